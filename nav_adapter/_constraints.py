@@ -1,0 +1,90 @@
+"""What a planner gets: the seam between the adapter and any local planner."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from shapely.geometry import Polygon
+
+from perception.arrays import FloatArray, finite_array, finite_number, set_fields
+
+from ._errors import NavError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PersonObstacle:
+    """One person as an obstacle in the odom frame.
+
+    Attributes:
+        track_id: the track it comes from.
+        center_odom_m: (2,).
+        velocity_odom_mps: (2,).
+        radius_m: > 0; body, clearance and awareness-dependent inflation.
+        height_m: > 0.
+        awareness_lower: the lower bound of α that the radius was made from, in [0, 1].
+        polygon: the same obstacle as a shapely polygon in odom; it contains the circle.
+    """
+
+    track_id: int
+    center_odom_m: FloatArray
+    velocity_odom_mps: FloatArray
+    radius_m: float
+    height_m: float
+    awareness_lower: float
+    polygon: Polygon
+
+    def __post_init__(self) -> None:
+        def positive(name: str) -> float:
+            return finite_number(
+                name, getattr(self, name), NavError, minimum=0.0, exclusive_minimum=True
+            )
+
+        set_fields(
+            self,
+            center_odom_m=finite_array("center_odom_m", self.center_odom_m, (2,), NavError),
+            velocity_odom_mps=finite_array(
+                "velocity_odom_mps", self.velocity_odom_mps, (2,), NavError
+            ),
+            radius_m=positive("radius_m"),
+            height_m=positive("height_m"),
+            awareness_lower=finite_number(
+                "awareness_lower", self.awareness_lower, NavError, minimum=0.0, maximum=1.0
+            ),
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NavConstraints:
+    """Obstacles and a speed limit for one planning cycle.
+
+    Attributes:
+        stamp_s: the instant they are for.
+        obstacles: one a person.
+        speed_limit_mps: ≥ 0; never above what speed-and-separation monitoring allows. 0 means stop.
+        limited_by: who and which rule set the limit, e.g. ``"track 3: speed and separation"``, or
+            ``"robot maximum"``.
+        stale: True when the data are too old to trust: everyone then counts as unaware.
+        reachable_speed_limit_mps: the limit that a robot braking as hard as it may can follow from
+            its present speed; equal to ``speed_limit_mps`` (and never below it) unless the limit
+            fell faster than the robot can brake.
+    """
+
+    stamp_s: float
+    obstacles: tuple[PersonObstacle, ...]
+    speed_limit_mps: float
+    limited_by: str
+    stale: bool
+    reachable_speed_limit_mps: float = 0.0
+
+    def __post_init__(self) -> None:
+        limit = finite_number("speed_limit_mps", self.speed_limit_mps, NavError, minimum=0.0)
+        reachable = finite_number(
+            "reachable_speed_limit_mps", self.reachable_speed_limit_mps, NavError, minimum=0.0
+        )
+        set_fields(
+            self,
+            stamp_s=finite_number("stamp_s", self.stamp_s, NavError),
+            obstacles=tuple(self.obstacles),
+            speed_limit_mps=limit,
+            reachable_speed_limit_mps=max(limit, reachable),
+        )

@@ -1,0 +1,86 @@
+"""The robot as navigation knows it: what it is, and where it is now."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from perception.arrays import FloatArray, finite_array, finite_number, set_fields
+
+from ._errors import NavError
+
+
+@dataclass(frozen=True, eq=False)
+class RobotProfile:
+    """What the robot can do.
+
+    Attributes:
+        footprint_m: (M, 2), M ≥ 3, convex outline in the base frame (x forward, y left).
+        max_speed_mps: > 0.
+        max_acceleration_mps2: > 0.
+        max_deceleration_mps2: > 0, the braking that can be relied on.
+        reaction_time_s: ≥ 0, from a change in the scene to the start of braking.
+    """
+
+    footprint_m: FloatArray
+    max_speed_mps: float
+    max_acceleration_mps2: float
+    max_deceleration_mps2: float
+    reaction_time_s: float
+
+    def __post_init__(self) -> None:
+        footprint = finite_array("footprint_m", self.footprint_m, ("M", 2), NavError)
+        if len(footprint) < 3:
+            raise NavError(f"footprint_m must have at least 3 corners, got {len(footprint)}")
+
+        def positive(name: str) -> float:
+            return finite_number(
+                name, getattr(self, name), NavError, minimum=0.0, exclusive_minimum=True
+            )
+
+        set_fields(
+            self,
+            footprint_m=footprint,
+            max_speed_mps=positive("max_speed_mps"),
+            max_acceleration_mps2=positive("max_acceleration_mps2"),
+            max_deceleration_mps2=positive("max_deceleration_mps2"),
+            reaction_time_s=finite_number(
+                "reaction_time_s", self.reaction_time_s, NavError, minimum=0.0
+            ),
+        )
+
+    @cached_property
+    def circumscribed_radius_m(self) -> float:
+        """Radius of the circle about the base origin that contains the footprint."""
+        return float(np.linalg.norm(self.footprint_m, axis=1).max())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RobotState:
+    """Where the robot is and how it moves.
+
+    Attributes:
+        stamp_s: the instant of the state.
+        position_odom_m: (2,).
+        heading_odom_rad: counter-clockwise from odom x.
+        speed_mps: signed, forward positive.
+        yaw_rate_radps: counter-clockwise positive.
+    """
+
+    stamp_s: float
+    position_odom_m: FloatArray
+    heading_odom_rad: float
+    speed_mps: float
+    yaw_rate_radps: float
+
+    def __post_init__(self) -> None:
+        set_fields(
+            self,
+            position_odom_m=finite_array("position_odom_m", self.position_odom_m, (2,), NavError),
+            **{
+                name: finite_number(name, getattr(self, name), NavError)
+                for name in ("stamp_s", "heading_odom_rad", "speed_mps", "yaw_rate_radps")
+            },
+        )

@@ -1,0 +1,52 @@
+"""The pose of a head in the camera frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .arrays import (
+    FloatArray,
+    covariance_matrix,
+    finite_array,
+    finite_number,
+    rotation_matrix,
+    set_fields,
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeadPose:
+    """Where a head is and where it points.
+
+    The head frame is the paper's: origin at the nose, y forward (the gaze), z towards the person's
+    right ear, x = y × z (downwards for an upright head). ``p_camera = rotation_camera_head @ p_head
+    + position_camera_m``.
+
+    Attributes:
+        position_camera_m: (3,) the nose, in the camera frame.
+        rotation_camera_head: (3, 3).
+        covariance: (6, 6), order rotation vector (rad), position (m). The rotation error δ is a
+            small rotation in camera axes: ``R_true = exp(δ) @ rotation_camera_head``.
+        reprojection_error_px: root mean square over the points used.
+    """
+
+    position_camera_m: FloatArray
+    rotation_camera_head: FloatArray
+    covariance: FloatArray
+    reprojection_error_px: float
+
+    def __post_init__(self) -> None:
+        set_fields(
+            self,
+            position_camera_m=finite_array("position_camera_m", self.position_camera_m, (3,)),
+            rotation_camera_head=rotation_matrix("rotation_camera_head", self.rotation_camera_head),
+            covariance=covariance_matrix("covariance", self.covariance, 6),
+            reprojection_error_px=finite_number(
+                "reprojection_error_px", self.reprojection_error_px, minimum=0.0
+            ),
+        )
+
+    @property
+    def gaze_camera(self) -> FloatArray:
+        """(3,) unit vector along the head's forward axis, in the camera frame."""
+        return self.rotation_camera_head[:, 1]

@@ -1,0 +1,49 @@
+"""The body keypoints of one person."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ._errors import PerceptionError
+from .arrays import FloatArray, finite_array, set_fields
+from .layouts import KeypointLayout, keypoint_layout
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PersonKeypoints:
+    """Keypoints of one person in the image and, relative to the body's root, in space.
+
+    Attributes:
+        keypoints_px: (K, 2) pixel coordinates u, v.
+        keypoints_root_m: (K, 3) positions in metres in camera axes (x right, y down, z forward),
+            relative to the body's root (mid-hip). Networks whose 3-D output has no unit may be
+            passed as they are: the pipeline rescales limb by limb.
+        scores: (K,) confidence of each keypoint in [0, 1]; 0 for one that was not seen.
+        layout: ``"coco"`` (K = 17) or ``"coco_wholebody"`` (K = 133).
+    """
+
+    keypoints_px: FloatArray
+    keypoints_root_m: FloatArray
+    scores: FloatArray
+    layout: str
+
+    def __post_init__(self) -> None:
+        count = keypoint_layout(self.layout).size
+        scores = finite_array("scores", self.scores, (count,))
+        if bool(np.any((scores < 0.0) | (scores > 1.0))):
+            raise PerceptionError(
+                f"scores must lie in [0, 1], got {scores.min():g} to {scores.max():g}"
+            )
+        set_fields(
+            self,
+            keypoints_px=finite_array("keypoints_px", self.keypoints_px, (count, 2)),
+            keypoints_root_m=finite_array("keypoints_root_m", self.keypoints_root_m, (count, 3)),
+            scores=scores,
+        )
+
+    @property
+    def indices(self) -> KeypointLayout:
+        """Where each named keypoint stands in this person's arrays."""
+        return keypoint_layout(self.layout)

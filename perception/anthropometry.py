@@ -1,0 +1,121 @@
+"""How large people are: limb lengths for metric scale and an anatomical template of the head.
+
+Limb lengths are distances between COCO keypoints of an adult of stature :data:`MEAN_STATURE_M`.
+Two sources are averaged where both define the limb alike: the body-segment fractions of Drillis and
+Contini (1966; reprinted in D. A. Winter, *Biomechanics and Motor Control of Human Movement*,
+table/figure 4.1) and 27 adult bodies of the parametric model ``anny`` 0.6.2 (its COCO keypoint
+definitions; body data of MakeHuman, CC0).
+
+=============== ===================== ================ =========
+limb            Drillis–Contini / H   anny / H         used / H
+=============== ===================== ================ =========
+torso           0.288                 0.294            0.291
+upper arm       0.186                 0.160            0.173
+forearm         0.146                 0.143            0.145
+thigh           0.245                 0.233            0.239
+shank           0.246                 0.233            0.240
+shoulder span   0.259 (0.45 m)        0.191            0.259
+hip span        0.191                 0.109            0.150
+=============== ===================== ================ =========
+
+The spans depend most on where a labeller puts the joint (over the deltoid or at the joint's
+centre), so their relative standard deviation is large and they weigh little beside the long bones.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from . import layouts as kp
+from .arrays import FloatArray
+
+#: Stature at which the Drillis–Contini shoulder span is the 0.45 m that the paper names.
+MEAN_STATURE_M: Final = 1.74
+
+#: Relative standard deviation of adult stature, women and men together (NCD-RisC 2020: national
+#: means of 1.6–1.8 m and standard deviations of 6–7 cm within each sex).
+STATURE_RELATIVE_STD: Final = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Limb:
+    """A limb between two keypoints, or between the midpoints of two pairs of keypoints.
+
+    ``relative_std`` is the spread of its length over adults of the same stature together with the
+    spread of where labels put its ends.
+    """
+
+    name: str
+    start: tuple[int, ...]
+    end: tuple[int, ...]
+    length_m: float
+    relative_std: float
+
+
+def _limb(
+    name: str, start: tuple[int, ...], end: tuple[int, ...], fraction: float, relative_std: float
+) -> Limb:
+    return Limb(name, start, end, fraction * MEAN_STATURE_M, relative_std)
+
+
+_SHOULDERS = (kp.LEFT_SHOULDER, kp.RIGHT_SHOULDER)
+_HIPS = (kp.LEFT_HIP, kp.RIGHT_HIP)
+
+LIMBS: Final[tuple[Limb, ...]] = (
+    _limb("torso", _SHOULDERS, _HIPS, 0.291, 0.06),
+    _limb("left upper arm", (kp.LEFT_SHOULDER,), (kp.LEFT_ELBOW,), 0.173, 0.10),
+    _limb("right upper arm", (kp.RIGHT_SHOULDER,), (kp.RIGHT_ELBOW,), 0.173, 0.10),
+    _limb("left forearm", (kp.LEFT_ELBOW,), (kp.LEFT_WRIST,), 0.145, 0.08),
+    _limb("right forearm", (kp.RIGHT_ELBOW,), (kp.RIGHT_WRIST,), 0.145, 0.08),
+    _limb("left thigh", (kp.LEFT_HIP,), (kp.LEFT_KNEE,), 0.239, 0.06),
+    _limb("right thigh", (kp.RIGHT_HIP,), (kp.RIGHT_KNEE,), 0.239, 0.06),
+    _limb("left shank", (kp.LEFT_KNEE,), (kp.LEFT_ANKLE,), 0.240, 0.06),
+    _limb("right shank", (kp.RIGHT_KNEE,), (kp.RIGHT_ANKLE,), 0.240, 0.06),
+    _limb("shoulder span", (kp.LEFT_SHOULDER,), (kp.RIGHT_SHOULDER,), 0.259, 0.20),
+    _limb("hip span", (kp.LEFT_HIP,), (kp.RIGHT_HIP,), 0.150, 0.30),
+)
+
+#: Keypoints of the head template, in the order of :data:`HEAD_TEMPLATE_M`.
+HEAD_KEYPOINTS: Final[tuple[int, ...]] = (
+    kp.NOSE,
+    kp.LEFT_EYE,
+    kp.RIGHT_EYE,
+    kp.LEFT_EAR,
+    kp.RIGHT_EAR,
+)
+
+
+def _locked(rows: list[list[float]]) -> FloatArray:
+    array = np.array(rows)
+    array.setflags(write=False)
+    return array
+
+
+#: (5, 3) nose, left eye, right eye, left ear, right ear in the paper's head frame: origin nose,
+#: x down, y forward along the Frankfurt horizontal, z to the right ear. Mean of the same 27 bodies:
+#: the ear midpoint lies 110 mm behind and 12 mm above the nose, the ears 156 mm and the eyes 63 mm
+#: apart, the eyes 23 mm behind and 33 mm above the nose.
+HEAD_TEMPLATE_M: Final[FloatArray] = _locked(
+    [
+        [0.000, 0.000, 0.000],
+        [-0.033, -0.023, -0.0315],
+        [-0.033, -0.023, 0.0315],
+        [-0.012, -0.110, -0.078],
+        [-0.012, -0.110, 0.078],
+    ]
+)
+
+#: Midpoint of the eyes in the head frame: the apex of the attention cone.
+EYES_HEAD_M: Final[FloatArray] = HEAD_TEMPLATE_M[1:3].mean(axis=0)
+
+#: From the shoulder midpoint (neck) to the nose of an upright adult looking straight ahead: forward
+#: and up, the mean of the same bodies.
+NECK_TO_NOSE_FORWARD_M: Final = 0.146
+NECK_TO_NOSE_UP_M: Final = 0.203
+
+#: Radius of a circle about the body's vertical centre line that holds an adult with arms down:
+#: half the 95th-percentile forearm-to-forearm breadth of the ANSUR II survey, rounded up.
+BODY_RADIUS_M: Final = 0.30

@@ -1,0 +1,1 @@
+"""Closed-loop crossings of a mobile robot and people in PyBullet."""

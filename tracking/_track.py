@@ -1,0 +1,85 @@
+"""One person followed over time: the seam between tracking and navigation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from perception.arrays import (
+    FloatArray,
+    covariance_matrix,
+    finite_array,
+    finite_number,
+    set_fields,
+)
+
+from ._errors import TrackingError
+
+TrackStatus = Literal["tentative", "confirmed", "coasting"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PersonTrack:
+    """A frozen snapshot of one tracked person, in the odom frame.
+
+    Attributes:
+        id: unique for the life of a tracker, never used again.
+        stamp_s: the instant that the state is for.
+        status: ``"tentative"`` (too new to trust), ``"confirmed"`` or ``"coasting"`` (not seen in
+            the latest frame).
+        position_odom_m: (2,).
+        velocity_odom_mps: (2,).
+        covariance_odom: (4, 4), order x, y, vx, vy.
+        awareness: smoothed α in [0, 1].
+        awareness_std: its standard deviation, ≥ 0.
+        awareness_lower: lower bound of α in [0, 1]; the only part that may shrink an obstacle.
+        height_m: the person's assumed stature, > 0.
+        time_since_seen_s: ≥ 0, time since a frame last showed this person.
+    """
+
+    id: int
+    stamp_s: float
+    status: TrackStatus
+    position_odom_m: FloatArray
+    velocity_odom_mps: FloatArray
+    covariance_odom: FloatArray
+    awareness: float
+    awareness_std: float
+    awareness_lower: float
+    height_m: float
+    time_since_seen_s: float
+
+    def __post_init__(self) -> None:
+        if self.status not in get_args(TrackStatus):
+            raise TrackingError(
+                f"status must be one of {', '.join(get_args(TrackStatus))}, got {self.status!r}"
+            )
+        if isinstance(self.id, bool) or int(self.id) != self.id:
+            raise TrackingError(f"id must be an integer, got {self.id!r}")
+
+        def number(name: str, low: float, high: float = float("inf")) -> float:
+            return finite_number(
+                name, getattr(self, name), TrackingError, minimum=low, maximum=high
+            )
+
+        set_fields(
+            self,
+            id=int(self.id),
+            stamp_s=finite_number("stamp_s", self.stamp_s, TrackingError),
+            position_odom_m=finite_array(
+                "position_odom_m", self.position_odom_m, (2,), TrackingError
+            ),
+            velocity_odom_mps=finite_array(
+                "velocity_odom_mps", self.velocity_odom_mps, (2,), TrackingError
+            ),
+            covariance_odom=covariance_matrix(
+                "covariance_odom", self.covariance_odom, 4, TrackingError
+            ),
+            awareness=number("awareness", 0.0, 1.0),
+            awareness_std=number("awareness_std", 0.0),
+            awareness_lower=number("awareness_lower", 0.0, 1.0),
+            height_m=finite_number(
+                "height_m", self.height_m, TrackingError, minimum=0.0, exclusive_minimum=True
+            ),
+            time_since_seen_s=number("time_since_seen_s", 0.0),
+        )

@@ -1,0 +1,67 @@
+"""Validated configuration: strict pydantic models that read and write YAML.
+
+Every config of the project derives from :class:`StrictConfig`: unknown keys are refused with the
+nearest valid name, values are checked, and ``from_yaml(to_yaml(config)) == config``.
+"""
+
+from __future__ import annotations
+
+import difflib
+from pathlib import Path
+from typing import Any, ClassVar, TypeVar
+
+import yaml
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+
+from ._errors import TrackingError
+
+_ConfigT = TypeVar("_ConfigT", bound="StrictConfig")
+
+
+class StrictConfig(BaseModel):
+    """Base of every config: frozen, finite numbers only, unknown keys refused by name."""
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", allow_inf_nan=False, validate_default=True
+    )
+
+    #: The error raised when a file cannot be used; packages override it with their own.
+    error: ClassVar[type[ValueError]] = TrackingError
+
+    @model_validator(mode="before")
+    @classmethod
+    def _name_unknown_keys(cls, data: Any) -> Any:
+        if not isinstance(data, dict):
+            return data
+        valid = list(cls.model_fields)
+        for key in data:
+            if key not in valid:
+                near = difflib.get_close_matches(str(key), valid, n=1, cutoff=0.5)
+                hint = f"did you mean {near[0]!r}?" if near else f"valid keys: {', '.join(valid)}"
+                raise ValueError(f"unknown key {key!r} in {cls.__name__}; {hint}")
+        return data
+
+    @classmethod
+    def from_yaml(cls: type[_ConfigT], path: str | Path) -> _ConfigT:
+        """Read and validate a YAML file; raises the package's error naming the file and key."""
+        path = Path(path)
+        try:
+            data = yaml.safe_load(path.read_text(encoding="utf-8"))
+        except OSError as cause:
+            raise cls.error(f"cannot read {path}: {cause.strerror or cause}") from cause
+        except (yaml.YAMLError, UnicodeDecodeError) as cause:
+            raise cls.error(f"{path} is not valid YAML: {cause}") from cause
+        if not isinstance(data, dict):
+            raise cls.error(f"{path} must hold a mapping of keys, got {type(data).__name__}")
+        try:
+            return cls.model_validate(data)
+        except ValidationError as cause:
+            raise cls.error(f"{path}: {cause}") from cause
+
+    def to_yaml(self, path: str | Path) -> None:
+        """Write the config as YAML for :meth:`from_yaml`; the file appears whole or not at all."""
+        path = Path(path)
+        text = yaml.safe_dump(self.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
+        partial = path.with_name(path.name + ".part")
+        partial.write_text(text, encoding="utf-8")
+        partial.replace(path)
