@@ -2,16 +2,28 @@
 
 from __future__ import annotations
 
+from ._attention import AttentionCone
+from ._camera import Camera
 from ._detection import PersonDetection
 from ._errors import PerceptionError
 from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
 from ._observation import PersonObservation
+from ._pipeline import AwarenessPipeline
+from ._pnp import PnpHeadPoseEstimator
+from ._protocols import HeadPoseEstimator, PersonDetector, PoseEstimator
 
 __all__ = [
+    "AttentionCone",
+    "AwarenessPipeline",
+    "Camera",
     "HeadPose",
+    "HeadPoseEstimator",
     "PerceptionError",
     "PersonDetection",
+    "PersonDetector",
     "PersonKeypoints",
     "PersonObservation",
+    "PnpHeadPoseEstimator",
+    "PoseEstimator",
 ]

@@ -117,5 +117,5 @@ NECK_TO_NOSE_FORWARD_M: Final = 0.146
 NECK_TO_NOSE_UP_M: Final = 0.203
 
 #: Radius of a circle about the body's vertical centre line that holds an adult with arms down:
-#: half the 95th-percentile forearm-to-forearm breadth of the ANSUR II survey, rounded up.
+#: half the 95th-percentile bideltoid breadth of men in the ANSUR II survey (0.56 m), rounded up.
 BODY_RADIUS_M: Final = 0.30

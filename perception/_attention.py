@@ -1,0 +1,89 @@
+"""The attention cone: how central the robot lies in a person's field of view."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ._errors import PerceptionError
+from .arrays import FloatArray, finite_number, set_fields
+
+#: Half of θ_FOV = 120°, the horizontal field that head orientation alone can vouch for.
+DEFAULT_HALF_ANGLE_RAD: Final = math.radians(60.0)
+
+
+@dataclass(frozen=True, slots=True)
+class AttentionCone:
+    """Awareness score of a target in a cone about the gaze (eqs. (1)–(3) of the paper).
+
+    α = 1 − d⊥ / (d · tan half-angle) for a target ahead of the apex and inside the cone, else 0;
+    d is the distance along the gaze and d⊥ the offset from it. The paper gives the cone's radius as
+    d · tan θ_FOV but calls θ_FOV/2 its half-angle; one unambiguous half-angle stands for both.
+
+    Attributes:
+        half_angle_rad: in (0, π/2).
+    """
+
+    half_angle_rad: float = DEFAULT_HALF_ANGLE_RAD
+
+    def __post_init__(self) -> None:
+        angle = finite_number(
+            "half_angle_rad", self.half_angle_rad, minimum=0.0, exclusive_minimum=True
+        )
+        if angle >= 0.5 * math.pi:
+            raise PerceptionError(f"half_angle_rad must lie in (0, pi/2), got {angle:g} rad")
+        set_fields(self, half_angle_rad=angle)
+
+    def score(self, apex_m: ArrayLike, gaze: ArrayLike, target_m: ArrayLike) -> Any:
+        """Return α in [0, 1].
+
+        Args:
+            apex_m: (3,) apex of the cone, or (N, 3).
+            gaze: (3,) or (N, 3) vectors along the gaze; they need not be unit vectors.
+            target_m: (3,); or (M, 3) points of one target, of which the best counts since seeing
+                any part of a robot is seeing the robot; or, with N gazes, (N, 3) one target each.
+
+        Returns:
+            A float for one gaze, (N,) for N. All vectors in one frame.
+
+        Raises:
+            PerceptionError: for a shape other than these, a non-finite number or a zero gaze.
+        """
+        apex, direction, target = (
+            np.asarray(value, dtype=np.float64) for value in (apex_m, gaze, target_m)
+        )
+        for name, array in (("apex_m", apex), ("gaze", direction), ("target_m", target)):
+            if array.ndim not in (1, 2) or array.shape[-1] != 3:
+                raise PerceptionError(f"{name} must have shape (3,) or (N, 3), got {array.shape}")
+            if not np.isfinite(array).all():
+                raise PerceptionError(f"{name} must be finite, got {array.tolist()!r:.120}")
+        one_gaze = apex.ndim == 1 and direction.ndim == 1
+        try:
+            scores = self.scores(apex, direction, target)
+        except ValueError as cause:
+            if isinstance(cause, PerceptionError):
+                raise
+            raise PerceptionError(
+                "apex_m, gaze and target_m must have equal lengths N where they are (N, 3), got "
+                f"{apex.shape}, {direction.shape} and {target.shape}"
+            ) from cause
+        return float(np.max(scores, initial=0.0)) if one_gaze else scores
+
+    def scores(self, apex_m: FloatArray, gaze: FloatArray, target_m: FloatArray) -> FloatArray:
+        """Evaluate eqs. (1)–(3) under NumPy broadcasting of (…, 3) arrays, unchecked, to (…,)."""
+        length = np.linalg.norm(gaze, axis=-1, keepdims=True)
+        if not np.all(length > 0.0):
+            raise PerceptionError("gaze must have a direction, got a vector of length 0")
+        unit = gaze / length
+        offset = target_m - apex_m
+        axial = np.sum(offset * unit, axis=-1)
+        perpendicular = np.linalg.norm(offset - axial[..., None] * unit, axis=-1)
+        radius = axial * math.tan(self.half_angle_rad)
+        ahead = axial > 0.0
+        inside = ahead & (perpendicular <= radius)
+        ratio = np.divide(perpendicular, radius, out=np.ones_like(radius), where=inside)
+        return np.asarray(np.where(inside, 1.0 - ratio, 0.0), dtype=np.float64)

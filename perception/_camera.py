@@ -1,0 +1,198 @@
+"""The pinhole camera with lens distortion, as ROS and OpenCV describe it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Final
+
+import cv2
+import numpy as np
+import yaml
+
+from ._errors import PerceptionError
+from .arrays import FloatArray, finite_array, finite_number, set_fields
+
+# OpenCV accepts these numbers of coefficients: plumb_bob has 5, rational_polynomial 8.
+_DISTORTION_SIZES: Final = (4, 5, 8, 12, 14)
+_DISTORTION_MODELS: Final = ("plumb_bob", "rational_polynomial")
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A calibrated camera in the optical frame (x right, y down, z forward).
+
+    Pixel centres lie at integer coordinates, so the image spans −0.5 to width − 0.5 (OpenCV's
+    convention).
+
+    Attributes:
+        width_px: image width, > 0.
+        height_px: image height, > 0.
+        fx_px: focal length along u, > 0.
+        fy_px: focal length along v, > 0.
+        cx_px: principal point, u.
+        cy_px: principal point, v.
+        distortion: OpenCV's coefficients k1, k2, p1, p2, k3, … (4, 5, 8, 12 or 14), or None.
+    """
+
+    width_px: int
+    height_px: int
+    fx_px: float
+    fy_px: float
+    cx_px: float
+    cy_px: float
+    distortion: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        size: dict[str, int] = {}
+        for name in ("width_px", "height_px"):
+            number = finite_number(name, getattr(self, name), minimum=1.0)
+            if number != int(number):
+                raise PerceptionError(f"{name} must be a whole number of pixels, got {number:g}")
+            size[name] = int(number)
+        distortion = self.distortion
+        if distortion is not None:
+            distortion = finite_array("distortion", np.ravel(distortion), ("N",))
+            if distortion.size not in _DISTORTION_SIZES:
+                raise PerceptionError(
+                    f"distortion must have {', '.join(map(str, _DISTORTION_SIZES))} coefficients, "
+                    f"got {distortion.size}"
+                )
+            if not np.any(distortion):
+                distortion = None
+        set_fields(
+            self,
+            **size,
+            distortion=distortion,
+            cx_px=finite_number("cx_px", self.cx_px),
+            cy_px=finite_number("cy_px", self.cy_px),
+            **{
+                name: finite_number(name, getattr(self, name), minimum=0.0, exclusive_minimum=True)
+                for name in ("fx_px", "fy_px")
+            },
+        )
+
+    @classmethod
+    def from_fov(cls, width_px: int, height_px: int, horizontal_fov_rad: float) -> Camera:
+        """Make a camera with square pixels and its principal point at (width/2, height/2).
+
+        ``horizontal_fov_rad`` lies in (0, π).
+        """
+        fov = finite_number(
+            "horizontal_fov_rad", horizontal_fov_rad, minimum=0.0, exclusive_minimum=True
+        )
+        if fov >= math.pi:
+            raise PerceptionError(f"horizontal_fov_rad must lie in (0, pi), got {fov:g} rad")
+        focal = 0.5 * width_px / math.tan(0.5 * fov)
+        return cls(width_px, height_px, focal, focal, 0.5 * width_px, 0.5 * height_px)
+
+    @classmethod
+    def from_yaml(cls, path: str | Path) -> Camera:
+        """Read a ROS ``camera_info`` YAML file as ``camera_calibration`` writes it.
+
+        Distortion models plumb_bob and rational_polynomial are accepted; raises
+        :class:`PerceptionError` naming the file and what is missing otherwise.
+        """
+        path = Path(path)
+        try:
+            data = yaml.safe_load(path.read_text(encoding="utf-8"))
+        except OSError as cause:
+            raise PerceptionError(f"cannot read {path}: {cause.strerror or cause}") from cause
+        except (yaml.YAMLError, UnicodeDecodeError) as cause:
+            raise PerceptionError(f"{path} is not valid YAML: {cause}") from cause
+        if not isinstance(data, dict):
+            raise PerceptionError(f"{path} must hold the keys of a ROS camera_info file")
+        try:
+            matrix = finite_array(
+                "camera_matrix", np.reshape(_entries(data["camera_matrix"]), (3, 3)), (3, 3)
+            )
+            width, height = data["image_width"], data["image_height"]
+            coefficients = _entries(data.get("distortion_coefficients", []))
+        except KeyError as missing:
+            raise PerceptionError(
+                f"{path} lacks the key {missing}; a camera_info file has image_width, "
+                "image_height, camera_matrix and distortion_coefficients"
+            ) from None
+        except (TypeError, ValueError) as cause:
+            raise PerceptionError(f"{path}: {cause}") from cause
+        model = data.get("distortion_model", "plumb_bob")
+        if np.any(coefficients) and model not in _DISTORTION_MODELS:
+            raise PerceptionError(
+                f"{path}: distortion_model must be one of {', '.join(_DISTORTION_MODELS)}, "
+                f"got {model!r}; rectify the images first"
+            )
+        return cls(
+            width,
+            height,
+            float(matrix[0, 0]),
+            float(matrix[1, 1]),
+            float(matrix[0, 2]),
+            float(matrix[1, 2]),
+            coefficients if np.size(coefficients) else None,
+        )
+
+    def to_yaml(self, path: str | Path) -> None:
+        """Write a ROS ``camera_info`` YAML file that :meth:`from_yaml` reads back."""
+        coefficients = [0.0] * 5 if self.distortion is None else self.distortion.tolist()
+        data = {
+            "image_width": self.width_px,
+            "image_height": self.height_px,
+            "camera_name": "camera",
+            "camera_matrix": {"rows": 3, "cols": 3, "data": self.matrix.ravel().tolist()},
+            "distortion_model": "plumb_bob" if len(coefficients) <= 5 else "rational_polynomial",
+            "distortion_coefficients": {
+                "rows": 1,
+                "cols": len(coefficients),
+                "data": coefficients,
+            },
+        }
+        Path(path).write_text(yaml.safe_dump(data, sort_keys=False), encoding="utf-8")
+
+    @cached_property
+    def matrix(self) -> FloatArray:
+        """(3, 3) intrinsic matrix."""
+        matrix = np.array(
+            [[self.fx_px, 0.0, self.cx_px], [0.0, self.fy_px, self.cy_px], [0.0, 0.0, 1.0]]
+        )
+        matrix.setflags(write=False)
+        return matrix
+
+    def project(self, points_camera_m: Any) -> FloatArray:
+        """Project points (N, 3) in the camera frame to pixels (N, 2), lens distortion included.
+
+        A point at or behind the image plane (z ≤ 0) has no image: its row is NaN.
+        """
+        points = finite_array("points_camera_m", points_camera_m, ("N", 3))
+        ahead = points[:, 2] > 0.0
+        pixels = np.full((len(points), 2), np.nan)
+        if not ahead.any():
+            return pixels
+        if self.distortion is None:
+            front = points[ahead]
+            pixels[ahead] = front[:, :2] / front[:, 2:] * (self.fx_px, self.fy_px) + (
+                self.cx_px,
+                self.cy_px,
+            )
+        else:
+            image, _ = cv2.projectPoints(
+                points[ahead], np.zeros(3), np.zeros(3), self.matrix, self.distortion
+            )
+            pixels[ahead] = image.reshape(-1, 2)
+        return pixels
+
+    def normalise(self, pixels_px: Any) -> FloatArray:
+        """Undo intrinsics and distortion: pixels (N, 2) to x/z, y/z (N, 2)."""
+        pixels = finite_array("pixels_px", pixels_px, ("N", 2))
+        if self.distortion is None or not len(pixels):
+            return np.asarray(
+                (pixels - (self.cx_px, self.cy_px)) / (self.fx_px, self.fy_px), dtype=np.float64
+            )
+        undistorted = cv2.undistortPoints(pixels.reshape(-1, 1, 2), self.matrix, self.distortion)
+        return np.asarray(undistorted, dtype=np.float64).reshape(-1, 2)
+
+
+def _entries(value: Any) -> Any:
+    """The numbers of a ROS matrix, written as a mapping with ``data`` or as a plain list."""
+    return np.asarray(value["data"] if isinstance(value, dict) else value, dtype=np.float64)

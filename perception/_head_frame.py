@@ -1,0 +1,95 @@
+"""The head frame: from head keypoints in space to axes, by the printed formula or by anatomy.
+
+Frame of the paper: origin nose, y forward (gaze), z to the right ear, x = y × z (downwards).
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ._errors import PerceptionError
+from .anthropometry import HEAD_TEMPLATE_M
+from .arrays import FloatArray, finite_array
+
+# Below this sine two directions count as parallel and span no frame.
+_PARALLEL_SINE: Final = 1e-3
+
+
+def printed_head_rotation(head_points_m: ArrayLike, neck_m: ArrayLike) -> FloatArray:
+    """Return the head frame by the paper's printed cross product.
+
+    The gaze is (left ear − right ear) × (nose − neck), normalised. It is perpendicular to the line
+    from neck to nose, so on an average adult looking straight ahead it points about 36° below the
+    horizontal; :func:`anatomical_head_rotation` has no such bias.
+
+    Args:
+        head_points_m: (5, 3) nose, left eye, right eye, left ear, right ear in any frame F.
+        neck_m: (3,) midpoint of the shoulders in F.
+
+    Returns:
+        (3, 3) rotation from the head frame to F.
+
+    Raises:
+        PerceptionError: when ears, nose and neck span no frame.
+    """
+    points = finite_array("head_points_m", head_points_m, (5, 3))
+    neck = finite_array("neck_m", neck_m, (3,))
+    ears, nose_line = points[3] - points[4], points[0] - neck
+    gaze = np.cross(ears, nose_line)
+    scale = float(np.linalg.norm(ears) * np.linalg.norm(nose_line))
+    length = float(np.linalg.norm(gaze))
+    if length <= _PARALLEL_SINE * scale or scale == 0.0:
+        raise PerceptionError(
+            "ears, nose and neck must span a frame; the ear axis and the neck-nose line are "
+            "parallel or of length 0"
+        )
+    forward = gaze / length
+    right = -ears / np.linalg.norm(ears)
+    return np.stack([np.cross(forward, right), forward, right], axis=1)
+
+
+def anatomical_head_rotation(
+    head_points_m: ArrayLike, weights: ArrayLike | None = None
+) -> FloatArray:
+    """Register the anatomical template to head keypoints and return the head frame.
+
+    The template's forward axis is the Frankfurt horizontal. Least squares over rotation,
+    translation and scale (Kabsch 1976, Umeyama 1991).
+
+    Args:
+        head_points_m: (5, 3) nose, left eye, right eye, left ear, right ear in any frame F.
+        weights: (5,) ≥ 0, zero for a point that was not seen; default all one.
+
+    Returns:
+        (3, 3) rotation from the head frame to F.
+
+    Raises:
+        PerceptionError: when fewer than three points count or they lie on one line.
+    """
+    points = finite_array("head_points_m", head_points_m, (5, 3))
+    weight = np.ones(5) if weights is None else finite_array("weights", weights, (5,))
+    if np.any(weight < 0.0) or np.count_nonzero(weight) < 3:
+        raise PerceptionError(
+            f"weights must be >= 0 with at least 3 above 0, got {weight.tolist()}"
+        )
+    share = (weight / weight.sum())[:, None]
+    template = HEAD_TEMPLATE_M - np.sum(share * HEAD_TEMPLATE_M, axis=0)
+    centred = points - np.sum(share * points, axis=0)
+    left, singular, right = np.linalg.svd((share * centred).T @ template)
+    if singular[1] <= _PARALLEL_SINE * singular[0]:
+        raise PerceptionError("head points must not lie on one line")
+    handed = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
+    return np.asarray(left @ handed @ right, dtype=np.float64)
+
+
+def lifted_head_model(head_points_m: ArrayLike, neck_m: ArrayLike) -> FloatArray:
+    """Return a person's own head points in the paper's head frame, (5, 3), nose at the origin.
+
+    These are the object points of the paper's PnP: lifted keypoints expressed in the frame of the
+    printed formula.
+    """
+    points = finite_array("head_points_m", head_points_m, (5, 3))
+    return np.asarray((points - points[0]) @ printed_head_rotation(points, neck_m))

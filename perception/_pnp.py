@@ -1,0 +1,278 @@
+"""Head pose from head keypoints: Perspective-n-Point, as in the paper."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final, Literal
+
+import cv2
+import numpy as np
+
+from . import layouts as kp
+from ._body import BodyPlacement, place_body
+from ._camera import Camera
+from ._errors import PerceptionError
+from ._head_frame import lifted_head_model
+from ._head_pose import HeadPose
+from ._keypoints import PersonKeypoints
+from ._metric_scale import DEFAULT_MIN_SCORE, metric_scale
+from ._pose_refinement import HeadPrior, RefinedPose, refine, rotation_exp
+from .anthropometry import HEAD_KEYPOINTS, HEAD_TEMPLATE_M
+from .arrays import FloatArray, finite_number
+
+HeadModel = Literal["template", "lifted"]
+
+# The head turns about a joint below and between the ears.
+_PIVOT_HEAD_M: Final = np.array([0.035, -0.100, 0.0])
+# From the shoulder midpoint to that joint, in the torso frame (forward, left, up), so that a head
+# looking straight ahead has its nose where anthropometry puts it.
+_NECK_TO_PIVOT_M: Final = np.array([0.046, 0.0, 0.168])
+# How far a head strays from straight ahead, within the limits of its joints.
+_YAW_STD_RAD, _ROLL_STD_RAD, _PITCH_STD_RAD = map(math.radians, (60.0, 15.0, 25.0))
+_PIVOT_STD_M: Final = 0.04
+_YAW_STARTS_RAD: Final = np.radians([0.0, 50.0, -50.0, 100.0, -100.0, 180.0])
+
+# A seen keypoint is expected to face the camera, an unseen one to face away; being wrong about one
+# costs as much as an error of two standard deviations, since either can happen.
+_VISIBILITY_COST: Final = 4.0
+# Cosine between the direction that a keypoint faces and the direction to the camera at which it
+# goes out of sight.
+_FACE_LIMIT: Final = math.cos(math.radians(95.0))
+_EAR_LIMIT: Final = math.cos(math.radians(105.0))
+_FACING: Final = np.array(
+    [[0.0, 1.0, 0.0], [0.0, 0.87, -0.5], [0.0, 0.87, 0.5], [0.0, 0.0, -1.0], [0.0, 0.0, 1.0]]
+)
+_SIGHT_LIMIT: Final = np.array([_FACE_LIMIT, _FACE_LIMIT, _FACE_LIMIT, _EAR_LIMIT, _EAR_LIMIT])
+
+# Heads whose keypoints span less than this many standard deviations carry no direction.
+_MIN_SPREAD_STD: Final = 3.0
+# Residuals that pixel noise of the stated size produces once in a hundred poses.
+_FIT_QUANTILE: Final = {1: 6.6, 2: 9.2, 3: 11.3, 4: 13.3, 5: 15.1, 6: 16.8}
+_MAX_ROTATION_STD_RAD: Final = math.radians(100.0)
+
+
+class PnpHeadPoseEstimator:
+    """The paper's head pose: PnP on the head keypoints of each person.
+
+    Four or more head keypoints: SQPnP gives the start (OpenCV ``SOLVEPNP_SQPNP``) and
+    Levenberg–Marquardt refines it; solutions behind the camera are rejected, and where two fit
+    alike, the one whose visible side matches the keypoints that were seen wins. With fewer (a
+    profile, a back of a head) the torso, where it is seen, adds what it knows of its head.
+
+    Args:
+        keypoint_std_px: standard deviation of the keypoint noise that the covariance assumes; where
+            residuals speak of more, the covariance grows with them.
+        min_score: keypoints scored below this count as not seen.
+        head_model: ``"template"``, the anatomical template whose forward axis is the Frankfurt
+            horizontal; or ``"lifted"``, the person's own lifted keypoints in the frame of the
+            paper's printed formula (about 36° of downward bias on an upright head).
+    """
+
+    def __init__(
+        self,
+        keypoint_std_px: float = 1.0,
+        min_score: float = DEFAULT_MIN_SCORE,
+        head_model: HeadModel = "template",
+    ) -> None:
+        if head_model not in ("template", "lifted"):
+            raise PerceptionError(f"head_model must be 'template' or 'lifted', got {head_model!r}")
+        self._std_px = finite_number(
+            "keypoint_std_px", keypoint_std_px, minimum=0.0, exclusive_minimum=True
+        )
+        self._min_score = finite_number("min_score", min_score, minimum=0.0, maximum=1.0)
+        self._head_model: HeadModel = head_model
+
+    def estimate(
+        self, image_rgb: Any, camera: Camera, people: tuple[PersonKeypoints, ...]
+    ) -> tuple[HeadPose | None, ...]:
+        """Return one head pose a person, or None where the head carries no evidence.
+
+        Args:
+            image_rgb: not used; keypoints say it all. May be None.
+            camera: the camera that saw the keypoints.
+            people: keypoints of each person.
+        """
+        return tuple(self._estimate_one(camera, person) for person in people)
+
+    def _estimate_one(self, camera: Camera, person: PersonKeypoints) -> HeadPose | None:
+        scores = person.scores[list(HEAD_KEYPOINTS)]
+        seen = scores >= self._min_score
+        rows = np.flatnonzero(seen)
+        if not len(rows):
+            return None
+        model = self._model(person, seen)
+        if model is None:
+            return None
+        pixels = person.keypoints_px[np.array(HEAD_KEYPOINTS)[rows]]
+        spread = float(np.max(np.ptp(pixels, axis=0))) if len(rows) > 1 else 0.0
+        if len(rows) > 1 and spread < _MIN_SPREAD_STD * self._std_px:
+            return None
+        rays = camera.normalise(pixels)
+        focal = np.array([camera.fx_px, camera.fy_px])
+        points = model[rows]
+        prior = None
+        if len(rows) >= 4:
+            starts = _sqpnp(points, rays)
+        else:
+            prior = _body_prior(camera, person, self._std_px, self._min_score)
+            starts = _prior_starts(prior) if prior is not None else _sqpnp(points, rays)
+        if starts is None:
+            return None
+        poses = refine(points, rays, focal, self._std_px, *starts, prior)
+        best = _choose(poses, points, seen, face_only=prior is None)
+        return None if best is None else self._finish(best, len(rows), prior is not None)
+
+    def _model(self, person: PersonKeypoints, seen: Any) -> FloatArray | None:
+        if self._head_model == "template":
+            return HEAD_TEMPLATE_M
+        neck_seen = person.scores[[kp.LEFT_SHOULDER, kp.RIGHT_SHOULDER]] >= self._min_score
+        scale = metric_scale(person, self._min_score)
+        if scale is None or not (neck_seen.all() and seen[[0, 3, 4]].all()):
+            return None
+        points = scale.factor * person.keypoints_root_m[:17]
+        neck = 0.5 * (points[kp.LEFT_SHOULDER] + points[kp.RIGHT_SHOULDER])
+        try:
+            return lifted_head_model(points[list(HEAD_KEYPOINTS)], neck)
+        except PerceptionError:
+            return None
+
+    def _finish(self, pose: RefinedPose, points: int, with_prior: bool) -> HeadPose | None:
+        try:
+            covariance = np.linalg.inv(pose.information)
+        except np.linalg.LinAlgError:
+            return None
+        squared = float(np.sum((pose.reprojection_px / self._std_px) ** 2))
+        degrees = 2 * points - (0 if with_prior else 6)
+        if degrees > 0 and squared > _FIT_QUANTILE[min(degrees, 6)]:
+            covariance = covariance * (squared / degrees)
+        covariance = 0.5 * (covariance + covariance.T)
+        largest = float(np.linalg.eigvalsh(covariance[:3, :3])[-1])
+        if not np.isfinite(covariance).all() or largest > _MAX_ROTATION_STD_RAD**2:
+            return None
+        return HeadPose(
+            pose.translation_m,
+            pose.rotation,
+            covariance,
+            float(np.sqrt(np.mean(pose.reprojection_px**2))),
+        )
+
+
+def _sqpnp(points: FloatArray, rays: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+    """Every SQPnP solution in front of the camera and its mirror in depth, as starts."""
+    if len(points) < 3:
+        return None
+    try:
+        _, rotation_vectors, translations, _ = cv2.solvePnPGeneric(
+            points.reshape(-1, 1, 3), rays.reshape(-1, 1, 2), np.eye(3), None,
+            flags=cv2.SOLVEPNP_SQPNP,
+        )  # fmt: skip
+    except cv2.error:  # raised on nearly coincident points
+        return None
+    rotations, origins = [], []
+    for vector, translation in zip(rotation_vectors, translations, strict=True):
+        origin: FloatArray = np.ravel(translation).astype(np.float64)
+        if not (np.isfinite(vector).all() and np.isfinite(origin).all()):
+            continue
+        if origin[2] <= 0.0:
+            continue
+        rotation = rotation_exp(np.ravel(vector))
+        rotations.append(rotation)
+        origins.append(origin)
+        # A small head far away is nearly a weak-perspective image, whose second solution is the
+        # first reflected in the image plane: start from it too.
+        centre = np.asarray(points.mean(axis=0), dtype=np.float64)
+        mirrored = _mirrored(rotation, origin, centre)
+        rotations.append(mirrored)
+        origins.append(origin + (rotation - mirrored) @ centre)
+    if not rotations:
+        return None
+    return np.array(rotations), np.array(origins)
+
+
+def _mirrored(rotation: FloatArray, origin: FloatArray, centre: FloatArray) -> FloatArray:
+    """The rotation that a planar figure seen along this ray could equally have (Oberkampf 1996)."""
+    ray = rotation @ centre + origin
+    ray = ray / np.linalg.norm(ray)
+    forward = rotation[:, 1]
+    # Turn the gaze to its reflection in the plane across the ray, about their common normal.
+    reflected = forward - 2.0 * (forward @ ray) * ray
+    axis = np.cross(forward, reflected)
+    sine = float(np.linalg.norm(axis))
+    if sine < 1e-6:
+        return rotation_exp(math.pi * rotation[:, 0]) @ rotation
+    angle = math.atan2(sine, float(forward @ reflected))
+    return np.asarray(rotation_exp(axis / sine * angle) @ rotation)
+
+
+def _body_prior(
+    camera: Camera, person: PersonKeypoints, keypoint_std_px: float, min_score: float
+) -> HeadPrior | None:
+    """What the torso says about its head, or None where too little of it is seen."""
+    body = place_body(camera, person, keypoint_std_px, min_score)
+    if body is None:
+        return None
+    torso = _torso_axes(body)
+    if torso is None:
+        return None
+    rotation_camera_torso, neck = torso
+    forward, left, up = rotation_camera_torso.T
+    pivot = neck + rotation_camera_torso @ _NECK_TO_PIVOT_M
+    ray = pivot / np.linalg.norm(pivot)
+    along = (body.scale_relative_std * np.linalg.norm(pivot)) ** 2 + _PIVOT_STD_M**2
+    covariance = _PIVOT_STD_M**2 * (np.eye(3) - np.outer(ray, ray)) + along * np.outer(ray, ray)
+    stds = np.array([_YAW_STD_RAD, _ROLL_STD_RAD, _PITCH_STD_RAD])
+    return HeadPrior(
+        np.stack([-up, forward, -left], axis=1),
+        np.diag(1.0 / stds**2),
+        _PIVOT_HEAD_M,
+        pivot,
+        np.linalg.inv(covariance),
+    )
+
+
+def _torso_axes(body: BodyPlacement) -> tuple[FloatArray, FloatArray] | None:
+    """(3, 3) forward, left, up as columns in the camera frame, and the neck (3,)."""
+    points = body.points_camera_m
+    shoulders = points[[kp.LEFT_SHOULDER, kp.RIGHT_SHOULDER]]
+    if np.isnan(shoulders).any():
+        return None
+    neck = shoulders.mean(axis=0)
+    hips = points[[kp.LEFT_HIP, kp.RIGHT_HIP]].mean(axis=0)
+    up = np.array([0.0, -1.0, 0.0]) if np.isnan(hips).any() else neck - hips
+    left = shoulders[0] - shoulders[1]
+    forward = np.cross(left, up)
+    length = float(np.linalg.norm(forward))
+    if length < 1e-6:
+        return None
+    forward = forward / length
+    up = up / np.linalg.norm(up)
+    return np.stack([forward, np.cross(up, forward), up], axis=1), neck
+
+
+def _prior_starts(prior: HeadPrior) -> tuple[FloatArray, FloatArray]:
+    """Heads turned by several yaws about the neck that the body gives."""
+    down = prior.rotation_camera_head[:, 0]
+    rotations = rotation_exp(_YAW_STARTS_RAD[:, None] * down) @ prior.rotation_camera_head
+    return rotations, prior.pivot_camera_m - rotations @ prior.pivot_head_m
+
+
+def _choose(
+    poses: list[RefinedPose], points: FloatArray, seen: Any, *, face_only: bool
+) -> RefinedPose | None:
+    """The pose that fits best, counting which keypoints the camera should have seen."""
+    best, lowest = None, math.inf
+    for pose in poses:
+        depth = points @ pose.rotation[2] + pose.translation_m[2]
+        if depth.min() <= 0.0:
+            continue
+        origin = HEAD_TEMPLATE_M @ pose.rotation.T + pose.translation_m
+        to_camera = -origin / np.linalg.norm(origin, axis=1, keepdims=True)
+        facing = np.sum((_FACING @ pose.rotation.T) * to_camera, axis=1)
+        expected = facing > _SIGHT_LIMIT
+        cost = pose.cost + _VISIBILITY_COST * float(np.count_nonzero(expected != seen))
+        if face_only and pose.rotation[1, 0] < 0.0:
+            # Upside down to the camera: possible, but not for somebody on their feet.
+            cost += _VISIBILITY_COST
+        if cost < lowest:
+            best, lowest = pose, cost
+    return best

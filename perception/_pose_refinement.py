@@ -1,0 +1,204 @@
+"""Least-squares refinement of head poses with priors, batched over starting points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from .arrays import FloatArray
+
+_ITERATIONS: Final = 8
+# Far below one, the scale of the noise.
+_CONVERGED_CHI2: Final = 1e-4
+_MIN_DEPTH_M: Final = 0.05
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeadPrior:
+    """What the body says about its head: weak, but enough where few head points are seen.
+
+    Attributes:
+        rotation_camera_head: (3, 3) head looking straight ahead of the torso.
+        rotation_information: (3, 3) inverse covariance of the head's rotation against that, as a
+            rotation vector in head axes (x yaw, y roll, z pitch).
+        pivot_head_m: (3,) the joint of head and neck in the head frame.
+        pivot_camera_m: (3,) where the body puts that joint.
+        position_information: (3, 3) inverse covariance of it, camera frame.
+    """
+
+    rotation_camera_head: FloatArray
+    rotation_information: FloatArray
+    pivot_head_m: FloatArray
+    pivot_camera_m: FloatArray
+    position_information: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RefinedPose:
+    """A local optimum: rotation (3, 3), translation (3,), 6×6 information, cost and pixel error.
+
+    ``cost`` is the sum of squared normalised residuals, priors included; ``reprojection_px`` (N,).
+    """
+
+    rotation: FloatArray
+    translation_m: FloatArray
+    information: FloatArray
+    cost: float
+    reprojection_px: FloatArray
+
+
+def skew(vectors: FloatArray) -> FloatArray:
+    """(…, 3) to (…, 3, 3) with ``skew(a) @ b == cross(a, b)``."""
+    out = np.zeros((*vectors.shape, 3))
+    x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
+    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -z, y, -x
+    out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = z, -y, x
+    return out
+
+
+def rotation_exp(vectors: FloatArray) -> FloatArray:
+    """Rodrigues' formula: rotation vectors (…, 3) to rotations (…, 3, 3)."""
+    angle = np.linalg.norm(vectors, axis=-1)[..., None, None]
+    cross = skew(vectors)
+    small = angle < 1e-8
+    safe = np.where(small, 1.0, angle)
+    first = np.where(small, 1.0, np.sin(angle) / safe)
+    second = np.where(small, 0.5, (1.0 - np.cos(angle)) / safe**2)
+    return np.asarray(np.eye(3) + first * cross + second * (cross @ cross))
+
+
+def rotation_log(rotations: FloatArray) -> FloatArray:
+    """Rotations (…, 3, 3) to rotation vectors (…, 3) of length at most π."""
+    trace = np.trace(rotations, axis1=-2, axis2=-1)
+    angle = np.arccos(np.clip(0.5 * (trace - 1.0), -1.0, 1.0))
+    axis = np.stack(
+        [
+            rotations[..., 2, 1] - rotations[..., 1, 2],
+            rotations[..., 0, 2] - rotations[..., 2, 0],
+            rotations[..., 1, 0] - rotations[..., 0, 1],
+        ],
+        axis=-1,
+    )
+    length = np.linalg.norm(axis, axis=-1)
+    # Near a half turn the antisymmetric part vanishes; the diagonal still gives the axis.
+    diagonal = np.sqrt(np.maximum(0.5 * (1.0 + np.diagonal(rotations, axis1=-2, axis2=-1)), 0.0))
+    turned = np.where(axis < 0.0, -diagonal, diagonal)
+    usable = length > 1e-6
+    unit = np.where(usable[..., None], axis / np.where(usable, length, 1.0)[..., None], turned)
+    return np.asarray(np.where((angle < 1e-8)[..., None], 0.5 * axis, angle[..., None] * unit))
+
+
+def _linearise(
+    model: FloatArray,
+    rays: FloatArray,
+    weight_px: FloatArray,
+    rotation: FloatArray,
+    translation: FloatArray,
+    prior: HeadPrior | None,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Cost (B,), gradient (B, 6), information (B, 6, 6) and pixel residuals (B, N, 2).
+
+    The state is a rotation in camera axes applied from the left, then the translation.
+    """
+    turned = np.einsum("bij,nj->bni", rotation, model)
+    points = turned + translation[:, None]
+    depth = np.maximum(points[..., 2], _MIN_DEPTH_M)
+    image = points[..., :2] / depth[..., None]
+    residual = (image - rays) * weight_px
+    slope = np.zeros((*depth.shape, 2, 3))
+    slope[..., 0, 0] = slope[..., 1, 1] = 1.0 / depth
+    slope[..., :, 2] = -image / depth[..., None]
+    slope *= weight_px[:, None]
+    jacobian = np.concatenate([slope @ -skew(turned), slope], axis=-1)
+    flat = jacobian.reshape(len(rotation), -1, 6)
+    flat_residual = residual.reshape(len(rotation), -1)
+    information = np.swapaxes(flat, 1, 2) @ flat
+    gradient = np.einsum("bki,bk->bi", flat, flat_residual)
+    cost = np.sum(flat_residual**2, axis=1)
+    # A point behind the camera must never look like a good fit.
+    cost += 1e6 * np.sum(np.maximum(_MIN_DEPTH_M - points[..., 2], 0.0), axis=1)
+    if prior is not None:
+        away = rotation_log(np.swapaxes(rotation, 1, 2) @ prior.rotation_camera_head)
+        # In camera axes: R log(Rᵀ R0) is the turn that brings the head back to the prior.
+        away = -np.einsum("bij,bj->bi", rotation, away)
+        axes = prior.rotation_camera_head
+        rotation_information = axes @ prior.rotation_information @ axes.T
+        pivot = np.einsum("bij,j->bi", rotation, prior.pivot_head_m)
+        offset = pivot + translation - prior.pivot_camera_m
+        motion = np.concatenate(
+            [-skew(pivot), np.broadcast_to(np.eye(3), (len(pivot), 3, 3))], axis=-1
+        )
+        weighted = prior.position_information @ motion
+        information = information + np.swapaxes(motion, 1, 2) @ weighted
+        information[:, :3, :3] += rotation_information
+        gradient = gradient + np.einsum("bji,bj->bi", weighted, offset)
+        gradient[:, :3] += away @ rotation_information
+        cost = cost + np.einsum("bi,ij,bj->b", away, rotation_information, away)
+        cost = cost + np.einsum("bi,ij,bj->b", offset, prior.position_information, offset)
+    return cost, gradient, information, residual
+
+
+def refine(
+    model_m: FloatArray,
+    rays: FloatArray,
+    focal_px: FloatArray,
+    keypoint_std_px: float,
+    rotations: FloatArray,
+    translations_m: FloatArray,
+    prior: HeadPrior | None,
+) -> list[RefinedPose]:
+    """Levenberg–Marquardt from B starts at once.
+
+    Args:
+        model_m: (N, 3) points in the head frame.
+        rays: (N, 2) x/z and y/z where they were seen.
+        focal_px: (2,) fx and fy.
+        keypoint_std_px: standard deviation of the pixel noise.
+        rotations: (B, 3, 3) starts.
+        translations_m: (B, 3) starts.
+        prior: what the body says, or None.
+
+    Returns:
+        One local optimum a start, in the same order.
+    """
+    weight = focal_px / keypoint_std_px
+    count = len(rotations)
+    damping = np.full(count, 1e-3)
+    rotation, translation = rotations, translations_m
+    state = _linearise(model_m, rays, weight, rotation, translation, prior)
+    for _ in range(_ITERATIONS):
+        cost, gradient, information, _ = state
+        scale = np.einsum("bii->bi", information)
+        damped = information + (damping[:, None] * scale + 1e-9)[..., None] * np.eye(6)
+        step = -np.linalg.solve(damped, gradient[..., None])[..., 0]
+        # The decrease of the cost that the local model still promises, in units of χ².
+        if float(np.max(-np.sum(gradient * step, axis=1))) < _CONVERGED_CHI2:
+            break
+        turn = step[:, :3]
+        length = np.linalg.norm(turn, axis=1, keepdims=True)
+        turn = turn * np.minimum(1.0, 0.7 / np.maximum(length, 1e-12))
+        trial_rotation = rotation_exp(turn) @ rotation
+        trial_translation = translation + step[:, 3:]
+        trial = _linearise(model_m, rays, weight, trial_rotation, trial_translation, prior)
+        better = trial[0] < cost
+        rotation = np.where(better[:, None, None], trial_rotation, rotation)
+        translation = np.where(better[:, None], trial_translation, translation)
+        kept = [
+            np.where(better.reshape(-1, *([1] * (new.ndim - 1))), new, old)
+            for new, old in zip(trial, state, strict=True)
+        ]
+        state = (kept[0], kept[1], kept[2], kept[3])
+        damping = np.where(better, 0.2 * damping, 10.0 * damping)
+    cost, _, information, residual = state
+    return [
+        RefinedPose(
+            rotation[index],
+            translation[index],
+            information[index],
+            float(cost[index]),
+            np.linalg.norm(residual[index], axis=-1) * keypoint_std_px,
+        )
+        for index in range(count)
+    ]

@@ -1,0 +1,43 @@
+"""What the pipeline asks of its networks: protocols that any detector or estimator can meet."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._camera import Camera
+from ._detection import PersonDetection
+from ._head_pose import HeadPose
+from ._keypoints import PersonKeypoints
+
+ImageRgb = NDArray[np.uint8]
+
+
+class PersonDetector(Protocol):
+    """Finds people in an image."""
+
+    def detect(self, image_rgb: ImageRgb) -> tuple[PersonDetection, ...]:
+        """Return the people in an (H, W, 3) RGB image; an empty tuple when there are none."""
+        ...
+
+
+class PoseEstimator(Protocol):
+    """Finds the keypoints of detected people."""
+
+    def estimate(
+        self, image_rgb: ImageRgb, detections: tuple[PersonDetection, ...]
+    ) -> tuple[PersonKeypoints, ...]:
+        """Return one set of keypoints a detection, in the same order."""
+        ...
+
+
+class HeadPoseEstimator(Protocol):
+    """Finds the head pose of people whose keypoints are known."""
+
+    def estimate(
+        self, image_rgb: ImageRgb, camera: Camera, people: tuple[PersonKeypoints, ...]
+    ) -> tuple[HeadPose | None, ...]:
+        """Return one head pose a person, in the same order; None where there is no evidence."""
+        ...

@@ -1,0 +1,125 @@
+import math
+
+import numpy as np
+import pytest
+from synthetic_people import person_at
+
+from perception import Camera, PersonKeypoints
+from perception._body import place_body, place_box
+from perception._metric_scale import metric_scale
+from perception.anthropometry import LIMBS, MEAN_STATURE_M
+
+CAMERA = Camera.from_fov(1280, 960, math.radians(60.0))
+
+
+def inside(person):
+    u, v = person.keypoints_px.T
+    seen = (u >= 0) & (u < CAMERA.width_px) & (v >= 0) & (v < CAMERA.height_px)
+    return PersonKeypoints(
+        person.keypoints_px, person.keypoints_root_m, seen.astype(float), person.layout
+    )
+
+
+def relative_errors(*, lift_std_m, unit, stature_m=1.74, count=200, seed=0):
+    """Range 2–8 m, every heading, whatever part of the body the image holds."""
+    rng = np.random.default_rng(seed)
+    errors = []
+    for _ in range(count):
+        depth = rng.uniform(2.0, 8.0)
+        person = person_at(
+            (rng.uniform(-0.4, 0.4) * depth, 0.45, depth),
+            body_yaw_rad=rng.uniform(-math.pi, math.pi),
+            stature_m=stature_m,
+        )
+        seen = person.keypoints(CAMERA, 1.0, rng, lift_std_m=lift_std_m, unit=unit)
+        body = place_body(CAMERA, inside(seen), 1.0)
+        error = np.linalg.norm(body.position_camera_m - person.chest_camera_m)
+        errors.append(error / np.linalg.norm(person.chest_camera_m))
+    return np.array(errors)
+
+
+@pytest.mark.parametrize("lift_std_m", [0.0, 0.045])
+@pytest.mark.parametrize("unit", [1.0, 1.0 / 1.74])
+def test_position_of_an_average_adult_within_four_percent(lift_std_m, unit):
+    errors = relative_errors(lift_std_m=lift_std_m, unit=unit)
+    assert np.median(errors) <= 0.04
+    assert np.percentile(errors, 90) <= 0.06
+
+
+@pytest.mark.parametrize("stature_m", [1.55, 1.92])
+def test_stature_is_the_error_that_remains(stature_m):
+    """A skeleton without a unit is scaled to the average; the range errs as the stature does."""
+    errors = relative_errors(lift_std_m=0.0, unit=1.0 / stature_m, stature_m=stature_m)
+    assert np.median(errors) == pytest.approx(abs(MEAN_STATURE_M / stature_m - 1.0), abs=0.045)
+
+
+def test_covariance_holds_the_errors_over_a_population():
+    rng = np.random.default_rng(1)
+    inside_95 = []
+    for _ in range(300):
+        depth = rng.uniform(2.0, 8.0)
+        stature = rng.normal(MEAN_STATURE_M, 0.05 * MEAN_STATURE_M)
+        person = person_at(
+            (rng.uniform(-0.4, 0.4) * depth, 0.45, depth),
+            body_yaw_rad=rng.uniform(-math.pi, math.pi),
+            stature_m=stature,
+        )
+        seen = person.keypoints(CAMERA, 1.0, rng, lift_std_m=0.045, unit=1.0 / stature)
+        body = place_body(CAMERA, inside(seen), 1.0)
+        error = body.position_camera_m - person.chest_camera_m
+        inside_95.append(error @ np.linalg.solve(body.position_covariance_m2, error) < 7.81)
+    assert 0.88 <= np.mean(inside_95) <= 1.0
+
+
+@pytest.mark.parametrize("unit", [0.01, 1.0, 37.0])
+def test_scale_is_found_in_any_unit_and_despite_a_wild_limb(unit):
+    person = person_at((0.0, 0.4, 3.0), stature_m=MEAN_STATURE_M)
+    keypoints = person.keypoints(CAMERA, 0.0, np.random.default_rng(0), unit=unit)
+    clean = metric_scale(keypoints)
+    assert clean.factor * unit == pytest.approx(1.0, abs=0.05)
+    wild = np.array(keypoints.keypoints_root_m)
+    wild[9] += 2.0 * unit  # the left wrist two metres off
+    spoilt = metric_scale(
+        PersonKeypoints(keypoints.keypoints_px, wild, keypoints.scores, keypoints.layout)
+    )
+    assert spoilt.factor * unit == pytest.approx(clean.factor * unit, rel=0.03)
+
+
+def test_constants_are_the_papers_shoulder_span():
+    span = next(limb for limb in LIMBS if limb.name == "shoulder span")
+    assert span.length_m == pytest.approx(0.45, abs=0.005)
+
+
+def test_one_wild_keypoint_hardly_moves_the_body():
+    rng = np.random.default_rng(2)
+    person = person_at((0.3, 0.4, 3.0))
+    keypoints = person.keypoints(CAMERA, 1.0, rng)
+    pixels = np.array(keypoints.keypoints_px)
+    pixels[10] += (250.0, -180.0)
+    wild = PersonKeypoints(pixels, keypoints.keypoints_root_m, keypoints.scores, "coco")
+    moved = place_body(CAMERA, wild, 1.0).position_camera_m
+    still = place_body(CAMERA, keypoints, 1.0).position_camera_m
+    assert np.linalg.norm(moved - still) < 0.06
+
+
+def test_too_little_of_a_body_is_no_position():
+    person = person_at((0.0, 0.4, 3.0)).keypoints(CAMERA, 0.0, np.random.default_rng(0))
+    scores = np.zeros(17)
+    scores[[5, 6]] = 1.0
+    two = PersonKeypoints(person.keypoints_px, person.keypoints_root_m, scores, "coco")
+    assert place_body(CAMERA, two, 1.0) is None
+    head_only = PersonKeypoints(
+        person.keypoints_px, person.keypoints_root_m, np.r_[np.ones(5), np.zeros(12)], "coco"
+    )
+    assert place_body(CAMERA, head_only, 1.0) is None
+
+
+def test_the_box_of_a_standing_adult_is_a_rough_position():
+    person = person_at((0.8, 0.45, 5.0), stature_m=1.74)
+    pixels = CAMERA.project(person.points_camera_m)
+    left, top = pixels.min(axis=0)
+    right, bottom = pixels.max(axis=0)
+    position, covariance = place_box(CAMERA, np.array([left, top - 20.0, right, bottom + 20.0]))
+    error = position - person.chest_camera_m
+    assert error @ np.linalg.solve(covariance, error) < 7.81
+    assert place_box(CAMERA, np.array([100.0, 100.0, 100.0, 100.0])) is None

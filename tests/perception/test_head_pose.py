@@ -1,0 +1,156 @@
+"""The figures that PnP head pose must reach, on heads all around the circle."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from scipy.stats import chi2
+from synthetic_people import person_at
+
+from perception import AttentionCone, Camera, PersonKeypoints, PnpHeadPoseEstimator
+from perception._awareness import awareness_of
+from perception.anthropometry import HEAD_TEMPLATE_M
+
+CAMERA = Camera(1280, 960, 1100.0, 1100.0, 640.0, 480.0)
+EAR_TO_NOSE_M = 0.1107
+
+
+def turned_head(rng, yaw_rad, ear_to_nose_px=55.0):
+    """A true rotation and position of a head whose ear-midpoint and nose are that far apart."""
+    facing = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+    angles = [yaw_rad, rng.uniform(-0.4, 0.4), rng.normal(0.0, 0.1)]
+    rotation = facing @ Rotation.from_euler("xzy", angles).as_matrix()
+    depth = CAMERA.fx_px * EAR_TO_NOSE_M / ear_to_nose_px
+    return rotation, depth * np.array([rng.uniform(-0.3, 0.3), rng.uniform(-0.2, 0.2), 1.0])
+
+
+def head_only(rotation, position, noise_px, rng, seen=(1, 1, 1, 1, 1)):
+    pixels, scores = np.zeros((17, 2)), np.zeros(17)
+    pixels[:5] = CAMERA.project(HEAD_TEMPLATE_M @ rotation.T + position)
+    pixels[:5] += rng.normal(0.0, noise_px, (5, 2))
+    scores[:5] = seen
+    return PersonKeypoints(pixels, np.zeros((17, 3)), scores, "coco")
+
+
+def gaze_errors_deg(noise_px, count, seed):
+    rng = np.random.default_rng(seed)
+    truth = [turned_head(rng, yaw) for yaw in rng.uniform(-math.pi, math.pi, count)]
+    people = tuple(head_only(*pose, noise_px, rng) for pose in truth)
+    heads = PnpHeadPoseEstimator().estimate(None, CAMERA, people)
+    assert all(head is not None for head in heads)
+    return np.degrees(
+        [
+            math.acos(np.clip(head.gaze_camera @ rotation[:, 1], -1.0, 1.0))
+            for head, (rotation, _) in zip(heads, truth, strict=True)
+        ]
+    ), [(head, pose) for head, pose in zip(heads, truth, strict=True)]
+
+
+def test_without_noise_the_pose_is_exact():
+    errors, pairs = gaze_errors_deg(1e-6, 100, 0)
+    assert errors.max() < 1e-3
+    for head, (_, position) in pairs:
+        np.testing.assert_allclose(head.position_camera_m, position, atol=1e-4)
+
+
+@pytest.mark.parametrize(("noise_px", "median_deg"), [(1.0, 2.0), (2.0, 3.5)])
+def test_gaze_all_around_the_circle(noise_px, median_deg):
+    errors, _ = gaze_errors_deg(noise_px, 500, 1)
+    assert np.median(errors) <= median_deg
+    if noise_px == 1.0:
+        assert errors.max() < 90.0
+
+
+def test_covariance_is_consistent_with_the_errors():
+    _, pairs = gaze_errors_deg(1.0, 800, 2)
+    nees = []
+    for head, (rotation, position) in pairs:
+        turn = Rotation.from_matrix(rotation @ head.rotation_camera_head.T).as_rotvec()
+        error = np.concatenate([turn, position - head.position_camera_m])
+        nees.append(error @ np.linalg.solve(head.covariance, error))
+    low, high = chi2.ppf([0.025, 0.975], 6 * len(nees)) / len(nees)
+    assert low <= np.mean(nees) <= high
+
+
+def test_covariance_grows_when_the_noise_is_larger_than_stated():
+    calm = gaze_errors_deg(1.0, 300, 3)[1]
+    rough = gaze_errors_deg(4.0, 300, 3)[1]
+    trace = [np.mean([np.trace(head.covariance[:3, :3]) for head, _ in s]) for s in (calm, rough)]
+    assert trace[1] > 6.0 * trace[0]
+
+
+@pytest.mark.parametrize("yaw_deg", [0, 5, 12, 34, 49, -34, 55])
+def test_awareness_std_equals_monte_carlo(yaw_deg):
+    """Within 25 %: at the centre, on the flank and at the edge of the cone."""
+    rng = np.random.default_rng(4)
+    person = person_at((0.2, 0.3, 2.5), body_yaw_rad=0.3, head_yaw_rad=math.radians(yaw_deg) - 0.3)
+    robot, cone, estimator = np.zeros((1, 3)), AttentionCone(), PnpHeadPoseEstimator()
+    people = tuple(person.keypoints(CAMERA, 1.0, rng) for _ in range(800))
+    heads = estimator.estimate(None, CAMERA, people)
+    drawn = np.array([awareness_of(cone, head, robot)[0] for head in heads])
+    (nominal,) = estimator.estimate(None, CAMERA, (person.keypoints(CAMERA, 0.0, rng),))
+    alpha, std = awareness_of(cone, nominal, robot)
+    truth = cone.score(person.eyes_camera_m, person.rotation_camera_head[:, 1], np.zeros(3))
+    assert alpha == pytest.approx(truth, abs=0.01)
+    assert std == pytest.approx(drawn.std(), rel=0.25)
+
+
+@pytest.mark.parametrize(
+    ("head_yaw_deg", "seen", "tolerance_deg"),
+    [
+        (90, (1, 1, 0, 1, 0), 15),  # left profile: nose, near eye, near ear
+        (-90, (1, 0, 1, 0, 1), 15),
+        (60, (1, 1, 1, 1, 0), 10),
+        (180, (0, 0, 0, 1, 1), 50),  # back of the head: ears only
+        (150, (0, 0, 0, 1, 1), 60),
+    ],
+)
+def test_turned_heads_with_what_a_camera_sees_of_them(head_yaw_deg, seen, tolerance_deg):
+    """Yaw is relative to facing the camera; the body is turned halfway with the head."""
+    rng = np.random.default_rng(5)
+    yaw = math.radians(head_yaw_deg)
+    # Turning left shows the camera the right side of the face, so mirror the mask's names.
+    person = person_at((0.1, 0.4, 3.0), body_yaw_rad=-0.5 * yaw, head_yaw_rad=-0.5 * yaw)
+    visible = np.concatenate([np.array(seen), np.ones(12)]).astype(bool)
+    people = tuple(
+        person.keypoints(CAMERA, 1.0, rng, lift_std_m=0.045, seen=visible) for _ in range(60)
+    )
+    heads = PnpHeadPoseEstimator().estimate(None, CAMERA, people)
+    truth = person.rotation_camera_head[:, 1]
+    errors = [
+        math.degrees(math.acos(np.clip(head.gaze_camera @ truth, -1, 1)))
+        for head in heads
+        if head is not None
+    ]
+    assert len(errors) >= 55
+    assert np.median(errors) < tolerance_deg
+    robot = np.zeros((1, 3))
+    for head in heads:
+        if head is not None and abs(head_yaw_deg) >= 90:
+            alpha, std = awareness_of(AttentionCone(), head, robot)
+            assert alpha - 1.28 * std < 0.2, "a face turned away was called aware"
+
+
+def test_heads_without_evidence_have_no_pose():
+    rng = np.random.default_rng(6)
+    rotation, position = turned_head(rng, 0.3)
+    far = position * 60.0
+    nobody = head_only(rotation, position, 0.0, rng, seen=(0, 0, 0, 0, 0))
+    nose_alone = head_only(rotation, position, 0.0, rng, seen=(1, 0, 0, 0, 0))
+    speck = head_only(rotation, far, 0.3, rng)
+    one_point = PersonKeypoints(np.full((17, 2), 300.0), np.zeros((17, 3)), np.ones(17), "coco")
+    people = (nobody, nose_alone, speck, one_point)
+    assert PnpHeadPoseEstimator().estimate(None, CAMERA, people) == (None,) * 4
+
+
+def test_distorted_images_give_the_same_pose():
+    rng = np.random.default_rng(7)
+    bent = Camera(1280, 960, 1100.0, 1100.0, 640.0, 480.0, [-0.2, 0.05, 0.001, 0.001, 0.0])
+    rotation, position = turned_head(rng, 0.5)
+    pixels, scores = np.zeros((17, 2)), np.zeros(17)
+    pixels[:5] = bent.project(HEAD_TEMPLATE_M @ rotation.T + position)
+    scores[:5] = 1.0
+    person = PersonKeypoints(pixels, np.zeros((17, 3)), scores, "coco")
+    (head,) = PnpHeadPoseEstimator().estimate(None, bent, (person,))
+    np.testing.assert_allclose(head.rotation_camera_head, rotation, atol=1e-3)
