@@ -1,9 +1,35 @@
-"""How large, how fast, and why: person tracks become obstacles and a speed limit for any planner."""
+"""How large, how fast, and why: tracks become obstacles and a speed limit for any planner.
+
+The parts of a policy are in :mod:`nav_adapter.policies`.
+"""
 
 from __future__ import annotations
 
+from ._adapter import NavAdapter
 from ._constraints import NavConstraints, PersonObstacle
+from ._costmap import paint_costmap
 from ._errors import NavError
+from ._exporters import boxes, circles, points, polygons
+from ._policy import AwarenessPolicy
 from ._robot import RobotProfile, RobotState
+from ._separation import max_speed_mps, protective_separation_m
+from .policies import InflationPolicy, SpeedPolicy
 
-__all__ = ["NavConstraints", "NavError", "PersonObstacle", "RobotProfile", "RobotState"]
+__all__ = [
+    "AwarenessPolicy",
+    "InflationPolicy",
+    "NavAdapter",
+    "NavConstraints",
+    "NavError",
+    "PersonObstacle",
+    "RobotProfile",
+    "RobotState",
+    "SpeedPolicy",
+    "boxes",
+    "circles",
+    "max_speed_mps",
+    "paint_costmap",
+    "points",
+    "polygons",
+    "protective_separation_m",
+]

@@ -21,7 +21,8 @@ class PersonObstacle:
         velocity_odom_mps: (2,).
         radius_m: > 0; body, clearance and awareness-dependent inflation.
         height_m: > 0.
-        awareness_lower: the lower bound of α that the radius was made from, in [0, 1].
+        awareness_lower: the lower bound of α that was acted on, in [0, 1]: 0 for people whose α is
+            not trusted. The radius follows it at once upward and at a bounded rate downward.
         polygon: the same obstacle as a shapely polygon in odom; it contains the circle.
     """
 
@@ -66,7 +67,9 @@ class NavConstraints:
         stale: True when the data are too old to trust: everyone then counts as unaware.
         reachable_speed_limit_mps: the limit that a robot braking as hard as it may can follow from
             its present speed; equal to ``speed_limit_mps`` (and never below it) unless the limit
-            fell faster than the robot can brake.
+            fell faster than the robot can brake. For planners whose window of reachable speeds must
+            not be empty. It starts from the measured speed, so a drive that ramps by itself should
+            be given ``speed_limit_mps``: following a late measurement brakes too softly.
     """
 
     stamp_s: float

@@ -6,10 +6,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from shapely.geometry import MultiPoint
 
 from perception.arrays import FloatArray, finite_array, finite_number, set_fields
 
 from ._errors import NavError
+
+# Below one square millimetre an outline is a line or a point, and a mistake.
+_SMALLEST_FOOTPRINT_M2 = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,11 +21,13 @@ class RobotProfile:
     """What the robot can do.
 
     Attributes:
-        footprint_m: (M, 2), M ≥ 3, convex outline in the base frame (x forward, y left).
+        footprint_m: (M, 2), M ≥ 3, outline in the base frame (x forward, y left); its convex hull
+            counts, in either direction of travel round it.
         max_speed_mps: > 0.
         max_acceleration_mps2: > 0.
         max_deceleration_mps2: > 0, the braking that can be relied on.
-        reaction_time_s: ≥ 0, from a change in the scene to the start of braking.
+        reaction_time_s: ≥ 0, from a change in the scene to the start of braking: exposure,
+            perception, the period of the control loop and the drive's own delay.
     """
 
     footprint_m: FloatArray
@@ -34,6 +40,11 @@ class RobotProfile:
         footprint = finite_array("footprint_m", self.footprint_m, ("M", 2), NavError)
         if len(footprint) < 3:
             raise NavError(f"footprint_m must have at least 3 corners, got {len(footprint)}")
+        area = float(MultiPoint(footprint).convex_hull.area)
+        if area < _SMALLEST_FOOTPRINT_M2:
+            raise NavError(
+                f"footprint_m must enclose at least {_SMALLEST_FOOTPRINT_M2:g} m², got {area:g} m²"
+            )
 
         def positive(name: str) -> float:
             return finite_number(

@@ -1,0 +1,66 @@
+"""Obstacles in the shapes that planners read: circles, points, polygons, boxes.
+
+Pure functions of the constraints; everything is in the odom frame, one entry a person, in the order
+of ``constraints.obstacles``, and an empty array or tuple when there is nobody.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from shapely.geometry import Polygon
+
+from perception.arrays import FloatArray, finite_number
+
+from ._constraints import NavConstraints
+from ._errors import NavError
+
+# A finer perimeter than this only costs memory.
+_MINIMUM_SPACING_M = 1e-3
+_MINIMUM_POINTS = 8
+
+
+def circles(constraints: NavConstraints) -> FloatArray:
+    """(N, 5) x, y (m), vx, vy (m/s) and radius (m): for velocity obstacles, MPC, TEB."""
+    rows = [[*o.center_odom_m, *o.velocity_odom_mps, o.radius_m] for o in constraints.obstacles]
+    return np.array(rows, dtype=np.float64).reshape(-1, 5)
+
+
+def points(constraints: NavConstraints, spacing_m: float) -> FloatArray:
+    """(M, 2) points on the obstacles' circles, for planners that read a laser scan or a cloud.
+
+    Neighbours along a circle, the last and the first included, lie at most ``spacing_m`` apart;
+    every circle has at least 8 points.
+
+    Raises:
+        NavError: ``spacing_m`` is not finite or below 1 mm.
+    """
+    spacing = finite_number("spacing_m", spacing_m, NavError, minimum=_MINIMUM_SPACING_M)
+    rings = [np.empty((0, 2))]
+    for obstacle in constraints.obstacles:
+        # The arc is longer than the chord between neighbours, so this errs to the dense side.
+        count = max(_MINIMUM_POINTS, math.ceil(2.0 * math.pi * obstacle.radius_m / spacing))
+        angle = np.arange(count) * (2.0 * math.pi / count)
+        ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        rings.append(obstacle.center_odom_m + obstacle.radius_m * ring)
+    return np.concatenate(rings)
+
+
+def polygons(constraints: NavConstraints) -> tuple[Polygon, ...]:
+    """Shapely polygons, each containing its obstacle's circle."""
+    return tuple(obstacle.polygon for obstacle in constraints.obstacles)
+
+
+def boxes(constraints: NavConstraints) -> FloatArray:
+    """(N, 7) upright 3-D boxes: centre x, y, z, size x, y, z (m) and yaw (rad).
+
+    Each is the box about the obstacle's cylinder, standing on the floor (z = 0) and turned with the
+    person's velocity (yaw 0 for one who stands). Size x runs along the yaw direction.
+    """
+    rows = []
+    for obstacle in constraints.obstacles:
+        (x, y), (vx, vy) = obstacle.center_odom_m, obstacle.velocity_odom_mps
+        side, height = 2.0 * obstacle.radius_m, obstacle.height_m
+        rows.append([x, y, 0.5 * height, side, side, height, math.atan2(vy, vx)])
+    return np.array(rows, dtype=np.float64).reshape(-1, 7)

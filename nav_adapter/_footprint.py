@@ -1,0 +1,52 @@
+"""Distance between a robot's footprint and points in the odom frame."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from shapely.geometry import MultiPoint
+from shapely.geometry.polygon import orient
+
+from perception.arrays import FloatArray
+
+from ._robot import RobotState
+
+_SHORTEST_EDGE_M = 1e-9
+
+
+class Footprint:
+    """The convex hull of a footprint, ready for fast distances.
+
+    Plain numpy: for a handful of people it is several times faster than building a shapely polygon
+    at the robot's pose. The points are taken into the base frame, so the hull is prepared once.
+
+    Args:
+        footprint_m: (M, 2) corners in the base frame, not all on one line.
+    """
+
+    def __init__(self, footprint_m: FloatArray) -> None:
+        hull = orient(MultiPoint(footprint_m).convex_hull, 1.0)
+        ring = np.asarray(hull.exterior.coords)
+        edges = np.diff(ring, axis=0)
+        length2 = (edges**2).sum(axis=1)
+        # Corners given twice, but for rounding, make an edge without a direction.
+        kept = length2 > _SHORTEST_EDGE_M**2
+        self._start_x, self._start_y = ring[:-1][kept].T
+        self._edge_x, self._edge_y = edges[kept].T
+        self._edge_length2 = length2[kept]
+
+    def distance_m(self, points_odom_m: FloatArray, robot_state: RobotState) -> FloatArray:
+        """(N,) distance of (N, 2) points from the footprint at the robot's pose; 0 inside."""
+        offset_x, offset_y = (points_odom_m - robot_state.position_odom_m).T
+        cos, sin = math.cos(robot_state.heading_odom_rad), math.sin(robot_state.heading_odom_rad)
+        # (N, M): from every corner to every point, in the base frame.
+        to_x = (cos * offset_x + sin * offset_y)[:, None] - self._start_x
+        to_y = (cos * offset_y - sin * offset_x)[:, None] - self._start_y
+        along = (to_x * self._edge_x + to_y * self._edge_y) / self._edge_length2
+        along = np.minimum(np.maximum(along, 0.0), 1.0)
+        gap2 = (to_x - along * self._edge_x) ** 2 + (to_y - along * self._edge_y) ** 2
+        # The hull runs counter-clockwise: inside is to the left of every edge.
+        inside = (self._edge_x * to_y >= self._edge_y * to_x).all(axis=1)
+        distance: FloatArray = np.where(inside, 0.0, np.sqrt(gap2.min(axis=1)))
+        return distance

@@ -1,0 +1,67 @@
+"""What the adapter remembers of one person from one update to the next."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from tracking import PersonTrack
+
+# Two stamps closer than this are one instant: a sighting's stamp is recomputed as a difference of
+# floats in every frame.
+_SAME_INSTANT_S = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class PersonMemory:
+    """One person as of the adapter's last update.
+
+    Attributes:
+        track: the latest track given for this person.
+        seen_stamp_s: when a frame last showed the person.
+        awareness_lower: the bound that was acted on.
+        radius_m: the obstacle's radius.
+        sigma_m: standard deviation of the position along its most uncertain direction.
+    """
+
+    track: PersonTrack
+    seen_stamp_s: float
+    awareness_lower: float
+    radius_m: float
+    sigma_m: float
+
+    def newly_seen_s(self, seen_stamp_s: float) -> float:
+        """Time from the last sighting to this one; 0 when it is no new one."""
+        advance_s = seen_stamp_s - self.seen_stamp_s
+        return advance_s if advance_s > _SAME_INSTANT_S else 0.0
+
+    def is_held(self, stamp_s: float, hold_s: float) -> bool:
+        """Whether a person missing from the input must still be kept at ``stamp_s``.
+
+        The tracker of this project lets a person coast visibly before it drops them. Another one
+        may drop a person the moment a detection fails, which is when they are most likely hidden
+        behind something and still there. A tentative track may be clutter and is let go.
+        """
+        return self.track.status != "tentative" and stamp_s - self.seen_stamp_s <= hold_s
+
+
+def position_at(track: PersonTrack, stamp_s: float) -> tuple[float, float]:
+    """Position in odom at ``stamp_s`` on the track's present velocity, in metres."""
+    dt = stamp_s - track.stamp_s
+    x, y = track.position_odom_m.tolist()
+    vx, vy = track.velocity_odom_mps.tolist()
+    return x + dt * vx, y + dt * vy
+
+
+def position_sigma_m(track: PersonTrack, stamp_s: float) -> float:
+    """Standard deviation at ``stamp_s`` of the position along its most uncertain direction.
+
+    The root of the larger eigenvalue of the position covariance, carried on with the velocity
+    covariance: F P Fᵀ of a constant velocity.
+    """
+    dt = max(stamp_s - track.stamp_s, 0.0)
+    P = track.covariance_odom.tolist()
+    xx = P[0][0] + dt * (P[0][2] + P[2][0]) + dt * dt * P[2][2]
+    yy = P[1][1] + dt * (P[1][3] + P[3][1]) + dt * dt * P[3][3]
+    xy = P[0][1] + dt * (P[0][3] + P[2][1]) + dt * dt * P[2][3]
+    return math.sqrt(max(0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy), 0.0))

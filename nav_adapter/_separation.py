@@ -1,0 +1,98 @@
+"""Speed-and-separation mathematics: how far apart for a speed, how fast for a separation.
+
+The protective separation distance of ISO/TS 15066 (which takes it from ISO 13855) for a robot that
+keeps its speed v during the reaction time T and then brakes at a, while a person walks straight
+at it with speed v_h until it stands:
+
+    S_p = S_h + S_r + S_s + C + Z,   S_h = v_h (T + v/a),   S_r = v T,   S_s = v² / 2a
+
+C (how far a body part reaches in before it is noticed) and Z (the position uncertainty of the
+robot) act together and are given together as ``clearance_m``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from perception.arrays import FloatArray
+
+from ._errors import NavError
+
+
+def _positive_deceleration(deceleration_mps2: ArrayLike) -> FloatArray:
+    deceleration = np.asarray(deceleration_mps2, dtype=np.float64)
+    if not bool((deceleration > 0.0).all()):
+        raise NavError(f"deceleration_mps2 must be > 0 m/s², got {deceleration_mps2!r:.80}")
+    return deceleration
+
+
+def protective_separation_m(
+    speed_mps: ArrayLike,
+    human_speed_mps: ArrayLike,
+    *,
+    deceleration_mps2: ArrayLike,
+    reaction_time_s: ArrayLike,
+    clearance_m: ArrayLike,
+) -> FloatArray:
+    """Separation that a robot at this speed must keep: S_p of the module's formula.
+
+    Args:
+        speed_mps: v ≥ 0 of the robot; like every argument a scalar or any broadcastable shape.
+        human_speed_mps: v_h ≥ 0, the speed assumed for the person, straight at the robot.
+        deceleration_mps2: a > 0.
+        reaction_time_s: T ≥ 0.
+        clearance_m: C + Z ≥ 0.
+
+    Returns:
+        S_p in metres, in the broadcast shape.
+
+    Raises:
+        NavError: a deceleration that is not positive.
+    """
+    a = _positive_deceleration(deceleration_mps2)
+    v, v_h, T, C = (
+        np.asarray(value, dtype=np.float64)
+        for value in (speed_mps, human_speed_mps, reaction_time_s, clearance_m)
+    )
+    separation: FloatArray = v_h * (T + v / a) + v * T + v**2 / (2.0 * a) + C
+    return separation
+
+
+def max_speed_mps(
+    separation_m: ArrayLike,
+    human_speed_mps: ArrayLike,
+    *,
+    deceleration_mps2: ArrayLike,
+    reaction_time_s: ArrayLike,
+    clearance_m: ArrayLike,
+) -> FloatArray:
+    """Highest speed whose protective separation fits into the separation there is.
+
+    The inverse of :func:`protective_separation_m` in v: the positive root of a quadratic, and 0
+    where even a standing robot is too close. A NaN separation also gives 0: not knowing is no
+    licence to drive.
+
+    Args:
+        separation_m: distance between the surfaces of robot and person; may be negative.
+        human_speed_mps: v_h ≥ 0, the speed assumed for the person, straight at the robot.
+        deceleration_mps2: a > 0.
+        reaction_time_s: T ≥ 0.
+        clearance_m: C + Z ≥ 0.
+
+    Returns:
+        v_max ≥ 0 in m/s, in the broadcast shape.
+
+    Raises:
+        NavError: a deceleration that is not positive.
+    """
+    a = _positive_deceleration(deceleration_mps2)
+    v_h = np.asarray(human_speed_mps, dtype=np.float64)
+    T = np.asarray(reaction_time_s, dtype=np.float64)
+    C = np.asarray(clearance_m, dtype=np.float64)
+    spare = np.asarray(separation_m, dtype=np.float64) - C - v_h * T
+    # Written this way round so that NaN lands on 0.
+    spare = np.where(spare > 0.0, spare, 0.0)
+    b = a * T + v_h
+    speed: FloatArray = np.maximum(np.sqrt(b**2 + 2.0 * a * spare) - b, 0.0)
+    return speed

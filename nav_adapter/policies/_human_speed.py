@@ -1,0 +1,52 @@
+"""How fast a person may come at the robot, given what they have noticed."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from pydantic import Field, model_validator
+
+from ._ramp import AwarenessRamp
+
+
+class SpeedPolicy(Protocol):
+    """Assumed speed of a person towards the robot; write your own with this one method.
+
+    A policy names the assumption, not the limit: the adapter turns it into a speed limit through
+    speed-and-separation monitoring, so that no policy can hand out more than that allows.
+    """
+
+    def human_speed_mps(self, awareness_lower: float) -> float:
+        """Speed assumed straight at the robot for a lower bound of α in [0, 1].
+
+        Must be finite, at least 0 and must not increase with α.
+        """
+        ...
+
+
+class InterpolatedHumanSpeed(AwarenessRamp):
+    """Assumed speed that falls from an unaware to an aware value.
+
+    Attributes:
+        unaware_human_speed_mps: for a person who has not noticed the robot; 1.6 m/s is the walking
+            speed of ISO 13855.
+        aware_human_speed_mps: for a person who has, at most the unaware value. Not zero: somebody
+            who sees the robot may still drift into its way, but will not walk into it.
+    """
+
+    unaware_human_speed_mps: float = Field(default=1.6, ge=0.0, le=10.0)
+    aware_human_speed_mps: float = Field(default=0.35, ge=0.0, le=10.0)
+
+    @model_validator(mode="after")
+    def _awareness_never_hastens(self) -> InterpolatedHumanSpeed:
+        if self.aware_human_speed_mps > self.unaware_human_speed_mps:
+            raise ValueError(
+                "aware_human_speed_mps must be at most unaware_human_speed_mps, got "
+                f"{self.aware_human_speed_mps:g} m/s and {self.unaware_human_speed_mps:g} m/s"
+            )
+        return self
+
+    def human_speed_mps(self, awareness_lower: float) -> float:
+        """Assumed speed for a lower bound of α; non-increasing in it."""
+        share = self.blend(awareness_lower)
+        return (1.0 - share) * self.unaware_human_speed_mps + share * self.aware_human_speed_mps

@@ -1,0 +1,140 @@
+"""Robots, people and walks that the tests of the adapter share."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from hypothesis import strategies as st
+
+from nav_adapter import NavConstraints, RobotProfile, RobotState
+from perception.arrays import FloatArray
+from tracking import PersonTrack
+
+ROBOT = RobotProfile(
+    footprint_m=np.array([[0.3625, 0.25], [-0.3625, 0.25], [-0.3625, -0.25], [0.3625, -0.25]]),
+    max_speed_mps=1.5,
+    max_acceleration_mps2=1.0,
+    max_deceleration_mps2=1.0,
+    reaction_time_s=0.3,
+)
+
+FLOOR_M = 0.40
+
+
+def person(
+    stamp_s: float = 0.0,
+    *,
+    track_id: int = 1,
+    status: str = "confirmed",
+    position: Sequence[float] = (3.0, 0.0),
+    velocity: Sequence[float] = (0.0, 0.0),
+    sigma_m: float = 0.0,
+    awareness_lower: float = 0.0,
+    unseen_s: float = 0.0,
+) -> PersonTrack:
+    return PersonTrack(
+        id=track_id,
+        stamp_s=stamp_s,
+        status=status,
+        position_odom_m=np.asarray(position),
+        velocity_odom_mps=np.asarray(velocity),
+        covariance_odom=np.diag([sigma_m**2, sigma_m**2, 0.0, 0.0]),
+        awareness=awareness_lower,
+        awareness_std=0.0,
+        awareness_lower=awareness_lower,
+        height_m=1.75,
+        time_since_seen_s=unseen_s,
+    )
+
+
+def robot_at(
+    stamp_s: float = 0.0,
+    *,
+    position: Sequence[float] = (0.0, 0.0),
+    heading_rad: float = 0.0,
+    speed_mps: float = 0.0,
+) -> RobotState:
+    return RobotState(stamp_s, np.asarray(position), heading_rad, speed_mps, 0.0)
+
+
+def rotation(angle_rad: float) -> FloatArray:
+    cos, sin = math.cos(angle_rad), math.sin(angle_rad)
+    return np.array([[cos, -sin], [sin, cos]])
+
+
+def moved_person(track: PersonTrack, angle_rad: float, shift_m: FloatArray) -> PersonTrack:
+    R = rotation(angle_rad)
+    both = np.kron(np.eye(2), R)
+    covariance = both @ track.covariance_odom @ both.T
+    return replace(
+        track,
+        position_odom_m=R @ track.position_odom_m + shift_m,
+        velocity_odom_mps=R @ track.velocity_odom_mps,
+        covariance_odom=0.5 * (covariance + covariance.T),
+    )
+
+
+def moved_robot(state: RobotState, angle_rad: float, shift_m: FloatArray) -> RobotState:
+    return replace(
+        state,
+        position_odom_m=rotation(angle_rad) @ state.position_odom_m + shift_m,
+        heading_odom_rad=state.heading_odom_rad + angle_rad,
+    )
+
+
+def numbers(constraints: NavConstraints) -> tuple[object, ...]:
+    """All that a planner can read from constraints, in comparable form."""
+    return (
+        constraints.stamp_s,
+        constraints.speed_limit_mps,
+        constraints.reachable_speed_limit_mps,
+        constraints.limited_by,
+        constraints.stale,
+        tuple(
+            (
+                o.track_id,
+                *o.center_odom_m,
+                *o.velocity_odom_mps,
+                o.radius_m,
+                o.height_m,
+                o.awareness_lower,
+                o.polygon.wkb,
+            )
+            for o in constraints.obstacles
+        ),
+    )
+
+
+def finite(low: float, high: float) -> st.SearchStrategy[float]:
+    return st.floats(low, high, allow_nan=False)
+
+
+@st.composite
+def covariances(draw: st.DrawFn) -> FloatArray:
+    root = np.array(draw(st.lists(finite(-0.4, 0.4), min_size=16, max_size=16))).reshape(4, 4)
+    return root @ root.T
+
+
+@st.composite
+def crowds(draw: st.DrawFn, stamp_s: float = 0.0, max_size: int = 4) -> tuple[PersonTrack, ...]:
+    """People of every status, some seen and some not, each with an id of their own."""
+    ids = draw(st.lists(st.integers(0, 30), max_size=max_size, unique=True))
+    return tuple(
+        PersonTrack(
+            id=track_id,
+            stamp_s=stamp_s - draw(finite(0.0, 0.6)),
+            status=draw(st.sampled_from(["tentative", "confirmed", "coasting"])),
+            position_odom_m=draw(st.tuples(finite(-6, 6), finite(-6, 6))),
+            velocity_odom_mps=draw(st.tuples(finite(-2, 2), finite(-2, 2))),
+            covariance_odom=draw(covariances()),
+            awareness=0.5,
+            awareness_std=0.1,
+            awareness_lower=draw(finite(0, 1)),
+            height_m=1.7,
+            time_since_seen_s=draw(st.sampled_from([0.0, 0.05, 0.4])),
+        )
+        for track_id in ids
+    )

@@ -1,0 +1,341 @@
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from nav_scenes import (
+    FLOOR_M,
+    ROBOT,
+    crowds,
+    finite,
+    moved_person,
+    moved_robot,
+    numbers,
+    person,
+    robot_at,
+)
+
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, NavError, max_speed_mps
+from perception.anthropometry import BODY_RADIUS_M
+from tracking import PersonTrack
+
+ALPHA = finite(0.0, 1.0)
+WALK = st.lists(crowds(), min_size=1, max_size=4)
+
+
+def at(tracks: tuple[PersonTrack, ...], stamp_s: float) -> tuple[PersonTrack, ...]:
+    """The same people, ``stamp_s`` later."""
+    return tuple(replace(track, stamp_s=track.stamp_s + stamp_s) for track in tracks)
+
+
+def settled(alpha: float, *, position: tuple[float, float], seconds: float = 2.0) -> NavConstraints:
+    """Constraints after a person with this α has stood in view for a while."""
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    for step in range(round(seconds / 0.05) + 1):
+        now = 0.05 * step
+        result = adapter.update(
+            (person(now, position=position, awareness_lower=alpha),), robot_at(now), now
+        )
+    return result
+
+
+def test_one_person_in_closed_form() -> None:
+    result = settled(1.0, position=(2.0, 0.0))
+    (obstacle,) = result.obstacles
+    assert obstacle.radius_m == pytest.approx(0.45)
+    assert obstacle.awareness_lower == 1.0
+    assert obstacle.height_m == 1.75
+    limit = max_speed_mps(
+        2.0 - 0.3625 - BODY_RADIUS_M,
+        0.35,
+        deceleration_mps2=1.0,
+        reaction_time_s=0.3,
+        clearance_m=0.1,
+    )
+    assert result.speed_limit_mps == pytest.approx(float(limit), abs=1e-12)
+    assert result.limited_by == "track 1: speed and separation"
+    assert not result.stale
+
+    result = settled(0.0, position=(2.0, 0.0))
+    assert result.obstacles[0].radius_m == pytest.approx(1.0)
+    assert result.speed_limit_mps < 0.5 * float(limit)
+
+
+def test_nobody_means_the_robots_own_maximum() -> None:
+    result = NavAdapter(AwarenessPolicy(), ROBOT).update((), robot_at(), 0.0)
+    assert result.obstacles == ()
+    assert (result.speed_limit_mps, result.limited_by) == (1.5, "robot maximum")
+    far = settled(0.0, position=(40.0, 0.0))
+    assert (far.speed_limit_mps, far.limited_by) == (1.5, "robot maximum")
+
+
+@given(low=ALPHA, high=ALPHA, x=finite(-4.0, 4.0), y=finite(-4.0, 4.0))
+@settings(max_examples=25)
+def test_awareness_never_enlarges_an_obstacle_and_never_slows_the_robot(
+    low: float, high: float, x: float, y: float
+) -> None:
+    low, high = sorted((low, high))
+    for seconds in (0.0, 0.3, 1.5):
+        less = settled(low, position=(x, y), seconds=seconds)
+        more = settled(high, position=(x, y), seconds=seconds)
+        assert more.obstacles[0].radius_m <= less.obstacles[0].radius_m + 1e-12
+        assert more.speed_limit_mps >= less.speed_limit_mps - 1e-12
+
+
+@given(walk=WALK, angle=finite(-7.0, 7.0), shift=st.tuples(finite(-50, 50), finite(-50, 50)))
+def test_the_world_may_be_turned_and_shifted(
+    walk: list[tuple[PersonTrack, ...]], angle: float, shift: tuple[float, float]
+) -> None:
+    here = NavAdapter(AwarenessPolicy(), ROBOT)
+    there = NavAdapter(AwarenessPolicy(), ROBOT)
+    for step, people in enumerate(walk):
+        now = 0.2 * step
+        tracks, state = at(people, now), robot_at(now, heading_rad=0.4, speed_mps=0.7)
+        ours = here.update(tracks, state, now)
+        theirs = there.update(
+            tuple(moved_person(track, angle, np.asarray(shift)) for track in tracks),
+            moved_robot(state, angle, np.asarray(shift)),
+            now,
+        )
+        assert theirs.speed_limit_mps == pytest.approx(ours.speed_limit_mps, abs=1e-9)
+        assert len(ours.obstacles) == len(theirs.obstacles)
+        for a, b in zip(ours.obstacles, theirs.obstacles, strict=True):
+            assert b.radius_m == pytest.approx(a.radius_m, abs=1e-9)
+            assert b.awareness_lower == a.awareness_lower
+
+
+@given(walk=WALK, order=st.randoms())
+def test_the_order_of_people_does_not_matter(
+    walk: list[tuple[PersonTrack, ...]], order: object
+) -> None:
+    one, other = NavAdapter(AwarenessPolicy(), ROBOT), NavAdapter(AwarenessPolicy(), ROBOT)
+    for step, people in enumerate(walk):
+        tracks, now = at(people, 0.2 * step), 0.2 * step
+        shuffled = list(tracks)
+        order.shuffle(shuffled)
+        expected = one.update(tracks, robot_at(now), now)
+        assert numbers(other.update(iter(shuffled), robot_at(now), now)) == numbers(expected)
+        ids = [obstacle.track_id for obstacle in expected.obstacles]
+        assert ids == sorted(ids)
+
+
+@given(walk=WALK, speed=finite(-1.5, 1.5))
+def test_floor_and_ceiling_hold_for_anyone(
+    walk: list[tuple[PersonTrack, ...]], speed: float
+) -> None:
+    adapter, before = NavAdapter(AwarenessPolicy(), ROBOT), None
+    for step, tracks in enumerate(walk):
+        now = 0.2 * step
+        result = adapter.update(at(tracks, now), robot_at(now, speed_mps=speed), now)
+        assert all(o.radius_m >= FLOOR_M for o in result.obstacles)
+        assert {t.id for t in tracks} <= {o.track_id for o in result.obstacles}
+        assert 0.0 <= result.speed_limit_mps <= ROBOT.max_speed_mps
+        braked = abs(speed) - (0.0 if before is None else now - before)
+        assert result.reachable_speed_limit_mps == max(result.speed_limit_mps, braked)
+        before = now
+
+
+class Own:
+    """A user's policy that gives whatever it was told to."""
+
+    def __init__(
+        self, radius: Callable[[float], float] = lambda _: 0.7, speed: float | None = 1.0
+    ) -> None:
+        self._radius, self._speed = radius, speed
+
+    def radius_m(self, awareness_lower: float) -> float:
+        return self._radius(awareness_lower)
+
+    def human_speed_mps(self, awareness_lower: float) -> float | None:
+        return self._speed
+
+
+@pytest.mark.parametrize("radius", [0.0, -3.0, 0.39, 0.41])
+def test_the_floor_holds_for_any_policy_object(radius: float) -> None:
+    adapter = NavAdapter(AwarenessPolicy(inflation=Own(lambda _: radius)), ROBOT)
+    for now in (0.0, 0.5, 1.0, 5.0):
+        result = adapter.update((person(now, awareness_lower=1.0),), robot_at(now), now)
+        assert result.obstacles[0].radius_m == max(FLOOR_M, radius)
+
+
+@pytest.mark.parametrize(
+    ("policy", "message"),
+    [
+        ({"inflation": Own(lambda _: math.nan)}, r"Own.radius_m\(0\) must be finite, got nan"),
+        ({"inflation": Own(lambda a: 0.5 + a)}, "Own must not grow with awareness, got 0.5 m"),
+        ({"inflation": Own(lambda a: math.inf if a else 1.0)}, "must be finite, got inf"),
+        ({"speed": Own(speed=-0.1)}, r"Own.human_speed_mps\(0\) must lie in \[0, inf\), got -0.1"),
+        ({"speed": Own(speed=None)}, "must be a number, got NoneType"),
+    ],
+)
+def test_own_policies_without_meaning_are_refused_by_name(
+    policy: dict[str, Own], message: str
+) -> None:
+    with pytest.raises(NavError, match=message):
+        NavAdapter(AwarenessPolicy(**policy), ROBOT)
+
+
+def test_a_policy_that_fails_later_leaves_the_adapter_as_it_was() -> None:
+    broken: list[bool] = []
+    own = Own(lambda _: math.nan if broken else 0.7)
+    adapter, twin = (NavAdapter(AwarenessPolicy(inflation=own), ROBOT) for _ in range(2))
+    for one in (adapter, twin):
+        one.update((person(),), robot_at(), 0.0)
+    broken.append(True)
+    with pytest.raises(NavError, match="radius_m"):
+        adapter.update((person(0.1), person(0.1, track_id=2)), robot_at(0.1), 0.1)
+    broken.clear()
+    later = (person(0.2, awareness_lower=1.0),), robot_at(0.2), 0.2
+    assert numbers(adapter.update(*later)) == numbers(twin.update(*later))
+
+
+def test_a_runner_is_faster_than_the_policy_assumes() -> None:
+    def limit(velocity: tuple[float, float], alpha: float) -> float:
+        track = person(position=(5.0, 0.0), velocity=velocity, awareness_lower=alpha)
+        return (
+            NavAdapter(AwarenessPolicy(), ROBOT).update((track,), robot_at(), 0.0).speed_limit_mps
+        )
+
+    for alpha, assumed in ((0.0, 1.6), (1.0, 0.35)):
+        assert limit((0.0, 1.5), alpha) == limit((0.0, 0.0), alpha)
+        running = max_speed_mps(
+            5.0 - 0.3625 - BODY_RADIUS_M,
+            assumed + 1.4,
+            deceleration_mps2=1.0,
+            reaction_time_s=0.3,
+            clearance_m=0.1,
+        )
+        assert limit((0.0, 3.0), alpha) == pytest.approx(min(1.5, float(running)), abs=1e-12)
+
+
+@given(sigma=finite(0.0, 1.0), x=finite(0.5, 6.0))
+def test_uncertainty_costs_room_and_speed(sigma: float, x: float) -> None:
+    def constraints(sigma_m: float) -> NavConstraints:
+        track = person(position=(x, 0.0), sigma_m=sigma_m)
+        return NavAdapter(AwarenessPolicy(), ROBOT).update((track,), robot_at(), 0.0)
+
+    sure, unsure = constraints(0.0), constraints(sigma)
+    assert unsure.obstacles[0].radius_m == pytest.approx(sure.obstacles[0].radius_m + 2 * sigma)
+    limit = max_speed_mps(
+        max(x - 0.3625, 0.0) - BODY_RADIUS_M - 2.0 * sigma,
+        1.6,
+        deceleration_mps2=1.0,
+        reaction_time_s=0.3,
+        clearance_m=0.1,
+    )
+    assert unsure.speed_limit_mps == pytest.approx(min(1.5, float(limit)), abs=1e-9)
+
+
+def test_the_most_uncertain_direction_counts() -> None:
+    axes = np.linalg.qr(np.array([[1.0, 0.3], [0.2, -1.0]]))[0]
+    covariance = np.zeros((4, 4))
+    covariance[:2, :2] = axes @ np.diag([0.01, 0.25]) @ axes.T
+    covariance[2:, 2:] = 0.16 * np.eye(2)
+    track = replace(person(), covariance_odom=0.5 * (covariance + covariance.T))
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    result = adapter.update((track,), robot_at(0.3), 0.3, perception_stamp_s=0.3)
+    sigma = math.sqrt(0.25 + 0.3**2 * 0.16)
+    assert result.obstacles[0].radius_m == pytest.approx(1.0 + 2.0 * sigma)
+
+
+def test_people_are_carried_on_but_never_out_of_the_way() -> None:
+    """A person last seen walking away may have turned round: the robot gains no speed by it."""
+
+    def constraints(vx: float, now: float) -> NavConstraints:
+        adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+        return adapter.update(
+            (person(velocity=(vx, 0.0)),), robot_at(now), now, perception_stamp_s=now
+        )
+
+    leaving, standing, coming = (constraints(vx, 0.2) for vx in (1.0, 0.0, -1.0))
+    np.testing.assert_allclose(leaving.obstacles[0].center_odom_m, [3.2, 0.0])
+    assert leaving.speed_limit_mps == standing.speed_limit_mps
+    assert coming.speed_limit_mps < standing.speed_limit_mps
+    assert standing.speed_limit_mps < constraints(0.0, 0.0).speed_limit_mps
+
+
+def test_an_older_robot_state_counts_the_way_driven_since() -> None:
+    def limit(speed: float, age: float) -> float:
+        adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+        return adapter.update(
+            (person(1.0),), robot_at(1.0 - age, speed_mps=speed), 1.0
+        ).speed_limit_mps
+
+    assert limit(0.0, 0.3) == limit(0.0, 0.0)
+    assert limit(1.0, 0.3) < limit(1.0, 0.1) < limit(1.0, 0.0)
+
+
+BAD_UPDATES: list[tuple[Callable[[], dict[str, object]], str]] = [
+    (lambda: {"tracks": [person(0.5), "person"]}, r"tracks\[1\] must be a PersonTrack, got str"),
+    (lambda: {"tracks": None}, "tracks must be an iterable of PersonTrack, got NoneType"),
+    (lambda: {"tracks": [person(0.5), person(0.5)]}, "distinct ids, got id 1 twice"),
+    (lambda: {"tracks": [person(0.6)]}, r"tracks\[0\].stamp_s must not lie after stamp_s"),
+    (lambda: {"robot_state": None}, "robot_state must be a RobotState, got NoneType"),
+    (lambda: {"robot_state": robot_at(0.7)}, "robot_state.stamp_s must not lie after stamp_s"),
+    (lambda: {"stamp_s": math.nan}, "stamp_s must be finite, got nan"),
+    (lambda: {"stamp_s": math.inf}, "stamp_s must be finite, got inf"),
+    (lambda: {"stamp_s": "now"}, "stamp_s must be a number, got str"),
+    (lambda: {"stamp_s": 0.1}, "must not go backward, got 0.100000 s after 0.400000 s"),
+    (lambda: {"perception_stamp_s": math.nan}, "perception_stamp_s must be finite"),
+    (lambda: {"perception_stamp_s": 0.8}, "perception_stamp_s must not lie after stamp_s"),
+]
+
+
+@pytest.mark.parametrize(("bad", "message"), BAD_UPDATES)
+def test_refused_input_leaves_no_trace(bad: Callable[[], dict[str, object]], message: str) -> None:
+    adapter, twin = (NavAdapter(AwarenessPolicy(), ROBOT) for _ in range(2))
+
+    def scene(now: float) -> dict[str, object]:
+        return {
+            "tracks": (person(now, awareness_lower=0.9), person(now, track_id=4)),
+            "robot_state": robot_at(now, speed_mps=0.5),
+            "stamp_s": now,
+        }
+
+    for now in (0.0, 0.2, 0.4):
+        adapter.update(**scene(now))
+        twin.update(**scene(now))
+    with pytest.raises(NavError, match=message):
+        adapter.update(**(scene(0.5) | bad()))
+    for now in (0.5, 0.6):
+        assert numbers(adapter.update(**scene(now))) == numbers(twin.update(**scene(now)))
+
+
+def test_wrong_constructor_arguments_are_refused() -> None:
+    with pytest.raises(NavError, match="policy must be an AwarenessPolicy, got dict"):
+        NavAdapter({}, ROBOT)
+    with pytest.raises(NavError, match="robot must be a RobotProfile, got tuple"):
+        NavAdapter(AwarenessPolicy(), ())
+
+
+@pytest.mark.parametrize("alpha", [0.0, 1.0])
+def test_a_robot_that_obeys_stands_before_an_approaching_person_arrives(alpha: float) -> None:
+    """The loop closed: the person walks at the assumed speed, the drive follows the limit.
+
+    The drive acts on constraints that are one period old, up to a whole period later, and brakes no
+    harder than the profile says. Both delays together lie within the reaction time.
+    """
+    period, policy = 0.05, AwarenessPolicy()
+    human = policy.speed.human_speed_mps(alpha)
+    for start_m in (1.5, 2.0, 4.0, 7.0, 11.0):
+        adapter, now, x, worker = NavAdapter(policy, ROBOT), 0.0, 0.0, start_m
+        speed = command = math.inf
+        while speed > 0.0:
+            separation = worker - x - 0.3625 - BODY_RADIUS_M
+            assert separation > 0.0
+            track = person(
+                now, position=(worker, 0.0), velocity=(-human, 0.0), awareness_lower=alpha
+            )
+            state = robot_at(now, position=(x, 0.0), speed_mps=min(speed, 1.5))
+            limit = adapter.update((track,), state, now).speed_limit_mps
+            if speed == math.inf:
+                speed = command = limit
+            after = max(command, speed - ROBOT.max_deceleration_mps2 * period)
+            x += 0.5 * (speed + after) * period
+            worker -= human * period
+            speed, command, now = after, limit, now + period

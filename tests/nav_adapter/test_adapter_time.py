@@ -1,0 +1,255 @@
+"""What the adapter does as time passes: shrinking, losing the camera, holding, staleness."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from nav_scenes import FLOOR_M, ROBOT, crowds, finite, person, robot_at
+
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints
+from tracking import PersonTrack
+
+PERIOD_S = 0.05
+RATE_MPS = AwarenessPolicy().timing.shrink_rate_mps
+
+
+def watch(adapter: NavAdapter, seconds: float, *, start_s: float = 0.0) -> list[NavConstraints]:
+    """An attentive person in full view at 20 Hz."""
+    results = []
+    for step in range(round(seconds / PERIOD_S)):
+        now = start_s + step * PERIOD_S
+        results.append(adapter.update((person(now, awareness_lower=1.0),), robot_at(now), now))
+    return results
+
+
+def radius(constraints: NavConstraints) -> float:
+    (obstacle,) = constraints.obstacles
+    return obstacle.radius_m
+
+
+def test_a_person_starts_large_and_shrinks_at_the_bounded_rate() -> None:
+    radii = [radius(result) for result in watch(NavAdapter(AwarenessPolicy(), ROBOT), 2.0)]
+    assert radii[0] == 1.0
+    steps = [before - after for before, after in pairwise(radii)]
+    assert max(steps) <= RATE_MPS * PERIOD_S + 1e-9
+    assert radii[10] == pytest.approx(1.0 - RATE_MPS * 0.5)
+    assert radii[-1] == pytest.approx(0.45)
+
+
+def test_growth_is_instant() -> None:
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    watch(adapter, 2.0)
+    result = adapter.update((person(2.0, awareness_lower=0.0),), robot_at(2.0), 2.0)
+    assert radius(result) == 1.0
+
+
+@pytest.mark.parametrize("control_period_s", [0.01, 0.03, 0.1, 0.2])
+def test_shrinking_follows_the_clock_not_the_number_of_updates(control_period_s: float) -> None:
+    """A 20 Hz camera and a control loop of another rate: the same radius after the same time."""
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    for step in range(round(0.6 / control_period_s) + 1):
+        now = step * control_period_s
+        frame = PERIOD_S * int(now / PERIOD_S + 1e-9)
+        result = adapter.update((person(frame, awareness_lower=1.0),), robot_at(now), now)
+    assert radius(result) == pytest.approx(1.0 - RATE_MPS * 0.6, abs=RATE_MPS * PERIOD_S)
+
+
+Loss = Callable[[float, float], PersonTrack]
+
+LOSSES: dict[str, Loss] = {
+    # The tracker is asked to predict, or is updated with empty frames, or nobody asks it.
+    "predicted": lambda lost, now: person(
+        now, status="confirmed", awareness_lower=1.0, unseen_s=now - lost
+    ),
+    "coasting": lambda lost, now: person(
+        now, status="coasting", awareness_lower=1.0, unseen_s=now - lost
+    ),
+    "repeated": lambda lost, now: person(lost, awareness_lower=1.0),
+}
+
+
+@pytest.mark.parametrize("seen_s", [0.05, 0.4, 3.0])
+@pytest.mark.parametrize("loss", LOSSES.values(), ids=LOSSES)
+@pytest.mark.parametrize("period_s", [0.01, 0.05, 0.3])
+def test_losing_the_camera_never_shrinks_a_radius(
+    loss: Loss, seen_s: float, period_s: float
+) -> None:
+    """Also not in the middle of a shrink, and not in the first moments after the loss."""
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    before = watch(adapter, seen_s)[-1]
+    lost = before.stamp_s
+    for step in range(1, round(1.0 / period_s) + 1):
+        now = lost + step * period_s
+        after = adapter.update((loss(lost, now),), robot_at(now), now)
+        assert radius(after) >= radius(before)
+        assert after.speed_limit_mps <= before.speed_limit_mps + 1e-12
+        before = after
+    assert radius(before) == 1.0
+    assert before.obstacles[0].awareness_lower == 0.0
+
+
+@given(
+    walk=st.lists(
+        st.tuples(
+            st.sampled_from([0.0, 0.01, 0.05, 0.3, 2.0]),
+            st.sampled_from([None, "frame", "repeat", *LOSSES]),
+            finite(0.0, 1.0),
+            finite(0.0, 0.2),
+            st.sampled_from(["tentative", "confirmed", "coasting"]),
+        ),
+        max_size=20,
+    )
+)
+def test_a_radius_shrinks_only_by_what_new_frames_pay_for(
+    walk: list[tuple[float, str | None, float, float, str]],
+) -> None:
+    """Any sequence of frames, repeats, predictions and disappearances."""
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    now, frame, before = 0.0, 0.0, None
+    latest = person()
+    for dt, event, alpha, sigma, status in walk:
+        now, previous = now + dt, frame
+        if event == "frame":
+            frame = now
+            latest = person(now, status=status, awareness_lower=alpha, sigma_m=sigma)
+        elif event in LOSSES:
+            latest = LOSSES[event](frame, now)
+        tracks = () if event is None else (latest,)
+        result = adapter.update(tracks, robot_at(now), now)
+        if not result.obstacles:
+            before = None
+            continue
+        (after,) = result.obstacles
+        assert after.radius_m >= FLOOR_M
+        if before is not None:
+            paid = RATE_MPS * (frame - previous) if latest.status == "confirmed" else 0.0
+            # Frames that came while the track was absent count once, when it is back.
+            assert after.radius_m >= before.radius_m - paid - 1e-9
+            if frame == previous:
+                assert after.radius_m >= before.radius_m
+                assert after.awareness_lower <= before.awareness_lower
+        before = after
+
+
+@pytest.mark.parametrize(
+    ("changes", "trusted"),
+    [
+        ({}, True),
+        ({"status": "coasting", "time_since_seen_s": 0.2}, True),
+        ({"status": "coasting", "time_since_seen_s": 0.3}, False),
+        ({"status": "confirmed", "time_since_seen_s": 0.3}, False),
+        ({"status": "tentative"}, False),
+    ],
+)
+def test_whose_awareness_counts(changes: dict[str, object], trusted: bool) -> None:
+    track = replace(person(awareness_lower=1.0), **changes)
+    result = NavAdapter(AwarenessPolicy(), ROBOT).update((track,), robot_at(), 0.0)
+    unaware = NavAdapter(AwarenessPolicy(), ROBOT).update((person(),), robot_at(), 0.0)
+    assert result.obstacles[0].awareness_lower == (1.0 if trusted else 0.0)
+    assert (result.speed_limit_mps > unaware.speed_limit_mps) is trusted
+
+
+def test_a_confirmed_person_who_vanishes_is_held_unaware_and_moving() -> None:
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    for step in range(41):
+        now = step * PERIOD_S
+        track = person(now, position=(3.0, now), velocity=(0.0, 1.0), awareness_lower=1.0)
+        seen = adapter.update((track,), robot_at(now), now)
+    assert seen.obstacles[0].radius_m == pytest.approx(0.45)
+    for gone_s in (0.1, 0.5, 0.99):
+        now = 2.0 + gone_s
+        held = adapter.update((), robot_at(now), now)
+        (obstacle,) = held.obstacles
+        assert obstacle.center_odom_m == pytest.approx([3.0, now])
+        assert obstacle.radius_m == 1.0
+        assert obstacle.awareness_lower == 0.0
+        assert held.speed_limit_mps < seen.speed_limit_mps
+        assert held.limited_by == "track 1: speed and separation"
+    assert adapter.update((), robot_at(3.01), 3.01).obstacles == ()
+
+
+def test_a_person_who_is_back_goes_on_from_the_radius_held() -> None:
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    watch(adapter, 2.0)
+    adapter.update((), robot_at(2.3), 2.3)
+    back = adapter.update((person(2.6, awareness_lower=1.0),), robot_at(2.6), 2.6)
+    # The absence pays for no more than the time for which a sighting counts as fresh.
+    assert radius(back) == pytest.approx(1.0 - RATE_MPS * 0.25)
+
+
+def test_a_tentative_or_long_unseen_person_is_let_go_at_once() -> None:
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    tracks = (
+        person(status="tentative"),
+        person(track_id=2, status="coasting", unseen_s=0.95),
+        person(track_id=3),
+    )
+    adapter.update(tracks, robot_at(), 0.0)
+    result = adapter.update((), robot_at(0.1), 0.1)
+    assert [obstacle.track_id for obstacle in result.obstacles] == [3]
+
+
+@given(tracks=crowds(), perception_age=finite(0.0, 3.0), robot_age=finite(0.0, 3.0))
+def test_old_data_are_never_looser_than_fresh_ones(
+    tracks: tuple[PersonTrack, ...], perception_age: float, robot_age: float
+) -> None:
+    def constraints(perception_age_s: float, robot_age_s: float) -> NavConstraints:
+        adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+        state = robot_at(-robot_age_s, speed_mps=0.8)
+        return adapter.update(tracks, state, 0.0, perception_stamp_s=-perception_age_s)
+
+    fresh, old = constraints(0.0, 0.0), constraints(perception_age, robot_age)
+    age = max(perception_age, robot_age)
+    assert old.stale is (age > 0.5)
+    assert old.speed_limit_mps <= fresh.speed_limit_mps
+    for a, b in zip(fresh.obstacles, old.obstacles, strict=True):
+        assert b.radius_m >= a.radius_m
+        assert b.awareness_lower <= a.awareness_lower
+        assert b.awareness_lower == 0.0 or not old.stale
+    if age > 1.5:
+        assert old.speed_limit_mps == 0.0
+        assert old.limited_by.startswith("stale data: ")
+        assert f"{age:.2f} s old" in old.limited_by or min(perception_age, robot_age) > 1.5
+
+
+def test_the_newest_track_stands_in_for_the_stamp_of_perception() -> None:
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    tracks = (person(0.0, awareness_lower=1.0), person(0.3, track_id=2, awareness_lower=1.0))
+    assert not adapter.update(tracks, robot_at(0.7), 0.7).stale
+    assert adapter.update(tracks, robot_at(0.81), 0.81).stale
+    stopped = adapter.update(tracks, robot_at(1.81), 1.81)
+    assert (stopped.speed_limit_mps, stopped.stale) == (0.0, True)
+    assert stopped.limited_by == "stale data: perception is 1.51 s old"
+
+
+def test_a_dead_camera_stops_a_robot_that_saw_nobody() -> None:
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    assert adapter.update((), robot_at(), 0.0, perception_stamp_s=0.0).speed_limit_mps == 1.5
+    result = adapter.update((), robot_at(2.0), 2.0, perception_stamp_s=0.0)
+    assert (result.speed_limit_mps, result.stale) == (0.0, True)
+
+
+def test_the_limit_for_a_braking_robot_falls_no_faster_than_it_can_brake() -> None:
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    adapter.update((), robot_at(speed_mps=1.2), 0.0)
+    close = person(0.1, position=(1.0, 0.0))
+    result = adapter.update((close,), robot_at(0.1, speed_mps=1.2), 0.1)
+    assert result.speed_limit_mps == 0.0
+    assert result.reachable_speed_limit_mps == pytest.approx(1.2 - 0.1)
+
+
+def test_memory_is_bounded_by_the_people_about() -> None:
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    for step in range(400):
+        now = step * 0.1
+        result = adapter.update((person(now, track_id=step),), robot_at(now), now)
+        # The one in view and those of the last second.
+        assert len(result.obstacles) <= 12
+    later = now + 1.5
+    assert adapter.update((), robot_at(later), later).obstacles == ()
+    assert adapter._people == {}

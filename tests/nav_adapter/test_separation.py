@@ -1,0 +1,117 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from nav_scenes import finite
+from scipy.optimize import brentq
+
+from nav_adapter import NavError, max_speed_mps, protective_separation_m
+
+SETTINGS = {
+    "deceleration_mps2": finite(0.2, 4.0),
+    "reaction_time_s": finite(0.0, 1.5),
+    "clearance_m": finite(0.0, 1.0),
+}
+
+
+def test_published_figures() -> None:
+    limits = max_speed_mps(
+        [1.0, 2.0, 3.0, 5.0], 1.6, deceleration_mps2=1.0, reaction_time_s=0.3, clearance_m=0.1
+    )
+    np.testing.assert_allclose(limits, [0.21, 0.64, 1.01, 1.63], atol=0.005)
+
+
+@given(separation=finite(0.0, 30.0), human=finite(0.0, 3.0), **SETTINGS)
+def test_speed_is_the_root_of_the_protective_separation(
+    separation: float,
+    human: float,
+    deceleration_mps2: float,
+    reaction_time_s: float,
+    clearance_m: float,
+) -> None:
+    settings = {
+        "deceleration_mps2": deceleration_mps2,
+        "reaction_time_s": reaction_time_s,
+        "clearance_m": clearance_m,
+    }
+
+    def spare(speed: float) -> float:
+        return separation - float(protective_separation_m(speed, human, **settings))
+
+    speed = float(max_speed_mps(separation, human, **settings))
+    if spare(0.0) <= 0.0:
+        assert speed == 0.0
+    else:
+        assert speed == pytest.approx(brentq(spare, 0.0, 100.0, xtol=1e-13), abs=1e-9)
+
+
+@given(low=finite(-1.0, 20.0), more=finite(0.0, 5.0), human=finite(0.0, 3.0), **SETTINGS)
+def test_farther_is_never_slower_and_a_faster_person_never_lets_the_robot_go_faster(
+    low: float, more: float, human: float, **settings: float
+) -> None:
+    assert max_speed_mps(low + more, human, **settings) >= max_speed_mps(low, human, **settings)
+    # Two roots of nearly equal size may differ by rounding.
+    assert (
+        max_speed_mps(low, human + more, **settings)
+        <= max_speed_mps(low, human, **settings) + 1e-12
+    )
+
+
+def test_broadcasts_and_stops_where_it_must() -> None:
+    limits = max_speed_mps(
+        np.array([[-1.0], [0.58], [np.nan], [4.0]]),
+        np.array([1.6, 0.3]),
+        deceleration_mps2=1.0,
+        reaction_time_s=0.3,
+        clearance_m=0.1,
+    )
+    assert limits.shape == (4, 2)
+    assert limits[0].tolist() == [0.0, 0.0]
+    assert limits[1, 0] == 0.0
+    assert limits[1, 1] > 0.0
+    assert limits[2].tolist() == [0.0, 0.0]
+    assert (limits[3] > 0.0).all()
+
+
+@pytest.mark.parametrize("deceleration", [0.0, -1.0, float("nan")])
+def test_a_robot_that_cannot_brake_is_refused(deceleration: float) -> None:
+    rest = {"deceleration_mps2": deceleration, "reaction_time_s": 0.3, "clearance_m": 0.1}
+    with pytest.raises(NavError, match="deceleration_mps2 must be > 0 m/s²"):
+        max_speed_mps(3.0, 1.6, **rest)
+    with pytest.raises(NavError, match="deceleration_mps2"):
+        protective_separation_m(1.0, 1.6, **rest)
+
+
+def test_a_robot_at_the_limit_stands_before_contact() -> None:
+    """Stepwise motion, no formula: a person walks at the robot, which reacts and then brakes."""
+    separation, human, deceleration, reaction = (
+        axis.ravel()
+        for axis in np.meshgrid(
+            np.linspace(0.2, 8.0, 27),
+            np.linspace(0.0, 2.4, 7),
+            [0.5, 1.0, 2.5],
+            [0.0, 0.3, 0.8],
+            indexing="ij",
+        )
+    )
+    clearance = 0.1
+    start = max_speed_mps(
+        separation,
+        human,
+        deceleration_mps2=deceleration,
+        reaction_time_s=reaction,
+        clearance_m=clearance,
+    )
+    moving = start > 0.0
+    assert moving.mean() > 0.7
+
+    dt, gap, speed, t = 1e-3, separation.copy(), start.copy(), 0.0
+    while (speed[moving] > 0.0).any():
+        braking = t >= reaction - 1e-9
+        after = np.where(braking, np.maximum(speed - deceleration * dt, 0.0), speed)
+        # A standing robot is no longer the one who makes contact.
+        gap -= np.where(speed > 0.0, (0.5 * (speed + after) + human) * dt, 0.0)
+        speed, t = after, t + dt
+    # Never nearer than the clearance, and no farther either: the limit wastes nothing.
+    np.testing.assert_allclose(gap[moving], clearance, atol=5.0 * dt)
