@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from . import layouts as kp
 from ._camera import Camera
@@ -21,6 +22,8 @@ CHEST_FRACTION: Final = 0.3
 # A box says little about depth: people stoop, sit and are cut off.
 _BOX_DEPTH_RELATIVE_STD: Final = 0.25
 _MIN_POINTS: Final = 3
+# How far shoulders lie from the mid-hip of people who stand, stoop or sit.
+_SHOULDER_REACH_M: Final = (0.25, 0.80)
 # What lifting leaves uncertain of the chest within the body: 45 mm a keypoint, averaged over four.
 _LIFT_STD_M: Final = 0.025
 _UP_CAMERA: Final = np.array([0.0, -1.0, 0.0])
@@ -31,13 +34,15 @@ class BodyPlacement:
     """A person's metric keypoints in the camera frame.
 
     Attributes:
-        points_camera_m: (17, 3) COCO keypoints; rows of unseen ones are NaN.
+        shoulders_camera_m: (2, 3) left and right, or None when the skeleton does not tell.
+        hips_camera_m: (3,) their midpoint.
         position_camera_m: (3,) the body's centre line at chest height.
         position_covariance_m2: (3, 3).
         scale_relative_std: the part of the range that scale leaves uncertain.
     """
 
-    points_camera_m: FloatArray
+    shoulders_camera_m: FloatArray | None
+    hips_camera_m: FloatArray
     position_camera_m: FloatArray
     position_covariance_m2: FloatArray
     scale_relative_std: float
@@ -68,13 +73,19 @@ def place_body(
     if solved is None:
         return None
     translation, covariance = solved
-    placed = np.full((17, 3), np.nan)
-    placed[rows] = points + translation
-    chest = _chest(placed)
-    if chest is None or chest[2] <= 0.0:
+    skeleton = scale.factor * person.keypoints_root_m[:17]
+    seen = person.scores[:17] >= min_score
+    hips = translation + _hips(skeleton, seen)
+    shoulders = _shoulders(skeleton, seen)
+    if shoulders is None:
+        chest = hips + (1.0 - CHEST_FRACTION) * _TORSO_M * _UP_CAMERA
+    else:
+        shoulders = shoulders + translation
+        chest = (1.0 - CHEST_FRACTION) * shoulders.mean(axis=0) + CHEST_FRACTION * hips
+    if chest[2] <= 0.0:
         return None
     covariance += scale.relative_std**2 * np.outer(chest, chest) + _LIFT_STD_M**2 * np.eye(3)
-    return BodyPlacement(placed, chest, covariance, scale.relative_std)
+    return BodyPlacement(shoulders, hips, chest, covariance, scale.relative_std)
 
 
 def _translation(
@@ -115,22 +126,23 @@ def _translation(
     return translation, variance * np.linalg.inv(information)
 
 
-def _pair(placed: FloatArray, first: int, second: int) -> FloatArray | None:
-    """Midpoint of two keypoints, or the one that was seen, or None."""
-    seen = [row for row in (first, second) if not math.isnan(placed[row, 0])]
-    return np.asarray(placed[seen].mean(axis=0)) if seen else None
+def _hips(skeleton: FloatArray, seen: NDArray[np.bool_]) -> FloatArray:
+    """Midpoint of the hips relative to the root, which it is by definition."""
+    hips = [kp.LEFT_HIP, kp.RIGHT_HIP]
+    return np.asarray(skeleton[hips].mean(axis=0)) if seen[hips].all() else np.zeros(3)
 
 
-def _chest(placed: FloatArray) -> FloatArray | None:
-    shoulders = _pair(placed, kp.LEFT_SHOULDER, kp.RIGHT_SHOULDER)
-    hips = _pair(placed, kp.LEFT_HIP, kp.RIGHT_HIP)
-    if shoulders is not None and hips is not None:
-        return (1.0 - CHEST_FRACTION) * shoulders + CHEST_FRACTION * hips
-    if shoulders is not None:
-        return np.asarray(shoulders - CHEST_FRACTION * _TORSO_M * _UP_CAMERA)
-    if hips is not None:
-        return np.asarray(hips + (1.0 - CHEST_FRACTION) * _TORSO_M * _UP_CAMERA)
-    return None
+def _shoulders(skeleton: FloatArray, seen: NDArray[np.bool_]) -> FloatArray | None:
+    """(2, 3) shoulders relative to the root.
+
+    In a profile one shoulder hides the other, yet a lifting network says where it is; that is
+    believed when it lies where a shoulder can be.
+    """
+    shoulders = skeleton[[kp.LEFT_SHOULDER, kp.RIGHT_SHOULDER]]
+    reach = np.linalg.norm(shoulders, axis=1)
+    low, high = _SHOULDER_REACH_M
+    usable = seen[[kp.LEFT_SHOULDER, kp.RIGHT_SHOULDER]] | ((reach > low) & (reach < high))
+    return shoulders if usable.all() else None
 
 
 def place_box(camera: Camera, box_xyxy_px: FloatArray) -> tuple[FloatArray, FloatArray] | None:

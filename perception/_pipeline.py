@@ -138,9 +138,12 @@ class AwarenessPipeline:
         self, detection: PersonDetection, person: PersonKeypoints
     ) -> tuple[FloatArray | None, FloatArray | None]:
         body = place_body(self.camera, person, self._std_px, self._min_score)
-        if body is not None:
-            return body.position_camera_m, body.position_covariance_m2
         boxed = place_box(self.camera, detection.box_xyxy_px)
+        if body is not None:
+            placed = body.position_camera_m, body.position_covariance_m2
+            # An arm at the image border says less about the range than the height of its box.
+            if boxed is None or np.trace(placed[1]) <= np.trace(boxed[1]):
+                return placed
         return (None, None) if boxed is None else boxed
 
     def _check_image(self, image_rgb: Any) -> None:

@@ -16,7 +16,7 @@ from ._head_frame import lifted_head_model
 from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
 from ._metric_scale import DEFAULT_MIN_SCORE, metric_scale
-from ._pose_refinement import HeadPrior, RefinedPose, refine, rotation_exp
+from ._pose_refinement import HeadPrior, RefinedPose, refine, rotation_exp, rotation_log
 from .anthropometry import HEAD_KEYPOINTS, HEAD_TEMPLATE_M
 from .arrays import FloatArray, finite_number
 
@@ -48,6 +48,10 @@ _SIGHT_LIMIT: Final = np.array([_FACE_LIMIT, _FACE_LIMIT, _FACE_LIMIT, _EAR_LIMI
 _MIN_SPREAD_STD: Final = 3.0
 # Residuals that pixel noise of the stated size produces once in a hundred poses.
 _FIT_QUANTILE: Final = {1: 6.6, 2: 9.2, 3: 11.3, 4: 13.3, 5: 15.1, 6: 16.8}
+# Poses that fit worse than the best by more than this are not answers any more.
+_MODE_CUTOFF_CHI2: Final = 16.0
+# Local optima closer than this to each other are one.
+_SAME_MODE_COSINE: Final = math.cos(math.radians(8.0))
 _MAX_ROTATION_STD_RAD: Final = math.radians(100.0)
 
 
@@ -119,8 +123,8 @@ class PnpHeadPoseEstimator:
         if starts is None:
             return None
         poses = refine(points, rays, focal, self._std_px, *starts, prior)
-        best = _choose(poses, points, seen, face_only=prior is None)
-        return None if best is None else self._finish(best, len(rows), prior is not None)
+        costs = _costs(poses, points, seen, face_only=prior is None)
+        return self._finish(costs, len(rows), prior is not None) if costs else None
 
     def _model(self, person: PersonKeypoints, seen: Any) -> FloatArray | None:
         if self._head_model == "template":
@@ -136,7 +140,10 @@ class PnpHeadPoseEstimator:
         except PerceptionError:
             return None
 
-    def _finish(self, pose: RefinedPose, points: int, with_prior: bool) -> HeadPose | None:
+    def _finish(
+        self, costs: list[tuple[float, RefinedPose]], points: int, with_prior: bool
+    ) -> HeadPose | None:
+        pose = costs[0][1]
         try:
             covariance = np.linalg.inv(pose.information)
         except np.linalg.LinAlgError:
@@ -145,7 +152,7 @@ class PnpHeadPoseEstimator:
         degrees = 2 * points - (0 if with_prior else 6)
         if degrees > 0 and squared > _FIT_QUANTILE[min(degrees, 6)]:
             covariance = covariance * (squared / degrees)
-        covariance = 0.5 * (covariance + covariance.T)
+        covariance = 0.5 * (covariance + covariance.T) + _spread_of_modes(costs)
         largest = float(np.linalg.eigvalsh(covariance[:3, :3])[-1])
         if not np.isfinite(covariance).all() or largest > _MAX_ROTATION_STD_RAD**2:
             return None
@@ -232,14 +239,11 @@ def _body_prior(
 
 def _torso_axes(body: BodyPlacement) -> tuple[FloatArray, FloatArray] | None:
     """(3, 3) forward, left, up as columns in the camera frame, and the neck (3,)."""
-    points = body.points_camera_m
-    shoulders = points[[kp.LEFT_SHOULDER, kp.RIGHT_SHOULDER]]
-    if np.isnan(shoulders).any():
+    shoulders = body.shoulders_camera_m
+    if shoulders is None:
         return None
     neck = shoulders.mean(axis=0)
-    hips = points[[kp.LEFT_HIP, kp.RIGHT_HIP]].mean(axis=0)
-    up = np.array([0.0, -1.0, 0.0]) if np.isnan(hips).any() else neck - hips
-    left = shoulders[0] - shoulders[1]
+    up, left = neck - body.hips_camera_m, shoulders[0] - shoulders[1]
     forward = np.cross(left, up)
     length = float(np.linalg.norm(forward))
     if length < 1e-6:
@@ -256,11 +260,15 @@ def _prior_starts(prior: HeadPrior) -> tuple[FloatArray, FloatArray]:
     return rotations, prior.pivot_camera_m - rotations @ prior.pivot_head_m
 
 
-def _choose(
+def _costs(
     poses: list[RefinedPose], points: FloatArray, seen: Any, *, face_only: bool
-) -> RefinedPose | None:
-    """The pose that fits best, counting which keypoints the camera should have seen."""
-    best, lowest = None, math.inf
+) -> list[tuple[float, RefinedPose]]:
+    """The poses in front of the camera with what each costs, cheapest first.
+
+    The cost is χ² of the fit and of the prior, and a charge for every keypoint that the camera
+    should have seen and did not, or the reverse.
+    """
+    costs = []
     for pose in poses:
         depth = points @ pose.rotation[2] + pose.translation_m[2]
         if depth.min() <= 0.0:
@@ -273,6 +281,30 @@ def _choose(
         if face_only and pose.rotation[1, 0] < 0.0:
             # Upside down to the camera: possible, but not for somebody on their feet.
             cost += _VISIBILITY_COST
-        if cost < lowest:
-            best, lowest = pose, cost
-    return best
+        costs.append((cost, pose))
+    return sorted(costs, key=lambda pair: pair[0])
+
+
+def _spread_of_modes(costs: list[tuple[float, RefinedPose]]) -> FloatArray:
+    """(6, 6) second moment about the best pose of the other poses that fit almost as well.
+
+    Each mode weighs exp(−Δχ²/2). Where the image allows two answers the covariance says so, and an
+    α that could be 0 or 0.8 is not reported as a sure 0.8.
+    """
+    lowest, best = costs[0]
+    modes: list[RefinedPose] = [best]
+    spread = np.zeros((6, 6))
+    total = 1.0
+    for cost, pose in costs[1:]:
+        if cost - lowest > _MODE_CUTOFF_CHI2:
+            break
+        cosines = [0.5 * (np.sum(pose.rotation * mode.rotation) - 1.0) for mode in modes]
+        if max(cosines) > _SAME_MODE_COSINE:
+            continue
+        modes.append(pose)
+        turn = rotation_log(pose.rotation @ best.rotation.T)
+        away = np.concatenate([turn, pose.translation_m - best.translation_m])
+        weight = math.exp(-0.5 * (cost - lowest))
+        spread += weight * np.outer(away, away)
+        total += weight
+    return spread / total

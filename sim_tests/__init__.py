@@ -1,1 +1,55 @@
-"""Closed-loop crossings of a mobile robot and people in PyBullet."""
+"""Closed-loop crossings of a mobile robot and people in PyBullet.
+
+Needs the extra ``awarenav[sim]``; names are imported when they are first used, so that the command
+line can say so where it is missing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ._amr import NOVA_CARTER
+    from ._crossing import CrossingFrame, CrossingResult, StraightOn, run_crossing
+    from ._errors import SimError
+    from ._keypoint_camera import KeypointNoise
+    from ._planner import LocalPlanner, SamplingPlanner
+    from ._renderer import CameraRenderer
+    from ._scenario import Scenario, shipped_scenarios
+
+__all__ = [
+    "NOVA_CARTER",
+    "CameraRenderer",
+    "CrossingFrame",
+    "CrossingResult",
+    "KeypointNoise",
+    "LocalPlanner",
+    "SamplingPlanner",
+    "Scenario",
+    "SimError",
+    "StraightOn",
+    "run_crossing",
+    "shipped_scenarios",
+]
+
+_HOMES = {
+    "NOVA_CARTER": "_amr",
+    "CameraRenderer": "_renderer",
+    "CrossingFrame": "_crossing",
+    "CrossingResult": "_crossing",
+    "KeypointNoise": "_keypoint_camera",
+    "LocalPlanner": "_planner",
+    "SamplingPlanner": "_planner",
+    "Scenario": "_scenario",
+    "SimError": "_errors",
+    "StraightOn": "_crossing",
+    "run_crossing": "_crossing",
+    "shipped_scenarios": "_scenario",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f".{_HOMES[name]}", __name__), name)

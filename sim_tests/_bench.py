@@ -1,0 +1,130 @@
+"""Measures how fast crossings run, against real time and against bare physics in the same run."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Literal
+
+from ._crossing import run_crossing
+from ._errors import SimError
+from ._layout import WarehouseLayout
+from ._scenario import Scenario
+from ._warehouse import Warehouse
+
+Direction = Literal["higher", "lower"]
+
+
+@dataclass(frozen=True, slots=True)
+class Metric:
+    """One measured figure.
+
+    Attributes:
+        name: unique in a baseline.
+        value: measured.
+        unit: of the value.
+        direction: which way is better.
+        tolerance: relative worsening against the baseline that still counts as equal.
+    """
+
+    name: str
+    value: float
+    unit: str
+    direction: Direction
+    tolerance: float
+
+    def is_worse_than(self, baseline: Metric) -> bool:
+        """True when the value is worse than the baseline by more than its tolerance."""
+        if baseline.direction == "higher":
+            return self.value < baseline.value * (1.0 - baseline.tolerance)
+        return self.value > baseline.value * (1.0 + baseline.tolerance)
+
+
+def measure(repeats: int = 3) -> tuple[Metric, ...]:
+    """Time crossings on this machine; the best of ``repeats`` counts, since noise only slows.
+
+    A peer runs in the same process: PyBullet stepping the empty hall, which no crossing can beat.
+    """
+    physics = min(_time_bare_physics() for _ in range(repeats))
+    names = ("crossing_attentive", "crossing_distracted")
+    truth = min((_time_runs(names, "truth") for _ in range(repeats)), key=lambda run: run[1])
+    encounter = min(
+        (_time_runs(("paper_encounter",), "truth") for _ in range(repeats)), key=lambda run: run[1]
+    )
+    keypoints = _time_runs(names, "keypoints")
+    return (
+        _factor("crossing_truth_real_time_factor", truth),
+        Metric(
+            "crossing_truth_cost_over_bare_physics",
+            truth[1] / truth[0] / physics,
+            "x",
+            "lower",
+            0.5,
+        ),
+        _factor("encounter_60hz_truth_real_time_factor", encounter),
+        _factor("crossing_keypoints_real_time_factor", keypoints),
+    )
+
+
+def _factor(name: str, run: tuple[float, float]) -> Metric:
+    # A bare speed depends on the machine; the wide tolerance only catches a change of kind.
+    return Metric(name, run[0] / run[1], "x real time", "higher", 0.6)
+
+
+def _time_bare_physics() -> float:
+    """Wall seconds a simulated second for the empty hall."""
+    with Warehouse(WarehouseLayout.crossing()) as warehouse:
+        steps = round(5.0 / warehouse.physics_dt_s)
+        start = time.perf_counter()
+        for _ in range(steps):
+            warehouse.step()
+        return (time.perf_counter() - start) / 5.0
+
+
+def _time_runs(names: Iterable[str], perception: str) -> tuple[float, float]:
+    """Simulated and wall seconds of the named crossings, loading the world included."""
+    simulated = 0.0
+    start = time.perf_counter()
+    for name in names:
+        result = run_crossing(Scenario.shipped(name), policy="balanced", perception=perception)
+        simulated += result.duration_s
+    return simulated, time.perf_counter() - start
+
+
+def write_baseline(path: Path, metrics: Iterable[Metric]) -> None:
+    """Write metrics as a baseline; the file appears whole or not at all."""
+    partial = path.with_name(path.name + ".part")
+    text = json.dumps({"metrics": [asdict(metric) for metric in metrics]}, indent=2)
+    partial.write_text(text + "\n", encoding="utf-8")
+    partial.replace(path)
+
+
+def read_baseline(path: Path) -> dict[str, Metric]:
+    """Read a baseline by metric name; raises SimError for a file that is not one."""
+    try:
+        entries = json.loads(path.read_text(encoding="utf-8"))["metrics"]
+        return {entry["name"]: Metric(**entry) for entry in entries}
+    except OSError as cause:
+        raise SimError(f"cannot read the baseline {path}: {cause.strerror or cause}") from cause
+    except (ValueError, KeyError, TypeError) as cause:
+        raise SimError(
+            f"{path} is not a baseline: it must hold a list 'metrics' of name, value, unit, "
+            f"direction and tolerance ({cause})"
+        ) from cause
+
+
+def report(metrics: Iterable[Metric], baseline: dict[str, Metric]) -> tuple[str, bool]:
+    """The metrics as text beside the baseline, and whether none is worse than it."""
+    lines = [f"{'metric':42s}{'now':>10s}{'baseline':>10s}  unit"]
+    good = True
+    for metric in metrics:
+        known = baseline.get(metric.name)
+        verdict = ""
+        if known is not None and metric.is_worse_than(known):
+            verdict, good = "   WORSE", False
+        before = "-" if known is None else f"{known.value:.1f}"
+        lines.append(f"{metric.name:42s}{metric.value:10.1f}{before:>10s}  {metric.unit}{verdict}")
+    return "\n".join(lines), good

@@ -1,0 +1,162 @@
+"""The command ``awarenav``."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from nav_adapter import NavError
+from perception import PerceptionError
+from tracking import TrackingError
+
+from ._errors import SimError
+
+_BASELINE = Path("benchmarks") / "baseline.json"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command and return its exit status: 0 well, 1 a gate failed, 2 bad input."""
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    try:
+        status: int = options.run(options)
+    except (NavError, PerceptionError, SimError, TrackingError) as error:
+        print(f"awarenav {options.command}: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print(f"\nawarenav {options.command}: interrupted; partial results kept", file=sys.stderr)
+        return 130
+    return status
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="awarenav",
+        description="Awareness-aware navigation: see who has noticed the robot, move accordingly.",
+    )
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+
+    demo = commands.add_parser(
+        "demo",
+        help="the paper's encounter and what awareness buys in a crossing",
+        description="Run the paper's 25 s encounter and the same crossing with and without "
+        "awareness; print the tables and write encounter.png, encounter.mp4, encounter.csv and "
+        "episodes.csv.",
+    )
+    _add_out(demo, "demo")
+    _add_seed(demo)
+    demo.add_argument("--no-video", action="store_true", help="leave the video out (faster)")
+    demo.set_defaults(run=_demo)
+
+    crossings = commands.add_parser(
+        "crossings",
+        help="run closed-loop crossings and write episodes.csv",
+        description="Run every scenario with every policy and seed in closed loop; one row an "
+        "episode goes to episodes.csv as soon as it is done.",
+    )
+    crossings.add_argument(
+        "--scenario",
+        nargs="+",
+        default=["all"],
+        metavar="NAME",
+        help="shipped scenarios, YAML files, or 'all' that have a planner (default)",
+    )
+    crossings.add_argument(
+        "--policy",
+        nargs="+",
+        default=["blind", "balanced"],
+        metavar="NAME|FILE",
+        help="presets or policy YAML files (default: blind balanced)",
+    )
+    crossings.add_argument(
+        "--perception",
+        choices=["truth", "keypoints"],
+        default="keypoints",
+        help="what the robot sees with (default: keypoints)",
+    )
+    crossings.add_argument(
+        "--episodes", type=_positive, default=1, metavar="N", help="seeds a scenario (default: 1)"
+    )
+    _add_out(crossings, "crossings")
+    _add_seed(crossings)
+    crossings.set_defaults(run=_crossings)
+
+    bench = commands.add_parser(
+        "bench",
+        help="measure how fast crossings run",
+        description="Time crossings against real time and against bare physics, and compare with a "
+        "baseline; exit status 1 when a figure is worse than its tolerance allows.",
+    )
+    bench.add_argument(
+        "--baseline",
+        type=Path,
+        default=_BASELINE,
+        metavar="FILE",
+        help=f"baseline to compare with, if it exists (default: {_BASELINE})",
+    )
+    bench.add_argument("--out", type=Path, metavar="FILE", help="write the figures as a baseline")
+    bench.set_defaults(run=_bench)
+    return parser
+
+
+def _positive(text: str) -> int:
+    number = int(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"must be at least 1, got {number}")
+    return number
+
+
+def _add_out(parser: argparse.ArgumentParser, default: str) -> None:
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=Path(default),
+        metavar="DIR",
+        help=f"folder for the results (default: {default})",
+    )
+
+
+def _add_seed(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="of everything random (default: 0)"
+    )
+
+
+# The simulator is imported when a command needs it, so that help works without it.
+def _demo(options: argparse.Namespace) -> int:
+    from ._demo import run_demo  # noqa: PLC0415
+
+    run_demo(options.out, seed=options.seed, video=not options.no_video)
+    return 0
+
+
+def _crossings(options: argparse.Namespace) -> int:
+    from ._batch import run_batch  # noqa: PLC0415
+
+    run_batch(
+        options.scenario,
+        options.policy,
+        perception=options.perception,
+        episodes=options.episodes,
+        seed=options.seed,
+        out=options.out,
+    )
+    return 0
+
+
+def _bench(options: argparse.Namespace) -> int:
+    from ._bench import measure, read_baseline, report, write_baseline  # noqa: PLC0415
+
+    baseline = read_baseline(options.baseline) if options.baseline.exists() else {}
+    metrics = measure()
+    text, good = report(metrics, baseline)
+    print(text)
+    if options.out is not None:
+        write_baseline(options.out, metrics)
+    return 0 if good else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

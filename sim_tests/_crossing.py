@@ -1,0 +1,263 @@
+"""One closed-loop crossing: camera to awareness to track to constraints to planner to wheels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotState
+from perception import AttentionCone, PersonObservation
+from perception.arrays import FloatArray
+from tracking import PersonTrack, PersonTracker, TrackerConfig
+
+from ._amr import NOVA_CARTER
+from ._errors import SimError
+from ._eyes import make_eyes
+from ._keypoint_camera import KeypointNoise
+from ._metrics import ContactEvent, SafetyMeter
+from ._planner import LocalPlanner, SamplingPlanner
+from ._scenario import Scenario
+from ._stage import Stage, TrueView
+
+_CLOSE_ENOUGH_TO_STOP_MPS: Final = 0.2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CrossingFrame:
+    """All that was seen, thought and commanded in one control cycle.
+
+    ``observed_workers[i]`` is the worker that ``observations[i]`` shows; ``margins_m`` holds the
+    separation margin of each worker.
+    """
+
+    t_s: float
+    robot_state: RobotState
+    T_odom_camera: FloatArray
+    truth: tuple[TrueView, ...]
+    observations: tuple[PersonObservation, ...]
+    observed_workers: tuple[int, ...]
+    tracks: tuple[PersonTrack, ...]
+    constraints: NavConstraints
+    command: tuple[float, float]
+    margins_m: tuple[float, ...]
+
+    def observation_of(self, worker: int) -> PersonObservation | None:
+        """What was seen of a worker in this frame, or None."""
+        for observation, index in zip(self.observations, self.observed_workers, strict=True):
+            if index == worker:
+                return observation
+        return None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CrossingResult:
+    """The outcome of one crossing.
+
+    Attributes:
+        scenario: its name.
+        seed: of the episode's random generator.
+        policy: name of the policy.
+        planner: name of the planner's class.
+        perception: ``"truth"``, ``"keypoints"`` or ``"pixels"``.
+        success: the goal was reached and the robot touched nobody by its own motion.
+        contact: robot and a person touched.
+        contact_by: ``"robot"`` if any contact was the robot moving into a person, ``"person"`` if
+            only people walked into it, else empty.
+        contacts: every contact.
+        min_separation_m: smallest distance between the surfaces of robot and person.
+        time_to_goal_s: None when the goal was not reached.
+        max_speed_within_2m_mps: the robot's highest speed with a person's surface within 2 m.
+        min_margin_m: smallest separation margin S − S_p at a moving robot.
+        violation_time_s: how long the margin was negative at a moving robot.
+        duration_s: simulated time.
+        frames: one a control cycle.
+    """
+
+    scenario: str
+    seed: int
+    policy: str
+    planner: str
+    perception: str
+    success: bool
+    contact: bool
+    contact_by: str
+    contacts: tuple[ContactEvent, ...]
+    min_separation_m: float
+    time_to_goal_s: float | None
+    max_speed_within_2m_mps: float
+    min_margin_m: float
+    violation_time_s: float
+    duration_s: float
+    frames: tuple[CrossingFrame, ...]
+
+
+class StraightOn:
+    """Drives straight ahead at one speed whatever happens: the robot of the paper's encounter.
+
+    Args:
+        speed_mps: > 0.
+    """
+
+    def __init__(self, speed_mps: float) -> None:
+        self._speed_mps = speed_mps
+
+    def plan(
+        self,
+        robot_state: RobotState,
+        goal_odom_m: FloatArray,
+        constraints: NavConstraints,
+        dt_s: float,
+    ) -> tuple[float, float]:
+        """Return the same speed and no turn."""
+        return self._speed_mps, 0.0
+
+
+Observer = Callable[[CrossingFrame, Stage], None]
+
+
+def run_crossing(
+    scenario: Scenario | str,
+    *,
+    policy: AwarenessPolicy | str | Path,
+    planner: LocalPlanner | None = None,
+    perception: str = "truth",
+    seed: int = 0,
+    noise: KeypointNoise | None = None,
+    observer: Observer | None = None,
+) -> CrossingResult:
+    """Run one crossing in PyBullet and measure it.
+
+    Args:
+        scenario: a scenario, or the name of a shipped one.
+        policy: a policy, the name of a preset, or a YAML file.
+        planner: the local planner; default the reference :class:`SamplingPlanner` (a scenario that
+            drives straight on needs none).
+        perception: ``"truth"`` or ``"keypoints"`` (``"pixels"`` once networks ship).
+        seed: the same seed gives the same result, bit for bit.
+        noise: of the keypoint camera.
+        observer: called after every control cycle with the frame and the stage, e.g. to render.
+
+    Raises:
+        SimError: unknown scenario or perception, or an invalid command from the planner.
+        NavError: unknown preset or unusable policy file.
+    """
+    scenario = Scenario.shipped(scenario) if isinstance(scenario, str) else scenario
+    policy_name, policy = _resolve(policy)
+    jitter_rng, camera_rng = np.random.default_rng(seed).spawn(2)
+    jitter = scenario.start_jitter_s
+    offsets = jitter_rng.uniform(-jitter, jitter, len(scenario.workers))
+    cone = AttentionCone()
+    meter = SafetyMeter(NOVA_CARTER)
+    with Stage(scenario, offsets) as stage:
+        driver = planner if planner is not None else _default_planner(scenario, stage)
+        eyes = make_eyes(
+            perception,
+            stage,
+            scenario.camera.camera(),
+            cone,
+            noise if noise is not None else KeypointNoise(),
+            camera_rng,
+        )
+        tracker = PersonTracker(TrackerConfig(awareness=policy.filter))
+        adapter = NavAdapter(policy, NOVA_CARTER)
+        goal = np.array([scenario.robot.goal_x_m, scenario.robot.goal_y_m])
+        dt_s = 1.0 / scenario.control_hz
+        frames: list[CrossingFrame] = []
+        reached_s: float | None = None
+        for tick in range(round(scenario.duration_s * scenario.control_hz)):
+            t_s = tick * dt_s
+            margins = stage.measure(meter, dt_s)
+            T_odom_camera = stage.amr.T_odom_camera
+            truth = stage.truth(cone, T_odom_camera)
+            seen = eyes.observe(t_s, T_odom_camera, truth)
+            observations = tuple(observation for observation, _ in seen)
+            tracks = tracker.update(observations, t_s, T_odom_camera)
+            state = stage.amr.state(t_s)
+            constraints = adapter.update(tracks, state, t_s, perception_stamp_s=t_s)
+            command = driver.plan(state, goal, constraints, dt_s)
+            stage.amr.command(*command)
+            frame = CrossingFrame(
+                t_s,
+                state,
+                T_odom_camera,
+                truth,
+                observations,
+                tuple(index for _, index in seen),
+                tracks,
+                constraints,
+                command,
+                margins,
+            )
+            frames.append(frame)
+            if observer is not None:
+                observer(frame, stage)
+            if _arrived(scenario, state, goal):
+                reached_s = t_s
+                break
+            stage.advance(t_s + dt_s, meter)
+        return _result(
+            scenario, seed, policy_name, type(driver).__name__, perception, meter, frames, reached_s
+        )
+
+
+def _default_planner(scenario: Scenario, stage: Stage) -> LocalPlanner:
+    straight = scenario.robot.straight_on_speed_mps
+    if straight is not None:
+        return StraightOn(straight)
+    return SamplingPlanner(NOVA_CARTER, stage.warehouse.obstacle_boxes_odom)
+
+
+def _resolve(policy: AwarenessPolicy | str | Path) -> tuple[str, AwarenessPolicy]:
+    """The name and the policy itself, from a policy, a preset's name or a file."""
+    if isinstance(policy, AwarenessPolicy):
+        return "custom", policy
+    path = Path(policy)
+    if path.suffix in (".yaml", ".yml"):
+        return path.stem, AwarenessPolicy.from_yaml(path)
+    if not isinstance(policy, str):
+        raise SimError(f"policy must be a preset's name or a .yaml file, got {policy}")
+    return policy, AwarenessPolicy.preset(policy)
+
+
+def _arrived(scenario: Scenario, state: RobotState, goal: FloatArray) -> bool:
+    if scenario.robot.straight_on_speed_mps is not None:
+        return False
+    distance = float(np.linalg.norm(goal - state.position_odom_m))
+    tolerance = scenario.robot.goal_tolerance_m
+    return distance <= tolerance and abs(state.speed_mps) <= _CLOSE_ENOUGH_TO_STOP_MPS
+
+
+def _result(
+    scenario: Scenario,
+    seed: int,
+    policy: str,
+    planner: str,
+    perception: str,
+    meter: SafetyMeter,
+    frames: list[CrossingFrame],
+    reached_s: float | None,
+) -> CrossingResult:
+    causes = {contact.by for contact in meter.contacts}
+    by = "robot" if "robot" in causes else "person" if causes else ""
+    return CrossingResult(
+        scenario=scenario.name,
+        seed=seed,
+        policy=policy,
+        planner=planner,
+        perception=perception,
+        success=reached_s is not None and by != "robot",
+        contact=bool(causes),
+        contact_by=by,
+        contacts=tuple(meter.contacts),
+        min_separation_m=meter.min_separation_m,
+        time_to_goal_s=reached_s,
+        max_speed_within_2m_mps=meter.max_speed_near_mps,
+        min_margin_m=meter.min_margin_m,
+        violation_time_s=meter.violation_time_s,
+        duration_s=frames[-1].t_s,
+        frames=tuple(frames),
+    )

@@ -1,0 +1,135 @@
+"""The demonstration: the paper's encounter, then what awareness buys in a crossing."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TextIO
+
+from tqdm import tqdm
+
+from ._crossing import CrossingResult, run_crossing
+from ._encounter import case_errors, run_encounter
+from ._scenario import Scenario
+from ._tables import EpisodeTable
+
+
+@dataclass(frozen=True, slots=True)
+class ComparisonRow:
+    """One line of the comparison: what it is called and how it went."""
+
+    label: str
+    result: CrossingResult
+
+
+def compare_policies(
+    seed: int = 0, perception: str = "keypoints", progress: bool = False
+) -> tuple[ComparisonRow, ...]:
+    """Run the same crossing with nobody there, blind, and aware with two kinds of worker.
+
+    The worker walks the same way in every run; only where he looks and what the robot makes of it
+    differ.
+    """
+    attentive = Scenario.shipped("crossing_attentive")
+    distracted = Scenario.shipped("crossing_distracted")
+    runs = (
+        ("nobody there", attentive.without_people(), "balanced"),
+        ("awareness-blind", attentive, "blind"),
+        ("aware, attentive worker", attentive, "balanced"),
+        ("aware, distracted worker", distracted, "balanced"),
+    )
+    rows = []
+    with tqdm(runs, desc="crossings", unit="run", disable=not progress, file=sys.stderr) as bar:
+        for label, scenario, policy in bar:
+            result = run_crossing(scenario, policy=policy, perception=perception, seed=seed)
+            rows.append(ComparisonRow(label, result))
+    return tuple(rows)
+
+
+def comparison_table(rows: tuple[ComparisonRow, ...]) -> str:
+    """The comparison as text."""
+    header = (
+        f"{'':26s}{'time to':>9s}{'smallest':>12s}{'top speed':>12s}{'margin':>12s}{'':>10s}\n"
+        f"{'crossing':26s}{'goal':>9s}{'separation':>12s}{'within 2 m':>12s}{'violated':>12s}"
+        f"{'contacts':>10s}"
+    )
+    lines = [header, "-" * 81]
+    for row in rows:
+        result = row.result
+        goal = "never" if result.time_to_goal_s is None else f"{result.time_to_goal_s:.2f} s"
+        nobody = not result.frames or not result.frames[0].truth
+        lines.append(
+            f"{row.label:26s}{goal:>9s}"
+            + (
+                f"{'-':>12s}{'-':>12s}{'-':>12s}{'-':>10s}"
+                if nobody
+                else f"{result.min_separation_m:>10.2f} m{result.max_speed_within_2m_mps:>8.2f} m/s"
+                f"{result.violation_time_s:>10.2f} s{len(result.contacts):>10d}"
+            )
+        )
+    return "\n".join(lines)
+
+
+def delay_won_back(rows: tuple[ComparisonRow, ...]) -> float | None:
+    """The share of the blind robot's delay that awareness of an attentive worker wins back."""
+    free, blind, aware = (row.result.time_to_goal_s for row in rows[:3])
+    if free is None or blind is None or aware is None or blind <= free:
+        return None
+    return (blind - aware) / (blind - free)
+
+
+def encounter_table(result: CrossingResult) -> str:
+    """The encounter's three cases beside the paper's, as text."""
+    lines = [f"{'case':24s}{'':11s}{'alpha':>8s}{'d_fwd':>9s}{'d_lat':>9s}", "-" * 61]
+    last = None
+    for case, perception, alpha, forward, lateral in case_errors(result):
+        if case is not last:
+            lines.append(
+                f"{case.t_s:5.2f} s {case.meaning:16s}{'paper':11s}{case.awareness:8.2f}"
+                f"{case.d_fwd_m:7.2f} m{case.d_lat_m:7.2f} m"
+            )
+            last = case
+        cells = [
+            "-" if value is None else f"{value:.2f}{unit}"
+            for value, unit in ((alpha, ""), (forward, " m"), (lateral, " m"))
+        ]
+        lines.append(f"{'':24s}{perception:11s}{cells[0]:>8s}{cells[1]:>9s}{cells[2]:>9s}")
+    return "\n".join(lines)
+
+
+def run_demo(out: Path, *, seed: int = 0, video: bool = True, stream: TextIO = sys.stdout) -> None:
+    """Run the demonstration and write its files.
+
+    Args:
+        out: folder for ``encounter.png``, ``encounter.mp4``, ``encounter.csv`` and
+            ``episodes.csv``; made when missing.
+        seed: of everything random.
+        video: whether to render the video.
+        stream: where the tables are printed.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    scenario = Scenario.shipped("paper_encounter")
+    print(f"The encounter of the paper: {scenario.duration_s:g} s", file=stream)
+    total = round(scenario.duration_s * scenario.control_hz)
+    with tqdm(total=total, desc="encounter", unit="frame", file=sys.stderr) as bar:
+
+        def advance(done: int) -> None:
+            bar.update(done - bar.n)
+
+        encounter = run_encounter(out, seed=seed, video=video, progress=advance)
+    print(encounter_table(encounter), file=stream)
+    print("\nThe same crossing, with and without awareness", file=stream)
+    rows = compare_policies(seed, progress=True)
+    with EpisodeTable(out / "episodes.csv") as table:
+        for row in rows:
+            table.add(row.result)
+    print(comparison_table(rows), file=stream)
+    share = delay_won_back(rows)
+    if share is not None:
+        print(
+            f"\nAn attentive worker gives back {share:.0%} of the time that the blind robot loses.",
+            file=stream,
+        )
+    names = ["encounter.png", *(["encounter.mp4"] if video else []), "encounter.csv"]
+    print(f"\nWritten to {out}: {', '.join([*names, 'episodes.csv'])}", file=stream)

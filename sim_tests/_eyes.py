@@ -1,0 +1,115 @@
+"""How the robot sees in a crossing: the truth itself, or keypoints through the whole pipeline."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final, Literal, Protocol, get_args
+
+import numpy as np
+
+from perception import AttentionCone, AwarenessPipeline, Camera, PersonObservation
+from perception.arrays import FloatArray
+
+from ._errors import SimError
+from ._keypoint_camera import KeypointCamera, KeypointNoise
+from ._renderer import CameraRenderer
+from ._stage import Stage, TrueView
+
+PerceptionKind = Literal["truth", "keypoints", "pixels"]
+
+# The truth is handed on with a spread small enough to be believed and large enough to be a number.
+_TRUE_POSITION_STD_M: Final = 0.01
+_TRUE_AWARENESS_STD: Final = 0.02
+_TRUE_RANGE_M: Final = 20.0
+
+
+class Eyes(Protocol):
+    """Makes the observations of one frame."""
+
+    def observe(
+        self, stamp_s: float, T_odom_camera: FloatArray, truth: tuple[TrueView, ...]
+    ) -> tuple[tuple[PersonObservation, int], ...]:
+        """Return each observation with the index of the worker that it shows."""
+        ...
+
+
+class TrueEyes:
+    """α and position straight from the simulator, all around and through walls."""
+
+    def observe(
+        self, stamp_s: float, T_odom_camera: FloatArray, truth: tuple[TrueView, ...]
+    ) -> tuple[tuple[PersonObservation, int], ...]:
+        """Return every worker within 20 m as it is."""
+        return tuple(
+            (
+                PersonObservation(
+                    stamp_s=stamp_s,
+                    position_camera_m=view.position_camera_m,
+                    position_covariance_m2=_TRUE_POSITION_STD_M**2 * np.eye(3),
+                    gaze_camera=view.gaze_camera,
+                    awareness=view.awareness,
+                    awareness_std=_TRUE_AWARENESS_STD,
+                    score=1.0,
+                    box_xyxy_px=None,
+                ),
+                index,
+            )
+            for index, view in enumerate(truth)
+            if float(np.linalg.norm(view.position_camera_m)) <= _TRUE_RANGE_M
+        )
+
+
+class KeypointEyes:
+    """A keypoint camera and the whole of the perception package behind it."""
+
+    def __init__(
+        self,
+        stage: Stage,
+        camera: Camera,
+        cone: AttentionCone,
+        noise: KeypointNoise,
+        rng: np.random.Generator,
+    ) -> None:
+        self._stage = stage
+        self._keypoints = KeypointCamera(camera, CameraRenderer(stage.warehouse), noise, rng)
+        self._pipeline = AwarenessPipeline(
+            camera,
+            self._keypoints,
+            self._keypoints,
+            cone=cone,
+            keypoint_std_px=max(noise.pixel_std_px, 0.1),
+        )
+        self._blank = np.zeros((camera.height_px, camera.width_px, 3), np.uint8)
+
+    def observe(
+        self, stamp_s: float, T_odom_camera: FloatArray, truth: tuple[TrueView, ...]
+    ) -> tuple[tuple[PersonObservation, int], ...]:
+        """Return what the pipeline makes of the keypoints seen now."""
+        seen = self._keypoints.look(T_odom_camera, self._stage.workers)
+        observations = self._pipeline.process(self._blank, stamp_s)
+        # The pipeline keeps order; it drops a person only when even the box gives no position.
+        return tuple(zip(observations, seen, strict=False))
+
+
+def make_eyes(
+    kind: str,
+    stage: Stage,
+    camera: Camera,
+    cone: AttentionCone,
+    noise: KeypointNoise,
+    rng: np.random.Generator,
+) -> Eyes:
+    """Return the eyes called ``kind``; raises SimError for others."""
+    makers: dict[str, Callable[[], Eyes]] = {
+        "truth": TrueEyes,
+        "keypoints": lambda: KeypointEyes(stage, camera, cone, noise, rng),
+    }
+    if kind == "pixels":
+        raise SimError(
+            "perception='pixels' needs the shipped networks, which this version does not have; "
+            "use 'truth' or 'keypoints'"
+        )
+    if kind not in makers:
+        valid = ", ".join(map(repr, get_args(PerceptionKind)))
+        raise SimError(f"perception must be one of {valid}, got {kind!r}")
+    return makers[kind]()

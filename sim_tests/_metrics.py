@@ -1,0 +1,110 @@
+"""What is measured in a crossing: separation, its safety margin, contacts and who caused them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+from nav_adapter import RobotProfile, protective_separation_m
+from perception.arrays import FloatArray
+
+#: A robot slower than this stands (wheel motors never hold exactly zero).
+STANDING_SPEED_MPS: Final = 0.03
+#: C + Z of the separation margin, as in decision 8 of the design.
+CLEARANCE_M: Final = 0.10
+#: Near a person: the distance within which the robot's highest speed is reported.
+NEAR_M: Final = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class ContactEvent:
+    """A touch of robot and person; ``by`` is ``"robot"`` when the robot moved into the person."""
+
+    t_s: float
+    worker: int
+    by: str
+    robot_speed_mps: float
+
+
+@dataclass(slots=True)
+class SafetyMeter:
+    """Accumulates the safety figures of one episode.
+
+    The separation margin is S − S_p: the distance between the surfaces of robot and person less
+    the protective separation of ISO 13855 and ISO/TS 15066 for their speeds towards each other, as
+    the simulation knows them. It counts while the robot moves; a robot that stands has done what
+    the standards ask of it, and its margin is S − C − Z.
+    """
+
+    robot: RobotProfile
+    min_separation_m: float = float("inf")
+    min_margin_m: float = float("inf")
+    violation_time_s: float = 0.0
+    max_speed_near_mps: float = 0.0
+    contacts: list[ContactEvent] = field(default_factory=list)
+    _touching: set[int] = field(default_factory=set)
+
+    def separation(
+        self,
+        separation_m: float,
+        robot_velocity_mps: FloatArray,
+        human_velocity_mps: FloatArray,
+        towards_human: FloatArray,
+        dt_s: float,
+    ) -> float:
+        """Account for one person over one control cycle and return the separation margin.
+
+        Args:
+            separation_m: between the surfaces, 0 when touching.
+            robot_velocity_mps: (2,) in odom.
+            human_velocity_mps: (2,) in odom.
+            towards_human: (2,) unit vector from the robot to the person, in odom.
+            dt_s: length of the cycle.
+        """
+        speed = float(np.linalg.norm(robot_velocity_mps))
+        robot_closing = max(float(robot_velocity_mps @ towards_human), 0.0)
+        human_closing = max(float(-(human_velocity_mps @ towards_human)), 0.0)
+        moving = speed > STANDING_SPEED_MPS
+        protective = CLEARANCE_M
+        if moving:
+            protective = float(
+                protective_separation_m(
+                    robot_closing,
+                    human_closing,
+                    deceleration_mps2=self.robot.max_deceleration_mps2,
+                    reaction_time_s=self.robot.reaction_time_s,
+                    clearance_m=CLEARANCE_M,
+                )
+            )
+        margin = separation_m - protective
+        self.min_separation_m = min(self.min_separation_m, separation_m)
+        if moving:
+            self.min_margin_m = min(self.min_margin_m, margin)
+            if margin < 0.0:
+                self.violation_time_s += dt_s
+        if separation_m < NEAR_M:
+            self.max_speed_near_mps = max(self.max_speed_near_mps, speed)
+        return margin
+
+    def touch(
+        self,
+        t_s: float,
+        worker: int,
+        robot_velocity_mps: FloatArray,
+        towards_human: FloatArray,
+    ) -> None:
+        """Record that robot and worker touch now; a touch that goes on is one contact."""
+        if worker in self._touching:
+            return
+        self._touching.add(worker)
+        closing = float(robot_velocity_mps @ towards_human)
+        by = "robot" if closing > STANDING_SPEED_MPS else "person"
+        self.contacts.append(
+            ContactEvent(t_s, worker, by, float(np.linalg.norm(robot_velocity_mps)))
+        )
+
+    def release(self, worker: int) -> None:
+        """Record that robot and worker do not touch (any more)."""
+        self._touching.discard(worker)

@@ -1,0 +1,120 @@
+"""A crossing as data: hall, robot task, camera and what each worker does."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from importlib import resources
+from typing import Annotated, Any, ClassVar
+
+import yaml
+from pydantic import BeforeValidator, Field
+
+from perception import Camera
+from tracking.config import StrictConfig
+
+from ._errors import SimError
+from ._layout import WarehouseLayout
+from ._script import WorkerScript
+
+_LAYOUTS = {"crossing": WarehouseLayout.crossing, "open": WarehouseLayout.open_floor}
+
+
+def _layout(value: Any) -> Any:
+    if not isinstance(value, str):
+        return value
+    if value not in _LAYOUTS:
+        raise ValueError(
+            f"layout must be one of {', '.join(map(repr, _LAYOUTS))} or a mapping, got {value!r}"
+        )
+    return _LAYOUTS[value]()
+
+
+class CameraSpec(StrictConfig):
+    """The robot's camera: image size and horizontal field of view."""
+
+    error: ClassVar[type[ValueError]] = SimError
+
+    width_px: int = Field(default=1280, ge=16, le=8192)
+    height_px: int = Field(default=960, ge=16, le=8192)
+    horizontal_fov_deg: float = Field(default=90.0, gt=0.0, lt=180.0)
+
+    def camera(self, scale: float = 1.0) -> Camera:
+        """The camera model, or one of the same view with ``scale`` times the pixels a side."""
+        return Camera.from_fov(
+            round(self.width_px * scale),
+            round(self.height_px * scale),
+            math.radians(self.horizontal_fov_deg),
+        )
+
+
+class RobotTask(StrictConfig):
+    """Where the robot starts and where it shall go; metres in odom."""
+
+    error: ClassVar[type[ValueError]] = SimError
+
+    start_x_m: float = 0.0
+    start_y_m: float = 0.0
+    start_heading_deg: float = 0.0
+    goal_x_m: float
+    goal_y_m: float = 0.0
+    goal_tolerance_m: float = Field(default=0.25, gt=0.0)
+    #: Drives straight on at this speed without a planner, as in the paper's encounter.
+    straight_on_speed_mps: float | None = Field(default=None, gt=0.0)
+
+
+class Scenario(StrictConfig):
+    """One crossing, named by a sentence.
+
+    Attributes:
+        name: identifier, also of the shipped file.
+        description: what happens, in one sentence.
+        duration_s: the longest an episode lasts.
+        control_hz: frames, planning cycles and log rows a second.
+        layout: the hall, ``"crossing"``, ``"open"`` or a mapping of :class:`WarehouseLayout`.
+        robot: the robot's task.
+        camera: the robot's camera.
+        workers: what each worker does.
+        start_jitter_s: each worker starts up to this much earlier or later, drawn from the seed.
+    """
+
+    error: ClassVar[type[ValueError]] = SimError
+
+    name: str = Field(min_length=1)
+    description: str = ""
+    duration_s: float = Field(gt=0.0, le=600.0)
+    control_hz: float = Field(default=20.0, gt=0.0, le=240.0)
+    layout: Annotated[WarehouseLayout, BeforeValidator(_layout)] = WarehouseLayout.crossing()
+    robot: RobotTask
+    camera: CameraSpec = CameraSpec()
+    workers: tuple[WorkerScript, ...] = ()
+    start_jitter_s: float = Field(default=0.0, ge=0.0)
+
+    @classmethod
+    def shipped(cls, name: str) -> Scenario:
+        """Load one of the scenarios that come with the package; raises SimError for others."""
+        names = shipped_scenarios()
+        if name not in names:
+            near = difflib.get_close_matches(str(name), names, n=1)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            raise SimError(
+                f"scenario must be one of {', '.join(map(repr, names))}, got {name!r}{hint}"
+            )
+        text = (resources.files("sim_tests") / "scenarios" / f"{name}.yaml").read_text("utf-8")
+        return cls.model_validate(yaml.safe_load(text))
+
+    def without_people(self) -> Scenario:
+        """The same task in an empty hall: what the robot could do if nobody were there."""
+        return self.model_copy(update={"workers": ()})
+
+
+def shipped_scenarios() -> tuple[str, ...]:
+    """Names of the scenarios that come with the package, sorted."""
+    folder = resources.files("sim_tests") / "scenarios"
+    return tuple(
+        sorted(
+            entry.name.removesuffix(".yaml")
+            for entry in folder.iterdir()
+            if entry.name.endswith(".yaml")
+        )
+    )

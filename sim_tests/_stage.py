@@ -1,0 +1,235 @@
+"""The stage of one crossing: hall, robot and scripted workers, and the truth about them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Final
+
+import numpy as np
+
+from perception import AttentionCone
+from perception.anthropometry import BODY_RADIUS_M
+from perception.arrays import FloatArray
+
+from ._amr import NOVA_CARTER, Amr
+from ._bullet import pybullet
+from ._metrics import SafetyMeter
+from ._scenario import Scenario
+from ._script import WorkerMotion, WorkerScript
+from ._warehouse import Warehouse
+from ._worker import MAX_HEAD_PITCH_RAD, MAX_HEAD_YAW_RAD, Worker
+
+# Surfaces are measured exactly once centres are nearer than this; farther away a bound will do.
+_EXACT_WITHIN_M: Final = 4.0
+# Physics looks for contacts once surfaces were nearer than this in the last control cycle.
+_TOUCH_WITHIN_M: Final = 0.5
+# A line of sight starts outside the head.
+_SKULL_M: Final = 0.16
+_BODY_UPDATE_HZ: Final = 60.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrueView:
+    """The truth about one worker at one instant.
+
+    Attributes:
+        position_camera_m: (3,) centre line at chest height, camera frame.
+        gaze_camera: (3,) unit vector of the head's forward axis.
+        awareness: cone score of the true gaze at the robot; 0 without a line of sight.
+        position_odom_m: (2,).
+        velocity_odom_mps: (2,).
+    """
+
+    position_camera_m: FloatArray
+    gaze_camera: FloatArray
+    awareness: float
+    position_odom_m: FloatArray
+    velocity_odom_mps: FloatArray
+
+    @property
+    def d_fwd_m(self) -> float:
+        """Distance along the robot's heading, from the camera."""
+        return float(self.position_camera_m[2])
+
+    @property
+    def d_lat_m(self) -> float:
+        """Lateral offset from the robot's heading, left positive."""
+        return -float(self.position_camera_m[0])
+
+
+class Stage:
+    """Everything that moves in one crossing.
+
+    Args:
+        scenario: what happens.
+        start_offsets_s: how much later each worker starts.
+    """
+
+    def __init__(self, scenario: Scenario, start_offsets_s: FloatArray) -> None:
+        self.scenario = scenario
+        self.warehouse = Warehouse(scenario.layout)
+        try:
+            task = scenario.robot
+            self.amr = Amr(
+                self.warehouse,
+                (task.start_x_m, task.start_y_m),
+                math.radians(task.start_heading_deg),
+                NOVA_CARTER,
+            )
+            self.scripts: tuple[WorkerScript, ...] = scenario.workers
+            self.workers = tuple(
+                Worker(self.warehouse, stature_m=script.stature_m) for script in self.scripts
+            )
+        except BaseException:
+            self.warehouse.close()
+            raise
+        self._offsets_s = start_offsets_s
+        self._motions: tuple[WorkerMotion, ...] = ()
+        steps = 1.0 / (_BODY_UPDATE_HZ * self.warehouse.physics_dt_s)
+        self._steps_per_body_update = max(round(steps), 1)
+        self._close = [False] * len(self.workers)
+        self._steps = 0
+        self._place_workers()
+
+    def __enter__(self) -> Stage:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.warehouse.close()
+
+    @property
+    def t_s(self) -> float:
+        """Simulated time."""
+        return self._steps * self.warehouse.physics_dt_s
+
+    def advance(self, until_s: float, meter: SafetyMeter) -> None:
+        """Run physics to ``until_s``, moving the workers and recording contacts."""
+        while self.t_s < until_s - 0.5 * self.warehouse.physics_dt_s:
+            if self._steps % self._steps_per_body_update == 0:
+                self._place_workers()
+            self.amr.advance(self.warehouse.physics_dt_s)
+            self.warehouse.step()
+            self._steps += 1
+            for index, close in enumerate(self._close):
+                if close:
+                    self._look_for_contact(index, meter)
+        self._place_workers()
+
+    def measure(self, meter: SafetyMeter, dt_s: float) -> tuple[float, ...]:
+        """Account for the separation of every worker; returns the separation margins."""
+        velocity = self.robot_velocity_odom_mps
+        margins = []
+        for index, motion in enumerate(self._motions):
+            separation, towards = self._separation(index)
+            self._close[index] = separation < _TOUCH_WITHIN_M
+            margins.append(
+                meter.separation(separation, velocity, motion.velocity_odom_mps, towards, dt_s)
+            )
+        return tuple(margins)
+
+    @property
+    def robot_velocity_odom_mps(self) -> FloatArray:
+        """(2,) velocity of the base origin."""
+        state = self.amr.state(self.t_s)
+        heading = state.heading_odom_rad
+        return state.speed_mps * np.array([math.cos(heading), math.sin(heading)])
+
+    def truth(self, cone: AttentionCone, T_odom_camera: FloatArray) -> tuple[TrueView, ...]:
+        """The truth about every worker, from the robot's camera."""
+        rotation, origin = T_odom_camera[:3, :3], T_odom_camera[:3, 3]
+        views = []
+        for worker, motion in zip(self.workers, self._motions, strict=True):
+            gaze = worker.rotation_odom_head[:, 1]
+            alpha = float(cone.scores(worker.eyes_odom_m, gaze, origin))
+            if alpha > 0.0 and not self._in_sight(worker, origin):
+                alpha = 0.0
+            views.append(
+                TrueView(
+                    (worker.chest_odom_m - origin) @ rotation,
+                    gaze @ rotation,
+                    alpha,
+                    motion.position_odom_m,
+                    motion.velocity_odom_mps,
+                )
+            )
+        return tuple(views)
+
+    def _place_workers(self) -> None:
+        camera = self.amr.T_odom_camera[:3, 3]
+        motions = []
+        for worker, script, offset in zip(self.workers, self.scripts, self._offsets_s, strict=True):
+            t_s = self.t_s - float(offset)
+            motion = script.motion(t_s)
+            to_robot = camera[:2] - motion.position_odom_m
+            flat = float(np.linalg.norm(to_robot))
+            # Eyes stand at about 0.94 of the stature.
+            up = float(camera[2]) - 0.94 * script.stature_m
+            azimuth, elevation = script.gaze_angles(
+                t_s,
+                motion.heading_odom_rad,
+                (math.atan2(to_robot[1], to_robot[0]), math.atan2(up, flat)),
+            )
+            yaw = math.remainder(azimuth - motion.heading_odom_rad, 2.0 * math.pi)
+            worker.place(
+                motion.position_odom_m,
+                motion.heading_odom_rad,
+                motion.walked_m,
+                float(np.linalg.norm(motion.velocity_odom_mps)),
+                min(max(yaw, -MAX_HEAD_YAW_RAD), MAX_HEAD_YAW_RAD),
+                min(max(elevation, -MAX_HEAD_PITCH_RAD), MAX_HEAD_PITCH_RAD),
+            )
+            motions.append(motion)
+        self._motions = tuple(motions)
+
+    def _separation(self, index: int) -> tuple[float, FloatArray]:
+        """Distance between the surfaces and the direction (2,) from robot to worker."""
+        base = self.amr.T_odom_base[:2, 3]
+        centre = self._motions[index].position_odom_m - base
+        distance = float(np.linalg.norm(centre))
+        towards = centre / max(distance, 1e-9)
+        bound = distance - self.amr.profile.circumscribed_radius_m - BODY_RADIUS_M
+        if distance > _EXACT_WITHIN_M:
+            return bound, towards
+        pairs = pybullet.getClosestPoints(
+            self.amr.body,
+            self.workers[index].body,
+            _EXACT_WITHIN_M,
+            physicsClientId=self.warehouse.client,
+        )
+        if not pairs:
+            return bound, towards
+        closest = min(pairs, key=lambda pair: pair[8])
+        gap = np.array(closest[6][:2]) - np.array(closest[5][:2])
+        length = float(np.linalg.norm(gap))
+        separation = max(float(closest[8]), 0.0)
+        return separation, gap / length if separation > 0.0 and length > 1e-3 else towards
+
+    def _look_for_contact(self, index: int, meter: SafetyMeter) -> None:
+        touching = pybullet.getContactPoints(
+            self.amr.body, self.workers[index].body, physicsClientId=self.warehouse.client
+        )
+        if any(point[8] <= 0.0 for point in touching):
+            _, towards = self._separation(index)
+            meter.touch(self.t_s, index, self.robot_velocity_odom_mps, towards)
+        else:
+            meter.release(index)
+
+    def _in_sight(self, worker: Worker, target_odom_m: FloatArray) -> bool:
+        """True unless something other than worker and robot stands between eyes and robot."""
+        eyes = worker.eyes_odom_m
+        ray = target_odom_m - eyes
+        distance = float(np.linalg.norm(ray))
+        if distance <= _SKULL_M:
+            return True
+        start = eyes + ray * (_SKULL_M / distance)
+        (hit,) = pybullet.rayTestBatch(
+            [start.tolist()], [target_odom_m.tolist()], physicsClientId=self.warehouse.client
+        )
+        return hit[0] in (-1, self.amr.body, worker.body)

@@ -1,0 +1,124 @@
+"""The tables that runs leave behind: one row an episode, one row an encounter frame."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterable
+from pathlib import Path
+from types import TracebackType
+from typing import Final
+
+from ._crossing import CrossingFrame, CrossingResult
+
+EPISODE_COLUMNS: Final = (
+    "scenario",
+    "seed",
+    "policy",
+    "planner",
+    "perception",
+    "success",
+    "contact",
+    "contact_by",
+    "min_separation_m",
+    "time_to_goal_s",
+    "max_speed_within_2m_mps",
+    "min_margin_m",
+    "violation_time_s",
+    "contacts",
+    "duration_s",
+)
+ENCOUNTER_COLUMNS: Final = ("t_s", "perception", "awareness", "d_fwd_m", "d_lat_m")
+
+
+def number_text(value: float | None) -> str:
+    """A number with six decimals; empty for None and for infinity (nobody was ever near)."""
+    return "" if value is None or not math.isfinite(value) else f"{value:.6f}"
+
+
+def episode_row(result: CrossingResult) -> list[str]:
+    """The row of ``episodes.csv`` for one crossing, in the order of :data:`EPISODE_COLUMNS`."""
+    return [
+        result.scenario,
+        str(result.seed),
+        result.policy,
+        result.planner,
+        result.perception,
+        str(result.success).lower(),
+        str(result.contact).lower(),
+        result.contact_by,
+        number_text(result.min_separation_m),
+        number_text(result.time_to_goal_s),
+        number_text(result.max_speed_within_2m_mps),
+        number_text(result.min_margin_m),
+        number_text(result.violation_time_s),
+        str(len(result.contacts)),
+        number_text(result.duration_s),
+    ]
+
+
+class EpisodeTable:
+    """Writes ``episodes.csv`` row by row, so that an interrupted run leaves whole rows behind.
+
+    Args:
+        path: the file; an existing one is replaced.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._file = path.open("w", newline="", encoding="utf-8")
+        self._writer = csv.writer(self._file, lineterminator="\n")
+        self._writer.writerow(EPISODE_COLUMNS)
+        self._file.flush()
+
+    def __enter__(self) -> EpisodeTable:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._file.close()
+
+    def add(self, result: CrossingResult) -> None:
+        """Append one crossing."""
+        self._writer.writerow(episode_row(result))
+        self._file.flush()
+
+
+def encounter_rows(frame: CrossingFrame) -> list[list[str]]:
+    """Rows of ``encounter.csv`` for one frame: the truth, then what keypoints made of it.
+
+    A frame without an observation, or without evidence of awareness, has empty cells.
+    """
+    true = frame.truth[0]
+    seen = frame.observation_of(0)
+    position = None if seen is None else seen.position_camera_m
+    return [
+        [
+            number_text(frame.t_s),
+            "truth",
+            number_text(true.awareness),
+            number_text(true.d_fwd_m),
+            number_text(true.d_lat_m),
+        ],
+        [
+            number_text(frame.t_s),
+            "keypoints",
+            number_text(None if seen is None else seen.awareness),
+            number_text(None if position is None else float(position[2])),
+            number_text(None if position is None else -float(position[0])),
+        ],
+    ]
+
+
+def write_encounter(path: Path, frames: Iterable[CrossingFrame]) -> None:
+    """Write ``encounter.csv``, two rows a frame; the file appears whole or not at all."""
+    partial = path.with_name(path.name + ".part")
+    with partial.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(ENCOUNTER_COLUMNS)
+        for frame in frames:
+            writer.writerows(encounter_rows(frame))
+    partial.replace(path)

@@ -1,0 +1,191 @@
+"""The simulated hall: it owns the physics and everything in it that stands still."""
+
+from __future__ import annotations
+
+from types import TracebackType
+from typing import Final
+
+import numpy as np
+
+from perception.arrays import FloatArray, finite_number
+
+from ._bullet import pybullet
+from ._errors import SimError
+from ._layout import WarehouseLayout
+from ._meshes import Mesh, quad
+from ._scenery import Colour, scenery
+
+GRAVITY_MPS2: Final = 9.81
+DEFAULT_PHYSICS_DT_S: Final = 1.0 / 240.0
+
+# Collision groups: people are moved, not simulated, so they meet only robots. Bit 1 is Bullet's
+# own group of rays: whatever admits it is hit by ray tests.
+RAY_GROUP: Final = 1
+STATIC_GROUP: Final = 2
+ROBOT_GROUP: Final = 4
+PERSON_GROUP: Final = 8
+
+_SPECK_M: Final = ((0.0, 0.0, -0.1), (1e-3, 0.0, -0.1), (1e-3, 1e-3, -0.1), (0.0, 1e-3, -0.1))
+
+
+class Warehouse:
+    """A physics world of its own with floor, walls and racks; use it as a context manager.
+
+    Every instance starts a fresh PyBullet world (no window), so two with the same inputs give the
+    same bytes. Robots and people join by being constructed with it.
+
+    Args:
+        layout: what stands where; None is :meth:`WarehouseLayout.crossing`.
+        physics_dt_s: length of one step, in (0, 1/60].
+
+    Attributes:
+        layout: as given.
+        physics_dt_s: as given.
+        client: PyBullet's id of this world.
+        obstacle_boxes_odom: (N, 4) x_min, y_min, x_max, y_max of racks and walls, metres.
+
+    Raises:
+        SimError: for a step that is not in range, and after :meth:`close`.
+    """
+
+    def __init__(
+        self, layout: WarehouseLayout | None = None, physics_dt_s: float = DEFAULT_PHYSICS_DT_S
+    ) -> None:
+        self.physics_dt_s = finite_number(
+            "physics_dt_s",
+            physics_dt_s,
+            SimError,
+            minimum=0.0,
+            maximum=1.0 / 60.0,
+            exclusive_minimum=True,
+        )
+        self.layout = WarehouseLayout.crossing() if layout is None else layout
+        self.obstacle_boxes_odom: FloatArray = self.layout.obstacle_boxes_odom
+        self._steps = 0
+        self.client: int = pybullet.connect(pybullet.DIRECT)
+        if self.client < 0:
+            raise SimError("PyBullet could not start another physics world")
+        pybullet.setGravity(0.0, 0.0, -GRAVITY_MPS2, physicsClientId=self.client)
+        pybullet.setPhysicsEngineParameter(
+            fixedTimeStep=self.physics_dt_s,
+            numSubSteps=0,
+            numSolverIterations=30,
+            deterministicOverlappingPairs=1,
+            enableConeFriction=0,
+            physicsClientId=self.client,
+        )
+        # A body without a visual shape is drawn as its collision shape, so the plain boxes and the
+        # floor plane get a speck that lies out of sight; the scenery is what shows.
+        self._unseen_shape = self.mesh_shape(quad(_SPECK_M), (0.5, 0.5, 0.5))
+        self._static_bodies = frozenset({self._add_floor(), *self._add_boxes()})
+        for colour, mesh in scenery(self.layout):
+            pybullet.createMultiBody(
+                0.0,
+                -1,
+                self.mesh_shape(mesh, colour),
+                useMaximalCoordinates=True,
+                physicsClientId=self.client,
+            )
+
+    def __enter__(self) -> Warehouse:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the physics world; a second call does nothing."""
+        if self.client >= 0:
+            pybullet.disconnect(physicsClientId=self.client)
+            self.client = -1
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time since the start, a whole number of steps."""
+        return self._steps * self.physics_dt_s
+
+    @property
+    def static_bodies(self) -> frozenset[int]:
+        """PyBullet's ids of the floor, the walls and the racks."""
+        return self._static_bodies
+
+    def step(self) -> None:
+        """Advance the physics by ``physics_dt_s``."""
+        if self.client < 0:
+            raise SimError("the warehouse is closed: it can no longer step")
+        pybullet.stepSimulation(physicsClientId=self.client)
+        self._steps += 1
+
+    def mesh_shape(self, mesh: Mesh, colour: Colour) -> int:
+        """Register a visual shape with this world; returns PyBullet's id of it."""
+        return int(
+            pybullet.createVisualShape(
+                pybullet.GEOM_MESH,
+                vertices=mesh.vertices_m.tolist(),
+                indices=mesh.indices.tolist(),
+                normals=mesh.normals.tolist(),
+                rgbaColor=[*colour, 1.0],
+                specularColor=[0.0, 0.0, 0.0],
+                physicsClientId=self.client,
+            )
+        )
+
+    @property
+    def _heights_m(self) -> FloatArray:
+        racks = [rack.height_m for rack in self.layout.racks]
+        return np.array([*racks, *[self.layout.wall_height_m] * 4])
+
+    def _add_floor(self) -> int:
+        shape = pybullet.createCollisionShape(
+            pybullet.GEOM_PLANE, planeNormal=[0.0, 0.0, 1.0], physicsClientId=self.client
+        )
+        body = int(
+            pybullet.createMultiBody(
+                0.0,
+                shape,
+                self._unseen_shape,
+                useMaximalCoordinates=True,
+                physicsClientId=self.client,
+            )
+        )
+        pybullet.changeDynamics(
+            body,
+            -1,
+            lateralFriction=self.layout.floor_friction,
+            restitution=0.0,
+            physicsClientId=self.client,
+        )
+        self._set_static(body)
+        return body
+
+    def _add_boxes(self) -> list[int]:
+        bodies = []
+        for (x_min, y_min, x_max, y_max), height in zip(
+            self.obstacle_boxes_odom.tolist(), self._heights_m.tolist(), strict=True
+        ):
+            shape = pybullet.createCollisionShape(
+                pybullet.GEOM_BOX,
+                halfExtents=[0.5 * (x_max - x_min), 0.5 * (y_max - y_min), 0.5 * height],
+                physicsClientId=self.client,
+            )
+            body = pybullet.createMultiBody(
+                0.0,
+                shape,
+                self._unseen_shape,
+                basePosition=[0.5 * (x_min + x_max), 0.5 * (y_min + y_max), 0.5 * height],
+                useMaximalCoordinates=True,
+                physicsClientId=self.client,
+            )
+            self._set_static(body)
+            bodies.append(int(body))
+        return bodies
+
+    def _set_static(self, body: int) -> None:
+        pybullet.setCollisionFilterGroupMask(
+            body, -1, STATIC_GROUP, ROBOT_GROUP | RAY_GROUP, physicsClientId=self.client
+        )
