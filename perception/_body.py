@@ -22,6 +22,8 @@ CHEST_FRACTION: Final = 0.3
 # A box says little about depth: people stoop, sit and are cut off.
 _BOX_DEPTH_RELATIVE_STD: Final = 0.25
 _MIN_POINTS: Final = 3
+# Face and hands of a whole-body layout are many points on two small spots; the body is enough.
+_BODY_AND_FEET: Final = 23
 # How far shoulders lie from the mid-hip of people who stand, stoop or sit.
 _SHOULDER_REACH_M: Final = (0.25, 0.80)
 # What lifting leaves uncertain of the chest within the body: 45 mm a keypoint, averaged over four.
@@ -64,7 +66,7 @@ def place_body(
     the camera.
     """
     scale = metric_scale(person, min_score)
-    rows = np.flatnonzero(person.scores[:17] >= min_score)
+    rows = np.flatnonzero(person.scores[:_BODY_AND_FEET] >= min_score)
     if scale is None or len(rows) < _MIN_POINTS:
         return None
     points = scale.factor * person.keypoints_root_m[rows]

@@ -21,6 +21,9 @@ _METRIC_CLAIM_LIMIT: Final = 0.15
 # How far a network that is right about its unit is wrong about the person's size.
 _METRIC_CLAIM_STD: Final = 0.03
 
+# How much less a limb says that the network lifted without seeing it.
+_GUESSED_RELATIVE_STD: Final = 0.10
+
 _STARTS: Final = [list(limb.start) for limb in LIMBS]
 _ENDS: Final = [list(limb.end) for limb in LIMBS]
 _LOG_LENGTHS: Final[FloatArray] = np.log([limb.length_m for limb in LIMBS])
@@ -64,14 +67,18 @@ def metric_scale(
     Each visible limb votes with the logarithm of (average length / lifted length), weighted by how
     much that limb varies between adults of one stature; Huber's weights keep a badly lifted limb
     from mattering. The skeleton's own claim to be in metres counts as one more vote when it is
-    plausible. Returns None when no limb is visible.
+    plausible. Where no limb is visible at both ends, what the network guessed of the hidden ones
+    serves, with a spread to match. Returns None for a skeleton without any limb.
     """
     seen = person.scores[:17] >= min_score
-    usable = ~np.any(_INVOLVED & ~seen, axis=1)
     lengths = np.linalg.norm(_DIFFERENCE @ person.keypoints_root_m[:17], axis=1)
-    usable &= lengths > 1e-9
+    present = lengths > 1e-9
+    usable = present & ~np.any(_INVOLVED & ~seen, axis=1)
     count = int(np.count_nonzero(usable))
+    guessed = 0.0
     if count == 0:
+        usable, guessed = present, _GUESSED_RELATIVE_STD
+    if not usable.any():
         return None
     votes = _LOG_LENGTHS[usable] - np.log(lengths[usable])
     std = _STDS[usable]
@@ -80,7 +87,8 @@ def metric_scale(
         distance = np.abs(votes - centre) / std
         weight = np.minimum(1.0, 1.5 / np.maximum(distance, 1e-9)) / std**2
         centre = float(np.sum(weight * votes) / np.sum(weight))
-    spread = math.sqrt(1.0 / float(np.sum(weight)) + STATURE_RELATIVE_STD**2)
+    variance = 1.0 / float(np.sum(weight)) + STATURE_RELATIVE_STD**2 + guessed**2
+    spread = math.sqrt(variance)
     if abs(centre) <= _METRIC_CLAIM_LIMIT:
-        centre *= _METRIC_CLAIM_STD**2 / (_METRIC_CLAIM_STD**2 + spread**2)
+        centre *= _METRIC_CLAIM_STD**2 / (_METRIC_CLAIM_STD**2 + variance)
     return MetricScale(math.exp(centre), spread, count)

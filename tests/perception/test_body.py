@@ -108,10 +108,18 @@ def test_too_little_of_a_body_is_no_position():
     scores[[5, 6]] = 1.0
     two = PersonKeypoints(person.keypoints_px, person.keypoints_root_m, scores, "coco")
     assert place_body(CAMERA, two, 1.0) is None
+
+
+def test_a_head_above_a_shelf_is_placed_with_the_doubt_that_it_deserves():
+    truth = person_at((0.0, 0.4, 3.0))
+    person = truth.keypoints(CAMERA, 1.0, np.random.default_rng(0))
     head_only = PersonKeypoints(
         person.keypoints_px, person.keypoints_root_m, np.r_[np.ones(5), np.zeros(12)], "coco"
     )
-    assert place_body(CAMERA, head_only, 1.0) is None
+    whole, head = (place_body(CAMERA, seen, 1.0) for seen in (person, head_only))
+    error = head.position_camera_m - truth.chest_camera_m
+    assert error @ np.linalg.solve(head.position_covariance_m2, error) < 7.81
+    assert head.position_covariance_m2[2, 2] > 2.0 * whole.position_covariance_m2[2, 2]
 
 
 def test_the_box_of_a_standing_adult_is_a_rough_position():
