@@ -5,6 +5,7 @@ The parts of a policy are in :mod:`nav_adapter.policies`.
 
 from __future__ import annotations
 
+from . import _clash  # noqa: F401 - first: refuses a foreign package of one of our names
 from ._adapter import NavAdapter
 from ._constraints import NavConstraints, PersonObstacle
 from ._costmap import paint_costmap

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from . import _clash  # noqa: F401 - first: refuses a foreign package of one of our names
 from ._attention import AttentionCone
 from ._camera import Camera
 from ._detection import PersonDetection

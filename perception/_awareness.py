@@ -68,11 +68,12 @@ def _across(
     gaze: FloatArray, sight: FloatArray, head: HeadPose
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The normal of the plane of gaze and line of sight, and in it the directions across either."""
-    normal = np.cross(gaze, sight)
+    normal = skew(gaze) @ sight
     sine = float(np.linalg.norm(normal))
     # Looking straight at the robot (or away): any plane through the gaze will do.
     normal = head.rotation_camera_head[:, 0] if sine < 1e-9 else normal / sine
-    return normal, np.cross(normal, gaze), np.cross(normal, sight)
+    turn = skew(normal)
+    return normal, turn @ gaze, turn @ sight
 
 
 def _factor(covariance: FloatArray) -> FloatArray:

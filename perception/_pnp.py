@@ -16,7 +16,7 @@ from ._head_frame import lifted_head_model
 from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
 from ._metric_scale import DEFAULT_MIN_SCORE, metric_scale
-from ._pose_refinement import HeadPrior, RefinedPose, refine, rotation_exp, rotation_log
+from ._pose_refinement import HeadPrior, RefinedPose, refine, rotation_exp, rotation_log, skew
 from .anthropometry import HEAD_KEYPOINTS, HEAD_TEMPLATE_M
 from .arrays import FloatArray, finite_number
 
@@ -203,7 +203,7 @@ def _mirrored(rotation: FloatArray, origin: FloatArray, centre: FloatArray) -> F
     forward = rotation[:, 1]
     # Turn the gaze to its reflection in the plane across the ray, about their common normal.
     reflected = forward - 2.0 * (forward @ ray) * ray
-    axis = np.cross(forward, reflected)
+    axis = skew(forward) @ reflected
     sine = float(np.linalg.norm(axis))
     if sine < 1e-6:
         return rotation_exp(math.pi * rotation[:, 0]) @ rotation
@@ -244,13 +244,13 @@ def _torso_axes(body: BodyPlacement) -> tuple[FloatArray, FloatArray] | None:
         return None
     neck = shoulders.mean(axis=0)
     up, left = neck - body.hips_camera_m, shoulders[0] - shoulders[1]
-    forward = np.cross(left, up)
+    forward = skew(left) @ up
     length = float(np.linalg.norm(forward))
     if length < 1e-6:
         return None
     forward = forward / length
     up = up / np.linalg.norm(up)
-    return np.stack([forward, np.cross(up, forward), up], axis=1), neck
+    return np.stack([forward, skew(up) @ forward, up], axis=1), neck
 
 
 def _prior_starts(prior: HeadPrior) -> tuple[FloatArray, FloatArray]:

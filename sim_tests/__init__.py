@@ -9,6 +9,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from . import _clash  # noqa: F401 - first: refuses a foreign package of one of our names
+
 if TYPE_CHECKING:
     from ._amr import NOVA_CARTER
     from ._crossing import CrossingFrame, CrossingResult, StraightOn, run_crossing

@@ -97,6 +97,8 @@ class Amr:
         self._target_yaw_rate_radps = 0.0
         self._speed_mps = 0.0
         self._yaw_rate_radps = 0.0
+        self._read_at_step = -1
+        self._last_motion = (np.eye(4), 0.0, 0.0)
         self._drive()
 
     def command(self, speed_mps: float, yaw_rate_radps: float) -> None:
@@ -147,7 +149,10 @@ class Amr:
         return np.asarray(self.T_odom_base @ self.T_base_camera)
 
     def _motion(self) -> tuple[FloatArray, float, float]:
-        """T_odom_base, speed along the base's x in m/s, yaw rate in rad/s."""
+        """T_odom_base, speed along the base's x in m/s, yaw rate in rad/s; read once a step."""
+        if self._read_at_step == self._warehouse.steps:
+            return self._last_motion
+        self._read_at_step = self._warehouse.steps
         com, quaternion = pybullet.getBasePositionAndOrientation(
             self.body, physicsClientId=self._client
         )
@@ -157,8 +162,12 @@ class Amr:
         T = np.eye(4)
         T[:3, :3] = rotation
         T[:3, 3] = com + arm
-        origin_velocity = np.array(velocity) + np.cross(angular, arm)
-        return T, float(origin_velocity @ rotation[:, 0]), float(angular[2])
+        (wx, wy, wz), (x, y, z) = angular, arm
+        turning = (wy * z - wz * y, wz * x - wx * z, wx * y - wy * x)
+        origin_velocity = np.array(velocity) + turning
+        T.setflags(write=False)
+        self._last_motion = T, float(origin_velocity @ rotation[:, 0]), float(angular[2])
+        return self._last_motion
 
     def _set_up_dynamics(self) -> None:
         links = {

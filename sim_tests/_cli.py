@@ -13,6 +13,8 @@ from tracking import TrackingError
 
 from ._errors import SimError
 
+# What the extra "sim" installs.
+_SIMULATOR_MODULES = ("av", "matplotlib", "pybullet", "tqdm")
 _BASELINE = Path("benchmarks") / "baseline.json"
 
 
@@ -24,6 +26,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         status: int = options.run(options)
     except (NavError, PerceptionError, SimError, TrackingError) as error:
         print(f"awarenav {options.command}: {error}", file=sys.stderr)
+        return 2
+    except ModuleNotFoundError as error:
+        if error.name not in _SIMULATOR_MODULES:
+            raise
+        print(
+            f"awarenav {options.command}: needs {error.name}, which is not installed; it is part "
+            "of the extra 'sim': pip install 'awarenav[sim]'",
+            file=sys.stderr,
+        )
         return 2
     except KeyboardInterrupt:
         print(f"\nawarenav {options.command}: interrupted; partial results kept", file=sys.stderr)

@@ -54,7 +54,8 @@ def _write(image: Image, lines: list[str], corner: tuple[int, int], size: float)
 
 
 def _fixed(points: Any) -> NDArray[np.int32]:
-    return np.round(points * (1 << _SHIFT)).astype(np.int32).reshape(-1, 1, 2)
+    fixed: NDArray[np.int32] = np.round(points * (1 << _SHIFT)).astype(np.int32).reshape(-1, 1, 2)
+    return fixed
 
 
 def _fill(image: Image, points: FloatArray, colour: Any, opacity: float) -> None:

@@ -17,6 +17,10 @@ from perception.arrays import FloatArray
 _BOX_CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 # Corners of the six faces, counter-clockwise as seen from outside.
 _BOX_FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+_UNIT_BOX = _BOX_CORNERS[np.array(_BOX_FACES)].reshape(24, 3)
+# The centre of a face of the unit box is its normal.
+_BOX_NORMALS = np.repeat(_UNIT_BOX.reshape(6, 4, 3).mean(axis=1), 4, axis=0)
+_BOX_INDICES = (np.array((0, 1, 2, 0, 2, 3)) + 4 * np.arange(6)[:, None]).ravel()
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,12 +62,8 @@ def merge(meshes: Iterable[Mesh]) -> Mesh:
 
 def box(center_m: Sequence[float], size_m: Sequence[float]) -> Mesh:
     """An axis-aligned box with flat faces."""
-    corners = _BOX_CORNERS * (0.5 * np.asarray(size_m)) + np.asarray(center_m)
-    vertices = [corners[list(face)] for face in _BOX_FACES]
-    normals = [np.cross(face[1] - face[0], face[3] - face[0]) for face in vertices]
-    units = [np.tile(normal / np.linalg.norm(normal), (4, 1)) for normal in normals]
-    quads = [np.array((0, 1, 2, 0, 2, 3)) + 4 * face for face in range(6)]
-    return Mesh(np.concatenate(vertices), np.concatenate(units), np.concatenate(quads))
+    vertices = _UNIT_BOX * (0.5 * np.asarray(size_m)) + np.asarray(center_m)
+    return Mesh(vertices, _BOX_NORMALS, _BOX_INDICES)
 
 
 def quad(corners_m: Sequence[Sequence[float]]) -> Mesh:

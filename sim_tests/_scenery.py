@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import Final
 
 from ._layout import RackBox, WarehouseLayout
@@ -38,7 +39,8 @@ _PAINT_M: Final = 0.004
 _TILE_M: Final = 4.0
 
 
-def scenery(layout: WarehouseLayout) -> list[tuple[Colour, Mesh]]:
+@lru_cache(maxsize=8)  # many episodes play in the same hall
+def scenery(layout: WarehouseLayout) -> tuple[tuple[Colour, Mesh], ...]:
     """Meshes in odom with their colours: floor, walls, paint, racks and the goods in them."""
     pieces: dict[Colour, list[Mesh]] = {}
     for colour, mesh in (*_hall(layout), *_paint(layout)):
@@ -46,7 +48,7 @@ def scenery(layout: WarehouseLayout) -> list[tuple[Colour, Mesh]]:
     for number, rack in enumerate(layout.racks):
         for colour, mesh in _rack(rack, number):
             pieces.setdefault(colour, []).append(mesh)
-    return [(colour, merge(meshes)) for colour, meshes in pieces.items()]
+    return tuple((colour, merge(meshes)) for colour, meshes in pieces.items())
 
 
 def _flat(x_min: float, y_min: float, x_max: float, y_max: float, z: float) -> Mesh:

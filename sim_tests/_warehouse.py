@@ -105,6 +105,11 @@ class Warehouse:
             self.client = -1
 
     @property
+    def steps(self) -> int:
+        """Physics steps since the start."""
+        return self._steps
+
+    @property
     def time_s(self) -> float:
         """Simulated time since the start, a whole number of steps."""
         return self._steps * self.physics_dt_s

@@ -2,7 +2,17 @@
 
 from __future__ import annotations
 
+from . import _clash  # noqa: F401 - first: refuses a foreign package of one of our names
+from ._config import AwarenessFilterConfig, TrackerConfig
 from ._errors import TrackingError
 from ._track import PersonTrack, TrackStatus
+from ._tracker import PersonTracker
 
-__all__ = ["PersonTrack", "TrackStatus", "TrackingError"]
+__all__ = [
+    "AwarenessFilterConfig",
+    "PersonTrack",
+    "PersonTracker",
+    "TrackStatus",
+    "TrackerConfig",
+    "TrackingError",
+]

@@ -1,0 +1,133 @@
+"""Another distribution that installs one of our import names is reported by its own name."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from perception import _clash
+
+FOREIGN_CODE = "print('foreign code ran')\nraise SystemExit(3)\n"
+# Loads the guard as our packages do; other imports may read metadata for reasons of their own.
+GUARD_ALONE = """
+import importlib.metadata, runpy, sys
+def refuse(*_): raise AssertionError("metadata of other distributions were read")
+importlib.metadata.distributions = refuse
+runpy.run_path(sys.prefix + "/FOLDER/perception/_clash.py")["require_sole_owner"]("sim_tests")
+"""
+
+
+def foreign_wheel(folder: Path, package: str) -> Path:
+    """A wheel of the distribution ``other-vision`` 9.9 that installs ``package``."""
+    path = folder / "other_vision-9.9-py3-none-any.whl"
+    info = "other_vision-9.9.dist-info"
+    files = {
+        f"{package}/__init__.py": FOREIGN_CODE,
+        f"{package}/vision_tools.py": FOREIGN_CODE,
+        f"{info}/METADATA": "Metadata-Version: 2.1\nName: other-vision\nVersion: 9.9\n",
+        f"{info}/WHEEL": "Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n",
+    }
+    files[f"{info}/RECORD"] = "".join(f"{name},,\n" for name in [*files, f"{info}/RECORD"])
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, text in files.items():
+            archive.writestr(name, text)
+    return path
+
+
+def assert_reported(done: Any, package: str, culprit: str = "other-vision 9.9") -> None:
+    assert done.returncode == 1, done.stderr
+    last = done.stderr.strip().splitlines()[-1]
+    assert last.startswith("ImportError: ")
+    assert culprit in last
+    assert repr(package) in last
+    assert "foreign code ran" not in done.stdout
+
+
+@pytest.fixture
+def installed(environment: Any, wheel: Path) -> Any:
+    """An environment with our wheel; dependencies come from the one that runs the tests."""
+    environment.borrow_dependencies()
+    environment.pip("install", "--quiet", "--no-deps", wheel)
+    return environment
+
+
+def test_other_installed_after_ours(installed: Any, tmp_path: Path) -> None:
+    installed.pip("install", "--quiet", foreign_wheel(tmp_path, "perception"))
+
+    for package in ("tracking", "nav_adapter", "sim_tests"):
+        assert_reported(installed.python(f"import {package}"), "perception")
+    assert_reported(installed.command("awarenav", "--help"), "perception")
+
+
+@pytest.mark.parametrize("package", ["tracking", "nav_adapter"])
+def test_every_name_is_protected(installed: Any, tmp_path: Path, package: str) -> None:
+    installed.pip("install", "--quiet", foreign_wheel(tmp_path, package))
+
+    assert_reported(installed.python("import sim_tests"), package)
+    unaffected = installed.python("import perception")
+    assert unaffected.returncode == 0, unaffected.stderr
+
+
+def test_other_installed_before_ours_and_the_remedy(
+    environment: Any, wheel: Path, tmp_path: Path
+) -> None:
+    environment.borrow_dependencies()
+    environment.pip("install", "--quiet", foreign_wheel(tmp_path, "perception"))
+    environment.pip("install", "--quiet", "--no-deps", wheel)
+    for package in ("perception", "tracking", "nav_adapter"):
+        assert_reported(environment.python(f"import {package}"), "perception")
+
+    # Uninstalling takes away the __init__.py that both had put there.
+    environment.pip("uninstall", "--quiet", "--yes", "other-vision")
+    without = environment.python("import tracking")
+    assert without.returncode == 1
+    assert "pip install --force-reinstall --no-deps awarenav" in without.stderr
+
+    environment.pip("install", "--quiet", "--force-reinstall", "--no-deps", wheel)
+    assert environment.python("import nav_adapter").returncode == 0
+
+
+@pytest.mark.parametrize("file", ["perception/__init__.py", "perception.py"])
+def test_stray_package_or_module_ahead_on_the_path_is_named_by_its_path(
+    installed: Any, tmp_path: Path, file: str
+) -> None:
+    stray = tmp_path / "workspace" / file
+    stray.parent.mkdir(parents=True)
+    stray.write_text(FOREIGN_CODE)
+
+    done = installed.python("import tracking", PYTHONPATH=str(tmp_path / "workspace"))
+
+    place = str(stray).removesuffix("/__init__.py")
+    assert_reported(done, "perception", f"unknown distribution at {place}.")
+
+
+def test_good_installation_needs_no_scan_and_users_files_are_welcome(installed: Any) -> None:
+    folder = installed.site.relative_to(installed.folder).as_posix()
+    guard = GUARD_ALONE.replace("FOLDER", folder)
+    done = installed.python(guard)
+    assert done.returncode == 0, done.stderr
+
+    (installed.site / "perception" / "my_camera.yaml").write_text("width: 640\n")
+    done = installed.python(guard)
+    assert done.returncode == 0, done.stderr
+
+    (installed.site / "perception" / "my_detector.py").write_text("")
+    done = installed.python("import nav_adapter")
+    assert done.returncode == 0, done.stderr
+
+
+def test_checkout_imports_without_a_scan(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse() -> None:
+        raise AssertionError("metadata of other distributions were read")
+
+    monkeypatch.setattr(importlib.metadata, "distributions", refuse)
+    _clash.require_sole_owner("sim_tests")
+
+
+def test_loaders_are_the_same_file(root: Path) -> None:
+    loaders = {(root / name / "_clash.py").read_text() for name in ("tracking", "nav_adapter")}
+    assert loaders == {(root / "sim_tests" / "_clash.py").read_text()}

@@ -1,0 +1,93 @@
+"""What users get: the wheel's content, and the core in an environment without the simulator."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from email.parser import Parser
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+PACKAGES = {"perception", "tracking", "nav_adapter", "sim_tests"}
+CORE = ("perception", "tracking", "nav_adapter")
+
+# Prints what importing and using the core pulled in.
+CORE_CODE = """
+import importlib.util, json, sys
+import nav_adapter, perception, tracking
+robot = nav_adapter.RobotProfile(
+    footprint_m=[[0.4, 0.3], [-0.4, 0.3], [-0.4, -0.3], [0.4, -0.3]], max_speed_mps=1.5,
+    max_acceleration_mps2=1.0, max_deceleration_mps2=1.0, reaction_time_s=0.3)
+state = nav_adapter.RobotState(0.0, [0.0, 0.0], 0.0, 0.0, 0.0)
+adapter = nav_adapter.NavAdapter(nav_adapter.AwarenessPolicy(), robot)
+constraints = adapter.update(tracking.PersonTracker().predict(0.0), state, 0.0)
+print(json.dumps({
+    "files": {core.__name__: core.__file__ for core in (perception, tracking, nav_adapter)},
+    "found": [name for name in ("pybullet", "av", "tqdm") if importlib.util.find_spec(name)],
+    "imported": [name for name in ("pybullet", "matplotlib", "av", "tqdm") if name in sys.modules],
+    "obstacles": nav_adapter.circles(constraints).shape,
+}))
+"""
+
+
+def names_in(wheel: Path) -> list[str]:
+    with zipfile.ZipFile(wheel) as archive:
+        return archive.namelist()
+
+
+def metadata_file(wheel: Path, name: str) -> str:
+    (path,) = (entry for entry in names_in(wheel) if entry.endswith(f".dist-info/{name}"))
+    with zipfile.ZipFile(wheel) as archive:
+        return archive.read(path).decode()
+
+
+def test_wheel_owns_its_four_top_level_names_and_no_others(wheel: Path) -> None:
+    tops = {name.split("/")[0] for name in names_in(wheel)}
+    assert {top for top in tops if not top.endswith(".dist-info")} == PACKAGES
+    assert len(tops) == len(PACKAGES) + 1
+
+
+@pytest.mark.parametrize("package", sorted(PACKAGES))
+def test_wheel_ships_every_file_of_the_package(wheel: Path, root: Path, package: str) -> None:
+    on_disk = {
+        path.relative_to(root).as_posix()
+        for path in (root / package).rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts and path.suffix != ".part"
+    }
+    shipped = {name for name in names_in(wheel) if name.startswith(f"{package}/")}
+    assert shipped == on_disk
+    assert f"{package}/py.typed" in shipped
+
+
+def test_wheel_carries_the_licence_and_the_command(wheel: Path, root: Path) -> None:
+    assert metadata_file(wheel, "licenses/LICENSE") == (root / "LICENSE").read_text()
+    assert "awarenav = sim_tests._cli:main" in metadata_file(wheel, "entry_points.txt")
+    metadata = Parser().parsestr(metadata_file(wheel, "METADATA"))
+    assert metadata["License-Expression"] == "Apache-2.0"
+    needed = [line for line in metadata.get_all("Requires-Dist", []) if "extra ==" not in line]
+    assert not any(line.startswith(("pybullet", "matplotlib", "av", "tqdm")) for line in needed)
+
+
+@pytest.mark.slow
+def test_core_installs_and_runs_without_the_simulator(
+    wheel: Path, root: Path, environment: Any
+) -> None:
+    environment.pip("install", "--quiet", "--constraint", root / "requirements.lock", wheel)
+
+    done = environment.python(CORE_CODE)
+
+    assert done.returncode == 0, done.stderr
+    seen = json.loads(done.stdout)
+    for name in CORE:
+        assert Path(seen["files"][name]).parent == environment.site / name
+    assert seen["found"] == []
+    assert seen["imported"] == []  # matplotlib is there, since filterpy depends on it
+    assert seen["obstacles"] == [0, 5]
+
+    assert environment.command("awarenav", "--help").returncode == 0
+    refused = environment.command("awarenav", "demo", "--out", "demo")
+    assert refused.returncode == 2, refused.stderr
+    assert "awarenav[sim]" in refused.stderr
+    assert "Traceback" not in refused.stderr
