@@ -222,7 +222,7 @@ class NavAdapter:
         lost_m = BODY_RADIUS_M + abs(robot_state.speed_mps) * robot_age_s
         limits_mps = max_speed_mps(
             distance_m - [lost_m + margins.uncertainty_sigmas * m.sigma_m for m in memories],
-            [self._human_speed_mps(m) for m in memories],
+            [self._human_speed_mps(m, robot_state) for m in memories],
             deceleration_mps2=self._robot.max_deceleration_mps2,
             reaction_time_s=[
                 self._robot.reaction_time_s + max(0.0, now - m.track.stamp_s) for m in memories
@@ -235,15 +235,20 @@ class NavAdapter:
             return maximum_mps, "robot maximum"
         return limit_mps, f"track {list(people)[nearest]}: speed and separation"
 
-    def _human_speed_mps(self, memory: PersonMemory) -> float:
-        """The policy's assumption, plus what the person walks faster than an unaware one may.
+    def _human_speed_mps(self, memory: PersonMemory, robot_state: RobotState) -> float:
+        """The policy's assumption, but at least the speed at which the track closes in.
 
-        An attentive runner cannot stop as fast as an attentive walker, and an unaware one is
-        already faster than the walking speed of the standard.
+        Awareness is a reason to expect that somebody will not step towards the robot, not a reason
+        to overlook that they do. What a person walks faster than an unaware one may is added: an
+        attentive runner cannot stop as fast as an attentive walker, and an unaware one is already
+        faster than the walking speed of the standard.
         """
-        measured_mps = math.hypot(*memory.track.velocity_odom_mps.tolist())
-        excess_mps = max(0.0, measured_mps - self._unaware_human_speed_mps)
-        return self._policy_human_speed_mps(memory.awareness_lower) + excess_mps
+        vx, vy = memory.track.velocity_odom_mps.tolist()
+        x, y = (memory.track.position_odom_m - robot_state.position_odom_m).tolist()
+        excess_mps = max(0.0, math.hypot(vx, vy) - self._unaware_human_speed_mps)
+        closing_mps = -(vx * x + vy * y) / max(math.hypot(x, y), 1e-9)
+        policy_mps = self._policy_human_speed_mps(memory.awareness_lower)
+        return max(policy_mps + excess_mps, closing_mps)
 
 
 def _require_non_increasing(function: Callable[[float], float], name: str, unit: str) -> None:
