@@ -248,7 +248,7 @@ class NavAdapter:
         excess_mps = max(0.0, math.hypot(vx, vy) - self._unaware_human_speed_mps)
         closing_mps = -(vx * x + vy * y) / max(math.hypot(x, y), 1e-9)
         policy_mps = self._policy_human_speed_mps(memory.awareness_lower)
-        return max(policy_mps + excess_mps, closing_mps)
+        return float(max(policy_mps + excess_mps, closing_mps))
 
 
 def _require_non_increasing(function: Callable[[float], float], name: str, unit: str) -> None:

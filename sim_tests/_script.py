@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import lru_cache
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -99,38 +99,9 @@ class WorkerScript(StrictConfig):
                 raise ValueError(f"{name} must have increasing t_s, got {times}")
         return self
 
-    @cached_property
-    def _walk(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Times, positions, velocities, path length and heading on a fine grid."""
-        start, end = self.path[0].t_s, self.path[-1].t_s
-        points = np.array([[p.x_m, p.y_m] for p in self.path])
-        if len(self.path) == 1:
-            times = np.array([start])
-            velocity = np.zeros((1, 2))
-        else:
-            count = max(math.ceil((end - start) / _TABLE_STEP_S), 1) + 1
-            times = np.linspace(start, end, count)
-            spline = PchipInterpolator([p.t_s for p in self.path], points)
-            points, velocity = spline(times), spline.derivative()(times)
-        steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-        walked = np.concatenate([[0.0], np.cumsum(steps)])
-        return times, points, velocity, walked, self._heading_along(velocity)
-
-    @staticmethod
-    def _heading_along(velocity: FloatArray) -> FloatArray:
-        """Unwrapped direction of walking, held where the worker hardly moves."""
-        moving = np.flatnonzero(np.linalg.norm(velocity, axis=1) > _TURNING_SPEED_MPS)
-        if not len(moving):
-            return np.zeros(len(velocity))
-        nearest = moving[
-            np.clip(np.searchsorted(moving, np.arange(len(velocity))), 0, len(moving) - 1)
-        ]
-        angles = np.arctan2(velocity[:, 1], velocity[:, 0])
-        return np.unwrap(angles[nearest])
-
     def motion(self, t_s: float) -> WorkerMotion:
         """Where the body is at ``t_s`` and how it moves."""
-        times, points, velocity, walked, along = self._walk
+        times, points, velocity, walked, along = _walk_table(self.path)
         position = np.array([np.interp(t_s, times, points[:, axis]) for axis in (0, 1)])
         inside = times[0] <= t_s <= times[-1] and len(times) > 1
         moving = np.array(
@@ -178,6 +149,36 @@ class WorkerScript(StrictConfig):
             heading_odom_rad + here + share * (there - here),
             elevation + share * (next_elevation - elevation),
         )
+
+
+@lru_cache(maxsize=64)
+def _walk_table(
+    path: tuple[Waypoint, ...],
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Times, positions, velocities, path length and heading on a fine grid."""
+    start, end = path[0].t_s, path[-1].t_s
+    points = np.array([[p.x_m, p.y_m] for p in path])
+    if len(path) == 1:
+        times = np.array([start])
+        velocity = np.zeros((1, 2))
+    else:
+        count = max(math.ceil((end - start) / _TABLE_STEP_S), 1) + 1
+        times = np.linspace(start, end, count)
+        spline = PchipInterpolator([p.t_s for p in path], points)
+        points, velocity = spline(times), spline.derivative()(times)
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    walked = np.concatenate([[0.0], np.cumsum(steps)])
+    return times, points, velocity, walked, _heading_along(velocity)
+
+
+def _heading_along(velocity: FloatArray) -> FloatArray:
+    """Unwrapped direction of walking, held where the worker hardly moves."""
+    moving = np.flatnonzero(np.linalg.norm(velocity, axis=1) > _TURNING_SPEED_MPS)
+    if not len(moving):
+        return np.zeros(len(velocity))
+    place = np.searchsorted(moving, np.arange(len(velocity)))
+    nearest = moving[np.clip(place, 0, len(moving) - 1)]
+    return np.unwrap(np.arctan2(velocity[:, 1], velocity[:, 0])[nearest])
 
 
 def _wrapped(angle_rad: float) -> float:

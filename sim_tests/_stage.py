@@ -115,11 +115,14 @@ class Stage:
             if self._steps % self._steps_per_body_update == 0:
                 self._place_workers()
             self.amr.advance(self.warehouse.physics_dt_s)
+            # A collision changes the velocity within the step that finds it: read it before.
+            velocity = self.robot_velocity_odom_mps if any(self._close) else None
             self.warehouse.step()
             self._steps += 1
-            for index, close in enumerate(self._close):
-                if close:
-                    self._look_for_contact(index, meter)
+            if velocity is not None:
+                for index, close in enumerate(self._close):
+                    if close:
+                        self._look_for_contact(index, velocity, meter)
         self._place_workers()
 
     def measure(self, meter: SafetyMeter, dt_s: float) -> tuple[float, ...]:
@@ -211,13 +214,15 @@ class Stage:
         separation = max(float(closest[8]), 0.0)
         return separation, gap / length if separation > 0.0 and length > 1e-3 else towards
 
-    def _look_for_contact(self, index: int, meter: SafetyMeter) -> None:
+    def _look_for_contact(
+        self, index: int, robot_velocity_mps: FloatArray, meter: SafetyMeter
+    ) -> None:
         touching = pybullet.getContactPoints(
             self.amr.body, self.workers[index].body, physicsClientId=self.warehouse.client
         )
         if any(point[8] <= 0.0 for point in touching):
             _, towards = self._separation(index)
-            meter.touch(self.t_s, index, self.robot_velocity_odom_mps, towards)
+            meter.touch(self.t_s, index, robot_velocity_mps, towards)
         else:
             meter.release(index)
 

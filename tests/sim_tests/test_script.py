@@ -89,3 +89,9 @@ def test_impossible_walks_are_refused(change):
 def test_unknown_keys_are_refused_with_the_nearest_name():
     with pytest.raises(ValueError, match="did you mean 'yaw_deg'"):
         GazeKey.model_validate({"t_s": 0.0, "yaw": 3.0})
+
+
+def test_a_copied_script_walks_its_own_path():
+    WALK.motion(1.0)
+    moved = WALK.model_copy(update={"path": (WALK.path[0].model_copy(update={"x_m": 9.0}),)})
+    assert moved.motion(1.0).position_odom_m[0] == 9.0

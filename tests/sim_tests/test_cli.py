@@ -1,0 +1,110 @@
+import csv
+
+import pytest
+
+from sim_tests._bench import Metric, read_baseline, report, write_baseline
+from sim_tests._cli import main
+from sim_tests._errors import SimError
+from sim_tests._tables import ENCOUNTER_COLUMNS, EPISODE_COLUMNS
+
+SHORT = """
+name: short
+description: Two seconds.
+duration_s: 2.0
+robot: {goal_x_m: 1.0}
+workers:
+  - path: [{t_s: 0.0, x_m: 3.0, y_m: -1.0}]
+"""
+
+
+def rows(path):
+    with path.open(newline="") as file:
+        return list(csv.reader(file))
+
+
+@pytest.mark.parametrize("command", [[], ["demo"], ["crossings"], ["bench"]])
+def test_help_says_what_a_command_does(command, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main([*command, "--help"])
+    assert stop.value.code == 0
+    text = capsys.readouterr().out
+    assert "usage: awarenav" in text
+    if command and command != ["bench"]:
+        assert "--seed" in text
+        assert "--out" in text
+
+
+def test_crossings_write_a_row_an_episode_with_paired_seeds(tmp_path, capsys):
+    scenario = tmp_path / "short.yaml"
+    scenario.write_text(SHORT)
+    out = tmp_path / "out"
+    arguments = ["crossings", "--scenario", str(scenario), "--episodes", "2", "--seed", "7"]
+    assert main([*arguments, "--out", str(out)]) == 0
+    header, *body = rows(out / "episodes.csv")
+    assert tuple(header) == EPISODE_COLUMNS
+    assert [(row[1], row[2]) for row in body] == [
+        ("7", "blind"),
+        ("7", "balanced"),
+        ("8", "blind"),
+        ("8", "balanced"),
+    ]
+    first = (out / "episodes.csv").read_bytes()
+    main([*arguments, "--out", str(out)])
+    assert (out / "episodes.csv").read_bytes() == first
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["crossings", "--scenario", "nowhere"], "scenario must be one of"),
+        (["crossings", "--policy", "brave"], "preset must be one of"),
+        (["crossings", "--policy", "absent.yaml"], "absent.yaml"),
+        (["bench", "--baseline", "{tmp}"], "baseline"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_status_2(arguments, message, tmp_path, capsys):
+    arguments = [argument.replace("{tmp}", str(tmp_path)) for argument in arguments]
+    if arguments[0] == "crossings":
+        arguments += ["--out", str(tmp_path / "out")]
+    assert main(arguments) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert "Traceback" not in error
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.slow
+def test_demo_writes_its_tables_pictures_and_video(tmp_path, capsys):
+    assert main(["demo", "--out", str(tmp_path), "--no-video"]) == 0
+    text = capsys.readouterr().out
+    for line in ("awareness-blind", "aware, attentive worker", "aware, distracted worker"):
+        assert line in text
+    header, *body = rows(tmp_path / "encounter.csv")
+    assert tuple(header) == ENCOUNTER_COLUMNS
+    assert len(body) == 3000
+    assert {row[1] for row in body} == {"truth", "keypoints"}
+    assert (tmp_path / "encounter.png").read_bytes().startswith(b"\x89PNG")
+    assert len(rows(tmp_path / "episodes.csv")) == 5
+
+
+def test_baselines_round_trip_and_judge(tmp_path):
+    path = tmp_path / "baseline.json"
+    fast, slow = (Metric("speed", value, "x", "higher", 0.2) for value in (10.0, 7.0))
+    write_baseline(path, [fast])
+    baseline = read_baseline(path)
+    assert baseline == {"speed": fast}
+    assert report([fast], baseline)[1]
+    text, good = report([slow], baseline)
+    assert not good
+    assert "WORSE" in text
+    cost = Metric("cost", 1.0, "ms", "lower", 0.1)
+    assert Metric("cost", 1.2, "ms", "lower", 0.1).is_worse_than(cost)
+    assert not Metric("cost", 1.05, "ms", "lower", 0.1).is_worse_than(cost)
+
+
+@pytest.mark.parametrize("text", ["{", "{}", '{"metrics": [{"name": "a"}]}'])
+def test_files_that_are_no_baseline_are_refused(tmp_path, text):
+    path = tmp_path / "baseline.json"
+    path.write_text(text)
+    with pytest.raises(SimError, match="not a baseline"):
+        read_baseline(path)
