@@ -23,8 +23,9 @@ from ._worker import MAX_HEAD_PITCH_RAD, MAX_HEAD_YAW_RAD, Worker
 
 # Surfaces are measured exactly once centres are nearer than this; farther away a bound will do.
 _EXACT_WITHIN_M: Final = 4.0
-# Physics looks for contacts once surfaces were nearer than this in the last control cycle.
-_TOUCH_WITHIN_M: Final = 0.5
+# Bodies move at their full rate and physics looks for contacts once surfaces were nearer than this
+# in the last control cycle; nobody closes it within one.
+_TOUCH_WITHIN_M: Final = 0.8
 # A line of sight starts outside the head.
 _SKULL_M: Final = 0.16
 _BODY_UPDATE_HZ: Final = 60.0
@@ -112,7 +113,8 @@ class Stage:
     def advance(self, until_s: float, meter: SafetyMeter) -> None:
         """Run physics to ``until_s``, moving the workers and recording contacts."""
         while self.t_s < until_s - 0.5 * self.warehouse.physics_dt_s:
-            if self._steps % self._steps_per_body_update == 0:
+            # Far from the robot a body that moves once a control cycle touches nobody either.
+            if any(self._close) and self._steps % self._steps_per_body_update == 0:
                 self._place_workers()
             self.amr.advance(self.warehouse.physics_dt_s)
             # A collision changes the velocity within the step that finds it: read it before.
