@@ -37,7 +37,7 @@ def points(constraints: NavConstraints, spacing_m: float) -> FloatArray:
         NavError: ``spacing_m`` is not finite or below 1 mm.
     """
     spacing = finite_number("spacing_m", spacing_m, NavError, minimum=_MINIMUM_SPACING_M)
-    rings = [np.empty((0, 2))]
+    rings: list[FloatArray] = [np.empty((0, 2))]
     for obstacle in constraints.obstacles:
         # The arc is longer than the chord between neighbours, so this errs to the dense side.
         count = max(_MINIMUM_POINTS, math.ceil(2.0 * math.pi * obstacle.radius_m / spacing))

@@ -165,7 +165,7 @@ def refine(
     """
     weight = focal_px / keypoint_std_px
     count = len(rotations)
-    damping = np.full(count, 1e-3)
+    damping: FloatArray = np.full(count, 1e-3)
     rotation, translation = rotations, translations_m
     state = _linearise(model_m, rays, weight, rotation, translation, prior)
     for _ in range(_ITERATIONS):

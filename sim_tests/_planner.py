@@ -83,7 +83,7 @@ class SamplingPlanner:
         self._boxes_odom_m = _checked_boxes(static_boxes_odom_m)
 
         def along_time(first: float, last: float, samples: int) -> FloatArray:
-            return np.linspace(first, last, samples)[:, None, None]
+            return np.linspace(first, last, samples, dtype=np.float64)[:, None, None]
 
         samples = max(2, math.ceil(config.horizon_s / config.step_s))
         self._t_s = along_time(config.horizon_s / samples, config.horizon_s, samples)

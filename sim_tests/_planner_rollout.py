@@ -41,7 +41,7 @@ class Poses(NamedTuple):
 
 def window(value: ArrayLike, now: float, fall: float, rise: float) -> FloatArray:
     """``value`` as near as one tick gets to it from ``now``: within ``now − fall, now + rise``."""
-    return np.minimum(np.maximum(value, now - fall), now + rise)
+    return np.asarray(np.minimum(np.maximum(value, now - fall), now + rise), dtype=np.float64)
 
 
 def ramp_integral(
