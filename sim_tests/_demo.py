@@ -81,12 +81,12 @@ def delay_won_back(rows: tuple[ComparisonRow, ...]) -> float | None:
 
 def encounter_table(result: CrossingResult) -> str:
     """The encounter's three cases beside the paper's, as text."""
-    lines = [f"{'case':24s}{'':11s}{'alpha':>8s}{'d_fwd':>9s}{'d_lat':>9s}", "-" * 61]
+    lines = [f"{'case':27s}{'':11s}{'alpha':>8s}{'d_fwd':>9s}{'d_lat':>9s}", "-" * 64]
     last = None
     for case, perception, alpha, forward, lateral in case_errors(result):
         if case is not last:
             lines.append(
-                f"{case.t_s:5.2f} s {case.meaning:16s}{'paper':11s}{case.awareness:8.2f}"
+                f"{case.t_s:5.2f} s {case.meaning:19s}{'paper':11s}{case.awareness:8.2f}"
                 f"{case.d_fwd_m:7.2f} m{case.d_lat_m:7.2f} m"
             )
             last = case
@@ -94,7 +94,7 @@ def encounter_table(result: CrossingResult) -> str:
             "-" if value is None else f"{value:.2f}{unit}"
             for value, unit in ((alpha, ""), (forward, " m"), (lateral, " m"))
         ]
-        lines.append(f"{'':24s}{perception:11s}{cells[0]:>8s}{cells[1]:>9s}{cells[2]:>9s}")
+        lines.append(f"{'':27s}{perception:11s}{cells[0]:>8s}{cells[1]:>9s}{cells[2]:>9s}")
     return "\n".join(lines)
 
 

@@ -78,6 +78,8 @@ class WorkerScript(StrictConfig):
 
     Attributes:
         stature_m: body height.
+        stride_m: distance of a full gait cycle (two steps); default 0.75 of the stature, that of a
+            brisk walk. Slow walkers take shorter strides.
         path: at least one waypoint in order of time; between them the walk is a monotone cubic
             (PCHIP), before the first and after the last the worker stands.
         heading: the way the body faces; empty means along the walk.
@@ -87,6 +89,7 @@ class WorkerScript(StrictConfig):
     error: ClassVar[type[ValueError]] = SimError
 
     stature_m: float = Field(default=1.75, ge=1.4, le=2.1)
+    stride_m: float | None = Field(default=None, gt=0.2, le=2.5)
     path: tuple[Waypoint, ...] = Field(min_length=1)
     heading: tuple[HeadingKey, ...] = ()
     gaze: tuple[GazeKey, ...] = ()

@@ -81,7 +81,8 @@ class Stage:
             )
             self.scripts: tuple[WorkerScript, ...] = scenario.workers
             self.workers = tuple(
-                Worker(self.warehouse, stature_m=script.stature_m) for script in self.scripts
+                Worker(self.warehouse, script.stature_m, stride_m=script.stride_m)
+                for script in self.scripts
             )
         except BaseException:
             self.warehouse.close()

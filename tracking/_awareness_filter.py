@@ -19,7 +19,7 @@ import numpy as np
 from ._config import AwarenessFilterConfig
 
 # Nodes and weights for the expectation of a function of a standard normal variable.
-_NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(15)
+_NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(11)
 _GAUSS_HERMITE: Final = tuple(
     zip(_NODES.tolist(), (_WEIGHTS / _WEIGHTS.sum()).tolist(), strict=True)
 )

@@ -1,0 +1,218 @@
+"""The scalar filter on its own: exactness, bounds, and what a measurement means."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import quad
+from scipy.stats import norm
+
+from tracking import AwarenessFilterConfig
+from tracking._awareness_filter import (
+    AwarenessBelief,
+    drift,
+    estimate,
+    evidence,
+    forget,
+    logit,
+    measure,
+    prior,
+    sigmoid,
+)
+
+CONFIG = AwarenessFilterConfig()
+Z = float(norm.ppf(CONFIG.lower_bound_confidence))
+TAU_S = CONFIG.unseen_time_constant_s
+PRIOR_VARIANCE = CONFIG.prior_std_logit**2
+
+alphas = st.floats(0.0, 1.0)
+stds = st.floats(0.0, CONFIG.max_evidence_std)
+intervals = st.floats(1e-3, 10.0)
+# Any mean; any variance that a filter which starts at the prior can hold; a bound below the mean.
+beliefs = st.builds(
+    lambda mean, variance, slack: AwarenessBelief(
+        mean, variance, mean - Z * math.sqrt(variance) - slack
+    ),
+    st.floats(-8.0, 8.0),
+    st.floats(1e-4, PRIOR_VARIANCE),
+    st.just(0.0) | st.floats(0.0, 10.0),
+)
+
+
+@given(belief=beliefs, dt_s=st.floats(1e-4, 20.0), share=st.floats(0.0, 1.0))
+def test_drift_is_exact_in_time(belief: AwarenessBelief, dt_s: float, share: float) -> None:
+    once = drift(belief, dt_s, TAU_S, CONFIG)
+    middle = drift(belief, share * dt_s, TAU_S, CONFIG)
+    twice = drift(middle, dt_s - share * dt_s, TAU_S, CONFIG)
+    assert twice.mean == pytest.approx(once.mean, abs=1e-9)
+    assert twice.variance == pytest.approx(once.variance, abs=1e-9)
+    assert twice.bound == pytest.approx(once.bound, abs=1e-9)
+
+
+@given(belief=beliefs, dt_s=st.floats(0.0, 20.0))
+def test_the_bound_never_rises_without_evidence(belief: AwarenessBelief, dt_s: float) -> None:
+    after = drift(belief, dt_s, TAU_S, CONFIG)
+    assert after.bound <= belief.bound
+    assert estimate(after).awareness_lower <= estimate(belief).awareness_lower
+    assert forget(after, CONFIG).bound <= after.bound
+
+
+@given(belief=beliefs, dt_s=st.floats(1e-3, 5.0))
+def test_the_bound_is_the_lowest_that_the_belief_passes(
+    belief: AwarenessBelief, dt_s: float
+) -> None:
+    phi = np.exp(-np.linspace(0.0, dt_s, 4001) / TAU_S)
+    m0 = logit(CONFIG.prior_awareness)
+    on_the_way = (
+        m0
+        + phi * (belief.mean - m0)
+        - Z * np.sqrt(PRIOR_VARIANCE + phi**2 * (belief.variance - PRIOR_VARIANCE))
+    )
+    lowest = min(belief.bound, on_the_way.min())
+    after = drift(belief, dt_s, TAU_S, CONFIG).bound
+    assert after <= lowest + 1e-9
+    assert after == pytest.approx(lowest, abs=1e-3)
+
+
+@given(belief=beliefs, dt_s=intervals)
+def test_a_hidden_face_lowers_the_bound_at_least_as_fast_as_an_absence(
+    belief: AwarenessBelief, dt_s: float
+) -> None:
+    no_face = drift(belief, dt_s, CONFIG.no_face_time_constant_s, CONFIG)
+    unseen = drift(belief, dt_s, CONFIG.unseen_time_constant_s, CONFIG)
+    assert no_face.bound <= unseen.bound + 1e-12
+
+
+@given(belief=beliefs)
+def test_without_evidence_belief_ends_at_the_prior(belief: AwarenessBelief) -> None:
+    after = drift(belief, 100.0 * TAU_S, TAU_S, CONFIG)
+    assert sigmoid(after.mean) == pytest.approx(CONFIG.prior_awareness)
+    assert after.variance == pytest.approx(PRIOR_VARIANCE)
+
+
+@given(belief=beliefs, dt_s=intervals)
+def test_uncertainty_grows_without_evidence_and_shrinks_with_it(
+    belief: AwarenessBelief, dt_s: float
+) -> None:
+    assert drift(belief, dt_s, TAU_S, CONFIG).variance >= belief.variance - 1e-12
+    measured = measure(belief, 0.0, 0.3, dt_s, CONFIG)
+    assert 0.0 < measured.variance < belief.variance
+
+
+@given(belief=beliefs, alpha=alphas, std=stds, dt_s=intervals)
+def test_a_measurement_is_a_scalar_bayes_update(
+    belief: AwarenessBelief, alpha: float, std: float, dt_s: float
+) -> None:
+    said = evidence(alpha, std, CONFIG)
+    assert said is not None
+    mean, variance = said
+    variance *= max(1.0, CONFIG.evidence_correlation_s / dt_s)
+    information = 1.0 / belief.variance + 1.0 / variance
+    after = measure(belief, *said, dt_s, CONFIG)
+    assert after.variance == pytest.approx(1.0 / information)
+    assert after.mean == pytest.approx(
+        (belief.mean / belief.variance + mean / variance) / information, abs=1e-9
+    )
+    assert after.bound == pytest.approx(after.mean - Z * math.sqrt(after.variance))
+
+
+@given(alpha=st.floats(0.3, 0.7))
+def test_in_mid_range_a_standard_deviation_maps_by_the_derivative(alpha: float) -> None:
+    std = 0.08
+    said = evidence(alpha, std, CONFIG)
+    assert said is not None
+    assert said[0] == pytest.approx(logit(alpha), abs=0.06)
+    assert math.sqrt(said[1]) == pytest.approx(std / (alpha * (1.0 - alpha)), rel=0.06)
+
+
+@given(alpha=alphas, std=stds)
+def test_the_one_sigma_points_of_a_measurement_are_those_of_alpha(alpha: float, std: float) -> None:
+    said = evidence(alpha, std, CONFIG)
+    assert said is not None
+    mean, sigma = said[0], math.sqrt(said[1])
+    epsilon = CONFIG.clip_awareness
+    assert sigma >= CONFIG.min_evidence_std_logit
+    if sigma > CONFIG.min_evidence_std_logit + 1e-9:
+        for sign in (-1.0, 1.0):
+            point = min(max(alpha + sign * std, epsilon), 1.0 - epsilon)
+            assert sigmoid(mean + sign * sigma) == pytest.approx(point)
+
+
+@given(low=alphas, high=alphas, std=stds)
+def test_a_higher_alpha_is_higher_evidence(low: float, high: float, std: float) -> None:
+    low, high = sorted((low, high))
+    first, second = evidence(low, std, CONFIG), evidence(high, std, CONFIG)
+    assert first is not None
+    assert second is not None
+    assert first[0] <= second[0]
+
+
+def test_a_confident_zero_is_confident_unawareness() -> None:
+    said = evidence(0.0, 0.05, CONFIG)
+    assert said is not None
+    # By the derivative at ε it would weigh next to nothing: σ = 0.05 / (0.02 · 0.98) = 2.6.
+    assert sigmoid(said[0] + 2.0 * math.sqrt(said[1])) < 0.1
+    after = estimate(measure(prior(CONFIG), *said, 1.0, CONFIG))
+    assert after.awareness < CONFIG.prior_awareness
+    assert after.awareness_std < 0.02
+
+
+def test_an_alpha_that_could_be_anything_is_no_evidence() -> None:
+    assert evidence(1.0, 0.3, CONFIG) is None
+    assert evidence(1.0, 1e9, CONFIG) is None
+    assert evidence(1.0, CONFIG.max_evidence_std, CONFIG) is not None
+
+
+@pytest.mark.parametrize("frames", [2, 5, 40])
+def test_information_in_a_span_of_time_does_not_depend_on_the_frame_rate(frames: int) -> None:
+    span_s = CONFIG.evidence_correlation_s
+    once = measure(prior(CONFIG), 1.0, 0.5, span_s, CONFIG)
+    many = prior(CONFIG)
+    for _ in range(frames):
+        many = measure(many, 1.0, 0.5, span_s / frames, CONFIG)
+    assert many.mean == pytest.approx(once.mean)
+    assert many.variance == pytest.approx(once.variance)
+
+
+@given(
+    mean=st.floats(-12.0, 12.0),
+    variance=st.floats(1e-4, 25.0),
+)
+def test_an_estimate_is_a_probability_with_a_bounded_deviation(
+    mean: float, variance: float
+) -> None:
+    result = estimate(AwarenessBelief(mean, variance, mean - Z * math.sqrt(variance)))
+    assert 0.0 <= result.awareness_lower <= result.awareness <= 1.0
+    assert 0.0 <= result.awareness_std <= 0.5
+
+
+@pytest.mark.parametrize("mean", [-4.0, -1.0, 0.0, 2.5])
+@pytest.mark.parametrize("variance", [0.05, 0.5, 2.25])
+def test_the_deviation_is_that_of_the_logit_normal_distribution(
+    mean: float, variance: float
+) -> None:
+    std = math.sqrt(variance)
+
+    def moment(order: int) -> float:
+        density = norm(mean, std).pdf
+        low, high = mean - 9.0 * std, mean + 9.0 * std
+        return float(quad(lambda x: sigmoid(x) ** order * density(x), low, high)[0])
+
+    expected = math.sqrt(moment(2) - moment(1) ** 2)
+    assert estimate(AwarenessBelief(mean, variance)).awareness_std == pytest.approx(
+        expected, rel=0.01
+    )
+
+
+def test_nothing_known_has_a_lower_bound_of_zero() -> None:
+    assert estimate(prior(CONFIG)).awareness_lower == 0.0
+    assert estimate(prior(CONFIG)).awareness == pytest.approx(CONFIG.prior_awareness)
+
+
+@given(value=st.floats(-30.0, 30.0))
+def test_sigmoid_inverts_logit(value: float) -> None:
+    assert logit(sigmoid(value)) == pytest.approx(value, rel=1e-3, abs=1e-6)

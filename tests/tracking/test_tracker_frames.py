@@ -1,0 +1,95 @@
+"""Frames of reference: neither the camera's motion nor the choice of odom may matter."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tracking_scenes import PERIOD_S, FloatArray, camera_at, observe
+
+from tracking import PersonTrack, PersonTracker
+
+NOISE_M2 = np.array([[0.01, 0.004], [0.004, 0.03]])
+
+
+def crowd(
+    camera_of: Callable[[float], FloatArray], world: FloatArray | None = None
+) -> tuple[PersonTrack, ...]:
+    """Three walkers, one of them hidden for a while, seen for two seconds by a given camera.
+
+    ``world`` (4, 4) turns and shifts odom: the same camera images, other names for places.
+    """
+    rng = np.random.default_rng(5)
+    starts = np.array([[3.0, -1.0], [4.0, 1.5], [6.0, 0.0]])
+    velocities = np.array([[0.2, 1.1], [-0.8, -0.5], [-1.0, 0.3]])
+    shift = np.eye(4) if world is None else world
+    tracker, tracks = PersonTracker(), ()
+    for step in range(40):
+        now = step * PERIOD_S
+        T = camera_of(now)
+        noise = rng.normal(size=(3, 2)) @ np.linalg.cholesky(NOISE_M2).T
+        observations = [
+            observe(
+                place,
+                now,
+                T_odom_camera=T,
+                covariance_odom_m2=NOISE_M2,
+                awareness=alpha,
+                awareness_std=0.06,
+            )
+            for index, (place, alpha) in enumerate(
+                zip(starts + velocities * now + noise, (0.9, 0.1, None), strict=True)
+            )
+            if index != 1 or not 20 <= step < 34
+        ]
+        tracks = tracker.update(observations, now, shift @ T)
+    return tracks
+
+
+def moving_camera(now: float) -> FloatArray:
+    return camera_at(0.8 * now, -0.2 * now, 0.4 * now, 0.1 + 0.05 * math.sin(9.0 * now))
+
+
+def assert_same(
+    first: tuple[PersonTrack, ...], second: tuple[PersonTrack, ...], world: FloatArray | None = None
+) -> None:
+    T = np.eye(4) if world is None else world
+    R, t = T[:2, :2], T[:2, 3]
+    turn = np.kron(np.eye(2), R)
+    assert [(a.id, a.status) for a in first] == [(b.id, b.status) for b in second]
+    assert len(first) == 3
+    for a, b in zip(first, second, strict=True):
+        np.testing.assert_allclose(b.position_odom_m, R @ a.position_odom_m + t, atol=1e-8)
+        np.testing.assert_allclose(b.velocity_odom_mps, R @ a.velocity_odom_mps, atol=1e-8)
+        np.testing.assert_allclose(b.covariance_odom, turn @ a.covariance_odom @ turn.T, atol=1e-8)
+        assert b.awareness == pytest.approx(a.awareness, abs=1e-12)
+        assert b.awareness_lower == pytest.approx(a.awareness_lower, abs=1e-12)
+
+
+def test_a_moving_camera_sees_what_a_fixed_one_sees() -> None:
+    assert_same(crowd(lambda _: camera_at()), crowd(moving_camera))
+
+
+def test_people_who_stand_still_have_no_velocity_however_the_camera_moves() -> None:
+    tracker = PersonTracker()
+    for step in range(60):
+        now = step * PERIOD_S
+        T = moving_camera(now)
+        tracks = tracker.update([observe((3.0, 0.5), now, T_odom_camera=T)], now, T)
+    np.testing.assert_allclose(tracks[0].position_odom_m, (3.0, 0.5), atol=1e-9)
+    np.testing.assert_allclose(tracks[0].velocity_odom_mps, (0.0, 0.0), atol=1e-9)
+
+
+@settings(max_examples=25)
+@given(x_m=st.floats(-100.0, 100.0), y_m=st.floats(-100.0, 100.0), yaw=st.floats(-math.pi, math.pi))
+def test_turning_and_shifting_the_world_turns_and_shifts_the_tracks(
+    x_m: float, y_m: float, yaw: float
+) -> None:
+    world = np.eye(4)
+    world[:2, :2] = [[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]]
+    world[:3, 3] = x_m, y_m, 0.3
+    assert_same(crowd(moving_camera), crowd(moving_camera, world), world)
