@@ -75,15 +75,21 @@ class AttentionCone:
 
     def scores(self, apex_m: FloatArray, gaze: FloatArray, target_m: FloatArray) -> FloatArray:
         """Evaluate eqs. (1)–(3) under NumPy broadcasting of (…, 3) arrays, unchecked, to (…,)."""
-        length = np.linalg.norm(gaze, axis=-1, keepdims=True)
+        length = np.sqrt(_dot(gaze, gaze))
         if not np.all(length > 0.0):
             raise PerceptionError("gaze must have a direction, got a vector of length 0")
-        unit = gaze / length
+        unit = gaze / length[..., None]
         offset = target_m - apex_m
-        axial = np.sum(offset * unit, axis=-1)
-        perpendicular = np.linalg.norm(offset - axial[..., None] * unit, axis=-1)
+        axial = _dot(offset, unit)
+        across = offset - axial[..., None] * unit
+        perpendicular = np.sqrt(_dot(across, across))
         radius = axial * math.tan(self.half_angle_rad)
         ahead = axial > 0.0
         inside = ahead & (perpendicular <= radius)
         ratio = np.divide(perpendicular, radius, out=np.ones_like(radius), where=inside)
         return np.asarray(np.where(inside, 1.0 - ratio, 0.0), dtype=np.float64)
+
+
+def _dot(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Dot products of (…, 3) arrays under broadcasting."""
+    return np.asarray(np.einsum("...i,...i->...", first, second))

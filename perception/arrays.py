@@ -7,6 +7,7 @@ valid, and the unit. Each caller passes the error class of its own package.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -18,11 +19,29 @@ FloatArray = NDArray[np.float64]
 
 # A rotation read from a file or sent over a wire carries rounding of about this size.
 _ROTATION_TOLERANCE = 1e-4
+_FEW_NUMBERS = 36
+_LAST_ROW = (0.0, 0.0, 0.0, 1.0)
 
 
 def _shape_text(shape: tuple[int | str, ...]) -> str:
     inner = ", ".join(str(extent) for extent in shape)
     return f"({inner},)" if len(shape) == 1 else f"({inner})"
+
+
+def _fits(given: tuple[int, ...], wanted: tuple[int | str, ...]) -> bool:
+    """True when the extents agree, letters standing for any extent but equal ones for equal."""
+    free: dict[str, int] = {}
+    return len(given) == len(wanted) and all(
+        extent == (want if isinstance(want, int) else free.setdefault(want, extent))
+        for extent, want in zip(given, wanted, strict=True)
+    )
+
+
+def _all_finite(array: FloatArray) -> bool:
+    # Plain Python is faster on the few numbers of a vector or a pose.
+    if array.size <= _FEW_NUMBERS:
+        return all(map(math.isfinite, array.ravel().tolist()))
+    return bool(np.isfinite(array).all())
 
 
 def finite_array(
@@ -43,14 +62,9 @@ def finite_array(
             f"{name} must be an array of numbers of shape {_shape_text(shape)}, "
             f"got {type(value).__name__}: {value!r:.80}"
         ) from cause
-    free: dict[str, int] = {}
-    fits = array.ndim == len(shape) and all(
-        extent == (wanted if isinstance(wanted, int) else free.setdefault(wanted, extent))
-        for extent, wanted in zip(array.shape, shape, strict=True)
-    )
-    if not fits:
+    if array.shape != shape and not _fits(array.shape, shape):
         raise error(f"{name} must have shape {_shape_text(shape)}, got {array.shape}")
-    if not np.isfinite(array).all():
+    if not _all_finite(array):
         bad = int(array.size - np.isfinite(array).sum())
         raise error(f"{name} must be finite, got {bad} NaN or infinite value(s) of {array.size}")
     array.setflags(write=False)
@@ -102,19 +116,36 @@ def covariance_matrix(
 def rotation_matrix(name: str, value: Any, error: type[ValueError] = PerceptionError) -> FloatArray:
     """Return a read-only (3, 3) rotation; it must be orthonormal with determinant +1."""
     array = finite_array(name, value, (3, 3), error)
-    deviation = float(np.abs(array @ array.T - np.eye(3)).max())
-    if deviation > _ROTATION_TOLERANCE or np.linalg.det(array) < 0.0:
+    a, b, c = array.tolist()
+    deviation = max(
+        abs(_dot(a, a) - 1.0),
+        abs(_dot(b, b) - 1.0),
+        abs(_dot(c, c) - 1.0),
+        abs(_dot(a, b)),
+        abs(_dot(a, c)),
+        abs(_dot(b, c)),
+    )
+    normal = (b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0])
+    determinant = _dot(a, normal)
+    if deviation > _ROTATION_TOLERANCE or determinant < 0.0:
         raise error(
             f"{name} must be a rotation (orthonormal, determinant +1), got a deviation of "
-            f"{deviation:g} and determinant {np.linalg.det(array):g}"
+            f"{deviation:g} and determinant {determinant:g}"
         )
     return array
+
+
+def _dot(first: Sequence[float], second: Sequence[float]) -> float:
+    return first[0] * second[0] + first[1] * second[1] + first[2] * second[2]
 
 
 def rigid_transform(name: str, value: Any, error: type[ValueError] = PerceptionError) -> FloatArray:
     """Return a read-only (4, 4) rigid transform; translation in metres."""
     array = finite_array(name, value, (4, 4), error)
-    if float(np.abs(array[3] - (0.0, 0.0, 0.0, 1.0)).max()) > 1e-9:
+    if any(
+        abs(given - wanted) > 1e-9
+        for given, wanted in zip(array[3].tolist(), _LAST_ROW, strict=True)
+    ):
         raise error(f"{name} must have the last row (0, 0, 0, 1), got {array[3].tolist()}")
     rotation_matrix(f"{name}[:3, :3]", array[:3, :3], error)
     return array

@@ -98,7 +98,7 @@ class Amr:
         self._speed_mps = 0.0
         self._yaw_rate_radps = 0.0
         self._read_at_step = -1
-        self._last_motion = (np.eye(4), 0.0, 0.0)
+        self._last_motion = (np.eye(4), 0.0, 0.0, np.eye(4))
         self._drive()
 
     def command(self, speed_mps: float, yaw_rate_radps: float) -> None:
@@ -129,7 +129,7 @@ class Amr:
 
     def state(self, stamp_s: float) -> RobotState:
         """Where the robot is and how it moves, from the physics."""
-        T, speed, yaw_rate = self._motion()
+        T, speed, yaw_rate, _ = self._motion()
         return RobotState(
             stamp_s=stamp_s,
             position_odom_m=T[:2, 3],
@@ -146,10 +146,10 @@ class Amr:
     @property
     def T_odom_camera(self) -> FloatArray:  # noqa: N802
         """(4, 4) pose of the camera's optical frame in odom."""
-        return np.asarray(self.T_odom_base @ self.T_base_camera)
+        return self._motion()[3]
 
-    def _motion(self) -> tuple[FloatArray, float, float]:
-        """T_odom_base, speed along the base's x in m/s, yaw rate in rad/s; read once a step."""
+    def _motion(self) -> tuple[FloatArray, float, float, FloatArray]:
+        """T_odom_base, speed (m/s), yaw rate (rad/s) and T_odom_camera; read once a step."""
         if self._read_at_step == self._warehouse.steps:
             return self._last_motion
         self._read_at_step = self._warehouse.steps
@@ -166,7 +166,10 @@ class Amr:
         turning = (wy * z - wz * y, wz * x - wx * z, wx * y - wy * x)
         origin_velocity = np.array(velocity) + turning
         T.setflags(write=False)
-        self._last_motion = T, float(origin_velocity @ rotation[:, 0]), float(angular[2])
+        T_odom_camera = np.asarray(T @ self.T_base_camera)
+        T_odom_camera.setflags(write=False)
+        speed = float(origin_velocity @ rotation[:, 0])
+        self._last_motion = T, speed, float(angular[2]), T_odom_camera
         return self._last_motion
 
     def _set_up_dynamics(self) -> None:

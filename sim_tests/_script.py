@@ -104,25 +104,19 @@ class WorkerScript(StrictConfig):
 
     def motion(self, t_s: float) -> WorkerMotion:
         """Where the body is at ``t_s`` and how it moves."""
-        times, points, velocity, walked, along = _walk_table(self.path)
-        position = np.array([np.interp(t_s, times, points[:, axis]) for axis in (0, 1)])
-        inside = times[0] <= t_s <= times[-1] and len(times) > 1
-        moving = np.array(
-            [np.interp(t_s, times, velocity[:, axis]) if inside else 0.0 for axis in (0, 1)]
-        )
+        start, step, table = _walk_table(self.path)
+        place = min(max((t_s - start) / step, 0.0), len(table) - 1.0)
+        row = min(int(place), len(table) - 2)
+        here = table[row] + (place - row) * (table[row + 1] - table[row])
+        moving = 0.0 < place < len(table) - 1.0
+        heading = float(here[4])
         if self.heading:
+            times = [key.t_s for key in self.heading]
             heading = math.radians(
-                float(
-                    np.interp(
-                        t_s,
-                        [key.t_s for key in self.heading],
-                        [key.heading_deg for key in self.heading],
-                    )
-                )
+                float(np.interp(t_s, times, [key.heading_deg for key in self.heading]))
             )
-        else:
-            heading = float(np.interp(t_s, times, along))
-        return WorkerMotion(position, moving, heading, float(np.interp(t_s, times, walked)))
+        velocity = here[2:4] if moving else np.zeros(2)
+        return WorkerMotion(here[:2], velocity, heading, float(here[5]))
 
     def gaze_angles(
         self, t_s: float, heading_odom_rad: float, to_robot: tuple[float, float]
@@ -155,23 +149,23 @@ class WorkerScript(StrictConfig):
 
 
 @lru_cache(maxsize=64)
-def _walk_table(
-    path: tuple[Waypoint, ...],
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Times, positions, velocities, path length and heading on a fine grid."""
+def _walk_table(path: tuple[Waypoint, ...]) -> tuple[float, float, FloatArray]:
+    """Start, time step and (N ≥ 2, 6) rows of x, y, vx, vy, heading along the walk, walked."""
     start, end = path[0].t_s, path[-1].t_s
-    points = np.array([[p.x_m, p.y_m] for p in path])
+    corners = np.array([[p.x_m, p.y_m] for p in path])
     if len(path) == 1:
-        times = np.array([start])
-        velocity = np.zeros((1, 2))
+        points, velocity, step = np.repeat(corners, 2, axis=0), np.zeros((2, 2)), 1.0
     else:
         count = max(math.ceil((end - start) / _TABLE_STEP_S), 1) + 1
         times = np.linspace(start, end, count)
-        spline = PchipInterpolator([p.t_s for p in path], points)
+        spline = PchipInterpolator([p.t_s for p in path], corners)
         points, velocity = spline(times), spline.derivative()(times)
-    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    walked = np.concatenate([[0.0], np.cumsum(steps)])
-    return times, points, velocity, walked, _heading_along(velocity)
+        step = (end - start) / (count - 1)
+    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    walked = np.concatenate([[0.0], np.cumsum(lengths)])
+    table = np.column_stack([points, velocity, _heading_along(velocity), walked])
+    table.setflags(write=False)
+    return start, step, table
 
 
 def _heading_along(velocity: FloatArray) -> FloatArray:

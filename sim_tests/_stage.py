@@ -168,26 +168,28 @@ class Stage:
         return tuple(views)
 
     def _place_workers(self) -> None:
-        camera = self.amr.T_odom_camera[:3, 3]
+        camera_x, camera_y, camera_z = self.amr.T_odom_camera[:3, 3].tolist()
         motions = []
         for worker, script, offset in zip(self.workers, self.scripts, self._offsets_s, strict=True):
             t_s = self.t_s - float(offset)
             motion = script.motion(t_s)
-            to_robot = camera[:2] - motion.position_odom_m
-            flat = float(np.linalg.norm(to_robot))
+            x, y = motion.position_odom_m.tolist()
             # Eyes stand at about 0.94 of the stature.
-            up = float(camera[2]) - 0.94 * script.stature_m
+            up = camera_z - 0.94 * script.stature_m
             azimuth, elevation = script.gaze_angles(
                 t_s,
                 motion.heading_odom_rad,
-                (math.atan2(to_robot[1], to_robot[0]), math.atan2(up, flat)),
+                (
+                    math.atan2(camera_y - y, camera_x - x),
+                    math.atan2(up, math.hypot(camera_x - x, camera_y - y)),
+                ),
             )
             yaw = math.remainder(azimuth - motion.heading_odom_rad, 2.0 * math.pi)
             worker.place(
                 motion.position_odom_m,
                 motion.heading_odom_rad,
                 motion.walked_m,
-                float(np.linalg.norm(motion.velocity_odom_mps)),
+                math.hypot(*motion.velocity_odom_mps.tolist()),
                 min(max(yaw, -MAX_HEAD_YAW_RAD), MAX_HEAD_YAW_RAD),
                 min(max(elevation, -MAX_HEAD_PITCH_RAD), MAX_HEAD_PITCH_RAD),
             )
