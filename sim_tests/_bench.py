@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+import sys
 import time
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Literal
+
+from tqdm import tqdm
 
 from ._crossing import run_crossing
 from ._errors import SimError
@@ -48,13 +51,19 @@ def measure(repeats: int = 3) -> tuple[Metric, ...]:
 
     A peer runs in the same process: PyBullet stepping the empty hall, which no crossing can beat.
     """
-    physics = min(_time_bare_physics() for _ in range(repeats))
     names = ("crossing_attentive", "crossing_distracted")
-    truth = min((_time_runs(names, "truth") for _ in range(repeats)), key=lambda run: run[1])
-    encounter = min(
-        (_time_runs(("paper_encounter",), "truth") for _ in range(repeats)), key=lambda run: run[1]
-    )
-    keypoints = _time_runs(names, "keypoints")
+    with tqdm(total=4, desc="bench", unit="figure", leave=False, file=sys.stderr) as bar:
+
+        def best(names: tuple[str, ...], perception: str) -> tuple[float, float]:
+            runs = [_time_runs(names, perception) for _ in range(repeats)]
+            bar.update()
+            return min(runs, key=lambda run: run[1])
+
+        physics = min(_time_bare_physics() for _ in range(repeats))
+        bar.update()
+        truth = best(names, "truth")
+        encounter = best(("paper_encounter",), "truth")
+        keypoints = best(names, "keypoints")
     return (
         _factor("crossing_truth_real_time_factor", truth),
         Metric(
