@@ -137,7 +137,7 @@ class _Recorder:
 
     def close(self) -> None:
         if self._video is not None:
-            self._video.__exit__(None, None, None)
+            self._video.close()
 
     def __call__(self, frame: CrossingFrame, stage: Stage) -> None:
         if self._map is None:

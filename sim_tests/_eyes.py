@@ -86,9 +86,15 @@ class KeypointEyes:
     ) -> tuple[tuple[PersonObservation, int], ...]:
         """Return what the pipeline makes of the keypoints seen now."""
         seen = self._keypoints.look(T_odom_camera, self._stage.workers)
-        observations = self._pipeline.process(self._blank, stamp_s)
-        # The pipeline keeps order; it drops a person only when even the box gives no position.
-        return tuple(zip(observations, seen, strict=False))
+        worker_of = {
+            detection.box_xyxy_px.tobytes(): worker
+            for detection, worker in zip(self._keypoints.detect(None), seen, strict=True)
+        }
+        return tuple(
+            (observation, worker_of[observation.box_xyxy_px.tobytes()])
+            for observation in self._pipeline.process(self._blank, stamp_s)
+            if observation.box_xyxy_px is not None
+        )
 
 
 def make_eyes(

@@ -50,10 +50,13 @@ class VideoWriter:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Finish the file. An interrupted video is still a video."""
         for packet in self._stream.encode():
             self._container.mux(packet)
         self._container.close()
-        # An interrupted video is still a video.
         self._partial.replace(self._path)
 
     def add(self, picture: NDArray[np.uint8]) -> None:

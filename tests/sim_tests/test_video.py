@@ -23,10 +23,14 @@ def test_a_video_has_its_pictures_at_its_rate(tmp_path):
 
 def test_an_interrupted_video_keeps_what_was_filmed(tmp_path):
     path = tmp_path / "film.mp4"
-    video = VideoWriter(path, 15, (64, 48))
-    video.add(np.zeros((48, 64, 3), np.uint8))
-    interruption = KeyboardInterrupt()
-    video.__exit__(KeyboardInterrupt, interruption, None)
+
+    def film():
+        with VideoWriter(path, 15, (64, 48)) as video:
+            video.add(np.zeros((48, 64, 3), np.uint8))
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        film()
     with av.open(str(path)) as film:
         assert len(list(film.decode(video=0))) == 1
 
