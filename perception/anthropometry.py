@@ -4,7 +4,7 @@ Limb lengths are distances between COCO keypoints of an adult of stature :data:`
 Two sources are averaged where both define the limb alike: the body-segment fractions of Drillis and
 Contini (1966; reprinted in D. A. Winter, *Biomechanics and Motor Control of Human Movement*,
 table/figure 4.1) and 27 adult bodies of the parametric model ``anny`` 0.6.2 (its COCO keypoint
-definitions; body data of MakeHuman, CC0).
+definitions; body data of MakeHuman, CC0), measured by ``training/anthropometry.py``.
 
 =============== ===================== ================ =========
 limb            Drillis–Contini / H   anny / H         used / H
@@ -113,8 +113,8 @@ EYES_HEAD_M: Final[FloatArray] = HEAD_TEMPLATE_M[1:3].mean(axis=0)
 
 #: From the shoulder midpoint (neck) to the nose of an upright adult looking straight ahead: forward
 #: and up, the mean of the same bodies.
-NECK_TO_NOSE_FORWARD_M: Final = 0.146
-NECK_TO_NOSE_UP_M: Final = 0.203
+NECK_TO_NOSE_FORWARD_M: Final = 0.144
+NECK_TO_NOSE_UP_M: Final = 0.198
 
 #: Radius of a circle about the body's vertical centre line that holds an adult with arms down:
 #: half the 95th-percentile bideltoid breadth of men in the ANSUR II survey (0.56 m), rounded up.

@@ -135,6 +135,7 @@ def draw_camera_view(
             if alpha is not None and spread is not None:
                 text = f"alpha {alpha:.2f} +- {spread:.2f}"
             _write(image, [text], (int(left) + 4, max(int(top) - 4, 18)), 0.42)
+    _write(image, _captions(frame), (8, 18), 0.42)
     return image
 
 
@@ -224,7 +225,6 @@ class TopView:
         )
         _line(image, metre, _INK, 2)
         _write(image, ["1 m"], (16, image.shape[0] - 18), 0.4)
-        _write(image, _captions(frame), (10, 22), 0.45)
         return image
 
     def _disc(self, image: Image, centre: FloatArray, radius_m: float, colour: Any) -> None:
