@@ -18,6 +18,15 @@ from .arrays import FloatArray, finite_array, finite_number, set_fields
 # OpenCV accepts these numbers of coefficients: plumb_bob has 5, rational_polynomial 8.
 _DISTORTION_SIZES: Final = (4, 5, 8, 12, 14)
 _DISTORTION_MODELS: Final = ("plumb_bob", "rational_polynomial")
+# Fields of sensor_msgs/CameraInfo (ROS 2 in lower case, ROS 1 in upper) by the calibrator's names.
+_MESSAGE_KEYS: Final = {
+    "width": "image_width",
+    "height": "image_height",
+    "k": "camera_matrix",
+    "K": "camera_matrix",
+    "d": "distortion_coefficients",
+    "D": "distortion_coefficients",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,26 +99,42 @@ class Camera:
 
     @classmethod
     def from_yaml(cls, path: str | Path) -> Camera:
-        """Read a ROS ``camera_info`` YAML file as ``camera_calibration`` writes it.
+        """Read a ROS camera_info YAML file.
 
-        Distortion models plumb_bob and rational_polynomial are accepted; raises
+        Either the file that ``camera_calibration`` writes (``camera_matrix`` and so on) or a
+        ``sensor_msgs/CameraInfo`` message as ``ros2 topic echo`` prints it (``k``, ``d``). The
+        distortion models plumb_bob and rational_polynomial are accepted; raises
         :class:`PerceptionError` naming the file and what is missing otherwise.
         """
         path = Path(path)
         try:
-            data = yaml.safe_load(path.read_text(encoding="utf-8"))
+            # Echoed messages end in "---"; the first one counts.
+            data = next(yaml.safe_load_all(path.read_text(encoding="utf-8")), None)
         except OSError as cause:
             raise PerceptionError(f"cannot read {path}: {cause.strerror or cause}") from cause
         except (yaml.YAMLError, UnicodeDecodeError) as cause:
             raise PerceptionError(f"{path} is not valid YAML: {cause}") from cause
         if not isinstance(data, dict):
             raise PerceptionError(f"{path} must hold the keys of a ROS camera_info file")
+        data = {_MESSAGE_KEYS.get(key, key): value for key, value in data.items()}
+        model = data.get("distortion_model") or "plumb_bob"
         try:
-            matrix = finite_array(
-                "camera_matrix", np.reshape(_entries(data["camera_matrix"]), (3, 3)), (3, 3)
-            )
-            width, height = data["image_width"], data["image_height"]
+            matrix = np.reshape(_entries(data["camera_matrix"]), (3, 3))
             coefficients = _entries(data.get("distortion_coefficients", []))
+            if np.any(coefficients) and model not in _DISTORTION_MODELS:
+                raise PerceptionError(
+                    f"distortion_model must be one of {', '.join(_DISTORTION_MODELS)}, "
+                    f"got {model!r}; rectify the images first"
+                )
+            return cls(
+                data["image_width"],
+                data["image_height"],
+                matrix[0, 0],
+                matrix[1, 1],
+                matrix[0, 2],
+                matrix[1, 2],
+                coefficients if np.size(coefficients) else None,
+            )
         except KeyError as missing:
             raise PerceptionError(
                 f"{path} lacks the key {missing}; a camera_info file has image_width, "
@@ -117,21 +142,6 @@ class Camera:
             ) from None
         except (TypeError, ValueError) as cause:
             raise PerceptionError(f"{path}: {cause}") from cause
-        model = data.get("distortion_model", "plumb_bob")
-        if np.any(coefficients) and model not in _DISTORTION_MODELS:
-            raise PerceptionError(
-                f"{path}: distortion_model must be one of {', '.join(_DISTORTION_MODELS)}, "
-                f"got {model!r}; rectify the images first"
-            )
-        return cls(
-            width,
-            height,
-            float(matrix[0, 0]),
-            float(matrix[1, 1]),
-            float(matrix[0, 2]),
-            float(matrix[1, 2]),
-            coefficients if np.size(coefficients) else None,
-        )
 
     def to_yaml(self, path: str | Path) -> None:
         """Write a ROS ``camera_info`` YAML file that :meth:`from_yaml` reads back."""

@@ -75,9 +75,24 @@ def test_reads_a_file_of_the_ros_calibrator(tmp_path):
     assert camera.distortion == pytest.approx([-0.36, 0.112, 0.0011, 0.0005, 0.0])
 
 
+def test_reads_an_echoed_camera_info_message(tmp_path):
+    path = tmp_path / "echo.yaml"
+    path.write_text(
+        "header: {frame_id: camera}\nheight: 480\nwidth: 640\ndistortion_model: plumb_bob\n"
+        "d: [0.1, -0.2, 0.0, 0.0, 0.0]\nk: [500.0, 0.0, 320.0, 0.0, 501.0, 240.0, 0, 0, 1]\n---\n"
+    )
+    camera = Camera.from_yaml(path)
+    assert (camera.width_px, camera.height_px, camera.fy_px) == (640, 480, 501.0)
+    assert camera.distortion[1] == -0.2
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
+        (
+            "width: 640\nheight: 480\nk: [0, 0, 320, 0, 501, 240, 0, 0, 1]\n",
+            "fx_px must lie in",
+        ),
         ("image_width: 640\nimage_height: 480\n", "lacks the key 'camera_matrix'"),
         ("- 1\n", "must hold the keys"),
         ("a: [", "not valid YAML"),
