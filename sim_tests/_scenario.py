@@ -105,7 +105,7 @@ class Scenario(StrictConfig):
 
     def without_people(self) -> Scenario:
         """The same task in an empty hall: what the robot could do if nobody were there."""
-        return self.model_copy(update={"workers": ()})
+        return self.model_copy(update={"name": f"{self.name}_without_people", "workers": ()})
 
 
 def shipped_scenarios() -> tuple[str, ...]:

@@ -84,7 +84,13 @@ def test_demo_writes_its_tables_pictures_and_video(tmp_path, capsys):
     assert len(body) == 3000
     assert {row[1] for row in body} == {"truth", "keypoints"}
     assert (tmp_path / "encounter.png").read_bytes().startswith(b"\x89PNG")
-    assert len(rows(tmp_path / "episodes.csv")) == 5
+    _, *episodes = rows(tmp_path / "episodes.csv")
+    assert [(row[0], row[2]) for row in episodes] == [
+        ("crossing_attentive_without_people", "balanced"),
+        ("crossing_attentive", "blind"),
+        ("crossing_attentive", "balanced"),
+        ("crossing_distracted", "balanced"),
+    ]
 
 
 def test_baselines_round_trip_and_judge(tmp_path):
