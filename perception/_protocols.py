@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from ._keypoints import PersonKeypoints
 ImageRgb = NDArray[np.uint8]
 
 
+@runtime_checkable
 class PersonDetector(Protocol):
     """Finds people in an image."""
 
@@ -23,6 +24,7 @@ class PersonDetector(Protocol):
         ...
 
 
+@runtime_checkable
 class PoseEstimator(Protocol):
     """Finds the keypoints of detected people."""
 
@@ -33,6 +35,7 @@ class PoseEstimator(Protocol):
         ...
 
 
+@runtime_checkable
 class HeadPoseEstimator(Protocol):
     """Finds the head pose of people whose keypoints are known."""
 

@@ -30,8 +30,8 @@ _HEAD_SAMPLES: Final = 40
 # inside the body, the points of the face on its skin.
 _JOINT_DEPTH_M: Final = 0.16
 _FACE_DEPTH_M: Final = 0.04
-# Fewer seen keypoints than this (about a third of a body) and a detector finds nobody.
-_MIN_SEEN: Final = 7
+# Fewer seen keypoints than this (about a quarter of a body) and a detector finds nobody.
+_MIN_SEEN: Final = 5
 _NEAR_M: Final = 0.1
 
 

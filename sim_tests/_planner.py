@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,6 +29,7 @@ _STANDING_MPS = 0.02
 _STANDING = Poses(*(np.asarray(value) for value in (0.0, 0.0, 1.0, 0.0)))
 
 
+@runtime_checkable
 class LocalPlanner(Protocol):
     """Anything that drives a robot to a goal within the adapter's constraints."""
 
