@@ -53,8 +53,8 @@ def _parser() -> argparse.ArgumentParser:
         "demo",
         help="the paper's encounter and what awareness buys in a crossing",
         description="Run the paper's 25 s encounter and the same crossing with and without "
-        "awareness; print the tables and write encounter.png, encounter.mp4, encounter.csv and "
-        "episodes.csv.",
+        "awareness; print the tables and write encounter.png, encounter.mp4, encounter.csv, "
+        "crossings.png and episodes.csv.",
     )
     _add_out(demo, "demo")
     _add_seed(demo)

@@ -11,6 +11,7 @@ from tqdm import tqdm
 
 from ._crossing import CrossingResult, run_crossing
 from ._encounter import case_errors, run_encounter
+from ._figures import plot_comparison
 from ._scenario import Scenario
 from ._tables import EpisodeTable
 
@@ -102,8 +103,8 @@ def run_demo(out: Path, *, seed: int = 0, video: bool = True, stream: TextIO = s
     """Run the demonstration and write its files.
 
     Args:
-        out: folder for ``encounter.png``, ``encounter.mp4``, ``encounter.csv`` and
-            ``episodes.csv``; made when missing.
+        out: folder for ``encounter.png``, ``encounter.mp4``, ``encounter.csv``, ``crossings.png``
+            and ``episodes.csv``; made when missing.
         seed: of everything random.
         video: whether to render the video.
         stream: where the tables are printed.
@@ -124,6 +125,7 @@ def run_demo(out: Path, *, seed: int = 0, video: bool = True, stream: TextIO = s
     with EpisodeTable(out / "episodes.csv") as table:
         for row in rows:
             table.add(row.result)
+    plot_comparison(out / "crossings.png", [(row.label, row.result) for row in rows])
     print(comparison_table(rows), file=stream)
     share = delay_won_back(rows)
     if share is not None:
@@ -132,4 +134,5 @@ def run_demo(out: Path, *, seed: int = 0, video: bool = True, stream: TextIO = s
             file=stream,
         )
     names = ["encounter.png", *(["encounter.mp4"] if video else []), "encounter.csv"]
-    print(f"\nWritten to {out}: {', '.join([*names, 'episodes.csv'])}", file=stream)
+    written = ", ".join([*names, "crossings.png", "episodes.csv"])
+    print(f"\nWritten to {out}: {written}", file=stream)

@@ -15,7 +15,7 @@ from perception.arrays import FloatArray
 
 from ._crossing import CrossingFrame, CrossingResult, run_crossing
 from ._drawing import TopView, awareness_colour, draw_camera_view
-from ._errors import MissingSimulatorError
+from ._figures import new_figure
 from ._renderer import CameraRenderer
 from ._scenario import Scenario
 from ._stage import Stage
@@ -187,16 +187,7 @@ def _seen(pick: Callable[[FloatArray], float]) -> Callable[[CrossingFrame], floa
 
 
 def _plot(path: Path, result: CrossingResult, pictures: list[_CasePictures]) -> None:
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
-        from matplotlib.figure import Figure  # noqa: PLC0415
-    except ImportError as cause:
-        raise MissingSimulatorError(
-            "plots need matplotlib, which is not installed; it is part of the extra 'sim': "
-            "pip install 'awarenav[sim]'"
-        ) from cause
-    figure = Figure(figsize=(16.0, 6.9), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(16.0, 6.9)
     grid = figure.add_gridspec(2, 6, height_ratios=[1.0, 1.9])
     for column, pair in enumerate(pictures):
         for side, (image, name) in enumerate(

@@ -83,7 +83,8 @@ def test_demo_writes_its_tables_pictures_and_video(tmp_path, capsys):
     assert tuple(header) == ENCOUNTER_COLUMNS
     assert len(body) == 3000
     assert {row[1] for row in body} == {"truth", "keypoints"}
-    assert (tmp_path / "encounter.png").read_bytes().startswith(b"\x89PNG")
+    for picture in ("encounter.png", "crossings.png"):
+        assert (tmp_path / picture).read_bytes().startswith(b"\x89PNG")
     _, *episodes = rows(tmp_path / "episodes.csv")
     assert [(row[0], row[2]) for row in episodes] == [
         ("crossing_attentive_without_people", "balanced"),
