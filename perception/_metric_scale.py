@@ -51,12 +51,10 @@ class MetricScale:
     Attributes:
         factor: > 0.
         relative_std: its relative standard deviation, mostly the spread of adult stature.
-        limbs_used: how many limbs it rests on.
     """
 
     factor: float
     relative_std: float
-    limbs_used: int
 
 
 def metric_scale(
@@ -74,9 +72,8 @@ def metric_scale(
     lengths = np.linalg.norm(_DIFFERENCE @ person.keypoints_root_m[:17], axis=1)
     present = lengths > 1e-9
     usable = present & ~np.any(_INVOLVED & ~seen, axis=1)
-    count = int(np.count_nonzero(usable))
     guessed = 0.0
-    if count == 0:
+    if not usable.any():
         usable, guessed = present, _GUESSED_RELATIVE_STD
     if not usable.any():
         return None
@@ -91,4 +88,4 @@ def metric_scale(
     spread = math.sqrt(variance)
     if abs(centre) <= _METRIC_CLAIM_LIMIT:
         centre *= _METRIC_CLAIM_STD**2 / (_METRIC_CLAIM_STD**2 + variance)
-    return MetricScale(math.exp(centre), spread, count)
+    return MetricScale(math.exp(centre), spread)

@@ -165,11 +165,8 @@ class _Recorder:
 
 def _eye_view(stage: Stage, like: Camera) -> Image:
     """What the first worker sees: a camera at the eyes along the gaze."""
-    worker = stage.workers[0]
-    down, forward, right = worker.rotation_odom_head.T
-    pose = np.eye(4)
-    pose[:3, :3] = np.stack([right, down, forward], axis=1)
-    pose[:3, 3] = worker.eyes_odom_m + _EYE_FORWARD_M * forward
+    pose = np.array(stage.workers[0].T_odom_eyes)
+    pose[:3, 3] += _EYE_FORWARD_M * pose[:3, 2]
     camera = Camera.from_fov(like.width_px, like.height_px, float(_EYE_CAMERA_FOV_RAD))
     return CameraRenderer(stage.warehouse).rgb(camera, pose)
 

@@ -35,6 +35,8 @@ def test_score_is_invariant_to_motion_scale_and_gaze_length(
     cone = AttentionCone(angle)
     alpha = cone.score(apex, gaze, target)
     assert 0.0 <= alpha <= 1.0
+    # At the apex itself the direction of the target is rounding.
+    assume(np.linalg.norm(target - apex) > 1e-2)
     turn = Rotation.random(random_state=seed).as_matrix()
     moved = cone.score(turn @ apex + 3.0, turn @ gaze, turn @ target + 3.0)
     assert moved == pytest.approx(alpha, abs=1e-6)
