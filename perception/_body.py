@@ -62,8 +62,8 @@ def place_body(
     the reprojection error. The covariance holds pixel noise (no smaller than the residuals say) and
     the uncertainty of scale, which acts along the ray.
 
-    Returns None when fewer than three keypoints or no limb were seen, or the body would lie behind
-    the camera.
+    Returns None when fewer than three keypoints were seen, the skeleton has no limb, or the body
+    would lie behind the camera.
     """
     scale = metric_scale(person, min_score)
     rows = np.flatnonzero(person.scores[:_BODY_AND_FEET] >= min_score)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -24,22 +25,20 @@ _METRIC_CLAIM_STD: Final = 0.03
 # How much less a limb says that the network lifted without seeing it.
 _GUESSED_RELATIVE_STD: Final = 0.10
 
-_STARTS: Final = [list(limb.start) for limb in LIMBS]
-_ENDS: Final = [list(limb.end) for limb in LIMBS]
 _LOG_LENGTHS: Final[FloatArray] = np.log([limb.length_m for limb in LIMBS])
 _STDS: Final[FloatArray] = np.array([limb.relative_std for limb in LIMBS])
 
 
-def _midpoint_matrix(ends: list[list[int]]) -> FloatArray:
+def _midpoint_matrix(ends: Sequence[tuple[int, ...]]) -> FloatArray:
     matrix = np.zeros((len(ends), 17))
     for row, columns in enumerate(ends):
-        matrix[row, columns] = 1.0 / len(columns)
+        matrix[row, list(columns)] = 1.0 / len(columns)
     return matrix
 
 
 # Rows pick (or average) the keypoints at either end of each limb.
-_START_MATRIX: Final = _midpoint_matrix(_STARTS)
-_END_MATRIX: Final = _midpoint_matrix(_ENDS)
+_START_MATRIX: Final = _midpoint_matrix([limb.start for limb in LIMBS])
+_END_MATRIX: Final = _midpoint_matrix([limb.end for limb in LIMBS])
 _DIFFERENCE: Final = _END_MATRIX - _START_MATRIX
 _INVOLVED: Final = (_START_MATRIX + _END_MATRIX) > 0.0
 

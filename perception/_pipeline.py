@@ -119,7 +119,9 @@ class AwarenessPipeline:
         position, covariance = self._place(detection, person)
         if position is None or covariance is None:
             return None
-        alpha, std = (None, None) if head is None else self._awareness(head)
+        alpha, std = None, None
+        if head is not None:
+            alpha, std = awareness_of(self.cone, head, self._robot_points)
         return PersonObservation(
             stamp_s=stamp_s,
             position_camera_m=position,
@@ -130,9 +132,6 @@ class AwarenessPipeline:
             score=detection.score,
             box_xyxy_px=detection.box_xyxy_px,
         )
-
-    def _awareness(self, head: HeadPose) -> tuple[float, float]:
-        return awareness_of(self.cone, head, self._robot_points)
 
     def _place(
         self, detection: PersonDetection, person: PersonKeypoints

@@ -123,7 +123,7 @@ class PnpHeadPoseEstimator:
         if starts is None:
             return None
         poses = refine(points, rays, focal, self._std_px, *starts, prior)
-        costs = _costs(poses, points, seen, face_only=prior is None)
+        costs = _costs(poses, points, seen, without_body=prior is None)
         return self._finish(costs, len(rows), prior is not None) if costs else None
 
     def _model(self, person: PersonKeypoints, seen: Any) -> FloatArray | None:
@@ -175,6 +175,7 @@ def _sqpnp(points: FloatArray, rays: FloatArray) -> tuple[FloatArray, FloatArray
         )  # fmt: skip
     except cv2.error:  # raised on nearly coincident points
         return None
+    centre = np.asarray(points.mean(axis=0), dtype=np.float64)
     rotations, origins = [], []
     for vector, translation in zip(rotation_vectors, translations, strict=True):
         origin: FloatArray = np.ravel(translation).astype(np.float64)
@@ -187,7 +188,6 @@ def _sqpnp(points: FloatArray, rays: FloatArray) -> tuple[FloatArray, FloatArray
         origins.append(origin)
         # A small head far away is nearly a weak-perspective image, whose second solution is the
         # first reflected in the image plane: start from it too.
-        centre = np.asarray(points.mean(axis=0), dtype=np.float64)
         mirrored = _mirrored(rotation, origin, centre)
         rotations.append(mirrored)
         origins.append(origin + (rotation - mirrored) @ centre)
@@ -261,7 +261,7 @@ def _prior_starts(prior: HeadPrior) -> tuple[FloatArray, FloatArray]:
 
 
 def _costs(
-    poses: list[RefinedPose], points: FloatArray, seen: Any, *, face_only: bool
+    poses: list[RefinedPose], points: FloatArray, seen: Any, *, without_body: bool
 ) -> list[tuple[float, RefinedPose]]:
     """The poses in front of the camera with what each costs, cheapest first.
 
@@ -278,7 +278,7 @@ def _costs(
         facing = np.sum((_FACING @ pose.rotation.T) * to_camera, axis=1)
         expected = facing > _SIGHT_LIMIT
         cost = pose.cost + _VISIBILITY_COST * float(np.count_nonzero(expected != seen))
-        if face_only and pose.rotation[1, 0] < 0.0:
+        if without_body and pose.rotation[1, 0] < 0.0:
             # Upside down to the camera: possible, but not for somebody on their feet.
             cost += _VISIBILITY_COST
         costs.append((cost, pose))

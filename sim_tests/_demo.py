@@ -10,7 +10,7 @@ from typing import TextIO
 from tqdm import tqdm
 
 from ._crossing import CrossingResult, run_crossing
-from ._encounter import case_errors, run_encounter
+from ._encounter import case_values, run_encounter
 from ._figures import plot_comparison
 from ._scenario import Scenario
 from ._tables import EpisodeTable
@@ -84,7 +84,7 @@ def encounter_table(result: CrossingResult) -> str:
     """The encounter's three cases beside the paper's, as text."""
     lines = [f"{'case':27s}{'':11s}{'alpha':>8s}{'d_fwd':>9s}{'d_lat':>9s}", "-" * 64]
     last = None
-    for case, perception, alpha, forward, lateral in case_errors(result):
+    for case, perception, alpha, forward, lateral in case_values(result):
         if case is not last:
             lines.append(
                 f"{case.t_s:5.2f} s {case.meaning:19s}{'paper':11s}{case.awareness:8.2f}"

@@ -93,7 +93,7 @@ def run_encounter(
     return result
 
 
-def case_errors(
+def case_values(
     result: CrossingResult,
 ) -> list[tuple[EncounterCase, str, float | None, float | None, float | None]]:
     """For each case and perception: α, d_fwd and d_lat at the frame of the paper's time."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from types import TracebackType
 from typing import Final
 
 import numpy as np
@@ -15,6 +14,7 @@ from perception.arrays import FloatArray
 
 from ._amr import NOVA_CARTER, Amr
 from ._bullet import pybullet
+from ._closing import Closing
 from ._metrics import SafetyMeter
 from ._scenario import Scenario
 from ._script import WorkerMotion, WorkerScript
@@ -60,7 +60,7 @@ class TrueView:
         return -float(self.position_camera_m[0])
 
 
-class Stage:
+class Stage(Closing):
     """Everything that moves in one crossing.
 
     Args:
@@ -92,36 +92,27 @@ class Stage:
         steps = 1.0 / (_BODY_UPDATE_HZ * self.warehouse.physics_dt_s)
         self._steps_per_body_update = max(round(steps), 1)
         self._close = [False] * len(self.workers)
-        self._steps = 0
         self._place_workers()
 
-    def __enter__(self) -> Stage:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """End the physics world."""
         self.warehouse.close()
 
     @property
     def t_s(self) -> float:
         """Simulated time."""
-        return self._steps * self.warehouse.physics_dt_s
+        return self.warehouse.time_s
 
     def advance(self, until_s: float, meter: SafetyMeter) -> None:
         """Run physics to ``until_s``, moving the workers and recording contacts."""
         while self.t_s < until_s - 0.5 * self.warehouse.physics_dt_s:
             # Far from the robot a body that moves once a control cycle touches nobody either.
-            if any(self._close) and self._steps % self._steps_per_body_update == 0:
+            if any(self._close) and self.warehouse.steps % self._steps_per_body_update == 0:
                 self._place_workers()
             self.amr.advance(self.warehouse.physics_dt_s)
             # A collision changes the velocity within the step that finds it: read it before.
             velocity = self.robot_velocity_odom_mps if any(self._close) else None
             self.warehouse.step()
-            self._steps += 1
             if velocity is not None:
                 for index, close in enumerate(self._close):
                     if close:

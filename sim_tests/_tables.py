@@ -6,9 +6,9 @@ import csv
 import math
 from collections.abc import Iterable
 from pathlib import Path
-from types import TracebackType
 from typing import Final
 
+from ._closing import Closing
 from ._crossing import CrossingFrame, CrossingResult
 
 EPISODE_COLUMNS: Final = (
@@ -57,7 +57,7 @@ def episode_row(result: CrossingResult) -> list[str]:
     ]
 
 
-class EpisodeTable:
+class EpisodeTable(Closing):
     """Writes ``episodes.csv`` row by row, so that an interrupted run leaves whole rows behind.
 
     Args:
@@ -70,15 +70,8 @@ class EpisodeTable:
         self._writer.writerow(EPISODE_COLUMNS)
         self._file.flush()
 
-    def __enter__(self) -> EpisodeTable:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Close the file; the rows are already in it."""
         self._file.close()
 
     def add(self, result: CrossingResult) -> None:

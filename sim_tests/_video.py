@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from fractions import Fraction
 from pathlib import Path
-from types import TracebackType
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ._closing import Closing
 from ._errors import MissingSimulatorError, SimError
 
 try:
@@ -20,7 +20,7 @@ except ImportError as cause:  # pragma: no cover - depends on the installation
     ) from cause
 
 
-class VideoWriter:
+class VideoWriter(Closing):
     """An MP4 file that plays everywhere (H.264, yuv420p); it appears when it is complete.
 
     Args:
@@ -40,17 +40,6 @@ class VideoWriter:
         self._stream.width, self._stream.height = size_px
         self._stream.pix_fmt = "yuv420p"
         self._stream.options = {"crf": "21", "preset": "veryfast"}
-
-    def __enter__(self) -> VideoWriter:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """Finish the file. An interrupted video is still a video."""

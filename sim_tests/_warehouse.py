@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from types import TracebackType
 from typing import Final
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 from perception.arrays import FloatArray, finite_number
 
 from ._bullet import pybullet
+from ._closing import Closing
 from ._errors import SimError
 from ._layout import WarehouseLayout
 from ._meshes import Mesh, quad
@@ -28,7 +28,7 @@ PERSON_GROUP: Final = 8
 _SPECK_M: Final = ((0.0, 0.0, -0.1), (1e-3, 0.0, -0.1), (1e-3, 1e-3, -0.1), (0.0, 1e-3, -0.1))
 
 
-class Warehouse:
+class Warehouse(Closing):
     """A physics world of its own with floor, walls and racks; use it as a context manager.
 
     Every instance starts a fresh PyBullet world (no window), so two with the same inputs give the
@@ -86,17 +86,6 @@ class Warehouse:
                 useMaximalCoordinates=True,
                 physicsClientId=self.client,
             )
-
-    def __enter__(self) -> Warehouse:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """End the physics world; a second call does nothing."""

@@ -7,7 +7,7 @@ import pytest
 
 from nav_adapter import AwarenessPolicy, NavError
 from sim_tests import KeypointNoise, Scenario, SimError, run_crossing
-from sim_tests._encounter import CASES, case_errors
+from sim_tests._encounter import CASES, case_values
 from sim_tests._tables import EpisodeTable, episode_row
 
 ATTENTIVE = Scenario.shipped("crossing_attentive")
@@ -81,7 +81,7 @@ def encounter():
     [("truth", 0.02, 0.05), ("keypoints", 0.10, 0.12)],
 )
 def test_the_papers_encounter(encounter, case, perception, alpha_tolerance, distance_tolerance_m):
-    (row,) = [r for r in case_errors(encounter) if r[0] is case and r[1] == perception]
+    (row,) = [r for r in case_values(encounter) if r[0] is case and r[1] == perception]
     _, _, alpha, forward, lateral = row
     assert alpha == pytest.approx(case.awareness, abs=alpha_tolerance)
     assert forward == pytest.approx(case.d_fwd_m, abs=distance_tolerance_m)
