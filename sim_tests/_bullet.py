@@ -8,6 +8,7 @@ holds only what the command says.
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import os
 from collections.abc import Iterator
 
@@ -15,25 +16,39 @@ from ._errors import MissingSimulatorError
 
 
 @contextlib.contextmanager
-def _muted_stderr() -> Iterator[None]:
-    """Send file descriptor 2 to the null device; C code bypasses ``sys.stderr``."""
-    try:
-        kept = os.dup(2)
-    except OSError:  # no standard error to mute
-        yield
-        return
+def muted(*descriptors: int) -> Iterator[None]:
+    """Send file descriptors to the null device; C code bypasses ``sys.stdout``.
+
+    Args:
+        descriptors: which; none given means both standard output and standard error.
+    """
+    kept = {}
+    _flush_c_streams()
+    for descriptor in descriptors or (1, 2):
+        # A process may have been started without the stream: then there is nothing to mute.
+        with contextlib.suppress(OSError):
+            kept[descriptor] = os.dup(descriptor)
     null = os.open(os.devnull, os.O_WRONLY)
     try:
-        os.dup2(null, 2)
+        for descriptor in kept:
+            os.dup2(null, descriptor)
         yield
     finally:
-        os.dup2(kept, 2)
+        # What C code has printed waits in its buffer and would come out later.
+        _flush_c_streams()
+        for descriptor, copy in kept.items():
+            os.dup2(copy, descriptor)
+            os.close(copy)
         os.close(null)
-        os.close(kept)
+
+
+def _flush_c_streams() -> None:
+    with contextlib.suppress(OSError, AttributeError, TypeError):
+        ctypes.CDLL(None).fflush(None)
 
 
 try:
-    with _muted_stderr():
+    with muted(2):
         import pybullet
 except ImportError as cause:
     raise MissingSimulatorError(
@@ -41,4 +56,4 @@ except ImportError as cause:
         "pip install 'awarenav[sim]' (wheels exist for Python 3.10 and 3.11)"
     ) from cause
 
-__all__ = ["pybullet"]
+__all__ = ["muted", "pybullet"]

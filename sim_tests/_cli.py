@@ -94,6 +94,8 @@ def _parser() -> argparse.ArgumentParser:
     _add_seed(crossings)
     crossings.set_defaults(run=_crossings)
 
+    _add_render(commands)
+
     bench = commands.add_parser(
         "bench",
         help="measure how fast crossings run",
@@ -110,6 +112,54 @@ def _parser() -> argparse.ArgumentParser:
     bench.add_argument("--out", type=Path, metavar="FILE", help="write the figures as a baseline")
     bench.set_defaults(run=_bench)
     return parser
+
+
+def _add_render(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    render = commands.add_parser(
+        "render",
+        help="pictures of people in warehouses, with the truth about each of them",
+        description="Render randomised scenes: frames, camera.yaml (ROS camera_info), truth.jsonl "
+        "(boxes, keypoints, gaze, position, awareness; one line a frame) and contact_sheet.png. "
+        "Run it again with the same settings to continue after an interruption.",
+    )
+    render.add_argument(
+        "--frames", type=_positive, default=400, metavar="N", help="pictures (default: 400)"
+    )
+    render.add_argument(
+        "--people",
+        type=_positive,
+        default=3,
+        metavar="N",
+        help="the most people in a picture (default: 3)",
+    )
+    render.add_argument(
+        "--scenes",
+        type=_positive,
+        metavar="N",
+        help="halls with a cast that the pictures are spread over (default: one a 20 pictures)",
+    )
+    render.add_argument(
+        "--size", default="640x480", metavar="WxH", help="pixels (default: 640x480)"
+    )
+    render.add_argument(
+        "--fov", type=float, default=60.0, metavar="DEG", help="horizontal (default: 60)"
+    )
+    render.add_argument(
+        "--supersampling",
+        type=_positive,
+        default=1,
+        metavar="N",
+        help="samples a pixel and side; 2 smooths edges (default: 1)",
+    )
+    render.add_argument(
+        "--processes",
+        type=_positive,
+        metavar="N",
+        help="work at once (default: one a processor)",
+    )
+    _add_out(render, "render")
+    _add_seed(render)
+    render.set_defaults(run=_render)
 
 
 def _positive(text: str) -> int:
@@ -153,6 +203,29 @@ def _crossings(options: argparse.Namespace) -> int:
         episodes=options.episodes,
         seed=options.seed,
         out=options.out,
+    )
+    return 0
+
+
+def _render(options: argparse.Namespace) -> int:
+    from ._render import render  # noqa: PLC0415
+    from ._render_config import RenderConfig, picture_size  # noqa: PLC0415
+
+    width, height = picture_size(options.size)
+    config = RenderConfig.checked(
+        frames=options.frames,
+        people=options.people,
+        scenes=options.scenes,
+        width_px=width,
+        height_px=height,
+        horizontal_fov_deg=options.fov,
+        supersampling=options.supersampling,
+        seed=options.seed,
+    )
+    truth = render(config, options.out, processes=options.processes)
+    print(
+        f"Written to {options.out}: {config.frames} pictures, camera.yaml, {truth.name}, "
+        "contact_sheet.png"
     )
     return 0
 

@@ -16,7 +16,7 @@ from tracking import PersonTrack, PersonTracker, TrackerConfig
 
 from ._amr import NOVA_CARTER
 from ._errors import SimError
-from ._eyes import make_eyes
+from ._eyes import TimedEyes, make_eyes
 from ._keypoint_camera import KeypointNoise
 from ._metrics import ContactEvent, SafetyMeter
 from ._planner import LocalPlanner, SamplingPlanner
@@ -26,6 +26,8 @@ from ._stage import Stage, TrueView
 _CLOSE_ENOUGH_TO_STOP_MPS: Final = 0.2
 # Separation is measured this often; contacts are looked for in every physics step.
 _MEASURED_HZ: Final = 20.0
+# Before the first frame has arrived, perception is this old: older than any policy allows.
+_NEVER_S: Final = 1.0e6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,7 +151,7 @@ def run_crossing(
     """
     scenario = Scenario.shipped(scenario) if isinstance(scenario, str) else scenario
     policy_name, policy = _resolve(policy)
-    jitter_rng, camera_rng = np.random.default_rng(seed).spawn(2)
+    jitter_rng, camera_rng, timing_rng = np.random.default_rng(seed).spawn(3)
     jitter = scenario.start_jitter_s
     offsets = jitter_rng.uniform(-jitter, jitter, len(scenario.workers))
     cone = AttentionCone()
@@ -164,11 +166,13 @@ def run_crossing(
             noise if noise is not None else KeypointNoise(),
             camera_rng,
         )
+        camera = TimedEyes(eyes, scenario.camera.timing, timing_rng)
         tracker = PersonTracker(TrackerConfig(awareness=policy.filter))
         adapter = NavAdapter(policy, NOVA_CARTER)
         goal = np.array([scenario.robot.goal_x_m, scenario.robot.goal_y_m])
         dt_s = 1.0 / scenario.control_hz
         frames: list[CrossingFrame] = []
+        seen_s = -_NEVER_S
         reached_s: float | None = None
         ticks_per_measurement = max(round(scenario.control_hz / _MEASURED_HZ), 1)
         margins: tuple[float, ...] = ()
@@ -178,11 +182,17 @@ def run_crossing(
                 margins = stage.measure(meter, ticks_per_measurement * dt_s)
             T_odom_camera = stage.amr.T_odom_camera
             truth = stage.truth(cone, T_odom_camera)
-            seen = eyes.observe(t_s, T_odom_camera, truth)
-            observations = tuple(observation for observation, _ in seen)
-            tracks = tracker.update(observations, t_s, T_odom_camera)
+            seen: tuple[tuple[PersonObservation, int], ...] = ()
+            tracks: tuple[PersonTrack, ...] = ()
+            for sighting in camera.look(t_s, T_odom_camera, truth):
+                if sighting.stamp_s > seen_s:  # one that a later frame has overtaken is old news
+                    seen, seen_s = sighting.seen, sighting.stamp_s
+                    observations = tuple(observation for observation, _ in seen)
+                    tracks = tracker.update(observations, seen_s, sighting.T_odom_camera)
+            if seen_s != t_s:
+                tracks = tracker.predict(t_s)
             state = stage.amr.state(t_s)
-            constraints = adapter.update(tracks, state, t_s, perception_stamp_s=t_s)
+            constraints = adapter.update(tracks, state, t_s, perception_stamp_s=seen_s)
             command = driver.plan(state, goal, constraints, dt_s)
             stage.amr.command(*command)
             frame = CrossingFrame(
@@ -190,7 +200,7 @@ def run_crossing(
                 state,
                 T_odom_camera,
                 truth,
-                observations,
+                tuple(observation for observation, _ in seen),
                 tuple(index for _, index in seen),
                 tracks,
                 constraints,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Final, Literal, Protocol, get_args
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from perception import AttentionCone, AwarenessPipeline, Camera, PersonObservation
 from perception.arrays import FloatArray
 
+from ._camera_timing import CameraTiming, FrameClock, FrameQueue
 from ._errors import SimError
 from ._keypoint_camera import KeypointCamera, KeypointNoise
 from ._renderer import CameraRenderer
@@ -95,6 +97,46 @@ class KeypointEyes:
             for observation in self._pipeline.process(self._blank, stamp_s)
             if observation.box_xyxy_px is not None
         )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sighting:
+    """What the robot learns from one frame, when it learns it.
+
+    Attributes:
+        stamp_s: when the frame was taken.
+        T_odom_camera: (4, 4) where the camera was then.
+        seen: each observation with the index of the worker that it shows.
+    """
+
+    stamp_s: float
+    T_odom_camera: FloatArray
+    seen: tuple[tuple[PersonObservation, int], ...]
+
+
+class TimedEyes:
+    """Eyes behind a camera with a frame rate, losses and delays.
+
+    Args:
+        eyes: what sees a frame that was taken.
+        timing: of the camera.
+        rng: of losses and delays.
+    """
+
+    def __init__(self, eyes: Eyes, timing: CameraTiming, rng: np.random.Generator) -> None:
+        self._eyes = eyes
+        self._clock = FrameClock(timing, rng)
+        self._queue: FrameQueue[Sighting] = FrameQueue()
+
+    def look(
+        self, now_s: float, T_odom_camera: FloatArray, truth: tuple[TrueView, ...]
+    ) -> tuple[Sighting, ...]:
+        """Take a frame if one is due; return what has arrived by now, in order of arrival."""
+        due, delivery_s = self._clock.tick(now_s)
+        if due and delivery_s is not None:
+            seen = self._eyes.observe(now_s, T_odom_camera, truth)
+            self._queue.put(now_s, delivery_s, Sighting(now_s, T_odom_camera, seen))
+        return self._queue.take(now_s)
 
 
 def make_eyes(

@@ -19,17 +19,14 @@ from perception.arrays import FloatArray
 from tracking.config import StrictConfig
 
 from ._errors import SimError
+from ._sight import FACE_DEPTH_M, JOINT_DEPTH_M
 
 _LAYOUT: Final = "coco_wholebody"
 _LAYOUT_SIZE: Final = 133
 _HEAD: Final = slice(0, 5)
 # The depth image of a person is this wide at most; more would be slower, not better.
 _MAX_BODY_SAMPLES: Final = 48
-_HEAD_SAMPLES: Final = 40
-# A keypoint counts as seen when nothing lies in front of it by more than this. Joint centres lie
-# inside the body, the points of the face on its skin.
-_JOINT_DEPTH_M: Final = 0.16
-_FACE_DEPTH_M: Final = 0.04
+_HEAD_SAMPLES: Final = 28
 # Fewer seen keypoints than this (about a quarter of a body) and a detector finds nobody.
 _MIN_SEEN: Final = 5
 _NEAR_M: Final = 0.1
@@ -188,8 +185,8 @@ class KeypointCamera:
         body = rows[5:][inside[5:]]
         unhidden = np.zeros(len(points), dtype=bool)
         for chosen, tolerance, samples in (
-            (head, _FACE_DEPTH_M, _HEAD_SAMPLES),
-            (body, _JOINT_DEPTH_M, _MAX_BODY_SAMPLES),
+            (head, FACE_DEPTH_M, _HEAD_SAMPLES),
+            (body, JOINT_DEPTH_M, _MAX_BODY_SAMPLES),
         ):
             if not len(chosen):
                 continue

@@ -13,31 +13,35 @@ from pydantic import BeforeValidator, Field
 from perception import Camera
 from tracking.config import StrictConfig
 
+from ._camera_timing import CameraTiming
 from ._errors import SimError
-from ._layout import WarehouseLayout
+from ._layout import LAYOUTS, WarehouseLayout
 from ._script import WorkerScript
-
-_LAYOUTS = {"crossing": WarehouseLayout.crossing, "open": WarehouseLayout.open_floor}
+from ._sensor import SensorConfig
 
 
 def _layout(value: Any) -> Any:
     if not isinstance(value, str):
         return value
-    if value not in _LAYOUTS:
+    if value not in LAYOUTS:
         raise ValueError(
-            f"layout must be one of {', '.join(map(repr, _LAYOUTS))} or a mapping, got {value!r}"
+            f"layout must be one of {', '.join(map(repr, LAYOUTS))} or a mapping, got {value!r}"
         )
-    return _LAYOUTS[value]()
+    return LAYOUTS[value]()
 
 
 class CameraSpec(StrictConfig):
-    """The robot's camera: image size and horizontal field of view."""
+    """The robot's camera: image size, horizontal field of view, sensor and timing."""
 
     error: ClassVar[type[ValueError]] = SimError
 
     width_px: int = Field(default=1280, ge=16, le=8192)
     height_px: int = Field(default=960, ge=16, le=8192)
     horizontal_fov_deg: float = Field(default=90.0, gt=0.0, lt=180.0)
+    #: Exposure, noise and blur of rendered pictures; the default adds none.
+    sensor: SensorConfig = SensorConfig()
+    #: Frame rate, losses and delays; the default is a frame every control cycle, at once.
+    timing: CameraTiming = CameraTiming()
 
     def camera(self, scale: float = 1.0) -> Camera:
         """The camera model, or one of the same view with ``scale`` times the pixels a side."""
@@ -71,7 +75,7 @@ class Scenario(StrictConfig):
         description: what happens, in one sentence.
         duration_s: the longest an episode lasts.
         control_hz: frames, planning cycles and log rows a second.
-        layout: the hall, ``"crossing"``, ``"open"`` or a mapping of :class:`WarehouseLayout`.
+        layout: the hall, a name of :data:`LAYOUTS` or a mapping of :class:`WarehouseLayout`.
         robot: the robot's task.
         camera: the robot's camera.
         workers: what each worker does.

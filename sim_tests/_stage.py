@@ -13,21 +13,25 @@ from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
 
 from ._amr import NOVA_CARTER, Amr
+from ._amr_look import AmrLook
 from ._bullet import pybullet
 from ._closing import Closing
+from ._held_thing import HeldThing
 from ._metrics import SafetyMeter
 from ._scenario import Scenario
 from ._script import WorkerMotion, WorkerScript
+from ._sight import sees
 from ._warehouse import Warehouse
 from ._worker import MAX_HEAD_PITCH_RAD, MAX_HEAD_YAW_RAD, Worker
+from ._worker_skin import WorkerSkin
 
 # Surfaces are measured exactly once centres are nearer than this; farther away a bound will do.
 _EXACT_WITHIN_M: Final = 4.0
+# How far the true separation of a body with arms down lies above its bound.
+_NEARER_THAN_BOUND_M: Final = 0.45
 # Bodies move at their full rate and physics looks for contacts once surfaces were nearer than this
 # in the last control cycle; nobody closes it within one.
 _TOUCH_WITHIN_M: Final = 0.8
-# A line of sight starts outside the head.
-_SKULL_M: Final = 0.16
 _BODY_UPDATE_HZ: Final = 60.0
 
 
@@ -37,7 +41,7 @@ class TrueView:
 
     Attributes:
         position_camera_m: (3,) centre line at chest height, camera frame.
-        gaze_camera: (3,) unit vector of the head's forward axis.
+        gaze_camera: (3,) unit vector of the gaze, eyes included.
         awareness: cone score of the true gaze at the robot; 0 without a line of sight.
         position_odom_m: (2,).
         velocity_odom_mps: (2,).
@@ -81,12 +85,17 @@ class Stage(Closing):
             )
             self.scripts: tuple[WorkerScript, ...] = scenario.workers
             self.workers = tuple(
-                Worker(self.warehouse, script.stature_m, stride_m=script.stride_m)
+                Worker(self.warehouse, script.stature_m, look=script.look, stride_m=script.stride_m)
                 for script in self.scripts
             )
         except BaseException:
             self.warehouse.close()
             raise
+        self.warehouse.add_actor(AmrLook.of(self.warehouse, self.amr))
+        for worker in self.workers:
+            self.warehouse.add_actor(WorkerSkin(worker))
+            self.warehouse.add_actor(HeldThing(worker))
+        self._walks = tuple(script.walk() for script in self.scripts)
         self._offsets_s = start_offsets_s
         self._motions: tuple[WorkerMotion, ...] = ()
         steps = 1.0 / (_BODY_UPDATE_HZ * self.warehouse.physics_dt_s)
@@ -143,9 +152,9 @@ class Stage(Closing):
         rotation, origin = T_odom_camera[:3, :3], T_odom_camera[:3, 3]
         views = []
         for worker, motion in zip(self.workers, self._motions, strict=True):
-            gaze = worker.rotation_odom_head[:, 1]
+            gaze = worker.gaze_odom
             alpha = float(cone.scores(worker.eyes_odom_m, gaze, origin))
-            if alpha > 0.0 and not self._in_sight(worker, origin):
+            if alpha > 0.0 and not sees(worker, origin, through=frozenset({self.amr.body})):
                 alpha = 0.0
             views.append(
                 TrueView(
@@ -161,9 +170,11 @@ class Stage(Closing):
     def _place_workers(self) -> None:
         camera_x, camera_y, camera_z = self.amr.T_odom_camera[:3, 3].tolist()
         motions = []
-        for worker, script, offset in zip(self.workers, self.scripts, self._offsets_s, strict=True):
+        for worker, script, walk, offset in zip(
+            self.workers, self.scripts, self._walks, self._offsets_s, strict=True
+        ):
             t_s = self.t_s - float(offset)
-            motion = script.motion(t_s)
+            motion = walk.motion(t_s)
             x, y = motion.position_odom_m.tolist()
             # Eyes stand at about 0.94 of the stature.
             up = camera_z - 0.94 * script.stature_m
@@ -175,6 +186,7 @@ class Stage(Closing):
                     math.atan2(up, math.hypot(camera_x - x, camera_y - y)),
                 ),
             )
+            eye_yaw, eye_pitch = script.eye_angles(t_s)
             yaw = math.remainder(azimuth - motion.heading_odom_rad, 2.0 * math.pi)
             worker.place(
                 motion.position_odom_m,
@@ -183,6 +195,10 @@ class Stage(Closing):
                 math.hypot(*motion.velocity_odom_mps.tolist()),
                 min(max(yaw, -MAX_HEAD_YAW_RAD), MAX_HEAD_YAW_RAD),
                 min(max(elevation, -MAX_HEAD_PITCH_RAD), MAX_HEAD_PITCH_RAD),
+                eye_yaw_rad=eye_yaw,
+                eye_pitch_rad=eye_pitch,
+                activity=script.activity(t_s),
+                feet=motion.feet,
             )
             motions.append(motion)
         self._motions = tuple(motions)
@@ -196,13 +212,18 @@ class Stage(Closing):
         bound = distance - self.amr.profile.circumscribed_radius_m - BODY_RADIUS_M
         if distance > _EXACT_WITHIN_M:
             return bound, towards
-        pairs = pybullet.getClosestPoints(
-            self.amr.body,
-            self.workers[index].body,
-            _EXACT_WITHIN_M,
-            physicsClientId=self.warehouse.client,
-        )
-        if not pairs:
+        # Pairs of shapes farther apart than asked for cost nothing, and one is always nearer than
+        # this, but for what is carried on the far side.
+        for within in (max(bound, 0.0) + _NEARER_THAN_BOUND_M, _EXACT_WITHIN_M):
+            pairs = pybullet.getClosestPoints(
+                self.amr.body,
+                self.workers[index].body,
+                within,
+                physicsClientId=self.warehouse.client,
+            )
+            if pairs:
+                break
+        else:
             return bound, towards
         closest = min(pairs, key=lambda pair: pair[8])
         gap = np.array(closest[6][:2]) - np.array(closest[5][:2])
@@ -221,16 +242,3 @@ class Stage(Closing):
             meter.touch(self.t_s, index, robot_velocity_mps, towards)
         else:
             meter.release(index)
-
-    def _in_sight(self, worker: Worker, target_odom_m: FloatArray) -> bool:
-        """True unless something other than worker and robot stands between eyes and robot."""
-        eyes = worker.eyes_odom_m
-        ray = target_odom_m - eyes
-        distance = float(np.linalg.norm(ray))
-        if distance <= _SKULL_M:
-            return True
-        start = eyes + ray * (_SKULL_M / distance)
-        (hit,) = pybullet.rayTestBatch(
-            [start.tolist()], [target_odom_m.tolist()], physicsClientId=self.warehouse.client
-        )
-        return hit[0] in (-1, self.amr.body, worker.body)

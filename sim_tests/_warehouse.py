@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final
-
-import numpy as np
+from typing import TYPE_CHECKING, Final
 
 from perception.arrays import FloatArray, finite_number
 
@@ -12,8 +10,11 @@ from ._bullet import pybullet
 from ._closing import Closing
 from ._errors import SimError
 from ._layout import WarehouseLayout
-from ._meshes import Mesh, quad
-from ._scenery import Colour, scenery
+from ._names import not_one_of
+from ._visual_backend import RENDERERS, RendererName
+
+if TYPE_CHECKING:
+    from ._visuals import Actor, Visuals
 
 GRAVITY_MPS2: Final = 9.81
 DEFAULT_PHYSICS_DT_S: Final = 1.0 / 240.0
@@ -25,18 +26,19 @@ STATIC_GROUP: Final = 2
 ROBOT_GROUP: Final = 4
 PERSON_GROUP: Final = 8
 
-_SPECK_M: Final = ((0.0, 0.0, -0.1), (1e-3, 0.0, -0.1), (1e-3, 1e-3, -0.1), (0.0, 1e-3, -0.1))
-
 
 class Warehouse(Closing):
     """A physics world of its own with floor, walls and racks; use it as a context manager.
 
     Every instance starts a fresh PyBullet world (no window), so two with the same inputs give the
-    same bytes. Robots and people join by being constructed with it.
+    same bytes. Robots and people join by being constructed with it. What a camera sees is a second
+    world, :attr:`visuals`, so that pictures never change the physics.
 
     Args:
         layout: what stands where; None is :meth:`WarehouseLayout.crossing`.
         physics_dt_s: length of one step, in (0, 1/60].
+        renderer: ``"tiny"``, ``"egl"`` or ``"auto"``, what draws :attr:`visuals`.
+        variant: number of the scenery's variant (goods, colours, wear).
 
     Attributes:
         layout: as given.
@@ -45,11 +47,16 @@ class Warehouse(Closing):
         obstacle_boxes_odom: (N, 4) x_min, y_min, x_max, y_max of racks and walls, metres.
 
     Raises:
-        SimError: for a step that is not in range, and after :meth:`close`.
+        SimError: for a step that is not in range, an unknown renderer, and after :meth:`close`.
     """
 
     def __init__(
-        self, layout: WarehouseLayout | None = None, physics_dt_s: float = DEFAULT_PHYSICS_DT_S
+        self,
+        layout: WarehouseLayout | None = None,
+        physics_dt_s: float = DEFAULT_PHYSICS_DT_S,
+        *,
+        renderer: RendererName = "tiny",
+        variant: int = 0,
     ) -> None:
         self.physics_dt_s = finite_number(
             "physics_dt_s",
@@ -59,7 +66,13 @@ class Warehouse(Closing):
             maximum=1.0 / 60.0,
             exclusive_minimum=True,
         )
+        if renderer not in RENDERERS:
+            raise SimError(not_one_of("renderer", renderer, RENDERERS))
         self.layout = WarehouseLayout.crossing() if layout is None else layout
+        self._renderer: RendererName = renderer
+        self._variant = variant
+        self._visuals: Visuals | None = None
+        self._actors: list[Actor] = []
         self.obstacle_boxes_odom: FloatArray = self.layout.obstacle_boxes_odom
         self._steps = 0
         self.client: int = pybullet.connect(pybullet.DIRECT)
@@ -74,21 +87,36 @@ class Warehouse(Closing):
             enableConeFriction=0,
             physicsClientId=self.client,
         )
-        # A body without a visual shape is drawn as its collision shape, so the plain boxes and the
-        # floor plane get a speck that lies out of sight; the scenery is what shows.
-        self._unseen_shape = self.mesh_shape(quad(_SPECK_M), (0.5, 0.5, 0.5))
         self._static_bodies = frozenset({self._add_floor(), *self._add_boxes()})
-        for colour, mesh in scenery(self.layout):
-            pybullet.createMultiBody(
-                0.0,
-                -1,
-                self.mesh_shape(mesh, colour),
-                useMaximalCoordinates=True,
-                physicsClientId=self.client,
-            )
+
+    @property
+    def visuals(self) -> Visuals:
+        """The picture world, made when it is first asked for; it never touches the physics."""
+        if self._visuals is None:
+            if self.client < 0:
+                raise SimError("the warehouse is closed: there is nothing left to see")
+            # Imported late: a run without pictures needs none of it.
+            from ._visuals import Visuals  # noqa: PLC0415
+
+            self._visuals = Visuals(self.layout, self._renderer, self._variant)
+            for actor in self._actors:
+                self._visuals.add_actor(actor)
+        return self._visuals
+
+    def add_actor(self, actor: Actor) -> int:
+        """Let something that moves be seen in pictures; returns its number in them.
+
+        Costs nothing until the first picture is taken.
+        """
+        if self._visuals is not None:
+            return self._visuals.add_actor(actor)
+        self._actors.append(actor)
+        return len(self._actors) - 1
 
     def close(self) -> None:
-        """End the physics world; a second call does nothing."""
+        """End the physics world and the picture world; a second call does nothing."""
+        if self._visuals is not None:
+            self._visuals.close()
         if self.client >= 0:
             pybullet.disconnect(physicsClientId=self.client)
             self.client = -1
@@ -115,36 +143,13 @@ class Warehouse(Closing):
         pybullet.stepSimulation(physicsClientId=self.client)
         self._steps += 1
 
-    def mesh_shape(self, mesh: Mesh, colour: Colour) -> int:
-        """Register a visual shape with this world; returns PyBullet's id of it."""
-        return int(
-            pybullet.createVisualShape(
-                pybullet.GEOM_MESH,
-                vertices=mesh.vertices_m.tolist(),
-                indices=mesh.indices.tolist(),
-                normals=mesh.normals.tolist(),
-                rgbaColor=[*colour, 1.0],
-                specularColor=[0.0, 0.0, 0.0],
-                physicsClientId=self.client,
-            )
-        )
-
-    @property
-    def _heights_m(self) -> FloatArray:
-        racks = [rack.height_m for rack in self.layout.racks]
-        return np.array([*racks, *[self.layout.wall_height_m] * 4])
-
     def _add_floor(self) -> int:
         shape = pybullet.createCollisionShape(
             pybullet.GEOM_PLANE, planeNormal=[0.0, 0.0, 1.0], physicsClientId=self.client
         )
         body = int(
             pybullet.createMultiBody(
-                0.0,
-                shape,
-                self._unseen_shape,
-                useMaximalCoordinates=True,
-                physicsClientId=self.client,
+                0.0, shape, useMaximalCoordinates=True, physicsClientId=self.client
             )
         )
         pybullet.changeDynamics(
@@ -160,7 +165,7 @@ class Warehouse(Closing):
     def _add_boxes(self) -> list[int]:
         bodies = []
         for (x_min, y_min, x_max, y_max), height in zip(
-            self.obstacle_boxes_odom.tolist(), self._heights_m.tolist(), strict=True
+            self.obstacle_boxes_odom.tolist(), self.layout.obstacle_heights_m.tolist(), strict=True
         ):
             shape = pybullet.createCollisionShape(
                 pybullet.GEOM_BOX,
@@ -170,7 +175,6 @@ class Warehouse(Closing):
             body = pybullet.createMultiBody(
                 0.0,
                 shape,
-                self._unseen_shape,
                 basePosition=[0.5 * (x_min + x_max), 0.5 * (y_min + y_max), 0.5 * height],
                 useMaximalCoordinates=True,
                 physicsClientId=self.client,

@@ -7,20 +7,19 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from camera_poses import level_pose
+from picture_actors import Shown, ball
 
 from perception import Camera
-from perception import layouts as kp
 from sim_tests._amr import Amr
-from sim_tests._bullet import pybullet
+from sim_tests._amr_look import AmrLook
 from sim_tests._errors import SimError
 from sim_tests._layout import WarehouseLayout
+from sim_tests._lighting import Lighting
 from sim_tests._renderer import CameraRenderer
 from sim_tests._warehouse import Warehouse
-from sim_tests._worker import Worker
 
-_DOWN_FROM_3_M = np.array(
-    [[0.0, -1.0, 0.0, 1.05], [-1.0, 0.0, 0.0, -0.5], [0.0, 0.0, -1.0, 3.0], [0.0, 0.0, 0.0, 1.0]]
-)
+_AWAY = (0.0, 0.0, -50.0)
 OFF_CENTRE = Camera(320, 240, 270.0, 260.0, 171.3, 110.6)
 
 
@@ -36,50 +35,36 @@ def renderer(hall: Warehouse) -> CameraRenderer:
 
 
 @pytest.fixture(scope="module")
-def worker(hall: Warehouse) -> Worker:
-    return Worker(hall, 1.75)
+def red_ball(hall: Warehouse) -> tuple[int, Shown]:
+    actor = ball(position_m=_AWAY, colour=(1.0, 0.0, 0.0))
+    return hall.visuals.add_actor(actor), actor
 
 
-def _pose(
-    position_m: tuple[float, float, float], heading_rad: float, pitch_down_rad: float = 0.0
-) -> np.ndarray:
-    """T_odom_camera of a camera with a level horizon."""
-    ch, sh = math.cos(heading_rad), math.sin(heading_rad)
-    cp, sp = math.cos(pitch_down_rad), math.sin(pitch_down_rad)
-    forward = np.array([cp * ch, cp * sh, -sp])
-    right = np.array([sh, -ch, 0.0])
-    pose = np.eye(4)
-    pose[:3, :3] = np.column_stack([right, np.cross(forward, right), forward])
-    pose[:3, 3] = position_m
-    return pose
+@pytest.fixture
+def target(red_ball: tuple[int, Shown]) -> Iterator[tuple[int, Shown]]:
+    """A red ball with its number among the actors; it waits underground."""
+    yield red_ball
+    red_ball[1].position_m = np.array(_AWAY)
 
 
-def _to_camera(T_odom_camera: np.ndarray, points_odom_m: np.ndarray) -> np.ndarray:
-    return (points_odom_m - T_odom_camera[:3, 3]) @ T_odom_camera[:3, :3]
-
-
-def test_a_ball_appears_where_it_is_projected(hall: Warehouse, renderer: CameraRenderer) -> None:
-    shape = pybullet.createVisualShape(
-        pybullet.GEOM_SPHERE, radius=0.06, rgbaColor=(1, 0, 0, 1), physicsClientId=hall.client
-    )
-    ball = pybullet.createMultiBody(0.0, -1, shape, physicsClientId=hall.client)
+def test_a_ball_appears_where_it_is_projected(
+    renderer: CameraRenderer, target: tuple[int, Shown]
+) -> None:
+    number, actor = target
     rng = np.random.default_rng(3)
     errors = []
     for _ in range(24):
-        T = _pose((0.0, 0.0, 1.4), rng.uniform(-3.0, 3.0), rng.uniform(-0.2, 0.3))
+        T = level_pose((0.0, 0.0, 1.4), rng.uniform(-3.0, 3.0), rng.uniform(-0.2, 0.3))
         camera_m = np.array([rng.uniform(-0.8, 0.8), rng.uniform(-0.6, 0.6), rng.uniform(2.0, 3.5)])
-        odom_m = T[:3, :3] @ camera_m + T[:3, 3]
-        pybullet.resetBasePositionAndOrientation(
-            ball, odom_m, (0, 0, 0, 1), physicsClientId=hall.client
-        )
+        actor.position_m = T[:3, :3] @ camera_m + T[:3, 3]
         view = renderer.render(OFF_CENTRE, T)
-        rows, columns = np.nonzero(view.body_ids == ball)
+        rows, columns = np.nonzero(view.actors == number)
         assert len(rows) > 50
         centroid = np.array([columns.mean(), rows.mean()])
         errors.append(centroid - OFF_CENTRE.project(camera_m[None])[0])
         front = view.depth_m[rows, columns].min()
-        assert front == pytest.approx(camera_m[2] - 0.06, abs=0.006)  # the ball has facets
-    pybullet.removeBody(ball, physicsClientId=hall.client)
+        assert front == pytest.approx(camera_m[2] - 0.06, abs=0.003)  # the ball has facets
+        np.testing.assert_array_equal(view.actors == number, view.body_ids == actor.body)
     # One ball's centroid depends on which pixels its edge takes; all together show any offset.
     assert np.abs(np.mean(errors, axis=0)).max() < 0.06
     assert np.linalg.norm(errors, axis=1).max() < 0.2
@@ -87,7 +72,7 @@ def test_a_ball_appears_where_it_is_projected(hall: Warehouse, renderer: CameraR
 
 @pytest.mark.parametrize("pitch_rad", [0.35, 1.2])
 def test_depth_of_the_floor_is_exact(renderer: CameraRenderer, pitch_rad: float) -> None:
-    T = _pose((0.0, 0.0, 1.4), 0.3, pitch_rad)
+    T = level_pose((0.0, 0.0, 1.4), 0.3, pitch_rad)
     view = renderer.render(OFF_CENTRE, T)
     rows, columns = np.mgrid[:240, :320]
     rays = np.stack(
@@ -106,9 +91,11 @@ def test_depth_of_the_floor_is_exact(renderer: CameraRenderer, pitch_rad: float)
     np.testing.assert_allclose(view.depth_m[near], expected[near], rtol=4e-3)
 
 
-def test_a_rectangle_is_that_part_of_the_whole(renderer: CameraRenderer, worker: Worker) -> None:
-    worker.place((3.0, 0.3), 2.5, 0.3, 1.0)
-    T = _pose((0.0, 0.0, 1.4), 0.0)
+def test_a_rectangle_is_that_part_of_the_whole(
+    renderer: CameraRenderer, target: tuple[int, Shown]
+) -> None:
+    target[1].position_m = np.array((2.0, 0.1, 1.5))
+    T = level_pose((0.0, 0.0, 1.4), 0.0)
     whole = renderer.render(OFF_CENTRE, T)
     for u0, v0, u1, v1 in ((100, 40, 220, 200), (0, 0, 77, 33), (159, 100, 160, 101)):
         part = renderer.render(OFF_CENTRE, T, (u0, v0, u1, v1))
@@ -116,11 +103,12 @@ def test_a_rectangle_is_that_part_of_the_whole(renderer: CameraRenderer, worker:
         same = part.body_ids == whole.body_ids[v0:v1, u0:u1]
         # A sample on the very edge of a triangle may round to either side.
         assert same.mean() > 0.995
-        np.testing.assert_allclose(part.depth_m[same], whole.depth_m[v0:v1, u0:u1][same], rtol=2e-3)
+        close = np.isclose(part.depth_m, whole.depth_m[v0:v1, u0:u1], rtol=2e-3)
+        assert close[same].mean() > 0.998
 
 
 def test_a_coarser_grid_samples_the_middle_of_its_cells(renderer: CameraRenderer) -> None:
-    T = _pose((0.0, 0.0, 1.4), 0.3, 1.2)
+    T = level_pose((0.0, 0.0, 1.4), 0.3, 1.2)
     coarse = renderer.depth(OFF_CENTRE, T, (60.0, 30.0, 180.0, 210.0), (40, 60))
     assert coarse.shape == (60, 40)
     fine = renderer.depth(OFF_CENTRE, T)
@@ -129,20 +117,19 @@ def test_a_coarser_grid_samples_the_middle_of_its_cells(renderer: CameraRenderer
 
 
 def test_a_rectangle_may_reach_outside_the_image(renderer: CameraRenderer) -> None:
-    T = _pose((0.0, 0.0, 1.4), 0.3, 1.2)
+    T = level_pose((0.0, 0.0, 1.4), 0.3, 1.2)
     wide = renderer.depth(OFF_CENTRE, T, (-20, -10, 340, 250))
     np.testing.assert_allclose(wide[10:250, 20:340], renderer.depth(OFF_CENTRE, T), rtol=2e-3)
 
 
 def test_nothing_is_infinitely_far(renderer: CameraRenderer) -> None:
-    view = renderer.render(OFF_CENTRE, _pose((-30.0, 0.0, 1.4), math.pi))
+    view = renderer.render(OFF_CENTRE, level_pose((-30.0, 0.0, 1.4), math.pi))
     assert np.isinf(view.depth_m).all()
     assert (view.body_ids == -1).all()
 
 
-def test_pictures_are_repeatable_and_not_empty(renderer: CameraRenderer, worker: Worker) -> None:
-    worker.place((3.0, 0.0), math.pi)
-    T = _pose((0.0, 0.0, 1.4), 0.0)
+def test_pictures_are_repeatable_and_not_empty(renderer: CameraRenderer) -> None:
+    T = level_pose((0.0, 0.0, 1.4), 0.0)
     picture = renderer.rgb(OFF_CENTRE, T)
     assert picture.shape == (240, 320, 3)
     assert picture.dtype == np.uint8
@@ -150,82 +137,77 @@ def test_pictures_are_repeatable_and_not_empty(renderer: CameraRenderer, worker:
     assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 100
 
 
-@pytest.mark.parametrize("stature_m", [1.6, 1.9])
-@pytest.mark.parametrize("yaw_deg", [-70, -30, 0, 40, 70])
-def test_points_of_the_face_lie_on_the_drawn_head(
-    hall: Warehouse, renderer: CameraRenderer, stature_m: float, yaw_deg: float
-) -> None:
-    """Seen from its own side, each point is within 1.5 cm of the surface."""
-    worker = Worker(hall, stature_m)
-    worker.place((1.0, 0.0), 0.4, 0.0, 0.0, math.radians(yaw_deg), 0.2)
-    head = worker.rotation_odom_head
-    sides = {
-        kp.NOSE: head[:, 1],
-        kp.LEFT_EYE: head[:, 1],
-        kp.RIGHT_EYE: head[:, 1],
-        kp.LEFT_EAR: -head[:, 2],
-        kp.RIGHT_EAR: head[:, 2],
-    }
-    camera = Camera(41, 41, 400.0, 400.0, 20.0, 20.0)
-    for row, outwards in sides.items():
-        point = worker.keypoints_odom_m[row]
-        T = np.eye(4)
-        forward = -outwards
-        right = np.cross(forward, (0.0, 0.0, 1.0))
-        right /= np.linalg.norm(right)
-        T[:3, :3] = np.column_stack([right, np.cross(forward, right), forward])
-        T[:3, 3] = point + 1.0 * outwards
+def test_robots_camera_sees_others_and_not_itself() -> None:
+    with Warehouse(WarehouseLayout.open_floor()) as hall:
+        amr = Amr(hall)
+        robot = hall.visuals.add_actor(AmrLook.of(hall, amr))
+        head = hall.visuals.add_actor(ball(0.12, position_m=(2.5, 0.0, 1.65)))
+        renderer = CameraRenderer(hall)
+        camera = Camera.from_fov(320, 240, math.radians(90.0))
+        view = renderer.render(camera, amr.T_odom_camera)
+        assert not (view.actors == robot).any()
+        assert (view.actors == head).any()
+        # Whoever looks at the robot sees it, about where its body is.
+        camera = Camera.from_fov(320, 240, math.radians(60.0))
+        T = level_pose((2.5, 0.3, 1.65), math.pi, 0.3)
         view = renderer.render(camera, T)
-        assert view.body_ids[20, 20] == worker.body
-        assert view.depth_m[20, 20] == pytest.approx(1.0, abs=0.015), kp.COCO_NAMES[row]
-    worker.place((-30.0, 0.0), 0.0)
+        assert (view.actors == robot).mean() > 0.02
+        points = np.array([[0.2, 0.0, 0.3], [0.2, 0.0, 0.2]])
+        columns, rows = np.rint(camera.project((points - T[:3, 3]) @ T[:3, :3])).astype(int).T
+        assert (view.actors[rows, columns] == robot).all()
 
 
-@pytest.mark.parametrize("stature_m", [1.5, 1.95])
-def test_drawn_body_is_as_tall_as_its_stature(
-    hall: Warehouse, renderer: CameraRenderer, stature_m: float
-) -> None:
-    worker = Worker(hall, stature_m, position_odom_m=(1.0, -0.5))
-    # Straight down from 3 m, wide enough for the head.
-    view = renderer.render(Camera(81, 81, 200.0, 200.0, 40.0, 40.0), _DOWN_FROM_3_M)
-    assert 3.0 - view.depth_m[view.body_ids == worker.body].min() == pytest.approx(
-        stature_m, abs=0.01
+@pytest.mark.parametrize("factor", [2, 3])
+def test_supersampling_averages_the_finer_picture(hall: Warehouse, factor: int) -> None:
+    T = level_pose((0.0, 0.0, 1.4), 0.4)
+    smooth = CameraRenderer(hall, supersampling=factor).render(OFF_CENTRE, T)
+    once = CameraRenderer(hall)
+    fine = once.render(OFF_CENTRE, T, (0, 0, 320, 240), (320 * factor, 240 * factor))
+    mean = fine.rgb.reshape(240, factor, 320, factor, 3).astype(float).mean(axis=(1, 3))
+    np.testing.assert_allclose(smooth.rgb, mean, atol=0.51)
+    middle = factor // 2
+    np.testing.assert_array_equal(smooth.depth_m, fine.depth_m[middle::factor, middle::factor])
+    np.testing.assert_array_equal(smooth.body_ids, fine.body_ids[middle::factor, middle::factor])
+    if factor % 2:  # an odd grid has a sample at the pixel's centre
+        plain = once.render(OFF_CENTRE, T)
+        same = smooth.body_ids == plain.body_ids
+        assert same.mean() > 0.995
+        np.testing.assert_allclose(smooth.depth_m[same], plain.depth_m[same], rtol=2e-3)
+
+
+def test_light_has_colour_and_strength(hall: Warehouse) -> None:
+    """A surface shows its own colour · the light's · (ambient + diffuse · cos)."""
+    T = level_pose((0.0, 0.0, 1.4), 0.3, 1.2)
+
+    def floor(**light: object) -> np.ndarray:
+        lighting = Lighting(**light)  # type: ignore[arg-type]
+        return CameraRenderer(hall, lighting=lighting).rgb(OFF_CENTRE, T)[60:200].astype(float)
+
+    white = floor(ambient=1.0, diffuse=0.0)
+    half = floor(ambient=0.2, diffuse=0.6, direction_odom=(0.0, math.sqrt(3.0), 1.0))
+    np.testing.assert_allclose(half, white * (0.2 + 0.6 * 0.5), atol=2.1)
+    below = floor(ambient=0.4, diffuse=0.6, direction_odom=(0.0, 0.0, -1.0))
+    np.testing.assert_allclose(below, white * 0.4, atol=2.1)
+    warm = floor(
+        ambient=0.5, diffuse=0.4, direction_odom=(0.0, 0.0, 1.0), colour_rgb=(1.0, 0.8, 0.5)
     )
-    worker.place((-30.0, 0.0), 0.0)
+    np.testing.assert_allclose(warm, white * 0.9 * np.array([1.0, 0.8, 0.5]), atol=2.1)
 
 
-@pytest.mark.parametrize("heading_deg", [0, 60, 135, 180, 270])
-def test_joints_lie_inside_the_drawn_body(
-    renderer: CameraRenderer, worker: Worker, heading_deg: float
+@pytest.mark.parametrize("size", [(1, 1), (7, 3), (641, 479)])
+def test_odd_sizes_are_as_good_as_even_ones(
+    renderer: CameraRenderer, size: tuple[int, int]
 ) -> None:
-    worker.place((3.2, 0.1), math.radians(heading_deg), 0.4, 1.2)
-    T = _pose((0.0, 0.0, 1.2), 0.0)
-    camera = Camera(320, 240, 190.0, 190.0, 160.0, 120.0)
-    view = renderer.render(camera, T)
-    points = _to_camera(T, worker.keypoints_odom_m)
-    columns, rows = np.rint(camera.project(points)).astype(int).T
-    body = [*range(5, 17)]
-    assert (view.body_ids[rows, columns][body] == worker.body).all()
-    # Nothing but the worker's own body lies in front of a joint, and by less than its girth.
-    behind = points[body, 2] - view.depth_m[rows, columns][body]
-    assert behind.min() > -0.02
-    assert (behind < 0.16).sum() >= 6
-
-
-def test_robots_camera_sees_the_worker_and_not_itself(
-    hall: Warehouse, renderer: CameraRenderer, worker: Worker
-) -> None:
-    amr = Amr(hall)
-    worker.place((2.5, 0.0), math.pi)
-    camera = Camera.from_fov(320, 240, math.radians(60.0))
-    view = renderer.render(camera, amr.T_odom_camera)
-    assert not (view.body_ids == amr.body).any()
-    assert (view.body_ids == worker.body).mean() > 0.05
-    # And the worker, looking at the robot, sees it and not the inside of the own head.
-    worker.place((2.5, 0.0), math.pi, head_pitch_rad=-0.2)
-    view = renderer.render(camera, worker.T_odom_eyes)
-    assert (view.body_ids == amr.body).mean() > 0.02
-    assert not (view.body_ids == worker.body)[:160].any()
+    T = level_pose((0.0, 0.0, 1.4), 0.3, 1.2)
+    depth = renderer.depth(OFF_CENTRE, T, (60.0, 60.0, 180.0, 180.0), size)
+    assert depth.shape == size[::-1]
+    u = 59.5 + (np.arange(size[0]) + 0.5) * 120.0 / size[0]
+    v = 59.5 + (np.arange(size[1]) + 0.5) * 120.0 / size[1]
+    right, down = np.meshgrid(
+        (u - OFF_CENTRE.cx_px) / OFF_CENTRE.fx_px, (v - OFF_CENTRE.cy_px) / OFF_CENTRE.fy_px
+    )
+    rays = np.stack([right, down, np.ones_like(right)], axis=-1)
+    np.testing.assert_allclose(depth, -1.4 / (rays @ T[2, :3]), rtol=4e-3)
 
 
 @pytest.mark.parametrize(
@@ -251,3 +233,6 @@ def test_unusable_ranges_are_refused(hall: Warehouse) -> None:
         CameraRenderer(hall, near_m=0.0)
     with pytest.raises(SimError, match="far_m"):
         CameraRenderer(hall, near_m=1.0, far_m=0.5)
+    for factor in (0, 9, 1.5):
+        with pytest.raises(SimError, match="supersampling"):
+            CameraRenderer(hall, supersampling=factor)  # type: ignore[arg-type]

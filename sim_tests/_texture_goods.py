@@ -1,0 +1,89 @@
+"""The atlas of racks, goods and props: cartons, pallets, film, crates, steel, signs."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._atlas import Atlas
+from ._texture_goods_paint import GOODS_PAINTERS
+from ._texture_paint import Rgb, grain, plain, sealed
+
+#: Sets of goods to choose from: a variant of the scenery uses one of them.
+GOODS_SETS: Final = 4
+# How many pictures there are of each kind.
+CARTONS: Final = 8
+STACKS: Final = 10
+WRAPS: Final = 4
+CRATES: Final = 5
+SIGNS: Final = 12
+
+_MATERIALS: Final[dict[str, Rgb]] = {
+    "steel": (138, 142, 146),
+    "dark": (52, 54, 58),
+    "rubber": (38, 38, 40),
+    "red": (176, 44, 36),
+    "yellow": (226, 178, 34),
+    "blue": (42, 78, 142),
+    "green": (48, 112, 70),
+    "orange": (214, 106, 30),
+    "grey": (150, 152, 152),
+    "white": (224, 224, 218),
+    "wood": (168, 134, 92),
+    "lamp": (255, 255, 255),
+}
+
+GOODS_ATLAS: Final = Atlas(
+    1024,
+    {
+        **{f"stack{k}": (128, 128) for k in range(STACKS)},
+        **{f"wrap{k}": (128, 128) for k in range(WRAPS)},
+        **{f"crates{k}": (128, 128) for k in range(CRATES)},
+        "sacks0": (128, 128),
+        "sacks1": (128, 128),
+        "drums0": (128, 128),
+        "drums1": (128, 128),
+        "backing": (128, 128),
+        "cage0": (128, 128),
+        "cage1": (128, 128),
+        "parts": (128, 128),
+        "end": (64, 256),
+        "upright": (16, 256),
+        "ladder": (64, 256),
+        **{f"carton{k}": (96, 96) for k in range(CARTONS)},
+        "window": (96, 64),
+        "deck": (96, 64),
+        **{f"top{k}": (64, 64) for k in range(4)},
+        "pallet_top": (128, 64),
+        "wrap_top": (64, 64),
+        "crates_top": (64, 64),
+        "mast": (64, 64),
+        **{f"sign{k}": (64, 32) for k in range(SIGNS)},
+        "hazard": (128, 32),
+        "beam": (128, 16),
+        "pallet_side": (128, 20),
+        "grille": (64, 32),
+        "label": (32, 14),
+        **dict.fromkeys(_MATERIALS, (16, 16)),
+    },
+)
+
+
+def goods_texture(variant: int) -> NDArray[np.uint8]:
+    """(1024, 1024, 3) picture of :data:`GOODS_ATLAS`; ``variant`` draws tones, prints, layouts."""
+    canvas = plain(GOODS_ATLAS.size_px, GOODS_ATLAS.size_px, (128, 128, 128))
+    for number, (name, cell) in enumerate(GOODS_ATLAS.cells.items()):
+        rng = np.random.default_rng((20260, variant, number))
+        family = name.rstrip("0123456789")
+        index = int(name[len(family) :] or 0)
+        painted = plain(cell.width_px, cell.height_px, _MATERIALS.get(name, (128, 128, 128)))
+        if name in _MATERIALS:
+            grain(painted, rng, 0.0 if name == "lamp" else 0.02)
+        else:
+            GOODS_PAINTERS[family](painted, rng, index)
+        canvas[
+            cell.top_px : cell.top_px + cell.height_px, cell.left_px : cell.left_px + cell.width_px
+        ] = painted
+    return sealed(canvas)

@@ -1,0 +1,41 @@
+"""``python -m training.workers``: makes the workers that ship with ``sim_tests``."""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import time
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+from ._make import make
+from ._people import PEOPLE
+
+_FOLDER = Path(__file__).parents[2] / "sim_tests" / "assets" / "workers"
+
+
+def main() -> None:
+    """Make all workers, or those named."""
+    parser = argparse.ArgumentParser(prog="python -m training.workers", description=__doc__)
+    parser.add_argument("names", nargs="*", help="which workers; all by default")
+    parser.add_argument("--out", type=Path, default=_FOLDER, help="folder (default: %(default)s)")
+    parser.add_argument("--jobs", type=int, default=1, help="workers made at once")
+    chosen = parser.parse_args()
+    people = [person for person in PEOPLE if not chosen.names or person.name in chosen.names]
+    unknown = set(chosen.names) - {person.name for person in people}
+    if unknown:
+        parser.error(f"no worker is called {', '.join(sorted(unknown))}")
+    chosen.out.mkdir(parents=True, exist_ok=True)
+    start, total = time.perf_counter(), 0
+    # A fresh process each: the unwrapping library does not always survive a second worker.
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(chosen.jobs, mp_context=context, max_tasks_per_child=1) as pool:
+        made = pool.map(make, people, [chosen.out] * len(people))
+        for person, size in zip(people, made, strict=True):
+            total += size
+            print(f"{person.name:10s} {size / 1e3:6.0f} kB  {time.perf_counter() - start:5.0f} s")
+    print(f"{len(people)} workers, {total / 1e6:.1f} MB")
+
+
+if __name__ == "__main__":
+    main()
