@@ -57,7 +57,9 @@ _GRIP_M: Final = 0.012
 _FOREARM_TWIST: Final = 0.65
 _ELBOW_BEND_RAD: Final = 0.16
 _ELBOW_SWING: Final = 0.55
-_ARMS_APART_RAD: Final = 0.055
+# Arms hang this far out from rest, and swing as much farther out in a brisk walk.
+_ARMS_APART_RAD: Final = 0.025
+_ARMS_SWING_APART_RAD: Final = 0.04
 # A box is in the hands once they are where it is.
 _HELD_SHARE: Final = 0.98
 
@@ -150,7 +152,7 @@ def arm_postures(bones: Skeleton) -> ArmPostures:
 
 def _hanging(side: int, swing_rad: float, vigour: float) -> Arm:
     """An arm that swings forwards by ``swing_rad``, the elbow bending as it comes forward."""
-    apart = about_x(SIGNS[side] * _ARMS_APART_RAD * vigour)
+    apart = about_x(SIGNS[side] * (_ARMS_APART_RAD + _ARMS_SWING_APART_RAD * vigour))
     bend = _ELBOW_BEND_RAD * vigour + _ELBOW_SWING * max(swing_rad, -0.1 * vigour)
     return product(apart, about_y(-swing_rad)), about_y(-max(bend, 0.0)), IDENTITY
 

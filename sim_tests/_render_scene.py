@@ -78,6 +78,7 @@ class RenderScene(Closing):
             self._renderer = CameraRenderer(
                 self.warehouse,
                 lighting=Lighting.preset(self.lighting_name),
+                shadows=True,
                 supersampling=config.supersampling,
             )
         except BaseException:

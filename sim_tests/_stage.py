@@ -101,6 +101,7 @@ class Stage(Closing):
         steps = 1.0 / (_BODY_UPDATE_HZ * self.warehouse.physics_dt_s)
         self._steps_per_body_update = max(round(steps), 1)
         self._close = [False] * len(self.workers)
+        self._velocity_mps: FloatArray | None = None
         self._place_workers()
 
     def close(self) -> None:
@@ -119,13 +120,21 @@ class Stage(Closing):
             if any(self._close) and self.warehouse.steps % self._steps_per_body_update == 0:
                 self._place_workers()
             self.amr.advance(self.warehouse.physics_dt_s)
-            # A collision changes the velocity within the step that finds it: read it before.
-            velocity = self.robot_velocity_odom_mps if any(self._close) else None
+            # A collision slows the robot in the step that finds it, and in the one before, which
+            # lets it come just as far as the body: what counts is how it came.
+            earlier, now = self._velocity_mps, None
+            if any(self._close):
+                now = self.robot_velocity_odom_mps
+            self._velocity_mps = now
             self.warehouse.step()
-            if velocity is not None:
-                for index, close in enumerate(self._close):
-                    if close:
-                        self._look_for_contact(index, velocity, meter)
+            if now is None:
+                continue
+            came = now
+            if earlier is not None and earlier @ earlier > now @ now:
+                came = earlier
+            for index, close in enumerate(self._close):
+                if close:
+                    self._look_for_contact(index, came, meter)
         self._place_workers()
 
     def measure(self, meter: SafetyMeter, dt_s: float) -> tuple[float, ...]:

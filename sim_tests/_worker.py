@@ -139,8 +139,8 @@ class Worker:
             eye_yaw_rad: of the eyes from the head, left positive, within ±35°.
             eye_pitch_rad: up positive, within ±25°.
             activity: what the hands do: ``"none"``, ``"carry_box"``, ``"phone"``, or on the way.
-            feet: where feet and hips are, in odom, from :func:`footstep_table`; None walks straight
-                on by ``walked_m`` and ``speed_mps``.
+            feet: where feet and hips of this body are, in odom, from :func:`footstep_table`; None
+                walks straight on by ``walked_m`` and ``speed_mps``.
 
         Raises:
             SimError: for a value that is not finite or out of range; nothing is moved then.

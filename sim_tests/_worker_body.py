@@ -24,15 +24,16 @@ _LINKS: Final = (
     *range(JOINTS.index("left_hip"), len(JOINTS)),
 )
 _LINK_PARENTS: Final = (*PARENTS, _SPINE)
-# Spherical joints need masses; motors that allow no speed keep gravity and robots from moving them.
-_LINK_MASS_KG: Final = 1.0
+# Spherical joints need masses. These are so large, and their motors so unwilling to move, that a
+# robot that pushes for seconds moves a limb by less than a millimetre.
+_LINK_MASS_KG: Final = 1000.0
 _HOLDING_NM: Final = 1e5
 # A box that nobody carries waits where nothing comes.
 _PARKED_M: Final = -100.0
 
 
 class WorkerBody:
-    """One kinematic multibody: it goes where it is put, weighs nothing and is never simulated.
+    """One kinematic multibody: it goes where it is put and stays there, whoever pushes.
 
     Its base is the pelvis with the hips' midpoint as origin (x forward, y left, z up at rest).
 

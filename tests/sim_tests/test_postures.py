@@ -56,74 +56,59 @@ def _joined(one: int, other: int) -> bool:
     )
 
 
-def _gap_m(one: np.ndarray, other: np.ndarray) -> float:
-    """Distance of two segments (2, 3) by sampling: never less than it is, by millimetres more."""
-    share = np.linspace(0.0, 1.0, 17)[:, None]
-    first, second = (ends[0] + share * (ends[1] - ends[0]) for ends in (one, other))
-    return float(np.linalg.norm(first[:, None] - second[None], axis=-1).min())
-
-
-def _capsules(worker: Worker) -> list[tuple[int, np.ndarray, float]]:
-    """Joint, ends (2, 3) in odom and radius of every capsule."""
+def _capsules(worker: Worker) -> tuple[np.ndarray, np.ndarray]:
+    """Ends (C, 2, 3) in odom and radii (C,) of the capsules."""
     links, scale = link_transforms(worker.asset.joints_m, worker.pose), worker.skeleton.scale
-    return [
-        (
-            capsule.joint,
-            np.array(
-                [
-                    (links[1 + capsule.joint] @ [*np.multiply(end, scale), 1.0])[:3]
-                    for end in (capsule.start_m, capsule.end_m)
-                ]
-            ),
-            capsule.radius_m * scale,
-        )
-        for capsule in worker.asset.capsules
-    ]
+    capsules = worker.asset.capsules
+    ends = np.array([[capsule.start_m, capsule.end_m] for capsule in capsules]) * scale
+    mine = links[[1 + capsule.joint for capsule in capsules]]
+    placed = np.einsum("cij,cej->cei", mine[:, :3, :3], ends) + mine[:, None, :3, 3]
+    return placed, np.array([capsule.radius_m for capsule in capsules]) * scale
 
 
 @pytest.mark.parametrize("look", worker_names())
-@pytest.mark.parametrize("activity", ACTIVITIES)
-def test_no_limb_passes_through_another(
-    cast: dict[str, Worker], look: str, activity: str
-) -> None:
+def test_no_limb_passes_through_another(cast: dict[str, Worker], look: str) -> None:
     """By capsules, and by the skin of one limb in the capsules of another."""
     worker = cast[look]
-    skin = worker.asset.levels[1]
+    asset, skin = worker.asset, worker.asset.levels[1]
+    joints = [capsule.joint for capsule in asset.capsules]
+    apart = np.array([[not _joined(one, other) for other in joints] for one in joints])
+    # Of the skin, arms and legs: what moves wholly with one joint.
     owner = np.full(len(skin.vertices_m), PELVIS)
     for joint in range(len(JOINTS)):
         owner[skin.weights[:, joint] > 0.99] = joint
-    limbs = {name: np.array([_limb(j) == name for j in owner.tolist()]) for name in (
-        "left arm", "right arm", "left leg", "right leg",
-    )}  # fmt: skip
-    for speed_mps, part in [(0.0, 0.0), *itertools.product((0.5, 1.2, 2.0), np.arange(6) / 6)]:
+    on_limb = np.array([_limb(joint).endswith(("arm", "leg")) for joint in owner.tolist()])
+    vertices, weights = skin.vertices_m[on_limb], skin.weights[on_limb]
+    foreign = np.array(
+        [[not _joined(one, other) for other in owner[on_limb].tolist()] for one in joints]
+    )
+    share = np.linspace(0.0, 1.0, 17)[:, None]
+    moments = [(0.0, 0.0), *itertools.product((0.5, 1.2, 2.0), np.arange(5) / 5)]
+    for activity, (speed_mps, part) in itertools.product(ACTIVITIES, moments):
         stride = float(worker.gait.stride_m(max(speed_mps, 0.1)))
         worker.place((0.0, 0.0), 0.0, part * stride, speed_mps, activity=activity)
-        capsules = _capsules(worker)
-        for one, other in itertools.combinations(capsules, 2):
-            if not _joined(one[0], other[0]):
-                assert one[2] + other[2] - _gap_m(one[1], other[1]) < PASSING_M, (
-                    JOINTS[one[0]], JOINTS[other[0]], speed_mps, part,
-                )  # fmt: skip
-        points = skin_points(worker.asset.joints_m, worker.pose, skin.vertices_m, skin.weights)
-        for joint, (start, end), radius in capsules:
-            for name, mine in limbs.items():
-                others = mine & np.array([not _joined(joint, j) for j in owner.tolist()])
-                if name == _limb(joint) or not others.any():
-                    continue
-                along = end - start
-                reach = points[others] - start
-                share = np.clip(reach @ along / max(along @ along, 1e-12), 0.0, 1.0)
-                depth = radius - np.linalg.norm(reach - share[:, None] * along, axis=1)
-                assert depth.max() < PASSING_M, (name, JOINTS[joint], speed_mps, part)
+        ends, radii = _capsules(worker)
+        along = ends[:, 1] - ends[:, 0]
+        axes = ends[:, :1] + share * along[:, None]
+        gaps = np.linalg.norm(axes[:, None, :, None] - axes[None, :, None], axis=-1)
+        depth = radii[:, None] + radii - gaps.min(axis=(2, 3))
+        assert depth[apart].max() < PASSING_M, (activity, speed_mps, part)
+        points = skin_points(asset.joints_m, worker.pose, vertices, weights)
+        for capsule in range(len(joints)):
+            near = points[foreign[capsule]] - ends[capsule, 0]
+            length = max(float(along[capsule] @ along[capsule]), 1e-12)
+            place = np.clip(near @ along[capsule] / length, 0.0, 1.0)
+            inside = radii[capsule] - np.linalg.norm(near - place[:, None] * along[capsule], axis=1)
+            assert inside.max() < PASSING_M, (activity, speed_mps, part)
 
 
 @pytest.mark.parametrize("look", worker_names())
-@pytest.mark.parametrize("speed_mps", [0.0, 0.6, 1.2, 2.0])
+@pytest.mark.parametrize("speed_mps", [0.0, 1.2, 2.0])
 def test_a_box_is_level_before_the_belly_and_between_the_hands(
     cast: dict[str, Worker], look: str, speed_mps: float
 ) -> None:
     worker = cast[look]
-    for part in np.arange(7) / 7:
+    for part in np.arange(4) / 4:
         walked = part * float(worker.gait.stride_m(max(speed_mps, 0.1)))
         worker.place((1.0, -2.0), 0.9, walked, speed_mps, activity="carry_box")
         assert worker.held == "box"

@@ -5,7 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sim_tests._postures import Activity
 from sim_tests._script import GazeKey, WorkerScript
+from sim_tests._worker_asset import worker_names
 
 
 def script(path, **keys):
@@ -95,3 +97,79 @@ def test_a_copied_script_walks_its_own_path():
     WALK.motion(1.0)
     moved = WALK.model_copy(update={"path": (WALK.path[0].model_copy(update={"x_m": 9.0}),)})
     assert moved.motion(1.0).position_odom_m[0] == 9.0
+
+
+def test_the_eyes_turn_smoothly_between_keys_and_not_without():
+    looking = script(
+        [(0, 0, 0)],
+        gaze=[
+            {"t_s": 1.0, "eye_yaw_deg": 0.0},
+            {"t_s": 2.0, "eye_yaw_deg": 30.0, "eye_pitch_deg": -10.0},
+        ],
+    )
+    assert looking.eye_angles(0.0) == (0.0, 0.0)
+    assert looking.eye_angles(1.5) == pytest.approx((math.radians(15.0), math.radians(-5.0)))
+    assert looking.eye_angles(9.0) == pytest.approx((math.radians(30.0), math.radians(-10.0)))
+    assert looking.gaze_angles(1.5, 0.2, (0.0, 0.0)) == (0.2, 0.0)  # the head does not follow
+    assert WALK.eye_angles(1.0) == (0.0, 0.0)
+    with pytest.raises(ValueError, match="eye_yaw_deg"):
+        GazeKey(t_s=0.0, eye_yaw_deg=50.0)
+
+
+def test_activities_change_in_six_tenths_of_a_second():
+    busy = script(
+        [(0, 0, 0)],
+        activities=[
+            {"t_s": 1.0, "activity": "phone"},
+            {"t_s": 3.0, "activity": "carry_box"},
+        ],
+    )
+    assert busy.activity(-5.0).held == "phone"  # the first holds before its time as well
+    assert busy.activity(2.9) == Activity("phone", "phone", 1.0)
+    halfway = busy.activity(3.3)
+    assert (halfway.name, halfway.before) == ("carry_box", "phone")
+    assert halfway.share == pytest.approx(0.5)
+    assert busy.activity(3.6 + 1e-9) == Activity("carry_box", "phone", 1.0)
+    assert WALK.activity(2.0) == Activity()
+    shares = [busy.activity(t).share for t in np.linspace(3.0, 3.6, 61)]
+    assert np.all(np.diff(shares) > 0.0)
+    assert np.max(np.diff(shares)) < 0.03
+    with pytest.raises(ValueError, match=r"activities must have increasing t_s at least 0\.6 s"):
+        script(
+            [(0, 0, 0)],
+            activities=[{"t_s": 1.0, "activity": "phone"}, {"t_s": 1.2, "activity": "none"}],
+        )
+
+
+def test_looks_are_those_that_ship():
+    assert script([(0, 0, 0)], look=worker_names()[0]).look == worker_names()[0]
+    with pytest.raises(ValueError, match="look must be one of"):
+        script([(0, 0, 0)], look="nobody")
+
+
+def test_headings_turn_without_jerks():
+    """Between keys the body starts and stops turning gently, and never overshoots."""
+    turning = script(
+        [(0, 0, 0)],
+        heading=[
+            {"t_s": 1.0, "heading_deg": 0.0},
+            {"t_s": 2.0, "heading_deg": 0.0},
+            {"t_s": 3.0, "heading_deg": 90.0},
+            {"t_s": 4.0, "heading_deg": 90.0},
+        ],
+    )
+    headings = np.array([turning.motion(t).heading_odom_rad for t in np.arange(0.0, 5.0, 0.02)])
+    assert headings.min() >= -1e-9
+    assert headings.max() <= math.pi / 2 + 1e-9
+    rate = np.diff(headings) / 0.02
+    assert rate.max() < math.pi  # 1.5 times the mean rate of a smooth turn
+    assert np.abs(np.diff(rate)).max() / 0.02 < 12.0
+
+
+def test_feet_are_ready_before_the_first_key_and_at_rest_after_the_last():
+    for t_s in (-1e6, -3.0, 8.0, 1e6):
+        feet = np.array(WALK.motion(t_s).feet.feet)
+        assert np.ptp(feet[:, 2]) < 1e-9
+        np.testing.assert_allclose(feet[:, 4], 0.0, atol=1e-9)
+        centre = WALK.motion(t_s).position_odom_m
+        assert np.linalg.norm(feet[:, :2].mean(axis=0) - centre) < 0.05

@@ -403,4 +403,4 @@ def test_capsules_are_where_the_body_is_and_stop_what_runs_into_them() -> None:
         assert float(amr.T_odom_base[0, 3]) < 1.3 - 0.2
         after = _links(hall, worker)
         for name in LINKS:
-            np.testing.assert_allclose(after[name][1], before[name][1], atol=0.02)
+            np.testing.assert_allclose(after[name][1], before[name][1], atol=2e-3)

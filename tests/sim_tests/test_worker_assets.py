@@ -28,7 +28,7 @@ LEGS = [JOINTS.index(f"{side}_hip") for side in ("left", "right")]
 #: One step of the weights as they are stored.
 STEP = 1.0 / 255.0
 #: Budgets of triangles; a level may miss its own by a tenth.
-MOST_TRIANGLES = (9_500, 3_400, 1_000)
+MOST_TRIANGLES = (9_500, 3_200, 1_000)
 
 
 @pytest.fixture(params=NAMES)
@@ -206,7 +206,7 @@ def test_head_is_rigid_and_the_trunk_does_not_turn_with_it(worker: WorkerAsset) 
         assert (neck[z < worker.joints_m[NECK, 2] - 0.16] == 0.0).all()
         arms = mesh.weights[:, ARMS].max(axis=1) > 0.5
         spine = mesh.weights[:, SPINE]
-        assert (spine[z > worker.joints_m[SPINE, 2] + 0.12] == 1.0).all()
+        assert (spine[z > worker.joints_m[SPINE, 2] + 0.12] > 0.98).all()
         assert (spine[(z < worker.joints_m[SPINE, 2] - 0.12) & ~arms] < 0.05).all()
 
 
@@ -216,7 +216,7 @@ def test_skin_bends_over_several_centimetres(worker: WorkerAsset) -> None:
         ends = mesh.weights[mesh.triangles]
         jumps = np.abs(ends - np.roll(ends, 1, axis=1)).max(axis=(1, 2))
         assert np.percentile(jumps, 99) <= step + 2.0 * STEP
-        assert jumps.max() <= step + 0.3
+        assert jumps.max() <= step + 0.15
 
 
 def test_eyeballs_sit_about_their_joints(worker: WorkerAsset) -> None:

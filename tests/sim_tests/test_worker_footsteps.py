@@ -22,7 +22,7 @@ from sim_tests._warehouse import Warehouse
 from sim_tests._worker import Worker
 from sim_tests._worker_asset import JOINTS, load_worker, worker_names
 
-HZ = 60.0
+HZ = 40.0
 TOUCHING_M = 0.004
 ANKLES = [JOINTS.index(f"{side}_ankle") for side in ("left", "right")]
 
@@ -46,7 +46,7 @@ WALKS = {
     "straight, 1.2 m/s": script([(0, 0, 0), (4, 4.8, 0)]),
     "straight, 2.0 m/s": script([(0, 0, 0), (3, 6, 0)]),
     "a slow shuffle": script([(0, 0, 0), (8, 0.8, 0)]),
-    "creeping": script([(0, 0, 0), (15, 0.3, 0)]),
+    "creeping": script([(0, 0, 0), (8, 0.16, 0)]),
     "one short step": script([(0, 0, 0), (1, 0.2, 0)]),
     "a wide curve": script(circle(3.0, 1.2)),
     "a tight curve": script(circle(1.0, 0.8)),
@@ -154,7 +154,7 @@ corners = st.lists(st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0)), min_si
 
 
 @given(corners, st.floats(0.4, 1.5), st.floats(-180.0, 180.0), st.booleans())
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=15, deadline=None)
 def test_stances_stay_put_whatever_the_walk(
     places: list, speed_mps: float, heading_deg: float, ahead: bool
 ) -> None:

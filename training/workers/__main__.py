@@ -27,7 +27,7 @@ def main() -> None:
         parser.error(f"no worker is called {', '.join(sorted(unknown))}")
     chosen.out.mkdir(parents=True, exist_ok=True)
     start, total = time.perf_counter(), 0
-    # A fresh process each: the unwrapping library does not always survive a second worker.
+    # A fresh process each, so that a worker's files do not depend on who came before.
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(chosen.jobs, mp_context=context, max_tasks_per_child=1) as pool:
         made = pool.map(make, people, [chosen.out] * len(people))

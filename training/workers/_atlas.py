@@ -145,28 +145,32 @@ def bake(pieces: list[Piece], fine: list[Fine], level: int, size_px: int, paint:
     for piece, samples in zip(pieces, fine, strict=True):
         if piece.budget[level] == 0:
             continue
-        rough = _simplify(piece, piece.budget[level])
-        vertices, normals, triangles = _split_creases(*_refine(*rough, samples, _STEPS[level]))
-        weights = samples.at(vertices, normals).weights
+        rough, faces = _refine(*_simplify(piece, piece.budget[level]), samples, _STEPS[level])
+        follow = _settled(rough, faces, samples, _STEPS[level])
+        rows, normals, triangles = _split_creases(rough, faces)
+        vertices, weights = rough[rows], follow[rows]
         parts.append(Part(samples, vertices, normals, triangles, weights))
-    return _assemble(_unwrap(parts, size_px), parts, size_px, paint)
+    return _assemble(parts, size_px, paint)
 
 
-def _unwrap(parts: list[Part], size_px: int) -> xatlas.Atlas:
-    """Charts of all parts on one sheet, as large as they fit."""
-    area = sum(
-        float(trimesh.triangles.area(part.vertices_m[part.triangles]).sum()) * part.sharpness**2
-        for part in parts
-    )
+def _unwrap(parts: list[Part], size_px: int) -> tuple[Triangles, Triangles, Array]:
+    """Charts of all parts on one sheet, as large as they fit.
+
+    The parts go to the library as one mesh: given several it works on them at once, and crashes
+    now and then. Returns rows of the parts' vertices one after the other, triangles of those rows
+    in the parts' order, and texture coordinates.
+    """
+    points = np.concatenate([part.vertices_m * part.sharpness for part in parts])
+    normals = np.concatenate([part.normals for part in parts])
+    shift = np.cumsum([0, *(len(part.vertices_m) for part in parts[:-1])])
+    triangles = np.concatenate([part.triangles + at for part, at in zip(parts, shift, strict=True)])
+    area = float(trimesh.triangles.area(points[triangles]).sum())
     fill = 0.72
     while fill > 0.05:
         atlas = xatlas.Atlas()
-        for part in parts:
-            atlas.add_mesh(
-                (part.vertices_m * part.sharpness).astype(np.float32),
-                part.triangles.astype(np.uint32),
-                part.normals.astype(np.float32),
-            )
+        atlas.add_mesh(
+            points.astype(np.float32), triangles.astype(np.uint32), normals.astype(np.float32)
+        )
         chart, pack = xatlas.ChartOptions(), xatlas.PackOptions()
         chart.max_cost = 6.0
         chart.normal_seam_weight = 1.0
@@ -175,41 +179,37 @@ def _unwrap(parts: list[Part], size_px: int) -> xatlas.Atlas:
         pack.create_image = False
         atlas.generate(chart, pack)
         if atlas.atlas_count == 1 and max(atlas.width, atlas.height) <= size_px:
-            return atlas
+            rows, index, uv = atlas[0]
+            # The library normalises by its own sheet, which may be smaller than ours.
+            uv = uv.astype(np.float64) * [atlas.width / size_px, atlas.height / size_px]
+            return rows.astype(np.int64), index.astype(np.int64).reshape(-1, 3), uv
         fill *= 0.88
     raise RuntimeError("the texture atlas does not fit on one sheet")
 
 
-def _assemble(
-    atlas: xatlas.Atlas,
-    parts: list[Part],
-    size_px: int,
-    paint: Paint,
-) -> Baked:
+def _assemble(parts: list[Part], size_px: int, paint: Paint) -> Baked:
+    """Unwrap all parts and paint them into one texture."""
+    rows, triangles, uv = _unwrap(parts, size_px)
+    points = np.concatenate([part.vertices_m for part in parts])[rows]
+    normals = np.concatenate([part.normals for part in parts])[rows]
+    weights = np.concatenate([part.weights for part in parts])[rows]
     # Painted finer than kept: the renderer takes the nearest texel, so edges must be smooth here.
     fine_px = size_px * (_OVERSAMPLING if size_px > 300 else 2 * _OVERSAMPLING)
     picture = np.zeros((fine_px, fine_px, 3))
     known = np.zeros((fine_px, fine_px), dtype=bool)
-    collected: list[tuple[Array, Array, Array, Triangles, Array]] = []
-    base = 0
-    # The library normalises by its own sheet, which may be smaller than ours.
-    sheet = np.array([atlas.width, atlas.height]) / size_px
-    for row, part in enumerate(parts):
-        rows, corners, unit_uv = atlas[row]
-        index, uv = corners.astype(np.int64).reshape(-1, 3), unit_uv.astype(np.float64) * sheet
-        points, turned = part.vertices_m[rows], part.normals[rows]
-        at, place, up = _texels(uv, index, points, turned, fine_px)
+    start = 0
+    for part in parts:
+        faces = triangles[start : start + len(part.triangles)]
+        start += len(part.triangles)
+        at, place, up = _texels(uv, faces, points, normals, fine_px)
         if len(at):
             picture[at[:, 0], at[:, 1]] = paint(part.fine.at(place, up))
             known[at[:, 0], at[:, 1]] = True
-        collected.append((points, turned, uv, index + base, part.weights[rows]))
-        base += len(rows)
     nearest = distance_transform_edt(~known, return_distances=False, return_indices=True)
     picture = picture[nearest[0], nearest[1]].astype(np.float32)
     picture = cv2.resize(picture, (size_px, size_px), interpolation=cv2.INTER_AREA)
-    stacked = [np.concatenate(list(column)) for column in zip(*collected, strict=True)]
     rgb = np.clip(np.round(picture), 0, 255).astype(np.uint8)
-    return Baked(stacked[0], stacked[1], stacked[2], stacked[3], stacked[4], rgb)
+    return Baked(points, normals, uv, triangles, weights, rgb)
 
 
 def _texels(
@@ -306,8 +306,29 @@ def _refine(
     return vertices, triangles
 
 
-def _split_creases(vertices: Array, triangles: Triangles) -> tuple[Array, Array, Triangles]:
-    """Vertices doubled along sharp edges; a normal each, smooth elsewhere."""
+def _settled(vertices: Array, triangles: Triangles, samples: Fine, step: float) -> Array:
+    """Weights from the fine piece, evened out where the nearest place was another limb's."""
+    weights = samples.at(vertices, vertex_normals(vertices, triangles)).weights
+    one, other = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+    a, b = np.concatenate([one, other]), np.concatenate([other, one])
+    for _ in range(12):
+        steep = np.abs(weights[a] - weights[b]).max(axis=1) > step + 0.05
+        if not steep.any():
+            break
+        total, count = np.zeros_like(weights), np.zeros((len(vertices), 1))
+        np.add.at(total, a, weights[b])
+        np.add.at(count, a, 1.0)
+        rows = np.unique(a[steep])
+        weights[rows] = 0.5 * weights[rows] + 0.5 * total[rows] / count[rows]
+    return weights
+
+
+def _split_creases(vertices: Array, triangles: Triangles) -> tuple[Triangles, Array, Triangles]:
+    """Double vertices along sharp edges.
+
+    Returns for each new vertex the row it comes from, its normal (smooth but across sharp edges),
+    and the triangles.
+    """
     corners = vertices[triangles]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     size = np.linalg.norm(area, axis=1, keepdims=True)
@@ -332,14 +353,18 @@ def _split_creases(vertices: Array, triangles: Triangles) -> tuple[Array, Array,
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     key = np.column_stack([corner_vertex, np.round(normals * 50.0)]).astype(np.int64)
     _, first, index = np.unique(key, axis=0, return_index=True, return_inverse=True)
-    return vertices[corner_vertex[first]], normals[first], index.reshape(-1, 3)
+    return corner_vertex[first], normals[first], index.reshape(-1, 3)
 
 
-def shade_of(pieces: list[Piece]) -> Shade:
-    """How the pieces shade each other."""
-    points = [trimesh.Trimesh(p.vertices_m, p.triangles, process=False) for p in pieces]
+def shade_of(pieces: list[Piece], *, forearms: bool) -> Shade:
+    """How the pieces shade each other; hips keep no shade of hands that will not stay there."""
     rng = np.random.default_rng(0)
-    clouds = [_sample(mesh, rng) for mesh in points]
+    clouds = []
+    for piece in pieces:
+        far = piece.weights[:, [5, 8]].max(axis=1) > 0.5
+        kept = piece.triangles if forearms else piece.triangles[~far[piece.triangles].any(axis=1)]
+        if len(kept):
+            clouds.append(_sample(trimesh.Trimesh(piece.vertices_m, kept, process=False), rng))
     return Shade(np.concatenate(clouds))
 
 

@@ -87,7 +87,7 @@ def _dome(kind: str, body: Body, places: Places, under: Array) -> Piece:
         inner = rings[-1].copy()
         inner[:, :2] = (inner[:, :2] - center[:2]) * 0.95 + center[:2]
         rings = np.concatenate([rings, inner[None]])
-    return _worn(kind, rings, center, body, (520, 200, 70))
+    return _worn(kind, rings, center, body, (520, 160, 70))
 
 
 def _brim(kind: str, body: Body, places: Places, under: Array) -> Piece:

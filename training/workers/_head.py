@@ -94,7 +94,7 @@ class Head:
             part.triangles,
             part(self._body.weights),
             part(self._at.canon_m),
-            (2150, 600, 160),
+            (2150, 520, 160),
         )
 
     def _beard(self) -> Array:
@@ -127,7 +127,7 @@ class Head:
         weights = part(self._body.weights)
         weights[:] = 0.0
         weights[:, :2] = 1.0
-        budget = (600, 220, 70) if self._hat_line is None else (260, 90, 30)
+        budget = (600, 180, 70) if self._hat_line is None else (260, 90, 30)
         made = [
             Piece(
                 "hair", part(self.hair_m), part.triangles, weights, part(self._at.canon_m), budget

@@ -43,8 +43,8 @@ def make(person: Person, folder: Path) -> int:
     places = Places(model().average())
     pieces = _dress(body, person, places)
     folded = [with_lip(piece) for piece in pieces]
-    shade = shade_of(folded)
-    fine = [Fine(piece, shade) for piece in folded]
+    whole, still = (shade_of(folded, forearms=arms) for arms in (True, False))
+    fine = [Fine(piece, whole if piece.label in ("skin", "glove") else still) for piece in folded]
     paint = Painter(person, np.random.default_rng(zlib.crc32(person.name.encode())))
     levels = [
         bake(folded if level < len(TEXTURE_PX) - 1 else pieces, fine, level, size, paint)

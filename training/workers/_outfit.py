@@ -128,17 +128,17 @@ class Outfit:
         field = self._whole_shirt()
         if self._person.vest is not None:
             field = np.minimum(field, _OVERLAP_M - self._vest_field())
-        budget = (1400, 480, 140) if self._person.vest is None else (1000, 360, 100)
+        budget = (1400, 400, 140) if self._person.vest is None else (1000, 300, 100)
         return self._piece("top", field, self._own.shirt_m, self._mean.shirt_m, budget, 0.008)
 
     def _vest(self) -> Piece:
-        field, budget = self._vest_field(), (850, 310, 100)
+        field, budget = self._vest_field(), (850, 260, 100)
         return self._piece("vest", field, self._own.vest_m, self._mean.vest_m, budget, 0.008)
 
     def _trousers(self) -> Piece:
         waist = 1.040 if self._top.hem_z_m > 1.0 else self._top.hem_z_m + 0.06
         field = np.minimum(self._on_trousers.below(waist), self._at.foot())
-        budget = (1000, 360, 100)
+        budget = (1100, 310, 110)
         piece = self._piece(
             "trousers", field, self._own.trousers_m, self._mean.trousers_m, budget, 0.007
         )
@@ -186,7 +186,7 @@ class Outfit:
             np.tile(part(self._body.weights)[rows], (levels, 1)),
             np.tile(canon[rows], (levels, 1))
             + np.repeat(np.arange(levels), count)[:, None] * [0, 0, 0.01],
-            (260, 110, 24),
+            (260, 90, 24),
         )
 
     def _socks(self) -> Piece:
@@ -199,11 +199,11 @@ class Outfit:
         bare_m, canon = self._body.vertices_m, self._at.canon_m
         along = np.where(self._at.arm > 0.3, self._at.along_arm_m, -1.0)
         bare = along - (self._top.sleeve_m - _OVERLAP_M)
-        budget = (1150, 360, 90) if self._top.sleeve_m < 0.3 else (900, 270, 64)
+        budget = (1150, 300, 90) if self._top.sleeve_m < 0.3 else (900, 230, 64)
         if self._person.gloves is None:
             return [self._piece("skin", bare, bare_m, canon, budget)]
         glove_m = bare_m + 0.0025 * self._normals
-        made = [self._piece("glove", along - 0.495, glove_m, canon, (900, 270, 64), 0.004)]
+        made = [self._piece("glove", along - 0.495, glove_m, canon, (900, 230, 64), 0.004)]
         if self._top.sleeve_m < 0.3:
             arm = np.minimum(bare, 0.53 - along)
             made.append(self._piece("skin", arm, bare_m, canon, (360, 120, 40)))

@@ -25,7 +25,7 @@ def shoes(body: Body, average: Body) -> list[Piece]:
             triangles = _outwards(at, rough)
             weights = np.zeros((len(points), body.weights.shape[1]))
             weights[:, [ankle - 2, ankle - 1, ankle]] = 1.0
-            budget = (300, 120, 34) if label == "shoe" else (90, 44, 16)
+            budget = (300, 90, 34) if label == "shoe" else (90, 44, 16)
             made.append(Piece(label, at, triangles, weights, canon, budget))
     return made
 
