@@ -125,11 +125,18 @@ class Outfit:
         )
 
     def _shirt(self) -> Piece:
-        field = self._whole_shirt()
+        field, covered = self._whole_shirt(), self._tucked()
         if self._person.vest is not None:
             field = np.minimum(field, _OVERLAP_M - self._vest_field())
+            covered = np.maximum(covered, smoothstep(self._vest_field(), 0.004, 0.020))
+        at_m = self._own.shirt_m - 0.008 * covered[:, None] * self._normals
         budget = (1400, 400, 140) if self._person.vest is None else (1000, 300, 100)
-        return self._piece("top", field, self._own.shirt_m, self._mean.shirt_m, budget, 0.008)
+        return self._piece("top", field, at_m, self._mean.shirt_m, budget, 0.008)
+
+    def _tucked(self) -> Array:
+        """1 where the shirt is worn inside the trousers, 0 elsewhere and for shirts worn over."""
+        inside = smoothstep(self._on_shirt.below(1.040), 0.0, 0.020)
+        return inside if self._top.hem_z_m > 1.0 else np.zeros_like(inside)
 
     def _vest(self) -> Piece:
         field, budget = self._vest_field(), (850, 260, 100)
@@ -139,9 +146,11 @@ class Outfit:
         waist = 1.040 if self._top.hem_z_m > 1.0 else self._top.hem_z_m + 0.06
         field = np.minimum(self._on_trousers.below(waist), self._at.foot())
         budget = (1100, 310, 110)
-        piece = self._piece(
-            "trousers", field, self._own.trousers_m, self._mean.trousers_m, budget, 0.007
-        )
+        # Under a shirt that hangs over them trousers lie closer.
+        over = self._on_trousers.canon_m[:, 2] - self._top.hem_z_m
+        covered = smoothstep(over, 0.0, 0.030) * (1.0 - self._tucked().max())
+        at_m = self._own.trousers_m - 0.010 * covered[:, None] * self._normals
+        piece = self._piece("trousers", field, at_m, self._mean.trousers_m, budget, 0.007)
         # Hems belong to the shank: the foot turns under them.
         piece.weights[:, [12, 15]] = 0.0
         return piece
