@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 from . import _clash  # noqa: F401 - first: refuses a foreign package of one of our names
 
 if TYPE_CHECKING:
-    from ._amr import NOVA_CARTER
     from ._crossing import CrossingFrame, CrossingResult, StraightOn, run_crossing
     from ._errors import SimError
     from ._keypoint_camera import KeypointNoise
-    from ._planner import LocalPlanner, SamplingPlanner
-    from ._renderer import CameraRenderer
     from ._scenario import Scenario, shipped_scenarios
+    from .pictures._renderer import CameraRenderer
+    from .robot._amr import NOVA_CARTER
+    from .robot._planner import LocalPlanner, SamplingPlanner
 
 __all__ = [
     "NOVA_CARTER",
@@ -36,13 +36,13 @@ __all__ = [
 ]
 
 _HOMES = {
-    "NOVA_CARTER": "_amr",
-    "CameraRenderer": "_renderer",
+    "NOVA_CARTER": "robot._amr",
+    "CameraRenderer": "pictures._renderer",
     "CrossingFrame": "_crossing",
     "CrossingResult": "_crossing",
     "KeypointNoise": "_keypoint_camera",
-    "LocalPlanner": "_planner",
-    "SamplingPlanner": "_planner",
+    "LocalPlanner": "robot._planner",
+    "SamplingPlanner": "robot._planner",
     "Scenario": "_scenario",
     "SimError": "_errors",
     "StraightOn": "_crossing",

@@ -14,9 +14,9 @@ from tqdm import tqdm
 
 from ._crossing import run_crossing
 from ._errors import SimError
-from ._layout import WarehouseLayout
 from ._scenario import Scenario
 from ._warehouse import Warehouse
+from .hall._layout import WarehouseLayout
 
 Direction = Literal["higher", "lower"]
 

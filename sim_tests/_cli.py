@@ -208,8 +208,8 @@ def _crossings(options: argparse.Namespace) -> int:
 
 
 def _render(options: argparse.Namespace) -> int:
-    from ._render import render  # noqa: PLC0415
-    from ._render_config import RenderConfig, picture_size  # noqa: PLC0415
+    from .sets._render import render  # noqa: PLC0415
+    from .sets._render_config import RenderConfig, picture_size  # noqa: PLC0415
 
     width, height = picture_size(options.size)
     config = RenderConfig.checked(

@@ -14,14 +14,14 @@ from perception import AttentionCone, PersonObservation
 from perception.arrays import FloatArray
 from tracking import PersonTrack, PersonTracker, TrackerConfig
 
-from ._amr import NOVA_CARTER
 from ._errors import SimError
 from ._eyes import TimedEyes, make_eyes
 from ._keypoint_camera import KeypointNoise
 from ._metrics import ContactEvent, SafetyMeter
-from ._planner import LocalPlanner, SamplingPlanner
 from ._scenario import Scenario
 from ._stage import Stage, TrueView
+from .robot._amr import NOVA_CARTER
+from .robot._planner import LocalPlanner, SamplingPlanner
 
 _CLOSE_ENOUGH_TO_STOP_MPS: Final = 0.2
 # Separation is measured this often; contacts are looked for in every physics step.

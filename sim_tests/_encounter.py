@@ -16,11 +16,11 @@ from perception.arrays import FloatArray
 from ._crossing import CrossingFrame, CrossingResult, run_crossing
 from ._drawing import TopView, awareness_colour, draw_camera_view
 from ._figures import new_figure
-from ._renderer import CameraRenderer
 from ._scenario import Scenario
 from ._stage import Stage
 from ._tables import write_encounter
 from ._video import VideoWriter
+from .pictures._renderer import CameraRenderer
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

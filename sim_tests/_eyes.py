@@ -11,11 +11,11 @@ import numpy as np
 from perception import AttentionCone, AwarenessPipeline, Camera, PersonObservation
 from perception.arrays import FloatArray
 
-from ._camera_timing import CameraTiming, FrameClock, FrameQueue
 from ._errors import SimError
 from ._keypoint_camera import KeypointCamera, KeypointNoise
-from ._renderer import CameraRenderer
 from ._stage import Stage, TrueView
+from .pictures._camera_timing import CameraTiming, FrameClock, FrameQueue
+from .pictures._renderer import CameraRenderer
 
 PerceptionKind = Literal["truth", "keypoints", "pixels"]
 

@@ -13,11 +13,11 @@ from pydantic import BeforeValidator, Field
 from perception import Camera
 from tracking.config import StrictConfig
 
-from ._camera_timing import CameraTiming
 from ._errors import SimError
-from ._layout import LAYOUTS, WarehouseLayout
-from ._script import WorkerScript
-from ._sensor import SensorConfig
+from .hall._layout import LAYOUTS, WarehouseLayout
+from .people._script import WorkerScript
+from .pictures._camera_timing import CameraTiming
+from .pictures._sensor import SensorConfig
 
 
 def _layout(value: Any) -> Any:

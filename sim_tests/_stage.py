@@ -12,18 +12,18 @@ from perception import AttentionCone
 from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
 
-from ._amr import NOVA_CARTER, Amr
-from ._amr_look import AmrLook
 from ._bullet import pybullet
 from ._closing import Closing
-from ._held_thing import HeldThing
 from ._metrics import SafetyMeter
 from ._scenario import Scenario
-from ._script import WorkerMotion, WorkerScript
 from ._sight import sees
 from ._warehouse import Warehouse
-from ._worker import MAX_HEAD_PITCH_RAD, MAX_HEAD_YAW_RAD, Worker
-from ._worker_skin import WorkerSkin
+from .people._held_thing import HeldThing
+from .people._script import WorkerMotion, WorkerScript
+from .people._worker import MAX_HEAD_PITCH_RAD, MAX_HEAD_YAW_RAD, Worker
+from .people._worker_skin import WorkerSkin
+from .robot._amr import NOVA_CARTER, Amr
+from .robot._amr_look import AmrLook
 
 # Surfaces are measured exactly once centres are nearer than this; farther away a bound will do.
 _EXACT_WITHIN_M: Final = 4.0

@@ -9,12 +9,12 @@ from perception.arrays import FloatArray, finite_number
 from ._bullet import pybullet
 from ._closing import Closing
 from ._errors import SimError
-from ._layout import WarehouseLayout
 from ._names import not_one_of
-from ._visual_backend import RENDERERS, RendererName
+from .hall._layout import WarehouseLayout
+from .pictures._visual_backend import RENDERERS, RendererName
 
 if TYPE_CHECKING:
-    from ._visuals import Actor, Visuals
+    from .pictures._visuals import Actor, Visuals
 
 GRAVITY_MPS2: Final = 9.81
 DEFAULT_PHYSICS_DT_S: Final = 1.0 / 240.0
@@ -96,7 +96,7 @@ class Warehouse(Closing):
             if self.client < 0:
                 raise SimError("the warehouse is closed: there is nothing left to see")
             # Imported late: a run without pictures needs none of it.
-            from ._visuals import Visuals  # noqa: PLC0415
+            from .pictures._visuals import Visuals  # noqa: PLC0415
 
             self._visuals = Visuals(self.layout, self._renderer, self._variant)
             for actor in self._actors:

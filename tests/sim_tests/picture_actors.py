@@ -6,8 +6,8 @@ import numpy as np
 
 from perception.arrays import FloatArray
 from sim_tests._bullet import pybullet
-from sim_tests._meshes import Mesh, ellipsoid, quad
-from sim_tests._visuals import Visuals
+from sim_tests.hall._meshes import Mesh, ellipsoid, quad
+from sim_tests.pictures._visuals import Visuals
 
 CHECKS = np.kron(np.indices((4, 4)).sum(axis=0) % 2, np.ones((8, 8)))[..., None] * np.array(
     [200, 40, 30]

@@ -9,7 +9,12 @@ import numpy as np
 import pytest
 
 from nav_adapter import RobotState
-from sim_tests._amr import (
+from sim_tests._bullet import pybullet
+from sim_tests._errors import SimError
+from sim_tests._warehouse import Warehouse
+from sim_tests.hall._layout import WarehouseLayout
+from sim_tests.people._worker import Worker
+from sim_tests.robot._amr import (
     CAMERA_FORWARD_M,
     CAMERA_HEIGHT_M,
     MAX_YAW_RATE_RADPS,
@@ -18,11 +23,6 @@ from sim_tests._amr import (
     WHEEL_RADIUS_M,
     Amr,
 )
-from sim_tests._bullet import pybullet
-from sim_tests._errors import SimError
-from sim_tests._layout import WarehouseLayout
-from sim_tests._warehouse import Warehouse
-from sim_tests._worker import Worker
 
 A_MPS2 = NOVA_CARTER.max_acceleration_mps2
 

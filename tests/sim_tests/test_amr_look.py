@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from perception import Camera
-from sim_tests._amr import CAMERA_FORWARD_M, CAMERA_HEIGHT_M, NOVA_CARTER, WHEEL_RADIUS_M, Amr
-from sim_tests._amr_look import AmrLook, amr_meshes
 from sim_tests._bullet import pybullet
 from sim_tests._errors import SimError
-from sim_tests._layout import WarehouseLayout
-from sim_tests._renderer import CameraRenderer
 from sim_tests._warehouse import Warehouse
+from sim_tests.hall._layout import WarehouseLayout
+from sim_tests.pictures._renderer import CameraRenderer
+from sim_tests.robot._amr import CAMERA_FORWARD_M, CAMERA_HEIGHT_M, NOVA_CARTER, WHEEL_RADIUS_M, Amr
+from sim_tests.robot._amr_look import AmrLook, amr_meshes
 
 
 def test_it_fills_its_footprint_and_stands_on_the_floor() -> None:

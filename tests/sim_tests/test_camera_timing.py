@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from perception.arrays import FloatArray
-from sim_tests._camera_timing import CameraTiming, FrameClock, FrameQueue
 from sim_tests._errors import SimError
 from sim_tests._eyes import TimedEyes
+from sim_tests.pictures._camera_timing import CameraTiming, FrameClock, FrameQueue
 
 
 def _frames(timing: CameraTiming, count: int, seed: int = 0) -> list[tuple[float, float | None]]:

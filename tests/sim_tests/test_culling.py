@@ -12,11 +12,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from perception import Camera
-from sim_tests._culling import box_corners, hidden_behind, in_view, least_depth_m, to_camera
-from sim_tests._layout import WarehouseLayout
-from sim_tests._renderer import CameraRenderer
-from sim_tests._view import View
 from sim_tests._warehouse import Warehouse
+from sim_tests.hall._layout import WarehouseLayout
+from sim_tests.pictures._culling import (
+    box_corners,
+    hidden_behind,
+    in_view,
+    least_depth_m,
+    to_camera,
+)
+from sim_tests.pictures._renderer import CameraRenderer
+from sim_tests.pictures._view import View
 
 CAMERA = Camera(40, 30, 33.0, 31.0, 17.3, 16.1)
 _SIDES = st.floats(0.02, 3.0)

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-
 from genuine_detectors import MODELS, REQUIRED, GenuineDetector, iou
-from sim_tests._render_config import RenderConfig
-from sim_tests._render_scene import RenderScene
+
+from sim_tests.people._worker_asset import worker_names
+from sim_tests.sets._render_config import RenderConfig
+from sim_tests.sets._render_scene import RenderScene
 
 CONFIG = RenderConfig(frames=72, scenes=12, people=3, seed=7)
 MAX_OCCLUSION = 0.2
@@ -69,7 +70,5 @@ def test_a_network_that_never_saw_a_render_finds_the_workers(
 
 
 def test_every_worker_is_among_them(pictures: list[Picture]) -> None:
-    from sim_tests._worker_asset import worker_names
-
     seen = {look for picture in pictures for look in picture.looks}
     assert seen == set(worker_names())

@@ -14,16 +14,16 @@ from camera_poses import level_pose
 from picture_actors import CHECKS, Shown, ball, upright_square
 
 from perception import Camera
-from sim_tests import _visual_backends
-from sim_tests._egl_probe import egl_works
 from sim_tests._errors import SimError
-from sim_tests._layout import WarehouseLayout
-from sim_tests._lighting import Lighting
-from sim_tests._meshes import Mesh, box
-from sim_tests._renderer import CameraRenderer, RenderedView
-from sim_tests._view import View
-from sim_tests._visuals import Visuals
 from sim_tests._warehouse import Warehouse
+from sim_tests.hall._layout import WarehouseLayout
+from sim_tests.hall._lighting import Lighting
+from sim_tests.hall._meshes import Mesh, box
+from sim_tests.pictures import _visual_backends
+from sim_tests.pictures._egl_probe import egl_works
+from sim_tests.pictures._renderer import CameraRenderer, RenderedView
+from sim_tests.pictures._view import View
+from sim_tests.pictures._visuals import Visuals
 
 CAMERA = Camera(320, 240, 270.0, 260.0, 171.3, 110.6)
 AHEAD = level_pose((0.0, 0.0, 1.4), 0.05, 0.08)
@@ -190,10 +190,10 @@ def test_where_egl_does_not_draw_it_is_refused_and_auto_is_tiny(
 def test_egl_is_silent_starts_again_and_leaves_no_files(tmp_path: Path) -> None:
     program = (
         "import numpy as np\n"
-        "from sim_tests._visuals import Visuals\n"
-        "from sim_tests._view import View\n"
-        "from sim_tests._lighting import Lighting\n"
-        "from sim_tests._meshes import box\n"
+        "from sim_tests.pictures._visuals import Visuals\n"
+        "from sim_tests.pictures._view import View\n"
+        "from sim_tests.hall._lighting import Lighting\n"
+        "from sim_tests.hall._meshes import box\n"
         "from perception import Camera\n"
         "view = View.of_rectangle(Camera(64, 48, 60.0, 60.0, 31.5, 23.5), np.eye(4))\n"
         "for _ in range(2):\n"

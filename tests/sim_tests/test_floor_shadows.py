@@ -10,12 +10,12 @@ from camera_poses import level_pose
 from picture_actors import Shown, ball
 
 from perception import Camera
-from sim_tests._egl_probe import egl_works
-from sim_tests._layout import WarehouseLayout
-from sim_tests._lighting import Lighting
-from sim_tests._meshes import box
-from sim_tests._renderer import CameraRenderer
 from sim_tests._warehouse import Warehouse
+from sim_tests.hall._layout import WarehouseLayout
+from sim_tests.hall._lighting import Lighting
+from sim_tests.hall._meshes import box
+from sim_tests.pictures._egl_probe import egl_works
+from sim_tests.pictures._renderer import CameraRenderer
 
 CAMERA = Camera(240, 180, 160.0, 160.0, 119.5, 89.5)
 ABOVE = level_pose((0.5, 0.0, 4.5), 0.0, 0.5 * math.pi - 1e-3)  # looks straight down

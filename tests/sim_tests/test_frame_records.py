@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from sim_tests import SimError
-from sim_tests._frame_records import read_records, record_line, write_records
+from sim_tests.sets._frame_records import read_records, record_line, write_records
 
 FRAMES = [
     {"frame": f"{k:06d}.png", "stamp_s": k / 20, "T_odom_camera": [[1.0]], "people": []}

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim_tests._body_pose import about, product, turned
 from sim_tests._errors import SimError
-from sim_tests._gait import Gait
-from sim_tests._skeleton import Skeleton, SoleRoll, TwoBones, nearest_look, skeleton
-from sim_tests._worker_asset import JOINTS, load_worker, worker_names
+from sim_tests.people._body_pose import about, product, turned
+from sim_tests.people._gait import Gait
+from sim_tests.people._skeleton import Skeleton, SoleRoll, TwoBones, nearest_look, skeleton
+from sim_tests.people._worker_asset import JOINTS, load_worker, worker_names
 
 NAMES = worker_names()
 SPEEDS_MPS = (0.5, 0.8, 1.2, 1.6, 2.0)

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from sim_tests._errors import SimError
-from sim_tests._layout import LAYOUTS, RackBox, WarehouseLayout
-from sim_tests._props import PROP_PARTS, Prop
+from sim_tests.hall._layout import LAYOUTS, RackBox, WarehouseLayout
+from sim_tests.hall._props import PROP_PARTS, Prop
 
 _HALL = {"x_min_m": 0.0, "y_min_m": 0.0, "x_max_m": 5.0, "y_max_m": 5.0}
 

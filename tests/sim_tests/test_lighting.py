@@ -8,11 +8,11 @@ from pydantic import ValidationError
 
 from perception import Camera
 from sim_tests._errors import SimError
-from sim_tests._layout import WarehouseLayout
-from sim_tests._lighting import LIGHTINGS, Lighting
-from sim_tests._meshes import quad
-from sim_tests._renderer import CameraRenderer
 from sim_tests._warehouse import Warehouse
+from sim_tests.hall._layout import WarehouseLayout
+from sim_tests.hall._lighting import LIGHTINGS, Lighting
+from sim_tests.hall._meshes import quad
+from sim_tests.pictures._renderer import CameraRenderer
 
 # A camera at eye level that looks along odom y, without a tilt.
 _T_ODOM_CAMERA = np.array(

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from sim_tests._meshes import BOX_FACES, Mesh, box, ellipsoid, merge, quad, tube
+from sim_tests.hall._meshes import BOX_FACES, Mesh, box, ellipsoid, merge, quad, tube
 
 
 def _volume_m3(mesh: Mesh) -> float:

@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim_tests._amr import NOVA_CARTER
 from sim_tests._metrics import CLEARANCE_M, SafetyMeter
+from sim_tests.robot._amr import NOVA_CARTER
 
 AHEAD = np.array([1.0, 0.0])
 

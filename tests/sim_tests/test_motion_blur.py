@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from perception import Camera
-from sim_tests._motion_blur import motion_blur, motion_field
-from sim_tests._sensor import to_linear
+from sim_tests.pictures._motion_blur import motion_blur, motion_field
+from sim_tests.pictures._sensor import to_linear
 
 CAMERA = Camera(120, 80, 110.0, 105.0, 58.7, 41.2)
 STILL = level_pose((0.3, -0.4, 1.2), 0.7, 0.1)

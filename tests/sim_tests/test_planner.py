@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nav_adapter import NavConstraints, PersonObstacle, RobotProfile, RobotState
-from sim_tests._planner import LocalPlanner, SamplingPlanner
+from sim_tests.robot._planner import LocalPlanner, SamplingPlanner
 
 HALF_LENGTH_M, HALF_WIDTH_M = 0.3625, 0.25
 OUTLINE_M = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * (HALF_LENGTH_M, HALF_WIDTH_M)

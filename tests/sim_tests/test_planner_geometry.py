@@ -12,9 +12,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from sim_tests._planner_clearance import Rectangles, box_gap_m, disc_gap_m, strip_distance_m
-from sim_tests._planner_detour import detour_bearing_rad
-from sim_tests._planner_rollout import Poses, follow_arcs, ramp_integral, stopping_integral
+from sim_tests.robot._planner_clearance import Rectangles, box_gap_m, disc_gap_m, strip_distance_m
+from sim_tests.robot._planner_detour import detour_bearing_rad
+from sim_tests.robot._planner_rollout import Poses, follow_arcs, ramp_integral, stopping_integral
 
 HALF_LENGTH_M, HALF_WIDTH_M = 0.3625, 0.25
 

@@ -11,8 +11,8 @@ from pydantic import ValidationError
 
 from nav_adapter import NavConstraints, RobotProfile, RobotState
 from sim_tests._errors import SimError
-from sim_tests._planner import SamplingPlanner
-from sim_tests._planner_config import PlannerConfig
+from sim_tests.robot._planner import SamplingPlanner
+from sim_tests.robot._planner_config import PlannerConfig
 
 OUTLINE_M = np.array([[0.36, 0.25], [-0.36, 0.25], [-0.36, -0.25], [0.36, -0.25]])
 ROBOT = RobotProfile(OUTLINE_M, 1.5, 1.0, 1.0, 0.3)

@@ -12,14 +12,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from perception import layouts as kp
-from sim_tests._body_pose import link_transforms, skin_points
 from sim_tests._bullet import pybullet
 from sim_tests._errors import SimError
-from sim_tests._layout import WarehouseLayout
-from sim_tests._postures import ACTIVITIES, BOX_SIZE_M, PHONE_SIZE_M, Activity
 from sim_tests._warehouse import Warehouse
-from sim_tests._worker import Worker
-from sim_tests._worker_asset import JOINTS, PARENTS, load_worker, worker_names
+from sim_tests.hall._layout import WarehouseLayout
+from sim_tests.people._body_pose import link_transforms, skin_points
+from sim_tests.people._postures import ACTIVITIES, BOX_SIZE_M, PHONE_SIZE_M, Activity
+from sim_tests.people._worker import Worker
+from sim_tests.people._worker_asset import JOINTS, PARENTS, load_worker, worker_names
 
 PELVIS = -1
 WRISTS = [kp.LEFT_WRIST, kp.RIGHT_WRIST]

@@ -12,9 +12,9 @@ import pytest
 from perception import Camera
 from sim_tests import SimError
 from sim_tests._cli import main
-from sim_tests._frame_records import read_records
-from sim_tests._render import render
-from sim_tests._render_config import RenderConfig, picture_size
+from sim_tests.sets._frame_records import read_records
+from sim_tests.sets._render import render
+from sim_tests.sets._render_config import RenderConfig, picture_size
 
 CONFIG = RenderConfig(frames=8, scenes=3, people=2, width_px=192, height_px=144, seed=5)
 

@@ -11,13 +11,13 @@ from camera_poses import level_pose
 from picture_actors import Shown, ball
 
 from perception import Camera
-from sim_tests._amr import Amr
-from sim_tests._amr_look import AmrLook
 from sim_tests._errors import SimError
-from sim_tests._layout import WarehouseLayout
-from sim_tests._lighting import Lighting
-from sim_tests._renderer import CameraRenderer
 from sim_tests._warehouse import Warehouse
+from sim_tests.hall._layout import WarehouseLayout
+from sim_tests.hall._lighting import Lighting
+from sim_tests.pictures._renderer import CameraRenderer
+from sim_tests.robot._amr import Amr
+from sim_tests.robot._amr_look import AmrLook
 
 _AWAY = (0.0, 0.0, -50.0)
 OFF_CENTRE = Camera(320, 240, 270.0, 260.0, 171.3, 110.6)

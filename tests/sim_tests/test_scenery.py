@@ -10,17 +10,17 @@ from genuine_detectors import MODELS, REQUIRED, GenuineDetector
 
 from perception import Camera
 from sim_tests._errors import SimError
-from sim_tests._layout import LAYOUTS, RackBox, WarehouseLayout
-from sim_tests._lighting import LIGHTINGS, Lighting
-from sim_tests._meshes import Mesh, merge
-from sim_tests._props import PROP_PARTS, Prop
-from sim_tests._renderer import CameraRenderer
-from sim_tests._scenery import scenery
-from sim_tests._scenery_chunk import SceneryChunk
-from sim_tests._scenery_props import prop_chunk
-from sim_tests._scenery_racks import rack_chunks
-from sim_tests._textures import TEXTURE_NAMES, scenery_texture
 from sim_tests._warehouse import Warehouse
+from sim_tests.hall._layout import LAYOUTS, RackBox, WarehouseLayout
+from sim_tests.hall._lighting import LIGHTINGS, Lighting
+from sim_tests.hall._meshes import Mesh, merge
+from sim_tests.hall._props import PROP_PARTS, Prop
+from sim_tests.hall._scenery import scenery
+from sim_tests.hall._scenery_chunk import SceneryChunk
+from sim_tests.hall._scenery_props import prop_chunk
+from sim_tests.hall._scenery_racks import rack_chunks
+from sim_tests.hall._textures import TEXTURE_NAMES, scenery_texture
+from sim_tests.pictures._renderer import CameraRenderer
 
 _VARIANTS = (0, 1, 6)
 # So far may a mesh stick out of what it collides with.

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim_tests._postures import Activity
-from sim_tests._script import GazeKey, WorkerScript
-from sim_tests._worker_asset import worker_names
+from sim_tests.people._postures import Activity
+from sim_tests.people._script import GazeKey, WorkerScript
+from sim_tests.people._worker_asset import worker_names
 
 
 def script(path, **keys):

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from sim_tests._errors import SimError
-from sim_tests._sensor import SensorConfig, collected_electrons, expose, to_linear, to_srgb
+from sim_tests.pictures._sensor import SensorConfig, collected_electrons, expose, to_linear, to_srgb
 
 RAMP = np.repeat(np.arange(256, dtype=np.uint8)[None, :, None], 3, axis=2).repeat(8, axis=0)
 

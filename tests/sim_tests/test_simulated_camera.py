@@ -11,13 +11,13 @@ from camera_poses import level_pose
 from picture_actors import ball
 
 from perception import Camera
-from sim_tests._camera_timing import CameraTiming
 from sim_tests._errors import SimError
-from sim_tests._layout import WarehouseLayout
-from sim_tests._renderer import CameraRenderer
-from sim_tests._sensor import SensorConfig
-from sim_tests._simulated_camera import SimulatedCamera
 from sim_tests._warehouse import Warehouse
+from sim_tests.hall._layout import WarehouseLayout
+from sim_tests.pictures._camera_timing import CameraTiming
+from sim_tests.pictures._renderer import CameraRenderer
+from sim_tests.pictures._sensor import SensorConfig
+from sim_tests.pictures._simulated_camera import SimulatedCamera
 
 CAMERA = Camera(96, 72, 90.0, 90.0, 47.5, 35.5)
 

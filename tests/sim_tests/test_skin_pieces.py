@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim_tests._skin_pieces import PELVIS, skin_pieces
-from sim_tests._worker_asset import JOINTS, SkinMesh, load_worker, worker_names
+from sim_tests.people._skin_pieces import PELVIS, skin_pieces
+from sim_tests.people._worker_asset import JOINTS, SkinMesh, load_worker, worker_names
 
 KNEE = JOINTS.index("left_knee")
 HIP = JOINTS.index("left_hip")

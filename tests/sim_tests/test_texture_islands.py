@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim_tests._layout import WarehouseLayout
-from sim_tests._scenery import scenery, scenery_texture
-from sim_tests._texture_islands import cut_texture
+from sim_tests.hall._layout import WarehouseLayout
+from sim_tests.hall._scenery import scenery, scenery_texture
+from sim_tests.pictures._texture_islands import cut_texture
 
 
 def _colours(uv: np.ndarray, picture: np.ndarray) -> np.ndarray:

@@ -11,16 +11,16 @@ from camera_poses import level_pose
 from picture_actors import CHECKS, Shown, ball, upright_square
 
 from perception import Camera
-from sim_tests._amr import Amr
 from sim_tests._bullet import pybullet
 from sim_tests._errors import SimError
-from sim_tests._layout import WarehouseLayout
-from sim_tests._lighting import Lighting
-from sim_tests._meshes import Mesh, box
-from sim_tests._renderer import CameraRenderer
-from sim_tests._view import View
-from sim_tests._visuals import Visuals
 from sim_tests._warehouse import Warehouse
+from sim_tests.hall._layout import WarehouseLayout
+from sim_tests.hall._lighting import Lighting
+from sim_tests.hall._meshes import Mesh, box
+from sim_tests.pictures._renderer import CameraRenderer
+from sim_tests.pictures._view import View
+from sim_tests.pictures._visuals import Visuals
+from sim_tests.robot._amr import Amr
 
 CAMERA = Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
 AHEAD = level_pose((0.0, 0.0, 1.4), 0.0)

@@ -11,13 +11,13 @@ import pytest
 
 from perception import Camera
 from sim_tests import _bullet
-from sim_tests._amr import Amr
 from sim_tests._bullet import pybullet
 from sim_tests._errors import MissingSimulatorError, SimError
-from sim_tests._layout import LAYOUTS, WarehouseLayout
-from sim_tests._renderer import CameraRenderer
 from sim_tests._warehouse import GRAVITY_MPS2, ROBOT_GROUP, Warehouse
-from sim_tests._worker import Worker
+from sim_tests.hall._layout import LAYOUTS, WarehouseLayout
+from sim_tests.people._worker import Worker
+from sim_tests.pictures._renderer import CameraRenderer
+from sim_tests.robot._amr import Amr
 
 
 def _ball(warehouse: Warehouse, position_m: tuple[float, float, float]) -> int:

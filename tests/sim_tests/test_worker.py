@@ -13,8 +13,11 @@ from scipy.spatial.transform import Rotation
 
 from perception import layouts as kp
 from perception.anthropometry import HEAD_TEMPLATE_M
-from sim_tests._amr import Amr
-from sim_tests._body_pose import (
+from sim_tests._bullet import pybullet
+from sim_tests._errors import SimError
+from sim_tests._warehouse import Warehouse
+from sim_tests.hall._layout import WarehouseLayout
+from sim_tests.people._body_pose import (
     BodyPose,
     about,
     link_transform,
@@ -27,19 +30,16 @@ from sim_tests._body_pose import (
     skin_points,
     slerp,
 )
-from sim_tests._bullet import pybullet
-from sim_tests._errors import SimError
-from sim_tests._gait import Gait
-from sim_tests._layout import WarehouseLayout
-from sim_tests._warehouse import Warehouse
-from sim_tests._worker import (
+from sim_tests.people._gait import Gait
+from sim_tests.people._worker import (
     MAX_EYE_PITCH_RAD,
     MAX_EYE_YAW_RAD,
     MAX_HEAD_PITCH_RAD,
     MAX_HEAD_YAW_RAD,
     Worker,
 )
-from sim_tests._worker_asset import JOINTS, PARENTS, load_worker, worker_names
+from sim_tests.people._worker_asset import JOINTS, PARENTS, load_worker, worker_names
+from sim_tests.robot._amr import Amr
 
 # PyBullet numbers links depth first, without the eyes; the slide of the carried box is one too.
 LINKS = [

@@ -11,7 +11,7 @@ from perception import layouts as kp
 from perception.anthropometry import HEAD_KEYPOINTS, HEAD_TEMPLATE_M, LIMBS, MEAN_STATURE_M
 from perception.arrays import FloatArray
 from sim_tests._errors import SimError
-from sim_tests._worker_asset import (
+from sim_tests.people._worker_asset import (
     JOINTS,
     LEVELS,
     PARENTS,

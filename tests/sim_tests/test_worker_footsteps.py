@@ -12,15 +12,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from perception import layouts as kp
-from sim_tests._body_pose import link_transforms
-from sim_tests._gait import Gait
-from sim_tests._layout import WarehouseLayout
 from sim_tests._scenario import Scenario, shipped_scenarios
-from sim_tests._script import WorkerScript
-from sim_tests._skeleton import skeleton
 from sim_tests._warehouse import Warehouse
-from sim_tests._worker import Worker
-from sim_tests._worker_asset import JOINTS, load_worker, worker_names
+from sim_tests.hall._layout import WarehouseLayout
+from sim_tests.people._body_pose import link_transforms
+from sim_tests.people._gait import Gait
+from sim_tests.people._script import WorkerScript
+from sim_tests.people._skeleton import skeleton
+from sim_tests.people._worker import Worker
+from sim_tests.people._worker_asset import JOINTS, load_worker, worker_names
 
 HZ = 40.0
 TOUCHING_M = 0.004

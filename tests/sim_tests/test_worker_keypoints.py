@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from perception import Camera
-from sim_tests._body_pose import skin_points
-from sim_tests._layout import WarehouseLayout
-from sim_tests._lighting import Lighting
-from sim_tests._renderer import CameraRenderer
 from sim_tests._warehouse import Warehouse
-from sim_tests._worker import Worker
-from sim_tests._worker_asset import JOINTS, SkinMesh, load_worker, worker_names
-from sim_tests._worker_skin import WorkerSkin
+from sim_tests.hall._layout import WarehouseLayout
+from sim_tests.hall._lighting import Lighting
+from sim_tests.people._body_pose import skin_points
+from sim_tests.people._worker import Worker
+from sim_tests.people._worker_asset import JOINTS, SkinMesh, load_worker, worker_names
+from sim_tests.people._worker_skin import WorkerSkin
+from sim_tests.pictures._renderer import CameraRenderer
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
 MARKERS = ((255, 0, 255), (0, 255, 255), (255, 255, 0), (0, 0, 255), (0, 255, 0))

@@ -1,0 +1,1 @@
+"""The warehouse as data and meshes: layouts, racks, goods, props, textures, light."""

@@ -1,0 +1,1 @@
+"""The picture world and the camera: drawing, culling, noise, blur, timing."""

@@ -1,0 +1,1 @@
+"""Sets of rendered pictures with the truth about the people in them."""
