@@ -15,6 +15,7 @@ from ..hall._meshes import Mesh, box, merge
 from ._postures import BOX_SIZE_M, PHONE_SIZE_M
 
 if TYPE_CHECKING:
+    from ..pictures._view import View
     from ..pictures._visuals import Visuals
     from ._worker import Worker
 
@@ -64,7 +65,7 @@ class HeldThing:
         """Ids of all things made so far."""
         return set(self._things.values())
 
-    def show(self, pixels_per_m: float | None) -> None:
+    def show(self, pixels_per_m: float | None, view: View | None = None) -> None:
         """Put the thing into the hands; there is one level of detail."""
         visuals = self._visuals
         if visuals is None:

@@ -16,11 +16,13 @@ from perception.arrays import FloatArray
 
 from .._bullet import pybullet
 from ..hall._meshes import Mesh
+from ..pictures._culling import box_corners, in_view, to_camera
 from ._body_pose import link_transform
 from ._skin_pieces import SkinPiece, skin_pieces
 from ._worker_asset import LEVELS, load_worker
 
 if TYPE_CHECKING:
+    from ..pictures._view import View
     from ..pictures._visuals import Visuals
     from ._worker import Worker
 
@@ -44,6 +46,7 @@ class _Level:
     bodies: tuple[int, ...]
     joints: NDArray[np.int64]
     shares: FloatArray
+    boxes_m: FloatArray  # (P, 8, 3) corners about each piece at rest, scaled
 
 
 class WorkerSkin:
@@ -67,7 +70,7 @@ class WorkerSkin:
         self._textures = shipped if textures is None else tuple(textures)
         self._visuals: Visuals | None = None
         self._levels: dict[int, _Level] = {}
-        self._shown: int | None = None
+        self._shown: set[int] = set()
 
     def bounds_odom_m(self) -> FloatArray:
         """(2, 3) low and high corner of a box about all of the worker."""
@@ -83,22 +86,28 @@ class WorkerSkin:
         """Ids of all pieces made so far."""
         return {body for level in self._levels.values() for body in level.bodies}
 
-    def show(self, pixels_per_m: float | None) -> None:
+    def show(self, pixels_per_m: float | None, view: View | None = None) -> None:
         """Take the worker's posture at the level of detail that so many samples a metre need."""
-        if self._visuals is None:
+        visuals = self._visuals
+        if visuals is None:
             return
-        level = None if pixels_per_m is None else _level_for(pixels_per_m)
-        if level is not None and level not in self._levels:
-            self._levels[level] = self._make(self._visuals, level)
-        elif level != self._shown and level is not None:
-            for body in self._levels[level].bodies:
-                self._visuals.reveal(body)
-        if self._shown is not None and level != self._shown:
-            for body in self._levels[self._shown].bodies:
-                self._visuals.hide(body)
-        self._shown = level
-        if level is not None:
-            self._pose(self._visuals.client, self._levels[level])
+        shown: set[int] = set()
+        if pixels_per_m is not None:
+            number = _level_for(pixels_per_m)
+            if number not in self._levels:
+                self._levels[number] = self._make(visuals, number)
+                self._shown |= set(self._levels[number].bodies)
+            level = self._levels[number]
+            places = self._places(level)
+            rows = _rows_in_view(level, places, view)
+            shown = {level.bodies[row] for row in rows}
+        for body in self._shown - shown:
+            visuals.hide(body)
+        for body in shown - self._shown:
+            visuals.reveal(body)
+        self._shown = shown
+        if shown:
+            _pose(visuals.client, level, places, rows)
 
     def _make(self, visuals: Visuals, level: int) -> _Level:
         asset, scale = self.worker.asset, self.worker.pose.scale
@@ -112,16 +121,38 @@ class WorkerSkin:
             bodies,
             np.array([piece.joint for piece in pieces]),
             np.array([piece.share for piece in pieces]),
+            box_corners(
+                scale
+                * np.array(
+                    [
+                        (piece.mesh.vertices_m.min(axis=0), piece.mesh.vertices_m.max(axis=0))
+                        for piece in pieces
+                    ]
+                )
+            ),
         )
 
-    def _pose(self, client: int, level: _Level) -> None:
-        worker = self.worker
-        places = link_transform(worker.asset.joints_m, worker.pose, level.joints, level.shares)
-        turns = Rotation.from_matrix(places[:, :3, :3]).as_quat()
-        for body, position, turn in zip(
-            level.bodies, places[:, :3, 3].tolist(), turns.tolist(), strict=True
-        ):
-            pybullet.resetBasePositionAndOrientation(body, position, turn, physicsClientId=client)
+    def _places(self, level: _Level) -> FloatArray:
+        """(P, 4, 4) from each piece at rest to odom."""
+        joints_m, pose = self.worker.asset.joints_m, self.worker.pose
+        return link_transform(joints_m, pose, level.joints, level.shares)
+
+
+def _rows_in_view(level: _Level, places: FloatArray, view: View | None) -> list[int]:
+    """Pieces that the view may show."""
+    if view is None:
+        return list(range(len(level.bodies)))
+    corners = np.einsum("pij,pkj->pki", places[:, :3, :3], level.boxes_m) + places[:, None, :3, 3]
+    rows: list[int] = np.flatnonzero(in_view(view, to_camera(view, corners))).tolist()
+    return rows
+
+
+def _pose(client: int, level: _Level, places: FloatArray, rows: list[int]) -> None:
+    turns = Rotation.from_matrix(places[rows, :3, :3]).as_quat().tolist()
+    for row, position, turn in zip(rows, places[rows, :3, 3].tolist(), turns, strict=True):
+        pybullet.resetBasePositionAndOrientation(
+            level.bodies[row], position, turn, physicsClientId=client
+        )
 
 
 def _level_for(samples_per_m: float) -> int:

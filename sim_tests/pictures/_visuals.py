@@ -50,8 +50,11 @@ class Actor(Protocol):
         """Make its bodies in the picture world; called once, before it is first drawn."""
         ...
 
-    def show(self, pixels_per_m: float | None) -> None:
-        """Pose its bodies for the coming picture at this level of detail; None: hide them."""
+    def show(self, pixels_per_m: float | None, view: View | None = None) -> None:
+        """Pose its bodies for the coming picture at this level of detail; None: hide them.
+
+        An actor of many bodies may hide those that ``view`` does not show; None shows them all.
+        """
         ...
 
     def bodies(self) -> AbstractSet[int]:
@@ -297,7 +300,7 @@ class Visuals(Closing):
                     actor.build(self)
                     self._built.add(number)
                 depth = max(float(corners_camera_m[number, :, 2].mean()), view.near_m)
-                actor.show(view.samples_per_m / depth)
+                actor.show(view.samples_per_m / depth, view if self.culling else None)
                 self._shown_actors.add(number)
                 self._enter(number, actor.bodies())
             elif number in self._shown_actors:

@@ -22,6 +22,7 @@ from ._amr import CAMERA_HEIGHT_M, TRACK_M, WHEEL_RADIUS_M, Amr
 
 if TYPE_CHECKING:
     from .._warehouse import Warehouse
+    from ..pictures._view import View
     from ..pictures._visuals import Visuals
 
 #: A mesh in its link's frame with its colour and the name of its texture.
@@ -290,7 +291,7 @@ class AmrLook:
                 body = visuals.add_body(visuals.shape(mesh, colour, number))
                 self._parts.append((body, origin, column))
 
-    def show(self, pixels_per_m: float | None) -> None:
+    def show(self, pixels_per_m: float | None, view: View | None = None) -> None:
         """Pose its bodies for the coming picture; None hides them. One level of detail does."""
         if self._visuals is None:
             raise SimError("the robot's look is shown before build() has made its bodies")

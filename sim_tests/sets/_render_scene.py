@@ -61,7 +61,8 @@ class RenderScene(Closing):
         self.number = number
         rng = np.random.default_rng([config.seed, 1, number])
         self.layout_name = list(LAYOUTS)[number % len(LAYOUTS)]
-        self.lighting_name = str(rng.choice(list(LIGHTINGS)))
+        lights = np.random.default_rng([config.seed, 4]).permutation(list(LIGHTINGS)).tolist()
+        self.lighting_name = str(lights[number % len(lights)])
         self.warehouse = Warehouse(
             WarehouseLayout.named(self.layout_name), variant=int(rng.integers(_VARIANTS))
         )

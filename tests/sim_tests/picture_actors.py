@@ -7,6 +7,7 @@ import numpy as np
 from perception.arrays import FloatArray
 from sim_tests._bullet import pybullet
 from sim_tests.hall._meshes import Mesh, ellipsoid, quad
+from sim_tests.pictures._view import View
 from sim_tests.pictures._visuals import Visuals
 
 CHECKS = np.kron(np.indices((4, 4)).sum(axis=0) % 2, np.ones((8, 8)))[..., None] * np.array(
@@ -48,7 +49,7 @@ class Shown:
             texture = visuals.texture(self._texture_rgb.astype(np.uint8))
         self.body = visuals.add_body(visuals.shape(self.mesh, self._colour, texture))
 
-    def show(self, pixels_per_m: float | None) -> None:
+    def show(self, pixels_per_m: float | None, view: View | None = None) -> None:
         self.shown.append(pixels_per_m)
         if pixels_per_m is None:
             self._visuals.hide(self.body)
