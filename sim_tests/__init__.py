@@ -16,7 +16,10 @@ if TYPE_CHECKING:
     from ._errors import SimError
     from ._keypoint_camera import KeypointNoise
     from ._scenario import Scenario, shipped_scenarios
+    from ._warehouse import Warehouse
+    from .people._worker import Worker
     from .pictures._renderer import CameraRenderer
+    from .pictures._simulated_camera import SimulatedCamera
     from .robot._amr import NOVA_CARTER
     from .robot._planner import LocalPlanner, SamplingPlanner
 
@@ -30,7 +33,10 @@ __all__ = [
     "SamplingPlanner",
     "Scenario",
     "SimError",
+    "SimulatedCamera",
     "StraightOn",
+    "Warehouse",
+    "Worker",
     "run_crossing",
     "shipped_scenarios",
 ]
@@ -45,7 +51,10 @@ _HOMES = {
     "SamplingPlanner": "robot._planner",
     "Scenario": "_scenario",
     "SimError": "_errors",
+    "SimulatedCamera": "pictures._simulated_camera",
     "StraightOn": "_crossing",
+    "Warehouse": "_warehouse",
+    "Worker": "people._worker",
     "run_crossing": "_crossing",
     "shipped_scenarios": "_scenario",
 }

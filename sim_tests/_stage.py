@@ -18,10 +18,8 @@ from ._metrics import SafetyMeter
 from ._scenario import Scenario
 from ._sight import sees
 from ._warehouse import Warehouse
-from .people._held_thing import HeldThing
 from .people._script import WorkerMotion, WorkerScript
 from .people._worker import MAX_HEAD_PITCH_RAD, MAX_HEAD_YAW_RAD, Worker
-from .people._worker_skin import WorkerSkin
 from .robot._amr import NOVA_CARTER, Amr
 from .robot._amr_look import AmrLook
 
@@ -92,9 +90,6 @@ class Stage(Closing):
             self.warehouse.close()
             raise
         self.warehouse.add_actor(AmrLook.of(self.warehouse, self.amr))
-        for worker in self.workers:
-            self.warehouse.add_actor(WorkerSkin(worker))
-            self.warehouse.add_actor(HeldThing(worker))
         self._walks = tuple(script.walk() for script in self.scripts)
         self._offsets_s = start_offsets_s
         self._motions: tuple[WorkerMotion, ...] = ()

@@ -42,10 +42,11 @@ def test_the_plug_in_example_shows_room_shrinking_for_an_aware_person():
     assert limits[-1] > limits[12]
 
 
-def test_the_readme_shows_code_that_runs(tmp_path):
-    """Python blocks of the README, in order, in one namespace."""
-    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S)
+@pytest.mark.parametrize("page", ["README.md", "docs/rendering.md"])
+def test_a_page_shows_code_that_runs(page):
+    """Python blocks of the page, in order, in one namespace."""
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(), re.S)
     assert blocks
     namespace: dict[str, object] = {}
     for block in blocks:
-        exec(compile(block, "README.md", "exec"), namespace)
+        exec(compile(block, page, "exec"), namespace)

@@ -29,10 +29,12 @@ from ._body_pose import (
 )
 from ._footing import Footing
 from ._gait import Gait
+from ._held_thing import HeldThing
 from ._postures import ACTIVITIES, Activity, arm_postures
 from ._skeleton import Skeleton, skeleton
-from ._worker_asset import JOINTS, WorkerAsset
+from ._worker_asset import JOINTS, WorkerAsset, load_worker
 from ._worker_body import WorkerBody
+from ._worker_skin import WorkerSkin
 
 #: How far the head turns from the torso, and how far it nods.
 MAX_HEAD_YAW_RAD: Final = math.radians(80.0)
@@ -41,6 +43,7 @@ MAX_HEAD_PITCH_RAD: Final = math.radians(40.0)
 MAX_EYE_YAW_RAD: Final = math.radians(35.0)
 MAX_EYE_PITCH_RAD: Final = math.radians(25.0)
 
+_STATURE_M: Final = 1.75
 # The optical frame (x right, y down, z forward) in the head frame (x down, y forward, z right).
 _ROTATION_HEAD_OPTICAL: Final = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 _CHEST_SHOULDERS: Final = 0.7
@@ -61,7 +64,7 @@ class Worker:
 
     Args:
         warehouse: the world to stand in.
-        stature_m: height standing, with shoes, in [1.4, 2.1].
+        stature_m: height standing, with shoes, in [1.4, 2.1]; None is that of ``look``, or 1.75 m.
         look: name of a shipped worker (:func:`worker_names`), scaled to the stature; None is the
             one of the nearest stature.
         stride_m: distance of a full gait cycle, see :class:`Gait`; None follows the speed.
@@ -71,6 +74,8 @@ class Worker:
     Attributes:
         body: PyBullet's id of the person.
         client: PyBullet's id of the world it is in.
+        skin: what pictures show of the person.
+        actor: number of the skin among the actors of pictures.
         skeleton: the bones.
         gait: how the person walks.
 
@@ -81,13 +86,15 @@ class Worker:
     def __init__(
         self,
         warehouse: Warehouse,
-        stature_m: float = 1.75,
+        stature_m: float | None = None,
         *,
         look: str | None = None,
         stride_m: float | None = None,
         position_odom_m: Any = None,
         heading_odom_rad: float = 0.0,
     ) -> None:
+        if stature_m is None:
+            stature_m = _STATURE_M if look is None else load_worker(look).stature_m
         self.skeleton: Skeleton = skeleton(look, stature_m)
         self.gait = Gait(self.skeleton, stride_m)
         if position_odom_m is None:
@@ -112,6 +119,9 @@ class Worker:
         self.client: int = warehouse.client
         self.body: int = self._body.body
         self.place(position_odom_m, heading_odom_rad)
+        self.skin = WorkerSkin(self)
+        self.actor: int = warehouse.add_actor(self.skin)
+        warehouse.add_actor(HeldThing(self))
 
     def place(
         self,

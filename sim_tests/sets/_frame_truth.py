@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -13,7 +13,6 @@ from perception.layouts import COCO_NAMES, FOOT_NAMES
 
 from .._sight import keypoints_in_front, sees
 from ..people._worker import Worker
-from ..people._worker_skin import WorkerSkin
 from ..pictures._renderer import CameraRenderer, RenderedView
 from ._frame_records import Record
 
@@ -30,7 +29,7 @@ def frame_truth(
     camera: Camera,
     T_odom_camera: FloatArray,
     view: RenderedView,
-    skins: Mapping[int, WorkerSkin],
+    workers: Sequence[Worker],
     cone: AttentionCone | None = None,
 ) -> list[Record]:
     """Return a record of every worker of whom ``view`` shows something.
@@ -40,19 +39,18 @@ def frame_truth(
         camera: that took the picture.
         T_odom_camera: (4, 4).
         view: the whole picture.
-        skins: the workers' skins by their number among the actors of the picture world.
+        workers: of the picture's warehouse.
         cone: scores awareness; None is the default cone.
     """
     people = []
-    for index, (actor, skin) in enumerate(skins.items()):
-        worker = skin.worker
-        mask = view.actors == actor
+    for index, worker in enumerate(workers):
+        mask = view.actors == worker.actor
         seen = int(np.count_nonzero(mask))
         if seen < _LEAST_PIXELS:
             continue
         rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
         box = [int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1]
-        shape = _silhouette(renderer, camera, T_odom_camera, skin, actor)
+        shape = _silhouette(renderer, camera, T_odom_camera, worker)
         people.append(
             {
                 "id": index,
@@ -74,11 +72,10 @@ def _silhouette(
     renderer: CameraRenderer,
     camera: Camera,
     T_odom_camera: FloatArray,
-    skin: WorkerSkin,
-    actor: int,
+    worker: Worker,
 ) -> tuple[int, int]:
     """Pixels of the worker drawn alone: inside the picture, and altogether."""
-    low, high = skin.bounds_odom_m()
+    low, high = worker.skin.bounds_odom_m()
     corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
     points = (corners - T_odom_camera[:3, 3]) @ T_odom_camera[:3, :3]
     points[:, 2] = np.maximum(points[:, 2], _NEAR_M)
@@ -90,8 +87,10 @@ def _silhouette(
     first, last = np.maximum(first, -size), np.minimum(last, 2 * size)
     if (last <= first).any():
         return 0, 0
-    alone = renderer.render(camera, T_odom_camera, [*first.tolist(), *last.tolist()], only={actor})
-    rows, columns = np.nonzero(alone.actors == actor)
+    alone = renderer.render(
+        camera, T_odom_camera, [*first.tolist(), *last.tolist()], only={worker.actor}
+    )
+    rows, columns = np.nonzero(alone.actors == worker.actor)
     u, v = columns + first[0], rows + first[1]
     inside = (u >= 0) & (u < camera.width_px) & (v >= 0) & (v < camera.height_px)
     return int(inside.sum()), len(u)

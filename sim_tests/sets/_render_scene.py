@@ -15,10 +15,8 @@ from .._closing import Closing
 from .._warehouse import Warehouse
 from ..hall._layout import LAYOUTS, WarehouseLayout
 from ..hall._lighting import LIGHTINGS, Lighting
-from ..people._held_thing import HeldThing
 from ..people._worker import MAX_HEAD_PITCH_RAD, MAX_HEAD_YAW_RAD, Worker
 from ..people._worker_asset import load_worker, worker_names
-from ..people._worker_skin import WorkerSkin
 from ..pictures._renderer import CameraRenderer
 from ..pictures._sensor import expose
 from ._frame_records import Record
@@ -71,11 +69,6 @@ class RenderScene(Closing):
                 Worker(self.warehouse, _stature_m(look, rng), look=look)
                 for look in _cast(config, number)
             )
-            visuals = self.warehouse.visuals
-            skins = [WorkerSkin(worker) for worker in self.workers]
-            self._skins = {visuals.add_actor(skin): skin for skin in skins}
-            for worker in self.workers:
-                visuals.add_actor(HeldThing(worker))
             self._renderer = CameraRenderer(
                 self.warehouse,
                 lighting=Lighting.preset(self.lighting_name),
@@ -96,7 +89,7 @@ class RenderScene(Closing):
         T_odom_camera = self._arrange(rng)
         camera = self._config.camera
         view = self._renderer.render(camera, T_odom_camera)
-        people = frame_truth(self._renderer, camera, T_odom_camera, view, self._skins)
+        people = frame_truth(self._renderer, camera, T_odom_camera, view, self.workers)
         record: Record = {
             "frame": f"{frame:06d}.png",
             # Snapshots are not a film: a second apart, no tracker takes them for one.
