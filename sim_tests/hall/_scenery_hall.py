@@ -7,6 +7,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from perception.arrays import FloatArray
+
 from ._layout import WarehouseLayout
 from ._meshes import Mesh, Region, box, merge, quad
 from ._scenery_chunk import Colour, SceneryChunk
@@ -57,7 +59,7 @@ def hall_tones(variant: int) -> tuple[Colour, Colour]:
     return _colour(colours[0]), _colour(colours[1])
 
 
-def _colour(rgb: np.ndarray) -> Colour:
+def _colour(rgb: FloatArray) -> Colour:
     red, green, blue = (float(value) for value in rgb)
     return red, green, blue
 

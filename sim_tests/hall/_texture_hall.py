@@ -73,7 +73,7 @@ def floor_texture(number: int) -> NDArray[np.uint8]:
     grain(canvas, rng, 0.022, 11)
     grain(canvas, rng, 0.014, 60)
     grain(canvas, rng, 0.012)
-    marks = np.zeros((512, 512), np.float32)
+    marks: NDArray[np.float32] = np.zeros((512, 512), np.float32)
     for _ in range(7):  # tyres that braked and turned
         turn = rng.uniform(-0.6, 0.6)
         start, heading = rng.uniform(0, 512, 2), rng.uniform(0, 2 * np.pi)

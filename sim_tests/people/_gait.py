@@ -114,7 +114,7 @@ class Gait:
         speed = np.asarray(speed_mps, dtype=np.float64)
         stride = np.maximum(self.stride_m(speed), 1e-9)
         waiting = 1.0 - LONGEST_SWING_S * speed / stride
-        return np.maximum(_STANCE_SHARE + _STANCE_SHARE_PER_MPS * speed, waiting)
+        return np.asarray(np.maximum(_STANCE_SHARE + _STANCE_SHARE_PER_MPS * speed, waiting))
 
     def vigour(self, forward_mps: FloatArray) -> FloatArray:
         """Stride at a speed over that of comfort, with the sign of the speed."""

@@ -140,11 +140,12 @@ def _smeared(values: Floats, field: Floats) -> Floats:
     total = np.zeros_like(values)
     for k in range(samples):
         share = np.float32((k + 0.5) / samples - 0.5)
-        total += cv2.remap(
+        moved = cv2.remap(
             values,
             u - share * field[..., 0],
             v - share * field[..., 1],
             cv2.INTER_LINEAR,
             borderMode=cv2.BORDER_REPLICATE,
         )
+        total += np.asarray(moved, dtype=np.float32)
     return np.asarray(total / samples, dtype=np.float32)

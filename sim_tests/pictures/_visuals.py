@@ -100,9 +100,9 @@ class Visuals(Closing):
         self._built: set[int] = set()
         self._shown_actors: set[int] = set()
         self._static_bodies: list[int] = []
-        self._static_corners = np.zeros((0, 8, 3))
-        self._static_shown = np.zeros(0, dtype=bool)
-        self._occluders = np.zeros((0, 2, 3))
+        self._static_corners: FloatArray = np.zeros((0, 8, 3))
+        self._static_shown: NDArray[np.bool_] = np.zeros(0, dtype=bool)
+        self._occluders: FloatArray = np.zeros((0, 2, 3))
         self._actor_numbers = np.full(1, -1, dtype=np.int32)
         try:
             if layout is not None:
