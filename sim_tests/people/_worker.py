@@ -8,6 +8,7 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from perception.arrays import FloatArray, finite_array, finite_number
+from perception.layouts import LEFT_SHOULDER, RIGHT_SHOULDER
 
 from .._errors import SimError
 from .._warehouse import Warehouse
@@ -292,6 +293,11 @@ class Worker:
             )
             self._keypoints.setflags(write=False)
         return self._keypoints
+
+    @property
+    def neck_odom_m(self) -> FloatArray:
+        """(3,) midpoint of the shoulder keypoints."""
+        return np.asarray(self.keypoints_odom_m[[LEFT_SHOULDER, RIGHT_SHOULDER]].mean(axis=0))
 
     def _bend(self, footing: Footing, local: bool, head: tuple[float, float]) -> None:
         """Joint angles from feet, hips, head and hands, in the frame of the heading, then odom."""

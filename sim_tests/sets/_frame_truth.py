@@ -17,7 +17,6 @@ from ..pictures._renderer import CameraRenderer, RenderedView
 from ._frame_records import Record
 
 _NAMES: Final = (*COCO_NAMES, *FOOT_NAMES, "neck")
-_LEFT_SHOULDER: Final = COCO_NAMES.index("left_shoulder")
 # Fewer pixels than this of a person are not worth a box.
 _LEAST_PIXELS: Final = 12
 # A person nearer to the image plane than this is not in front of the camera.
@@ -104,9 +103,8 @@ def _geometry(
     cone: AttentionCone,
 ) -> dict[str, Any]:
     rotation, origin = T_odom_camera[:3, :3], T_odom_camera[:3, 3]
-    body = worker.keypoints_odom_m
-    neck = body[_LEFT_SHOULDER : _LEFT_SHOULDER + 2].mean(axis=0, keepdims=True)
-    points = (np.concatenate([body, neck]) - origin) @ rotation
+    body = np.concatenate([worker.keypoints_odom_m, worker.neck_odom_m[None]])
+    points = (body - origin) @ rotation
     pixels = camera.project(points)
     seen = keypoints_in_front(points, pixels, view.depth_m)
     gaze = worker.gaze_odom

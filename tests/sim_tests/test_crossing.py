@@ -9,6 +9,7 @@ from nav_adapter import AwarenessPolicy, NavError
 from sim_tests import KeypointNoise, Scenario, SimError, run_crossing
 from sim_tests._encounter import CASES, case_values
 from sim_tests._tables import EpisodeTable, episode_row
+from sim_tests.pictures._camera_timing import CameraTiming
 
 ATTENTIVE = Scenario.shipped("crossing_attentive")
 DISTRACTED = Scenario.shipped("crossing_distracted")
@@ -137,6 +138,41 @@ def test_noise_and_missed_people_cost_time_not_clearance():
     assert result.success
     assert result.contact_by != "robot"
     assert result.violation_time_s == 0.0
+
+
+def with_timing(scenario, **timing):
+    camera = scenario.camera.model_copy(update={"timing": CameraTiming(**timing)})
+    return scenario.model_copy(update={"camera": camera})
+
+
+def test_late_and_lost_frames_cost_time_not_clearance():
+    slow = with_timing(DISTRACTED, latency_s=0.2, latency_jitter_s=0.1, drop_rate=0.2)
+    result = run_crossing(slow, policy="balanced", perception="truth", seed=2)
+    prompt = run_crossing(DISTRACTED, policy="balanced", perception="truth", seed=2)
+    assert not result.contact
+    assert result.success
+    assert result.time_to_goal_s >= prompt.time_to_goal_s - 0.2
+    # Nothing is known before the first frame has arrived, so the robot waits for it.
+    waiting = [f for f in result.frames if f.t_s < 0.2]
+    assert waiting
+    assert all(f.constraints.stale and f.command[0] == 0.0 for f in waiting)
+
+
+def test_a_camera_with_its_own_rate_sees_no_more_often():
+    result = run_crossing(
+        with_timing(ATTENTIVE, rate_hz=5.0), policy="balanced", perception="truth", seed=0
+    )
+    seen = [frame.t_s for frame in result.frames if frame.observations]
+    assert np.diff(seen) == pytest.approx(0.2)
+    assert result.success
+
+
+def test_a_dead_camera_keeps_the_robot_where_it_is():
+    scenario = with_timing(DISTRACTED, drop_rate=1.0).model_copy(update={"duration_s": 3.0})
+    result = run_crossing(scenario, policy="balanced", perception="truth", seed=0)
+    assert not result.success
+    start, end = (result.frames[k].robot_state.position_odom_m for k in (0, -1))
+    assert np.linalg.norm(end - start) < 0.01
 
 
 def test_a_planner_of_ones_own_is_driven_by_and_named():
