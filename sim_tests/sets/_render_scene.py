@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from perception.arrays import FloatArray
 
 from .._closing import Closing
+from .._errors import SimError
 from .._warehouse import Warehouse
 from ..hall._layout import LAYOUTS, WarehouseLayout
 from ..hall._lighting import LIGHTINGS, Lighting
@@ -35,6 +36,7 @@ _HIDDEN_SHARE: Final = 0.08
 # Share of the people who may stand before or behind another.
 _OVERLAP_SHARE: Final = 0.15
 _TRIES: Final = 40
+_CAMERA_TRIES: Final = 500
 _VARIANTS: Final = 8
 _ACTIVITIES: Final = ("none", "carry_box", "phone")
 _ACTIVITY_SHARES: Final = (0.64, 0.18, 0.18)
@@ -108,11 +110,18 @@ class RenderScene(Closing):
         cast = rng.permutation(len(self.workers))[:wanted]
         for worker in self.workers:
             worker.place((self.warehouse.layout.x_min_m - 9.0, 0.0), 0.0)
-        while True:
+        places: list[_Place] = []
+        for _ in range(_CAMERA_TRIES):
             T_odom_camera, heading = self._camera_pose(rng)
             places = self._places(T_odom_camera[:3, 3], heading, wanted, rng)
             if places:
                 break
+        else:
+            config = self._config
+            raise SimError(
+                f"hall {self.layout_name!r} has no room for people {config.min_range_m:g} to "
+                f"{config.max_range_m:g} m before a camera; use shorter ranges"
+            )
         for row, place in zip(cast.tolist(), places, strict=False):
             _pose(self.workers[row], place, T_odom_camera[:3, 3], rng)
         return T_odom_camera

@@ -49,6 +49,10 @@ def test_wheel_owns_its_four_top_level_names_and_no_others(wheel: Path) -> None:
     assert len(tops) == len(PACKAGES) + 1
 
 
+def test_wheel_stays_small(wheel: Path) -> None:
+    assert wheel.stat().st_size <= 25e6
+
+
 @pytest.mark.parametrize("package", sorted(PACKAGES))
 def test_wheel_ships_every_file_of_the_package(wheel: Path, root: Path, package: str) -> None:
     on_disk = {

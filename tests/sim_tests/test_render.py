@@ -15,6 +15,7 @@ from sim_tests._cli import main
 from sim_tests.sets._frame_records import read_records
 from sim_tests.sets._render import render
 from sim_tests.sets._render_config import RenderConfig, picture_size
+from sim_tests.sets._render_scene import RenderScene
 
 CONFIG = RenderConfig(frames=8, scenes=3, people=2, width_px=192, height_px=144, seed=5)
 
@@ -148,6 +149,12 @@ def test_settings_out_of_range_are_refused_by_name(
     assert main(["render", *arguments, "--out", str(tmp_path / "x")]) == 2
     assert message in capsys.readouterr().err
     assert not (tmp_path / "x").exists()
+
+
+def test_ranges_longer_than_the_hall_are_refused() -> None:
+    far = CONFIG.model_copy(update={"min_range_m": 29.0, "max_range_m": 30.0})
+    with RenderScene(far, 0) as scene, pytest.raises(SimError, match="29 to 30 m"):
+        scene.snapshot(0)
 
 
 def test_sizes_are_read() -> None:
