@@ -2,20 +2,30 @@
 
 At a joint whose rotation is R, skin of weight w ought to turn by R to the power w. The weight is
 quantised into ``bands`` equal steps between 0 and 1, and every step is a piece of its own. Each
-triangle joins every piece whose weight is less than one step away from that of one of its corners,
-so that neighbouring pieces overlap by a step and no gap opens where the body bends.
+triangle joins every piece whose weight is not much more than one step away from its own, so that
+the nearest two or three draw it and no gap opens where the body bends. Where a piece overlaps the
+part that its neighbour fits better, it dips under the skin: its rim would stick out of a bent knee.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from perception.arrays import FloatArray
+
 from ..hall._meshes import Mesh
 from ._worker_asset import JOINTS, PARENTS, SkinMesh
 
+# How many steps off a triangle's weight may be from that of a piece.
+_OVERLAP: Final = 1.6
+_RIGID: Final = 1.0e-3
+# A rim lies so deep where its weight is a whole step off, and at most so many times as deep.
+_SINK_M: Final = 0.012
+_MOST_SUNK: Final = 3.0
 #: Number of the pelvis among joints.
 PELVIS = -1
 
@@ -38,28 +48,42 @@ class SkinPiece:
 def skin_pieces(skin: SkinMesh, bands: int) -> tuple[SkinPiece, ...]:
     """Cut ``skin`` into rigid pieces, ``bands`` ≥ 0 between the two sides of every joint."""
     step = 1.0 / (bands + 1)
-    children = [[child for child, up in enumerate(PARENTS) if up == joint] for joint in _ALL]
+    weights = skin.weights[skin.triangles].mean(axis=1)
     pieces = []
-    for joint, below in zip(_ALL, children, strict=True):
+    for joint in (PELVIS, *range(len(JOINTS))):
         # What hangs below takes over one step after it has begun.
-        unbent = np.ones(len(skin.vertices_m), dtype=bool)
-        for child in below:
-            unbent &= skin.weights[:, child] < step
+        unbent = np.ones(len(skin.triangles), dtype=bool)
+        for child, parent in enumerate(PARENTS):
+            if parent == joint:
+                unbent &= weights[:, child] < _OVERLAP * step
         for level in range(1, bands + 2) if joint != PELVIS else (bands + 1,):
             share = level * step
             chosen = unbent.copy() if level == bands + 1 else np.ones_like(unbent)
             if joint != PELVIS:
-                chosen &= np.abs(skin.weights[:, joint] - share) < step
-            triangles = skin.triangles[chosen[skin.triangles].any(axis=1)]
-            if len(triangles):
-                pieces.append(SkinPiece(joint, share, _part(skin, triangles)))
+                chosen &= np.abs(weights[:, joint] - share) < _OVERLAP * step
+                # What does not bend at all is drawn once.
+                chosen &= weights[:, joint] > _RIGID
+                if level <= bands:
+                    chosen &= weights[:, joint] < 1.0 - _RIGID
+            if chosen.any():
+                beyond = _beyond(skin, joint, share, level == bands + 1)
+                sink_m = _SINK_M * np.clip(beyond / step - 0.5, 0.0, _MOST_SUNK)
+                pieces.append(SkinPiece(joint, share, _part(skin, skin.triangles[chosen], sink_m)))
     return tuple(pieces)
 
 
-_ALL = (PELVIS, *range(len(JOINTS)))
+def _beyond(skin: SkinMesh, joint: int, share: float, whole: bool) -> FloatArray:
+    """(V,) how far each vertex's weight is from that of a piece."""
+    off = [np.zeros(len(skin.vertices_m))]
+    if joint != PELVIS:
+        off.append(np.abs(skin.weights[:, joint] - share))
+    if whole:
+        off += [skin.weights[:, c] for c, parent in enumerate(PARENTS) if parent == joint]
+    return np.asarray(np.max(off, axis=0))
 
 
-def _part(skin: SkinMesh, triangles: NDArray[np.int64]) -> Mesh:
-    """Only the vertices that the triangles use."""
+def _part(skin: SkinMesh, triangles: NDArray[np.int64], sink_m: FloatArray) -> Mesh:
+    """Only the vertices that the triangles use, each moved inwards by so much."""
     used, rows = np.unique(triangles.ravel(), return_inverse=True)
-    return Mesh(skin.vertices_m[used], skin.normals[used], rows.astype(np.int64), skin.uv[used])
+    vertices = skin.vertices_m[used] - sink_m[used, None] * skin.normals[used]
+    return Mesh(vertices, skin.normals[used], rows.astype(np.int64), skin.uv[used])

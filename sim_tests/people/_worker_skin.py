@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from ._worker import Worker
 
 # Bands between the two sides of a joint, a level of detail; far away nobody sees a knee bend.
-_BANDS: Final = (3, 2, 1)
+_BANDS: Final = (5, 2, 1)
 # A level serves down to so many samples a metre of the picture; the coarsest all the rest.
 _COARSEST_SAMPLES_PER_M: Final = (120.0, 60.0)
 # How far skin, clothes, hair and hats reach beyond the keypoints.
