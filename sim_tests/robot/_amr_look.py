@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final
@@ -305,40 +304,18 @@ class AmrLook:
             return
         pose = self._pose()
         T = np.asarray(pose[0])
-        base = _quaternion(T[:3, :3])
+        base = Rotation.from_matrix(T[:3, :3])
         for body, origin, column in self._parts:
             turned = base
             if column:
-                angle = 0.5 * pose[column]
-                turned = _times(base, (0.0, math.sin(angle), 0.0, math.cos(angle)))
+                turned = base * Rotation.from_rotvec((0.0, pose[column], 0.0))
             pybullet.resetBasePositionAndOrientation(
                 body,
                 (T[:3, :3] @ origin + T[:3, 3]).tolist(),
-                turned,
+                turned.as_quat().tolist(),
                 physicsClientId=self._visuals.client,
             )
 
     def bodies(self) -> frozenset[int]:
         """Ids of its bodies in the picture world."""
         return frozenset(body for body, _, _ in self._parts)
-
-
-Quaternion = tuple[float, float, float, float]
-
-
-def _quaternion(rotation: FloatArray) -> Quaternion:
-    """PyBullet's quaternion (x, y, z, w) of a rotation (3, 3)."""
-    x, y, z, w = Rotation.from_matrix(rotation).as_quat().tolist()
-    return x, y, z, w
-
-
-def _times(a: Quaternion, b: Quaternion) -> Quaternion:
-    """Rotation b, then a."""
-    ax, ay, az, aw = a
-    bx, by, bz, bw = b
-    return (
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-        aw * bw - ax * bx - ay * by - az * bz,
-    )

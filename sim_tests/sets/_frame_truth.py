@@ -41,6 +41,7 @@ def frame_truth(
         workers: of the picture's warehouse.
         cone: scores awareness; None is the default cone.
     """
+    cone = AttentionCone() if cone is None else cone
     people = []
     for index, worker in enumerate(workers):
         mask = view.actors == worker.actor
@@ -54,7 +55,7 @@ def frame_truth(
             {
                 "id": index,
                 "box_xyxy_px": [float(edge) for edge in box],
-                **_geometry(camera, T_odom_camera, view, worker, cone or AttentionCone()),
+                **_geometry(camera, T_odom_camera, view, worker, cone),
                 "score": 1.0,
                 "occlusion": round(1.0 - min(seen / max(shape[0], seen), 1.0), 4),
                 "truncation": round(1.0 - shape[0] / max(shape[1], 1), 4),
