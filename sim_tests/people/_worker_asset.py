@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import resources
+from pathlib import Path
 from typing import Final
 
 import cv2
@@ -82,7 +83,7 @@ class WorkerAsset:
     """A worker as shipped.
 
     Attributes:
-        name: of the files.
+        name: by which it was loaded.
         description: who this is, in a line.
         stature_m: height with shoes and without hat or helmet.
         joints_m: (16, 3) at rest, in the order of :data:`JOINTS`.
@@ -115,15 +116,28 @@ def worker_names() -> tuple[str, ...]:
     )
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=64)
 def load_worker(name: str) -> WorkerAsset:
-    """Read a shipped worker; raises :class:`SimError` for a name that is not shipped."""
-    if name not in worker_names():
-        raise SimError(f"worker must be one of {', '.join(worker_names())}, got {name!r}")
-    folder = resources.files("sim_tests") / "assets" / "workers"
-    with (folder / f"{name}.npz").open("rb") as file, np.load(file, allow_pickle=False) as data:
+    """Read a shipped worker, or one from the ``.npz`` file that ``training/workers`` has made.
+
+    Raises:
+        SimError: for a name that is not shipped or a file that is not there.
+    """
+    if name.endswith(".npz"):
+        folder, stem = Path(name).parent, Path(name).stem
+        if not Path(name).is_file():
+            raise SimError(f"there is no worker {name!r}")
+    else:
+        folder, stem = Path(str(resources.files("sim_tests"))) / "assets" / "workers", name
+        if name not in worker_names():
+            raise SimError(
+                f"worker must be one of {', '.join(worker_names())} or an .npz file, got {name!r}"
+            )
+    with (folder / f"{stem}.npz").open("rb") as file, np.load(file, allow_pickle=False) as data:
         arrays = {key: data[key] for key in data.files}
-    levels = tuple(_skin(arrays, level, _picture(name, level)) for level in range(LEVELS))
+    levels = tuple(
+        _skin(arrays, level, _picture(folder / f"{stem}_lod{level}.jpg")) for level in range(LEVELS)
+    )
     capsules = tuple(
         Capsule(int(joint), tuple(row[:3]), tuple(row[3:6]), row[6])
         for joint, row in zip(
@@ -160,8 +174,7 @@ def _skin(arrays: dict[str, NDArray[np.generic]], level: int, rgb: NDArray[np.ui
     )
 
 
-def _picture(name: str, level: int) -> NDArray[np.uint8]:
-    file = resources.files("sim_tests") / "assets" / "workers" / f"{name}_lod{level}.jpg"
+def _picture(file: Path) -> NDArray[np.uint8]:
     bgr = cv2.imdecode(np.frombuffer(file.read_bytes(), np.uint8), cv2.IMREAD_COLOR)
     return np.ascontiguousarray(np.asarray(bgr, dtype=np.uint8)[..., ::-1])
 

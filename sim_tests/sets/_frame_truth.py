@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -59,7 +60,7 @@ def frame_truth(
                 "score": 1.0,
                 "occlusion": round(1.0 - min(seen / max(shape[0], seen), 1.0), 4),
                 "truncation": round(1.0 - shape[0] / max(shape[1], 1), 4),
-                "look": worker.asset.name,
+                "look": Path(worker.asset.name).stem,
                 "stature_m": round(worker.stature_m, 4),
                 "heading_odom_rad": round(worker.heading_odom_rad, 5),
                 "holds": worker.held,

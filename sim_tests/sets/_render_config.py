@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field, ValidationError, model_validator
 
@@ -12,6 +12,8 @@ from perception import Camera
 from tracking.config import StrictConfig
 
 from .._errors import SimError
+from ..hall._layout import LAYOUTS
+from ..people._worker_asset import worker_names
 from ..pictures._sensor import SensorConfig
 
 _SIZE = re.compile(r"^(\d+)x(\d+)$")
@@ -33,6 +35,11 @@ class RenderConfig(StrictConfig):
         supersampling: samples a pixel and side; 2 smooths edges and costs three times as much.
         seed: of everything random.
         sensor: noise and exposure of the camera; the default adds none.
+        workers: who appears: names of shipped workers or .npz files; None is all who are shipped.
+        layouts: names of the halls; None is all.
+        variants: numbers of the first and the last variant of a hall's goods and colours.
+        eyes: ``"wander"``: they turn in the head, by 7° sideways and 3.4° up and down (standard
+            deviation); ``"ahead"``: the gaze is the head's direction.
     """
 
     error: ClassVar[type[ValueError]] = SimError
@@ -48,6 +55,10 @@ class RenderConfig(StrictConfig):
     supersampling: int = Field(default=1, ge=1, le=4)
     seed: int = Field(default=0, ge=0)
     sensor: SensorConfig = SensorConfig()
+    workers: tuple[str, ...] | None = Field(default=None, min_length=1)
+    layouts: tuple[str, ...] | None = Field(default=None, min_length=1)
+    variants: tuple[int, int] = (0, 7)
+    eyes: Literal["wander", "ahead"] = "wander"
 
     @model_validator(mode="after")
     def _ranges(self) -> RenderConfig:
@@ -56,6 +67,16 @@ class RenderConfig(StrictConfig):
                 "min_range_m must be less than max_range_m, got "
                 f"{self.min_range_m:g} m and {self.max_range_m:g} m"
             )
+        if not 0 <= self.variants[0] <= self.variants[1]:
+            raise ValueError(f"variants must be 0 <= first <= last, got {self.variants}")
+        for layout in self.layouts or ():
+            if layout not in LAYOUTS:
+                raise ValueError(f"layouts must be of {', '.join(LAYOUTS)}, got {layout!r}")
+        for name in self.workers or ():
+            if not name.endswith(".npz") and name not in worker_names():
+                raise ValueError(
+                    f"workers must be .npz files or of {', '.join(worker_names())}, got {name!r}"
+                )
         return self
 
     @classmethod

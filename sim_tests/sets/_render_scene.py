@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from perception import Camera
 from perception.arrays import FloatArray
 
 from .._closing import Closing
@@ -37,7 +38,6 @@ _HIDDEN_SHARE: Final = 0.08
 _OVERLAP_SHARE: Final = 0.15
 _TRIES: Final = 40
 _CAMERA_TRIES: Final = 500
-_VARIANTS: Final = 8
 _ACTIVITIES: Final = ("none", "carry_box", "phone")
 _ACTIVITY_SHARES: Final = (0.64, 0.18, 0.18)
 
@@ -54,24 +54,31 @@ class RenderScene(Closing):
     Args:
         config: what is rendered.
         number: which scene, from 0.
+
+    Attributes:
+        warehouse: the hall.
+        workers: the cast.
+        renderer: what the camera sees.
     """
 
     def __init__(self, config: RenderConfig, number: int) -> None:
         self._config = config
         self.number = number
         rng = np.random.default_rng([config.seed, 1, number])
-        self.layout_name = list(LAYOUTS)[number % len(LAYOUTS)]
+        halls = config.layouts or tuple(LAYOUTS)
+        self.layout_name = halls[number % len(halls)]
         lights = np.random.default_rng([config.seed, 4]).permutation(list(LIGHTINGS)).tolist()
         self.lighting_name = str(lights[number % len(lights)])
+        first, last = config.variants
         self.warehouse = Warehouse(
-            WarehouseLayout.named(self.layout_name), variant=int(rng.integers(_VARIANTS))
+            WarehouseLayout.named(self.layout_name), variant=int(rng.integers(first, last + 1))
         )
         try:
             self.workers = tuple(
                 Worker(self.warehouse, _stature_m(look, rng), look=look)
                 for look in _cast(config, number)
             )
-            self._renderer = CameraRenderer(
+            self.renderer = CameraRenderer(
                 self.warehouse,
                 lighting=Lighting.preset(self.lighting_name),
                 shadows=True,
@@ -85,13 +92,18 @@ class RenderScene(Closing):
         """End the scene."""
         self.warehouse.close()
 
+    @property
+    def camera(self) -> Camera:
+        """The camera of every picture."""
+        return self._config.camera
+
     def snapshot(self, frame: int) -> tuple[NDArray[np.uint8], Record]:
         """Picture number ``frame`` (H, W, 3) and the truth about it; the same every time."""
         rng = np.random.default_rng([self._config.seed, 2, frame])
-        T_odom_camera = self._arrange(rng)
+        T_odom_camera = self.arrange(rng)
         camera = self._config.camera
-        view = self._renderer.render(camera, T_odom_camera)
-        people = frame_truth(self._renderer, camera, T_odom_camera, view, self.workers)
+        view = self.renderer.render(camera, T_odom_camera)
+        people = frame_truth(self.renderer, camera, T_odom_camera, view, self.workers)
         record: Record = {
             "frame": f"{frame:06d}.png",
             # Snapshots are not a film: a second apart, no tracker takes them for one.
@@ -104,8 +116,9 @@ class RenderScene(Closing):
         }
         return expose(view.rgb, self._config.sensor, rng), record
 
-    def _arrange(self, rng: np.random.Generator) -> FloatArray:
-        """Put camera and people somewhere; returns T_odom_camera (4, 4)."""
+    def arrange(self, rng: np.random.Generator) -> FloatArray:
+        """Put camera and people somewhere at random; returns T_odom_camera (4, 4)."""
+        config = self._config
         wanted = int(rng.integers(1, len(self.workers) + 1))
         cast = rng.permutation(len(self.workers))[:wanted]
         for worker in self.workers:
@@ -117,13 +130,14 @@ class RenderScene(Closing):
             if places:
                 break
         else:
-            config = self._config
             raise SimError(
                 f"hall {self.layout_name!r} has no room for people {config.min_range_m:g} to "
                 f"{config.max_range_m:g} m before a camera; use shorter ranges"
             )
         for row, place in zip(cast.tolist(), places, strict=False):
-            _pose(self.workers[row], place, T_odom_camera[:3, 3], rng)
+            pose_at_random(
+                self.workers[row], (place.x_m, place.y_m), T_odom_camera[:3, 3], rng, config.eyes
+            )
         return T_odom_camera
 
     def _camera_pose(self, rng: np.random.Generator) -> tuple[FloatArray, float]:
@@ -174,7 +188,7 @@ class RenderScene(Closing):
 
 def _cast(config: RenderConfig, number: int) -> list[str]:
     """Who plays in a scene: the whole troupe comes round, in a shuffled order."""
-    names = list(worker_names())
+    names = list(config.workers or worker_names())
     order = np.random.default_rng([config.seed, 3]).permutation(len(names)).tolist()
     first = number * config.people
     return [names[order[(first + k) % len(names)]] for k in range(config.people)]
@@ -186,8 +200,23 @@ def _stature_m(look: str, rng: np.random.Generator) -> float:
     return float(np.clip(stature * rng.normal(1.0, 0.012), 1.45, 2.05))
 
 
-def _pose(worker: Worker, place: _Place, origin: FloatArray, rng: np.random.Generator) -> None:
-    """Any heading, any activity, the head anywhere that a neck allows."""
+def pose_at_random(
+    worker: Worker,
+    position_odom_m: tuple[float, float],
+    camera_odom_m: FloatArray,
+    rng: np.random.Generator,
+    eyes: str = "wander",
+) -> None:
+    """Any heading, any activity, the head anywhere that a neck allows.
+
+    Args:
+        worker: who.
+        position_odom_m: (2,) where.
+        camera_odom_m: (3,) the robot's camera, at which three in ten look.
+        rng: of all of it.
+        eyes: see :class:`RenderConfig`.
+    """
+    x, y = position_odom_m
     heading = float(rng.uniform(-math.pi, math.pi))
     activity = str(rng.choice(_ACTIVITIES, p=_ACTIVITY_SHARES))
     speed = 0.0 if rng.random() < 0.4 else float(rng.uniform(0.5, 2.0))
@@ -197,19 +226,22 @@ def _pose(worker: Worker, place: _Place, origin: FloatArray, rng: np.random.Gene
     if activity == "phone":
         yaw, pitch = 0.3 * yaw, math.radians(-30.0) + 0.6 * pitch
     elif kind < 0.3:  # at the robot, where the neck reaches that far
-        away = math.atan2(origin[1] - place.y_m, origin[0] - place.x_m)
+        away = math.atan2(camera_odom_m[1] - y, camera_odom_m[0] - x)
         yaw = math.remainder(away - heading, math.tau) + 0.2 * yaw
     elif kind < 0.5:
         yaw = rng.uniform(-MAX_HEAD_YAW_RAD, MAX_HEAD_YAW_RAD)
+    eye_yaw = float(np.clip(rng.normal(0.0, 0.12), -0.5, 0.5))
+    eye_pitch = float(np.clip(rng.normal(0.0, 0.06), -0.3, 0.3))
+    wander = float(eyes == "wander")
     worker.place(
-        (place.x_m, place.y_m),
+        (x, y),
         heading,
         walked_m=walked,
         speed_mps=speed,
         head_yaw_rad=float(np.clip(yaw, -MAX_HEAD_YAW_RAD, MAX_HEAD_YAW_RAD)),
         head_pitch_rad=float(np.clip(pitch, -MAX_HEAD_PITCH_RAD, MAX_HEAD_PITCH_RAD)),
-        eye_yaw_rad=float(np.clip(rng.normal(0.0, 0.12), -0.5, 0.5)),
-        eye_pitch_rad=float(np.clip(rng.normal(0.0, 0.06), -0.3, 0.3)),
+        eye_yaw_rad=wander * eye_yaw,
+        eye_pitch_rad=wander * eye_pitch,
         activity=activity,
     )
 

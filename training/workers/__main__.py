@@ -1,4 +1,7 @@
-"""``python -m training.workers``: makes the workers that ship with ``sim_tests``."""
+"""``python -m training.workers``: makes the workers that ship with ``sim_tests``.
+
+With ``--random N`` it makes a crowd instead, for networks to learn from.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ from pathlib import Path
 
 from ._make import make
 from ._people import PEOPLE
+from ._random import random_person
 
 _FOLDER = Path(__file__).parents[2] / "sim_tests" / "assets" / "workers"
 
@@ -20,12 +24,20 @@ def main() -> None:
     parser.add_argument("names", nargs="*", help="which workers; all by default")
     parser.add_argument("--out", type=Path, default=_FOLDER, help="folder (default: %(default)s)")
     parser.add_argument("--jobs", type=int, default=1, help="workers made at once")
+    parser.add_argument("--random", type=int, default=0, metavar="N", help="N random ones instead")
+    parser.add_argument("--seed", type=int, default=0, help="of the random ones")
     chosen = parser.parse_args()
+    if chosen.random and chosen.out == _FOLDER:
+        parser.error("--random needs --out: a random crowd does not ship")
     people = [person for person in PEOPLE if not chosen.names or person.name in chosen.names]
     unknown = set(chosen.names) - {person.name for person in people}
     if unknown:
         parser.error(f"no worker is called {', '.join(sorted(unknown))}")
     chosen.out.mkdir(parents=True, exist_ok=True)
+    if chosen.random:
+        crowd = (random_person(number, chosen.seed) for number in range(chosen.random))
+        # The .npz is written last: who has one is finished.
+        people = [person for person in crowd if not (chosen.out / f"{person.name}.npz").exists()]
     start, total = time.perf_counter(), 0
     # A fresh process each, so that a worker's files do not depend on who came before.
     context = multiprocessing.get_context("spawn")

@@ -7,7 +7,7 @@ from typing import Final
 from ._person import Person
 
 
-def _build(amount: float, belly: float = 0.0) -> dict[str, float]:
+def build(amount: float, belly: float = 0.0) -> dict[str, float]:
     """Changes of girth: 1 heavy, −1 thin; the model's own weight changes little."""
     girths = {"waist": 0.9, "hips": 0.6, "bust": 0.5, "thigh": 0.5, "upperarm": 0.6, "neck": 0.5}
     out = {f"measure-{name}-circ-incr": amount * share for name, share in girths.items()}
@@ -34,7 +34,7 @@ PEOPLE: Final = (
         skin=(112, 74, 54), hair_colour=(24, 20, 20), hair="bun",
         top="shirt", top_colour=(110, 52, 84), top_trim=(88, 40, 68), trousers=_NAVY,
         vest=_YELLOW, shoes=(50, 46, 44),
-        changes=_build(-0.4) | {"mouth-lowerlip-volume-incr": 0.6, "nose-scale-horiz-incr": 0.4},
+        changes=build(-0.4) | {"mouth-lowerlip-volume-incr": 0.6, "nose-scale-horiz-incr": 0.4},
     ),
     Person(
         "bjorn", "man, tall and broad, white helmet, orange vest over a grey hoodie", 1.94,
@@ -65,7 +65,7 @@ PEOPLE: Final = (
         {"gender": 1.0, "age": 0.80, "muscle": 0.45, "weight": 0.68, "proportions": 0.45},
         skin=(222, 172, 142), hair_colour=(92, 60, 40), hair="bob", glasses=True,
         top="jacket", top_colour=(48, 84, 66), top_trim=(36, 62, 50), trousers=_CHARCOAL,
-        changes=_build(0.8, 0.15) | {"nose-hump-incr": 0.4},
+        changes=build(0.8, 0.15) | {"nose-hump-incr": 0.4},
     ),
     Person(
         "femi", "man, lean and tall, shaved head, orange vest over a white T-shirt", 1.88,
@@ -73,7 +73,7 @@ PEOPLE: Final = (
         skin=(84, 56, 42), hair_colour=(22, 18, 18), hair="crop", beard=0.35,
         top="tshirt", top_colour=(214, 214, 210), top_trim=(196, 196, 192), trousers=_NAVY,
         vest=_ORANGE, reflective_legs=True,
-        changes=_build(-0.5) | {"nose-scale-horiz-incr": 0.6, "mouth-lowerlip-volume-incr": 0.5},
+        changes=build(-0.5) | {"nose-scale-horiz-incr": 0.6, "mouth-lowerlip-volume-incr": 0.5},
     ),
     Person(
         "giulia", "woman, average build, long fair hair tied back, blue helmet, yellow vest", 1.72,
@@ -89,7 +89,7 @@ PEOPLE: Final = (
         skin=(220, 176, 140), hair_colour=(128, 126, 124), hair="short", glasses=True,
         top="shirt", top_colour=(138, 168, 198), top_trim=(112, 140, 170), trousers=(70, 66, 64),
         shoes=(34, 34, 36),
-        changes=_build(-0.3) | {"l-eye-epicanthus-out": 0.7, "r-eye-epicanthus-out": 0.7},
+        changes=build(-0.3) | {"l-eye-epicanthus-out": 0.7, "r-eye-epicanthus-out": 0.7},
     ),
     Person(
         "ivan", "man, heavy, bald under a dark cap, beard, blue overalls", 1.80,
@@ -97,7 +97,7 @@ PEOPLE: Final = (
         skin=(216, 164, 140), hair_colour=(98, 72, 52), hair="bald", beard=1.0,
         headwear=("cap", (52, 54, 62)),
         top="overalls", top_colour=(124, 128, 130), top_trim=(40, 62, 108), trousers=(40, 62, 108),
-        shoes=(60, 52, 46), changes=_build(1.0, 0.45) | {"neck-double-incr": 0.4},
+        shoes=(60, 52, 46), changes=build(1.0, 0.45) | {"neck-double-incr": 0.4},
     ),
     Person(
         "jamila", "woman, short, cropped black hair, orange vest over a dark polo", 1.52,
@@ -127,6 +127,6 @@ PEOPLE: Final = (
         skin=(184, 128, 96), hair_colour=(34, 26, 24), hair="short", beard=0.5,
         headwear=("cap", (168, 40, 38)),
         top="jacket", top_colour=(40, 50, 80), top_trim=(30, 38, 62), trousers=_CHARCOAL,
-        vest=_YELLOW, reflective_legs=True, shoes=(40, 40, 42), changes=_build(0.6, 0.2),
+        vest=_YELLOW, reflective_legs=True, shoes=(40, 40, 42), changes=build(0.6, 0.2),
     ),
 )  # fmt: skip

@@ -1,0 +1,1 @@
+"""Trains the networks that ship with ``perception``: see README.md in this folder."""

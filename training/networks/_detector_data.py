@@ -1,0 +1,156 @@
+"""Whole pictures to learn from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from ._augment import covered, degraded, similarity, warp
+from ._detector_net import HEIGHT, WIDTH
+from ._fit import Batch
+from ._samples import picture, read_shards
+
+#: People in a batch's picture are padded to so many.
+MOST: Final = 8
+# Of whom less shows than this (pixels of a 640 × 480 picture, keypoints), nobody is asked.
+_FEWEST_PIXELS: Final = 350
+_FEWEST_KEYPOINTS: Final = 4
+
+
+@dataclass
+class FrameSample:
+    """A picture, boxes (N, 4) from its corner, and which of them are to be found (N,)."""
+
+    image: NDArray[np.uint8]
+    boxes: NDArray[np.float64]
+    wanted: NDArray[np.bool_]
+
+
+class DetectorData:
+    """All whole pictures of some shards, in memory; :meth:`batch` draws and distorts them."""
+
+    def __init__(self, folder: Path, seed: int, first: int = 0, last: int | None = None) -> None:
+        self._seed = seed
+        self.frames: list[FrameSample] = []
+        for shard in read_shards(folder, first, last):
+            for frame in shard["frames"]:
+                boxes = [person.box_xyxy_px for person in frame.people]
+                wanted = [
+                    person.pixels >= _FEWEST_PIXELS and person.visible.sum() >= _FEWEST_KEYPOINTS
+                    for person in frame.people
+                ]
+                self.frames.append(
+                    FrameSample(
+                        picture(frame.png),
+                        np.array(boxes, dtype=np.float64).reshape(-1, 4),
+                        np.array(wanted, dtype=bool),
+                    )
+                )
+
+    def batch(self, step: int, count: int = 16) -> Batch:
+        """``count`` pictures; the same for the same step."""
+        rng = np.random.default_rng([self._seed, 42, step])
+        return _stacked([self._distorted(rng) for _ in range(count)])
+
+    def still(self, start: int, stop: int) -> Batch:
+        """Pictures ``start`` to ``stop`` as in use: letterboxed, the whole of each."""
+        return _stacked(
+            [_placed(frame, _fit_scale(frame.image), np.zeros(2)) for frame in self.frames[start:stop]]
+        )
+
+    def _distorted(self, rng: np.random.Generator) -> FrameSample:
+        frame = self.frames[int(rng.integers(len(self.frames)))]
+        scale = _fit_scale(frame.image) * float(np.exp(np.clip(rng.normal(0.05, 0.2), -0.5, 0.6)))
+        size = np.array([WIDTH, HEIGHT]) / scale
+        slack = np.abs(size - frame.image.shape[1::-1])
+        sample = _placed(
+            frame,
+            scale,
+            rng.uniform(-0.5, 0.5, 2) * slack,
+            flip=bool(rng.random() < 0.5),
+            angle=np.radians(rng.normal(0.0, 2.0)),
+        )
+        for _ in range(int(rng.integers(0, 3))):
+            if rng.random() < 0.35:
+                other = self.frames[int(rng.integers(len(self.frames)))].image
+                image, box = covered(sample.image, rng, other[::4, ::4])
+                sample = _hidden(FrameSample(image, sample.boxes, sample.wanted), box)
+        sample.image = degraded(sample.image, rng)
+        return sample
+
+
+def _fit_scale(image: NDArray[np.uint8]) -> float:
+    return min(WIDTH / image.shape[1], HEIGHT / image.shape[0])
+
+
+def _placed(
+    frame: FrameSample,
+    scale: float,
+    shift: NDArray[np.float64],
+    *,
+    flip: bool = False,
+    angle: float = 0.0,
+) -> FrameSample:
+    middle = 0.5 * np.array(frame.image.shape[1::-1]) + shift
+    matrix = similarity(middle, scale, angle, (WIDTH, HEIGHT), flip=flip)
+    image = warp(frame.image, matrix, (WIDTH, HEIGHT))
+    if not len(frame.boxes):
+        return FrameSample(image, frame.boxes, frame.wanted)
+    x1, y1, x2, y2 = frame.boxes.T
+    corners = np.stack([x1, y1, x2, y1, x2, y2, x1, y2], axis=1).reshape(-1, 4, 2)
+    corners = corners @ matrix[:, :2].T + matrix[:, 2]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    area = np.prod(high - low, axis=1)
+    low, high = np.clip(low, 0, [WIDTH, HEIGHT]), np.clip(high, 0, [WIDTH, HEIGHT])
+    size = high - low
+    left = np.prod(size, axis=1) / np.maximum(area, 1e-9)
+    keep = (size.min(axis=1) > 2.0) & (left > 0.05)
+    wanted = frame.wanted & (left > 0.25) & (size.min(axis=1) > 5.0)
+    return FrameSample(image, np.concatenate([low, high], axis=1)[keep], wanted[keep])
+
+
+def _hidden(frame: FrameSample, cover: NDArray[np.float64]) -> FrameSample:
+    """Boxes after something was put before the people: cut where it hides a whole side."""
+    boxes, wanted = frame.boxes.copy(), frame.wanted.copy()
+    for row, (x1, y1, x2, y2) in enumerate(boxes):
+        across = cover[0] <= x1 and cover[2] >= x2
+        along = cover[1] <= y1 and cover[3] >= y2
+        overlap = max(0.0, min(x2, cover[2]) - max(x1, cover[0])) * max(
+            0.0, min(y2, cover[3]) - max(y1, cover[1])
+        )
+        if overlap > 0.6 * (x2 - x1) * (y2 - y1):
+            wanted[row] = False
+        if across and cover[1] <= y1 < cover[3]:
+            boxes[row, 1] = min(cover[3], y2)
+        if across and cover[1] < y2 <= cover[3]:
+            boxes[row, 3] = max(cover[1], boxes[row, 1])
+        if along and cover[0] <= x1 < cover[2]:
+            boxes[row, 0] = min(cover[2], x2)
+        if along and cover[0] < x2 <= cover[2]:
+            boxes[row, 2] = max(cover[0], boxes[row, 0])
+    size = boxes[:, 2:] - boxes[:, :2]
+    keep = size.min(axis=1, initial=np.inf) > 2.0 if len(boxes) else np.zeros(0, bool)
+    wanted &= keep
+    return FrameSample(frame.image, boxes[keep], wanted[keep])
+
+
+def _stacked(samples: list[FrameSample]) -> Batch:
+    boxes = np.zeros((len(samples), MOST, 4), np.float32)
+    kind = np.zeros((len(samples), MOST), np.float32)  # 0 nobody, 1 to be found, 2 not asked
+    for row, sample in enumerate(samples):
+        count = min(len(sample.boxes), MOST)
+        boxes[row, :count] = sample.boxes[:count]
+        kind[row, :count] = np.where(sample.wanted[:count], 1.0, 2.0)
+    images = torch.from_numpy(np.stack([sample.image for sample in samples]))
+    return {
+        "image": images.permute(0, 3, 1, 2),
+        "boxes": torch.from_numpy(boxes),
+        "kind": torch.from_numpy(kind),
+    }
+
+

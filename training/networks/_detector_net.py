@@ -1,0 +1,78 @@
+"""The person detector: one class, no anchors, exported in the layout of YOLOv8."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import torch
+from torch import Tensor, nn
+
+from ._blocks import Backbone, conv, enlarged
+
+HEIGHT, WIDTH = 256, 320
+STRIDES: Final = (8, 16, 32)
+
+
+class DetectorNet(nn.Module):
+    """Feature pyramid, then a score and four distances to the sides of the box in every cell."""
+
+    inner = 64
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.backbone = Backbone()
+        self.lateral = nn.ModuleList(conv(c, self.inner, 1) for c in Backbone.channels)
+        self.fuse = nn.ModuleList(conv(self.inner, self.inner) for _ in Backbone.channels)
+        self.head = nn.ModuleList(conv(self.inner, self.inner) for _ in Backbone.channels)
+        self.out = nn.ModuleList(nn.Conv2d(self.inner, 5, 1) for _ in Backbone.channels)
+        for layer in self.out:
+            assert isinstance(layer, nn.Conv2d)
+            assert layer.bias is not None
+            nn.init.constant_(layer.bias[:1], -4.6)
+            nn.init.constant_(layer.bias[1:], 1.0)
+        points, strides = cells()
+        self.register_buffer("points", points, persistent=False)
+        self.register_buffer("strides", strides, persistent=False)
+
+    def forward(self, x: Tensor) -> tuple[Tensor, Tensor]:
+        """(N, 3, 256, 320) to logits (N, cells) and boxes (N, cells, 4) x1, y1, x2, y2 in pixels."""
+        maps = self.backbone(x)
+        levels = [lateral(part) for lateral, part in zip(self.lateral, maps, strict=True)]
+        for finer in (1, 0):
+            levels[finer] = levels[finer] + enlarged(levels[finer + 1], levels[finer])
+        rows = [
+            out(head(fuse(level))).flatten(2)
+            for out, head, fuse, level in zip(self.out, self.head, self.fuse, levels, strict=True)
+        ]
+        flat = torch.cat(rows, dim=2).transpose(1, 2).float()
+        reach = torch.exp(flat[..., 1:].clamp(-4.0, 4.0)) * self.strides[:, None]
+        boxes = torch.cat([self.points - reach[..., :2], self.points + reach[..., 2:]], dim=2)
+        return flat[..., 0], boxes
+
+
+def cells() -> tuple[Tensor, Tensor]:
+    """Centres (cells, 2) in pixels and strides (cells,), finest level first, row by row."""
+    points, strides = [], []
+    for stride in STRIDES:
+        rows, columns = HEIGHT // stride, WIDTH // stride
+        v, u = torch.meshgrid(torch.arange(rows), torch.arange(columns), indexing="ij")
+        points.append((torch.stack([u, v], dim=2).reshape(-1, 2) + 0.5) * stride)
+        strides.append(torch.full((rows * columns,), float(stride)))
+    return torch.cat(points).float(), torch.cat(strides)
+
+
+class DetectorExport(nn.Module):
+    """(1, 5, cells): centre, width and height in pixels, and the score, as YOLOv8 has them."""
+
+    names = ("output0",)
+
+    def __init__(self, net: DetectorNet) -> None:
+        super().__init__()
+        self.net = net
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(1, 3, 256, 320) RGB in 0–1."""
+        logits, boxes = self.net(x)
+        centre = 0.5 * (boxes[..., :2] + boxes[..., 2:])
+        size = boxes[..., 2:] - boxes[..., :2]
+        return torch.cat([centre, size, torch.sigmoid(logits)[..., None]], dim=2).transpose(1, 2)

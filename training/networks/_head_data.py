@@ -1,0 +1,277 @@
+"""Head crops to learn from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from ._augment import covered, degraded, inside_of, similarity, warp, with_surroundings
+from ._fit import Batch
+from ._samples import HEAD_SIDE_M, Frame, Patch, PersonTruth, picture, read_shards
+
+_SIZE: Final = 64
+_SWAP: Final = [0, 2, 1, 4, 3]
+_MIRROR: Final = np.diag([-1.0, 1.0, 1.0])
+# Mirroring a head swaps its right (z) with its left.
+_MIRROR_HEAD: Final = np.diag([1.0, 1.0, -1.0])
+#: So much of a crop's side around the head is kept of a picture.
+_REACH: Final = 0.95
+_NEGATIVES: Final = 0.08
+#: A crop of which less than this is the head shows none.
+_LEAST_SEEN: Final = 0.35
+_FEWEST_PX: Final = 10.0
+_SMALLEST_PX: Final = 18.0
+
+
+@dataclass
+class HeadSample:
+    """A head at the camera's own resolution. Pixels from the corner of ``image``."""
+
+    image: NDArray[np.uint8]
+    centre: NDArray[np.float64]
+    side_px: float
+    keypoints: NDArray[np.float64]
+    visible: NDArray[np.bool_]
+    rotation_ray_head: NDArray[np.float64]
+    focal_px: float
+    principal_point: NDArray[np.float64]
+    rotation_camera_head: NDArray[np.float64]
+    seen: float
+
+
+def ray_from_camera(ray: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(3, 3) the smallest rotation that takes a direction (3,) to the optical axis z."""
+    x, y, z = ray / np.linalg.norm(ray)
+    # Rodrigues for the axis (y, −x, 0) that is perpendicular to the ray and to z.
+    k = 1.0 / (1.0 + z)
+    return np.array([[1.0 - k * x * x, -k * x * y, -x], [-k * x * y, 1.0 - k * y * y, -y], [x, y, z]])
+
+
+class HeadData:
+    """All heads of some shards, in memory; :meth:`batch` draws and distorts them."""
+
+    def __init__(self, folder: Path, seed: int, first: int = 0, last: int | None = None) -> None:
+        self._seed = seed
+        self.heads: list[HeadSample] = []
+        self.others: list[NDArray[np.uint8]] = []
+        rng = np.random.default_rng([seed, 21])
+        for shard in read_shards(folder, first, last):
+            for patch in [*shard["heads"], *shard["people"]]:
+                self._add(_of_patch(patch))
+            for frame in shard["frames"]:
+                image = picture(frame.png)
+                for person in frame.people:
+                    self._add(_of_frame(frame, image, person))
+                self.others += list(_elsewhere(frame, image, rng))
+
+    def _add(self, sample: HeadSample | None) -> None:
+        if sample is not None:
+            self.heads.append(sample)
+
+    def batch(self, step: int, count: int = 64) -> Batch:
+        """``count`` crops; the same for the same step."""
+        rng = np.random.default_rng([self._seed, 22, step])
+        samples = [self._distorted(rng) for _ in range(count)]
+        return _stacked(samples)
+
+    def still(self, start: int, stop: int, jitter: float = 0.05, spread: float = 0.07) -> Batch:
+        """Crops ``start`` to ``stop`` placed as in use, not distorted."""
+        rng = np.random.default_rng([self._seed, 23, start])
+        return _stacked(
+            [
+                _crop(head, rng.normal(0, jitter, 2), np.exp(rng.normal(0, spread)), 0.0, flip=False)
+                for head in self.heads[start:stop]
+            ]
+        )
+
+    def _distorted(self, rng: np.random.Generator) -> dict[str, Any]:
+        if rng.random() < _NEGATIVES:
+            return self._nobody(rng)
+        head = self.heads[int(rng.integers(len(self.heads)))]
+        angle = np.radians(rng.normal(0.0, 12.0)) if rng.random() < 0.5 else 0.0
+        # How far first guesses lie from the head; the second pass is better than this.
+        wide = 1.0 if rng.random() < 0.6 else 0.4
+        shift = np.clip(rng.normal(0.0, 0.11 * wide, 2), -0.3, 0.3)
+        enlarged = float(np.exp(np.clip(rng.normal(0.0, 0.17 * wide), -0.4, 0.4)))
+        coarse = None
+        if rng.random() < 0.35:
+            low = min(_SMALLEST_PX, head.side_px)
+            coarse = int(np.exp(rng.uniform(np.log(low), np.log(max(head.side_px, low + 1.0)))))
+        sample = _crop(head, shift, enlarged, angle, flip=bool(rng.random() < 0.5), coarse=coarse)
+        if rng.random() < 0.22:
+            other = self.others[int(rng.integers(len(self.others)))]
+            _hide(sample, rng, other)
+        sample["image"] = degraded(sample["image"], rng)
+        return sample
+
+    def _nobody(self, rng: np.random.Generator) -> dict[str, Any]:
+        other = self.others[int(rng.integers(len(self.others)))]
+        height, width = other.shape[:2]
+        image = warp(other, np.array([[64 / width, 0, 0], [0, 64 / height, 0.0]]), (_SIZE, _SIZE))
+        if rng.random() < 0.5:
+            image = np.ascontiguousarray(image[:, ::-1])
+        return {
+            "image": degraded(image, rng),
+            "rotation": np.eye(3),
+            "keypoints": np.full((5, 2), 0.5),
+            "visible": np.zeros(5, bool),
+            "centre": np.full(2, 0.5),
+            "log_side": 0.0,
+            "head": 0.0,
+            "weight": 0.0,
+        }
+
+
+def _of_patch(patch: Patch) -> HeadSample | None:
+    return _sample(
+        picture(patch.png), patch.origin_px, patch.size_px, patch.intrinsics_px, patch.person
+    )
+
+
+def _of_frame(frame: Frame, image: NDArray[np.uint8], person: PersonTruth) -> HeadSample | None:
+    height, width = image.shape[:2]
+    principal = (width / 2.0, height / 2.0)
+    return _sample(image, (0, 0), (width, height), (frame.focal_px, *principal), person)
+
+
+def _sample(
+    image: NDArray[np.uint8],
+    origin: tuple[int, int],
+    size: tuple[int, int],
+    intrinsics: tuple[float, float, float],
+    person: PersonTruth,
+) -> HeadSample | None:
+    focal, cx, cy = intrinsics
+    x, y, z = person.head_centre_camera_m.tolist()
+    # Continuous coordinates: half a pixel more than those of pixel centres.
+    centre = np.array([focal * x / z + cx + 0.5, focal * y / z + cy + 0.5])
+    side = HEAD_SIDE_M * focal / z
+    if side < _FEWEST_PX or person.head_seen < 0.05:
+        return None
+    reach = int(np.ceil(_REACH * side))
+    low = np.floor(centre).astype(int) - reach
+    high = low + 2 * reach
+    # What the patch has of that square, and what lies beside it.
+    height, width = image.shape[:2]
+    left, top = np.maximum(low - origin, 0).tolist()
+    right, bottom = np.minimum(high - origin, [width, height]).tolist()
+    if right - left < 4 or bottom - top < 4:
+        return None
+    cut = image[top:bottom, left:right]
+    cut_origin = (left + origin[0], top + origin[1])
+    cut, cut_origin = with_surroundings(cut, cut_origin, size, max(4, int(0.3 * side)))
+    corner = np.array(cut_origin, dtype=np.float64)
+    return HeadSample(
+        image=cut,
+        centre=centre - corner,
+        side_px=float(side),
+        keypoints=person.keypoints_px[:5] + 0.5 - corner,
+        visible=person.visible[:5],
+        rotation_ray_head=np.eye(3),
+        focal_px=focal,
+        principal_point=np.array([cx, cy]) + 0.5 - corner,
+        rotation_camera_head=person.rotation_camera_head.astype(np.float64),
+        seen=person.head_seen,
+    )
+
+
+def _crop(
+    head: HeadSample,
+    shift: NDArray[np.float64],
+    enlarged: float,
+    angle: float,
+    *,
+    flip: bool,
+    coarse: int | None = None,
+) -> dict[str, Any]:
+    """A crop about the head, off by ``shift`` of its side, with everything turned along."""
+    side = head.side_px * enlarged
+    middle = head.centre + shift * side
+    matrix = similarity(middle, _SIZE / side, angle, (_SIZE, _SIZE), flip=flip)
+    if coarse is None:
+        image = warp(head.image, matrix, (_SIZE, _SIZE), int(np.clip(np.ceil(side / _SIZE), 1, 8)))
+    else:
+        # As from farther away: few pixels first, then enlarged.
+        small = max(8, round(coarse * enlarged))
+        step = int(np.clip(np.ceil(side / small), 1, 8))
+        image = warp(head.image, matrix * small / _SIZE, (small, small), step)
+        grow = np.array([[_SIZE / small, 0.0, 0.0], [0.0, _SIZE / small, 0.0]])
+        image = warp(image, grow, (_SIZE, _SIZE))
+    ray = np.append((middle - head.principal_point) / head.focal_px, 1.0)
+    rotation = ray_from_camera(ray) @ head.rotation_camera_head
+    c, s = np.cos(angle), np.sin(angle)
+    rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ rotation
+    keypoints = (head.keypoints @ matrix[:, :2].T + matrix[:, 2]) / _SIZE
+    visible = head.visible
+    if flip:
+        rotation = _MIRROR @ rotation @ _MIRROR_HEAD
+        keypoints, visible = keypoints[_SWAP], visible[_SWAP]
+    return {
+        "image": image,
+        "rotation": rotation,
+        "keypoints": keypoints,
+        "visible": visible & inside_of(keypoints, np.array([0.0, 0.0, 1.0, 1.0])),
+        "centre": (matrix[:, :2] @ head.centre + matrix[:, 2]) / _SIZE,
+        "log_side": np.log(enlarged),
+        "head": float(head.seen > _LEAST_SEEN),
+        "weight": float(head.seen > 0.5 * _LEAST_SEEN),
+    }
+
+
+def _hide(sample: dict[str, Any], rng: np.random.Generator, other: NDArray[np.uint8]) -> None:
+    """Put something before the head."""
+    sample["image"], box = covered(sample["image"], rng, other)
+    box = box / _SIZE
+    sample["visible"] = sample["visible"] & ~inside_of(sample["keypoints"], box)
+    v, u = np.mgrid[-1:1:9j, -1:1:9j].reshape(2, -1)
+    disk = np.stack([u, v], axis=1)[u**2 + v**2 <= 1.0]
+    # The disk of the head's size, as in the shards.
+    points = sample["centre"] + disk * 0.2 * np.exp(-sample["log_side"])
+    hidden = inside_of(points, box).mean()
+    if hidden > 1.0 - _LEAST_SEEN:
+        sample["head"] = 0.0
+    if hidden > 0.8:
+        sample["weight"] = 0.0
+
+
+def _elsewhere(
+    frame: Frame, image: NDArray[np.uint8], rng: np.random.Generator
+) -> Iterable[NDArray[np.uint8]]:
+    """Squares of a picture without a head in their middle; half of them on bodies."""
+    height, width = image.shape[:2]
+    for _ in range(2):
+        side = float(np.exp(rng.uniform(np.log(20.0), np.log(140.0))))
+        centre = rng.uniform([0.0, 0.0], [width, height])
+        if frame.people and rng.random() < 0.6:
+            person = frame.people[int(rng.integers(len(frame.people)))]
+            centre = rng.uniform(person.box_xyxy_px[:2], person.box_xyxy_px[2:])
+        near = False
+        for person in frame.people:
+            x, y, z = person.head_centre_camera_m.tolist()
+            head = np.array([x, y]) * frame.focal_px / z + [width / 2.0, height / 2.0]
+            size = HEAD_SIDE_M * frame.focal_px / z
+            near |= bool(np.abs(head - centre).max() < 0.5 * side + 0.25 * size)
+        if near:
+            continue
+        half = side / 2.0
+        low = np.maximum(centre - half, 0.0).astype(int)
+        high = np.minimum(centre + half, [width, height]).astype(int)
+        if (high - low).min() > 8:
+            yield image[low[1] : high[1], low[0] : high[0]].copy()
+
+
+def _stacked(samples: list[dict[str, Any]]) -> Batch:
+    batch = {
+        key: torch.from_numpy(np.stack([np.asarray(s[key], np.float32) for s in samples]))
+        for key in samples[0]
+        if key != "image"
+    }
+    images = np.stack([sample["image"] for sample in samples])
+    batch["image"] = torch.from_numpy(images).permute(0, 3, 1, 2)
+    return batch

@@ -1,0 +1,135 @@
+"""The head network: a 64 × 64 crop to rotation, keypoints, visibility, place, and how sure it is."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import torch
+from torch import Tensor, nn
+
+from ._blocks import Residual, conv, rotation_from_6d
+
+#: Bins a keypoint coordinate is classified into, over one crop side and a quarter to either side.
+BINS: Final = 96
+SPAN: Final = (-0.25, 1.25)
+KEYPOINTS: Final = 5
+
+
+class HeadNet(nn.Module):
+    """Dense residual network with flattened heads (pooling loses the direction of a face).
+
+    Forward returns raw tensors by name; :class:`HeadExport` turns them into the shipped layout.
+    """
+
+    size = 64
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.fine = nn.Sequential(
+            conv(3, 20, 3, 2), conv(20, 40, 3, 2), Residual(40), conv(40, 80, 3, 2), Residual(80)
+        )
+        self.coarse = nn.Sequential(conv(80, 160, 3, 2), Residual(160))
+        self.trunk = nn.Sequential(
+            nn.Flatten(), nn.Dropout(0.1), nn.Linear(160 * 16, 320), nn.ReLU(inplace=True)
+        )
+        self.maps = nn.Conv2d(80, KEYPOINTS, 3, padding=1)
+        self.tokens = nn.Sequential(nn.Linear(64, 128), nn.ReLU(inplace=True))
+        self.u, self.v = nn.Linear(128, BINS), nn.Linear(128, BINS)
+        self.rotation = nn.Linear(320, 6)
+        self.spread = nn.Sequential(nn.Linear(320, 64), nn.ReLU(inplace=True), nn.Linear(64, 12))
+        self.place = nn.Linear(320, 3)
+        self.seen = nn.Linear(320, KEYPOINTS + 1)
+
+    def forward(self, x: Tensor) -> dict[str, Tensor]:
+        """(N, 3, 64, 64) to named tensors."""
+        fine = self.fine(x)
+        trunk = self.trunk(self.coarse(fine))
+        tokens = self.tokens(self.maps(fine).flatten(2))
+        # What it knows of its own errors must not bend what it says.
+        spread = self.spread(trunk.detach())
+        return {
+            "rotation_6d": self.rotation(trunk),
+            "u": self.u(tokens),
+            "v": self.v(tokens),
+            "place": self.place(trunk),
+            "seen": self.seen(trunk),
+            "rotation_spread": spread[:, :6],
+            "side_log_std": spread[:, 6],
+            "keypoint_log_std": spread[:, 7:],
+        }
+
+
+def head_rotation(rotation_6d: Tensor) -> Tensor:
+    """(N, 3, 3) R_ray_head in the paper's head frame; the six numbers are forward and right."""
+    columns = rotation_from_6d(rotation_6d)
+    return torch.stack([columns[:, :, 2], columns[:, :, 0], columns[:, :, 1]], dim=2)
+
+
+def keypoint_means(logits: Tensor) -> Tensor:
+    """Expectation over bins in units of the crop's side: (…, bins) to (…,)."""
+    low, high = SPAN
+    centres = low + (high - low) * (torch.arange(BINS, device=logits.device) + 0.5) / BINS
+    return (logits.softmax(-1) * centres).sum(-1)
+
+
+def spread_factor(raw: Tensor) -> Tensor:
+    """(N, 6) to the lower Cholesky factor (N, 3, 3) of the rotation's covariance, in rad."""
+    scale = torch.exp(raw[:, :3].clamp(-5.0, 1.0))
+    zero = torch.zeros_like(raw[:, 0])
+    rows = [
+        torch.stack([scale[:, 0], zero, zero], dim=1),
+        torch.stack([raw[:, 3] * scale[:, 0], scale[:, 1], zero], dim=1),
+        torch.stack([raw[:, 4] * scale[:, 0], raw[:, 5] * scale[:, 1], scale[:, 2]], dim=1),
+    ]
+    return torch.stack(rows, dim=1)
+
+
+class HeadExport(nn.Module):
+    """The network with the outputs of the shipped layout (see ``perception/models/head_pose.md``).
+
+    Args:
+        net: trained.
+        rotation_factor: what calibration multiplies the rotation's standard deviations with.
+        side_factor: likewise for the crop's side.
+        keypoint_factor: likewise for the keypoints.
+    """
+
+    names = (
+        "rotation",
+        "rotation_covariance",
+        "keypoints",
+        "keypoints_std",
+        "visible",
+        "centre",
+        "side_m",
+        "side_log_std",
+        "head",
+    )
+
+    def __init__(
+        self,
+        net: HeadNet,
+        rotation_factor: float = 1.0,
+        side_factor: float = 1.0,
+        keypoint_factor: float = 1.0,
+    ) -> None:
+        super().__init__()
+        self.net = net
+        self.factors = (rotation_factor, side_factor, keypoint_factor)
+
+    def forward(self, x: Tensor) -> tuple[Tensor, ...]:
+        """(N, 3, 64, 64) to the nine outputs in the order of :attr:`names`."""
+        out = self.net(x)
+        factor = spread_factor(out["rotation_spread"]) * self.factors[0]
+        seen = torch.sigmoid(out["seen"])
+        return (
+            head_rotation(out["rotation_6d"]),
+            factor @ factor.transpose(1, 2),
+            torch.stack([keypoint_means(out["u"]), keypoint_means(out["v"])], dim=2),
+            torch.exp(out["keypoint_log_std"].clamp(-7.0, 1.0)) * self.factors[2],
+            seen[:, :KEYPOINTS],
+            0.5 + 0.25 * out["place"][:, :2],
+            0.40 * torch.exp(0.25 * out["place"][:, 2]),
+            torch.exp(out["side_log_std"].clamp(-5.0, 1.0)) * self.factors[1],
+            seen[:, KEYPOINTS],
+        )

@@ -1,0 +1,137 @@
+"""Crops of people to learn from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from ._augment import covered, degraded, inside_of, similarity, warp, with_surroundings
+from ._fit import Batch
+from ._pose_net import HEIGHT, WIDTH
+from ._samples import PersonTruth, picture, read_shards
+
+_SWAP: Final = [0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 16, 15]
+_PADDING: Final = 1.25
+_FEWEST_PX: Final = 12.0
+
+
+@dataclass
+class PersonSample:
+    """A person at the camera's own resolution. Pixels from the corner of ``image``."""
+
+    image: NDArray[np.uint8]
+    box: NDArray[np.float64]
+    keypoints: NDArray[np.float64]
+    keypoints_root_m: NDArray[np.float64]
+    visible: NDArray[np.bool_]
+
+
+class PoseData:
+    """All people of some shards, in memory; :meth:`batch` draws and distorts them."""
+
+    def __init__(self, folder: Path, seed: int, first: int = 0, last: int | None = None) -> None:
+        self._seed = seed
+        self.people: list[PersonSample] = []
+        for shard in read_shards(folder, first, last):
+            for patch in shard["people"]:
+                self._add(picture(patch.png), patch.origin_px, patch.size_px, patch.person)
+            for frame in shard["frames"]:
+                image = picture(frame.png)
+                size = (image.shape[1], image.shape[0])
+                for person in frame.people:
+                    self._add(image, (0, 0), size, person)
+
+    def _add(
+        self,
+        image: NDArray[np.uint8],
+        origin: tuple[int, int],
+        size: tuple[int, int],
+        person: PersonTruth,
+    ) -> None:
+        box = person.box_xyxy_px.astype(np.float64)
+        extent = box[2:] - box[:2]
+        if extent.min() < _FEWEST_PX or person.visible.sum() < 3:
+            return
+        # A crop never reaches farther than this, distorted as it may be.
+        half = 0.5 * _PADDING * max(extent[0], extent[1] * WIDTH / HEIGHT) * 1.25
+        half = np.array([half, half * HEIGHT / WIDTH])
+        middle = 0.5 * (box[:2] + box[2:])
+        low = np.maximum(np.floor(middle - half).astype(int) - origin, 0)
+        high = np.minimum(np.ceil(middle + half).astype(int) - origin, image.shape[1::-1])
+        cut = np.ascontiguousarray(image[low[1] : high[1], low[0] : high[0]])
+        corner = (int(low[0]) + origin[0], int(low[1]) + origin[1])
+        cut, corner = with_surroundings(cut, corner, size, int(0.12 * extent.max()) + 2)
+        at = np.array(corner, dtype=np.float64)
+        self.people.append(
+            PersonSample(
+                cut,
+                box - [*at, *at],
+                person.keypoints_px.astype(np.float64) + 0.5 - at,
+                person.keypoints_root_m.astype(np.float64),
+                person.visible,
+            )
+        )
+
+    def batch(self, step: int, count: int = 32) -> Batch:
+        """``count`` crops; the same for the same step."""
+        rng = np.random.default_rng([self._seed, 32, step])
+        return _stacked([self._distorted(rng) for _ in range(count)])
+
+    def still(self, start: int, stop: int) -> Batch:
+        """Crops ``start`` to ``stop`` as in use."""
+        return _stacked([_crop(p, np.zeros(2), 1.0, 0.0, flip=False) for p in self.people[start:stop]])
+
+    def _distorted(self, rng: np.random.Generator) -> dict[str, Any]:
+        person = self.people[int(rng.integers(len(self.people)))]
+        sample = _crop(
+            person,
+            np.clip(rng.normal(0.0, 0.035, 2), -0.12, 0.12),
+            float(np.exp(np.clip(rng.normal(0.0, 0.09), -0.22, 0.22))),
+            np.radians(rng.normal(0.0, 7.0)) if rng.random() < 0.5 else 0.0,
+            flip=bool(rng.random() < 0.5),
+        )
+        if rng.random() < 0.3:
+            other = self.people[int(rng.integers(len(self.people)))].image
+            sample["image"], box = covered(sample["image"], rng, other)
+            sample["visible"] = sample["visible"] & ~inside_of(sample["keypoints"], box)
+        sample["image"] = degraded(sample["image"], rng)
+        return sample
+
+
+def _crop(
+    person: PersonSample, shift: NDArray[np.float64], enlarged: float, angle: float, *, flip: bool
+) -> dict[str, Any]:
+    extent = (person.box[2:] - person.box[:2]) * _PADDING
+    width = max(extent[0], extent[1] * WIDTH / HEIGHT) * enlarged
+    height = width * HEIGHT / WIDTH
+    middle = 0.5 * (person.box[:2] + person.box[2:]) + shift * [width, height]
+    matrix = similarity(middle, WIDTH / width, angle, (WIDTH, HEIGHT), flip=flip)
+    image = warp(person.image, matrix, (WIDTH, HEIGHT))
+    keypoints = person.keypoints @ matrix[:, :2].T + matrix[:, 2]
+    depth, visible = person.keypoints_root_m[:, 2], person.visible
+    if flip:
+        keypoints, depth, visible = keypoints[_SWAP], depth[_SWAP], visible[_SWAP]
+    within = inside_of(keypoints, np.array([0.0, 0.0, WIDTH, HEIGHT]))
+    return {
+        "image": image,
+        "keypoints": keypoints,
+        "within": within,
+        "visible": visible & within,
+        "depth": depth,
+    }
+
+
+def _stacked(samples: list[dict[str, Any]]) -> Batch:
+    batch = {
+        key: torch.from_numpy(np.stack([np.asarray(s[key], np.float32) for s in samples]))
+        for key in samples[0]
+        if key != "image"
+    }
+    images = np.stack([sample["image"] for sample in samples])
+    batch["image"] = torch.from_numpy(images).permute(0, 3, 1, 2)
+    return batch

@@ -1,0 +1,214 @@
+"""Pictures to learn from: whole frames, exact crops of people and of heads, with their truth.
+
+A scene is one shard, a file written whole or not at all; shards that are there are not made again.
+Crops are rendered at the camera's own resolution through the rectangle of the picture that they
+fill, with the hall around them, so that a crop equals that part of a whole picture at a tenth of
+its cost.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import pickle
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+import cv2
+import numpy as np
+from tqdm import tqdm
+
+from perception.anthropometry import HEAD_TEMPLATE_M
+from perception.layouts import LEFT_HIP, RIGHT_HIP
+from sim_tests._sight import keypoints_in_front
+from sim_tests.people._worker import Worker
+from sim_tests.sets._render_config import RenderConfig
+from sim_tests.sets._render_scene import RenderScene, pose_at_random
+
+from ._recipe import Recipe
+from ._samples import HEAD_CENTRE_HEAD_M, HEAD_SIDE_M, Frame, Patch, PersonTruth
+
+_BODY: Final = 17
+_SIZES: Final = ((640, 480), (640, 480), (640, 480), (848, 480), (800, 600))
+_FEWEST_PIXELS: Final = 60
+#: Around a head, the disk in which its pixels are counted.
+_HEAD_RADIUS_M: Final = 0.08
+
+
+def shard_path(folder: Path, scene: int) -> Path:
+    """Where a scene's pictures are."""
+    return folder / f"scene{scene:04d}.pkl"
+
+
+def make_shards(recipe: Recipe, workers: tuple[str, ...], folder: Path, processes: int = 2) -> None:
+    """Render the scenes that are missing.
+
+    Args:
+        recipe: how many and what.
+        workers: ``.npz`` files of the crowd.
+        folder: of the shards.
+        processes: rendering at once.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    todo = [scene for scene in range(recipe.scenes) if not shard_path(folder, scene).exists()]
+    context = multiprocessing.get_context("spawn")
+    # PyBullet keeps the memory of a closed world; fresh processes give it back.
+    with context.Pool(processes, maxtasksperchild=6) as pool:
+        task = partial(_make_shard, recipe, workers, folder)
+        for _ in tqdm(pool.imap_unordered(task, todo), total=len(todo), desc="scenes"):
+            pass
+
+
+def _make_shard(recipe: Recipe, workers: tuple[str, ...], folder: Path, scene: int) -> None:
+    cv2.setNumThreads(1)
+    rng = np.random.default_rng([recipe.seed, 11, scene])
+    with RenderScene(_config(recipe, workers, rng), scene) as hall:
+        shard = {
+            "frames": [_frame(hall, rng) for _ in range(recipe.frames)],
+            "people": list(_patches(hall, rng, recipe.person_patches, whole=True)),
+            "heads": list(_patches(hall, rng, recipe.head_patches, whole=False)),
+        }
+    path = shard_path(folder, scene)
+    part = path.with_suffix(".part")
+    part.write_bytes(pickle.dumps(shard, protocol=pickle.HIGHEST_PROTOCOL))
+    part.replace(path)
+
+
+def _config(recipe: Recipe, workers: tuple[str, ...], rng: np.random.Generator) -> RenderConfig:
+    """A camera much like the one of the rendered sets, and now and then a little different."""
+    width, height = _SIZES[int(rng.integers(len(_SIZES)))]
+    return RenderConfig(
+        frames=10_000_000,
+        scenes=recipe.scenes,
+        people=4,
+        width_px=width,
+        height_px=height,
+        horizontal_fov_deg=float(rng.uniform(55.0, 72.0)),
+        min_range_m=1.0,
+        max_range_m=8.5,
+        seed=recipe.seed + 1_000_003,
+        workers=workers,
+        layouts=recipe.layouts,
+        variants=recipe.variants,
+    )
+
+
+def _frame(hall: RenderScene, rng: np.random.Generator) -> Frame:
+    camera = hall.camera
+    T_odom_camera = hall.arrange(rng)
+    view = hall.renderer.render(camera, T_odom_camera)
+    people = []
+    for worker in hall.workers:
+        truth = _truth(hall, worker, T_odom_camera, view, (0, 0))
+        if truth is not None:
+            people.append(truth)
+    return Frame(_packed(view.rgb), tuple(people), camera.fx_px)
+
+
+def _patches(
+    hall: RenderScene, rng: np.random.Generator, wanted: int, *, whole: bool
+) -> Iterator[Patch]:
+    """Crops of people, or of heads in four attitudes each."""
+    camera = hall.camera
+    size = np.array([camera.width_px, camera.height_px])
+    made = 0
+    while made < wanted:
+        T_odom_camera = hall.arrange(rng)
+        # Whoever takes no part waits outside the hall.
+        here = [w for w in hall.workers if w.position_odom_m[0] > hall.warehouse.layout.x_min_m]
+        for worker in here:
+            for attitude in range(1 if whole else 4):
+                if attitude:
+                    x, y = worker.position_odom_m.tolist()
+                    pose_at_random(worker, (x, y), T_odom_camera[:3, 3], rng)
+                box = _rectangle(camera, T_odom_camera, worker, whole=whole)
+                low = np.clip(np.floor(box[:2]), 0, size).astype(int)
+                high = np.clip(np.ceil(box[2:]), 0, size).astype(int)
+                if (high - low).min() < 6:
+                    continue
+                view = hall.renderer.render(camera, T_odom_camera, [*low.tolist(), *high.tolist()])
+                truth = _truth(hall, worker, T_odom_camera, view, (int(low[0]), int(low[1])))
+                if truth is None:
+                    continue
+                yield Patch(
+                    _packed(view.rgb),
+                    (int(low[0]), int(low[1])),
+                    (camera.width_px, camera.height_px),
+                    (camera.fx_px, camera.cx_px, camera.cy_px),
+                    truth,
+                )
+                made += 1
+
+
+def _rectangle(camera: Any, T_odom_camera: Any, worker: Worker, *, whole: bool) -> Any:
+    """What to render: the body with all that a crop may show of its surroundings."""
+    if whole:
+        pixels = camera.project(_in_camera(T_odom_camera, worker.keypoints_odom_m))
+        low, high = np.nanmin(pixels, axis=0), np.nanmax(pixels, axis=0)
+        pad = 0.30 * (high - low) + 0.10 * (high - low).max()
+        return np.concatenate([low - pad, high + pad])
+    centre = _head_centre(T_odom_camera, worker)
+    half = 0.80 * HEAD_SIDE_M * camera.fx_px / centre[2]
+    pixel = camera.project(centre[None])[0]
+    return np.concatenate([pixel - half, pixel + half])
+
+
+def _truth(
+    hall: RenderScene, worker: Worker, T_odom_camera: Any, view: Any, origin: tuple[int, int]
+) -> PersonTruth | None:
+    """Truth in pixels of the whole picture; None for somebody who does not show."""
+    mask = view.actors == worker.actor
+    seen = int(np.count_nonzero(mask))
+    if seen < _FEWEST_PIXELS // 4:
+        return None
+    camera = hall.camera
+    points = _in_camera(T_odom_camera, worker.keypoints_odom_m[:_BODY])
+    if points[:, 2].min() < 0.2:
+        return None
+    pixels = camera.project(points)
+    visible = keypoints_in_front(points, pixels - origin, view.depth_m)
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    box = np.array([columns[0], rows[0], columns[-1] + 1, rows[-1] + 1]) + [*origin, *origin]
+    rotation = T_odom_camera[:3, :3].T @ worker.rotation_odom_head
+    centre = points[0] + rotation @ HEAD_CENTRE_HEAD_M
+    pixel = camera.project(centre[None])[0]
+    return PersonTruth(
+        box_xyxy_px=box.astype(np.float32),
+        keypoints_px=pixels.astype(np.float32),
+        keypoints_root_m=(points - points[[LEFT_HIP, RIGHT_HIP]].mean(axis=0)).astype(np.float32),
+        visible=visible,
+        rotation_camera_head=rotation.astype(np.float32),
+        head_centre_camera_m=centre.astype(np.float32),
+        head_keypoints_camera_m=points[: len(HEAD_TEMPLATE_M)].astype(np.float32),
+        head_seen=_head_seen(mask, pixel - origin, _HEAD_RADIUS_M * camera.fx_px / centre[2]),
+        pixels=seen,
+        depth_m=float(centre[2]),
+    )
+
+
+def _head_seen(mask: Any, pixel: Any, radius_px: float) -> float:
+    """Share of the disk about the head's centre that shows this person."""
+    height, width = mask.shape
+    v, u = np.mgrid[-1:1:9j, -1:1:9j].reshape(2, -1)
+    inside = u**2 + v**2 <= 1.0
+    columns = np.floor(pixel[0] + radius_px * u[inside] + 0.5).astype(int)
+    rows = np.floor(pixel[1] + radius_px * v[inside] + 0.5).astype(int)
+    good = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
+    return float(mask[rows[good], columns[good]].sum() / len(good))
+
+
+def _head_centre(T_odom_camera: Any, worker: Worker) -> Any:
+    centre = worker.keypoints_odom_m[0] + worker.rotation_odom_head @ HEAD_CENTRE_HEAD_M
+    return _in_camera(T_odom_camera, centre[None])[0]
+
+
+def _in_camera(T_odom_camera: Any, points_odom_m: Any) -> Any:
+    return (points_odom_m - T_odom_camera[:3, 3]) @ T_odom_camera[:3, :3]
+
+
+def _packed(rgb: Any) -> bytes:
+    good, data = cv2.imencode(".png", rgb[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 1])
+    if not good:
+        raise RuntimeError("a picture could not be encoded")
+    return bytes(data)
