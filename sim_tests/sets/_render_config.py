@@ -6,7 +6,7 @@ import math
 import re
 from typing import Any, ClassVar, Literal
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 
 from perception import Camera
 from tracking.config import StrictConfig
@@ -69,15 +69,22 @@ class RenderConfig(StrictConfig):
             )
         if not 0 <= self.variants[0] <= self.variants[1]:
             raise ValueError(f"variants must be 0 <= first <= last, got {self.variants}")
-        for layout in self.layouts or ():
-            if layout not in LAYOUTS:
-                raise ValueError(f"layouts must be of {', '.join(LAYOUTS)}, got {layout!r}")
-        for name in self.workers or ():
-            if not name.endswith(".npz") and name not in worker_names():
-                raise ValueError(
-                    f"workers must be .npz files or of {', '.join(worker_names())}, got {name!r}"
-                )
         return self
+
+    @field_validator("workers")
+    @classmethod
+    def _known_workers(cls, names: tuple[str, ...] | None) -> tuple[str, ...] | None:
+        unknown = [n for n in names or () if not n.endswith(".npz") and n not in worker_names()]
+        if unknown:
+            raise ValueError(f"must be .npz files or of {', '.join(worker_names())}")
+        return names
+
+    @field_validator("layouts")
+    @classmethod
+    def _known_layouts(cls, names: tuple[str, ...] | None) -> tuple[str, ...] | None:
+        if not set(names or ()) <= set(LAYOUTS):
+            raise ValueError(f"must be of {', '.join(LAYOUTS)}")
+        return names
 
     @classmethod
     def checked(cls, **values: Any) -> RenderConfig:

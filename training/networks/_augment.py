@@ -6,9 +6,7 @@ from typing import Any, Final
 
 import cv2
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 OUTSIDE_GREY: Final = 114
 
@@ -64,7 +62,12 @@ def warp(
 
 
 def similarity(
-    centre: NDArray[np.float64], scale: float, angle_rad: float, size: tuple[int, int], *, flip: bool
+    centre: NDArray[np.float64],
+    scale: float,
+    angle_rad: float,
+    size: tuple[int, int],
+    *,
+    flip: bool,
 ) -> NDArray[np.float64]:
     """(2, 3) that takes ``centre`` to the middle of the result, enlarged, turned, mirrored."""
     c, s = scale * np.cos(angle_rad), scale * np.sin(angle_rad)
@@ -117,22 +120,3 @@ def covered(
 def inside_of(points: NDArray[Any], box: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Which points (…, 2) lie in a rectangle."""
     return np.asarray(((points >= box[:2]) & (points <= box[2:])).all(axis=-1))
-
-
-def photographed(batch: Tensor, generator: torch.Generator) -> Tensor:
-    """Exposure, contrast, colour cast, faded colour and noise on (N, 3, H, W) in 0–255."""
-    n = len(batch)
-
-    def uniform(low: float, high: float, *shape: int) -> Tensor:
-        return low + (high - low) * torch.rand(n, *shape, generator=generator)
-
-    out = batch.float()
-    out = (out - 128.0) * uniform(0.6, 1.4, 1, 1, 1) + 128.0 + uniform(-35.0, 35.0, 1, 1, 1)
-    out = out * uniform(0.85, 1.15, 3, 1, 1)
-    fade = uniform(-0.6, 0.6, 1, 1, 1).clamp(min=0.0)
-    out = out * (1.0 - fade) + fade * out.mean(1, keepdim=True)
-    gamma = torch.exp(uniform(-0.35, 0.35, 1, 1, 1))
-    out = 255.0 * (out.clamp(1.0, 255.0) / 255.0) ** gamma
-    noise = uniform(-8.0, 12.0, 1, 1, 1).clamp(min=0.0)
-    out = out + noise * torch.randn(out.shape, generator=generator)
-    return out.clamp(0.0, 255.0)

@@ -60,7 +60,10 @@ class DetectorData:
     def still(self, start: int, stop: int) -> Batch:
         """Pictures ``start`` to ``stop`` as in use: letterboxed, the whole of each."""
         return _stacked(
-            [_placed(frame, _fit_scale(frame.image), np.zeros(2)) for frame in self.frames[start:stop]]
+            [
+                _placed(frame, _fit_scale(frame.image), np.zeros(2))
+                for frame in self.frames[start:stop]
+            ]
         )
 
     def _distorted(self, rng: np.random.Generator) -> FrameSample:
@@ -152,5 +155,3 @@ def _stacked(samples: list[FrameSample]) -> Batch:
         "boxes": torch.from_numpy(boxes),
         "kind": torch.from_numpy(kind),
     }
-
-

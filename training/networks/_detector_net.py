@@ -35,7 +35,7 @@ class DetectorNet(nn.Module):
         self.register_buffer("strides", strides, persistent=False)
 
     def forward(self, x: Tensor) -> tuple[Tensor, Tensor]:
-        """(N, 3, 256, 320) to logits (N, cells) and boxes (N, cells, 4) x1, y1, x2, y2 in pixels."""
+        """(N, 3, 256, 320) to logits (N, cells) and corners of boxes (N, cells, 4) in pixels."""
         maps = self.backbone(x)
         levels = [lateral(part) for lateral, part in zip(self.lateral, maps, strict=True)]
         for finer in (1, 0):

@@ -10,10 +10,10 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F  # noqa: N812
 
-from ._augment import photographed
 from ._detector_data import DetectorData
 from ._detector_net import DetectorNet
 from ._fit import Batch, fit
+from ._photograph import photographed
 from ._recipe import Recipe
 
 _TOP: Final = 10
@@ -73,8 +73,8 @@ def assigned(
     """Which cells answer for which person.
 
     Returns:
-        quality (N, cells): what the score is to be, 0 where nobody is; owner (N, cells): row of the person;
-        unasked (N, cells): cells within somebody of whom too little shows.
+        quality (N, cells): what the score is to be, 0 where nobody is; owner (N, cells): row of
+        the person; unasked (N, cells): cells within somebody of whom too little shows.
     """
     truth, kind = batch["boxes"], batch["kind"]
     low, high = truth[:, :, None, :2], truth[:, :, None, 2:]
@@ -98,7 +98,9 @@ def assigned(
     # A cell answers for one person: the one that it overlaps most.
     rank = torch.where(chosen, iou + 1e-6, torch.zeros_like(iou))
     best, owner = rank.max(1)
-    own = chosen & (torch.arange(truth.shape[1], device=owner.device)[None, :, None] == owner[:, None])
+    own = chosen & (
+        torch.arange(truth.shape[1], device=owner.device)[None, :, None] == owner[:, None]
+    )
     score = metric * own
     largest = score.amax(2, keepdim=True).clamp(min=1e-9)
     reach = (iou * own).amax(2, keepdim=True)

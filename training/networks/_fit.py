@@ -38,7 +38,7 @@ def fit(
         name: of the checkpoint file.
         net: to be trained.
         batch_of: the batch of a step; the same for the same step, so that training can be resumed.
-        loss_of: network, batch and share of the training done, to named losses whose sum is minimised.
+        loss_of: network, batch and share of the training done, to named losses to minimise.
         steps: of the optimiser, under a cosine schedule.
         folder: of the checkpoints and the log.
         learning_rate: the highest.
@@ -92,7 +92,10 @@ def fit(
                 sums[key] = sums.get(key, 0.0) + float(value.detach())
             if (step + 1) % _EVERY == 0 or step + 1 == steps:
                 since = (step % _EVERY) + 1
-                record: dict[str, Any] = {"step": step + 1, "minutes": (time.perf_counter() - started) / 60}
+                record: dict[str, Any] = {
+                    "step": step + 1,
+                    "minutes": (time.perf_counter() - started) / 60,
+                }
                 record |= {key: value / since for key, value in sums.items()}
                 if judge is not None and ((step + 1) % (4 * _EVERY) == 0 or step + 1 == steps):
                     record |= judge(average)

@@ -50,7 +50,9 @@ def ray_from_camera(ray: NDArray[np.float64]) -> NDArray[np.float64]:
     x, y, z = ray / np.linalg.norm(ray)
     # Rodrigues for the axis (y, −x, 0) that is perpendicular to the ray and to z.
     k = 1.0 / (1.0 + z)
-    return np.array([[1.0 - k * x * x, -k * x * y, -x], [-k * x * y, 1.0 - k * y * y, -y], [x, y, z]])
+    return np.array(
+        [[1.0 - k * x * x, -k * x * y, -x], [-k * x * y, 1.0 - k * y * y, -y], [x, y, z]]
+    )
 
 
 class HeadData:
@@ -85,7 +87,9 @@ class HeadData:
         rng = np.random.default_rng([self._seed, 23, start])
         return _stacked(
             [
-                _crop(head, rng.normal(0, jitter, 2), np.exp(rng.normal(0, spread)), 0.0, flip=False)
+                _crop(
+                    head, rng.normal(0, jitter, 2), np.exp(rng.normal(0, spread)), 0.0, flip=False
+                )
                 for head in self.heads[start:stop]
             ]
         )

@@ -1,4 +1,4 @@
-"""The head network: a 64 × 64 crop to rotation, keypoints, visibility, place, and how sure it is."""
+"""The head network: a 64 × 64 crop to rotation, keypoints, place, and how sure it is."""
 
 from __future__ import annotations
 

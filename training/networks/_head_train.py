@@ -10,11 +10,11 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F  # noqa: N812
 
-from ._augment import photographed
 from ._blocks import cross_entropy, soft_labels
 from ._fit import Batch, fit
 from ._head_data import HeadData
 from ._head_net import BINS, SPAN, HeadNet, head_rotation, keypoint_means, spread_factor
+from ._photograph import photographed
 from ._recipe import Recipe
 
 MEAN, STD = 120.0, 60.0
@@ -68,7 +68,9 @@ def head_loss(net: nn.Module, batch: Batch, done: float) -> dict[str, Tensor]:
     within = ((target > low) & (target < high)).all(-1).float()
     # What is hidden is still to be placed, but matters less.
     matters = within * (0.3 + 0.7 * batch["visible"])
-    entropy = cross_entropy(out["u"], soft_labels(bins[..., 0].cpu(), BINS, 1.0, 1.2).to(bins.device))
+    entropy = cross_entropy(
+        out["u"], soft_labels(bins[..., 0].cpu(), BINS, 1.0, 1.2).to(bins.device)
+    )
     entropy = entropy + cross_entropy(
         out["v"], soft_labels(bins[..., 1].cpu(), BINS, 1.0, 1.2).to(bins.device)
     )

@@ -84,7 +84,9 @@ class PoseData:
 
     def still(self, start: int, stop: int) -> Batch:
         """Crops ``start`` to ``stop`` as in use."""
-        return _stacked([_crop(p, np.zeros(2), 1.0, 0.0, flip=False) for p in self.people[start:stop]])
+        return _stacked(
+            [_crop(p, np.zeros(2), 1.0, 0.0, flip=False) for p in self.people[start:stop]]
+        )
 
     def _distorted(self, rng: np.random.Generator) -> dict[str, Any]:
         person = self.people[int(rng.integers(len(self.people)))]

@@ -10,11 +10,11 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F  # noqa: N812
 
-from ._augment import photographed
 from ._blocks import cross_entropy, soft_labels
 from ._fit import Batch, fit
 from ._pose_data import PoseData
 from ._pose_net import BINS_X, BINS_Y, BINS_Z, SPLIT, PoseNet, z_bins, z_metres
+from ._photograph import photographed
 from ._recipe import Recipe
 
 MEAN: Final = (123.675, 116.28, 103.53)

@@ -80,7 +80,7 @@ class Patch:
 def read_shards(folder: Path, first: int = 0, last: int | None = None) -> Iterator[dict[str, Any]]:
     """The shards of a folder in order."""
     for path in sorted(folder.glob("scene*.pkl"))[first:last]:
-        yield pickle.loads(path.read_bytes())  # noqa: S301 - our own files
+        yield pickle.loads(path.read_bytes())
 
 
 def picture(png: bytes) -> NDArray[np.uint8]:

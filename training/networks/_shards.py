@@ -169,7 +169,7 @@ def _truth(
     pixels = camera.project(points)
     visible = keypoints_in_front(points, pixels - origin, view.depth_m)
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    box = np.array([columns[0], rows[0], columns[-1] + 1, rows[-1] + 1]) + [*origin, *origin]
+    box = np.array([columns[0], rows[0], columns[-1] + 1, rows[-1] + 1]) + np.tile(origin, 2)
     rotation = T_odom_camera[:3, :3].T @ worker.rotation_odom_head
     centre = points[0] + rotation @ HEAD_CENTRE_HEAD_M
     pixel = camera.project(centre[None])[0]

@@ -13,7 +13,10 @@ from ._person import Colour, Person
 # A plane of skin tones: from light to dark, and how far a tone strays towards red or yellow.
 _LIGHT_SKIN: Final = np.array([242.0, 202.0, 178.0])
 _DARK_SKIN: Final = np.array([70.0, 46.0, 36.0])
-_HAIR: Final = ((24, 20, 20), (52, 34, 24), (96, 62, 40), (150, 112, 66), (196, 158, 98), (140, 62, 30), (134, 132, 130), (206, 204, 200))  # fmt: skip
+_HAIR: Final = (
+    (24, 20, 20), (52, 34, 24), (96, 62, 40), (150, 112, 66),
+    (196, 158, 98), (140, 62, 30), (134, 132, 130), (206, 204, 200),
+)  # fmt: skip
 _HI_VIS: Final = ((214, 236, 40), (250, 104, 24), (240, 60, 110), (120, 220, 60))
 _TOPS: Final = ("tshirt", "polo", "shirt", "checked", "hoodie", "jacket", "overalls")
 _STYLES: Final = ("short", "crop", "bob", "bun", "ponytail", "bald")

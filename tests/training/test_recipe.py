@@ -1,0 +1,70 @@
+"""What the networks learn from stays apart from what they are judged on."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from perception.networks._head_crop import head_crop
+from sim_tests.hall._layout import LAYOUTS
+from sim_tests.sets._render_config import RenderConfig
+from training.networks._augment import similarity, warp, with_surroundings
+from training.networks._recipe import Recipe
+from training.workers._people import PEOPLE
+from training.workers._random import random_person
+
+
+def test_judging_has_halls_goods_and_colours_of_its_own():
+    recipe = Recipe()
+    held_out = recipe.held_out()
+    shipped = RenderConfig()
+    assert set(LAYOUTS) - set(recipe.layouts) == {"crossing", "staging_hall"}
+    assert shipped.variants[1] < recipe.variants[0]
+    assert recipe.variants[1] < held_out.variants[0]
+    assert held_out.seed != recipe.seed
+
+
+def test_a_random_crowd_is_the_same_for_the_same_seed_and_nobody_who_ships():
+    crowd = [random_person(number) for number in range(60)]
+    assert crowd == [random_person(number) for number in range(60)]
+    assert crowd[0] != random_person(0, seed=1)
+    assert not {person.name for person in crowd} & {person.name for person in PEOPLE}
+
+
+def test_a_random_crowd_is_as_varied_as_a_warehouse():
+    crowd = [random_person(number) for number in range(200)]
+    statures = np.array([person.stature_m for person in crowd])
+    assert statures.min() >= 1.48
+    assert statures.max() <= 2.0
+    assert statures.std() > 0.07
+    brightness = np.array([sum(person.skin) for person in crowd])
+    assert brightness.min() < 260
+    assert brightness.max() > 540
+    assert {person.headwear[0] for person in crowd} == {"none", "cap", "helmet"}
+    assert {person.hair for person in crowd} == {"short", "crop", "bob", "bun", "ponytail", "bald"}
+    for person in crowd:
+        colours = (person.skin, person.top_colour, person.trousers, person.hair_colour)
+        assert all(0 <= value <= 255 for colour in colours for value in colour)
+
+
+@pytest.mark.parametrize("side", [20.0, 41.3, 64.0, 97.0, 150.5])
+def test_the_head_crop_of_training_is_the_head_crop_of_use(side):
+    image = np.random.default_rng(4).integers(0, 256, (240, 320, 3), np.uint8)
+    centre = np.array([171.3, 118.8])
+    oversampling = max(1, int(np.ceil(side / 64)))
+    # Training counts from the picture's corner, use from the middle of its first pixel.
+    matrix = similarity(centre + 0.5, 64 / side, 0.0, (64, 64), flip=False)
+    theirs = warp(image, matrix, (64, 64), oversampling)
+    ours = head_crop(image, centre, side)
+    # OpenCV rounds coordinates to 1/32 pixel, the two ways round differently.
+    assert np.abs(theirs.astype(int) - ours.astype(int)).mean() < 3.0
+    assert np.corrcoef(theirs.ravel(), ours.ravel())[0, 1] > 0.999
+
+
+def test_surroundings_are_grey_beyond_the_picture_and_repeated_within():
+    patch = np.full((10, 12, 3), 200, np.uint8)
+    larger, origin = with_surroundings(patch, (0, 20), (640, 480), 4)
+    assert larger.shape == (18, 20, 3)
+    assert origin == (-4, 16)
+    assert (larger[4:-4, :4] == 114).all()
+    assert (larger[:, 4:] == 200).all()

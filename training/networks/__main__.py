@@ -1,0 +1,129 @@
+"""``python -m training.networks``: makes the networks that ship with ``perception``.
+
+Crowd, pictures, three networks, export; every stage goes on where it was interrupted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+import cv2
+import torch
+from torch import nn
+
+from perception._shipped import write_manifest
+
+from ._detector_net import DetectorNet
+from ._detector_train import train_detector
+from ._export import export_detector, export_head, export_pose
+from ._head_data import HeadData
+from ._head_net import HeadNet
+from ._head_train import calibration, predictions, train_head
+from ._pose_net import PoseNet
+from ._pose_train import train_pose
+from ._recipe import Recipe
+from ._shards import make_shards
+
+_ROOT: Final = Path(__file__).parents[2]
+_MODELS: Final = _ROOT / "perception" / "models"
+_STAGES: Final = ("data", "head", "pose", "detector", "export")
+_TRAINERS: Final[dict[str, Callable[[Recipe, Path, Path, Path], nn.Module]]] = {
+    "head": train_head,
+    "pose": train_pose,
+    "detector": train_detector,
+}
+_ENTRIES: Final = (
+    {
+        "name": "person_detector",
+        "licence": "Apache-2.0",
+        "input": "(1, 3, 256, 320) RGB / 255, centred letterbox 114",
+        "summary": "Finds people; YOLOv8's layout. Made for the simulator.",
+    },
+    {
+        "name": "person_pose",
+        "licence": "Apache-2.0",
+        "input": "(N, 3, 192, 144) RGB, ImageNet mean and standard deviation, box padding 1.25",
+        "summary": "COCO's 17 keypoints in the image and in depth; RTMW3D's layout. Made for the "
+        "simulator.",
+    },
+    {
+        "name": "head_pose",
+        "licence": "Apache-2.0",
+        "input": "(N, 3, 64, 64) RGB, mean 120, standard deviation 60, square head crop",
+        "summary": "Rotation, keypoints, visibility and place of a head, each with its "
+        "uncertainty. Made for the simulator.",
+    },
+)
+
+
+def main() -> None:
+    """Run the stages asked for; all by default."""
+    parser = argparse.ArgumentParser(prog="python -m training.networks", description=__doc__)
+    parser.add_argument(
+        "stages", nargs="*", metavar="STAGE", help=f"of {', '.join(_STAGES)} (default: all)"
+    )
+    parser.add_argument(
+        "--work", type=Path, default=_ROOT / "build" / "networks", help="folder for what is made"
+    )
+    parser.add_argument("--out", type=Path, default=_MODELS, help="folder for the networks")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--processes", type=int, default=2, help="rendering at once")
+    parser.add_argument("--quick", action="store_true", help="in miniature, to see that it runs")
+    chosen = parser.parse_args()
+    unknown = [stage for stage in chosen.stages if stage not in _STAGES]
+    if unknown:
+        parser.error(f"no stage is called {', '.join(unknown)}; there are {', '.join(_STAGES)}")
+    stages = chosen.stages or list(_STAGES)
+    recipe = replace(Recipe(), seed=chosen.seed)
+    recipe = recipe.quick() if chosen.quick else recipe
+    if chosen.quick and chosen.out == _MODELS:
+        parser.error("--quick needs --out: its networks are useless and must not ship")
+    cv2.setNumThreads(1)
+    work: Path = chosen.work
+    shards, check = work / "shards", work / "shards_check"
+    if "data" in stages:
+        make_shards(recipe, _crowd(recipe, work / "crowd"), shards, chosen.processes)
+        held_out = recipe.held_out()
+        make_shards(held_out, _crowd(held_out, work / "crowd_check"), check, chosen.processes)
+    for name, train in _TRAINERS.items():
+        if name in stages:
+            train(recipe, shards, check, work / "checkpoints")
+    if "export" in stages:
+        _export(recipe, check, work / "checkpoints", chosen.out)
+
+
+def _crowd(recipe: Recipe, folder: Path) -> tuple[str, ...]:
+    """Files of random workers, made where they are missing."""
+    command = ["-m", "training.workers", "--random", str(recipe.crowd), "--jobs", "2"]
+    command += ["--seed", str(recipe.seed), "--out", str(folder)]
+    subprocess.run([sys.executable, *command], cwd=_ROOT, check=True)
+    return tuple(str(path) for path in sorted(folder.glob("*.npz")))
+
+
+def _export(recipe: Recipe, check: Path, checkpoints: Path, out: Path) -> None:
+    """Write what the checkpoints hold, with what calibration on held-out people says."""
+    nets: dict[str, nn.Module] = {"detector": DetectorNet(), "pose": PoseNet(), "head": HeadNet()}
+    for name, net in nets.items():
+        saved = torch.load(checkpoints / f"{name}.pt", map_location="cpu", weights_only=True)
+        net.load_state_dict(saved["average"])
+        net.eval()
+    head, pose, detector = nets["head"], nets["pose"], nets["detector"]
+    assert isinstance(head, HeadNet)
+    assert isinstance(pose, PoseNet)
+    assert isinstance(detector, DetectorNet)
+    factors = calibration(predictions(head, HeadData(check, recipe.seed)))
+    print("standard deviations are multiplied by", factors)
+    export_head(head, out / "head_pose.onnx", factors)
+    export_pose(pose, out / "person_pose.onnx")
+    export_detector(detector, out / "person_detector.onnx")
+    print("written", write_manifest(out, _ENTRIES))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,132 @@
+"""From trained networks to the ONNX files that ship."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import onnx
+import onnxruntime
+import torch
+from torch import nn
+
+from ._detector_net import HEIGHT, STRIDES, WIDTH, DetectorExport, DetectorNet
+from ._head_net import HeadExport, HeadNet
+from ._pose_net import PoseExport, PoseNet
+
+_OPSET: Final = 17
+_LICENCE: Final = "Apache-2.0"
+# What half-precision weights may change, as a share of the output's range.
+_TOLERANCE: Final = 1e-2
+# Weights of fewer elements stay as they are.
+_LARGE: Final = 1024
+
+
+def export_detector(net: DetectorNet, path: Path) -> None:
+    """Write the detector with the metadata by which YOLOv8 exports are recognised."""
+    metadata = {
+        "description": "person detector of awarenav, made for its simulator",
+        "license": _LICENCE,
+        "task": "detect",
+        "stride": str(max(STRIDES)),
+        "imgsz": f"[{HEIGHT}, {WIDTH}]",
+        "batch": "1",
+        "names": "{0: 'person'}",
+    }
+    example = torch.rand(1, 3, HEIGHT, WIDTH)
+    _export(DetectorExport(net), example, "images", path, metadata, dynamic=False)
+
+
+def export_pose(net: PoseNet, path: Path) -> None:
+    """Write the pose network in RTMW3D's layout with COCO's 17 keypoints."""
+    metadata = {
+        "description": "whole-body pose of awarenav, made for its simulator",
+        "license": _LICENCE,
+        "keypoints": "coco",
+        "simcc_split_ratio": "2",
+        "box_padding": "1.25",
+        "z_range_m": "2.1744869",
+    }
+    _export(PoseExport(net), torch.randn(2, 3, 192, 144), "input", path, metadata, dynamic=True)
+
+
+def export_head(net: HeadNet, path: Path, factors: Mapping[str, float]) -> None:
+    """Write the head network with its calibration."""
+    metadata = {
+        "description": "head pose of awarenav, made for its simulator",
+        "license": _LICENCE,
+        "awarenav_model": "head_pose",
+        "awarenav_layout": "1",
+        "crop_side_m": "0.40",
+        "mean": "120",
+        "std": "60",
+        "head_centre_head_m": "-0.045,-0.090,0",
+    }
+    whole = HeadExport(net, factors["rotation"], factors["side"], factors["keypoint"])
+    _export(whole, torch.randn(2, 3, 64, 64), "image", path, metadata, dynamic=True)
+
+
+def _halve(model: onnx.ModelProto) -> None:
+    """Store large weights in half precision; the runtime widens them once, when it loads them."""
+    graph = model.graph
+    casts = []
+    for tensor in graph.initializer:
+        if tensor.data_type != onnx.TensorProto.FLOAT or np.prod(tensor.dims) < _LARGE:
+            continue
+        name = tensor.name
+        half = onnx.numpy_helper.to_array(tensor).astype(np.float16)
+        tensor.CopyFrom(onnx.numpy_helper.from_array(half, name + "_half"))
+        casts.append(onnx.helper.make_node("Cast", [name + "_half"], [name], to=1))
+    nodes = list(graph.node)
+    del graph.node[:]
+    graph.node.extend([*casts, *nodes])
+
+
+def _export(
+    module: Any,
+    example: torch.Tensor,
+    name: str,
+    path: Path,
+    metadata: Mapping[str, str],
+    *,
+    dynamic: bool,
+) -> None:
+    """Export, describe, and compare with PyTorch; the file is written whole or not at all."""
+    assert isinstance(module, nn.Module)
+    module = module.cpu().float().eval()
+    outputs = list(module.names)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_suffix(".part")
+    with torch.no_grad():
+        torch.onnx.export(
+            module,
+            (example,),
+            str(part),
+            input_names=[name],
+            output_names=outputs,
+            opset_version=_OPSET,
+            dynamic_axes={key: {0: "batch"} for key in (name, *outputs)} if dynamic else None,
+            dynamo=False,
+        )
+        wanted = module(example)
+    model = onnx.load(str(part))
+    # The order of entries and the producer's version must not change the file from run to run.
+    model.producer_name, model.producer_version = "awarenav", ""
+    for key in sorted(metadata):
+        entry = model.metadata_props.add()
+        entry.key, entry.value = key, metadata[key]
+    _halve(model)
+    onnx.checker.check_model(model)
+    part.write_bytes(model.SerializeToString(deterministic=True))
+    session = onnxruntime.InferenceSession(part.read_bytes(), providers=["CPUExecutionProvider"])
+    got = session.run(outputs, {name: example.numpy()})
+    for key, ours, theirs in zip(
+        outputs, got, wanted if isinstance(wanted, tuple) else (wanted,), strict=True
+    ):
+        error = float(np.abs(np.asarray(ours) - theirs.numpy()).max())
+        scale = max(1.0, float(theirs.abs().max()))
+        if error > _TOLERANCE * scale:
+            raise RuntimeError(f"{path.name}: {key} differs by {error:g} from PyTorch")
+    part.replace(path)
