@@ -31,10 +31,12 @@ lint: setup ## ruff, import layers, strict types
 
 bench: setup ## measure speed
 	$(AWARENAV) bench
+	$(PY) benchmarks/perception_speed.py
 
+# The extra mediapipe brings another build of OpenCV along, so it is not in the lock.
 lock: setup ## pin the newest packages that pyproject.toml allows, for every supported Python
 	@command -v uv >/dev/null || $(PY) -m pip install --quiet uv
-	PATH="$$PATH:$(VENV)/bin" uv pip compile --universal --python-version 3.10 --all-extras \
+	PATH="$$PATH:$(VENV)/bin" uv pip compile --universal --python-version 3.10 --extra dev \
 		--upgrade --quiet --custom-compile-command "make lock" \
 		--output-file requirements.lock pyproject.toml
 

@@ -7,19 +7,29 @@ from ._attention import AttentionCone
 from ._camera import Camera
 from ._detection import PersonDetection
 from ._errors import PerceptionError
+from ._floor import FloorPlane
+from ._fusion import FusedHeadPoseEstimator
 from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
 from ._observation import PersonObservation
 from ._pipeline import AwarenessPipeline
 from ._pnp import PnpHeadPoseEstimator
 from ._protocols import HeadPoseEstimator, PersonDetector, PoseEstimator
+from .networks._detector import OnnxPersonDetector
+from .networks._head import OnnxHeadPoseEstimator
+from .networks._pose import OnnxPoseEstimator
 
 __all__ = [
     "AttentionCone",
     "AwarenessPipeline",
     "Camera",
+    "FloorPlane",
+    "FusedHeadPoseEstimator",
     "HeadPose",
     "HeadPoseEstimator",
+    "OnnxHeadPoseEstimator",
+    "OnnxPersonDetector",
+    "OnnxPoseEstimator",
     "PerceptionError",
     "PersonDetection",
     "PersonDetector",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from . import layouts as kp
 from ._camera import Camera
 from ._keypoints import PersonKeypoints
-from ._metric_scale import DEFAULT_MIN_SCORE, metric_scale
+from ._metric_scale import DEFAULT_MIN_SCORE, metric_scales
 from .anthropometry import LIMBS, MEAN_STATURE_M, STATURE_RELATIVE_STD
 from .arrays import FloatArray
 
@@ -28,7 +29,13 @@ _BODY_AND_FEET: Final = 23
 _SHOULDER_REACH_M: Final = (0.25, 0.80)
 # What lifting leaves uncertain of the chest within the body: 45 mm a keypoint, averaged over four.
 _LIFT_STD_M: Final = 0.025
+_SHOULDERS: Final = slice(kp.LEFT_SHOULDER, kp.RIGHT_SHOULDER + 1)
+_HIPS: Final = slice(kp.LEFT_HIP, kp.RIGHT_HIP + 1)
 _UP_CAMERA: Final = np.array([0.0, -1.0, 0.0])
+_ITERATIONS: Final = 4
+# Far below what scale leaves uncertain.
+_CONVERGED: Final = 1e-3
+_IDENTITY: Final = np.eye(3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,6 +48,7 @@ class BodyPlacement:
         position_camera_m: (3,) the body's centre line at chest height.
         position_covariance_m2: (3, 3).
         scale_relative_std: the part of the range that scale leaves uncertain.
+        keypoints_camera_m: (17, 3) the whole skeleton, guessed parts included.
     """
 
     shoulders_camera_m: FloatArray | None
@@ -48,6 +56,7 @@ class BodyPlacement:
     position_camera_m: FloatArray
     position_covariance_m2: FloatArray
     scale_relative_std: float
+    keypoints_camera_m: FloatArray
 
 
 def place_body(
@@ -65,86 +74,148 @@ def place_body(
     Returns None when fewer than three keypoints were seen, the skeleton has no limb, or the body
     would lie behind the camera.
     """
-    scale = metric_scale(person, min_score)
-    rows = np.flatnonzero(person.scores[:_BODY_AND_FEET] >= min_score)
-    if scale is None or len(rows) < _MIN_POINTS:
-        return None
-    points = scale.factor * person.keypoints_root_m[rows]
-    rays = camera.normalise(person.keypoints_px[rows])
-    solved = _translation(points, rays, camera.fx_px, keypoint_std_px)
-    if solved is None:
-        return None
-    translation, covariance = solved
-    skeleton = scale.factor * person.keypoints_root_m[:17]
-    seen = person.scores[:17] >= min_score
-    hips = translation + _hips(skeleton, seen)
-    shoulders = _shoulders(skeleton, seen)
-    if shoulders is None:
-        chest = hips + (1.0 - CHEST_FRACTION) * _TORSO_M * _UP_CAMERA
-    else:
-        shoulders = shoulders + translation
-        chest = (1.0 - CHEST_FRACTION) * shoulders.mean(axis=0) + CHEST_FRACTION * hips
-    if chest[2] <= 0.0:
-        return None
-    covariance += scale.relative_std**2 * np.outer(chest, chest) + _LIFT_STD_M**2 * np.eye(3)
-    return BodyPlacement(shoulders, hips, chest, covariance, scale.relative_std)
+    return place_bodies(camera, (person,), keypoint_std_px, min_score)[0]
 
 
-def _translation(
-    points: FloatArray, rays: FloatArray, focal_px: float, keypoint_std_px: float
-) -> tuple[FloatArray, FloatArray] | None:
-    """Weighted solution of (X + tx) − x (Z + tz) = 0 and (Y + ty) − y (Z + tz) = 0."""
-    count = len(points)
-    design = np.zeros((count, 2, 3))
-    design[:, 0, 0] = design[:, 1, 1] = 1.0
-    design[:, :, 2] = -rays
-    target = rays * points[:, 2:] - points[:, :2]
-    weight = np.ones(count)
-    translation = np.zeros(3)
-    for iteration in range(4):
-        information = np.einsum("n,nij,nik->jk", weight, design, design)
-        try:
-            translation = np.linalg.solve(
-                information, np.einsum("n,nij,ni->j", weight, design, target)
-            )
-        except np.linalg.LinAlgError:
-            return None
-        depth = points[:, 2] + translation[2]
-        if not np.isfinite(translation).all() or depth.min() <= 0.0:
-            return None
-        residual_px = (design @ translation - target) * (focal_px / depth)[:, None]
-        error_px = np.linalg.norm(residual_px, axis=1)
-        if iteration < 3:
-            robust = 3.0 * max(keypoint_std_px, float(np.median(error_px)))
-            weight = np.minimum(1.0, robust / np.maximum(error_px, 1e-9)) / depth**2
-    degrees = max(2 * count - 3, 1)
-    # Huber's weights without the 1/depth² that turns metres into pixels.
-    relative = weight * depth**2
-    variance = max(keypoint_std_px**2, float(np.sum(relative * error_px**2)) / degrees)
-    jacobian_px = design * (focal_px / depth)[:, None, None]
-    information = np.einsum("n,nij,nik->jk", relative, jacobian_px, jacobian_px)
-    if np.linalg.cond(information) > 1e12:
-        return None
-    return translation, variance * np.linalg.inv(information)
+def place_bodies(
+    camera: Camera,
+    people: Sequence[PersonKeypoints],
+    keypoint_std_px: float,
+    min_score: float = DEFAULT_MIN_SCORE,
+) -> tuple[BodyPlacement | None, ...]:
+    """Return :func:`place_body` of several people at once."""
+    scales = metric_scales(people, min_score)
+    width = min((min(len(person.scores), _BODY_AND_FEET) for person in people), default=0)
+    if not width:
+        return ()
+    scores = np.array([person.scores[:width] for person in people])
+    seen = (scores >= min_score) & np.array([scale is not None for scale in scales])[:, None]
+    factor = np.array([1.0 if scale is None else scale.factor for scale in scales])
+    points = factor[:, None, None] * np.array(
+        [person.keypoints_root_m[:width] for person in people]
+    )
+    pixels = np.array([person.keypoints_px[:width] for person in people])
+    rays = camera.normalise(pixels.reshape(-1, 2)).reshape(pixels.shape)
+    translation, covariance, valid = _translations(
+        points, rays, seen, camera.fx_px, keypoint_std_px
+    )
+    shoulders, usable, hips, chest = _trunks(points, seen)
+    valid &= chest[:, 2] + translation[:, 2] > 0.0
+    chest += translation
+    covariance += _LIFT_STD_M**2 * _IDENTITY
+    return tuple(
+        None
+        if scale is None or not valid[row]
+        else BodyPlacement(
+            shoulders[row] + translation[row] if usable[row] else None,
+            hips[row] + translation[row],
+            chest[row],
+            covariance[row] + scale.relative_std**2 * (chest[row][:, None] * chest[row]),
+            scale.relative_std,
+            points[row, :17] + translation[row],
+        )
+        for row, scale in enumerate(scales)
+    )
 
 
-def _hips(skeleton: FloatArray, seen: NDArray[np.bool_]) -> FloatArray:
-    """Midpoint of the hips relative to the root, which it is by definition."""
-    hips = [kp.LEFT_HIP, kp.RIGHT_HIP]
-    return np.asarray(skeleton[hips].mean(axis=0)) if seen[hips].all() else np.zeros(3)
+def _translations(
+    points: FloatArray,
+    rays: FloatArray,
+    seen: NDArray[np.bool_],
+    focal_px: float,
+    keypoint_std_px: float,
+) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+    """Weighted solutions of (X + tx) − x (Z + tz) = 0 and (Y + ty) − y (Z + tz) = 0.
 
+    Args:
+        points: (P, N, 3) skeletons in metres.
+        rays: (P, N, 2) x/z and y/z where their points were seen.
+        seen: (P, N); the others do not count.
+        focal_px: turns rays into pixels.
+        keypoint_std_px: of the pixels, at least.
 
-def _shoulders(skeleton: FloatArray, seen: NDArray[np.bool_]) -> FloatArray | None:
-    """(2, 3) shoulders relative to the root.
-
-    In a profile one shoulder hides the other, yet a lifting network says where it is; that is
-    believed when it lies where a shoulder can be.
+    Returns:
+        Translations (P, 3), their covariances (P, 3, 3) and whether each is one (P,).
     """
-    shoulders = skeleton[[kp.LEFT_SHOULDER, kp.RIGHT_SHOULDER]]
-    reach = np.linalg.norm(shoulders, axis=1)
+    count = seen.sum(axis=1)
+    mask = seen.astype(np.float64)
+    # With p = t_xy − ray · tz + start, tz is the slope of start over ray.
+    start = points[..., :2] - rays * points[..., 2:]
+    weight = mask
+    everything = np.maximum(keypoint_std_px, 1e-9)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        depth_of_root = np.zeros(len(count))
+        for iteration in range(_ITERATIONS):
+            previous = depth_of_root
+            share = (weight / weight.sum(axis=1, keepdims=True))[..., None]
+            middle, level = np.sum(share * rays, axis=1), np.sum(share * start, axis=1)
+            away, rise = rays - middle[:, None], start - level[:, None]
+            depth_of_root = np.sum(share * away * rise, axis=(1, 2)) / np.sum(
+                share * away**2, axis=(1, 2)
+            )
+            depth = points[..., 2] + depth_of_root[:, None]
+            error_px = (focal_px / depth)[..., None] * (rise - away * depth_of_root[:, None, None])
+            error_px = np.sqrt(error_px[..., 0] ** 2 + error_px[..., 1] ** 2)
+            moved = np.abs(depth_of_root - previous) > _CONVERGED * np.abs(depth_of_root)
+            if iteration + 1 < _ITERATIONS and (iteration == 0 or moved.any()):
+                robust = 3.0 * np.maximum(everything, _masked_median(error_px, seen, count))
+                huber = np.minimum(1.0, robust[:, None] / np.maximum(error_px, 1e-9))
+                weight = np.where(seen, huber / depth**2, 0.0)
+                continue
+            break
+        translation = np.column_stack([middle * depth_of_root[:, None] - level, depth_of_root])
+        # Huber's weights without the 1/depth² that turns metres into pixels.
+        relative = np.where(seen, weight * depth**2, 0.0)
+        spread = np.sum(relative * np.where(seen, error_px, 0.0) ** 2, axis=1)
+        variance = np.maximum(keypoint_std_px**2, spread / np.maximum(2 * count - 3, 1))
+        strength = np.where(seen, relative * (focal_px / depth) ** 2, 0.0)[..., None]
+        total = strength.sum(axis=(1, 2))
+        first = np.sum(strength * rays, axis=1)
+        second = np.sum(strength * rays**2, axis=(1, 2)) - np.sum(first**2, axis=1) / total
+        ahead = np.where(seen, depth, 1.0).min(axis=1) > 0.0
+    valid = (count >= _MIN_POINTS) & ahead & np.isfinite(translation).all(axis=1)
+    valid &= np.isfinite(second) & (second > 1e-12 * total)
+    # Inverse of [[S, 0, −a], [0, S, −b], [−a, −b, q]] with the Schur complement q − (a² + b²)/S.
+    slope = np.column_stack(
+        [first / np.where(total > 0.0, total, 1.0)[:, None], np.ones(len(count))]
+    )
+    covariance = slope[:, :, None] * slope[:, None] / np.where(valid, second, 1.0)[:, None, None]
+    covariance[:, [0, 1], [0, 1]] += (1.0 / np.where(valid, total, 1.0))[:, None]
+    return translation, variance[:, None, None] * covariance, valid
+
+
+def _masked_median(
+    values: FloatArray, seen: NDArray[np.bool_], count: NDArray[np.intp]
+) -> FloatArray:
+    """(P,) medians of the seen values of each row; of none, whatever."""
+    ordered = np.sort(np.where(seen, values, np.inf), axis=1)
+    rows, last = np.arange(len(ordered)), np.maximum(count - 1, 0)
+    return np.asarray(0.5 * (ordered[rows, last // 2] + ordered[rows, (last + 1) // 2]))
+
+
+def _trunks(
+    skeletons: FloatArray, seen: NDArray[np.bool_]
+) -> tuple[FloatArray, NDArray[np.bool_], FloatArray, FloatArray]:
+    """Shoulders (P, 2, 3), whether usable (P,), hips and chest (P, 3), relative to the root.
+
+    The midpoint of the hips is the root by definition where they are not seen. In a profile one
+    shoulder hides the other, yet a lifting network says where it is; that is believed when it lies
+    where a shoulder can be. Without shoulders the chest stands above the hips.
+    """
+    both = skeletons[:, _HIPS]
+    shown = np.asarray(seen[:, _HIPS].all(axis=1))[:, None]
+    hips = np.where(shown, 0.5 * (both[:, 0] + both[:, 1]), 0.0)
+    shoulders = skeletons[:, _SHOULDERS]
+    reach = np.sqrt(np.einsum("psi,psi->ps", shoulders, shoulders))
     low, high = _SHOULDER_REACH_M
-    usable = seen[[kp.LEFT_SHOULDER, kp.RIGHT_SHOULDER]] | ((reach > low) & (reach < high))
-    return shoulders if usable.all() else None
+    there = seen[:, _SHOULDERS] | ((reach > low) & (reach < high))
+    usable = there[:, 0] & there[:, 1]
+    neck = np.where(
+        usable[:, None],
+        0.5 * (shoulders[:, 0] + shoulders[:, 1]),
+        hips + _TORSO_M * _UP_CAMERA,
+    )
+    return shoulders, usable, hips, (1.0 - CHEST_FRACTION) * neck + CHEST_FRACTION * hips
 
 
 def place_box(camera: Camera, box_xyxy_px: FloatArray) -> tuple[FloatArray, FloatArray] | None:

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
 
 from .arrays import (
     FloatArray,
@@ -12,6 +15,10 @@ from .arrays import (
     rotation_matrix,
     set_fields,
 )
+
+#: (3,) the middle of the head in the paper's head frame: between the ears and a little above them.
+HEAD_CENTRE_HEAD_M: Final[FloatArray] = np.array([-0.045, -0.090, 0.0])
+HEAD_CENTRE_HEAD_M.setflags(write=False)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,14 +35,22 @@ class HeadPose:
         covariance: (6, 6), order rotation vector (rad), position (m). The rotation error δ is a
             small rotation in camera axes: ``R_true = exp(δ) @ rotation_camera_head``.
         reprojection_error_px: root mean square over the points used.
+        face_seen: probability that the camera sees the face of this head (two of nose and eyes),
+            where the estimator can tell; None leaves it to the scores of the keypoints.
+        range_relative_std: how well the range |position| is known from the head itself, relative;
+            None when the range is not of its own measuring (taken from the body, or the template's
+            size without its spread), and then it says nothing new about where the body is.
     """
 
     position_camera_m: FloatArray
     rotation_camera_head: FloatArray
     covariance: FloatArray
     reprojection_error_px: float
+    face_seen: float | None = None
+    range_relative_std: float | None = None
 
     def __post_init__(self) -> None:
+        seen, range_std = self.face_seen, self.range_relative_std
         set_fields(
             self,
             position_camera_m=finite_array("position_camera_m", self.position_camera_m, (3,)),
@@ -43,6 +58,14 @@ class HeadPose:
             covariance=covariance_matrix("covariance", self.covariance, 6),
             reprojection_error_px=finite_number(
                 "reprojection_error_px", self.reprojection_error_px, minimum=0.0
+            ),
+            face_seen=None
+            if seen is None
+            else finite_number("face_seen", seen, minimum=0.0, maximum=1.0),
+            range_relative_std=None
+            if range_std is None
+            else finite_number(
+                "range_relative_std", range_std, minimum=0.0, exclusive_minimum=True
             ),
         )
 

@@ -22,12 +22,19 @@ class PersonKeypoints:
             passed as they are: the pipeline rescales limb by limb.
         scores: (K,) confidence of each keypoint in [0, 1]; 0 for one that was not seen.
         layout: ``"coco"`` (K = 17) or ``"coco_wholebody"`` (K = 133).
+        lifted: False for a 2-D network, whose ``keypoints_root_m`` is flat: x and y follow the
+            pixels, z is 0. Limbs that point at the camera then look short, and the scale of the
+            body is taken from those that do not.
+        face_evidence: False when high scores of nose and eyes do not mean that the face is seen.
+            MediaPipe Pose, for one, scores them near 1 on backs of heads.
     """
 
     keypoints_px: FloatArray
     keypoints_root_m: FloatArray
     scores: FloatArray
     layout: str
+    lifted: bool = True
+    face_evidence: bool = True
 
     def __post_init__(self) -> None:
         count = keypoint_layout(self.layout).size
@@ -41,6 +48,8 @@ class PersonKeypoints:
             keypoints_px=finite_array("keypoints_px", self.keypoints_px, (count, 2)),
             keypoints_root_m=finite_array("keypoints_root_m", self.keypoints_root_m, (count, 3)),
             scores=scores,
+            lifted=bool(self.lifted),
+            face_evidence=bool(self.face_evidence),
         )
 
     @property

@@ -24,6 +24,8 @@ _METRIC_CLAIM_STD: Final = 0.03
 
 # How much less a limb says that the network lifted without seeing it.
 _GUESSED_RELATIVE_STD: Final = 0.10
+# What foreshortening leaves open where the skeleton is flat.
+_FLAT_RELATIVE_STD: Final = 0.08
 
 _LOG_LENGTHS: Final[FloatArray] = np.log([limb.length_m for limb in LIMBS])
 _STDS: Final[FloatArray] = np.array([limb.relative_std for limb in LIMBS])
@@ -40,7 +42,7 @@ def _midpoint_matrix(ends: Sequence[tuple[int, ...]]) -> FloatArray:
 _START_MATRIX: Final = _midpoint_matrix([limb.start for limb in LIMBS])
 _END_MATRIX: Final = _midpoint_matrix([limb.end for limb in LIMBS])
 _DIFFERENCE: Final = _END_MATRIX - _START_MATRIX
-_INVOLVED: Final = (_START_MATRIX + _END_MATRIX) > 0.0
+_INVOLVED_COLUMNS: Final = ((_START_MATRIX + _END_MATRIX) > 0.0).T.astype(np.float64)
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,26 +67,52 @@ def metric_scale(
     much that limb varies between adults of one stature; Huber's weights keep a badly lifted limb
     from mattering. The skeleton's own claim to be in metres counts as one more vote when it is
     plausible. Where no limb is visible at both ends, what the network guessed of the hidden ones
-    serves, with a spread to match. Returns None for a skeleton without any limb.
+    serves, with a spread to match. In a flat skeleton (``lifted`` False) a limb that points at the
+    camera looks short and none looks long: the second longest counts, and the unit claims nothing.
+    Returns None for a skeleton without any limb.
     """
-    seen = person.scores[:17] >= min_score
-    lengths = np.linalg.norm(_DIFFERENCE @ person.keypoints_root_m[:17], axis=1)
+    return metric_scales((person,), min_score)[0]
+
+
+def metric_scales(
+    people: Sequence[PersonKeypoints], min_score: float = DEFAULT_MIN_SCORE
+) -> tuple[MetricScale | None, ...]:
+    """Return :func:`metric_scale` of several people at once."""
+    if not people:
+        return ()
+    seen = np.array([person.scores[:17] for person in people]) >= min_score
+    roots = np.array([person.keypoints_root_m[:17] for person in people])
+    ends = _DIFFERENCE @ roots
+    lengths = np.sqrt(np.einsum("pli,pli->pl", ends, ends))
     present = lengths > 1e-9
-    usable = present & ~np.any(_INVOLVED & ~seen, axis=1)
-    guessed = 0.0
-    if not usable.any():
-        usable, guessed = present, _GUESSED_RELATIVE_STD
-    if not usable.any():
-        return None
-    votes = _LOG_LENGTHS[usable] - np.log(lengths[usable])
-    std = _STDS[usable]
-    centre = float(np.median(votes))
+    usable = present & ~((~seen).astype(np.float64) @ _INVOLVED_COLUMNS > 0.0)
+    measured = usable.any(axis=1)
+    usable = np.where(measured[:, None], usable, present)
+    found = usable.any(axis=1)
+    votes = np.where(usable, _LOG_LENGTHS - np.log(np.where(present, lengths, 1.0)), np.inf)
+    ordered, count = np.sort(votes, axis=1), usable.sum(axis=1)
+    rows, last = np.arange(len(people)), np.maximum(count - 1, 0)
+    centre = 0.5 * (ordered[rows, last // 2] + ordered[rows, (last + 1) // 2])
+    centre = np.where(found, centre, 0.0)
+    votes = np.where(usable, votes, 0.0)
+    inverse = usable / _STDS**2
     for _ in range(4):
-        distance = np.abs(votes - centre) / std
-        weight = np.minimum(1.0, 1.5 / np.maximum(distance, 1e-9)) / std**2
-        centre = float(np.sum(weight * votes) / np.sum(weight))
-    variance = 1.0 / float(np.sum(weight)) + STATURE_RELATIVE_STD**2 + guessed**2
-    spread = math.sqrt(variance)
-    if abs(centre) <= _METRIC_CLAIM_LIMIT:
-        centre *= _METRIC_CLAIM_STD**2 / (_METRIC_CLAIM_STD**2 + variance)
-    return MetricScale(math.exp(centre), spread)
+        distance = np.abs(votes - centre[:, None]) / _STDS
+        weight = inverse * np.minimum(1.0, 1.5 / np.maximum(distance, 1e-9))
+        total = np.maximum(weight.sum(axis=1), 1e-12)
+        centre = np.sum(weight * votes, axis=1) / total
+    variance = 1.0 / total + STATURE_RELATIVE_STD**2
+    variance += np.where(measured, 0.0, _GUESSED_RELATIVE_STD**2)
+    scales: list[MetricScale | None] = []
+    for row, person in enumerate(people):
+        if not found[row]:
+            scales.append(None)
+            continue
+        middle, spread = float(centre[row]), math.sqrt(float(variance[row]))
+        if not person.lifted:
+            middle = float(ordered[row, 1 if count[row] >= 3 else 0])
+            spread = math.hypot(spread, _FLAT_RELATIVE_STD)
+        elif abs(middle) <= _METRIC_CLAIM_LIMIT:
+            middle *= _METRIC_CLAIM_STD**2 / (_METRIC_CLAIM_STD**2 + spread**2)
+        scales.append(MetricScale(math.exp(middle), spread))
+    return tuple(scales)

@@ -2,25 +2,55 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+import math
+from dataclasses import dataclass
+from time import perf_counter
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from ._attention import AttentionCone
-from ._awareness import awareness_of
-from ._body import place_body, place_box
+from ._awareness import AwarenessEstimate, estimate_awareness
 from ._camera import Camera
-from ._detection import PersonDetection
 from ._errors import PerceptionError
+from ._evidence import judge_face
+from ._floor import FloorPlane
 from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
 from ._metric_scale import DEFAULT_MIN_SCORE
 from ._observation import PersonObservation
+from ._placement import place_people
 from ._pnp import PnpHeadPoseEstimator
 from ._protocols import HeadPoseEstimator, ImageRgb, PersonDetector, PoseEstimator
-from .arrays import FloatArray, finite_array, finite_number
+from .arrays import finite_array, finite_number
+
+if TYPE_CHECKING:
+    from .networks._session import OnnxSettings
 
 _CAMERA_CENTRE: Final = np.zeros((1, 3))
+#: Spread of the eyes in the head, sideways and up and down: what the workers of the simulator have.
+#: People differ a good deal in how far they turn their eyes before they turn their head (Thumser
+#: and Stahl 2009, doi:10.1007/s00221-009-1803-8); give your own where you know it.
+DEFAULT_EYE_IN_HEAD_STD_RAD: Final = (math.radians(7.0), math.radians(3.4))
+
+
+@dataclass(frozen=True, slots=True)
+class StageTimings:
+    """Wall-clock time of the stages of one frame in seconds.
+
+    The stages of the networks hold their own preparation and reading of results; ``rest_s`` is
+    everything else: placing, judging, awareness, checks.
+    """
+
+    detector_s: float = 0.0
+    pose_s: float = 0.0
+    head_pose_s: float = 0.0
+    rest_s: float = 0.0
+
+    @property
+    def total_s(self) -> float:
+        """The whole frame."""
+        return self.detector_s + self.pose_s + self.head_pose_s + self.rest_s
 
 
 class AwarenessPipeline:
@@ -28,17 +58,25 @@ class AwarenessPipeline:
 
     Args:
         camera: the robot's camera.
-        detector: finds people.
-        pose_estimator: finds their keypoints.
-        head_pose_estimator: finds their head poses; default :class:`PnpHeadPoseEstimator`.
+        detector: finds people; default the shipped network.
+        pose_estimator: finds their keypoints; default the shipped network.
+        head_pose_estimator: finds their head poses; default the shipped network beside the shipped
+            pose network, and :class:`PnpHeadPoseEstimator` on the keypoints of any other: the
+            shipped networks are made for the simulator, so none of them looks at real heads
+            unasked.
         cone: the attention cone; default half-angle 60°.
         robot_points_camera_m: (M, 3) points of the robot in the camera frame, of which seeing any
             one counts as seeing the robot; default the camera's centre, as in the paper.
         keypoint_std_px: noise of the keypoints assumed for the body's position.
         min_score: keypoints scored below this count as not seen.
+        floor: the floor in the camera frame, where it is known and does not move in it; the feet
+            then help to say how far away people are.
+        eye_in_head_std_rad: how far eyes stray from where the head points, sideways and up and
+            down (or one number for both); it is part of α's standard deviation.
+        onnx_settings: providers and threads for the shipped networks.
 
     Raises:
-        PerceptionError: when detector or pose estimator is missing, or a value is not valid.
+        PerceptionError: when a value is not valid or a shipped network cannot be loaded.
     """
 
     def __init__(
@@ -52,25 +90,14 @@ class AwarenessPipeline:
         *,
         keypoint_std_px: float = 1.0,
         min_score: float = DEFAULT_MIN_SCORE,
+        floor: FloorPlane | None = None,
+        eye_in_head_std_rad: Any = DEFAULT_EYE_IN_HEAD_STD_RAD,
+        onnx_settings: OnnxSettings | None = None,
     ) -> None:
         if not isinstance(camera, Camera):
             raise PerceptionError(f"camera must be a Camera, got {type(camera).__name__}")
-        if detector is None or pose_estimator is None:
-            missing = "detector" if detector is None else "pose_estimator"
-            raise PerceptionError(
-                f"{missing} must be given: this version ships no person detector and no pose "
-                "network. Pass any object with the methods of perception.PersonDetector and "
-                "perception.PoseEstimator."
-            )
         self.camera = camera
         self.cone = AttentionCone() if cone is None else cone
-        self._detector = detector
-        self._pose_estimator = pose_estimator
-        self._head_pose_estimator: HeadPoseEstimator = (
-            PnpHeadPoseEstimator(keypoint_std_px, min_score)
-            if head_pose_estimator is None
-            else head_pose_estimator
-        )
         points = _CAMERA_CENTRE if robot_points_camera_m is None else robot_points_camera_m
         self._robot_points = finite_array("robot_points_camera_m", points, ("M", 3))
         if not len(self._robot_points):
@@ -79,8 +106,33 @@ class AwarenessPipeline:
             "keypoint_std_px", keypoint_std_px, minimum=0.0, exclusive_minimum=True
         )
         self._min_score = finite_number("min_score", min_score, minimum=0.0, maximum=1.0)
+        self._floor = _floor("floor", floor)
+        self._eye_std_rad = _eye_std(eye_in_head_std_rad)
+        shipped_pose = pose_estimator is None
+        if detector is None or pose_estimator is None:
+            from . import shipped  # noqa: PLC0415 - networks load only where they are wanted
 
-    def process(self, image_rgb: ImageRgb, stamp_s: float) -> tuple[PersonObservation, ...]:
+            if detector is None:
+                detector = shipped.shipped_detector(onnx_settings)
+            if pose_estimator is None:
+                pose_estimator = shipped.shipped_pose_estimator(onnx_settings)
+        if head_pose_estimator is None:
+            head_pose_estimator = PnpHeadPoseEstimator(self._std_px, self._min_score)
+            if shipped_pose:
+                head_pose_estimator = shipped.shipped_head_pose_estimator(onnx_settings)
+        self._detector: PersonDetector = detector
+        self._pose_estimator: PoseEstimator = pose_estimator
+        self._head_pose_estimator: HeadPoseEstimator = head_pose_estimator
+        self._timings = StageTimings()
+
+    @property
+    def last_timings(self) -> StageTimings:
+        """How long the stages of the last processed frame took; zeros before the first."""
+        return self._timings
+
+    def process(
+        self, image_rgb: ImageRgb, stamp_s: float, floor: FloorPlane | None = None
+    ) -> tuple[PersonObservation, ...]:
         """Return one observation a detected person.
 
         A person whose keypoints cannot place the body is placed by the box, with a covariance to
@@ -89,61 +141,73 @@ class AwarenessPipeline:
         Args:
             image_rgb: (H, W, 3) uint8 of the camera's size.
             stamp_s: time of the frame.
+            floor: the floor in this frame's camera, for a camera that moves against it; default the
+                one given to the constructor.
 
         Raises:
             PerceptionError: for an image of another size or type, a non-finite stamp, or an
                 estimator that returns a different number of people than it was given.
         """
+        began = perf_counter()
         stamp_s = finite_number("stamp_s", stamp_s)
+        floor = self._floor if floor is None else _floor("floor", floor)
         self._check_image(image_rgb)
+        ready = perf_counter()
         detections = tuple(self._detector.detect(image_rgb))
+        detected = perf_counter()
         if not detections:
+            self._timings = StageTimings(detected - ready, 0.0, 0.0, ready - began)
             return ()
         people = tuple(self._pose_estimator.estimate(image_rgb, detections))
         _same_count("pose_estimator", len(people), len(detections))
+        posed = perf_counter()
         heads = tuple(self._head_pose_estimator.estimate(image_rgb, self.camera, people))
         _same_count("head_pose_estimator", len(heads), len(people))
-        observations = (
-            self._observe(detection, person, head, stamp_s)
-            for detection, person, head in zip(detections, people, heads, strict=True)
+        headed = perf_counter()
+        places = place_people(
+            self.camera, detections, people, heads, floor, self._std_px, self._min_score
         )
-        return tuple(seen for seen in observations if seen is not None)
-
-    def _observe(
-        self,
-        detection: PersonDetection,
-        person: PersonKeypoints,
-        head: HeadPose | None,
-        stamp_s: float,
-    ) -> PersonObservation | None:
-        position, covariance = self._place(detection, person)
-        if position is None or covariance is None:
-            return None
-        alpha, std = None, None
-        if head is not None:
-            alpha, std = awareness_of(self.cone, head, self._robot_points)
-        return PersonObservation(
-            stamp_s=stamp_s,
-            position_camera_m=position,
-            position_covariance_m2=covariance,
-            gaze_camera=None if head is None else head.gaze_camera,
-            awareness=alpha,
-            awareness_std=std,
-            score=detection.score,
-            box_xyxy_px=detection.box_xyxy_px,
+        known = self._awareness(people, heads)
+        observations = tuple(
+            PersonObservation(
+                stamp_s=stamp_s,
+                position_camera_m=place[0],
+                position_covariance_m2=place[1],
+                gaze_camera=None if head is None or seen is None else head.gaze_camera,
+                awareness=None if seen is None else seen.awareness,
+                awareness_std=None if seen is None else seen.awareness_std,
+                score=detection.score,
+                box_xyxy_px=detection.box_xyxy_px,
+            )
+            for detection, place, head, seen in zip(detections, places, heads, known, strict=True)
+            if place is not None
         )
+        rest = ready - began + perf_counter() - headed
+        self._timings = StageTimings(detected - ready, posed - detected, headed - posed, rest)
+        return observations
 
-    def _place(
-        self, detection: PersonDetection, person: PersonKeypoints
-    ) -> tuple[FloatArray | None, FloatArray | None]:
-        body = place_body(self.camera, person, self._std_px, self._min_score)
-        boxed = place_box(self.camera, detection.box_xyxy_px)
-        if body is not None:
-            placed = body.position_camera_m, body.position_covariance_m2
-            # An arm at the image border says less about the range than the height of its box.
-            if boxed is None or np.trace(placed[1]) <= np.trace(boxed[1]):
-                return placed
-        return (None, None) if boxed is None else boxed
+    def _awareness(
+        self, people: tuple[PersonKeypoints, ...], heads: tuple[HeadPose | None, ...]
+    ) -> list[AwarenessEstimate | None]:
+        """α of each person, or None where there is no evidence."""
+        estimates: list[AwarenessEstimate | None] = [None] * len(people)
+        judged = [
+            (row, head, evidence)
+            for row, (person, head) in enumerate(zip(people, heads, strict=True))
+            if head is not None
+            and (evidence := judge_face(self.camera, person, head, self._min_score)) is not None
+        ]
+        made = estimate_awareness(
+            self.cone,
+            [head for _, head, _ in judged],
+            self._robot_points,
+            extra_std_rad=np.array([evidence.extra_std_rad for *_, evidence in judged]),
+            eye_in_head_std_rad=self._eye_std_rad,
+            face_seen=np.array([evidence.seen for *_, evidence in judged]),
+        )
+        for (row, *_), estimate in zip(judged, made, strict=True):
+            estimates[row] = estimate
+        return estimates
 
     def _check_image(self, image_rgb: Any) -> None:
         wanted = (self.camera.height_px, self.camera.width_px, 3)
@@ -161,3 +225,17 @@ class AwarenessPipeline:
 def _same_count(name: str, got: int, wanted: int) -> None:
     if got != wanted:
         raise PerceptionError(f"{name} must return one result a person ({wanted}), got {got}")
+
+
+def _floor(name: str, floor: Any) -> FloorPlane | None:
+    if floor is not None and not isinstance(floor, FloorPlane):
+        raise PerceptionError(f"{name} must be a FloorPlane or None, got {type(floor).__name__}")
+    return floor
+
+
+def _eye_std(value: Any) -> tuple[float, float]:
+    pair = np.broadcast_to(value, 2) if np.ndim(value) == 0 else value
+    sideways, upwards = finite_array("eye_in_head_std_rad", pair, (2,)).tolist()
+    for std in (sideways, upwards):
+        finite_number("eye_in_head_std_rad", std, minimum=0.0, maximum=math.pi / 2.0)
+    return sideways, upwards

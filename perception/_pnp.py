@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from . import layouts as kp
 from ._body import BodyPlacement, place_body
@@ -55,6 +57,22 @@ _SAME_MODE_COSINE: Final = math.cos(math.radians(8.0))
 _MAX_ROTATION_STD_RAD: Final = math.radians(100.0)
 
 
+_HEAD_ROWS: Final = np.array(HEAD_KEYPOINTS)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Head:
+    """The five points of one head: model (5, 3), rays (5, 2), which were seen (5,), and starts."""
+
+    row: int
+    model: FloatArray
+    rays: FloatArray
+    seen: NDArray[np.bool_]
+    rotations: FloatArray
+    translations_m: FloatArray
+    prior: HeadPrior | None
+
+
 class PnpHeadPoseEstimator:
     """The paper's head pose: PnP on the head keypoints of each person.
 
@@ -96,10 +114,24 @@ class PnpHeadPoseEstimator:
             camera: the camera that saw the keypoints.
             people: keypoints of each person.
         """
-        return tuple(self._estimate_one(camera, person) for person in people)
+        poses: list[HeadPose | None] = [None] * len(people)
+        whole: list[_Head] = []
+        for row, person in enumerate(people):
+            head = self._head(camera, person, row)
+            if head is None:
+                continue
+            if head.prior is None:
+                whole.append(head)
+            else:
+                poses[row] = self._refined(camera, [head])[0]
+        if whole:
+            for head, pose in zip(whole, self._refined(camera, whole), strict=True):
+                poses[head.row] = pose
+        return tuple(poses)
 
-    def _estimate_one(self, camera: Camera, person: PersonKeypoints) -> HeadPose | None:
-        scores = person.scores[list(HEAD_KEYPOINTS)]
+    def _head(self, camera: Camera, person: PersonKeypoints, row: int) -> _Head | None:
+        """What is seen of a head and where to start, or None where it carries no evidence."""
+        scores = person.scores[_HEAD_ROWS]
         seen = scores >= self._min_score
         rows = np.flatnonzero(seen)
         if not len(rows):
@@ -107,24 +139,42 @@ class PnpHeadPoseEstimator:
         model = self._model(person, seen)
         if model is None:
             return None
-        pixels = person.keypoints_px[np.array(HEAD_KEYPOINTS)[rows]]
-        spread = float(np.max(np.ptp(pixels, axis=0))) if len(rows) > 1 else 0.0
+        pixels = person.keypoints_px[_HEAD_ROWS]
+        spread = float(np.max(np.ptp(pixels[rows], axis=0))) if len(rows) > 1 else 0.0
         if len(rows) > 1 and spread < _MIN_SPREAD_STD * self._std_px:
             return None
         rays = camera.normalise(pixels)
-        focal = np.array([camera.fx_px, camera.fy_px])
-        points = model[rows]
         prior = None
         if len(rows) >= 4:
-            starts = _sqpnp(points, rays)
+            starts = _sqpnp(model[rows], rays[rows])
         else:
             prior = _body_prior(camera, person, self._std_px, self._min_score)
-            starts = _prior_starts(prior) if prior is not None else _sqpnp(points, rays)
-        if starts is None:
-            return None
-        poses = refine(points, rays, focal, self._std_px, *starts, prior)
-        costs = _costs(poses, points, seen, without_body=prior is None)
-        return self._finish(costs, len(rows), prior is not None) if costs else None
+            starts = _prior_starts(prior) if prior is not None else _sqpnp(model[rows], rays[rows])
+        return None if starts is None else _Head(row, model, rays, seen, *starts, prior)
+
+    def _refined(self, camera: Camera, heads: list[_Head]) -> list[HeadPose | None]:
+        """Refine the starts of several heads in one go; a prior is that of all of them."""
+        counts = [len(head.rotations) for head in heads]
+        owner = np.repeat(np.arange(len(heads)), counts)
+        poses = refine(
+            np.array([head.model for head in heads])[owner],
+            np.array([head.rays for head in heads])[owner],
+            np.array([camera.fx_px, camera.fy_px]),
+            self._std_px,
+            np.concatenate([head.rotations for head in heads]),
+            np.concatenate([head.translations_m for head in heads]),
+            heads[0].prior,
+            np.array([head.seen for head in heads], dtype=np.float64)[owner],
+        )
+        results: list[HeadPose | None] = []
+        for index, head in enumerate(heads):
+            own = [poses[start] for start in np.flatnonzero(owner == index)]
+            rows = np.flatnonzero(head.seen)
+            costs = _costs(own, head.model[rows], head.seen, without_body=head.prior is None)
+            results.append(
+                self._finish(costs, len(rows), head.prior is not None) if costs else None
+            )
+        return results
 
     def _model(self, person: PersonKeypoints, seen: Any) -> FloatArray | None:
         if self._head_model == "template":
@@ -160,7 +210,7 @@ class PnpHeadPoseEstimator:
             pose.translation_m,
             pose.rotation,
             covariance,
-            float(np.sqrt(np.mean(pose.reprojection_px**2))),
+            float(np.sqrt(np.sum(pose.reprojection_px**2) / points)),
         )
 
 

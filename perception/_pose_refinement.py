@@ -11,7 +11,7 @@ from .arrays import FloatArray
 
 _ITERATIONS: Final = 8
 # Far below one, the scale of the noise.
-_CONVERGED_CHI2: Final = 1e-4
+_CONVERGED_CHI2: Final = 1e-2
 _MIN_DEPTH_M: Final = 0.05
 
 
@@ -60,7 +60,7 @@ def skew(vectors: FloatArray) -> FloatArray:
 
 def rotation_exp(vectors: FloatArray) -> FloatArray:
     """Rodrigues' formula: rotation vectors (…, 3) to rotations (…, 3, 3)."""
-    angle = np.linalg.norm(vectors, axis=-1)[..., None, None]
+    angle = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))[..., None, None]
     cross = skew(vectors)
     small = angle < 1e-8
     safe = np.where(small, 1.0, angle)
@@ -102,7 +102,7 @@ def _linearise(
 
     The state is a rotation in camera axes applied from the left, then the translation.
     """
-    turned = np.einsum("bij,nj->bni", rotation, model)
+    turned = model @ np.swapaxes(rotation, 1, 2)
     points = turned + translation[:, None]
     depth = np.maximum(points[..., 2], _MIN_DEPTH_M)
     image = points[..., :2] / depth[..., None]
@@ -110,7 +110,7 @@ def _linearise(
     slope = np.zeros((*depth.shape, 2, 3))
     slope[..., 0, 0] = slope[..., 1, 1] = 1.0 / depth
     slope[..., :, 2] = -image / depth[..., None]
-    slope *= weight_px[:, None]
+    slope *= weight_px[..., None]
     jacobian = np.concatenate([slope @ -skew(turned), slope], axis=-1)
     flat = jacobian.reshape(len(rotation), -1, 6)
     flat_residual = residual.reshape(len(rotation), -1)
@@ -118,7 +118,8 @@ def _linearise(
     gradient = np.einsum("bki,bk->bi", flat, flat_residual)
     cost = np.sum(flat_residual**2, axis=1)
     # A point behind the camera must never look like a good fit.
-    cost += 1e6 * np.sum(np.maximum(_MIN_DEPTH_M - points[..., 2], 0.0), axis=1)
+    behind = np.maximum(_MIN_DEPTH_M - points[..., 2], 0.0)
+    cost += 1e6 * np.sum(behind * (weight_px[..., 0] > 0.0), axis=1)
     if prior is not None:
         away = rotation_log(np.swapaxes(rotation, 1, 2) @ prior.rotation_camera_head)
         # In camera axes: R log(Rᵀ R0) is the turn that brings the head back to the prior.
@@ -148,22 +149,25 @@ def refine(
     rotations: FloatArray,
     translations_m: FloatArray,
     prior: HeadPrior | None,
+    seen: FloatArray | None = None,
 ) -> list[RefinedPose]:
-    """Levenberg–Marquardt from B starts at once.
+    """Levenberg–Marquardt from B starts at once, of one head or of several.
 
     Args:
-        model_m: (N, 3) points in the head frame.
-        rays: (N, 2) x/z and y/z where they were seen.
+        model_m: (N, 3) points in the head frame, or (B, N, 3) each start's own.
+        rays: (N, 2) or (B, N, 2) x/z and y/z where they were seen.
         focal_px: (2,) fx and fy.
         keypoint_std_px: standard deviation of the pixel noise.
         rotations: (B, 3, 3) starts.
         translations_m: (B, 3) starts.
-        prior: what the body says, or None.
+        prior: what the body says, or None; for starts of one head.
+        seen: (B, N) of ones, and zeros for points that do not count; default all count.
 
     Returns:
         One local optimum a start, in the same order.
     """
     weight = focal_px / keypoint_std_px
+    weight = weight[None, None] if seen is None else seen[..., None] * weight
     count = len(rotations)
     damping: FloatArray = np.full(count, 1e-3)
     rotation, translation = rotations, translations_m
@@ -177,12 +181,16 @@ def refine(
         if float(np.max(-np.sum(gradient * step, axis=1))) < _CONVERGED_CHI2:
             break
         turn = step[:, :3]
-        length = np.linalg.norm(turn, axis=1, keepdims=True)
+        length = np.sqrt(np.einsum("bi,bi->b", turn, turn))[:, None]
         turn = turn * np.minimum(1.0, 0.7 / np.maximum(length, 1e-12))
         trial_rotation = rotation_exp(turn) @ rotation
         trial_translation = translation + step[:, 3:]
         trial = _linearise(model_m, rays, weight, trial_rotation, trial_translation, prior)
         better = trial[0] < cost
+        damping = np.where(better, 0.2 * damping, 10.0 * damping)
+        if better.all():
+            rotation, translation, state = trial_rotation, trial_translation, trial
+            continue
         rotation = np.where(better[:, None, None], trial_rotation, rotation)
         translation = np.where(better[:, None], trial_translation, translation)
         kept = [
@@ -190,15 +198,15 @@ def refine(
             for new, old in zip(trial, state, strict=True)
         ]
         state = (kept[0], kept[1], kept[2], kept[3])
-        damping = np.where(better, 0.2 * damping, 10.0 * damping)
     cost, _, information, residual = state
+    error_px = keypoint_std_px * np.sqrt(np.einsum("bni,bni->bn", residual, residual))
     return [
         RefinedPose(
             rotation[index],
             translation[index],
             information[index],
             float(cost[index]),
-            np.linalg.norm(residual[index], axis=-1) * keypoint_std_px,
+            error_px[index],
         )
         for index in range(count)
     ]

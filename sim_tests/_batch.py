@@ -10,6 +10,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from nav_adapter import AwarenessPolicy
+from perception import AwarenessPipeline, Camera
 
 from ._crossing import CrossingResult, run_crossing
 from ._scenario import Scenario, shipped_scenarios
@@ -30,7 +31,7 @@ def run_batch(
     Args:
         scenarios: shipped names, YAML files, or ``"all"`` for the shipped ones that have a planner.
         policies: presets' names or YAML files.
-        perception: ``"truth"`` or ``"keypoints"``.
+        perception: ``"truth"``, ``"keypoints"`` or ``"pixels"``.
         episodes: seeds a scenario, counted up from ``seed``.
         seed: the first seed.
         out: folder, made when missing; rows appear in ``episodes.csv`` as they are done.
@@ -38,6 +39,7 @@ def run_batch(
     Raises:
         SimError: an unknown scenario; nothing has run then.
         NavError: an unknown preset or unusable policy file; nothing has run then.
+        PerceptionError: for pixels, when the shipped networks cannot be loaded; nothing has run.
     """
     chosen = [scenario for name in scenarios for scenario in _scenarios(name)]
     for policy in policies:
@@ -45,6 +47,8 @@ def run_batch(
             AwarenessPolicy.from_yaml(policy)
         else:
             AwarenessPolicy.preset(policy)
+    if perception == "pixels":
+        AwarenessPipeline(Camera.from_fov(640, 480, 1.0))  # says at once which networks are absent
     out.mkdir(parents=True, exist_ok=True)
     runs = list(itertools.product(chosen, range(seed, seed + episodes), policies))
     results = []

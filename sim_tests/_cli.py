@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,9 +13,12 @@ from perception import PerceptionError
 from tracking import TrackingError
 
 from ._errors import SimError
+from .estimates._command import add_parsers as add_estimate_parsers
+from .models._command import add_parser as add_models_parser
+from .sets._command import add_parser as add_render_parser
 
 # What the extra "sim" installs.
-_SIMULATOR_MODULES = ("av", "matplotlib", "pybullet", "tqdm")
+_SIMULATOR_MODULES = ("av", "matplotlib", "pybullet")
 _BASELINE = Path("benchmarks") / "baseline.json"
 
 
@@ -36,6 +40,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             file=sys.stderr,
         )
         return 2
+    except BrokenPipeError:  # who read our output, such as head, has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
     except KeyboardInterrupt:
         print(f"\nawarenav {options.command}: interrupted; partial results kept", file=sys.stderr)
         return 130
@@ -59,6 +66,13 @@ def _parser() -> argparse.ArgumentParser:
     _add_out(demo, "demo")
     _add_seed(demo)
     demo.add_argument("--no-video", action="store_true", help="leave the video out (faster)")
+    demo.add_argument(
+        "--perception",
+        choices=["keypoints", "pixels"],
+        default="keypoints",
+        help="what the robot sees with; pixels render every frame and take many minutes "
+        "(default: keypoints)",
+    )
     demo.set_defaults(run=_demo)
 
     crossings = commands.add_parser(
@@ -83,7 +97,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     crossings.add_argument(
         "--perception",
-        choices=["truth", "keypoints"],
+        choices=["truth", "keypoints", "pixels"],
         default="keypoints",
         help="what the robot sees with (default: keypoints)",
     )
@@ -94,7 +108,9 @@ def _parser() -> argparse.ArgumentParser:
     _add_seed(crossings)
     crossings.set_defaults(run=_crossings)
 
-    _add_render(commands)
+    add_render_parser(commands)
+    add_models_parser(commands)
+    add_estimate_parsers(commands)
 
     bench = commands.add_parser(
         "bench",
@@ -112,54 +128,6 @@ def _parser() -> argparse.ArgumentParser:
     bench.add_argument("--out", type=Path, metavar="FILE", help="write the figures as a baseline")
     bench.set_defaults(run=_bench)
     return parser
-
-
-def _add_render(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    render = commands.add_parser(
-        "render",
-        help="pictures of people in warehouses, with the truth about each of them",
-        description="Render randomised scenes: frames, camera.yaml (ROS camera_info), truth.jsonl "
-        "(boxes, keypoints, gaze, position, awareness; one line a frame) and contact_sheet.png. "
-        "Run it again with the same settings to continue after an interruption.",
-    )
-    render.add_argument(
-        "--frames", type=_positive, default=400, metavar="N", help="pictures (default: 400)"
-    )
-    render.add_argument(
-        "--people",
-        type=_positive,
-        default=3,
-        metavar="N",
-        help="the most people in a picture (default: 3)",
-    )
-    render.add_argument(
-        "--scenes",
-        type=_positive,
-        metavar="N",
-        help="halls with a cast that the pictures are spread over (default: one a 20 pictures)",
-    )
-    render.add_argument(
-        "--size", default="640x480", metavar="WxH", help="pixels (default: 640x480)"
-    )
-    render.add_argument(
-        "--fov", type=float, default=60.0, metavar="DEG", help="horizontal (default: 60)"
-    )
-    render.add_argument(
-        "--supersampling",
-        type=_positive,
-        default=1,
-        metavar="N",
-        help="samples a pixel and side; 2 smooths edges (default: 1)",
-    )
-    render.add_argument(
-        "--processes",
-        type=_positive,
-        metavar="N",
-        help="work at once (default: one a processor)",
-    )
-    _add_out(render, "render")
-    _add_seed(render)
-    render.set_defaults(run=_render)
 
 
 def _positive(text: str) -> int:
@@ -189,7 +157,12 @@ def _add_seed(parser: argparse.ArgumentParser) -> None:
 def _demo(options: argparse.Namespace) -> int:
     from ._demo import run_demo  # noqa: PLC0415
 
-    run_demo(options.out, seed=options.seed, video=not options.no_video)
+    run_demo(
+        options.out,
+        seed=options.seed,
+        video=not options.no_video,
+        perception=options.perception,
+    )
     return 0
 
 
@@ -203,29 +176,6 @@ def _crossings(options: argparse.Namespace) -> int:
         episodes=options.episodes,
         seed=options.seed,
         out=options.out,
-    )
-    return 0
-
-
-def _render(options: argparse.Namespace) -> int:
-    from .sets._render import render  # noqa: PLC0415
-    from .sets._render_config import RenderConfig, picture_size  # noqa: PLC0415
-
-    width, height = picture_size(options.size)
-    config = RenderConfig.checked(
-        frames=options.frames,
-        people=options.people,
-        scenes=options.scenes,
-        width_px=width,
-        height_px=height,
-        horizontal_fov_deg=options.fov,
-        supersampling=options.supersampling,
-        seed=options.seed,
-    )
-    truth = render(config, options.out, processes=options.processes)
-    print(
-        f"Written to {options.out}: {config.frames} pictures, camera.yaml, {truth.name}, "
-        "contact_sheet.png"
     )
     return 0
 

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotState
-from perception import AttentionCone, PersonObservation
+from perception import AttentionCone, AwarenessPipeline, PersonObservation
 from perception.arrays import FloatArray
 from tracking import PersonTrack, PersonTracker, TrackerConfig
 
@@ -18,6 +18,7 @@ from ._errors import SimError
 from ._eyes import TimedEyes, make_eyes
 from ._keypoint_camera import KeypointNoise
 from ._metrics import ContactEvent, SafetyMeter
+from ._pixel_eyes import pixel_timing
 from ._scenario import Scenario
 from ._stage import Stage, TrueView
 from .robot._amr import NOVA_CARTER
@@ -34,8 +35,8 @@ _NEVER_S: Final = 1.0e6
 class CrossingFrame:
     """All that was seen, thought and commanded in one control cycle.
 
-    ``observed_workers[i]`` is the worker that ``observations[i]`` shows; ``margins_m`` holds the
-    separation margin of each worker.
+    ``observed_workers[i]`` is the worker that ``observations[i]`` shows, −1 for none of them;
+    ``margins_m`` holds the separation margin of each worker.
     """
 
     t_s: float
@@ -131,6 +132,7 @@ def run_crossing(
     perception: str = "truth",
     seed: int = 0,
     noise: KeypointNoise | None = None,
+    pipeline: AwarenessPipeline | None = None,
     observer: Observer | None = None,
 ) -> CrossingResult:
     """Run one crossing in PyBullet and measure it.
@@ -140,14 +142,18 @@ def run_crossing(
         policy: a policy, the name of a preset, or a YAML file.
         planner: the local planner; default the reference :class:`SamplingPlanner` (a scenario that
             drives straight on needs none).
-        perception: ``"truth"`` or ``"keypoints"`` (``"pixels"`` once networks ship).
+        perception: ``"truth"``, ``"keypoints"`` or ``"pixels"``: the rendered camera through the
+            shipped networks, at 10 frames a second where the scenario names no rate.
         seed: the same seed gives the same result, bit for bit.
         noise: of the keypoint camera.
+        pipeline: what pixels go through instead of the shipped networks; it has the camera of the
+            pictures.
         observer: called after every control cycle with the frame and the stage, e.g. to render.
 
     Raises:
         SimError: unknown scenario or perception, or an invalid command from the planner.
         NavError: unknown preset or unusable policy file.
+        PerceptionError: for pixels, when the shipped networks cannot be loaded.
     """
     scenario = Scenario.shipped(scenario) if isinstance(scenario, str) else scenario
     policy_name, policy = _resolve(policy)
@@ -158,15 +164,19 @@ def run_crossing(
     meter = SafetyMeter(NOVA_CARTER)
     with Stage(scenario, offsets) as stage:
         driver = planner if planner is not None else _default_planner(scenario, stage)
+        pixels = perception == "pixels"
+        spec = scenario.camera
         eyes = make_eyes(
             perception,
             stage,
-            scenario.camera.camera(),
+            spec.camera(spec.picture_scale if pixels else 1.0),
             cone,
             noise if noise is not None else KeypointNoise(),
             camera_rng,
+            pipeline,
         )
-        camera = TimedEyes(eyes, scenario.camera.timing, timing_rng)
+        timing = pixel_timing(spec.timing) if pixels else spec.timing
+        camera = TimedEyes(eyes, timing, timing_rng)
         tracker = PersonTracker(TrackerConfig(awareness=policy.filter))
         adapter = NavAdapter(policy, NOVA_CARTER)
         goal = np.array([scenario.robot.goal_x_m, scenario.robot.goal_y_m])

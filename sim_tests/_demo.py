@@ -9,6 +9,8 @@ from typing import TextIO
 
 from tqdm import tqdm
 
+from perception import AwarenessPipeline, Camera
+
 from ._crossing import CrossingResult, run_crossing
 from ._encounter import case_values, run_encounter
 from ._figures import plot_comparison
@@ -99,7 +101,14 @@ def encounter_table(result: CrossingResult) -> str:
     return "\n".join(lines)
 
 
-def run_demo(out: Path, *, seed: int = 0, video: bool = True, stream: TextIO = sys.stdout) -> None:
+def run_demo(
+    out: Path,
+    *,
+    seed: int = 0,
+    video: bool = True,
+    perception: str = "keypoints",
+    stream: TextIO = sys.stdout,
+) -> None:
     """Run the demonstration and write its files.
 
     Args:
@@ -107,8 +116,11 @@ def run_demo(out: Path, *, seed: int = 0, video: bool = True, stream: TextIO = s
             and ``episodes.csv``; made when missing.
         seed: of everything random.
         video: whether to render the video.
+        perception: ``"keypoints"``, or ``"pixels"``: rendered, through the shipped networks.
         stream: where the tables are printed.
     """
+    if perception == "pixels":
+        AwarenessPipeline(Camera.from_fov(640, 480, 1.0))  # says at once which networks are absent
     out.mkdir(parents=True, exist_ok=True)
     scenario = Scenario.shipped("paper_encounter")
     print(f"The encounter of the paper: {scenario.duration_s:g} s", file=stream)
@@ -118,10 +130,12 @@ def run_demo(out: Path, *, seed: int = 0, video: bool = True, stream: TextIO = s
         def advance(done: int) -> None:
             bar.update(done - bar.n)
 
-        encounter = run_encounter(out, seed=seed, video=video, progress=advance)
+        encounter = run_encounter(
+            out, seed=seed, video=video, perception=perception, progress=advance
+        )
     print(encounter_table(encounter), file=stream)
     print("\nThe same crossing, with and without awareness", file=stream)
-    rows = compare_policies(seed, progress=True)
+    rows = compare_policies(seed, perception, progress=True)
     with EpisodeTable(out / "episodes.csv") as table:
         for row in rows:
             table.add(row.result)

@@ -14,6 +14,7 @@ from perception import AttentionCone, Camera
 from perception.arrays import FloatArray
 
 from ._crossing import CrossingFrame
+from ._pixel_eyes import NOBODY
 from ._stage import Stage
 
 Image = NDArray[np.uint8]
@@ -115,7 +116,7 @@ def draw_camera_view(
                 _line(image, np.array([start, end]), colour, 2)
     for observation, worker in zip(frame.observations, frame.observed_workers, strict=True):
         colour = awareness_colour(observation.awareness)
-        if observation.gaze_camera is not None:
+        if observation.gaze_camera is not None and worker != NOBODY:
             eyes = stage.workers[worker].eyes_odom_m
             gaze = rotation @ observation.gaze_camera
             rim = pixels(np.vstack([eyes, _cone_rim(eyes, gaze, cone.half_angle_rad)]))

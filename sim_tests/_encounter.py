@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from perception import AttentionCone, Camera
+from perception import AttentionCone, Camera, PersonObservation
 from perception.arrays import FloatArray
 
 from ._crossing import CrossingFrame, CrossingResult, run_crossing
 from ._drawing import TopView, awareness_colour, draw_camera_view
 from ._figures import new_figure
+from ._pixel_eyes import PIXEL_RATE_HZ
 from ._scenario import Scenario
 from ._stage import Stage
 from ._tables import write_encounter
@@ -52,6 +53,8 @@ _MAP_WINDOW_M: Final = (-0.9, -2.05, 5.5, 1.95)
 _EYE_CAMERA_FOV_RAD: Final = np.radians(75.0)
 # The eye camera sits at the front of the eyes, so that the worker's own face is not in its view.
 _EYE_FORWARD_M: Final = 0.08
+# Of the slowest camera that an encounter is seen with, and a little.
+_CAMERA_PERIOD_S: Final = 1.1 / PIXEL_RATE_HZ
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,14 +70,16 @@ def run_encounter(
     *,
     seed: int = 0,
     video: bool = True,
+    perception: str = "keypoints",
     progress: Callable[[int], None] | None = None,
 ) -> CrossingResult:
-    """Run the encounter with the keypoint camera and write its table, plot and video.
+    """Run the encounter and write its table, plot and video.
 
     Args:
         out: folder for ``encounter.csv``, ``encounter.png`` and ``encounter.mp4``.
-        seed: of the keypoint noise.
-        video: whether to render the video, which takes most of the time.
+        seed: of the perception's noise.
+        video: whether to render the video, which takes most of the time from keypoints.
+        perception: ``"keypoints"``, or ``"pixels"``: rendered, through the shipped networks.
         progress: called once a frame with the number of frames done.
 
     Returns:
@@ -84,11 +89,11 @@ def run_encounter(
     recorder = _Recorder(scenario, out / "encounter.mp4" if video else None, progress)
     try:
         result = run_crossing(
-            scenario, policy="balanced", perception="keypoints", seed=seed, observer=recorder
+            scenario, policy="balanced", perception=perception, seed=seed, observer=recorder
         )
     finally:
         recorder.close()
-    write_encounter(out / "encounter.csv", result.frames)
+    write_encounter(out / "encounter.csv", result.frames, perception)
     _plot(out / "encounter.png", result, recorder.pictures)
     return result
 
@@ -102,20 +107,30 @@ def case_values(
         frame = frame_at(result, case.t_s)
         true = frame.truth[0]
         rows.append((case, "truth", true.awareness, true.d_fwd_m, true.d_lat_m))
-        seen = frame.observation_of(0)
+        seen = _observation_near(result, case.t_s)
+        name = result.perception
         if seen is None:
-            rows.append((case, "keypoints", None, None, None))
+            rows.append((case, name, None, None, None))
         else:
             position = seen.position_camera_m
-            rows.append(
-                (case, "keypoints", seen.awareness, float(position[2]), -float(position[0]))
-            )
+            rows.append((case, name, seen.awareness, float(position[2]), -float(position[0])))
     return rows
 
 
 def frame_at(result: CrossingResult, t_s: float) -> CrossingFrame:
     """The frame nearest in time."""
     return min(result.frames, key=lambda frame: abs(frame.t_s - t_s))
+
+
+def _observation_near(result: CrossingResult, t_s: float) -> PersonObservation | None:
+    """What was seen of the first worker in the camera's frame nearest in time."""
+    near = (frame for frame in result.frames if abs(frame.t_s - t_s) <= _CAMERA_PERIOD_S)
+    seen = [
+        (abs(frame.t_s - t_s), observation)
+        for frame in near
+        if (observation := frame.observation_of(0)) is not None
+    ]
+    return min(seen, key=lambda each: each[0])[1] if seen else None
 
 
 class _Recorder:
@@ -128,6 +143,7 @@ class _Recorder:
         self._cone = AttentionCone()
         self._every = round(scenario.control_hz / _VIDEO_HZ)
         self._ticks = 0
+        self._seen: CrossingFrame | None = None
         self._progress = progress
         self._map: TopView | None = None
         size = (2 * self._camera.width_px, self._camera.height_px)
@@ -139,7 +155,18 @@ class _Recorder:
         if self._video is not None:
             self._video.close()
 
+    def _with_last_seen(self, frame: CrossingFrame) -> CrossingFrame:
+        """The frame with what the last camera frame showed, while that is fresh."""
+        seen = self._seen
+        if seen is None or frame.t_s - seen.t_s > _CAMERA_PERIOD_S:
+            return frame
+        return replace(
+            frame, observations=seen.observations, observed_workers=seen.observed_workers
+        )
+
     def __call__(self, frame: CrossingFrame, stage: Stage) -> None:
+        if frame.observations:
+            self._seen = frame
         if self._map is None:
             size = (self._camera.width_px, self._camera.height_px)
             self._map = TopView(stage, size, _MAP_WINDOW_M)
@@ -149,7 +176,9 @@ class _Recorder:
         if filming or case is not None:
             renderer = CameraRenderer(stage.warehouse)
             picture = renderer.rgb(self._camera, frame.T_odom_camera)
-            drawn = draw_camera_view(picture, self._camera, frame, stage, self._cone)
+            drawn = draw_camera_view(
+                picture, self._camera, self._with_last_seen(frame), stage, self._cone
+            )
             if case is not None:
                 self._waiting.remove(case)
                 self.pictures.append(
@@ -232,7 +261,10 @@ def _plot(path: Path, result: CrossingResult, pictures: list[_CasePictures]) -> 
     )
     for index, (name, true, seen, of_case) in enumerate(panels):
         axes = figure.add_subplot(grid[1, 2 * index : 2 * index + 2])
-        axes.plot(time, _column(result, seen), color="#d9822b", lw=0.7, label="from keypoints")
+        axes.plot(
+            *_frames_of_camera(time, _column(result, seen)), color="#d9822b", lw=0.7,
+            label=f"from {result.perception}",
+        )  # fmt: skip
         if index == 0:
             _plot_bound(axes, result, time)
         axes.plot(time, _column(result, true), color="#1f4e79", lw=1.4, label="truth")
@@ -251,6 +283,14 @@ def _plot(path: Path, result: CrossingResult, pictures: list[_CasePictures]) -> 
         axes.grid(alpha=0.25)
         axes.legend(fontsize=8, loc="best")
     figure.savefig(path, dpi=110)
+
+
+def _frames_of_camera(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The values that there are, with a gap where the camera had nothing for longer than usual."""
+    there = np.isfinite(values)
+    times, seen = time[there], values[there].copy()
+    breaks = np.flatnonzero(np.diff(times) > 2.0 * _CAMERA_PERIOD_S) + 1
+    return np.insert(times, breaks, times[breaks]), np.insert(seen, breaks, np.nan)
 
 
 def _plot_bound(axes: Axes, result: CrossingResult, time: FloatArray) -> None:

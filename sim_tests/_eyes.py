@@ -1,4 +1,4 @@
-"""How the robot sees in a crossing: the truth itself, or keypoints through the whole pipeline."""
+"""How the robot sees in a crossing: the truth itself, keypoints, or pixels through the pipeline."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from perception.arrays import FloatArray
 
 from ._errors import SimError
 from ._keypoint_camera import KeypointCamera, KeypointNoise
+from ._pixel_eyes import PixelEyes
 from ._stage import Stage, TrueView
 from .pictures._camera_timing import CameraTiming, FrameClock, FrameQueue
 from .pictures._renderer import CameraRenderer
@@ -31,7 +32,7 @@ class Eyes(Protocol):
     def observe(
         self, stamp_s: float, T_odom_camera: FloatArray, truth: tuple[TrueView, ...]
     ) -> tuple[tuple[PersonObservation, int], ...]:
-        """Return each observation with the index of the worker that it shows."""
+        """Return each observation with the index of the worker that it shows, −1 for none."""
         ...
 
 
@@ -80,6 +81,8 @@ class KeypointEyes:
             self._keypoints,
             cone=cone,
             keypoint_std_px=max(noise.pixel_std_px, 0.1),
+            # Workers in a crossing turn their heads; their eyes follow.
+            eye_in_head_std_rad=0.0,
         )
         self._blank = np.zeros((camera.height_px, camera.width_px, 3), np.uint8)
 
@@ -146,17 +149,19 @@ def make_eyes(
     cone: AttentionCone,
     noise: KeypointNoise,
     rng: np.random.Generator,
+    pipeline: AwarenessPipeline | None = None,
 ) -> Eyes:
-    """Return the eyes called ``kind``; raises SimError for others."""
+    """Return the eyes called ``kind``; raises SimError for others.
+
+    ``noise`` is of the keypoint camera; ``pipeline`` works on pixels, default the shipped networks.
+    """
     makers: dict[str, Callable[[], Eyes]] = {
         "truth": TrueEyes,
         "keypoints": lambda: KeypointEyes(stage, camera, cone, noise, rng),
+        "pixels": lambda: PixelEyes(
+            stage, camera, cone, stage.scenario.camera.sensor, rng, pipeline
+        ),
     }
-    if kind == "pixels":
-        raise SimError(
-            "perception='pixels' needs the shipped networks, which this version does not have; "
-            "use 'truth' or 'keypoints'"
-        )
     if kind not in makers:
         valid = ", ".join(map(repr, get_args(PerceptionKind)))
         raise SimError(f"perception must be one of {valid}, got {kind!r}")

@@ -38,6 +38,9 @@ class CameraSpec(StrictConfig):
     width_px: int = Field(default=1280, ge=16, le=8192)
     height_px: int = Field(default=960, ge=16, le=8192)
     horizontal_fov_deg: float = Field(default=90.0, gt=0.0, lt=180.0)
+    #: Share of these pixels a side that the pictures of ``perception="pixels"`` have: half as many
+    #: are rendered four times as fast.
+    picture_scale: float = Field(default=1.0, gt=0.0, le=1.0)
     #: Exposure, noise and blur of rendered pictures; the default adds none.
     sensor: SensorConfig = SensorConfig()
     #: Frame rate, losses and delays; the default is a frame every control cycle, at once.

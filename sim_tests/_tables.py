@@ -80,8 +80,8 @@ class EpisodeTable(Closing):
         self._file.flush()
 
 
-def encounter_rows(frame: CrossingFrame) -> list[list[str]]:
-    """Rows of ``encounter.csv`` for one frame: the truth, then what keypoints made of it.
+def encounter_rows(frame: CrossingFrame, perception: str = "keypoints") -> list[list[str]]:
+    """Rows of ``encounter.csv`` for one frame: the truth, then what perception made of it.
 
     A frame without an observation, or without evidence of awareness, has empty cells.
     """
@@ -98,7 +98,7 @@ def encounter_rows(frame: CrossingFrame) -> list[list[str]]:
         ],
         [
             number_text(frame.t_s),
-            "keypoints",
+            perception,
             number_text(None if seen is None else seen.awareness),
             number_text(None if position is None else float(position[2])),
             number_text(None if position is None else -float(position[0])),
@@ -106,12 +106,14 @@ def encounter_rows(frame: CrossingFrame) -> list[list[str]]:
     ]
 
 
-def write_encounter(path: Path, frames: Iterable[CrossingFrame]) -> None:
+def write_encounter(
+    path: Path, frames: Iterable[CrossingFrame], perception: str = "keypoints"
+) -> None:
     """Write ``encounter.csv``, two rows a frame; the file appears whole or not at all."""
     partial = path.with_name(path.name + ".part")
     with partial.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(ENCOUNTER_COLUMNS)
         for frame in frames:
-            writer.writerows(encounter_rows(frame))
+            writer.writerows(encounter_rows(frame, perception))
     partial.replace(path)

@@ -15,6 +15,7 @@ from perception import (
     PersonKeypoints,
     PersonObservation,
 )
+from perception._floor import FloorPlane
 
 CAMERA = Camera.from_fov(1280, 960, math.radians(60.0))
 FRAME = np.zeros((960, 1280, 3), np.uint8)
@@ -128,13 +129,80 @@ def test_a_clock_without_a_time_is_refused():
         pipeline(Eyes([])).process(FRAME, math.nan)
 
 
-def test_missing_parts_are_named():
-    with pytest.raises(PerceptionError, match="detector"):
-        AwarenessPipeline(CAMERA)
-    with pytest.raises(PerceptionError, match="pose_estimator"):
-        AwarenessPipeline(CAMERA, Eyes([]))
-    with pytest.raises(PerceptionError, match="robot_points_camera_m"):
-        pipeline(Eyes([]), robot_points_camera_m=np.empty((0, 3)))
+def test_parts_that_are_none_are_named():
+    for change, name in [
+        ({"robot_points_camera_m": np.empty((0, 3))}, "robot_points_camera_m"),
+        ({"floor": 1.2}, "floor must be a FloorPlane"),
+        ({"eye_in_head_std_rad": -0.1}, "eye_in_head_std_rad"),
+        ({"eye_in_head_std_rad": (0.1, 0.1, 0.1)}, "eye_in_head_std_rad"),
+        ({"keypoint_std_px": 0.0}, "keypoint_std_px"),
+        ({"min_score": 1.5}, "min_score"),
+    ]:
+        with pytest.raises(PerceptionError, match=name):
+            pipeline(Eyes([]), **change)
+    with pytest.raises(PerceptionError, match="floor must be a FloorPlane"):
+        pipeline(Eyes([])).process(FRAME, 0.0, floor="z = 0")
+
+
+def test_without_networks_of_its_own_it_runs_the_shipped_ones():
+    seen = AwarenessPipeline(CAMERA).process(FRAME, 0.0)
+    assert all(person.awareness is None or person.awareness_std is not None for person in seen)
+
+
+def test_the_backs_of_heads_are_surely_unaware():
+    person = person_at((0.0, 0.4, 3.0), body_yaw_rad=math.pi)
+    ears_only = np.r_[np.zeros(3), np.ones(14)]
+    (seen,) = pipeline(Eyes([person], seen=ears_only)).process(FRAME, 0.0)
+    assert seen.awareness == 0.0
+    assert seen.awareness_std < 0.05
+
+
+def test_wandering_eyes_widen_alpha_and_leave_it_where_it_is():
+    person = person_at((0.0, 0.4, 2.5), head_yaw_rad=math.radians(25.0))
+    steady, wandering = (
+        pipeline(Eyes([person]), eye_in_head_std_rad=std).process(FRAME, 0.0)[0]
+        for std in (0.0, (math.radians(15.0), math.radians(10.0)))
+    )
+    assert steady.awareness == wandering.awareness
+    assert wandering.awareness_std > 1.5 * steady.awareness_std
+
+
+def test_a_floor_helps_with_range_and_each_frame_may_bring_its_own():
+    rng_error = []
+    camera_height_m = 1.25
+    floor = FloorPlane([0.0, -1.0, 0.0], camera_height_m)
+    for stature in (1.55, 1.95):
+        scale = stature / 1.83
+        person = person_at((0.0, camera_height_m - 0.93 * scale, 4.5), stature_m=stature)
+        eyes = Eyes([person])
+        eyes.estimate = lambda image, found, person=person, stature=stature: (
+            person.keypoints(CAMERA, 1.0, np.random.default_rng(0), unit=1.0 / stature),
+        )
+        (without,) = pipeline(eyes).process(FRAME, 0.0)
+        (always,) = pipeline(eyes, floor=floor).process(FRAME, 0.0)
+        (now,) = pipeline(eyes).process(FRAME, 0.0, floor=floor)
+        np.testing.assert_array_equal(always.position_camera_m, now.position_camera_m)
+        blind, floored = (
+            np.linalg.norm(seen.position_camera_m - person.chest_camera_m)
+            for seen in (without, now)
+        )
+        rng_error.append((blind, floored))
+    assert all(floored < 0.6 * blind for blind, floored in rng_error)
+
+
+def test_timings_add_up_and_are_of_the_last_frame():
+    person = person_at((0.0, 0.4, 3.0))
+    eyes = Eyes([person])
+    line = pipeline(eyes)
+    assert line.last_timings.total_s == 0.0
+    line.process(FRAME, 0.0)
+    timings = line.last_timings
+    parts = (timings.detector_s, timings.pose_s, timings.head_pose_s, timings.rest_s)
+    assert min(parts) > 0.0
+    assert timings.total_s == pytest.approx(sum(parts))
+    eyes.people = []
+    line.process(FRAME, 0.1)
+    assert line.last_timings.head_pose_s == 0.0
 
 
 def test_an_estimator_that_loses_people_is_named():

@@ -229,7 +229,6 @@ def test_policies_come_by_name_by_file_and_as_objects(tmp_path):
         ({"scenario": "crossing_attentiv"}, SimError, "did you mean 'crossing_attentive'"),
         ({"policy": "balancd"}, NavError, "balanced"),
         ({"perception": "radar"}, SimError, "'truth', 'keypoints', 'pixels'"),
-        ({"perception": "pixels"}, SimError, "networks"),
     ],
 )
 def test_unknown_names_are_refused(change, error, message):

@@ -17,7 +17,7 @@ import cv2
 import torch
 from torch import nn
 
-from perception._shipped import write_manifest
+from perception.shipped import write_manifest
 
 from ._detector_net import DetectorNet
 from ._detector_train import train_detector

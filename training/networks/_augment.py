@@ -12,9 +12,13 @@ OUTSIDE_GREY: Final = 114
 
 
 def with_surroundings(
-    patch: NDArray[np.uint8], origin: tuple[int, int], size: tuple[int, int], margin_px: int
+    patch: NDArray[np.uint8],
+    origin: tuple[int, int],
+    size: tuple[int, int],
+    margin_px: int,
+    outside: int = OUTSIDE_GREY,
 ) -> tuple[NDArray[np.uint8], tuple[int, int]]:
-    """Enlarge a patch: by grey where the whole picture ends, else by repeating its border."""
+    """Enlarge a patch: by ``outside`` where the whole picture ends, else by repeating its edge."""
     height, width = patch.shape[:2]
     ends = (
         (origin[1] <= 0, origin[1] + height >= size[1]),
@@ -26,7 +30,7 @@ def with_surroundings(
             pads[2 * axis + side] = margin_px
             kind = cv2.BORDER_CONSTANT if is_end else cv2.BORDER_REPLICATE
             patch = np.asarray(
-                cv2.copyMakeBorder(patch, *pads, kind, value=(OUTSIDE_GREY,) * 3), dtype=np.uint8
+                cv2.copyMakeBorder(patch, *pads, kind, value=(outside,) * 3), dtype=np.uint8
             )
     return patch, (origin[0] - margin_px, origin[1] - margin_px)
 
@@ -36,6 +40,7 @@ def warp(
     out_from_image: NDArray[np.float64],
     size: tuple[int, int],
     oversampling: int = 1,
+    outside: int = OUTSIDE_GREY,
 ) -> NDArray[np.uint8]:
     """Affine crop in continuous coordinates: (0, 0) is the corner of either picture.
 
@@ -44,6 +49,7 @@ def warp(
         out_from_image: (2, 3).
         size: width and height of the result.
         oversampling: samples a pixel and side, averaged.
+        outside: grey level where there is no picture.
     """
     k = oversampling
     matrix = out_from_image * k
@@ -54,7 +60,7 @@ def warp(
         matrix,
         (size[0] * k, size[1] * k),
         flags=cv2.INTER_LINEAR,
-        borderValue=(OUTSIDE_GREY,) * 3,
+        borderValue=(outside,) * 3,
     )
     if k > 1:
         out = cv2.resize(out, size, interpolation=cv2.INTER_AREA)

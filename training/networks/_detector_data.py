@@ -68,7 +68,7 @@ class DetectorData:
 
     def _distorted(self, rng: np.random.Generator) -> FrameSample:
         frame = self.frames[int(rng.integers(len(self.frames)))]
-        scale = _fit_scale(frame.image) * float(np.exp(np.clip(rng.normal(0.05, 0.2), -0.5, 0.6)))
+        scale = _fit_scale(frame.image) * float(np.exp(np.clip(rng.normal(-0.05, 0.3), -1.0, 0.6)))
         size = np.array([WIDTH, HEIGHT]) / scale
         slack = np.abs(size - frame.image.shape[1::-1])
         sample = _placed(

@@ -30,9 +30,6 @@ class DetectorNet(nn.Module):
             assert layer.bias is not None
             nn.init.constant_(layer.bias[:1], -4.6)
             nn.init.constant_(layer.bias[1:], 1.0)
-        points, strides = cells()
-        self.register_buffer("points", points, persistent=False)
-        self.register_buffer("strides", strides, persistent=False)
 
     def forward(self, x: Tensor) -> tuple[Tensor, Tensor]:
         """(N, 3, 256, 320) to logits (N, cells) and corners of boxes (N, cells, 4) in pixels."""
@@ -45,24 +42,41 @@ class DetectorNet(nn.Module):
             for out, head, fuse, level in zip(self.out, self.head, self.fuse, levels, strict=True)
         ]
         flat = torch.cat(rows, dim=2).transpose(1, 2).float()
-        reach = torch.exp(flat[..., 1:].clamp(-4.0, 4.0)) * self.strides[:, None]
-        boxes = torch.cat([self.points - reach[..., :2], self.points + reach[..., 2:]], dim=2)
+        points, strides = cells([(part.shape[2], part.shape[3]) for part in maps], flat.device)
+        reach = torch.exp(flat[..., 1:].clamp(-4.0, 4.0)) * strides[:, None]
+        boxes = torch.cat([points - reach[..., :2], points + reach[..., 2:]], dim=2)
         return flat[..., 0], boxes
 
 
-def cells() -> tuple[Tensor, Tensor]:
-    """Centres (cells, 2) in pixels and strides (cells,), finest level first, row by row."""
+def cells(
+    sizes: list[tuple[int, int]], device: torch.device | None = None
+) -> tuple[Tensor, Tensor]:
+    """Centres (cells, 2) in pixels and strides (cells,), finest level first, row by row.
+
+    Args:
+        sizes: rows and columns of each level; read off tensors while the network is exported, they
+            stay open, and the file takes pictures of any size that 32 divides.
+        device: of the result.
+    """
     points, strides = [], []
-    for stride in STRIDES:
-        rows, columns = HEIGHT // stride, WIDTH // stride
-        v, u = torch.meshgrid(torch.arange(rows), torch.arange(columns), indexing="ij")
-        points.append((torch.stack([u, v], dim=2).reshape(-1, 2) + 0.5) * stride)
-        strides.append(torch.full((rows * columns,), float(stride)))
-    return torch.cat(points).float(), torch.cat(strides)
+    for stride, (rows, columns) in zip(STRIDES, sizes, strict=True):
+        v = (torch.arange(rows, device=device) + 0.5)[:, None] * stride
+        u = (torch.arange(columns, device=device) + 0.5)[None] * stride
+        grid = torch.stack([u + 0.0 * v, v + 0.0 * u], dim=2).reshape(-1, 2)
+        points.append(grid)
+        strides.append(torch.full_like(grid[:, 0], float(stride)))
+    return torch.cat(points), torch.cat(strides)
+
+
+#: Of a picture of the usual size.
+GRID: Final = [(HEIGHT // stride, WIDTH // stride) for stride in STRIDES]
 
 
 class DetectorExport(nn.Module):
-    """(1, 5, cells): centre, width and height in pixels, and the score, as YOLOv8 has them."""
+    """(1, 5, cells): centre, width and height in pixels, and the score, as YOLOv8 has them.
+
+    The picture may have any size that 32 divides: a wide-angle camera needs more pixels.
+    """
 
     names = ("output0",)
 

@@ -11,7 +11,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F  # noqa: N812
 
 from ._detector_data import DetectorData
-from ._detector_net import DetectorNet
+from ._detector_net import GRID, DetectorNet, cells
 from ._fit import Batch, fit
 from ._photograph import photographed
 from ._recipe import Recipe
@@ -50,8 +50,7 @@ def detector_loss(net: nn.Module, batch: Batch, done: float) -> dict[str, Tensor
     with torch.autocast(device.type, dtype=torch.bfloat16):
         logits, boxes = net(normalised(images))
     logits, boxes = logits.float(), boxes.float()
-    assert isinstance(net, DetectorNet)
-    quality, owner, unasked = assigned(logits, boxes, batch, net.points, net.strides)
+    quality, owner, unasked = assigned(logits, boxes, batch, *cells(GRID, device))
     positive = quality > 0.0
     target = torch.gather(batch["boxes"], 1, owner[..., None].expand(-1, -1, 4))
     # The quality itself weighs the boxes, as in the assignment.

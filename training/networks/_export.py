@@ -25,7 +25,10 @@ _LARGE: Final = 1024
 
 
 def export_detector(net: DetectorNet, path: Path) -> None:
-    """Write the detector with the metadata by which YOLOv8 exports are recognised."""
+    """Write the detector with the metadata by which YOLOv8 exports are recognised.
+
+    Height and width are open, as in exports with ``dynamic=True``; ``imgsz`` is the usual size.
+    """
     metadata = {
         "description": "person detector of awarenav, made for its simulator",
         "license": _LICENCE,
@@ -36,7 +39,8 @@ def export_detector(net: DetectorNet, path: Path) -> None:
         "names": "{0: 'person'}",
     }
     example = torch.rand(1, 3, HEIGHT, WIDTH)
-    _export(DetectorExport(net), example, "images", path, metadata, dynamic=False)
+    axes = {"images": {2: "height", 3: "width"}, "output0": {2: "cells"}}
+    _export(DetectorExport(net), example, "images", path, metadata, axes)
 
 
 def export_pose(net: PoseNet, path: Path) -> None:
@@ -49,7 +53,7 @@ def export_pose(net: PoseNet, path: Path) -> None:
         "box_padding": "1.25",
         "z_range_m": "2.1744869",
     }
-    _export(PoseExport(net), torch.randn(2, 3, 192, 144), "input", path, metadata, dynamic=True)
+    _export(PoseExport(net), torch.randn(2, 3, 192, 144), "input", path, metadata)
 
 
 def export_head(net: HeadNet, path: Path, factors: Mapping[str, float]) -> None:
@@ -65,7 +69,7 @@ def export_head(net: HeadNet, path: Path, factors: Mapping[str, float]) -> None:
         "head_centre_head_m": "-0.045,-0.090,0",
     }
     whole = HeadExport(net, factors["rotation"], factors["side"], factors["keypoint"])
-    _export(whole, torch.randn(2, 3, 64, 64), "image", path, metadata, dynamic=True)
+    _export(whole, torch.randn(2, 3, 64, 64), "image", path, metadata)
 
 
 def _halve(model: onnx.ModelProto) -> None:
@@ -90,10 +94,12 @@ def _export(
     name: str,
     path: Path,
     metadata: Mapping[str, str],
-    *,
-    dynamic: bool,
+    open_axes: Mapping[str, Mapping[int, str]] | None = None,
 ) -> None:
-    """Export, describe, and compare with PyTorch; the file is written whole or not at all."""
+    """Export, describe, and compare with PyTorch; the file is written whole or not at all.
+
+    The number of pictures is open unless ``open_axes`` says otherwise.
+    """
     assert isinstance(module, nn.Module)
     module = module.cpu().float().eval()
     outputs = list(module.names)
@@ -107,7 +113,7 @@ def _export(
             input_names=[name],
             output_names=outputs,
             opset_version=_OPSET,
-            dynamic_axes={key: {0: "batch"} for key in (name, *outputs)} if dynamic else None,
+            dynamic_axes=open_axes or {key: {0: "batch"} for key in (name, *outputs)},
             dynamo=False,
         )
         wanted = module(example)

@@ -18,6 +18,8 @@ from ._samples import PersonTruth, picture, read_shards
 _SWAP: Final = [0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 16, 15]
 _PADDING: Final = 1.25
 _FEWEST_PX: Final = 12.0
+# Person crops are black beyond the picture, as OpenMMLab's are.
+_OUTSIDE: Final = 0
 
 
 @dataclass
@@ -65,7 +67,7 @@ class PoseData:
         high = np.minimum(np.ceil(middle + half).astype(int) - origin, image.shape[1::-1])
         cut = np.ascontiguousarray(image[low[1] : high[1], low[0] : high[0]])
         corner = (int(low[0]) + origin[0], int(low[1]) + origin[1])
-        cut, corner = with_surroundings(cut, corner, size, int(0.12 * extent.max()) + 2)
+        cut, corner = with_surroundings(cut, corner, size, int(0.12 * extent.max()) + 2, _OUTSIDE)
         at = np.array(corner, dtype=np.float64)
         self.people.append(
             PersonSample(
@@ -113,7 +115,7 @@ def _crop(
     height = width * HEIGHT / WIDTH
     middle = 0.5 * (person.box[:2] + person.box[2:]) + shift * [width, height]
     matrix = similarity(middle, WIDTH / width, angle, (WIDTH, HEIGHT), flip=flip)
-    image = warp(person.image, matrix, (WIDTH, HEIGHT))
+    image = warp(person.image, matrix, (WIDTH, HEIGHT), outside=_OUTSIDE)
     keypoints = person.keypoints @ matrix[:, :2].T + matrix[:, 2]
     depth, visible = person.keypoints_root_m[:, 2], person.visible
     if flip:

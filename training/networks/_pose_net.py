@@ -56,7 +56,7 @@ class PoseNet(nn.Module):
         fine = self.fuse_fine(fine + enlarged(self.middle_to_fine(middle), fine))
         tokens = self.tokens(self.maps(fine).flatten(2))
         whole = self.whole(middle)[:, None].expand(-1, KEYPOINTS, -1)
-        name = self.name[None].expand(len(x), -1, -1)
+        name = self.name[None].expand(x.shape[0], -1, -1)
         context = torch.cat([tokens, whole, name], dim=2)
         return self.x(tokens), self.y(tokens), self.z(context), self.seen(context)[..., 0]
 

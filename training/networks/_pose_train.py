@@ -12,9 +12,9 @@ from torch.nn import functional as F  # noqa: N812
 
 from ._blocks import cross_entropy, soft_labels
 from ._fit import Batch, fit
+from ._photograph import photographed
 from ._pose_data import PoseData
 from ._pose_net import BINS_X, BINS_Y, BINS_Z, SPLIT, PoseNet, z_bins, z_metres
-from ._photograph import photographed
 from ._recipe import Recipe
 
 MEAN: Final = (123.675, 116.28, 103.53)

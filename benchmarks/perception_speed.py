@@ -1,0 +1,324 @@
+"""Measures perception: frames a second, the time outside the networks, and rtmlib beside it.
+
+    python benchmarks/perception_speed.py
+
+The clip is rendered: 640×480 pixels, two people. Time outside the networks is processor time of the
+calling thread less that in the networks, which run on one thread; rtmlib (see requirements.txt)
+prepares and reads the very same model files and pictures in the same run. A part whose package or
+file is not there is left out, saying so. Exit status 1 when a figure is worse than the baseline
+allows, or when ours costs more than rtmlib's.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import onnxruntime as ort
+
+from perception import (
+    AwarenessPipeline,
+    Camera,
+    PerceptionError,
+    PersonDetection,
+    PersonDetector,
+)
+from perception.networks import OnnxModel, OnnxSettings
+from perception.networks._detector import OnnxPersonDetector
+from perception.networks._head import OnnxHeadPoseEstimator
+from perception.networks._pose import OnnxPoseEstimator
+from perception.shipped import DETECTOR, HEAD, POSE, shipped_model_path
+from sim_tests import SimError
+from sim_tests._bench import Metric, read_baseline, write_baseline
+
+ONE_THREAD = OnnxSettings(intra_op_threads=1)
+TWO_THREADS = OnnxSettings(intra_op_threads=2)
+REPEATS = 7
+BASELINE = Path(__file__).with_name("perception_baseline.json")
+LIMIT_MS = 2.0  # outside the networks, two people
+#: Genuine detectors: file, rtmlib's class and the input's height and width.
+DETECTORS = {
+    "yolox": ("yolox_nano_416_coco.onnx", "YOLOX", (416, 416)),
+    "rtmdet": ("rtmdet_nano_person_320_mmpose.onnx", "RTMDet", (320, 320)),
+}
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A picture and the boxes (2, 4) of the two people in it."""
+
+    image_rgb: Any
+    boxes_xyxy_px: Any
+
+    @property
+    def detections(self) -> tuple[PersonDetection, ...]:
+        """The boxes as detections."""
+        return tuple(PersonDetection(box, 1.0) for box in self.boxes_xyxy_px)
+
+
+class Stopwatch:
+    """Adds up the calling thread's processor time in networks."""
+
+    def __init__(self) -> None:
+        self.network_s = 0.0
+
+    def timed(self, run: Callable[..., Any]) -> Callable[..., Any]:
+        """The same function, whose time counts."""
+
+        def timed_run(*args: Any, **kwargs: Any) -> Any:
+            began = time.thread_time()
+            try:
+                return run(*args, **kwargs)
+            finally:
+                self.network_s += time.thread_time() - began
+
+        return timed_run
+
+    def model(self, path: Path) -> OnnxModel:
+        """A network of ours on one thread, timed."""
+        model = OnnxModel(path, settings=ONE_THREAD)
+        model.run = self.timed(model.run)  # type: ignore[method-assign]
+        return model
+
+    def peer(self, tool: Any, path: Path) -> Any:
+        """A tool of rtmlib with its network on one thread, timed."""
+        options = ort.SessionOptions()
+        options.intra_op_num_threads = 1
+        session = ort.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+        tool.session = _TimedSession(session, self)
+        return tool
+
+
+class _TimedSession:
+    def __init__(self, session: Any, watch: Stopwatch) -> None:
+        self.run = watch.timed(session.run)
+        self.get_inputs = session.get_inputs
+        self.get_outputs = session.get_outputs
+
+
+class TwoPeople:
+    """Runs a detector and reports the two people who are there, so that all runs do the same."""
+
+    def __init__(self, detector: PersonDetector) -> None:
+        self.detector = detector
+        self.detections: tuple[PersonDetection, ...] = ()
+
+    def detect(self, image_rgb: Any) -> tuple[PersonDetection, ...]:
+        """Run the network, and return what is known."""
+        self.detector.detect(image_rgb)
+        return self.detections
+
+
+def clip(frames: int) -> tuple[Camera, list[Frame]]:
+    """Render pictures with two people in them."""
+    from sim_tests.sets._frame_records import read_records  # noqa: PLC0415 - needs the simulator
+    from sim_tests.sets._render import render  # noqa: PLC0415
+    from sim_tests.sets._render_config import RenderConfig  # noqa: PLC0415
+
+    config = RenderConfig(frames=3 * frames, scenes=1, people=2, max_range_m=6.0, seed=4)
+    with tempfile.TemporaryDirectory() as folder:
+        records = read_records(render(config, Path(folder)))
+        camera = Camera.from_yaml(Path(folder) / "camera.yaml")
+        pairs = [record for record in records if len(record["people"]) == 2][:frames]
+        if not pairs:
+            raise SimError(f"none of {config.frames} pictures shows two people; take more --frames")
+        return camera, [
+            Frame(
+                cv2.cvtColor(cv2.imread(str(Path(folder) / record["frame"])), cv2.COLOR_BGR2RGB),
+                np.array([person["box_xyxy_px"] for person in record["people"]]),
+            )
+            for record in pairs
+        ]
+
+
+def outside_ms(watch: Stopwatch, call: Callable[[Frame], Any], frames: Sequence[Frame]) -> float:
+    """Processor milliseconds a frame outside the networks.
+
+    Each frame's best of seven counts: other programs and cold caches only slow.
+    """
+    call(frames[0])
+    best = np.full(len(frames), np.inf)
+    for _ in range(REPEATS):
+        for row, frame in enumerate(frames):
+            watch.network_s = 0.0
+            began = time.thread_time()
+            call(frame)
+            best[row] = min(best[row], time.thread_time() - began - watch.network_s)
+    return 1e3 * float(best.mean())
+
+
+def peers() -> Any | None:
+    """The peer's package, where it is installed."""
+    try:
+        import rtmlib  # noqa: PLC0415
+    except ImportError:
+        return None
+    return rtmlib
+
+
+def measure(models: Path, count: int) -> list[Metric]:
+    """All figures that the packages and files at hand allow."""
+    cv2.setNumThreads(1)
+    skipped = []
+    try:
+        camera, frames = clip(count)
+    except ImportError as error:
+        print(f"left out, all of it: the clip needs the extra 'sim' ({error})", file=sys.stderr)
+        return []
+    metrics = pipeline_metrics(camera, frames)
+    rtmlib = peers()
+    if rtmlib is None:
+        skipped.append("the comparison: rtmlib is not installed (benchmarks/requirements.txt)")
+    else:
+        for name, (file, kind, size) in DETECTORS.items():
+            if (models / file).is_file():
+                metrics += detector_metrics(
+                    name, models / file, getattr(rtmlib, kind), size, frames
+                )
+            else:
+                skipped.append(f"{name}: {models / file} is not there (--models)")
+        metrics += pose_metrics(rtmlib, frames)
+    for reason in skipped:
+        print(f"left out, {reason}", file=sys.stderr)
+    return metrics
+
+
+def pipeline_metrics(camera: Camera, frames: Sequence[Frame]) -> list[Metric]:
+    watch = Stopwatch()
+    detector = TwoPeople(OnnxPersonDetector(watch.model(shipped_model_path(DETECTOR))))
+    pipeline = AwarenessPipeline(
+        camera,
+        detector,
+        OnnxPoseEstimator(watch.model(shipped_model_path(POSE))),
+        OnnxHeadPoseEstimator(watch.model(shipped_model_path(HEAD))),
+    )
+
+    def process(frame: Frame, through: AwarenessPipeline = pipeline) -> None:
+        detector.detections = frame.detections
+        through.process(frame.image_rgb, 0.0)
+
+    outside = outside_ms(watch, process, frames)
+    inside = 1e3 * watch.network_s  # of the last frame; all run the same networks
+    detector.detector = OnnxPersonDetector(shipped_model_path(DETECTOR), settings=TWO_THREADS)
+    fast = AwarenessPipeline(
+        camera,
+        detector,
+        OnnxPoseEstimator(shipped_model_path(POSE), settings=TWO_THREADS),
+        OnnxHeadPoseEstimator(shipped_model_path(HEAD), settings=TWO_THREADS),
+    )
+    times = []
+    for _ in range(REPEATS):
+        began = time.perf_counter()
+        for frame in frames:
+            process(frame, fast)
+        times.append((time.perf_counter() - began) / len(frames))
+    return [
+        # Bare times depend on the machine; wide tolerances only catch a change of kind.
+        Metric("pipeline_frames_per_s_two_threads", 1.0 / min(times), "frames/s", "higher", 0.6),
+        Metric("pipeline_outside_networks", outside, "ms/frame", "lower", 1.0),
+        Metric("pipeline_in_networks_one_thread", inside, "ms/frame", "lower", 1.0),
+    ]
+
+
+def detector_metrics(
+    name: str, path: Path, peer: Any, size: tuple[int, int], frames: Sequence[Frame]
+) -> list[Metric]:
+    ours, theirs = Stopwatch(), Stopwatch()
+    detector = OnnxPersonDetector(ours.model(path))
+    with contextlib.redirect_stdout(sys.stderr):
+        other = theirs.peer(peer(str(path), model_input_size=size, backend="onnxruntime"), path)
+    bgr = {id(frame): frame.image_rgb[..., ::-1].copy() for frame in frames}
+    return compared(
+        f"{name}_detector",
+        outside_ms(ours, lambda frame: detector.detect(frame.image_rgb), frames),
+        outside_ms(theirs, lambda frame: other(bgr[id(frame)]), frames),
+    )
+
+
+def pose_metrics(rtmlib: Any, frames: Sequence[Frame]) -> list[Metric]:
+    path = shipped_model_path(POSE)
+    ours, theirs = Stopwatch(), Stopwatch()
+    estimator = OnnxPoseEstimator(ours.model(path))
+    with contextlib.redirect_stdout(sys.stderr):
+        tool = rtmlib.RTMPose3d(str(path), model_input_size=(144, 192), backend="onnxruntime")
+    other = theirs.peer(tool, path)
+    return compared(
+        "pose_two_people",
+        outside_ms(
+            ours, lambda frame: estimator.estimate(frame.image_rgb, frame.detections), frames
+        ),
+        outside_ms(theirs, lambda frame: other(frame.image_rgb, frame.boxes_xyxy_px), frames),
+    )
+
+
+def compared(name: str, ours_ms: float, theirs_ms: float) -> list[Metric]:
+    return [
+        Metric(f"{name}_outside_network", ours_ms, "ms/frame", "lower", 1.0),
+        Metric(f"{name}_outside_over_rtmlib", ours_ms / theirs_ms, "x", "lower", 0.5),
+    ]
+
+
+def report(metrics: Sequence[Metric], baseline: dict[str, Metric]) -> tuple[str, bool]:
+    """The figures as text beside the baseline, and whether all are as they should be."""
+    lines = [f"{'figure':42s}{'now':>10s}{'baseline':>10s}  unit"]
+    good = True
+    for metric in metrics:
+        known = baseline.get(metric.name)
+        verdict = "   WORSE" if known is not None and metric.is_worse_than(known) else ""
+        if metric.name.endswith("_over_rtmlib") and metric.value >= 1.0:
+            verdict = "   MORE THAN RTMLIB"
+        good = good and not verdict
+        if metric.name == "pipeline_outside_networks" and metric.value > LIMIT_MS:
+            verdict += f"   above {LIMIT_MS:g}, the aim on an idle machine"
+        before = "-" if known is None else f"{known.value:.3g}"
+        lines.append(f"{metric.name:42s}{metric.value:10.3g}{before:>10s}  {metric.unit}{verdict}")
+    return "\n".join(lines), good
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(
+        description="Measure frames a second and the time outside the networks, with rtmlib's on "
+        "the same model files in the same run beside it."
+    )
+    shared = Path(__file__).resolve().parents[2] / "shared" / "models"
+    parser.add_argument(
+        "--models", type=Path, default=shared, metavar="DIR", help="folder of genuine detectors"
+    )
+    parser.add_argument(
+        "--frames", type=int, default=12, metavar="N", help="pictures of the clip (default: 12)"
+    )
+    parser.add_argument(
+        "--baseline",
+        type=Path,
+        default=BASELINE,
+        metavar="FILE",
+        help=f"figures to compare with, if it exists (default: {BASELINE.name} beside this file)",
+    )
+    parser.add_argument("--out", type=Path, metavar="FILE", help="write the figures as a baseline")
+    options = parser.parse_args()
+    if options.frames < 1:
+        parser.error(f"--frames must be at least 1, got {options.frames}")
+    try:
+        baseline = read_baseline(options.baseline) if options.baseline.exists() else {}
+        metrics = measure(options.models, options.frames)
+    except (PerceptionError, SimError) as error:
+        print(f"{parser.prog}: {error}", file=sys.stderr)
+        return 2
+    text, good = report(metrics, baseline)
+    print(text)
+    if options.out is not None:
+        write_baseline(options.out, metrics)
+    return 0 if good else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

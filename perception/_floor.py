@@ -1,0 +1,86 @@
+"""The floor that people stand on, as the camera sees it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ._errors import PerceptionError
+from .arrays import FloatArray, finite_number, rigid_transform, set_fields, unit_vector
+
+# A ray flatter than this meets the floor too far away to say where.
+_HORIZON_SINE = 0.02
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FloorPlane:
+    """A flat floor in the camera frame: ``normal_camera · p + height_m = 0`` for its points p.
+
+    Attributes:
+        normal_camera: (3,) unit vector up from the floor, in the camera frame.
+        height_m: how high the camera's centre is above the floor, > 0.
+        height_std_m: standard deviation of that, ≥ 0.
+        tilt_std_rad: standard deviation of the normal's direction an axis, ≥ 0: how well the
+            camera's mount is known, and how much the robot pitches.
+    """
+
+    normal_camera: FloatArray
+    height_m: float
+    height_std_m: float = 0.02
+    tilt_std_rad: float = 0.01
+
+    def __post_init__(self) -> None:
+        set_fields(
+            self,
+            normal_camera=unit_vector("normal_camera", self.normal_camera),
+            height_m=finite_number("height_m", self.height_m, minimum=0.0, exclusive_minimum=True),
+            height_std_m=finite_number("height_std_m", self.height_std_m, minimum=0.0),
+            tilt_std_rad=finite_number("tilt_std_rad", self.tilt_std_rad, minimum=0.0),
+        )
+
+    @classmethod
+    def from_pose(
+        cls, T_odom_camera: Any, *, height_std_m: float = 0.02, tilt_std_rad: float = 0.01
+    ) -> FloorPlane:
+        """Return the floor z = 0 of odom for a camera at ``T_odom_camera`` (4, 4).
+
+        Raises:
+            PerceptionError: for a transform that is none, or a camera that is not above z = 0.
+        """
+        pose = rigid_transform("T_odom_camera", T_odom_camera)
+        if pose[2, 3] <= 0.0:
+            raise PerceptionError(
+                "T_odom_camera must put the camera above the floor z = 0 of odom, got "
+                f"z = {pose[2, 3]:g} m"
+            )
+        return cls(pose[2, :3], float(pose[2, 3]), height_std_m, tilt_std_rad)
+
+    def depth_of(
+        self, rays: FloatArray, above_m: float, above_std_m: float, ray_std: float | FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return where rays meet the plane that lies ``above_m`` above the floor.
+
+        Args:
+            rays: (N, 2) x/z and y/z of points known to be at that height.
+            above_m: ≥ 0.
+            above_std_m: standard deviation of that height.
+            ray_std: standard deviation of either coordinate of a ray, or (N,) of each.
+
+        Returns:
+            (N,) depths z in metres and (N,) standard deviations of their logarithms, first order.
+            Both are NaN for a ray that goes at or above the horizon.
+        """
+        points = np.column_stack([rays, np.ones(len(rays))])
+        sine = -points @ self.normal_camera
+        clearance = self.height_m - above_m
+        length = np.sqrt(np.einsum("ni,ni->n", points, points))
+        meets = (sine > _HORIZON_SINE * length) & (clearance > 0.0)
+        down = np.where(meets, sine, np.nan)
+        height = math.hypot(self.height_std_m, above_std_m) / max(clearance, 1e-9)
+        # sine = −n·ray: tilting n by δ changes it by |ray| δ, moving the ray by its components.
+        across = math.hypot(*self.normal_camera[:2].tolist())
+        slope = np.hypot(self.tilt_std_rad * length, ray_std * across) / down
+        return clearance / down, np.hypot(height, slope)

@@ -1,0 +1,85 @@
+"""Square crops about a head, cut out the same way for training and for use."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..arrays import FloatArray, finite_array, finite_number
+
+#: What stands for the world outside the image, in every channel.
+OUTSIDE_GREY: Final = 114
+
+# Beyond this factor the bilinear samples lie more than a pixel apart; averaged by the dozen they
+# still do not alias visibly, and a face that fills the picture costs no more than this.
+_MAX_OVERSAMPLING: Final = 8
+
+
+def head_crop(
+    image_rgb: NDArray[np.uint8], centre_px: ArrayLike, side_px: float, size: int = 64
+) -> NDArray[np.uint8]:
+    """Cut a square out of an image and bring it to ``size`` × ``size`` pixels.
+
+    Enlarging is bilinear. Shrinking averages over the area of each new pixel (bilinear samples at
+    most a pixel apart, then OpenCV's ``INTER_AREA``), so that a near face does not alias. Nothing
+    is rounded to whole pixels. The crop's corner lies at ``centre_px − side_px / 2``; column ``j``
+    of the result has its centre at ``(j + 0.5) / size`` of the side from there.
+
+    Args:
+        image_rgb: (H, W, 3).
+        centre_px: (2,) where the middle of the crop lies, in the coordinates of
+            :meth:`perception.Camera.project` (pixel centres at whole numbers). It may lie outside.
+        side_px: length of its side in pixels of the image, > 0.
+        size: pixels along a side of the result.
+
+    Returns:
+        (size, size, 3), grey (:data:`OUTSIDE_GREY`) outside the image.
+
+    Raises:
+        PerceptionError: for a centre or a side that is no such number.
+    """
+    u, v = finite_array("centre_px", centre_px, (2,)).tolist()
+    side = finite_number("side_px", side_px, minimum=0.0, exclusive_minimum=True)
+    height, width = image_rgb.shape[:2]
+    reach = 0.5 * side + 1.0
+    if not (-reach < u < width + reach and -reach < v < height + reach):
+        return np.full((size, size, 3), OUTSIDE_GREY, np.uint8)
+    oversampling = min(max(math.ceil(side / size), 1), _MAX_OVERSAMPLING)
+    fine = size * oversampling
+    step = side / fine
+    # Column j of the fine grid lies at corner + (j + ½) · step.
+    grid_to_image = np.array(
+        [
+            [step, 0.0, u - 0.5 * side + 0.5 * step],
+            [0.0, step, v - 0.5 * side + 0.5 * step],
+        ]
+    )
+    crop = cv2.warpAffine(
+        image_rgb,
+        grid_to_image,
+        (fine, fine),
+        flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+        borderMode=cv2.BORDER_CONSTANT,
+        borderValue=(OUTSIDE_GREY,) * 3,
+    )
+    if oversampling > 1:
+        crop = cv2.resize(crop, (size, size), interpolation=cv2.INTER_AREA)
+    return np.asarray(crop, dtype=np.uint8)
+
+
+def crop_to_image(
+    points: FloatArray, centre_px: FloatArray, side_px: float | FloatArray
+) -> FloatArray:
+    """Map (…, 2) points in units of a crop's side, (0, 0) its top-left corner, to pixels."""
+    return np.asarray(centre_px + (points - 0.5) * side_px, dtype=np.float64)
+
+
+def image_to_crop(
+    points_px: FloatArray, centre_px: FloatArray, side_px: float | FloatArray
+) -> FloatArray:
+    """Map (…, 2) pixels to units of a crop's side, (0, 0) its top-left corner."""
+    return np.asarray((points_px - centre_px) / side_px + 0.5, dtype=np.float64)

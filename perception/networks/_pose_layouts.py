@@ -1,0 +1,97 @@
+"""Which pose network a file holds, told from the shapes of its outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from numpy.typing import NDArray
+
+from .._errors import PerceptionError
+from ..arrays import finite_number
+from ._session import OnnxModel
+from ._simcc import Z_RANGE_M
+
+KNOWN: Final = (
+    "RTMPose and RTMW: simcc_x (N, K, s * width), simcc_y (N, K, s * height); "
+    "RTMW3D: simcc_z (N, K, depth bins) beside them; K = 17 (COCO) or 133 (COCO-WholeBody)"
+)
+_KEYPOINTS: Final = {17: "coco", 133: "coco_wholebody"}
+_AXES: Final = ("simcc_x", "simcc_y", "simcc_z")
+
+
+@dataclass(frozen=True, slots=True)
+class PoseLayout:
+    """How to read a pose network.
+
+    Attributes:
+        keypoints: the layout's name: ``"coco"`` or ``"coco_wholebody"``.
+        axes: which outputs are x, y and, where it has one, z.
+        split_ratio: bins a pixel of the input along x and y.
+        z_range_m: half the depth that the z axis spans.
+    """
+
+    keypoints: str
+    axes: tuple[int, ...]
+    split_ratio: float
+    z_range_m: float
+
+    @property
+    def has_depth(self) -> bool:
+        """Whether the network says how deep keypoints lie."""
+        return len(self.axes) == 3
+
+
+def recognise_pose(
+    model: OnnxModel, outputs: Sequence[NDArray[Any]], height_px: int, width_px: int
+) -> PoseLayout:
+    """Tell the layout of a pose network from the outputs of a trial run.
+
+    Outputs called simcc_x, simcc_y and simcc_z are found by name, others are taken in this order.
+
+    Raises:
+        PerceptionError: for a layout that is not known, saying what was found and what is known.
+    """
+
+    def refusal(reason: str) -> PerceptionError:
+        shapes = (
+            f"{tensor.name} {output.shape}"
+            for tensor, output in zip(model.outputs, outputs, strict=True)
+        )
+        return PerceptionError(
+            f"{model.name} is no pose network of a known layout: {reason}. Found input "
+            f"(N, 3, {height_px}, {width_px}) -> {', '.join(shapes)}. Known: {KNOWN}"
+        )
+
+    if len(outputs) not in (2, 3) or any(output.ndim != 3 for output in outputs):
+        raise refusal("it has no two or three outputs (N, K, bins)")
+    names = [tensor.name for tensor in model.outputs]
+    axes = tuple(range(len(outputs)))
+    if set(names) == set(_AXES[: len(names)]):
+        axes = tuple(names.index(axis) for axis in _AXES[: len(names)])
+    count = {output.shape[1] for output in outputs}
+    if len(count) != 1 or not count <= set(_KEYPOINTS):
+        raise refusal(f"{' and '.join(map(str, sorted(count)))} keypoints are not known")
+    bins_x, bins_y = (outputs[axis].shape[2] for axis in axes[:2])
+    split = bins_x / width_px
+    if split < 1.0 or bins_y != split * height_px:
+        raise refusal(
+            f"{bins_x} bins along x and {bins_y} along y are not the same number to a pixel"
+        )
+    if min(output.shape[2] for output in outputs) < 3:
+        raise refusal("an axis has fewer than three bins")
+    z_range_m = metadata_number(model, "z_range_m", Z_RANGE_M)
+    return PoseLayout(_KEYPOINTS[count.pop()], axes, split, z_range_m)
+
+
+def metadata_number(model: OnnxModel, key: str, default: float) -> float:
+    """A number > 0 that the metadata hold, as our own exports do, or the default of the makers."""
+    if key not in model.metadata:
+        return default
+    return finite_number(
+        f"metadata {key} of {model.name}",
+        model.metadata[key],
+        minimum=0.0,
+        exclusive_minimum=True,
+    )

@@ -1,0 +1,255 @@
+"""An ONNX file in memory: checked when loaded, described by its shapes, run by onnxruntime."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import onnxruntime as ort  # type: ignore[import-untyped]
+from numpy.typing import NDArray
+
+from .._errors import PerceptionError
+
+_PROVIDERS: Final[dict[str, str]] = {
+    "cpu": "CPUExecutionProvider",
+    "cuda": "CUDAExecutionProvider",
+    "tensorrt": "TensorrtExecutionProvider",
+}
+_DTYPES: Final[dict[str, str]] = {
+    "float": "float32",
+    "float16": "float16",
+    "double": "float64",
+    "uint8": "uint8",
+    "int8": "int8",
+    "uint16": "uint16",
+    "int16": "int16",
+    "int32": "int32",
+    "int64": "int64",
+    "uint32": "uint32",
+    "uint64": "uint64",
+    "bool": "bool",
+}
+_ERRORS_ONLY: Final = 3
+
+
+@dataclass(frozen=True, slots=True)
+class OnnxSettings:
+    """How onnxruntime runs a network.
+
+    Attributes:
+        providers: in order of preference, of ``"cpu"``, ``"cuda"`` and ``"tensorrt"``. One that is
+            asked for and not present is refused; the CPU takes what the others leave over.
+        intra_op_threads: threads of one operator, ≥ 1; None leaves it to onnxruntime, which takes
+            one a physical core.
+        allow_spinning: whether idle threads wait in a busy loop. That is faster by some
+            microseconds and takes whole cores from the robot's other programs.
+    """
+
+    providers: tuple[str, ...] = ("cpu",)
+    intra_op_threads: int | None = None
+    allow_spinning: bool = False
+
+    def __post_init__(self) -> None:
+        # A lone string is a sequence of letters, which would be refused one letter at a time.
+        given: Any = self.providers
+        names = (given,) if isinstance(given, str) else tuple(given)
+        if not names or any(name not in _PROVIDERS for name in names):
+            raise PerceptionError(
+                f"providers must be one or more of {', '.join(map(repr, _PROVIDERS))}, "
+                f"got {self.providers!r}"
+            )
+        threads = self.intra_op_threads
+        if threads is not None and (
+            isinstance(threads, bool) or not isinstance(threads, int) or threads < 1
+        ):
+            raise PerceptionError(
+                f"intra_op_threads must be a whole number of at least 1 or None, got {threads!r}"
+            )
+        object.__setattr__(self, "providers", names)
+
+
+@dataclass(frozen=True, slots=True)
+class OnnxTensor:
+    """An input or output of a network.
+
+    Attributes:
+        name: as the graph has it.
+        shape: extents; None where the graph leaves one free.
+        dtype: NumPy's name of its numbers, or onnxruntime's where NumPy has none.
+    """
+
+    name: str
+    shape: tuple[int | None, ...]
+    dtype: str
+
+    def __str__(self) -> str:
+        extents = ", ".join("any" if extent is None else str(extent) for extent in self.shape)
+        return f"{self.name} ({extents}) {self.dtype}"
+
+
+class OnnxModel:
+    """A network loaded from an ONNX file.
+
+    Args:
+        path_or_bytes: the file, or its content.
+        settings: providers and threads.
+        sha256: 64 hexadecimal digits that the content must hash to; checked on the very bytes that
+            are loaded. Weights in files of their own are not covered by it and are then refused.
+
+    Raises:
+        PerceptionError: for a file that is absent, cannot be read, has another sha256 or is no
+            network that onnxruntime can load, and for a provider that is not present.
+    """
+
+    def __init__(
+        self,
+        path_or_bytes: str | os.PathLike[str] | bytes,
+        *,
+        settings: OnnxSettings | None = None,
+        sha256: str | None = None,
+    ) -> None:
+        self.settings = OnnxSettings() if settings is None else settings
+        self.path, content = _read(path_or_bytes)
+        if sha256 is not None:
+            self._check_sha256(content, sha256)
+        self._session = self._load(content, sealed=sha256 is not None)
+        self.inputs = tuple(_tensor(entry) for entry in self._session.get_inputs())
+        self.outputs = tuple(_tensor(entry) for entry in self._session.get_outputs())
+        self.metadata: dict[str, str] = dict(self._session.get_modelmeta().custom_metadata_map)
+        self._names = [tensor.name for tensor in self.outputs]
+
+    def __repr__(self) -> str:
+        return f"OnnxModel({self.name}: {self.layout})"
+
+    @property
+    def name(self) -> str:
+        """What messages call it: the file, or that it came as bytes."""
+        return "model given as bytes" if self.path is None else str(self.path)
+
+    @property
+    def layout(self) -> str:
+        """Inputs and outputs with shapes and types, for messages."""
+        ends = (", ".join(map(str, tensors)) for tensors in (self.inputs, self.outputs))
+        return " -> ".join(ends)
+
+    @property
+    def providers(self) -> tuple[str, ...]:
+        """The providers in use, in order of preference, by the names of :class:`OnnxSettings`."""
+        short = {long: name for name, long in _PROVIDERS.items()}
+        return tuple(short.get(name, name) for name in self._session.get_providers())
+
+    def run(self, feeds: Mapping[str, NDArray[Any]]) -> list[NDArray[Any]]:
+        """Run the network on its named inputs; the outputs come in the order of ``outputs``.
+
+        Raises:
+            PerceptionError: for inputs of the wrong name, shape or type, and when the network
+                fails, with onnxruntime's words.
+        """
+        try:
+            results: list[NDArray[Any]] = self._session.run(self._names, feeds)
+        except Exception as cause:  # onnxruntime's errors share no base of their own
+            given = ", ".join(f"{name} {np.shape(feed)}" for name, feed in feeds.items())
+            raise PerceptionError(
+                f"{self.name} could not be run on {given}; it takes "
+                f"{', '.join(map(str, self.inputs))}: {_first_line(cause)}"
+            ) from cause
+        return results
+
+    def _check_sha256(self, content: bytes, wanted: str) -> None:
+        digits = str(wanted).strip().lower()
+        if len(digits) != 64 or set(digits) - set("0123456789abcdef"):
+            raise PerceptionError(f"sha256 must be 64 hexadecimal digits, got {wanted!r}")
+        found = hashlib.sha256(content).hexdigest()
+        if found != digits:
+            raise PerceptionError(
+                f"{self.name} is not the file it should be: its sha256 is {found}, "
+                f"wanted {digits} ({len(content)} bytes)"
+            )
+
+    def _load(self, content: bytes, *, sealed: bool) -> Any:
+        wanted = [_PROVIDERS[name] for name in self.settings.providers]
+        present = ort.get_available_providers()
+        if missing := [name for name in self.settings.providers if _PROVIDERS[name] not in present]:
+            here = [name for name, long in _PROVIDERS.items() if long in present]
+            raise PerceptionError(
+                f"provider {missing[0]!r} is not present in this onnxruntime {ort.__version__}, "
+                f"which has {', '.join(map(repr, here))}; onnxruntime-gpu has the others"
+            )
+        options = ort.SessionOptions()
+        options.log_severity_level = _ERRORS_ONLY
+        if self.settings.intra_op_threads is not None:
+            options.intra_op_num_threads = self.settings.intra_op_threads
+        spinning = "1" if self.settings.allow_spinning else "0"
+        options.add_session_config_entry("session.intra_op.allow_spinning", spinning)
+        if _PROVIDERS["cpu"] not in wanted:
+            wanted.append(_PROVIDERS["cpu"])
+        # By its path, a file finds the weights that some exporters write beside it.
+        source = content if self.path is None or sealed else str(self.path)
+        try:
+            # Without enable_fallback=0 a failing GPU is replaced by the CPU, with a print.
+            session = ort.InferenceSession(source, options, providers=wanted, enable_fallback=0)
+        except Exception as cause:  # onnxruntime's errors share no base of their own
+            raise PerceptionError(
+                f"{self.name} is no ONNX network that onnxruntime {ort.__version__} can load "
+                f"({len(content)} bytes): {_first_line(cause)}"
+            ) from cause
+        idle = [name for name in self.settings.providers if _PROVIDERS[name] not in _used(session)]
+        if idle:
+            raise PerceptionError(
+                f"provider {idle[0]!r} is built into this onnxruntime {ort.__version__} but could "
+                "not start: its driver or libraries are missing or of another version"
+            )
+        return session
+
+
+def as_onnx_model(
+    model: OnnxModel | str | os.PathLike[str] | bytes,
+    settings: OnnxSettings | None,
+    sha256: str | None,
+) -> OnnxModel:
+    """Load what is not loaded yet; a loaded model takes no settings and no sha256 any more."""
+    if not isinstance(model, OnnxModel):
+        return OnnxModel(model, settings=settings, sha256=sha256)
+    if settings is not None or sha256 is not None:
+        raise PerceptionError(
+            "settings and sha256 are for loading a model: give them to OnnxModel, "
+            f"not beside {model.name}, which is loaded already"
+        )
+    return model
+
+
+def _read(path_or_bytes: Any) -> tuple[Path | None, bytes]:
+    if isinstance(path_or_bytes, (bytes, bytearray, memoryview)):
+        return None, bytes(path_or_bytes)
+    try:
+        path = Path(path_or_bytes)
+    except TypeError:
+        raise PerceptionError(
+            "a model must be a path to an ONNX file or its bytes, got "
+            f"{type(path_or_bytes).__name__}: {path_or_bytes!r:.80}"
+        ) from None
+    try:
+        return path, path.read_bytes()
+    except (OSError, ValueError) as cause:  # ValueError: a path with a null character
+        reason = getattr(cause, "strerror", None) or cause
+        raise PerceptionError(f"cannot read the model {path}: {reason}") from cause
+
+
+def _used(session: Any) -> list[str]:
+    return list(session.get_providers())
+
+
+def _tensor(entry: Any) -> OnnxTensor:
+    shape = tuple(extent if isinstance(extent, int) else None for extent in entry.shape)
+    inner = entry.type.removeprefix("tensor(").removesuffix(")")
+    return OnnxTensor(entry.name, shape, _DTYPES.get(inner, entry.type))
+
+
+def _first_line(cause: Exception) -> str:
+    lines = str(cause).strip().splitlines()
+    return lines[0][:300] if lines else type(cause).__name__

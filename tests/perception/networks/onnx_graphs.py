@@ -1,0 +1,236 @@
+"""Small ONNX graphs in the layouts of detectors and pose networks, with answers known beforehand.
+
+Some give fixed rows. Others look at the picture: a detector that scores each cell by how much of
+one colour lies in it, and a pose network whose keypoints all sit on the reddest point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import onnx
+from onnx import TensorProto, helper, numpy_helper
+
+STRIDES = (8, 16, 32)
+MEAN_RGB = np.array([123.675, 116.28, 103.53])
+STD_RGB = np.array([58.395, 57.12, 57.375])
+_TYPES = {
+    "float32": TensorProto.FLOAT,
+    "float16": TensorProto.FLOAT16,
+    "uint8": TensorProto.UINT8,
+}
+
+
+class Graph:
+    """Collects nodes and constants and writes a model."""
+
+    def __init__(
+        self,
+        input_name: str,
+        shape: Sequence[int | str],
+        *,
+        dtype: str = "float32",
+        opset: int = 13,
+    ) -> None:
+        self._nodes: list[Any] = []
+        self._constants: list[Any] = []
+        self._outputs: list[Any] = []
+        self._input = helper.make_tensor_value_info(input_name, _TYPES[dtype], list(shape))
+        self._opset = opset
+        self.pixels = input_name
+        if dtype != "float32":
+            self.pixels = self.node("Cast", input_name, to=TensorProto.FLOAT)
+
+    def constant(self, values: Any, dtype: Any = np.float32) -> str:
+        name = f"constant_{len(self._constants)}"
+        self._constants.append(numpy_helper.from_array(np.asarray(values, dtype), name))
+        return name
+
+    def node(self, kind: str, *inputs: str, name: str | None = None, **attributes: Any) -> str:
+        output = name or f"{kind}_{len(self._nodes)}"
+        self._nodes.append(helper.make_node(kind, list(inputs), [output], **attributes))
+        return output
+
+    def zero(self) -> str:
+        """A number that is 0 for every finite picture and yet depends on it."""
+        mean = self.node("ReduceMean", self.pixels, axes=[1, 2, 3], keepdims=0)
+        bounded = self.node("Clip", mean, self.constant(-1.0), self.constant(1.0))
+        return self.node("Mul", bounded, self.constant([0.0]))
+
+    def output(
+        self, value: str, name: str, shape: Sequence[int | str | None], dtype: int | None = None
+    ) -> None:
+        self.node("Identity", value, name=name)
+        kind = TensorProto.FLOAT if dtype is None else dtype
+        self._outputs.append(helper.make_tensor_value_info(name, kind, list(shape)))
+
+    def bytes(self, metadata: dict[str, str] | None = None) -> bytes:
+        graph = helper.make_graph(
+            self._nodes, "graph", [self._input], self._outputs, self._constants
+        )
+        model = helper.make_model(
+            graph, opset_imports=[helper.make_opsetid("", self._opset)], ir_version=8
+        )
+        helper.set_model_props(model, metadata or {})
+        onnx.checker.check_model(model)
+        content: bytes = model.SerializeToString()
+        return content
+
+
+def fixed(
+    outputs: dict[str, np.ndarray],
+    size: tuple[int | str, int | str],
+    *,
+    metadata: dict[str, str] | None = None,
+    batch: int | str = 1,
+    dtype: str = "float32",
+    declared: dict[str, Sequence[int | str | None]] | None = None,
+) -> bytes:
+    """A network that gives these outputs whatever it sees; NaN in a picture reaches them too."""
+    graph = Graph("images", (batch, 3, *size), dtype=dtype)
+    zero = graph.zero()
+    for name, value in outputs.items():
+        shape = (declared or {}).get(name, value.shape)
+        if np.issubdtype(value.dtype, np.integer):
+            whole = graph.node("Cast", zero, to=TensorProto.INT64)
+            total = graph.node("Add", graph.constant(value, np.int64), whole)
+            graph.output(total, name, shape, TensorProto.INT64)
+        else:
+            graph.output(graph.node("Add", graph.constant(value), zero), name, shape)
+    return graph.bytes(metadata)
+
+
+def cell_count(height: int, width: int) -> int:
+    return sum((height // stride) * (width // stride) for stride in STRIDES)
+
+
+def cell_centres(height: int, width: int) -> tuple[np.ndarray, np.ndarray]:
+    """(N, 2) centres in pixels of the input and (N,) strides."""
+    centres, strides = [], []
+    for stride in STRIDES:
+        for row in range(height // stride):
+            for column in range(width // stride):
+                centres.append(((column + 0.5) * stride, (row + 0.5) * stride))
+                strides.append(stride)
+    return np.array(centres), np.array(strides)
+
+
+def colour_scores(graph: Graph, channel: int, gain: float, offset: float) -> str:
+    """(1, 1, N): the mean of one channel over each cell, times gain, plus offset."""
+    parts = []
+    for stride in STRIDES:
+        weight = np.zeros((1, 3, stride, stride))
+        weight[0, channel] = gain / stride**2
+        cells = graph.node(
+            "Conv",
+            graph.pixels,
+            graph.constant(weight),
+            graph.constant([offset]),
+            kernel_shape=[stride, stride],
+            strides=[stride, stride],
+        )
+        parts.append(graph.node("Reshape", cells, graph.constant([1, 1, -1], np.int64)))
+    return graph.node("Concat", *parts, axis=2)
+
+
+def colour_yolov8(height: int, width: int, *, dtype: str = "float32") -> bytes:
+    """YOLOv8 of one class that sees red: every cell's box is the cell, its score the redness."""
+    graph = Graph("images", (1, 3, height, width), dtype=dtype)
+    centres, strides = cell_centres(height, width)
+    boxes = np.concatenate([centres, np.repeat(strides[:, None], 2, axis=1)], axis=1).T
+    gain = 1 / 255.0 if dtype == "uint8" else 1.0
+    scores = colour_scores(graph, 0, gain, 0.0)
+    rows = graph.node("Concat", graph.constant(boxes[None]), scores, axis=1)
+    graph.output(rows, "output0", (1, 5, len(centres)))
+    return graph.bytes({"names": "{0: 'person'}", "task": "detect"})
+
+
+def colour_yolox(height: int, width: int) -> bytes:
+    """YOLOX of one class that sees red, in the blue-green-red order of 0–255."""
+    graph = Graph("images", (1, 3, height, width))
+    count = cell_count(height, width)
+    # Offsets of half a cell and log sizes of 0: the cell itself.
+    boxes = np.tile([[0.5], [0.5], [0.0], [0.0]], (1, count))
+    scores = colour_scores(graph, 2, 1 / 255.0, 0.0)
+    ones = graph.constant(np.ones((1, 1, count)))
+    columns = graph.node("Concat", graph.constant(boxes[None]), scores, ones, axis=1)
+    graph.output(graph.node("Transpose", columns, perm=[0, 2, 1]), "output", (1, count, 6))
+    return graph.bytes()
+
+
+def colour_rtmdet(height: int, width: int) -> bytes:
+    """RTMDet of any input size that sees red; ``dets`` belong to an input of height × width."""
+    graph = Graph("input", ("batch", 3, "height", "width"))
+    centres, strides = cell_centres(height, width)
+    half = 0.5 * strides[:, None]
+    boxes = np.concatenate([centres - half, centres + half], axis=1).T
+    # Standardised red back to 0–1.
+    scores = colour_scores(graph, 2, STD_RGB[0] / 255.0, MEAN_RGB[0] / 255.0)
+    columns = graph.node("Concat", graph.constant(boxes[None]), scores, axis=1)
+    rows = graph.node("Transpose", columns, perm=[0, 2, 1])
+    graph.output(rows, "dets", ("batch", "num", "five"))
+    labels = np.zeros((1, len(centres)), np.int64)
+    graph.output(
+        graph.node("Identity", graph.constant(labels, np.int64)),
+        "labels",
+        ("batch", "num"),
+        TensorProto.INT64,
+    )
+    return graph.bytes()
+
+
+def simcc(
+    places: Sequence[np.ndarray],
+    heights: Sequence[np.ndarray],
+    bins: Sequence[int],
+    size: tuple[int, int],
+    *,
+    batch: int | str = "batch",
+    sigma: float = 6.0,
+    dtype: str = "float32",
+    metadata: dict[str, str] | None = None,
+) -> bytes:
+    """A pose network that gives Gaussians at ``places`` (K,) in bins with ``heights`` (K,)."""
+    graph = Graph("input", (batch, 3, *size), dtype=dtype)
+    mean = graph.node("ReduceMean", graph.pixels, axes=[1, 2, 3], keepdims=1)
+    zero = graph.node("Mul", mean, graph.constant([0.0]))
+    zero = graph.node("Squeeze", zero, graph.constant([3], np.int64))
+    for axis, place, height, count in zip("xyz", places, heights, bins, strict=False):
+        reach = np.arange(count) - place[:, None]
+        rows = height[:, None] * np.exp(-0.5 * (reach / sigma) ** 2)
+        total = graph.node("Add", zero, graph.constant(rows[None]))
+        graph.output(total, f"simcc_{axis}", (batch, len(place), count))
+    return graph.bytes(metadata)
+
+
+def red_point_pose(
+    height: int, width: int, *, batch: int | str = "batch", order: str = "xy", named: bool = True
+) -> bytes:
+    """A pose network of 17 keypoints that all sit on the reddest column and row of the picture.
+
+    Bins are two to a pixel; the odd ones hold the mean of their neighbours.
+    """
+    graph = Graph("input", (batch, 3, height, width))
+    red = graph.node("Slice", graph.pixels, *(graph.constant([v], np.int64) for v in (0, 1, 1)))
+    scaled = graph.node("Mul", red, graph.constant([STD_RGB[0] / 255.0]))
+    red = graph.node("Add", scaled, graph.constant([MEAN_RGB[0] / 255.0]))
+    outputs = {}
+    for axis, across, count in (("x", 2, width), ("y", 3, height)):
+        peak = graph.node("ReduceMax", red, axes=[across], keepdims=0)  # (N, 1, count)
+        wide = graph.node(
+            "ConvTranspose",
+            peak,
+            graph.constant([[[0.5, 1.0, 0.5]]]),
+            strides=[2],
+            kernel_shape=[3],
+            pads=[1, 0],
+        )
+        shape = graph.constant([1, 17, 1], np.int64)
+        outputs[axis] = (graph.node("Expand", wide, shape), 2 * count)
+    for place, axis in enumerate(order):
+        value, bins = outputs[axis]
+        name = f"simcc_{axis}" if named else f"out_{place}"
+        graph.output(value, name, (batch, 17, bins))
+    return graph.bytes()

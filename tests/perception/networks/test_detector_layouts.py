@@ -1,0 +1,200 @@
+"""Layouts are told apart, and what is unknown or could be two things is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from onnx_graphs import cell_centres, cell_count, fixed, red_point_pose
+
+from perception import PerceptionError
+from perception.networks._box_format import BoxFormatVote
+from perception.networks._detector import OnnxPersonDetector
+
+SIZE = (256, 320)
+CELLS = cell_count(*SIZE)
+PICTURE = np.zeros((*SIZE, 3), np.uint8)
+
+
+def layout(shape: tuple[int, ...], names: str | None = None, **metadata: str) -> str:
+    properties = metadata if names is None else metadata | {"names": names}
+    graph = fixed({"out": np.zeros(shape)}, SIZE, metadata=properties)
+    return OnnxPersonDetector(graph).layout
+
+
+@pytest.mark.parametrize(
+    ("shape", "names", "wanted"),
+    [
+        ((1, 84, CELLS), None, "YOLOv8"),
+        ((1, 5, CELLS), None, "YOLOv8"),
+        ((1, 6, CELLS), "{0: 'person', 1: 'dog'}", "YOLOv8"),
+        ((1, 84, CELLS + 4 * 5), None, "YOLOv8"),  # with stride 64
+        ((1, 300, 6), None, "rows (NMS inside)"),
+        ((1, 100, 6), "{0: 'person', 1: 'dog'}", "rows (NMS inside)"),
+        ((1, CELLS, 85), None, "YOLOX raw"),
+        ((1, CELLS, 6), None, "YOLOX raw"),
+        ((1, CELLS, 6), "['person']", "YOLOX raw"),
+    ],
+)
+def test_shapes_tell_the_layout(shape: tuple[int, ...], names: str | None, wanted: str) -> None:
+    assert layout(shape, names) == wanted
+
+
+@pytest.mark.parametrize("end2end", ["True", "False"])
+def test_what_metadata_say_of_end2end_does_not_matter(end2end: str) -> None:
+    assert layout((1, 300, 6), end2end=end2end) == "rows (NMS inside)"
+    assert layout((1, 84, CELLS), end2end=end2end) == "YOLOv8"
+
+
+@pytest.mark.parametrize(
+    ("shape", "names", "reason"),
+    [
+        ((1, CELLS, 84), None, "could be YOLOX raw or YOLOv8 with its axes swapped"),
+        ((1, CELLS, 5), None, "looks like YOLOv8 with its axes swapped"),
+        ((1, CELLS, 6), "['person', 'dog']", "looks like YOLOv8 with its axes swapped"),
+        ((1, 84, CELLS), "['person', 'dog']", "do not agree with the classes"),
+        ((1, 3 * CELLS, 85), None, "three places a cell, as YOLOv5"),
+        ((1, 84, 8400), None, rf"an input of this size has {CELLS} cells"),
+        ((1, 300, 84), None, "cells"),
+        ((1, 17, 64, 48), None, "no known detector has such outputs"),
+        ((2, 84, CELLS), None, "one batch for one picture"),
+        ((300, 6), None, "one batch for one picture"),
+    ],
+)
+def test_other_shapes_are_refused_with_what_was_found_and_what_is_known(
+    shape: tuple[int, ...], names: str | None, reason: str
+) -> None:
+    with pytest.raises(PerceptionError, match=reason) as refused:
+        layout(shape, names)
+    assert f"Found input (1, 3, 256, 320) -> out {shape}" in str(refused.value)
+    assert "Known: YOLOv8/11" in str(refused.value)
+
+
+def test_other_tasks_and_more_outputs_are_refused() -> None:
+    with pytest.raises(PerceptionError, match="its task is 'pose'"):
+        layout((1, 56, CELLS), task="pose")
+    two = {"a": np.zeros((1, 84, CELLS)), "b": np.zeros((1, 32, 64, 80))}
+    with pytest.raises(PerceptionError, match="two outputs are known of RTMDet only"):
+        OnnxPersonDetector(fixed(two, SIZE))
+    three = {name: np.zeros((1, 4, 4)) for name in "abc"}
+    with pytest.raises(PerceptionError, match="no known detector"):
+        OnnxPersonDetector(fixed(three, SIZE))
+
+
+def test_yolox_with_boxes_decoded_in_the_network_is_refused() -> None:
+    centres, strides = cell_centres(*SIZE)
+    rows = np.zeros((1, CELLS, 85))
+    rows[0, :, :2], rows[0, :, 2:4] = centres, 3.0 * strides[:, None]
+    with pytest.raises(PerceptionError, match="decode_in_inference=False"):
+        OnnxPersonDetector(fixed({"out": rows}, SIZE))
+
+
+@pytest.mark.parametrize(
+    ("names", "found"),
+    [
+        ("{0: 'helmet', 1: 'vest'}", None),
+        ("{0: 'helmet', 1: 'Person'}", 1),
+        ("{0: '0', 1: '1'}", 0),
+        ("not a dictionary", 0),
+        ("{}", 0),
+    ],
+)
+def test_the_person_is_the_class_of_that_name_or_else_the_first(
+    names: str, found: int | None
+) -> None:
+    rows = np.zeros((1, 6, CELLS))
+    rows[0, :4, :2] = np.array([(50, 50, 40, 80), (200, 50, 40, 80)]).T
+    rows[0, 4, 0] = rows[0, 5, 1] = 0.9
+    graph = fixed({"out": rows}, SIZE, metadata={"names": names})
+    if found is None:
+        with pytest.raises(PerceptionError, match="no class 'person' but 'helmet', 'vest'"):
+            OnnxPersonDetector(graph)
+        found = 1
+        detector = OnnxPersonDetector(graph, person_class=1)
+    else:
+        detector = OnnxPersonDetector(graph)
+    (person,) = detector.detect(PICTURE)
+    assert person.box_xyxy_px[0] == pytest.approx((30, 180)[found])
+
+
+def test_a_free_input_size_comes_from_metadata_or_the_caller() -> None:
+    rows = np.zeros((1, 84, CELLS))
+    free = {"out": (1, 84, "cells")}
+    described = fixed({"out": rows}, ("h", "w"), metadata={"imgsz": "[256, 320]"}, declared=free)
+    assert OnnxPersonDetector(described).input_size_hw_px == SIZE
+    silent = fixed({"out": rows}, ("h", "w"), declared=free)
+    with pytest.raises(PerceptionError, match=r"give it with input_size_hw_px=\(height, width\)"):
+        OnnxPersonDetector(silent)
+    assert OnnxPersonDetector(silent, input_size_hw_px=SIZE).layout == "YOLOv8"
+    square = fixed({"out": np.zeros((1, 84, 8400))}, ("h", "w"), metadata={"imgsz": "640"})
+    assert OnnxPersonDetector(square).input_size_hw_px == (640, 640)
+
+
+def test_inputs_that_are_no_single_picture_are_refused() -> None:
+    with pytest.raises(PerceptionError, match="takes 4 pictures at a time"):
+        OnnxPersonDetector(red_point_pose(32, 32, batch=4))
+
+
+# --- corners or centre and size ---
+
+BOXES = np.array([[150.0, 40.0, 190.0, 160.0], [20.0, 60.0, 70.0, 250.0]])
+
+
+def as_centres(boxes: np.ndarray) -> np.ndarray:
+    return np.concatenate(
+        [0.5 * (boxes[:, :2] + boxes[:, 2:]), boxes[:, 2:] - boxes[:, :2]], axis=1
+    )
+
+
+@pytest.mark.parametrize("corners", [True, False])
+def test_the_boxes_tell_their_own_format(corners: bool) -> None:
+    rows = np.zeros((1, 300, 6))
+    rows[0, :2, :4] = BOXES if corners else as_centres(BOXES)
+    rows[0, :2, 4] = (0.9, 0.8)
+    detector = OnnxPersonDetector(fixed({"out": rows}, SIZE, metadata={"end2end": "True"}))
+    people = detector.detect(PICTURE)
+    np.testing.assert_allclose([p.box_xyxy_px for p in people], BOXES)
+
+
+def test_an_undecided_picture_is_read_as_those_before_it() -> None:
+    # Left and large: read either way it is a box within the input.
+    undecided = np.array([[80.0, 100.0, 120.0, 180.0]])
+    vote = BoxFormatVote()
+    vote.listen(undecided, np.array([0.9]), (320, 256))
+    assert vote.format == "xyxy"  # as exporters have it
+    vote.listen(as_centres(BOXES), np.array([0.9, 0.9]), (320, 256))
+    vote.listen(undecided, np.array([0.9]), (320, 256))
+    assert vote.format == "cxcywh"
+
+
+def test_the_caller_may_know_the_format() -> None:
+    vote = BoxFormatVote("cxcywh")
+    vote.listen(BOXES, np.array([0.9, 0.9]), (320, 256))
+    assert vote.format == "cxcywh"
+    with pytest.raises(PerceptionError, match="one of 'xyxy', 'cxcywh' or None, got 'xywh'"):
+        BoxFormatVote("xywh")
+
+
+@given(st.data())
+def test_four_people_anywhere_decide_the_format(data: st.DataObject) -> None:
+    """Property: people spread over a picture never look like the other format."""
+    width, height = 320, 256
+    boxes = []
+    for column in range(4):  # one in each quarter
+        left = column * 80 + data.draw(st.floats(0, 20))
+        top = data.draw(st.floats(0, 120))
+        boxes.append(
+            (
+                left,
+                top,
+                left + data.draw(st.floats(20, 55)),
+                min(top + data.draw(st.floats(60, 130)), height),
+            )
+        )
+    corners = np.array(boxes)
+    for given_boxes, wanted in ((corners, "xyxy"), (as_centres(corners), "cxcywh")):
+        vote = BoxFormatVote()
+        vote.listen(given_boxes, np.full(4, 0.7), (width, height))
+        assert vote.format == wanted
+        np.testing.assert_allclose(vote.corners(given_boxes), corners, atol=1e-9)

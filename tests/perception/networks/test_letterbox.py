@@ -1,0 +1,125 @@
+"""Pictures of any size in a network's input, and boxes back, exactly."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from perception import PerceptionError
+from perception.networks._image import rgb_image
+from perception.networks._letterbox import Letterbox, LetterboxGeometry
+from perception.networks._pixels import PixelFormat
+
+sides = st.integers(1, 3000)
+STANDARD = {"mean_rgb": (123.675, 116.28, 103.53), "std_rgb": (58.395, 57.12, 57.375)}
+
+
+@given(sides, sides, st.integers(8, 700), st.integers(8, 700), st.booleans())
+def test_the_picture_fits_and_boxes_return(
+    width: int, height: int, input_width: int, input_height: int, centred: bool
+) -> None:
+    geometry = LetterboxGeometry.of((width, height), (input_width, input_height), centred=centred)
+    scaled, corner = np.array(geometry.scaled_px), np.array(geometry.corner_px)
+    room = np.array([input_width, input_height])
+    assert (scaled >= 1).all()
+    assert (corner + scaled <= room).all()
+    assert (scaled == room).any()  # as large as it goes
+    if centred:
+        assert (abs(room - scaled - 2 * corner) <= 1).all()
+    whole = np.array([[0.0, 0.0, width, height]])
+    np.testing.assert_allclose(geometry.to_input(whole), [[*corner, *(corner + scaled)]])
+    inner = whole * 0.75 + 0.1
+    inner = np.minimum(inner, whole[:, [2, 3, 2, 3]])
+    np.testing.assert_allclose(geometry.to_image(geometry.to_input(inner)), inner, atol=1e-9)
+    far = np.array([[-1e4, -1e4, 1e4, 1e4]])
+    np.testing.assert_array_equal(geometry.to_image(far), whole)
+
+
+@pytest.mark.parametrize(
+    ("size", "input_size"),
+    [((640, 480), (320, 256)), ((100, 75), (320, 256)), ((77, 200), (64, 64))],
+)
+def test_scaling_is_bilinear_between_pixel_centres(
+    size: tuple[int, int], input_size: tuple[int, int]
+) -> None:
+    """Noise tells a shift of a tenth of a pixel from none."""
+    width, height = size
+    image = np.random.default_rng(0).integers(0, 256, (height, width, 3), np.uint8)
+    letterbox = Letterbox(input_size[1], input_size[0], PixelFormat(), centred=True)
+    blob, geometry = letterbox.fill(image)
+    (columns, rows), (left, top) = geometry.scaled_px, geometry.corner_px
+
+    def interpolated(values: np.ndarray, count: int) -> np.ndarray:
+        """Along the first axis, at the centres of ``count`` pixels that share its extent."""
+        places = (np.arange(count) + 0.5) * len(values) / count - 0.5
+        flat = values.reshape(len(values), -1).T
+        lines = [np.interp(places, np.arange(len(values)), line) for line in flat]
+        return np.stack(lines, axis=1).reshape(count, *values.shape[1:])
+
+    wanted = interpolated(interpolated(image, rows).transpose(1, 0, 2), columns)
+    found = blob[0, :, top : top + rows, left : left + columns]
+    np.testing.assert_allclose(found, wanted.transpose(2, 1, 0), atol=1.5)
+
+
+def test_a_picture_of_the_inputs_size_goes_in_as_it_is() -> None:
+    image = np.random.default_rng(0).integers(0, 256, (48, 64, 3), np.uint8)
+    pixels = PixelFormat(**STANDARD)
+    blob, _ = Letterbox(48, 64, pixels, centred=True).fill(image)
+    wanted = (image - np.array(pixels.mean_rgb)) / np.array(pixels.std_rgb)
+    np.testing.assert_array_equal(blob[0], wanted.transpose(2, 0, 1).astype(np.float32))
+
+
+@pytest.mark.parametrize("centred", [True, False])
+def test_padding_is_grey_also_after_a_picture_of_another_shape(centred: bool) -> None:
+    letterbox = Letterbox(64, 64, PixelFormat(), centred=centred)
+    white = np.full((64, 20, 3), 255, np.uint8)
+    letterbox.fill(white)
+    blob, geometry = letterbox.fill(np.ascontiguousarray(white.transpose(1, 0, 2)))
+    (width, height), (left, top) = geometry.scaled_px, geometry.corner_px
+    assert (width, height) == (64, 20)
+    assert top == (22 if centred else 0)
+    outside = np.ones((64, 64), bool)
+    outside[top : top + height, left : left + width] = False
+    assert (blob[0][:, outside] == 114.0).all()
+    assert (blob[0][:, ~outside] == 255.0).all()
+
+
+def test_channels_stand_in_the_order_of_the_network() -> None:
+    image = np.zeros((8, 8, 3), np.uint8)
+    image[...] = (10, 20, 30)
+    for bgr, order in ((False, (0, 1, 2)), (True, (2, 1, 0))):
+        for dtype in ("float32", "float16", "uint8"):
+            pixels = PixelFormat(**STANDARD, bgr=bgr, dtype=dtype)
+            blob, _ = Letterbox(8, 8, pixels, centred=True).fill(image)
+            assert blob.dtype == dtype
+            values = (np.array([10, 20, 30]) - STANDARD["mean_rgb"]) / STANDARD["std_rgb"]
+            wanted = np.array([10, 20, 30]) if dtype == "uint8" else values
+            np.testing.assert_allclose(blob[0, :, 0, 0], wanted[list(order)], rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("image", "words"),
+    [
+        (np.zeros((4, 4), np.uint8), "cvtColor"),
+        (np.zeros((4, 4, 4), np.uint8), "fourth channel"),
+        (np.zeros((4, 4, 1), np.uint8), r"got uint8 of shape \(4, 4, 1\)"),
+        (np.zeros((4, 4, 3), np.float32), "got float32"),
+        (np.zeros((0, 4, 3), np.uint8), "got 4 x 0"),
+        (np.zeros((1, 40000, 3), np.uint8), "got 40000 x 1"),
+        ([[0, 0, 0]], "got list"),
+        (None, "got NoneType"),
+    ],
+)
+def test_what_is_no_rgb_picture_is_refused(image: object, words: str) -> None:
+    with pytest.raises(PerceptionError, match=words):
+        rgb_image(image)
+
+
+def test_views_are_read_as_they_are_seen() -> None:
+    image = np.random.default_rng(0).integers(0, 256, (40, 60, 3), np.uint8)
+    letterbox = Letterbox(64, 64, PixelFormat(), centred=True)
+    for view in (image[..., ::-1], image[::-1], image[:, ::2], image.transpose(1, 0, 2)):
+        seen = letterbox.fill(rgb_image(view))[0].copy()
+        np.testing.assert_array_equal(seen, letterbox.fill(np.ascontiguousarray(view))[0])

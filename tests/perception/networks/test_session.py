@@ -1,0 +1,163 @@
+"""Loading a network: what is checked, what is refused, and in which words."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+import onnx
+import onnxruntime as ort
+import pytest
+from onnx_graphs import fixed, red_point_pose
+
+from perception import PerceptionError
+from perception.networks._session import OnnxModel, OnnxSettings, as_onnx_model
+
+ROWS = np.arange(12.0).reshape(1, 2, 6)
+
+
+def content() -> bytes:
+    return fixed({"out": ROWS}, (32, 64), metadata={"names": "{0: 'person'}"}, batch="N")
+
+
+def test_a_model_tells_its_inputs_outputs_metadata_and_provider() -> None:
+    model = OnnxModel(content())
+    assert [(t.name, t.shape, t.dtype) for t in model.inputs] == [
+        ("images", (None, 3, 32, 64), "float32")
+    ]
+    assert [(t.name, t.shape, t.dtype) for t in model.outputs] == [("out", (1, 2, 6), "float32")]
+    assert model.metadata == {"names": "{0: 'person'}"}
+    assert model.providers == ("cpu",)
+    assert model.path is None
+    assert "images (any, 3, 32, 64) float32 -> out (1, 2, 6) float32" in repr(model)
+
+
+def test_outputs_come_in_the_order_of_the_graph(tmp_path: Path) -> None:
+    path = tmp_path / "model.onnx"
+    path.write_bytes(fixed({"b": ROWS, "a": np.array([[3]])}, (32, 64)))
+    model = OnnxModel(path)
+    assert model.path == path
+    first, second = model.run({"images": np.zeros((1, 3, 32, 64), np.float32)})
+    np.testing.assert_array_equal(first, ROWS)
+    np.testing.assert_array_equal(second, [[3]])
+
+
+def test_the_sha256_is_that_of_the_bytes_loaded(tmp_path: Path) -> None:
+    path = tmp_path / "model.onnx"
+    path.write_bytes(content())
+    digest = hashlib.sha256(content()).hexdigest()
+    assert OnnxModel(path, sha256=digest.upper()).path == path
+    path.write_bytes(content() + b"\x00")
+    with pytest.raises(PerceptionError, match=rf"model\.onnx is not the file.*wanted {digest}"):
+        OnnxModel(path, sha256=digest)
+
+
+@pytest.mark.parametrize("sha256", ["", "ab", "g" * 64, 7])
+def test_a_sha256_is_64_hexadecimal_digits(sha256: str) -> None:
+    with pytest.raises(PerceptionError, match="64 hexadecimal digits"):
+        OnnxModel(content(), sha256=sha256)
+
+
+@pytest.mark.parametrize("keep", [0, 1, 50, -1])
+def test_a_truncated_file_is_named(tmp_path: Path, keep: int) -> None:
+    path = tmp_path / "half.onnx"
+    path.write_bytes(content()[:keep])
+    with pytest.raises(PerceptionError, match=r"half\.onnx is no ONNX network"):
+        OnnxModel(path)
+
+
+@pytest.mark.parametrize("noise", [b"PK\x03\x04 not a model", b"<html>404</html>"])
+def test_other_content_is_refused(noise: bytes) -> None:
+    with pytest.raises(PerceptionError, match=f"no ONNX network .*{len(noise)} bytes"):
+        OnnxModel(noise)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ("absent.onnx", "cannot read the model .*absent.onnx: No such file"),
+        (".", "cannot read the model .*: Is a directory"),
+        ("a\0b", "cannot read the model"),
+        (3, "got int: 3"),
+        (None, "got NoneType"),
+    ],
+)
+def test_what_is_no_file_is_refused(tmp_path: Path, given: object, words: str) -> None:
+    path = tmp_path / given if isinstance(given, str) else given
+    with pytest.raises(PerceptionError, match=words):
+        OnnxModel(path)  # type: ignore[arg-type]
+
+
+def test_weights_beside_the_file_are_found_unless_the_file_is_sealed(tmp_path: Path) -> None:
+    path = tmp_path / "model.onnx"
+    values = np.full((1, 2000, 6), 0.5, np.float32)
+    onnx.save_model(
+        onnx.load_from_string(fixed({"out": values}, (32, 64))),
+        str(path),
+        save_as_external_data=True,
+        location="weights.bin",
+        size_threshold=100,
+    )
+    (out,) = OnnxModel(path).run({"images": np.zeros((1, 3, 32, 64), np.float32)})
+    np.testing.assert_array_equal(out, values)
+    with pytest.raises(PerceptionError, match="no ONNX network"):
+        OnnxModel(path, sha256=hashlib.sha256(path.read_bytes()).hexdigest())
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"providers": ()}, "providers must be one or more of 'cpu', 'cuda', 'tensorrt', got"),
+        ({"providers": ("gpu",)}, "'gpu'"),
+        ({"providers": "gpu"}, "got 'gpu'"),
+        ({"intra_op_threads": 0}, "at least 1 or None, got 0"),
+        ({"intra_op_threads": 1.5}, "got 1.5"),
+        ({"intra_op_threads": True}, "got True"),
+    ],
+)
+def test_settings_are_checked(settings: dict[str, object], words: str) -> None:
+    with pytest.raises(PerceptionError, match=words):
+        OnnxSettings(**settings)  # type: ignore[arg-type]
+
+
+def test_settings_reach_the_session() -> None:
+    model = OnnxModel(content(), settings=OnnxSettings(intra_op_threads=1, allow_spinning=False))
+    options = model._session.get_session_options()
+    assert options.intra_op_num_threads == 1
+    assert options.get_session_config_entry("session.intra_op.allow_spinning") == "0"
+    spinning = OnnxModel(content(), settings=OnnxSettings(allow_spinning=True))
+    options = spinning._session.get_session_options()
+    assert options.get_session_config_entry("session.intra_op.allow_spinning") == "1"
+    assert OnnxSettings(providers="cpu").providers == ("cpu",)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["cuda", "tensorrt"])
+def test_a_provider_is_used_when_present_and_refused_when_not(name: str) -> None:
+    settings = OnnxSettings(providers=(name, "cpu"))
+    long = {"cuda": "CUDAExecutionProvider", "tensorrt": "TensorrtExecutionProvider"}[name]
+    if long in ort.get_available_providers():
+        assert OnnxModel(content(), settings=settings).providers[0] == name
+        return
+    with pytest.raises(PerceptionError, match=f"'{name}' is not present .* which has 'cpu'"):
+        OnnxModel(content(), settings=settings)
+
+
+def test_what_a_run_refuses_says_what_the_network_takes() -> None:
+    model = OnnxModel(content())
+    for feeds in (
+        {"picture": np.zeros((1, 3, 32, 64), np.float32)},
+        {"images": np.zeros((1, 3, 32, 32), np.float32)},
+        {"images": np.zeros((1, 3, 32, 64), np.float64)},
+    ):
+        with pytest.raises(PerceptionError, match=r"takes images \(any, 3, 32, 64\) float32"):
+            model.run(feeds)
+
+
+def test_a_loaded_model_takes_no_settings_any_more() -> None:
+    model = OnnxModel(red_point_pose(32, 32))
+    assert as_onnx_model(model, None, None) is model
+    with pytest.raises(PerceptionError, match="loaded already"):
+        as_onnx_model(model, OnnxSettings(), None)
+    with pytest.raises(PerceptionError, match="loaded already"):
+        as_onnx_model(model, None, "0" * 64)

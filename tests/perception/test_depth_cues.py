@@ -1,0 +1,257 @@
+"""Range from several cues: least squares where they agree, outvoting where they do not."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from synthetic_people import person_at
+
+from perception import Camera, HeadPose, PersonDetection, PersonKeypoints
+from perception._depth_cues import DepthCue, combine_cues
+from perception._floor import FloorPlane
+from perception._placement import place_people
+
+CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
+CAMERA_HEIGHT_M = 1.2
+FLOOR = FloorPlane(np.array([0.0, -1.0, 0.0]), CAMERA_HEIGHT_M)
+SURE = 1e-9
+
+cue = st.builds(
+    DepthCue,
+    st.floats(-0.2, 0.2),
+    st.floats(0.02, 0.2),
+    st.floats(0.0, 0.01),
+    st.floats(0.01, 0.3),
+)
+
+
+# --- the combination ----------------------------------------------------------------------------
+
+
+def test_cues_that_cannot_be_wrong_are_generalised_least_squares():
+    cues = [
+        DepthCue(0.02, 0.06, 0.05, SURE),
+        DepthCue(-0.01, 0.05, 0.016, SURE),
+        DepthCue(0.0, 0.04, 0.0, SURE),
+    ]
+    stature = np.array([0.05, 0.016, 0.0])
+    covariance = np.outer(stature, stature) + np.diag(
+        [0.06**2 - 0.05**2, 0.05**2 - 0.016**2, 0.04**2]
+    )
+    weight = np.linalg.inv(covariance)
+    mean, std = combine_cues(cues)
+    assert mean == pytest.approx(weight.sum(axis=0) @ [0.02, -0.01, 0.0] / weight.sum(), abs=1e-6)
+    assert std == pytest.approx(1.0 / math.sqrt(weight.sum()), rel=1e-4)
+
+
+def test_what_shares_the_stature_is_not_counted_twice():
+    same = [DepthCue(0.0, 0.05, 0.0499, SURE)] * 2
+    assert combine_cues(same)[1] == pytest.approx(0.05, rel=0.01)
+    apart = [DepthCue(0.0, 0.05, 0.0, SURE)] * 2
+    assert combine_cues(apart)[1] == pytest.approx(0.05 / math.sqrt(2.0), rel=0.01)
+
+
+def test_a_single_cue_stays_as_it_is():
+    assert combine_cues([DepthCue(0.3, 0.07, 0.05, 0.2)]) == (0.3, 0.07)
+
+
+@given(st.lists(cue, min_size=1, max_size=4), st.floats(-2.0, 2.0))
+def test_a_common_shift_shifts_the_answer(cues, shift):
+    moved = [
+        DepthCue(one.log_range + shift, one.log_std, one.stature_std, one.wrong) for one in cues
+    ]
+    mean, std = combine_cues(cues)
+    other_mean, other_std = combine_cues(moved)
+    assert other_mean == pytest.approx(mean + shift, abs=1e-9)
+    assert other_std == pytest.approx(std, rel=1e-6)
+
+
+@given(st.permutations(range(4)), st.lists(cue, min_size=4, max_size=4))
+def test_the_order_of_cues_does_not_matter(order, cues):
+    assert combine_cues([cues[index] for index in order]) == pytest.approx(combine_cues(cues))
+
+
+@given(st.floats(0.4, 1.5))
+def test_a_cue_far_off_is_outvoted_by_two(off):
+    agreeing = [DepthCue(0.0, 0.06, 0.05, 0.03), DepthCue(0.01, 0.05, 0.016, 0.05)]
+    mean, std = combine_cues([*agreeing, DepthCue(off, 0.03, 0.0, 0.1)])
+    assert abs(mean) < 0.03
+    assert std < 0.08
+
+
+@given(st.floats(0.3, 1.0))
+def test_two_cues_that_contradict_each_other_leave_both_possible(off):
+    mean, std = combine_cues([DepthCue(0.0, 0.05, 0.0, 0.1), DepthCue(off, 0.05, 0.0, 0.1)])
+    assert mean == pytest.approx(0.5 * off, abs=1e-6)
+    assert std > 0.45 * off
+
+
+def test_the_mixture_is_consistent_over_a_population():
+    """Errors drawn as the model says, wrong cues included: 68 and 95 % intervals hold."""
+    rng = np.random.default_rng(0)
+    normalised = []
+    for _ in range(3000):
+        stature = rng.normal()
+        cues = []
+        for std, part, wrong in ((0.06, 0.05, 0.03), (0.05, 0.016, 0.05), (0.05, 0.0, 0.1)):
+            own = math.sqrt(std**2 - part**2)
+            value = part * stature + own * rng.normal()
+            if rng.random() < wrong:
+                value = rng.uniform(-1.0, 1.0)
+            cues.append(DepthCue(value, std, part, wrong))
+        mean, std = combine_cues(cues)
+        normalised.append(abs(mean) / std)
+    assert 0.66 <= np.mean(np.array(normalised) < 1.0) <= 0.80
+    assert 0.93 <= np.mean(np.array(normalised) < 1.96) <= 0.99
+
+
+# --- placement ----------------------------------------------------------------------------------
+
+
+def seen_person(rng, *, stature_m=1.74, depth=4.0, across=0.0, lift_m=0.0, noise_px=1.0, yaw=0.0):
+    """Standing on the floor (or ``lift_m`` above it) with keypoints and the tight box of them."""
+    scale = stature_m / 1.83
+    hips_down = CAMERA_HEIGHT_M - lift_m - 0.93 * scale
+    person = person_at((across, hips_down, depth), body_yaw_rad=yaw, stature_m=stature_m)
+    keypoints = person.keypoints(CAMERA, noise_px, rng, lift_std_m=0.03, unit=1.0 / stature_m)
+    soles = person.points_camera_m[15:17] + np.array([0.0, 0.081 * scale, 0.0])
+    crown = person.points_camera_m[0] - np.array([0.0, 0.16 * scale, 0.0])
+    extent = np.vstack([keypoints.keypoints_px, CAMERA.project([*soles, crown])])
+    # What lies outside the picture is not seen, and boxes end at its border.
+    limits = (CAMERA.width_px - 1.0, CAMERA.height_px - 1.0)
+    box = np.clip(np.r_[extent.min(axis=0), extent.max(axis=0)], 0.0, [*limits, *limits])
+    inside = ((keypoints.keypoints_px >= 0.0) & (keypoints.keypoints_px <= limits)).all(axis=1)
+    shown = PersonKeypoints(
+        keypoints.keypoints_px, keypoints.keypoints_root_m, inside.astype(float), "coco"
+    )
+    return person, shown, PersonDetection(box, 0.9)
+
+
+def head_of(person, rng=None, *, range_std=0.05, stature_m=1.74, factor=None):
+    """A head pose whose range errs as a head of unknown size does."""
+    if factor is None:
+        factor = 1.0 + (rng.normal(0.0, range_std) if rng is not None else 0.0)
+    nose = person.points_camera_m[0] * factor
+    covariance = 0.05**2 * np.eye(6)
+    return HeadPose(nose, person.rotation_camera_head, covariance, 0.5, 1.0, range_std)
+
+
+def place(shown, detection, head=None, floor=None):
+    (placed,) = place_people(CAMERA, (detection,), (shown,), (head,), floor, 1.0, 0.3)
+    return placed
+
+
+def test_more_cues_make_the_range_sharper_and_stay_consistent():
+    """Statures of a population; median error falls with every cue and the covariance holds it."""
+    rng = np.random.default_rng(1)
+    errors = {name: [] for name in ("body", "head", "floor", "all")}
+    held = {name: [] for name in errors}
+    for _ in range(250):
+        stature = rng.normal(1.74, 0.05 * 1.74)
+        person, shown, detection = seen_person(
+            rng,
+            stature_m=stature,
+            depth=rng.uniform(3.0, 7.0),
+            across=rng.uniform(-1.0, 1.0),
+            yaw=rng.uniform(-math.pi, math.pi),
+        )
+        head = head_of(person, rng, range_std=0.04)
+        given_cues = {
+            "body": (None, None), "head": (head, None), "floor": (None, FLOOR), "all": (head, FLOOR)
+        }  # fmt: skip
+        for name, (with_head, with_floor) in given_cues.items():
+            position, covariance = place(shown, detection, with_head, with_floor)
+            error = position - person.chest_camera_m
+            errors[name].append(np.linalg.norm(error) / np.linalg.norm(person.chest_camera_m))
+            held[name].append(error @ np.linalg.solve(covariance, error) < 7.81)
+    median = {name: np.median(values) for name, values in errors.items()}
+    assert median["head"] < median["body"]
+    assert median["floor"] < 0.7 * median["body"]
+    assert median["all"] <= 1.1 * median["floor"]
+    assert median["all"] < 0.02
+    for name, values in held.items():
+        assert 0.88 <= np.mean(values) <= 1.0, name
+
+
+@pytest.mark.parametrize("lift_m", [0.0, 0.3, 0.6, 0.9])
+@pytest.mark.parametrize("with_head", [True, False])
+def test_on_a_ladder_nobody_is_placed_surely_where_the_ladder_is_not(lift_m, with_head):
+    rng = np.random.default_rng(2)
+    inside = []
+    for _ in range(25):
+        person, shown, detection = seen_person(rng, depth=4.0, lift_m=lift_m)
+        head = head_of(person, rng, range_std=0.05) if with_head else None
+        position, covariance = place(shown, detection, head, FLOOR)
+        error = position - person.chest_camera_m
+        inside.append(error @ np.linalg.solve(covariance, error) < 11.3)
+    assert np.mean(inside) >= 0.9
+
+
+def test_hidden_feet_do_not_pull_people_away():
+    """Behind a bench: neither ankles nor the lower edge of the box are at the floor."""
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        person, shown, detection = seen_person(rng, depth=4.0)
+        scores = np.array(shown.scores)
+        scores[13:17] = 0.0
+        hidden = PersonKeypoints(shown.keypoints_px, shown.keypoints_root_m, scores, "coco")
+        box = np.array(detection.box_xyxy_px)
+        box[3] = shown.keypoints_px[11:13, 1].mean() + 15.0
+        position, covariance = place(hidden, PersonDetection(box, 0.9), head_of(person, rng), FLOOR)
+        error = position - person.chest_camera_m
+        assert error @ np.linalg.solve(covariance, error) < 11.3
+        assert np.linalg.norm(error) < 0.15 * 4.0
+
+
+def test_the_planted_foot_counts_in_a_step():
+    rng = np.random.default_rng(4)
+    _, shown, detection = seen_person(rng, depth=4.0, noise_px=0.2)
+    pixels, root = np.array(shown.keypoints_px), np.array(shown.keypoints_root_m)
+    pixels[15, 1] -= 0.25 * CAMERA.fx_px / 4.0
+    root[15, 1] -= 0.25 / 1.74
+    step = PersonKeypoints(pixels, root, shown.scores, "coco")
+    position, _ = place(step, detection, None, FLOOR)
+    standing, _ = place(shown, detection, None, FLOOR)
+    assert np.linalg.norm(position - standing) < 0.12
+
+
+def test_a_box_alone_is_placed_by_its_feet_when_the_floor_is_known():
+    rng = np.random.default_rng(5)
+    person, shown, detection = seen_person(rng, depth=5.0, stature_m=1.5)
+    unseen = PersonKeypoints(shown.keypoints_px, shown.keypoints_root_m, np.zeros(17), "coco")
+    (rough, wide), (fine, tight) = place(unseen, detection), place(unseen, detection, None, FLOOR)
+    truth = person.chest_camera_m
+    assert np.linalg.norm(fine - truth) < 0.5 * np.linalg.norm(rough - truth)
+    assert tight[2, 2] < 0.7 * wide[2, 2]
+    # The same box cut off by the image's lower border says nothing about feet.
+    lower = CAMERA.height_px - 1.0
+    cut = PersonDetection([300.0, 200.0, 360.0, lower], 0.9)
+    with_floor, without = place(unseen, cut, None, FLOOR), place(unseen, cut)
+    np.testing.assert_array_equal(with_floor[0], without[0])
+
+
+@given(st.floats(0.3, 3.0))
+def test_a_head_range_alone_never_overrules_the_body_surely(factor):
+    rng = np.random.default_rng(6)
+    person, shown, detection = seen_person(rng, depth=4.0, stature_m=1.74, noise_px=0.3)
+    position, covariance = place(shown, detection, head_of(person, factor=factor))
+    truth = person.chest_camera_m
+    error = position - truth
+    assert error @ np.linalg.solve(covariance, error) < 9.0
+
+
+def test_flat_skeletons_have_wider_ranges():
+    rng = np.random.default_rng(7)
+    person, shown, detection = seen_person(rng, depth=4.0)
+    root = np.array(shown.keypoints_root_m)
+    root[:, 2] = 0.0
+    flat = PersonKeypoints(shown.keypoints_px, root, shown.scores, "coco", lifted=False)
+    position, covariance = place(flat, detection)
+    _, lifted = place(shown, detection)
+    assert covariance[2, 2] > 1.5 * lifted[2, 2]
+    error = position - person.chest_camera_m
+    assert error @ np.linalg.solve(covariance, error) < 7.81

@@ -1,0 +1,143 @@
+"""Head poses from several sources: sharper where they agree, doubtful where they do not."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from perception import AttentionCone, HeadPose, PerceptionError, PersonKeypoints
+from perception._awareness import estimate_awareness
+from perception._fusion import FusedHeadPoseEstimator, fuse_heads
+
+FACING = np.stack([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]], axis=1)
+POSITION = np.array([0.2, -0.3, 3.0])
+
+
+def head(turn=(0.0, 0.0, 0.0), std_rad=0.1, *, shift=(0.0, 0.0, 0.0), seen=None, range_std=0.04):
+    rotation = Rotation.from_rotvec(turn).as_matrix() @ FACING
+    covariance = np.diag([std_rad**2] * 3 + [0.05**2] * 3)
+    return HeadPose(POSITION + shift, rotation, covariance, 1.0, seen, range_std)
+
+
+class Always:
+    """A source that has made up its mind."""
+
+    def __init__(self, *heads):
+        self.heads = heads
+
+    def estimate(self, image_rgb, camera, people):
+        return self.heads[: len(people)]
+
+
+NOBODY = PersonKeypoints(np.zeros((17, 2)), np.zeros((17, 3)), np.zeros(17), "coco")
+
+
+def alpha_of(pose):
+    (estimate,) = estimate_awareness(
+        AttentionCone(),
+        (pose,),
+        np.zeros((1, 3)),
+        extra_std_rad=np.zeros(1),
+        eye_in_head_std_rad=(0.0, 0.0),
+        face_seen=np.ones(1),
+    )
+    return estimate.awareness, estimate.awareness_std
+
+
+def test_agreeing_poses_are_combined_in_information_form():
+    first, second = head((0.0, 0.0, 0.0), 0.1), head((0.06, 0.0, 0.0), 0.2)
+    fused = fuse_heads(first, second)
+    turn = Rotation.from_matrix(fused.rotation_camera_head @ FACING.T).as_rotvec()
+    np.testing.assert_allclose(turn, [0.06 * 0.2, 0.0, 0.0], atol=1e-9)
+    information = np.linalg.inv(first.covariance) + np.linalg.inv(second.covariance)
+    np.testing.assert_allclose(fused.covariance, np.linalg.inv(information), atol=1e-9)
+
+
+@given(
+    st.lists(st.floats(-0.1, 0.1), min_size=3, max_size=3),
+    st.floats(0.06, 0.3),
+    st.floats(0.06, 0.3),
+)
+def test_the_order_of_agreeing_sources_hardly_matters(turn, one, two):
+    first, second = head(std_rad=one), head(turn, two)
+    forth, back = fuse_heads(first, second), fuse_heads(second, first)
+    angle = Rotation.from_matrix(
+        forth.rotation_camera_head @ back.rotation_camera_head.T
+    ).magnitude()
+    assert angle < 0.01
+    np.testing.assert_allclose(forth.covariance, back.covariance, atol=2e-3)
+
+
+@given(st.floats(0.0, math.pi - 0.05), st.floats(0.0, math.pi - 0.05))
+def test_the_covariance_never_shrinks_with_disagreement(first_turn, second_turn):
+    less, more = sorted([first_turn, second_turn])
+    base = head(std_rad=0.15)
+    near, far = (fuse_heads(base, head((turn, 0.0, 0.0), 0.15)) for turn in (less, more))
+    assert np.trace(far.covariance[:3, :3]) >= np.trace(near.covariance[:3, :3]) - 1e-12
+
+
+@given(st.floats(0.8, 3.0), st.floats(0.02, 0.2), st.floats(0.02, 0.2), st.booleans())
+def test_sources_that_contradict_each_other_are_not_surely_aware(turn, one, two, swap):
+    """One says that the person looks at the robot, the other that they look away."""
+    towards = head(np.zeros(3), one)
+    away = head((0.0, max(turn, math.radians(65.0)), 0.0), two)
+    fused = fuse_heads(away, towards) if swap else fuse_heads(towards, away)
+    alpha, std = alpha_of(fused)
+    assert alpha - 1.28 * std < 0.35
+    angle = np.array([0.0, max(turn, math.radians(65.0)), 0.0])
+    assert fused.covariance[1, 1] >= angle[1] ** 2 - 1e-9
+
+
+def test_fused_poses_are_consistent_over_a_population():
+    rng = np.random.default_rng(0)
+    nees = []
+    for _ in range(2000):
+        poses = []
+        for std in (0.08, 0.15):
+            turn, shift = rng.normal(0.0, std, 3), rng.normal(0.0, 0.05, 3)
+            poses.append(head(turn, std, shift=shift))
+        fused = fuse_heads(*poses)
+        turn = Rotation.from_matrix(FACING @ fused.rotation_camera_head.T).as_rotvec()
+        error = np.concatenate([turn, POSITION - fused.position_camera_m])
+        nees.append(error @ np.linalg.solve(fused.covariance, error))
+    # Growing with disagreement makes it a little cautious.
+    assert 4.0 <= np.mean(nees) <= 6.2
+
+
+def test_a_face_has_to_be_seen_by_all_who_can_tell():
+    assert fuse_heads(head(seen=0.9), head(seen=0.1)).face_seen == pytest.approx(0.1)
+    assert fuse_heads(head(seen=0.9), head()).face_seen == pytest.approx(0.9)
+    assert fuse_heads(head(), head()).face_seen is None
+
+
+def test_only_a_measured_range_stays_one():
+    measured, borrowed = head(range_std=0.04), head(range_std=None)
+    assert fuse_heads(measured, borrowed).range_relative_std == pytest.approx(0.04)
+    assert fuse_heads(borrowed, borrowed).range_relative_std is None
+    # Head sizes vary by 4 %: the borrowed range weighs accordingly less along the ray.
+    shifted = head(shift=(0.0, 0.0, 0.2), range_std=None)
+    moved = fuse_heads(measured, shifted).position_camera_m[2] - POSITION[2]
+    assert 0.0 < moved < 0.2 * 0.05**2 / (2 * 0.05**2 + 0.9 * 0.12**2) * 1.2
+
+
+def test_who_makes_no_pose_leaves_it_to_the_other():
+    first, second = head((0.05, 0.0, 0.0)), head((0.0, 0.05, 0.0))
+    fused = FusedHeadPoseEstimator(Always(first, None, None), Always(None, second, None))
+    assert fused.estimate(None, None, (NOBODY,) * 3) == (first, second, None)
+    three = FusedHeadPoseEstimator(Always(first), Always(first), Always(first))
+    (sharper,) = three.estimate(None, None, (NOBODY,))
+    np.testing.assert_allclose(sharper.covariance, first.covariance / 3.0, rtol=1e-6)
+
+
+def test_what_cannot_be_fused_is_refused():
+    with pytest.raises(PerceptionError, match="two or more"):
+        FusedHeadPoseEstimator(Always())
+    with pytest.raises(PerceptionError, match="estimate"):
+        FusedHeadPoseEstimator(Always(), 5)
+    with pytest.raises(PerceptionError, match="one result a person"):
+        FusedHeadPoseEstimator(Always(), Always()).estimate(None, None, (NOBODY,))

@@ -1,0 +1,360 @@
+"""A head pose network between pixels and the camera frame, on graphs whose answers are known."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from head_graphs import DISC_M, disc_network, full_range_network
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from perception import Camera, PerceptionError, PersonKeypoints
+from perception._head_pose import HEAD_CENTRE_HEAD_M
+from perception.networks._head import OnnxHeadPoseEstimator, ray_axes
+from perception.networks._head_crop import crop_to_image, head_crop, image_to_crop
+from perception.networks._session import OnnxModel
+
+CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
+FACING_HEAD = np.stack([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]], axis=1)
+
+
+def disc_image(camera, centre_camera_m):
+    """A white disc, square to the optical axis, with pixels at its rim as grey as they are full."""
+    v, u = np.mgrid[: camera.height_px, : camera.width_px]
+    rays = camera.normalise(np.column_stack([u.ravel(), v.ravel()]))
+    away = np.linalg.norm(centre_camera_m[2] * rays - centre_camera_m[:2], axis=1)
+    rim_px = (0.5 * DISC_M - away) * camera.fx_px / centre_camera_m[2]
+    grey = np.round(255.0 * np.clip(rim_px + 0.5, 0.0, 1.0)).astype(np.uint8)
+    return np.repeat(grey.reshape(camera.height_px, camera.width_px, 1), 3, axis=2)
+
+
+def disc_at(centre_camera_m):
+    return disc_image(CAMERA, centre_camera_m), CAMERA.project([centre_camera_m])[0]
+
+
+def person_about(pixel, px_per_m, offset_px=(0.0, 0.0), scores=(1, 1, 1, 1, 1)):
+    """A person whose keypoints put the head's centre near ``pixel``: ears beside, body below."""
+    pixels = np.zeros((17, 2))
+    down = np.array([0.0, 1.0])
+    u = np.asarray(pixel) + offset_px
+    pixels[0] = u + 0.045 * px_per_m * down
+    for row, (across, below) in enumerate(
+        [(0.03, 0.012), (-0.03, 0.012), (0.078, 0.033), (-0.078, 0.033)], start=1
+    ):
+        pixels[row] = u + px_per_m * np.array([across, below])
+    for row, (across, below) in {
+        5: (0.2, 0.243), 6: (-0.2, 0.243), 11: (0.12, 0.75), 12: (-0.12, 0.75),
+        13: (0.12, 1.16), 14: (-0.12, 1.16), 15: (0.12, 1.58), 16: (-0.12, 1.58),
+    }.items():  # fmt: skip
+        pixels[row] = u + px_per_m * np.array([across, below])
+    root = np.column_stack([(pixels - pixels[11:13].mean(axis=0)) / px_per_m, np.zeros(17)])
+    score = np.zeros(17)
+    score[:5] = scores
+    score[[5, 6, 11, 12, 13, 14, 15, 16]] = 1.0
+    return PersonKeypoints(pixels, root, score, "coco")
+
+
+# --- the crop -----------------------------------------------------------------------------------
+
+
+@given(
+    u=st.floats(100.0, 540.0),
+    v=st.floats(100.0, 380.0),
+    side=st.floats(10.0, 180.0),
+    size=st.sampled_from([32, 64, 224]),
+)
+@settings(max_examples=40, deadline=None)
+def test_a_ramp_stays_the_same_ramp_in_any_crop(u, v, side, size):
+    """Bilinear sampling and area averages are both exact on a linear ramp of brightness."""
+    ramp = np.zeros((480, 640, 3), np.uint8)
+    ramp[..., 0] = np.round(np.arange(640) * 0.375)[None, :]
+    ramp[..., 1] = np.round(np.arange(480) * 0.5)[:, None]
+    crop = head_crop(ramp, (u, v), side, size).astype(float)
+    steps = ((np.arange(size) + 0.5) / size - 0.5) * side
+    np.testing.assert_allclose(crop[:, :, 0], np.tile((u + steps) * 0.375, (size, 1)), atol=1.3)
+    np.testing.assert_allclose(crop[:, :, 1].T, np.tile((v + steps) * 0.5, (size, 1)), atol=1.3)
+    assert abs(np.mean(crop[..., 0]) - 0.375 * u) < 0.35
+
+
+def test_shrinking_averages_over_areas():
+    """A chequerboard of single pixels becomes grey: nothing of it survives as a pattern."""
+    board = np.zeros((480, 640, 3), np.uint8)
+    board[(np.add.outer(np.arange(480), np.arange(640)) % 2).astype(bool)] = 255
+    crop = head_crop(board, (320.2, 240.4), 400.0)
+    assert abs(float(crop.mean()) - 127.5) < 2.0
+    assert float(crop.std()) < 12.0
+
+
+@pytest.mark.parametrize("centre", [(-500.0, 100.0), (1e9, -1e9), (320.0, 900.0)])
+def test_outside_the_image_is_grey(centre):
+    image = np.zeros((480, 640, 3), np.uint8)
+    assert (head_crop(image, centre, 80.0) == 114).all()
+
+
+def test_the_border_of_the_image_runs_through_the_crop():
+    image = np.full((480, 640, 3), 255, np.uint8)
+    crop = head_crop(image, (-0.5, 239.5), 64.0)
+    assert (crop[:, :31] == 114).all()
+    assert (crop[:, 33:] == 255).all()
+
+
+@pytest.mark.parametrize("side", [0.0, -3.0, math.nan])
+def test_a_crop_without_extent_is_refused(side):
+    with pytest.raises(PerceptionError, match="side_px"):
+        head_crop(np.zeros((9, 9, 3), np.uint8), (4.0, 4.0), side)
+
+
+def test_one_pixel_is_an_image():
+    crop = head_crop(np.full((1, 1, 3), 7, np.uint8), (0.0, 0.0), 1.0, 8)
+    assert crop.shape == (8, 8, 3)
+    assert (crop[4, 4] < 114).all()
+
+
+def test_crop_units_and_pixels_are_inverse():
+    points = np.random.default_rng(0).uniform(-1.0, 2.0, (7, 2))
+    there = crop_to_image(points, np.array([12.3, -4.0]), 33.0)
+    np.testing.assert_allclose(image_to_crop(there, np.array([12.3, -4.0]), 33.0), points)
+    corner = crop_to_image(np.zeros(2), np.array([10.0, 20.0]), 8.0)
+    np.testing.assert_allclose(corner, [6.0, 16.0])
+
+
+# --- geometry -----------------------------------------------------------------------------------
+
+
+@given(x=st.floats(-1.5, 1.5), y=st.floats(-1.5, 1.5))
+def test_ray_axes_are_the_smallest_rotation_onto_the_ray(x, y):
+    (axes,) = ray_axes(np.array([[x, y]]))
+    ray = np.array([x, y, 1.0]) / math.sqrt(x * x + y * y + 1.0)
+    expected, _ = Rotation.align_vectors([ray], [[0.0, 0.0, 1.0]])
+    np.testing.assert_allclose(axes[:, 2], ray, atol=1e-12)
+    np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
+    angle = np.linalg.norm(Rotation.from_matrix(axes).as_rotvec())
+    assert angle == pytest.approx(math.acos(min(ray[2], 1.0)), abs=1e-7)
+    assert expected.magnitude() == pytest.approx(angle, abs=1e-6)
+
+
+@pytest.mark.parametrize("centre_m", [(0.0, -0.2, 2.0), (1.2, -0.5, 3.0), (-1.5, 0.6, 4.0)])
+@pytest.mark.parametrize("misplaced", [(0.0, 0.0), (0.25, -0.2)])
+def test_position_and_rotation_come_back_to_the_camera(centre_m, misplaced):
+    rotation = FACING_HEAD @ Rotation.from_euler("x", 0.4).as_matrix()
+    estimator = OnnxHeadPoseEstimator(disc_network(rotation), passes=3)
+    image, pixel = disc_at(np.array(centre_m))
+    px_per_m = CAMERA.fx_px / centre_m[2]
+    off = 0.4 * px_per_m * np.array(misplaced)
+    (head,) = estimator.estimate(image, CAMERA, (person_about(pixel, px_per_m, off),))
+    centre = head.position_camera_m + head.rotation_camera_head @ HEAD_CENTRE_HEAD_M
+    np.testing.assert_allclose(centre, centre_m, rtol=0.012, atol=0.004)
+    ray = CAMERA.normalise([pixel])
+    # A crop is not cut again once it is centred to 3 % of its side, 0.4 m: under half a degree.
+    expected = ray_axes(ray)[0] @ rotation
+    turn = Rotation.from_matrix(head.rotation_camera_head @ expected.T).magnitude()
+    assert turn < math.radians(0.5)
+    assert head.range_relative_std == pytest.approx(0.05)
+    a, b, c = 0.95, 0.9, 0.9
+    assert head.face_seen == pytest.approx(a * b + a * c + b * c - 2 * a * b * c, abs=1e-6)
+
+
+def test_distorted_lenses_give_the_same_place():
+    bent = Camera(640, 480, 554.0, 554.0, 320.0, 240.0, [-0.25, 0.06, 0.0, 0.0, 0.0])
+    truth = np.array([1.0, -0.4, 2.5])
+    pixel = bent.project([truth])[0]
+    image = disc_image(bent, truth)
+    estimator = OnnxHeadPoseEstimator(disc_network(FACING_HEAD), passes=3)
+    (head,) = estimator.estimate(image, bent, (person_about(pixel, 554.0 / 2.5),))
+    centre = head.position_camera_m + head.rotation_camera_head @ HEAD_CENTRE_HEAD_M
+    np.testing.assert_allclose(centre, truth, rtol=0.015)
+
+
+def test_the_covariance_is_that_of_drawn_errors():
+    """First order: rotation and crop scale drawn, nose placed, against the 6×6 covariance."""
+    rotation = FACING_HEAD
+    estimator = OnnxHeadPoseEstimator(disc_network(rotation, rotation_std=0.05, side_log_std=0.03))
+    truth = np.array([0.8, -0.3, 2.5])
+    image, pixel = disc_at(truth)
+    (head,) = estimator.estimate(image, CAMERA, (person_about(pixel, CAMERA.fx_px / 2.5),))
+    rng = np.random.default_rng(0)
+    count = 20000
+    floor = math.radians(0.5)
+    turns = rng.normal(0.0, math.hypot(0.05, floor), (count, 3))
+    centre = head.position_camera_m + head.rotation_camera_head @ HEAD_CENTRE_HEAD_M
+    side_m = DISC_M * 64 / (DISC_M * CAMERA.fx_px / 2.5) * (0.4 * CAMERA.fx_px / 2.5) / 64
+    scale = rng.normal(0.0, 0.03, (count, 1))
+    centres = centre * (1.0 + scale) + rng.normal(0.0, 0.01 * side_m, (count, 3))
+    turned = Rotation.from_rotvec(turns).as_matrix() @ head.rotation_camera_head
+    noses = centres - turned @ HEAD_CENTRE_HEAD_M
+    drawn = np.cov(np.hstack([turns, noses]).T)
+    scale = np.sqrt(np.outer(np.diag(drawn), np.diag(drawn)))
+    np.testing.assert_allclose(head.covariance / scale, drawn / scale, atol=0.05)
+
+
+def test_people_of_a_frame_are_one_batch_and_order_is_kept():
+    truths = [np.array([-0.9, -0.2, 2.5]), np.array([0.9, -0.1, 3.5])]
+    images, pixels = zip(*(disc_at(truth) for truth in truths), strict=True)
+    image = np.maximum(*images)
+    people = tuple(
+        person_about(pixel, CAMERA.fx_px / truth[2])
+        for pixel, truth in zip(pixels, truths, strict=True)
+    )
+    nobody = PersonKeypoints(np.zeros((17, 2)), np.zeros((17, 3)), np.zeros(17), "coco")
+    for batch in ("N", 1, 3):
+        estimator = OnnxHeadPoseEstimator(disc_network(FACING_HEAD, batch=batch))
+        left, none, right = estimator.estimate(image, CAMERA, (people[0], nobody, people[1]))
+        assert none is None
+        assert left.position_camera_m[2] == pytest.approx(2.5 - 0.09, rel=0.03)
+        assert right.position_camera_m[2] == pytest.approx(3.5 - 0.09, rel=0.03)
+
+
+@pytest.mark.parametrize(
+    "scores", [(1, 1, 1, 1, 1), (0, 0, 0, 1, 1), (1, 1, 0, 1, 0), (0, 0, 0, 0, 0), (0, 0, 0, 0, 1)]
+)
+def test_a_head_is_found_from_whichever_keypoints_there_are(scores):
+    truth = np.array([0.3, -0.4, 3.0])
+    image, pixel = disc_at(truth)
+    person = person_about(pixel, CAMERA.fx_px / 3.0, scores=scores)
+    (head,) = OnnxHeadPoseEstimator(disc_network(FACING_HEAD), passes=3).estimate(
+        image, CAMERA, (person,)
+    )
+    centre = head.position_camera_m + head.rotation_camera_head @ HEAD_CENTRE_HEAD_M
+    np.testing.assert_allclose(centre, truth, rtol=0.02, atol=0.01)
+
+
+def test_flat_skeletons_of_2d_networks_serve_as_well():
+    truth = np.array([0.3, -0.4, 3.0])
+    image, pixel = disc_at(truth)
+    person = person_about(pixel, CAMERA.fx_px / 3.0)
+    flat = PersonKeypoints(
+        person.keypoints_px, 37.0 * person.keypoints_root_m, person.scores, "coco", lifted=False
+    )
+    (head,) = OnnxHeadPoseEstimator(disc_network(FACING_HEAD), passes=3).estimate(
+        image, CAMERA, (flat,)
+    )
+    assert head.position_camera_m[2] == pytest.approx(2.91, rel=0.03)
+
+
+# --- what is no head ----------------------------------------------------------------------------
+
+
+def test_a_crop_without_a_head_gives_none():
+    image, pixel = disc_at(np.array([0.0, 0.0, 2.0]))
+    people = (person_about(pixel, CAMERA.fx_px / 2.0),)
+    assert OnnxHeadPoseEstimator(disc_network(head=0.3)).estimate(image, CAMERA, people) == (None,)
+    lenient = OnnxHeadPoseEstimator(disc_network(head=0.3), min_head=0.2)
+    assert lenient.estimate(image, CAMERA, people)[0].face_seen < 0.3
+
+
+def test_nobody_is_an_empty_result_and_an_unlocated_head_is_none():
+    estimator = OnnxHeadPoseEstimator(disc_network())
+    image = np.zeros((480, 640, 3), np.uint8)
+    assert estimator.estimate(image, CAMERA, ()) == ()
+    far_off = person_about((5000.0, -900.0), 200.0)
+    tiny = person_about((300.0, 200.0), 10.0)
+    assert estimator.estimate(image, CAMERA, (far_off, tiny)) == (None, None)
+
+
+@pytest.mark.parametrize(
+    "image",
+    [
+        np.zeros((480, 640), np.uint8),
+        np.zeros((480, 640, 3), np.float32),
+        np.zeros((0, 0, 3), np.uint8),
+        None,
+    ],
+)
+def test_bad_images_are_refused(image):
+    with pytest.raises(PerceptionError, match="image_rgb"):
+        OnnxHeadPoseEstimator(disc_network()).estimate(
+            image, CAMERA, (person_about((320.0, 240.0), 200.0),)
+        )
+
+
+def test_one_pixel_of_image_is_no_crash():
+    person = person_about((0.0, 0.0), 100.0)
+    assert len(OnnxHeadPoseEstimator(disc_network()).estimate(
+        np.zeros((1, 1, 3), np.uint8), CAMERA, (person,)
+    )) == 1  # fmt: skip
+
+
+def test_numbers_that_are_none_are_named():
+    image, pixel = disc_at(np.array([0.0, 0.0, 2.0]))
+    estimator = OnnxHeadPoseEstimator(disc_network(nan=True))
+    with pytest.raises(PerceptionError, match="side_log_std"):
+        estimator.estimate(image, CAMERA, (person_about(pixel, 277.0),))
+    squashed = OnnxHeadPoseEstimator(disc_network(0.3 * np.eye(3)))
+    with pytest.raises(PerceptionError, match="no rotations"):
+        squashed.estimate(image, CAMERA, (person_about(pixel, 277.0),))
+
+
+def test_unknown_layouts_are_refused_with_what_is_known():
+    stranger = full_range_network(np.zeros(5))
+    with pytest.raises(PerceptionError, match=r"found image .* known are awarenav"):
+        OnnxHeadPoseEstimator(stranger)
+    with pytest.raises(PerceptionError, match="6DRepNet"):
+        OnnxHeadPoseEstimator(full_range_network(np.eye(3), size=96))
+    with pytest.raises(PerceptionError, match="layout 2"):
+        OnnxHeadPoseEstimator(disc_network(metadata={"awarenav_layout": "2"}))
+    with pytest.raises(PerceptionError, match="'mean' must be a number"):
+        OnnxHeadPoseEstimator(disc_network(metadata={"mean": "grey"}))
+    with pytest.raises(PerceptionError, match="passes"):
+        OnnxHeadPoseEstimator(disc_network(), passes=0)
+    assert OnnxHeadPoseEstimator(OnnxModel(disc_network())).layout.own
+
+
+# --- networks of the 6DRepNet kind ---------------------------------------------------------------
+
+
+def angles_300w_lp(yaw, pitch, roll):
+    """Their matrix: Rz(roll) Ry(yaw) Rx(pitch)."""
+    return Rotation.from_euler("xyz", [pitch, yaw, roll]).as_matrix()
+
+
+@given(yaw=st.floats(-3.1, 3.1), pitch=st.floats(-1.0, 1.0), roll=st.floats(-1.0, 1.0))
+@settings(max_examples=20, deadline=None)
+def test_full_range_networks_turn_as_they_draw_their_axes(yaw, pitch, roll):
+    """Against the repository's drawing of the axes in the picture, in the middle of the image.
+
+    It draws the face's forward axis to (sin(−yaw), −cos(yaw) sin(pitch)) and the axis to the
+    person's left to (cos(yaw) cos(roll), cos(pitch) sin(roll) + cos(roll) sin(pitch) sin(−yaw)),
+    x to the right and y down.
+    """
+    matrix = angles_300w_lp(yaw, pitch, roll)
+    (rotation,) = rotations_of(matrix)
+    forward, left = rotation[:, 1], -rotation[:, 2]
+    np.testing.assert_allclose(
+        forward[:2], [-math.sin(yaw), -math.cos(yaw) * math.sin(pitch)], atol=1e-4
+    )
+    drawn = math.cos(pitch) * math.sin(roll) - math.cos(roll) * math.sin(pitch) * math.sin(yaw)
+    np.testing.assert_allclose(left[:2], [math.cos(yaw) * math.cos(roll), drawn], atol=1e-4)
+    # A face with no angles looks at the camera.
+    assert forward[2] == pytest.approx(-math.cos(yaw) * math.cos(pitch), abs=1e-4)
+    assert np.linalg.det(rotation) == pytest.approx(1.0)
+
+
+def rotations_of(*outputs):
+    estimator = OnnxHeadPoseEstimator(full_range_network(outputs[0]))
+    image = np.zeros((480, 640, 3), np.uint8)
+    person = person_about((320.0, 240.0), 200.0)
+    (head,) = estimator.estimate(image, CAMERA, (person,))
+    return (head.rotation_camera_head,)
+
+
+def test_six_numbers_mean_the_same_rotation():
+    matrix = angles_300w_lp(0.7, -0.2, 0.1)
+    six = np.concatenate([2.5 * matrix[:, 0], matrix[:, 1] + 0.3 * matrix[:, 0]])
+    np.testing.assert_allclose(rotations_of(six)[0], rotations_of(matrix)[0], atol=1e-5)
+    with pytest.raises(PerceptionError, match="span no rotation"):
+        rotations_of(np.ones(6))
+
+
+def test_a_full_range_network_says_nothing_of_range_or_visibility():
+    estimator = OnnxHeadPoseEstimator(full_range_network(np.eye(3)))
+    person = person_about((320.0, 240.0), 200.0)
+    (head,) = estimator.estimate(np.zeros((480, 640, 3), np.uint8), CAMERA, (person,))
+    assert head.face_seen is None
+    assert head.range_relative_std is None
+    assert head.gaze_camera[2] < -0.99
+    std = np.sqrt(np.diag(head.covariance))
+    assert np.allclose(std[:3], math.radians(10.0), rtol=0.01)
+    assert head.position_camera_m[2] == pytest.approx(CAMERA.fx_px / 200.0 - 0.09, rel=0.1)

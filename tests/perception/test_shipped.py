@@ -1,0 +1,258 @@
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from perception import PerceptionError
+from perception.shipped import (
+    DETECTOR,
+    HEAD,
+    POSE,
+    ShippedModel,
+    load_shipped,
+    shipped_detector,
+    shipped_head_pose_estimator,
+    shipped_model_path,
+    shipped_models,
+    shipped_pose_estimator,
+    verify_shipped_model,
+    write_manifest,
+)
+
+FOLDER = Path(__file__).parents[2] / "perception" / "models"
+NAMES = (DETECTOR, POSE, HEAD)
+CARD = """# Something
+
+Does one thing. More about it.
+
+- sha256: not exported yet
+- size_bytes: not exported yet
+- licence: Apache-2.0
+- input: 1×3×8×8
+
+## Limits
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder with one network, which is none, and its card."""
+    (tmp_path / "thing.onnx").write_bytes(b"weights")
+    (tmp_path / "thing.md").write_text(CARD, encoding="utf-8")
+    return tmp_path
+
+
+@pytest.fixture
+def box(tmp_path):
+    """A copy of what is shipped."""
+    return Path(shutil.copytree(FOLDER, tmp_path / "box"))
+
+
+# What is in the box
+
+
+def test_three_networks_are_shipped_and_small():
+    models = shipped_models()
+    assert tuple(model.name for model in models) == NAMES
+    assert sum(model.size_bytes for model in models) <= 20e6
+    assert {model.licence for model in models} == {"Apache-2.0"}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_file_manifest_and_card_agree(name):
+    (model,) = (each for each in shipped_models() if each.name == name)
+    content = verify_shipped_model(name).read_bytes()
+    assert (hashlib.sha256(content).hexdigest(), len(content)) == (model.sha256, model.size_bytes)
+    card = (FOLDER / f"{name}.md").read_text(encoding="utf-8")
+    for fact in ("sha256", "size_bytes", "licence", "input"):
+        assert re.findall(rf"^- {fact}: (.+)$", card, re.MULTILINE) == [str(getattr(model, fact))]
+    assert re.findall(r"^## (.+)$", card, re.MULTILINE) == [
+        *("File", "Data", "Recipe", "Figures", "Limits"),
+    ]
+    assert "Made for the simulator" in card
+
+
+def test_nothing_else_is_in_the_box():
+    expected = {"manifest.json"}
+    expected |= {f"{name}.{suffix}" for name in NAMES for suffix in ("onnx", "md")}
+    assert {path.name for path in FOLDER.iterdir() if path.suffix != ".part"} == expected
+
+
+def test_each_loads_as_what_it_is():
+    for make in (shipped_detector, shipped_pose_estimator, shipped_head_pose_estimator):
+        assert make() is not None
+
+
+@pytest.mark.parametrize("name", [POSE, HEAD])
+@pytest.mark.parametrize("people", [1, 2, 3, 7])
+def test_any_number_of_people_fits_in_a_batch(name, people):
+    model = load_shipped(name)
+    (tensor,) = model.inputs
+    assert tensor.shape[0] is None
+    crops = np.zeros((people, *tensor.shape[1:]), tensor.dtype)
+    for output in model.run({tensor.name: crops}):
+        assert len(output) == people
+        assert np.isfinite(output).all()
+
+
+# What is not as it should be
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_altered_file_is_refused_with_both_hashes_and_the_remedy(box, name):
+    path = box / f"{name}.onnx"
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+    expected = verify_shipped_model(name, FOLDER).read_bytes()
+    with pytest.raises(PerceptionError) as refused:
+        load_shipped(name, folder=box)
+    for part in (
+        str(path),
+        hashlib.sha256(content).hexdigest(),
+        hashlib.sha256(expected).hexdigest(),
+        "pip install --force-reinstall",
+    ):
+        assert part in str(refused.value)
+
+
+def test_truncated_file_is_refused(box):
+    path = box / f"{DETECTOR}.onnx"
+    path.write_bytes(path.read_bytes()[:1000])
+    with pytest.raises(PerceptionError, match=r"altered.*\(1000 bytes\)"):
+        load_shipped(DETECTOR, folder=box)
+
+
+def test_missing_file_is_refused(box):
+    (box / f"{HEAD}.onnx").unlink()
+    with pytest.raises(PerceptionError, match=r"head_pose\.onnx is missing.*pip install"):
+        load_shipped(HEAD, folder=box)
+    with pytest.raises(PerceptionError, match="is missing"):
+        shipped_model_path(HEAD, box)
+
+
+def test_trouble_of_another_kind_is_not_blamed_on_the_file():
+    # Whoever asks for a GPU that is not there has an unaltered file.
+    from perception.networks._session import OnnxSettings  # noqa: PLC0415
+
+    with pytest.raises(PerceptionError, match="provider") as refused:
+        load_shipped(DETECTOR, OnnxSettings(providers=("tensorrt",)))
+    assert "altered" not in str(refused.value)
+
+
+def test_unknown_name_says_which_there_are():
+    with pytest.raises(PerceptionError, match=r"'face'.*'person_detector'"):
+        load_shipped("face")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "[]",
+        "{}",
+        '{"models": 3}',
+        '{"models": [3]}',
+        '{"models": [{"name": "thing"}]}',
+        json.dumps({"models": [{"name": "../up", "sha256": "0" * 64, "size_bytes": 1}]}),
+    ],
+)
+def test_manifest_that_is_none(tmp_path, text):
+    (tmp_path / "manifest.json").write_text(text)
+    with pytest.raises(PerceptionError, match=r"manifest\.json"):
+        shipped_models(tmp_path)
+
+
+def test_manifest_that_is_missing(tmp_path):
+    with pytest.raises(PerceptionError, match=r"cannot be read.*pip install"):
+        shipped_models(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"name": "../up"}, "name must match"),
+        ({"name": ""}, "needs every text"),
+        ({"licence": None}, "needs every text"),
+        ({"sha256": "abc"}, "64 lower-case hexadecimal"),
+        ({"sha256": "G" * 64}, "64 lower-case hexadecimal"),
+        ({"size_bytes": 0}, "size_bytes must be"),
+        ({"size_bytes": "7"}, "size_bytes must be"),
+    ],
+)
+def test_entries_are_checked(change, message):
+    good = {
+        "name": "thing",
+        "sha256": "0" * 64,
+        "size_bytes": 7,
+        "licence": "Apache-2.0",
+        "input": "1×3×8×8",
+        "summary": "Does.",
+    }
+    ShippedModel(**good)
+    with pytest.raises(PerceptionError, match=message):
+        ShippedModel(**(good | change))
+
+
+# Writing it
+
+
+ENTRY = {
+    "name": "thing",
+    "licence": "Apache-2.0",
+    "input": "1×3×8×8",
+    "summary": "Does one thing.",
+}
+
+
+def test_manifest_and_card_are_written_from_the_file(folder):
+    digest = hashlib.sha256(b"weights").hexdigest()
+    write_manifest(folder, [ENTRY])
+    assert shipped_models(folder) == (
+        ShippedModel("thing", digest, 7, "Apache-2.0", "1×3×8×8", "Does one thing."),
+    )
+    card = (folder / "thing.md").read_text(encoding="utf-8")
+    assert f"- sha256: {digest}\n- size_bytes: 7\n- licence: Apache-2.0\n- input: 1×3×8×8" in card
+    assert card.replace(digest, "not exported yet").replace("7", "not exported yet") == CARD
+    first = (folder / "thing.md").read_bytes(), (folder / "manifest.json").read_bytes()
+    write_manifest(folder, [ENTRY])
+    assert first == ((folder / "thing.md").read_bytes(), (folder / "manifest.json").read_bytes())
+    (folder / "thing.onnx").write_bytes(b"other weights")
+    with pytest.raises(PerceptionError, match="altered"):
+        verify_shipped_model("thing", folder)
+    write_manifest(folder, [ENTRY])
+    assert verify_shipped_model("thing", folder) == folder / "thing.onnx"
+
+
+def test_manifest_is_written_where_there_are_no_cards(folder):
+    (folder / "thing.md").unlink()
+    write_manifest(folder, [ENTRY])
+    assert verify_shipped_model("thing", folder) == folder / "thing.onnx"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("- sha256: not exported yet\n", "", "one line '- sha256: …', got 0"),
+        ("- licence: Apache-2.0", "- licence: MIT\n- licence: Apache-2.0", "got 2"),
+    ],
+)
+def test_card_that_does_not_say_what_it_must_changes_nothing(folder, old, new, message):
+    (folder / "thing.md").write_text(CARD.replace(old, new), encoding="utf-8")
+    with pytest.raises(PerceptionError, match=message):
+        write_manifest(folder, [ENTRY])
+    assert not (folder / "manifest.json").exists()
+
+
+def test_file_that_is_missing_changes_nothing(folder):
+    before = (folder / "thing.md").read_bytes()
+    with pytest.raises(PerceptionError, match=r"cannot read .*other\.onnx"):
+        write_manifest(folder, [ENTRY, ENTRY | {"name": "other"}])
+    assert (folder / "thing.md").read_bytes() == before
+    assert not (folder / "manifest.json").exists()
