@@ -32,7 +32,8 @@ from perception import (
     PersonDetection,
     PersonDetector,
 )
-from perception.networks import OnnxModel, OnnxSettings
+from perception._network_time import NETWORK_TIME
+from perception.networks import OnnxSettings
 from perception.networks._detector import OnnxPersonDetector
 from perception.networks._head import OnnxHeadPoseEstimator
 from perception.networks._pose import OnnxPoseEstimator
@@ -65,44 +66,31 @@ class Frame:
         return tuple(PersonDetection(box, 1.0) for box in self.boxes_xyxy_px)
 
 
-class Stopwatch:
-    """Adds up the calling thread's processor time in networks."""
+class TimedSession:
+    """A session of onnxruntime whose runs count as time in networks, as those of ours do."""
 
-    def __init__(self) -> None:
-        self.network_s = 0.0
-
-    def timed(self, run: Callable[..., Any]) -> Callable[..., Any]:
-        """The same function, whose time counts."""
-
-        def timed_run(*args: Any, **kwargs: Any) -> Any:
-            began = time.thread_time()
-            try:
-                return run(*args, **kwargs)
-            finally:
-                self.network_s += time.thread_time() - began
-
-        return timed_run
-
-    def model(self, path: Path) -> OnnxModel:
-        """A network of ours on one thread, timed."""
-        model = OnnxModel(path, settings=ONE_THREAD)
-        model.run = self.timed(model.run)  # type: ignore[method-assign]
-        return model
-
-    def peer(self, tool: Any, path: Path) -> Any:
-        """A tool of rtmlib with its network on one thread, timed."""
+    def __init__(self, path: Path) -> None:
         options = ort.SessionOptions()
         options.intra_op_num_threads = 1
-        session = ort.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
-        tool.session = _TimedSession(session, self)
-        return tool
+        self._session = ort.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+        self.get_inputs = self._session.get_inputs
+        self.get_outputs = self._session.get_outputs
+
+    def run(self, *args: Any) -> Any:
+        """Run the network."""
+        began = time.thread_time()
+        try:
+            return self._session.run(*args)
+        finally:
+            NETWORK_TIME.processor_s += time.thread_time() - began
 
 
-class _TimedSession:
-    def __init__(self, session: Any, watch: Stopwatch) -> None:
-        self.run = watch.timed(session.run)
-        self.get_inputs = session.get_inputs
-        self.get_outputs = session.get_outputs
+def peer_tool(make: Callable[..., Any], path: Path, size: tuple[int, int]) -> Any:
+    """A tool of rtmlib with its network on one thread, timed."""
+    with contextlib.redirect_stdout(sys.stderr):
+        tool = make(str(path), model_input_size=size, backend="onnxruntime")
+    tool.session = TimedSession(path)
+    return tool
 
 
 class TwoPeople:
@@ -140,7 +128,7 @@ def clip(frames: int) -> tuple[Camera, list[Frame]]:
         ]
 
 
-def outside_ms(watch: Stopwatch, call: Callable[[Frame], Any], frames: Sequence[Frame]) -> float:
+def outside_ms(call: Callable[[Frame], Any], frames: Sequence[Frame]) -> float:
     """Processor milliseconds a frame outside the networks.
 
     Each frame's best of seven counts: other programs and cold caches only slow.
@@ -149,10 +137,10 @@ def outside_ms(watch: Stopwatch, call: Callable[[Frame], Any], frames: Sequence[
     best = np.full(len(frames), np.inf)
     for _ in range(REPEATS):
         for row, frame in enumerate(frames):
-            watch.network_s = 0.0
-            began = time.thread_time()
+            networks_s, began = NETWORK_TIME.processor_s, time.thread_time()
             call(frame)
-            best[row] = min(best[row], time.thread_time() - began - watch.network_s)
+            took_s = time.thread_time() - began
+            best[row] = min(best[row], took_s - (NETWORK_TIME.processor_s - networks_s))
     return 1e3 * float(best.mean())
 
 
@@ -193,21 +181,20 @@ def measure(models: Path, count: int) -> list[Metric]:
 
 
 def pipeline_metrics(camera: Camera, frames: Sequence[Frame]) -> list[Metric]:
-    watch = Stopwatch()
-    detector = TwoPeople(OnnxPersonDetector(watch.model(shipped_model_path(DETECTOR))))
+    detector = TwoPeople(OnnxPersonDetector(shipped_model_path(DETECTOR), settings=ONE_THREAD))
     pipeline = AwarenessPipeline(
         camera,
         detector,
-        OnnxPoseEstimator(watch.model(shipped_model_path(POSE))),
-        OnnxHeadPoseEstimator(watch.model(shipped_model_path(HEAD))),
+        OnnxPoseEstimator(shipped_model_path(POSE), settings=ONE_THREAD),
+        OnnxHeadPoseEstimator(shipped_model_path(HEAD), settings=ONE_THREAD),
     )
 
     def process(frame: Frame, through: AwarenessPipeline = pipeline) -> None:
         detector.detections = frame.detections
         through.process(frame.image_rgb, 0.0)
 
-    outside = outside_ms(watch, process, frames)
-    inside = 1e3 * watch.network_s  # of the last frame; all run the same networks
+    outside = outside_ms(process, frames)
+    inside = 1e3 * pipeline.last_timings.networks_s  # of the last frame; all run the same networks
     detector.detector = OnnxPersonDetector(shipped_model_path(DETECTOR), settings=TWO_THREADS)
     fast = AwarenessPipeline(
         camera,
@@ -232,31 +219,24 @@ def pipeline_metrics(camera: Camera, frames: Sequence[Frame]) -> list[Metric]:
 def detector_metrics(
     name: str, path: Path, peer: Any, size: tuple[int, int], frames: Sequence[Frame]
 ) -> list[Metric]:
-    ours, theirs = Stopwatch(), Stopwatch()
-    detector = OnnxPersonDetector(ours.model(path))
-    with contextlib.redirect_stdout(sys.stderr):
-        other = theirs.peer(peer(str(path), model_input_size=size, backend="onnxruntime"), path)
+    detector = OnnxPersonDetector(path, settings=ONE_THREAD)
+    other = peer_tool(peer, path, size)
     bgr = {id(frame): frame.image_rgb[..., ::-1].copy() for frame in frames}
     return compared(
         f"{name}_detector",
-        outside_ms(ours, lambda frame: detector.detect(frame.image_rgb), frames),
-        outside_ms(theirs, lambda frame: other(bgr[id(frame)]), frames),
+        outside_ms(lambda frame: detector.detect(frame.image_rgb), frames),
+        outside_ms(lambda frame: other(bgr[id(frame)]), frames),
     )
 
 
 def pose_metrics(rtmlib: Any, frames: Sequence[Frame]) -> list[Metric]:
     path = shipped_model_path(POSE)
-    ours, theirs = Stopwatch(), Stopwatch()
-    estimator = OnnxPoseEstimator(ours.model(path))
-    with contextlib.redirect_stdout(sys.stderr):
-        tool = rtmlib.RTMPose3d(str(path), model_input_size=(144, 192), backend="onnxruntime")
-    other = theirs.peer(tool, path)
+    estimator = OnnxPoseEstimator(path, settings=ONE_THREAD)
+    other = peer_tool(rtmlib.RTMPose3d, path, (144, 192))
     return compared(
         "pose_two_people",
-        outside_ms(
-            ours, lambda frame: estimator.estimate(frame.image_rgb, frame.detections), frames
-        ),
-        outside_ms(theirs, lambda frame: other(frame.image_rgb, frame.boxes_xyxy_px), frames),
+        outside_ms(lambda frame: estimator.estimate(frame.image_rgb, frame.detections), frames),
+        outside_ms(lambda frame: other(frame.image_rgb, frame.boxes_xyxy_px), frames),
     )
 
 

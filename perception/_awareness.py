@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -10,14 +11,13 @@ import numpy as np
 
 from ._attention import AttentionCone
 from ._head_pose import HeadPose
-from ._pose_refinement import skew
 from .anthropometry import EYES_HEAD_M
 from .arrays import FloatArray
 
 # A standard normal in two dimensions on a regular grid (trapezoidal rule). The score has kinks, on
 # the axis and at the edge of the cone, where a linear propagation fails and a Gauss–Hermite rule is
 # coarse; the grid is finest in the plane of gaze and robot, where the edge is crossed.
-_IN_PLANE: Final = np.linspace(-4.0, 4.0, 33)
+_IN_PLANE: Final = np.linspace(-4.0, 4.0, 25)
 _OUT_OF_PLANE: Final = np.linspace(-3.5, 3.5, 15)
 _NODES: Final = np.stack(
     [axis.ravel() for axis in np.meshgrid(_OUT_OF_PLANE, _IN_PLANE, indexing="ij")], axis=0
@@ -25,6 +25,9 @@ _NODES: Final = np.stack(
 _DENSITY: Final = np.exp(-0.5 * np.sum(_NODES**2, axis=0))
 _WEIGHTS: Final = _DENSITY / _DENSITY.sum()
 _NEAREST_M: Final = 0.1
+# Of the components of a cross product: x from y and z, and so on.
+_NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
+_TURNING_SIGNS: Final = np.array([[-1.0], [1.0]])
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +92,7 @@ def estimate_awareness(
     nominal = cone_scores(cone, sights.cosines.max(axis=1))
     posed = sights.pose_covariance() + (extra_std_rad**2)[:, None, None] * np.eye(2)
     looked = posed + sights.eye_covariance(eye_in_head_std_rad)
-    means, squares = _moments(cone, sights, np.stack([posed, looked]))
+    means, squares = _moments(cone, sights, np.array([posed, looked]))
     mean, (whole_mean, whole_square) = means[0], (means[1], squares[1])
     alpha = face_seen * np.minimum(nominal, mean)
     variance = face_seen * (whole_square - 2.0 * alpha * whole_mean) + alpha**2
@@ -101,10 +104,10 @@ def estimate_awareness(
 
 def cone_scores(cone: AttentionCone, cosines: FloatArray) -> FloatArray:
     """α for the cosine of the angle between gaze and robot: eq. (3) in terms of that angle."""
-    edge = np.cos(cone.half_angle_rad)
-    inside = np.clip(cosines, edge, 1.0)
-    tangent = np.sqrt(1.0 - inside**2) / inside
-    return np.asarray(np.maximum(1.0 - tangent / np.tan(cone.half_angle_rad), 0.0))
+    edge = math.cos(cone.half_angle_rad)
+    inside = np.minimum(np.maximum(cosines, edge), 1.0)
+    tangent = np.sqrt(1.0 - inside * inside) / inside
+    return np.asarray(np.maximum(1.0 - tangent / math.tan(cone.half_angle_rad), 0.0))
 
 
 class _Sights:
@@ -117,54 +120,54 @@ class _Sights:
     def __init__(self, heads: tuple[HeadPose, ...], points: FloatArray) -> None:
         self._rotation = np.array([head.rotation_camera_head for head in heads])
         self._covariance = np.array([head.covariance for head in heads])
-        self.gaze = self._rotation[:, :, 1]
+        gaze = self._rotation[:, :, 1]
         self._arm = self._rotation @ EYES_HEAD_M
         apex = self._arm + np.array([head.position_camera_m for head in heads])
         offset = points - apex[:, None]
-        distance = np.maximum(np.sqrt(np.einsum("nmi,nmi->nm", offset, offset)), 1e-9)
+        distance = np.maximum(np.sqrt((offset * offset).sum(axis=2)), 1e-9)
         sight = offset / distance[..., None]
         #: (N, M) of the angles between gaze and lines of sight
-        self.cosines = np.einsum("nmi,ni->nm", sight, self.gaze)
-        best = np.argmax(self.cosines, axis=1)
-        rows = np.arange(len(heads))
+        self.cosines = (sight @ gaze[:, :, None])[..., 0]
+        rows, best = np.arange(len(heads)), self.cosines.argmax(axis=1)
         self._distance = np.maximum(distance[rows, best], _NEAREST_M)
-        normal = _cross(self.gaze, sight[rows, best])
-        sine = np.sqrt(np.einsum("ni,ni->n", normal, normal))[:, None]
+        nearest = sight[rows, best]
+        normal = _cross(gaze, nearest)
+        sine = np.sqrt((normal * normal).sum(axis=1))[:, None]
         # Looking straight at the robot (or away): any plane through the gaze will do.
         straight = sine < 1e-9
-        self.normal = np.where(
-            straight, self._rotation[:, :, 0], normal / np.where(straight, 1.0, sine)
-        )
-        self.across = _cross(self.normal, self.gaze)
-        self._across_sight = _cross(self.normal, sight[rows, best])
-        #: (N, M) components of the lines of sight along normal and across
-        self.out_of_plane = np.einsum("nmi,ni->nm", sight, self.normal)
-        self.in_plane = np.einsum("nmi,ni->nm", sight, self.across)
-
-    def _turning(self) -> FloatArray:
-        """(N, 2, 3): how a small rotation vector moves the gaze along normal and across."""
-        axes = np.stack([self.normal, self.across], axis=1)
-        return -axes @ skew(self.gaze)
+        normal = np.where(straight, self._rotation[:, :, 0], normal / np.maximum(sine, 1e-9))
+        #: (N, 2, 3) normal and across
+        self._axes = np.empty((len(heads), 2, 3))
+        self._axes[:, 0], self._axes[:, 1] = normal, _cross(normal, gaze)
+        self._sight_axes = np.empty_like(self._axes)
+        self._sight_axes[:, 0], self._sight_axes[:, 1] = normal, _cross(normal, nearest)
+        #: (N, 2, 3): how a small rotation vector moves the gaze along normal and across: since
+        #: normal · (δ × gaze) = −across · δ and across · (δ × gaze) = normal · δ.
+        self._turning = self._axes[:, ::-1] * _TURNING_SIGNS
+        #: (N, 2, M) components of the lines of sight along normal and across
+        self.components = self._axes @ sight.swapaxes(1, 2)
 
     def pose_covariance(self) -> FloatArray:
         """(N, 2, 2) of the gaze against the line of sight, from the covariance of the head pose."""
         # A small turn δ moves the gaze by δ × g and the apex by δ × arm; a shift of the apex turns
         # the line of sight the other way.
-        sight = np.stack([self.normal, self._across_sight], axis=1)
-        sight = sight / self._distance[:, None, None]
-        turn = self._turning() - sight @ skew(self._arm)
-        jacobian = np.concatenate([turn, sight], axis=2)
-        return np.asarray(jacobian @ self._covariance @ np.swapaxes(jacobian, 1, 2))
+        jacobian = np.empty((len(self._arm), 2, 6))
+        sight = self._sight_axes / self._distance[:, None, None]
+        jacobian[..., 3:] = sight
+        jacobian[..., :3] = self._turning - _cross(sight, self._arm[:, None])
+        return np.asarray(jacobian @ self._covariance @ jacobian.swapaxes(1, 2))
 
     def eye_covariance(self, std_rad: tuple[float, float]) -> FloatArray:
         """(N, 2, 2) from eyes that turn sideways about the head's x axis and up about its z."""
-        axes = self._turning() @ self._rotation[:, :, [0, 2]]
-        return np.asarray((axes * np.square(std_rad)) @ np.swapaxes(axes, 1, 2))
+        axes = self._turning @ (self._rotation[:, :, ::2] * std_rad)
+        return np.asarray(axes @ axes.swapaxes(1, 2))
 
 
 def _cross(first: FloatArray, second: FloatArray) -> FloatArray:
-    """(N, 3) cross products; several times faster than ``np.cross`` on a handful of rows."""
-    return np.asarray((skew(first) @ second[:, :, None])[:, :, 0])
+    """(…, 3) cross products; several times faster than ``np.cross`` on a handful of rows."""
+    return np.asarray(
+        first[..., _NEXT] * second[..., _LAST] - first[..., _LAST] * second[..., _NEXT]
+    )
 
 
 def _moments(
@@ -180,10 +183,9 @@ def _moments(
     cosine, slope = np.cos(angle), np.sin(angle) / angle
     highest = None
     for point in range(sights.cosines.shape[1]):
-        turned = (
-            out * sights.out_of_plane[:, point, None] + within * sights.in_plane[:, point, None]
-        )
-        towards = cosine * sights.cosines[:, point, None] + slope * turned
+        aside = sights.components[:, :, point, None]
+        towards = cosine * sights.cosines[:, point, None]
+        towards += slope * (out * aside[:, 0] + within * aside[:, 1])
         highest = towards if highest is None else np.maximum(highest, towards)
     scores = cone_scores(cone, highest) if highest is not None else np.zeros_like(out)
     return scores @ _WEIGHTS, (scores * scores) @ _WEIGHTS

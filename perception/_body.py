@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import compress
 from typing import Final
 
 import numpy as np
@@ -36,6 +36,14 @@ _ITERATIONS: Final = 4
 # Far below what scale leaves uncertain.
 _CONVERGED: Final = 1e-3
 _IDENTITY: Final = np.eye(3)
+_ACROSS: Final = np.diag([1.0, 1.0, 0.0])
+# Where the chest is in the box of somebody who stands: shoulders stand at 0.82 of the stature, and
+# it a little below (Drillis and Contini).
+_CHEST_IN_BOX: Final = np.array([0.5, 0.27])
+_BOX_VARIANCE: Final = _BOX_DEPTH_RELATIVE_STD**2 + STATURE_RELATIVE_STD**2
+_BOX_LATERAL_M2: Final = (0.15 * MEAN_STATURE_M) ** 2 * _IDENTITY
+#: No placement by a box has a covariance of a smaller trace.
+BOX_LEAST_TRACE_M2: Final = 3.0 * (0.15 * MEAN_STATURE_M) ** 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,30 +97,35 @@ def place_bodies(
     if not width:
         return ()
     scores = np.array([person.scores[:width] for person in people])
-    seen = (scores >= min_score) & np.array([scale is not None for scale in scales])[:, None]
-    factor = np.array([1.0 if scale is None else scale.factor for scale in scales])
-    points = factor[:, None, None] * np.array(
-        [person.keypoints_root_m[:width] for person in people]
-    )
+    points = np.array([person.keypoints_root_m[:width] for person in people])
     pixels = np.array([person.keypoints_px[:width] for person in people])
+    # Nobody without a scale is placed.
+    factor, relative_std = np.array(
+        [(np.nan, 0.0) if scale is None else (scale.factor, scale.relative_std) for scale in scales]
+    ).T
+    seen = (scores >= min_score) & (factor > 0.0)[:, None]
+    points *= np.where(factor > 0.0, factor, 1.0)[:, None, None]
     rays = camera.normalise(pixels.reshape(-1, 2)).reshape(pixels.shape)
     translation, covariance, valid = _translations(
         points, rays, seen, camera.fx_px, keypoint_std_px
     )
     shoulders, usable, hips, chest = _trunks(points, seen)
-    valid &= chest[:, 2] + translation[:, 2] > 0.0
     chest += translation
-    covariance += _LIFT_STD_M**2 * _IDENTITY
+    valid &= chest[:, 2] > 0.0
+    far = relative_std[:, None] * chest
+    covariance += far[:, :, None] * far[:, None] + _LIFT_STD_M**2 * _IDENTITY
+    shoulders, hips = shoulders + translation[:, None], hips + translation
+    points = points[:, :17] + translation[:, None]
     return tuple(
         None
         if scale is None or not valid[row]
         else BodyPlacement(
-            shoulders[row] + translation[row] if usable[row] else None,
-            hips[row] + translation[row],
+            shoulders[row] if usable[row] else None,
+            hips[row],
             chest[row],
-            covariance[row] + scale.relative_std**2 * (chest[row][:, None] * chest[row]),
+            covariance[row],
             scale.relative_std,
-            points[row, :17] + translation[row],
+            points[row],
         )
         for row, scale in enumerate(scales)
     )
@@ -138,59 +151,69 @@ def _translations(
         Translations (P, 3), their covariances (P, 3, 3) and whether each is one (P,).
     """
     count = seen.sum(axis=1)
-    mask = seen.astype(np.float64)
     # With p = t_xy − ray · tz + start, tz is the slope of start over ray.
     start = points[..., :2] - rays * points[..., 2:]
-    weight = mask
-    everything = np.maximum(keypoint_std_px, 1e-9)
+    # Weights times this are all the sums that the slope needs.
+    table = np.empty((*seen.shape, 6))
+    table[..., :2], table[..., 2:4] = rays, start
+    table[..., 4], table[..., 5] = (rays * rays).sum(axis=2), (rays * start).sum(axis=2)
+    weight = seen.astype(np.float64)
+    allowed_px = 3.0 * max(keypoint_std_px, 1e-9)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         depth_of_root = np.zeros(len(count))
         for iteration in range(_ITERATIONS):
             previous = depth_of_root
-            share = (weight / weight.sum(axis=1, keepdims=True))[..., None]
-            middle, level = np.sum(share * rays, axis=1), np.sum(share * start, axis=1)
-            away, rise = rays - middle[:, None], start - level[:, None]
-            depth_of_root = np.sum(share * away * rise, axis=(1, 2)) / np.sum(
-                share * away**2, axis=(1, 2)
+            mean = (weight[:, None] @ table)[:, 0] / weight.sum(axis=1, keepdims=True)
+            middle, level = mean[:, :2], mean[:, 2:4]
+            depth_of_root = (mean[:, 5] - (middle * level).sum(axis=1)) / (
+                mean[:, 4] - (middle * middle).sum(axis=1)
             )
+            across = middle * depth_of_root[:, None] - level
             depth = points[..., 2] + depth_of_root[:, None]
-            error_px = (focal_px / depth)[..., None] * (rise - away * depth_of_root[:, None, None])
-            error_px = np.sqrt(error_px[..., 0] ** 2 + error_px[..., 1] ** 2)
-            moved = np.abs(depth_of_root - previous) > _CONVERGED * np.abs(depth_of_root)
-            if iteration + 1 < _ITERATIONS and (iteration == 0 or moved.any()):
-                robust = 3.0 * np.maximum(everything, _masked_median(error_px, seen, count))
+            off = start - rays * depth_of_root[:, None, None] + across[:, None]
+            error_px = np.sqrt((off * off).sum(axis=2)) * np.abs(focal_px / depth)
+            if iteration and not _moved(depth_of_root, previous):
+                break
+            if iteration + 1 < _ITERATIONS:
+                robust = np.maximum(allowed_px, 3.0 * _masked_median(error_px, seen))
                 huber = np.minimum(1.0, robust[:, None] / np.maximum(error_px, 1e-9))
-                weight = np.where(seen, huber / depth**2, 0.0)
-                continue
-            break
-        translation = np.column_stack([middle * depth_of_root[:, None] - level, depth_of_root])
+                weight = np.where(seen, huber / (depth * depth), 0.0)
+        translation = np.concatenate([across, depth_of_root[:, None]], axis=1)
         # Huber's weights without the 1/depth² that turns metres into pixels.
-        relative = np.where(seen, weight * depth**2, 0.0)
-        spread = np.sum(relative * np.where(seen, error_px, 0.0) ** 2, axis=1)
+        relative = np.where(seen, weight * depth * depth, 0.0)
+        spread = (relative * np.where(seen, error_px * error_px, 0.0)).sum(axis=1)
         variance = np.maximum(keypoint_std_px**2, spread / np.maximum(2 * count - 3, 1))
-        strength = np.where(seen, relative * (focal_px / depth) ** 2, 0.0)[..., None]
-        total = strength.sum(axis=(1, 2))
-        first = np.sum(strength * rays, axis=1)
-        second = np.sum(strength * rays**2, axis=(1, 2)) - np.sum(first**2, axis=1) / total
+        strength = np.where(seen, relative * (focal_px / depth) ** 2, 0.0)
+        total = strength.sum(axis=1)
+        sums = (strength[:, None] @ table[..., :5])[:, 0]
+        first = sums[:, :2]
+        second = sums[:, 4] - (first * first).sum(axis=1) / total
         ahead = np.where(seen, depth, 1.0).min(axis=1) > 0.0
     valid = (count >= _MIN_POINTS) & ahead & np.isfinite(translation).all(axis=1)
     valid &= np.isfinite(second) & (second > 1e-12 * total)
     # Inverse of [[S, 0, −a], [0, S, −b], [−a, −b, q]] with the Schur complement q − (a² + b²)/S.
-    slope = np.column_stack(
-        [first / np.where(total > 0.0, total, 1.0)[:, None], np.ones(len(count))]
-    )
+    slope = np.ones((len(count), 3))
+    slope[:, :2] = first / np.where(total > 0.0, total, 1.0)[:, None]
     covariance = slope[:, :, None] * slope[:, None] / np.where(valid, second, 1.0)[:, None, None]
-    covariance[:, [0, 1], [0, 1]] += (1.0 / np.where(valid, total, 1.0))[:, None]
+    covariance += (1.0 / np.where(valid, total, 1.0))[:, None, None] * _ACROSS
     return translation, variance[:, None, None] * covariance, valid
 
 
-def _masked_median(
-    values: FloatArray, seen: NDArray[np.bool_], count: NDArray[np.intp]
-) -> FloatArray:
-    """(P,) medians of the seen values of each row; of none, whatever."""
-    ordered = np.sort(np.where(seen, values, np.inf), axis=1)
-    rows, last = np.arange(len(ordered)), np.maximum(count - 1, 0)
-    return np.asarray(0.5 * (ordered[rows, last // 2] + ordered[rows, (last + 1) // 2]))
+def _moved(values: FloatArray, previous: FloatArray) -> bool:
+    return any(
+        abs(new - old) > _CONVERGED * abs(new)
+        for new, old in zip(values.tolist(), previous.tolist(), strict=True)
+    )
+
+
+def _masked_median(values: FloatArray, seen: NDArray[np.bool_]) -> FloatArray:
+    """(P,) medians of the seen values of each row; of none, 0."""
+    medians = []
+    for row, counts in zip(values.tolist(), seen.tolist(), strict=True):
+        ordered = sorted(compress(row, counts))
+        last = len(ordered) - 1
+        medians.append(0.5 * (ordered[last // 2] + ordered[(last + 1) // 2]) if ordered else 0.0)
+    return np.array(medians)
 
 
 def _trunks(
@@ -206,7 +229,7 @@ def _trunks(
     shown = np.asarray(seen[:, _HIPS].all(axis=1))[:, None]
     hips = np.where(shown, 0.5 * (both[:, 0] + both[:, 1]), 0.0)
     shoulders = skeletons[:, _SHOULDERS]
-    reach = np.sqrt(np.einsum("psi,psi->ps", shoulders, shoulders))
+    reach = np.sqrt((shoulders * shoulders).sum(axis=2))
     low, high = _SHOULDER_REACH_M
     there = seen[:, _SHOULDERS] | ((reach > low) & (reach < high))
     usable = there[:, 0] & there[:, 1]
@@ -225,17 +248,21 @@ def place_box(camera: Camera, box_xyxy_px: FloatArray) -> tuple[FloatArray, Floa
     A box that is cut off by the image border looks farther away than it is; that error is bounded
     by taking the larger of height and 2.5 × width as the height.
     """
-    left, top, right, bottom = (float(edge) for edge in box_xyxy_px)
-    corners = camera.normalise([[left, top], [right, bottom]])
-    width, height = (float(extent) for extent in corners[1] - corners[0])
-    if height <= 0.0 or width <= 0.0:
-        return None
-    range_m = MEAN_STATURE_M / max(height, 2.5 * width)
-    # Shoulders stand at 0.82 of the stature and the chest a little below (Drillis and Contini).
-    across = 0.5 * float(corners[0, 0] + corners[1, 0])
-    down = float(corners[0, 1]) + 0.27 * height
-    position = range_m * np.array([across, down, 1.0])
-    relative = math.hypot(_BOX_DEPTH_RELATIVE_STD, STATURE_RELATIVE_STD)
-    lateral = 0.15 * MEAN_STATURE_M
-    covariance = relative**2 * np.outer(position, position) + lateral**2 * np.eye(3)
-    return position, covariance
+    return place_boxes(camera, [box_xyxy_px])[0]
+
+
+def place_boxes(
+    camera: Camera, boxes_xyxy_px: Sequence[FloatArray]
+) -> list[tuple[FloatArray, FloatArray] | None]:
+    """Return :func:`place_box` of several boxes at once."""
+    corners = camera.normalise(np.reshape(boxes_xyxy_px, (-1, 2)))
+    edges = corners.reshape(-1, 4)
+    low, extent = edges[:, :2], edges[:, 2:] - edges[:, :2]
+    boxes = extent.min(axis=1) > 0.0
+    height = np.maximum(np.maximum(extent[:, 1], 2.5 * extent[:, 0]), 1e-9)
+    position = np.ones((len(edges), 3))
+    position[:, :2] = low + extent * _CHEST_IN_BOX
+    position *= (MEAN_STATURE_M / height)[:, None]
+    covariance = _BOX_VARIANCE * (position[:, :, None] * position[:, None]) + _BOX_LATERAL_M2
+    placed = zip(position, covariance, strict=True)
+    return [pair if box else None for pair, box in zip(placed, boxes.tolist(), strict=True)]

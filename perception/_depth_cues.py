@@ -5,11 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Final
-
-import numpy as np
-
-from .arrays import FloatArray
 
 # Density of a cue that is wrong, and of ranges before anything is known, over the logarithm of the
 # range: flat within a factor of e up or down.
@@ -54,45 +51,80 @@ def combine_cues(cues: Sequence[DepthCue]) -> tuple[float, float]:
     """
     if len(cues) == 1:
         return cues[0].log_range, cues[0].log_std
-    value, std, stature, wrong = np.array(
-        [(cue.log_range, cue.log_std, cue.stature_std, cue.wrong) for cue in cues]
-    ).T
-    right = _SUBSETS[len(cues)]
-    own = np.maximum(std**2 - stature**2, 1e-8)
-    # Covariance diag(own) + stature·statureᵀ of each subset, inverted after Sherman and Morrison.
-    terms = np.stack([np.ones_like(value), stature, stature**2, value, stature * value, value**2])
-    one, s, ss, z, sz, zz = (terms / own) @ right.T
-    shared = 1.0 / (1.0 + ss)
-    information = np.maximum(one - s * s * shared, 1e-12)
-    mean = (z - s * sz * shared) / information
-    chi2 = np.maximum(zz - sz * sz * shared - information * mean**2, 0.0)
-    size = right.sum(axis=1)
-    # Logarithm of ∫ N(values; x, Σ) dx for the right ones, flat for the others.
-    fit = -0.5 * (
-        chi2
-        + (size - 1) * math.log(2.0 * math.pi)
-        + right @ np.log(own)
-        - np.log(shared)
-        + np.log(information)
+    terms = [_terms(cue) for cue in cues]
+    # Nothing is right: the range itself is all that is left to integrate over.
+    middle = _median([cue.log_range for cue in cues])
+    nothing = sum(wrong for *_, wrong in terms) - math.log(_FLAT_DENSITY)
+    found = [(middle, _ALL_WRONG_LOG_STD**2, nothing)]
+    found += [_least_squares(terms, right) for right in _SUBSETS[len(cues)]]
+    found.sort()
+    highest = max(fit for *_, fit in found)
+    weights = [math.exp(fit - highest) for *_, fit in found]
+    total = sum(weights)
+    # Rounding must not carry the sum past a half that it reaches exactly.
+    half, centre = (0.5 - 1e-9) * total, found[-1][0]
+    for (mean, _, _), weight in zip(found, weights, strict=True):
+        half -= weight
+        if half <= 0.0:
+            centre = mean
+            break
+    spread = sum(
+        weight * (variance + (mean - centre) ** 2)
+        for (mean, variance, _), weight in zip(found, weights, strict=True)
     )
-    prior = right @ np.log1p(-wrong) + (1.0 - right) @ np.log(_FLAT_DENSITY * wrong)
-    # The first subset is the empty one: the range itself is all that is left to integrate over.
-    fit[0] = -math.log(_FLAT_DENSITY)
-    mean[0] = float(np.median(value))
-    variance = 1.0 / information
-    variance[0] = _ALL_WRONG_LOG_STD**2
-    weight = np.exp(fit + prior - np.max(fit + prior))
-    weight /= weight.sum()
-    order = np.argsort(mean)
-    middle = np.searchsorted(np.cumsum(weight[order]), 0.5 - 1e-9)
-    centre = float(mean[order[min(int(middle), len(order) - 1)]])
-    return centre, math.sqrt(float(weight @ (variance + (mean - centre) ** 2)))
+    return centre, math.sqrt(spread / total)
 
 
-def _subsets(count: int) -> FloatArray:
-    """(2^count, count) of ones and zeros, the empty subset first."""
-    rows = (np.arange(2**count)[:, None] >> np.arange(count)) & 1
-    return np.asarray(rows, dtype=np.float64)
+def _terms(cue: DepthCue) -> tuple[float, ...]:
+    """The sums of least squares that one cue adds, and the logarithms of its densities.
+
+    Information alone, with stature once and twice, with value, with both, with value twice; density
+    when right, but for the exponent, and when wrong.
+    """
+    value, stature = cue.log_range, cue.stature_std
+    own = max(cue.log_std**2 - stature**2, 1e-8)
+    one = 1.0 / own
+    return (
+        one,
+        one * stature,
+        one * stature * stature,
+        one * value,
+        one * stature * value,
+        one * value * value,
+        math.log1p(-cue.wrong) - 0.5 * math.log(2.0 * math.pi * own),
+        math.log(_FLAT_DENSITY * cue.wrong),
+    )
 
 
-_SUBSETS: Final = {count: _subsets(count) for count in range(2, _MAX_CUES + 1)}
+def _least_squares(
+    terms: Sequence[tuple[float, ...]], right: Sequence[bool]
+) -> tuple[float, float, float]:
+    """Mean, variance and logarithm of the probability where some of the cues are the right ones."""
+    one = s = ss = z = sz = zz = fit = 0.0
+    for (a, b, c, d, e, f, as_right, as_wrong), believed in zip(terms, right, strict=True):
+        if not believed:
+            fit += as_wrong
+            continue
+        one, s, ss, z, sz, zz = one + a, s + b, ss + c, z + d, sz + e, zz + f
+        fit += as_right
+    # Covariance diag(own) + stature·statureᵀ, inverted after Sherman and Morrison.
+    shared = 1.0 / (1.0 + ss)
+    information = max(one - s * s * shared, 1e-12)
+    mean = (z - s * sz * shared) / information
+    chi2 = max(zz - sz * sz * shared - information * mean * mean, 0.0)
+    # Logarithm of ∫ N(values; x, Σ) dx for the right ones.
+    fit -= 0.5 * (chi2 + math.log(information / (shared * 2.0 * math.pi)))
+    return mean, 1.0 / information, fit
+
+
+def _median(values: list[float]) -> float:
+    values.sort()
+    last = len(values) - 1
+    return 0.5 * (values[last // 2] + values[(last + 1) // 2])
+
+
+#: By the number of cues: every way in which at least one of them is right.
+_SUBSETS: Final = {
+    count: tuple(right for right in product((False, True), repeat=count) if any(right))
+    for count in range(2, _MAX_CUES + 1)
+}

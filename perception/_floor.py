@@ -73,14 +73,15 @@ class FloorPlane:
             (N,) depths z in metres and (N,) standard deviations of their logarithms, first order.
             Both are NaN for a ray that goes at or above the horizon.
         """
-        points = np.column_stack([rays, np.ones(len(rays))])
+        points = np.ones((len(rays), 3))
+        points[:, :2] = rays
         sine = -points @ self.normal_camera
         clearance = self.height_m - above_m
-        length = np.sqrt(np.einsum("ni,ni->n", points, points))
+        length = np.sqrt((points * points).sum(axis=1))
         meets = (sine > _HORIZON_SINE * length) & (clearance > 0.0)
         down = np.where(meets, sine, np.nan)
         height = math.hypot(self.height_std_m, above_std_m) / max(clearance, 1e-9)
         # sine = −n·ray: tilting n by δ changes it by |ray| δ, moving the ray by its components.
         across = math.hypot(*self.normal_camera[:2].tolist())
-        slope = np.hypot(self.tilt_std_rad * length, ray_std * across) / down
-        return clearance / down, np.hypot(height, slope)
+        tilted, moved = self.tilt_std_rad * length / down, ray_std * across / down
+        return clearance / down, np.sqrt(height * height + tilted * tilted + moved * moved)

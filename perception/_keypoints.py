@@ -39,7 +39,7 @@ class PersonKeypoints:
     def __post_init__(self) -> None:
         count = keypoint_layout(self.layout).size
         scores = finite_array("scores", self.scores, (count,))
-        if bool(np.any((scores < 0.0) | (scores > 1.0))):
+        if scores.min() < 0.0 or scores.max() > 1.0:
             raise PerceptionError(
                 f"scores must lie in [0, 1], got {scores.min():g} to {scores.max():g}"
             )

@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from itertools import compress
+from operator import mul
 from typing import Final
 
 import numpy as np
@@ -28,7 +31,9 @@ _GUESSED_RELATIVE_STD: Final = 0.10
 _FLAT_RELATIVE_STD: Final = 0.08
 
 _LOG_LENGTHS: Final[FloatArray] = np.log([limb.length_m for limb in LIMBS])
-_STDS: Final[FloatArray] = np.array([limb.relative_std for limb in LIMBS])
+_INFORMATION: Final = tuple(limb.relative_std**-2 for limb in LIMBS)
+# A vote counts less from one and a half standard deviations on.
+_PER_HUBER: Final = tuple(1.0 / (1.5 * limb.relative_std) for limb in LIMBS)
 
 
 def _midpoint_matrix(ends: Sequence[tuple[int, ...]]) -> FloatArray:
@@ -78,41 +83,53 @@ def metric_scales(
     people: Sequence[PersonKeypoints], min_score: float = DEFAULT_MIN_SCORE
 ) -> tuple[MetricScale | None, ...]:
     """Return :func:`metric_scale` of several people at once."""
+    return _metric_scales(tuple(people), min_score)
+
+
+# Finding heads and placing bodies ask for the scales of the same people, who never change.
+@lru_cache(maxsize=1)
+def _metric_scales(
+    people: tuple[PersonKeypoints, ...], min_score: float
+) -> tuple[MetricScale | None, ...]:
     if not people:
         return ()
-    seen = np.array([person.scores[:17] for person in people]) >= min_score
-    roots = np.array([person.keypoints_root_m[:17] for person in people])
-    ends = _DIFFERENCE @ roots
-    lengths = np.sqrt(np.einsum("pli,pli->pl", ends, ends))
+    hidden = np.array([person.scores[:17] for person in people]) < min_score
+    ends = _DIFFERENCE @ np.array([person.keypoints_root_m[:17] for person in people])
+    lengths = np.sqrt((ends * ends).sum(axis=2))
     present = lengths > 1e-9
-    usable = present & ~((~seen).astype(np.float64) @ _INVOLVED_COLUMNS > 0.0)
-    measured = usable.any(axis=1)
-    usable = np.where(measured[:, None], usable, present)
-    found = usable.any(axis=1)
-    votes = np.where(usable, _LOG_LENGTHS - np.log(np.where(present, lengths, 1.0)), np.inf)
-    ordered, count = np.sort(votes, axis=1), usable.sum(axis=1)
-    rows, last = np.arange(len(people)), np.maximum(count - 1, 0)
-    centre = 0.5 * (ordered[rows, last // 2] + ordered[rows, (last + 1) // 2])
-    centre = np.where(found, centre, 0.0)
-    votes = np.where(usable, votes, 0.0)
-    inverse = usable / _STDS**2
+    usable = present & (hidden @ _INVOLVED_COLUMNS == 0.0)
+    votes = _LOG_LENGTHS - np.log(np.maximum(lengths, 1e-9))
+    return tuple(
+        _scale(*row)
+        for row in zip(people, votes.tolist(), usable.tolist(), present.tolist(), strict=True)
+    )
+
+
+def _scale(
+    person: PersonKeypoints, votes: list[float], usable: list[bool], present: list[bool]
+) -> MetricScale | None:
+    """Scale of one person from what each limb says of its logarithm."""
+    measured = any(usable)
+    counted = usable if measured else present
+    votes = list(compress(votes, counted))
+    if not votes:
+        return None
+    information = list(compress(_INFORMATION, counted))
+    per_huber = list(compress(_PER_HUBER, counted))
+    ordered, last = sorted(votes), len(votes) - 1
+    middle, total = 0.5 * (ordered[last // 2] + ordered[(last + 1) // 2]), 0.0
     for _ in range(4):
-        distance = np.abs(votes - centre[:, None]) / _STDS
-        weight = inverse * np.minimum(1.0, 1.5 / np.maximum(distance, 1e-9))
-        total = np.maximum(weight.sum(axis=1), 1e-12)
-        centre = np.sum(weight * votes, axis=1) / total
+        weights = [
+            part / max(1.0, abs(vote - middle) * scale)
+            for vote, part, scale in zip(votes, information, per_huber, strict=True)
+        ]
+        total = sum(weights)
+        middle = sum(map(mul, weights, votes)) / total
     variance = 1.0 / total + STATURE_RELATIVE_STD**2
-    variance += np.where(measured, 0.0, _GUESSED_RELATIVE_STD**2)
-    scales: list[MetricScale | None] = []
-    for row, person in enumerate(people):
-        if not found[row]:
-            scales.append(None)
-            continue
-        middle, spread = float(centre[row]), math.sqrt(float(variance[row]))
-        if not person.lifted:
-            middle = float(ordered[row, 1 if count[row] >= 3 else 0])
-            spread = math.hypot(spread, _FLAT_RELATIVE_STD)
-        elif abs(middle) <= _METRIC_CLAIM_LIMIT:
-            middle *= _METRIC_CLAIM_STD**2 / (_METRIC_CLAIM_STD**2 + spread**2)
-        scales.append(MetricScale(math.exp(middle), spread))
-    return tuple(scales)
+    spread = math.sqrt(variance + (0.0 if measured else _GUESSED_RELATIVE_STD**2))
+    if not person.lifted:
+        middle = ordered[1 if len(votes) >= 3 else 0]
+        spread = math.hypot(spread, _FLAT_RELATIVE_STD)
+    elif abs(middle) <= _METRIC_CLAIM_LIMIT:
+        middle *= _METRIC_CLAIM_STD**2 / (_METRIC_CLAIM_STD**2 + spread**2)
+    return MetricScale(math.exp(middle), spread)

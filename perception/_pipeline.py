@@ -18,6 +18,7 @@ from ._floor import FloorPlane
 from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
 from ._metric_scale import DEFAULT_MIN_SCORE
+from ._network_time import NETWORK_TIME
 from ._observation import PersonObservation
 from ._placement import place_people
 from ._pnp import PnpHeadPoseEstimator
@@ -39,18 +40,25 @@ class StageTimings:
     """Wall-clock time of the stages of one frame in seconds.
 
     The stages of the networks hold their own preparation and reading of results; ``rest_s`` is
-    everything else: placing, judging, awareness, checks.
+    everything else: placing, judging, awareness, checks. ``networks_s`` is what the runs of ONNX
+    networks alone took of all that; networks that run elsewhere count as work outside of them.
     """
 
     detector_s: float = 0.0
     pose_s: float = 0.0
     head_pose_s: float = 0.0
     rest_s: float = 0.0
+    networks_s: float = 0.0
 
     @property
     def total_s(self) -> float:
         """The whole frame."""
         return self.detector_s + self.pose_s + self.head_pose_s + self.rest_s
+
+    @property
+    def outside_s(self) -> float:
+        """The whole frame less the runs of ONNX networks."""
+        return self.total_s - self.networks_s
 
 
 class AwarenessPipeline:
@@ -113,7 +121,7 @@ class AwarenessPipeline:
             from . import shipped  # noqa: PLC0415 - networks load only where they are wanted
 
             if detector is None:
-                detector = shipped.shipped_detector(onnx_settings)
+                detector = shipped.shipped_detector(onnx_settings, camera)
             if pose_estimator is None:
                 pose_estimator = shipped.shipped_pose_estimator(onnx_settings)
         if head_pose_estimator is None:
@@ -148,7 +156,7 @@ class AwarenessPipeline:
             PerceptionError: for an image of another size or type, a non-finite stamp, or an
                 estimator that returns a different number of people than it was given.
         """
-        began = perf_counter()
+        began, run_before_s = perf_counter(), NETWORK_TIME.elapsed_s
         stamp_s = finite_number("stamp_s", stamp_s)
         floor = self._floor if floor is None else _floor("floor", floor)
         self._check_image(image_rgb)
@@ -156,7 +164,11 @@ class AwarenessPipeline:
         detections = tuple(self._detector.detect(image_rgb))
         detected = perf_counter()
         if not detections:
-            self._timings = StageTimings(detected - ready, 0.0, 0.0, ready - began)
+            self._timings = StageTimings(
+                detected - ready,
+                rest_s=ready - began,
+                networks_s=NETWORK_TIME.elapsed_s - run_before_s,
+            )
             return ()
         people = tuple(self._pose_estimator.estimate(image_rgb, detections))
         _same_count("pose_estimator", len(people), len(detections))
@@ -183,7 +195,13 @@ class AwarenessPipeline:
             if place is not None
         )
         rest = ready - began + perf_counter() - headed
-        self._timings = StageTimings(detected - ready, posed - detected, headed - posed, rest)
+        self._timings = StageTimings(
+            detected - ready,
+            posed - detected,
+            headed - posed,
+            rest,
+            NETWORK_TIME.elapsed_s - run_before_s,
+        )
         return observations
 
     def _awareness(

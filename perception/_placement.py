@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from . import layouts as kp
-from ._body import BodyPlacement, place_bodies, place_box
+from ._body import BOX_LEAST_TRACE_M2, BodyPlacement, place_bodies, place_boxes
 from ._camera import Camera
 from ._depth_cues import DepthCue, combine_cues
 from ._detection import PersonDetection
@@ -33,14 +33,16 @@ _HEAD_OFFSET_STD_M, _HEAD_OFFSET_FLAT_STD_M = 0.05, 0.09
 _FOOT_OFFSET_STD_M, _FOOT_OFFSET_FLAT_STD_M = 0.06, 0.20
 # From chest to head centre along the upright body (0.93 and 0.73 of an average stature).
 _CHEST_TO_HEAD_M: Final = 0.35
-# An ankle stands 0.039 of the stature above the floor (Drillis and Contini); a step lifts it.
-_ANKLE_M, _ANKLE_STD_M = 0.07, 0.03
+# An ankle stands 0.039 of the stature above the sole of the foot (Drillis and Contini), a work
+# shoe's sole adds three centimetres, and a step lifts it.
+_ANKLE_M, _ANKLE_STD_M = 0.10, 0.03
 _BOTTOM_STD_M: Final = 0.02
 # The lowest pixel of a person is the nearer toe, not the middle of the body.
 _TOE_AHEAD_M, _TOE_AHEAD_STD_M = 0.10, 0.15
 # Noise of ankle labels and of the lower edge of a box, in parts of the box's height.
 _ANKLE_LABEL_STD, _BOTTOM_LABEL_STD = 0.012, 0.02
-_BORDER_PX: Final = 4.0
+# Boxes of detectors end a little short of the border that cuts them off, in parts of the height.
+_BORDER: Final = 0.03
 _SAME_FLOOR_STDS: Final = 1.5
 _UP_LEVEL_CAMERA: Final = np.array([0.0, -1.0, 0.0])
 _IDENTITY: Final = np.eye(3)
@@ -70,40 +72,79 @@ def place_people(
     one, and the feet on a known floor are further opinions about the range;
     :func:`combine_cues` weighs them and lets any of them be wrong.
     """
+    if not people:
+        return ()
     bodies = place_bodies(camera, people, keypoint_std_px, min_score)
+    boxes = _boxes(camera, detections, bodies)
     feet: Sequence[_Feet | None] = [None] * len(people)
-    if floor is not None and people:
+    if floor is not None:
         feet = _feet_on(floor, camera, detections, people, keypoint_std_px, min_score)
-    return tuple(
-        _place(camera, detection, person, body, head, floor, ankles)
-        for detection, person, body, head, ankles in zip(
-            detections, people, bodies, heads, feet, strict=True
+    placed: list[Placement | None] = [None] * len(people)
+    moves: list[tuple[int, Placement, list[DepthCue]]] = []
+    for row, (body, boxed) in enumerate(zip(bodies, boxes, strict=True)):
+        body, start = _first(body, boxed)  # noqa: PLW2901 - a body that says too little goes
+        if start is None:
+            continue
+        placed[row] = start
+        opinions = _opinions(
+            camera, detections[row], people[row], body, start, heads[row], floor, feet[row]
         )
-    )
+        if len(opinions) > 1:
+            moves.append((row, start, opinions))
+    if moves:
+        rows, starts, cues = zip(*moves, strict=True)
+        for row, moved in zip(rows, _moved(starts, cues), strict=True):
+            placed[row] = moved
+    return tuple(placed)
 
 
-def _place(
+def _boxes(
+    camera: Camera, detections: Sequence[PersonDetection], bodies: Sequence[BodyPlacement | None]
+) -> list[Placement | None]:
+    """What the boxes say, of those people alone for whom it can matter."""
+    asked = [
+        row
+        for row, body in enumerate(bodies)
+        if body is None or _trace(body.position_covariance_m2) > BOX_LEAST_TRACE_M2
+    ]
+    boxes: list[Placement | None] = [None] * len(bodies)
+    if asked:
+        found = place_boxes(camera, [detections[row].box_xyxy_px for row in asked])
+        for row, place in zip(asked, found, strict=True):
+            boxes[row] = place
+    return boxes
+
+
+def _first(
+    body: BodyPlacement | None, boxed: Placement | None
+) -> tuple[BodyPlacement | None, Placement | None]:
+    """Where a person is by body or box, and the body if it is the one that counts."""
+    if body is None:
+        return None, boxed
+    # An arm at the image border says less about the range than the height of its box.
+    if boxed is not None and _trace(body.position_covariance_m2) > _trace(boxed[1]):
+        return None, boxed
+    return body, (body.position_camera_m, body.position_covariance_m2)
+
+
+def _trace(matrix: FloatArray) -> float:
+    return float(matrix[0, 0] + matrix[1, 1] + matrix[2, 2])
+
+
+def _opinions(
     camera: Camera,
     detection: PersonDetection,
     person: PersonKeypoints,
     body: BodyPlacement | None,
+    start: Placement,
     head: HeadPose | None,
     floor: FloorPlane | None,
     feet: _Feet | None,
-) -> Placement | None:
-    boxed = place_box(camera, detection.box_xyxy_px)
-    if boxed is None and body is None:
-        return None
-    # An arm at the image border says less about the range than the height of its box.
-    if body is not None and boxed is not None:
-        doubt = float(np.trace(body.position_covariance_m2))
-        if doubt > float(np.trace(boxed[1])):
-            body = None
-    if body is not None:
-        position, covariance = body.position_camera_m, body.position_covariance_m2
-    elif boxed is not None:
-        position, covariance = boxed
-    squared = float(position @ position)
+) -> list[DepthCue]:
+    """What body or box, head and feet say about a person's range, against that of the start."""
+    position, covariance = start
+    x, y, z = position.tolist()
+    squared = x * x + y * y + z * z
     along = math.sqrt(max(float(position @ covariance @ position), 1e-9)) / squared
     stature = STATURE_RELATIVE_STD if body is None else body.scale_relative_std
     wrong = _BOX_WRONG if body is None else _BODY_WRONG
@@ -111,19 +152,30 @@ def _place(
     if (cue := _head_cue(position, person, body, head, floor)) is not None:
         cues.append(cue)
     if floor is not None:
-        cue = None if body is None or feet is None else _feet_cue(person, body, feet)
-        cue = cue or _bottom_cue(camera, detection, position, floor)
+        # A body whose ankles do not show stands behind something or beyond the picture's border;
+        # the lower edge of its box is not its feet.
+        if body is None or feet is None:
+            cue = _bottom_cue(camera, detection, position, floor)
+        else:
+            cue = _feet_cue(person, body, feet)
         if cue is not None:
             cues.append(cue)
-    if len(cues) == 1:
-        return position, covariance
-    log_range, log_std = combine_cues(cues)
-    ratio = math.exp(log_range)
-    ray = position / math.sqrt(squared)
-    across = _IDENTITY - ray[:, None] * ray
+    return cues
+
+
+def _moved(starts: Sequence[Placement], cues: Sequence[Sequence[DepthCue]]) -> list[Placement]:
+    """Placements with their ranges replaced by what all cues say together."""
+    position = np.array([start[0] for start in starts])
+    covariance = np.array([start[1] for start in starts])
+    log_range, log_std = np.array([combine_cues(opinions) for opinions in cues]).T
+    ratio = np.exp(log_range)[:, None]
+    squared = (position * position).sum(axis=1)[:, None, None]
+    across = ratio[..., None] * (_IDENTITY - position[:, :, None] * position[:, None] / squared)
     placed = ratio * position
-    spread = ratio**2 * (across @ covariance @ across) + log_std**2 * (placed[:, None] * placed)
-    return placed, 0.5 * (spread + spread.T)
+    far = log_std[:, None] * placed
+    spread = across @ covariance @ across + far[:, :, None] * far[:, None]
+    spread = 0.5 * (spread + spread.swapaxes(1, 2))
+    return list(zip(placed, spread, strict=True))
 
 
 def _head_cue(
@@ -205,7 +257,7 @@ def _bottom_cue(
 ) -> DepthCue | None:
     """The lower edge of a box that the image does not cut off, taken for shoes on the floor."""
     left, top, right, bottom = detection.box_xyxy_px.tolist()
-    if bottom > camera.height_px - _BORDER_PX or position[2] <= _TOE_AHEAD_M:
+    if bottom > (1.0 - _BORDER) * camera.height_px or position[2] <= _TOE_AHEAD_M:
         return None
     ray = camera.normalise([[0.5 * (left + right), bottom]])
     ray_std = _BOTTOM_LABEL_STD * (bottom - top) / camera.fy_px

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from operator import mul
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ FloatArray = NDArray[np.float64]
 
 # A rotation read from a file or sent over a wire carries rounding of about this size.
 _ROTATION_TOLERANCE = 1e-4
-_FEW_NUMBERS = 36
+_FEW_NUMBERS = 64
 _LAST_ROW = (0.0, 0.0, 0.0, 1.0)
 
 
@@ -38,9 +39,10 @@ def _fits(given: tuple[int, ...], wanted: tuple[int | str, ...]) -> bool:
 
 
 def _all_finite(array: FloatArray) -> bool:
-    # Plain Python is faster on the few numbers of a vector or a pose.
-    if array.size <= _FEW_NUMBERS:
-        return all(map(math.isfinite, array.ravel().tolist()))
+    # Plain Python is faster on few numbers; their sum is finite unless one of them is not, or all
+    # are enormous.
+    if array.size <= _FEW_NUMBERS and math.isfinite(sum(array.ravel().tolist())):
+        return True
     return bool(np.isfinite(array).all())
 
 
@@ -102,6 +104,8 @@ def covariance_matrix(
 ) -> FloatArray:
     """Return a read-only (size, size) symmetric, positive semi-definite covariance."""
     array = finite_array(name, value, (size, size), error)
+    if _is_plainly_a_covariance(array.tolist()):
+        return array
     scale = max(float(np.abs(array).max()), 1e-12)
     if float(np.abs(array - array.T).max()) > 1e-6 * scale:
         raise error(
@@ -111,6 +115,27 @@ def covariance_matrix(
     if lowest < -1e-6 * scale:
         raise error(f"{name} must be positive semi-definite, got an eigenvalue of {lowest:g}")
     return array
+
+
+def _is_plainly_a_covariance(rows: list[list[float]]) -> bool:
+    """True for an exactly symmetric, positive definite matrix; by Cholesky's decomposition.
+
+    False says nothing yet. A few numbers are done before LAPACK has begun.
+    """
+    factor: list[list[float]] = []
+    for size, row in enumerate(rows):
+        new: list[float] = []
+        for column in range(size):
+            if row[column] != rows[column][size]:
+                return False
+            known = factor[column]
+            new.append((row[column] - sum(map(mul, new, known))) / known[column])
+        left = row[size] - sum(map(mul, new, new))
+        if not left > 0.0:
+            return False
+        new.append(math.sqrt(left))
+        factor.append(new)
+    return True
 
 
 def rotation_matrix(name: str, value: Any, error: type[ValueError] = PerceptionError) -> FloatArray:
@@ -154,7 +179,7 @@ def rigid_transform(name: str, value: Any, error: type[ValueError] = PerceptionE
 def unit_vector(name: str, value: Any, error: type[ValueError] = PerceptionError) -> FloatArray:
     """Return a read-only (3,) unit vector; a length within 1e-3 of one is normalised."""
     array = finite_array(name, value, (3,), error)
-    length = float(np.linalg.norm(array))
+    length = math.hypot(*array.tolist())
     if abs(length - 1.0) > 1e-3:
         raise error(f"{name} must be a unit vector, got length {length:g}")
     unit = np.asarray(array / length)

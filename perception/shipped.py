@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
@@ -18,6 +19,7 @@ from typing import TYPE_CHECKING, Final
 from ._errors import PerceptionError
 
 if TYPE_CHECKING:
+    from ._camera import Camera
     from .networks._detector import OnnxPersonDetector
     from .networks._head import OnnxHeadPoseEstimator
     from .networks._pose import OnnxPoseEstimator
@@ -26,6 +28,11 @@ if TYPE_CHECKING:
 DETECTOR: Final = "person_detector"
 POSE: Final = "person_pose"
 HEAD: Final = "head_pose"
+
+# The picture that the detector was trained on, and the focal length of a 60° camera in it.
+_DETECTOR_WIDTH_PX, _DETECTOR_HEIGHT_PX, _DETECTOR_STRIDE = 320, 256, 32
+_DETECTOR_FOCAL_PX: Final = 160.0 / math.tan(math.radians(30.0))
+_DETECTOR_MAX_ENLARGEMENT: Final = 2.0
 
 _FOLDER: Final = Path(__file__).parent / "models"
 _MANIFEST: Final = "manifest.json"
@@ -165,11 +172,43 @@ def load_shipped(
         raise
 
 
-def shipped_detector(settings: OnnxSettings | None = None) -> OnnxPersonDetector:
-    """Return the shipped person detector; errors as :func:`load_shipped`."""
+def shipped_detector(
+    settings: OnnxSettings | None = None,
+    camera: Camera | None = None,
+    *,
+    score_threshold: float = 0.25,
+) -> OnnxPersonDetector:
+    """Return the shipped person detector; errors as :func:`load_shipped`.
+
+    Args:
+        settings: providers and threads.
+        camera: whose pictures it will see; a wide field gets a larger input.
+        score_threshold: people with less confidence are dropped.
+    """
     from .networks._detector import OnnxPersonDetector  # noqa: PLC0415
 
-    return OnnxPersonDetector(load_shipped(DETECTOR, settings))
+    return OnnxPersonDetector(
+        load_shipped(DETECTOR, settings),
+        score_threshold=score_threshold,
+        input_size_hw_px=None if camera is None else detector_input_size(camera),
+    )
+
+
+def detector_input_size(camera: Camera) -> tuple[int, int]:
+    """Height and width of the detector's input that suit a camera.
+
+    As many pixels a radian as a camera of 60° has at 320 × 256, on which it was trained, if need be
+    at twice the length and four times the cost; wider fields than that show people smaller.
+    """
+    width, height = camera.width_px, camera.height_px
+    fitting = min(_DETECTOR_WIDTH_PX / width, _DETECTOR_HEIGHT_PX / height)
+    wanted = _DETECTOR_FOCAL_PX / (camera.fx_px * fitting)
+    scale = fitting * min(max(wanted, 1.0), _DETECTOR_MAX_ENLARGEMENT)
+
+    def padded(length_px: float) -> int:
+        return math.ceil(round(length_px, 6) / _DETECTOR_STRIDE) * _DETECTOR_STRIDE
+
+    return padded(height * scale), padded(width * scale)
 
 
 def shipped_pose_estimator(settings: OnnxSettings | None = None) -> OnnxPoseEstimator:

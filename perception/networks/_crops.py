@@ -53,7 +53,8 @@ class PersonCrops:
         low, high = boxes[:, :2], boxes[:, 2:]
         size = np.array([width_px, height_px], dtype=np.float64)
         self._size_px = (width_px, height_px)
-        step = (padding * (high - low) / size).max(axis=1, keepdims=True) * np.ones(2)
+        shares = padding * (high - low) / size
+        step = np.maximum(shares[:, :1], shares[:, 1:])
         # Half a pixel lies between counting from the corner and counting centres.
         origin = 0.5 * (low + high) - 0.5 - 0.5 * step * size
         self._whole = (step[:, 0] >= 1.0) & (step[:, 0] <= _MAX_RESIZED)
@@ -104,8 +105,9 @@ class PersonCrops:
     def _window(self, image_rgb: ImageRgb, row: int) -> NDArray[np.uint8]:
         """What crop ``row`` shows, in the picture's own pixels."""
         height, width = image_rgb.shape[:2]
-        left, top = (int(side) for side in self._corner_px[row])
-        right, bottom = (int(side) for side in self._corner_px[row] + self._window_px[row])
+        left, top = map(int, self._corner_px[row].tolist())
+        across, down = map(int, self._window_px[row].tolist())
+        right, bottom = left + across, top + down
         part = image_rgb[max(top, 0) : min(bottom, height), max(left, 0) : min(right, width)]
         beyond = max(-top, 0), max(bottom - height, 0), max(-left, 0), max(right - width, 0)
         if not any(beyond):

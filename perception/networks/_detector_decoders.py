@@ -47,7 +47,7 @@ class YoloV8Decoder:
         """See :class:`Decoder`."""
         columns = outputs[0][0]
         scores = columns[self._score_row]
-        picked = np.flatnonzero(scores >= score_threshold)
+        picked = (scores >= score_threshold).nonzero()[0]
         boxes = _float32(columns[:4, picked]).T
         return centre_to_corners(boxes[:, :2], boxes[:, 2:]), _float32(scores[picked])
 
@@ -94,7 +94,7 @@ class YoloxDecoder:
         """See :class:`Decoder`."""
         rows = outputs[0][0]
         scores = _float32(rows[:, 4]) * _float32(rows[:, self._class_column])
-        picked = np.flatnonzero(scores >= score_threshold)
+        picked = (scores >= score_threshold).nonzero()[0]
         found, stride = _float32(rows[picked, :4]), self._strides[picked]
         centre = (found[:, :2] + self._cells[picked]) * stride
         size = np.exp(found[:, 2:]) * stride

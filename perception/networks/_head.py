@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import os
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .._camera import Camera
 from .._errors import PerceptionError
@@ -18,7 +18,7 @@ from .._protocols import ImageRgb
 from ..anthropometry import HEAD_TEMPLATE_M
 from ..arrays import FloatArray, finite_number
 from ._head_crop import crop_to_image, head_crop
-from ._head_layouts import HeadOutputs, read_outputs, recognise
+from ._head_layouts import HeadOutputs, read_outputs, read_rows, recognise, where_it_is
 from ._head_place import locate_heads
 from ._image import rgb_image
 from ._session import OnnxModel, OnnxSettings, as_onnx_model
@@ -32,6 +32,15 @@ _SIZED: Final = 0.08
 _MIN_ROTATION_STD_RAD: Final = float(np.radians(0.5))
 _MIN_LOG_STD: Final = 0.01
 _MAX_ROTATION_STD_RAD: Final = float(np.radians(100.0))
+_IDENTITY: Final = np.eye(3)
+_MOST_TURN: Final = _MAX_ROTATION_STD_RAD**2 * _IDENTITY
+_HALF_TURN: Final = np.array([-1.0, -1.0, 1.0])
+_TURNED: Final = np.diag(_HALF_TURN)
+# Points of a crop in units of its side: its middle, the head's centre unless it is known better,
+# and the middles of its right, lower, left and upper edge.
+_LOOKED_AT: Final = np.array(
+    [[0.5, 0.5], [0.5, 0.5], [1.0, 0.5], [0.5, 1.0], [0.0, 0.5], [0.5, 0.0]]
+)
 # What a network without keypoints leaves open of the head's centre, and of its distance when the
 # body's scale alone says it.
 _CENTRE_STD_M: Final = 0.04
@@ -109,7 +118,8 @@ class OnnxHeadPoseEstimator:
         places = [place for place in (found[row] for row in rows) if place is not None]
         centre_px = np.array([place[0] for place in places])
         side_px = np.array([self.layout.crop_side_m * place[1] for place in places])
-        outputs, centre_px, side_px = self._look(image, centre_px, side_px)
+        answers, centre_px, side_px = self._look(image, centre_px, side_px)
+        outputs = read_outputs(self.layout, self.model, answers)
         made = _poses(camera, outputs, centre_px, side_px, self.layout.crop_side_m)
         for index, row in enumerate(rows):
             if outputs.head is None or outputs.head[index] >= self._min_head:
@@ -125,28 +135,25 @@ class OnnxHeadPoseEstimator:
 
     def _look(
         self, image: ImageRgb, centre_px: FloatArray, side_px: FloatArray
-    ) -> tuple[HeadOutputs, FloatArray, FloatArray]:
-        """Outputs of the last pass with the crops that they belong to."""
-        outputs = self._run(image, centre_px, side_px)
-        for _ in range(self._passes - 1):
-            if outputs.centre is None or outputs.side_m is None or outputs.head is None:
-                break
-            larger = outputs.side_m / self.layout.crop_side_m
-            off = np.abs(outputs.centre - 0.5).max(axis=1) > _CENTRED
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """What the network said in the last pass, with the crops that it belongs to."""
+        answers = self._run(image, centre_px, side_px)
+        for _ in range(self._passes - 1 if self.layout.own else 0):
+            centre, side_m, head = where_it_is(answers)
+            larger = side_m / self.layout.crop_side_m
+            off = np.abs(centre - 0.5).max(axis=1) > _CENTRED
             off |= np.abs(np.log(larger)) > _SIZED
-            again = np.flatnonzero(off & (outputs.head >= 0.5 * self._min_head))
+            again = (off & (head >= 0.5 * self._min_head)).nonzero()[0]
             if not len(again):
                 break
             centre_px, side_px = centre_px.copy(), side_px.copy()
-            centre_px[again] = crop_to_image(
-                outputs.centre[again], centre_px[again], side_px[again, None]
-            )
+            centre_px[again] = crop_to_image(centre[again], centre_px[again], side_px[again, None])
             # A wild answer must not end in a crop of the whole picture or of one pixel.
-            side_px[again] /= np.clip(larger[again], 0.5, 2.0)
-            outputs = _replaced(outputs, again, self._run(image, centre_px[again], side_px[again]))
-        return outputs, centre_px, side_px
+            side_px[again] /= np.minimum(np.maximum(larger[again], 0.5), 2.0)
+            answers[again] = self._run(image, centre_px[again], side_px[again])
+        return answers, centre_px, side_px
 
-    def _run(self, image: ImageRgb, centre_px: FloatArray, side_px: FloatArray) -> HeadOutputs:
+    def _run(self, image: ImageRgb, centre_px: FloatArray, side_px: FloatArray) -> FloatArray:
         layout, size, count = self.layout, self.layout.size_px, len(centre_px)
         blob = layout.pixels.blob(count, size, size)
         for row in range(count):
@@ -170,19 +177,7 @@ class OnnxHeadPoseEstimator:
                 f"{self.model.name} must return one result a crop ({count}), got "
                 f"{[len(array) for array in arrays]}"
             )
-        return read_outputs(layout, self.model, arrays)
-
-
-def _replaced(outputs: HeadOutputs, rows: NDArray[np.intp], new: HeadOutputs) -> HeadOutputs:
-    """The outputs with those of some rows taken from another run."""
-    fields = {}
-    for name in HeadOutputs.__slots__:
-        old_values, new_values = getattr(outputs, name), getattr(new, name)
-        if old_values is not None:
-            old_values = old_values.copy()
-            old_values[rows] = new_values
-        fields[name] = old_values
-    return HeadOutputs(**fields)
+        return read_rows(layout, self.model, arrays)
 
 
 def ray_axes(rays: FloatArray) -> FloatArray:
@@ -190,18 +185,14 @@ def ray_axes(rays: FloatArray) -> FloatArray:
 
     The smallest rotation that takes the camera's z axis onto the ray: its third column is the ray.
     """
-    unit = np.column_stack([rays, np.ones(len(rays))])
-    unit /= np.linalg.norm(unit, axis=1, keepdims=True)
-    x, y, z = unit.T
-    # Rodrigues with axis z × ray = (−y, x, 0) and cosine z.
-    shared = 1.0 / (1.0 + z)
-    return np.stack(
-        [
-            np.stack([1.0 - x * x * shared, -x * y * shared, x], axis=1),
-            np.stack([-x * y * shared, 1.0 - y * y * shared, y], axis=1),
-            np.stack([-x, -y, z], axis=1),
-        ],
-        axis=1,
+    unit = np.ones((len(rays), 3))
+    unit[:, :2] = rays
+    unit /= np.sqrt((unit * unit).sum(axis=1))[:, None]
+    # A half turn about z, which leaves z where it is, then one about the bisector of z and ray.
+    unit[:, 2] += 1.0
+    bisector = unit[:, :, None]
+    return np.asarray(
+        bisector * (bisector.swapaxes(1, 2) * (_HALF_TURN / bisector[:, 2:])) - _TURNED
     )
 
 
@@ -219,17 +210,15 @@ def _poses(
     the covariance.
     """
     count = len(centre_px)
-    half = 0.5 * side_px[:, None] * np.array([1.0, 0.0])
-    middle = (
-        centre_px
-        if outputs.centre is None
-        else crop_to_image(outputs.centre, centre_px, side_px[:, None])
-    )
-    looked = camera.normalise(np.concatenate([centre_px, middle, centre_px - half,
-                                              centre_px + half, centre_px - half[:, ::-1],
-                                              centre_px + half[:, ::-1]]))  # fmt: skip
-    ray, towards, left, right, top, bottom = looked.reshape(6, count, 2)
-    spread = 0.5 * (np.hypot(*(right - left).T) + np.hypot(*(bottom - top).T))
+    at = np.empty((count, 6, 2))
+    at[:] = _LOOKED_AT
+    if outputs.centre is not None:
+        at[:, 1] = outputs.centre
+    looked = camera.normalise(
+        crop_to_image(at, centre_px[:, None], side_px[:, None, None]).reshape(-1, 2)
+    ).reshape(count, 6, 2)
+    across = looked[:, 2:4] - looked[:, 4:]
+    spread = 0.5 * np.sqrt((across * across).sum(axis=2)).sum(axis=1)
     side_m = np.full(count, crop_side_m) if outputs.side_m is None else outputs.side_m
     log_std = (
         np.full(count, _BODY_LOG_STD)
@@ -239,39 +228,52 @@ def _poses(
     across_m = (
         np.full(count, _CENTRE_STD_M)
         if outputs.keypoints_std is None
-        else outputs.keypoints_std.mean(axis=1) * side_m
+        else outputs.keypoints_std.sum(axis=1) * (side_m / 5.0)
     )
-    axes = ray_axes(ray)
+    axes = ray_axes(looked[:, 0])
     rotation = axes @ outputs.rotation_ray_head
-    turn = axes @ outputs.covariance_ray @ np.swapaxes(axes, 1, 2)
-    turn = turn + _MIN_ROTATION_STD_RAD**2 * np.eye(3)
-    centre = (side_m / spread)[:, None] * np.column_stack([towards, np.ones(count)])
+    turn = outputs.covariance_ray + _MIN_ROTATION_STD_RAD**2 * _IDENTITY
+    centre = np.ones((count, 3))
+    centre[:, :2] = looked[:, 1]
+    centre *= (side_m / spread)[:, None]
     arm = rotation @ HEAD_CENTRE_HEAD_M
     nose = centre - arm
-    position = (log_std**2)[:, None, None] * (centre[:, :, None] * centre[:, None, :])
-    position = position + (across_m**2)[:, None, None] * np.eye(3)
-    lever = skew(arm)
-    covariance = np.zeros((count, 6, 6))
-    covariance[:, :3, :3] = turn
-    covariance[:, :3, 3:] = turn @ np.swapaxes(lever, 1, 2)
-    covariance[:, 3:, :3] = lever @ turn
-    covariance[:, 3:, 3:] = lever @ turn @ np.swapaxes(lever, 1, 2) + position
-    lowest, highest = np.linalg.eigvalsh(turn)[:, [0, -1]].T
-    usable = (lowest > 0.0) & (highest <= _MAX_ROTATION_STD_RAD**2) & np.isfinite(spread)
-    error_px = _reprojection(camera, outputs, centre_px, side_px, rotation, nose)
+    # Turning moves rotation and nose together; distance and place in the crop move the nose alone.
+    moves = np.empty((count, 6, 3))
+    moves[:, :3] = axes
+    moves[:, 3:] = skew(arm) @ axes
+    covariance = moves @ turn @ moves.swapaxes(1, 2)
+    along = log_std[:, None] * centre
+    covariance[:, 3:, 3:] += (
+        along[:, :, None] * along[:, None] + (across_m**2)[:, None, None] * _IDENTITY
+    )
+    covariance = 0.5 * (covariance + covariance.swapaxes(1, 2))
+    error_px = _reprojection(camera, outputs, centre_px, side_px, rotation, nose).tolist()
     return [
         HeadPose(
             nose[row],
             rotation[row],
-            0.5 * (covariance[row] + covariance[row].T),
-            float(error_px[row]),
+            covariance[row],
+            error_px[row],
             face_seen=_face_seen(outputs, row),
             range_relative_std=None if outputs.side_m is None else float(log_std[row]),
         )
-        if usable[row]
+        if math.isfinite(spread[row]) and _is_usable(turn[row])
         else None
         for row in range(count)
     ]
+
+
+def _is_usable(turn: FloatArray) -> bool:
+    """Whether a covariance (3, 3) is one and no standard deviation exceeds what makes sense."""
+    return _is_positive(turn.tolist()) and _is_positive((_MOST_TURN - turn).tolist())
+
+
+def _is_positive(matrix: list[list[float]]) -> bool:
+    """Whether a symmetric (3, 3) matrix is positive definite, by Sylvester's criterion."""
+    (a, b, c), (_, e, f), (_, _, i) = matrix
+    minor = a * e - b * b
+    return a > 0.0 and minor > 0.0 and i * minor - a * f * f + c * (2.0 * b * f - c * e) > 0.0
 
 
 def _face_seen(outputs: HeadOutputs, row: int) -> float | None:
@@ -279,7 +281,8 @@ def _face_seen(outputs: HeadOutputs, row: int) -> float | None:
     if outputs.visible is None or outputs.head is None:
         return None
     a, b, c = outputs.visible[row, :3].tolist()
-    return float(np.clip((a * b + a * c + b * c - 2.0 * a * b * c) * outputs.head[row], 0.0, 1.0))
+    two: float = (a * b + a * c + b * c - 2.0 * a * b * c) * float(outputs.head[row])
+    return min(max(two, 0.0), 1.0)
 
 
 def _reprojection(
@@ -294,9 +297,11 @@ def _reprojection(
     count = len(centre_px)
     if outputs.keypoints is None or outputs.visible is None:
         return np.zeros(count)
-    points = HEAD_TEMPLATE_M @ np.swapaxes(rotation, 1, 2) + nose[:, None]
+    points = HEAD_TEMPLATE_M @ rotation.swapaxes(1, 2) + nose[:, None]
     expected = camera.project(points.reshape(-1, 3)).reshape(count, 5, 2)
     found = crop_to_image(outputs.keypoints, centre_px[:, None], side_px[:, None, None])
     seen = outputs.visible >= 0.5
-    squared = np.where(seen, np.sum((expected - found) ** 2, axis=2), 0.0)
-    return np.asarray(np.sqrt(np.nan_to_num(squared).sum(axis=1) / np.maximum(seen.sum(axis=1), 1)))
+    # A template point behind the camera has no image, and no error.
+    seen &= points[:, :, 2] > 0.0
+    away = np.where(seen[:, :, None], expected - found, 0.0).reshape(count, 10)
+    return np.asarray(np.sqrt((away * away).sum(axis=1) / np.maximum(seen.sum(axis=1), 1)))

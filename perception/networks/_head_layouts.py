@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -25,6 +26,20 @@ _OWN_OUTPUTS: Final[dict[str, tuple[int, ...]]] = {
     "side_log_std": (),
     "head": (),
 }
+
+
+def _columns() -> dict[str, slice]:
+    """Which columns of a row each own output takes, in the order of :data:`_OWN_OUTPUTS`."""
+    ends = np.cumsum([math.prod(tail) for tail in _OWN_OUTPUTS.values()]).tolist()
+    return {
+        name: slice(end - math.prod(tail), end)
+        for (name, tail), end in zip(_OWN_OUTPUTS.items(), ends, strict=True)
+    }
+
+
+_COLUMNS: Final = _columns()
+_WIDTH: Final = max(columns.stop for columns in _COLUMNS.values())
+_CENTRE, _SIDE, _HEAD = _COLUMNS["centre"], _COLUMNS["side_m"].start, _COLUMNS["head"].start
 _KNOWN: Final = (
     "known are awarenav's own head network (input (N, 3, 64, 64); outputs "
     + ", ".join(_OWN_OUTPUTS)
@@ -32,6 +47,8 @@ _KNOWN: Final = (
     "(N, 3, 3) or (N, 6))"
 )
 _OWN_LAYOUT: Final = "1"
+_IDENTITY: Final = np.eye(3)
+_ROUNDING: Final = 1e-5
 
 _IMAGENET: Final = ((123.675, 116.28, 103.53), (58.395, 57.12, 57.375))
 _FULL_RANGE_SIZE_PX: Final = 224
@@ -59,6 +76,7 @@ class HeadLayout:
         crop_side_m: what that side should measure at the head.
         pixels: how it wants its pixels.
         batch: extent of its batch axis; None when it is free.
+        tail: extents of the one output of a full-range network.
     """
 
     own: bool
@@ -66,6 +84,7 @@ class HeadLayout:
     crop_side_m: float
     pixels: PixelFormat
     batch: int | None
+    tail: tuple[int | None, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,42 +135,70 @@ def recognise(model: OnnxModel) -> HeadLayout:
         size = (_FULL_RANGE_SIZE_PX, _FULL_RANGE_SIZE_PX)
         if input_size(model, None, size) == size:
             pixels = PixelFormat(*_IMAGENET, dtype=dtype)
-            return HeadLayout(False, _FULL_RANGE_SIZE_PX, _FULL_RANGE_SIDE_M, pixels, batch)
+            side_m = _FULL_RANGE_SIDE_M
+            return HeadLayout(False, _FULL_RANGE_SIZE_PX, side_m, pixels, batch, tails[0])
     raise PerceptionError(
         f"{model.name} is no head pose network of a known layout: found {model.layout}; {_KNOWN}"
     )
 
 
-def read_outputs(layout: HeadLayout, model: OnnxModel, arrays: list[NDArray[Any]]) -> HeadOutputs:
-    """Check and convert what a network returned for N crops.
+def read_rows(layout: HeadLayout, model: OnnxModel, arrays: list[NDArray[Any]]) -> FloatArray:
+    """Check what a network returned for N crops and put it side by side, one row a crop, float64.
 
     Raises:
-        PerceptionError: for numbers that are not finite and for values that cannot be.
+        PerceptionError: for numbers that are not finite and for sizes that cannot be.
     """
-    named = {
-        tensor.name: np.asarray(array, dtype=np.float64)
-        for tensor, array in zip(model.outputs, arrays, strict=True)
-    }
-    for name, array in named.items():
-        if not np.isfinite(array).all():
-            raise PerceptionError(f"{model.name} returned NaN or infinite numbers in {name!r}")
+    parts = arrays
+    if layout.own:
+        named = {tensor.name: array for tensor, array in zip(model.outputs, arrays, strict=True)}
+        parts = [named[name] for name in _OWN_OUTPUTS]
+    rows = np.concatenate(
+        [part.reshape(len(part), -1) for part in parts], axis=1, dtype=np.float64, casting="unsafe"
+    )
+    if layout.own and rows.shape[1] != _WIDTH:
+        raise PerceptionError(
+            f"{model.name} returned {rows.shape[1]} numbers a crop, wanted {_WIDTH}"
+        )
+    if not np.isfinite(rows).all():
+        bad = [
+            tensor.name
+            for tensor, array in zip(model.outputs, arrays, strict=True)
+            if not np.isfinite(array).all()
+        ]
+        raise PerceptionError(f"{model.name} returned NaN or infinite numbers in {bad[0]!r}")
+    if layout.own and rows[:, _SIDE].min() <= 0.0:
+        raise PerceptionError(f"{model.name} returned a side_m of 0 or less: {rows[:, _SIDE]}")
+    return rows
+
+
+def where_it_is(rows: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Of an own network's rows: centres (N, 2), sides in metres (N,) and whether heads (N,)."""
+    return rows[:, _CENTRE], rows[:, _SIDE], rows[:, _HEAD]
+
+
+def read_outputs(layout: HeadLayout, model: OnnxModel, rows: FloatArray) -> HeadOutputs:
+    """What the rows of :func:`read_rows` mean.
+
+    Raises:
+        PerceptionError: for rotations that are none.
+    """
     if not layout.own:
-        return _full_range(model, next(iter(named.values())))
-    count = len(named["rotation"])
-    named = {name: named[name].reshape(count, *tail) for name, tail in _OWN_OUTPUTS.items()}
-    if np.any(named["side_m"] <= 0.0):
-        raise PerceptionError(f"{model.name} returned a side_m of 0 or less: {named['side_m']}")
+        return _full_range(model, rows.reshape(len(rows), *layout.tail))
+    named = {
+        name: rows[:, _COLUMNS[name]].reshape(len(rows), *tail)
+        for name, tail in _OWN_OUTPUTS.items()
+    }
     covariance = named["rotation_covariance"]
     return HeadOutputs(
         _orthonormal(model, named["rotation"]),
-        0.5 * (covariance + np.swapaxes(covariance, 1, 2)),
+        0.5 * (covariance + covariance.swapaxes(1, 2)),
         named["keypoints"],
         np.abs(named["keypoints_std"]),
-        np.clip(named["visible"], 0.0, 1.0),
+        np.minimum(np.maximum(named["visible"], 0.0), 1.0),
         named["centre"],
         named["side_m"],
         np.abs(named["side_log_std"]),
-        np.clip(named["head"], 0.0, 1.0),
+        np.minimum(np.maximum(named["head"], 0.0), 1.0),
     )
 
 
@@ -175,6 +222,11 @@ def _full_range(model: OnnxModel, output: FloatArray) -> HeadOutputs:
 
 def _orthonormal(model: OnnxModel, rotations: FloatArray) -> FloatArray:
     """The nearest rotations (N, 3, 3), after refusing what is none."""
+    # A network that has orthonormalised in float32 is one Newton step of the polar decomposition
+    # away from float64.
+    gram = rotations @ rotations.swapaxes(1, 2)
+    if np.abs(gram - _IDENTITY).max() < _ROUNDING and all(map(_keeps_hands, rotations.tolist())):
+        return np.asarray(0.5 * (3.0 * _IDENTITY - gram) @ rotations)
     left, singular, right = np.linalg.svd(rotations)
     nearest = left @ right
     if np.any(np.abs(singular - 1.0) > 0.05) or np.any(np.linalg.det(nearest) < 0.0):
@@ -183,6 +235,12 @@ def _orthonormal(model: OnnxModel, rotations: FloatArray) -> FloatArray:
             f"{singular.min():g} to {singular.max():g})"
         )
     return np.asarray(nearest)
+
+
+def _keeps_hands(rotation: list[list[float]]) -> bool:
+    """Whether the determinant is above 0; in plain numbers, since LAPACK is slow to wake."""
+    (a, b, c), (d, e, f), (g, h, i) = rotation
+    return a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g) > 0.0
 
 
 def _unit(model: OnnxModel, vectors: FloatArray) -> FloatArray:

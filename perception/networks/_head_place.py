@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .. import layouts as kp
 from .._head_pose import HEAD_CENTRE_HEAD_M
 from .._keypoints import PersonKeypoints
-from .._metric_scale import MetricScale, metric_scales
+from .._metric_scale import metric_scales
 from ..anthropometry import (
     HEAD_TEMPLATE_M,
     LIMBS,
@@ -31,6 +31,10 @@ _SINGLE_LIMBS: Final = tuple(limb for limb in LIMBS if limb.relative_std <= 0.10
 # The largest distance that two of the head's keypoints can have.
 _HEAD_SPAN_M: Final = 0.156
 _MIN_BODY_POINTS: Final = 4
+# Its place after the five keypoints of the head, where the left shoulder stands otherwise.
+_NECK: Final = kp.LEFT_SHOULDER
+_TRUNK: Final = [kp.LEFT_SHOULDER, kp.RIGHT_SHOULDER, kp.LEFT_HIP, kp.RIGHT_HIP]
+_PICTURE_UP: Final = np.array([0.0, -1.0])
 
 
 def locate_heads(
@@ -46,59 +50,60 @@ def locate_heads(
         Of each person the centre (2,) in pixels and pixels a metre, or None where neither head nor
         shoulders are seen or nothing tells the size.
     """
+    if not people:
+        return ()
     scales = metric_scales(people, min_score)
+    pixels = np.array([person.keypoints_px[:_BODY] for person in people])
+    seen = np.array([person.scores[:_BODY] for person in people]) >= min_score
+    fitted = _weak_perspective(people, pixels, seen).tolist()
+    px_per_m = [
+        fit / scale.factor
+        if person.lifted and scale is not None and fit > 0.0
+        else _from_limbs(limbs_px, there)
+        for person, scale, fit, limbs_px, there in zip(
+            people, scales, fitted, pixels, seen, strict=True
+        )
+    ]
+    sizes = np.array([0.0 if size is None else size for size in px_per_m])
+    # Nose, eyes and ears, then the neck.
+    points, known = pixels[:, : _NECK + 1].copy(), seen[:, : _NECK + 1].copy()
+    points[:, _NECK] = 0.5 * (pixels[:, kp.LEFT_SHOULDER] + pixels[:, kp.RIGHT_SHOULDER])
+    known[:, _NECK] &= seen[:, kp.RIGHT_SHOULDER]
+    weight = known * _WEIGHT
+    total = np.maximum(weight.sum(axis=1), 1e-9)[:, None]
+    above = (weight @ _BELOW_CENTRE_M * sizes)[:, None] * _up(pixels, seen, points[:, _NECK])
+    centre = ((weight[:, None] @ points)[:, 0] + above) / total
     return tuple(
-        _locate(person, scale, min_score) for person, scale in zip(people, scales, strict=True)
+        None if size is None or not there else (place, size)
+        for place, size, there in zip(centre, px_per_m, known.any(axis=1).tolist(), strict=True)
     )
 
 
-def _locate(
-    person: PersonKeypoints, scale: MetricScale | None, min_score: float
-) -> tuple[FloatArray, float] | None:
-    pixels, seen = person.keypoints_px[:_BODY], person.scores[:_BODY] >= min_score
-    px_per_m = _pixels_per_metre(person, pixels, seen, scale)
-    shoulders = bool(seen[kp.LEFT_SHOULDER] and seen[kp.RIGHT_SHOULDER])
-    known = np.append(seen[_HEAD], shoulders)
-    if px_per_m is None or not known.any():
-        return None
-    neck = 0.5 * (pixels[kp.LEFT_SHOULDER] + pixels[kp.RIGHT_SHOULDER])
-    points = np.vstack([pixels[_HEAD], neck])[known]
-    up = _up(pixels, seen, neck, shoulders)
-    centres = points + px_per_m * _BELOW_CENTRE_M[known, None] * up
-    weight = _WEIGHT[known]
-    return np.asarray(weight @ centres / weight.sum()), px_per_m
+def _up(pixels: FloatArray, seen: NDArray[np.bool_], neck: FloatArray) -> FloatArray:
+    """(N, 2) unit vectors up the bodies in the picture, its own up where the trunk is not seen."""
+    trunk = neck - 0.5 * (pixels[:, kp.LEFT_HIP] + pixels[:, kp.RIGHT_HIP])
+    length = np.sqrt((trunk * trunk).sum(axis=1))
+    known = seen[:, _TRUNK].all(axis=1) & (length > 1.0)
+    return np.where(known[:, None], trunk / np.maximum(length, 1.0)[:, None], _PICTURE_UP)
 
 
-def _up(
-    pixels: FloatArray, seen: NDArray[np.bool_], neck: FloatArray, shoulders: bool
+def _weak_perspective(
+    people: Sequence[PersonKeypoints], pixels: FloatArray, seen: NDArray[np.bool_]
 ) -> FloatArray:
-    """(2,) unit vector up the body in the picture; the picture's own up where hips are not seen."""
-    if shoulders and seen[kp.LEFT_HIP] and seen[kp.RIGHT_HIP]:
-        trunk = neck - 0.5 * (pixels[kp.LEFT_HIP] + pixels[kp.RIGHT_HIP])
-        length = float(np.hypot(*trunk))
-        if length > 1.0:
-            return np.asarray(trunk / length)
-    return np.array([0.0, -1.0])
+    """(N,) pixels per unit of the skeletons; 0 where too few points or no extent tell it."""
+    body = np.array([person.keypoints_root_m[:_BODY, :2] for person in people])
+    count = seen.sum(axis=1)
+    mask = seen[:, :, None]
+    # The mean of either side drops out of the sums where it is taken off one of them.
+    mean = (body * mask).sum(axis=1) / np.maximum(count, 1)[:, None]
+    body = np.where(mask, body - mean[:, None], 0.0)
+    extent = (body * body).sum(axis=(1, 2))
+    fit = (body * pixels).sum(axis=(1, 2)) / np.maximum(extent, 1e-12)
+    return np.where((count >= _MIN_BODY_POINTS) & (extent > 0.01), fit, 0.0)
 
 
-def _pixels_per_metre(
-    person: PersonKeypoints,
-    pixels: FloatArray,
-    seen: NDArray[np.bool_],
-    scale: MetricScale | None,
-) -> float | None:
-    """Scale of the picture at the person: weak perspective for a lifted skeleton, else limbs."""
-    if person.lifted and scale is not None and np.count_nonzero(seen) >= _MIN_BODY_POINTS:
-        body = scale.factor * person.keypoints_root_m[:_BODY, :2][seen]
-        image = pixels[seen]
-        # The mean of either side drops out of the sums where it is taken off one of them.
-        body = body - body.sum(axis=0) / len(body)
-        extent = float(np.einsum("ni,ni->", body, body))
-        if extent > 0.01:
-            fitted = float(np.einsum("ni,ni->", body, image)) / extent
-            if fitted > 0.0:
-                return fitted
-    # A limb looks shorter than it is, never longer: the one that looks longest counts.
+def _from_limbs(pixels: FloatArray, seen: NDArray[np.bool_]) -> float | None:
+    """Pixels a metre from the limb that looks longest, since none looks longer than it is."""
     sizes = [
         float(np.hypot(*(_middle(pixels, limb.end) - _middle(pixels, limb.start)))) / limb.length_m
         for limb in _SINGLE_LIMBS

@@ -28,12 +28,16 @@ def _ends() -> tuple[FloatArray, FloatArray]:
 
 
 _DIFFERENCE, _NEEDED = _ends()
-_LENGTHS_M: Final = np.array([limb.length_m for limb in LIMBS])
-_WEIGHTS: Final = np.array([limb.relative_std**-2 for limb in LIMBS])
+_SQUARED_M2: Final = np.array([limb.length_m**2 for limb in LIMBS])
+# Times the square of what is left of the length across the view.
+_WEIGHTS: Final = np.array([limb.relative_std**-2 for limb in LIMBS]) / _SQUARED_M2
 
 
 def metres_per_pixel(
-    keypoints_px: FloatArray, depths_m: FloatArray | None, scores: FloatArray
+    keypoints_px: FloatArray,
+    depths_m: FloatArray | None,
+    scores: FloatArray,
+    limb_scale: float = 1.0,
 ) -> FloatArray:
     """Scale (N,) of bodies that are much farther away than they are deep.
 
@@ -46,26 +50,51 @@ def metres_per_pixel(
         keypoints_px: (N, K, 2).
         depths_m: (N, K) relative to the mid-hip, or None.
         scores: (N, K).
+        limb_scale: how long limbs are between keypoints as this network places them, relative to
+            :data:`perception.anthropometry.LIMBS`.
     """
     ends_px = _DIFFERENCE @ keypoints_px[:, :_BODY]
-    extent_px = np.hypot(ends_px[..., 0], ends_px[..., 1])
-    depth = 0.0 if depths_m is None else depths_m[:, :_BODY] @ _DIFFERENCE.T
-    across = np.maximum(_LENGTHS_M**2 - np.square(depth), 0.0) * np.ones_like(extent_px)
-    weight = _WEIGHTS * across / _LENGTHS_M**2 * (extent_px > 1e-9)
-    hidden = (scores[:, :_BODY] < DEFAULT_MIN_SCORE).astype(np.float64) @ _NEEDED.T > 0.0
-    seen = weight * ~hidden
-    weight = np.where(seen.any(axis=1, keepdims=True), seen, weight)
+    extent_px = np.sqrt((ends_px * ends_px).sum(axis=2))
+    depth = np.zeros_like(extent_px)
+    if depths_m is not None:
+        depth = depths_m[:, :_BODY] @ _DIFFERENCE.T
+    across = np.maximum(limb_scale**2 * _SQUARED_M2 - depth * depth, 0.0)
+    weight = _WEIGHTS * across * (extent_px > 1e-9)
+    seen = (scores[:, :_BODY] < DEFAULT_MIN_SCORE) @ _NEEDED.T == 0.0
     votes = np.sqrt(across) / np.maximum(extent_px, 1e-9)
-    order = np.argsort(votes, axis=1)
-    total = np.cumsum(np.take_along_axis(weight, order, axis=1), axis=1)
     quantile = _FLAT_QUANTILE if depths_m is None else _MEDIAN
-    # The first vote at which the share is reached; strictly above zero, so that it has weight.
-    chosen = np.argmax((total >= quantile * total[:, -1:]) & (total > 0.0), axis=1)
-    scale = votes[np.arange(len(votes)), order[np.arange(len(votes)), chosen]]
-    return np.asarray(np.where(total[:, -1] > 0.0, scale, 0.0))
+    return np.array(
+        [
+            _weighted_quantile(*row, quantile)
+            for row in zip(votes.tolist(), weight.tolist(), seen.tolist(), strict=True)
+        ]
+    )
 
 
-def lift(keypoints_px: FloatArray, depths_m: FloatArray | None, scores: FloatArray) -> FloatArray:
+def _weighted_quantile(
+    votes: list[float], weights: list[float], seen: list[bool], quantile: float
+) -> float:
+    """The first of the ordered votes at which the share is reached; of those seen, if any."""
+    cast = [entry for entry in zip(votes, weights, seen, strict=True) if entry[1] > 0.0]
+    pairs = sorted(
+        [(vote, weight) for vote, weight, there in cast if there]
+        or [(vote, weight) for vote, weight, _ in cast]
+    )
+    total = 0.0
+    share = quantile * sum(weight for _, weight in pairs)
+    for vote, weight in pairs:
+        total += weight
+        if total >= share:
+            return vote
+    return pairs[-1][0] if pairs else 0.0
+
+
+def lift(
+    keypoints_px: FloatArray,
+    depths_m: FloatArray | None,
+    scores: FloatArray,
+    limb_scale: float = 1.0,
+) -> FloatArray:
     """Skeletons (N, K, 3) in camera axes relative to the mid-hip, in metres.
 
     Pixels are scaled about the mid-hip (weak perspective); depths stay as they are. Without depths
@@ -75,8 +104,9 @@ def lift(keypoints_px: FloatArray, depths_m: FloatArray | None, scores: FloatArr
         keypoints_px: (N, K, 2).
         depths_m: (N, K) relative to the mid-hip, or None.
         scores: (N, K).
+        limb_scale: see :func:`metres_per_pixel`.
     """
-    scale = metres_per_pixel(keypoints_px, depths_m, scores)
+    scale = metres_per_pixel(keypoints_px, depths_m, scores, limb_scale)
     hips = 0.5 * (keypoints_px[:, kp.LEFT_HIP] + keypoints_px[:, kp.RIGHT_HIP])
     skeleton = np.zeros((*keypoints_px.shape[:2], 3))
     skeleton[..., :2] = (keypoints_px - hips[:, None]) * scale[:, None, None]

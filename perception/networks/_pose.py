@@ -73,6 +73,8 @@ class OnnxPoseEstimator:
             if box_padding is None
             else box_padding
         )
+        # Where a network's keypoints lie in the body is a habit of whoever labelled its data.
+        self._limb_scale = metadata_number(self.model, "limb_scale", 1.0)
         batch = batch_of(self.model)
         self.input_size_hw_px = input_size(self.model, input_size_hw_px, None)
         dtype = input_dtype(self.model.inputs[0], self.model.name)
@@ -116,11 +118,12 @@ class OnnxPoseEstimator:
             return ()
         boxes = np.array([detection.box_xyxy_px for detection in detections])
         crops = PersonCrops(boxes, *self.input_size_hw_px, self._padding)
-        visible = np.flatnonzero(crops.inside(image))
+        visible = crops.inside(image).nonzero()[0]
         size = keypoint_layout(self.layout).size
         # Those who are not seen stand in the middle of their box, with scores of 0.
         middle = 0.5 * (boxes[:, :2] + boxes[:, 2:]) - 0.5
-        pixels = np.repeat(middle[:, None], size, axis=1)
+        pixels = np.empty((len(boxes), size, 2))
+        pixels[:] = middle[:, None]
         skeletons = np.zeros((len(boxes), size, 3))
         scores = np.zeros((len(boxes), size))
         if len(visible):
@@ -167,7 +170,7 @@ class OnnxPoseEstimator:
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Pixels (n, K, 2), skeletons (n, K, 3) and scores (n, K) of the crops ``rows``."""
         places, heights = peaks(outputs)
-        in_crop = np.stack([places[0], places[1]], axis=2) / self._layout.split_ratio
+        in_crop = places[:2].transpose(1, 2, 0) / self._layout.split_ratio
         pixels = crops.to_image(in_crop, rows)
         # What lies outside the picture was guessed. One pixel of the crop is rounding.
         extent = np.array([image.shape[1], image.shape[0]])
@@ -177,7 +180,7 @@ class OnnxPoseEstimator:
         depths = None
         if self.has_depth:
             depths = depth_m(places[2], outputs[2].shape[2], self._layout.z_range_m)
-        return pixels, lift(pixels, depths, scores), scores
+        return pixels, lift(pixels, depths, scores, self._limb_scale), scores
 
     def _recognise(self, batch: int | None) -> tuple[int, bool, PoseLayout]:
         """How many crops the network takes at most, whether always so many, and its layout.

@@ -7,6 +7,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from time import perf_counter, thread_time
 from typing import Any, Final
 
 import numpy as np
@@ -14,6 +15,7 @@ import onnxruntime as ort  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from .._errors import PerceptionError
+from .._network_time import NETWORK_TIME
 
 _PROVIDERS: Final[dict[str, str]] = {
     "cpu": "CPUExecutionProvider",
@@ -150,6 +152,7 @@ class OnnxModel:
             PerceptionError: for inputs of the wrong name, shape or type, and when the network
                 fails, with onnxruntime's words.
         """
+        began, processor_began = perf_counter(), thread_time()
         try:
             results: list[NDArray[Any]] = self._session.run(self._names, feeds)
         except Exception as cause:  # onnxruntime's errors share no base of their own
@@ -158,6 +161,8 @@ class OnnxModel:
                 f"{self.name} could not be run on {given}; it takes "
                 f"{', '.join(map(str, self.inputs))}: {_first_line(cause)}"
             ) from cause
+        NETWORK_TIME.elapsed_s += perf_counter() - began
+        NETWORK_TIME.processor_s += thread_time() - processor_began
         return results
 
     def _check_sha256(self, content: bytes, wanted: str) -> None:

@@ -6,6 +6,7 @@ SimCC (Li et al., ECCV 2022) gives each keypoint one row of bins an axis, severa
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
@@ -15,7 +16,6 @@ from ..arrays import FloatArray
 
 #: Half the depth that RTMW3D's z axis spans about the mid-hip, in metres: ``z_range`` of its codec.
 Z_RANGE_M: Final = 2.1744869
-
 
 _AROUND: Final = np.array([-1, 0, 1])
 
@@ -34,27 +34,39 @@ def peaks(axes: Sequence[NDArray[Any]]) -> tuple[FloatArray, FloatArray]:
         Places (axes, N, K) in bins, and values (axes, N, K) at the highest bin.
     """
     shape = (len(axes), *axes[0].shape[:2])
-    index = np.empty((len(axes), shape[1] * shape[2], 1))
-    values = np.empty((*index.shape[:2], 3))
+    rows = shape[1] * shape[2]
+    starts, last = _rows(rows, tuple(activations.shape[2] for activations in axes))
     # Few and large NumPy calls: with 17 keypoints their number is what takes the time.
-    for axis, activations in enumerate(axes):
-        bins = activations.shape[2]
-        top = activations.argmax(axis=2).reshape(-1, 1)  # the first NaN, where there is one
-        index[axis] = top
-        start = np.arange(0, len(top) * bins, bins)[:, None]
-        values[axis] = activations.take(np.clip(top, 1, bins - 2) + start + _AROUND)
-    height = values.max(axis=2)
+    top = np.array([activations.argmax(axis=2) for activations in axes]).reshape(-1, rows)
+    around = (top + starts)[..., None] + _AROUND  # of a NaN, where there is one
+    values = np.array(
+        [
+            activations.take(place, mode="clip")
+            for activations, place in zip(axes, around, strict=True)
+        ],
+        dtype=np.float64,
+    )
+    height = values[..., 1]
     with np.errstate(all="ignore"):
-        curve = np.where(values.min(axis=2, keepdims=True) > 0.0, np.log(values), values)
+        curve = np.log(values)
+        if not values.min() > 0.0:
+            curve = np.where(values.min(axis=2, keepdims=True) > 0.0, curve, values)
         before, middle, after = curve[..., 0], curve[..., 1], curve[..., 2]
         shift = 0.5 * (before - after) / (before - 2.0 * middle + after)
     # At either end of an axis, and where the three make no peak, the bin itself is the place.
-    inner = (values[..., 1] == height) & (np.abs(shift) <= 0.5)
-    place = index[..., 0] + np.where(inner, shift, 0.0)
+    inner = (np.abs(shift) <= 0.5) & (top > 0) & (top < last)
+    place = top + np.where(inner, shift, 0.0)
     good = np.isfinite(height)
     if not good.all():
         place, height = np.where(good, place, 0.0), np.where(good, height, 0.0)
     return place.reshape(shape), height.reshape(shape)
+
+
+@lru_cache(maxsize=8)
+def _rows(rows: int, bins: tuple[int, ...]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Where each row of each axis starts in its activations (axes, rows); last bins (axes, 1)."""
+    counts = np.array(bins, dtype=np.intp)[:, None]
+    return counts * np.arange(rows), counts - 1
 
 
 def depth_m(places: FloatArray, bins: int, range_m: float = Z_RANGE_M) -> FloatArray:
@@ -75,4 +87,4 @@ def confidence(heights: FloatArray, possible: NDArray[np.bool_]) -> FloatArray:
         heights: (axes, N, K).
         possible: (N, K) False where the keypoint cannot have been seen.
     """
-    return np.asarray(np.where(possible, np.clip(heights.min(axis=0), 0.0, 1.0), 0.0))
+    return np.asarray(possible * np.minimum(np.maximum(heights.min(axis=0), 0.0), 1.0))

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
 from perception import (
+    Camera,
     FusedHeadPoseEstimator,
     HeadPoseEstimator,
     OnnxHeadPoseEstimator,
@@ -18,9 +20,10 @@ from perception import (
 from perception.networks import MediaPipePoseEstimator, OnnxModel, OnnxSettings
 from perception.shipped import (
     DETECTOR,
-    load_shipped,
+    shipped_detector,
     shipped_head_pose_estimator,
     shipped_pose_estimator,
+    verify_shipped_model,
 )
 
 from .._errors import SimError
@@ -68,12 +71,13 @@ def choose_networks(
     )
 
 
-def _detector(name: str, min_score: float, settings: OnnxSettings) -> PersonDetector:
-    model = (
-        load_shipped(DETECTOR, settings)
-        if name == SHIPPED
-        else _model("--detector", name, (SHIPPED,), settings)
-    )
+def _detector(
+    name: str, min_score: float, settings: OnnxSettings
+) -> PersonDetector | Callable[[Camera], PersonDetector]:
+    if name == SHIPPED:
+        verify_shipped_model(DETECTOR)  # before the first frame, not at it
+        return lambda camera: shipped_detector(settings, camera, score_threshold=min_score)
+    model = _model("--detector", name, (SHIPPED,), settings)
     return OnnxPersonDetector(model, score_threshold=min_score)
 
 

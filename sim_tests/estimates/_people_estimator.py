@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -37,9 +37,13 @@ _MEASURED_STD_RAD: Final = math.radians(2.0)
 
 @dataclass(frozen=True, slots=True)
 class Networks:
-    """The estimators that work; ``head_pose_estimator`` None is the pipeline's default."""
+    """The estimators that work.
 
-    detector: PersonDetector
+    ``detector`` may be a function that makes the one for a camera; ``head_pose_estimator`` None is
+    the pipeline's default.
+    """
+
+    detector: PersonDetector | Callable[[Camera], PersonDetector]
     pose_estimator: PoseEstimator
     head_pose_estimator: HeadPoseEstimator | None = None
     #: More settings of :class:`~perception.AwarenessPipeline` by name.
@@ -106,9 +110,10 @@ class PeopleEstimator:
     def _process(self, camera: Camera, frame: SourceFrame) -> tuple[PersonObservation, ...]:
         pipeline = self._pipelines.get(camera)
         if pipeline is None:
+            detector = self._networks.detector
             pipeline = self._pipelines[camera] = AwarenessPipeline(
                 camera,
-                self._networks.detector,
+                detector if isinstance(detector, PersonDetector) else detector(camera),
                 self._tap,
                 self._networks.head_pose_estimator,
                 **self._networks.settings,

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+import scipy.linalg
 from head_graphs import DISC_M, disc_network, full_range_network
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -15,6 +16,7 @@ from perception import Camera, PerceptionError, PersonKeypoints
 from perception._head_pose import HEAD_CENTRE_HEAD_M
 from perception.networks._head import OnnxHeadPoseEstimator, ray_axes
 from perception.networks._head_crop import crop_to_image, head_crop, image_to_crop
+from perception.networks._head_layouts import _orthonormal
 from perception.networks._session import OnnxModel
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
@@ -358,3 +360,16 @@ def test_a_full_range_network_says_nothing_of_range_or_visibility():
     std = np.sqrt(np.diag(head.covariance))
     assert np.allclose(std[:3], math.radians(10.0), rtol=0.01)
     assert head.position_camera_m[2] == pytest.approx(CAMERA.fx_px / 200.0 - 0.09, rel=0.1)
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 1e-7, 1e-3, 0.01]))
+def test_rotations_are_brought_to_the_nearest_ones(seed, error):
+    model = OnnxModel(full_range_network(np.eye(3)))
+    rng = np.random.default_rng(seed)
+    noise = error * rng.uniform(-1.0, 1.0, (3, 3, 3))
+    output = np.float64(np.float32(Rotation.random(3, rng).as_matrix() + noise))
+    for found, put_out in zip(_orthonormal(model, output), output, strict=True):
+        assert found == pytest.approx(scipy.linalg.polar(put_out)[0], abs=1e-9)
+    output[1] *= -1.0
+    with pytest.raises(PerceptionError, match="no rotations"):
+        _orthonormal(model, output)

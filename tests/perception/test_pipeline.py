@@ -16,6 +16,7 @@ from perception import (
     PersonObservation,
 )
 from perception._floor import FloorPlane
+from perception._network_time import NETWORK_TIME
 
 CAMERA = Camera.from_fov(1280, 960, math.radians(60.0))
 FRAME = np.zeros((960, 1280, 3), np.uint8)
@@ -203,6 +204,24 @@ def test_timings_add_up_and_are_of_the_last_frame():
     eyes.people = []
     line.process(FRAME, 0.1)
     assert line.last_timings.head_pose_s == 0.0
+
+
+def test_the_runs_of_networks_are_told_from_the_rest():
+    class Slow(Eyes):
+        def detect(self, image_rgb):
+            NETWORK_TIME.elapsed_s += 0.015  # as a network would that took that long
+            return super().detect(image_rgb)
+
+    person = person_at((0.0, 0.4, 3.0))
+    eyes = Slow([person])
+    line = pipeline(eyes)
+    assert line.last_timings.networks_s == 0.0
+    for people in ([person], [person], []):  # of each frame, not of all so far
+        eyes.people = people
+        line.process(FRAME, 0.0)
+        timings = line.last_timings
+        assert timings.networks_s == pytest.approx(0.015)
+        assert timings.outside_s == pytest.approx(timings.total_s - 0.015)
 
 
 def test_an_estimator_that_loses_people_is_named():

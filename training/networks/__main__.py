@@ -14,11 +14,15 @@ from pathlib import Path
 from typing import Final
 
 import cv2
+import numpy as np
 import torch
 from torch import nn
 
+from perception import OnnxPoseEstimator
 from perception.shipped import write_manifest
+from sim_tests.people._worker_asset import load_worker
 
+from ._calibrate import limb_scale
 from ._detector_net import DetectorNet
 from ._detector_train import train_detector
 from ._export import export_detector, export_head, export_pose
@@ -120,7 +124,16 @@ def _export(recipe: Recipe, check: Path, checkpoints: Path, out: Path) -> None:
     factors = calibration(predictions(head, HeadData(check, recipe.seed)))
     print("standard deviations are multiplied by", factors)
     export_head(head, out / "head_pose.onnx", factors)
-    export_pose(pose, out / "person_pose.onnx")
+
+    def with_scale(scale: float) -> OnnxPoseEstimator:
+        export_pose(pose, out / "person_pose.onnx", scale)
+        return OnnxPoseEstimator(out / "person_pose.onnx")
+
+    crowd = sorted(check.with_name("crowd_check").glob("*.npz"))
+    stature_m = float(np.mean([load_worker(str(path)).stature_m for path in crowd]))
+    scale = limb_scale(with_scale, check, stature_m)
+    print("limbs count as", scale, "of those of perception.anthropometry")
+    export_pose(pose, out / "person_pose.onnx", scale)
     export_detector(detector, out / "person_detector.onnx")
     print("written", write_manifest(out, _ENTRIES))
 

@@ -43,7 +43,7 @@ def export_detector(net: DetectorNet, path: Path) -> None:
     _export(DetectorExport(net), example, "images", path, metadata, axes)
 
 
-def export_pose(net: PoseNet, path: Path) -> None:
+def export_pose(net: PoseNet, path: Path, limb_scale: float) -> None:
     """Write the pose network in RTMW3D's layout with COCO's 17 keypoints."""
     metadata = {
         "description": "whole-body pose of awarenav, made for its simulator",
@@ -52,6 +52,7 @@ def export_pose(net: PoseNet, path: Path) -> None:
         "simcc_split_ratio": "2",
         "box_padding": "1.25",
         "z_range_m": "2.1744869",
+        "limb_scale": f"{limb_scale:.3f}",
     }
     _export(PoseExport(net), torch.randn(2, 3, 192, 144), "input", path, metadata)
 

@@ -22,7 +22,9 @@ _MIRROR: Final = np.diag([-1.0, 1.0, 1.0])
 _MIRROR_HEAD: Final = np.diag([1.0, 1.0, -1.0])
 #: So much of a crop's side around the head is kept of a picture.
 _REACH: Final = 0.95
-_NEGATIVES: Final = 0.08
+_NEGATIVES: Final = 0.05
+#: Share of the training after which crops are distorted less.
+LATE: Final = 0.75
 #: A crop of which less than this is the head shows none.
 _LEAST_SEEN: Final = 0.35
 _FEWEST_PX: Final = 10.0
@@ -76,11 +78,11 @@ class HeadData:
         if sample is not None:
             self.heads.append(sample)
 
-    def batch(self, step: int, count: int = 64) -> Batch:
-        """``count`` crops; the same for the same step."""
+    def batch(self, step: int, done: float, count: int = 64) -> Batch:
+        """``count`` crops; the same for the same step. The last quarter is distorted less."""
         rng = np.random.default_rng([self._seed, 22, step])
-        samples = [self._distorted(rng) for _ in range(count)]
-        return _stacked(samples)
+        strength = 1.0 if done < LATE else 0.5
+        return _stacked([self._distorted(rng, strength) for _ in range(count)])
 
     def still(self, start: int, stop: int, jitter: float = 0.05, spread: float = 0.07) -> Batch:
         """Crops ``start`` to ``stop`` placed as in use, not distorted."""
@@ -94,21 +96,21 @@ class HeadData:
             ]
         )
 
-    def _distorted(self, rng: np.random.Generator) -> dict[str, Any]:
+    def _distorted(self, rng: np.random.Generator, strength: float) -> dict[str, Any]:
         if rng.random() < _NEGATIVES:
             return self._nobody(rng)
         head = self.heads[int(rng.integers(len(self.heads)))]
         angle = np.radians(rng.normal(0.0, 12.0)) if rng.random() < 0.5 else 0.0
         # How far first guesses lie from the head; the second pass is better than this.
-        wide = 1.0 if rng.random() < 0.6 else 0.4
+        wide = 1.0 if rng.random() < 0.5 * strength else 0.4
         shift = np.clip(rng.normal(0.0, 0.11 * wide, 2), -0.3, 0.3)
         enlarged = float(np.exp(np.clip(rng.normal(0.0, 0.17 * wide), -0.4, 0.4)))
         coarse = None
-        if rng.random() < 0.35:
+        if rng.random() < 0.3 * strength:
             low = min(_SMALLEST_PX, head.side_px)
             coarse = int(np.exp(rng.uniform(np.log(low), np.log(max(head.side_px, low + 1.0)))))
         sample = _crop(head, shift, enlarged, angle, flip=bool(rng.random() < 0.5), coarse=coarse)
-        if rng.random() < 0.22:
+        if rng.random() < 0.16 * strength:
             other = self.others[int(rng.integers(len(self.others)))]
             _hide(sample, rng, other)
         sample["image"] = degraded(sample["image"], rng)

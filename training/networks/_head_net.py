@@ -26,9 +26,14 @@ class HeadNet(nn.Module):
     def __init__(self) -> None:
         super().__init__()
         self.fine = nn.Sequential(
-            conv(3, 20, 3, 2), conv(20, 40, 3, 2), Residual(40), conv(40, 80, 3, 2), Residual(80)
+            conv(3, 20, 3, 2),
+            conv(20, 40, 3, 2),
+            Residual(40),
+            conv(40, 80, 3, 2),
+            Residual(80),
+            Residual(80),
         )
-        self.coarse = nn.Sequential(conv(80, 160, 3, 2), Residual(160))
+        self.coarse = nn.Sequential(conv(80, 160, 3, 2), Residual(160), Residual(160))
         self.trunk = nn.Sequential(
             nn.Flatten(), nn.Dropout(0.1), nn.Linear(160 * 16, 320), nn.ReLU(inplace=True)
         )

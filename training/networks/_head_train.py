@@ -12,7 +12,7 @@ from torch.nn import functional as F  # noqa: N812
 
 from ._blocks import cross_entropy, soft_labels
 from ._fit import Batch, fit
-from ._head_data import HeadData
+from ._head_data import LATE, HeadData
 from ._head_net import BINS, SPAN, HeadNet, head_rotation, keypoint_means, spread_factor
 from ._photograph import photographed
 from ._recipe import Recipe
@@ -29,7 +29,7 @@ def train_head(recipe: Recipe, shards: Path, held_out: Path, folder: Path) -> nn
     return fit(
         "head",
         HeadNet(),
-        data.batch,
+        lambda step: data.batch(step, step / recipe.head_steps),
         head_loss,
         steps=recipe.head_steps,
         folder=folder,
@@ -46,9 +46,9 @@ def normalised(images: Tensor) -> Tensor:
 def head_loss(net: nn.Module, batch: Batch, done: float) -> dict[str, Tensor]:
     """Named losses of a batch."""
     generator = torch.Generator().manual_seed(int(batch["keypoints"].sum().abs() * 1e4) % (2**31))
-    images = photographed(batch["image"].cpu(), generator).to(batch["image"].device)
-    kind = images.device.type
-    with torch.autocast(kind, dtype=torch.bfloat16):
+    device = batch["image"].device
+    images = photographed(batch["image"].cpu(), generator, 1.0 if done < LATE else 0.5).to(device)
+    with torch.autocast(device.type, dtype=torch.bfloat16):
         out = net(normalised(images))
     out = {key: value.float() for key, value in out.items()}
     weight = batch["weight"]

@@ -6,8 +6,14 @@ import torch
 from torch import Tensor
 
 
-def photographed(batch: Tensor, generator: torch.Generator) -> Tensor:
-    """Exposure, contrast, colour cast, faded colour and noise on (N, 3, H, W) in 0–255."""
+def photographed(batch: Tensor, generator: torch.Generator, strength: float = 1.0) -> Tensor:
+    """Exposure, contrast, colour cast, faded colour and noise on (N, 3, H, W) in 0–255.
+
+    Args:
+        batch: pictures.
+        generator: of all of it.
+        strength: 1 in full, 0 not at all.
+    """
     n = len(batch)
 
     def uniform(low: float, high: float, *shape: int) -> Tensor:
@@ -22,4 +28,4 @@ def photographed(batch: Tensor, generator: torch.Generator) -> Tensor:
     out = 255.0 * (out.clamp(1.0, 255.0) / 255.0) ** gamma
     noise = uniform(-8.0, 12.0, 1, 1, 1).clamp(min=0.0)
     out = out + noise * torch.randn(out.shape, generator=generator)
-    return out.clamp(0.0, 255.0)
+    return torch.lerp(batch.float(), out.clamp(0.0, 255.0), strength)

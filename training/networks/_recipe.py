@@ -36,7 +36,7 @@ class Recipe:
     variants: tuple[int, int] = (8, 200)
     detector_steps: int = 2600
     pose_steps: int = 5500
-    head_steps: int = 10000
+    head_steps: int = 26000
 
     def held_out(self) -> Recipe:
         """Other people in other goods and colours: to watch over training and to calibrate."""

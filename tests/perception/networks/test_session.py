@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 from onnx_graphs import fixed, red_point_pose
 
 from perception import PerceptionError
+from perception._network_time import NETWORK_TIME
 from perception.networks._session import OnnxModel, OnnxSettings, as_onnx_model
 
 ROWS = np.arange(12.0).reshape(1, 2, 6)
@@ -152,6 +154,25 @@ def test_what_a_run_refuses_says_what_the_network_takes() -> None:
     ):
         with pytest.raises(PerceptionError, match=r"takes images \(any, 3, 32, 64\) float32"):
             model.run(feeds)
+
+
+def test_runs_add_up_to_the_time_of_the_calling_thread() -> None:
+    model = OnnxModel(red_point_pose(64, 48))
+    feeds = {"input": np.zeros((1, 3, 64, 48), np.float32)}
+
+    def spent() -> list[tuple[float, float]]:
+        times = [(NETWORK_TIME.elapsed_s, NETWORK_TIME.processor_s)]
+        for _ in range(2):
+            model.run(feeds)
+            times.append((NETWORK_TIME.elapsed_s, NETWORK_TIME.processor_s))
+        return times
+
+    here = np.array(spent())
+    assert (np.diff(here, axis=0) > 0.0).all()
+    with ThreadPoolExecutor(1) as other:
+        there = np.array(other.submit(spent).result())
+    assert there[0].tolist() == [0.0, 0.0]
+    assert here[-1].tolist() == [NETWORK_TIME.elapsed_s, NETWORK_TIME.processor_s]
 
 
 def test_a_loaded_model_takes_no_settings_any_more() -> None:
