@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from ._errors import PerceptionError
-from .arrays import FloatArray, finite_array, set_fields
+from .arrays import FloatArray, finite_array, finite_number, set_fields
 from .layouts import KeypointLayout, keypoint_layout
 
 
@@ -27,6 +25,8 @@ class PersonKeypoints:
             body is taken from those that do not.
         face_evidence: False when high scores of nose and eyes do not mean that the face is seen.
             MediaPipe Pose, for one, scores them near 1 on backs of heads.
+        scale_relative_std: what the estimator's own noise leaves open of the size of the whole
+            skeleton, relative to it, beyond the spread of adults' statures and limbs.
     """
 
     keypoints_px: FloatArray
@@ -35,6 +35,7 @@ class PersonKeypoints:
     layout: str
     lifted: bool = True
     face_evidence: bool = True
+    scale_relative_std: float = 0.0
 
     def __post_init__(self) -> None:
         count = keypoint_layout(self.layout).size
@@ -50,6 +51,9 @@ class PersonKeypoints:
             scores=scores,
             lifted=bool(self.lifted),
             face_evidence=bool(self.face_evidence),
+            scale_relative_std=finite_number(
+                "scale_relative_std", self.scale_relative_std, minimum=0.0
+            ),
         )
 
     @property

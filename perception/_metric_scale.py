@@ -125,7 +125,7 @@ def _scale(
         ]
         total = sum(weights)
         middle = sum(map(mul, weights, votes)) / total
-    variance = 1.0 / total + STATURE_RELATIVE_STD**2
+    variance = 1.0 / total + STATURE_RELATIVE_STD**2 + person.scale_relative_std**2
     spread = math.sqrt(variance + (0.0 if measured else _GUESSED_RELATIVE_STD**2))
     if not person.lifted:
         middle = ordered[1 if len(votes) >= 3 else 0]

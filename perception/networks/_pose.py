@@ -75,6 +75,7 @@ class OnnxPoseEstimator:
         )
         # Where a network's keypoints lie in the body is a habit of whoever labelled its data.
         self._limb_scale = metadata_number(self.model, "limb_scale", 1.0)
+        self._scale_std = metadata_number(self.model, "scale_relative_std", 0.0)
         batch = batch_of(self.model)
         self.input_size_hw_px = input_size(self.model, input_size_hw_px, None)
         dtype = input_dtype(self.model.inputs[0], self.model.name)
@@ -134,7 +135,12 @@ class OnnxPoseEstimator:
             )
         return tuple(
             PersonKeypoints(
-                pixels[row], skeletons[row], scores[row], self.layout, lifted=self.has_depth
+                pixels[row],
+                skeletons[row],
+                scores[row],
+                self.layout,
+                lifted=self.has_depth,
+                scale_relative_std=self._scale_std,
             )
             for row in range(len(boxes))
         )

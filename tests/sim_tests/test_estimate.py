@@ -251,7 +251,7 @@ def test_a_standing_camera_looks_where_it_is_pointed(pitch_deg):
         (["{set}", "--camera-pitch-deg", "5"], "needs --camera-height-m"),
         (["{set}", "--camera-height-m", "0"], "must be above 0"),
         (["{set}", "--camera", "absent.yaml"], "absent.yaml"),
-        (["{set}", "--detector", "absent.onnx"], "--detector must be 'shipped', or an ONNX file"),
+        (["{set}", "--detector", "absent.onnx"], "--detector must be 'shipped', an ONNX file"),
         (["{set}", "--topic", "/image"], "--topic is for ROS recordings"),
     ],
 )

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Final
 
 import cv2
-import numpy as np
 import torch
 from torch import nn
 
@@ -130,10 +129,10 @@ def _export(recipe: Recipe, check: Path, checkpoints: Path, out: Path) -> None:
         return OnnxPoseEstimator(out / "person_pose.onnx")
 
     crowd = sorted(check.with_name("crowd_check").glob("*.npz"))
-    stature_m = float(np.mean([load_worker(str(path)).stature_m for path in crowd]))
-    scale = limb_scale(with_scale, check, stature_m)
-    print("limbs count as", scale, "of those of perception.anthropometry")
-    export_pose(pose, out / "person_pose.onnx", scale)
+    statures_m = [load_worker(str(path)).stature_m for path in crowd]
+    scale, noise = limb_scale(with_scale, check, statures_m)
+    print(f"limbs count as {scale:.3f} of those of perception.anthropometry, noise {noise:.3f}")
+    export_pose(pose, out / "person_pose.onnx", scale, noise)
     export_detector(detector, out / "person_detector.onnx")
     print("written", write_manifest(out, _ENTRIES))
 

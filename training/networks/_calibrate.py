@@ -17,10 +17,14 @@ from ._samples import Frame, picture, read_shards
 
 # People of whom less shows say little about limbs.
 _FEWEST_KEYPOINTS: Final = 12
+# Median absolute deviation of a normal distribution with unit variance.
+_MAD_OF_A_NORMAL: Final = 0.6745
 
 
-def limb_scale(estimator_of: Any, folder: Path, stature_m: float, rounds: int = 3) -> float:
-    """The limb scale with which the median range from the body alone is right.
+def limb_scale(
+    estimator_of: Any, folder: Path, statures_m: Any, rounds: int = 3
+) -> tuple[float, float]:
+    """The limb scale with which the median range from the body alone is right, and its noise.
 
     A network's keypoints lie where its labels put them, and depths that are guessed too small make
     limbs look shorter and people farther away. One number sets both right on average.
@@ -28,15 +32,21 @@ def limb_scale(estimator_of: Any, folder: Path, stature_m: float, rounds: int = 
     Args:
         estimator_of: makes the :class:`OnnxPoseEstimator` with a given scale.
         folder: of shards with people who were not learned from.
-        stature_m: mean of these people; that of adults would have another range.
+        statures_m: of these people; adults on average would appear at other ranges.
         rounds: of the fixed point; the skeleton's own claim to be in metres damps each.
+
+    Returns:
+        The scale, and the relative standard deviation of ranges beyond that of statures.
     """
     frames = [frame for shard in read_shards(folder) for frame in shard["frames"]]
-    scale, taller = 1.0, np.log(stature_m / MEAN_STATURE_M)
+    scale, taller = 1.0, np.log(np.mean(statures_m) / MEAN_STATURE_M)
     for _ in range(rounds):
-        errors = list(_range_errors(estimator_of(scale), frames))
-        scale *= float(np.exp(-np.median(errors) - taller))
-    return scale
+        errors = np.array(list(_range_errors(estimator_of(scale), frames)))
+        middle = float(np.median(errors))
+        scale *= float(np.exp(-middle - taller))
+    spread = float(np.median(np.abs(errors - middle))) / _MAD_OF_A_NORMAL
+    known = float(np.std(statures_m) / np.mean(statures_m))
+    return scale, float(np.sqrt(max(spread**2 - known**2, 0.0)))
 
 
 def _range_errors(estimator: OnnxPoseEstimator, frames: list[Frame]) -> Iterator[float]:

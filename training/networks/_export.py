@@ -43,8 +43,15 @@ def export_detector(net: DetectorNet, path: Path) -> None:
     _export(DetectorExport(net), example, "images", path, metadata, axes)
 
 
-def export_pose(net: PoseNet, path: Path, limb_scale: float) -> None:
-    """Write the pose network in RTMW3D's layout with COCO's 17 keypoints."""
+def export_pose(net: PoseNet, path: Path, limb_scale: float, scale_std: float = 0.0) -> None:
+    """Write the pose network in RTMW3D's layout with COCO's 17 keypoints.
+
+    Args:
+        net: trained.
+        path: of the file.
+        limb_scale: see :func:`._calibrate.limb_scale`.
+        scale_std: what the network's noise leaves open of the body's scale; 0 is left out.
+    """
     metadata = {
         "description": "whole-body pose of awarenav, made for its simulator",
         "license": _LICENCE,
@@ -54,6 +61,8 @@ def export_pose(net: PoseNet, path: Path, limb_scale: float) -> None:
         "z_range_m": "2.1744869",
         "limb_scale": f"{limb_scale:.3f}",
     }
+    if scale_std > 0.0:
+        metadata["scale_relative_std"] = f"{scale_std:.3f}"
     _export(PoseExport(net), torch.randn(2, 3, 192, 144), "input", path, metadata)
 
 
