@@ -13,7 +13,15 @@ from torch.nn import functional as F  # noqa: N812
 from ._blocks import cross_entropy, soft_labels
 from ._fit import Batch, fit
 from ._head_data import LATE, HeadData
-from ._head_net import BINS, SPAN, HeadNet, head_rotation, keypoint_means, spread_factor
+from ._head_net import (
+    BINS,
+    SPAN,
+    HeadNet,
+    averaged,
+    head_rotation,
+    keypoint_means,
+    spread_factor,
+)
 from ._photograph import photographed
 from ._recipe import Recipe
 
@@ -135,7 +143,7 @@ def predictions(net: nn.Module, data: HeadData, step: int = 256) -> dict[str, An
     with torch.no_grad():
         for start in range(0, len(data.heads), step):
             batch = data.still(start, min(start + step, len(data.heads)))
-            out = net(normalised(batch["image"]).to(device))
+            out = averaged(net, normalised(batch["image"]).to(device))
             out = {key: value.float().cpu() for key, value in out.items()}
             rotation = head_rotation(out["rotation_6d"])
             cosine = (rotation[:, :, 1] * batch["rotation"][:, :, 1]).sum(1).clamp(-1.0, 1.0)
