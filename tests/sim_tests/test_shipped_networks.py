@@ -33,9 +33,10 @@ def test_the_figures_of_the_model_cards_hold_on_a_sample(held_out):
     overall = report["overall"]
     assert overall["people"] >= 60
     assert report["detection"]["ap50"] >= 0.97
+    # Medians of a hundred people scatter about those of nine hundred, which have 5°, 15° and 4 %.
     assert overall["head_median_deg"] <= 6.0
     assert overall["head_p90_deg"] <= 18.0
-    assert overall["position_median"] <= 0.04
+    assert overall["position_median"] <= 0.05
     assert overall["awareness_mae"] <= 0.08
     assert overall["false_aware"] <= 0.02
 
