@@ -149,7 +149,8 @@ vectors = st.tuples(*[st.floats(-0.08, 0.08)] * 2, st.floats(-0.5, -0.25))
     st.floats(-1.2, 1.2),
     st.floats(-0.6, 0.6),
     st.floats(0.4, 0.99),
-    st.floats(-0.7, 0.7),
+    # A subnormal turn divides by zero in the determinant, not in the gait.
+    st.floats(-0.7, 0.7, allow_subnormal=False),
 )
 @settings(max_examples=200, deadline=None)
 def test_two_bones_bring_their_tip_where_it_is_wanted(

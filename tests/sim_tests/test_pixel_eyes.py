@@ -152,7 +152,10 @@ def test_a_crossing_is_driven_by_what_a_genuine_detector_sees_in_the_pictures(sc
         for found, worker in zip(frame.observations, frame.observed_workers, strict=True):
             # A box alone tells nothing of awareness, and no evidence is never awareness.
             assert found.awareness is None
-            if worker != NOBODY:
+            left, _, right, _ = found.box_xyxy_px
+            # A sliver of a person at the picture's border has no height to tell the range by.
+            cut_off = left < 1.0 or right > CAMERA.width_px - 1.0
+            if worker != NOBODY and not cut_off:
                 workers.add(worker)
                 true = frame.truth[worker].position_camera_m
                 assert np.linalg.norm(found.position_camera_m - true) < 0.3 * np.linalg.norm(true)
