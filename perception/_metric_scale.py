@@ -46,8 +46,10 @@ def _midpoint_matrix(ends: Sequence[tuple[int, ...]]) -> FloatArray:
 # Rows pick (or average) the keypoints at either end of each limb.
 _START_MATRIX: Final = _midpoint_matrix([limb.start for limb in LIMBS])
 _END_MATRIX: Final = _midpoint_matrix([limb.end for limb in LIMBS])
-_DIFFERENCE: Final = _END_MATRIX - _START_MATRIX
-_INVOLVED_COLUMNS: Final = ((_START_MATRIX + _END_MATRIX) > 0.0).T.astype(np.float64)
+#: (limbs, 17) end minus start of each limb of :data:`~perception.anthropometry.LIMBS`.
+LIMB_DIFFERENCE: Final = _END_MATRIX - _START_MATRIX
+#: (17, limbs) 1 where a limb needs a keypoint.
+LIMB_KEYPOINTS: Final = ((_START_MATRIX + _END_MATRIX) > 0.0).T.astype(np.float64)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,10 +96,10 @@ def _metric_scales(
     if not people:
         return ()
     hidden = np.array([person.scores[:17] for person in people]) < min_score
-    ends = _DIFFERENCE @ np.array([person.keypoints_root_m[:17] for person in people])
+    ends = LIMB_DIFFERENCE @ np.array([person.keypoints_root_m[:17] for person in people])
     lengths = np.sqrt((ends * ends).sum(axis=2))
     present = lengths > 1e-9
-    usable = present & (hidden @ _INVOLVED_COLUMNS == 0.0)
+    usable = present & (hidden @ LIMB_KEYPOINTS == 0.0)
     votes = _LOG_LENGTHS - np.log(np.maximum(lengths, 1e-9))
     return tuple(
         _scale(*row)

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from .. import layouts as kp
-from .._metric_scale import DEFAULT_MIN_SCORE
+from .._metric_scale import DEFAULT_MIN_SCORE, LIMB_DIFFERENCE, LIMB_KEYPOINTS
 from ..anthropometry import LIMBS
 from ..arrays import FloatArray
 
@@ -18,16 +18,6 @@ _FLAT_QUANTILE: Final = 0.25
 _MEDIAN: Final = 0.5
 
 
-def _ends() -> tuple[FloatArray, FloatArray]:
-    """End minus start of each limb, and which keypoints it needs, (limbs, 17) both."""
-    difference = np.zeros((len(LIMBS), _BODY))
-    for row, limb in enumerate(LIMBS):
-        difference[row, list(limb.end)] += 1.0 / len(limb.end)
-        difference[row, list(limb.start)] -= 1.0 / len(limb.start)
-    return difference, (difference != 0.0).astype(np.float64)
-
-
-_DIFFERENCE, _NEEDED = _ends()
 _SQUARED_M2: Final = np.array([limb.length_m**2 for limb in LIMBS])
 # Times the square of what is left of the length across the view.
 _WEIGHTS: Final = np.array([limb.relative_std**-2 for limb in LIMBS]) / _SQUARED_M2
@@ -53,14 +43,14 @@ def metres_per_pixel(
         limb_scale: how long limbs are between keypoints as this network places them, relative to
             :data:`perception.anthropometry.LIMBS`.
     """
-    ends_px = _DIFFERENCE @ keypoints_px[:, :_BODY]
+    ends_px = LIMB_DIFFERENCE @ keypoints_px[:, :_BODY]
     extent_px = np.sqrt((ends_px * ends_px).sum(axis=2))
     depth = np.zeros_like(extent_px)
     if depths_m is not None:
-        depth = depths_m[:, :_BODY] @ _DIFFERENCE.T
+        depth = depths_m[:, :_BODY] @ LIMB_DIFFERENCE.T
     across = np.maximum(limb_scale**2 * _SQUARED_M2 - depth * depth, 0.0)
     weight = _WEIGHTS * across * (extent_px > 1e-9)
-    seen = (scores[:, :_BODY] < DEFAULT_MIN_SCORE) @ _NEEDED.T == 0.0
+    seen = (scores[:, :_BODY] < DEFAULT_MIN_SCORE) @ LIMB_KEYPOINTS == 0.0
     votes = np.sqrt(across) / np.maximum(extent_px, 1e-9)
     quantile = _FLAT_QUANTILE if depths_m is None else _MEDIAN
     return np.array(

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-OUTSIDE_GREY: Final = 114
+from perception.networks._head_crop import OUTSIDE_GREY
 
 
 def with_surroundings(

@@ -12,8 +12,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-#: The head's centre in the paper's head frame: between the ears and a little up.
-HEAD_CENTRE_HEAD_M: Final = np.array([-0.045, -0.090, 0.0])
 #: What a head crop's side measures at the head's distance.
 HEAD_SIDE_M: Final = 0.40
 

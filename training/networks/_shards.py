@@ -19,6 +19,7 @@ import cv2
 import numpy as np
 from tqdm import tqdm
 
+from perception._head_pose import HEAD_CENTRE_HEAD_M
 from perception.anthropometry import HEAD_TEMPLATE_M
 from perception.layouts import LEFT_HIP, RIGHT_HIP
 from sim_tests._sight import keypoints_in_front
@@ -27,7 +28,7 @@ from sim_tests.sets._render_config import RenderConfig
 from sim_tests.sets._render_scene import RenderScene, pose_at_random
 
 from ._recipe import Recipe
-from ._samples import HEAD_CENTRE_HEAD_M, HEAD_SIDE_M, Frame, Patch, PersonTruth
+from ._samples import HEAD_SIDE_M, Frame, Patch, PersonTruth
 
 _BODY: Final = 17
 _SIZES: Final = ((640, 480), (640, 480), (640, 480), (848, 480), (800, 600))
