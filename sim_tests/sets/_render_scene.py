@@ -116,13 +116,17 @@ class RenderScene(Closing):
         }
         return expose(view.rgb, self._config.sensor, rng), record
 
+    def clear(self) -> None:
+        """Send everybody out of the hall."""
+        for worker in self.workers:
+            worker.place((self.warehouse.layout.x_min_m - 9.0, 0.0), 0.0)
+
     def arrange(self, rng: np.random.Generator) -> FloatArray:
         """Put camera and people somewhere at random; returns T_odom_camera (4, 4)."""
         config = self._config
         wanted = int(rng.integers(1, len(self.workers) + 1))
         cast = rng.permutation(len(self.workers))[:wanted]
-        for worker in self.workers:
-            worker.place((self.warehouse.layout.x_min_m - 9.0, 0.0), 0.0)
+        self.clear()
         places: list[_Place] = []
         for _ in range(_CAMERA_TRIES):
             T_odom_camera, heading = self._camera_pose(rng)

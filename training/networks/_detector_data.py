@@ -10,6 +10,9 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from perception import Camera
+from perception.shipped import detector_input_size
+
 from ._augment import covered, degraded, similarity, warp
 from ._detector_net import HEIGHT, WIDTH
 from ._fit import Batch
@@ -24,11 +27,15 @@ _FEWEST_KEYPOINTS: Final = 4
 
 @dataclass
 class FrameSample:
-    """A picture, boxes (N, 4) from its corner, and which of them are to be found (N,)."""
+    """A picture, boxes (N, 4) from its corner, and which of them are to be found (N,).
+
+    ``scale`` takes the picture's pixels to those of the network in use.
+    """
 
     image: NDArray[np.uint8]
     boxes: NDArray[np.float64]
     wanted: NDArray[np.bool_]
+    scale: float = 1.0
 
 
 class DetectorData:
@@ -44,31 +51,40 @@ class DetectorData:
                     person.pixels >= _FEWEST_PIXELS and person.visible.sum() >= _FEWEST_KEYPOINTS
                     for person in frame.people
                 ]
+                image = picture(frame.png)
                 self.frames.append(
                     FrameSample(
-                        picture(frame.png),
+                        image,
                         np.array(boxes, dtype=np.float64).reshape(-1, 4),
                         np.array(wanted, dtype=bool),
+                        _scale_in_use(image, frame.focal_px),
                     )
                 )
+        # Pictures of wide lenses get a much larger input in use, so they are not judged whole.
+        self._whole = [f for f in self.frames if f.scale <= 1.4 * _fit_scale(f.image)]
 
     def batch(self, step: int, count: int = 16) -> Batch:
         """``count`` pictures; the same for the same step."""
         rng = np.random.default_rng([self._seed, 42, step])
         return _stacked([self._distorted(rng) for _ in range(count)])
 
+    @property
+    def stills(self) -> int:
+        """How many pictures :meth:`still` has."""
+        return len(self._whole)
+
     def still(self, start: int, stop: int) -> Batch:
-        """Pictures ``start`` to ``stop`` as in use: letterboxed, the whole of each."""
+        """Pictures ``start`` to ``stop`` letterboxed, the whole of each."""
         return _stacked(
             [
                 _placed(frame, _fit_scale(frame.image), np.zeros(2))
-                for frame in self.frames[start:stop]
+                for frame in self._whole[start:stop]
             ]
         )
 
     def _distorted(self, rng: np.random.Generator) -> FrameSample:
         frame = self.frames[int(rng.integers(len(self.frames)))]
-        scale = _fit_scale(frame.image) * float(np.exp(np.clip(rng.normal(-0.05, 0.3), -1.0, 0.6)))
+        scale = frame.scale * float(np.exp(np.clip(rng.normal(-0.05, 0.3), -1.0, 0.6)))
         size = np.array([WIDTH, HEIGHT]) / scale
         slack = np.abs(size - frame.image.shape[1::-1])
         sample = _placed(
@@ -89,6 +105,13 @@ class DetectorData:
 
 def _fit_scale(image: NDArray[np.uint8]) -> float:
     return min(WIDTH / image.shape[1], HEIGHT / image.shape[0])
+
+
+def _scale_in_use(image: NDArray[np.uint8], focal_px: float) -> float:
+    height, width = image.shape[:2]
+    camera = Camera(width, height, focal_px, focal_px, 0.5 * width, 0.5 * height)
+    input_height, input_width = detector_input_size(camera)
+    return min(input_width / width, input_height / height)
 
 
 def _placed(

@@ -24,7 +24,7 @@ def train_detector(recipe: Recipe, shards: Path, held_out: Path, folder: Path) -
     """Train the detector on the shards; figures on held-out people go to the log."""
     torch.manual_seed(recipe.seed + 2)
     data, check = DetectorData(shards, recipe.seed), DetectorData(held_out, recipe.seed)
-    print(f"{len(data.frames)} pictures to learn from, {len(check.frames)} to check", flush=True)
+    print(f"{len(data.frames)} pictures to learn from, {check.stills} to check", flush=True)
     return fit(
         "detector",
         DetectorNet(),
@@ -135,8 +135,8 @@ def judge_detector(net: nn.Module, data: DetectorData, step: int = 16) -> dict[s
     device = next(net.parameters()).device
     scores, hits, wanted = [], [], 0
     with torch.no_grad():
-        for start in range(0, len(data.frames), step):
-            batch = data.still(start, min(start + step, len(data.frames)))
+        for start in range(0, data.stills, step):
+            batch = data.still(start, min(start + step, data.stills))
             logits, boxes = (p.cpu() for p in net(normalised(batch["image"]).to(device)))
             for row in range(len(logits)):
                 found, confidence = suppressed(boxes[row], logits[row].sigmoid())
@@ -165,7 +165,7 @@ def judge_detector(net: nn.Module, data: DetectorData, step: int = 16) -> dict[s
     return {
         "ap50": ap,
         "recall_at_0.3": float(hit[at].sum() / max(wanted, 1)),
-        "false_at_0.3": float((1.0 - hit[at]).sum() / max(len(data.frames), 1)),
+        "false_at_0.3": float((1.0 - hit[at]).sum() / max(data.stills, 1)),
     }
 
 

@@ -27,7 +27,7 @@ class Recipe:
     """
 
     seed: int = 0
-    crowd: int = 36
+    crowd: int = 40
     scenes: int = 110
     frames: int = 28
     person_patches: int = 70

@@ -32,6 +32,13 @@ from ._samples import HEAD_SIDE_M, Frame, Patch, PersonTruth
 
 _BODY: Final = 17
 _SIZES: Final = ((640, 480), (640, 480), (640, 480), (848, 480), (800, 600))
+_FIELDS_DEG: Final = (55.0, 72.0)
+# Robots also look about with wide lenses, which stretch whatever stands at the side.
+_WIDE_SHARE: Final = 0.25
+_WIDE_SIZES: Final = ((640, 480), (800, 600), (960, 600))
+_WIDE_FIELDS_DEG: Final = (80.0, 122.0)
+# Share of whole pictures that show nobody.
+_EMPTY_SHARE: Final = 0.12
 _FEWEST_PIXELS: Final = 60
 #: Around a head, the disk in which its pixels are counted.
 _HEAD_RADIUS_M: Final = 0.08
@@ -78,14 +85,16 @@ def _make_shard(recipe: Recipe, workers: tuple[str, ...], folder: Path, scene: i
 
 def _config(recipe: Recipe, workers: tuple[str, ...], rng: np.random.Generator) -> RenderConfig:
     """A camera much like the one of the rendered sets, and now and then a little different."""
-    width, height = _SIZES[int(rng.integers(len(_SIZES)))]
+    wide = bool(rng.random() < _WIDE_SHARE)
+    sizes = _WIDE_SIZES if wide else _SIZES
+    width, height = sizes[int(rng.integers(len(sizes)))]
     return RenderConfig(
         frames=10_000_000,
         scenes=recipe.scenes,
         people=4,
         width_px=width,
         height_px=height,
-        horizontal_fov_deg=float(rng.uniform(55.0, 72.0)),
+        horizontal_fov_deg=float(rng.uniform(*(_WIDE_FIELDS_DEG if wide else _FIELDS_DEG))),
         min_range_m=1.0,
         max_range_m=8.5,
         seed=recipe.seed + 1_000_003,
@@ -98,6 +107,8 @@ def _config(recipe: Recipe, workers: tuple[str, ...], rng: np.random.Generator) 
 def _frame(hall: RenderScene, rng: np.random.Generator) -> Frame:
     camera = hall.camera
     T_odom_camera = hall.arrange(rng)
+    if rng.random() < _EMPTY_SHARE:
+        hall.clear()
     view = hall.renderer.render(camera, T_odom_camera)
     people = []
     for worker in hall.workers:

@@ -46,9 +46,12 @@ def random_person(number: int, seed: int = 0) -> Person:
     hair = str(rng.choice(_STYLES, p=_styles(woman)))
     top_colour = _colour(rng)
     vest = _HI_VIS[int(rng.integers(len(_HI_VIS)))] if rng.random() < 0.45 else None
-    changes = build(float(rng.uniform(-0.6, 1.0)), float(rng.uniform(0.0, 0.35)))
+    # As many thin as heavy: a crowd of heavy heads teaches that heads are near.
+    girth = float(np.clip(rng.normal(0.05, 0.45), -0.8, 1.1))
+    changes = build(girth, max(0.0, 0.35 * girth * float(rng.random())))
     for name in rng.choice(_FACES, size=3, replace=False):
-        changes[str(name)] = float(rng.uniform(0.0, 0.6))
+        change = changes.get(str(name), 0.0) + float(rng.uniform(-0.5, 0.6))
+        changes[str(name)] = min(max(change, -1.0), 1.0)
     return Person(
         f"random{number:03d}",
         f"{'woman' if woman else 'man'} number {number} of a random crowd",
