@@ -57,7 +57,10 @@ class PixelEyes:
         pipeline: AwarenessPipeline | None = None,
     ) -> None:
         self._stage = stage
-        self._pipeline = AwarenessPipeline(camera, cone=cone) if pipeline is None else pipeline
+        if pipeline is None:
+            # Workers in a crossing turn their heads; their eyes follow.
+            pipeline = AwarenessPipeline(camera, cone=cone, eye_in_head_std_rad=0.0)
+        self._pipeline = pipeline
         theirs = self._pipeline.camera
         # The renderer draws without distortion, whatever the pipeline believes.
         if (theirs.width_px, theirs.height_px) != (camera.width_px, camera.height_px) or not (
