@@ -155,11 +155,12 @@ def make_eyes(
 
     ``noise`` is of the keypoint camera; ``pipeline`` works on pixels, default the shipped networks.
     """
+    spec = stage.scenario.camera
     makers: dict[str, Callable[[], Eyes]] = {
         "truth": TrueEyes,
         "keypoints": lambda: KeypointEyes(stage, camera, cone, noise, rng),
         "pixels": lambda: PixelEyes(
-            stage, camera, cone, stage.scenario.camera.sensor, rng, pipeline
+            stage, camera, cone, spec.sensor, rng, pipeline, spec.scenery_divisor
         ),
     }
     if kind not in makers:

@@ -15,6 +15,7 @@ from perception.arrays import FloatArray
 from ._errors import SimError
 from ._stage import Stage, TrueView
 from .pictures._camera_timing import CameraTiming
+from .pictures._coarse_scenery import CoarseSceneryRenderer
 from .pictures._sensor import SensorConfig
 from .pictures._simulated_camera import SimulatedCamera
 
@@ -41,6 +42,8 @@ class PixelEyes:
         sensor: noise, exposure and blur.
         rng: of the sensor's noise.
         pipeline: None is an :class:`~perception.AwarenessPipeline` with the shipped networks.
+        scenery_divisor: pixels a side of a block of scenery that is rendered as one; people are
+            rendered as finely as they need.
 
     Raises:
         PerceptionError: when the shipped networks cannot be loaded.
@@ -55,6 +58,7 @@ class PixelEyes:
         sensor: SensorConfig,
         rng: np.random.Generator,
         pipeline: AwarenessPipeline | None = None,
+        scenery_divisor: int = 1,
     ) -> None:
         self._stage = stage
         if pipeline is None:
@@ -71,7 +75,13 @@ class PixelEyes:
                 f"{camera.height_px} px, focal length {camera.fx_px:.1f} px, no distortion), got "
                 f"{theirs.width_px} x {theirs.height_px} px, {theirs.fx_px:.1f} px"
             )
-        self._camera = SimulatedCamera(stage.warehouse, camera, sensor=sensor, rng=rng)
+        self._camera = SimulatedCamera(
+            stage.warehouse,
+            camera,
+            sensor=sensor,
+            rng=rng,
+            renderer=CoarseSceneryRenderer(stage.warehouse, scenery_divisor),
+        )
 
     def observe(
         self, stamp_s: float, T_odom_camera: FloatArray, truth: tuple[TrueView, ...]

@@ -8,7 +8,7 @@ from importlib import resources
 from typing import Annotated, Any, ClassVar
 
 import yaml
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, model_validator
 
 from perception import Camera
 from tracking.config import StrictConfig
@@ -41,10 +41,26 @@ class CameraSpec(StrictConfig):
     #: Share of these pixels a side that the pictures of ``perception="pixels"`` have: half as many
     #: are rendered four times as fast.
     picture_scale: float = Field(default=1.0, gt=0.0, le=1.0)
+    #: Those pictures have one sample of scenery in a block of so many pixels a side; people have as
+    #: many samples as they need.
+    scenery_divisor: int = Field(default=1, ge=1, le=8)
     #: Exposure, noise and blur of rendered pictures; the default adds none.
     sensor: SensorConfig = SensorConfig()
     #: Frame rate, losses and delays; the default is a frame every control cycle, at once.
     timing: CameraTiming = CameraTiming()
+
+    @model_validator(mode="after")
+    def _blocks_fill_the_picture(self) -> CameraSpec:
+        size = (
+            round(self.width_px * self.picture_scale),
+            round(self.height_px * self.picture_scale),
+        )
+        if any(length % self.scenery_divisor for length in size):
+            raise ValueError(
+                f"scenery_divisor must divide the width and height of the pictures, {size[0]} and "
+                f"{size[1]} px, got {self.scenery_divisor}"
+            )
+        return self
 
     def camera(self, scale: float = 1.0) -> Camera:
         """The camera model, or one of the same view with ``scale`` times the pixels a side."""

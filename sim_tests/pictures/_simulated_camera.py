@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 import cv2
 import numpy as np
@@ -17,7 +17,7 @@ from .._errors import SimError
 from .._warehouse import Warehouse
 from ._camera_timing import CameraTiming, FrameClock, FrameQueue
 from ._motion_blur import motion_blur, motion_field
-from ._renderer import CameraRenderer
+from ._renderer import CameraRenderer, RenderedView
 from ._sensor import SensorConfig, expose
 
 # Two captures farther apart than this say nothing about how things move between them.
@@ -45,6 +45,14 @@ class CameraFrame:
     person_mask: NDArray[np.bool_]
 
 
+class PictureRenderer(Protocol):
+    """Renders what a camera sees."""
+
+    def render(self, camera: Camera, T_odom_camera: Any) -> RenderedView:
+        """The whole picture."""
+        ...
+
+
 class SimulatedCamera:
     """Takes frames of a warehouse and delivers them as late as a real camera would.
 
@@ -68,7 +76,7 @@ class SimulatedCamera:
         sensor: SensorConfig | None = None,
         timing: CameraTiming | None = None,
         rng: np.random.Generator | None = None,
-        renderer: CameraRenderer | None = None,
+        renderer: PictureRenderer | None = None,
     ) -> None:
         self._warehouse = warehouse
         self._camera = camera
@@ -80,7 +88,9 @@ class SimulatedCamera:
         # Noise and delays draw from generators of their own: one never changes the other.
         self._noise_rng, timing_rng = (rng or np.random.default_rng(0)).spawn(2)
         self._clock = FrameClock(timing, timing_rng)
-        self._renderer = CameraRenderer(warehouse) if renderer is None else renderer
+        self._renderer: PictureRenderer = (
+            CameraRenderer(warehouse) if renderer is None else renderer
+        )
         self._queue: FrameQueue[CameraFrame] = FrameQueue()
         self._last: tuple[float, FloatArray, dict[int, FloatArray]] | None = None
 
