@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from typing import Final
 
@@ -17,7 +16,7 @@ from .._pose_refinement import skew
 from .._protocols import ImageRgb
 from ..anthropometry import HEAD_TEMPLATE_M
 from ..arrays import FloatArray, finite_number
-from ._head_crop import crop_to_image, head_crop
+from ._head_crops import HeadCrops
 from ._head_layouts import HeadOutputs, read_outputs, read_rows, recognise, where_it_is
 from ._head_place import locate_heads
 from ._image import rgb_image
@@ -34,13 +33,6 @@ _MIN_LOG_STD: Final = 0.01
 _MAX_ROTATION_STD_RAD: Final = float(np.radians(100.0))
 _IDENTITY: Final = np.eye(3)
 _MOST_TURN: Final = _MAX_ROTATION_STD_RAD**2 * _IDENTITY
-_HALF_TURN: Final = np.array([-1.0, -1.0, 1.0])
-_TURNED: Final = np.diag(_HALF_TURN)
-# Points of a crop in units of its side: its middle, the head's centre unless it is known better,
-# and the middles of its right, lower, left and upper edge.
-_LOOKED_AT: Final = np.array(
-    [[0.5, 0.5], [0.5, 0.5], [1.0, 0.5], [0.5, 1.0], [0.0, 0.5], [0.5, 0.0]]
-)
 # What a network without keypoints leaves open of the head's centre, and of its distance when the
 # body's scale alone says it.
 _CENTRE_STD_M: Final = 0.04
@@ -116,11 +108,12 @@ class OnnxHeadPoseEstimator:
         if not rows:
             return tuple(poses)
         places = [place for place in (found[row] for row in rows) if place is not None]
-        centre_px = np.array([place[0] for place in places])
-        side_px = np.array([self.layout.crop_side_m * place[1] for place in places])
-        answers, centre_px, side_px = self._look(image, centre_px, side_px)
+        size_px = self.layout.crop_side_m * np.array([place[1] for place in places])
+        answers, crops = self._look(
+            image, HeadCrops.of_sizes(camera, np.array([place[0] for place in places]), size_px)
+        )
         outputs = read_outputs(self.layout, self.model, answers)
-        made = _poses(camera, outputs, centre_px, side_px, self.layout.crop_side_m)
+        made = _poses(outputs, crops, self.layout.crop_side_m)
         for index, row in enumerate(rows):
             if outputs.head is None or outputs.head[index] >= self._min_head:
                 poses[row] = made[index]
@@ -133,11 +126,9 @@ class OnnxHeadPoseEstimator:
         inside = -reach < u < shape[1] + reach and -reach < v < shape[0] + reach
         return bool(inside and side >= _MIN_SIDE_PX)
 
-    def _look(
-        self, image: ImageRgb, centre_px: FloatArray, side_px: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _look(self, image: ImageRgb, crops: HeadCrops) -> tuple[FloatArray, HeadCrops]:
         """What the network said in the last pass, with the crops that it belongs to."""
-        answers = self._run(image, centre_px, side_px)
+        answers = self._run(image, crops)
         for _ in range(self._passes - 1 if self.layout.own else 0):
             centre, side_m, head = where_it_is(answers)
             larger = side_m / self.layout.crop_side_m
@@ -146,19 +137,17 @@ class OnnxHeadPoseEstimator:
             again = (off & (head >= 0.5 * self._min_head)).nonzero()[0]
             if not len(again):
                 break
-            centre_px, side_px = centre_px.copy(), side_px.copy()
-            centre_px[again] = crop_to_image(centre[again], centre_px[again], side_px[again, None])
             # A wild answer must not end in a crop of the whole picture or of one pixel.
-            side_px[again] /= np.minimum(np.maximum(larger[again], 0.5), 2.0)
-            answers[again] = self._run(image, centre_px[again], side_px[again])
-        return answers, centre_px, side_px
+            factor = 1.0 / np.minimum(np.maximum(larger[again], 0.5), 2.0)
+            crops = crops.moved(again, centre[again], factor)
+            answers[again] = self._run(image, crops.only(again))
+        return answers, crops
 
-    def _run(self, image: ImageRgb, centre_px: FloatArray, side_px: FloatArray) -> FloatArray:
-        layout, size, count = self.layout, self.layout.size_px, len(centre_px)
+    def _run(self, image: ImageRgb, crops: HeadCrops) -> FloatArray:
+        layout, size, count = self.layout, self.layout.size_px, len(crops.side_px)
         blob = layout.pixels.blob(count, size, size)
         for row in range(count):
-            crop = head_crop(image, centre_px[row], float(side_px[row]), size)
-            layout.pixels.write(crop, blob[row])
+            layout.pixels.write(crops.cut(image, row, size), blob[row])
         blob = layout.pixels.fed(blob)
         name, step = self.model.inputs[0].name, layout.batch or count
         parts = []
@@ -180,45 +169,15 @@ class OnnxHeadPoseEstimator:
         return read_rows(layout, self.model, arrays)
 
 
-def ray_axes(rays: FloatArray) -> FloatArray:
-    """Rotations (N, 3, 3) from ray axes to the camera for rays (N, 2) given as x/z and y/z.
-
-    The smallest rotation that takes the camera's z axis onto the ray: its third column is the ray.
-    """
-    unit = np.ones((len(rays), 3))
-    unit[:, :2] = rays
-    unit /= np.sqrt((unit * unit).sum(axis=1))[:, None]
-    # A half turn about z, which leaves z where it is, then one about the bisector of z and ray.
-    unit[:, 2] += 1.0
-    bisector = unit[:, :, None]
-    return np.asarray(
-        bisector * (bisector.swapaxes(1, 2) * (_HALF_TURN / bisector[:, 2:])) - _TURNED
-    )
-
-
-def _poses(
-    camera: Camera,
-    outputs: HeadOutputs,
-    centre_px: FloatArray,
-    side_px: FloatArray,
-    crop_side_m: float,
-) -> list[HeadPose | None]:
+def _poses(outputs: HeadOutputs, crops: HeadCrops, crop_side_m: float) -> list[HeadPose | None]:
     """Head poses in the camera frame from what the network said of each crop.
 
-    The crop's side in metres and, through the lens, in radians gives the depth of the head's centre
-    C; the nose is C less the rotated arm from nose to C, whose turning couples the two halves of
-    the covariance.
+    The crop's side in metres and in radians, as seen along its ray, gives the distance of the
+    head's centre C; the nose is C less the rotated arm from nose to C, whose turning couples the
+    two halves of the covariance.
     """
-    count = len(centre_px)
-    at = np.empty((count, 6, 2))
-    at[:] = _LOOKED_AT
-    if outputs.centre is not None:
-        at[:, 1] = outputs.centre
-    looked = camera.normalise(
-        crop_to_image(at, centre_px[:, None], side_px[:, None, None]).reshape(-1, 2)
-    ).reshape(count, 6, 2)
-    across = looked[:, 2:4] - looked[:, 4:]
-    spread = 0.5 * np.sqrt((across * across).sum(axis=2)).sum(axis=1)
+    axes, side_px = crops.axes, crops.side_px
+    count = len(side_px)
     side_m = np.full(count, crop_side_m) if outputs.side_m is None else outputs.side_m
     log_std = (
         np.full(count, _BODY_LOG_STD)
@@ -230,12 +189,13 @@ def _poses(
         if outputs.keypoints_std is None
         else outputs.keypoints_std.sum(axis=1) * (side_m / 5.0)
     )
-    axes = ray_axes(looked[:, 0])
     rotation = axes @ outputs.rotation_ray_head
     turn = outputs.covariance_ray + _MIN_ROTATION_STD_RAD**2 * _IDENTITY
-    centre = np.ones((count, 3))
-    centre[:, :2] = looked[:, 1]
-    centre *= (side_m / spread)[:, None]
+    tangent = side_px / crops.focal_px
+    along_ray = np.ones((count, 3))
+    along_ray[:, :2] = 0.0 if outputs.centre is None else (outputs.centre - 0.5) * tangent[:, None]
+    along_ray *= (side_m / tangent)[:, None]
+    centre = (axes @ along_ray[:, :, None])[:, :, 0]
     arm = rotation @ HEAD_CENTRE_HEAD_M
     nose = centre - arm
     # Turning moves rotation and nose together; distance and place in the crop move the nose alone.
@@ -248,7 +208,7 @@ def _poses(
         along[:, :, None] * along[:, None] + (across_m**2)[:, None, None] * _IDENTITY
     )
     covariance = 0.5 * (covariance + covariance.swapaxes(1, 2))
-    error_px = _reprojection(camera, outputs, centre_px, side_px, rotation, nose).tolist()
+    error_px = _reprojection(outputs, crops, rotation, nose).tolist()
     return [
         HeadPose(
             nose[row],
@@ -258,7 +218,7 @@ def _poses(
             face_seen=_face_seen(outputs, row),
             range_relative_std=None if outputs.side_m is None else float(log_std[row]),
         )
-        if math.isfinite(spread[row]) and _is_usable(turn[row])
+        if _is_usable(turn[row])
         else None
         for row in range(count)
     ]
@@ -286,22 +246,22 @@ def _face_seen(outputs: HeadOutputs, row: int) -> float | None:
 
 
 def _reprojection(
-    camera: Camera,
-    outputs: HeadOutputs,
-    centre_px: FloatArray,
-    side_px: FloatArray,
-    rotation: FloatArray,
-    nose: FloatArray,
+    outputs: HeadOutputs, crops: HeadCrops, rotation: FloatArray, nose: FloatArray
 ) -> FloatArray:
-    """(N,) root mean square distance of the visible keypoints from the template's, in pixels."""
-    count = len(centre_px)
+    """(N,) root mean square distance of the visible keypoints from the template's.
+
+    In pixels of the camera turned to each head, as which the crop shows it.
+    """
+    count = len(nose)
     if outputs.keypoints is None or outputs.visible is None:
         return np.zeros(count)
     points = HEAD_TEMPLATE_M @ rotation.swapaxes(1, 2) + nose[:, None]
-    expected = camera.project(points.reshape(-1, 3)).reshape(count, 5, 2)
-    found = crop_to_image(outputs.keypoints, centre_px[:, None], side_px[:, None, None])
+    turned = points @ crops.axes
+    depth = turned[:, :, 2:]
     seen = outputs.visible >= 0.5
     # A template point behind the camera has no image, and no error.
-    seen &= points[:, :, 2] > 0.0
+    seen &= depth[:, :, 0] > 0.0
+    expected = crops.focal_px * turned[:, :, :2] / np.where(depth > 0.0, depth, 1.0)
+    found = (outputs.keypoints - 0.5) * crops.side_px[:, None, None]
     away = np.where(seen[:, :, None], expected - found, 0.0).reshape(count, 10)
     return np.asarray(np.sqrt((away * away).sum(axis=1) / np.maximum(seen.sum(axis=1), 1)))

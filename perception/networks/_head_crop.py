@@ -20,14 +20,19 @@ _MAX_OVERSAMPLING: Final = 8
 
 
 def head_crop(
-    image_rgb: NDArray[np.uint8], centre_px: ArrayLike, side_px: float, size: int = 64
+    image_rgb: NDArray[np.uint8],
+    centre_px: ArrayLike,
+    side_px: float,
+    size: int = 64,
+    stretch: FloatArray | None = None,
 ) -> NDArray[np.uint8]:
     """Cut a square out of an image and bring it to ``size`` × ``size`` pixels.
 
     Enlarging is bilinear. Shrinking averages over the area of each new pixel (bilinear samples at
     most a pixel apart, then OpenCV's ``INTER_AREA``), so that a near face does not alias. Nothing
     is rounded to whole pixels. The crop's corner lies at ``centre_px − side_px / 2``; column ``j``
-    of the result has its centre at ``(j + 0.5) / size`` of the side from there.
+    of the result has its centre at ``(j + 0.5) / size`` of the side from there. A stretch makes
+    the square a parallelogram of the image, by which a wide lens draws it.
 
     Args:
         image_rgb: (H, W, 3).
@@ -35,6 +40,7 @@ def head_crop(
             :meth:`perception.Camera.project` (pixel centres at whole numbers). It may lie outside.
         side_px: length of its side in pixels of the image, > 0.
         size: pixels along a side of the result.
+        stretch: (2, 2) from :func:`._ray_view.looking_at`; None is none.
 
     Returns:
         (size, size, 3), grey (:data:`OUTSIDE_GREY`) outside the image.
@@ -45,17 +51,21 @@ def head_crop(
     u, v = finite_array("centre_px", centre_px, (2,)).tolist()
     side = finite_number("side_px", side_px, minimum=0.0, exclusive_minimum=True)
     height, width = image_rgb.shape[:2]
-    reach = 0.5 * side + 1.0
-    if not (-reach < u < width + reach and -reach < v < height + reach):
+    xx, xy, yx, yy = (1.0, 0.0, 0.0, 1.0) if stretch is None else stretch.ravel().tolist()
+    wide, high = side * (abs(xx) + abs(xy)), side * (abs(yx) + abs(yy))
+    if not (u + 0.5 * wide > -1.0 and u - 0.5 * wide < width + 1.0) or not (
+        v + 0.5 * high > -1.0 and v - 0.5 * high < height + 1.0
+    ):
         return np.full((size, size, 3), OUTSIDE_GREY, np.uint8)
-    oversampling = min(max(math.ceil(side / size), 1), _MAX_OVERSAMPLING)
+    oversampling = min(max(math.ceil(max(wide, high) / size - 1e-9), 1), _MAX_OVERSAMPLING)
     fine = size * oversampling
     step = side / fine
-    # Column j of the fine grid lies at corner + (j + ½) · step.
+    # Column j of the fine grid lies at (j + ½) · step from the crop's corner.
+    first = 0.5 * (step - side)
     grid_to_image = np.array(
         [
-            [step, 0.0, u - 0.5 * side + 0.5 * step],
-            [0.0, step, v - 0.5 * side + 0.5 * step],
+            [step * xx, step * xy, u + first * (xx + xy)],
+            [step * yx, step * yy, v + first * (yx + yy)],
         ]
     )
     crop = cv2.warpAffine(
@@ -72,14 +82,16 @@ def head_crop(
 
 
 def crop_to_image(
-    points: FloatArray, centre_px: FloatArray, side_px: float | FloatArray
+    points: FloatArray,
+    centre_px: FloatArray,
+    side_px: float | FloatArray,
+    stretch: FloatArray | None = None,
 ) -> FloatArray:
-    """Map (…, 2) points in units of a crop's side, (0, 0) its top-left corner, to pixels."""
-    return np.asarray(centre_px + (points - 0.5) * side_px, dtype=np.float64)
+    """Map (…, 2) points in units of a crop's side, (0, 0) its top-left corner, to pixels.
 
-
-def image_to_crop(
-    points_px: FloatArray, centre_px: FloatArray, side_px: float | FloatArray
-) -> FloatArray:
-    """Map (…, 2) pixels to units of a crop's side, (0, 0) its top-left corner."""
-    return np.asarray((points_px - centre_px) / side_px + 0.5, dtype=np.float64)
+    ``stretch`` (…, 2, 2) is that of :func:`head_crop`.
+    """
+    across = (points - 0.5) * side_px
+    if stretch is not None:
+        across = (stretch @ across[..., None])[..., 0]
+    return np.asarray(centre_px + across, dtype=np.float64)

@@ -14,9 +14,10 @@ from scipy.spatial.transform import Rotation
 
 from perception import Camera, PerceptionError, PersonKeypoints
 from perception._head_pose import HEAD_CENTRE_HEAD_M
-from perception.networks._head import OnnxHeadPoseEstimator, ray_axes
-from perception.networks._head_crop import crop_to_image, head_crop, image_to_crop
+from perception.networks._head import OnnxHeadPoseEstimator
+from perception.networks._head_crop import crop_to_image, head_crop
 from perception.networks._head_layouts import _orthonormal
+from perception.networks._ray_view import focal_px, looking_at, ray_axes
 from perception.networks._session import OnnxModel
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
@@ -24,16 +25,21 @@ FACING_HEAD = np.stack([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]], ax
 
 
 def disc_image(camera, centre_camera_m):
-    """A white disc, square to the optical axis, with pixels at its rim as grey as they are full."""
+    """A white disc, square to its ray, with pixels at its rim as grey as they are full."""
     v, u = np.mgrid[: camera.height_px, : camera.width_px]
     rays = camera.normalise(np.column_stack([u.ravel(), v.ravel()]))
-    away = np.linalg.norm(centre_camera_m[2] * rays - centre_camera_m[:2], axis=1)
-    rim_px = (0.5 * DISC_M - away) * camera.fx_px / centre_camera_m[2]
+    (axes,) = ray_axes(centre_camera_m[None, :2] / centre_camera_m[2])
+    turned = np.column_stack([rays, np.ones(len(rays))]) @ axes
+    distance_m = np.linalg.norm(centre_camera_m)
+    ahead = np.maximum(turned[:, 2], 1e-3)
+    away = distance_m * np.hypot(turned[:, 0], turned[:, 1]) / ahead
+    rim_px = (0.5 * DISC_M - away) * camera.fx_px / distance_m
     grey = np.round(255.0 * np.clip(rim_px + 0.5, 0.0, 1.0)).astype(np.uint8)
     return np.repeat(grey.reshape(camera.height_px, camera.width_px, 1), 3, axis=2)
 
 
 def disc_at(centre_camera_m):
+    centre_camera_m = np.asarray(centre_camera_m)
     return disc_image(CAMERA, centre_camera_m), CAMERA.project([centre_camera_m])[0]
 
 
@@ -115,12 +121,52 @@ def test_one_pixel_is_an_image():
     assert (crop[4, 4] < 114).all()
 
 
-def test_crop_units_and_pixels_are_inverse():
-    points = np.random.default_rng(0).uniform(-1.0, 2.0, (7, 2))
-    there = crop_to_image(points, np.array([12.3, -4.0]), 33.0)
-    np.testing.assert_allclose(image_to_crop(there, np.array([12.3, -4.0]), 33.0), points)
+def test_crop_units_become_pixels():
     corner = crop_to_image(np.zeros(2), np.array([10.0, 20.0]), 8.0)
     np.testing.assert_allclose(corner, [6.0, 16.0])
+    stretched = crop_to_image(np.zeros(2), np.array([10.0, 20.0]), 8.0, np.diag([2.0, 0.5]))
+    np.testing.assert_allclose(stretched, [2.0, 18.0])
+
+
+BENT = Camera(960, 600, 340.0, 345.0, 470.0, 310.0, [-0.15, 0.02, 0.001, -0.001, 0.0])
+WIDE = Camera.from_fov(960, 600, math.radians(120.0))
+
+
+@pytest.mark.parametrize("camera", [WIDE, BENT], ids=["pinhole", "distorted"])
+@given(u=st.floats(20.0, 940.0), v=st.floats(20.0, 580.0), angle=st.floats(0.0, 6.28))
+@settings(max_examples=40, deadline=None)
+def test_the_stretch_is_how_the_lens_draws_what_lies_around_a_ray(camera, u, v, angle):
+    axes, stretch = looking_at(camera, np.array([[u, v]]))
+    step = 0.02 * np.array([math.cos(angle), math.sin(angle)])
+    both = np.array([[*step, 1.0], [*-step, 1.0]]) @ axes[0].T
+    ahead, behind = camera.project(both)
+    drawn = stretch[0] @ (2.0 * step) * focal_px(camera)
+    np.testing.assert_allclose(ahead - behind, drawn, atol=0.02 * np.linalg.norm(drawn))
+
+
+@pytest.mark.parametrize("pixel", [(480.0, 300.0), (860.0, 180.0), (60.0, 420.0)])
+def test_a_crop_looks_as_if_the_camera_had_been_turned_to_the_head(pixel):
+    """A pattern on the directions around a ray: the same crop wherever the ray hits the picture."""
+    (axes,), (stretch,) = looking_at(WIDE, np.array([pixel]))
+    v, u = np.mgrid[0:600, 0:960]
+    rays = WIDE.normalise(np.stack([u.ravel(), v.ravel()], axis=1))
+    turned = np.column_stack([rays, np.ones(len(rays))]) @ axes
+    a, b = (turned[:, :2] / turned[:, 2:]).T * focal_px(WIDE)
+
+    def pattern(across, down):
+        return 127.0 + 60.0 * np.sin(across / 7.0) + 50.0 * np.cos(down / 5.0)
+
+    shown = np.where(turned[:, 2] > 0.0, pattern(a, b), 0.0).reshape(600, 960)
+    image = np.repeat(np.clip(np.rint(shown), 0, 255).astype(np.uint8)[..., None], 3, axis=2)
+    side = 24.0
+    crop = head_crop(image, pixel, side, 64, stretch)[..., 0].astype(float)
+    steps = ((np.arange(64) + 0.5) / 64 - 0.5) * side
+    expected = pattern(steps[None, :], steps[:, None])
+    # What bends within the crop is left of the lens: some tenths of a pixel at its corners.
+    assert np.abs(crop - expected).mean() < 4.0
+    plain = head_crop(image, pixel, side, 64)[..., 0].astype(float)
+    off_axis = math.hypot(pixel[0] - 480.0, pixel[1] - 300.0) > 100.0
+    assert (np.abs(plain - expected).mean() > 15.0) == off_axis
 
 
 # --- geometry -----------------------------------------------------------------------------------
@@ -157,6 +203,23 @@ def test_position_and_rotation_come_back_to_the_camera(centre_m, misplaced):
     assert head.range_relative_std == pytest.approx(0.05)
     a, b, c = 0.95, 0.9, 0.9
     assert head.face_seen == pytest.approx(a * b + a * c + b * c - 2 * a * b * c, abs=1e-6)
+
+
+@pytest.mark.parametrize("azimuth_deg", [-48.0, 35.0, 50.0])
+def test_at_the_side_of_a_wide_lens_a_head_is_as_large_as_in_its_middle(azimuth_deg):
+    azimuth = math.radians(azimuth_deg)
+    truth = 2.0 * np.array([math.sin(azimuth), -0.12, math.cos(azimuth)])
+    rotation = FACING_HEAD @ Rotation.from_euler("x", 0.4).as_matrix()
+    estimator = OnnxHeadPoseEstimator(disc_network(rotation), passes=3)
+    pixel = WIDE.project([truth])[0]
+    person = person_about(pixel, WIDE.fx_px / truth[2])
+    (head,) = estimator.estimate(disc_image(WIDE, truth), WIDE, (person,))
+    centre = head.position_camera_m + head.rotation_camera_head @ HEAD_CENTRE_HEAD_M
+    # What a wide lens bends within the crop itself is left.
+    assert np.linalg.norm(centre - truth) < 0.03 * np.linalg.norm(truth)
+    expected = ray_axes(WIDE.normalise([pixel]))[0] @ rotation
+    turn = Rotation.from_matrix(head.rotation_camera_head @ expected.T).magnitude()
+    assert turn < math.radians(0.7)
 
 
 def test_distorted_lenses_give_the_same_place():

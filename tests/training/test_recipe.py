@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 
+from perception import Camera
 from perception.networks._head_crop import head_crop
+from perception.networks._ray_view import looking_at
 from sim_tests.hall._layout import LAYOUTS
 from sim_tests.sets._render_config import RenderConfig
 from training.networks._augment import similarity, warp, with_surroundings
+from training.networks._head_sample import HeadSample, cropped
 from training.networks._recipe import Recipe
 from training.workers._people import PEOPLE
 from training.workers._random import random_person
@@ -59,6 +63,32 @@ def test_the_head_crop_of_training_is_the_head_crop_of_use(side):
     # OpenCV rounds coordinates to 1/32 pixel, the two ways round differently.
     assert np.abs(theirs.astype(int) - ours.astype(int)).mean() < 3.0
     assert np.corrcoef(theirs.ravel(), ours.ravel())[0, 1] > 0.999
+
+
+def test_off_the_axis_of_a_wide_lens_too():
+    rng = np.random.default_rng(5)
+    image = cv2.GaussianBlur(rng.integers(0, 256, (240, 320, 3), np.uint8), (0, 0), 1.5)
+    camera = Camera.from_fov(320, 240, np.radians(110.0))
+    centre = np.array([262.3, 71.8])
+    head = HeadSample(
+        image=image,
+        centre=centre + 0.5,
+        side_px=45.0,
+        keypoints=np.tile(centre + 0.5, (5, 1)),
+        visible=np.ones(5, bool),
+        focal_px=camera.fx_px,
+        principal_point=np.array([camera.cx_px, camera.cy_px]) + 0.5,
+        rotation_camera_head=np.eye(3),
+        seen=1.0,
+    )
+    sample = cropped(head, np.zeros(2), 1.0, 0.0, flip=False)
+    (axes,), (stretch,) = looking_at(camera, centre[None])
+    ours = head_crop(image, centre, 45.0, 64, stretch)
+    assert np.abs(sample["image"].astype(int) - ours.astype(int)).mean() < 3.0
+    np.testing.assert_allclose(sample["rotation"], axes.T, atol=1e-9)
+    np.testing.assert_allclose(sample["keypoints"], 0.5, atol=1e-9)
+    moved = cropped(head, np.array([0.1, 0.0]), 1.0, 0.0, flip=False)
+    assert moved["centre"][0] == pytest.approx(0.4, abs=0.02)
 
 
 def test_surroundings_are_grey_beyond_the_picture_and_repeated_within():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -11,50 +10,20 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from ._augment import covered, degraded, inside_of, similarity, warp, with_surroundings
+from perception.networks._ray_view import ray_axes, ray_stretch
+
+from ._augment import covered, degraded, inside_of, warp, with_surroundings
 from ._fit import Batch
+from ._head_sample import LEAST_SEEN, SIZE, HeadSample, cropped
 from ._samples import HEAD_SIDE_M, Frame, Patch, PersonTruth, picture, read_shards
 
-_SIZE: Final = 64
-_SWAP: Final = [0, 2, 1, 4, 3]
-_MIRROR: Final = np.diag([-1.0, 1.0, 1.0])
-# Mirroring a head swaps its right (z) with its left.
-_MIRROR_HEAD: Final = np.diag([1.0, 1.0, -1.0])
 #: So much of a crop's side around the head is kept of a picture.
 _REACH: Final = 0.95
 _NEGATIVES: Final = 0.05
 #: Share of the training after which crops are distorted less.
 LATE: Final = 0.75
-#: A crop of which less than this is the head shows none.
-_LEAST_SEEN: Final = 0.35
 _FEWEST_PX: Final = 10.0
 _SMALLEST_PX: Final = 18.0
-
-
-@dataclass
-class HeadSample:
-    """A head at the camera's own resolution. Pixels from the corner of ``image``."""
-
-    image: NDArray[np.uint8]
-    centre: NDArray[np.float64]
-    side_px: float
-    keypoints: NDArray[np.float64]
-    visible: NDArray[np.bool_]
-    rotation_ray_head: NDArray[np.float64]
-    focal_px: float
-    principal_point: NDArray[np.float64]
-    rotation_camera_head: NDArray[np.float64]
-    seen: float
-
-
-def ray_from_camera(ray: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(3, 3) the smallest rotation that takes a direction (3,) to the optical axis z."""
-    x, y, z = ray / np.linalg.norm(ray)
-    # Rodrigues for the axis (y, −x, 0) that is perpendicular to the ray and to z.
-    k = 1.0 / (1.0 + z)
-    return np.array(
-        [[1.0 - k * x * x, -k * x * y, -x], [-k * x * y, 1.0 - k * y * y, -y], [x, y, z]]
-    )
 
 
 class HeadData:
@@ -89,7 +58,7 @@ class HeadData:
         rng = np.random.default_rng([self._seed, 23, start])
         return _stacked(
             [
-                _crop(
+                cropped(
                     head, rng.normal(0, jitter, 2), np.exp(rng.normal(0, spread)), 0.0, flip=False
                 )
                 for head in self.heads[start:stop]
@@ -109,7 +78,7 @@ class HeadData:
         if rng.random() < 0.3 * strength:
             low = min(_SMALLEST_PX, head.side_px)
             coarse = int(np.exp(rng.uniform(np.log(low), np.log(max(head.side_px, low + 1.0)))))
-        sample = _crop(head, shift, enlarged, angle, flip=bool(rng.random() < 0.5), coarse=coarse)
+        sample = cropped(head, shift, enlarged, angle, flip=bool(rng.random() < 0.5), coarse=coarse)
         if rng.random() < 0.16 * strength:
             other = self.others[int(rng.integers(len(self.others)))]
             _hide(sample, rng, other)
@@ -119,7 +88,7 @@ class HeadData:
     def _nobody(self, rng: np.random.Generator) -> dict[str, Any]:
         other = self.others[int(rng.integers(len(self.others)))]
         height, width = other.shape[:2]
-        image = warp(other, np.array([[64 / width, 0, 0], [0, 64 / height, 0.0]]), (_SIZE, _SIZE))
+        image = warp(other, np.array([[64 / width, 0, 0], [0, 64 / height, 0.0]]), (SIZE, SIZE))
         if rng.random() < 0.5:
             image = np.ascontiguousarray(image[:, ::-1])
         return {
@@ -157,13 +126,14 @@ def _sample(
     x, y, z = person.head_centre_camera_m.tolist()
     # Continuous coordinates: half a pixel more than those of pixel centres.
     centre = np.array([focal * x / z + cx + 0.5, focal * y / z + cy + 0.5])
-    side = HEAD_SIDE_M * focal / z
+    side = HEAD_SIDE_M * focal / float(np.sqrt(x * x + y * y + z * z))
     if side < _FEWEST_PX or person.head_seen < 0.05:
         return None
-    reach = int(np.ceil(_REACH * side))
+    stretch = ray_stretch(ray_axes(np.array([[x / z, y / z]])))[0]
+    reach = np.ceil(_REACH * side * np.abs(stretch).sum(axis=1)).astype(int)
     low = np.floor(centre).astype(int) - reach
     high = low + 2 * reach
-    # What the patch has of that square, and what lies beside it.
+    # What the patch has of that rectangle, and what lies beside it.
     height, width = image.shape[:2]
     left, top = np.maximum(low - origin, 0).tolist()
     right, bottom = np.minimum(high - origin, [width, height]).tolist()
@@ -179,7 +149,6 @@ def _sample(
         side_px=float(side),
         keypoints=person.keypoints_px[:5] + 0.5 - corner,
         visible=person.visible[:5],
-        rotation_ray_head=np.eye(3),
         focal_px=focal,
         principal_point=np.array([cx, cy]) + 0.5 - corner,
         rotation_camera_head=person.rotation_camera_head.astype(np.float64),
@@ -187,60 +156,17 @@ def _sample(
     )
 
 
-def _crop(
-    head: HeadSample,
-    shift: NDArray[np.float64],
-    enlarged: float,
-    angle: float,
-    *,
-    flip: bool,
-    coarse: int | None = None,
-) -> dict[str, Any]:
-    """A crop about the head, off by ``shift`` of its side, with everything turned along."""
-    side = head.side_px * enlarged
-    middle = head.centre + shift * side
-    matrix = similarity(middle, _SIZE / side, angle, (_SIZE, _SIZE), flip=flip)
-    if coarse is None:
-        image = warp(head.image, matrix, (_SIZE, _SIZE), int(np.clip(np.ceil(side / _SIZE), 1, 8)))
-    else:
-        # As from farther away: few pixels first, then enlarged.
-        small = max(8, round(coarse * enlarged))
-        step = int(np.clip(np.ceil(side / small), 1, 8))
-        image = warp(head.image, matrix * small / _SIZE, (small, small), step)
-        grow = np.array([[_SIZE / small, 0.0, 0.0], [0.0, _SIZE / small, 0.0]])
-        image = warp(image, grow, (_SIZE, _SIZE))
-    ray = np.append((middle - head.principal_point) / head.focal_px, 1.0)
-    rotation = ray_from_camera(ray) @ head.rotation_camera_head
-    c, s = np.cos(angle), np.sin(angle)
-    rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ rotation
-    keypoints = (head.keypoints @ matrix[:, :2].T + matrix[:, 2]) / _SIZE
-    visible = head.visible
-    if flip:
-        rotation = _MIRROR @ rotation @ _MIRROR_HEAD
-        keypoints, visible = keypoints[_SWAP], visible[_SWAP]
-    return {
-        "image": image,
-        "rotation": rotation,
-        "keypoints": keypoints,
-        "visible": visible & inside_of(keypoints, np.array([0.0, 0.0, 1.0, 1.0])),
-        "centre": (matrix[:, :2] @ head.centre + matrix[:, 2]) / _SIZE,
-        "log_side": np.log(enlarged),
-        "head": float(head.seen > _LEAST_SEEN),
-        "weight": float(head.seen > 0.5 * _LEAST_SEEN),
-    }
-
-
 def _hide(sample: dict[str, Any], rng: np.random.Generator, other: NDArray[np.uint8]) -> None:
     """Put something before the head."""
     sample["image"], box = covered(sample["image"], rng, other)
-    box = box / _SIZE
+    box = box / SIZE
     sample["visible"] = sample["visible"] & ~inside_of(sample["keypoints"], box)
     v, u = np.mgrid[-1:1:9j, -1:1:9j].reshape(2, -1)
     disk = np.stack([u, v], axis=1)[u**2 + v**2 <= 1.0]
     # The disk of the head's size, as in the shards.
     points = sample["centre"] + disk * 0.2 * np.exp(-sample["log_side"])
     hidden = inside_of(points, box).mean()
-    if hidden > 1.0 - _LEAST_SEEN:
+    if hidden > 1.0 - LEAST_SEEN:
         sample["head"] = 0.0
     if hidden > 0.8:
         sample["weight"] = 0.0

@@ -22,6 +22,7 @@ from tqdm import tqdm
 from perception._head_pose import HEAD_CENTRE_HEAD_M
 from perception.anthropometry import HEAD_TEMPLATE_M
 from perception.layouts import LEFT_HIP, RIGHT_HIP
+from perception.networks._ray_view import ray_axes
 from sim_tests._sight import keypoints_in_front
 from sim_tests.people._worker import Worker
 from sim_tests.sets._render_config import RenderConfig
@@ -40,6 +41,7 @@ _WIDE_FIELDS_DEG: Final = (80.0, 122.0)
 # Share of whole pictures that show nobody.
 _EMPTY_SHARE: Final = 0.12
 _FEWEST_PIXELS: Final = 60
+_SQUARE: Final = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [-1.0, 1.0, 0.0], [1.0, 1.0, 0.0]])
 #: Around a head, the disk in which its pixels are counted.
 _HEAD_RADIUS_M: Final = 0.08
 
@@ -160,10 +162,13 @@ def _rectangle(camera: Any, T_odom_camera: Any, worker: Worker, *, whole: bool) 
         low, high = np.nanmin(pixels, axis=0), np.nanmax(pixels, axis=0)
         pad = 0.30 * (high - low) + 0.10 * (high - low).max()
         return np.concatenate([low - pad, high + pad])
+    # A square across the ray, which a wide lens draws larger than one across the axis.
     centre = _head_centre(T_odom_camera, worker)
-    half = 0.80 * HEAD_SIDE_M * camera.fx_px / centre[2]
-    pixel = camera.project(centre[None])[0]
-    return np.concatenate([pixel - half, pixel + half])
+    (axes,) = ray_axes(centre[None, :2] / centre[2])
+    corners = centre + 0.80 * HEAD_SIDE_M * (_SQUARE @ axes.T)
+    corners[:, 2] = np.maximum(corners[:, 2], 0.1)
+    pixels = camera.project(corners)
+    return np.concatenate([pixels.min(axis=0), pixels.max(axis=0)])
 
 
 def _truth(

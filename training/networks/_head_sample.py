@@ -1,0 +1,94 @@
+"""One head to learn from, and crops about it: as use cuts them, or off the mark."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perception.networks._ray_view import ray_axes, ray_stretch
+
+from ._augment import inside_of, similarity, warp
+
+SIZE: Final = 64
+_SWAP: Final = [0, 2, 1, 4, 3]
+_MIRROR: Final = np.diag([-1.0, 1.0, 1.0])
+# Mirroring a head swaps its right (z) with its left.
+_MIRROR_HEAD: Final = np.diag([1.0, 1.0, -1.0])
+#: A crop of which less than this is the head shows none.
+LEAST_SEEN: Final = 0.35
+
+
+@dataclass
+class HeadSample:
+    """A head at the camera's own resolution. Pixels from the corner of ``image``.
+
+    ``side_px`` is what a crop's side measures for the camera turned to the head.
+    """
+
+    image: NDArray[np.uint8]
+    centre: NDArray[np.float64]
+    side_px: float
+    keypoints: NDArray[np.float64]
+    visible: NDArray[np.bool_]
+    focal_px: float
+    principal_point: NDArray[np.float64]
+    rotation_camera_head: NDArray[np.float64]
+    seen: float
+
+
+def cropped(
+    head: HeadSample,
+    shift: NDArray[np.float64],
+    enlarged: float,
+    angle: float,
+    *,
+    flip: bool,
+    coarse: int | None = None,
+) -> dict[str, Any]:
+    """A crop about the head, off by ``shift`` of its side, with everything turned along."""
+    side = head.side_px * enlarged
+    middle = head.centre + _looking_at(head, head.centre)[1] @ (shift * side)
+    axes, stretch = _looking_at(head, middle)
+    # As head_crop cuts it: a square of the camera that is turned to the middle.
+    turn = similarity(np.zeros(2), SIZE / side, angle, (SIZE, SIZE), flip=flip)
+    linear = turn[:, :2] @ np.linalg.inv(stretch)
+    matrix = np.column_stack([linear, turn[:, 2] - linear @ middle])
+    drawn = side * np.abs(stretch).sum(axis=1).max()
+    if coarse is None:
+        image = warp(head.image, matrix, (SIZE, SIZE), int(np.clip(np.ceil(drawn / SIZE), 1, 8)))
+    else:
+        # As from farther away: few pixels first, then enlarged.
+        small = max(8, round(coarse * enlarged))
+        step = int(np.clip(np.ceil(drawn / small), 1, 8))
+        image = warp(head.image, matrix * small / SIZE, (small, small), step)
+        grow = np.array([[SIZE / small, 0.0, 0.0], [0.0, SIZE / small, 0.0]])
+        image = warp(image, grow, (SIZE, SIZE))
+    rotation = axes.T @ head.rotation_camera_head
+    c, s = np.cos(angle), np.sin(angle)
+    rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ rotation
+    keypoints = (head.keypoints @ matrix[:, :2].T + matrix[:, 2]) / SIZE
+    visible = head.visible
+    if flip:
+        rotation = _MIRROR @ rotation @ _MIRROR_HEAD
+        keypoints, visible = keypoints[_SWAP], visible[_SWAP]
+    return {
+        "image": image,
+        "rotation": rotation,
+        "keypoints": keypoints,
+        "visible": visible & inside_of(keypoints, np.array([0.0, 0.0, 1.0, 1.0])),
+        "centre": (matrix[:, :2] @ head.centre + matrix[:, 2]) / SIZE,
+        "log_side": np.log(enlarged),
+        "head": float(head.seen > LEAST_SEEN),
+        "weight": float(head.seen > 0.5 * LEAST_SEEN),
+    }
+
+
+def _looking_at(
+    head: HeadSample, point: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Ray axes (3, 3) of a point of the picture and how the lens draws what lies around it."""
+    axes = ray_axes((point - head.principal_point)[None] / head.focal_px)
+    return axes[0], ray_stretch(axes)[0]
