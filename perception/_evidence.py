@@ -11,6 +11,7 @@ import numpy as np
 from ._camera import Camera
 from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
+from .anthropometry import HEAD_TEMPLATE_M
 
 # Ear to ear.
 _FACE_WIDTH_M: Final = 0.156
@@ -26,6 +27,8 @@ _ERROR_SCALE: Final = 0.15
 # Without any evidence either way a face is as likely seen as not.
 _UNKNOWN: Final = 0.5
 _LOWEST_SCORE: Final = 0.05
+# How far a lens's distortion may move the picture's edge, generously.
+_BENT_PX: Final = 200.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,8 +56,9 @@ def judge_face(
     one and a half); a pose model whose scores say nothing about it (``face_evidence`` False) leaves
     it open. That nose, eyes and ears lie where such a head has them: a root mean square distance of
     more than 15 % of the face's width speaks against it. And that there are pixels enough: below
-    twelve pixels of width the gaze is hardly known, below five not at all. Where no keypoint of
-    the head is seen and the estimator does not vouch for the face either, there is no evidence.
+    twelve pixels of width the gaze is hardly known, below five not at all. A nose or an eye beyond
+    the picture's edge is not hidden; whether it would be seen stays open. Where no keypoint of the
+    head is seen and the estimator does not vouch for the face either, there is no evidence.
 
     Args:
         camera: that saw the person.
@@ -66,14 +70,16 @@ def judge_face(
     width_px = _FACE_WIDTH_M * math.sqrt(camera.fx_px * camera.fy_px) / depth
     if width_px < _SMALLEST_FACE_PX or head.position_camera_m[2] <= 0.0:
         return None
+    beyond = _beyond_the_edge(camera, head, width_px)
     if head.face_seen is not None:
-        seen = head.face_seen
+        seen = max(head.face_seen, _UNKNOWN) if sum(beyond) > 1 else head.face_seen
     elif not (person.scores[:5] >= min_score).any():
         return None
     elif person.face_evidence:
         scale = max(min_score, _LOWEST_SCORE)
         shown = np.clip((person.scores[:3] - 0.5 * scale) / scale, 0.0, 1.0)
-        seen = float(np.sort(shown)[1])
+        open_or_shown = np.where(beyond, np.maximum(shown, _UNKNOWN), shown)
+        seen = float(np.sort(open_or_shown)[1])
     else:
         seen = _UNKNOWN
     excess = head.reprojection_error_px / width_px - _CONSISTENT_ERROR
@@ -81,3 +87,17 @@ def judge_face(
         seen *= math.exp(-0.5 * (excess / _ERROR_SCALE) ** 2)
     extra = _WEAK_FACE_STD_RAD * (_WEAK_FACE_PX / width_px) ** _SIZE_POWER
     return FaceEvidence(seen, width_px, extra)
+
+
+def _beyond_the_edge(camera: Camera, head: HeadPose, width_px: float) -> tuple[bool, bool, bool]:
+    """Whether nose, left and right eye of such a head lie outside the picture."""
+    x, y, z = head.position_camera_m.tolist()
+    u, v = camera.fx_px * x / z + camera.cx_px, camera.fy_px * y / z + camera.cy_px
+    margin = width_px + _BENT_PX * (camera.distortion is not None)
+    within_u = margin < u < camera.width_px - margin
+    if within_u and margin < v < camera.height_px - margin:
+        return False, False, False
+    points = head.position_camera_m + HEAD_TEMPLATE_M[:3] @ head.rotation_camera_head.T
+    pixels = camera.project(points)
+    inside = (pixels > -0.5) & (pixels < (camera.width_px - 0.5, camera.height_px - 0.5))
+    return not inside[0].all(), not inside[1].all(), not inside[2].all()

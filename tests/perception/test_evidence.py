@@ -93,6 +93,34 @@ def test_a_higher_score_never_hides_a_face(scores, which):
     assert after.seen >= before.seen
 
 
+def moved(head, x_m):
+    position = head.position_camera_m + [x_m, 0.0, 0.0]
+    return HeadPose(
+        position,
+        head.rotation_camera_head,
+        head.covariance,
+        head.reprojection_error_px,
+        head.face_seen,
+    )
+
+
+@pytest.mark.parametrize("person", [with_scores(0, 0, 0, 1, 0), with_scores(1, 0, 0, 1, 0)])
+@pytest.mark.parametrize("seen", [None, 0.02])
+def test_a_face_beyond_the_pictures_edge_is_not_a_face_turned_away(person, seen):
+    """Half a head at the edge: whether it shows the camera a face is open, not denied."""
+    edge_m = 0.5 * CAMERA.width_px / CAMERA.fx_px * 2.0
+    inside, cut = moved(head_at(seen=seen), edge_m - 0.3), moved(head_at(seen=seen), edge_m + 0.05)
+    assert judge_face(CAMERA, person, inside, 0.3).seen <= 0.02
+    assert judge_face(CAMERA, person, cut, 0.3).seen == pytest.approx(0.5)
+    _, std = judged(cut, person)
+    assert std > 0.29  # the tracker takes it for no evidence
+    # A back of a head there is still known to look away.
+    away = moved(head_at(180.0, seen=seen), edge_m + 0.05)
+    alpha, std = judged(away, person)
+    assert alpha == pytest.approx(0.0, abs=1e-6)
+    assert std < 0.05
+
+
 def test_the_estimators_own_word_comes_first():
     head = head_at(seen=0.05)
     assert judge_face(CAMERA, ALL, head, 0.3).seen == pytest.approx(0.05)
