@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from perception.arrays import FloatArray
 
-# Stands for "not allowed": above the cost of any set of allowed matches.
-_FORBIDDEN_COST = 1e6
+from ._table import BoolArray, IndexArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,38 +19,65 @@ class Gates:
     Attributes:
         mahalanobis2: largest squared Mahalanobis distance (χ² with two degrees of freedom).
         distance_m: largest distance.
+        miss_cost: what a track and a measurement that both stay alone cost together; see
+            :func:`associate`.
         ambiguity_margin: rivals within this cost of the chosen match put it in doubt, …
         ambiguity_distance_m: … if they are no further away than this.
     """
 
     mahalanobis2: float
     distance_m: float
+    miss_cost: float
     ambiguity_margin: float
     ambiguity_distance_m: float
 
 
-@dataclass(frozen=True, slots=True)
-class Match:
-    """A track (row) that takes a measurement (column); ``ambiguous`` when it could be another's."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Matches:
+    """K matches, one to one.
 
-    track: int
-    measurement: int
-    ambiguous: bool
+    Attributes:
+        tracks: (K,) rows of tracks.
+        measurements: (K,) rows of measurements.
+        ambiguous: (K,) True where it could as well be another's.
+    """
+
+    tracks: IndexArray
+    measurements: IndexArray
+    ambiguous: BoolArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Edges:
+    """The matches that both gates let pass: rows of tracks and measurements, and their costs."""
+
+    tracks: IndexArray
+    measurements: IndexArray
+    costs: FloatArray
+
+    def where(self, mask: BoolArray) -> _Edges:
+        return _Edges(self.tracks[mask], self.measurements[mask], self.costs[mask])
+
+
+_NO_ROWS: IndexArray = np.empty(0, dtype=np.intp)
+_NOBODY = Matches(_NO_ROWS, _NO_ROWS, np.empty(0, dtype=np.bool_))
 
 
 def associate(
     positions_m: FloatArray,
     covariances_m2: FloatArray,
-    confirmed: NDArray[np.bool_],
+    confirmed: BoolArray,
     measured_m: FloatArray,
     noises_m2: FloatArray,
     gates: Gates,
-) -> tuple[Match, ...]:
+) -> Matches:
     """Match tracks to measurements one to one: confirmed tracks first, the others to what is left.
 
     The cost d² + ln det S is twice the negative log-likelihood of the measurement. Without its
     second term a track that has coasted, and so has a wide S, would take its neighbour's
-    measurements. Each of the two rounds is solved by ``scipy.optimize.linear_sum_assignment``.
+    measurements. Each of the two rounds takes the set of matches with the least sum of costs, a
+    track that stays alone counting ``miss_cost``: without that, a person whom the frame missed
+    would take their neighbour's measurement, and the neighbour any clutter in reach.
 
     Args:
         positions_m: (N, 2) predicted positions.
@@ -63,69 +88,108 @@ def associate(
         gates: both must let a match pass.
     """
     if not len(positions_m) or not len(measured_m):
-        return ()
-    cost = _costs(positions_m, covariances_m2, measured_m, noises_m2, gates)
-    pairs: list[tuple[int, int]] = []
-    free = np.ones(len(measured_m), dtype=bool)
-    for round_tracks in (confirmed, ~confirmed):
-        rows, columns = np.flatnonzero(round_tracks), np.flatnonzero(free)
-        if not rows.size or not columns.size:
-            continue
-        allowed = cost[rows[:, None], columns]
-        chosen = linear_sum_assignment(np.where(np.isfinite(allowed), allowed, _FORBIDDEN_COST))
-        for row, column in zip(*chosen, strict=True):
-            if np.isfinite(allowed[row, column]):
-                pairs.append((int(rows[row]), int(columns[column])))
-                free[columns[column]] = False
-    doubt = _doubts(pairs, cost, positions_m, measured_m, gates)
-    return tuple(Match(i, j, ambiguous) for (i, j), ambiguous in zip(pairs, doubt, strict=True))
+        return _NOBODY
+    edges = _edges(positions_m, covariances_m2, measured_m, noises_m2, gates)
+    if not edges.tracks.size:
+        return _NOBODY
+    partner = np.full(len(positions_m), -1, dtype=np.intp)
+    if confirmed.all():
+        _solve(edges, gates.miss_cost, partner)
+    else:
+        first = confirmed[edges.tracks]
+        _solve(edges.where(first), gates.miss_cost, partner)
+        taken = np.zeros(len(measured_m), dtype=np.bool_)
+        taken[partner[partner >= 0]] = True
+        _solve(edges.where(~first & ~taken[edges.measurements]), gates.miss_cost, partner)
+    tracks = np.flatnonzero(partner >= 0)
+    measurements = partner[tracks]
+    doubt = _doubts(edges, partner, positions_m, measured_m, gates)
+    return Matches(tracks, measurements, doubt[tracks])
 
 
-def _costs(
+def _edges(
     positions_m: FloatArray,
     covariances_m2: FloatArray,
     measured_m: FloatArray,
     noises_m2: FloatArray,
     gates: Gates,
-) -> FloatArray:
-    """Return d² + ln det S as (N, M), infinite where a gate is shut."""
-    delta = measured_m[None, :, :] - positions_m[:, None, :]
-    spread = covariances_m2[:, None] + noises_m2[None, :]
-    s_xx, s_xy, s_yy = spread[..., 0, 0], spread[..., 0, 1], spread[..., 1, 1]
-    x, y = delta[..., 0], delta[..., 1]
+) -> _Edges:
+    """Return the matches that both gates let pass, with their costs d² + ln det S."""
+    offset_x = measured_m[None, :, 0] - positions_m[:, None, 0]
+    offset_y = measured_m[None, :, 1] - positions_m[:, None, 1]
+    near = offset_x * offset_x + offset_y * offset_y <= gates.distance_m**2
+    flat = np.flatnonzero(near)
+    tracks, measurements = np.divmod(flat, len(measured_m))
+    x, y = offset_x.ravel()[flat], offset_y.ravel()[flat]
+    spread = covariances_m2[tracks] + noises_m2[measurements]
+    s_xx, s_xy, s_yy = spread[:, 0, 0], spread[:, 0, 1], spread[:, 1, 1]
     determinant = s_xx * s_yy - s_xy * s_xy
     distance2 = (s_yy * x * x - 2.0 * s_xy * x * y + s_xx * y * y) / determinant
-    allowed = (distance2 <= gates.mahalanobis2) & (np.hypot(x, y) <= gates.distance_m)
-    return np.where(allowed, distance2 + np.log(determinant), np.inf)
+    edges = _Edges(tracks, measurements, distance2 + np.log(determinant))
+    inside = distance2 <= gates.mahalanobis2
+    return edges if inside.all() else edges.where(inside)
+
+
+def _solve(edges: _Edges, miss_cost: float, partner: IndexArray) -> None:
+    """Write the best set of matches into ``partner``: the measurement of each track.
+
+    A match whose track and measurement have no other is part of every best set when it costs no
+    more than a miss. What is left has rivals, and ``scipy.optimize.linear_sum_assignment`` decides.
+    """
+    worth = edges.costs < miss_cost
+    if not worth.all():
+        edges = edges.where(worth)
+    if not edges.tracks.size:
+        return
+    per_track = np.bincount(edges.tracks)
+    per_measurement = np.bincount(edges.measurements)
+    lone = (per_track[edges.tracks] == 1) & (per_measurement[edges.measurements] == 1)
+    partner[edges.tracks[lone]] = edges.measurements[lone]
+    if lone.all():
+        return
+    rivals = edges.where(~lone)
+    per_track[edges.tracks[lone]] = per_measurement[edges.measurements[lone]] = 0
+    rows, columns = np.flatnonzero(per_track), np.flatnonzero(per_measurement)
+    costs = np.full((len(rows), len(columns)), miss_cost)
+    costs[rows.searchsorted(rivals.tracks), columns.searchsorted(rivals.measurements)] = (
+        rivals.costs
+    )
+    chosen_rows, chosen_columns = linear_sum_assignment(costs)
+    real = costs[chosen_rows, chosen_columns] < miss_cost
+    partner[rows[chosen_rows[real]]] = columns[chosen_columns[real]]
 
 
 def _doubts(
-    pairs: list[tuple[int, int]],
-    cost: FloatArray,
+    edges: _Edges,
+    partner: IndexArray,
     positions_m: FloatArray,
     measured_m: FloatArray,
     gates: Gates,
-) -> list[bool]:
-    """Say for each pair whether a rival track, or a rival measurement, fits about as well."""
-    if cost.size == 1:
-        return [False] * len(pairs)
-    doubts: list[bool] = []
-    for track, measurement in pairs:
-        limit = cost[track, measurement] + gates.ambiguity_margin
-        tracks = cost[:, measurement] <= limit
-        measurements = cost[track] <= limit
-        tracks[track] = measurements[measurement] = False
-        doubts.append(
-            _any_near(positions_m[tracks], positions_m[track], gates.ambiguity_distance_m)
-            or _any_near(
-                measured_m[measurements], measured_m[measurement], gates.ambiguity_distance_m
-            )
-        )
-    return doubts
+) -> BoolArray:
+    """Return (N,) True where a rival track, or measurement, fits about as well as the match."""
+    doubt = np.zeros(len(positions_m), dtype=np.bool_)
+    chosen = partner[edges.tracks] == edges.measurements
+    if chosen.all():
+        return doubt
+    holder = np.full(len(measured_m), -1, dtype=np.intp)
+    holder[edges.measurements[chosen]] = edges.tracks[chosen]
+    limit = np.full(len(positions_m) + 1, -np.inf)  # the last row stands for "nobody"
+    limit[edges.tracks[chosen]] = edges.costs[chosen] + gates.ambiguity_margin
+    rival = edges.where(~chosen)
+    reach2 = gates.ambiguity_distance_m**2
+
+    # The track's own match against another measurement that it could have taken.
+    offset = measured_m[rival.measurements] - measured_m[partner[rival.tracks]]
+    fits = (rival.costs <= limit[rival.tracks]) & (_squares(offset) <= reach2)
+    doubt[rival.tracks[fits]] = True
+    # The measurement's own match against another track that could have taken it.
+    owner = holder[rival.measurements]
+    offset = positions_m[rival.tracks] - positions_m[owner]
+    fits = (rival.costs <= limit[owner]) & (_squares(offset) <= reach2)
+    doubt[owner[fits]] = True
+    return doubt
 
 
-def _any_near(points_m: FloatArray, point_m: FloatArray, distance_m: float) -> bool:
-    if not len(points_m):
-        return False
-    offset = points_m - point_m
-    return bool((np.hypot(offset[:, 0], offset[:, 1]) <= distance_m).any())
+def _squares(offsets: FloatArray) -> FloatArray:
+    """Return the squared lengths of (N, 2)."""
+    return np.asarray(offsets[:, 0] * offsets[:, 0] + offsets[:, 1] * offsets[:, 1])

@@ -1,9 +1,11 @@
-"""Awareness over time: a scalar Gaussian filter in logit(α) with a lower bound that keeps its word.
+"""Awareness over time: a Gaussian filter in logit(α) with a lower bound that keeps its word.
 
 Between measurements the belief follows an Ornstein–Uhlenbeck process towards a low prior. It is
 stationary at the prior, so uncertainty grows while nothing is known but never beyond the prior's,
 and its solution is exact for any time step. The lower bound is remembered: without evidence it may
 fall, never rise, however the belief moves.
+
+Every function works on one person (numbers) as on many at once (arrays of equal shape).
 """
 
 from __future__ import annotations
@@ -12,22 +14,26 @@ import math
 from dataclasses import dataclass
 from functools import lru_cache
 from statistics import NormalDist
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
+from scipy.special import expit
+
+from perception.arrays import FloatArray
 
 from ._config import AwarenessFilterConfig
 
+Value: TypeAlias = "float | FloatArray"
+
 # Nodes and weights for the expectation of a function of a standard normal variable.
 _NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(11)
-_GAUSS_HERMITE: Final = tuple(
-    zip(_NODES.tolist(), (_WEIGHTS / _WEIGHTS.sum()).tolist(), strict=True)
-)
+_GAUSS_HERMITE_NODES: Final = _NODES
+_GAUSS_HERMITE_WEIGHTS: Final = _WEIGHTS / _WEIGHTS.sum()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class AwarenessBelief:
-    """What is believed of one person's α, in logit units.
+    """What is believed of α, in logit units.
 
     Attributes:
         mean: of logit(α).
@@ -35,31 +41,31 @@ class AwarenessBelief:
         bound: the remembered lower bound of logit(α); −∞ until evidence has lifted it.
     """
 
-    mean: float
-    variance: float
-    bound: float = -math.inf
+    mean: Value
+    variance: Value
+    bound: Value = -math.inf
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class AwarenessEstimate:
     """A belief in units of α: median, standard deviation (≤ 0.5) and one-sided lower bound."""
 
-    awareness: float
-    awareness_std: float
-    awareness_lower: float
+    awareness: Value
+    awareness_std: Value
+    awareness_lower: Value
 
 
-def logit(awareness: float) -> float:
+def logit(awareness: Value) -> Value:
     """Return ln(α / (1 − α)) for α strictly between 0 and 1."""
+    if isinstance(awareness, np.ndarray):
+        return np.asarray(np.log(awareness / (1.0 - awareness)))
     return math.log(awareness / (1.0 - awareness))
 
 
-def sigmoid(value: float) -> float:
+def sigmoid(value: Value) -> Value:
     """Return 1 / (1 + exp(−value)), the inverse of :func:`logit`; 0 at −∞."""
-    if value >= 0.0:
-        return 1.0 / (1.0 + math.exp(-value))
-    scaled = math.exp(value)
-    return scaled / (1.0 + scaled)
+    result: Value = expit(value)
+    return result
 
 
 def prior(config: AwarenessFilterConfig) -> AwarenessBelief:
@@ -68,7 +74,7 @@ def prior(config: AwarenessFilterConfig) -> AwarenessBelief:
 
 
 def drift(
-    belief: AwarenessBelief, dt_s: float, time_constant_s: float, config: AwarenessFilterConfig
+    belief: AwarenessBelief, dt_s: float, time_constant_s: Value, config: AwarenessFilterConfig
 ) -> AwarenessBelief:
     """Return the belief after ``dt_s`` ≥ 0 without evidence.
 
@@ -80,44 +86,52 @@ def drift(
     prior_mean, prior_variance = logit(config.prior_awareness), config.prior_std_logit**2
     z = _quantile(config.lower_bound_confidence)
     offset, excess = belief.mean - prior_mean, belief.variance - prior_variance
-
-    def bound_at(phi: float) -> float:
-        variance = max(prior_variance + phi * phi * excess, 0.0)
-        return prior_mean + phi * offset - z * math.sqrt(variance)
-
-    phi = math.exp(-dt_s / time_constant_s)
-    lowest = min(belief.bound, bound_at(1.0), bound_at(phi))
-    if offset < 0.0 and excess < 0.0:
-        # A belief surer and lower than the prior dips while its variance grows and then climbs
-        # towards the prior: setting the derivative by φ to zero gives the turning point.
-        turn2 = offset**2 * prior_variance / (z * z * excess * excess - offset**2 * excess)
-        if phi * phi < turn2 < 1.0:
-            lowest = min(lowest, bound_at(math.sqrt(turn2)))
-    return AwarenessBelief(prior_mean + phi * offset, prior_variance + phi * phi * excess, lowest)
+    phi = np.exp(-dt_s / time_constant_s)
+    mean = prior_mean + phi * offset
+    variance = prior_variance + phi * phi * excess
+    before = belief.mean - z * np.sqrt(belief.variance)
+    after = mean - z * np.sqrt(np.maximum(variance, 0.0))
+    lowest = np.minimum(np.minimum(belief.bound, before), after)
+    # A belief surer and lower than the prior dips while its variance grows and then climbs
+    # towards the prior: setting the derivative by φ to zero gives the turning point.
+    dips = (offset < 0.0) & (excess < 0.0)
+    if np.any(dips):
+        squared = offset * offset
+        divisor = np.where(dips, z * z * excess * excess - squared * excess, 1.0)
+        turn2 = np.where(dips, squared * prior_variance / divisor, 0.0)
+        turns = (phi * phi < turn2) & (turn2 < 1.0)
+        if np.any(turns):
+            turn2 = np.where(turns, turn2, 1.0)
+            spread = np.sqrt(np.maximum(prior_variance + turn2 * excess, 0.0))
+            at_turn = prior_mean + np.sqrt(turn2) * offset - z * spread
+            lowest = np.where(turns, np.minimum(lowest, at_turn), lowest)
+    return AwarenessBelief(mean, variance, lowest)
 
 
 def evidence(
-    awareness: float, awareness_std: float, config: AwarenessFilterConfig
-) -> tuple[float, float] | None:
-    """Return a measured α as (mean, variance) of logit(α), or None when it says too little.
+    awareness: Value, awareness_std: Value, config: AwarenessFilterConfig
+) -> tuple[FloatArray, FloatArray]:
+    """Return a measured α as mean and variance of logit(α), NaN where it says too little.
 
     The Gaussian in logit(α) whose two one-σ points are those of α, α ± σ clipped to [ε, 1 − ε]. In
     mid-range that is the logit's derivative, σ / (α (1 − α)); near 0 and 1 the derivative has no
     bound and would turn a confident "unaware" (α = 0, σ = 0.05) into next to nothing.
+
+    NaN in, for no measured α, gives NaN.
     """
-    if awareness_std > config.max_evidence_std:
-        return None
+    awareness, awareness_std = np.asarray(awareness), np.asarray(awareness_std)
     low, high = config.clip_awareness, 1.0 - config.clip_awareness
-    below = logit(min(max(awareness - awareness_std, low), high))
-    above = logit(min(max(awareness + awareness_std, low), high))
-    std = max(0.5 * (above - below), config.min_evidence_std_logit)
-    return 0.5 * (above + below), std * std
+    below = logit(np.minimum(np.maximum(awareness - awareness_std, low), high))
+    above = logit(np.minimum(np.maximum(awareness + awareness_std, low), high))
+    std = np.maximum(0.5 * (above - below), config.min_evidence_std_logit)
+    usable = awareness_std <= config.max_evidence_std
+    return np.where(usable, 0.5 * (above + below), np.nan), np.where(usable, std * std, np.nan)
 
 
 def measure(
     belief: AwarenessBelief,
-    mean: float,
-    variance: float,
+    mean: Value,
+    variance: Value,
     interval_s: float,
     config: AwarenessFilterConfig,
 ) -> AwarenessBelief:
@@ -136,33 +150,34 @@ def measure(
     corrected = belief.mean + gain * (mean - belief.mean)
     remaining = belief.variance * (1.0 - gain)
     z = _quantile(config.lower_bound_confidence)
-    return AwarenessBelief(corrected, remaining, corrected - z * math.sqrt(remaining))
+    return AwarenessBelief(corrected, remaining, corrected - z * np.sqrt(remaining))
 
 
 def forget(belief: AwarenessBelief, config: AwarenessFilterConfig) -> AwarenessBelief:
     """Return the prior, with a lower bound no higher than the belief's or the prior's own."""
     fresh = prior(config)
     own = fresh.mean - _quantile(config.lower_bound_confidence) * config.prior_std_logit
-    return AwarenessBelief(fresh.mean, fresh.variance, min(belief.bound, own))
+    bound = np.minimum(belief.bound, own)
+    return AwarenessBelief(fresh.mean, fresh.variance, bound)
 
 
-def estimate(belief: AwarenessBelief) -> AwarenessEstimate:
+def estimate(belief: AwarenessBelief, config: AwarenessFilterConfig) -> AwarenessEstimate:
     """Return a belief in units of α.
 
     The awareness is sigmoid(mean), the median of the logit-normal distribution; the standard
     deviation is that of the distribution by Gauss–Hermite quadrature, so it never exceeds 0.5.
+    The lower bound is (sigmoid(bound) − ε) / (1 − ε), not below 0: no measurement tells an α below
+    ε from 0, which a logit cannot reach, so what is no more than ε must not count for anything.
     """
-    std = math.sqrt(belief.variance)
-    first = second = 0.0
-    for node, weight in _GAUSS_HERMITE:
-        value = sigmoid(belief.mean + std * node)
-        first += weight * value
-        second += weight * value * value
-    return AwarenessEstimate(
-        sigmoid(belief.mean),
-        math.sqrt(max(second - first * first, 0.0)),
-        sigmoid(belief.bound),
-    )
+    mean, std = np.asarray(belief.mean), np.sqrt(belief.variance)
+    # The sigmoid is (1 + tanh(x / 2)) / 2, and tanh the faster function of an array.
+    values = np.tanh((0.5 * mean)[..., None] + (0.5 * std)[..., None] * _GAUSS_HERMITE_NODES)
+    # Sums along the last axis, which do not depend on how many people there are.
+    deviation = values - (values * _GAUSS_HERMITE_WEIGHTS).sum(axis=-1)[..., None]
+    second = (deviation * deviation * _GAUSS_HERMITE_WEIGHTS).sum(axis=-1)
+    clip = config.clip_awareness
+    lower = np.maximum((expit(belief.bound) - clip) / (1.0 - clip), 0.0)
+    return AwarenessEstimate(expit(belief.mean), 0.5 * np.sqrt(second), lower)
 
 
 @lru_cache(maxsize=32)

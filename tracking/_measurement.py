@@ -1,8 +1,8 @@
-"""What one observation says in the odom frame: a place on the floor plane, its noise, evidence."""
+"""What a frame says in the odom frame: places on the floor plane, their noise, evidence."""
 
 from __future__ import annotations
 
-import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -21,82 +21,140 @@ _MAX_VARIANCE_M2: Final = 1e6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Measurement:
-    """One observation, checked and carried to the odom frame.
+class Measurements:
+    """The M observations of one frame, checked and carried to the odom frame.
 
     Attributes:
-        position_odom_m: (2,).
-        noise_m2: (2, 2) positive definite covariance of it.
-        evidence: mean and variance of logit(α), or None for "no evidence".
+        positions_odom_m: (M, 2).
+        noises_m2: (M, 2, 2) positive definite covariances of them.
+        evidence_means: (M,) of logit(α); NaN for "no evidence".
+        evidence_variances: (M,) of logit(α); NaN for "no evidence".
     """
 
-    position_odom_m: FloatArray
-    noise_m2: FloatArray
-    evidence: tuple[float, float] | None
+    positions_odom_m: FloatArray
+    noises_m2: FloatArray
+    evidence_means: FloatArray
+    evidence_variances: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.positions_odom_m)
 
 
-def measurement_of(
-    observation: Any, name: str, stamp_s: float, T_odom_camera: FloatArray, config: TrackerConfig
-) -> Measurement:
-    """Return an observation of the frame at ``stamp_s`` as a measurement.
+_NO_ONE = np.empty(0)
+_NOTHING = Measurements(np.empty((0, 2)), np.empty((0, 2, 2)), _NO_ONE, _NO_ONE)
 
-    The position covariance turns with the camera, R Σ Rᵀ, and its x–y block remains.
+
+def measurements_of(
+    observations: Iterable[PersonObservation],
+    stamp_s: float,
+    T_odom_camera: FloatArray,
+    pose_covariance_odom: FloatArray | None,
+    config: TrackerConfig,
+) -> Measurements:
+    """Return the observations of the frame at ``stamp_s`` as measurements.
+
+    A position covariance turns with the camera, R Σ Rᵀ, and its x–y block remains. A pose
+    covariance (3, 3) of the camera's x, y and yaw adds J Σ Jᵀ with J = [I, (t_y − p_y, p_x − t_x)]:
+    an error in yaw moves a person in proportion to their range.
 
     Raises:
-        TrackingError: naming the observation by ``name``, when it is no ``PersonObservation``,
-            carries another frame's stamp or lies out of this world.
+        TrackingError: naming the observation, when it is no ``PersonObservation``, carries
+            another frame's stamp or lies out of this world.
     """
-    if not isinstance(observation, PersonObservation):
-        raise TrackingError(f"{name} must be a PersonObservation, got {type(observation).__name__}")
-    if abs(observation.stamp_s - stamp_s) > config.stamp_tolerance_s:
-        raise TrackingError(
-            f"{name}.stamp_s = {observation.stamp_s!r} s must be that of its frame, "
-            f"{stamp_s!r} s, within {config.stamp_tolerance_s:g} s"
-        )
-    to_floor = T_odom_camera[:2, :3]
+    given = _checked(observations, stamp_s, config.stamp_tolerance_s)
+    if not given:
+        return _NOTHING
+    to_floor, origin = T_odom_camera[:2, :3], T_odom_camera[:2, 3]
+    places = np.concatenate([one.position_camera_m for one in given]).reshape(-1, 3)
+    spreads = np.concatenate([one.position_covariance_m2 for one in given]).reshape(-1, 3, 3)
     with np.errstate(over="ignore", invalid="ignore"):
-        position = to_floor @ observation.position_camera_m + T_odom_camera[:2, 3]
-        noise = to_floor @ observation.position_covariance_m2 @ to_floor.T
-        variance = float(noise[0, 0] + noise[1, 1])
-    # Written so that NaN, from overflow, is refused as well.
-    if not all(abs(value) <= _MAX_POSITION_M for value in position.tolist()):
+        offsets = places @ to_floor.T
+        positions = offsets + origin
+        noises = to_floor @ spreads @ to_floor.T
+        if pose_covariance_odom is not None:
+            noises = noises + _pose_noises(offsets, pose_covariance_odom)
+        variances = noises[:, 0, 0] + noises[:, 1, 1]
+        # Written so that NaN, from overflow, is refused as well.
+        inside = (np.abs(positions) <= _MAX_POSITION_M).all(axis=1)
+        sure = variances <= _MAX_VARIANCE_M2
+    if not inside.all():
+        index = int(np.argmin(inside))
         raise TrackingError(
-            f"{name} must lie within {_MAX_POSITION_M:g} m of the origin of odom, "
-            f"got {position.tolist()} m"
+            f"observations[{index}] must lie within {_MAX_POSITION_M:g} m of the origin of odom, "
+            f"got {positions[index].tolist()} m"
         )
-    if not variance <= _MAX_VARIANCE_M2:
+    if not sure.all():
+        index = int(np.argmin(sure))
         raise TrackingError(
-            f"{name}.position_covariance_m2 must sum to at most {_MAX_VARIANCE_M2:g} m² on the "
-            f"floor plane, got {variance:g} m²"
+            f"observations[{index}].position_covariance_m2 must sum to at most "
+            f"{_MAX_VARIANCE_M2:g} m² on the floor plane, the pose's share included, "
+            f"got {variances[index]:g} m²"
         )
-    alpha, alpha_std = observation.awareness, observation.awareness_std
-    return Measurement(
-        position,
-        floor_covariance(noise, config.position_noise_floor_m),
-        None
-        if alpha is None or alpha_std is None
-        else evidence(alpha, alpha_std, config.awareness),
+    means, evidence_variances = evidence(
+        np.array([np.nan if one.awareness is None else one.awareness for one in given]),
+        np.array([np.nan if one.awareness_std is None else one.awareness_std for one in given]),
+        config.awareness,
+    )
+    return Measurements(
+        positions,
+        floor_covariances(noises, config.position_noise_floor_m),
+        means,
+        evidence_variances,
     )
 
 
-def floor_covariance(covariance_m2: FloatArray, floor_m: float) -> FloatArray:
-    """Return a (2, 2) covariance with no standard deviation below ``floor_m`` in any direction.
+def _checked(
+    observations: Any, stamp_s: float, tolerance_s: float
+) -> tuple[PersonObservation, ...]:
+    """Return the observations of a frame after checking that they are its own."""
+    try:
+        given = tuple(observations)
+    except TypeError as cause:
+        raise TrackingError(
+            "observations must be an iterable of PersonObservation, got "
+            f"{type(observations).__name__}"
+        ) from cause
+    for index, one in enumerate(given):
+        if not isinstance(one, PersonObservation):
+            raise TrackingError(
+                f"observations[{index}] must be a PersonObservation, got {type(one).__name__}"
+            )
+        if abs(one.stamp_s - stamp_s) > tolerance_s:
+            raise TrackingError(
+                f"observations[{index}].stamp_s = {one.stamp_s!r} s must be that of its frame, "
+                f"{stamp_s!r} s, within {tolerance_s:g} s"
+            )
+    return given
+
+
+def _pose_noises(offsets_m: FloatArray, pose_covariance: FloatArray) -> FloatArray:
+    """Return (M, 2, 2) what an uncertain pose adds to places at ``offsets_m`` (M, 2) from it."""
+    J = np.zeros((len(offsets_m), 2, 3))
+    J[:, 0, 0] = J[:, 1, 1] = 1.0
+    J[:, 0, 2], J[:, 1, 2] = -offsets_m[:, 1], offsets_m[:, 0]
+    return np.asarray(J @ pose_covariance @ J.transpose(0, 2, 1))
+
+
+def floor_covariances(covariances_m2: FloatArray, floor_m: float) -> FloatArray:
+    """Return (M, 2, 2) covariances with no standard deviation below ``floor_m`` in any direction.
 
     Eigenvalues below the floor are raised to it and the eigenvectors kept, in closed form: turning
     the world turns the result.
     """
-    xx, yy = float(covariance_m2[0, 0]), float(covariance_m2[1, 1])
-    xy = 0.5 * float(covariance_m2[0, 1] + covariance_m2[1, 0])
-    centre, radius = 0.5 * (xx + yy), math.hypot(0.5 * (xx - yy), xy)
+    xx, yy = covariances_m2[:, 0, 0], covariances_m2[:, 1, 1]
+    xy = 0.5 * (covariances_m2[:, 0, 1] + covariances_m2[:, 1, 0])
+    centre, radius = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
     low, high, floor = centre - radius, centre + radius, floor_m * floor_m
-    if low >= floor:
-        return np.array([[xx, xy], [xy, yy]])
-    if high <= floor:
-        return np.array([[floor, 0.0], [0.0, floor]])
-    scale = (high - floor) / (high - low)
-    return np.array(
-        [
-            [floor + scale * (xx - low), scale * xy],
-            [scale * xy, floor + scale * (yy - low)],
-        ]
-    )
+    floored = np.empty_like(covariances_m2)
+    floored[:, 0, 0], floored[:, 1, 1] = xx, yy
+    floored[:, 0, 1] = floored[:, 1, 0] = xy
+    below = low < floor
+    if below.any():
+        # Those below the floor in every direction have none to keep: scale 0 leaves it round.
+        split = high > floor
+        scale = np.where(split, high - floor, 0.0) / np.where(split & below, high - low, 1.0)
+        scale = scale[below]
+        floored[below, 0, 0] = floor + scale * (xx - low)[below]
+        floored[below, 1, 1] = floor + scale * (yy - low)[below]
+        floored[below, 0, 1] = floored[below, 1, 0] = scale * xy[below]
+    return floored

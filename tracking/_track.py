@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal, get_args
+from dataclasses import dataclass, fields
+from typing import Any, Final, Literal, cast, get_args
 
 from perception.arrays import (
     FloatArray,
@@ -83,3 +83,20 @@ class PersonTrack:
             ),
             time_since_seen_s=number("time_since_seen_s", 0.0),
         )
+
+
+_SETTERS: Final = tuple(
+    cast(Any, getattr(PersonTrack, field.name)).__set__ for field in fields(PersonTrack)
+)
+
+
+def trusted_track(*values: Any) -> PersonTrack:
+    """Make a track of values known to be sound, in the order of its fields, without checking them.
+
+    The tracker's own numbers are; arrays must be read-only. A fifth of the time of the constructor,
+    which is for everybody else.
+    """
+    track = object.__new__(PersonTrack)
+    for assign, value in zip(_SETTERS, values, strict=True):
+        assign(track, value)
+    return track

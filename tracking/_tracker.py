@@ -2,54 +2,69 @@
 
 from __future__ import annotations
 
-import math
+import json
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
-import numpy as np
-from scipy.stats import chi2
-
 from perception import PersonObservation
-from perception.arrays import FloatArray, finite_number, rigid_transform
+from perception.arrays import covariance_matrix, finite_number, rigid_transform
 
-from ._association import Gates, Match, associate
 from ._config import TrackerConfig
 from ._errors import TrackingError
-from ._measurement import Measurement, measurement_of
-from ._motion import process_noise, transition
-from ._person_filter import PersonFilter
+from ._frame import Frame
+from ._history import History
+from ._measurement import measurements_of
+from ._saved_state import frame_of, record_of, state_of, to_plain
+from ._snapshot import snapshots
+from ._step import TrackerState, advance, gates_of
+from ._table import TrackTable
 from ._track import PersonTrack
+from ._view import View
 
 
 class PersonTracker:
     """Follow people through frames that come at any rate from a camera that moves.
 
     Each person is a constant-velocity Kalman filter on the floor plane (odom x and y) and a filter
-    of awareness in logit(α). A person is tentative until ``confirm_hits`` frames have shown them,
-    coasting while the latest frame does not, and dropped after ``max_coast_s`` out of sight. Ids
-    are never used again. Tentative tracks are returned too, with ``awareness_lower`` 0: navigation
-    must reckon with a person who may not be there, as with one who has not seen the robot.
+    of awareness in logit(α). A person is tentative until ``confirm_hits`` frames within
+    ``confirm_window_s`` have shown them and coasting while the latest frame does not. Ids are never
+    used again. Tentative tracks are returned too, with ``awareness_lower`` 0: navigation must
+    reckon with a person who may not be there, as with one who has not seen the robot.
 
-    A refused input raises :class:`~tracking.TrackingError` and leaves the tracker as it was.
+    How long an unseen person is kept depends on whether they should have been seen. With a
+    ``view``, those whom nothing hides are dropped after ``max_missed_s``, those out of view or
+    behind somebody after ``max_coast_s``, or ``max_standing_coast_s`` if they stood still; without
+    one nobody knows, and all are kept for ``max_coast_s``.
+
+    Frames may come late by up to ``max_lag_s``. The tracks, their ids included, are then those of
+    frames that came in order. That may take back what was said since the late frame's stamp: a
+    person who was first seen after it can get another id, or turn out to be somebody known.
+
+    The tracker is deterministic. A refused input raises :class:`~tracking.TrackingError` and leaves
+    it as it was, save that :attr:`refused_late_frames` counts.
+
+    Args:
+        config: settings; None for the defaults.
+        view: where the camera can see people; None when nobody knows.
     """
 
-    def __init__(self, config: TrackerConfig | None = None) -> None:
+    def __init__(self, config: TrackerConfig | None = None, *, view: View | None = None) -> None:
         if config is None:
             config = TrackerConfig()
         if not isinstance(config, TrackerConfig):
             raise TrackingError(f"config must be a TrackerConfig, got {type(config).__name__}")
+        if view is not None and not isinstance(view, View):
+            raise TrackingError(
+                "view must have a method visibility(positions_odom_m, T_odom_camera), "
+                f"got {type(view).__name__}"
+            )
         self._config = config
-        self._gates = Gates(
-            mahalanobis2=float(chi2.ppf(config.gate_probability, df=2)),
-            distance_m=config.gate_distance_m,
-            ambiguity_margin=config.ambiguity_margin,
-            ambiguity_distance_m=config.ambiguity_distance_m,
-        )
-        # All that a frame changes is below; every filter stands at _stamp_s.
-        self._people: list[PersonFilter] = []
-        self._next_id = 1
-        self._stamp_s: float | None = None
-        self._interval_s = math.inf
+        self._view = view
+        self._gates = gates_of(config)
+        self._refused_late_frames = 0
+        nobody = TrackerState(TrackTable.empty(config.confirm_hits))
+        self._history = History(self._advance, config.max_lag_s, nobody)
 
     @property
     def config(self) -> TrackerConfig:
@@ -62,140 +77,147 @@ class PersonTracker:
 
         No tracks may mean that nobody is there or that the camera has stopped; this tells which.
         """
-        return self._stamp_s
+        return self._history.latest.stamp_s
+
+    @property
+    def refused_late_frames(self) -> int:
+        """How many frames have been refused because they came too late."""
+        return self._refused_late_frames
 
     def update(
         self,
         observations: Iterable[PersonObservation],
         stamp_s: float,
         T_odom_camera: Any,
+        *,
+        pose_covariance_odom: Any = None,
     ) -> tuple[PersonTrack, ...]:
-        """Take one frame and return every track at its stamp, in the order of their ids.
+        """Take one frame and return every track at the latest stamp, in the order of their ids.
 
         Args:
             observations: of this frame; none when it shows nobody.
-            stamp_s: time of the frame. Not before the last one; the same stamp again is a second
-                set of measurements of that instant.
+            stamp_s: time of the frame, at most ``max_lag_s`` before the latest one's. The same
+                stamp again is a second set of measurements of that instant.
             T_odom_camera: (4, 4) where the camera was at ``stamp_s``.
+            pose_covariance_odom: (3, 3) of the camera's x, y (m) and yaw (rad) in odom at
+                ``stamp_s``, or None when its pose is as good as known. People of one frame share
+                the pose's error; it counts for each of them on their own.
 
         Raises:
-            TrackingError: for a stamp that is not finite, lies before the last frame's or differs
-                from that of an observation by more than ``stamp_tolerance_s``, for a
-                ``T_odom_camera`` that is no rigid transform, and for anything in ``observations``
-                that is no :class:`~perception.PersonObservation` or lies out of this world.
+            TrackingError: for a stamp that is not finite, lies too far back or differs from that of
+                an observation by more than ``stamp_tolerance_s``, for a ``T_odom_camera`` that is
+                no rigid transform, a ``pose_covariance_odom`` that is no covariance, and for
+                anything in ``observations`` that is no :class:`~perception.PersonObservation` or
+                lies out of this world.
         """
-        stamp = self._checked_stamp(stamp_s, "update")
+        stamp = finite_number("stamp_s", stamp_s, TrackingError)
+        late = self._history.refusal(stamp)
+        if late is not None:
+            self._refused_late_frames += 1
+            raise TrackingError(late)
         T = rigid_transform("T_odom_camera", T_odom_camera, TrackingError)
-        measurements = self._measurements(observations, stamp, T)
-
-        previous = stamp if self._stamp_s is None else self._stamp_s
-        dt_s = stamp - previous
-        if dt_s > 0.0:
-            self._interval_s = dt_s
-        self._stamp_s = stamp
-        self._move(stamp, dt_s)
-
-        people = self._people
-        taken: set[int] = set()
-        seen: set[int] = set()
-        for match in self._associate(measurements):
-            person, measurement = people[match.track], measurements[match.measurement]
-            person.see(stamp, measurement.position_odom_m, measurement.noise_m2)
-            if match.ambiguous:
-                person.forget_attention(dt_s)
-            else:
-                person.attend(previous, stamp, self._interval_s, measurement.evidence)
-            seen.add(match.track)
-            taken.add(match.measurement)
-        for index, person in enumerate(people):
-            if index not in seen:
-                person.lose_attention(dt_s)
-        self._people = [
-            person
-            for index, person in enumerate(people)
-            if index in seen or not person.has_expired(stamp)
-        ]
-        for index, measurement in enumerate(measurements):
-            if index not in taken:
-                self._begin(stamp, measurement)
-        return tuple(person.snapshot(stamp, stamp) for person in self._people)
+        pose = None
+        if pose_covariance_odom is not None:
+            pose = covariance_matrix("pose_covariance_odom", pose_covariance_odom, 3, TrackingError)
+        measurements = measurements_of(observations, stamp, T, pose, self._config)
+        self._history.insert(Frame(stamp, T, measurements))
+        latest = self._history.latest
+        return self._snapshots(stamp if latest.stamp_s is None else latest.stamp_s)
 
     def predict(self, stamp_s: float) -> tuple[PersonTrack, ...]:
         """Return the tracks at a later (or the same) instant; the tracker stays as it was.
 
-        They are what :meth:`update` would return for a frame at ``stamp_s`` that shows nobody, save
-        that a person whom the latest frame showed is still called confirmed: position uncertainty
-        grows, awareness falls, and a track whose time is up is absent.
+        They are what :meth:`update` would return for a frame at ``stamp_s`` that shows nobody and
+        looks nowhere: position uncertainty grows, awareness falls, and a track whose time is up is
+        absent. A person whom the latest frame showed is still called confirmed, and a tentative
+        track is kept for ``confirm_window_s``.
 
         Raises:
-            TrackingError: for a stamp that is not finite or lies before the last frame's.
+            TrackingError: for a stamp that is not finite or lies before the latest frame's.
         """
-        stamp = self._checked_stamp(stamp_s, "predict")
-        if self._stamp_s is None:
-            return ()
-        return tuple(
-            person.snapshot(self._stamp_s, stamp)
-            for person in self._people
-            if not person.has_expired(stamp)
-        )
-
-    def _checked_stamp(self, stamp_s: float, action: str) -> float:
         stamp = finite_number("stamp_s", stamp_s, TrackingError)
-        if self._stamp_s is not None and stamp < self._stamp_s:
+        last_s = self.last_stamp_s
+        if last_s is not None and stamp < last_s:
             raise TrackingError(
-                f"cannot {action} at stamp_s = {stamp!r} s: the last frame was at "
-                f"{self._stamp_s!r} s, and stamps must not go back"
+                f"cannot predict at stamp_s = {stamp!r} s: the last frame was at {last_s!r} s, "
+                "and what was before is not kept"
             )
-        return stamp
+        return self._snapshots(stamp)
 
-    def _measurements(
-        self, observations: Iterable[PersonObservation], stamp_s: float, T: FloatArray
-    ) -> list[Measurement]:
-        """Check every observation and carry it to the odom frame."""
-        try:
-            given = tuple(observations)
-        except TypeError as cause:
-            raise TrackingError(
-                "observations must be an iterable of PersonObservation, got "
-                f"{type(observations).__name__}"
-            ) from cause
-        return [
-            measurement_of(observation, f"observations[{index}]", stamp_s, T, self._config)
-            for index, observation in enumerate(given)
-        ]
+    def state(self) -> dict[str, Any]:
+        """Return everything that the tracker knows, its config included, as plain JSON values.
 
-    def _move(self, stamp_s: float, dt_s: float) -> None:
-        """Drop who cannot be found again and carry the others to the frame's stamp."""
-        if dt_s <= 0.0:
-            return
-        # A tentative track gets its chance in this frame, however long the frame took.
-        limit_s = self._config.max_coast_s
-        self._people = [p for p in self._people if stamp_s - p.last_seen_s <= limit_s]
-        F, Q = transition(dt_s), process_noise(dt_s, self._config.acceleration_density_m2ps3)
-        for person in self._people:
-            person.move(F, Q)
-
-    def _associate(self, measurements: list[Measurement]) -> tuple[Match, ...]:
-        if not self._people or not measurements:
-            return ()
-        return associate(
-            np.array([person.position_odom_m for person in self._people]),
-            np.array([person.position_covariance_m2 for person in self._people]),
-            np.array([person.is_confirmed for person in self._people]),
-            np.array([measurement.position_odom_m for measurement in measurements]),
-            np.array([measurement.noise_m2 for measurement in measurements]),
-            self._gates,
-        )
-
-    def _begin(self, stamp_s: float, measurement: Measurement) -> None:
-        """Start a track at an unclaimed measurement."""
-        person = PersonFilter(
-            self._next_id,
-            stamp_s,
-            measurement.position_odom_m,
-            measurement.noise_m2,
+        :meth:`from_state` continues from it to the last bit. The view is not part of it.
+        """
+        history = self._history
+        return to_plain(
             self._config,
+            self._refused_late_frames,
+            history.base,
+            history.frames,
+            history.latest,
         )
-        person.attend(stamp_s, stamp_s, self._interval_s, measurement.evidence)
-        self._people.append(person)
-        self._next_id += 1
+
+    @classmethod
+    def from_state(cls, state: dict[str, Any], *, view: View | None = None) -> PersonTracker:
+        """Make a tracker that continues where :meth:`state` was taken.
+
+        Args:
+            state: from :meth:`state`, or from its JSON.
+            view: the same as the first tracker's; it is not part of the state.
+
+        Raises:
+            TrackingError: for a state that no tracker has written, or another version has.
+        """
+        record = record_of(state)
+        tracker = cls(record.config, view=view)
+        tracker._refused_late_frames = record.refused_late_frames
+        hits = record.config.confirm_hits
+        tracker._history = History(
+            tracker._advance,
+            record.config.max_lag_s,
+            state_of(record.base, hits, "base"),
+            [frame_of(frame, f"frames[{index}]") for index, frame in enumerate(record.frames)],
+            state_of(record.latest, hits, "latest"),
+        )
+        return tracker
+
+    def save(self, path: str | Path) -> None:
+        """Write :meth:`state` as JSON for :meth:`load`; the file appears whole or not at all.
+
+        Raises:
+            TrackingError: naming the file, when it cannot be written.
+        """
+        path = Path(path)
+        text = json.dumps(self.state(), allow_nan=False)
+        partial = path.with_name(path.name + ".part")
+        try:
+            partial.write_text(text, encoding="utf-8")
+            partial.replace(path)
+        except OSError as cause:
+            raise TrackingError(f"cannot write {path}: {cause.strerror or cause}") from cause
+
+    @classmethod
+    def load(cls, path: str | Path, *, view: View | None = None) -> PersonTracker:
+        """Make a tracker that continues where :meth:`save` wrote ``path``.
+
+        Raises:
+            TrackingError: naming the file, when it cannot be read or holds no tracker's state.
+        """
+        path = Path(path)
+        try:
+            state = json.loads(path.read_text(encoding="utf-8"))
+        except OSError as cause:
+            raise TrackingError(f"cannot read {path}: {cause.strerror or cause}") from cause
+        except (ValueError, RecursionError) as cause:
+            raise TrackingError(f"{path} is not valid JSON: {cause}") from cause
+        try:
+            return cls.from_state(state, view=view)
+        except TrackingError as cause:
+            raise TrackingError(f"{path}: {cause}") from cause
+
+    def _advance(self, state: TrackerState, frame: Frame) -> TrackerState:
+        return advance(state, frame, self._config, self._gates, self._view)
+
+    def _snapshots(self, stamp_s: float) -> tuple[PersonTrack, ...]:
+        return snapshots(self._history.latest, stamp_s, self._config, self._view is not None)

@@ -1,14 +1,27 @@
 from __future__ import annotations
 
 import itertools
+from typing import NamedTuple
 
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tracking._association import Gates, Match, associate
+from tracking._association import Gates, associate
 
-GATES = Gates(mahalanobis2=11.6, distance_m=1.0, ambiguity_margin=4.0, ambiguity_distance_m=0.8)
+GATES = Gates(
+    mahalanobis2=11.6,
+    distance_m=1.0,
+    miss_cost=10.0,
+    ambiguity_margin=4.0,
+    ambiguity_distance_m=0.8,
+)
+
+
+class Match(NamedTuple):
+    track: int
+    measurement: int
+    ambiguous: bool
 
 
 def match(
@@ -21,13 +34,18 @@ def match(
     gates: Gates = GATES,
 ) -> tuple[Match, ...]:
     stds = np.broadcast_to(np.asarray(track_std_m, dtype=float), len(tracks))
-    return associate(
+    found = associate(
         np.array(tracks, dtype=float).reshape(-1, 2),
         np.array([np.eye(2) * std**2 for std in stds]).reshape(-1, 2, 2),
         np.array([True] * len(tracks) if confirmed is None else confirmed, dtype=bool),
         np.array(measured, dtype=float).reshape(-1, 2),
         np.array([np.eye(2) * noise_std_m**2] * len(measured)).reshape(-1, 2, 2),
         gates,
+    )
+    columns = (found.tracks, found.measurements, found.ambiguous)
+    return tuple(
+        Match(i, j, doubt)
+        for i, j, doubt in zip(*(column.tolist() for column in columns), strict=True)
     )
 
 
@@ -80,26 +98,30 @@ def test_matching_is_the_best_over_all_permutations(
     found = match(tracks, measured)
     assert len({m.track for m in found}) == len({m.measurement for m in found}) == len(found)
 
-    def cost(i: int, j: int) -> float | None:
+    def cost(i: int, j: int) -> float:
+        """What a match costs more than leaving both alone; 0 where a gate is shut."""
         offset = np.hypot(*np.subtract(tracks[i], measured[j]))
         distance2 = offset**2 / 0.02
         if offset > GATES.distance_m or distance2 > GATES.mahalanobis2:
-            return None
-        return float(distance2)
+            return 0.0
+        return float(distance2 + np.log(0.02**2) - GATES.miss_cost)
 
-    best = (0, 0.0)  # most matches first, then least cost
+    best = 0.0
     size = max(len(tracks), len(measured))
     for order in itertools.permutations(range(size)):
-        costs = [
-            c
-            for i, j in enumerate(order)
-            if i < len(tracks) and j < len(measured) and (c := cost(i, j)) is not None
-        ]
-        best = min(best, (-len(costs), sum(costs)))
+        allowed = [(i, j) for i, j in enumerate(order) if i < len(tracks) and j < len(measured)]
+        best = min(best, sum(cost(i, j) for i, j in allowed))
     chosen = [cost(m.track, m.measurement) for m in found]
-    assert None not in chosen
-    assert len(found) == -best[0]
-    assert sum(c for c in chosen if c is not None) <= best[1] + 1e-6
+    assert all(c < 0.0 for c in chosen)
+    assert sum(chosen) <= best + 1e-6
+
+
+def test_a_person_who_was_missed_does_not_set_off_a_chain() -> None:
+    # B's measurement lies on B and within A's gate, clutter within B's. The most matches would be
+    # A with B's measurement and B with the clutter.
+    tracks: list[tuple[float, float]] = [(0.0, 0), (0.45, 0)]
+    measured: list[tuple[float, float]] = [(0.45, 0), (0.9, 0)]
+    assert pairs(match(tracks, measured)) == {(1, 0)}
 
 
 def test_a_lone_match_is_never_in_doubt() -> None:
@@ -120,7 +142,7 @@ def test_rivals_that_fit_much_worse_or_lie_far_off_raise_no_doubt() -> None:
     tracks: list[tuple[float, float]] = [(0.0, 0), (0.42, 0)]
     measured: list[tuple[float, float]] = [(0.0, 0), (0.42, 0)]
     assert not any(found.ambiguous for found in match(tracks, measured))
-    near = Gates(11.6, 1.0, 20.0, 0.3)
+    near = Gates(11.6, 1.0, 10.0, 20.0, 0.3)
     assert not any(found.ambiguous for found in match(tracks, measured, gates=near))
-    wide = Gates(11.6, 1.0, 20.0, 0.8)
+    wide = Gates(11.6, 1.0, 10.0, 20.0, 0.8)
     assert all(found.ambiguous for found in match(tracks, measured, gates=wide))

@@ -57,7 +57,7 @@ def test_drift_is_exact_in_time(belief: AwarenessBelief, dt_s: float, share: flo
 def test_the_bound_never_rises_without_evidence(belief: AwarenessBelief, dt_s: float) -> None:
     after = drift(belief, dt_s, TAU_S, CONFIG)
     assert after.bound <= belief.bound
-    assert estimate(after).awareness_lower <= estimate(belief).awareness_lower
+    assert estimate(after, CONFIG).awareness_lower <= estimate(belief, CONFIG).awareness_lower
     assert forget(after, CONFIG).bound <= after.bound
 
 
@@ -108,9 +108,8 @@ def test_a_measurement_is_a_scalar_bayes_update(
     belief: AwarenessBelief, alpha: float, std: float, dt_s: float
 ) -> None:
     said = evidence(alpha, std, CONFIG)
-    assert said is not None
     mean, variance = said
-    variance *= max(1.0, CONFIG.evidence_correlation_s / dt_s)
+    variance = variance * max(1.0, CONFIG.evidence_correlation_s / dt_s)
     information = 1.0 / belief.variance + 1.0 / variance
     after = measure(belief, *said, dt_s, CONFIG)
     assert after.variance == pytest.approx(1.0 / information)
@@ -124,7 +123,6 @@ def test_a_measurement_is_a_scalar_bayes_update(
 def test_in_mid_range_a_standard_deviation_maps_by_the_derivative(alpha: float) -> None:
     std = 0.08
     said = evidence(alpha, std, CONFIG)
-    assert said is not None
     assert said[0] == pytest.approx(logit(alpha), abs=0.06)
     assert math.sqrt(said[1]) == pytest.approx(std / (alpha * (1.0 - alpha)), rel=0.06)
 
@@ -132,7 +130,6 @@ def test_in_mid_range_a_standard_deviation_maps_by_the_derivative(alpha: float) 
 @given(alpha=alphas, std=stds)
 def test_the_one_sigma_points_of_a_measurement_are_those_of_alpha(alpha: float, std: float) -> None:
     said = evidence(alpha, std, CONFIG)
-    assert said is not None
     mean, sigma = said[0], math.sqrt(said[1])
     epsilon = CONFIG.clip_awareness
     assert sigma >= CONFIG.min_evidence_std_logit
@@ -146,25 +143,26 @@ def test_the_one_sigma_points_of_a_measurement_are_those_of_alpha(alpha: float, 
 def test_a_higher_alpha_is_higher_evidence(low: float, high: float, std: float) -> None:
     low, high = sorted((low, high))
     first, second = evidence(low, std, CONFIG), evidence(high, std, CONFIG)
-    assert first is not None
-    assert second is not None
     assert first[0] <= second[0]
 
 
 def test_a_confident_zero_is_confident_unawareness() -> None:
     said = evidence(0.0, 0.05, CONFIG)
-    assert said is not None
     # By the derivative at ε it would weigh next to nothing: σ = 0.05 / (0.02 · 0.98) = 2.6.
     assert sigmoid(said[0] + 2.0 * math.sqrt(said[1])) < 0.1
-    after = estimate(measure(prior(CONFIG), *said, 1.0, CONFIG))
+    after = estimate(measure(prior(CONFIG), *said, 1.0, CONFIG), CONFIG)
     assert after.awareness < CONFIG.prior_awareness
     assert after.awareness_std < 0.02
 
 
 def test_an_alpha_that_could_be_anything_is_no_evidence() -> None:
-    assert evidence(1.0, 0.3, CONFIG) is None
-    assert evidence(1.0, 1e9, CONFIG) is None
-    assert evidence(1.0, CONFIG.max_evidence_std, CONFIG) is not None
+    mean, variance = evidence(
+        np.array([1.0, 1.0, 1.0, np.nan]),
+        np.array([0.3, 1e9, CONFIG.max_evidence_std, np.nan]),
+        CONFIG,
+    )
+    assert np.isnan(mean).tolist() == [True, True, False, True]
+    assert np.isnan(variance).tolist() == [True, True, False, True]
 
 
 @pytest.mark.parametrize("frames", [2, 5, 40])
@@ -185,13 +183,13 @@ def test_information_in_a_span_of_time_does_not_depend_on_the_frame_rate(frames:
 def test_an_estimate_is_a_probability_with_a_bounded_deviation(
     mean: float, variance: float
 ) -> None:
-    result = estimate(AwarenessBelief(mean, variance, mean - Z * math.sqrt(variance)))
+    result = estimate(AwarenessBelief(mean, variance, mean - Z * math.sqrt(variance)), CONFIG)
     assert 0.0 <= result.awareness_lower <= result.awareness <= 1.0
     assert 0.0 <= result.awareness_std <= 0.5
 
 
 @pytest.mark.parametrize("mean", [-4.0, -1.0, 0.0, 2.5])
-@pytest.mark.parametrize("variance", [0.05, 0.5, 2.25])
+@pytest.mark.parametrize("variance", [0.05, 0.5, 2.25, 4.0])
 def test_the_deviation_is_that_of_the_logit_normal_distribution(
     mean: float, variance: float
 ) -> None:
@@ -203,14 +201,23 @@ def test_the_deviation_is_that_of_the_logit_normal_distribution(
         return float(quad(lambda x: sigmoid(x) ** order * density(x), low, high)[0])
 
     expected = math.sqrt(moment(2) - moment(1) ** 2)
-    assert estimate(AwarenessBelief(mean, variance)).awareness_std == pytest.approx(
+    assert estimate(AwarenessBelief(mean, variance), CONFIG).awareness_std == pytest.approx(
         expected, rel=0.01
     )
 
 
+@given(value=st.floats(-12.0, 12.0))
+def test_a_lower_bound_that_no_measurement_could_tell_from_zero_is_zero(value: float) -> None:
+    epsilon = CONFIG.clip_awareness
+    lower = estimate(AwarenessBelief(value, 1.0, value), CONFIG).awareness_lower
+    assert lower == pytest.approx(max(0.0, (sigmoid(value) - epsilon) / (1.0 - epsilon)))
+    assert lower <= sigmoid(value)
+    assert lower == 0.0 or sigmoid(value) > epsilon
+
+
 def test_nothing_known_has_a_lower_bound_of_zero() -> None:
-    assert estimate(prior(CONFIG)).awareness_lower == 0.0
-    assert estimate(prior(CONFIG)).awareness == pytest.approx(CONFIG.prior_awareness)
+    assert estimate(prior(CONFIG), CONFIG).awareness_lower == 0.0
+    assert estimate(prior(CONFIG), CONFIG).awareness == pytest.approx(CONFIG.prior_awareness)
 
 
 @given(value=st.floats(-30.0, 30.0))

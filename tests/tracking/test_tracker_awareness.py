@@ -104,11 +104,12 @@ def test_without_a_face_nobody_was_ever_aware(blind: Shown) -> None:
 
 def test_evidence_from_before_confirmation_does_not_count() -> None:
     tracker = PersonTracker()
-    for step in range(2):
+    last = TrackerConfig().confirm_hits - 1
+    for step in range(last):
         now = step * PERIOD_S
         (track,) = tracker.update([observe((3, 0), now, awareness=1.0)], now, CAMERA)
         assert (track.status, track.awareness_lower) == ("tentative", 0.0)
-    (track,) = tracker.update([observe((3, 0), 2 * PERIOD_S)], 2 * PERIOD_S, CAMERA)
+    (track,) = tracker.update([observe((3, 0), last * PERIOD_S)], last * PERIOD_S, CAMERA)
     assert (track.status, track.awareness_lower) == ("confirmed", 0.0)
 
 

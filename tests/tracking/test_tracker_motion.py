@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tracking_scenes import white_acceleration
 
-from tracking._measurement import floor_covariance
+from tracking._measurement import floor_covariances
 from tracking._motion import process_noise, transition
 
 steps = st.floats(1e-3, 5.0)
@@ -48,6 +48,6 @@ def test_the_noise_floor_raises_eigenvalues_and_keeps_directions(
 ) -> None:
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     eigenvalues = np.array([low, low + extra])
-    floored = floor_covariance(turn @ np.diag(eigenvalues) @ turn.T, floor_m)
+    (floored,) = floor_covariances((turn @ np.diag(eigenvalues) @ turn.T)[None], floor_m)
     expected = turn @ np.diag(np.maximum(eigenvalues, floor_m**2)) @ turn.T
     np.testing.assert_allclose(floored, expected, atol=1e-9)

@@ -42,8 +42,8 @@ REFUSED: dict[str, tuple[Callable[[PersonTracker], Any], str]] = {
     "infinite stamp": (lambda t: t.update(seen(), np.inf, CAMERA), "stamp_s must be finite"),
     "text stamp": (lambda t: t.update(seen(), "now", CAMERA), "stamp_s must be a number"),  # type: ignore[arg-type]
     "earlier stamp": (
-        lambda t: t.update(seen(0.1), 0.1, CAMERA),
-        r"stamp_s = 0.1 s: the last frame was at 0.45\d* s",
+        lambda t: t.update(seen(-0.1), -0.1, CAMERA),
+        r"the last frame was at 0.45\d* s, and a frame may come at most max_lag_s = 0.5 s late",
     ),
     "predict the past": (
         lambda t: t.predict(0.1),

@@ -1,0 +1,47 @@
+"""The measurement update of many Kalman filters at once: position measured, constant velocity.
+
+The equations of ``filterpy.kalman.KalmanFilter.update`` with H = [I 0], in Joseph form, which keeps
+P positive definite. The tests hold it to filterpy's result within 1e-9.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from perception.arrays import FloatArray
+
+_IDENTITY = np.eye(4)
+
+
+def correct(
+    states: FloatArray, covariances: FloatArray, measured_m: FloatArray, noises_m2: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return N states and covariances after one measured position each.
+
+    Args:
+        states: (N, 4) x, y, vx, vy.
+        covariances: (N, 4, 4), positive definite.
+        measured_m: (N, 2).
+        noises_m2: (N, 2, 2), positive definite.
+    """
+    inverse = inverse_2x2(covariances[:, :2, :2] + noises_m2)
+    gain = covariances[:, :, :2] @ inverse
+    innovation = measured_m - states[:, :2]
+    corrected = states + (gain @ innovation[:, :, None])[:, :, 0]
+    remainder = np.repeat(_IDENTITY[None], len(states), axis=0)
+    remainder[:, :, :2] -= gain
+    joseph = remainder @ covariances @ remainder.transpose(0, 2, 1)
+    joseph += gain @ noises_m2 @ gain.transpose(0, 2, 1)
+    # Rounding leaves it asymmetric in the last digit.
+    return corrected, 0.5 * (joseph + joseph.transpose(0, 2, 1))
+
+
+def inverse_2x2(matrices: FloatArray) -> FloatArray:
+    """Return the inverses of (N, 2, 2) symmetric matrices in closed form."""
+    inverse = np.empty_like(matrices)
+    xx, xy, yy = matrices[:, 0, 0], matrices[:, 0, 1], matrices[:, 1, 1]
+    scale = 1.0 / (xx * yy - xy * xy)
+    inverse[:, 0, 0] = yy * scale
+    inverse[:, 1, 1] = xx * scale
+    inverse[:, 0, 1] = inverse[:, 1, 0] = -xy * scale
+    return inverse

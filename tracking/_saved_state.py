@@ -1,0 +1,262 @@
+"""A tracker's state as plain JSON values, and back to the last bit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, Final, Literal, TypeAlias
+
+import numpy as np
+from pydantic import Field, ValidationError, model_validator
+
+from perception.arrays import FloatArray, covariance_matrix, rigid_transform
+
+from ._config import TrackerConfig
+from ._errors import TrackingError
+from ._frame import Frame
+from ._measurement import Measurements
+from ._step import TrackerState
+from ._table import TrackTable
+from .config import StrictConfig
+
+FORMAT: Final = "awarenav-tracker"
+VERSION: Final = 1
+
+_Two: TypeAlias = tuple[float, float]
+_Four: TypeAlias = tuple[float, float, float, float]
+
+
+class _TracksRecord(StrictConfig):
+    """A :class:`TrackTable`, column by column; null where a number is not finite."""
+
+    ids: list[int]
+    states: list[_Four]
+    covariances: list[tuple[_Four, _Four, _Four, _Four]]
+    awareness_means: list[float]
+    awareness_variances: list[float]
+    awareness_bounds: list[float | None]
+    evidence_stamps_s: list[float | None]
+    hit_stamps_s: list[list[float | None]]
+    confirmed: list[bool]
+    standing: list[bool]
+    missed_s: list[float]
+
+    @model_validator(mode="after")
+    def _agree(self) -> _TracksRecord:
+        lengths = {name: len(getattr(self, name)) for name in type(self).model_fields}
+        if len(set(lengths.values())) > 1:
+            raise ValueError(f"every column must have one entry a track, got {lengths}")
+        if any(a >= b for a, b in zip([0, *self.ids], self.ids, strict=False)):
+            raise ValueError(f"ids must be above 0 and increase, got {self.ids}")
+        if any(not variance > 0.0 for variance in self.awareness_variances):
+            raise ValueError("awareness_variances must be above 0")
+        return self
+
+
+class _StateRecord(StrictConfig):
+    """A :class:`TrackerState`."""
+
+    stamp_s: float | None
+    interval_s: float | None
+    next_id: int = Field(ge=1, lt=2**63)
+    tracks: _TracksRecord
+
+    @model_validator(mode="after")
+    def _agree(self) -> _StateRecord:
+        if self.tracks.ids and self.tracks.ids[-1] >= self.next_id:
+            raise ValueError(
+                f"next_id must be above every id in use, got {self.next_id} with a track "
+                f"{self.tracks.ids[-1]}"
+            )
+        if self.tracks.ids and self.stamp_s is None:
+            raise ValueError("stamp_s must be a number where there are tracks")
+        for row in self.tracks.hit_stamps_s:
+            seen_s = row[-1] if row else None
+            if seen_s is None or self.stamp_s is None or seen_s > self.stamp_s:
+                raise ValueError(
+                    f"hit_stamps_s must end in a stamp of at most {self.stamp_s} s, got {row}"
+                )
+        return self
+
+
+class _FrameRecord(StrictConfig):
+    """A :class:`Frame`."""
+
+    stamp_s: float
+    T_odom_camera: tuple[_Four, _Four, _Four, _Four]
+    positions_odom_m: list[_Two]
+    noises_m2: list[tuple[_Two, _Two]]
+    evidence_means: list[float | None]
+    evidence_variances: list[float | None]
+
+    @model_validator(mode="after")
+    def _agree(self) -> _FrameRecord:
+        lengths = {
+            len(self.positions_odom_m),
+            len(self.noises_m2),
+            len(self.evidence_means),
+            len(self.evidence_variances),
+        }
+        if len(lengths) > 1:
+            raise ValueError("every column of a frame must have one entry an observation")
+        return self
+
+
+class TrackerRecord(StrictConfig):
+    """All of a tracker but its view: the frames that may still be replayed are in it."""
+
+    format: Literal["awarenav-tracker"]
+    version: Literal[1]
+    config: TrackerConfig
+    refused_late_frames: int = Field(ge=0)
+    base: _StateRecord
+    frames: list[_FrameRecord]
+    latest: _StateRecord
+
+    @model_validator(mode="after")
+    def _agree(self) -> TrackerRecord:
+        stamps = [frame.stamp_s for frame in self.frames]
+        if self.base.stamp_s is not None:
+            stamps.insert(0, self.base.stamp_s)
+        if stamps != sorted(stamps):
+            raise ValueError("stamps of base and frames must not go back")
+        if self.latest.stamp_s != (stamps[-1] if stamps else None):
+            raise ValueError(
+                f"latest.stamp_s must be that of the last frame, got {self.latest.stamp_s}"
+            )
+        for state in (self.base, self.latest):
+            if any(len(row) != self.config.confirm_hits for row in state.tracks.hit_stamps_s):
+                raise ValueError(
+                    f"hit_stamps_s must hold confirm_hits = {self.config.confirm_hits} stamps a "
+                    "track"
+                )
+        return self
+
+
+def to_plain(
+    config: TrackerConfig,
+    refused_late_frames: int,
+    base: TrackerState,
+    frames: Sequence[Frame],
+    latest: TrackerState,
+) -> dict[str, Any]:
+    """Return a tracker as plain JSON values."""
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "config": config.model_dump(mode="json"),
+        "refused_late_frames": refused_late_frames,
+        "base": _plain_state(base),
+        "frames": [_plain_frame(frame) for frame in frames],
+        "latest": _plain_state(latest),
+    }
+
+
+def record_of(state: Any) -> TrackerRecord:
+    """Return a checked record of plain values.
+
+    Raises:
+        TrackingError: for anything that :func:`to_plain` has not written.
+    """
+    if not isinstance(state, dict):
+        raise TrackingError(f"state must be a mapping, got {type(state).__name__}")
+    if state.get("format") != FORMAT:
+        raise TrackingError(
+            f"state must have format {FORMAT!r}, as a tracker's state() does, "
+            f"got {state.get('format')!r}"
+        )
+    if state.get("version") != VERSION:
+        raise TrackingError(
+            f"state must have version {VERSION}, the one that this release reads and writes, "
+            f"got {state.get('version')!r}"
+        )
+    try:
+        return TrackerRecord.model_validate(state)
+    except ValidationError as cause:
+        raise TrackingError(f"state is not one that a tracker has written: {cause}") from cause
+
+
+def state_of(record: _StateRecord, confirm_hits: int, name: str) -> TrackerState:
+    """Return the state that a record describes; ``name`` is for messages."""
+    tracks = record.tracks
+    for index, covariance in enumerate(tracks.covariances):
+        covariance_matrix(f"{name}.tracks.covariances[{index}]", covariance, 4, TrackingError)
+    count = len(tracks.ids)
+    table = TrackTable(
+        ids=np.array(tracks.ids, dtype=np.int64),
+        states=_numbers(tracks.states).reshape(count, 4),
+        covariances=_numbers(tracks.covariances).reshape(count, 4, 4),
+        awareness_means=_numbers(tracks.awareness_means),
+        awareness_variances=_numbers(tracks.awareness_variances),
+        awareness_bounds=_numbers(tracks.awareness_bounds, -math.inf),
+        evidence_stamps_s=_numbers(tracks.evidence_stamps_s, math.nan),
+        hit_stamps_s=_numbers(
+            [stamp for row in tracks.hit_stamps_s for stamp in row], -math.inf
+        ).reshape(count, confirm_hits),
+        confirmed=np.array(tracks.confirmed, dtype=np.bool_),
+        standing=np.array(tracks.standing, dtype=np.bool_),
+        missed_s=_numbers(tracks.missed_s),
+    )
+    interval_s = math.inf if record.interval_s is None else record.interval_s
+    return TrackerState(table, record.next_id, record.stamp_s, interval_s)
+
+
+def frame_of(record: _FrameRecord, name: str) -> Frame:
+    """Return the frame that a record describes; ``name`` is for messages."""
+    for index, noise in enumerate(record.noises_m2):
+        covariance_matrix(f"{name}.noises_m2[{index}]", noise, 2, TrackingError)
+    count = len(record.positions_odom_m)
+    return Frame(
+        record.stamp_s,
+        rigid_transform(f"{name}.T_odom_camera", record.T_odom_camera, TrackingError),
+        Measurements(
+            _numbers(record.positions_odom_m).reshape(count, 2),
+            _numbers(record.noises_m2).reshape(count, 2, 2),
+            _numbers(record.evidence_means, math.nan),
+            _numbers(record.evidence_variances, math.nan),
+        ),
+    )
+
+
+def _plain_state(state: TrackerState) -> dict[str, Any]:
+    tracks = state.tracks
+    return {
+        "stamp_s": state.stamp_s,
+        "interval_s": state.interval_s if math.isfinite(state.interval_s) else None,
+        "next_id": state.next_id,
+        "tracks": {
+            "ids": tracks.ids.tolist(),
+            "states": tracks.states.tolist(),
+            "covariances": tracks.covariances.tolist(),
+            "awareness_means": tracks.awareness_means.tolist(),
+            "awareness_variances": tracks.awareness_variances.tolist(),
+            "awareness_bounds": _finite_or_none(tracks.awareness_bounds),
+            "evidence_stamps_s": _finite_or_none(tracks.evidence_stamps_s),
+            "hit_stamps_s": [_finite_or_none(row) for row in tracks.hit_stamps_s],
+            "confirmed": tracks.confirmed.tolist(),
+            "standing": tracks.standing.tolist(),
+            "missed_s": tracks.missed_s.tolist(),
+        },
+    }
+
+
+def _plain_frame(frame: Frame) -> dict[str, Any]:
+    measured = frame.measurements
+    return {
+        "stamp_s": frame.stamp_s,
+        "T_odom_camera": frame.T_odom_camera.tolist(),
+        "positions_odom_m": measured.positions_odom_m.tolist(),
+        "noises_m2": measured.noises_m2.tolist(),
+        "evidence_means": _finite_or_none(measured.evidence_means),
+        "evidence_variances": _finite_or_none(measured.evidence_variances),
+    }
+
+
+def _finite_or_none(values: FloatArray) -> list[float | None]:
+    """Return numbers as a list; JSON has no word for those that are not finite."""
+    return [value if math.isfinite(value) else None for value in values.tolist()]
+
+
+def _numbers(values: Sequence[Any], missing: float = math.nan) -> FloatArray:
+    """Return numbers as an array, with ``missing`` for None."""
+    return np.array([missing if value is None else value for value in values], dtype=np.float64)

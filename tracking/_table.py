@@ -1,0 +1,99 @@
+"""All tracks at one instant as arrays, one row a track: the state that the tracker computes on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perception.arrays import FloatArray
+
+IntArray = NDArray[np.int64]
+IndexArray = NDArray[np.intp]
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackTable:
+    """The tracks in the order of their ids; arrays are never written to once they are in here.
+
+    Attributes:
+        ids: (N,) increasing.
+        states: (N, 4) x, y, vx, vy in odom, metres and metres per second.
+        covariances: (N, 4, 4) of them.
+        awareness_means: (N,) of logit(α).
+        awareness_variances: (N,) of logit(α).
+        awareness_bounds: (N,) remembered lower bound of logit(α); −∞ until evidence has lifted it.
+        evidence_stamps_s: (N,) of the latest evidence of awareness that counted; NaN for none.
+        hit_stamps_s: (N, confirm_hits) of the latest frames that showed the person, oldest first;
+            −∞ where there were fewer.
+        confirmed: (N,) whether enough frames have shown the person.
+        standing: (N,) whether the person stood still when last seen.
+        missed_s: (N,) how long frames should have shown the person, and did not, since last seen.
+    """
+
+    ids: IntArray
+    states: FloatArray
+    covariances: FloatArray
+    awareness_means: FloatArray
+    awareness_variances: FloatArray
+    awareness_bounds: FloatArray
+    evidence_stamps_s: FloatArray
+    hit_stamps_s: FloatArray
+    confirmed: BoolArray
+    standing: BoolArray
+    missed_s: FloatArray
+
+    @staticmethod
+    def empty(confirm_hits: int) -> TrackTable:
+        """Return a table without tracks."""
+        none = np.empty(0)
+        no = np.empty(0, dtype=np.bool_)
+        return TrackTable(
+            ids=np.empty(0, dtype=np.int64),
+            states=np.empty((0, 4)),
+            covariances=np.empty((0, 4, 4)),
+            awareness_means=none,
+            awareness_variances=none,
+            awareness_bounds=none,
+            evidence_stamps_s=none,
+            hit_stamps_s=np.empty((0, confirm_hits)),
+            confirmed=no,
+            standing=no,
+            missed_s=none,
+        )
+
+    @property
+    def last_seen_s(self) -> FloatArray:
+        """(N,) stamp of the latest frame that showed each person."""
+        return self.hit_stamps_s[:, -1]
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    def take(self, keep: BoolArray) -> TrackTable:
+        """Return the tracks where ``keep`` (N,) is True."""
+        if keep.all():
+            return self
+        return TrackTable(*(getattr(self, name)[keep] for name in TRACK_COLUMNS))
+
+    def replaced(self, **columns: NDArray[Any]) -> TrackTable:
+        """Return the table with other columns; half the time of ``dataclasses.replace``."""
+        return TrackTable(
+            *(columns[name] if name in columns else getattr(self, name) for name in TRACK_COLUMNS)
+        )
+
+    def append(self, other: TrackTable) -> TrackTable:
+        """Return these tracks followed by the others, whose ids must be higher."""
+        if not len(self):
+            return other
+        if not len(other):
+            return self
+        return TrackTable(
+            *(np.concatenate((getattr(self, name), getattr(other, name))) for name in TRACK_COLUMNS)
+        )
+
+
+TRACK_COLUMNS = tuple(TrackTable.__slots__)
