@@ -16,6 +16,7 @@ from ._errors import SimError
 from .estimates._command import add_parsers as add_estimate_parsers
 from .models._command import add_parser as add_models_parser
 from .sets._command import add_parser as add_render_parser
+from .tracks._command import add_parser as add_tracks_parser
 
 # What the extra "sim" installs.
 _SIMULATOR_MODULES = ("av", "matplotlib", "pybullet")
@@ -111,6 +112,7 @@ def _parser() -> argparse.ArgumentParser:
     add_render_parser(commands)
     add_models_parser(commands)
     add_estimate_parsers(commands)
+    add_tracks_parser(commands)
 
     bench = commands.add_parser(
         "bench",
