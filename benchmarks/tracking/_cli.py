@@ -1,0 +1,300 @@
+"""The command line of the benchmark."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+from tqdm import tqdm
+
+from sim_tests import SimError
+from sim_tests._bench import Metric, read_baseline, write_baseline
+from tracking import TrackerConfig, TrackingError
+
+from ._consistency import on_own_model, on_walkers, open_gates
+from ._contender import Contender, run
+from ._cost import cost_ms
+from ._figures import (
+    INSIDE_TARGET,
+    SCORE_HEADER,
+    cost_metrics,
+    missed_costs,
+    missed_scores,
+    score_line,
+    score_metrics,
+    worse_than,
+)
+from ._judges import Scores, judge
+from ._measurements import OCCLUDED, OPEN, record
+from ._naive import Naive
+from ._norfair import Norfair
+from ._ours import Ours
+from ._stonesoup import StoneSoupGnn, StoneSoupJpda
+
+BASELINE = Path(__file__).with_name("baseline.json")
+SETS = {"open": OPEN, "occluded": OCCLUDED}
+#: The baseline holds for runs of this size only.
+STANDARD_SEEDS, STANDARD_FRAMES = 10, 500
+PARTS = ("scores", "cost", "consistency")
+#: How far the two judges may differ: they keep a match over a gap by different rules.
+MOST_DISAGREEMENT = 0.002
+COST_FRAMES, COST_REPEATS = 150, 3
+STEPS_S = (0.03, 0.05, 0.1, 0.2, 0.4)
+CONSISTENCY_WALKERS, CONSISTENCY_FRAMES = 60, 60
+_NEEDS = {"norfair": "norfair", "stonesoup-gnn": "stonesoup", "stonesoup-jpda": "stonesoup"}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the benchmark; 0 when all is as it should be, 1 when a figure is not, 2 for bad input."""
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    try:
+        config = (
+            TrackerConfig() if options.config is None else TrackerConfig.from_yaml(options.config)
+        )
+        baseline = read_baseline(options.baseline) if options.baseline.exists() else {}
+        missing = [m for m in ("motmetrics", "trackeval") if find_spec(m) is None]
+        if "scores" in options.parts and missing:
+            parser.error(
+                f"{' and '.join(missing)} not found; see benchmarks/tracking/requirements.txt "
+                "or leave out the scores (--parts cost,consistency)"
+            )
+    except (SimError, TrackingError) as error:
+        print(f"{parser.prog}: {error}", file=sys.stderr)
+        return 2
+    makers = _makers(options.trackers, config)
+    metrics: list[Metric] = []
+    missed: list[str] = []
+    if "scores" in options.parts:
+        _scores(options, makers, metrics, missed)
+    if "cost" in options.parts:
+        _cost(options, makers, metrics, missed)
+    if "consistency" in options.parts:
+        _consistency(options, config, metrics, missed)
+    if _is_standard(options):
+        missed += worse_than(baseline, metrics)
+    for line in missed:
+        print(f"NOT AS WANTED  {line}")
+    if options.out is not None:
+        write_baseline(options.out, metrics)
+    return 1 if missed else 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.tracking",
+        description="Run several trackers on the same simulated walkers, judge them with "
+        "motmetrics and TrackEval, compare their processor time, and check the covariance of ours.",
+    )
+    parser.add_argument(
+        "--people",
+        type=_counts,
+        default=[20],
+        metavar="N,N",
+        help="how many walkers, at a constant density (default: 20; the full run: 5,20,50,100)",
+    )
+    parser.add_argument(
+        "--seeds",
+        type=_count,
+        default=STANDARD_SEEDS,
+        metavar="N",
+        help="runs of each set (default: 10)",
+    )
+    parser.add_argument(
+        "--seed",
+        type=int,
+        default=0,
+        metavar="S",
+        help="first seed (default: 0; from 100 on are those that the trackers were tuned on)",
+    )
+    parser.add_argument(
+        "--frames",
+        type=_count,
+        default=STANDARD_FRAMES,
+        metavar="N",
+        help="of a run, 20 a second (default: 500)",
+    )
+    parser.add_argument(
+        "--sets",
+        type=_subset(tuple(SETS)),
+        default=list(SETS),
+        metavar="NAMES",
+        help="open, occluded (0.5–1 s out of sight after 2.5 s in sight) or both (default: both)",
+    )
+    parser.add_argument(
+        "--trackers",
+        type=_subset(("ours", "naive", *_NEEDS)),
+        default=["ours", "naive", *_NEEDS],
+        metavar="NAMES",
+        help="some of ours, naive, norfair, stonesoup-gnn, stonesoup-jpda (default: all)",
+    )
+    parser.add_argument(
+        "--parts",
+        type=_subset(PARTS),
+        default=list(PARTS),
+        metavar="NAMES",
+        help="some of scores, cost, consistency (default: all)",
+    )
+    parser.add_argument(
+        "--stonesoup-up-to",
+        type=_count,
+        default=20,
+        metavar="N",
+        help="leave Stone Soup out beyond N people; 100 take it an hour (default: 20)",
+    )
+    parser.add_argument(
+        "--config", type=Path, metavar="FILE", help="YAML of TrackerConfig for ours"
+    )
+    parser.add_argument(
+        "--baseline",
+        type=Path,
+        default=BASELINE,
+        metavar="FILE",
+        help=f"figures to compare with, if it exists (default: {BASELINE.name} beside this file)",
+    )
+    parser.add_argument("--out", type=Path, metavar="FILE", help="write the figures as JSON")
+    return parser
+
+
+def _count(text: str) -> int:
+    try:
+        value = int(text)
+    except ValueError:
+        value = 0
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"must be a whole number of at least 1, got {text!r}")
+    return value
+
+
+def _counts(text: str) -> list[int]:
+    return [_count(part) for part in text.split(",")]
+
+
+def _subset(valid: Sequence[str]) -> Callable[[str], list[str]]:
+    def parse(text: str) -> list[str]:
+        chosen = text.split(",")
+        for name in chosen:
+            if name not in valid:
+                raise argparse.ArgumentTypeError(f"{name!r} is none of {', '.join(valid)}")
+        return chosen
+
+    return parse
+
+
+def _makers(names: Sequence[str], config: TrackerConfig) -> dict[str, Callable[[], Contender]]:
+    """Return a maker for each tracker whose package is there, saying which are left out."""
+    makers: dict[str, Callable[[], Contender]] = {
+        "ours": lambda: Ours(config),
+        "naive": Naive,
+        "norfair": Norfair,
+        "stonesoup-gnn": StoneSoupGnn,
+        "stonesoup-jpda": StoneSoupJpda,
+    }
+    chosen = {}
+    for name in names:
+        if name in _NEEDS and find_spec(_NEEDS[name]) is None:
+            print(f"left out, {name}: see benchmarks/tracking/requirements.txt", file=sys.stderr)
+        else:
+            chosen[name] = makers[name]
+    return chosen
+
+
+def _is_standard(options: argparse.Namespace) -> bool:
+    """Say whether the figures may be compared with the baseline; tell when not."""
+    standard = (options.seed, options.seeds, options.frames) == (0, STANDARD_SEEDS, STANDARD_FRAMES)
+    if not standard or options.config is not None:
+        print("not compared with the baseline: it holds for the default seeds, frames and settings")
+        return False
+    return True
+
+
+def _affordable(
+    options: argparse.Namespace, makers: dict[str, Callable[[], Contender]], people: int
+) -> dict[str, Callable[[], Contender]]:
+    if people <= options.stonesoup_up_to:
+        return makers
+    return {name: make for name, make in makers.items() if not name.startswith("stonesoup")}
+
+
+def _scores(
+    options: argparse.Namespace,
+    makers: dict[str, Callable[[], Contender]],
+    metrics: list[Metric],
+    missed: list[str],
+) -> None:
+    print(SCORE_HEADER)
+    for name in options.sets:
+        for people in options.people:
+            chosen = _affordable(options, makers, people)
+            scores: dict[str, list[Scores]] = {tracker: [] for tracker in chosen}
+            with tqdm(
+                total=options.seeds * len(chosen),
+                desc=f"{name}, {people} people",
+                unit="run",
+                leave=False,
+                file=sys.stderr,
+            ) as bar:
+                for seed in range(options.seed, options.seed + options.seeds):
+                    rng = np.random.default_rng([seed, people])
+                    recording = record(people, options.frames, rng, SETS[name])
+                    for tracker, make in chosen.items():
+                        score = judge(recording.truth, run(make(), recording))
+                        if score.disagreement() > MOST_DISAGREEMENT:
+                            missed.append(
+                                f"{name}, {people} people, seed {seed}, {tracker}: the judges "
+                                f"differ by {score.disagreement():.4f} in MOTA or IDF1"
+                            )
+                        scores[tracker].append(score)
+                        bar.update()
+            for tracker, runs in scores.items():
+                print(score_line(name, people, tracker, runs), flush=True)
+                metrics += score_metrics(name, people, tracker, runs)
+                if options.frames >= STANDARD_FRAMES:
+                    missed += missed_scores(name, people, tracker, runs)
+
+
+def _cost(
+    options: argparse.Namespace,
+    makers: dict[str, Callable[[], Contender]],
+    metrics: list[Metric],
+    missed: list[str],
+) -> None:
+    print(f"\n{'processor time':16s}{'people':>6s}{'ms/frame':>10s}{'ours over it':>14s}")
+    for people in (20, 100):
+        rng = np.random.default_rng([options.seed, people])
+        recording = record(people, COST_FRAMES, rng, OPEN)
+        chosen = _affordable(options, makers, people)
+        cost = cost_ms([make() for make in chosen.values()], recording, COST_REPEATS)
+        for tracker, value in cost.items():
+            ratio = f"{cost['ours'] / value:14.3f}" if "ours" in cost else f"{'-':>14s}"
+            print(f"{tracker:16s}{people:6d}{value:10.3f}{ratio}", flush=True)
+        metrics += cost_metrics(people, cost)
+        missed += missed_costs(people, cost)
+
+
+def _consistency(
+    options: argparse.Namespace, config: TrackerConfig, metrics: list[Metric], missed: list[str]
+) -> None:
+    wide = open_gates(config)
+    print(f"\n{'consistency of ours':28s}{'NEES':>7s}{'in band':>9s}{'NIS':>7s}{'95 % band':>15s}")
+    for dt_s in tqdm(STEPS_S, desc="consistency", leave=False, file=sys.stderr):
+        rng = np.random.default_rng([options.seed, round(1e3 * dt_s)])
+        found = on_own_model(dt_s, CONSISTENCY_WALKERS, CONSISTENCY_FRAMES, rng, wide)
+        low, high = found.nis_band
+        tqdm.write(
+            f"{f'own model, dt {dt_s:g} s':28s}{found.nees:7.3f}{found.nees_inside:9.0%}"
+            f"{found.nis:7.3f}{f'{low:.3f}–{high:.3f}':>15s}"
+        )
+        if found.nees_inside < INSIDE_TARGET:
+            missed.append(f"NEES at dt {dt_s:g} s: {found.nees_inside:.0%} of frames in their band")
+        if not low <= found.nis <= high:
+            missed.append(f"NIS at dt {dt_s:g} s: {found.nis:.3f}, {low:.3f} to {high:.3f} wanted")
+    for name in options.sets:
+        recording = record(20, 200, np.random.default_rng([options.seed, 20]), SETS[name])
+        for key, value in on_walkers(recording, config).items():
+            print(f"walkers, {name}: {key.replace('_', ' ')}: {value:.2f}")
+            metrics.append(Metric(f"{name}_20_{key}", value, "1", "lower", 0.3))

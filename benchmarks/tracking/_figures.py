@@ -1,0 +1,104 @@
+"""The figures of the benchmark as text and as a baseline, and what they are held to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+
+import numpy as np
+
+from sim_tests._bench import Metric
+
+from ._judges import Scores
+
+#: Ours at 20 people: least MOTA, least IDF1, most switches (means over seeds).
+TARGETS = {"open": (0.985, 0.95, 4.0), "occluded": (0.94, 0.72, 35.0)}
+#: Most processor time of ours against a peer's: (people, peer) -> ratio.
+COST_TARGETS = {(20, "norfair"): 0.75, (20, "stonesoup-gnn"): 0.05, (100, "norfair"): 0.5}
+#: Least share of frames whose NEES lies in its 95 % band: frames of one run hang together, so that
+#: the share scatters around 0.95.
+INSIDE_TARGET = 0.85
+
+SCORE_HEADER = (
+    f"{'set':9s}{'people':>6s}  {'tracker':15s}{'MOTA':>14s}{'IDF1':>14s}{'switches':>14s}"
+    f"{'HOTA':>7s}{'misses':>8s}{'false':>7s}"
+)
+
+
+def score_line(name: str, people: int, tracker: str, scores: Sequence[Scores]) -> str:
+    """Return one tracker's row: means over seeds, ± their standard deviation."""
+
+    def mean(field: str) -> float:
+        return float(np.mean([getattr(score, field) for score in scores]))
+
+    def spread(field: str) -> float:
+        return float(np.std([getattr(score, field) for score in scores]))
+
+    return (
+        f"{name:9s}{people:6d}  {tracker:15s}"
+        f"{mean('mota'):8.3f} ±{spread('mota'):.3f}{mean('idf1'):8.3f} ±{spread('idf1'):.3f}"
+        f"{mean('switches'):8.1f} ±{spread('switches'):<4.1f}{mean('hota'):7.3f}"
+        f"{mean('misses'):8.0f}{mean('false_positives'):7.0f}"
+    )
+
+
+def score_metrics(name: str, people: int, tracker: str, scores: Sequence[Scores]) -> list[Metric]:
+    """Return a tracker's figures for the baseline."""
+    key = f"{name}_{people}_{tracker}"
+    mean = {
+        field: float(np.mean([asdict(s)[field] for s in scores])) for field in asdict(scores[0])
+    }
+    return [
+        Metric(f"{key}_mota", mean["mota"], "1", "higher", 0.005),
+        Metric(f"{key}_idf1", mean["idf1"], "1", "higher", 0.03),
+        Metric(f"{key}_hota", mean["hota"], "1", "higher", 0.03),
+        # Few and far between, so they scatter.
+        Metric(f"{key}_switches", mean["switches"], "switches/run", "lower", 0.5),
+    ]
+
+
+def missed_scores(name: str, people: int, tracker: str, scores: Sequence[Scores]) -> list[str]:
+    """Return what ours misses of its targets in one set."""
+    if tracker != "ours" or people != 20 or name not in TARGETS:
+        return []
+    mota, idf1, switches = TARGETS[name]
+    got = [float(np.mean([getattr(s, f) for s in scores])) for f in ("mota", "idf1", "switches")]
+    missed = []
+    if got[0] < mota:
+        missed.append(f"{name}: MOTA {got[0]:.3f}, at least {mota:g} wanted")
+    if got[1] < idf1:
+        missed.append(f"{name}: IDF1 {got[1]:.3f}, at least {idf1:g} wanted")
+    if got[2] > switches:
+        missed.append(f"{name}: {got[2]:.1f} switches, at most {switches:g} wanted")
+    return missed
+
+
+def cost_metrics(people: int, cost_ms: Mapping[str, float]) -> list[Metric]:
+    """Return ratios of our processor time to each peer's; bare times say more of the machine."""
+    return [
+        Metric(f"cost_{people}_over_{peer}", cost_ms["ours"] / value, "x", "lower", 0.4)
+        for peer, value in cost_ms.items()
+        if peer != "ours" and "ours" in cost_ms
+    ]
+
+
+def missed_costs(people: int, cost_ms: Mapping[str, float]) -> list[str]:
+    """Return what ours costs too much."""
+    missed = []
+    for (crowd, peer), most in COST_TARGETS.items():
+        if crowd == people and peer in cost_ms and "ours" in cost_ms:
+            ratio = cost_ms["ours"] / cost_ms[peer]
+            if ratio > most:
+                missed.append(
+                    f"cost at {people} people: {ratio:.2f} of {peer}'s, at most {most:g} wanted"
+                )
+    return missed
+
+
+def worse_than(baseline: Mapping[str, Metric], metrics: Sequence[Metric]) -> list[str]:
+    """Return what is worse than the baseline allows."""
+    return [
+        f"{metric.name}: {metric.value:.3g} {metric.unit}, was {baseline[metric.name].value:.3g}"
+        for metric in metrics
+        if metric.name in baseline and metric.is_worse_than(baseline[metric.name])
+    ]

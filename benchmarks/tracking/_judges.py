@@ -1,0 +1,128 @@
+"""Two judges of the same tracks, motmetrics and TrackEval, with one gate."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.distance import cdist
+
+from ._walkers import FloatArray
+
+#: A track further than this from a person is not that person.
+GATE_M = 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackedFrame:
+    """What a tracker reports for one frame: ids (K,) and positions (K, 2) in metres."""
+
+    ids: NDArray[np.int64]
+    positions_m: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Scores:
+    """Figures of one run, all of the whole run at once.
+
+    Attributes:
+        mota: multiple object tracking accuracy (motmetrics).
+        idf1: share of frames with the right identity (motmetrics).
+        switches: identity switches (motmetrics).
+        misses: people a frame without a track (motmetrics).
+        false_positives: tracks a frame without a person (motmetrics).
+        hota: higher order tracking accuracy, mean over its thresholds (TrackEval).
+        mota_trackeval: MOTA by TrackEval.
+        idf1_trackeval: IDF1 by TrackEval.
+        switches_trackeval: identity switches by TrackEval.
+    """
+
+    mota: float
+    idf1: float
+    switches: float
+    misses: float
+    false_positives: float
+    hota: float
+    mota_trackeval: float
+    idf1_trackeval: float
+    switches_trackeval: float
+
+    def disagreement(self) -> float:
+        """Return the larger of the two differences between the judges, in MOTA and in IDF1."""
+        return max(abs(self.mota - self.mota_trackeval), abs(self.idf1 - self.idf1_trackeval))
+
+
+def judge(truth: FloatArray, tracked: Sequence[TrackedFrame]) -> Scores:
+    """Judge tracks against truth (T, N, ≥ 2); everybody counts in every frame, seen or not."""
+    distances = [
+        cdist(people[:, :2], frame.positions_m) if len(frame.ids) else np.empty((len(people), 0))
+        for people, frame in zip(truth, tracked, strict=True)
+    ]
+    clear = _motmetrics(truth, tracked, distances)
+    other = _trackeval(truth, tracked, distances)
+    return Scores(**clear, **other)
+
+
+def _motmetrics(
+    truth: FloatArray, tracked: Sequence[TrackedFrame], distances: Sequence[FloatArray]
+) -> dict[str, float]:
+    import motmetrics  # noqa: PLC0415 - an optional peer
+
+    accumulator = motmetrics.MOTAccumulator(auto_id=True)
+    people = list(range(truth.shape[1]))
+    for frame, distance in zip(tracked, distances, strict=True):
+        accumulator.update(
+            people, frame.ids.tolist(), np.where(distance <= GATE_M, distance, np.nan)
+        )
+    names = ["mota", "idf1", "num_switches", "num_misses", "num_false_positives"]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of pandas, at motmetrics
+        row = motmetrics.metrics.create().compute(accumulator, metrics=names, name="run").iloc[0]
+    return {
+        "mota": float(row["mota"]),
+        "idf1": float(row["idf1"]),
+        "switches": float(row["num_switches"]),
+        "misses": float(row["num_misses"]),
+        "false_positives": float(row["num_false_positives"]),
+    }
+
+
+def _trackeval(
+    truth: FloatArray, tracked: Sequence[TrackedFrame], distances: Sequence[FloatArray]
+) -> dict[str, float]:
+    with contextlib.redirect_stdout(io.StringIO()):  # it prints which of its own sets it misses
+        import trackeval.metrics  # noqa: PLC0415 - an optional peer
+
+    frames, people = truth.shape[:2]
+    known: dict[int, int] = {}
+    ids = [
+        np.array([known.setdefault(int(i), len(known)) for i in frame.ids], dtype=int)
+        for frame in tracked
+    ]
+    data = {
+        "num_timesteps": frames,
+        "num_gt_ids": people,
+        "num_tracker_ids": len(known),
+        "num_gt_dets": frames * people,
+        "num_tracker_dets": sum(len(i) for i in ids),
+        "gt_ids": [np.arange(people)] * frames,
+        "tracker_ids": ids,
+        # As in TrackEval's own 3-D sets: 1 at no distance, the threshold of 0.5 at the gate.
+        "similarity_scores": [np.maximum(0.0, 1.0 - 0.5 * d / GATE_M) for d in distances],
+    }
+    quiet = {"PRINT_CONFIG": False}
+    with contextlib.redirect_stdout(io.StringIO()):
+        clear = trackeval.metrics.CLEAR(quiet).eval_sequence(data)
+        identity = trackeval.metrics.Identity(quiet).eval_sequence(data)
+        hota = trackeval.metrics.HOTA().eval_sequence(data)
+    return {
+        "hota": float(np.mean(hota["HOTA"])),
+        "mota_trackeval": float(clear["MOTA"]),
+        "idf1_trackeval": float(identity["IDF1"]),
+        "switches_trackeval": float(clear["IDSW"]),
+    }

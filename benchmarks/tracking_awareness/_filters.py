@@ -1,0 +1,242 @@
+"""Filters of awareness that were tried, all on the same evidence.
+
+Each takes stamps (T,) and what the frames say (T, N) and returns the awareness and its lower bound,
+(T, N). None of them knows about tracks that are new or mistaken for each other; the tracker's own
+is judged through the tracker.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from statistics import NormalDist
+from typing import Final, TypeAlias
+
+import numpy as np
+
+from tracking import AwarenessFilterConfig
+from tracking import _awareness_filter as gaussian
+
+from ._attention import BoolArray, FloatArray
+from ._camera import Measured
+
+Filter: TypeAlias = Callable[[FloatArray, Measured], tuple[FloatArray, FloatArray]]
+
+Z: Final = NormalDist().inv_cdf(0.9)
+
+
+def held(stamps_s: FloatArray, measured: Measured) -> tuple[FloatArray, FloatArray]:
+    """The latest measurement and its own bound α − zσ, held until the next: what not to do."""
+    alpha = measured.awareness.copy()
+    lower = np.maximum(alpha - Z * measured.awareness_std, 0.0)
+    for row in range(len(stamps_s)):
+        before = row - 1 if row else None
+        gap = np.isnan(alpha[row])
+        alpha[row, gap] = 0.0 if before is None else alpha[before, gap]
+        lower[row, gap] = 0.0 if before is None else lower[before, gap]
+    return alpha, lower
+
+
+@dataclass(frozen=True)
+class Smoothed:
+    """Exponential smoothing of α and of its spread, towards 0 without evidence."""
+
+    time_constant_s: float = 0.2
+
+    def __call__(self, stamps_s: FloatArray, measured: Measured) -> tuple[FloatArray, FloatArray]:
+        """Run over all frames."""
+        alpha = np.zeros_like(measured.awareness)
+        lower = np.zeros_like(alpha)
+        spread = np.full(alpha.shape[1], 0.25)
+        for row in range(1, len(stamps_s)):
+            keep = math.exp(-(stamps_s[row] - stamps_s[row - 1]) / self.time_constant_s)
+            shown = ~np.isnan(measured.awareness[row])
+            new = np.where(shown, measured.awareness[row], 0.0)
+            own = np.where(shown, measured.awareness_std[row], 0.5)
+            alpha[row] = keep * alpha[row - 1] + (1.0 - keep) * new
+            spread = keep * spread + (1.0 - keep) * (own**2 + (new - alpha[row]) ** 2)
+            bound = np.maximum(alpha[row] - Z * np.sqrt(spread), 0.0)
+            lower[row] = np.where(shown, bound, np.minimum(bound, lower[row - 1]))
+        return alpha, lower
+
+
+@dataclass(frozen=True)
+class LogitGaussian:
+    """The tracker's filter, and variations of it.
+
+    Attributes:
+        config: settings.
+        surprise: where a measurement lies this many σ below what was expected, the belief goes back
+            to the prior before it counts (quick down, slow up); infinite for never.
+        doubt: where a measurement lies this many σ above what was expected, the belief goes back to
+            the prior and the measurement itself does not count (a jump takes two frames); infinite
+            for never.
+        bias_std_logit: part of the error of every measurement that lasts for ``bias_s``, estimated
+            beside logit(α); 0 for none.
+        bias_s: time constant of that.
+    """
+
+    config: AwarenessFilterConfig = field(default_factory=AwarenessFilterConfig)
+    surprise: float = math.inf
+    doubt: float = math.inf
+    bias_std_logit: float = 0.0
+    bias_s: float = 0.3
+
+    def __call__(self, stamps_s: FloatArray, measured: Measured) -> tuple[FloatArray, FloatArray]:
+        """Run over all frames."""
+        config = self.config
+        shape = measured.awareness.shape
+        alpha, lower = np.empty(shape), np.empty(shape)
+        start = gaussian.prior(config)
+        belief = gaussian.AwarenessBelief(
+            np.full(shape[1], start.mean),
+            np.full(shape[1], start.variance),
+            np.full(shape[1], -math.inf),
+        )
+        lasting = _LastingError(shape[1], self.bias_std_logit**2, self.bias_s)
+        means, variances = gaussian.evidence(measured.awareness, measured.awareness_std, config)
+        before = np.zeros(shape[1], dtype=bool)
+        for row, stamp_s in enumerate(stamps_s):
+            dt_s = float(stamp_s - stamps_s[row - 1]) if row else 0.0
+            shown = ~np.isnan(means[row])
+            constants_s = np.where(
+                shown | ~measured.seen[row],
+                config.unseen_time_constant_s,
+                config.no_face_time_constant_s,
+            )
+            if dt_s <= config.max_evidence_gap_s:
+                constants_s[shown & before] = config.evidence_time_constant_s
+            before = shown
+            belief = gaussian.drift(belief, dt_s, constants_s, config)
+            mean = np.where(shown, means[row], 0.0)
+            variance = np.where(shown, variances[row], 1.0)
+            if self.bias_std_logit > 0.0:
+                lasting.drift(dt_s, constants_s)
+                after = lasting.measure(belief, mean, variance, shown)
+            else:
+                after = self._measure(belief, mean, variance, dt_s if row else math.inf)
+            belief = _choose(shown, after, belief)
+            told = gaussian.estimate(belief, config)
+            alpha[row], lower[row] = told.awareness, told.awareness_lower
+        return alpha, lower
+
+    def _measure(
+        self,
+        belief: gaussian.AwarenessBelief,
+        mean: FloatArray,
+        variance: FloatArray,
+        interval_s: float,
+    ) -> gaussian.AwarenessBelief:
+        config = self.config
+        spread = np.sqrt(belief.variance + variance)
+        reset = gaussian.forget(belief, config)
+        high = mean > belief.mean + self.doubt * spread
+        belief = _choose(mean < belief.mean - self.surprise * spread, reset, belief)
+        return _choose(high, reset, gaussian.measure(belief, mean, variance, interval_s, config))
+
+
+class _LastingError:
+    """An error that all measurements share for a while, as a second state beside logit(α)."""
+
+    def __init__(self, people: int, variance: float, time_constant_s: float) -> None:
+        self._stationary, self._time_constant_s = variance, time_constant_s
+        self._mean, self._shared = np.zeros(people), np.zeros(people)
+        self._variance = np.full(people, variance)
+
+    def drift(self, dt_s: float, constants_s: FloatArray) -> None:
+        keep = math.exp(-dt_s / self._time_constant_s)
+        self._mean = self._mean * keep
+        self._shared = self._shared * keep * np.exp(-dt_s / constants_s)
+        self._variance = self._stationary + keep**2 * (self._variance - self._stationary)
+
+    def measure(
+        self,
+        belief: gaussian.AwarenessBelief,
+        mean: FloatArray,
+        variance: FloatArray,
+        shown: BoolArray,
+    ) -> gaussian.AwarenessBelief:
+        total = belief.variance + 2.0 * self._shared + self._variance + variance
+        gain = (belief.variance + self._shared) / total
+        own_gain = np.where(shown, (self._variance + self._shared) / total, 0.0)
+        innovation = mean - belief.mean - self._mean
+        corrected = belief.mean + gain * innovation
+        remaining = belief.variance - gain * (belief.variance + self._shared)
+        covariance = self._shared - gain * (self._variance + self._shared)
+        self._mean = self._mean + own_gain * innovation
+        self._variance = self._variance - own_gain * (self._variance + self._shared)
+        self._shared = np.where(shown, covariance, self._shared)
+        bound = corrected - Z * np.sqrt(remaining)
+        return gaussian.AwarenessBelief(corrected, remaining, bound)
+
+
+@dataclass(frozen=True)
+class Jumps:
+    """A histogram of α that jumps: gaze stays where it is until it is somewhere else.
+
+    Between frames a share 1 − exp(−dt/τ) of the belief is drawn anew from what people do (with
+    evidence) or from the prior (without); exact for any dt. A measurement is wrong altogether with
+    a small probability. Two bins make it the two-state hidden Markov model of aware and unaware.
+
+    Attributes:
+        bins: of α, the first of which is 0.
+        stay_s: τ with evidence.
+        unseen_s: τ without.
+        correlation_s: frames closer than this count in part (likelihood to the power dt / this).
+        outliers: probability that a measurement says nothing.
+        least_std: floor of a measurement's σ.
+    """
+
+    bins: int = 21
+    stay_s: float = 0.6
+    unseen_s: float = 0.2
+    correlation_s: float = 0.15
+    outliers: float = 0.03
+    least_std: float = 0.06
+
+    def __call__(self, stamps_s: FloatArray, measured: Measured) -> tuple[FloatArray, FloatArray]:
+        """Run over all frames."""
+        if self.bins == 2:
+            levels, extra, people_do = np.array([0.0, 0.8]), 0.12, np.array([0.5, 0.5])
+            unknown = np.array([0.95, 0.05])
+        else:
+            levels, extra = np.linspace(0.0, 1.0, self.bins), 0.0
+            people_do = np.full(self.bins, 0.5 / (self.bins - 1))
+            people_do[0] = 0.5
+            unknown = np.where(levels == 0.0, 0.9, 0.1 / (self.bins - 1))
+        belief = np.tile(unknown, (measured.awareness.shape[1], 1))
+        alpha = np.zeros_like(measured.awareness)
+        lower = np.zeros_like(alpha)
+        for row in range(1, len(stamps_s)):
+            dt_s = float(stamps_s[row] - stamps_s[row - 1])
+            shown = ~np.isnan(measured.awareness[row])
+            keep = np.exp(-dt_s / np.where(shown, self.stay_s, self.unseen_s))[:, None]
+            fresh = np.where(shown[:, None], people_do, unknown)
+            belief = keep * belief + (1.0 - keep) * fresh
+            said = np.where(shown, measured.awareness[row], 0.0)[:, None]
+            std = np.where(shown, measured.awareness_std[row], 1.0)[:, None]
+            std = np.sqrt(np.maximum(std, self.least_std) ** 2 + extra**2)
+            density = np.exp(-0.5 * ((said - levels) / std) ** 2) / (std * math.sqrt(2 * math.pi))
+            likelihood = (1.0 - self.outliers) * density + self.outliers
+            power = min(1.0, dt_s / self.correlation_s) if self.correlation_s else 1.0
+            belief = np.where(shown[:, None], belief * likelihood**power, belief)
+            belief /= belief.sum(axis=1, keepdims=True)
+            alpha[row] = belief @ levels
+            if self.bins == 2:
+                bound = belief[:, 1]
+            else:
+                # The tenth percentile: α is at least the level below which a tenth of belief lies.
+                bound = levels[(np.cumsum(belief, axis=1) > 0.1).argmax(axis=1)]
+            lower[row] = np.where(shown, bound, np.minimum(bound, lower[row - 1]))
+        return alpha, lower
+
+
+def _choose(
+    mask: BoolArray, first: gaussian.AwarenessBelief, second: gaussian.AwarenessBelief
+) -> gaussian.AwarenessBelief:
+    return gaussian.AwarenessBelief(
+        np.where(mask, first.mean, second.mean),
+        np.where(mask, first.variance, second.variance),
+        np.where(mask, first.bound, second.bound),
+    )

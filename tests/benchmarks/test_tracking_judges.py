@@ -1,0 +1,52 @@
+"""The judges, on tracks whose scores are known by counting."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benchmarks.tracking._judges import GATE_M, TrackedFrame, judge
+
+pytest.importorskip("motmetrics", reason="see benchmarks/tracking/requirements.txt")
+pytest.importorskip("trackeval", reason="see benchmarks/tracking/requirements.txt")
+
+FRAMES = 20
+TRUTH = np.zeros((FRAMES, 2, 4))
+TRUTH[:, 1, 0] = 5.0
+
+
+def frames(ids: list[list[int]], x_m: list[list[float]]) -> list[TrackedFrame]:
+    return [
+        TrackedFrame(np.array(i, dtype=np.int64), np.array([[x, 0.0] for x in xs]).reshape(-1, 2))
+        for i, xs in zip(ids, x_m, strict=True)
+    ]
+
+
+def test_perfect_tracks_score_one() -> None:
+    score = judge(TRUTH, frames([[7, 3]] * FRAMES, [[0.0, 5.0]] * FRAMES))
+    assert (score.mota, score.idf1, score.hota, score.switches) == (1.0, 1.0, 1.0, 0.0)
+    assert score.disagreement() == 0.0
+
+
+def test_a_swap_half_way_costs_two_switches_and_half_the_identities() -> None:
+    half = FRAMES // 2
+    score = judge(TRUTH, frames([[1, 2]] * half + [[2, 1]] * half, [[0.0, 5.0]] * FRAMES))
+    assert score.switches == score.switches_trackeval == 2.0
+    assert score.mota == pytest.approx(1.0 - 2.0 / (2 * FRAMES))
+    assert score.idf1 == pytest.approx(0.5)
+    assert score.disagreement() < 1e-12
+
+
+def test_the_gate_is_one_metre_for_both_judges() -> None:
+    inside = judge(TRUTH, frames([[1, 2]] * FRAMES, [[0.99 * GATE_M, 5.0]] * FRAMES))
+    outside = judge(TRUTH, frames([[1, 2]] * FRAMES, [[1.01 * GATE_M, 5.0]] * FRAMES))
+    assert inside.mota == inside.mota_trackeval == 1.0
+    # One person missed and one track at nobody, in every frame.
+    assert outside.mota == outside.mota_trackeval == 0.0
+    assert outside.misses == outside.false_positives == FRAMES
+
+
+def test_no_tracks_at_all_is_a_score_too() -> None:
+    score = judge(TRUTH, frames([[]] * FRAMES, [[]] * FRAMES))
+    assert score.mota == 0.0
+    assert score.misses == 2 * FRAMES
