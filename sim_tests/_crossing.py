@@ -10,17 +10,19 @@ from typing import Final
 import numpy as np
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotState
-from perception import AttentionCone, AwarenessPipeline, PersonObservation
+from perception import AttentionCone, AwarenessPipeline, Camera, PersonObservation
 from perception.arrays import FloatArray
-from tracking import PersonTrack, PersonTracker, TrackerConfig
+from tracking import CameraView, PersonTrack, PersonTracker, TrackerConfig
 
 from ._errors import SimError
 from ._eyes import TimedEyes, make_eyes
 from ._keypoint_camera import KeypointNoise
+from ._map_view import MapView
 from ._metrics import ContactEvent, SafetyMeter
 from ._pixel_eyes import pixel_timing
 from ._scenario import Scenario
 from ._stage import Stage, TrueView
+from .pictures._camera_timing import CameraTiming
 from .robot._amr import NOVA_CARTER
 from .robot._planner import LocalPlanner, SamplingPlanner
 
@@ -29,6 +31,8 @@ _CLOSE_ENOUGH_TO_STOP_MPS: Final = 0.2
 _MEASURED_HZ: Final = 20.0
 # Before the first frame has arrived, perception is this old: older than any policy allows.
 _NEVER_S: Final = 1.0e6
+# Nobody farther away is missed when a frame does not show them.
+_SEEN_WITHIN_M: Final = 10.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,20 +168,18 @@ def run_crossing(
     meter = SafetyMeter(NOVA_CARTER)
     with Stage(scenario, offsets) as stage:
         driver = planner if planner is not None else _default_planner(scenario, stage)
-        pixels = perception == "pixels"
-        spec = scenario.camera
+        camera_model, timing = _camera(scenario, perception)
         eyes = make_eyes(
             perception,
             stage,
-            spec.camera(spec.picture_scale if pixels else 1.0),
+            camera_model,
             cone,
             noise if noise is not None else KeypointNoise(),
             camera_rng,
             pipeline,
         )
-        timing = pixel_timing(spec.timing) if pixels else spec.timing
         camera = TimedEyes(eyes, timing, timing_rng)
-        tracker = PersonTracker(TrackerConfig(awareness=policy.filter))
+        tracker = _tracker(perception, policy, stage, camera_model)
         adapter = NavAdapter(policy, NOVA_CARTER)
         goal = np.array([scenario.robot.goal_x_m, scenario.robot.goal_y_m])
         dt_s = 1.0 / scenario.control_hz
@@ -195,10 +197,12 @@ def run_crossing(
             seen: tuple[tuple[PersonObservation, int], ...] = ()
             tracks: tuple[PersonTrack, ...] = ()
             for sighting in camera.look(t_s, T_odom_camera, truth):
-                if sighting.stamp_s > seen_s:  # one that a later frame has overtaken is old news
+                if seen_s - sighting.stamp_s > tracker.config.max_lag_s:
+                    continue  # too old for the tracker to go back to
+                observations = tuple(observation for observation, _ in sighting.seen)
+                tracks = tracker.update(observations, sighting.stamp_s, sighting.T_odom_camera)
+                if sighting.stamp_s > seen_s:
                     seen, seen_s = sighting.seen, sighting.stamp_s
-                    observations = tuple(observation for observation, _ in seen)
-                    tracks = tracker.update(observations, seen_s, sighting.T_odom_camera)
             if seen_s != t_s:
                 tracks = tracker.predict(t_s)
             state = stage.amr.state(t_s)
@@ -227,6 +231,23 @@ def run_crossing(
         return _result(
             scenario, seed, policy_name, type(driver).__name__, perception, meter, frames, reached_s
         )
+
+
+def _camera(scenario: Scenario, perception: str) -> tuple[Camera, CameraTiming]:
+    spec = scenario.camera
+    if perception == "pixels":
+        return spec.camera(spec.picture_scale), pixel_timing(spec.timing)
+    return spec.camera(), spec.timing
+
+
+def _tracker(
+    perception: str, policy: AwarenessPolicy, stage: Stage, camera: Camera
+) -> PersonTracker:
+    config = TrackerConfig(awareness=policy.filter)
+    if perception == "truth":  # which sees all around
+        return PersonTracker(config)
+    view = CameraView(camera, max_range_m=_SEEN_WITHIN_M)
+    return PersonTracker(config, view=MapView.of(stage.warehouse, view))
 
 
 def _default_planner(scenario: Scenario, stage: Stage) -> LocalPlanner:

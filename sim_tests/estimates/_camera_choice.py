@@ -35,6 +35,11 @@ class CameraChoice:
         self._say = say
         self._cameras: dict[tuple[int, int], Camera] = {}
 
+    @property
+    def known(self) -> bool:
+        """Whether the field of view was given, not assumed."""
+        return self._calibrated is not None or self._fov_deg is not None
+
     def of_size(self, width_px: int, height_px: int) -> Camera:
         """The camera of a picture; raises SimError where the calibration cannot be of it."""
         size = (width_px, height_px)

@@ -20,7 +20,7 @@ from perception import (
     PoseEstimator,
 )
 from perception.arrays import FloatArray
-from tracking import PersonTrack, PersonTracker
+from tracking import CameraView, PersonTrack, PersonTracker
 
 from ._camera_choice import CameraChoice
 from ._frame_estimate import FrameEstimate
@@ -75,7 +75,8 @@ class PeopleEstimator:
         self._standing_pose = standing_pose_odom_camera
         self._tap = KeypointTap(networks.pose_estimator)
         self._pipelines: dict[Camera, AwarenessPipeline] = {}
-        self._tracker = PersonTracker() if track else None
+        self._track = track
+        self._tracker: PersonTracker | None = None
 
     def estimate(self, frame: SourceFrame) -> FrameEstimate:
         """Estimate the people of a frame that has a picture.
@@ -83,7 +84,7 @@ class PeopleEstimator:
         Raises:
             SimError: for a picture that the calibrated camera cannot have taken.
             PerceptionError: for a picture or a network's answer that cannot be used.
-            TrackingError: for a stamp before that of the last frame, with ``track``.
+            TrackingError: for a stamp too far before that of the last frame, with ``track``.
         """
         assert frame.image_rgb is not None
         height, width = frame.image_rgb.shape[:2]
@@ -93,8 +94,12 @@ class PeopleEstimator:
         observations = self._process(camera, frame)
         tracks: tuple[PersonTrack, ...] | None = None
         track_ids: tuple[int | None, ...] = (None,) * len(observations)
-        if self._tracker is not None:
+        if self._track:
             pose = standing_pose() if pose is None else pose
+            if self._tracker is None:
+                # A field that was only assumed would drop or keep people wrongly.
+                view = CameraView(camera) if self._cameras.known else None
+                self._tracker = PersonTracker(view=view)
             tracks = self._tracker.update(observations, frame.stamp_s, pose)
             track_ids = track_of_each(observations, tracks, pose)
         return FrameEstimate(

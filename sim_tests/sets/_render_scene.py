@@ -14,6 +14,7 @@ from perception.arrays import FloatArray
 
 from .._closing import Closing
 from .._errors import SimError
+from .._line_of_sight import crosses_boxes
 from .._warehouse import Warehouse
 from ..hall._layout import LAYOUTS, WarehouseLayout
 from ..hall._lighting import LIGHTINGS, Lighting
@@ -290,9 +291,4 @@ def _clearance_m(boxes: FloatArray, x: float, y: float) -> float:
 
 def _blocked(boxes: FloatArray, start: tuple[float, float], end: tuple[float, float]) -> bool:
     """Whether the straight line between two points crosses one of (N, 4) boxes."""
-    origin, along = np.array(start), np.subtract(end, start)
-    safe = np.where(np.abs(along) < 1e-9, 1e-9, along)
-    first, second = (boxes[:, :2] - origin) / safe, (boxes[:, 2:] - origin) / safe
-    enter = np.minimum(first, second).max(axis=1)
-    leave = np.maximum(first, second).min(axis=1)
-    return bool(((enter < leave) & (leave > 0.0) & (enter < 1.0)).any())
+    return bool(crosses_boxes(boxes, start, end)[0])

@@ -101,7 +101,7 @@ def test_core_installs_and_runs_without_the_simulator(
     for name in CORE:
         assert Path(seen["files"][name]).parent == environment.site / name
     assert seen["found"] == []
-    assert seen["imported"] == []  # matplotlib is there, since filterpy depends on it
+    assert seen["imported"] == []
     assert seen["obstacles"] == [0, 5]
 
     assert environment.command("awarenav", "--help").returncode == 0

@@ -94,7 +94,7 @@ def test_a_higher_score_never_hides_a_face(scores, which):
 
 
 def moved(head, x_m):
-    position = head.position_camera_m + [x_m, 0.0, 0.0]
+    position = head.position_camera_m + np.array([x_m, 0.0, 0.0])
     return HeadPose(
         position,
         head.rotation_camera_head,

@@ -1,0 +1,41 @@
+"""What a robot that knows its hall expects to see: its camera's view less what racks hide."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from perception.arrays import FloatArray
+from tracking import CameraView
+
+from ._line_of_sight import crosses_boxes
+from ._warehouse import Warehouse
+
+# Lower things hide legs at most.
+_HIDING_HEIGHT_M = 1.2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MapView:
+    """A view for the tracker: in the camera's field, in range, and with no rack in between.
+
+    Attributes:
+        camera: the field and the range.
+        boxes_odom_m: (N, 4) what is high enough to hide a person.
+    """
+
+    camera: CameraView
+    boxes_odom_m: FloatArray
+
+    @classmethod
+    def of(cls, warehouse: Warehouse, camera: CameraView) -> MapView:
+        """The view in a hall whose racks and walls the robot knows."""
+        high = warehouse.layout.obstacle_heights_m >= _HIDING_HEIGHT_M
+        return cls(camera, warehouse.obstacle_boxes_odom[high])
+
+    def visibility(self, positions_odom_m: FloatArray, T_odom_camera: FloatArray) -> FloatArray:
+        """Return (N,) in [0, 1]; see :class:`tracking.View`."""
+        open_field = self.camera.visibility(positions_odom_m, T_odom_camera)
+        hidden = crosses_boxes(self.boxes_odom_m, T_odom_camera[:2, 3], positions_odom_m)
+        return np.where(hidden, 0.0, open_field)
