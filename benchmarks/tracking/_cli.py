@@ -40,8 +40,6 @@ SETS = {"open": OPEN, "occluded": OCCLUDED}
 #: The baseline holds for runs of this size only.
 STANDARD_SEEDS, STANDARD_FRAMES = 10, 500
 PARTS = ("scores", "cost", "consistency")
-#: How far the two judges may differ: they keep a match over a gap by different rules.
-MOST_DISAGREEMENT = 0.002
 COST_FRAMES, COST_REPEATS = 150, 3
 STEPS_S = (0.03, 0.05, 0.1, 0.2, 0.4)
 CONSISTENCY_WALKERS, CONSISTENCY_FRAMES = 60, 60
@@ -243,10 +241,9 @@ def _scores(
                     recording = record(people, options.frames, rng, SETS[name])
                     for tracker, make in chosen.items():
                         score = judge(recording.truth, run(make(), recording))
-                        if score.disagreement() > MOST_DISAGREEMENT:
+                        if (apart := score.disagreement()) is not None:
                             missed.append(
-                                f"{name}, {people} people, seed {seed}, {tracker}: the judges "
-                                f"differ by {score.disagreement():.4f} in MOTA or IDF1"
+                                f"{name}, {people} people, seed {seed}, {tracker}: {apart}"
                             )
                         scores[tracker].append(score)
                         bar.update()

@@ -1,4 +1,4 @@
-"""Closed loop: what a crossing must do, with the truth and with keypoints."""
+"""Closed loop: what a crossing must do, with the truth, with keypoints and with pixels."""
 
 import math
 
@@ -15,7 +15,10 @@ ATTENTIVE = Scenario.shipped("crossing_attentive")
 DISTRACTED = Scenario.shipped("crossing_distracted")
 
 
-@pytest.fixture(scope="module", params=["truth", "keypoints"])
+PIXELS = pytest.param("pixels", marks=pytest.mark.slow)
+
+
+@pytest.fixture(scope="module", params=["truth", "keypoints", PIXELS])
 def comparison(request):
     """Nobody there, blind, aware of an attentive worker, aware of a distracted worker."""
     options = {"perception": request.param, "seed": 3}
@@ -87,6 +90,23 @@ def test_the_papers_encounter(encounter, case, perception, alpha_tolerance, dist
     assert alpha == pytest.approx(case.awareness, abs=alpha_tolerance)
     assert forward == pytest.approx(case.d_fwd_m, abs=distance_tolerance_m)
     assert lateral == pytest.approx(case.d_lat_m, abs=distance_tolerance_m)
+
+
+@pytest.fixture(scope="module")
+def encounter_in_pixels():
+    # The last of the paper's three cases is at 16.25 s.
+    scenario = Scenario.shipped("paper_encounter").model_copy(update={"duration_s": 16.5})
+    return run_crossing(scenario, policy="balanced", perception="pixels", seed=0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.meaning)
+def test_the_papers_encounter_in_pixels(encounter_in_pixels, case):
+    (row,) = [r for r in case_values(encounter_in_pixels) if r[0] is case and r[1] == "pixels"]
+    _, _, alpha, forward, lateral = row
+    assert alpha == pytest.approx(case.awareness, abs=0.10)
+    assert forward == pytest.approx(case.d_fwd_m, abs=0.15)
+    assert lateral == pytest.approx(case.d_lat_m, abs=0.15)
 
 
 def test_the_encounter_has_a_frame_for_every_sixtieth_of_its_25_seconds(encounter):
