@@ -4,8 +4,24 @@ from __future__ import annotations
 
 import os
 
+import pytest
 from hypothesis import settings
 
 # A busy machine must not fail a property for being slow; CI draws the same examples every time.
 settings.register_profile("awarenav", deadline=None, derandomize=bool(os.environ.get("CI")))
 settings.load_profile("awarenav")
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """``--full`` runs what takes minutes."""
+    parser.addoption("--full", action="store_true", help="run the tests marked full as well")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out what takes minutes; shorter runs of the same are never left out."""
+    if config.getoption("--full"):
+        return
+    skip = pytest.mark.skip(reason="takes minutes; pytest --full runs it")
+    for item in items:
+        if item.get_closest_marker("full"):
+            item.add_marker(skip)

@@ -100,7 +100,7 @@ def kept(tracker: PersonTracker) -> int:
     return len(json.dumps(tracker.state()))
 
 
-@pytest.mark.parametrize("frames", [1500, pytest.param(100_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("frames", [10_000, pytest.param(100_000, marks=pytest.mark.full)])
 def test_memory_is_bounded_however_long_it_runs(frames: int) -> None:
     rng = np.random.default_rng(1)
     tracker = PersonTracker(TrackerConfig(max_lag_s=0.2), view=VIEW)
