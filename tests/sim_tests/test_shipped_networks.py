@@ -13,14 +13,14 @@ from sim_tests._cli import main
 from sim_tests.estimates._judge import judge_files
 from sim_tests.sets._frame_records import read_records
 
-FRAMES = 60
+FRAMES = 100
 
 
 @pytest.fixture(scope="module")
 def held_out(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Rendered frames and what the shipped networks make of them."""
     folder = tmp_path_factory.mktemp("held_out")
-    size = ["--frames", str(FRAMES), "--scenes", "6", "--range", "1.5", "6", "--eyes", "ahead"]
+    size = ["--frames", str(FRAMES), "--scenes", "10", "--range", "1.5", "6", "--eyes", "ahead"]
     halls = ["--layouts", "crossing", "staging_hall", "--seed", "77"]
     assert main(["render", *size, *halls, "--out", str(folder)]) == 0
     networks = ["--overlay", "none", "--min-score", "0.01"]
@@ -31,7 +31,7 @@ def held_out(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_figures_of_the_model_cards_hold_on_a_sample(held_out):
     report = judge_files(held_out / "truth.jsonl", held_out / "seen.jsonl")
     overall = report["overall"]
-    assert overall["people"] >= 60
+    assert overall["people"] >= 100
     assert report["detection"]["ap50"] >= 0.97
     # Medians of a hundred people scatter about those of nine hundred, which have 5°, 15° and 4 %.
     assert overall["head_median_deg"] <= 6.0
