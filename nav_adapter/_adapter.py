@@ -64,8 +64,8 @@ class NavAdapter:
         self._book = AlertBook()
         self._latest: NavConstraints | None = None
         self._latest_input: tuple[tuple[PersonTrack, ...], RobotState, float] | None = None
-        # While the limit climbs back after stale data: where it has got to.
-        self._recovered_mps: float | None = None
+        # While the limit climbs back after stale data.
+        self._ceiling_mps: float | None = None
 
     def update(
         self,
@@ -112,7 +112,7 @@ class NavAdapter:
             if age_s > timing.stop_after_s:
                 reason = f"stale data: {name} is {age_s:.2f} s old"
                 limit = replace(limit, limit_mps=0.0, limited_by=reason)
-        limit, recovered_mps = self._recovering(limit, robot_state, now, stale)
+        limit, ceiling_mps = self._recovering(limit, robot_state, now, stale)
         alerts: tuple[Alert, ...] = ()
         book = self._book
         if self._policy.alerts is not None and not stale:
@@ -142,7 +142,7 @@ class NavAdapter:
         self._book = book
         self._latest = constraints
         self._latest_input = current, robot_state, seen
-        self._recovered_mps = recovered_mps
+        self._ceiling_mps = ceiling_mps
         return constraints
 
     def watchdog(self, stamp_s: float) -> NavConstraints:
@@ -164,23 +164,26 @@ class NavAdapter:
     def _recovering(
         self, limit: SpeedLimit, robot_state: RobotState, now: float, stale: bool
     ) -> tuple[SpeedLimit, float | None]:
-        """The limit while it climbs back after stale data, and where it has got to, if it does."""
-        if self._latest is None:
-            return limit, (limit.limit_mps if stale else None)
-        timing = self._policy.timing
-        elapsed_s = now - self._latest.stamp_s
-        from_mps = self._recovered_mps
-        if elapsed_s > timing.stale_after_s:
-            # Nobody has said anything meanwhile; nor may what was allowed before count.
-            from_mps = min(self._latest.speed_limit_mps, abs(robot_state.speed_mps))
-        if from_mps is None:
-            return limit, (limit.limit_mps if stale else None)
-        credit_s = min(elapsed_s, timing.fresh_within_s)
-        reached_mps = from_mps + (0.0 if stale else self._robot.max_acceleration_mps2 * credit_s)
-        if limit.limit_mps > reached_mps:
-            slow = replace(limit, limit_mps=reached_mps, limited_by="recovery after stale data")
-            return slow, reached_mps
-        return limit, (limit.limit_mps if stale else None)
+        """The limit under a ceiling that rises from stale data on, and that ceiling if any.
+
+        The ceiling rises to the robot's maximum whatever the limit is meanwhile, so that more
+        awareness never means less speed.
+        """
+        ceiling_mps, timing = self._ceiling_mps, self._policy.timing
+        if self._latest is not None:
+            elapsed_s = now - self._latest.stamp_s
+            if elapsed_s > timing.stale_after_s:
+                # Nobody has asked meanwhile: what was allowed before that counts no longer.
+                ceiling_mps = min(self._latest.speed_limit_mps, abs(robot_state.speed_mps))
+            if ceiling_mps is not None and not stale:
+                credit_s = min(elapsed_s, timing.fresh_within_s)
+                ceiling_mps += self._robot.max_acceleration_mps2 * credit_s
+        if ceiling_mps is not None and limit.limit_mps > ceiling_mps:
+            limit = replace(limit, limit_mps=ceiling_mps, limited_by="recovery after stale data")
+        if stale:
+            return limit, limit.limit_mps
+        done = ceiling_mps is None or ceiling_mps >= self._robot.max_speed_mps
+        return limit, (None if done else ceiling_mps)
 
     def _checked_stamp(self, stamp_s: float) -> float:
         now = finite_number("stamp_s", stamp_s, NavError)

@@ -169,11 +169,16 @@ class Crowd:
 def _with_allowed(
     before: _Allowed, newest: tuple[float, float, float], within_s: float
 ) -> _Allowed:
-    """What was allowed within the last ``within_s``, less what the newest is no smaller than."""
+    """What was allowed within the last ``within_s``, less what the newest is no smaller than.
+
+    What was allowed at one sighting holds until the next, so that the first sighting after an
+    absence proves nothing about the time between.
+    """
     clock_s, radius_m, ahead_m = newest
+    held = (*before[:-1], (clock_s, *before[-1][1:]))
     kept = (
         entry
-        for entry in before
+        for entry in held
         if clock_s - entry[0] < within_s - _ROUNDING_S
         and (entry[1] > radius_m or entry[2] > ahead_m)
     )

@@ -25,7 +25,7 @@ class PersonMemory:
         paid_s: how much time of being seen has been counted for this person.
         ahead_m: how far the obstacle's polygon reaches ahead of its circle.
         facing_odom: unit vector of the way the person walks, or last walked.
-        allowed: what has been allowed lately, newest last: (``paid_s`` then, radius, ahead).
+        allowed: what has been allowed lately, newest last: (``paid_s`` until which, radius, ahead).
         inflation_held: whether the inflation policy's hysteresis holds the person "aware".
         speed_held: the same of the speed policy.
     """

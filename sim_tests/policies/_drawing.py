@@ -59,7 +59,8 @@ def policy_figure(
         _draw_radius(axes[0], policy, largest_m)
         _draw_human_speed(axes[1], policy, fastest_mps)
         drawn = _draw_limit(axes[2], policy, robot, farthest_m)
-        figure.colorbar(drawn, ax=axes[2], label="speed limit (m/s)")
+        bar = figure.colorbar(drawn, ax=axes[2], label="speed limit (m/s)")
+        bar.ax.set_ylim(0.0, robot.max_speed_mps)
         axes[0].set_title(Path(name).name, loc="left", fontweight="bold")
     return figure
 
@@ -141,7 +142,7 @@ def _draw_limit(
         limit,
         cmap="viridis",
         vmin=0.0,
-        vmax=robot.max_speed_mps,
+        vmax=1.2 * robot.max_speed_mps,  # white lines do not show on the map's brightest yellow
         shading="nearest",
         rasterized=True,
     )

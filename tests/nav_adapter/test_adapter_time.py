@@ -16,6 +16,7 @@ from tracking import PersonTrack
 
 PERIOD_S = 0.05
 RATE_MPS = AwarenessPolicy().timing.shrink_rate_mps
+HELD_S = AwarenessPolicy().timing.shrink_after_s
 
 
 def watch(adapter: NavAdapter, seconds: float, *, start_s: float = 0.0) -> list[NavConstraints]:
@@ -37,8 +38,20 @@ def test_a_person_starts_large_and_shrinks_at_the_bounded_rate() -> None:
     assert radii[0] == 1.0
     steps = [before - after for before, after in pairwise(radii)]
     assert max(steps) <= RATE_MPS * PERIOD_S + 1e-9
-    assert radii[10] == pytest.approx(1.0 - RATE_MPS * 0.5)
+    # Not before awareness has held: four frames from the second on, the first being unaware.
+    assert radii[4] == 1.0
+    assert radii[5] == pytest.approx(1.0 - RATE_MPS * PERIOD_S)
+    assert radii[10] == pytest.approx(1.0 - RATE_MPS * (0.5 - HELD_S))
     assert radii[-1] == pytest.approx(0.45)
+
+
+def test_a_glance_shorter_than_the_hold_shrinks_nothing() -> None:
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    for step in range(60):
+        now = step * PERIOD_S
+        alpha = 1.0 if step % 5 else 0.0
+        result = adapter.update((person(now, awareness_lower=alpha),), robot_at(now), now)
+        assert radius(result) == 1.0
 
 
 def test_growth_is_instant() -> None:
@@ -56,7 +69,10 @@ def test_shrinking_follows_the_clock_not_the_number_of_updates(control_period_s:
         now = step * control_period_s
         frame = PERIOD_S * int(now / PERIOD_S + 1e-9)
         result = adapter.update((person(frame, awareness_lower=1.0),), robot_at(now), now)
-    assert radius(result) == pytest.approx(1.0 - RATE_MPS * 0.6, abs=RATE_MPS * PERIOD_S)
+    # Whether the first frame counts as aware depends on whether it is looked at twice.
+    late_s = max(control_period_s, PERIOD_S)
+    expected = 1.0 - RATE_MPS * (0.6 - HELD_S)
+    assert radius(result) == pytest.approx(expected, abs=RATE_MPS * late_s + 1e-9)
 
 
 Loss = Callable[[float, float], PersonTrack]
@@ -178,8 +194,12 @@ def test_a_person_who_is_back_goes_on_from_the_radius_held() -> None:
     watch(adapter, 2.0)
     adapter.update((), robot_at(2.3), 2.3)
     back = adapter.update((person(2.6, awareness_lower=1.0),), robot_at(2.6), 2.6)
-    # The absence pays for no more than the time for which a sighting counts as fresh.
-    assert radius(back) == pytest.approx(1.0 - RATE_MPS * 0.25)
+    # One sighting proves nothing about the absence.
+    assert radius(back) == 1.0
+    for step in range(1, 6):
+        now = 2.6 + step * PERIOD_S
+        back = adapter.update((person(now, awareness_lower=1.0),), robot_at(now), now)
+    assert radius(back) == pytest.approx(1.0 - RATE_MPS * 2 * PERIOD_S)
 
 
 def test_a_tentative_or_long_unseen_person_is_let_go_at_once() -> None:
