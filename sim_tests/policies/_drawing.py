@@ -95,9 +95,9 @@ def _draw_radius(axes: Axes, policy: AwarenessPolicy, largest_m: float) -> None:
     _draw_way_back(axes, inflation, float(settled_radius_m(policy, 1.0)), inflation.radius_m)
     floor_m = policy.margins.floor_m
     axes.axhline(floor_m, color=_FAINT, ls="--", lw=1.0)
-    axes.text(0.0, floor_m, f"floor {floor_m:.2f} m", color=_FAINT, va="bottom", fontsize=8)
+    axes.text(0.02, floor_m, f"floor {floor_m:.2f} m", color=_FAINT, va="bottom", fontsize=8)
     axes.axhline(BODY_RADIUS_M, color=_FAINT, ls=":", lw=1.0)
-    axes.text(0.0, BODY_RADIUS_M, "body", color=_FAINT, va="bottom", fontsize=8)
+    axes.text(0.02, BODY_RADIUS_M, "body", color=_FAINT, va="bottom", fontsize=8)
     _finish(axes, "obstacle radius (m)", largest_m)
 
 
