@@ -41,7 +41,11 @@ class Crowd:
 
     def __init__(self, policy: AwarenessPolicy) -> None:
         self._policy = policy
-        inflation, speed = policy.inflation, policy.speed
+        inflation, speed, margins = policy.inflation, policy.speed, policy.margins
+        self._floor_m, self._sigmas = margins.floor_m, margins.uncertainty_sigmas
+        ceiling_m = margins.maximum_radius_m
+        self._ceiling_m = math.inf if ceiling_m is None else ceiling_m
+        self._elongates = policy.outline.unaware_ahead_s > 0.0
         _require_non_increasing(self._policy_radius_m, type(inflation).__name__, "m")
         _require_non_increasing(self._policy_human_speed_mps, type(speed).__name__, "m/s")
         self.unaware_human_speed_mps = self._policy_human_speed_mps(0.0)
@@ -129,16 +133,18 @@ class Crowd:
         clock_s = before.paid_s + paid_s
         allowed = _with_allowed(before.allowed, (clock_s, *target), timing.shrink_after_s)
         shrink_m = timing.shrink_rate_mps * paid_s
-        radius_m = max(*(entry[1] for entry in allowed), before.radius_m - shrink_m)
-        ahead_m = max(*(entry[2] for entry in allowed), before.ahead_m - shrink_m)
+        radius_m, ahead_m = target
+        if len(allowed) > 1:
+            radius_m = max(entry[1] for entry in allowed)
+            ahead_m = max(entry[2] for entry in allowed)
         return PersonMemory(
             track=track,
             seen_stamp_s=max(before.seen_stamp_s, seen_stamp_s),
             awareness_lower=lower,
-            radius_m=radius_m,
+            radius_m=max(radius_m, before.radius_m - shrink_m),
             sigma_m=sigma_m,
             paid_s=clock_s,
-            ahead_m=ahead_m,
+            ahead_m=max(ahead_m, before.ahead_m - shrink_m),
             facing_odom=_facing(track, before.facing_odom),
             allowed=allowed,
             inflation_held=held,
@@ -149,16 +155,20 @@ class Crowd:
         self, track: PersonTrack, awareness: float, sigma_m: float
     ) -> tuple[float, float]:
         """Radius and elongation that this awareness allows."""
-        margins, outline = self._policy.margins, self._policy.outline
-        radius_m = self._policy_radius_m(awareness) + margins.uncertainty_sigmas * sigma_m
+        radius_m = self._bounded_m(self._policy_radius_m(awareness) + self._sigmas * sigma_m)
+        if not self._elongates:
+            return radius_m, 0.0
+        outline = self._policy.outline
         walking_mps = math.hypot(*track.velocity_odom_mps.tolist())
-        ahead_m = min(outline.ahead_s(awareness) * walking_mps, outline.longest_ahead_m)
-        return margins.bounded_m(radius_m), ahead_m
+        return radius_m, min(outline.ahead_s(awareness) * walking_mps, outline.longest_ahead_m)
+
+    def _bounded_m(self, radius_m: float) -> float:
+        return min(max(radius_m, self._floor_m), self._ceiling_m)
 
     def _policy_radius_m(self, awareness_lower: float) -> float:
         radius_m = self._policy.inflation.radius_m(awareness_lower)
         name = f"{type(self._policy.inflation).__name__}.radius_m({awareness_lower:g})"
-        return self._policy.margins.bounded_m(finite_number(name, radius_m, NavError))
+        return self._bounded_m(finite_number(name, radius_m, NavError))
 
     def _policy_human_speed_mps(self, awareness_lower: float) -> float:
         speed_mps = self._policy.speed.human_speed_mps(awareness_lower)

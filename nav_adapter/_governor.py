@@ -102,8 +102,10 @@ class SpeedGovernor:
         )
         rule, person = divmod(int(limits.argmin()), len(memories))
         limit_mps = float(limits[rule, person])
-        suffices = self._braking_suffices(
-            ahead_m, around_m, approach, human_mps, age_s, abs(robot_state.speed_mps)
+        speed_mps = abs(robot_state.speed_mps)
+        # Who keeps to speed and separation has the whole reaction time left.
+        suffices = speed_mps <= float(limits[0].min()) or self._braking_suffices(
+            ahead_m, around_m, approach, human_mps, age_s, speed_mps
         )
         if limit_mps >= maximum_mps:
             return SpeedLimit(maximum_mps, "robot maximum", suffices)

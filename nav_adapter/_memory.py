@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from tracking import PersonTrack
 
@@ -12,8 +12,7 @@ from tracking import PersonTrack
 _SAME_INSTANT_S = 1e-6
 
 
-@dataclass(frozen=True, slots=True)
-class PersonMemory:
+class PersonMemory(NamedTuple):
     """One person as of the adapter's last update.
 
     Attributes:
