@@ -108,9 +108,8 @@ class NavAdapter:
         stale = max(robot_age_s, perception_age_s) > timing.stale_after_s
         people = self._people
         if self._latest is not None and now - self._latest.stamp_s > timing.stale_after_s:
-            # What a watchdog would have said meanwhile: nobody is known to be aware any more.
-            tracks_before = [memory.track for memory in people.values()]
-            people = self._crowd.after(people, tracks_before, now, stale=True)
+            # Nobody has asked meanwhile, and nobody is known to be aware any more.
+            people = self._crowd.doubted(people)
         people = self._crowd.after(people, current, now, stale)
         limit = self._governor.limit(people, robot_state, now, robot_age_s)
         for name, age_s in (("perception", perception_age_s), ("robot state", robot_age_s)):

@@ -69,6 +69,21 @@ class Crowd:
                 known[track_id] = self._updated(memory.track, memory, 0.0, now, paid_s=0.0)
         return dict(sorted(known.items()))
 
+    def doubted(self, people: Mapping[int, PersonMemory]) -> dict[int, PersonMemory]:
+        """The same people after a silence: unaware, and no smaller than at first sight."""
+        doubted = {}
+        for track_id, memory in people.items():
+            radius_m, ahead_m = self._target_m(memory.track, 0.0, memory.sigma_m)
+            doubted[track_id] = memory._replace(
+                awareness_lower=0.0,
+                radius_m=max(memory.radius_m, radius_m),
+                ahead_m=max(memory.ahead_m, ahead_m),
+                allowed=((memory.paid_s, radius_m, ahead_m),),
+                inflation_held=False,
+                speed_held=False,
+            )
+        return doubted
+
     def human_speed_mps(self, memory: PersonMemory) -> float:
         """The policy's assumption for a person."""
         return self._policy_human_speed_mps(1.0 if memory.speed_held else memory.awareness_lower)
@@ -99,7 +114,7 @@ class Crowd:
         self, track: PersonTrack, seen_stamp_s: float, lower: float, now: float
     ) -> PersonMemory:
         """Nobody is known to be aware at first sight: the first obstacle is the unaware one."""
-        sigma_m = position_sigma_m(track, now)
+        sigma_m = self._sigma_m(track, now)
         radius_m, ahead_m = self._target_m(track, 0.0, sigma_m)
         return PersonMemory(
             track=track,
@@ -127,7 +142,7 @@ class Crowd:
     ) -> PersonMemory:
         """A person known before, now with this bound of α."""
         timing = self._policy.timing
-        sigma_m = position_sigma_m(track, now)
+        sigma_m = self._sigma_m(track, now)
         held = self._inflation_holds(lower, before.inflation_held)
         target = self._target_m(track, 1.0 if held else lower, sigma_m)
         clock_s = before.paid_s + paid_s
@@ -161,6 +176,10 @@ class Crowd:
         outline = self._policy.outline
         walking_mps = math.hypot(*track.velocity_odom_mps.tolist())
         return radius_m, min(outline.ahead_s(awareness) * walking_mps, outline.longest_ahead_m)
+
+    def _sigma_m(self, track: PersonTrack, now: float) -> float:
+        # Once the robot stands for want of data, doubt that grew on would only block its restart.
+        return position_sigma_m(track, min(now, track.stamp_s + self._policy.timing.stop_after_s))
 
     def _bounded_m(self, radius_m: float) -> float:
         return min(max(radius_m, self._floor_m), self._ceiling_m)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -200,6 +202,46 @@ def test_a_person_who_is_back_goes_on_from_the_radius_held() -> None:
         now = 2.6 + step * PERIOD_S
         back = adapter.update((person(now, awareness_lower=1.0),), robot_at(now), now)
     assert radius(back) == pytest.approx(1.0 - RATE_MPS * 2 * PERIOD_S)
+
+
+def test_two_levels_in_a_loop() -> None:
+    """Between the levels the person stays what they were; without evidence they are unaware."""
+    levels = {"shape": "two_level", "unaware_below": 0.2, "aware_above": 0.6}
+    policy = AwarenessPolicy(inflation=levels, speed=levels)
+    adapter, limits, radii = NavAdapter(policy, ROBOT), [], []
+    phases = [0.5] * 40 + [0.7] * 40 + [0.4] * 40 + [0.1] + [0.4] * 20
+    for step, alpha in enumerate(phases):
+        now = step * PERIOD_S
+        result = adapter.update((person(now, awareness_lower=alpha),), robot_at(now), now)
+        radii.append(radius(result))
+        limits.append(result.speed_limit_mps)
+    assert radii[39] == 1.0
+    assert radii[79] == radii[119] == pytest.approx(0.45)
+    assert set(radii[120:]) == {1.0}
+    assert limits[39] < limits[40] == limits[119]
+    assert set(limits[120:]) == {limits[0]}
+    for _ in range(2):  # lost while held
+        adapter.update((person(now, awareness_lower=0.7),), robot_at(now), now)
+    gone = adapter.update((person(now, awareness_lower=0.7),), robot_at(now + 0.3), now + 0.3)
+    assert gone.speed_limit_mps <= limits[0]
+    assert radius(gone) == 1.0
+
+
+def test_a_long_silence_does_not_blow_people_up() -> None:
+    """A walker tracked with some doubt of their velocity, then nothing for half a minute."""
+    walker = person(position=(6.0, 0.0), velocity=(0.0, 1.0), sigma_m=0.1)
+    doubt = np.diag([0.01, 0.01, 0.09, 0.09])
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    adapter.update((replace(walker, covariance_odom=doubt),), robot_at(), 0.0)
+    for step in range(1, 31):
+        result = adapter.watchdog(float(step))
+    assert result.speed_limit_mps == 0.0
+    sigma_m = math.sqrt(0.01 + 1.5**2 * 0.09)
+    assert radius(result) == pytest.approx(1.0 + 2.0 * sigma_m)
+    silent = NavAdapter(AwarenessPolicy(), ROBOT)
+    silent.update((replace(walker, covariance_odom=doubt),), robot_at(), 0.0)
+    back = silent.update((person(30.0, awareness_lower=1.0),), robot_at(30.0), 30.0)
+    assert radius(back) == pytest.approx(1.2)
 
 
 def test_a_tentative_or_long_unseen_person_is_let_go_at_once() -> None:
