@@ -20,7 +20,7 @@ class SpeedRules(StrictConfig):
         turn_within_stop_deg: how far the robot may turn off its direction of travel while it stops.
             Towards a person who lies farther off, it gets less far than its stopping distance, and
             towards one straight behind not at all: such people limit the speed less. 180 makes
-            everybody count as if straight ahead.
+            everybody count as if straight ahead; needed by robots that can drive sideways.
         zones: a limit over distance, or none.
         near_cap: a limit near anyone, or none.
     """
