@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from . import _clash  # noqa: F401 - first: refuses a foreign package of one of our names
 from ._adapter import NavAdapter
+from ._alert import Alert
 from ._constraints import NavConstraints, PersonObstacle
 from ._costmap import paint_costmap
 from ._errors import NavError
@@ -17,6 +18,7 @@ from ._separation import max_speed_mps, protective_separation_m
 from .policies import InflationPolicy, SpeedPolicy
 
 __all__ = [
+    "Alert",
     "AwarenessPolicy",
     "InflationPolicy",
     "NavAdapter",

@@ -2,34 +2,25 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import replace
 
-import numpy as np
-import shapely
-
-from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import finite_number
 from tracking import PersonTrack
 
-from ._constraints import NavConstraints, PersonObstacle
+from ._alert import Alert
+from ._alerting import AlertBook, alerts_due
+from ._constraints import NavConstraints
+from ._crowd import Crowd
 from ._errors import NavError
-from ._footprint import Footprint
-from ._memory import PersonMemory, position_at, position_sigma_m
+from ._governor import SpeedGovernor, SpeedLimit
+from ._memory import PersonMemory
+from ._obstacles import obstacles_of
 from ._policy import AwarenessPolicy
 from ._robot import RobotProfile, RobotState
-from ._separation import max_speed_mps
 
 # Clocks of two machines, or of a camera and a control loop, differ by this much without harm.
 _CLOCK_TOLERANCE_S = 0.05
-
-_POLYGON_SIDES = 24
-_ANGLES = np.arange(_POLYGON_SIDES) * (2.0 * math.pi / _POLYGON_SIDES)
-# Stretched so that the sides, not the corners, touch the circle: the polygon contains it.
-_UNIT_POLYGON = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1) / math.cos(
-    math.pi / _POLYGON_SIDES
-)
 
 
 class NavAdapter:
@@ -37,16 +28,19 @@ class NavAdapter:
 
     A person's radius is the policy's, for the lower bound of their α, plus ``uncertainty_sigmas``
     standard deviations of their position, and never below the floor (body radius plus minimum
-    clearance). It grows at once. It shrinks at a bounded rate and only by what a *new sighting* of
-    a confirmed person pays for: as long as no frame shows the person, however the tracks are
-    repeated or predicted, neither the radius shrinks nor the awareness rises.
+    clearance). It grows at once. It shrinks at a bounded rate, to what has been allowed for
+    ``shrink_after_s``, and only by what a *new sighting* of a confirmed person pays for: as long as
+    no frame shows the person, however the tracks are repeated or predicted, neither the radius
+    shrinks nor the awareness rises.
 
     The speed limit is the smallest v_max of speed-and-separation monitoring over all people, with
-    the human speed that the policy assumes. The separation runs from the robot's footprint to the
-    person's body circle (radius 0.30 m), not to the inflated obstacle.
+    the human speed that the policy assumes, and of the policy's other rules. The separation runs
+    from the robot to the person's body circle (radius 0.30 m), not to the inflated obstacle. People
+    whom the robot cannot meet while it stops limit it less (:class:`SpeedGovernor`).
 
     Tentative people, people unseen for longer than ``fresh_within_s`` and, when the data are stale,
-    all people count as unaware.
+    all people count as unaware. After stale data, or a pause in the updates as long as that, the
+    limit rises from where it was no faster than the robot accelerates.
 
     Args:
         policy: radii, human speeds, margins and time behaviour.
@@ -64,13 +58,14 @@ class NavAdapter:
             raise NavError(f"robot must be a RobotProfile, got {type(robot).__name__}")
         self._policy = policy
         self._robot = robot
-        self._footprint = Footprint(robot.footprint_m)
-        self._floor_m = BODY_RADIUS_M + policy.margins.minimum_clearance_m
-        _require_non_increasing(self._policy_radius_m, type(policy.inflation).__name__, "m")
-        _require_non_increasing(self._policy_human_speed_mps, type(policy.speed).__name__, "m/s")
-        self._unaware_human_speed_mps = self._policy_human_speed_mps(0.0)
+        self._crowd = Crowd(policy)
+        self._governor = SpeedGovernor(policy, robot, self._crowd)
         self._people: dict[int, PersonMemory] = {}
-        self._stamp_s: float | None = None
+        self._book = AlertBook()
+        self._latest: NavConstraints | None = None
+        self._latest_input: tuple[tuple[PersonTrack, ...], RobotState, float] | None = None
+        # While the limit climbs back after stale data.
+        self._ceiling_mps: float | None = None
 
     def update(
         self,
@@ -91,7 +86,8 @@ class NavAdapter:
                 there": only with it does a dead camera stop a robot that saw nobody.
 
         Returns:
-            Obstacles ordered by track id, and the speed limit with the rule that set it.
+            Obstacles ordered by track id, the speed limit with the rule that set it, and alerts,
+            the most urgent first.
 
         Raises:
             NavError: input of the wrong type, not finite, twice the same id, a stamp before the
@@ -104,164 +100,102 @@ class NavAdapter:
         robot_age_s = _age_s("robot_state.stamp_s", robot_state.stamp_s, now)
         if perception_stamp_s is not None:
             seen = finite_number("perception_stamp_s", perception_stamp_s, NavError)
-            perception_age_s = _age_s("perception_stamp_s", seen, now)
         else:
-            perception_age_s = max(0.0, now - max((t.stamp_s for t in current), default=now))
+            seen = min(now, max((track.stamp_s for track in current), default=now))
+        perception_age_s = _age_s("perception_stamp_s", seen, now)
 
         timing = self._policy.timing
         stale = max(robot_age_s, perception_age_s) > timing.stale_after_s
-        people = {track.id: self._remember(track, now, stale) for track in current}
-        for track_id, memory in self._people.items():
-            if track_id not in people and memory.is_held(now, timing.hold_s):
-                people[track_id] = self._hold(memory, now)
-        people = dict(sorted(people.items()))
-
-        limit_mps, limited_by = self._speed_limit(people, robot_state, now, robot_age_s)
+        people = self._people
+        if self._latest is not None and now - self._latest.stamp_s > timing.stale_after_s:
+            # Nobody has asked meanwhile, and nobody is known to be aware any more.
+            people = self._crowd.doubted(people)
+        people = self._crowd.after(people, current, now, stale)
+        limit = self._governor.limit(people, robot_state, now, robot_age_s)
         for name, age_s in (("perception", perception_age_s), ("robot state", robot_age_s)):
             if age_s > timing.stop_after_s:
-                limit_mps, limited_by = 0.0, f"stale data: {name} is {age_s:.2f} s old"
-        braked_mps = abs(robot_state.speed_mps) - self._robot.max_deceleration_mps2 * (
-            now - (now if self._stamp_s is None else self._stamp_s)
-        )
+                reason = f"stale data: {name} is {age_s:.2f} s old"
+                limit = replace(limit, limit_mps=0.0, limited_by=reason)
+        limit, ceiling_mps = self._recovering(limit, robot_state, now, stale)
+        alerts: tuple[Alert, ...] = ()
+        book = self._book
+        if self._policy.alerts is not None and not stale:
+            alerts, book = alerts_due(
+                self._policy.alerts,
+                self._robot,
+                people,
+                robot_state,
+                now,
+                self._policy.margins.uncertainty_sigmas,
+                book,
+            )
+        last_s = now if self._latest is None else self._latest.stamp_s
+        braked_mps = abs(robot_state.speed_mps) - self._robot.max_deceleration_mps2 * (now - last_s)
         constraints = NavConstraints(
             stamp_s=now,
-            obstacles=_obstacles(people, now),
-            speed_limit_mps=limit_mps,
-            limited_by=limited_by,
+            obstacles=obstacles_of(people, now, self._policy),
+            speed_limit_mps=limit.limit_mps,
+            limited_by=limit.limited_by,
             stale=stale,
-            reachable_speed_limit_mps=max(limit_mps, braked_mps),
+            reachable_speed_limit_mps=max(limit.limit_mps, braked_mps),
+            alerts=alerts,
+            braking_suffices=limit.braking_suffices,
         )
         # Nothing can fail from here on: whatever was refused above has left no trace.
         self._people = people
-        self._stamp_s = now
+        self._book = book
+        self._latest = constraints
+        self._latest_input = current, robot_state, seen
+        self._ceiling_mps = ceiling_mps
         return constraints
+
+    def watchdog(self, stamp_s: float) -> NavConstraints:
+        """Constraints at ``stamp_s`` when nothing new has come: the latest input, grown older.
+
+        For a timer beside the callbacks that call :meth:`update`: first everyone counts as unaware
+        (``stale_after_s``), then the limit is 0 (``stop_after_s``). Before the first update it is
+        0 as well.
+
+        Raises:
+            NavError: a stamp that is not finite or lies before the last one.
+        """
+        now = self._checked_stamp(stamp_s)
+        if self._latest_input is None:
+            return NavConstraints(now, (), 0.0, "stale data: none yet", True)
+        tracks, robot_state, seen = self._latest_input
+        return self.update(tracks, robot_state, now, perception_stamp_s=seen)
+
+    def _recovering(
+        self, limit: SpeedLimit, robot_state: RobotState, now: float, stale: bool
+    ) -> tuple[SpeedLimit, float | None]:
+        """The limit under a ceiling that rises from stale data on, and that ceiling if any.
+
+        The ceiling rises to the robot's maximum whatever the limit is meanwhile, so that more
+        awareness never means less speed.
+        """
+        ceiling_mps, timing = self._ceiling_mps, self._policy.timing
+        if self._latest is not None:
+            elapsed_s = now - self._latest.stamp_s
+            if elapsed_s > timing.stale_after_s:
+                # Nobody has asked meanwhile: what was allowed before that counts no longer.
+                ceiling_mps = min(self._latest.speed_limit_mps, abs(robot_state.speed_mps))
+            if ceiling_mps is not None and not stale:
+                credit_s = min(elapsed_s, timing.fresh_within_s)
+                ceiling_mps += self._robot.max_acceleration_mps2 * credit_s
+        if ceiling_mps is not None and limit.limit_mps > ceiling_mps:
+            limit = replace(limit, limit_mps=ceiling_mps, limited_by="recovery after stale data")
+        if stale:
+            return limit, limit.limit_mps
+        done = ceiling_mps is None or ceiling_mps >= self._robot.max_speed_mps
+        return limit, (None if done else ceiling_mps)
 
     def _checked_stamp(self, stamp_s: float) -> float:
         now = finite_number("stamp_s", stamp_s, NavError)
-        if self._stamp_s is not None and now < self._stamp_s:
+        if self._latest is not None and now < self._latest.stamp_s:
             raise NavError(
-                f"stamp_s must not go backward, got {now:.6f} s after {self._stamp_s:.6f} s"
+                f"stamp_s must not go backward, got {now:.6f} s after {self._latest.stamp_s:.6f} s"
             )
         return now
-
-    def _policy_radius_m(self, awareness_lower: float) -> float:
-        radius_m = self._policy.inflation.radius_m(awareness_lower)
-        name = f"{type(self._policy.inflation).__name__}.radius_m({awareness_lower:g})"
-        return max(self._floor_m, finite_number(name, radius_m, NavError))
-
-    def _policy_human_speed_mps(self, awareness_lower: float) -> float:
-        speed_mps = self._policy.speed.human_speed_mps(awareness_lower)
-        name = f"{type(self._policy.speed).__name__}.human_speed_mps({awareness_lower:g})"
-        return finite_number(name, speed_mps, NavError, minimum=0.0)
-
-    def _remember(self, track: PersonTrack, now: float, stale: bool) -> PersonMemory:
-        """The person of a track that is in the input."""
-        timing, before = self._policy.timing, self._people.get(track.id)
-        seen_stamp_s = track.stamp_s - track.time_since_seen_s
-        trusted = (
-            not stale
-            and track.status != "tentative"
-            and now - seen_stamp_s <= timing.fresh_within_s
-        )
-        lower = track.awareness_lower if trusted else 0.0
-        sigma_m = position_sigma_m(track, now)
-        if before is None:
-            # Nobody is known to be aware at first sight: the first radius is the unaware one.
-            radius_m = self._target_radius_m(0.0, sigma_m)
-            return PersonMemory(track, seen_stamp_s, lower, radius_m, sigma_m)
-
-        newly_seen_s = before.newly_seen_s(seen_stamp_s)
-        if newly_seen_s == 0.0:
-            # No new frame, no new evidence: also not from a tracker that claims otherwise.
-            lower = min(lower, before.awareness_lower)
-        radius_m = self._target_radius_m(lower, sigma_m)
-        if radius_m < before.radius_m:
-            may_shrink = trusted and track.status == "confirmed"
-            paid_s = min(newly_seen_s, timing.fresh_within_s) if may_shrink else 0.0
-            radius_m = max(radius_m, before.radius_m - timing.shrink_rate_mps * paid_s)
-        return PersonMemory(
-            track=track,
-            seen_stamp_s=seen_stamp_s if newly_seen_s > 0.0 else before.seen_stamp_s,
-            awareness_lower=lower,
-            radius_m=radius_m,
-            sigma_m=sigma_m,
-        )
-
-    def _hold(self, memory: PersonMemory, now: float) -> PersonMemory:
-        """The person of a track that has vanished: unaware, walking on, never smaller."""
-        sigma_m = position_sigma_m(memory.track, now)
-        return replace(
-            memory,
-            awareness_lower=0.0,
-            radius_m=max(memory.radius_m, self._target_radius_m(0.0, sigma_m)),
-            sigma_m=sigma_m,
-        )
-
-    def _target_radius_m(self, awareness_lower: float, sigma_m: float) -> float:
-        margin_m = self._policy.margins.uncertainty_sigmas * sigma_m
-        return self._policy_radius_m(awareness_lower) + margin_m
-
-    def _speed_limit(
-        self,
-        people: dict[int, PersonMemory],
-        robot_state: RobotState,
-        now: float,
-        robot_age_s: float,
-    ) -> tuple[float, str]:
-        """Smallest v_max of all people, m/s, and the rule that set it."""
-        maximum_mps = self._robot.max_speed_mps
-        if not people:
-            return maximum_mps, "robot maximum"
-        memories = people.values()
-        # Carrying a person on may only bring them nearer: they may have turned round since.
-        candidates = [position_at(m.track, now) for m in memories]
-        candidates += [tuple(m.track.position_odom_m.tolist()) for m in memories]
-        distance_m = self._footprint.distance_m(np.array(candidates), robot_state)
-        distance_m = distance_m.reshape(2, -1).min(axis=0)
-        margins = self._policy.margins
-        lost_m = BODY_RADIUS_M + abs(robot_state.speed_mps) * robot_age_s
-        limits_mps = max_speed_mps(
-            distance_m - [lost_m + margins.uncertainty_sigmas * m.sigma_m for m in memories],
-            [self._human_speed_mps(m, robot_state) for m in memories],
-            deceleration_mps2=self._robot.max_deceleration_mps2,
-            reaction_time_s=[
-                self._robot.reaction_time_s + max(0.0, now - m.track.stamp_s) for m in memories
-            ],
-            clearance_m=margins.separation_clearance_m,
-        )
-        nearest = int(limits_mps.argmin())
-        limit_mps = float(limits_mps[nearest])
-        if limit_mps >= maximum_mps:
-            return maximum_mps, "robot maximum"
-        return limit_mps, f"track {list(people)[nearest]}: speed and separation"
-
-    def _human_speed_mps(self, memory: PersonMemory, robot_state: RobotState) -> float:
-        """The policy's assumption, but at least the speed at which the track closes in.
-
-        Awareness is a reason to expect that somebody will not step towards the robot, not a reason
-        to overlook that they do. What a person walks faster than an unaware one may is added: an
-        attentive runner cannot stop as fast as an attentive walker, and an unaware one is already
-        faster than the walking speed of the standard.
-        """
-        vx, vy = memory.track.velocity_odom_mps.tolist()
-        x, y = (memory.track.position_odom_m - robot_state.position_odom_m).tolist()
-        excess_mps = max(0.0, math.hypot(vx, vy) - self._unaware_human_speed_mps)
-        closing_mps = -(vx * x + vy * y) / max(math.hypot(x, y), 1e-9)
-        policy_mps = self._policy_human_speed_mps(memory.awareness_lower)
-        return float(max(policy_mps + excess_mps, closing_mps))
-
-
-def _require_non_increasing(function: Callable[[float], float], name: str, unit: str) -> None:
-    """Refuse an own policy that gives less room or more haste to people who are less aware."""
-    before = function(0.0)
-    for alpha in np.linspace(0.0, 1.0, 101).tolist():
-        after = function(alpha)
-        if after > before + 1e-9:
-            raise NavError(
-                f"{name} must not grow with awareness, got {before:g} {unit} below and {after:g} "
-                f"{unit} at awareness_lower = {alpha:g}"
-            )
-        before = after
 
 
 def _age_s(name: str, stamp_s: float, now: float) -> float:
@@ -289,25 +223,3 @@ def _checked_tracks(tracks: Iterable[PersonTrack], now: float) -> tuple[PersonTr
         ids.add(track.id)
         _age_s(f"tracks[{index}].stamp_s", track.stamp_s, now)
     return checked
-
-
-def _obstacles(people: dict[int, PersonMemory], now: float) -> tuple[PersonObstacle, ...]:
-    if not people:
-        return ()
-    centers = np.array([position_at(m.track, now) for m in people.values()])
-    radii = np.array([m.radius_m for m in people.values()])
-    polygons = shapely.polygons(centers[:, None] + radii[:, None, None] * _UNIT_POLYGON)
-    return tuple(
-        PersonObstacle(
-            track_id=track_id,
-            center_odom_m=center,
-            velocity_odom_mps=memory.track.velocity_odom_mps,
-            radius_m=memory.radius_m,
-            height_m=memory.track.height_m,
-            awareness_lower=memory.awareness_lower,
-            polygon=polygon,
-        )
-        for (track_id, memory), center, polygon in zip(
-            people.items(), centers, polygons, strict=True
-        )
-    )

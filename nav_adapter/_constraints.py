@@ -8,6 +8,7 @@ from shapely.geometry import Polygon
 
 from perception.arrays import FloatArray, finite_array, finite_number, set_fields
 
+from ._alert import Alert
 from ._errors import NavError
 
 
@@ -23,7 +24,8 @@ class PersonObstacle:
         height_m: > 0.
         awareness_lower: the lower bound of α that was acted on, in [0, 1]: 0 for people whose α is
             not trusted. The radius follows it at once upward and at a bounded rate downward.
-        polygon: the same obstacle as a shapely polygon in odom; it contains the circle.
+        polygon: the same obstacle as a shapely polygon in odom; it contains the circle, and reaches
+            farther where the policy's outline says so.
     """
 
     track_id: int
@@ -70,6 +72,10 @@ class NavConstraints:
             fell faster than the robot can brake. For planners whose window of reachable speeds must
             not be empty. It starts from the measured speed, so a drive that ramps by itself should
             be given ``speed_limit_mps``: following a late measurement brakes too softly.
+        alerts: who should be warned now; an alert is asked for once, not in every update.
+        braking_suffices: False when a robot that brakes from this instant at its full deceleration
+            comes, by the assumptions of speed and separation, nearer to somebody than the clearance
+            before it stands. Then a limit is not enough: warn, evade, stop harder.
     """
 
     stamp_s: float
@@ -78,6 +84,8 @@ class NavConstraints:
     limited_by: str
     stale: bool
     reachable_speed_limit_mps: float = 0.0
+    alerts: tuple[Alert, ...] = ()
+    braking_suffices: bool = True
 
     def __post_init__(self) -> None:
         limit = finite_number("speed_limit_mps", self.speed_limit_mps, NavError, minimum=0.0)
@@ -90,4 +98,5 @@ class NavConstraints:
             obstacles=tuple(self.obstacles),
             speed_limit_mps=limit,
             reachable_speed_limit_mps=max(limit, reachable),
+            alerts=tuple(self.alerts),
         )

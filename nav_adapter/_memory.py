@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from tracking import PersonTrack
 
@@ -12,8 +12,7 @@ from tracking import PersonTrack
 _SAME_INSTANT_S = 1e-6
 
 
-@dataclass(frozen=True, slots=True)
-class PersonMemory:
+class PersonMemory(NamedTuple):
     """One person as of the adapter's last update.
 
     Attributes:
@@ -22,6 +21,12 @@ class PersonMemory:
         awareness_lower: the bound that was acted on.
         radius_m: the obstacle's radius.
         sigma_m: standard deviation of the position along its most uncertain direction.
+        paid_s: how much time of being seen has been counted for this person.
+        ahead_m: how far the obstacle's polygon reaches ahead of its circle.
+        facing_odom: unit vector of the way the person walks, or last walked.
+        allowed: what has been allowed lately, newest last: (``paid_s`` until which, radius, ahead).
+        inflation_held: whether the inflation policy's hysteresis holds the person "aware".
+        speed_held: the same of the speed policy.
     """
 
     track: PersonTrack
@@ -29,6 +34,12 @@ class PersonMemory:
     awareness_lower: float
     radius_m: float
     sigma_m: float
+    paid_s: float
+    ahead_m: float
+    facing_odom: tuple[float, float]
+    allowed: tuple[tuple[float, float, float], ...]
+    inflation_held: bool
+    speed_held: bool
 
     def newly_seen_s(self, seen_stamp_s: float) -> float:
         """Time from the last sighting to this one; 0 when it is no new one."""

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 import yaml
-from pydantic import GetCoreSchemaHandler
+from pydantic import GetCoreSchemaHandler, model_validator
 from pydantic_core import CoreSchema, core_schema
 
 from tracking import AwarenessFilterConfig
@@ -17,43 +17,58 @@ from tracking.config import StrictConfig
 
 from ._errors import NavError
 from .policies import (
+    AlertRules,
     InflationPolicy,
     InterpolatedHumanSpeed,
     InterpolatedInflation,
+    ObstacleOutline,
     SafetyMargins,
     SpeedPolicy,
+    SpeedRules,
+    TableHumanSpeed,
+    TableInflation,
     TimeBehaviour,
 )
 
+_SHIPPED: dict[str, tuple[type[StrictConfig], ...]] = {
+    "inflation": (InterpolatedInflation, TableInflation),
+    "speed": (InterpolatedHumanSpeed, TableHumanSpeed),
+}
+
 
 class _ShippedOrOwn:
-    """Pydantic marker of a field: the shipped model (or its YAML keys), or a user's own object."""
+    """Pydantic marker of a field: a shipped model (or its YAML keys), or a user's own object."""
 
-    def __init__(self, shipped: type[StrictConfig], method: str) -> None:
-        self._shipped = shipped
+    def __init__(self, field: str, method: str) -> None:
+        self._ramp, self._table = _SHIPPED[field]
         self._method = method
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        shipped, method = self._shipped, self._method
+        ramp, table, method = self._ramp, self._table, self._method
 
-        def check(value: Any, validate_shipped: Callable[[Any], Any]) -> Any:
-            if isinstance(value, (shipped, Mapping)):
-                return validate_shipped(value)
+        def check(value: Any, validate_ramp: Callable[[Any], Any]) -> Any:
+            if isinstance(value, table):
+                return value
+            if isinstance(value, Mapping) and any(str(key).startswith("table") for key in value):
+                return table.model_validate(dict(value))
+            if isinstance(value, (ramp, Mapping)):
+                return validate_ramp(value)
             if callable(getattr(value, method, None)) and not isinstance(value, type):
                 return value
             raise ValueError(
-                f"must be a mapping with the keys of {shipped.__name__} or an object with a "
-                f"method {method}(awareness_lower), got {type(value).__name__}"
+                f"must be a mapping with the keys of {ramp.__name__} or {table.__name__}, or an "
+                f"object with a method {method}(awareness_lower), got {type(value).__name__}"
             )
 
         def dump(value: Any) -> Any:
-            return value.model_dump(mode="json") if isinstance(value, shipped) else value
+            shipped = isinstance(value, (ramp, table))
+            return value.model_dump(mode="json") if shipped else value
 
         return core_schema.no_info_wrap_validator_function(
             check,
-            handler.generate_schema(shipped),
+            handler.generate_schema(ramp),
             serialization=core_schema.plain_serializer_function_ser_schema(dump),
         )
 
@@ -62,8 +77,11 @@ class AwarenessPolicy(StrictConfig):
     """Everything between a person's awareness and the planner's constraints, in one YAML file.
 
     Attributes:
-        inflation: radius of a person over ``awareness_lower``: the shipped model or an own object.
-        speed: assumed human speed over ``awareness_lower``: the shipped model or an own object.
+        inflation: radius of a person over ``awareness_lower``: a ramp, a table or an own object.
+        speed: assumed human speed over ``awareness_lower``: a ramp, a table or an own object.
+        outline: what the obstacles' polygons add to their circles; by default nothing.
+        rules: speed limits beside speed and separation, and whom limits are about.
+        alerts: who is warned and when, or none.
         margins: distances that hold whatever α says.
         timing: how fast obstacles may shrink and how long data may be trusted.
         filter: settings of the tracker's awareness filter, kept here because they decide with the
@@ -72,19 +90,37 @@ class AwarenessPolicy(StrictConfig):
 
     error: ClassVar[type[ValueError]] = NavError
 
-    inflation: Annotated[InflationPolicy, _ShippedOrOwn(InterpolatedInflation, "radius_m")] = (
+    inflation: Annotated[InflationPolicy, _ShippedOrOwn("inflation", "radius_m")] = (
         InterpolatedInflation()
     )
-    speed: Annotated[SpeedPolicy, _ShippedOrOwn(InterpolatedHumanSpeed, "human_speed_mps")] = (
+    speed: Annotated[SpeedPolicy, _ShippedOrOwn("speed", "human_speed_mps")] = (
         InterpolatedHumanSpeed()
     )
+    outline: ObstacleOutline = ObstacleOutline()
+    rules: SpeedRules = SpeedRules()
+    alerts: AlertRules | None = AlertRules()
     margins: SafetyMargins = SafetyMargins()
     timing: TimeBehaviour = TimeBehaviour()
     filter: AwarenessFilterConfig = AwarenessFilterConfig()
 
+    @model_validator(mode="after")
+    def _ceiling_above_unaware(self) -> AwarenessPolicy:
+        ceiling_m = self.margins.maximum_radius_m
+        if ceiling_m is not None and isinstance(self.inflation, _SHIPPED["inflation"]):
+            unaware_m = self.inflation.radius_m(0.0)
+            if unaware_m > ceiling_m:
+                raise ValueError(
+                    "margins.maximum_radius_m must be at least the unaware radius of "
+                    f"{unaware_m:g} m, got {ceiling_m:g} m"
+                )
+        return self
+
     @classmethod
     def preset(cls, name: str) -> AwarenessPolicy:
-        """Load a shipped policy: ``"balanced"`` (the default) or ``"blind"`` (ignores α).
+        """Load a shipped policy.
+
+        ``"balanced"`` is the default, ``"blind"`` ignores α, ``"conservative"`` and
+        ``"assertive"`` lie on either side of the default.
 
         Raises:
             NavError: there is no preset of that name.
@@ -105,14 +141,11 @@ class AwarenessPolicy(StrictConfig):
 
     def to_yaml(self, path: str | Path) -> None:
         """Write the policy for :meth:`from_yaml`; own policy objects cannot be written."""
-        for field, shipped in (
-            ("inflation", InterpolatedInflation),
-            ("speed", InterpolatedHumanSpeed),
-        ):
+        for field, shipped in _SHIPPED.items():
             value = getattr(self, field)
             if not isinstance(value, shipped):
+                names = " and ".join(model.__name__ for model in shipped)
                 raise NavError(
-                    f"{field} is a {type(value).__name__}; only {shipped.__name__} can be written "
-                    "to YAML"
+                    f"{field} is a {type(value).__name__}; only {names} can be written to YAML"
                 )
         super().to_yaml(path)

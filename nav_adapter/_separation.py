@@ -8,6 +8,9 @@ at it with speed v_h until it stands:
 
 C (how far a body part reaches in before it is noticed) and Z (the position uncertainty of the
 robot) act together and are given together as ``clearance_m``.
+
+S_r + S_s is the robot's stopping distance. Where the robot cannot get that far towards the person,
+because they stand behind it, only the share ``approach`` of it counts: 1 straight ahead, 0 behind.
 """
 
 from __future__ import annotations
@@ -34,6 +37,7 @@ def protective_separation_m(
     deceleration_mps2: ArrayLike,
     reaction_time_s: ArrayLike,
     clearance_m: ArrayLike,
+    approach: ArrayLike = 1.0,
 ) -> FloatArray:
     """Separation that a robot at this speed must keep: S_p of the module's formula.
 
@@ -43,6 +47,7 @@ def protective_separation_m(
         deceleration_mps2: a > 0.
         reaction_time_s: T ≥ 0.
         clearance_m: C + Z ≥ 0.
+        approach: in [0, 1], the share of the stopping distance that can lead to the person.
 
     Returns:
         S_p in metres, in the broadcast shape.
@@ -51,11 +56,11 @@ def protective_separation_m(
         NavError: a deceleration that is not positive.
     """
     a = _positive_deceleration(deceleration_mps2)
-    v, v_h, T, C = (
+    v, v_h, T, C, share = (
         np.asarray(value, dtype=np.float64)
-        for value in (speed_mps, human_speed_mps, reaction_time_s, clearance_m)
+        for value in (speed_mps, human_speed_mps, reaction_time_s, clearance_m, approach)
     )
-    separation: FloatArray = v_h * (T + v / a) + v * T + v**2 / (2.0 * a) + C
+    separation: FloatArray = v_h * (T + v / a) + share * (v * T + v**2 / (2.0 * a)) + C
     return separation
 
 
@@ -66,6 +71,7 @@ def max_speed_mps(
     deceleration_mps2: ArrayLike,
     reaction_time_s: ArrayLike,
     clearance_m: ArrayLike,
+    approach: ArrayLike = 1.0,
 ) -> FloatArray:
     """Highest speed whose protective separation fits into the separation there is.
 
@@ -79,9 +85,11 @@ def max_speed_mps(
         deceleration_mps2: a > 0.
         reaction_time_s: T ≥ 0.
         clearance_m: C + Z ≥ 0.
+        approach: in [0, 1], the share of the stopping distance that can lead to the person.
 
     Returns:
-        v_max ≥ 0 in m/s, in the broadcast shape.
+        v_max ≥ 0 in m/s, in the broadcast shape; infinite where no speed is too much (neither comes
+        nearer: ``approach`` and v_h are both 0).
 
     Raises:
         NavError: a deceleration that is not positive.
@@ -93,6 +101,15 @@ def max_speed_mps(
     spare = np.asarray(separation_m, dtype=np.float64) - C - v_h * T
     # Written this way round so that NaN lands on 0.
     spare = np.where(spare > 0.0, spare, 0.0)
-    b = a * T + v_h
-    speed: FloatArray = np.maximum(np.sqrt(b**2 + 2.0 * a * spare) - b, 0.0)
+    share = np.asarray(approach, dtype=np.float64)
+    b = share * a * T + v_h
+    # The root of share·v²/2 + b·v = a·spare in the form that does not divide by a share of 0.
+    below = b + np.sqrt(b**2 + 2.0 * a * share * spare)
+    some = np.broadcast_to(spare > 0.0, np.broadcast(below, spare).shape)
+    speed: FloatArray = np.divide(
+        2.0 * a * spare,
+        below,
+        out=np.where(some, np.inf, 0.0),
+        where=some & (below > 0.0),
+    )
     return speed

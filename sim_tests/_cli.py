@@ -15,6 +15,7 @@ from tracking import TrackingError
 from ._errors import SimError
 from .estimates._command import add_parsers as add_estimate_parsers
 from .models._command import add_parser as add_models_parser
+from .policies._command import add_parser as add_policy_parser
 from .sets._command import add_parser as add_render_parser
 from .tracks._command import add_parser as add_tracks_parser
 
@@ -113,6 +114,7 @@ def _parser() -> argparse.ArgumentParser:
     add_models_parser(commands)
     add_estimate_parsers(commands)
     add_tracks_parser(commands)
+    add_policy_parser(commands)
 
     bench = commands.add_parser(
         "bench",

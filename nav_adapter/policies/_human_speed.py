@@ -12,6 +12,10 @@ from ._ramp import AwarenessRamp
 class SpeedPolicy(Protocol):
     """Assumed speed of a person towards the robot; write your own with this one method.
 
+    A policy with hysteresis has a second one, ``holds(awareness_lower, held) -> bool``: whether a
+    person who was, or was not, held at the aware level at the last sighting is so now. While it
+    says so, α counts as 1 for this policy. It must say False for α = 0.
+
     A policy names the assumption, not the limit: the adapter turns it into a speed limit through
     speed-and-separation monitoring, so that no policy can hand out more than that allows.
     """

@@ -10,7 +10,12 @@ from ._ramp import AwarenessRamp
 
 
 class InflationPolicy(Protocol):
-    """Radius of a person as an obstacle; write your own with this one method."""
+    """Radius of a person as an obstacle; write your own with this one method.
+
+    A policy with hysteresis has a second one, ``holds(awareness_lower, held) -> bool``: whether a
+    person who was, or was not, held at the aware level at the last sighting is so now. While it
+    says so, α counts as 1 for this policy. It must say False for α = 0.
+    """
 
     def radius_m(self, awareness_lower: float) -> float:
         """Radius about the body's centre line for a lower bound of α in [0, 1].

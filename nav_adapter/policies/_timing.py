@@ -16,6 +16,8 @@ class TimeBehaviour(StrictConfig):
 
     Attributes:
         shrink_rate_mps: how fast an obstacle may shrink while its person is being seen.
+        shrink_after_s: an obstacle shrinks only to what awareness has allowed for this long; time
+            in which frames show the person counts, other time does not.
         fresh_within_s: a person unseen for longer counts as unaware. Must exceed the camera's
             period plus the delay of perception.
         hold_s: a confirmed person who disappears from the input is kept, unaware and moving on,
@@ -27,6 +29,7 @@ class TimeBehaviour(StrictConfig):
     error: ClassVar[type[ValueError]] = NavError
 
     shrink_rate_mps: float = Field(default=0.5, gt=0.0, le=5.0)
+    shrink_after_s: float = Field(default=0.2, ge=0.0, le=5.0)
     fresh_within_s: float = Field(default=0.25, gt=0.0, le=1.0)
     hold_s: float = Field(default=1.0, ge=0.0, le=10.0)
     stale_after_s: float = Field(default=0.5, gt=0.0, le=5.0)

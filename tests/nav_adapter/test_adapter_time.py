@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -16,6 +18,7 @@ from tracking import PersonTrack
 
 PERIOD_S = 0.05
 RATE_MPS = AwarenessPolicy().timing.shrink_rate_mps
+HELD_S = AwarenessPolicy().timing.shrink_after_s
 
 
 def watch(adapter: NavAdapter, seconds: float, *, start_s: float = 0.0) -> list[NavConstraints]:
@@ -37,8 +40,20 @@ def test_a_person_starts_large_and_shrinks_at_the_bounded_rate() -> None:
     assert radii[0] == 1.0
     steps = [before - after for before, after in pairwise(radii)]
     assert max(steps) <= RATE_MPS * PERIOD_S + 1e-9
-    assert radii[10] == pytest.approx(1.0 - RATE_MPS * 0.5)
+    # Not before awareness has held: four frames from the second on, the first being unaware.
+    assert radii[4] == 1.0
+    assert radii[5] == pytest.approx(1.0 - RATE_MPS * PERIOD_S)
+    assert radii[10] == pytest.approx(1.0 - RATE_MPS * (0.5 - HELD_S))
     assert radii[-1] == pytest.approx(0.45)
+
+
+def test_a_glance_shorter_than_the_hold_shrinks_nothing() -> None:
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    for step in range(60):
+        now = step * PERIOD_S
+        alpha = 1.0 if step % 5 else 0.0
+        result = adapter.update((person(now, awareness_lower=alpha),), robot_at(now), now)
+        assert radius(result) == 1.0
 
 
 def test_growth_is_instant() -> None:
@@ -56,7 +71,10 @@ def test_shrinking_follows_the_clock_not_the_number_of_updates(control_period_s:
         now = step * control_period_s
         frame = PERIOD_S * int(now / PERIOD_S + 1e-9)
         result = adapter.update((person(frame, awareness_lower=1.0),), robot_at(now), now)
-    assert radius(result) == pytest.approx(1.0 - RATE_MPS * 0.6, abs=RATE_MPS * PERIOD_S)
+    # Whether the first frame counts as aware depends on whether it is looked at twice.
+    late_s = max(control_period_s, PERIOD_S)
+    expected = 1.0 - RATE_MPS * (0.6 - HELD_S)
+    assert radius(result) == pytest.approx(expected, abs=RATE_MPS * late_s + 1e-9)
 
 
 Loss = Callable[[float, float], PersonTrack]
@@ -178,8 +196,52 @@ def test_a_person_who_is_back_goes_on_from_the_radius_held() -> None:
     watch(adapter, 2.0)
     adapter.update((), robot_at(2.3), 2.3)
     back = adapter.update((person(2.6, awareness_lower=1.0),), robot_at(2.6), 2.6)
-    # The absence pays for no more than the time for which a sighting counts as fresh.
-    assert radius(back) == pytest.approx(1.0 - RATE_MPS * 0.25)
+    # One sighting proves nothing about the absence.
+    assert radius(back) == 1.0
+    for step in range(1, 6):
+        now = 2.6 + step * PERIOD_S
+        back = adapter.update((person(now, awareness_lower=1.0),), robot_at(now), now)
+    assert radius(back) == pytest.approx(1.0 - RATE_MPS * 2 * PERIOD_S)
+
+
+def test_two_levels_in_a_loop() -> None:
+    """Between the levels the person stays what they were; without evidence they are unaware."""
+    levels = {"shape": "two_level", "unaware_below": 0.2, "aware_above": 0.6}
+    policy = AwarenessPolicy(inflation=levels, speed=levels)
+    adapter, limits, radii = NavAdapter(policy, ROBOT), [], []
+    phases = [0.5] * 40 + [0.7] * 40 + [0.4] * 40 + [0.1] + [0.4] * 20
+    for step, alpha in enumerate(phases):
+        now = step * PERIOD_S
+        result = adapter.update((person(now, awareness_lower=alpha),), robot_at(now), now)
+        radii.append(radius(result))
+        limits.append(result.speed_limit_mps)
+    assert radii[39] == 1.0
+    assert radii[79] == radii[119] == pytest.approx(0.45)
+    assert set(radii[120:]) == {1.0}
+    assert limits[39] < limits[40] == limits[119]
+    assert set(limits[120:]) == {limits[0]}
+    for _ in range(2):  # lost while held
+        adapter.update((person(now, awareness_lower=0.7),), robot_at(now), now)
+    gone = adapter.update((person(now, awareness_lower=0.7),), robot_at(now + 0.3), now + 0.3)
+    assert gone.speed_limit_mps <= limits[0]
+    assert radius(gone) == 1.0
+
+
+def test_a_long_silence_does_not_blow_people_up() -> None:
+    """A walker tracked with some doubt of their velocity, then nothing for half a minute."""
+    walker = person(position=(6.0, 0.0), velocity=(0.0, 1.0), sigma_m=0.1)
+    doubt = np.diag([0.01, 0.01, 0.09, 0.09])
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    adapter.update((replace(walker, covariance_odom=doubt),), robot_at(), 0.0)
+    for step in range(1, 31):
+        result = adapter.watchdog(float(step))
+    assert result.speed_limit_mps == 0.0
+    sigma_m = math.sqrt(0.01 + 1.5**2 * 0.09)
+    assert radius(result) == pytest.approx(1.0 + 2.0 * sigma_m)
+    silent = NavAdapter(AwarenessPolicy(), ROBOT)
+    silent.update((replace(walker, covariance_odom=doubt),), robot_at(), 0.0)
+    back = silent.update((person(30.0, awareness_lower=1.0),), robot_at(30.0), 30.0)
+    assert radius(back) == pytest.approx(1.2)
 
 
 def test_a_tentative_or_long_unseen_person_is_let_go_at_once() -> None:

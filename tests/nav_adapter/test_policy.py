@@ -1,19 +1,22 @@
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
 from hypothesis import given
-from hypothesis import strategies as st
+from nav_policies import human_speeds, inflations, policies
 from nav_scenes import finite
 from pydantic import ValidationError
 
 from nav_adapter import AwarenessPolicy, NavError
 from nav_adapter.policies import (
+    DistanceZones,
     InterpolatedHumanSpeed,
     InterpolatedInflation,
-    SafetyMargins,
-    TimeBehaviour,
+    NearCap,
+    TableHumanSpeed,
+    TableInflation,
 )
 
 ALPHA = finite(0.0, 1.0)
@@ -29,36 +32,6 @@ class Constant:
         return 1.2
 
 
-@st.composite
-def ramps(draw: st.DrawFn) -> dict[str, object]:
-    low = draw(finite(0.0, 0.98))
-    return {
-        "unaware_below": low,
-        "aware_above": draw(finite(low + 0.01, 1.0)),
-        "shape": draw(st.sampled_from(["linear", "smoothstep"])),
-    }
-
-
-@st.composite
-def policies(draw: st.DrawFn) -> AwarenessPolicy:
-    aware_radius, aware_speed = draw(finite(0.05, 2.0)), draw(finite(0.0, 2.0))
-    fresh = draw(finite(0.05, 0.3))
-    return AwarenessPolicy(
-        inflation=InterpolatedInflation(
-            unaware_radius_m=aware_radius + draw(finite(0.0, 3.0)),
-            aware_radius_m=aware_radius,
-            **draw(ramps()),
-        ),
-        speed=InterpolatedHumanSpeed(
-            unaware_human_speed_mps=aware_speed + draw(finite(0.0, 2.0)),
-            aware_human_speed_mps=aware_speed,
-            **draw(ramps()),
-        ),
-        margins=SafetyMargins(minimum_clearance_m=draw(finite(0.1, 1.0))),
-        timing=TimeBehaviour(fresh_within_s=fresh, stale_after_s=fresh + draw(finite(0.0, 1.0))),
-    )
-
-
 @given(policy=policies(), low=ALPHA, high=ALPHA)
 def test_awareness_never_enlarges_and_never_hastens(
     policy: AwarenessPolicy, low: float, high: float
@@ -69,13 +42,20 @@ def test_awareness_never_enlarges_and_never_hastens(
     assert policy.speed.human_speed_mps(high) <= policy.speed.human_speed_mps(low) + rounding
 
 
-@given(policy=policies())
-def test_both_ends_are_reached_exactly(policy: AwarenessPolicy) -> None:
-    inflation, speed = policy.inflation, policy.speed
-    assert inflation.radius_m(0.0) == inflation.unaware_radius_m
-    assert inflation.radius_m(1.0) == inflation.aware_radius_m
-    assert speed.human_speed_mps(0.0) == speed.unaware_human_speed_mps
-    assert speed.human_speed_mps(1.0) == speed.aware_human_speed_mps
+@given(inflation=inflations(), speed=human_speeds())
+def test_both_ends_are_reached_exactly(
+    inflation: InterpolatedInflation | TableInflation,
+    speed: InterpolatedHumanSpeed | TableHumanSpeed,
+) -> None:
+    if isinstance(inflation, TableInflation):
+        assert inflation.radius_m(0.0) == inflation.table_m[0][1]
+        assert inflation.radius_m(1.0) == inflation.table_m[-1][1]
+    else:
+        assert inflation.radius_m(0.0) == inflation.unaware_radius_m
+        assert inflation.radius_m(1.0) == inflation.aware_radius_m
+    if isinstance(speed, InterpolatedHumanSpeed):
+        assert speed.human_speed_mps(0.0) == speed.unaware_human_speed_mps
+        assert speed.human_speed_mps(1.0) == speed.aware_human_speed_mps
 
 
 def test_shapes() -> None:
@@ -85,6 +65,45 @@ def test_shapes() -> None:
     assert smooth.radius_m(0.3) == pytest.approx(1.0 - (3 * 0.25**2 - 2 * 0.25**3) * 0.55)
     assert smooth.radius_m(0.4) == pytest.approx(linear.radius_m(0.4))
     assert linear.radius_m(float("nan")) == 1.0
+    logistic = linear.model_copy(update={"shape": "logistic", "steepness": 12.0})
+    assert logistic.radius_m(0.4) == pytest.approx(linear.radius_m(0.4))
+    # Steeper than a straight line in the middle, flatter at the ends, and the same from both.
+    assert logistic.radius_m(0.25) > linear.radius_m(0.25)
+    assert logistic.radius_m(0.45) < linear.radius_m(0.45)
+    middle = logistic.radius_m(0.4)
+    assert logistic.radius_m(0.3) - middle == pytest.approx(middle - logistic.radius_m(0.5))
+    gentle = linear.model_copy(update={"shape": "logistic", "steepness": 1.0})
+    assert gentle.radius_m(0.3) == pytest.approx(linear.radius_m(0.3), abs=0.01)
+
+
+def test_two_levels_have_a_memory() -> None:
+    levels = InterpolatedInflation(shape="two_level", unaware_below=0.2, aware_above=0.6)
+    assert [levels.radius_m(alpha) for alpha in (0.0, 0.59, 0.6, 1.0)] == [1.0, 1.0, 0.45, 0.45]
+    held, seen = False, []
+    for alpha in (0.3, 0.59, 0.6, 0.5, 0.21, 0.2, 0.5, 0.7, float("nan")):
+        held = levels.holds(alpha, held)
+        seen.append(held)
+    assert seen == [False, False, True, True, True, False, False, True, False]
+    assert not InterpolatedInflation().holds(1.0, True)
+
+
+def test_tables() -> None:
+    table = TableInflation(table_m=[[0.2, 1.0], [0.4, 0.6], [0.8, 0.5]])
+    given = (0.0, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0, float("nan"))
+    expected = [1.0, 1.0, 0.8, 0.6, 0.55, 0.5, 0.5, 1.0]
+    assert [table.radius_m(alpha) for alpha in given] == pytest.approx(expected)
+    speed = TableHumanSpeed(table_mps=[[0.5, 1.6]])
+    assert {speed.human_speed_mps(alpha) for alpha in given} == {1.6}
+
+
+def test_zones_and_caps_in_closed_form() -> None:
+    zones = DistanceZones(stop_within_m=0.5, full_speed_beyond_m=2.5)
+    distances = [-1.0, 0.5, 1.0, 2.5, 9.0, float("nan")]
+    assert zones.limit_mps(distances, 1.2) == pytest.approx([0.0, 0.0, 0.3, 1.2, 1.2, 0.0])
+    cap = NearCap(within_m=1.5, speed_mps=0.8)
+    assert cap.limit_mps([0.0, 1.5, 2.5, float("nan")], 1.0) == pytest.approx(
+        [0.8, 0.8, math.sqrt(0.64 + 2.0), 0.8]
+    )
 
 
 @given(policy=policies())
@@ -100,7 +119,7 @@ def test_presets() -> None:
     for alpha in (0.0, 0.3, 0.7, 1.0):
         assert blind.inflation.radius_m(alpha) == AwarenessPolicy().inflation.radius_m(0.0)
         assert blind.speed.human_speed_mps(alpha) == AwarenessPolicy().speed.human_speed_mps(0.0)
-    with pytest.raises(NavError, match=r"'balanced', 'blind', got 'blinded'; did you mean 'blind'"):
+    with pytest.raises(NavError, match=r"'conservative', got 'blinded'; did you mean 'blind'"):
         AwarenessPolicy.preset("blinded")
 
 
@@ -116,6 +135,20 @@ def test_presets() -> None:
         ("inflation: {unaware_radius_m: .nan}", "inflation.unaware_radius_m"),
         ("timing: {stop_after_s: 0.4}", "stale_after_s <= stop_after_s must hold"),
         ("inflation: 3", "inflation"),
+        ("inflation: {table: [[0, 1]]}", "did you mean 'table_m'"),
+        ("inflation: {table_m: []}", "table_m must hold at least one [awareness, m] pair"),
+        ("inflation: {table_m: [[0, 1], [0, 0.5]]}", "awareness must rise, got 0 after 0"),
+        ("inflation: {table_m: [[0, 1], [1, 1.5]]}", "must not grow with awareness, got 1.5 m"),
+        ("inflation: {table_m: [[0, 1], [1.1, 1]]}", "awareness must lie in [0, 1], got 1.1"),
+        ("speed: {table_mps: [[0, -1]]}", "values must lie in [0, 10] m/s, got -1"),
+        ("speed: {table_mps: [[0, .nan]]}", "speed.table_mps"),
+        ("inflation: {shape: two_levels}", "inflation.shape"),
+        ("margins: {maximum_radius_m: 0.39}", "at least the floor of 0.4 m"),
+        ("margins: {maximum_radius_m: 0.9}", "at least the unaware radius of 1 m, got 0.9 m"),
+        ("rules: {zones: {stop_within_m: 4}}", "full_speed_beyond_m must exceed stop_within_m"),
+        ("rules: {near: {}}", "did you mean 'near_cap'"),
+        ("outline: {aware_ahead_s: 1}", "at most unaware_ahead_s, got 1 s and 0 s"),
+        ("alerts: {horn_within_s: -1}", "alerts.horn_within_s"),
         ("[1, 2]", "must hold a mapping"),
         ("inflation: {", "not valid YAML"),
     ],

@@ -1,0 +1,205 @@
+"""The speed limit: for each person the smallest of all rules, and of those the smallest."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from perception.anthropometry import BODY_RADIUS_M
+from perception.arrays import FloatArray
+
+from ._crowd import Crowd
+from ._footprint import Footprint
+from ._memory import PersonMemory, position_at
+from ._policy import AwarenessPolicy
+from ._robot import RobotProfile, RobotState
+from ._separation import max_speed_mps, protective_separation_m
+
+# A robot that stands may start off either way, or turn on the spot.
+_STANDING_MPS: Final = 0.05
+_RULES: Final = ("speed and separation", "distance zone", "cap near people")
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedLimit:
+    """A limit and where it comes from.
+
+    Attributes:
+        limit_mps: ≥ 0.
+        limited_by: person and rule, or the robot's maximum.
+        braking_suffices: whether a robot that brakes from now on stands in time.
+    """
+
+    limit_mps: float
+    limited_by: str
+    braking_suffices: bool
+
+
+class SpeedGovernor:
+    """Turns people into a speed limit.
+
+    Separations run from the robot to a person's body circle (radius 0.30 m), less the uncertainty
+    of their position and the way driven since the robot's state. Two bounds on how near the robot
+    comes while it stops are known, and the better one counts:
+
+    - it comes nearer by its stopping distance at most, measured from its footprint;
+    - where it turns by at most ``turn_within_stop_deg`` off its direction of travel while it stops,
+      it comes nearer by the stopping distance × cos(angle beyond that) at most, since no piece of
+      its path leads more directly to the person. Turned corners stay within the circumscribed
+      circle, from which this separation is measured.
+
+    Args:
+        policy: margins and rules.
+        robot: footprint, braking and reaction time.
+        crowd: gives the human speeds.
+    """
+
+    def __init__(self, policy: AwarenessPolicy, robot: RobotProfile, crowd: Crowd) -> None:
+        self._policy = policy
+        self._robot = robot
+        self._crowd = crowd
+        self._footprint = Footprint(robot.footprint_m)
+        self._turn_rad = math.radians(policy.rules.turn_within_stop_deg)
+
+    def limit(
+        self,
+        people: Mapping[int, PersonMemory],
+        robot_state: RobotState,
+        now: float,
+        robot_age_s: float,
+    ) -> SpeedLimit:
+        """The limit at ``now`` for a robot whose state is ``robot_age_s`` old."""
+        maximum_mps = self._robot.max_speed_mps
+        if not people:
+            return SpeedLimit(maximum_mps, "robot maximum", True)
+        memories = list(people.values())
+        sigmas = self._policy.margins.uncertainty_sigmas
+        lost_m = BODY_RADIUS_M + abs(robot_state.speed_mps) * robot_age_s
+        lost = np.array([lost_m + sigmas * memory.sigma_m for memory in memories])
+        # Carrying a person on may only bring them nearer: they may have turned round since.
+        positions = np.array(
+            [position_at(m.track, now) for m in memories]
+            + [tuple(m.track.position_odom_m.tolist()) for m in memories]
+        )
+        ahead_m = self._footprint.distance_m(positions, robot_state)
+        ahead_m = ahead_m.reshape(2, -1).min(axis=0) - lost
+        offset = positions - robot_state.position_odom_m
+        around_m = np.hypot(offset[:, 0], offset[:, 1]).reshape(2, -1).min(axis=0)
+        around_m = around_m - self._robot.circumscribed_radius_m - lost
+        approach = self._approach(offset, robot_state, robot_age_s).reshape(2, -1).max(axis=0)
+
+        age_s = np.array([max(0.0, now - memory.track.stamp_s) for memory in memories])
+        human_mps = np.array([self._human_speed_mps(m, robot_state) for m in memories])
+        limits = np.stack(
+            [
+                self._separation_limit_mps(ahead_m, around_m, approach, human_mps, age_s),
+                *self._rule_limits_mps(ahead_m, around_m, approach),
+            ]
+        )
+        rule, person = divmod(int(limits.argmin()), len(memories))
+        limit_mps = float(limits[rule, person])
+        speed_mps = abs(robot_state.speed_mps)
+        # Who keeps to speed and separation has the whole reaction time left.
+        suffices = speed_mps <= float(limits[0].min()) or self._braking_suffices(
+            ahead_m, around_m, approach, human_mps, age_s, speed_mps
+        )
+        if limit_mps >= maximum_mps:
+            return SpeedLimit(maximum_mps, "robot maximum", suffices)
+        names = [name for name, used in zip(_RULES, self._rules_used(), strict=True) if used]
+        return SpeedLimit(limit_mps, f"track {list(people)[person]}: {names[rule]}", suffices)
+
+    def _rules_used(self) -> tuple[bool, bool, bool]:
+        rules = self._policy.rules
+        return True, rules.zones is not None, rules.near_cap is not None
+
+    def _approach(
+        self, offset_odom_m: FloatArray, robot_state: RobotState, robot_age_s: float
+    ) -> FloatArray:
+        """(N,) share of its stopping distance by which the robot can come nearer to each point."""
+        if abs(robot_state.speed_mps) < _STANDING_MPS:
+            return np.ones(len(offset_odom_m))
+        heading = robot_state.heading_odom_rad
+        sign = math.copysign(1.0, robot_state.speed_mps)
+        travel_x, travel_y = sign * math.cos(heading), sign * math.sin(heading)
+        x, y = offset_odom_m.T
+        off_rad = np.abs(np.arctan2(travel_x * y - travel_y * x, travel_x * x + travel_y * y))
+        turned_rad = self._turn_rad + abs(robot_state.yaw_rate_radps) * robot_age_s
+        beyond_rad = np.maximum(off_rad - turned_rad, 0.0)
+        return np.asarray(np.maximum(np.cos(beyond_rad), 0.0))
+
+    def _separation_limit_mps(
+        self,
+        ahead_m: FloatArray,
+        around_m: FloatArray,
+        approach: FloatArray,
+        human_mps: FloatArray,
+        age_s: FloatArray,
+    ) -> FloatArray:
+        limits_mps = max_speed_mps(
+            [ahead_m, around_m],
+            human_mps,
+            deceleration_mps2=self._robot.max_deceleration_mps2,
+            reaction_time_s=self._robot.reaction_time_s + age_s,
+            clearance_m=self._policy.margins.separation_clearance_m,
+            approach=[np.ones_like(approach), approach],
+        )
+        return np.asarray(limits_mps.max(axis=0))
+
+    def _rule_limits_mps(
+        self, ahead_m: FloatArray, around_m: FloatArray, approach: FloatArray
+    ) -> list[FloatArray]:
+        """The limits of the rules that the policy has."""
+        rules, limits = self._policy.rules, []
+        if rules.zones is not None:
+            # How far the robot may drive until it has come so near.
+            way_m = np.divide(
+                around_m, approach, out=np.full_like(approach, np.inf), where=approach > 0.0
+            )
+            reach_m = np.maximum(ahead_m, np.where(around_m > 0.0, way_m, around_m))
+            limits.append(rules.zones.limit_mps(reach_m, self._robot.max_speed_mps))
+        if rules.near_cap is not None:
+            limits.append(rules.near_cap.limit_mps(ahead_m, self._robot.max_deceleration_mps2))
+        return limits
+
+    def _braking_suffices(
+        self,
+        ahead_m: FloatArray,
+        around_m: FloatArray,
+        approach: FloatArray,
+        human_mps: FloatArray,
+        age_s: FloatArray,
+        speed_mps: float,
+    ) -> bool:
+        """Whether the separations are enough for full braking from now on, reaction time used up.
+
+        A robot that stands has done what it can.
+        """
+        if speed_mps < _STANDING_MPS:
+            return True
+        needed_m = protective_separation_m(
+            speed_mps,
+            human_mps,
+            deceleration_mps2=self._robot.max_deceleration_mps2,
+            reaction_time_s=age_s,
+            clearance_m=self._policy.margins.separation_clearance_m,
+            approach=[np.ones_like(approach), approach],
+        )
+        return bool((needed_m <= [ahead_m, around_m]).any(axis=0).all())
+
+    def _human_speed_mps(self, memory: PersonMemory, robot_state: RobotState) -> float:
+        """The policy's assumption, but at least the speed at which the track closes in.
+
+        Awareness is a reason to expect that somebody will not step towards the robot, not a reason
+        to overlook that they do. What a person walks faster than an unaware one may is added: an
+        attentive runner cannot stop as fast as an attentive walker, and an unaware one is already
+        faster than the walking speed of the standard.
+        """
+        vx, vy = memory.track.velocity_odom_mps.tolist()
+        x, y = (memory.track.position_odom_m - robot_state.position_odom_m).tolist()
+        excess_mps = max(0.0, math.hypot(vx, vy) - self._crowd.unaware_human_speed_mps)
+        closing_mps = -(vx * x + vy * y) / max(math.hypot(x, y), 1e-9)
+        return float(max(self._crowd.human_speed_mps(memory) + excess_mps, closing_mps))

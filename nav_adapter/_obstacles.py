@@ -1,0 +1,88 @@
+"""The obstacles of the people known: circles, and polygons that may be longer."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+import shapely
+
+from perception.arrays import FloatArray
+
+from ._constraints import PersonObstacle
+from ._memory import PersonMemory, position_at, position_sigma_m
+from ._policy import AwarenessPolicy
+
+_SIDES: Final = 24
+_ANGLES = np.arange(_SIDES) * (2.0 * math.pi / _SIDES)
+# Stretched so that the sides, not the corners, touch the circle: the polygon contains it.
+_UNIT_POLYGON = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1) / math.cos(math.pi / _SIDES)
+# Between these instants of the sweep the hull runs straight.
+_SWEEP_STEP_S: Final = 0.25
+
+
+def obstacles_of(
+    people: Mapping[int, PersonMemory], now: float, policy: AwarenessPolicy
+) -> tuple[PersonObstacle, ...]:
+    """One obstacle a person, in their order."""
+    if not people:
+        return ()
+    centers = np.array([position_at(m.track, now) for m in people.values()])
+    radii = np.array([m.radius_m for m in people.values()])
+    rings = centers[:, None] + radii[:, None, None] * _UNIT_POLYGON
+    polygons = shapely.polygons(rings)
+    if policy.outline.unaware_ahead_s > 0.0 or policy.outline.sweep_s > 0.0:
+        discs = [
+            np.concatenate([ring, *_discs_ahead(memory, center, now, policy)])
+            for memory, center, ring in zip(people.values(), centers, rings, strict=True)
+        ]
+        polygons = [shapely.convex_hull(shapely.multipoints(points)) for points in discs]
+    return tuple(
+        PersonObstacle(
+            track_id=track_id,
+            center_odom_m=center,
+            velocity_odom_mps=memory.track.velocity_odom_mps,
+            radius_m=memory.radius_m,
+            height_m=memory.track.height_m,
+            awareness_lower=memory.awareness_lower,
+            polygon=polygon,
+        )
+        for (track_id, memory), center, polygon in zip(
+            people.items(), centers, polygons, strict=True
+        )
+    )
+
+
+def _discs_ahead(
+    memory: PersonMemory, center: FloatArray, now: float, policy: AwarenessPolicy
+) -> list[FloatArray]:
+    """Polygons about the disc at the end of the elongation, and about those of the sweep."""
+    outline, margins = policy.outline, policy.margins
+    tip = center + memory.ahead_m * np.array(memory.facing_odom)
+    discs = [tip + memory.radius_m * _UNIT_POLYGON]
+    steps = math.ceil(outline.sweep_s / _SWEEP_STEP_S)
+    for step in range(1, steps + 1):
+        ahead_s = outline.sweep_s * step / steps
+        wider_m = margins.uncertainty_sigmas * max(
+            0.0, _sigma_ahead_m(memory, now, ahead_s, policy) - memory.sigma_m
+        )
+        radius_m = margins.bounded_m(memory.radius_m + wider_m)
+        there = center + ahead_s * memory.track.velocity_odom_mps
+        discs.append(there + radius_m * _UNIT_POLYGON)
+    return discs
+
+
+def _sigma_ahead_m(
+    memory: PersonMemory, now: float, ahead_s: float, policy: AwarenessPolicy
+) -> float:
+    """Standard deviation of the position predicted ``ahead_s`` from now, most uncertain direction.
+
+    White acceleration of density q adds q t³/3, and the whole is widened by how much too sure
+    constant velocity was found to be.
+    """
+    outline = policy.outline
+    carried_m = position_sigma_m(memory.track, now + ahead_s)
+    noise_m2 = outline.acceleration_density_m2ps3 * ahead_s**3 / 3.0
+    return math.sqrt((carried_m**2 + noise_m2) * (1.0 + outline.overconfidence_per_s * ahead_s))

@@ -1,0 +1,59 @@
+"""What a policy comes to once all has settled: one person, standing, known exactly."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from perception.arrays import FloatArray
+
+from ._policy import AwarenessPolicy
+from ._robot import RobotProfile
+from ._separation import max_speed_mps
+
+
+def settled_radius_m(policy: AwarenessPolicy, awareness_lower: ArrayLike) -> FloatArray:
+    """Obstacle radius at each lower bound of α, between floor and ceiling; from "unaware" up."""
+    flat = np.asarray(awareness_lower, dtype=np.float64)
+    radii = [policy.margins.bounded_m(policy.inflation.radius_m(a)) for a in flat.ravel().tolist()]
+    return np.array(radii).reshape(flat.shape)
+
+
+def settled_human_speed_mps(policy: AwarenessPolicy, awareness_lower: ArrayLike) -> FloatArray:
+    """Assumed human speed at each lower bound of α."""
+    flat = np.asarray(awareness_lower, dtype=np.float64)
+    speeds = [policy.speed.human_speed_mps(a) for a in flat.ravel().tolist()]
+    return np.array(speeds).reshape(flat.shape)
+
+
+def settled_speed_limit_mps(
+    policy: AwarenessPolicy,
+    robot: RobotProfile,
+    separation_m: ArrayLike,
+    awareness_lower: ArrayLike,
+) -> FloatArray:
+    """Speed limit for a person straight ahead.
+
+    Args:
+        policy: the policy.
+        robot: the robot.
+        separation_m: from the footprint to the body's surface; broadcasts with the next.
+        awareness_lower: lower bound of α.
+
+    Returns:
+        m/s in the broadcast shape: the smallest of all rules, as :class:`NavAdapter` gives it.
+    """
+    separation = np.asarray(separation_m, dtype=np.float64)
+    limit = max_speed_mps(
+        separation,
+        settled_human_speed_mps(policy, awareness_lower),
+        deceleration_mps2=robot.max_deceleration_mps2,
+        reaction_time_s=robot.reaction_time_s,
+        clearance_m=policy.margins.separation_clearance_m,
+    )
+    rules = policy.rules
+    if rules.zones is not None:
+        limit = np.minimum(limit, rules.zones.limit_mps(separation, robot.max_speed_mps))
+    if rules.near_cap is not None:
+        limit = np.minimum(limit, rules.near_cap.limit_mps(separation, robot.max_deceleration_mps2))
+    return np.minimum(limit, robot.max_speed_mps)

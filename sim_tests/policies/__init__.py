@@ -1,0 +1,1 @@
+"""Policies shown: radius, human speed and speed limit over awareness and distance."""

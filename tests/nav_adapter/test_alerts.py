@@ -1,0 +1,122 @@
+"""Who is warned, when, and not too often."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from nav_scenes import ROBOT, crowds, finite, person, robot_at
+
+from nav_adapter import Alert, AwarenessPolicy, NavAdapter, NavConstraints, NavError
+from nav_adapter.policies import AlertRules
+from perception.anthropometry import BODY_RADIUS_M
+from tracking import PersonTrack
+
+RULES = AlertRules()
+
+
+def warned(
+    *tracks: PersonTrack, speed_mps: float = 1.0, policy: AwarenessPolicy | None = None
+) -> tuple[Alert, ...]:
+    adapter = NavAdapter(policy or AwarenessPolicy(), ROBOT)
+    return adapter.update(tracks, robot_at(speed_mps=speed_mps), 0.0).alerts
+
+
+@pytest.mark.parametrize(
+    ("x_m", "kind"), [(1.5, "horn"), (3.0, "voice"), (4.5, "light"), (5.5, None)]
+)
+def test_the_nearer_the_louder(x_m: float, kind: str | None) -> None:
+    alerts = warned(person(position=(x_m, 0.0)))
+    assert [alert.kind for alert in alerts] == ([] if kind is None else [kind])
+    for alert in alerts:
+        assert alert.track_id == 1
+        assert alert.time_to_closest_s == pytest.approx(x_m)
+        assert alert.closest_gap_m == 0.0
+        assert alert.reason == (
+            f"track 1: unaware (lower bound 0.00), closest approach of 0.0 m in {x_m:.1f} s"
+        )
+
+
+def test_a_crossing_course_in_closed_form() -> None:
+    """Robot along x at 1 m/s, person along −y at 1 m/s: nearest at t = 2.5 s, 0.71 m apart."""
+    (alert,) = warned(person(position=(2.0, 3.0), velocity=(0.0, -1.0)))
+    assert alert.time_to_closest_s == pytest.approx(2.5)
+    gap = 0.5 * 2.0**0.5 - ROBOT.circumscribed_radius_m - BODY_RADIUS_M
+    assert alert.closest_gap_m == pytest.approx(max(gap, 0.0))
+
+
+@pytest.mark.parametrize(
+    "track",
+    [
+        person(position=(2.0, 0.0), awareness_lower=0.3),
+        person(position=(2.0, 0.0), status="tentative"),
+        person(position=(-2.0, 0.0)),
+        person(position=(2.0, 2.0)),
+        person(position=(2.0, 0.0), velocity=(1.2, 0.0)),
+        person(position=(2.0, 0.0), velocity=(1.0, 0.0)),
+    ],
+    ids=["aware", "tentative", "behind", "beside", "faster away", "same velocity"],
+)
+def test_who_is_not_warned(track: PersonTrack) -> None:
+    assert warned(track) == ()
+
+
+def test_a_standing_robot_and_a_policy_without_alerts_are_silent() -> None:
+    coming = person(position=(2.0, 0.0), velocity=(-1.0, 0.0))
+    assert len(warned(coming)) == 1
+    assert warned(coming, speed_mps=0.0) == ()
+    assert warned(coming, policy=AwarenessPolicy(alerts=None)) == ()
+
+
+def test_stale_data_warn_nobody() -> None:
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    result = adapter.update(
+        (person(position=(2.0, 0.0)),), robot_at(1.0, speed_mps=1.0), 1.0, perception_stamp_s=0.0
+    )
+    assert result.stale
+    assert result.alerts == ()
+
+
+def test_the_most_urgent_person_gets_the_horn_first() -> None:
+    near, nearer = person(position=(1.8, 0.0)), person(position=(1.2, 0.1), track_id=2)
+    alerts = warned(near, nearer)
+    # The second sound has to wait its turn.
+    assert [(alert.track_id, alert.kind) for alert in alerts] == [(2, "horn")]
+
+
+@given(people=crowds(max_size=3), rates=st.lists(finite(0.05, 0.4), min_size=1, max_size=20))
+def test_alerts_are_rate_limited(people: tuple[PersonTrack, ...], rates: list[float]) -> None:
+    adapter, now = NavAdapter(AwarenessPolicy(), ROBOT), 0.0
+    given_s: dict[tuple[int, str], float] = {}
+    sounded_s = -100.0
+    for dt in rates:
+        now += dt
+        result: NavConstraints = adapter.update(
+            people, robot_at(now, speed_mps=1.0), now, perception_stamp_s=now
+        )
+        times = [alert.time_to_closest_s for alert in result.alerts]
+        assert times == sorted(times)
+        assert len({alert.track_id for alert in result.alerts}) == len(result.alerts)
+        for alert in result.alerts:
+            key = (alert.track_id, alert.kind)
+            assert now - given_s.get(key, -100.0) >= RULES.repeat_after_s
+            given_s[key] = now
+            if alert.kind != "light":
+                assert now - sounded_s >= RULES.quiet_s
+                sounded_s = now
+
+
+def test_a_refused_update_uses_up_no_alert() -> None:
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    track, state = person(position=(2.5, 0.0)), robot_at(speed_mps=1.0)
+    with pytest.raises(NavError, match="distinct ids"):
+        adapter.update((track, track), state, 0.0)
+    assert len(adapter.update((track,), state, 0.0).alerts) == 1
+    assert adapter.update((track,), state, 0.0).alerts == ()
+
+
+def test_an_alert_is_checked() -> None:
+    with pytest.raises(NavError, match="kind must be one of light, voice, horn, got 'siren'"):
+        Alert(1, "siren", 1.0, 0.0, "")
+    with pytest.raises(NavError, match="time_to_closest_s must lie in"):
+        Alert(1, "horn", -1.0, 0.0, "")

@@ -1,0 +1,76 @@
+"""The figures of docs/policies.md are those of the presets, and its file is a policy."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from nav_scenes import ROBOT
+
+from nav_adapter import AwarenessPolicy
+from nav_adapter.settled import settled_human_speed_mps, settled_radius_m, settled_speed_limit_mps
+from perception.arrays import FloatArray
+
+TEXT = (Path(__file__).parents[2] / "docs" / "policies.md").read_text(encoding="utf-8")
+ENDS = np.array([0.0, 1.0])
+DISTANCE_M = np.linspace(0.0, 6.0, 6001)
+
+
+def row(name: str) -> list[list[float]]:
+    """The numbers of a table row: for each preset its value, or the unaware and the aware one."""
+    (line,) = [line for line in TEXT.splitlines() if line.startswith(f"| {name}")]
+    cells = line.strip("|").split("|")[1:]
+    return [[float(number) for number in re.findall(r"\d+\.\d+", cell)] for cell in cells]
+
+
+def limits(policy: AwarenessPolicy, distance_m: FloatArray) -> FloatArray:
+    return settled_speed_limit_mps(policy, ROBOT, distance_m, ENDS[:, None])
+
+
+@pytest.mark.parametrize(
+    ("column", "name"), list(enumerate(["blind", "conservative", "balanced", "assertive"]))
+)
+def test_the_table_of_presets(column: int, name: str) -> None:
+    policy = AwarenessPolicy.preset(name)
+    over_distance = limits(policy, DISTANCE_M)
+    expected = {
+        "radius, unaware": settled_radius_m(policy, ENDS),
+        "assumed human speed": settled_human_speed_mps(policy, ENDS),
+        "limit at 1 m": limits(policy, np.array([1.0]))[:, 0],
+        "limit at 2 m": limits(policy, np.array([2.0]))[:, 0],
+        "limit at 3 m": limits(policy, np.array([3.0]))[:, 0],
+        "the robot stands within": DISTANCE_M[(over_distance > 0.0).argmax(axis=1)],
+        "full speed beyond": DISTANCE_M[(over_distance > 1.5 - 1e-9).argmax(axis=1)],
+    }
+    for title, (unaware, aware) in expected.items():
+        shown = row(title)[column]
+        assert shown[0] == pytest.approx(unaware, abs=0.0051), title
+        assert shown[-1] == pytest.approx(aware, abs=0.0051), title
+    shrinking = row("shrinks at")[column]
+    assert shrinking == [policy.timing.shrink_rate_mps, policy.timing.shrink_after_s]
+
+
+def test_the_file_shown_is_a_policy() -> None:
+    (block,) = re.findall(r"```yaml\n(.*?)```", TEXT, flags=re.DOTALL)
+    policy = AwarenessPolicy.model_validate(yaml.safe_load(block))
+    assert policy.rules.zones is not None
+    assert policy.outline.sweep_s == 1.0
+
+
+def test_every_test_that_the_safety_argument_names_exists() -> None:
+    root = Path(__file__).parents[2]
+    safety = (root / "docs" / "safety.md").read_text(encoding="utf-8")
+    named = re.findall(r"`((?:tests/\w+/)?test_\w+\.py)?(?:::(test_\w+))?`", safety)
+    file = ""
+    checked = 0
+    for path, function in named:
+        if path:
+            file = path if "/" in path else f"tests/nav_adapter/{path}"
+            assert (root / file).exists(), file
+        if function:
+            checked += 1
+            assert f"def {function}(" in (root / file).read_text(encoding="utf-8"), function
+    assert checked >= 12
