@@ -13,8 +13,8 @@ from shapely.geometry import Polygon
 
 from perception.arrays import FloatArray, finite_number
 
-from ._constraints import NavConstraints
-from ._errors import NavError
+from .._constraints import NavConstraints
+from .._errors import NavError
 
 # A finer perimeter than this only costs memory.
 _MINIMUM_SPACING_M = 1e-3
