@@ -8,11 +8,11 @@ from __future__ import annotations
 from . import _clash  # noqa: F401 - first: refuses a foreign package of one of our names
 from ._adapter import NavAdapter
 from ._constraints import NavConstraints, PersonObstacle
-from .exporters import boxes, circles, paint_costmap, points, polygons
 from ._errors import NavError
 from ._policy import AwarenessPolicy
 from ._robot import RobotProfile, RobotState
 from ._separation import max_speed_mps, protective_separation_m
+from .exporters import boxes, circles, paint_costmap, points, polygons
 from .policies import InflationPolicy, SpeedPolicy
 
 __all__ = [

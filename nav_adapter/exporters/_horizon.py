@@ -58,7 +58,7 @@ def predicted_circles(
         raise NavError(f"slots must be a whole number of at least 1, got {slots!r}")
     robot = finite_array("robot_position_odom_m", robot_position_odom_m, (2,), NavError)
     filled = np.zeros((slots, len(times), 5))
-    filled[:, :, :2] = robot + [_FAR_M, 0.0]
+    filled[:, :, :2] = robot + np.array([_FAR_M, 0.0])
     gap = np.hypot(out[:, :, 0] - robot[0], out[:, :, 1] - robot[1]) - out[:, :, 4]
     nearest = np.argsort(gap.min(axis=1, initial=np.inf), kind="stable")[:slots]
     filled[: len(nearest)] = out[nearest]

@@ -24,6 +24,10 @@ _UNKNOWN: Final = 255
 _RING_COST: Final = 252.0
 # Single precision is off by less than this within 10 m; the doubt widens the obstacle.
 _ROUNDING_M: Final = np.float32(2e-6)
+# The gap where nobody is near; finite, so that no product with it is undefined.
+_NOBODY_M: Final = np.float32(1e9)
+# Steeper than this a ring is gone within a millimetre.
+_STEEPEST_PER_M: Final = 1e5
 # Beginning a window takes about as long as so many cells of it.
 _CELLS_PER_WINDOW: Final = 8000
 
@@ -132,7 +136,7 @@ def _stamp(
     rows = (np.arange(bottom, top) + 0.5) * resolution
     dx2 = np.square(columns - center[:, 0, None]).astype(np.float32)
     dy2 = np.square(rows - center[:, 1, None]).astype(np.float32)
-    gap = np.full((top - bottom, right - left), np.inf, dtype=np.float32)
+    gap = np.full((top - bottom, right - left), _NOBODY_M, dtype=np.float32)
     radii = radius.astype(np.float32)
     spans = np.concatenate([low - [left, bottom], high - [left, bottom]], axis=1).tolist()
     for index, (x0, y0, x1, y1) in enumerate(spans):
@@ -146,7 +150,7 @@ def _stamp(
     held = (column >= left) & (column < right) & (row >= bottom) & (row < top)
     gap[row[held].astype(int) - bottom, column[held].astype(int) - left] = -1.0
 
-    decay = np.float32(-brush.decay_per_m)
+    decay = np.float32(-min(brush.decay_per_m, _STEEPEST_PER_M))
     cost = gap - np.float32(brush.inscribed_radius_m)
     np.maximum(cost, np.float32(0.0), out=cost)
     np.multiply(cost, decay, out=cost)

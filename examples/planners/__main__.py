@@ -1,0 +1,85 @@
+"""``python -m examples.planners``: the crossings with every planner, as a Markdown table."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from importlib.util import find_spec
+from pathlib import Path
+
+from tqdm import tqdm
+
+from sim_tests import NOVA_CARTER, LocalPlanner, SamplingPlanner
+
+from ._compare import HEADER, Row, compare, scenario
+
+_NEEDS = {"ir-sim": "irsim", "do-mpc": "do_mpc"}
+_NAMES = ("reference", *_NEEDS)
+_CASES = 4
+
+
+def main() -> int:
+    """Run the comparison; 0 when every planner obeyed and touched nobody, else 1."""
+    parser = argparse.ArgumentParser(
+        prog="python -m examples.planners",
+        description="Cross a warehouse in PyBullet with the reference planner and with planners "
+        "that others wrote: with nobody there, with a worker who watches the robot, with one who "
+        "does not, and with a wider radius round that one.",
+    )
+    parser.add_argument(
+        "--planner",
+        choices=_NAMES,
+        action="append",
+        help="only this one; may be given more than once (default: all that are installed)",
+    )
+    parser.add_argument(
+        "--perception",
+        choices=("truth", "keypoints", "pixels"),
+        default="truth",
+        help="what the robot sees with (default: truth, all around and through walls)",
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of every crossing (default: 0)")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="write the table there as well")
+    options = parser.parse_args()
+    if options.seed < 0:
+        parser.error(f"--seed must be 0 or more, got {options.seed}")
+    rows: list[Row] = []
+    chosen = []
+    for name in options.planner or _NAMES:
+        if name in _NEEDS and find_spec(_NEEDS[name]) is None:
+            print(f"left out, {name} is not installed: pip install {name}", file=sys.stderr)
+        else:
+            chosen.append(name)
+    with tqdm(total=_CASES * len(chosen), unit="crossing", file=sys.stderr, leave=False) as bar:
+        for name in chosen:
+            bar.set_description(name)
+            rows += compare(
+                name,
+                _maker(name),
+                perception=options.perception,
+                seed=options.seed,
+                done=lambda _: bar.update(),
+            )
+    table = "\n".join([HEADER, *(row.line() for row in rows)])
+    print(table)
+    if options.out is not None:
+        options.out.write_text(table + "\n", encoding="utf-8")
+    return 0 if rows and all(row.is_good for row in rows) else 1
+
+
+def _maker(name: str) -> Callable[[], LocalPlanner]:
+    if name == "ir-sim":
+        from .velocity_obstacles import VelocityObstaclePlanner
+
+        return lambda: VelocityObstaclePlanner(NOVA_CARTER)
+    if name == "do-mpc":
+        from .model_predictive import ModelPredictivePlanner
+
+        return lambda: ModelPredictivePlanner(NOVA_CARTER)
+    boxes = scenario("crossing_attentive").layout.obstacle_boxes_odom
+    return lambda: SamplingPlanner(NOVA_CARTER, boxes)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
