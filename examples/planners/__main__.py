@@ -5,8 +5,10 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from typing import cast
 
 from tqdm import tqdm
 
@@ -14,8 +16,12 @@ from sim_tests import NOVA_CARTER, LocalPlanner, SamplingPlanner
 
 from ._compare import HEADER, Row, compare, scenario
 
-_NEEDS = {"ir-sim": "irsim", "do-mpc": "do_mpc"}
-_NAMES = ("reference", *_NEEDS)
+# The package that it needs, the module here and its class.
+_OTHERS = {
+    "ir-sim": ("irsim", "velocity_obstacles", "VelocityObstaclePlanner"),
+    "do-mpc": ("do_mpc", "model_predictive", "ModelPredictivePlanner"),
+}
+_NAMES = ("reference", *_OTHERS)
 _CASES = 4
 
 
@@ -47,7 +53,7 @@ def main() -> int:
     rows: list[Row] = []
     chosen = []
     for name in options.planner or _NAMES:
-        if name in _NEEDS and find_spec(_NEEDS[name]) is None:
+        if name in _OTHERS and find_spec(_OTHERS[name][0]) is None:
             print(f"left out, {name} is not installed: pip install {name}", file=sys.stderr)
         else:
             chosen.append(name)
@@ -69,16 +75,13 @@ def main() -> int:
 
 
 def _maker(name: str) -> Callable[[], LocalPlanner]:
-    if name == "ir-sim":
-        from .velocity_obstacles import VelocityObstaclePlanner
-
-        return lambda: VelocityObstaclePlanner(NOVA_CARTER)
-    if name == "do-mpc":
-        from .model_predictive import ModelPredictivePlanner
-
-        return lambda: ModelPredictivePlanner(NOVA_CARTER)
-    boxes = scenario("crossing_attentive").layout.obstacle_boxes_odom
-    return lambda: SamplingPlanner(NOVA_CARTER, boxes)
+    if name == "reference":
+        boxes = scenario("crossing_attentive").layout.obstacle_boxes_odom
+        return lambda: SamplingPlanner(NOVA_CARTER, boxes)
+    # Only now: the packages need not all be there, and take a second to import.
+    _, module, planner = _OTHERS[name]
+    make = getattr(import_module(f".{module}", __package__), planner)
+    return lambda: cast(LocalPlanner, make(NOVA_CARTER))
 
 
 if __name__ == "__main__":

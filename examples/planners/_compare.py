@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -40,7 +41,7 @@ class Row:
                 before.robot_state.speed_mps
                 - NOVA_CARTER.max_deceleration_mps2 * (after.t_s - before.t_s),
             )
-            for before, after in zip(frames, frames[1:], strict=False)
+            for before, after in itertools.pairwise(frames)
         )
 
     @property

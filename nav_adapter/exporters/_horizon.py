@@ -56,6 +56,8 @@ def predicted_circles(
         return out
     if isinstance(slots, bool) or not isinstance(slots, int) or slots < 1:
         raise NavError(f"slots must be a whole number of at least 1, got {slots!r}")
+    if robot_position_odom_m is None:
+        raise NavError("slots needs robot_position_odom_m, (2,) in metres, to tell who is nearest")
     robot = finite_array("robot_position_odom_m", robot_position_odom_m, (2,), NavError)
     filled = np.zeros((slots, len(times), 5))
     filled[:, :, :2] = robot + np.array([_FAR_M, 0.0])
