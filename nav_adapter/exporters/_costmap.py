@@ -31,6 +31,9 @@ def paint_costmap(
     (255) become lethal within the radius and stay unknown in the ring. Cells farther away are not
     touched.
 
+    An obstacle that its policy stretches along the person's way is painted as its polygon. Off the
+    polygon's corners distances err to the near side.
+
     The default r_i = 0 is for a planner that checks the robot's footprint, or a map that is
     inflated afterwards. To take people away again, see :class:`CostmapPainter`.
 

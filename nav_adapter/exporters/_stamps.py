@@ -13,6 +13,7 @@ from perception.arrays import FloatArray, finite_array, finite_number
 
 from .._constraints import NavConstraints
 from .._errors import NavError
+from ._outlines import long_outlines
 from ._shapes import circles
 
 Cells = NDArray[np.uint8]
@@ -89,18 +90,25 @@ def stamps(
     People close to each other share a window; the costs do not depend on who shares.
     """
     rows = circles(constraints)
+    if not len(rows):
+        return
     size = np.array(shape[::-1])
     center, radius = rows[:, :2] - origin, rows[:, 4]
-    reach = (radius + brush.ring_m)[:, None]
+    first, last = center - radius[:, None], center + radius[:, None]
+    outlines = {i: corners - origin for i, corners in long_outlines(constraints).items()}
+    for index, corners in outlines.items():
+        first[index] = np.minimum(first[index], corners.min(axis=0))
+        last[index] = np.maximum(last[index], corners.max(axis=0))
     # Clipped as floats: an obstacle far off the map must not overflow an integer.
-    low = np.clip(np.floor((center - reach) / resolution), 0, size).astype(np.int64)
-    high = np.clip(np.ceil((center + reach) / resolution), 0, size).astype(np.int64)
-    seen = (low < high).all(axis=1)
-    if not seen.any():
+    low = np.clip(np.floor((first - brush.ring_m) / resolution), 0, size).astype(np.int64)
+    high = np.clip(np.ceil((last + brush.ring_m) / resolution), 0, size).astype(np.int64)
+    seen = np.flatnonzero((low < high).all(axis=1))
+    if not len(seen):
         return
-    center, radius, low, high = center[seen], radius[seen], low[seen], high[seen]
-    for group in _groups(low, high):
-        yield _stamp(center[group], radius[group], low[group], high[group], resolution, brush)
+    for group in _groups(low[seen], high[seen]):
+        who = seen[group]
+        long = {i: outlines[k] for i, k in enumerate(who.tolist()) if k in outlines}
+        yield _stamp(center[who], radius[who], long, low[who], high[who], resolution, brush)
 
 
 def paint(window: Cells, cost: Cells) -> None:
@@ -125,6 +133,7 @@ def _groups(low: NDArray[np.int64], high: NDArray[np.int64]) -> list[slice]:
 def _stamp(
     center: FloatArray,
     radius: FloatArray,
+    outlines: dict[int, FloatArray],
     low: NDArray[np.int64],
     high: NDArray[np.int64],
     resolution: float,
@@ -143,6 +152,9 @@ def _stamp(
         part = np.add(dx2[index, x0:x1], dy2[index, y0:y1, None])
         np.sqrt(part, out=part)
         part -= radii[index]
+        if index in outlines:
+            beyond = _beyond(outlines[index], columns[x0:x1], rows[y0:y1])
+            np.minimum(part, beyond, out=part)
         view = gap[y0:y1, x0:x1]
         np.minimum(view, part, out=view)
     # So that no obstacle slips through a coarse grid: the cell that holds a centre is inside.
@@ -165,3 +177,21 @@ def _stamp(
     inside = gap <= _ROUNDING_M
     np.maximum(cells, inside.view(np.uint8) * np.uint8(LETHAL), out=cells)
     return (slice(int(bottom), int(top)), slice(int(left), int(right))), cells
+
+
+def _beyond(corners: FloatArray, x: FloatArray, y: FloatArray) -> NDArray[np.float32]:
+    """How far outside a convex outline the cells are, m; negative inside, too small off corners."""
+    edges = np.roll(corners, -1, axis=0) - corners
+    normals = np.stack([edges[:, 1], -edges[:, 0]], axis=1)
+    normals /= np.hypot(edges[:, 0], edges[:, 1])[:, None]
+    inside = ((corners.mean(axis=0) - corners) * normals).sum(axis=1, keepdims=True)
+    normals = np.where(inside > 0.0, -normals, normals)  # whichever way the corners run
+    offsets = (normals * corners).sum(axis=1)
+    across_x = (normals[:, :1] * x - offsets[:, None]).astype(np.float32)
+    across_y = (normals[:, 1:] * y).astype(np.float32)[:, :, None]
+    beyond: NDArray[np.float32] = across_x[0] + across_y[0]
+    side = np.empty_like(beyond)
+    for along_x, along_y in zip(across_x[1:], across_y[1:], strict=True):
+        np.add(along_x, along_y, out=side)
+        np.maximum(beyond, side, out=beyond)
+    return beyond
