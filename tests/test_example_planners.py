@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -64,3 +65,41 @@ def test_the_speed_stays_at_or_under_the_limit(rows):
 def test_the_separation_margin_is_never_violated(rows):
     for row in rows[1:]:
         assert row.result.violation_time_s == 0.0, row.worker
+
+
+def command(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "examples.planners", *arguments],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        timeout=120,
+        check=False,
+        env={"PYTHONPATH": str(ROOT)},
+    )
+
+
+def test_the_command_writes_the_table_that_it_prints(tmp_path):
+    pytest.importorskip("pybullet", reason="the crossings need the extra sim")
+    out = tmp_path / "table.md"
+    done = command("--planner", "reference", "--out", str(out))
+    assert done.returncode == 0, done.stderr
+    lines = out.read_text().splitlines()
+    assert done.stdout.splitlines() == lines
+    assert len(lines) == 2 + 4
+    assert all(line.startswith("| reference |") for line in lines[2:])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--seed", "-1"), "--seed must be 0 or more, got -1"),
+        (("--planner", "teb"), "invalid choice: 'teb'"),
+        (("--out", "no/such/folder/table.md"), "a folder that exists"),
+    ],
+)
+def test_a_command_without_meaning_is_refused(arguments, message):
+    pytest.importorskip("pybullet", reason="the crossings need the extra sim")
+    done = command(*arguments)
+    assert done.returncode == 2
+    assert message in done.stderr

@@ -44,6 +44,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     if options.seed < 0:
         parser.error(f"--seed must be 0 or more, got {options.seed}")
+    if options.out is not None and not options.out.parent.is_dir():
+        parser.error(f"--out must be a file in a folder that exists, got {options.out}")
     try:
         baseline = read_baseline(options.baseline) if options.baseline.exists() else {}
     except SimError as error:

@@ -50,6 +50,8 @@ def main() -> int:
     options = parser.parse_args()
     if options.seed < 0:
         parser.error(f"--seed must be 0 or more, got {options.seed}")
+    if options.out is not None and not options.out.parent.is_dir():
+        parser.error(f"--out must be a file in a folder that exists, got {options.out}")
     rows: list[Row] = []
     chosen = []
     for name in options.planner or _NAMES:

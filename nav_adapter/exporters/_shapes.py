@@ -28,7 +28,10 @@ _MINIMUM_POINTS = 8
 
 def circles(constraints: NavConstraints) -> FloatArray:
     """(N, 5) x, y (m), vx, vy (m/s) and radius (m): for velocity obstacles, MPC, TEB."""
-    rows = [[*o.center_odom_m, *o.velocity_odom_mps, o.radius_m] for o in constraints.obstacles]
+    rows = [
+        [*o.center_odom_m.tolist(), *o.velocity_odom_mps.tolist(), o.radius_m]
+        for o in constraints.obstacles
+    ]
     return np.array(rows, dtype=np.float64).reshape(-1, 5)
 
 

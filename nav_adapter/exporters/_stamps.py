@@ -29,6 +29,8 @@ _ROUNDING_M: Final = np.float32(2e-6)
 _NOBODY_M: Final = np.float32(1e9)
 # Steeper than this a ring is gone within a millimetre.
 _STEEPEST_PER_M: Final = 1e5
+# So many windows of 60 × 60 cells take half a megabyte.
+_AT_ONCE: Final = 32
 # Beginning a window takes about as long as so many cells of it.
 _CELLS_PER_WINDOW: Final = 8000
 
@@ -139,36 +141,63 @@ def _stamp(
     resolution: float,
     brush: Brush,
 ) -> tuple[tuple[slice, slice], Cells]:
-    (left, bottom), (right, top) = low.min(axis=0), high.max(axis=0)
-    # In double precision up to the squares, which no longer suffer from a far origin.
-    columns = (np.arange(left, right) + 0.5) * resolution
-    rows = (np.arange(bottom, top) + 0.5) * resolution
-    dx2 = np.square(columns - center[:, 0, None]).astype(np.float32)
-    dy2 = np.square(rows - center[:, 1, None]).astype(np.float32)
+    corner = low.min(axis=0)
+    (left, bottom), (right, top) = corner, high.max(axis=0)
     gap = np.full((top - bottom, right - left), _NOBODY_M, dtype=np.float32)
-    radii = radius.astype(np.float32)
-    spans = np.concatenate([low - [left, bottom], high - [left, bottom]], axis=1).tolist()
-    for index, (x0, y0, x1, y1) in enumerate(spans):
-        part = np.add(dx2[index, x0:x1], dy2[index, y0:y1, None])
-        np.sqrt(part, out=part)
-        part -= radii[index]
-        if index in outlines:
-            beyond = _beyond(outlines[index], columns[x0:x1], rows[y0:y1])
-            np.minimum(part, beyond, out=part)
+    order = np.argsort((high - low).max(axis=1), kind="stable")
+    for first in range(0, len(order), _AT_ONCE):
+        some = order[first : first + _AT_ONCE]
+        _lower(gap, corner, center[some], radius[some], low[some], high[some], resolution)
+    for index, corners in outlines.items():
+        (x0, y0), (x1, y1) = (low[index] - corner).tolist(), (high[index] - corner).tolist()
         view = gap[y0:y1, x0:x1]
-        np.minimum(view, part, out=view)
+        x = (np.arange(low[index, 0], high[index, 0]) + 0.5) * resolution
+        y = (np.arange(low[index, 1], high[index, 1]) + 0.5) * resolution
+        np.minimum(view, _beyond(corners, x, y), out=view)
     # So that no obstacle slips through a coarse grid: the cell that holds a centre is inside.
     column, row = np.floor(center / resolution).T
     held = (column >= left) & (column < right) & (row >= bottom) & (row < top)
     gap[row[held].astype(int) - bottom, column[held].astype(int) - left] = -1.0
+    return (slice(int(bottom), int(top)), slice(int(left), int(right))), _costs(gap, brush)
 
+
+def _lower(
+    gap: NDArray[np.float32],
+    corner: NDArray[np.int64],
+    center: FloatArray,
+    radius: FloatArray,
+    low: NDArray[np.int64],
+    high: NDArray[np.int64],
+    resolution: float,
+) -> None:
+    """Lower the gaps, m, to those from some people's circles, in place.
+
+    Their windows are made equally large, so that one call does for all of them.
+    """
+    width, height = (high - low).max(axis=0).tolist()
+    low = np.minimum(low - corner, [gap.shape[1] - width, gap.shape[0] - height])
+    # In double precision up to the squares, which no longer suffer from a far origin.
+    x = (low[:, :1] + corner[0] + np.arange(width) + 0.5) * resolution - center[:, :1]
+    y = (low[:, 1:] + corner[1] + np.arange(height) + 0.5) * resolution - center[:, 1:]
+    parts = np.add(
+        np.square(x).astype(np.float32)[:, None, :], np.square(y).astype(np.float32)[:, :, None]
+    )
+    np.sqrt(parts, out=parts)
+    parts -= radius.astype(np.float32)[:, None, None]
+    for part, (x0, y0) in zip(parts, low.tolist(), strict=True):
+        view = gap[y0 : y0 + height, x0 : x0 + width]
+        np.minimum(view, part, out=view)
+
+
+def _costs(gap: NDArray[np.float32], brush: Brush) -> Cells:
+    """The cost of each gap, m, between cell and obstacle."""
     decay = np.float32(-min(brush.decay_per_m, _STEEPEST_PER_M))
     cost = gap - np.float32(brush.inscribed_radius_m)
     np.maximum(cost, np.float32(0.0), out=cost)
     np.multiply(cost, decay, out=cost)
     np.exp(cost, out=cost)
     np.multiply(cost, np.float32(_RING_COST), out=cost)
-    cells = cost.astype(np.uint8)  # cuts off, as Nav2 does
+    cells: Cells = cost.astype(np.uint8)  # cuts off, as Nav2 does
     # Arithmetic with masks takes a tenth of the time of writing through them.
     cells *= (gap <= np.float32(brush.ring_m) + _ROUNDING_M).view(np.uint8)
     if brush.inscribed_radius_m > 0.0:
@@ -176,7 +205,7 @@ def _stamp(
         np.maximum(cells, inscribed.view(np.uint8) * np.uint8(INSCRIBED), out=cells)
     inside = gap <= _ROUNDING_M
     np.maximum(cells, inside.view(np.uint8) * np.uint8(LETHAL), out=cells)
-    return (slice(int(bottom), int(top)), slice(int(left), int(right))), cells
+    return cells
 
 
 def _beyond(corners: FloatArray, x: FloatArray, y: FloatArray) -> NDArray[np.float32]:
