@@ -23,14 +23,16 @@ LETHAL: Final = 254
 INSCRIBED: Final = 253
 _UNKNOWN: Final = 255
 _RING_COST: Final = 252.0
-# Single precision is off by less than this within 10 m; the doubt widens the obstacle.
-_ROUNDING_M: Final = np.float32(2e-6)
+# Single precision is off by less than this share of a length; the doubt widens the obstacle.
+_ROUNDING: Final = 4e-7
 # The gap where nobody is near; finite, so that no product with it is undefined.
 _NOBODY_M: Final = np.float32(1e9)
 # Steeper than this a ring is gone within a millimetre.
 _STEEPEST_PER_M: Final = 1e5
 # So many windows of 60 × 60 cells take half a megabyte.
 _AT_ONCE: Final = 32
+# Windows whose sides differ by no more are treated as equal.
+_LIKE_SIZE: Final = 1.3
 # Beginning a window takes about as long as so many cells of it.
 _CELLS_PER_WINDOW: Final = 8000
 
@@ -144,9 +146,7 @@ def _stamp(
     corner = low.min(axis=0)
     (left, bottom), (right, top) = corner, high.max(axis=0)
     gap = np.full((top - bottom, right - left), _NOBODY_M, dtype=np.float32)
-    order = np.argsort((high - low).max(axis=1), kind="stable")
-    for first in range(0, len(order), _AT_ONCE):
-        some = order[first : first + _AT_ONCE]
+    for some in _of_like_size((high - low).max(axis=1)):
         _lower(gap, corner, center[some], radius[some], low[some], high[some], resolution)
     for index, corners in outlines.items():
         (x0, y0), (x1, y1) = (low[index] - corner).tolist(), (high[index] - corner).tolist()
@@ -158,7 +158,21 @@ def _stamp(
     column, row = np.floor(center / resolution).T
     held = (column >= left) & (column < right) & (row >= bottom) & (row < top)
     gap[row[held].astype(int) - bottom, column[held].astype(int) - left] = -1.0
-    return (slice(int(bottom), int(top)), slice(int(left), int(right))), _costs(gap, brush)
+    # Of the longest lengths: a radius, also where the map cuts it off, or an outline.
+    doubt_m = _ROUNDING * (float(radius.max()) + resolution * float((high - low).max()))
+    return (slice(int(bottom), int(top)), slice(int(left), int(right))), _costs(gap, brush, doubt_m)
+
+
+def _of_like_size(sizes: NDArray[np.int64]) -> Iterator[NDArray[np.intp]]:
+    """Indices of windows that can be treated as equally large without much waste."""
+    order = np.argsort(sizes, kind="stable")
+    ascending = sizes[order].tolist()
+    first = 0
+    for last in range(1, len(ascending) + 1):
+        ends = last == len(ascending) or last - first == _AT_ONCE
+        if ends or ascending[last] > _LIKE_SIZE * ascending[first]:
+            yield order[first:last]
+            first = last
 
 
 def _lower(
@@ -189,21 +203,22 @@ def _lower(
         np.minimum(view, part, out=view)
 
 
-def _costs(gap: NDArray[np.float32], brush: Brush) -> Cells:
+def _costs(gap: NDArray[np.float32], brush: Brush, doubt_m: float) -> Cells:
     """The cost of each gap, m, between cell and obstacle."""
+    doubt = np.float32(doubt_m)
     decay = np.float32(-min(brush.decay_per_m, _STEEPEST_PER_M))
     cost = gap - np.float32(brush.inscribed_radius_m)
-    np.maximum(cost, np.float32(0.0), out=cost)
+    np.abs(cost, out=cost)  # what is nearer is overwritten below
     np.multiply(cost, decay, out=cost)
     np.exp(cost, out=cost)
     np.multiply(cost, np.float32(_RING_COST), out=cost)
     cells: Cells = cost.astype(np.uint8)  # cuts off, as Nav2 does
     # Arithmetic with masks takes a tenth of the time of writing through them.
-    cells *= (gap <= np.float32(brush.ring_m) + _ROUNDING_M).view(np.uint8)
+    cells *= (gap <= np.float32(brush.ring_m) + doubt).view(np.uint8)
     if brush.inscribed_radius_m > 0.0:
-        inscribed = gap <= np.float32(brush.inscribed_radius_m) + _ROUNDING_M
+        inscribed = gap <= np.float32(brush.inscribed_radius_m) + doubt
         np.maximum(cells, inscribed.view(np.uint8) * np.uint8(INSCRIBED), out=cells)
-    inside = gap <= _ROUNDING_M
+    inside = gap <= doubt
     np.maximum(cells, inside.view(np.uint8) * np.uint8(LETHAL), out=cells)
     return cells
 
@@ -213,9 +228,12 @@ def _beyond(corners: FloatArray, x: FloatArray, y: FloatArray) -> NDArray[np.flo
     edges = np.roll(corners, -1, axis=0) - corners
     normals = np.stack([edges[:, 1], -edges[:, 0]], axis=1)
     normals /= np.hypot(edges[:, 0], edges[:, 1])[:, None]
-    inside = ((corners.mean(axis=0) - corners) * normals).sum(axis=1, keepdims=True)
-    normals = np.where(inside > 0.0, -normals, normals)  # whichever way the corners run
+    # From its middle, so that small numbers remain to be rounded.
+    middle = corners.mean(axis=0)
+    x, y, corners = x - middle[0], y - middle[1], corners - middle
     offsets = (normals * corners).sum(axis=1)
+    normals[offsets < 0.0] *= -1.0  # whichever way the corners run
+    offsets = np.abs(offsets)
     across_x = (normals[:, :1] * x - offsets[:, None]).astype(np.float32)
     across_y = (normals[:, 1:] * y).astype(np.float32)[:, :, None]
     beyond: NDArray[np.float32] = across_x[0] + across_y[0]
