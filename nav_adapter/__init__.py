@@ -9,12 +9,11 @@ from . import _clash  # noqa: F401 - first: refuses a foreign package of one of 
 from ._adapter import NavAdapter
 from ._alert import Alert
 from ._constraints import NavConstraints, PersonObstacle
-from ._costmap import paint_costmap
 from ._errors import NavError
-from ._exporters import boxes, circles, points, polygons
 from ._policy import AwarenessPolicy
 from ._robot import RobotProfile, RobotState
 from ._separation import max_speed_mps, protective_separation_m
+from .exporters import boxes, circles, paint_costmap, points, polygons
 from .policies import InflationPolicy, SpeedPolicy
 
 __all__ = [

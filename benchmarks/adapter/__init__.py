@@ -1,0 +1,1 @@
+"""What the adapter and its exporters cost, against painting the same costmap with shapely."""

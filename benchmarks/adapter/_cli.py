@@ -1,0 +1,122 @@
+"""The command line of the benchmark."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from tqdm import tqdm
+
+from sim_tests import SimError
+from sim_tests._bench import Metric, read_baseline, write_baseline
+
+from ._cost import CYCLE, cost_ms
+
+BASELINE = Path(__file__).with_name("baseline.json")
+#: Of a cycle with 20 people, milliseconds.
+WANTED_MS = 1.0
+#: A person more may cost so many times what a person costs between the two smaller crowds.
+LINEAR = 1.5
+PEOPLE = (20, 100, 500)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the benchmark; 0 when all is as it should be, 1 when a figure is not, 2 for bad input."""
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.adapter",
+        description="Measure the processor time of a control cycle with 20, 100 and 500 people on "
+        "a map of 200 × 200 cells of 5 cm: NavAdapter.update, circles and the costmap; beside it "
+        "the painter that also clears, and the same costmap painted naively with shapely.",
+    )
+    parser.add_argument("--frames", type=_count, default=60, metavar="N", help="default: 60")
+    parser.add_argument("--repeats", type=_count, default=5, metavar="N", help="default: 5")
+    parser.add_argument("--seed", type=int, default=0, metavar="S", help="default: 0")
+    parser.add_argument(
+        "--baseline",
+        type=Path,
+        default=BASELINE,
+        metavar="FILE",
+        help=f"figures to compare with, if it exists (default: {BASELINE.name} beside this file)",
+    )
+    parser.add_argument("--out", type=Path, metavar="FILE", help="write the figures as JSON")
+    options = parser.parse_args(arguments)
+    if options.seed < 0:
+        parser.error(f"--seed must be 0 or more, got {options.seed}")
+    if options.out is not None and not options.out.parent.is_dir():
+        parser.error(f"--out must be a file in a folder that exists, got {options.out}")
+    try:
+        baseline = read_baseline(options.baseline) if options.baseline.exists() else {}
+    except SimError as error:
+        print(f"{parser.prog}: {error}", file=sys.stderr)
+        return 2
+
+    costs: dict[int, dict[str, float]] = {}
+    for people in tqdm(PEOPLE, unit="crowd", leave=False, file=sys.stderr):
+        # Crowds that take longer need fewer frames for the same certainty.
+        frames = max(8, options.frames * PEOPLE[0] // people)
+        naive = people == PEOPLE[0]  # it takes seconds a frame with more
+        costs[people] = cost_ms(people, frames, options.repeats, options.seed, naive)
+    steps = (*CYCLE, "cycle", "painter", "naive")
+    print(f"{'people':>8s}" + "".join(f"{step:>10s}" for step in steps) + "   ms of processor time")
+    for people, cost in costs.items():
+        cost["cycle"] = sum(cost[step] for step in CYCLE)
+        print(
+            f"{people:8d}"
+            + "".join(f"{cost[step]:10.3f}" if step in cost else f"{'-':>10s}" for step in steps)
+        )
+
+    metrics = _metrics(costs)
+    for metric in metrics:
+        print(f"{metric.name:44s}{metric.value:9.3f} {metric.unit}")
+    missed = [
+        f"{metric.name}: {metric.value:.3g} {metric.unit}, {baseline[metric.name].value:.3g} before"
+        for metric in metrics
+        if metric.name in baseline and metric.is_worse_than(baseline[metric.name])
+    ]
+    missed += _missed(costs, metrics)
+    for line in missed:
+        print(f"NOT AS WANTED  {line}")
+    if options.out is not None:
+        write_baseline(options.out, metrics)
+    return 1 if missed else 0
+
+
+def _metrics(costs: dict[int, dict[str, float]]) -> list[Metric]:
+    few, more, most = PEOPLE
+    slope_ms = (costs[more]["cycle"] - costs[few]["cycle"]) / (more - few)
+    steeper_ms = (costs[most]["cycle"] - costs[more]["cycle"]) / (most - more)
+    return [
+        # A bare time depends on the machine; the wide tolerance only catches a change of kind.
+        Metric("adapter_20_cycle", costs[few]["cycle"], "ms", "lower", 1.0),
+        Metric(
+            "adapter_20_costmap_over_naive",
+            costs[few]["costmap"] / costs[few]["naive"],
+            "x",
+            "lower",
+            0.5,
+        ),
+        Metric("adapter_a_person_more_500_over_100", steeper_ms / slope_ms, "x", "lower", 0.5),
+    ]
+
+
+def _missed(costs: dict[int, dict[str, float]], metrics: list[Metric]) -> list[str]:
+    missed = []
+    cycle_ms = costs[PEOPLE[0]]["cycle"]
+    if cycle_ms > WANTED_MS:
+        missed.append(f"a cycle with {PEOPLE[0]} people: {cycle_ms:.2f} ms, {WANTED_MS:g} wanted")
+    growth = metrics[-1].value
+    if growth > LINEAR:
+        missed.append(f"a person more costs {growth:.2f} times as much in a large crowd")
+    return missed
+
+
+def _count(text: str) -> int:
+    try:
+        value = int(text)
+    except ValueError:
+        value = 0
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"must be a whole number of at least 1, got {text!r}")
+    return value

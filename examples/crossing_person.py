@@ -1,0 +1,130 @@
+"""A robot with eight metres to go and a person who walks across its way.
+
+What the other examples drive in: a disc with wheels, without physics (``examples/planners`` has
+it), and cameras all around. The person looks elsewhere for two seconds and then at the robot. Run
+by itself, it shows a planner that only obeys the speed limit and drives straight on.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile, RobotState
+from perception import PersonObservation
+from perception.anthropometry import BODY_RADIUS_M
+from tracking import PersonTracker, TrackerConfig
+
+DT_S = 0.1
+GOAL_ODOM_M = np.array([8.0, 0.0])
+ROBOT_RADIUS_M = 0.45
+MAX_YAW_RATE_RADPS = 1.5
+ROBOT = RobotProfile(
+    footprint_m=np.array([[0.36, 0.25], [-0.36, 0.25], [-0.36, -0.25], [0.36, -0.25]]),
+    max_speed_mps=1.5,
+    max_acceleration_mps2=1.0,
+    max_deceleration_mps2=1.0,
+    reaction_time_s=0.3,
+)
+#: speed (m/s) and yaw rate (rad/s) from state and constraints.
+Plan = Callable[[RobotState, NavConstraints], tuple[float, float]]
+
+
+def drive(plan: Plan) -> None:
+    """Drive with a planner, print a line a second, and at the end what came of it."""
+    policy = AwarenessPolicy.preset("balanced")
+    tracker = PersonTracker(TrackerConfig(awareness=policy.filter))
+    adapter = NavAdapter(policy, ROBOT)
+    state = RobotState(0.0, np.zeros(2), 0.0, 0.0, 0.0)
+    least_gap_m, most_excess_mps = math.inf, -math.inf
+    for tick in range(400):
+        now = tick * DT_S
+        T_odom_camera = _camera_pose(state, now)
+        tracks = tracker.update(_observed(T_odom_camera, now), now, T_odom_camera)
+        constraints = adapter.update(tracks, state, now, perception_stamp_s=now)
+        command = plan(state, constraints)
+        if tick % 10 == 0:
+            radii = ", ".join(f"{o.radius_m:.2f} m" for o in constraints.obstacles) or "nobody"
+            print(
+                f"{now:4.1f} s  at ({state.position_odom_m[0]:4.2f}, "
+                f"{state.position_odom_m[1]:5.2f}) m with {state.speed_mps:4.2f} m/s, limit "
+                f"{constraints.speed_limit_mps:4.2f} m/s, radius {radii}"
+            )
+        state = _moved(state, command)
+        most_excess_mps = max(
+            most_excess_mps, state.speed_mps - constraints.reachable_speed_limit_mps
+        )
+        apart_m = float(np.hypot(*(_person_odom_m(now + DT_S) - state.position_odom_m)))
+        least_gap_m = min(least_gap_m, apart_m - BODY_RADIUS_M - ROBOT_RADIUS_M)
+        if np.hypot(*(GOAL_ODOM_M - state.position_odom_m)) < 0.3:
+            break
+    print(
+        f"goal {'reached' if tick < 399 else 'not reached'} after {now:.1f} s, least gap to the "
+        f"person {least_gap_m:.2f} m, speed over the limit by at most {most_excess_mps:.2f} m/s"
+    )
+
+
+def towards_goal(state: RobotState) -> tuple[float, float]:
+    """Distance (m) and bearing (rad, from the heading) of the goal."""
+    dx, dy = GOAL_ODOM_M - state.position_odom_m
+    off = math.atan2(dy, dx) - state.heading_odom_rad
+    return math.hypot(dx, dy), math.atan2(math.sin(off), math.cos(off))
+
+
+def follow_velocity(state: RobotState, velocity_odom_mps: np.ndarray) -> tuple[float, float]:
+    """Speed and yaw rate of a wheeled robot that shall come to have a velocity."""
+    vx, vy = velocity_odom_mps
+    off = math.atan2(vy, vx) - state.heading_odom_rad
+    off = math.atan2(math.sin(off), math.cos(off))
+    speed = math.hypot(vx, vy)
+    # Turn before going: the component along the heading is all that it can have now.
+    return speed * max(math.cos(off), 0.0), (2.0 * off if speed > 0.02 else 0.0)
+
+
+def _person_odom_m(now: float) -> np.ndarray:
+    return np.array([5.0, -3.0 + 0.7 * now])
+
+
+def _observed(T_odom_camera: np.ndarray, now: float) -> tuple[PersonObservation, ...]:
+    position = (np.linalg.inv(T_odom_camera) @ [*_person_odom_m(now), 1.2, 1.0])[:3]
+    return (
+        PersonObservation(
+            stamp_s=now,
+            position_camera_m=position,
+            position_covariance_m2=np.diag([0.03, 0.03, 0.08]) ** 2,
+            gaze_camera=None,
+            awareness=0.85 if now > 2.0 else 0.0,
+            awareness_std=0.05,
+            score=0.9,
+        ),
+    )
+
+
+def _camera_pose(state: RobotState, now: float) -> np.ndarray:
+    """T_odom_camera of the camera that looks the person's way, 1.4 m above the base."""
+    x, y = state.position_odom_m
+    dx, dy = _person_odom_m(now) - state.position_odom_m
+    c, s = dx / math.hypot(dx, dy), dy / math.hypot(dx, dy)
+    return np.array([[s, 0, c, x], [-c, 0, s, y], [0, -1, 0, 1.4], [0, 0, 0, 1]], dtype=float)
+
+
+def _moved(state: RobotState, command: tuple[float, float]) -> RobotState:
+    speed, yaw_rate = command
+    speed = max(speed, state.speed_mps - ROBOT.max_deceleration_mps2 * DT_S, 0.0)
+    speed = min(speed, state.speed_mps + ROBOT.max_acceleration_mps2 * DT_S)
+    yaw_rate = min(max(yaw_rate, -MAX_YAW_RATE_RADPS), MAX_YAW_RATE_RADPS)
+    heading = state.heading_odom_rad + yaw_rate * DT_S
+    way = speed * DT_S * np.array([math.cos(heading), math.sin(heading)])
+    return RobotState(state.stamp_s + DT_S, state.position_odom_m + way, heading, speed, yaw_rate)
+
+
+def straight_on(state: RobotState, constraints: NavConstraints) -> tuple[float, float]:
+    """Obey the limit and steer at the goal."""
+    distance_m, bearing_rad = towards_goal(state)
+    return min(constraints.speed_limit_mps, distance_m), bearing_rad
+
+
+if __name__ == "__main__":
+    drive(straight_on)

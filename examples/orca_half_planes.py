@@ -1,0 +1,48 @@
+"""ORCA with the robot doing all the avoiding: half-planes and a small solver from SciPy.
+
+The integration is the call of ``half_planes``. ORCA has no notion of acceleration: the velocity
+that it picks may be out of reach within a tick, and the drive here ramps.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from crossing_person import GOAL_ODOM_M, ROBOT_RADIUS_M, drive, follow_velocity
+from scipy.optimize import minimize
+
+from nav_adapter import NavConstraints, RobotState
+from nav_adapter.exporters import half_planes
+
+
+def plan(state: RobotState, constraints: NavConstraints) -> tuple[float, float]:
+    """Speed and yaw rate towards the allowed velocity nearest to the wished one."""
+    heading = np.array([math.cos(state.heading_odom_rad), math.sin(state.heading_odom_rad)])
+    velocity = state.speed_mps * heading
+    rows = half_planes(constraints, state.position_odom_m, velocity, ROBOT_RADIUS_M)
+    normals, bounds = rows[:, :2], rows[:, 2]
+
+    limit_mps = constraints.speed_limit_mps
+    to_goal = GOAL_ODOM_M - state.position_odom_m
+    wish = to_goal * min(limit_mps / float(np.hypot(*to_goal)), 1.0)
+    # A person straight ahead has no nearer side; leaning right, as people do, decides it.
+    wish = wish + 0.05 * limit_mps * np.array([heading[1], -heading[0]])
+    if (normals @ wish >= bounds).all():
+        return follow_velocity(state, wish)
+    found = minimize(
+        lambda v: float(np.sum((v - wish) ** 2)),
+        np.zeros(2),
+        jac=lambda v: 2.0 * (v - wish),
+        constraints=[
+            {"type": "ineq", "fun": lambda v: normals @ v - bounds, "jac": lambda v: normals},
+            {"type": "ineq", "fun": lambda v: limit_mps**2 - v @ v, "jac": lambda v: -2.0 * v},
+        ],
+        method="SLSQP",
+    )
+    # The half-planes contradict each other, or the limit: stop.
+    return follow_velocity(state, found.x) if found.success else (0.0, 0.0)
+
+
+if __name__ == "__main__":
+    drive(plan)

@@ -1,0 +1,1 @@
+"""Planners that others wrote, driving the crossings of this package in PyBullet."""

@@ -1,0 +1,90 @@
+"""``python -m examples.planners``: the crossings with every planner, as a Markdown table."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import cast
+
+from tqdm import tqdm
+
+from sim_tests import NOVA_CARTER, LocalPlanner, SamplingPlanner
+
+from ._compare import HEADER, Row, compare, scenario
+
+# The package that it needs, the module here and its class.
+_OTHERS = {
+    "ir-sim": ("irsim", "velocity_obstacles", "VelocityObstaclePlanner"),
+    "do-mpc": ("do_mpc", "model_predictive", "ModelPredictivePlanner"),
+}
+_NAMES = ("reference", *_OTHERS)
+_CASES = 4
+
+
+def main() -> int:
+    """Run the comparison; 0 when every planner obeyed and touched nobody, else 1."""
+    parser = argparse.ArgumentParser(
+        prog="python -m examples.planners",
+        description="Cross a warehouse in PyBullet with the reference planner and with planners "
+        "that others wrote: with nobody there, with a worker who watches the robot, with one who "
+        "does not, and with a wider radius round that one.",
+    )
+    parser.add_argument(
+        "--planner",
+        choices=_NAMES,
+        action="append",
+        help="only this one; may be given more than once (default: all that are installed)",
+    )
+    parser.add_argument(
+        "--perception",
+        choices=("truth", "keypoints", "pixels"),
+        default="truth",
+        help="what the robot sees with (default: truth, all around and through walls)",
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of every crossing (default: 0)")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="write the table there as well")
+    options = parser.parse_args()
+    if options.seed < 0:
+        parser.error(f"--seed must be 0 or more, got {options.seed}")
+    if options.out is not None and not options.out.parent.is_dir():
+        parser.error(f"--out must be a file in a folder that exists, got {options.out}")
+    rows: list[Row] = []
+    chosen = []
+    for name in options.planner or _NAMES:
+        if name in _OTHERS and find_spec(_OTHERS[name][0]) is None:
+            print(f"left out, {name} is not installed: pip install {name}", file=sys.stderr)
+        else:
+            chosen.append(name)
+    with tqdm(total=_CASES * len(chosen), unit="crossing", file=sys.stderr, leave=False) as bar:
+        for name in chosen:
+            bar.set_description(name)
+            rows += compare(
+                name,
+                _maker(name),
+                perception=options.perception,
+                seed=options.seed,
+                done=lambda _: bar.update(),
+            )
+    table = "\n".join([HEADER, *(row.line() for row in rows)])
+    print(table)
+    if options.out is not None:
+        options.out.write_text(table + "\n", encoding="utf-8")
+    return 0 if rows and all(row.is_good for row in rows) else 1
+
+
+def _maker(name: str) -> Callable[[], LocalPlanner]:
+    if name == "reference":
+        boxes = scenario("crossing_attentive").layout.obstacle_boxes_odom
+        return lambda: SamplingPlanner(NOVA_CARTER, boxes)
+    # Only now: the packages need not all be there, and take a second to import.
+    _, module, planner = _OTHERS[name]
+    make = getattr(import_module(f".{module}", __package__), planner)
+    return lambda: cast(LocalPlanner, make(NOVA_CARTER))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

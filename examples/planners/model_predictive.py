@@ -1,0 +1,162 @@
+"""A nonlinear model-predictive controller of do-mpc (``pip install do-mpc``, LGPL-3.0 licence).
+
+Everything that the adapter says goes in as a time-varying parameter: it changes every tick, and so
+does what is predicted for the stages ahead.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import warnings
+
+import casadi
+import numpy as np
+
+from nav_adapter import NavConstraints, RobotProfile, RobotState
+from nav_adapter.exporters import predicted_circles
+from perception.arrays import FloatArray
+
+with warnings.catch_warnings():
+    warnings.simplefilter("ignore")  # about parts of it that are not installed
+    import do_mpc
+
+# do-mpc hands casadi objects to numpy; newer releases of casadi ask that this be agreed to.
+with contextlib.suppress(AttributeError):
+    casadi.GlobalOptions.setNumpyMode(-1)
+
+_STAGES = 20
+_STAGE_S = 0.15
+_SLOTS = 4
+_MAX_YAW_RATE_RADPS = 1.0
+# A stage's excess over limit or circle costs this much, so that there always is a solution.
+_PENALTY = 1000.0
+_QUIET = {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": 0, "ipopt.max_iter": 60}
+
+
+class ModelPredictivePlanner:
+    """Drives a differential-drive robot by optimising the next three seconds.
+
+    States x, y, heading, speed; inputs acceleration and yaw rate. People are soft constraints on
+    the distance at each stage, from where they will be then. So is the speed limit, which falls
+    over the stages no faster than the robot brakes: a hard bound under the present speed would
+    leave the solver without a solution.
+
+    Args:
+        robot: footprint and limits.
+        replan_s: how long a solution is held.
+    """
+
+    def __init__(self, robot: RobotProfile, replan_s: float = 0.1) -> None:
+        self._robot = robot
+        self._replan_s = replan_s
+        self._planned_s = -math.inf
+        self._command = (0.0, 0.0)
+        self._times_s = _STAGE_S * np.arange(_STAGES + 1)
+        self._people = np.zeros((_SLOTS, _STAGES + 1, 5))
+        self._caps_mps = np.zeros(_STAGES + 1)
+        self._goal = np.zeros(2)
+        self._mpc = self._controller(self._model())
+        self._started = False
+
+    def plan(
+        self,
+        robot_state: RobotState,
+        goal_odom_m: FloatArray,
+        constraints: NavConstraints,
+        dt_s: float,
+    ) -> tuple[float, float]:
+        """Return speed (m/s) and yaw rate (rad/s)."""
+        limit_mps = min(constraints.speed_limit_mps, self._robot.max_speed_mps)
+        if robot_state.stamp_s - self._planned_s >= self._replan_s - 1e-9:
+            self._planned_s = robot_state.stamp_s
+            self._command = self._solve(robot_state, goal_odom_m, constraints, limit_mps)
+        speed, yaw_rate = self._command
+        return min(max(speed, 0.0), limit_mps), yaw_rate
+
+    def _solve(
+        self,
+        robot_state: RobotState,
+        goal_odom_m: FloatArray,
+        constraints: NavConstraints,
+        limit_mps: float,
+    ) -> tuple[float, float]:
+        speed = robot_state.speed_mps
+        braked = speed - self._robot.max_deceleration_mps2 * self._times_s
+        self._caps_mps = np.maximum(limit_mps, braked)
+        self._people = predicted_circles(
+            constraints,
+            self._times_s,
+            slots=_SLOTS,
+            robot_position_odom_m=robot_state.position_odom_m,
+        )
+        self._goal = np.asarray(goal_odom_m)
+        heading = robot_state.heading_odom_rad
+        state = np.array([[*robot_state.position_odom_m, heading, speed]]).T
+        if not self._started:
+            self._mpc.x0 = state
+            self._mpc.set_initial_guess()
+            self._started = True
+        acceleration, yaw_rate = self._mpc.make_step(state).ravel().tolist()
+        # What the drive shall reach: where the speed will be after the stage.
+        return speed + acceleration * _STAGE_S, yaw_rate
+
+    def _model(self) -> do_mpc.model.Model:
+        model = do_mpc.model.Model("continuous")
+        x, y, heading, speed = (
+            model.set_variable("_x", name) for name in ("x", "y", "heading", "speed")
+        )
+        acceleration = model.set_variable("_u", "acceleration")
+        yaw_rate = model.set_variable("_u", "yaw_rate")
+        for name in ("goal_x", "goal_y", "cap"):
+            model.set_variable("_tvp", name)
+        for slot in range(_SLOTS):
+            for name in ("px", "py", "pr"):
+                model.set_variable("_tvp", f"{name}{slot}")
+        model.set_rhs("x", speed * casadi.cos(heading))
+        model.set_rhs("y", speed * casadi.sin(heading))
+        model.set_rhs("heading", yaw_rate)
+        model.set_rhs("speed", acceleration)
+        away = casadi.hypot(model.tvp["goal_x"] - x, model.tvp["goal_y"] - y + 1e-6)
+        model.set_expression("away", away)
+        model.setup()
+        return model
+
+    def _controller(self, model: do_mpc.model.Model) -> do_mpc.controller.MPC:
+        mpc = do_mpc.controller.MPC(model)
+        mpc.settings.n_horizon = _STAGES
+        mpc.settings.t_step = _STAGE_S
+        mpc.settings.collocation_deg = 1
+        mpc.settings.nlpsol_opts = _QUIET
+        mpc.settings.store_full_solution = False
+        mpc.set_objective(mterm=model.aux["away"], lterm=model.aux["away"])
+        mpc.set_rterm(acceleration=0.05, yaw_rate=0.5)
+        robot = self._robot
+        mpc.bounds["lower", "_u", "acceleration"] = -robot.max_deceleration_mps2
+        mpc.bounds["upper", "_u", "acceleration"] = robot.max_acceleration_mps2
+        mpc.bounds["lower", "_u", "yaw_rate"] = -_MAX_YAW_RATE_RADPS
+        mpc.bounds["upper", "_u", "yaw_rate"] = _MAX_YAW_RATE_RADPS
+        soft = {"ub": 0.0, "soft_constraint": True, "penalty_term_cons": _PENALTY}
+        mpc.set_nl_cons("over_cap", model.x["speed"] - model.tvp["cap"], **soft)
+        mpc.set_nl_cons("backward", -model.x["speed"], **soft)
+        for slot in range(_SLOTS):
+            gap_x = model.x["x"] - model.tvp[f"px{slot}"]
+            gap_y = model.x["y"] - model.tvp[f"py{slot}"]
+            room = model.tvp[f"pr{slot}"] + robot.circumscribed_radius_m
+            mpc.set_nl_cons(f"person{slot}", room - casadi.hypot(gap_x, gap_y + 1e-6), **soft)
+        template = mpc.get_tvp_template()
+
+        def tvp(_: float) -> object:
+            for stage in range(_STAGES + 1):
+                template["_tvp", stage, "goal_x"] = self._goal[0]
+                template["_tvp", stage, "goal_y"] = self._goal[1]
+                template["_tvp", stage, "cap"] = self._caps_mps[stage]
+                for slot, (px, py, _, _, pr) in enumerate(self._people[:, stage]):
+                    template["_tvp", stage, f"px{slot}"] = px
+                    template["_tvp", stage, f"py{slot}"] = py
+                    template["_tvp", stage, f"pr{slot}"] = pr
+            return template
+
+        mpc.set_tvp_fun(tvp)
+        mpc.setup()
+        return mpc

@@ -1,0 +1,27 @@
+"""Constraints in the form that a planner reads: one function a form, all in the odom frame.
+
+Functions of :class:`nav_adapter.NavConstraints` without memory; only :class:`CostmapPainter`
+remembers what it painted. ``docs/planners.md`` says which planner reads which.
+"""
+
+from __future__ import annotations
+
+from ._cost import people_cost
+from ._costmap import paint_costmap
+from ._costmap_painter import CostmapPainter
+from ._horizon import predicted_circles
+from ._shapes import boxes, circles, points, polygons
+from ._velocity import half_planes, velocity_obstacles
+
+__all__ = [
+    "CostmapPainter",
+    "boxes",
+    "circles",
+    "half_planes",
+    "paint_costmap",
+    "people_cost",
+    "points",
+    "polygons",
+    "predicted_circles",
+    "velocity_obstacles",
+]

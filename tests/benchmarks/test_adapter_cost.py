@@ -1,0 +1,66 @@
+"""The benchmark of the adapter compares like with like."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benchmarks.adapter._cli import main
+from benchmarks.adapter._cost import CYCLE, cost_ms
+from benchmarks.adapter._crowd import CELLS, ORIGIN_ODOM_M, RESOLUTION_M, ROBOT, crowd, robot_at
+from benchmarks.adapter._naive import paint_naively
+from nav_adapter import AwarenessPolicy, NavAdapter, paint_costmap
+
+
+def test_both_ways_paint_the_same_costmap() -> None:
+    (tracks,) = crowd(6, 1, np.random.default_rng(3))
+    policy = AwarenessPolicy.preset("balanced")
+    constraints = NavAdapter(policy, ROBOT).update(tracks, robot_at(0.0), 0.0)
+    ours, naive = np.zeros((2, *CELLS), dtype=np.uint8)
+    paint_costmap(ours, ORIGIN_ODOM_M, RESOLUTION_M, constraints)
+    paint_naively(naive, constraints)
+    # The polygon holds the circle and is less than 1 % wider: 1 cm, or a tenth of a cost.
+    assert (naive[ours == 254] == 254).all()
+    assert (naive == 254).sum() <= 1.03 * (ours == 254).sum()
+    ring = (ours < 254) & (naive < 254)
+    ratio = (naive[ring] + 1.0) / (ours[ring] + 1.0)
+    assert ratio[ours[ring] > 30].min() >= 1.0 / 1.01
+    assert ratio[ours[ring] > 30].max() <= 1.15
+
+
+def test_everybody_walks_and_stays_on_the_map() -> None:
+    frames = crowd(30, 50, np.random.default_rng(0))
+    positions = np.array([[track.position_odom_m for track in frame] for frame in frames])
+    assert np.abs(positions).max() <= 5.0
+    assert (np.abs(positions[1] - positions[0]).sum(axis=1) > 0.0).all()
+
+
+def test_every_step_has_a_cost_of_its_own() -> None:
+    cost = cost_ms(3, 8, 1, 0, naive=True)
+    assert set(cost) == {*CYCLE, "painter", "naive"}
+    assert all(milliseconds > 0.0 for milliseconds in cost.values())
+    assert cost["naive"] > cost["costmap"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--frames", "0"], "must be a whole number of at least 1, got '0'"),
+        (["--seed", "-3"], "--seed must be 0 or more, got -3"),
+        (["--out", "no/such/folder/x.json"], "a folder that exists"),
+    ],
+)
+def test_input_without_meaning_is_refused(
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        main(arguments)
+    assert stopped.value.code == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_broken_baseline_is_said(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
+    broken = tmp_path / "baseline.json"
+    broken.write_text("{}")
+    assert main(["--baseline", str(broken)]) == 2
+    assert "is not a baseline" in capsys.readouterr().err

@@ -1,0 +1,105 @@
+"""Planners that others wrote obey the adapter, and awareness pays with each of them."""
+
+from __future__ import annotations
+
+import importlib
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PLANNERS = {
+    "ir-sim": ("irsim", "velocity_obstacles", "VelocityObstaclePlanner"),
+    "do-mpc": ("do_mpc", "model_predictive", "ModelPredictivePlanner"),
+}
+SLOW = pytest.param("do-mpc", marks=pytest.mark.slow)
+
+
+@pytest.fixture(scope="module")
+def examples() -> Iterator[None]:
+    """The examples are no part of the package: they are found from the project's root."""
+    sys.path.insert(0, str(ROOT))
+    yield
+    sys.path.remove(str(ROOT))
+
+
+@pytest.fixture(scope="module", params=["ir-sim", SLOW])
+def rows(request, examples):
+    """Nobody, an aware worker, an unaware one, an unaware one with a wider radius."""
+    package, module, name = PLANNERS[request.param]
+    if importlib.util.find_spec(package) is None:
+        pytest.skip(f"{request.param} is not installed (extra dev)")
+    pytest.importorskip("pybullet", reason="the crossings need the extra sim")
+    compare = importlib.import_module("examples.planners._compare")
+    planner = getattr(importlib.import_module(f"examples.planners.{module}"), name)
+    return compare.compare(request.param, lambda: planner(compare.NOVA_CARTER))
+
+
+def test_every_crossing_ends_at_the_goal_without_a_contact(rows):
+    for row in rows:
+        assert row.result.success, row.worker
+        assert not row.result.contact, row.worker
+
+
+def test_an_aware_worker_costs_less_time_than_an_unaware_one(rows):
+    nobody, aware, unaware, _ = (row.result.time_to_goal_s for row in rows)
+    assert nobody + 1.0 < aware < unaware - 3.0
+
+
+def test_a_larger_radius_gives_a_larger_separation(rows):
+    _, _, unaware, wide = (row.result.min_separation_m for row in rows)
+    assert wide > unaware + 0.2
+
+
+def test_the_speed_stays_at_or_under_the_limit(rows):
+    for row in rows:
+        assert row.excess_mps <= 0.03, row.worker
+        # Not for want of a limit.
+        slowest = min(frame.constraints.speed_limit_mps for frame in row.result.frames)
+        assert row.worker == "nobody" or slowest < 1.0
+
+
+def test_the_separation_margin_is_never_violated(rows):
+    for row in rows[1:]:
+        assert row.result.violation_time_s == 0.0, row.worker
+
+
+def command(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "examples.planners", *arguments],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        timeout=120,
+        check=False,
+        env={"PYTHONPATH": str(ROOT)},
+    )
+
+
+def test_the_command_writes_the_table_that_it_prints(tmp_path):
+    pytest.importorskip("pybullet", reason="the crossings need the extra sim")
+    out = tmp_path / "table.md"
+    done = command("--planner", "reference", "--out", str(out))
+    assert done.returncode == 0, done.stderr
+    lines = out.read_text().splitlines()
+    assert done.stdout.splitlines() == lines
+    assert len(lines) == 2 + 4
+    assert all(line.startswith("| reference |") for line in lines[2:])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--seed", "-1"), "--seed must be 0 or more, got -1"),
+        (("--planner", "teb"), "invalid choice: 'teb'"),
+        (("--out", "no/such/folder/table.md"), "a folder that exists"),
+    ],
+)
+def test_a_command_without_meaning_is_refused(arguments, message):
+    pytest.importorskip("pybullet", reason="the crossings need the extra sim")
+    done = command(*arguments)
+    assert done.returncode == 2
+    assert message in done.stderr
