@@ -188,6 +188,10 @@ class AwarenessBridge:
             self._publish(key, message)
         return constraints
 
+    def refuse(self, problem: str) -> None:
+        """Say what was wrong with a message that never got here."""
+        self._warn(problem)
+
     def stop(self, now_s: float, reason: str) -> NavConstraints:
         """Publish a stop, for a caller that is about to leave."""
         constraints = NavConstraints(now_s, (), 0.0, reason, True)

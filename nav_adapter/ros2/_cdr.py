@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any, Final, TypeVar, cast
 
 from .._errors import NavError
@@ -30,6 +29,8 @@ except ImportError as cause:  # pragma: no cover - depends on the installation
 
 _AnyMessage = TypeVar("_AnyMessage", bound=Message)
 
+# By ROS name, and whether sequences of bytes are bytes.
+_IDL_TYPES: Final[dict[tuple[str, bool], Any]] = {}
 _PRIMITIVES: Final[dict[str, Any]] = {
     "bool": bool,
     "int8": int8,
@@ -66,13 +67,14 @@ def decode(kind: type[_AnyMessage], data: bytes) -> _AnyMessage:
         raise NavError(f"received bytes are no {ros_type(kind)}: {cause}") from cause
 
 
-@cache
 def topic_type(kind: type[Message]) -> Any:
     """The DDS type of a message: an IDL structure with the name that ROS 2 gives it.
 
     Samples of it carry CDR bytes (attribute ``cdr``) and are not decoded on the way.
     """
     exact = _idl_type(kind, False)
+    if hasattr(exact, "cdr"):
+        return exact
 
     def serialize(self: Any, *_: Any, **__: Any) -> bytes:
         return cast(bytes, self.cdr)
@@ -82,6 +84,7 @@ def topic_type(kind: type[Message]) -> Any:
         sample.cdr = bytes(data)
         return sample
 
+    exact.cdr = b""
     exact.serialize = serialize
     exact.deserialize = classmethod(deserialize)
     return exact
@@ -92,13 +95,15 @@ def sample(message_type: type[Message], cdr: bytes) -> Any:
     return topic_type(message_type).deserialize(cdr)
 
 
-@cache
 def _idl_type(kind: type[Message], fast: bool) -> Any:
     """The IDL structure of a message, read and written as the message itself.
 
     ``fast`` takes sequences of bytes as bytes: the same wire format a hundred times faster, but
     another type by name, so that topics do not use it.
     """
+    known = _IDL_TYPES.get((ros_type(kind), fast))
+    if known is not None:
+        return known
     # rosidl_generator_dds_idl mangles package/msg/Name so.
     name = ros_type(kind).replace("/", "::").replace("::msg::", "::msg::dds_::") + "_"
     namespace: Any = IdlMeta.__prepare__(kind.__name__, (IdlStruct,), typename=name)
@@ -109,7 +114,8 @@ def _idl_type(kind: type[Message], fast: bool) -> Any:
         **{key: tuple(value) if isinstance(value, list) else value for key, value in values.items()}
     )
     namespace["__module__"] = __name__
-    return IdlMeta(kind.__name__, (IdlStruct,), namespace)
+    made = IdlMeta(kind.__name__, (IdlStruct,), namespace)
+    return _IDL_TYPES.setdefault((ros_type(kind), fast), made)
 
 
 def _idl_field(kind: FieldType, fast: bool) -> Any:
