@@ -8,7 +8,7 @@ from .._errors import NavError
 from ._message import FieldType, Message, field_types, ros_type
 
 try:
-    from cyclonedds.idl import Endianness, IdlStruct
+    from cyclonedds.idl import Buffer, Endianness, IdlStruct
     from cyclonedds.idl._main import IdlMeta
     from cyclonedds.idl.types import (
         array,
@@ -29,6 +29,7 @@ except ImportError as cause:  # pragma: no cover - depends on the installation
 
 _AnyMessage = TypeVar("_AnyMessage", bound=Message)
 
+_HEADER_BYTES: Final = 4
 # By ROS name, and whether sequences of bytes are bytes.
 _IDL_TYPES: Final[dict[tuple[str, bool], Any]] = {}
 _PRIMITIVES: Final[dict[str, Any]] = {
@@ -61,8 +62,12 @@ def decode(kind: type[_AnyMessage], data: bytes) -> _AnyMessage:
     Raises:
         NavError: the bytes are cut off or are those of something else.
     """
+    buffer = Buffer(data, align_offset=_HEADER_BYTES)
     try:
-        return cast(_AnyMessage, _idl_type(kind, True).__idl__.deserialize(data))
+        message = _idl_type(kind, True).__idl__.deserialize(buffer)
+        if buffer.tell() > len(data):  # slices of bytes end early without a word
+            raise ValueError(f"{buffer.tell()} bytes are needed, got {len(data)}")
+        return cast(_AnyMessage, message)
     except Exception as cause:  # the library raises what struct, str and it itself raise
         raise NavError(f"received bytes are no {ros_type(kind)}: {cause}") from cause
 

@@ -25,8 +25,10 @@ def to_time(stamp_s: float) -> Time:
         NavError: it is not finite or outside 0 to 2³¹ − 1 s.
     """
     stamp = finite_number("stamp_s", stamp_s, NavError, minimum=0.0, maximum=_LATEST_S - 1.0)
-    sec, nanosec = divmod(round(stamp * 1e9), 1_000_000_000)
-    return Time(sec, nanosec)
+    # Apart, since a float holds today's seconds to a quarter of a microsecond only.
+    sec = math.floor(stamp)
+    more, nanosec = divmod(round((stamp - sec) * 1e9), 1_000_000_000)
+    return Time(sec + more, nanosec)
 
 
 def to_seconds(time: Time) -> float:
