@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from types import TracebackType
 
+import yaml
+
 from .._errors import NavError
 from ._message import definition, ros_type
 from ._topics import Topic
@@ -77,15 +79,20 @@ class McapRecorder:
 
 
 def _metadata(topic: Topic) -> dict[str, str]:
-    """The publisher's quality of service, in the form that rosbag2 writes and replays."""
+    """The publisher's quality of service, in the form that rosbag2 writes and replays.
+
+    Numbers are those of rmw (``rmw/types.h``); times are its "for ever".
+    """
+    ever = {"sec": 9223372036, "nsec": 854775807}
     qos = {
-        "history": 1,
+        "history": 1,  # keep last
         "depth": topic.depth,
         "reliability": 1 if topic.reliable else 2,
         "durability": 1 if topic.transient_local else 2,
+        "deadline": ever,
+        "lifespan": dict(ever),
+        "liveliness": 1,
+        "liveliness_lease_duration": dict(ever),
+        "avoid_ros_namespace_conventions": False,
     }
-    lines = [
-        f"{'-' if index == 0 else ' '} {key}: {value}"
-        for index, (key, value) in enumerate(qos.items())
-    ]
-    return {"offered_qos_profiles": "\n".join(lines)}
+    return {"offered_qos_profiles": yaml.safe_dump([qos], sort_keys=False)}
