@@ -29,6 +29,8 @@ from .messages.sensor_msgs import CameraInfo, CompressedImage, Image
 from .messages.tf2_msgs import TFMessage
 
 _CLOCK_TOLERANCE_S = 0.05
+# No robot of this library drives so fast: such a number is a fault of the sender.
+_FASTEST_MPS = 100.0
 
 
 class AwarenessBridge:
@@ -129,11 +131,14 @@ class AwarenessBridge:
         stamp_s = to_seconds(message.header.stamp)
         try:
             T = pose_matrix((place.x, place.y, place.z), turn)
+            speed_mps = message.twist.twist.linear.x
+            if abs(speed_mps) > _FASTEST_MPS:
+                raise NavError(f"speed must be within {_FASTEST_MPS:g} m/s, got {speed_mps:g} m/s")
             state = RobotState(
                 stamp_s,
                 T[:2, 3],
                 math.atan2(T[1, 0], T[0, 0]),
-                message.twist.twist.linear.x,
+                speed_mps,
                 message.twist.twist.angular.z,
             )
             child = message.child_frame_id or self.frames.base

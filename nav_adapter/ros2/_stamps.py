@@ -16,6 +16,8 @@ from .messages.std_msgs import Header
 
 # builtin_interfaces/Time counts whole seconds in 32 bits.
 _LATEST_S = 2**31 - 1
+# A robot farther from its odom frame than the earth is round is lost.
+_FARTHEST_M = 1e6
 
 
 def to_time(stamp_s: float) -> Time:
@@ -50,14 +52,15 @@ def pose_matrix(position_m: tuple[float, float, float], turn: Quaternion) -> Flo
     """(4, 4) of a position and a quaternion, which is normalised.
 
     Raises:
-        NavError: a number is not finite, or the quaternion has no length.
+        NavError: a number is not finite, a place beyond 10⁶ m, or a quaternion without length.
     """
     numbers = np.array([turn.x, turn.y, turn.z, turn.w])
     length = float(np.linalg.norm(numbers))
-    if not (np.isfinite(position_m).all() and np.isfinite(length) and length > 1e-6):
+    # Written this way round so that NaN is refused.
+    if not (np.abs(position_m).max() <= _FARTHEST_M and 0.5 < length < 2.0):
         raise NavError(
-            f"a pose must have finite numbers and a quaternion of length 1, got {position_m} m and "
-            f"{numbers.tolist()}"
+            f"a pose must have a finite place within {_FARTHEST_M:g} m and a quaternion of length "
+            f"1, got {position_m} m and {numbers.tolist()}"
         )
     pose = np.eye(4)
     pose[:3, :3] = Rotation.from_quat(numbers / length).as_matrix()

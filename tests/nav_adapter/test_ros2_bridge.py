@@ -5,10 +5,21 @@ from collections import defaultdict
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from nav_scenes import ROBOT
 
-from nav_adapter import AwarenessPolicy
-from nav_adapter.ros2 import SLOWEST_MPS, STOP_POLYGON_ID, AwarenessBridge, CameraMount
+pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
+
+from nav_adapter import AwarenessPolicy, NavError
+from nav_adapter.ros2 import (
+    SLOWEST_MPS,
+    STOP_POLYGON_ID,
+    AwarenessBridge,
+    CameraMount,
+    decode,
+    encode,
+)
 from nav_adapter.ros2._stamps import to_time, yaw_quaternion
 from nav_adapter.ros2.messages.geometry_msgs import (
     Point,
@@ -191,6 +202,8 @@ def test_refused_messages_are_said_once_and_stop_by_going_stale() -> None:
         ),
         (odometry(START_S, speed=math.nan), "speed_mps"),
         (odometry(START_S, x=math.inf), "finite"),
+        (odometry(START_S, x=1e300), "1e+06 m"),
+        (odometry(START_S, speed=1e300), "100 m/s"),
     ],
 )
 def test_odometry_that_cannot_be_is_refused(message: Odometry, text: str) -> None:
@@ -257,3 +270,42 @@ def test_odometry_from_the_future_stops_with_the_reason() -> None:
     constraints = nav.bridge.tick(START_S)
     assert nav.standing()
     assert "robot_state.stamp_s" in constraints.limited_by
+
+
+def _mount() -> TFMessage:
+    move = Transform(Vector3(0.2, 0.0, 1.4), Quaternion(-0.5, 0.5, -0.5, 0.5))
+    return TFMessage((TransformStamped(Header(frame_id="base_link"), "camera", move),))
+
+
+@given(
+    st.sampled_from(["odometry", "camera_info", "transforms", "image"]),
+    st.lists(st.tuples(st.integers(4, 4000), st.integers(0, 255)), min_size=1, max_size=6),
+)
+def test_damaged_messages_never_crash_it_and_everything_stays_publishable(
+    which: str, damage: list[tuple[int, int]]
+) -> None:
+    nav = Listener(T_base_camera=None)
+    good = {
+        "odometry": odometry(START_S),
+        "camera_info": INFO,
+        "transforms": _mount(),
+        "image": image(START_S),
+    }
+    for name, message in good.items():
+        if name == which:
+            data = bytearray(encode(message))
+            for place, value in damage:
+                data[4 + place % (len(data) - 4)] = value
+            try:
+                message = decode(type(message), bytes(data))  # noqa: PLW2901
+            except NavError:
+                continue
+        if name == "image":
+            nav.bridge.on_image(message, START_S)
+        else:
+            getattr(nav.bridge, f"on_{name}")(message)
+        nav.bridge.tick(START_S)
+        nav.standing()
+    for messages in nav.heard.values():
+        for message in messages:
+            encode(message)
