@@ -8,7 +8,13 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from perception import AwarenessPipeline, Camera, PerceptionError, PersonObservation
+from perception import (
+    AwarenessPipeline,
+    Camera,
+    FloorPlane,
+    PerceptionError,
+    PersonObservation,
+)
 from perception.arrays import FloatArray
 from tracking import CameraView, PersonTrack, PersonTracker, TrackerConfig, TrackingError
 
@@ -29,6 +35,9 @@ from .messages.sensor_msgs import CameraInfo, CompressedImage, Image
 from .messages.tf2_msgs import TFMessage
 
 _CLOCK_TOLERANCE_S = 0.05
+# How well the height and the tilt of a camera on a driving robot are known.
+_HEIGHT_STD_M = 0.05
+_TILT_STD_RAD = math.radians(2.0)
 # No robot of this library drives so fast: such a number is a fault of the sender.
 _FASTEST_MPS = 100.0
 
@@ -162,7 +171,7 @@ class AwarenessBridge:
             frame = self.frames.camera or message.header.frame_id
             T_odom_camera = self._camera_pose(frame, stamp_s)
             image = picture(message)
-            observations = self._pipeline.process(image, stamp_s)
+            observations = self._pipeline.process(image, stamp_s, floor=_floor(T_odom_camera))
             tracks = self._tracker.update(observations, stamp_s, T_odom_camera)
         except (NavError, PerceptionError, TrackingError) as problem:
             self._warn(f"image: {problem}")
@@ -254,3 +263,12 @@ class AwarenessBridge:
         if text != self._warned:
             self._warned = text
             self._warn_user(text)
+
+
+def _floor(T_odom_camera: FloatArray) -> FloorPlane | None:
+    """The floor z = 0 of odom, which the feet of people stand on."""
+    if T_odom_camera[2, 3] <= 0.0:
+        return None
+    return FloorPlane.from_pose(
+        T_odom_camera, height_std_m=_HEIGHT_STD_M, tilt_std_rad=_TILT_STD_RAD
+    )

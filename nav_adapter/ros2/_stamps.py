@@ -55,7 +55,7 @@ def pose_matrix(position_m: tuple[float, float, float], turn: Quaternion) -> Flo
         NavError: a number is not finite, a place beyond 10⁶ m, or a quaternion without length.
     """
     numbers = np.array([turn.x, turn.y, turn.z, turn.w])
-    length = float(np.linalg.norm(numbers))
+    length = math.hypot(*numbers)  # infinite without a warning
     # Written this way round so that NaN is refused.
     if not (np.abs(position_m).max() <= _FARTHEST_M and 0.5 < length < 2.0):
         raise NavError(

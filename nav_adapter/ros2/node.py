@@ -2,15 +2,25 @@
 
 Run it with ``python -m nav_adapter.ros2.node --ros-args -p robot_file:=robot.yaml``. Parameters:
 ``robot_file`` (needed), ``policy`` (``balanced``), ``rate_hz`` (20.0), ``compressed`` (false),
-``percentage`` (false), ``odom_frame``, ``base_frame``, ``camera_frame``. ROS's remapping renames
-topics. Imports without ROS; making the node then says what is missing.
+``percentage`` (false), ``detector_file`` and ``pose_file`` (ONNX; else the networks in the box, which
+are made for the simulator), ``odom_frame``, ``base_frame``, ``camera_frame``. ROS's remapping
+renames topics. Imports without ROS; making the node then says what is missing.
 """
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+
+from perception import (
+    AwarenessPipeline,
+    Camera,
+    OnnxPersonDetector,
+    OnnxPoseEstimator,
+    PerceptionError,
+)
 
 from .._errors import NavError
 from .._policy import AwarenessPolicy
@@ -69,6 +79,9 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
             ),
             T_base_camera=None if robot.camera is None else robot.camera.T_base_camera(),
             percentage=self._parameter("percentage", False),
+            make_pipeline=_pipelines(
+                self._parameter("detector_file", ""), self._parameter("pose_file", "")
+            ),
             warn=self.get_logger().warning,
         )
         self._subscribe(READ["odom"], lambda m: self._bridge.on_odometry(from_ros(Odometry, m)))
@@ -130,7 +143,7 @@ def main() -> int:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = AwarenessNode()
-    except NavError as problem:
+    except (NavError, PerceptionError) as problem:
         print(f"awarenav node: {problem}", file=sys.stderr)
         return 2
     try:
@@ -143,6 +156,13 @@ def main() -> int:
         node.destroy_node()
         rclpy.try_shutdown()
     return 0
+
+
+def _pipelines(detector_file: str, pose_file: str) -> Callable[[Camera], AwarenessPipeline]:
+    """Makes the pipeline of these networks; files are read at once, to fail at once."""
+    detector = OnnxPersonDetector(detector_file) if detector_file else None
+    pose = OnnxPoseEstimator(pose_file) if pose_file else None
+    return lambda camera: AwarenessPipeline(camera, detector, pose)
 
 
 def _qos(topic: Topic) -> Any:

@@ -6,10 +6,11 @@ import argparse
 import signal
 import sys
 import time
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from types import FrameType
-from typing import Any, NoReturn
+from typing import NoReturn
 
 from nav_adapter import AwarenessPolicy, NavError
 from nav_adapter.ros2 import (
@@ -22,10 +23,13 @@ from nav_adapter.ros2 import (
     renamed,
 )
 from nav_adapter.ros2.messages import Message
-from perception import Camera
+from perception import AttentionCone, AwarenessPipeline, Camera, PersonDetector
 from perception.arrays import finite_number
 
 from .._errors import SimError
+from ..estimates._keypoint_tap import KeypointTap
+from ..estimates._network_choice import SHIPPED, choose_networks
+from ..estimates._people_estimator import Networks
 from ._command import domain_of
 from ._loop import BridgeLoop, Inputs
 
@@ -39,13 +43,12 @@ def bridge_command(options: argparse.Namespace) -> int:
     seconds = options.seconds
     if seconds is not None:
         seconds = finite_number("--seconds", seconds, SimError, minimum=0.0)
-    domain = domain_of(options.domain)
-    if not isinstance(domain, int):
-        raise SimError(f"ROS_DOMAIN_ID must be a number from 0 to 232, got {domain!r}")
+    domain = _domain(options.domain)
     robot = RobotFile.from_yaml(options.robot)
     policy = _policy(options.policy)
     camera = None if options.camera is None else Camera.from_yaml(options.camera)
     published = _published(options.topic, options.only)
+    networks = choose_networks(options.detector, options.pose, options.head)
     inputs = _inputs(options, with_info=camera is None, with_tf=robot.camera is None)
 
     from nav_adapter.ros2 import DdsNode, McapRecorder  # noqa: PLC0415 - needs the extra ros2
@@ -66,14 +69,19 @@ def bridge_command(options: argparse.Namespace) -> int:
                 if recorder is not None:
                     recorder.write(topic, cdr, time.time())
 
-        extra: dict[str, Any] = {}
+        tap = KeypointTap(networks.pose_estimator)
+        cone = AttentionCone()
         drawing = None
         if options.rerun is not None:
             from ._rerun import RerunRecorder  # noqa: PLC0415 - needs the extra viz
 
-            drawing = stack.enter_context(RerunRecorder(options.rerun))
-            extra["make_pipeline"] = drawing.make_pipeline
-        _say("loading the networks" if camera is not None else "waiting for camera_info")
+            drawing = RerunRecorder(options.rerun, tap, cone.half_angle_rad)
+            stack.enter_context(drawing)
+
+        if SHIPPED in (options.detector, options.pose):
+            _say("the networks in the box are made for the simulator; see --detector and --pose")
+        if camera is None:
+            _say(f"waiting for /{options.camera_info.strip('/')}")
         bridge = AwarenessBridge(
             policy,
             robot.profile(),
@@ -83,7 +91,7 @@ def bridge_command(options: argparse.Namespace) -> int:
             camera=camera,
             percentage=options.percentage,
             warn=_say,
-            **extra,
+            make_pipeline=_pipelines(networks, tap, cone),
         )
         loop = BridgeLoop(node, bridge, inputs, rate_hz, recorder=recorder, drawing=drawing)
         _say(
@@ -101,6 +109,27 @@ def bridge_command(options: argparse.Namespace) -> int:
             time.sleep(_LINGER_S)
         _say(f"ended after {loop.frames} frames; a stop was published")
     return 0
+
+
+def _pipelines(
+    networks: Networks, tap: KeypointTap, cone: AttentionCone
+) -> Callable[[Camera], AwarenessPipeline]:
+    """Makes the pipeline of these networks, with the keypoints listened to."""
+
+    def make(camera: Camera) -> AwarenessPipeline:
+        detector = networks.detector
+        if not isinstance(detector, PersonDetector):
+            detector = detector(camera)
+        return AwarenessPipeline(camera, detector, tap, networks.head_pose_estimator, cone)
+
+    return make
+
+
+def _domain(option: int | None) -> int:
+    domain = domain_of(option)
+    if not isinstance(domain, int):
+        raise SimError(f"ROS_DOMAIN_ID must be a number from 0 to 232, got {domain!r}")
+    return domain
 
 
 def _interrupt(number: int, frame: FrameType | None) -> NoReturn:

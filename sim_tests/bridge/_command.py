@@ -51,6 +51,23 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     bridge.add_argument(
         "--seconds", type=float, default=None, metavar="S", help="end by itself after so long"
     )
+    networks = bridge.add_argument_group(
+        "networks",
+        "those in the box are made for the simulator: on a robot, give some that were trained on "
+        "photographs (`awarenav models`)",
+    )
+    networks.add_argument(
+        "--detector",
+        default="shipped",
+        metavar="NAME|FILE",
+        help="as for `awarenav estimate` (default: shipped)",
+    )
+    networks.add_argument(
+        "--pose", default="shipped", metavar="NAME|FILE|mediapipe", help="likewise"
+    )
+    networks.add_argument(
+        "--head", default="auto", metavar="auto|network|pnp|fused|FILE", help="likewise"
+    )
     read = bridge.add_argument_group("topics to read")
     read.add_argument("--image", default="camera/image_raw", metavar="TOPIC")
     read.add_argument(

@@ -10,7 +10,6 @@ import numpy as np
 
 from nav_adapter import NavConstraints
 from nav_adapter.ros2 import AwarenessBridge
-from perception import AwarenessPipeline, Camera, shipped
 from perception.arrays import FloatArray
 
 from .._errors import SimError
@@ -36,28 +35,17 @@ class RerunRecorder:
 
     Args:
         path: of the file; one that is there is replaced.
+        tap: has the keypoints of the latest frame.
+        half_angle_rad: of the attention cone.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, tap: KeypointTap, half_angle_rad: float) -> None:
         if not path.parent.is_dir():
             raise SimError(f"cannot write {path}: there is no folder {path.parent}")
         self._stream = rr.RecordingStream("awarenav")
         self._stream.save(path)
         self._stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-        self._tap: KeypointTap | None = None
-        self._half_angle_rad = 0.0
-
-    def make_pipeline(self, camera: Camera) -> AwarenessPipeline:
-        """The default pipeline, with its keypoints listened to."""
-        self._tap = KeypointTap(shipped.shipped_pose_estimator(None))
-        pipeline = AwarenessPipeline(
-            camera,
-            detector=shipped.shipped_detector(None, camera),
-            pose_estimator=self._tap,
-            head_pose_estimator=shipped.shipped_head_pose_estimator(None),
-        )
-        self._half_angle_rad = pipeline.cone.half_angle_rad
-        return pipeline
+        self._tap, self._half_angle_rad = tap, half_angle_rad
 
     def draw(self, bridge: AwarenessBridge, constraints: NavConstraints, *, frame: bool) -> None:
         """Write the constraints, and the frame when there is a new one."""
@@ -112,7 +100,7 @@ class RerunRecorder:
         keypoints: list[FloatArray] = []
         cones: list[FloatArray] = []
         for seen in bridge.last_observations:
-            person = None if self._tap is None else self._tap.keypoints_of(seen)
+            person = self._tap.keypoints_of(seen)
             if person is not None:
                 keypoints.append(np.asarray(person.keypoints_px)[person.scores >= _SEEN_SCORE])
             if seen.gaze_camera is not None:
