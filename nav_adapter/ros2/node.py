@@ -2,8 +2,8 @@
 
 Run it with ``python -m nav_adapter.ros2.node --ros-args -p robot_file:=robot.yaml``. Parameters:
 ``robot_file`` (needed), ``policy`` (``balanced``), ``rate_hz`` (20.0), ``compressed`` (false),
-``percentage`` (false), ``detector_file`` and ``pose_file`` (ONNX; else the networks in the box, which
-are made for the simulator), ``odom_frame``, ``base_frame``, ``camera_frame``. ROS's remapping
+``percentage`` (false), ``detector_file`` and ``pose_file`` (ONNX; else the networks in the box,
+which are made for the simulator), ``odom_frame``, ``base_frame``, ``camera_frame``. ROS's remapping
 renames topics. Imports without ROS; making the node then says what is missing.
 """
 

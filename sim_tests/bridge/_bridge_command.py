@@ -40,9 +40,7 @@ _LINGER_S = 0.1
 def bridge_command(options: argparse.Namespace) -> int:
     """Run the bridge until Ctrl-C, SIGTERM or ``--seconds``."""
     rate_hz = finite_number("--rate", options.rate, SimError, minimum=1.0, maximum=200.0)
-    seconds = options.seconds
-    if seconds is not None:
-        seconds = finite_number("--seconds", seconds, SimError, minimum=0.0)
+    seconds = _seconds(options.seconds)
     domain = _domain(options.domain)
     robot = RobotFile.from_yaml(options.robot)
     policy = _policy(options.policy)
@@ -123,6 +121,10 @@ def _pipelines(
         return AwarenessPipeline(camera, detector, tap, networks.head_pose_estimator, cone)
 
     return make
+
+
+def _seconds(option: float | None) -> float | None:
+    return None if option is None else finite_number("--seconds", option, SimError, minimum=0.0)
 
 
 def _domain(option: int | None) -> int:
