@@ -1,0 +1,162 @@
+"""People as obstacles, people and boxes of neighbouring packages."""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Iterable
+from typing import Final
+
+import numpy as np
+
+from tracking import PersonTrack
+
+from .._constraints import NavConstraints, PersonObstacle
+from .._exporters import boxes
+from ._stamps import header, yaw_quaternion
+from .messages.costmap_converter_msgs import ObstacleArrayMsg, ObstacleMsg
+from .messages.geometry_msgs import (
+    Point,
+    Point32,
+    Polygon,
+    Pose,
+    PoseWithCovariance,
+    Twist,
+    TwistWithCovariance,
+    Vector3,
+)
+from .messages.nav2_msgs import CircleObject
+from .messages.people_msgs import People, Person
+from .messages.unique_identifier_msgs import UUID
+from .messages.vision_msgs import (
+    BoundingBox3D,
+    Detection3D,
+    Detection3DArray,
+    ObjectHypothesis,
+    ObjectHypothesisWithPose,
+)
+
+_OCCUPIED: Final = 100
+# Any fixed one: the same track has the same UUID in every run and in every process.
+_NAMESPACE: Final = uuid.UUID("6f1b3f0a-6f53-4d5e-9c0e-5b2f3f8a7c11")
+_RELIABILITY: Final = {"confirmed": 1.0, "coasting": 0.5, "tentative": 0.25}
+# A regular 24-gon about a circle reaches 0.9 % beyond it.
+_ROUND: Final = 1.02
+
+
+def circle_objects(
+    constraints: NavConstraints, *, frame_id: str = "odom"
+) -> tuple[CircleObject, ...]:
+    """``nav2_msgs/CircleObject``, filled and occupied, one a person.
+
+    A track keeps its UUID, so that a shape in the vector-object server is replaced and not added.
+    The circle contains the obstacle's polygon.
+    """
+    return tuple(
+        CircleObject(
+            header(constraints.stamp_s, frame_id),
+            UUID(uuid.uuid5(_NAMESPACE, str(each.track_id)).bytes),
+            Point32(*each.center_odom_m.tolist()),
+            max(each.radius_m, _reach_m(each) if not _is_round(each) else 0.0),
+            True,
+            _OCCUPIED,
+        )
+        for each in constraints.obstacles
+    )
+
+
+def teb_obstacles(constraints: NavConstraints, *, frame_id: str = "odom") -> ObstacleArrayMsg:
+    """``costmap_converter_msgs/ObstacleArrayMsg`` for TEB: moving circles, or moving polygons.
+
+    One corner and a radius is a circle there; an obstacle drawn out along the motion is sent with
+    its corners instead. The velocity is in the frame of the header.
+    """
+    top = header(constraints.stamp_s, frame_id)
+    obstacles = []
+    for each in constraints.obstacles:
+        (x, y), (vx, vy) = each.center_odom_m.tolist(), each.velocity_odom_mps.tolist()
+        ring = [(x, y)] if _is_round(each) else list(each.polygon.exterior.coords)[:-1]
+        obstacles.append(
+            ObstacleMsg(
+                top,
+                Polygon(tuple(Point32(u, v, 0.0) for u, v in ring)),
+                each.radius_m if len(ring) == 1 else 0.0,
+                each.track_id,
+                velocities=TwistWithCovariance(Twist(Vector3(vx, vy, 0.0))),
+            )
+        )
+    return ObstacleArrayMsg(top, tuple(obstacles))
+
+
+def people(
+    constraints: NavConstraints, tracks: Iterable[PersonTrack] = (), *, frame_id: str = "odom"
+) -> People:
+    """``people_msgs/People`` with awareness and radius in the tags.
+
+    Tags of everybody: ``awareness_lower`` (acted on), ``radius_m``; of people with a track also
+    ``awareness``, ``awareness_std``, ``status`` and ``time_since_seen_s``. ``reliability`` is 1 for
+    a confirmed track, 0.5 for a coasting one, 0.25 for a tentative one, 0 for a person who is only
+    remembered.
+    """
+    by_id = {track.id: track for track in tracks}
+    everybody = []
+    for each in constraints.obstacles:
+        tags = {
+            "awareness_lower": f"{each.awareness_lower:.3f}",
+            "radius_m": f"{each.radius_m:.3f}",
+        }
+        track = by_id.get(each.track_id)
+        if track is not None:
+            tags |= {
+                "awareness": f"{track.awareness:.3f}",
+                "awareness_std": f"{track.awareness_std:.3f}",
+                "status": track.status,
+                "time_since_seen_s": f"{track.time_since_seen_s:.3f}",
+            }
+        everybody.append(
+            Person(
+                str(each.track_id),
+                Point(*each.center_odom_m.tolist()),
+                Point(*each.velocity_odom_mps.tolist()),
+                0.0 if track is None else _RELIABILITY[track.status],
+                tuple(tags),
+                tuple(tags.values()),
+            )
+        )
+    return People(header(constraints.stamp_s, frame_id), tuple(everybody))
+
+
+def detections(constraints: NavConstraints, *, frame_id: str = "odom") -> Detection3DArray:
+    """``vision_msgs/Detection3DArray``: the paper's 3-D boxes, sized by awareness.
+
+    Hypotheses of each: ``"person"`` with score 1, and ``"aware_person"`` with the lower bound of α
+    that was acted on.
+    """
+    top = header(constraints.stamp_s, frame_id)
+    found = []
+    for each, box in zip(constraints.obstacles, boxes(constraints).tolist(), strict=True):
+        x, y, z, length, width, height, yaw = box
+        pose = Pose(Point(x, y, z), yaw_quaternion(yaw))
+        found.append(
+            Detection3D(
+                top,
+                tuple(
+                    ObjectHypothesisWithPose(
+                        ObjectHypothesis(name, score), PoseWithCovariance(pose)
+                    )
+                    for name, score in (("person", 1.0), ("aware_person", each.awareness_lower))
+                ),
+                BoundingBox3D(pose, Vector3(length, width, height)),
+                str(each.track_id),
+            )
+        )
+    return Detection3DArray(top, tuple(found))
+
+
+def _reach_m(obstacle: PersonObstacle) -> float:
+    """Farthest corner of the polygon from the centre."""
+    corners = np.asarray(obstacle.polygon.exterior.coords)[:, :2]
+    return float(np.linalg.norm(corners - obstacle.center_odom_m, axis=1).max())
+
+
+def _is_round(obstacle: PersonObstacle) -> bool:
+    return _reach_m(obstacle) <= _ROUND * obstacle.radius_m

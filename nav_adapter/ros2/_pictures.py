@@ -1,0 +1,104 @@
+"""Image messages as (H, W, 3) uint8 RGB, and camera_info as a camera."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from perception import Camera, PerceptionError
+
+from .._errors import NavError
+from .messages.sensor_msgs import CameraInfo, CompressedImage, Image
+
+# sensor_msgs/image_encodings.hpp: bytes a pixel, and how it becomes RGB.
+_ENCODINGS: Final[dict[str, tuple[int, int | None]]] = {
+    "rgb8": (3, None),
+    "bgr8": (3, cv2.COLOR_BGR2RGB),
+    "8UC3": (3, cv2.COLOR_BGR2RGB),
+    "rgba8": (4, cv2.COLOR_RGBA2RGB),
+    "bgra8": (4, cv2.COLOR_BGRA2RGB),
+    "8UC4": (4, cv2.COLOR_BGRA2RGB),
+    "mono8": (1, cv2.COLOR_GRAY2RGB),
+    "8UC1": (1, cv2.COLOR_GRAY2RGB),
+    # OpenCV names a Bayer pattern by its second row, ROS by its first.
+    "bayer_rggb8": (1, cv2.COLOR_BayerBG2RGB),
+    "bayer_bggr8": (1, cv2.COLOR_BayerRG2RGB),
+    "bayer_gbrg8": (1, cv2.COLOR_BayerGR2RGB),
+    "bayer_grbg8": (1, cv2.COLOR_BayerGB2RGB),
+    "yuv422": (2, cv2.COLOR_YUV2RGB_UYVY),
+    "uyvy": (2, cv2.COLOR_YUV2RGB_UYVY),
+    "yuv422_yuy2": (2, cv2.COLOR_YUV2RGB_YUY2),
+    "yuyv": (2, cv2.COLOR_YUV2RGB_YUY2),
+}
+_DISTORTION_MODELS: Final = ("plumb_bob", "rational_polynomial")
+
+
+def picture(message: Image | CompressedImage) -> NDArray[np.uint8]:
+    """The picture of a message, (H, W, 3) uint8 RGB.
+
+    Raises:
+        NavError: an encoding that is not known here, too few bytes, or a damaged file.
+    """
+    if isinstance(message, CompressedImage):
+        return _decompressed(message)
+    if message.encoding not in _ENCODINGS:
+        raise NavError(f"encoding must be one of {', '.join(_ENCODINGS)}, got {message.encoding!r}")
+    depth, code = _ENCODINGS[message.encoding]
+    height, width, step = message.height, message.width, message.step
+    row = width * depth
+    if height * width == 0 or step < row or len(message.data) < height * step:
+        raise NavError(
+            f"{width} x {height} px of {message.encoding} with {step} bytes a row need "
+            f"{height * max(step, row)} bytes and at least one pixel, got {len(message.data)} bytes"
+        )
+    rows = np.frombuffer(message.data, np.uint8, height * step).reshape(height, step)[:, :row]
+    pixels = rows.reshape(height, width, depth) if depth > 1 else rows
+    try:
+        rgb = pixels if code is None else cv2.cvtColor(np.ascontiguousarray(pixels), code)
+    except cv2.error as cause:
+        raise NavError(f"{message.encoding} of {width} x {height} px: {cause.err}") from cause
+    return np.ascontiguousarray(rgb, dtype=np.uint8)
+
+
+def camera(message: CameraInfo) -> Camera:
+    """The camera of a ``camera_info`` message: its matrix k and distortion d.
+
+    Raises:
+        NavError: an uncalibrated driver's zeros, or a distortion model that is not known here.
+    """
+    if not message.k[0] > 0.0:
+        raise NavError("camera_info has no calibration (k is zero): calibrate the camera")
+    if message.distortion_model not in ("", *_DISTORTION_MODELS) and any(message.d):
+        raise NavError(
+            f"distortion_model must be one of {', '.join(_DISTORTION_MODELS)}, got "
+            f"{message.distortion_model!r}; rectify the images first"
+        )
+    try:
+        return Camera(
+            message.width,
+            message.height,
+            message.k[0],
+            message.k[4],
+            message.k[2],
+            message.k[5],
+            np.array(message.d) if any(message.d) else None,
+        )
+    except PerceptionError as cause:
+        raise NavError(f"camera_info: {cause}") from cause
+
+
+def _decompressed(message: CompressedImage) -> NDArray[np.uint8]:
+    data = np.frombuffer(message.data, np.uint8)
+    try:
+        bgr = cv2.imdecode(data, cv2.IMREAD_COLOR) if data.size else None
+    except cv2.error:
+        bgr = None
+    if bgr is None:
+        raise NavError(
+            f"a compressed image must hold a picture file, got {data.size} bytes of format "
+            f"{message.format!r} that cannot be read"
+        )
+    return np.asarray(cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB), dtype=np.uint8)

@@ -1,0 +1,89 @@
+"""The robot of a bridge, in one YAML file."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from perception.arrays import FloatArray
+from tracking.config import StrictConfig
+
+from .._errors import NavError
+from .._robot import RobotProfile
+
+_Position = Annotated[list[float], Field(min_length=3, max_length=3)]
+_Corner = Annotated[list[float], Field(min_length=2, max_length=2)]
+
+
+class CameraMount(StrictConfig):
+    """Where a fixed camera sits.
+
+    Attributes:
+        position_base_m: x, y, z of its optical centre in the base frame, metres; the base frame
+            lies on the floor.
+        yaw_deg: how far it looks to the left of straight ahead.
+        pitch_down_deg: how far it looks down.
+    """
+
+    error: ClassVar[type[ValueError]] = NavError
+
+    position_base_m: _Position
+    yaw_deg: float = Field(default=0.0, ge=-180.0, le=180.0)
+    pitch_down_deg: float = Field(default=0.0, ge=-90.0, le=90.0)
+
+    def T_base_camera(self) -> FloatArray:  # noqa: N802 - frames in names
+        """(4, 4) pose of the optical frame (x right, y down, z forward) in the base frame."""
+        yaw, pitch = math.radians(self.yaw_deg), math.radians(self.pitch_down_deg)
+        turn_left = np.array(
+            [
+                [math.cos(yaw), -math.sin(yaw), 0.0],
+                [math.sin(yaw), math.cos(yaw), 0.0],
+                [0.0, 0.0, 1.0],
+            ]
+        )
+        turn_down = np.array(
+            [
+                [math.cos(pitch), 0.0, math.sin(pitch)],
+                [0.0, 1.0, 0.0],
+                [-math.sin(pitch), 0.0, math.cos(pitch)],
+            ]
+        )
+        T = np.eye(4)
+        T[:3, :3] = turn_left @ turn_down @ [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]
+        T[:3, 3] = self.position_base_m
+        return T
+
+
+class RobotFile(StrictConfig):
+    """What ``awarenav bridge --robot`` reads.
+
+    Attributes:
+        footprint_m: corners x, y in the base frame, metres.
+        max_speed_mps: > 0.01, the fastest that the controller is configured for.
+        max_acceleration_mps2: > 0.
+        max_deceleration_mps2: > 0, the braking that can be relied on.
+        reaction_time_s: ≥ 0, exposure to start of braking.
+        camera: where the camera sits; without it tf has to say.
+    """
+
+    error: ClassVar[type[ValueError]] = NavError
+
+    footprint_m: list[_Corner]
+    max_speed_mps: float = Field(gt=0.01)
+    max_acceleration_mps2: float = Field(gt=0.0)
+    max_deceleration_mps2: float = Field(gt=0.0)
+    reaction_time_s: float = Field(ge=0.0)
+    camera: CameraMount | None = None
+
+    def profile(self) -> RobotProfile:
+        """As the adapter takes it; raises :class:`NavError` for a footprint without area."""
+        return RobotProfile(
+            footprint_m=np.array(self.footprint_m),
+            max_speed_mps=self.max_speed_mps,
+            max_acceleration_mps2=self.max_acceleration_mps2,
+            max_deceleration_mps2=self.max_deceleration_mps2,
+            reaction_time_s=self.reaction_time_s,
+        )

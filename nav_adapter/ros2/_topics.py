@@ -1,0 +1,89 @@
+"""The topics of the bridge: names, types and qualities of service, in one table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Final
+
+from .._errors import NavError
+from .messages import Message
+from .messages.costmap_converter_msgs import ObstacleArrayMsg
+from .messages.geometry_msgs import PolygonInstanceStamped, PolygonStamped
+from .messages.nav2_msgs import CircleObject, SpeedLimit
+from .messages.nav_msgs import OccupancyGrid, Odometry
+from .messages.people_msgs import People
+from .messages.sensor_msgs import CameraInfo, CompressedImage, Image
+from .messages.tf2_msgs import TFMessage
+from .messages.vision_msgs import Detection3DArray
+from .messages.visualization_msgs import MarkerArray
+
+
+@dataclass(frozen=True)
+class Topic:
+    """One topic and its quality of service.
+
+    Attributes:
+        name: ROS name without a leading slash.
+        message: its type.
+        reliable: reliable, else best effort. A reliable publisher matches every subscriber.
+        transient_local: late subscribers get the last message, else volatile.
+        depth: messages kept.
+    """
+
+    name: str
+    message: type[Message]
+    reliable: bool = True
+    transient_local: bool = False
+    depth: int = 10
+
+
+#: What the bridge publishes, by key.
+PUBLISHED: Final = MappingProxyType(
+    {
+        "speed_limit": Topic("speed_limit", SpeedLimit),
+        "collision_polygons": Topic(
+            "awarenav/collision_polygons", PolygonInstanceStamped, depth=64
+        ),
+        "stop_zone": Topic("awarenav/stop_zone", PolygonStamped, depth=1),
+        "grid": Topic("awarenav/people_grid", OccupancyGrid, transient_local=True, depth=1),
+        "circles": Topic("awarenav/circles", CircleObject, depth=64),
+        "obstacles": Topic("obstacles", ObstacleArrayMsg, depth=1),
+        "people": Topic("people", People, depth=1),
+        "detections": Topic("awarenav/detections", Detection3DArray, depth=1),
+        "markers": Topic("awarenav/markers", MarkerArray, depth=1),
+    }
+)
+
+#: What the bridge reads, by key. Best effort matches every publisher; old frames are worth nothing.
+READ: Final = MappingProxyType(
+    {
+        "image": Topic("camera/image_raw", Image, reliable=False, depth=1),
+        "compressed": Topic(
+            "camera/image_raw/compressed", CompressedImage, reliable=False, depth=1
+        ),
+        "camera_info": Topic("camera/camera_info", CameraInfo, reliable=False, depth=1),
+        "odom": Topic("odom", Odometry, reliable=False, depth=50),
+        "tf": Topic("tf", TFMessage, reliable=False, depth=100),
+        "tf_static": Topic("tf_static", TFMessage, transient_local=True, depth=100),
+    }
+)
+
+
+def renamed(topic: Topic, name: str) -> Topic:
+    """The same topic under another name, as ROS writes it (``/robot1/odom``).
+
+    Raises:
+        NavError: a name that ROS would not take.
+    """
+    bare = name.strip("/")
+    parts = bare.split("/")
+    if not all(
+        part.isascii() and part.replace("_", "a").isalnum() and not part[0].isdigit()
+        for part in parts
+    ):
+        raise NavError(
+            f"a topic must consist of letters, digits, _ and /, no part starting with a digit, "
+            f"got {name!r}"
+        )
+    return replace(topic, name=bare)

@@ -1,0 +1,117 @@
+"""Frames over time, from tf and odometry."""
+
+from __future__ import annotations
+
+from bisect import bisect_right, insort
+from typing import Final
+
+import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
+
+from perception.arrays import FloatArray, finite_number, rigid_transform
+
+from .._errors import NavError
+
+_KEPT_S: Final = 5.0
+#: A transform stands for instants at most so much later than itself.
+HOLD_S: Final = 0.1
+
+
+class TransformBuffer:
+    """Remembers transforms of the last 5 s and gives those between any two frames of a tree.
+
+    Between two stamps it interpolates; the newest transform stands for up to 0.1 s after it, the
+    oldest for nothing before it. Static transforms hold for all time.
+    """
+
+    def __init__(self) -> None:
+        self._parents: dict[str, str] = {}
+        self._histories: dict[str, list[tuple[float, FloatArray]]] = {}
+        self._static: set[str] = set()
+
+    def add(
+        self,
+        parent: str,
+        child: str,
+        stamp_s: float,
+        T_parent_child: FloatArray,
+        *,
+        static: bool = False,
+    ) -> None:
+        """Remember where ``child`` was in ``parent``.
+
+        A frame has one parent; a transform with another one replaces what was known of the frame.
+
+        Raises:
+            NavError: no rigid transform, a stamp that is not finite, or a loop of frames.
+        """
+        parent, child = parent.lstrip("/"), child.lstrip("/")
+        T = rigid_transform("T_parent_child", T_parent_child, NavError)
+        stamp = finite_number("stamp_s", stamp_s, NavError)
+        if child in self._path(parent):
+            raise NavError(f"frames must form a tree, got {child!r} above and below {parent!r}")
+        if self._parents.get(child) != parent or static:
+            self._histories[child] = []
+        self._parents[child] = parent
+        (self._static.add if static else self._static.discard)(child)
+        history = self._histories[child]
+        insort(history, (stamp, T), key=lambda entry: entry[0])
+        while history[-1][0] - history[0][0] > _KEPT_S:
+            del history[0]
+
+    def lookup(self, target: str, source: str, stamp_s: float) -> FloatArray:
+        """T_target_source (4, 4) at an instant.
+
+        Raises:
+            NavError: the frames are not connected, or not known at that instant.
+        """
+        stamp = finite_number("stamp_s", stamp_s, NavError)
+        target, source = target.lstrip("/"), source.lstrip("/")
+        up, down = self._path(source), self._path(target)
+        common = next((frame for frame in up if frame in down), None)
+        if common is None:
+            raise NavError(
+                f"no transform between {source!r} and {target!r}: known are "
+                f"{', '.join(f'{p} -> {c}' for c, p in self._parents.items()) or 'none'}"
+            )
+        T_common_source = self._down_to(up[: up.index(common)], stamp)
+        T_common_target = self._down_to(down[: down.index(common)], stamp)
+        return np.asarray(np.linalg.inv(T_common_target) @ T_common_source, dtype=np.float64)
+
+    def _path(self, frame: str) -> list[str]:
+        path = [frame]
+        while path[-1] in self._parents:
+            path.append(self._parents[path[-1]])
+        return path
+
+    def _down_to(self, children: list[str], stamp: float) -> FloatArray:
+        T = np.eye(4)
+        for child in children:
+            T = self._at(child, stamp) @ T
+        return T
+
+    def _at(self, child: str, stamp: float) -> FloatArray:
+        history = self._histories[child]
+        after = bisect_right(history, stamp, key=lambda entry: entry[0])
+        if child in self._static or (after > 0 and history[after - 1][0] == stamp):
+            return history[max(after - 1, 0)][1]
+        if after == 0:
+            raise NavError(
+                f"transform of {child!r} is wanted at {stamp:.3f} s and known from "
+                f"{history[0][0]:.3f} s on"
+            )
+        before_s, before = history[after - 1]
+        if after == len(history):
+            if stamp - before_s > HOLD_S:
+                raise NavError(
+                    f"transform of {child!r} is wanted at {stamp:.3f} s and known until "
+                    f"{before_s:.3f} s (holds {HOLD_S:g} s longer)"
+                )
+            return before
+        later_s, later = history[after]
+        share = (stamp - before_s) / (later_s - before_s)
+        T = np.eye(4)
+        turns = Rotation.from_matrix(np.stack([before[:3, :3], later[:3, :3]]))
+        T[:3, :3] = Slerp([0.0, 1.0], turns)(share).as_matrix()
+        T[:3, 3] = (1.0 - share) * before[:3, 3] + share * later[:3, 3]
+        return T

@@ -1,0 +1,29 @@
+"""ROS package costmap_converter_msgs, which the TEB planner reads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .._message import Float64, Int64, Message
+from .geometry_msgs import Polygon, Quaternion, TwistWithCovariance
+from .std_msgs import Header
+
+
+@dataclass(frozen=True)
+class ObstacleMsg(Message):
+    """One point and a radius is a circle."""
+
+    header: Header = Header()
+    polygon: Polygon = Polygon()
+    radius: Float64 = 0.0
+    id: Int64 = 0
+    orientation: Quaternion = Quaternion()
+    velocities: TwistWithCovariance = TwistWithCovariance()
+
+
+@dataclass(frozen=True)
+class ObstacleArrayMsg(Message):
+    """All obstacles of one instant."""
+
+    header: Header = Header()
+    obstacles: tuple[ObstacleMsg, ...] = ()

@@ -1,0 +1,125 @@
+"""ROS package geometry_msgs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .._message import Float32, Float64, Float64x36, Int64, Message, String
+from .std_msgs import Header
+
+
+@dataclass(frozen=True)
+class Point(Message):
+    """Metres."""
+
+    x: Float64 = 0.0
+    y: Float64 = 0.0
+    z: Float64 = 0.0
+
+
+@dataclass(frozen=True)
+class Point32(Message):
+    """Metres, in single precision."""
+
+    x: Float32 = 0.0
+    y: Float32 = 0.0
+    z: Float32 = 0.0
+
+
+@dataclass(frozen=True)
+class Vector3(Message):
+    """A direction, a size or a velocity."""
+
+    x: Float64 = 0.0
+    y: Float64 = 0.0
+    z: Float64 = 0.0
+
+
+@dataclass(frozen=True)
+class Quaternion(Message):
+    """A rotation; the default is none."""
+
+    x: Float64 = 0.0
+    y: Float64 = 0.0
+    z: Float64 = 0.0
+    w: Float64 = 1.0
+
+
+@dataclass(frozen=True)
+class Pose(Message):
+    """Where, and which way round."""
+
+    position: Point = Point()
+    orientation: Quaternion = Quaternion()
+
+
+@dataclass(frozen=True)
+class PoseWithCovariance(Message):
+    """Covariance row by row over x, y, z and rotations about X, Y, Z."""
+
+    pose: Pose = Pose()
+    covariance: Float64x36 = (0.0,) * 36
+
+
+@dataclass(frozen=True)
+class Twist(Message):
+    """Velocity in m/s and rad/s."""
+
+    linear: Vector3 = Vector3()
+    angular: Vector3 = Vector3()
+
+
+@dataclass(frozen=True)
+class TwistWithCovariance(Message):
+    """Covariance as in a pose."""
+
+    twist: Twist = Twist()
+    covariance: Float64x36 = (0.0,) * 36
+
+
+@dataclass(frozen=True)
+class Transform(Message):
+    """Of a child frame in its parent."""
+
+    translation: Vector3 = Vector3()
+    rotation: Quaternion = Quaternion()
+
+
+@dataclass(frozen=True)
+class TransformStamped(Message):
+    """The header names the parent."""
+
+    header: Header = Header()
+    child_frame_id: String = ""
+    transform: Transform = Transform()
+
+
+@dataclass(frozen=True)
+class Polygon(Message):
+    """Corners; the last joins the first."""
+
+    points: tuple[Point32, ...] = ()
+
+
+@dataclass(frozen=True)
+class PolygonStamped(Message):
+    """With time and frame."""
+
+    header: Header = Header()
+    polygon: Polygon = Polygon()
+
+
+@dataclass(frozen=True)
+class PolygonInstance(Message):
+    """One of several, known by its id."""
+
+    polygon: Polygon = Polygon()
+    id: Int64 = 0
+
+
+@dataclass(frozen=True)
+class PolygonInstanceStamped(Message):
+    """With time and frame."""
+
+    header: Header = Header()
+    polygon: PolygonInstance = PolygonInstance()

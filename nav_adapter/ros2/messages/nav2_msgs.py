@@ -1,0 +1,31 @@
+"""ROS package nav2_msgs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .._message import Bool, Float32, Float64, Int8, Message
+from .geometry_msgs import Point32
+from .std_msgs import Header
+from .unique_identifier_msgs import UUID
+
+
+@dataclass(frozen=True)
+class SpeedLimit(Message):
+    """In m/s or in per cent of the controller's maximum; 0.0 means that there is no limit."""
+
+    header: Header = Header()
+    percentage: Bool = False
+    speed_limit: Float64 = 0.0
+
+
+@dataclass(frozen=True)
+class CircleObject(Message):
+    """A circle of the vector-object server (Nav2 Kilted and later)."""
+
+    header: Header = Header()
+    uuid: UUID = UUID()
+    center: Point32 = Point32()
+    radius: Float32 = 0.0
+    fill: Bool = False
+    value: Int8 = 0

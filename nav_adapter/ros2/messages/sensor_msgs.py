@@ -1,0 +1,68 @@
+"""ROS package sensor_msgs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .._message import (
+    Bool,
+    Float64,
+    Float64x9,
+    Float64x12,
+    Message,
+    String,
+    UInt8,
+    UInt8s,
+    UInt32,
+)
+from .std_msgs import Header
+
+
+@dataclass(frozen=True)
+class Image(Message):
+    """Raw pixels; ``step`` bytes a row."""
+
+    header: Header = Header()
+    height: UInt32 = 0
+    width: UInt32 = 0
+    encoding: String = ""
+    is_bigendian: UInt8 = 0
+    step: UInt32 = 0
+    data: UInt8s = b""
+
+
+@dataclass(frozen=True)
+class CompressedImage(Message):
+    """The bytes of a JPEG or PNG file."""
+
+    header: Header = Header()
+    format: String = ""
+    data: UInt8s = b""
+
+
+@dataclass(frozen=True)
+class RegionOfInterest(Message):
+    """Part of an image; all zero is the whole."""
+
+    x_offset: UInt32 = 0
+    y_offset: UInt32 = 0
+    height: UInt32 = 0
+    width: UInt32 = 0
+    do_rectify: Bool = False
+
+
+@dataclass(frozen=True)
+class CameraInfo(Message):
+    """Calibration: k is the camera matrix, d the distortion."""
+
+    header: Header = Header()
+    height: UInt32 = 0
+    width: UInt32 = 0
+    distortion_model: String = ""
+    d: tuple[Float64, ...] = ()
+    k: Float64x9 = (0.0,) * 9
+    r: Float64x9 = (0.0,) * 9
+    p: Float64x12 = (0.0,) * 12
+    binning_x: UInt32 = 0
+    binning_y: UInt32 = 0
+    roi: RegionOfInterest = RegionOfInterest()

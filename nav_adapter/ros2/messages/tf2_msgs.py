@@ -1,0 +1,15 @@
+"""ROS package tf2_msgs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .._message import Message
+from .geometry_msgs import TransformStamped
+
+
+@dataclass(frozen=True)
+class TFMessage(Message):
+    """Transforms of the topics /tf and /tf_static."""
+
+    transforms: tuple[TransformStamped, ...] = ()

@@ -1,0 +1,51 @@
+"""ROS package vision_msgs, version 4 (ROS 2 Humble and later)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .._message import Float64, Message, String
+from .geometry_msgs import Pose, PoseWithCovariance, Vector3
+from .std_msgs import Header
+
+
+@dataclass(frozen=True)
+class BoundingBox3D(Message):
+    """Pose of the centre, and the sides."""
+
+    center: Pose = Pose()
+    size: Vector3 = Vector3()
+
+
+@dataclass(frozen=True)
+class ObjectHypothesis(Message):
+    """What it is, and how sure that is."""
+
+    class_id: String = ""
+    score: Float64 = 0.0
+
+
+@dataclass(frozen=True)
+class ObjectHypothesisWithPose(Message):
+    """With the pose of the object."""
+
+    hypothesis: ObjectHypothesis = ObjectHypothesis()
+    pose: PoseWithCovariance = PoseWithCovariance()
+
+
+@dataclass(frozen=True)
+class Detection3D(Message):
+    """One object; the id stays the same over time."""
+
+    header: Header = Header()
+    results: tuple[ObjectHypothesisWithPose, ...] = ()
+    bbox: BoundingBox3D = BoundingBox3D()
+    id: String = ""
+
+
+@dataclass(frozen=True)
+class Detection3DArray(Message):
+    """All objects of one instant."""
+
+    header: Header = Header()
+    detections: tuple[Detection3D, ...] = ()

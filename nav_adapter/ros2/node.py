@@ -1,0 +1,181 @@
+"""The bridge as an rclpy node, for machines with ROS 2: the same topics, ROS's own clock.
+
+Run it with ``python -m nav_adapter.ros2.node --ros-args -p robot_file:=robot.yaml``. Parameters:
+``robot_file`` (needed), ``policy`` (``balanced``), ``rate_hz`` (20.0), ``compressed`` (false),
+``percentage`` (false), ``detector_file`` and ``pose_file`` (ONNX; else the networks in the box,
+which are made for the simulator), ``odom_frame``, ``base_frame``, ``camera_frame``. ROS's remapping
+renames topics. Imports without ROS; making the node then says what is missing.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from perception import (
+    AwarenessPipeline,
+    Camera,
+    OnnxPersonDetector,
+    OnnxPoseEstimator,
+    PerceptionError,
+)
+
+from .._errors import NavError
+from .._policy import AwarenessPolicy
+from ._bridge import AwarenessBridge
+from ._outgoing import Frames
+from ._robot_file import RobotFile
+from ._ros_values import from_ros, ros_class, to_ros
+from ._topics import PUBLISHED, READ, Topic
+from .messages import Message, ros_type
+from .messages.nav_msgs import Odometry
+from .messages.sensor_msgs import CameraInfo, CompressedImage, Image
+from .messages.tf2_msgs import TFMessage
+
+try:
+    import rclpy
+    from rclpy.node import Node
+    from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+    from rclpy.signals import SignalHandlerOptions
+except ImportError:  # importable all the same: __init__ says what is missing
+    rclpy = None
+    Node = object
+
+
+class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
+    """Camera and odometry in, everything of :data:`~nav_adapter.ros2.PUBLISHED` out.
+
+    A topic whose message package is not installed (``people_msgs``, ``costmap_converter_msgs``,
+    ``vision_msgs``) is left out with a warning; ``nav2_msgs`` is needed.
+
+    Raises:
+        NavError: no rclpy, no ``nav2_msgs``, or a parameter that is wrong.
+    """
+
+    def __init__(self) -> None:
+        if rclpy is None:
+            raise NavError(
+                "the node needs rclpy, which comes with ROS 2 and not from pip: source its "
+                "setup.bash, or use `awarenav bridge`, which needs no ROS"
+            )
+        super().__init__("awarenav")
+        robot = RobotFile.from_yaml(self._parameter("robot_file", ""))
+        policy = self._parameter("policy", "balanced")
+        self._publishers_by_key: dict[str, Any] = {}
+        for key, topic in PUBLISHED.items():
+            self._advertise(key, topic)
+        self._bridge = AwarenessBridge(
+            AwarenessPolicy.from_yaml(policy)
+            if Path(policy).suffix in (".yaml", ".yml")
+            else AwarenessPolicy.preset(policy),
+            robot.profile(),
+            self._publish,
+            frames=Frames(
+                self._parameter("odom_frame", "odom"),
+                self._parameter("base_frame", "base_link"),
+                self._parameter("camera_frame", ""),
+            ),
+            T_base_camera=None if robot.camera is None else robot.camera.T_base_camera(),
+            percentage=self._parameter("percentage", False),
+            make_pipeline=_pipelines(
+                self._parameter("detector_file", ""), self._parameter("pose_file", "")
+            ),
+            warn=self.get_logger().warning,
+        )
+        self._subscribe(READ["odom"], lambda m: self._bridge.on_odometry(from_ros(Odometry, m)))
+        self._subscribe(
+            READ["camera_info"], lambda m: self._bridge.on_camera_info(from_ros(CameraInfo, m))
+        )
+        if robot.camera is None:
+            self._subscribe(READ["tf"], lambda m: self._transforms(m, False))
+            self._subscribe(READ["tf_static"], lambda m: self._transforms(m, True))
+        if self._parameter("compressed", False):
+            self._subscribe(READ["compressed"], lambda m: self._image(CompressedImage, m))
+        else:
+            self._subscribe(READ["image"], lambda m: self._image(Image, m))
+        self.create_timer(1.0 / self._parameter("rate_hz", 20.0), self._tick)
+
+    def stop(self) -> None:
+        """Publish a stop, before leaving."""
+        self._bridge.stop(self._now_s(), "the awarenav node has ended")
+
+    def _tick(self) -> None:
+        self._bridge.tick(self._now_s())
+
+    def _image(self, kind: type[Image] | type[CompressedImage], message: Any) -> None:
+        if self._bridge.on_image(from_ros(kind, message), self._now_s()):
+            self._tick()
+
+    def _transforms(self, message: Any, static: bool) -> None:
+        self._bridge.on_transforms(from_ros(TFMessage, message), static=static)
+
+    def _publish(self, key: str, message: Message) -> None:
+        publisher = self._publishers_by_key.get(key)
+        if publisher is not None:
+            publisher.publish(to_ros(message))
+
+    def _advertise(self, key: str, topic: Topic) -> None:
+        try:
+            kind = ros_class(topic.message)
+        except ImportError as problem:
+            if key == "speed_limit":
+                raise NavError(f"the node needs nav2_msgs: {problem}") from problem
+            self.get_logger().warning(f"{ros_type(topic.message)}: {problem}; not published")
+            return
+        self._publishers_by_key[key] = self.create_publisher(kind, topic.name, _qos(topic))
+
+    def _subscribe(self, topic: Topic, callback: Any) -> None:
+        self.create_subscription(ros_class(topic.message), topic.name, callback, _qos(topic))
+
+    def _parameter(self, name: str, default: Any) -> Any:
+        return self.declare_parameter(name, default).value
+
+    def _now_s(self) -> float:
+        return float(self.get_clock().now().nanoseconds) * 1e-9
+
+
+def main() -> int:
+    """Run the node until Ctrl-C; 0 well, 2 bad input."""
+    if rclpy is not None:
+        # Its own handlers would shut ROS down before the last stop is out.
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        node = AwarenessNode()
+    except (NavError, PerceptionError) as problem:
+        print(f"awarenav node: {problem}", file=sys.stderr)
+        return 2
+    try:
+        rclpy.spin(node)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        if rclpy.ok():
+            node.stop()
+        node.destroy_node()
+        rclpy.try_shutdown()
+    return 0
+
+
+def _pipelines(detector_file: str, pose_file: str) -> Callable[[Camera], AwarenessPipeline]:
+    """Makes the pipeline of these networks; files are read at once, to fail at once."""
+    detector = OnnxPersonDetector(detector_file) if detector_file else None
+    pose = OnnxPoseEstimator(pose_file) if pose_file else None
+    return lambda camera: AwarenessPipeline(camera, detector, pose)
+
+
+def _qos(topic: Topic) -> Any:
+    return QoSProfile(
+        depth=topic.depth,
+        reliability=(
+            ReliabilityPolicy.RELIABLE if topic.reliable else ReliabilityPolicy.BEST_EFFORT
+        ),
+        durability=(
+            DurabilityPolicy.TRANSIENT_LOCAL if topic.transient_local else DurabilityPolicy.VOLATILE
+        ),
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

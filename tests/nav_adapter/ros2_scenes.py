@@ -1,0 +1,101 @@
+"""Messages, people and independent definitions that the tests of nav_adapter.ros2 share."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import random
+from pathlib import Path
+from typing import Any
+
+from nav_scenes import ROBOT, person, robot_at
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints
+from nav_adapter.ros2 import Frames, outgoing
+from nav_adapter.ros2.messages import Message
+from tracking import PersonTrack
+
+ROOT = Path(__file__).parents[2]
+STAMP_S = 1_700_000_000.25
+
+# Packages that rosbags does not bring along, from their own .msg files.
+DEFINITIONS = {
+    "nav2_msgs/msg/SpeedLimit": "std_msgs/Header header\nbool percentage\nfloat64 speed_limit\n",
+    "nav2_msgs/msg/CircleObject": "std_msgs/Header header\nunique_identifier_msgs/UUID uuid\n"
+    "geometry_msgs/Point32 center\nfloat32 radius\nbool fill\nint8 value\n",
+    "costmap_converter_msgs/msg/ObstacleMsg": "std_msgs/Header header\n"
+    "geometry_msgs/Polygon polygon\nfloat64 radius\nint64 id\n"
+    "geometry_msgs/Quaternion orientation\ngeometry_msgs/TwistWithCovariance velocities\n",
+    "costmap_converter_msgs/msg/ObstacleArrayMsg": "std_msgs/Header header\n"
+    "costmap_converter_msgs/ObstacleMsg[] obstacles\n",
+    "people_msgs/msg/Person": "string name\ngeometry_msgs/Point position\n"
+    "geometry_msgs/Point velocity\nfloat64 reliability\nstring[] tagnames\nstring[] tags\n",
+    "people_msgs/msg/People": "std_msgs/Header header\npeople_msgs/Person[] people\n",
+    "vision_msgs/msg/ObjectHypothesis": "string class_id\nfloat64 score\n",
+    "vision_msgs/msg/ObjectHypothesisWithPose": "vision_msgs/ObjectHypothesis hypothesis\n"
+    "geometry_msgs/PoseWithCovariance pose\n",
+    "vision_msgs/msg/BoundingBox3D": "geometry_msgs/Pose center\ngeometry_msgs/Vector3 size\n",
+    "vision_msgs/msg/Detection3D": "std_msgs/Header header\n"
+    "vision_msgs/ObjectHypothesisWithPose[] results\nvision_msgs/BoundingBox3D bbox\nstring id\n",
+    "vision_msgs/msg/Detection3DArray": "std_msgs/Header header\n"
+    "vision_msgs/Detection3D[] detections\n",
+}
+
+
+def typestore() -> Any:
+    """rosbags' types of ROS 2 Jazzy and the packages above: nothing of ours."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    for name, text in DEFINITIONS.items():
+        store.register(get_types_from_msg(text, name))
+    return store
+
+
+def crowd(stamp_s: float = STAMP_S) -> tuple[PersonTrack, ...]:
+    return (
+        person(stamp_s, track_id=3, position=(2.5, 0.4), velocity=(-0.6, 0.2)),
+        person(stamp_s, track_id=0, position=(6.0, -1.0), awareness_lower=0.7, sigma_m=0.05),
+        person(stamp_s, track_id=11, position=(4.0, 3.0), status="coasting", unseen_s=0.1),
+    )
+
+
+def constraints(stamp_s: float = STAMP_S) -> NavConstraints:
+    """What the adapter makes of that crowd."""
+    adapter = NavAdapter(AwarenessPolicy.preset("balanced"), ROBOT)
+    return adapter.update(crowd(stamp_s), robot_at(stamp_s, speed_mps=0.5), stamp_s)
+
+
+def everything(stamp_s: float = STAMP_S) -> list[tuple[str, Message]]:
+    """One instant on every topic."""
+    state = robot_at(stamp_s, position=(0.3, -0.2), speed_mps=0.5)
+    return list(outgoing(constraints(stamp_s), crowd(stamp_s), ROBOT, state, Frames()))
+
+
+def plain(value: Any) -> Any:
+    """A message of any library as nested dicts and lists of Python's own types."""
+    if dataclasses.is_dataclass(value):
+        # rosbags counts a type's constants and its name among the fields.
+        names = [field.name for field in dataclasses.fields(value)]
+        return {name: plain(getattr(value, name)) for name in names if name[0].islower()}
+    if isinstance(value, bytes):
+        return list(value)
+    if hasattr(value, "tolist"):
+        # int8 and uint8 arrays are bytes here.
+        return [each % 256 for each in value.tolist()] if value.itemsize == 1 else value.tolist()
+    if isinstance(value, (list, tuple)):
+        return [plain(each) for each in value]
+    return value
+
+
+def loopback_environment(domain: int | None = None) -> dict[str, str]:
+    """Processes that see each other on loopback only, in a domain of their own."""
+    interface = '<NetworkInterface name="lo" multicast="false"/>'
+    uri = (
+        f"<CycloneDDS><Domain><General><Interfaces>{interface}</Interfaces>"
+        "<AllowMulticast>false</AllowMulticast></General><Discovery>"
+        '<ParticipantIndex>auto</ParticipantIndex><Peers><Peer address="localhost"/></Peers>'
+        "</Discovery></Domain></CycloneDDS>"
+    )
+    number = random.SystemRandom().randint(1, 200) if domain is None else domain
+    path = os.pathsep.join(part for part in (str(ROOT), os.environ.get("PYTHONPATH")) if part)
+    return {"CYCLONEDDS_URI": uri, "ROS_DOMAIN_ID": str(number), "PYTHONPATH": path}

@@ -1,0 +1,311 @@
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from nav_scenes import ROBOT
+
+pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
+
+from nav_adapter import AwarenessPolicy, NavError
+from nav_adapter.ros2 import (
+    SLOWEST_MPS,
+    STOP_POLYGON_ID,
+    AwarenessBridge,
+    CameraMount,
+    decode,
+    encode,
+)
+from nav_adapter.ros2._stamps import to_time, yaw_quaternion
+from nav_adapter.ros2.messages.geometry_msgs import (
+    Point,
+    Pose,
+    PoseWithCovariance,
+    Quaternion,
+    Transform,
+    TransformStamped,
+    Twist,
+    TwistWithCovariance,
+    Vector3,
+)
+from nav_adapter.ros2.messages.nav_msgs import Odometry
+from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, Image
+from nav_adapter.ros2.messages.std_msgs import Header
+from nav_adapter.ros2.messages.tf2_msgs import TFMessage
+from perception import AwarenessPipeline, Camera
+
+START_S = 1000.0
+MOUNT = CameraMount(position_base_m=[0.2, 0.0, 1.4]).T_base_camera()
+INFO = CameraInfo(
+    Header(to_time(START_S), "camera"), 48, 64, k=(50.0, 0.0, 32.0, 0.0, 50.0, 24.0, 0.0, 0.0, 1.0)
+)
+
+
+class EmptyHall:
+    """A detector and a pose estimator where there is nobody."""
+
+    def detect(self, image_rgb):
+        return ()
+
+    def estimate(self, image_rgb, *_):
+        return ()
+
+
+def nobody(camera: Camera) -> AwarenessPipeline:
+    hall = EmptyHall()
+    return AwarenessPipeline(camera, detector=hall, pose_estimator=hall, head_pose_estimator=hall)
+
+
+def odometry(stamp_s: float, x: float = 0.0, yaw: float = 0.0, speed: float = 0.5) -> Odometry:
+    return Odometry(
+        Header(to_time(stamp_s), "odom"),
+        "base_link",
+        PoseWithCovariance(Pose(Point(x, 0.0, 0.0), yaw_quaternion(yaw))),
+        TwistWithCovariance(Twist(Vector3(speed, 0.0, 0.0))),
+    )
+
+
+def image(stamp_s: float) -> Image:
+    header = Header(to_time(stamp_s), "camera")
+    return Image(header, 48, 64, "rgb8", 0, 192, bytes(48 * 192))
+
+
+class Listener:
+    """What Nav2 would have heard."""
+
+    def __init__(self, **settings) -> None:
+        self.heard = defaultdict(list)
+        self.warnings: list[str] = []
+        self.bridge = AwarenessBridge(
+            AwarenessPolicy.preset("balanced"),
+            ROBOT,
+            lambda key, message: self.heard[key].append(message),
+            make_pipeline=nobody,
+            warn=self.warnings.append,
+            **{"T_base_camera": MOUNT, **settings},
+        )
+
+    def standing(self) -> bool:
+        """Whether the last tick stops a robot: limit, polygon and both together or neither."""
+        polygon = self.heard["collision_polygons"][-1]
+        assert polygon.polygon.id == STOP_POLYGON_ID
+        near = all(abs(corner.x) < 1.0 for corner in polygon.polygon.polygon.points)
+        assert near == (self.heard["speed_limit"][-1].speed_limit == SLOWEST_MPS)
+        return near
+
+
+def test_nothing_moves_before_everything_is_there() -> None:
+    nav = Listener()
+    for give, reason in (
+        (lambda: None, "no odometry yet"),
+        (lambda: nav.bridge.on_odometry(odometry(START_S)), "no camera_info yet"),
+        (lambda: nav.bridge.on_camera_info(INFO), "no camera frame yet"),
+    ):
+        give()
+        assert nav.bridge.tick(START_S).limited_by == reason
+        assert nav.standing()
+    assert nav.bridge.on_image(image(START_S), START_S)
+    assert nav.bridge.tick(START_S).limited_by == "robot maximum"
+    assert not nav.standing()
+
+
+@pytest.mark.parametrize("silent", ["camera", "odometry"])
+def test_a_source_that_falls_silent_stops_the_robot_and_its_return_frees_it(silent: str) -> None:
+    nav = Listener()
+    nav.bridge.on_camera_info(INFO)
+    stop_after_s = AwarenessPolicy.preset("balanced").timing.stop_after_s
+    stood_from = None
+    for tick in range(100):
+        now = START_S + 0.05 * tick
+        talks = now < START_S + 1.0 or now > START_S + 4.0
+        if talks or silent != "odometry":
+            nav.bridge.on_odometry(odometry(now))
+        if talks or silent != "camera":
+            nav.bridge.on_image(image(now), now)
+        constraints = nav.bridge.tick(now)
+        if nav.standing() and stood_from is None:
+            stood_from = now
+            assert "stale data" in constraints.limited_by
+    assert stood_from is not None
+    assert stood_from - (START_S + 1.0) <= stop_after_s + 0.051
+    assert not nav.standing()
+
+
+def test_every_tick_says_everything_once() -> None:
+    nav = Listener(camera=Camera(64, 48, 50.0, 50.0, 32.0, 24.0))
+    nav.bridge.on_odometry(odometry(START_S))
+    nav.bridge.on_image(image(START_S), START_S)
+    nav.bridge.tick(START_S + 0.01)
+    counts = {key: len(messages) for key, messages in nav.heard.items()}
+    once = ["speed_limit", "collision_polygons", "stop_zone", "grid", "obstacles", "people"]
+    assert counts == dict.fromkeys([*once, "detections", "markers"], 1)
+
+
+def test_the_camera_is_where_mount_and_odometry_put_it() -> None:
+    nav = Listener()
+    nav.bridge.on_camera_info(INFO)
+    nav.bridge.on_odometry(odometry(START_S, x=2.0, yaw=math.pi / 2.0))
+    assert nav.bridge.on_image(image(START_S), START_S)
+    T = nav.bridge.last_T_odom_camera
+    assert T is not None
+    assert np.allclose(T[:3, 3], [2.0, 0.2, 1.4])
+    assert np.allclose(T[:3, 2], [0.0, 1.0, 0.0], atol=1e-9)
+
+
+def test_tf_can_say_where_the_camera_is() -> None:
+    nav = Listener(T_base_camera=None)
+    nav.bridge.on_camera_info(INFO)
+    nav.bridge.on_odometry(odometry(START_S, x=2.0))
+    assert not nav.bridge.on_image(image(START_S), START_S)
+    assert "no transform between 'camera' and 'odom'" in nav.warnings[-1]
+    optical = Quaternion(-0.5, 0.5, -0.5, 0.5)
+    mounted = TransformStamped(
+        Header(frame_id="base_link"), "camera", Transform(Vector3(0.2, 0.0, 1.4), optical)
+    )
+    nav.bridge.on_transforms(TFMessage((mounted,)), static=True)
+    assert nav.bridge.on_image(image(START_S), START_S)
+    T = nav.bridge.last_T_odom_camera
+    assert T is not None
+    assert np.allclose(T[:3, 3], [2.2, 0.0, 1.4])
+    assert np.allclose(T[:3, :3], MOUNT[:3, :3])
+
+
+def test_refused_messages_are_said_once_and_stop_by_going_stale() -> None:
+    nav = Listener()
+    nav.bridge.on_camera_info(INFO)
+    for tick in range(80):
+        now = START_S + 0.05 * tick
+        nav.bridge.on_odometry(odometry(now))
+        if tick == 0:
+            assert nav.bridge.on_image(image(now), now)
+        else:
+            assert not nav.bridge.on_image(image(now + 1.0), now)
+        nav.bridge.tick(now)
+    assert nav.standing()
+    assert nav.warnings == ["image: the image's stamp is 1.000 s ahead of this machine's clock"]
+
+
+@pytest.mark.parametrize(
+    ("message", "text"),
+    [
+        (Odometry(Header(to_time(START_S), "map"), "base_link"), "must be in frame 'odom'"),
+        (
+            Odometry(
+                Header(to_time(START_S), "odom"),
+                pose=PoseWithCovariance(Pose(orientation=Quaternion(w=0.0))),
+            ),
+            "quaternion",
+        ),
+        (odometry(START_S, speed=math.nan), "speed_mps"),
+        (odometry(START_S, x=math.inf), "finite"),
+        (odometry(START_S, x=1e300), "1e+06 m"),
+        (odometry(START_S, speed=1e300), "100 m/s"),
+    ],
+)
+def test_odometry_that_cannot_be_is_refused(message: Odometry, text: str) -> None:
+    nav = Listener()
+    nav.bridge.on_odometry(message)
+    assert text in nav.warnings[-1]
+    assert nav.bridge.robot_state is None
+    nav.bridge.tick(START_S)
+    assert nav.standing()
+
+
+def test_a_calibration_that_is_none_keeps_the_robot_standing() -> None:
+    nav = Listener()
+    nav.bridge.on_camera_info(CameraInfo())
+    assert "calibrate" in nav.warnings[-1]
+    nav.bridge.on_odometry(odometry(START_S))
+    assert not nav.bridge.on_image(image(START_S), START_S)
+    nav.bridge.tick(START_S)
+    assert nav.standing()
+    nav.bridge.on_camera_info(INFO)
+    assert nav.bridge.on_image(image(START_S), START_S)
+
+
+def test_a_picture_of_another_size_than_the_calibration_is_refused() -> None:
+    nav = Listener()
+    nav.bridge.on_camera_info(INFO)
+    nav.bridge.on_odometry(odometry(START_S))
+    small = Image(Header(to_time(START_S), "camera"), 1, 1, "rgb8", 0, 3, bytes(3))
+    assert not nav.bridge.on_image(small, START_S)
+    assert "shape" in nav.warnings[-1]
+
+
+def test_a_clock_that_goes_backward_starts_afresh_with_a_stop() -> None:
+    nav = Listener()
+    nav.bridge.on_camera_info(INFO)
+    nav.bridge.on_odometry(odometry(START_S))
+    nav.bridge.on_image(image(START_S), START_S)
+    nav.bridge.tick(START_S)
+    assert not nav.standing()
+    nav.bridge.tick(10.0)
+    assert nav.standing()
+    nav.bridge.on_odometry(odometry(10.05))
+    assert nav.bridge.on_image(image(10.05), 10.05)
+    nav.bridge.tick(10.05)
+    assert not nav.standing()
+
+
+def test_the_last_word_is_a_stop() -> None:
+    nav = Listener()
+    nav.bridge.on_camera_info(INFO)
+    nav.bridge.on_odometry(odometry(START_S))
+    nav.bridge.on_image(image(START_S), START_S)
+    nav.bridge.tick(START_S)
+    nav.bridge.stop(START_S + 0.1, "the end")
+    assert nav.standing()
+
+
+def test_odometry_from_the_future_stops_with_the_reason() -> None:
+    nav = Listener()
+    nav.bridge.on_camera_info(INFO)
+    nav.bridge.on_odometry(odometry(START_S))
+    nav.bridge.on_image(image(START_S), START_S)
+    nav.bridge.on_odometry(odometry(START_S + 1.0))
+    constraints = nav.bridge.tick(START_S)
+    assert nav.standing()
+    assert "robot_state.stamp_s" in constraints.limited_by
+
+
+def _mount() -> TFMessage:
+    move = Transform(Vector3(0.2, 0.0, 1.4), Quaternion(-0.5, 0.5, -0.5, 0.5))
+    return TFMessage((TransformStamped(Header(frame_id="base_link"), "camera", move),))
+
+
+@given(
+    st.sampled_from(["odometry", "camera_info", "transforms", "image"]),
+    st.lists(st.tuples(st.integers(4, 4000), st.integers(0, 255)), min_size=1, max_size=6),
+)
+def test_damaged_messages_never_crash_it_and_everything_stays_publishable(
+    which: str, damage: list[tuple[int, int]]
+) -> None:
+    nav = Listener(T_base_camera=None)
+    good = {
+        "odometry": odometry(START_S),
+        "camera_info": INFO,
+        "transforms": _mount(),
+        "image": image(START_S),
+    }
+    for name, message in good.items():
+        if name == which:
+            data = bytearray(encode(message))
+            for place, value in damage:
+                data[4 + place % (len(data) - 4)] = value
+            try:
+                message = decode(type(message), bytes(data))  # noqa: PLW2901
+            except NavError:
+                continue
+        if name == "image":
+            nav.bridge.on_image(message, START_S)
+        else:
+            getattr(nav.bridge, f"on_{name}")(message)
+        nav.bridge.tick(START_S)
+        nav.standing()
+    for messages in nav.heard.values():
+        for message in messages:
+            encode(message)

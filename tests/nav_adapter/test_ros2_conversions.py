@@ -1,0 +1,238 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from nav_scenes import ROBOT, crowds, finite, person, robot_at
+from shapely import affinity
+from shapely.geometry import Point as ShapelyPoint
+from shapely.geometry import Polygon
+
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, NavError, paint_costmap
+from nav_adapter.ros2 import (
+    SLOWEST_MPS,
+    STOP_POLYGON_ID,
+    circle_objects,
+    collision_polygons,
+    detections,
+    markers,
+    occupancy_grid,
+    people,
+    speed_limit,
+    stop_zone,
+    teb_obstacles,
+)
+from nav_adapter.ros2._stamps import to_seconds, to_time
+from nav_adapter.ros2.messages.visualization_msgs import Marker
+
+FOOTPRINT = Polygon(ROBOT.footprint_m)
+
+
+def limited(limit_mps: float) -> NavConstraints:
+    return NavConstraints(5.0, (), limit_mps, "a test", False)
+
+
+def around(tracks) -> NavConstraints:
+    adapter = NavAdapter(AwarenessPolicy.preset("balanced"), ROBOT)
+    return adapter.update(tracks, robot_at(), 0.0)
+
+
+def shape(polygon) -> Polygon:
+    return Polygon([(corner.x, corner.y) for corner in polygon.points])
+
+
+@given(finite(0.0, 1e6), finite(0.02, 10.0), st.booleans())
+def test_a_speed_limit_is_never_no_limit_nor_above_the_maximum(
+    limit: float, maximum: float, percentage: bool
+) -> None:
+    message = speed_limit(limited(limit), maximum, percentage=percentage)
+    # What a controller with that maximum makes of it.
+    meant = message.speed_limit * (maximum / 100.0 if percentage else 1.0)
+    assert message.percentage is percentage
+    assert message.speed_limit > 0.0
+    assert SLOWEST_MPS * (1.0 - 1e-12) <= meant < maximum
+    assert meant <= max(limit, SLOWEST_MPS) * (1.0 + 1e-12)
+    if SLOWEST_MPS <= limit <= 0.999 * maximum:
+        assert meant == pytest.approx(limit, rel=1e-12)
+
+
+@pytest.mark.parametrize("maximum", [0.0, -1.0, SLOWEST_MPS, float("nan"), float("inf"), "fast"])
+def test_a_maximum_that_leaves_no_room_is_refused(maximum) -> None:
+    with pytest.raises(NavError, match="max_speed_mps"):
+        speed_limit(limited(0.5), maximum)
+
+
+@given(finite(0.0, 2.0**31 - 2.0))
+def test_stamps_keep_their_nanoseconds(stamp_s: float) -> None:
+    time = to_time(stamp_s)
+    assert 0 <= time.nanosec < 1_000_000_000
+    assert to_seconds(time) == pytest.approx(stamp_s, abs=3e-7)
+    exact = stamp_s - int(stamp_s)
+    assert abs(time.sec - int(stamp_s) + 1e-9 * time.nanosec - exact) <= 0.51e-9
+
+
+@pytest.mark.parametrize("stamp_s", [-1.0, float("nan"), float("inf"), 2.0**31])
+def test_a_stamp_that_ros_cannot_hold_is_refused(stamp_s: float) -> None:
+    with pytest.raises(NavError, match="stamp_s"):
+        to_time(stamp_s)
+
+
+@given(crowds())
+def test_every_person_has_a_polygon_and_the_stop_polygon_comes_last(tracks) -> None:
+    constraints = around(tracks)
+    *persons, stop = collision_polygons(constraints, ROBOT, robot_at())
+    assert stop.polygon.id == STOP_POLYGON_ID
+    assert {each.polygon.id for each in persons} == {o.track_id for o in constraints.obstacles}
+    by_id = {each.polygon.id: shape(each.polygon.polygon) for each in persons}
+    gaps = []
+    for obstacle in constraints.obstacles:
+        circle = ShapelyPoint(obstacle.center_odom_m).buffer(obstacle.radius_m)
+        # Single precision on the wire, doubles here.
+        assert by_id[obstacle.track_id].buffer(1e-6).contains(circle)
+    for each in persons:
+        obstacle = next(o for o in constraints.obstacles if o.track_id == each.polygon.id)
+        gaps.append(float(np.linalg.norm(obstacle.center_odom_m)) - obstacle.radius_m)
+    assert gaps == sorted(gaps, reverse=True)
+
+
+@given(finite(0.0, 1.5))
+def test_the_stop_polygon_is_in_the_footprint_exactly_when_the_limit_cannot_be_sent(
+    limit: float,
+) -> None:
+    (stop,) = collision_polygons(limited(limit), ROBOT, None, base_frame="base")
+    drawn = shape(stop.polygon.polygon)
+    assert stop.header.frame_id == "base"
+    if limit < SLOWEST_MPS:
+        assert FOOTPRINT.contains_properly(drawn)
+        assert drawn.area > 0.5 * FOOTPRINT.area
+    else:
+        assert drawn.distance(FOOTPRINT) > 900.0
+
+
+@given(finite(-1.5, 1.5))
+def test_the_stop_zone_is_the_footprint_swept_by_the_stopping_distance(speed: float) -> None:
+    zone = shape(stop_zone(ROBOT, speed, 5.0).polygon)
+    # Constant acceleration: v T + v²/2a, by stepping through time.
+    reach = abs(speed) * ROBOT.reaction_time_s + speed**2 / (2.0 * ROBOT.max_deceleration_mps2)
+    ahead = affinity.translate(FOOTPRINT, np.sign(speed) * reach)
+    wanted = FOOTPRINT.union(ahead).convex_hull
+    assert zone.symmetric_difference(wanted).area < 1e-9
+
+
+@given(crowds(), finite(-5.0, 5.0), finite(-5.0, 5.0))
+def test_the_grid_is_occupied_where_the_costmap_is_lethal(tracks, x: float, y: float) -> None:
+    constraints = around(tracks)
+    grid = occupancy_grid(constraints, (x, y), size_m=6.0, resolution_m=0.1)
+    cells = np.frombuffer(grid.data, np.int8).reshape(grid.info.height, grid.info.width)
+    corner = np.array([grid.info.origin.position.x, grid.info.origin.position.y])
+    costs = paint_costmap(np.zeros((60, 60), np.uint8), corner, 0.1, constraints)
+    assert np.array_equal(cells == 100, costs == 254)
+    assert set(np.unique(cells)) <= {0, 100}
+    # The window moves by whole cells, so that a cell of the world stays a cell.
+    assert np.allclose(corner / 0.1, np.round(corner / 0.1), atol=1e-6)
+    assert (np.abs(corner + 3.0 - [x, y]) <= 0.1 + 1e-9).all()
+
+
+@pytest.mark.parametrize("change", [{"size_m": 0.0}, {"size_m": 500.0}, {"resolution_m": 0.0}])
+def test_a_grid_of_no_or_too_many_cells_is_refused(change) -> None:
+    with pytest.raises(NavError):
+        occupancy_grid(limited(1.0), (0.0, 0.0), **change)
+
+
+@given(crowds())
+def test_circles_contain_their_obstacles_and_keep_their_uuid(tracks) -> None:
+    constraints = around(tracks)
+    circles = circle_objects(constraints)
+    assert len({each.uuid.uuid for each in circles}) == len(circles)
+    for circle, obstacle in zip(circles, constraints.obstacles, strict=True):
+        assert circle.fill
+        assert circle.value == 100
+        assert circle.radius >= obstacle.radius_m
+        assert circle.radius <= 1.02 * obstacle.radius_m
+    assert [each.uuid for each in circle_objects(constraints)] == [each.uuid for each in circles]
+
+
+def stretched(constraints: NavConstraints) -> NavConstraints:
+    longer = tuple(
+        replace(each, polygon=affinity.scale(each.polygon, 2.0, 1.0))
+        for each in constraints.obstacles
+    )
+    return replace(constraints, obstacles=longer)
+
+
+def test_an_obstacle_drawn_out_is_not_cut_back_to_its_circle() -> None:
+    constraints = stretched(around([person(position=(2.0, 1.0), velocity=(1.0, 0.0))]))
+    (obstacle,) = constraints.obstacles
+    (circle,) = circle_objects(constraints)
+    grown = ShapelyPoint(circle.center.x, circle.center.y).buffer(circle.radius, quad_segs=400)
+    assert grown.buffer(1e-3).contains(obstacle.polygon)
+    (teb,) = teb_obstacles(constraints).obstacles
+    assert shape(teb.polygon).symmetric_difference(obstacle.polygon).area < 1e-9
+    assert teb.radius == 0.0
+
+
+@given(crowds())
+def test_teb_gets_circles_with_velocities(tracks) -> None:
+    constraints = around(tracks)
+    message = teb_obstacles(constraints, frame_id="world")
+    assert message.header.frame_id == "world"
+    for each, obstacle in zip(message.obstacles, constraints.obstacles, strict=True):
+        (center,) = each.polygon.points
+        moving = each.velocities.twist.linear
+        assert (center.x, center.y) == tuple(obstacle.center_odom_m)
+        assert (moving.x, moving.y) == tuple(obstacle.velocity_odom_mps)
+        assert each.radius == obstacle.radius_m
+        assert each.id == obstacle.track_id
+
+
+def test_people_carry_awareness_in_their_tags() -> None:
+    seen = person(track_id=4, position=(3.0, 1.0), velocity=(0.5, 0.0), awareness_lower=0.75)
+    constraints = around([seen])
+    (message,) = people(constraints, [seen]).people
+    tags = dict(zip(message.tagnames, message.tags, strict=True))
+    assert message.name == "4"
+    assert float(tags["awareness_lower"]) == constraints.obstacles[0].awareness_lower
+    assert float(tags["radius_m"]) == pytest.approx(constraints.obstacles[0].radius_m, abs=5e-4)
+    assert float(tags["awareness"]) == seen.awareness
+    assert tags["status"] == "confirmed"
+    assert message.reliability == 1.0
+
+
+def test_a_person_who_is_only_remembered_has_no_reliability() -> None:
+    constraints = around([person(track_id=4)])
+    (message,) = people(constraints, []).people
+    assert message.reliability == 0.0
+    assert "awareness" not in message.tagnames
+    assert "awareness_lower" in message.tagnames
+
+
+@given(crowds())
+def test_detections_are_the_papers_boxes(tracks) -> None:
+    constraints = around(tracks)
+    message = detections(constraints)
+    for found, obstacle in zip(message.detections, constraints.obstacles, strict=True):
+        size, center = found.bbox.size, found.bbox.center
+        assert (size.x, size.y) == (2.0 * obstacle.radius_m,) * 2
+        assert size.z == obstacle.height_m
+        assert center.position.z == 0.5 * obstacle.height_m
+        # The turn about z brings x to the person's direction.
+        turn = center.orientation
+        heading = np.array([1.0 - 2.0 * turn.z**2, 2.0 * turn.w * turn.z])
+        speed = np.linalg.norm(obstacle.velocity_odom_mps)
+        assert np.allclose(heading * speed, obstacle.velocity_odom_mps, atol=1e-9)
+        scores = {each.hypothesis.class_id: each.hypothesis.score for each in found.results}
+        assert scores == {"person": 1.0, "aware_person": obstacle.awareness_lower}
+
+
+@given(crowds())
+def test_markers_clear_what_was_there_and_have_ids_of_their_own(tracks) -> None:
+    constraints = around(tracks)
+    first, *rest = markers(constraints, robot_at()).markers
+    assert first.action == Marker.DELETEALL
+    assert len({(each.ns, each.id) for each in rest}) == len(rest)
+    assert all(each.lifetime.sec > 0 for each in rest)
+    assert sum(each.ns == "body" for each in rest) == len(constraints.obstacles)
+    assert constraints.limited_by in rest[-1].text

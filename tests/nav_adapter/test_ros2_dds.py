@@ -1,0 +1,179 @@
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
+
+from ros2_scenes import DEFINITIONS, everything, loopback_environment, plain, typestore
+
+from nav_adapter import NavError
+from nav_adapter.ros2 import PUBLISHED, READ, DdsNode, Topic, decode, encode, renamed
+from nav_adapter.ros2.messages import ros_type
+from nav_adapter.ros2.messages.nav2_msgs import SpeedLimit
+from nav_adapter.ros2.messages.sensor_msgs import Image
+
+RECEIVER = Path(__file__).with_name("ros2_receiver.py")
+PATIENCE_S = 20.0
+
+
+@pytest.fixture
+def domain(monkeypatch: pytest.MonkeyPatch) -> int:
+    environment = loopback_environment()
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    return int(environment["ROS_DOMAIN_ID"])
+
+
+@pytest.fixture
+def node(domain: int) -> Iterator[DdsNode]:
+    made = DdsNode(domain)
+    yield made
+    made.close()
+
+
+def until(condition, node: DdsNode | None = None) -> bool:
+    end = time.monotonic() + PATIENCE_S
+    while not condition() and time.monotonic() < end:
+        if node is None:
+            time.sleep(0.01)
+        else:
+            node.wait(0.01)
+    return bool(condition())
+
+
+def test_another_process_with_types_of_its_own_receives_every_topic(node: DdsNode) -> None:
+    wanted = {topic.name: ros_type(topic.message) for topic in PUBLISHED.values()}
+    for topic in PUBLISHED.values():
+        node.advertise(topic)
+    command = [sys.executable, str(RECEIVER), str(PATIENCE_S), json.dumps(wanted)]
+    command += [json.dumps(DEFINITIONS)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=os.environ) as process:
+        try:
+            assert process.stdout is not None
+            assert process.stdout.readline() == "ready\n"
+            assert until(lambda: all(node.readers_of(topic) for topic in PUBLISHED.values()))
+            sent: dict[str, list] = defaultdict(list)
+            for key, message in everything():
+                cdr = node.publish(PUBLISHED[key], message)
+                # As it is after the wire: single precision rounded.
+                sent[PUBLISHED[key].name].append(plain(decode(type(message), cdr)))
+            received: dict[str, list] = defaultdict(list)
+            for _ in range(sum(map(len, sent.values()))):
+                line = json.loads(process.stdout.readline())
+                received[line["topic"]].append(_unsigned(line["message"], line["topic"]))
+        finally:
+            process.kill()
+    assert received == sent
+    assert set(received) == set(wanted)
+
+
+def _unsigned(message: dict, topic: str) -> dict:
+    if topic.endswith("grid"):
+        message["data"] = [each % 256 for each in message["data"]]
+    return message
+
+
+def test_captured_payloads_are_what_rosbags_reads(node: DdsNode, domain: int) -> None:
+    store = typestore()
+    listener = DdsNode(domain)
+    try:
+        for topic in PUBLISHED.values():
+            node.advertise(topic)
+            listener.subscribe(topic)
+        assert until(lambda: all(node.readers_of(topic) for topic in PUBLISHED.values()))
+        for key, message in everything():
+            node.publish(PUBLISHED[key], message)
+            topic = PUBLISHED[key]
+            assert listener.wait(PATIENCE_S)
+            (caught,) = listener.take_cdr(topic)
+            read = store.deserialize_cdr(caught, ros_type(topic.message))
+            assert plain(read) == plain(decode(topic.message, encode(message)))
+    finally:
+        listener.close()
+
+
+def test_a_late_subscriber_gets_the_grid_and_nothing_else(node: DdsNode, domain: int) -> None:
+    for key, message in everything():
+        node.advertise(PUBLISHED[key])
+        node.publish(PUBLISHED[key], message)
+    late = DdsNode(domain)
+    try:
+        for topic in PUBLISHED.values():
+            late.subscribe(topic)
+        assert until(lambda: late.wait(0.01))
+        assert until(lambda: all(node.readers_of(topic) for topic in PUBLISHED.values()))
+        (grid,) = late.take(PUBLISHED["grid"])
+        assert grid == dict(everything())["grid"] or encode(grid) == encode(
+            dict(everything())["grid"]
+        )
+        assert not any(late.take(t) for key, t in PUBLISHED.items() if key != "grid")
+    finally:
+        late.close()
+
+
+def test_an_image_of_full_size_arrives_whole(node: DdsNode, domain: int) -> None:
+    pixels = np.random.default_rng(0).integers(0, 256, (480, 640, 3), dtype=np.uint8).tobytes()
+    sent = Image(height=480, width=640, encoding="rgb8", step=1920, data=pixels)
+    reader = DdsNode(domain)
+    try:
+        node.advertise(READ["image"])
+        reader.subscribe(READ["image"])
+        assert until(lambda: node.readers_of(READ["image"]))
+        got: list = []
+
+        def arrived() -> bool:
+            # Best effort: a frame may be lost, as on a robot.
+            node.publish(READ["image"], sent)
+            reader.wait(0.2)
+            got.extend(reader.take(READ["image"]))
+            return bool(got)
+
+        assert until(arrived)
+        assert got[0] == sent
+    finally:
+        reader.close()
+
+
+def test_waiting_ends_with_a_message_or_in_time(node: DdsNode, domain: int) -> None:
+    topic = PUBLISHED["speed_limit"]
+    node.subscribe(topic)
+    assert node.wait(0.0) is False
+    node.advertise(topic)
+    assert until(lambda: node.readers_of(topic))
+    threading.Timer(0.05, lambda: node.publish(topic, SpeedLimit(speed_limit=0.5))).start()
+    assert node.wait(PATIENCE_S) is True
+    assert node.take(topic) == [SpeedLimit(speed_limit=0.5)]
+    assert node.take(topic) == []
+
+
+@pytest.mark.parametrize("number", [-1, 233])
+def test_a_domain_that_dds_does_not_have_is_refused(number: int) -> None:
+    with pytest.raises(NavError, match="0 to 232"):
+        DdsNode(number)
+
+
+def test_one_name_has_one_type(node: DdsNode) -> None:
+    node.advertise(Topic("x", SpeedLimit))
+    with pytest.raises(NavError, match="SpeedLimit here, not Image"):
+        node.subscribe(Topic("x", Image))
+
+
+@pytest.mark.parametrize("name", ["", "/", "a//b", "1odom", "a/2b", "odom!", "ødom", "a b"])
+def test_names_that_ros_refuses_are_refused(name: str) -> None:
+    with pytest.raises(NavError, match="topic"):
+        renamed(READ["odom"], name)
+
+
+def test_a_leading_slash_is_no_part_of_a_name() -> None:
+    assert renamed(READ["odom"], "/robot_1/odom").name == "robot_1/odom"

@@ -1,0 +1,65 @@
+"""docs/nav2.md and its files say what the code does."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from nav_adapter.ros2 import PUBLISHED, READ, SLOWEST_MPS, RobotFile, Topic
+from nav_adapter.ros2.messages import ros_type
+from sim_tests._cli import _parser
+
+DOCS = Path(__file__).parents[2] / "docs"
+TEXT = (DOCS / "nav2.md").read_text(encoding="utf-8")
+
+
+def row(topic: Topic) -> tuple[str, str, str]:
+    reliability = "reliable" if topic.reliable else "best effort"
+    durability = "transient local" if topic.transient_local else "volatile"
+    kind = ros_type(topic.message).replace("/msg/", "/")
+    return f"/{topic.name}", kind, f"{reliability}, {durability}, {topic.depth}"
+
+
+def test_the_table_of_topics_is_that_of_the_code() -> None:
+    found = re.findall(r"^\| `(/\S+)`[^|]*\| `(\S+)` \| ([^|]+?) \|", TEXT, re.MULTILINE)
+    assert found == [row(topic) for topic in (*PUBLISHED.values(), *READ.values())]
+
+
+def test_nav2_reads_what_is_published() -> None:
+    parameters = yaml.safe_load((DOCS / "nav2" / "nav2_params.yaml").read_text())
+    names = {f"/{topic.name}": topic for topic in PUBLISHED.values()}
+    controller = parameters["controller_server"]["ros__parameters"]
+    costmap = parameters["local_costmap"]["local_costmap"]["ros__parameters"]
+    monitor = parameters["collision_monitor"]["ros__parameters"]
+    assert f"/{controller['speed_limit_topic']}" in names
+    people = costmap[costmap["plugins"][0]]
+    assert names[people["map_topic"]].message.__name__ == "OccupancyGrid"
+    assert names[people["map_topic"]].transient_local == people["map_subscribe_transient_local"]
+    (source,) = monitor["observation_sources"]
+    assert names[monitor[source]["topic"]].message.__name__ == "PolygonInstanceStamped"
+    (zone,) = monitor["polygons"]
+    assert names[monitor[zone]["polygon_sub_topic"]].message.__name__ == "PolygonStamped"
+    # The watchdog of the chain: silence must stop the robot, the default rate must not be silence.
+    assert 2.0 / _default("rate") < monitor["source_timeout"] <= 1.0
+    robot = RobotFile.from_yaml(DOCS / "nav2" / "robot.yaml")
+    assert controller["FollowPath"]["vx_max"] == robot.max_speed_mps
+    assert -controller["FollowPath"]["ax_min"] == robot.max_deceleration_mps2
+    assert str(SLOWEST_MPS) in TEXT
+
+
+def test_the_launch_file_starts_a_command_that_there_is() -> None:
+    launch = yaml.safe_load((DOCS / "nav2" / "awarenav.launch.yaml").read_text())["launch"]
+    (program,) = [entry["executable"] for entry in launch if "executable" in entry]
+    defaults = {entry["arg"]["name"]: entry["arg"]["default"] for entry in launch if "arg" in entry}
+    command = re.sub(r"\$\(var (\w+)\)", lambda match: defaults[match[1]], program["cmd"])
+    options = _parser().parse_args(shlex.split(command)[1:])
+    assert options.command == "bridge"
+    assert options.robot == Path("robot.yaml")
+
+
+def _default(name: str) -> Any:
+    return getattr(_parser().parse_args(["bridge", "--robot", "x"]), name)

@@ -1,0 +1,254 @@
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from nav_scenes import finite
+from scipy.spatial.transform import Rotation
+
+from nav_adapter import NavError
+from nav_adapter.ros2 import CameraMount, RobotFile, TransformBuffer
+from nav_adapter.ros2._pictures import camera, picture
+from nav_adapter.ros2._stamps import pose_matrix, yaw_quaternion
+from nav_adapter.ros2.messages.geometry_msgs import Quaternion
+from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, CompressedImage, Image
+from perception import Camera
+
+RGB = np.random.default_rng(5).integers(0, 256, (4, 6, 3), dtype=np.uint8)
+SMOOTH = np.full((16, 16, 3), (200, 90, 30), np.uint8)
+
+
+def raw(pixels: np.ndarray, encoding: str, padding: int = 0) -> Image:
+    rows = pixels.reshape(len(pixels), -1)
+    padded = np.pad(rows, [(0, 0), (0, padding)])
+    return Image(
+        height=pixels.shape[0],
+        width=pixels.shape[1],
+        encoding=encoding,
+        step=padded.shape[1],
+        data=padded.tobytes(),
+    )
+
+
+@pytest.mark.parametrize("padding", [0, 5])
+@pytest.mark.parametrize(
+    ("encoding", "code"),
+    [
+        ("rgb8", None),
+        ("bgr8", cv2.COLOR_RGB2BGR),
+        ("8UC3", cv2.COLOR_RGB2BGR),
+        ("rgba8", cv2.COLOR_RGB2RGBA),
+        ("bgra8", cv2.COLOR_RGB2BGRA),
+    ],
+)
+def test_colours_come_back_exactly(encoding: str, code: int | None, padding: int) -> None:
+    pixels = RGB if code is None else cv2.cvtColor(RGB, code)
+    read = picture(raw(pixels, encoding, padding))
+    assert np.array_equal(read, RGB)
+    assert read.flags.c_contiguous
+
+
+def test_grey_becomes_three_equal_channels() -> None:
+    read = picture(raw(RGB[:, :, :1], "mono8"))
+    assert (read == RGB[:, :, :1]).all()
+
+
+@pytest.mark.parametrize(
+    ("encoding", "first", "second"),
+    [
+        ("bayer_rggb8", "RG", "GB"),
+        ("bayer_bggr8", "BG", "GR"),
+        ("bayer_gbrg8", "GB", "RG"),
+        ("bayer_grbg8", "GR", "BG"),
+    ],
+)
+def test_bayer_patterns_give_the_colour_that_the_sensor_saw(
+    encoding: str, first: str, second: str
+) -> None:
+    mosaic = np.zeros((16, 16, 1), np.uint8)
+    for row, letters in enumerate((first, second)):
+        for column, letter in enumerate(letters):
+            mosaic[row::2, column::2, 0] = SMOOTH[0, 0, "RGB".index(letter)]
+    assert np.array_equal(picture(raw(mosaic, encoding))[4:-4, 4:-4], SMOOTH[4:-4, 4:-4])
+
+
+@pytest.mark.parametrize(("suffix", "tolerance"), [(".png", 0), (".jpg", 6)])
+def test_compressed_pictures_are_decoded(suffix: str, tolerance: int) -> None:
+    data = cv2.imencode(suffix, SMOOTH[:, :, ::-1])[1].tobytes()
+    read = picture(CompressedImage(format=suffix, data=data))
+    assert np.abs(read.astype(int) - SMOOTH).max() <= tolerance
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        Image(),
+        Image(height=2, width=2, encoding="rgb8", step=6, data=bytes(11)),
+        Image(height=2, width=2, encoding="rgb8", step=5, data=bytes(12)),
+        Image(height=2, width=2, encoding="32FC1", step=8, data=bytes(16)),
+        Image(height=4_000_000_000, width=4_000_000_000, encoding="rgb8", step=6, data=bytes(12)),
+        Image(height=1, width=1, encoding="yuyv", step=2, data=bytes(2)),
+        CompressedImage(),
+        CompressedImage(format="jpeg", data=b"\xff\xd8 not a picture"),
+        CompressedImage(format="jpeg", data=cv2.imencode(".png", RGB)[1].tobytes()[:40]),
+    ],
+)
+def test_images_that_cannot_be_read_are_refused(message) -> None:
+    with pytest.raises(NavError):
+        picture(message)
+
+
+def test_camera_info_is_a_camera() -> None:
+    info = CameraInfo(
+        height=480,
+        width=640,
+        distortion_model="plumb_bob",
+        d=(0.1, -0.2, 0.001, 0.002, 0.0),
+        k=(500.0, 0.0, 320.0, 0.0, 510.0, 240.0, 0.0, 0.0, 1.0),
+    )
+    wanted = Camera(640, 480, 500.0, 510.0, 320.0, 240.0, np.array(info.d))
+    point = [[0.3, -0.2, 2.0]]
+    assert np.array_equal(camera(info).project(point), wanted.project(point))
+
+
+@pytest.mark.parametrize(
+    ("info", "text"),
+    [
+        (CameraInfo(height=480, width=640), "calibrate"),
+        (CameraInfo(k=(500.0, *[0.0] * 8)), "camera_info"),
+        (
+            CameraInfo(
+                height=4, width=4, distortion_model="equidistant", d=(0.1,) * 4, k=(5.0,) * 9
+            ),
+            "rectify",
+        ),
+        (CameraInfo(height=4, width=4, k=(math.nan,) * 9), "calibrat"),
+    ],
+)
+def test_a_calibration_that_is_none_is_refused(info: CameraInfo, text: str) -> None:
+    with pytest.raises(NavError, match=text):
+        camera(info)
+
+
+poses = st.builds(
+    lambda x, y, z, turn: pose_matrix((x, y, z), Quaternion(*turn)),
+    *[finite(-5.0, 5.0)] * 3,
+    st.tuples(*[finite(-1.0, 1.0)] * 4).filter(lambda q: 0.6 < np.linalg.norm(q) < 1.9),
+)
+
+
+@given(poses, poses, poses)
+def test_lookups_compose_and_invert(first, second, third) -> None:
+    buffer = TransformBuffer()
+    buffer.add("odom", "base", 1.0, first)
+    buffer.add("base", "mast", 0.0, second, static=True)
+    buffer.add("/mast", "camera", 0.0, third, static=True)
+    forward = buffer.lookup("odom", "camera", 1.0)
+    assert np.allclose(forward, first @ second @ third)
+    assert np.allclose(forward @ buffer.lookup("camera", "/odom", 1.0), np.eye(4))
+    assert np.array_equal(buffer.lookup("mast", "mast", 9.0), np.eye(4))
+    assert np.allclose(
+        buffer.lookup("odom", "mast", 1.0) @ buffer.lookup("mast", "camera", 1.0), forward
+    )
+
+
+@given(finite(0.0, 1.0), finite(-3.0, 3.0), finite(-1.0, 1.0))
+def test_between_two_stamps_a_robot_on_an_even_turn_is_found(
+    share: float, start_rad: float, turn_rad: float
+) -> None:
+    buffer = TransformBuffer()
+    for stamp_s, yaw in ((10.0, start_rad), (10.1, start_rad + turn_rad)):
+        x = 2.0 * (stamp_s - 10.0)
+        buffer.add("odom", "base", stamp_s, pose_matrix((x, 0.0, 0.0), yaw_quaternion(yaw)))
+    T = buffer.lookup("odom", "base", 10.0 + 0.1 * share)
+    assert T[0, 3] == pytest.approx(0.2 * share, abs=1e-6)
+    wanted = Rotation.from_euler("z", start_rad + share * turn_rad).as_matrix()
+    assert np.allclose(T[:3, :3], wanted, atol=1e-6)
+
+
+def test_what_is_too_old_or_too_new_is_refused_with_the_times() -> None:
+    buffer = TransformBuffer()
+    buffer.add("odom", "base", 10.0, np.eye(4))
+    assert np.array_equal(buffer.lookup("odom", "base", 10.1), np.eye(4))
+    with pytest.raises(NavError, match=r"wanted at 10\.150 s and known until 10\.000 s"):
+        buffer.lookup("odom", "base", 10.15)
+    with pytest.raises(NavError, match=r"wanted at 9\.900 s and known from 10\.000 s"):
+        buffer.lookup("odom", "base", 9.9)
+    for tick in range(100):
+        buffer.add("odom", "base", 11.0 + 0.1 * tick, np.eye(4))
+    with pytest.raises(NavError, match="known from"):
+        buffer.lookup("odom", "base", 11.0)
+
+
+def test_late_transforms_are_sorted_in() -> None:
+    buffer = TransformBuffer()
+    for stamp_s in (1.0, 1.2, 1.1):
+        buffer.add("odom", "base", stamp_s, pose_matrix((stamp_s, 0.0, 0.0), Quaternion()))
+    assert buffer.lookup("odom", "base", 1.15)[0, 3] == pytest.approx(1.15)
+
+
+def test_frames_without_a_way_between_them_are_refused_by_name() -> None:
+    buffer = TransformBuffer()
+    buffer.add("odom", "base", 0.0, np.eye(4), static=True)
+    with pytest.raises(NavError, match="between 'camera' and 'odom': known are odom -> base"):
+        buffer.lookup("odom", "camera", 0.0)
+    with pytest.raises(NavError, match="tree"):
+        buffer.add("base", "odom", 0.0, np.eye(4))
+    with pytest.raises(NavError, match="tree"):
+        buffer.add("odom", "odom", 0.0, np.eye(4))
+
+
+@pytest.mark.parametrize("turn", [Quaternion(w=0.0), Quaternion(w=math.nan)])
+def test_a_turn_of_no_length_is_refused(turn: Quaternion) -> None:
+    with pytest.raises(NavError, match="quaternion"):
+        pose_matrix((0.0, 0.0, 0.0), turn)
+
+
+def test_a_camera_mount_looks_where_it_says() -> None:
+    mount = CameraMount(position_base_m=[0.2, 0.1, 1.4], yaw_deg=90.0, pitch_down_deg=30.0)
+    T = mount.T_base_camera()
+    ahead, down = T[:3, 2], T[:3, 1]
+    assert np.allclose(ahead, [0.0, math.cos(math.radians(30)), -math.sin(math.radians(30))])
+    assert down[2] == pytest.approx(-math.cos(math.radians(30)))
+    assert np.allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3))
+    assert np.linalg.det(T[:3, :3]) == pytest.approx(1.0)
+    assert T[:3, 3].tolist() == [0.2, 0.1, 1.4]
+
+
+def test_the_robot_file_of_the_docs_is_valid(tmp_path: Path) -> None:
+    example = Path(__file__).parents[2] / "docs" / "nav2" / "robot.yaml"
+    robot = RobotFile.from_yaml(example)
+    assert robot.profile().max_speed_mps == 1.5
+    assert robot.camera is not None
+    robot.to_yaml(tmp_path / "robot.yaml")
+    assert RobotFile.from_yaml(tmp_path / "robot.yaml") == robot
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        ("max_sped_mps: 1.0", "did you mean 'max_speed_mps'"),
+        ("footprint_m: [[0, 0], [1, 0], [2, 0]]", "enclose"),
+        ("footprint_m: [[0, 0, 0]]", "footprint_m"),
+        ("max_speed_mps: 0.0", "max_speed_mps"),
+        ("camera: {position_base_m: [1, 2]}", "position_base_m"),
+    ],
+)
+def test_a_robot_file_that_is_wrong_says_where(tmp_path: Path, change: str, text: str) -> None:
+    lines = {
+        "footprint_m": "footprint_m: [[0.3, 0.2], [-0.3, 0.2], [-0.3, -0.2], [0.3, -0.2]]",
+        "max_speed_mps": "max_speed_mps: 1.0",
+        "max_acceleration_mps2": "max_acceleration_mps2: 1.0",
+        "max_deceleration_mps2": "max_deceleration_mps2: 1.0",
+        "reaction_time_s": "reaction_time_s: 0.3",
+    }
+    lines[change.split(":", maxsplit=1)[0]] = change
+    path = tmp_path / "robot.yaml"
+    path.write_text("\n".join(lines.values()))
+    with pytest.raises(NavError, match=text):
+        RobotFile.from_yaml(path).profile()

@@ -1,0 +1,149 @@
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
+
+from ros2_scenes import everything, plain, typestore
+from rosbags.typesys import get_types_from_msg
+
+from nav_adapter import NavError
+from nav_adapter.ros2 import PUBLISHED, READ, decode, encode, messages
+from nav_adapter.ros2._cdr import topic_type
+from nav_adapter.ros2._message import field_types
+from nav_adapter.ros2.messages import Message, definition, ros_type
+from nav_adapter.ros2.messages.builtin_interfaces import Time
+from nav_adapter.ros2.messages.nav2_msgs import SpeedLimit
+from nav_adapter.ros2.messages.nav_msgs import OccupancyGrid
+from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, Image
+from nav_adapter.ros2.messages.std_msgs import Header
+
+STORE = typestore()
+KINDS = sorted(
+    (
+        value
+        for module in pkgutil.iter_modules(messages.__path__)
+        for value in vars(importlib.import_module(f"{messages.__name__}.{module.name}")).values()
+        if isinstance(value, type)
+        and issubclass(value, Message)
+        and value.__module__.endswith(module.name)
+    ),
+    key=ros_type,
+)
+
+
+def _as_rosbags_writes(kind: type[Message]) -> list[tuple[str, str]]:
+    """Fields of a type in rosbags' registry, in our notation."""
+
+    def text(node: tuple) -> str:
+        tag, content = int(node[0]), node[1]
+        if tag == 1:
+            return str(content[0])
+        if tag == 2:
+            return str(content).replace("/msg/", "/")
+        inner, count = content
+        return f"{text(inner)}[{count or ''}]"
+
+    return [(name, text(node)) for name, node in STORE.fielddefs[ros_type(kind)][1]]
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=ros_type)
+def test_fields_are_those_of_the_msg_files(kind: type[Message]) -> None:
+    ours = [(name, field.text) for name, field in field_types(kind).items()]
+    assert ours == _as_rosbags_writes(kind)
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=ros_type)
+def test_a_schema_carries_every_message_in_it_once(kind: type[Message]) -> None:
+    text = definition(kind)
+    registered = get_types_from_msg(text, ros_type(kind))
+    for name, content in registered.items():
+        assert content[1] == STORE.fielddefs[name][1]
+    heads = [line for line in text.splitlines() if line.startswith("MSG: ")]
+    assert len(heads) == len(set(heads))
+
+
+@pytest.mark.parametrize(("key", "message"), everything(), ids=lambda value: str(value)[:20])
+def test_an_independent_decoder_reads_what_was_sent(key: str, message: Message) -> None:
+    cdr = encode(message)
+    assert PUBLISHED[key].message is type(message)
+    read = STORE.deserialize_cdr(cdr, ros_type(type(message)))
+    # Single precision on the wire: our values rounded so must be theirs exactly.
+    assert plain(read) == plain(decode(type(message), cdr))
+    again = decode(type(message), cdr)
+    assert encode(again) == cdr
+    assert bytes(STORE.serialize_cdr(read, ros_type(type(message)))) == cdr
+
+
+@given(
+    st.floats(allow_nan=False, allow_infinity=False),
+    st.booleans(),
+    st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0")),
+    st.integers(0, 2**31 - 1),
+    st.integers(0, 999_999_999),
+)
+def test_any_speed_limit_survives_both_ways(
+    limit: float, percentage: bool, frame: str, sec: int, nanosec: int
+) -> None:
+    message = SpeedLimit(Header(Time(sec, nanosec), frame), percentage, limit)
+    assert decode(SpeedLimit, encode(message)) == message
+    assert plain(STORE.deserialize_cdr(encode(message), "nav2_msgs/msg/SpeedLimit")) == plain(
+        message
+    )
+
+
+@given(st.binary(max_size=40))
+def test_foreign_bytes_are_refused_or_read_and_never_crash(data: bytes) -> None:
+    try:
+        read = decode(SpeedLimit, data)
+    except NavError:
+        return
+    assert isinstance(read, SpeedLimit)
+
+
+def test_every_shortened_message_is_refused() -> None:
+    whole = encode(Image(Header(Time(1, 2), "camera"), 2, 3, "rgb8", 0, 9, bytes(18)))
+    for length in range(len(whole)):
+        with pytest.raises(NavError, match="sensor_msgs/msg/Image"):
+            decode(Image, whole[:length])
+
+
+def test_what_rosbags_encodes_is_read() -> None:
+    kind = STORE.types["sensor_msgs/msg/CameraInfo"]
+    blank = decode(CameraInfo, encode(CameraInfo()))
+    theirs = STORE.deserialize_cdr(encode(CameraInfo()), "sensor_msgs/msg/CameraInfo")
+    assert isinstance(theirs, kind)
+    theirs.k = np.arange(9.0)
+    theirs.d = np.array([0.1, 0.2])
+    theirs.distortion_model = "plumb_bob"
+    for little in (True, False):
+        raw = bytes(STORE.serialize_cdr(theirs, "sensor_msgs/msg/CameraInfo", little_endian=little))
+        read = decode(CameraInfo, raw)
+        assert read == replace(blank, k=tuple(range(9)), d=(0.1, 0.2), distortion_model="plumb_bob")
+
+
+@pytest.mark.parametrize("topic", [*PUBLISHED.values(), *READ.values()], ids=lambda each: each.name)
+def test_type_names_are_mangled_as_ros_2_does(topic) -> None:
+    package, _, name = ros_type(topic.message).split("/")
+    assert topic_type(topic.message).__idl_typename__ == f"{package}::msg::dds_::{name}_"
+
+
+def test_messages_are_values() -> None:
+    first, second = OccupancyGrid(data=b"\x01"), OccupancyGrid(data=b"\x01")
+    assert first == second
+    assert hash(first) == hash(second)
+    assert all(field.default is not None for field in fields(OccupancyGrid))
+    with pytest.raises(AttributeError):
+        first.data = b""  # type: ignore[misc]
+
+
+def test_a_value_of_the_wrong_type_is_refused() -> None:
+    with pytest.raises(NavError, match="nav2_msgs/msg/SpeedLimit cannot be encoded"):
+        encode(SpeedLimit(speed_limit="fast"))  # type: ignore[arg-type]

@@ -1,0 +1,72 @@
+from __future__ import annotations
+
+import importlib.util
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import pytest
+
+pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
+
+from ros2_scenes import ROOT, everything, plain, typestore
+
+from nav_adapter import NavError
+from nav_adapter.ros2 import decode, encode
+from nav_adapter.ros2._ros_values import from_ros, ros_class, to_ros
+from nav_adapter.ros2.messages import ros_type
+from nav_adapter.ros2.messages.nav2_msgs import CircleObject
+from nav_adapter.ros2.messages.nav_msgs import Odometry
+from nav_adapter.ros2.node import AwarenessNode
+
+STORE = typestore()
+MESSAGES = [*everything(), ("odom", Odometry())]
+no_ros = pytest.mark.skipif(
+    importlib.util.find_spec("rclpy") is not None, reason="ROS is installed here"
+)
+
+
+@pytest.mark.parametrize(("key", "message"), MESSAGES, ids=lambda value: str(value)[:12])
+def test_a_message_of_another_library_becomes_ours(key: str, message) -> None:
+    # rosbags' messages have attributes and arrays like those of rclpy.
+    cdr = encode(message)
+    theirs = STORE.deserialize_cdr(cdr, ros_type(type(message)))
+    assert from_ros(type(message), theirs) == decode(type(message), cdr)
+
+
+@pytest.mark.parametrize(("key", "message"), MESSAGES, ids=lambda value: str(value)[:12])
+def test_ours_and_back_is_the_same(key: str, message) -> None:
+    made = to_ros(message, lambda kind: SimpleNamespace)
+    assert from_ros(type(message), made) == message
+
+
+def test_ros_gets_the_kinds_of_sequences_that_it_takes() -> None:
+    messages = dict(everything())
+    grid = to_ros(messages["grid"], lambda kind: SimpleNamespace)
+    assert grid.data.typecode == "b"
+    assert list(grid.data.tobytes()) == plain(messages["grid"])["data"]
+    circle = to_ros(messages["circles"], lambda kind: SimpleNamespace)
+    assert circle.uuid.uuid == list(messages["circles"].uuid.uuid)
+    assert isinstance(to_ros(messages["people"], lambda kind: SimpleNamespace).people, list)
+
+
+@no_ros
+def test_without_ros_it_imports_and_says_what_is_missing() -> None:
+    with pytest.raises(NavError, match="needs rclpy"):
+        AwarenessNode()
+    with pytest.raises(ImportError):
+        ros_class(CircleObject)
+
+
+@no_ros
+def test_as_a_program_it_says_so_in_a_line() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "nav_adapter.ros2.node"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert done.stderr.startswith("awarenav node: the node needs rclpy")
+    assert "Traceback" not in done.stderr
