@@ -26,7 +26,7 @@ _CASES = 4
 
 
 def main() -> int:
-    """Run the comparison; 0 when every planner obeyed and touched nobody, 1 when not, 2 when none is there."""
+    """Run the comparison; 0: every planner obeyed and touched nobody, 1: not so, 2: none there."""
     parser = argparse.ArgumentParser(
         prog="python -m examples.planners",
         description="Cross a warehouse in PyBullet with the reference planner and with planners "
