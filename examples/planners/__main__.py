@@ -26,7 +26,7 @@ _CASES = 4
 
 
 def main() -> int:
-    """Run the comparison; 0 when every planner obeyed and touched nobody, else 1."""
+    """Run the comparison; 0: every planner obeyed and touched nobody, 1: not so, 2: none there."""
     parser = argparse.ArgumentParser(
         prog="python -m examples.planners",
         description="Cross a warehouse in PyBullet with the reference planner and with planners "
@@ -59,6 +59,8 @@ def main() -> int:
             print(f"left out, {name} is not installed: pip install {name}", file=sys.stderr)
         else:
             chosen.append(name)
+    if not chosen:
+        return 2
     with tqdm(total=_CASES * len(chosen), unit="crossing", file=sys.stderr, leave=False) as bar:
         for name in chosen:
             bar.set_description(name)

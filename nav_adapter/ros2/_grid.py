@@ -9,7 +9,7 @@ import numpy as np
 from perception.arrays import finite_array, finite_number
 
 from .._constraints import NavConstraints
-from .._costmap import paint_costmap
+from ..exporters import paint_costmap
 from .._errors import NavError
 from ._stamps import header, to_time
 from .messages.geometry_msgs import Point, Pose

@@ -11,7 +11,7 @@ import numpy as np
 from tracking import PersonTrack
 
 from .._constraints import NavConstraints, PersonObstacle
-from .._exporters import boxes
+from ..exporters import boxes
 from ._stamps import header, yaw_quaternion
 from .messages.costmap_converter_msgs import ObstacleArrayMsg, ObstacleMsg
 from .messages.geometry_msgs import (
