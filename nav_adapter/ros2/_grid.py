@@ -9,8 +9,8 @@ import numpy as np
 from perception.arrays import finite_array, finite_number
 
 from .._constraints import NavConstraints
-from ..exporters import paint_costmap
 from .._errors import NavError
+from ..exporters import paint_costmap
 from ._stamps import header, to_time
 from .messages.geometry_msgs import Point, Pose
 from .messages.nav_msgs import MapMetaData, OccupancyGrid
