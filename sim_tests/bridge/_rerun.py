@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Final
 
 import numpy as np
@@ -12,6 +11,7 @@ from nav_adapter import NavConstraints
 from nav_adapter.ros2 import AwarenessBridge
 from perception.arrays import FloatArray
 
+from .._closing import Closing
 from .._errors import SimError
 from ..estimates._keypoint_tap import KeypointTap
 
@@ -30,7 +30,7 @@ _RIM: Final = np.linspace(0.0, 2.0 * np.pi, 25)
 _EYES_M: Final = 1.6
 
 
-class RerunRecorder:
+class RerunRecorder(Closing):
     """Writes image, keypoints, cones, tracks, radii and speed limit to an ``.rrd`` file.
 
     Args:
@@ -70,17 +70,6 @@ class RerunRecorder:
     def close(self) -> None:
         """Write what is left and close the file."""
         self._stream.disconnect()
-
-    def __enter__(self) -> RerunRecorder:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _draw_frame(self, bridge: AwarenessBridge) -> None:
         picture, T = bridge.last_picture, bridge.last_T_odom_camera

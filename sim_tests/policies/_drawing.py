@@ -17,10 +17,9 @@ from nav_adapter.settled import (
 from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
 
-from .._errors import MissingSimulatorError, SimError
+from .._errors import MissingSimulatorError
 
 try:
-    from matplotlib import rc_context
     from matplotlib.axes import Axes
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.collections import QuadMesh
@@ -63,30 +62,6 @@ def policy_figure(
         bar.ax.set_ylim(0.0, robot.max_speed_mps)
         axes[0].set_title(Path(name).name, loc="left", fontweight="bold")
     return figure
-
-
-def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure whole or not at all; the ending says the format.
-
-    Raises:
-        SimError: for a place that cannot be written.
-    """
-    part = path.with_name(path.name + ".part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        # Dates of the day and random names inside the file would make two runs differ.
-        date = {".svg": "Date", ".pdf": "CreationDate"}.get(path.suffix.lower())
-        with rc_context({"svg.hashsalt": "awarenav"}):
-            figure.savefig(
-                part,
-                format=path.suffix[1:].lower(),
-                metadata=None if date is None else {date: None},
-            )
-        part.replace(path)
-    except OSError as cause:
-        raise SimError(f"cannot write {path}: {cause.strerror or cause}") from cause
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def _draw_radius(axes: Axes, policy: AwarenessPolicy, largest_m: float) -> None:

@@ -46,7 +46,8 @@ def show_command(options: argparse.Namespace) -> int:
         if out.resolve() in {Path(name).resolve() for name in options.policies}:
             raise SimError(f"--out {out} would replace a policy")
         # Tables need no matplotlib; a drawing says at once that it is missing.
-        from ._drawing import policy_figure, save_figure  # noqa: PLC0415
+        from .._figure_file import save_figure  # noqa: PLC0415
+        from ._drawing import policy_figure  # noqa: PLC0415
 
         save_figure(policy_figure(policies, robot, farthest_m), out)
     for name, policy in policies:
