@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any
 
@@ -36,7 +37,7 @@ class StoneSoupSettings:
     max_unseen_s: float = MAX_UNSEEN_S
 
 
-class StoneSoup:
+class StoneSoup(ABC):
     """A Stone Soup multi-target tracker on precomputed sets of detections."""
 
     name = "stonesoup"
@@ -116,10 +117,11 @@ class StoneSoup:
         )
         self._ids: dict[str, int] = {}
 
+    @abstractmethod
     def _tracker(
         self, parts: dict[str, Any], nearest: Any, predictor: Any, recording: Recording
     ) -> Any:
-        raise NotImplementedError
+        """Return the tracker made of these parts."""
 
     def advance(self, frame: int) -> Any:
         """Take the next frame."""
