@@ -1,0 +1,1 @@
+"""Many crossings: in parallel, under faults, resumable, the same on any number of workers."""
