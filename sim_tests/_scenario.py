@@ -15,6 +15,7 @@ from tracking.config import StrictConfig
 
 from ._errors import SimError
 from .hall._layout import LAYOUTS, WarehouseLayout
+from .people._person_spec import PersonSpec
 from .people._script import WorkerScript
 from .pictures._camera_timing import CameraTiming
 from .pictures._sensor import SensorConfig
@@ -97,8 +98,11 @@ class Scenario(StrictConfig):
         layout: the hall, a name of :data:`LAYOUTS` or a mapping of :class:`WarehouseLayout`.
         robot: the robot's task.
         camera: the robot's camera.
-        workers: what each worker does.
-        start_jitter_s: each worker starts up to this much earlier or later, drawn from the seed.
+        workers: what each scripted worker does.
+        people: those who look, react and walk by themselves; every name once.
+        replay_csv: table of recorded people to replay, see :func:`read_recordings`.
+        start_jitter_s: each worker and each person starts up to this much earlier or later, drawn
+            from the seed.
     """
 
     error: ClassVar[type[ValueError]] = SimError
@@ -111,7 +115,17 @@ class Scenario(StrictConfig):
     robot: RobotTask
     camera: CameraSpec = CameraSpec()
     workers: tuple[WorkerScript, ...] = ()
+    people: tuple[PersonSpec, ...] = ()
+    replay_csv: str | None = None
     start_jitter_s: float = Field(default=0.0, ge=0.0)
+
+    @model_validator(mode="after")
+    def _names_once(self) -> Scenario:
+        names = [person.name for person in self.people]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise ValueError(f"names of people must be unique, got {', '.join(twice)} twice")
+        return self
 
     @classmethod
     def shipped(cls, name: str) -> Scenario:
@@ -128,7 +142,8 @@ class Scenario(StrictConfig):
 
     def without_people(self) -> Scenario:
         """The same task in an empty hall: what the robot could do if nobody were there."""
-        return self.model_copy(update={"name": f"{self.name}_without_people", "workers": ()})
+        nobody = {"workers": (), "people": (), "replay_csv": None}
+        return self.model_copy(update={"name": f"{self.name}_without_people", **nobody})
 
 
 def shipped_scenarios() -> tuple[str, ...]:
