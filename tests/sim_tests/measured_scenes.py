@@ -112,7 +112,7 @@ def crossing(
         "contact": bool(by),
         "contact_by": blamed,
         "contacts": tuple(contacts),
-        "min_separation_m": min((min(f.separations_m, default=math.inf) for f in frames)),
+        "min_separation_m": min(min(f.separations_m, default=math.inf) for f in frames),
         "time_to_goal_s": frames[-1].t_s if reached else None,
         "max_speed_within_2m_mps": 0.0,
         "min_margin_m": math.inf,

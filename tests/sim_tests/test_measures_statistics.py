@@ -26,7 +26,7 @@ from sim_tests.measures._statistics import (
 
 
 def coverage(draw, truth, strata=None, runs=300):
-    """Share of 95 % intervals that hold the truth; its standard error is 1.3 % at 300 runs."""
+    """Share of 95 % intervals that hold the truth; its standard error is 1.3 % of 300 runs."""
     rng = np.random.default_rng(11)
     hits = 0
     for _ in range(runs):
@@ -37,7 +37,7 @@ def coverage(draw, truth, strata=None, runs=300):
 
 def test_intervals_of_means_cover_normal_and_skewed_values():
     assert coverage(lambda rng: rng.normal(2.0, 3.0, 30), 2.0) > 0.90
-    assert coverage(lambda rng: rng.exponential(1.0, 40), 1.0) > 0.89
+    assert coverage(lambda rng: rng.exponential(1.0, 40), 1.0, runs=1000) > 0.89
 
 
 def test_two_seeds_a_scenario_suffice_for_an_honest_interval():
