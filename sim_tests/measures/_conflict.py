@@ -88,8 +88,9 @@ class _Paths:
 
     def around(self, t_s: float) -> FloatArray:
         """Instants about one."""
-        fine: FloatArray = t_s + np.linspace(-1.0, 1.0, _FINER) / _COMPARED_HZ
-        return fine[(fine >= self._t_s[0]) & (fine <= self._t_s[-1])]
+        fine = t_s + np.linspace(-1.0, 1.0, _FINER) / _COMPARED_HZ
+        there: FloatArray = fine[(fine >= self._t_s[0]) & (fine <= self._t_s[-1])]
+        return there
 
     def overlaps(
         self, robot_s: FloatArray, person_s: FloatArray, less_than_s: float
