@@ -18,7 +18,6 @@ from .policies import AlertRules
 _STANDING_MPS: Final = 0.05
 # Two people who do not move against each other have no closest approach.
 _SAME_VELOCITY_MPS: Final = 1e-3
-_LOUDEST_FIRST: Final[tuple[AlertKind, ...]] = ("horn", "voice", "light")
 _SOUNDS: Final[frozenset[AlertKind]] = frozenset(("horn", "voice"))
 
 
@@ -63,8 +62,8 @@ def alerts_due(
             time_s, gap_m = _closest_approach(
                 memory, place, velocity, age_s, reach_m + sigmas * memory.sigma_m
             )
-            kind = _kind(rules, time_s)
-            if gap_m <= rules.miss_within_m and kind is not None:
+            kind = _kind(rules, time_s) if gap_m <= rules.miss_within_m else None
+            if kind is not None:
                 reason = (
                     f"track {track_id}: unaware (lower bound {memory.awareness_lower:.2f}), "
                     f"closest approach of {gap_m:.1f} m in {time_s:.1f} s"
@@ -88,12 +87,12 @@ def alerts_due(
 
 
 def _kind(rules: AlertRules, time_s: float) -> AlertKind | None:
-    within_s = {
-        "horn": rules.horn_within_s,
-        "voice": rules.voice_within_s,
-        "light": rules.light_within_s,
-    }
-    return next((kind for kind in _LOUDEST_FIRST if time_s < within_s[kind]), None)
+    """The loudest alert whose time is reached."""
+    if time_s < rules.horn_within_s:
+        return "horn"
+    if time_s < rules.voice_within_s:
+        return "voice"
+    return "light" if time_s < rules.light_within_s else None
 
 
 def _closest_approach(

@@ -41,6 +41,7 @@ class Crowd:
 
     def __init__(self, policy: AwarenessPolicy) -> None:
         self._policy = policy
+        self._timing = policy.timing
         inflation, speed, margins = policy.inflation, policy.speed, policy.margins
         self._floor_m, self._sigmas = margins.floor_m, margins.uncertainty_sigmas
         ceiling_m = margins.maximum_radius_m
@@ -64,7 +65,7 @@ class Crowd:
             track.id: self._remember(track, people.get(track.id), now, stale) for track in tracks
         }
         for track_id, memory in people.items():
-            if track_id not in known and memory.is_held(now, self._policy.timing.hold_s):
+            if track_id not in known and memory.is_held(now, self._timing.hold_s):
                 # Vanished from the input: walking on and unaware.
                 known[track_id] = self._updated(memory.track, memory, 0.0, now, paid_s=0.0)
         return dict(sorted(known.items()))
@@ -92,7 +93,7 @@ class Crowd:
         self, track: PersonTrack, before: PersonMemory | None, now: float, stale: bool
     ) -> PersonMemory:
         """The person of a track that is in the input."""
-        timing = self._policy.timing
+        timing = self._timing
         seen_stamp_s = track.stamp_s - track.time_since_seen_s
         trusted = (
             not stale
@@ -145,7 +146,7 @@ class Crowd:
         seen_stamp_s: float = -math.inf,
     ) -> PersonMemory:
         """A person known before, now with this bound of α."""
-        timing = self._policy.timing
+        timing = self._timing
         sigma_m = self._sigma_m(track, now)
         held = self._inflation_holds(lower, before.inflation_held)
         place, here, velocity = motion_at(track, now)
@@ -185,7 +186,7 @@ class Crowd:
 
     def _sigma_m(self, track: PersonTrack, now: float) -> float:
         # Once the robot stands for want of data, doubt that grew on would only block its restart.
-        return position_sigma_m(track, min(now, track.stamp_s + self._policy.timing.stop_after_s))
+        return position_sigma_m(track, min(now, track.stamp_s + self._timing.stop_after_s))
 
     def _bounded_m(self, radius_m: float) -> float:
         return min(max(radius_m, self._floor_m), self._ceiling_m)

@@ -151,7 +151,7 @@ class SpeedGovernor:
             self._policy.margins.separation_clearance_m,
             shares,
         )
-        return np.maximum(limits_mps[0], limits_mps[1])
+        return np.asarray(np.maximum(limits_mps[0], limits_mps[1]))
 
     def _rule_limits_mps(self, gaps_m: FloatArray, approach: FloatArray) -> list[FloatArray]:
         """The limits of the rules that the policy has."""

@@ -78,12 +78,14 @@ def motion_at(track: PersonTrack, stamp_s: float) -> tuple[Pair, Pair, Pair]:
 def position_sigma_m(track: PersonTrack, stamp_s: float) -> float:
     """Standard deviation at ``stamp_s`` of the position along its most uncertain direction.
 
-    The root of the larger eigenvalue of the position covariance, carried on with the velocity
-    covariance: F P Fᵀ of a constant velocity.
+    The root of the larger eigenvalue of the position covariance, carried on with the
+    velocity (u, v) covariance: F P Fᵀ of a constant velocity.
     """
     dt = max(stamp_s - track.stamp_s, 0.0)
-    P = track.covariance_odom.tolist()
-    xx = P[0][0] + dt * (P[0][2] + P[2][0]) + dt * dt * P[2][2]
-    yy = P[1][1] + dt * (P[1][3] + P[3][1]) + dt * dt * P[3][3]
-    xy = P[0][1] + dt * (P[0][3] + P[2][1]) + dt * dt * P[2][3]
+    (x_x, x_y, x_u, x_v), (_, y_y, _, y_v), (u_x, u_y, u_u, u_v), (_, v_y, _, v_v) = (
+        track.covariance_odom.tolist()
+    )
+    xx = x_x + dt * (x_u + u_x) + dt * dt * u_u
+    yy = y_y + dt * (y_v + v_y) + dt * dt * v_v
+    xy = x_y + dt * (x_v + u_y) + dt * dt * u_v
     return math.sqrt(max(0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy), 0.0))
