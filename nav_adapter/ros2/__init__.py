@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from ._alerts import alerts
 from ._bridge import AwarenessBridge
 from ._grid import occupancy_grid
 from ._markers import markers
@@ -39,6 +40,7 @@ __all__ = [
     "RobotFile",
     "Topic",
     "TransformBuffer",
+    "alerts",
     "circle_objects",
     "collision_polygons",
     "decode",

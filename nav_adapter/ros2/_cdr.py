@@ -12,6 +12,7 @@ try:
     from cyclonedds.idl._main import IdlMeta
     from cyclonedds.idl.types import (
         array,
+        byte,
         float32,
         float64,
         int8,
@@ -34,6 +35,7 @@ _HEADER_BYTES: Final = 4
 _IDL_TYPES: Final[dict[tuple[str, bool], Any]] = {}
 _PRIMITIVES: Final[dict[str, Any]] = {
     "bool": bool,
+    "byte": byte,
     "int8": int8,
     "uint8": uint8,
     "int32": int32,

@@ -9,6 +9,7 @@ from tracking import PersonTrack
 
 from .._constraints import NavConstraints
 from .._robot import RobotProfile, RobotState
+from ._alerts import alerts
 from ._grid import occupancy_grid
 from ._markers import markers
 from ._people import circle_objects, detections, people, teb_obstacles
@@ -51,6 +52,7 @@ def outgoing(
         constraints, robot, robot_state, odom_frame=frames.odom, base_frame=frames.base
     ):
         yield "collision_polygons", polygon
+    yield "alerts", alerts(constraints)
     speed_mps = 0.0 if robot_state is None else robot_state.speed_mps
     yield (
         "stop_zone",
