@@ -24,8 +24,7 @@ from .._errors import NavError
 from .._policy import AwarenessPolicy
 from .._robot import RobotProfile, RobotState
 from ._outgoing import Frames, outgoing
-from ._pictures import camera as camera_of
-from ._pictures import picture
+from ._pictures import camera_of, picture_of
 from ._stamps import pose_matrix, to_seconds
 from ._transforms import TransformBuffer
 from .messages import Message
@@ -170,7 +169,7 @@ class AwarenessBridge:
                 )
             frame = self.frames.camera or message.header.frame_id
             T_odom_camera = self._camera_pose(frame, stamp_s)
-            image = picture(message)
+            image = picture_of(message)
             observations = self._pipeline.process(image, stamp_s, floor=_floor(T_odom_camera))
             tracks = self._tracker.update(observations, stamp_s, T_odom_camera)
         except (NavError, PerceptionError, TrackingError) as problem:
