@@ -60,6 +60,7 @@ class AwarenessBridge:
         camera: calibration, if it is not to come from camera_info.
         percentage: of :func:`speed_limit`.
         warn: called with what went wrong, each text once in a row.
+        wanted: asked with the key of a topic in every tick; what nobody wants is not made.
     """
 
     def __init__(
@@ -74,12 +75,14 @@ class AwarenessBridge:
         camera: Camera | None = None,
         percentage: bool = False,
         warn: Callable[[str], None] = lambda text: None,
+        wanted: Callable[[str], bool] = lambda key: True,
     ) -> None:
         self.frames = frames or Frames()
         self._policy, self._robot, self._publish = policy, robot, publish
         self._T_base_camera = T_base_camera
         self._make_pipeline = make_pipeline
         self._percentage = percentage
+        self._wanted = wanted
         self._warn_user, self._warned = warn, ""
         self._camera = camera
         self._pipeline = make_pipeline(camera) if camera is not None else None
@@ -197,6 +200,7 @@ class AwarenessBridge:
             self._state,
             self.frames,
             percentage=self._percentage,
+            wanted=self._wanted,
         ):
             self._publish(key, message)
         return constraints
