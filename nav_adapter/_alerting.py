@@ -10,7 +10,7 @@ from typing import Final
 from perception.anthropometry import BODY_RADIUS_M
 
 from ._alert import Alert, AlertKind
-from ._memory import PersonMemory, position_at
+from ._memory import Pair, PersonMemory
 from ._robot import RobotProfile, RobotState
 from .policies import AlertRules
 
@@ -18,7 +18,6 @@ from .policies import AlertRules
 _STANDING_MPS: Final = 0.05
 # Two people who do not move against each other have no closest approach.
 _SAME_VELOCITY_MPS: Final = 1e-3
-_LOUDEST_FIRST: Final[tuple[AlertKind, ...]] = ("horn", "voice", "light")
 _SOUNDS: Final[frozenset[AlertKind]] = frozenset(("horn", "voice"))
 
 
@@ -52,12 +51,19 @@ def alerts_due(
     """
     due = []
     if abs(robot_state.speed_mps) > _STANDING_MPS:
+        # Straight on from where the robot was ``age_s`` ago.
+        heading, age_s = robot_state.heading_odom_rad, now - robot_state.stamp_s
+        speed_mps, place = robot_state.speed_mps, robot_state.position_odom_m.tolist()
+        velocity = speed_mps * math.cos(heading), speed_mps * math.sin(heading)
+        reach_m = robot.circumscribed_radius_m + BODY_RADIUS_M
         for track_id, memory in people.items():
             if memory.track.status == "tentative" or memory.awareness_lower >= rules.unaware_below:
                 continue
-            time_s, gap_m = _closest_approach(robot, memory, robot_state, now, sigmas)
-            kind = _kind(rules, time_s)
-            if gap_m <= rules.miss_within_m and kind is not None:
+            time_s, gap_m = _closest_approach(
+                memory, place, velocity, age_s, reach_m + sigmas * memory.sigma_m
+            )
+            kind = _kind(rules, time_s) if gap_m <= rules.miss_within_m else None
+            if kind is not None:
                 reason = (
                     f"track {track_id}: unaware (lower bound {memory.awareness_lower:.2f}), "
                     f"closest approach of {gap_m:.1f} m in {time_s:.1f} s"
@@ -81,28 +87,24 @@ def alerts_due(
 
 
 def _kind(rules: AlertRules, time_s: float) -> AlertKind | None:
-    within_s = {
-        "horn": rules.horn_within_s,
-        "voice": rules.voice_within_s,
-        "light": rules.light_within_s,
-    }
-    return next((kind for kind in _LOUDEST_FIRST if time_s < within_s[kind]), None)
+    """The loudest alert whose time is reached."""
+    if time_s < rules.horn_within_s:
+        return "horn"
+    if time_s < rules.voice_within_s:
+        return "voice"
+    return "light" if time_s < rules.light_within_s else None
 
 
 def _closest_approach(
-    robot: RobotProfile, memory: PersonMemory, state: RobotState, now: float, sigmas: float
+    memory: PersonMemory, place: Pair, velocity: Pair, age_s: float, reach_m: float
 ) -> tuple[float, float]:
-    """Time (s) and gap (m) of the closest approach; an infinite time when they move apart."""
-    heading = state.heading_odom_rad
-    robot_vx = state.speed_mps * math.cos(heading)
-    robot_vy = state.speed_mps * math.sin(heading)
-    age_s = now - state.stamp_s
-    robot_x, robot_y = state.position_odom_m.tolist()
-    x, y = position_at(memory.track, now)
-    x, y = x - robot_x - age_s * robot_vx, y - robot_y - age_s * robot_vy
-    vx, vy = memory.track.velocity_odom_mps.tolist()
-    vx, vy = vx - robot_vx, vy - robot_vy
-    reach_m = robot.circumscribed_radius_m + BODY_RADIUS_M + sigmas * memory.sigma_m
+    """Time (s) and gap (m) of the closest approach; an infinite time when they move apart.
+
+    The robot was at ``place`` ``age_s`` ago.
+    """
+    (x, y), (vx, vy) = memory.here_odom_m, memory.velocity_odom_mps
+    x, y = x - place[0] - age_s * velocity[0], y - place[1] - age_s * velocity[1]
+    vx, vy = vx - velocity[0], vy - velocity[1]
     speed2 = vx * vx + vy * vy
     closing = -(x * vx + y * vy)
     if speed2 < _SAME_VELOCITY_MPS**2 or closing <= 0.0:

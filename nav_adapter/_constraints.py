@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any, cast
 
 from shapely.geometry import Polygon
 
@@ -54,6 +55,36 @@ class PersonObstacle:
                 "awareness_lower", self.awareness_lower, NavError, minimum=0.0, maximum=1.0
             ),
         )
+
+
+_SET_ID, _SET_CENTER, _SET_VELOCITY, _SET_RADIUS, _SET_HEIGHT, _SET_LOWER, _SET_POLYGON = (
+    cast(Any, getattr(PersonObstacle, field.name)).__set__ for field in fields(PersonObstacle)
+)
+
+
+def trusted_obstacle(
+    track_id: int,
+    center_odom_m: FloatArray,
+    velocity_odom_mps: FloatArray,
+    radius_m: float,
+    height_m: float,
+    awareness_lower: float,
+    polygon: Polygon,
+) -> PersonObstacle:
+    """Make an obstacle of values known to be sound, without checking them.
+
+    The adapter's own numbers are; arrays must be read-only. A fifth of the time of the constructor,
+    which is for everybody else.
+    """
+    obstacle = object.__new__(PersonObstacle)
+    _SET_ID(obstacle, track_id)
+    _SET_CENTER(obstacle, center_odom_m)
+    _SET_VELOCITY(obstacle, velocity_odom_mps)
+    _SET_RADIUS(obstacle, radius_m)
+    _SET_HEIGHT(obstacle, height_m)
+    _SET_LOWER(obstacle, awareness_lower)
+    _SET_POLYGON(obstacle, polygon)
+    return obstacle
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,7 +12,7 @@ from perception.arrays import finite_number
 from tracking import PersonTrack
 
 from ._errors import NavError
-from ._memory import PersonMemory, position_sigma_m
+from ._memory import Pair, PersonMemory, motion_at, position_sigma_m
 from ._policy import AwarenessPolicy
 
 # Slower than this, the direction of a velocity is noise.
@@ -41,6 +41,7 @@ class Crowd:
 
     def __init__(self, policy: AwarenessPolicy) -> None:
         self._policy = policy
+        self._timing = policy.timing
         inflation, speed, margins = policy.inflation, policy.speed, policy.margins
         self._floor_m, self._sigmas = margins.floor_m, margins.uncertainty_sigmas
         ceiling_m = margins.maximum_radius_m
@@ -64,7 +65,7 @@ class Crowd:
             track.id: self._remember(track, people.get(track.id), now, stale) for track in tracks
         }
         for track_id, memory in people.items():
-            if track_id not in known and memory.is_held(now, self._policy.timing.hold_s):
+            if track_id not in known and memory.is_held(now, self._timing.hold_s):
                 # Vanished from the input: walking on and unaware.
                 known[track_id] = self._updated(memory.track, memory, 0.0, now, paid_s=0.0)
         return dict(sorted(known.items()))
@@ -73,7 +74,7 @@ class Crowd:
         """The same people after a silence: unaware, and no smaller than at first sight."""
         doubted = {}
         for track_id, memory in people.items():
-            radius_m, ahead_m = self._target_m(memory.track, 0.0, memory.sigma_m)
+            radius_m, ahead_m = self._target_m(memory.velocity_odom_mps, 0.0, memory.sigma_m)
             doubted[track_id] = memory._replace(
                 awareness_lower=0.0,
                 radius_m=max(memory.radius_m, radius_m),
@@ -92,7 +93,7 @@ class Crowd:
         self, track: PersonTrack, before: PersonMemory | None, now: float, stale: bool
     ) -> PersonMemory:
         """The person of a track that is in the input."""
-        timing = self._policy.timing
+        timing = self._timing
         seen_stamp_s = track.stamp_s - track.time_since_seen_s
         trusted = (
             not stale
@@ -115,16 +116,20 @@ class Crowd:
     ) -> PersonMemory:
         """Nobody is known to be aware at first sight: the first obstacle is the unaware one."""
         sigma_m = self._sigma_m(track, now)
-        radius_m, ahead_m = self._target_m(track, 0.0, sigma_m)
+        place, here, velocity = motion_at(track, now)
+        radius_m, ahead_m = self._target_m(velocity, 0.0, sigma_m)
         return PersonMemory(
             track=track,
+            place_odom_m=place,
+            here_odom_m=here,
+            velocity_odom_mps=velocity,
             seen_stamp_s=seen_stamp_s,
             awareness_lower=lower,
             radius_m=radius_m,
             sigma_m=sigma_m,
             paid_s=0.0,
             ahead_m=ahead_m,
-            facing_odom=_facing(track, (1.0, 0.0)),
+            facing_odom=_facing(velocity, (1.0, 0.0)),
             allowed=((0.0, radius_m, ahead_m),),
             inflation_held=self._inflation_holds(lower, False),
             speed_held=self._speed_holds(lower, False),
@@ -141,10 +146,11 @@ class Crowd:
         seen_stamp_s: float = -math.inf,
     ) -> PersonMemory:
         """A person known before, now with this bound of α."""
-        timing = self._policy.timing
+        timing = self._timing
         sigma_m = self._sigma_m(track, now)
         held = self._inflation_holds(lower, before.inflation_held)
-        target = self._target_m(track, 1.0 if held else lower, sigma_m)
+        place, here, velocity = motion_at(track, now)
+        target = self._target_m(velocity, 1.0 if held else lower, sigma_m)
         clock_s = before.paid_s + paid_s
         allowed = _with_allowed(before.allowed, (clock_s, *target), timing.shrink_after_s)
         shrink_m = timing.shrink_rate_mps * paid_s
@@ -154,45 +160,55 @@ class Crowd:
             ahead_m = max(entry[2] for entry in allowed)
         return PersonMemory(
             track=track,
+            place_odom_m=place,
+            here_odom_m=here,
+            velocity_odom_mps=velocity,
             seen_stamp_s=max(before.seen_stamp_s, seen_stamp_s),
             awareness_lower=lower,
             radius_m=max(radius_m, before.radius_m - shrink_m),
             sigma_m=sigma_m,
             paid_s=clock_s,
             ahead_m=max(ahead_m, before.ahead_m - shrink_m),
-            facing_odom=_facing(track, before.facing_odom),
+            facing_odom=_facing(velocity, before.facing_odom),
             allowed=allowed,
             inflation_held=held,
             speed_held=self._speed_holds(lower, before.speed_held),
         )
 
-    def _target_m(
-        self, track: PersonTrack, awareness: float, sigma_m: float
-    ) -> tuple[float, float]:
+    def _target_m(self, velocity: Pair, awareness: float, sigma_m: float) -> Pair:
         """Radius and elongation that this awareness allows."""
         radius_m = self._bounded_m(self._policy_radius_m(awareness) + self._sigmas * sigma_m)
         if not self._elongates:
             return radius_m, 0.0
         outline = self._policy.outline
-        walking_mps = math.hypot(*track.velocity_odom_mps.tolist())
+        walking_mps = math.hypot(*velocity)
         return radius_m, min(outline.ahead_s(awareness) * walking_mps, outline.longest_ahead_m)
 
     def _sigma_m(self, track: PersonTrack, now: float) -> float:
         # Once the robot stands for want of data, doubt that grew on would only block its restart.
-        return position_sigma_m(track, min(now, track.stamp_s + self._policy.timing.stop_after_s))
+        return position_sigma_m(track, min(now, track.stamp_s + self._timing.stop_after_s))
 
     def _bounded_m(self, radius_m: float) -> float:
         return min(max(radius_m, self._floor_m), self._ceiling_m)
 
     def _policy_radius_m(self, awareness_lower: float) -> float:
         radius_m = self._policy.inflation.radius_m(awareness_lower)
-        name = f"{type(self._policy.inflation).__name__}.radius_m({awareness_lower:g})"
-        return self._bounded_m(finite_number(name, radius_m, NavError))
+        if not _is_plain(radius_m):
+            name = f"{type(self._policy.inflation).__name__}.radius_m({awareness_lower:g})"
+            radius_m = finite_number(name, radius_m, NavError)
+        return self._bounded_m(radius_m)
 
     def _policy_human_speed_mps(self, awareness_lower: float) -> float:
         speed_mps = self._policy.speed.human_speed_mps(awareness_lower)
+        if _is_plain(speed_mps) and speed_mps >= 0.0:
+            return speed_mps
         name = f"{type(self._policy.speed).__name__}.human_speed_mps({awareness_lower:g})"
         return finite_number(name, speed_mps, NavError, minimum=0.0)
+
+
+def _is_plain(value: float) -> bool:
+    """A finite float, which needs no closer look; an own policy may give anything."""
+    return type(value) is float and math.isfinite(value)
 
 
 def _with_allowed(
@@ -204,6 +220,8 @@ def _with_allowed(
     absence proves nothing about the time between.
     """
     clock_s, radius_m, ahead_m = newest
+    if len(before) == 1 and radius_m >= before[0][1] and ahead_m >= before[0][2]:
+        return (newest,)
     held = (*before[:-1], (clock_s, *before[-1][1:]))
     kept = (
         entry
@@ -214,8 +232,8 @@ def _with_allowed(
     return (*kept, newest)
 
 
-def _facing(track: PersonTrack, before: tuple[float, float]) -> tuple[float, float]:
-    vx, vy = track.velocity_odom_mps.tolist()
+def _facing(velocity: Pair, before: Pair) -> Pair:
+    vx, vy = velocity
     speed_mps = math.hypot(vx, vy)
     return (vx / speed_mps, vy / speed_mps) if speed_mps > _WALKING_MPS else before
 

@@ -32,21 +32,24 @@ class Footprint:
         length2 = (edges**2).sum(axis=1)
         # Corners given twice, but for rounding, make an edge without a direction.
         kept = length2 > _SHORTEST_EDGE_M**2
-        self._start_x, self._start_y = ring[:-1][kept].T
-        self._edge_x, self._edge_y = edges[kept].T
-        self._edge_length2 = length2[kept]
+        # (M, 1): the edges run down, the points along, so that minima are taken row by row.
+        self._start_x, self._start_y = ring[:-1][kept].T[:, :, None].copy()
+        self._edge_x, self._edge_y = edges[kept].T[:, :, None].copy()
+        self._edge_length2 = length2[kept][:, None].copy()
 
     def distance_m(self, points_odom_m: FloatArray, robot_state: RobotState) -> FloatArray:
         """(N,) distance of (N, 2) points from the footprint at the robot's pose; 0 inside."""
         offset_x, offset_y = (points_odom_m - robot_state.position_odom_m).T
         cos, sin = math.cos(robot_state.heading_odom_rad), math.sin(robot_state.heading_odom_rad)
-        # (N, M): from every corner to every point, in the base frame.
-        to_x = (cos * offset_x + sin * offset_y)[:, None] - self._start_x
-        to_y = (cos * offset_y - sin * offset_x)[:, None] - self._start_y
+        # (M, N): from every corner to every point, in the base frame.
+        to_x = (cos * offset_x + sin * offset_y) - self._start_x
+        to_y = (cos * offset_y - sin * offset_x) - self._start_y
         along = (to_x * self._edge_x + to_y * self._edge_y) / self._edge_length2
-        along = np.minimum(np.maximum(along, 0.0), 1.0)
-        gap2 = (to_x - along * self._edge_x) ** 2 + (to_y - along * self._edge_y) ** 2
+        np.maximum(along, 0.0, out=along)
+        np.minimum(along, 1.0, out=along)
+        gap2 = np.square(to_x - along * self._edge_x)
+        gap2 += np.square(to_y - along * self._edge_y)
+        distance: FloatArray = np.sqrt(gap2.min(axis=0))
         # The hull runs counter-clockwise: inside is to the left of every edge.
-        inside = (self._edge_x * to_y >= self._edge_y * to_x).all(axis=1)
-        distance: FloatArray = np.where(inside, 0.0, np.sqrt(gap2.min(axis=1)))
+        distance[(self._edge_x * to_y >= self._edge_y * to_x).all(axis=0)] = 0.0
         return distance

@@ -14,10 +14,10 @@ from perception.arrays import FloatArray
 
 from ._crowd import Crowd
 from ._footprint import Footprint
-from ._memory import PersonMemory, position_at
+from ._memory import PersonMemory
 from ._policy import AwarenessPolicy
 from ._robot import RobotProfile, RobotState
-from ._separation import max_speed_mps, protective_separation_m
+from ._separation import highest_speed_mps, protective_separation_m
 
 # A robot that stands may start off either way, or turn on the spot.
 _STANDING_MPS: Final = 0.05
@@ -76,40 +76,49 @@ class SpeedGovernor:
         maximum_mps = self._robot.max_speed_mps
         if not people:
             return SpeedLimit(maximum_mps, "robot maximum", True)
-        memories = list(people.values())
+        count = len(people)
         sigmas = self._policy.margins.uncertainty_sigmas
         lost_m = BODY_RADIUS_M + abs(robot_state.speed_mps) * robot_age_s
-        lost = np.array([lost_m + sigmas * memory.sigma_m for memory in memories])
         # Carrying a person on may only bring them nearer: they may have turned round since.
         positions = np.array(
-            [position_at(m.track, now) for m in memories]
-            + [tuple(m.track.position_odom_m.tolist()) for m in memories]
+            [m.here_odom_m for m in people.values()] + [m.place_odom_m for m in people.values()]
         )
-        ahead_m = self._footprint.distance_m(positions, robot_state)
-        ahead_m = ahead_m.reshape(2, -1).min(axis=0) - lost
+        robot_x, robot_y = robot_state.position_odom_m.tolist()
+        rows = [
+            (
+                lost_m + sigmas * m.sigma_m,
+                max(0.0, now - m.track.stamp_s),
+                self._human_speed_mps(m, robot_x, robot_y),
+            )
+            for m in people.values()
+        ]
+        lost, age_s, human_mps = np.array(rows).T.copy()
         offset = positions - robot_state.position_odom_m
-        around_m = np.hypot(offset[:, 0], offset[:, 1]).reshape(2, -1).min(axis=0)
-        around_m = around_m - self._robot.circumscribed_radius_m - lost
-        approach = self._approach(offset, robot_state, robot_age_s).reshape(2, -1).max(axis=0)
+        # Both bounds on the separation: from the footprint, and from the circle about the robot.
+        gaps_m = np.empty((2, count))
+        ahead_m = self._footprint.distance_m(positions, robot_state)
+        np.minimum(ahead_m[:count], ahead_m[count:], out=gaps_m[0])
+        around_m = np.hypot(offset[:, 0], offset[:, 1])
+        np.minimum(around_m[:count], around_m[count:], out=gaps_m[1])
+        gaps_m[1] -= self._robot.circumscribed_radius_m
+        gaps_m -= lost
+        approach = self._approach(offset, robot_state, robot_age_s)
+        shares = np.ones((2, count))
+        np.maximum(approach[:count], approach[count:], out=shares[1])
 
-        age_s = np.array([max(0.0, now - memory.track.stamp_s) for memory in memories])
-        human_mps = np.array([self._human_speed_mps(m, robot_state) for m in memories])
-        limits = np.stack(
-            [
-                self._separation_limit_mps(ahead_m, around_m, approach, human_mps, age_s),
-                *self._rule_limits_mps(ahead_m, around_m, approach),
-            ]
-        )
-        rule, person = divmod(int(limits.argmin()), len(memories))
-        limit_mps = float(limits[rule, person])
+        separation_mps = self._separation_limit_mps(gaps_m, shares, human_mps, age_s)
+        limits = [separation_mps, *self._rule_limits_mps(gaps_m, shares[1])]
+        lowest = [(float(limit[who]), who) for limit in limits for who in (int(limit.argmin()),)]
+        limit_mps, person = min(lowest, key=lambda entry: entry[0])
         speed_mps = abs(robot_state.speed_mps)
         # Who keeps to speed and separation has the whole reaction time left.
-        suffices = speed_mps <= float(limits[0].min()) or self._braking_suffices(
-            ahead_m, around_m, approach, human_mps, age_s, speed_mps
+        suffices = speed_mps <= lowest[0][0] or self._braking_suffices(
+            gaps_m, shares, human_mps, age_s, speed_mps
         )
         if limit_mps >= maximum_mps:
             return SpeedLimit(maximum_mps, "robot maximum", suffices)
         names = [name for name, used in zip(_RULES, self._rules_used(), strict=True) if used]
+        rule = lowest.index((limit_mps, person))
         return SpeedLimit(limit_mps, f"track {list(people)[person]}: {names[rule]}", suffices)
 
     def _rules_used(self) -> tuple[bool, bool, bool]:
@@ -132,28 +141,21 @@ class SpeedGovernor:
         return np.asarray(np.maximum(np.cos(beyond_rad), 0.0))
 
     def _separation_limit_mps(
-        self,
-        ahead_m: FloatArray,
-        around_m: FloatArray,
-        approach: FloatArray,
-        human_mps: FloatArray,
-        age_s: FloatArray,
+        self, gaps_m: FloatArray, shares: FloatArray, human_mps: FloatArray, age_s: FloatArray
     ) -> FloatArray:
-        limits_mps = max_speed_mps(
-            [ahead_m, around_m],
+        limits_mps = highest_speed_mps(
+            gaps_m,
             human_mps,
-            deceleration_mps2=self._robot.max_deceleration_mps2,
-            reaction_time_s=self._robot.reaction_time_s + age_s,
-            clearance_m=self._policy.margins.separation_clearance_m,
-            approach=[np.ones_like(approach), approach],
+            self._robot.max_deceleration_mps2,
+            self._robot.reaction_time_s + age_s,
+            self._policy.margins.separation_clearance_m,
+            shares,
         )
-        return np.asarray(limits_mps.max(axis=0))
+        return np.asarray(np.maximum(limits_mps[0], limits_mps[1]))
 
-    def _rule_limits_mps(
-        self, ahead_m: FloatArray, around_m: FloatArray, approach: FloatArray
-    ) -> list[FloatArray]:
+    def _rule_limits_mps(self, gaps_m: FloatArray, approach: FloatArray) -> list[FloatArray]:
         """The limits of the rules that the policy has."""
-        rules, limits = self._policy.rules, []
+        rules, limits, (ahead_m, around_m) = self._policy.rules, [], gaps_m
         if rules.zones is not None:
             # How far the robot may drive until it has come so near.
             way_m = np.divide(
@@ -167,9 +169,8 @@ class SpeedGovernor:
 
     def _braking_suffices(
         self,
-        ahead_m: FloatArray,
-        around_m: FloatArray,
-        approach: FloatArray,
+        gaps_m: FloatArray,
+        shares: FloatArray,
         human_mps: FloatArray,
         age_s: FloatArray,
         speed_mps: float,
@@ -186,11 +187,11 @@ class SpeedGovernor:
             deceleration_mps2=self._robot.max_deceleration_mps2,
             reaction_time_s=age_s,
             clearance_m=self._policy.margins.separation_clearance_m,
-            approach=[np.ones_like(approach), approach],
+            approach=shares,
         )
-        return bool((needed_m <= [ahead_m, around_m]).any(axis=0).all())
+        return bool((needed_m <= gaps_m).any(axis=0).all())
 
-    def _human_speed_mps(self, memory: PersonMemory, robot_state: RobotState) -> float:
+    def _human_speed_mps(self, memory: PersonMemory, robot_x: float, robot_y: float) -> float:
         """The policy's assumption, but at least the speed at which the track closes in.
 
         Awareness is a reason to expect that somebody will not step towards the robot, not a reason
@@ -198,8 +199,8 @@ class SpeedGovernor:
         attentive runner cannot stop as fast as an attentive walker, and an unaware one is already
         faster than the walking speed of the standard.
         """
-        vx, vy = memory.track.velocity_odom_mps.tolist()
-        x, y = (memory.track.position_odom_m - robot_state.position_odom_m).tolist()
+        (x, y), (vx, vy) = memory.place_odom_m, memory.velocity_odom_mps
+        x, y = x - robot_x, y - robot_y
         excess_mps = max(0.0, math.hypot(vx, vy) - self._crowd.unaware_human_speed_mps)
         closing_mps = -(vx * x + vy * y) / max(math.hypot(x, y), 1e-9)
         return float(max(self._crowd.human_speed_mps(memory) + excess_mps, closing_mps))

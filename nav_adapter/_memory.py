@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 from tracking import PersonTrack
 
+Pair = tuple[float, float]
+
 # Two stamps closer than this are one instant: a sighting's stamp is recomputed as a difference of
 # floats in every frame.
 _SAME_INSTANT_S = 1e-6
@@ -15,8 +17,14 @@ _SAME_INSTANT_S = 1e-6
 class PersonMemory(NamedTuple):
     """One person as of the adapter's last update.
 
+    Numbers of the track that every rule asks for are kept as floats: taking them out of their
+    arrays again and again would cost more than the rules.
+
     Attributes:
         track: the latest track given for this person.
+        place_odom_m: its position, at its own stamp.
+        here_odom_m: its position carried on to the update.
+        velocity_odom_mps: its velocity.
         seen_stamp_s: when a frame last showed the person.
         awareness_lower: the bound that was acted on.
         radius_m: the obstacle's radius.
@@ -30,13 +38,16 @@ class PersonMemory(NamedTuple):
     """
 
     track: PersonTrack
+    place_odom_m: Pair
+    here_odom_m: Pair
+    velocity_odom_mps: Pair
     seen_stamp_s: float
     awareness_lower: float
     radius_m: float
     sigma_m: float
     paid_s: float
     ahead_m: float
-    facing_odom: tuple[float, float]
+    facing_odom: Pair
     allowed: tuple[tuple[float, float, float], ...]
     inflation_held: bool
     speed_held: bool
@@ -56,23 +67,25 @@ class PersonMemory(NamedTuple):
         return self.track.status != "tentative" and stamp_s - self.seen_stamp_s <= hold_s
 
 
-def position_at(track: PersonTrack, stamp_s: float) -> tuple[float, float]:
-    """Position in odom at ``stamp_s`` on the track's present velocity, in metres."""
+def motion_at(track: PersonTrack, stamp_s: float) -> tuple[Pair, Pair, Pair]:
+    """Position (m) at the track's stamp and at ``stamp_s``, and velocity (m/s), all in odom."""
     dt = stamp_s - track.stamp_s
     x, y = track.position_odom_m.tolist()
     vx, vy = track.velocity_odom_mps.tolist()
-    return x + dt * vx, y + dt * vy
+    return (x, y), (x + dt * vx, y + dt * vy), (vx, vy)
 
 
 def position_sigma_m(track: PersonTrack, stamp_s: float) -> float:
     """Standard deviation at ``stamp_s`` of the position along its most uncertain direction.
 
-    The root of the larger eigenvalue of the position covariance, carried on with the velocity
-    covariance: F P Fᵀ of a constant velocity.
+    The root of the larger eigenvalue of the position covariance, carried on with the
+    velocity (u, v) covariance: F P Fᵀ of a constant velocity.
     """
     dt = max(stamp_s - track.stamp_s, 0.0)
-    P = track.covariance_odom.tolist()
-    xx = P[0][0] + dt * (P[0][2] + P[2][0]) + dt * dt * P[2][2]
-    yy = P[1][1] + dt * (P[1][3] + P[3][1]) + dt * dt * P[3][3]
-    xy = P[0][1] + dt * (P[0][3] + P[2][1]) + dt * dt * P[2][3]
+    (x_x, x_y, x_u, x_v), (_, y_y, _, y_v), (u_x, u_y, u_u, u_v), (_, v_y, _, v_v) = (
+        track.covariance_odom.tolist()
+    )
+    xx = x_x + dt * (x_u + u_x) + dt * dt * u_u
+    yy = y_y + dt * (y_v + v_y) + dt * dt * v_v
+    xy = x_y + dt * (x_v + u_y) + dt * dt * u_v
     return math.sqrt(max(0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy), 0.0))

@@ -11,8 +11,8 @@ import shapely
 
 from perception.arrays import FloatArray
 
-from ._constraints import PersonObstacle
-from ._memory import PersonMemory, position_at, position_sigma_m
+from ._constraints import PersonObstacle, trusted_obstacle
+from ._memory import PersonMemory, position_sigma_m
 from ._policy import AwarenessPolicy
 
 _SIDES: Final = 24
@@ -29,7 +29,9 @@ def obstacles_of(
     """One obstacle a person, in their order."""
     if not people:
         return ()
-    centers = np.array([position_at(m.track, now) for m in people.values()])
+    centers = np.array([m.here_odom_m for m in people.values()])
+    # The obstacles get read-only rows.
+    centers.setflags(write=False)
     radii = np.array([m.radius_m for m in people.values()])
     rings = centers[:, None] + radii[:, None, None] * _UNIT_POLYGON
     polygons = shapely.polygons(rings)
@@ -39,15 +41,18 @@ def obstacles_of(
             for memory, center, ring in zip(people.values(), centers, rings, strict=True)
         ]
         polygons = [shapely.convex_hull(shapely.multipoints(points)) for points in discs]
+    # Enormous numbers may have become infinite on the way: those are looked at, and refused.
+    sound = math.isfinite(float(centers.sum()) + float(radii.sum()))
+    make = trusted_obstacle if sound else PersonObstacle
     return tuple(
-        PersonObstacle(
-            track_id=track_id,
-            center_odom_m=center,
-            velocity_odom_mps=memory.track.velocity_odom_mps,
-            radius_m=memory.radius_m,
-            height_m=memory.track.height_m,
-            awareness_lower=memory.awareness_lower,
-            polygon=polygon,
+        make(
+            track_id,
+            center,
+            memory.track.velocity_odom_mps,
+            memory.radius_m,
+            memory.track.height_m,
+            memory.awareness_lower,
+            polygon,
         )
         for (track_id, memory), center, polygon in zip(
             people.items(), centers, polygons, strict=True

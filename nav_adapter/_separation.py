@@ -94,18 +94,34 @@ def max_speed_mps(
     Raises:
         NavError: a deceleration that is not positive.
     """
-    a = _positive_deceleration(deceleration_mps2)
-    v_h = np.asarray(human_speed_mps, dtype=np.float64)
-    T = np.asarray(reaction_time_s, dtype=np.float64)
-    C = np.asarray(clearance_m, dtype=np.float64)
-    spare = np.asarray(separation_m, dtype=np.float64) - C - v_h * T
+    return highest_speed_mps(
+        np.asarray(separation_m, dtype=np.float64),
+        np.asarray(human_speed_mps, dtype=np.float64),
+        _positive_deceleration(deceleration_mps2),
+        np.asarray(reaction_time_s, dtype=np.float64),
+        np.asarray(clearance_m, dtype=np.float64),
+        np.asarray(approach, dtype=np.float64),
+    )
+
+
+def highest_speed_mps(
+    separation_m: FloatArray,
+    v_h: FloatArray,
+    a: FloatArray | float,
+    T: FloatArray,
+    C: FloatArray | float,
+    share: FloatArray,
+) -> FloatArray:
+    """:func:`max_speed_mps` of arguments that are sound, in their order."""
+    spare = separation_m - C - v_h * T
     # Written this way round so that NaN lands on 0.
     spare = np.where(spare > 0.0, spare, 0.0)
-    share = np.asarray(approach, dtype=np.float64)
     b = share * a * T + v_h
     # The root of share·v²/2 + b·v = a·spare in the form that does not divide by a share of 0.
     below = b + np.sqrt(b**2 + 2.0 * a * share * spare)
-    some = np.broadcast_to(spare > 0.0, np.broadcast(below, spare).shape)
+    some = spare > 0.0
+    if some.shape != below.shape:
+        some = np.broadcast_to(some, np.broadcast(below, spare).shape)
     speed: FloatArray = np.divide(
         2.0 * a * spare,
         below,

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from perception import AttentionCone, Camera
 from perception.arrays import FloatArray
 
+from ._colours import awareness_colour
 from ._crossing import CrossingFrame
 from ._pixel_eyes import NOBODY
 from ._stage import Stage
@@ -24,21 +25,8 @@ _INK: Final = (40, 40, 46)
 _PAPER: Final = (246, 245, 242)
 _RACK: Final = (176, 182, 190)
 _ROBOT: Final = (38, 84, 140)
-_UNAWARE: Final = np.array([204.0, 52.0, 40.0])
-_UNCERTAIN: Final = np.array([232.0, 160.0, 30.0])
-_AWARE: Final = np.array([34.0, 148.0, 84.0])
 _CONE_LENGTH_M: Final = 0.4
 _SHIFT: Final = 4  # sub-pixel bits of OpenCV's drawing functions
-
-
-def awareness_colour(alpha: float | None) -> tuple[int, int, int]:
-    """Red for unaware over amber to green for aware; grey for no evidence."""
-    if alpha is None:
-        return (128, 128, 132)
-    low, high = (_UNAWARE, _UNCERTAIN) if alpha < 0.5 else (_UNCERTAIN, _AWARE)
-    share = 2.0 * alpha if alpha < 0.5 else 2.0 * alpha - 1.0
-    red, green, blue = (low + share * (high - low)).round().astype(int).tolist()
-    return red, green, blue
 
 
 def _write(image: Image, lines: list[str], corner: tuple[int, int], size: float) -> None:

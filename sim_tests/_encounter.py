@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from perception import AttentionCone, Camera, PersonObservation
 from perception.arrays import FloatArray
 
+from ._colours import awareness_colour
 from ._crossing import CrossingFrame, CrossingResult, run_crossing
-from ._drawing import TopView, awareness_colour, draw_camera_view
+from ._drawing import TopView, draw_camera_view
 from ._figures import new_figure
 from ._pixel_eyes import PIXEL_RATE_HZ
 from ._scenario import Scenario

@@ -10,6 +10,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from sim_tests import SimError
+from sim_tests._arguments import count
 from sim_tests._bench import Metric, read_baseline, write_baseline
 
 from ._cost import CYCLE, cost_ms
@@ -30,8 +31,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "a map of 200 × 200 cells of 5 cm: NavAdapter.update, circles and the costmap; beside it "
         "the painter that also clears, and the same costmap painted naively with shapely.",
     )
-    parser.add_argument("--frames", type=_count, default=60, metavar="N", help="default: 60")
-    parser.add_argument("--repeats", type=_count, default=5, metavar="N", help="default: 5")
+    parser.add_argument("--frames", type=count, default=60, metavar="N", help="default: 60")
+    parser.add_argument("--repeats", type=count, default=5, metavar="N", help="default: 5")
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="default: 0")
     parser.add_argument(
         "--baseline",
@@ -110,13 +111,3 @@ def _missed(costs: dict[int, dict[str, float]], metrics: list[Metric]) -> list[s
     if growth > LINEAR:
         missed.append(f"a person more costs {growth:.2f} times as much in a large crowd")
     return missed
-
-
-def _count(text: str) -> int:
-    try:
-        value = int(text)
-    except ValueError:
-        value = 0
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"must be a whole number of at least 1, got {text!r}")
-    return value

@@ -12,6 +12,7 @@ import numpy as np
 from tqdm import tqdm
 
 from sim_tests import SimError
+from sim_tests._arguments import count
 from sim_tests._bench import Metric, read_baseline, write_baseline
 from tracking import TrackerConfig, TrackingError
 
@@ -97,7 +98,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--seeds",
-        type=_count,
+        type=count,
         default=STANDARD_SEEDS,
         metavar="N",
         help="runs of each set (default: 10)",
@@ -111,7 +112,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--frames",
-        type=_count,
+        type=count,
         default=STANDARD_FRAMES,
         metavar="N",
         help="of a run, 20 a second (default: 500)",
@@ -139,7 +140,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--stonesoup-up-to",
-        type=_count,
+        type=count,
         default=20,
         metavar="N",
         help="leave Stone Soup out beyond N people; 100 take it an hour (default: 20)",
@@ -158,18 +159,8 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _count(text: str) -> int:
-    try:
-        value = int(text)
-    except ValueError:
-        value = 0
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"must be a whole number of at least 1, got {text!r}")
-    return value
-
-
 def _counts(text: str) -> list[int]:
-    return [_count(part) for part in text.split(",")]
+    return [count(part) for part in text.split(",")]
 
 
 def _subset(valid: Sequence[str]) -> Callable[[str], list[str]]:

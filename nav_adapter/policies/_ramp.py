@@ -48,13 +48,13 @@ class AwarenessRamp(StrictConfig):
 
         Without memory: two levels start from "unaware".
         """
-        span = self.aware_above - self.unaware_below
-        position = (awareness_lower - self.unaware_below) / span
+        below, above = self.unaware_below, self.aware_above
         # Written this way round so that NaN counts as unaware.
-        if not position > 0.0:
+        if not awareness_lower > below:
             return 0.0
-        if awareness_lower >= self.aware_above:
+        if awareness_lower >= above:
             return 1.0
+        position = (awareness_lower - below) / (above - below)
         if self.shape == "two_level":
             return 0.0
         if self.shape == "linear":

@@ -10,11 +10,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from ._alerts import alerts
 from ._bridge import AwarenessBridge
 from ._grid import occupancy_grid
 from ._markers import markers
 from ._outgoing import Frames, outgoing
 from ._people import circle_objects, detections, people, teb_obstacles
+from ._pictures import camera_of, picture_of
 from ._polygons import STOP_POLYGON_ID, collision_polygons, stop_zone
 from ._robot_file import CameraMount, RobotFile
 from ._speed_limit import SLOWEST_MPS, speed_limit
@@ -39,6 +41,8 @@ __all__ = [
     "RobotFile",
     "Topic",
     "TransformBuffer",
+    "alerts",
+    "camera_of",
     "circle_objects",
     "collision_polygons",
     "decode",
@@ -48,6 +52,7 @@ __all__ = [
     "occupancy_grid",
     "outgoing",
     "people",
+    "picture_of",
     "renamed",
     "speed_limit",
     "stop_zone",

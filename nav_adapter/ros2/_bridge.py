@@ -24,8 +24,7 @@ from .._errors import NavError
 from .._policy import AwarenessPolicy
 from .._robot import RobotProfile, RobotState
 from ._outgoing import Frames, outgoing
-from ._pictures import camera as camera_of
-from ._pictures import picture
+from ._pictures import camera_of, picture_of
 from ._stamps import pose_matrix, to_seconds
 from ._transforms import TransformBuffer
 from .messages import Message
@@ -61,6 +60,7 @@ class AwarenessBridge:
         camera: calibration, if it is not to come from camera_info.
         percentage: of :func:`speed_limit`.
         warn: called with what went wrong, each text once in a row.
+        wanted: asked with the key of a topic in every tick; what nobody wants is not made.
     """
 
     def __init__(
@@ -75,12 +75,14 @@ class AwarenessBridge:
         camera: Camera | None = None,
         percentage: bool = False,
         warn: Callable[[str], None] = lambda text: None,
+        wanted: Callable[[str], bool] = lambda key: True,
     ) -> None:
         self.frames = frames or Frames()
         self._policy, self._robot, self._publish = policy, robot, publish
         self._T_base_camera = T_base_camera
         self._make_pipeline = make_pipeline
         self._percentage = percentage
+        self._wanted = wanted
         self._warn_user, self._warned = warn, ""
         self._camera = camera
         self._pipeline = make_pipeline(camera) if camera is not None else None
@@ -170,7 +172,7 @@ class AwarenessBridge:
                 )
             frame = self.frames.camera or message.header.frame_id
             T_odom_camera = self._camera_pose(frame, stamp_s)
-            image = picture(message)
+            image = picture_of(message)
             observations = self._pipeline.process(image, stamp_s, floor=_floor(T_odom_camera))
             tracks = self._tracker.update(observations, stamp_s, T_odom_camera)
         except (NavError, PerceptionError, TrackingError) as problem:
@@ -198,6 +200,7 @@ class AwarenessBridge:
             self._state,
             self.frames,
             percentage=self._percentage,
+            wanted=self._wanted,
         ):
             self._publish(key, message)
         return constraints

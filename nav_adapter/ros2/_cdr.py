@@ -5,13 +5,15 @@ from __future__ import annotations
 from typing import Any, Final, TypeVar, cast
 
 from .._errors import NavError
+from ._encoder import REFUSALS, encoded
 from ._message import FieldType, Message, field_types, ros_type
 
 try:
-    from cyclonedds.idl import Buffer, Endianness, IdlStruct
+    from cyclonedds.idl import Buffer, IdlStruct
     from cyclonedds.idl._main import IdlMeta
     from cyclonedds.idl.types import (
         array,
+        byte,
         float32,
         float64,
         int8,
@@ -34,6 +36,7 @@ _HEADER_BYTES: Final = 4
 _IDL_TYPES: Final[dict[tuple[str, bool], Any]] = {}
 _PRIMITIVES: Final[dict[str, Any]] = {
     "bool": bool,
+    "byte": byte,
     "int8": int8,
     "uint8": uint8,
     "int32": int32,
@@ -47,12 +50,9 @@ _PRIMITIVES: Final[dict[str, Any]] = {
 
 def encode(message: Message) -> bytes:
     """A message in CDR (XCDR1, little-endian, with its four-byte header), as ROS 2 sends it."""
-    kind = _idl_type(type(message), True)
     try:
-        return bytes(
-            kind.__idl__.serialize(message, use_version_2=False, endianness=Endianness.Little)
-        )
-    except Exception as cause:  # the library raises bare exceptions
+        return encoded(message)
+    except REFUSALS as cause:
         raise NavError(f"{ros_type(type(message))} cannot be encoded: {cause}") from cause
 
 

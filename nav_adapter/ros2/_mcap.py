@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
 from pathlib import Path
-from types import TracebackType
 
 import yaml
 
@@ -20,7 +20,7 @@ except ImportError as cause:  # pragma: no cover - depends on the installation
     ) from cause
 
 
-class McapRecorder:
+class McapRecorder(AbstractContextManager["McapRecorder"]):
     """Writes CDR messages with their ROS 2 schemas to an MCAP file.
 
     Profile "ros2", schemas "ros2msg", messages "cdr": Foxglove, ``ros2 bag play``, ``mcap`` and
@@ -59,15 +59,7 @@ class McapRecorder:
             self._writer.finish()
             self._stream.close()
 
-    def __enter__(self) -> McapRecorder:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _schema(self, topic: Topic) -> int:

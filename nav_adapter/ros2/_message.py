@@ -7,6 +7,8 @@ from typing import Annotated, Any, Final, get_args, get_origin, get_type_hints
 
 # The second argument is the ROS name of the type.
 Bool = Annotated[bool, "bool"]
+# An octet: bytes of length one in rclpy.
+Byte = Annotated[int, "byte"]
 Int8 = Annotated[int, "int8"]
 UInt8 = Annotated[int, "uint8"]
 Int32 = Annotated[int, "int32"]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from tracking import PersonTrack
 
 from .._constraints import NavConstraints
 from .._robot import RobotProfile, RobotState
+from ._alerts import alerts
 from ._grid import occupancy_grid
 from ._markers import markers
 from ._people import circle_objects, detections, people, teb_obstacles
@@ -41,31 +42,37 @@ def outgoing(
     *,
     percentage: bool = False,
     grid_m: float = 10.0,
+    wanted: Callable[[str], bool] = lambda key: True,
 ) -> Iterator[tuple[str, Message]]:
     """Key of the topic (:data:`~nav_adapter.ros2.PUBLISHED`) and message, the urgent ones first.
 
-    Without ``robot_state`` there is no grid, which is about the robot.
+    Without ``robot_state`` there is no grid, which is about the robot. Messages that are not
+    ``wanted``, asked by key, are not made.
     """
-    yield "speed_limit", speed_limit(constraints, robot.max_speed_mps, percentage=percentage)
-    for polygon in collision_polygons(
-        constraints, robot, robot_state, odom_frame=frames.odom, base_frame=frames.base
-    ):
-        yield "collision_polygons", polygon
-    speed_mps = 0.0 if robot_state is None else robot_state.speed_mps
-    yield (
-        "stop_zone",
-        stop_zone(robot, speed_mps, constraints.stamp_s, base_frame=frames.base),
-    )
-    if robot_state is not None:
-        yield (
-            "grid",
-            occupancy_grid(
-                constraints, robot_state.position_odom_m, size_m=grid_m, frame_id=frames.odom
-            ),
-        )
-    for circle in circle_objects(constraints, frame_id=frames.odom):
-        yield "circles", circle
-    yield "obstacles", teb_obstacles(constraints, frame_id=frames.odom)
-    yield "people", people(constraints, tracks, frame_id=frames.odom)
-    yield "detections", detections(constraints, frame_id=frames.odom)
-    yield "markers", markers(constraints, robot_state, frame_id=frames.odom)
+    odom, base = frames.odom, frames.base
+    if wanted("speed_limit"):
+        yield "speed_limit", speed_limit(constraints, robot.max_speed_mps, percentage=percentage)
+    if wanted("collision_polygons"):
+        for polygon in collision_polygons(
+            constraints, robot, robot_state, odom_frame=odom, base_frame=base
+        ):
+            yield "collision_polygons", polygon
+    if wanted("alerts"):
+        yield "alerts", alerts(constraints)
+    if wanted("stop_zone"):
+        speed_mps = 0.0 if robot_state is None else robot_state.speed_mps
+        yield "stop_zone", stop_zone(robot, speed_mps, constraints.stamp_s, base_frame=base)
+    if robot_state is not None and wanted("grid"):
+        place = robot_state.position_odom_m
+        yield "grid", occupancy_grid(constraints, place, size_m=grid_m, frame_id=odom)
+    if wanted("circles"):
+        for circle in circle_objects(constraints, frame_id=odom):
+            yield "circles", circle
+    if wanted("obstacles"):
+        yield "obstacles", teb_obstacles(constraints, frame_id=odom)
+    if wanted("people"):
+        yield "people", people(constraints, tracks, frame_id=odom)
+    if wanted("detections"):
+        yield "detections", detections(constraints, frame_id=odom)
+    if wanted("markers"):
+        yield "markers", markers(constraints, robot_state, frame_id=odom)

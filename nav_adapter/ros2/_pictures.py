@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 import cv2
 import numpy as np
@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from perception import Camera, PerceptionError
 
 from .._errors import NavError
-from .messages.sensor_msgs import CameraInfo, CompressedImage, Image
+from .messages.sensor_msgs import CameraInfo
 
-# sensor_msgs/image_encodings.hpp: bytes a pixel, and how it becomes RGB.
+# sensor_msgs/image_encodings.hpp: samples a pixel, and how it becomes RGB.
 _ENCODINGS: Final[dict[str, tuple[int, int | None]]] = {
     "rgb8": (3, None),
     "bgr8": (3, cv2.COLOR_BGR2RGB),
@@ -23,6 +23,9 @@ _ENCODINGS: Final[dict[str, tuple[int, int | None]]] = {
     "8UC4": (4, cv2.COLOR_BGRA2RGB),
     "mono8": (1, cv2.COLOR_GRAY2RGB),
     "8UC1": (1, cv2.COLOR_GRAY2RGB),
+    "rgb16": (3, None),
+    "bgr16": (3, cv2.COLOR_BGR2RGB),
+    "mono16": (1, cv2.COLOR_GRAY2RGB),
     # OpenCV names a Bayer pattern by its second row, ROS by its first.
     "bayer_rggb8": (1, cv2.COLOR_BayerBG2RGB),
     "bayer_bggr8": (1, cv2.COLOR_BayerRG2RGB),
@@ -33,28 +36,40 @@ _ENCODINGS: Final[dict[str, tuple[int, int | None]]] = {
     "yuv422_yuy2": (2, cv2.COLOR_YUV2RGB_YUY2),
     "yuyv": (2, cv2.COLOR_YUV2RGB_YUY2),
 }
+_SIXTEEN_BITS: Final = ("rgb16", "bgr16", "mono16")
 _DISTORTION_MODELS: Final = ("plumb_bob", "rational_polynomial")
 
 
-def picture(message: Image | CompressedImage) -> NDArray[np.uint8]:
+def picture_of(message: Any) -> NDArray[np.uint8]:
     """The picture of a message, (H, W, 3) uint8 RGB.
+
+    Sixteen bits become eight by their full range, transparency is dropped, and the orientation that
+    a picture file may claim is ignored: the calibration is of the pixels as they are.
+
+    Args:
+        message: ``sensor_msgs`` Image or CompressedImage, ours or as another library has read it.
 
     Raises:
         NavError: an encoding that is not known here, too few bytes, or a damaged file.
     """
-    if isinstance(message, CompressedImage):
+    if not hasattr(message, "encoding"):
         return _decompressed(message)
     if message.encoding not in _ENCODINGS:
         raise NavError(f"encoding must be one of {', '.join(_ENCODINGS)}, got {message.encoding!r}")
     depth, code = _ENCODINGS[message.encoding]
-    height, width, step = message.height, message.width, message.step
-    row = width * depth
+    height, width, step = int(message.height), int(message.width), int(message.step)
+    wide = message.encoding in _SIXTEEN_BITS
+    row = width * depth * (2 if wide else 1)
     if height * width == 0 or step < row or len(message.data) < height * step:
         raise NavError(
             f"{width} x {height} px of {message.encoding} with {step} bytes a row need "
             f"{height * max(step, row)} bytes and at least one pixel, got {len(message.data)} bytes"
         )
     rows = np.frombuffer(message.data, np.uint8, height * step).reshape(height, step)[:, :row]
+    if wide:
+        samples = np.ascontiguousarray(rows).view(">u2" if message.is_bigendian else "<u2")
+        native = samples.astype(np.uint16, copy=False)
+        rows = np.asarray(cv2.convertScaleAbs(native, alpha=255.0 / 65535.0), dtype=np.uint8)
     pixels = rows.reshape(height, width, depth) if depth > 1 else rows
     try:
         rgb = pixels if code is None else cv2.cvtColor(np.ascontiguousarray(pixels), code)
@@ -63,7 +78,7 @@ def picture(message: Image | CompressedImage) -> NDArray[np.uint8]:
     return np.ascontiguousarray(rgb, dtype=np.uint8)
 
 
-def camera(message: CameraInfo) -> Camera:
+def camera_of(message: CameraInfo) -> Camera:
     """The camera of a ``camera_info`` message: its matrix k and distortion d.
 
     Raises:
@@ -90,10 +105,11 @@ def camera(message: CameraInfo) -> Camera:
         raise NavError(f"camera_info: {cause}") from cause
 
 
-def _decompressed(message: CompressedImage) -> NDArray[np.uint8]:
+def _decompressed(message: Any) -> NDArray[np.uint8]:
     data = np.frombuffer(message.data, np.uint8)
     try:
-        bgr = cv2.imdecode(data, cv2.IMREAD_COLOR) if data.size else None
+        as_it_is = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
+        bgr = cv2.imdecode(data, as_it_is) if data.size else None
     except cv2.error:
         bgr = None
     if bgr is None:

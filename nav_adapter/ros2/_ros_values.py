@@ -43,6 +43,8 @@ def from_ros(kind: type[_AnyMessage], message: Any) -> _AnyMessage:
 def _to_ros(value: Any, kind: FieldType, find: Callable[[type[Message]], Any]) -> Any:
     if kind.message is not None:
         return to_ros(value, find) if kind.count is None else [to_ros(each, find) for each in value]
+    if kind.name == "byte":
+        return bytes([value])
     if kind.count is None:
         return value
     if kind.name in ("int8", "uint8"):
@@ -56,6 +58,8 @@ def _from_ros(value: Any, kind: FieldType) -> Any:
         if kind.count is None:
             return from_ros(kind.message, value)
         return tuple(from_ros(kind.message, each) for each in value)
+    if kind.name == "byte":
+        return value[0] if isinstance(value, bytes) else value
     if kind.count is None:
         return value
     if kind.name in ("int8", "uint8"):

@@ -9,6 +9,7 @@ from typing import Final
 from .._errors import NavError
 from .messages import Message
 from .messages.costmap_converter_msgs import ObstacleArrayMsg
+from .messages.diagnostic_msgs import DiagnosticArray
 from .messages.geometry_msgs import PolygonInstanceStamped, PolygonStamped
 from .messages.nav2_msgs import CircleObject, SpeedLimit
 from .messages.nav_msgs import OccupancyGrid, Odometry
@@ -52,6 +53,8 @@ PUBLISHED: Final = MappingProxyType(
         "people": Topic("people", People, depth=1),
         "detections": Topic("awarenav/detections", Detection3DArray, depth=1),
         "markers": Topic("awarenav/markers", MarkerArray, depth=1),
+        # Each alert is in one message only: room for two seconds of them.
+        "alerts": Topic("awarenav/alerts", DiagnosticArray, depth=64),
     }
 )
 

@@ -83,6 +83,7 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
                 self._parameter("detector_file", ""), self._parameter("pose_file", "")
             ),
             warn=self.get_logger().warning,
+            wanted=self._wanted,
         )
         self._subscribe(READ["odom"], lambda m: self._bridge.on_odometry(from_ros(Odometry, m)))
         self._subscribe(
@@ -115,6 +116,12 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
         publisher = self._publishers_by_key.get(key)
         if publisher is not None:
             publisher.publish(to_ros(message))
+
+    def _wanted(self, key: str) -> bool:
+        publisher = self._publishers_by_key.get(key)
+        return publisher is not None and (
+            PUBLISHED[key].transient_local or publisher.get_subscription_count() > 0
+        )
 
     def _advertise(self, key: str, topic: Topic) -> None:
         try:

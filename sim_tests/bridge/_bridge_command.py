@@ -22,7 +22,6 @@ from nav_adapter.ros2 import (
     Topic,
     renamed,
 )
-from nav_adapter.ros2.messages import Message
 from perception import AttentionCone, AwarenessPipeline, Camera, PersonDetector
 from perception.arrays import finite_number
 
@@ -32,6 +31,7 @@ from ..estimates._network_choice import SHIPPED, choose_networks
 from ..estimates._people_estimator import Networks
 from ._command import domain_of
 from ._loop import BridgeLoop, Inputs
+from ._outlet import Outlet
 
 # Time for the last messages to leave before the node does.
 _LINGER_S = 0.1
@@ -57,16 +57,7 @@ def bridge_command(options: argparse.Namespace) -> int:
         recorder = None
         if options.record is not None:
             recorder = stack.enter_context(McapRecorder(options.record))
-        for topic in published.values():
-            node.advertise(topic)
-
-        def publish(key: str, message: Message) -> None:
-            topic = published.get(key)
-            if topic is not None:
-                cdr = node.publish(topic, message)
-                if recorder is not None:
-                    recorder.write(topic, cdr, time.time())
-
+        outlet = Outlet(node, published, recorder)
         tap = KeypointTap(networks.pose_estimator)
         cone = AttentionCone()
         drawing = None
@@ -83,12 +74,13 @@ def bridge_command(options: argparse.Namespace) -> int:
         bridge = AwarenessBridge(
             policy,
             robot.profile(),
-            publish,
+            outlet.publish,
             frames=Frames(options.odom_frame, options.base_frame, options.camera_frame),
             T_base_camera=None if robot.camera is None else robot.camera.T_base_camera(),
             camera=camera,
             percentage=options.percentage,
             warn=_say,
+            wanted=outlet.wants,
             make_pipeline=_pipelines(networks, tap, cone),
         )
         loop = BridgeLoop(node, bridge, inputs, rate_hz, recorder=recorder, drawing=drawing)

@@ -14,8 +14,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         help="read a camera over ROS 2, publish obstacles and a speed limit for Nav2",
         description="Read a camera, its calibration and the robot's odometry from ROS 2 topics, "
         "find and track people, and publish what Nav2, its collision monitor, TEB and RViz read: "
-        "speed limit, polygons, grid, circles, obstacles, people, boxes, markers. No ROS needs to "
-        "be installed. Whatever is missing or late makes it publish a stop and say why. See "
+        "speed limit, polygons, grid, circles, obstacles, people, boxes, markers, alerts. No "
+        "ROS is needed. Whatever is missing or late makes it publish a stop and say why. See "
         "docs/nav2.md for the parameters to set in Nav2.",
         epilog="Exit status: 0 ended by Ctrl-C or --seconds, 2 bad input. The network interface is "
         "chosen by CYCLONEDDS_URI, as with rmw_cyclonedds_cpp. Needs the extra 'ros2': "
@@ -106,7 +106,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         default=None,
         metavar="KEY",
         help="publish these only: speed_limit collision_polygons stop_zone grid circles obstacles "
-        "people detections markers (default: all)",
+        "people detections markers alerts (default: all)",
     )
     write.add_argument(
         "--percentage",

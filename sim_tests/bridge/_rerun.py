@@ -12,6 +12,7 @@ from nav_adapter.ros2 import AwarenessBridge
 from perception.arrays import FloatArray
 
 from .._closing import Closing
+from .._colours import awareness_colour
 from .._errors import SimError
 from ..estimates._keypoint_tap import KeypointTap
 
@@ -61,7 +62,7 @@ class RerunRecorder(Closing):
             ring = np.asarray(each.polygon.exterior.coords)[:, :2]
             rings.append(np.column_stack([ring, np.full(len(ring), 0.02)]))
             aware = each.awareness_lower
-            colors.append((min(1.0, 2.0 - 2.0 * aware), min(1.0, 2.0 * aware), 0.1))
+            colors.append(awareness_colour(aware))
             labels.append(f"{each.track_id}: r {each.radius_m:.2f} m, α ≥ {aware:.2f}")
             self._stream.log(f"radius_m/{each.track_id}", rr.Scalars(each.radius_m))
             self._stream.log(f"awareness_lower/{each.track_id}", rr.Scalars(aware))

@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from .._arguments import count
 from .._errors import SimError
 from ._judge import judge_files
 from ._judge_config import JudgeConfig
@@ -56,9 +57,9 @@ def _add_estimate(commands: argparse._SubParsersAction[argparse.ArgumentParser])
         "--tracks", action="store_true", help="follow people from frame to frame too"
     )
     estimate.add_argument(
-        "--every", type=_positive, default=1, metavar="N", help="each N-th frame only"
+        "--every", type=count, default=1, metavar="N", help="each N-th frame only"
     )
-    estimate.add_argument("--frames", type=_positive, metavar="N", help="at most N frames")
+    estimate.add_argument("--frames", type=count, metavar="N", help="at most N frames")
     estimate.add_argument("--topic", metavar="NAME", help="image topic of a recording with several")
     estimate.set_defaults(run=_estimate)
 
@@ -95,7 +96,7 @@ def _add_networks(estimate: argparse.ArgumentParser) -> None:
         help="people detected with less confidence are dropped (default: 0.25)",
     )
     networks.add_argument(
-        "--threads", type=_positive, metavar="N", help="of one network (default: onnxruntime's)"
+        "--threads", type=count, metavar="N", help="of one network (default: onnxruntime's)"
     )
     networks.add_argument(
         "--provider",
@@ -129,13 +130,6 @@ def _add_camera(estimate: argparse.ArgumentParser) -> None:
         metavar="DEG",
         help="how far that camera looks down (default: 0)",
     )
-
-
-def _positive(text: str) -> int:
-    number = int(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"must be at least 1, got {number}")
-    return number
 
 
 def _add_judge(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

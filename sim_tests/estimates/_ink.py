@@ -11,31 +11,16 @@ from numpy.typing import NDArray
 
 from perception.arrays import FloatArray
 
+from .._colours import Colour
 from ._picture_file import ImageRgb
-
-Colour = tuple[int, int, int]
 
 WHITE: Final[Colour] = (246, 245, 242)
 NIGHT: Final[Colour] = (22, 24, 30)
-_UNKNOWN: Final[Colour] = (150, 152, 160)
-_UNAWARE: Final = np.array([222.0, 66.0, 52.0])
-_UNCERTAIN: Final = np.array([240.0, 172.0, 46.0])
-_AWARE: Final = np.array([52.0, 178.0, 108.0])
 _SHIFT: Final = 4  # sub-pixel bits of OpenCV's drawing functions
 # Beyond this, OpenCV's fixed-point coordinates are near their end.
 _FAR_PX: Final = 20_000.0
 # Before version 5 OpenCV has only letters of the American alphabet.
 _PLAIN: Final = {"α": "alpha", "±": "+-", "σ": "sigma", "°": " deg", "·": "-"}
-
-
-def awareness_colour(alpha: float | None) -> Colour:
-    """Red for unaware over amber to green for aware; grey for no evidence."""
-    if alpha is None:
-        return _UNKNOWN
-    low, high = (_UNAWARE, _UNCERTAIN) if alpha < 0.5 else (_UNCERTAIN, _AWARE)
-    share = 2.0 * alpha if alpha < 0.5 else 2.0 * alpha - 1.0
-    red, green, blue = (low + share * (high - low)).round().astype(int).tolist()
-    return red, green, blue
 
 
 def drawable(points_px: FloatArray) -> bool:

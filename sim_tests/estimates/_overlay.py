@@ -13,13 +13,12 @@ from perception import layouts as kp
 from perception.arrays import FloatArray
 from tracking import PersonTrack
 
+from .._colours import Colour, awareness_colour
 from ._frame_estimate import FrameEstimate
 from ._ink import (
     NIGHT,
     WHITE,
-    Colour,
     Lettering,
-    awareness_colour,
     dot,
     drawable,
     line,

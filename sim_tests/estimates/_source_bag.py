@@ -7,13 +7,15 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
-import cv2
 import numpy as np
 
-from perception import Camera, PerceptionError
+from nav_adapter import NavError
+from nav_adapter.ros2 import camera_of, picture_of
+from nav_adapter.ros2.messages.sensor_msgs import CameraInfo
+from perception import Camera
 
 from .._errors import SimError
-from ._picture_file import ImageRgb, as_rgb, decode_picture
+from ._picture_file import ImageRgb
 from ._source_frame import SourceFrame
 
 try:
@@ -28,30 +30,6 @@ except ImportError as cause:  # pragma: no cover - depends on the installation
 _IMAGE: Final = "sensor_msgs/msg/Image"
 _COMPRESSED: Final = "sensor_msgs/msg/CompressedImage"
 _INFO: Final = "sensor_msgs/msg/CameraInfo"
-_MODELS: Final = ("plumb_bob", "rational_polynomial")
-# sensor_msgs/image_encodings.hpp: type of a sample, channels, and how it becomes BGR.
-_ENCODINGS: Final[dict[str, tuple[str, int, int | None]]] = {
-    "rgb8": ("u1", 3, cv2.COLOR_RGB2BGR),
-    "bgr8": ("u1", 3, None),
-    "8UC3": ("u1", 3, None),
-    "rgba8": ("u1", 4, cv2.COLOR_RGBA2BGR),
-    "bgra8": ("u1", 4, None),
-    "8UC4": ("u1", 4, None),
-    "mono8": ("u1", 1, None),
-    "8UC1": ("u1", 1, None),
-    "rgb16": ("u2", 3, cv2.COLOR_RGB2BGR),
-    "bgr16": ("u2", 3, None),
-    "mono16": ("u2", 1, None),
-    # OpenCV names a Bayer pattern by its second row, ROS by its first.
-    "bayer_rggb8": ("u1", 1, cv2.COLOR_BayerBG2BGR),
-    "bayer_bggr8": ("u1", 1, cv2.COLOR_BayerRG2BGR),
-    "bayer_gbrg8": ("u1", 1, cv2.COLOR_BayerGR2BGR),
-    "bayer_grbg8": ("u1", 1, cv2.COLOR_BayerGB2BGR),
-    "yuv422": ("u1", 2, cv2.COLOR_YUV2BGR_UYVY),
-    "uyvy": ("u1", 2, cv2.COLOR_YUV2BGR_UYVY),
-    "yuv422_yuy2": ("u1", 2, cv2.COLOR_YUV2BGR_YUY2),
-    "yuyv": ("u1", 2, cv2.COLOR_YUV2BGR_YUY2),
-}
 
 
 class BagSource:
@@ -110,7 +88,7 @@ class BagSource:
                 stamp_s = recorded_ns * 1.0e-9
             last_s = stamp_s
             try:
-                image = _picture(message, connection.msgtype, f"{self._topic}, message {number}")
+                image = _picture(message, f"{self._topic}, message {number}")
                 yield SourceFrame(name, stamp_s, image)
             except SimError as error:
                 yield SourceFrame(name, stamp_s, None, None, str(error))
@@ -164,23 +142,16 @@ def _camera(message: Any, topic: str) -> Camera | None:
     distortion = np.asarray(getattr(message, "d", getattr(message, "D", ())), dtype=float)
     if matrix.size != 9 or not matrix[0] > 0.0:
         return None
-    model = str(message.distortion_model) or _MODELS[0]
-    if model not in _MODELS and np.any(distortion):
-        raise SimError(
-            f"{topic}: distortion_model must be {' or '.join(_MODELS)}, got {model!r}; "
-            "rectify the images first"
-        )
+    info = CameraInfo(
+        height=int(message.height),
+        width=int(message.width),
+        distortion_model=str(message.distortion_model),
+        d=tuple(distortion.tolist()),
+        k=tuple(matrix.tolist()),
+    )
     try:
-        return Camera(
-            int(message.width),
-            int(message.height),
-            matrix[0],
-            matrix[4],
-            matrix[2],
-            matrix[5],
-            distortion if np.any(distortion) else None,
-        )
-    except PerceptionError as cause:
+        return camera_of(info)
+    except NavError as cause:
         raise SimError(f"{topic}: {cause}") from cause
 
 
@@ -191,23 +162,8 @@ def _stamp_s(message: Any) -> float | None:
     return seconds if seconds > 0.0 else None
 
 
-def _picture(message: Any, kind: str, name: str) -> ImageRgb:
-    data = np.frombuffer(memoryview(message.data), np.uint8)
-    if kind == _COMPRESSED:
-        return decode_picture(data, name)
-    encoding = str(message.encoding)
-    if encoding not in _ENCODINGS:
-        raise SimError(f"{name}: encoding must be one of {', '.join(_ENCODINGS)}, got {encoding!r}")
-    sample, channels, code = _ENCODINGS[encoding]
-    height, width, step = int(message.height), int(message.width), int(message.step)
-    row = width * channels * int(sample[1])
-    if step < row or data.size < height * step or height * width == 0:
-        raise SimError(
-            f"{name}: {width} x {height} px of {encoding} with {step} bytes a row need "
-            f"{height * max(step, row)} bytes, got {data.size}"
-        )
-    rows = np.ascontiguousarray(data[: height * step].reshape(height, step)[:, :row])
-    order = ">" if message.is_bigendian else "<"
-    samples = rows.view(order + sample).astype("=" + sample, copy=False)
-    picture = samples.reshape(height, width, channels) if channels > 1 else samples
-    return as_rgb(picture if code is None else cv2.cvtColor(picture, code), name)
+def _picture(message: Any, name: str) -> ImageRgb:
+    try:
+        return picture_of(message)
+    except NavError as cause:
+        raise SimError(f"{name}: {cause}") from cause

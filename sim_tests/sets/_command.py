@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from .._arguments import count
+
 Subparsers = argparse._SubParsersAction  # argparse has no public name for what it returns
 
 
@@ -51,7 +53,7 @@ def add_parser(commands: Subparsers[argparse.ArgumentParser]) -> None:
         metavar="N",
         help="samples a pixel and side; 2 smooths edges (default: 1)",
     )
-    add("--processes", type=_positive, metavar="N", help="at once (default: one a processor)")
+    add("--processes", type=count, metavar="N", help="at once (default: one a processor)")
     add(
         "--out",
         type=Path,
@@ -61,13 +63,6 @@ def add_parser(commands: Subparsers[argparse.ArgumentParser]) -> None:
     )
     add("--seed", type=int, default=0, metavar="N", help="of everything random (default: 0)")
     render.set_defaults(run=_run)
-
-
-def _positive(text: str) -> int:
-    number = int(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"must be at least 1, got {number}")
-    return number
 
 
 def _run(options: argparse.Namespace) -> int:

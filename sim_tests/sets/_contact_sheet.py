@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from perception import Camera
 
-from .._drawing import awareness_colour
+from .._colours import awareness_colour
 from .._errors import SimError
 from ._frame_records import Record
 

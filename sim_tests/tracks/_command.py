@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from .._arguments import count
+
 _MOST = 20
 
 
@@ -51,20 +53,13 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     )
     tracks.add_argument(
         "--most",
-        type=_positive,
+        type=count,
         default=_MOST,
         metavar="N",
         help="tracks with a colour and a panel, those seen most often first; the others are drawn "
         f"grey (default: {_MOST})",
     )
     tracks.set_defaults(run=_tracks)
-
-
-def _positive(text: str) -> int:
-    number = int(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"must be at least 1, got {number}")
-    return number
 
 
 def _tracks(options: argparse.Namespace) -> int:

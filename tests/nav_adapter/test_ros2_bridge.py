@@ -36,7 +36,7 @@ from nav_adapter.ros2.messages.nav_msgs import Odometry
 from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, Image
 from nav_adapter.ros2.messages.std_msgs import Header
 from nav_adapter.ros2.messages.tf2_msgs import TFMessage
-from perception import AwarenessPipeline, Camera
+from perception import AwarenessPipeline, Camera, PersonObservation
 
 START_S = 1000.0
 MOUNT = CameraMount(position_base_m=[0.2, 0.0, 1.4]).T_base_camera()
@@ -84,9 +84,8 @@ class Listener:
             AwarenessPolicy.preset("balanced"),
             ROBOT,
             lambda key, message: self.heard[key].append(message),
-            make_pipeline=nobody,
             warn=self.warnings.append,
-            **{"T_base_camera": MOUNT, **settings},
+            **{"T_base_camera": MOUNT, "make_pipeline": nobody, **settings},
         )
 
     def standing(self) -> bool:
@@ -141,8 +140,51 @@ def test_every_tick_says_everything_once() -> None:
     nav.bridge.on_image(image(START_S), START_S)
     nav.bridge.tick(START_S + 0.01)
     counts = {key: len(messages) for key, messages in nav.heard.items()}
-    once = ["speed_limit", "collision_polygons", "stop_zone", "grid", "obstacles", "people"]
-    assert counts == dict.fromkeys([*once, "detections", "markers"], 1)
+    once = ["speed_limit", "collision_polygons", "alerts", "stop_zone", "grid", "obstacles"]
+    assert counts == dict.fromkeys([*once, "people", "detections", "markers"], 1)
+
+
+class OneWhoComes:
+    """Sees one person who walks at the robot and never looks up."""
+
+    def process(self, image_rgb, stamp_s, *, floor=None):
+        ahead_m = 6.0 - 1.1 * (stamp_s - START_S)
+        return (
+            PersonObservation(
+                stamp_s=stamp_s,
+                position_camera_m=np.array([0.0, 0.2, ahead_m]),
+                position_covariance_m2=np.diag([0.01, 0.01, 0.01]),
+                gaze_camera=np.array([0.0, 0.0, 1.0]),
+                awareness=0.0,
+                awareness_std=0.05,
+                score=0.9,
+                box_xyxy_px=None,
+            ),
+        )
+
+
+def test_every_alert_is_in_one_message_of_a_hundred() -> None:
+    nav = Listener(make_pipeline=lambda camera: OneWhoComes())
+    nav.bridge.on_camera_info(INFO)
+    asked = []
+    for tick in range(100):
+        now = START_S + 0.05 * tick
+        nav.bridge.on_odometry(odometry(now, x=0.5 * (now - START_S)))
+        assert nav.bridge.on_image(image(now), now)
+        asked += [(now, each) for each in nav.bridge.tick(now).alerts]
+    sent = [
+        (message.header.stamp, status)
+        for message in nav.heard["alerts"]
+        for status in message.status[1:]
+    ]
+    assert [(to_time(now), f"awarenav: {each.kind}") for now, each in asked] == [
+        (stamp, status.name) for stamp, status in sent
+    ]
+    kinds = [status.name.removeprefix("awarenav: ") for _, status in sent]
+    # Nearer and nearer: light, then voice, then the horn.
+    assert kinds == ["light", "voice", "horn"]
+    assert all(message.status[0].name == "awarenav: speed limit" for message in nav.heard["alerts"])
+    assert len(nav.heard["alerts"]) == 100
 
 
 def test_the_camera_is_where_mount_and_odometry_put_it() -> None:

@@ -11,10 +11,11 @@ from shapely import affinity
 from shapely.geometry import Point as ShapelyPoint
 from shapely.geometry import Polygon
 
-from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, NavError, paint_costmap
+from nav_adapter import Alert, AwarenessPolicy, NavAdapter, NavConstraints, NavError, paint_costmap
 from nav_adapter.ros2 import (
     SLOWEST_MPS,
     STOP_POLYGON_ID,
+    alerts,
     circle_objects,
     collision_polygons,
     detections,
@@ -26,6 +27,7 @@ from nav_adapter.ros2 import (
     teb_obstacles,
 )
 from nav_adapter.ros2._stamps import to_seconds, to_time
+from nav_adapter.ros2.messages.diagnostic_msgs import DiagnosticStatus
 from nav_adapter.ros2.messages.visualization_msgs import Marker
 
 FOOTPRINT = Polygon(ROBOT.footprint_m)
@@ -236,3 +238,40 @@ def test_markers_clear_what_was_there_and_have_ids_of_their_own(tracks) -> None:
     assert all(each.lifetime.sec > 0 for each in rest)
     assert sum(each.ns == "body" for each in rest) == len(constraints.obstacles)
     assert constraints.limited_by in rest[-1].text
+
+
+ALERTS = st.builds(
+    Alert,
+    track_id=st.integers(0, 99),
+    kind=st.sampled_from(["light", "voice", "horn"]),
+    time_to_closest_s=finite(0.0, 30.0),
+    closest_gap_m=finite(0.0, 5.0),
+    reason=st.text(max_size=20),
+)
+
+
+@given(st.lists(ALERTS, max_size=4), st.booleans(), st.booleans())
+def test_alerts_are_warnings_after_the_state_of_the_limit(
+    asked: list[Alert], stale: bool, suffices: bool
+) -> None:
+    constraints = replace(
+        limited(0.25), alerts=tuple(asked), stale=stale, braking_suffices=suffices
+    )
+    state, *warnings = alerts(constraints).status
+    wanted = DiagnosticStatus.WARN if stale else DiagnosticStatus.OK
+    assert state.level == (wanted if suffices else DiagnosticStatus.ERROR)
+    assert state.name == "awarenav: speed limit"
+    assert constraints.limited_by in state.message
+    values = {each.key: each.value for each in state.values}
+    assert values["speed_limit_mps"] == "0.250"
+    assert values["braking_suffices"] == ("true" if suffices else "false")
+    assert values["stale"] == ("true" if stale else "false")
+    for alert, status in zip(asked, warnings, strict=True):
+        assert (status.level, status.message) == (DiagnosticStatus.WARN, alert.reason)
+        assert status.name == f"awarenav: {alert.kind}"
+        values = {each.key: each.value for each in status.values}
+        assert int(values["track_id"]) == alert.track_id
+        assert float(values["time_to_closest_s"]) == pytest.approx(
+            alert.time_to_closest_s, abs=5e-4
+        )
+        assert float(values["closest_gap_m"]) == pytest.approx(alert.closest_gap_m, abs=5e-4)

@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 import shlex
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import yaml
 
-from nav_adapter.ros2 import PUBLISHED, READ, SLOWEST_MPS, RobotFile, Topic
+from nav_adapter import Alert, NavConstraints
+from nav_adapter._alert import AlertKind
+from nav_adapter.ros2 import PUBLISHED, READ, SLOWEST_MPS, RobotFile, Topic, alerts
 from nav_adapter.ros2.messages import ros_type
 from sim_tests._cli import _parser
 
@@ -39,6 +41,9 @@ def test_nav2_reads_what_is_published() -> None:
     people = costmap[costmap["plugins"][0]]
     assert names[people["map_topic"]].message.__name__ == "OccupancyGrid"
     assert names[people["map_topic"]].transient_local == people["map_subscribe_transient_local"]
+    # Nav2's static layer asks the costmap for these, and says nothing to those under its own name.
+    assert costmap["use_maximum"] is True
+    assert not {"use_maximum", "transform_tolerance"} & set(people)
     (source,) = monitor["observation_sources"]
     assert names[monitor[source]["topic"]].message.__name__ == "PolygonInstanceStamped"
     (zone,) = monitor["polygons"]
@@ -49,6 +54,12 @@ def test_nav2_reads_what_is_published() -> None:
     assert controller["FollowPath"]["vx_max"] == robot.max_speed_mps
     assert -controller["FollowPath"]["ax_min"] == robot.max_deceleration_mps2
     assert str(SLOWEST_MPS) in TEXT
+
+
+def test_alerts_have_the_names_that_are_documented() -> None:
+    asked = tuple(Alert(1, kind, 1.0, 0.0, "why") for kind in get_args(AlertKind))
+    message = alerts(NavConstraints(0.0, (), 0.0, "why", False, alerts=asked))
+    assert [status.name for status in message.status if f"`{status.name}`" not in TEXT] == []
 
 
 def test_the_launch_file_starts_a_command_that_there_is() -> None:

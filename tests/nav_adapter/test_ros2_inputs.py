@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -12,8 +13,7 @@ from nav_scenes import finite
 from scipy.spatial.transform import Rotation
 
 from nav_adapter import NavError
-from nav_adapter.ros2 import CameraMount, RobotFile, TransformBuffer
-from nav_adapter.ros2._pictures import camera, picture
+from nav_adapter.ros2 import CameraMount, RobotFile, TransformBuffer, camera_of, picture_of
 from nav_adapter.ros2._stamps import pose_matrix, yaw_quaternion
 from nav_adapter.ros2.messages.geometry_msgs import Quaternion
 from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, CompressedImage, Image
@@ -48,13 +48,41 @@ def raw(pixels: np.ndarray, encoding: str, padding: int = 0) -> Image:
 )
 def test_colours_come_back_exactly(encoding: str, code: int | None, padding: int) -> None:
     pixels = RGB if code is None else cv2.cvtColor(RGB, code)
-    read = picture(raw(pixels, encoding, padding))
+    read = picture_of(raw(pixels, encoding, padding))
     assert np.array_equal(read, RGB)
     assert read.flags.c_contiguous
 
 
+@pytest.mark.parametrize("big", [False, True], ids=["little", "big"])
+@pytest.mark.parametrize("encoding", ["rgb16", "bgr16", "mono16"])
+def test_sixteen_bits_become_eight_by_their_full_range(encoding: str, big: bool) -> None:
+    pixels = {"rgb16": RGB, "bgr16": RGB[:, :, ::-1], "mono16": RGB[:, :, :1]}[encoding]
+    samples = (pixels.astype(np.uint16) * 257).astype(">u2" if big else "<u2")
+    message = replace(
+        raw(samples.view(np.uint8), encoding, 3), width=RGB.shape[1], is_bigendian=int(big)
+    )
+    expected = RGB if encoding != "mono16" else np.repeat(RGB[:, :, :1], 3, axis=2)
+    assert np.array_equal(picture_of(message), expected)
+
+
+def test_a_picture_file_is_not_turned_by_what_it_claims() -> None:
+    """The calibration is of the sensor's pixels, not of how somebody would like to see them."""
+    tall = np.zeros((64, 32, 3), np.uint8)
+    tall[:16] = 250
+    plain = cv2.imencode(".jpg", tall)[1].tobytes()
+    # Exif with one entry: orientation (0x0112) 6, "turn right".
+    tiff = b"MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0"
+    exif = b"Exif\0\0" + tiff
+    claimed = plain[:2] + b"\xff\xe1" + (len(exif) + 2).to_bytes(2, "big") + exif + plain[2:]
+    turned = cv2.imdecode(np.frombuffer(claimed, np.uint8), cv2.IMREAD_COLOR)
+    assert turned.shape == (32, 64, 3)  # the claim is understood where it is asked
+    read = picture_of(CompressedImage(format="jpeg", data=claimed))
+    assert np.array_equal(read, picture_of(CompressedImage(format="jpeg", data=plain)))
+    assert read.shape == (64, 32, 3)
+
+
 def test_grey_becomes_three_equal_channels() -> None:
-    read = picture(raw(RGB[:, :, :1], "mono8"))
+    read = picture_of(raw(RGB[:, :, :1], "mono8"))
     assert (read == RGB[:, :, :1]).all()
 
 
@@ -74,13 +102,13 @@ def test_bayer_patterns_give_the_colour_that_the_sensor_saw(
     for row, letters in enumerate((first, second)):
         for column, letter in enumerate(letters):
             mosaic[row::2, column::2, 0] = SMOOTH[0, 0, "RGB".index(letter)]
-    assert np.array_equal(picture(raw(mosaic, encoding))[4:-4, 4:-4], SMOOTH[4:-4, 4:-4])
+    assert np.array_equal(picture_of(raw(mosaic, encoding))[4:-4, 4:-4], SMOOTH[4:-4, 4:-4])
 
 
 @pytest.mark.parametrize(("suffix", "tolerance"), [(".png", 0), (".jpg", 6)])
 def test_compressed_pictures_are_decoded(suffix: str, tolerance: int) -> None:
     data = cv2.imencode(suffix, SMOOTH[:, :, ::-1])[1].tobytes()
-    read = picture(CompressedImage(format=suffix, data=data))
+    read = picture_of(CompressedImage(format=suffix, data=data))
     assert np.abs(read.astype(int) - SMOOTH).max() <= tolerance
 
 
@@ -100,7 +128,7 @@ def test_compressed_pictures_are_decoded(suffix: str, tolerance: int) -> None:
 )
 def test_images_that_cannot_be_read_are_refused(message) -> None:
     with pytest.raises(NavError):
-        picture(message)
+        picture_of(message)
 
 
 def test_camera_info_is_a_camera() -> None:
@@ -113,7 +141,7 @@ def test_camera_info_is_a_camera() -> None:
     )
     wanted = Camera(640, 480, 500.0, 510.0, 320.0, 240.0, np.array(info.d))
     point = [[0.3, -0.2, 2.0]]
-    assert np.array_equal(camera(info).project(point), wanted.project(point))
+    assert np.array_equal(camera_of(info).project(point), wanted.project(point))
 
 
 @pytest.mark.parametrize(
@@ -132,7 +160,7 @@ def test_camera_info_is_a_camera() -> None:
 )
 def test_a_calibration_that_is_none_is_refused(info: CameraInfo, text: str) -> None:
     with pytest.raises(NavError, match=text):
-        camera(info)
+        camera_of(info)
 
 
 poses = st.builds(

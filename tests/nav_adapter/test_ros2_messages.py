@@ -3,27 +3,30 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from dataclasses import fields, replace
+from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
 
+from cyclonedds.idl import Endianness
 from ros2_scenes import everything, plain, typestore
 from rosbags.typesys import get_types_from_msg
 
 from nav_adapter import NavError
 from nav_adapter.ros2 import PUBLISHED, READ, decode, encode, messages
-from nav_adapter.ros2._cdr import topic_type
-from nav_adapter.ros2._message import field_types
+from nav_adapter.ros2._cdr import _idl_type, topic_type
+from nav_adapter.ros2._message import FieldType, field_types
 from nav_adapter.ros2.messages import Message, definition, ros_type
 from nav_adapter.ros2.messages.builtin_interfaces import Time
-from nav_adapter.ros2.messages.nav2_msgs import SpeedLimit
+from nav_adapter.ros2.messages.nav2_msgs import CircleObject, SpeedLimit
 from nav_adapter.ros2.messages.nav_msgs import OccupancyGrid
 from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, Image
 from nav_adapter.ros2.messages.std_msgs import Header
+from nav_adapter.ros2.messages.unique_identifier_msgs import UUID
 
 STORE = typestore()
 KINDS = sorted(
@@ -147,3 +150,58 @@ def test_messages_are_values() -> None:
 def test_a_value_of_the_wrong_type_is_refused() -> None:
     with pytest.raises(NavError, match="nav2_msgs/msg/SpeedLimit cannot be encoded"):
         encode(SpeedLimit(speed_limit="fast"))  # type: ignore[arg-type]
+
+
+def value_of(kind: FieldType) -> st.SearchStrategy:
+    """Any value that a field may have."""
+    integers = {"byte": (0, 255), "int32": (-(2**31), 2**31 - 1), "uint32": (0, 2**32 - 1)}
+    integers |= {"int8": (-128, 127), "uint8": (0, 255), "int64": (-(2**63), 2**63 - 1)}
+    if kind.message is not None:
+        one = filled(kind.message)
+    elif kind.name in ("int8", "uint8") and kind.count is not None:
+        return st.binary(min_size=kind.count, max_size=kind.count or 9)
+    elif kind.name == "bool":
+        one = st.booleans()
+    elif kind.name == "string":
+        one = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), max_size=9)
+    elif kind.name in integers:
+        one = st.integers(*integers[kind.name])
+    else:
+        one = st.floats(width=32 if kind.name == "float32" else 64)
+    if kind.count is None:
+        return one
+    return st.lists(one, min_size=kind.count, max_size=kind.count or 3).map(tuple)
+
+
+@cache
+def filled(kind: type[Message]) -> st.SearchStrategy[Message]:
+    return st.builds(kind, **{name: value_of(each) for name, each in field_types(kind).items()})
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=ros_type)
+@settings(max_examples=15)
+@given(data=st.data())
+def test_the_bytes_are_those_of_the_library(kind: type[Message], data: st.DataObject) -> None:
+    """Whatever the values, and with them the alignments: cyclonedds writes the same."""
+    message = data.draw(filled(kind))
+    theirs = _idl_type(kind, True).__idl__.serialize(
+        message, use_version_2=False, endianness=Endianness.Little
+    )
+    assert encode(message) == bytes(theirs)
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        SpeedLimit(Header(frame_id="no\0end")),
+        SpeedLimit(Header(Time(sec=2**31))),
+        CameraInfo(k=(1.0,)),
+        CircleObject(uuid=UUID(b"short")),
+        CircleObject(radius=1e300),
+        Header(frame_id="\ud800"),
+    ],
+    ids=["zero", "late", "array", "bytes", "overflow", "surrogate"],
+)
+def test_values_that_do_not_fit_are_refused(message: Message) -> None:
+    with pytest.raises(NavError, match=f"{ros_type(type(message))} cannot be encoded"):
+        encode(message)

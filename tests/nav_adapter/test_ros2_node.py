@@ -47,6 +47,11 @@ def test_ros_gets_the_kinds_of_sequences_that_it_takes() -> None:
     assert list(grid.data.tobytes()) == plain(messages["grid"])["data"]
     circle = to_ros(messages["circles"], lambda kind: SimpleNamespace)
     assert circle.uuid.uuid == list(messages["circles"].uuid.uuid)
+    # rclpy takes an octet as bytes of length one.
+    levels = [
+        each.level for each in to_ros(messages["alerts"], lambda kind: SimpleNamespace).status
+    ]
+    assert levels == [b"\x00", b"\x01"]
     assert isinstance(to_ros(messages["people"], lambda kind: SimpleNamespace).people, list)
 
 

@@ -16,9 +16,10 @@ from numbered_pictures import CAMERA, HEIGHT, WIDTH, numbered, standing_at
 
 from perception import AttentionCone, Camera, PersonKeypoints, PersonObservation
 from sim_tests import SimError
+from sim_tests._colours import awareness_colour
 from sim_tests.estimates import _ink, _overlay
 from sim_tests.estimates._frame_estimate import FrameEstimate
-from sim_tests.estimates._ink import Lettering, awareness_colour
+from sim_tests.estimates._ink import Lettering
 from sim_tests.estimates._overlay import draw_overlay
 from sim_tests.estimates._overlay_file import OverlayFile, fit
 from sim_tests.estimates._source_frame import SourceFrame

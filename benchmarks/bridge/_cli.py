@@ -1,0 +1,102 @@
+"""The command line of the benchmark."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from nav_adapter import NavError
+from sim_tests import SimError
+from sim_tests._arguments import count
+from sim_tests._bench import Metric, read_baseline, write_baseline
+from sim_tests._cli import main as awarenav
+
+BASELINE = Path(__file__).with_name("baseline.json")
+#: Pictures a second on two cores.
+WANTED_HZ = 15.0
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the benchmark; 0 when all is as it should be, 1 when a figure is not, 2 for bad input."""
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.bridge",
+        description="Send one rendered picture of 640 × 480 again and again over DDS on loopback "
+        "to `awarenav bridge` with the networks in the box, with odometry at 50 Hz and a listener "
+        "on every topic, and count what comes back. Bridge, sender and listener share the cores. "
+        "Anything else that runs on them slows it: use a computer that does nothing else.",
+    )
+    parser.add_argument("--seconds", type=count, default=20, metavar="S", help="default: 20")
+    parser.add_argument(
+        "--rate", type=count, default=30, metavar="HZ", help="pictures sent a second (default: 30)"
+    )
+    parser.add_argument("--cores", type=count, default=2, metavar="N", help="default: 2 (Linux)")
+    parser.add_argument(
+        "--people", type=count, default=1, metavar="N", help="in the picture (default: 1)"
+    )
+    parser.add_argument("--compressed", action="store_true", help="send JPEG files")
+    parser.add_argument(
+        "--render",
+        type=Path,
+        metavar="DIR",
+        help="an `awarenav render` folder instead of a new one",
+    )
+    parser.add_argument(
+        "--baseline",
+        type=Path,
+        default=BASELINE,
+        metavar="FILE",
+        help=f"figures to compare with, if it exists (default: {BASELINE.name} beside this file)",
+    )
+    parser.add_argument("--out", type=Path, metavar="FILE", help="write the figures as JSON")
+    options = parser.parse_args(arguments)
+    if options.out is not None and not options.out.parent.is_dir():
+        parser.error(f"--out must be a file in a folder that exists, got {options.out}")
+    try:
+        baseline = read_baseline(options.baseline) if options.baseline.exists() else {}
+        metrics = _metrics(options)
+    except (SimError, NavError) as error:
+        print(f"{parser.prog}: {error}", file=sys.stderr)
+        return 2
+    for metric in metrics:
+        print(f"{metric.name:24s}{metric.value:9.2f} {metric.unit}")
+    missed = [
+        f"{metric.name}: {metric.value:.3g} {metric.unit}, {baseline[metric.name].value:.3g} before"
+        for metric in metrics
+        if metric.name in baseline and metric.is_worse_than(baseline[metric.name])
+    ]
+    if metrics[0].value < min(WANTED_HZ, options.rate):
+        missed.append(f"{metrics[0].value:.1f} pictures a second, {WANTED_HZ:g} wanted")
+    for line in missed:
+        print(f"NOT AS WANTED  {line}")
+    if options.out is not None:
+        write_baseline(options.out, metrics)
+    return 1 if missed else 0
+
+
+def _metrics(options: argparse.Namespace) -> list[Metric]:
+    # Only now: help works without the extra ros2.
+    from ._measure import measure  # noqa: PLC0415
+
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = options.render
+        if folder is None:
+            folder = Path(temporary)
+            _render(folder, options.people)
+        figures = measure(folder, options.seconds, options.rate, options.cores, options.compressed)
+    print(f"{figures.people} of {options.people} people confirmed")
+    # Bare figures depend on the machine; wide tolerances only catch a change of kind.
+    return [
+        Metric("bridge_pictures_per_s", figures.frames_per_s, "1/s", "higher", 0.3),
+        Metric("bridge_latency", figures.latency_ms, "ms", "lower", 0.5),
+        Metric("bridge_cpu_per_picture", figures.cpu_ms, "ms", "lower", 0.5),
+    ]
+
+
+def _render(folder: Path, people: int) -> None:
+    size = ["--frames", "1", "--scenes", "1", "--people", str(people), "--range", "2", "4"]
+    status = awarenav(["render", *size, "--seed", "3", "--processes", "1", "--out", str(folder)])
+    if status != 0:
+        raise SimError(f"awarenav render has ended with status {status}")

@@ -1,0 +1,114 @@
+"""The robot's side of the wire: a camera that shows one rendered picture, and wheels."""
+
+from __future__ import annotations
+
+import json
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from nav_adapter.ros2 import PUBLISHED, READ, DdsNode, encode
+from nav_adapter.ros2.messages.builtin_interfaces import Time
+from nav_adapter.ros2.messages.geometry_msgs import (
+    Quaternion,
+    Transform,
+    TransformStamped,
+    Twist,
+    TwistWithCovariance,
+    Vector3,
+)
+from nav_adapter.ros2.messages.nav_msgs import Odometry
+from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, CompressedImage, Image
+from nav_adapter.ros2.messages.std_msgs import Header
+from nav_adapter.ros2.messages.tf2_msgs import TFMessage
+from perception import Camera
+
+#: Odometry between two pictures at any rate: the adapter's data never grow old.
+ODOMETRY_S = 0.02
+_SPEED_MPS = 0.5
+
+
+class Robot:
+    """Sends what a robot's drivers send, and hears what its planners would.
+
+    Args:
+        folder: what ``awarenav render`` wrote.
+        domain: DDS domain.
+        compressed: send JPEG files instead of pixels.
+    """
+
+    def __init__(self, folder: Path, domain: int, compressed: bool) -> None:
+        self.node = DdsNode(domain)
+        self._image = READ["compressed" if compressed else "image"]
+        for topic in (self._image, READ["camera_info"], READ["odom"], READ["tf_static"]):
+            self.node.advertise(replace(topic, reliable=True))
+        for topic in PUBLISHED.values():
+            self.node.subscribe(topic)
+        frame = json.loads((folder / "truth.jsonl").read_text().splitlines()[0])
+        self.people = len(frame["people"])
+        self._pixels = cv2.imread(str(folder / frame["frame"]))
+        self._jpeg = cv2.imencode(".jpg", self._pixels)[1].tobytes() if compressed else b""
+        self._bytes = self._pixels.tobytes()
+        self._camera = Camera.from_yaml(folder / "camera.yaml")
+        self._T_base_camera = np.array(frame["T_odom_camera"])
+        self._odometry_due_s = 0.0
+
+    def close(self) -> None:
+        """Leave the domain."""
+        self.node.close()
+
+    def say_where_the_camera_is(self) -> None:
+        """Send the static transform and the calibration."""
+        T = self._T_base_camera
+        turn = Quaternion(*Rotation.from_matrix(T[:3, :3]).as_quat().tolist())
+        mount = Transform(Vector3(*T[:3, 3].tolist()), turn)
+        transform = TransformStamped(Header(frame_id="base_link"), "camera", mount)
+        self.node.publish(READ["tf_static"], TFMessage((transform,)))
+        size = self._camera.height_px, self._camera.width_px
+        k = tuple(self._camera.matrix.ravel().tolist())
+        info = CameraInfo(_header("camera"), *size, "plumb_bob", (), k)
+        self.node.publish(READ["camera_info"], info)
+
+    def show(self) -> None:
+        """Send the picture, with the wheels' state before it."""
+        self.roll()
+        if self._jpeg:
+            message: Image | CompressedImage = CompressedImage(
+                _header("camera"), "jpeg", self._jpeg
+            )
+        else:
+            height, width, _ = self._pixels.shape
+            message = Image(_header("camera"), height, width, "bgr8", 0, 3 * width, self._bytes)
+        self.node.publish_cdr(self._image, encode(message))
+
+    def roll(self) -> None:
+        """Send odometry."""
+        twist = TwistWithCovariance(Twist(Vector3(_SPEED_MPS, 0.0, 0.0)))
+        self.node.publish(READ["odom"], Odometry(_header("odom"), "base_link", twist=twist))
+        self._odometry_due_s = time.monotonic() + ODOMETRY_S
+
+    def listen(self, until_s: float) -> list[float]:
+        """Roll on until then, and return when each speed limit came (monotonic, s).
+
+        Everything is taken, so that the bridge sends everything; nothing is decoded.
+        """
+        heard = []
+        while (left_s := until_s - time.monotonic()) > 0.0:
+            self.node.wait(min(left_s, max(0.0, self._odometry_due_s - time.monotonic())))
+            now = time.monotonic()
+            for key, topic in PUBLISHED.items():
+                came = self.node.take_cdr(topic)
+                if key == "speed_limit":
+                    heard += [now] * len(came)
+            if now >= self._odometry_due_s:
+                self.roll()
+        return heard
+
+
+def _header(frame_id: str) -> Header:
+    sec, nanosec = divmod(time.time_ns(), 1_000_000_000)
+    return Header(Time(sec, nanosec), frame_id)

@@ -1,0 +1,41 @@
+"""ROS package diagnostic_msgs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from .._message import Byte, Message, String
+from .std_msgs import Header
+
+
+@dataclass(frozen=True)
+class KeyValue(Message):
+    """A name and what belongs to it."""
+
+    key: String = ""
+    value: String = ""
+
+
+@dataclass(frozen=True)
+class DiagnosticStatus(Message):
+    """How one part of the robot is."""
+
+    OK: ClassVar[int] = 0
+    WARN: ClassVar[int] = 1
+    ERROR: ClassVar[int] = 2
+    STALE: ClassVar[int] = 3
+
+    level: Byte = 0
+    name: String = ""
+    message: String = ""
+    hardware_id: String = ""
+    values: tuple[KeyValue, ...] = ()
+
+
+@dataclass(frozen=True)
+class DiagnosticArray(Message):
+    """How several parts are at one instant."""
+
+    header: Header = Header()
+    status: tuple[DiagnosticStatus, ...] = ()
