@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -217,7 +218,7 @@ class Stage(Closing):
             around = Surroundings(
                 robot,
                 movers[:index] + movers[index + 1 :],
-                lambda worker=worker: self._sees_robot(worker),
+                partial(self._sees_robot, worker),
             )
             motion = actor.motion(self.t_s, around)
             worker.place(
