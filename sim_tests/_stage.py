@@ -195,6 +195,11 @@ class Stage(Closing):
         return tuple(views)
 
     @property
+    def motions(self) -> tuple[PersonMotion, ...]:
+        """What everybody does now."""
+        return self._motions
+
+    @property
     def outcomes(self) -> tuple[PersonOutcome, ...]:
         """What has become of the people who react, in their order."""
         return tuple(walker.outcome() for walker in self.walkers)

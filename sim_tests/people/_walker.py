@@ -131,6 +131,11 @@ class Walker:
         return self._gaze.noticed_s
 
     @property
+    def place_odom_m(self) -> tuple[float, float]:
+        """Where the person was when last asked, x and y."""
+        return self._at(self._now_s)[:2]
+
+    @property
     def reaction(self) -> str:
         """What the person does about the robot now; empty for nothing."""
         return self._meeting.reaction
