@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotState
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile, RobotState
 from perception import AttentionCone, AwarenessPipeline, Camera, PersonObservation
 from perception.arrays import FloatArray
 from tracking import CameraView, PersonTrack, PersonTracker, TrackerConfig
@@ -21,6 +21,7 @@ from ._map_view import MapView
 from ._metrics import ContactEvent, SafetyMeter
 from ._pixel_eyes import pixel_timing
 from ._scenario import Scenario
+from ._scenario_template import ScenarioTemplate
 from ._stage import Stage, TrueView
 from .faults._fault import Fault
 from .faults._faulty_eyes import FaultInjection
@@ -42,7 +43,9 @@ class CrossingFrame:
     """All that was seen, thought and commanded in one control cycle.
 
     ``observed_workers[i]`` is the worker that ``observations[i]`` shows, −1 for none of them;
-    ``margins_m`` holds the separation margin of each worker.
+    ``margins_m`` and ``separations_m`` hold each worker's separation margin and the distance
+    between its surface and the robot's (a lower bound with centres more than 4 m apart), as last
+    measured, which is in every frame up to 20 a second.
     """
 
     t_s: float
@@ -55,6 +58,7 @@ class CrossingFrame:
     constraints: NavConstraints
     command: tuple[float, float]
     margins_m: tuple[float, ...]
+    separations_m: tuple[float, ...] = ()
 
     def observation_of(self, worker: int) -> PersonObservation | None:
         """What was seen of a worker in this frame, or None."""
@@ -86,6 +90,7 @@ class CrossingResult:
         violation_time_s: how long the margin was negative at a moving robot.
         duration_s: simulated time.
         frames: one a control cycle.
+        robot: what drove.
     """
 
     scenario: str
@@ -104,6 +109,7 @@ class CrossingResult:
     violation_time_s: float
     duration_s: float
     frames: tuple[CrossingFrame, ...]
+    robot: RobotProfile = NOVA_CARTER
 
 
 class StraightOn:
@@ -145,7 +151,7 @@ def run_crossing(
     """Run one crossing in PyBullet and measure it.
 
     Args:
-        scenario: a scenario, or the name of a shipped one.
+        scenario: a scenario, or the name of a shipped one, drawn by the seed.
         policy: a policy, the name of a preset, or a YAML file.
         planner: the local planner; default the reference :class:`SamplingPlanner` (a scenario that
             drives straight on needs none).
@@ -163,7 +169,8 @@ def run_crossing(
         NavError: unknown preset or unusable policy file.
         PerceptionError: for pixels, when the shipped networks cannot be loaded.
     """
-    scenario = Scenario.shipped(scenario) if isinstance(scenario, str) else scenario
+    if isinstance(scenario, str):
+        scenario = ScenarioTemplate.shipped(scenario).for_seed(seed)
     policy_name, policy = _resolve(policy)
     jitter_rng, camera_rng, timing_rng = np.random.default_rng(seed).spawn(3)
     jitter = scenario.start_jitter_s
@@ -230,6 +237,7 @@ def run_crossing(
                 constraints,
                 command,
                 margins,
+                tuple(meter.separations_m),
             )
             frames.append(frame)
             if observer is not None:
