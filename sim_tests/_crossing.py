@@ -15,7 +15,7 @@ from perception.arrays import FloatArray
 from tracking import CameraView, PersonTrack, PersonTracker, TrackerConfig
 
 from ._errors import SimError
-from ._eyes import TimedEyes, make_eyes
+from ._eyes import Sighting, TimedEyes, make_eyes
 from ._keypoint_camera import KeypointNoise
 from ._map_view import MapView
 from ._metrics import ContactEvent, SafetyMeter
@@ -210,17 +210,8 @@ def run_crossing(
             truth = stage.truth(cone, T_odom_camera)
             state = stage.amr.state(t_s)
             known = odometry.known(state, T_odom_camera)
-            seen: tuple[tuple[PersonObservation, int], ...] = ()
-            tracks: tuple[PersonTrack, ...] = ()
-            for sighting in camera.look(t_s, T_odom_camera, known.T_odom_camera, truth):
-                if sighting.stamp_s == seen_s:
-                    continue  # the same picture again is no new evidence
-                if seen_s - sighting.stamp_s > tracker.config.max_lag_s:
-                    continue  # too old for the tracker to go back to
-                observations = tuple(observation for observation, _ in sighting.seen)
-                tracks = tracker.update(observations, sighting.stamp_s, sighting.T_odom_camera)
-                if sighting.stamp_s > seen_s:
-                    seen, seen_s = sighting.seen, sighting.stamp_s
+            arrived = camera.look(t_s, T_odom_camera, known.T_odom_camera, truth)
+            seen, seen_s, tracks = _take_in(tracker, arrived, seen_s)
             if seen_s != t_s:
                 tracks = tracker.predict(t_s)
             constraints = adapter.update(tracks, known.state, t_s, perception_stamp_s=seen_s)
@@ -249,6 +240,29 @@ def run_crossing(
         return _result(
             scenario, seed, policy_name, type(driver).__name__, perception, meter, frames, reached_s
         )
+
+
+def _take_in(
+    tracker: PersonTracker, sightings: tuple[Sighting, ...], seen_s: float
+) -> tuple[tuple[tuple[PersonObservation, int], ...], float, tuple[PersonTrack, ...]]:
+    """Give frames to the tracker.
+
+    Returns:
+        What the newest of them shows if it is newer than ``seen_s``, the newest stamp of all, and
+        the tracks if there were frames.
+    """
+    seen: tuple[tuple[PersonObservation, int], ...] = ()
+    tracks: tuple[PersonTrack, ...] = ()
+    for sighting in sightings:
+        if sighting.stamp_s == seen_s:
+            continue  # the same picture again is no new evidence
+        if seen_s - sighting.stamp_s > tracker.config.max_lag_s:
+            continue  # too old for the tracker to go back to
+        observations = tuple(observation for observation, _ in sighting.seen)
+        tracks = tracker.update(observations, sighting.stamp_s, sighting.T_odom_camera)
+        if sighting.stamp_s > seen_s:
+            seen, seen_s = sighting.seen, sighting.stamp_s
+    return seen, seen_s, tracks
 
 
 def _camera(scenario: Scenario, perception: str) -> tuple[Camera, CameraTiming]:
