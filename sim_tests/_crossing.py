@@ -25,6 +25,7 @@ from ._scenario_template import ScenarioTemplate
 from ._stage import Stage, TrueView
 from .faults._fault import Fault
 from .faults._faulty_eyes import FaultInjection
+from .people._person_outcome import PersonOutcome
 from .pictures._camera_timing import CameraTiming
 from .robot._amr import NOVA_CARTER
 from .robot._planner import LocalPlanner, SamplingPlanner
@@ -91,6 +92,8 @@ class CrossingResult:
         duration_s: simulated time.
         frames: one a control cycle.
         robot: what drove.
+        people: what became of those who react: ``people[i]`` is person ``i`` of the scenario, and
+            number ``len(scenario.workers) + i`` of everybody.
     """
 
     scenario: str
@@ -110,6 +113,7 @@ class CrossingResult:
     duration_s: float
     frames: tuple[CrossingFrame, ...]
     robot: RobotProfile = NOVA_CARTER
+    people: tuple[PersonOutcome, ...] = ()
 
 
 class StraightOn:
@@ -172,13 +176,13 @@ def run_crossing(
     if isinstance(scenario, str):
         scenario = ScenarioTemplate.shipped(scenario).for_seed(seed)
     policy_name, policy = _resolve(policy)
-    jitter_rng, camera_rng, timing_rng = np.random.default_rng(seed).spawn(3)
+    jitter_rng, camera_rng, timing_rng, people_rng = np.random.default_rng(seed).spawn(4)
     jitter = scenario.start_jitter_s
     offsets = jitter_rng.uniform(-jitter, jitter, len(scenario.workers))
     cone = AttentionCone()
     meter = SafetyMeter(NOVA_CARTER)
     injection = FaultInjection(fault, seed)
-    with Stage(scenario, offsets) as stage:
+    with Stage(scenario, offsets, people_rng) as stage:
         driver = planner if planner is not None else _default_planner(scenario, stage)
         camera_model, timing = _camera(scenario, perception)
         eyes = make_eyes(
@@ -238,7 +242,15 @@ def run_crossing(
                 break
             stage.advance(t_s + dt_s, meter)
         return _result(
-            scenario, seed, policy_name, type(driver).__name__, perception, meter, frames, reached_s
+            scenario,
+            seed,
+            policy_name,
+            type(driver).__name__,
+            perception,
+            meter,
+            frames,
+            reached_s,
+            stage.outcomes,
         )
 
 
@@ -318,6 +330,7 @@ def _result(
     meter: SafetyMeter,
     frames: list[CrossingFrame],
     reached_s: float | None,
+    people: tuple[PersonOutcome, ...],
 ) -> CrossingResult:
     causes = {contact.by for contact in meter.contacts}
     by = "robot" if "robot" in causes else "person" if causes else ""
@@ -338,4 +351,5 @@ def _result(
         violation_time_s=meter.violation_time_s,
         duration_s=frames[-1].t_s,
         frames=tuple(frames),
+        people=people,
     )
