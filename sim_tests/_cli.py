@@ -14,6 +14,7 @@ from tracking import TrackingError
 
 from ._errors import SimError
 from .bridge._command import add_parser as add_bridge_parser
+from .catalogue._command import add_parser as add_scenario_parser
 from .estimates._command import add_parsers as add_estimate_parsers
 from .measures._command import add_parser as add_compare_parser
 from .models._command import add_parser as add_models_parser
@@ -86,6 +87,7 @@ def _parser() -> argparse.ArgumentParser:
     add_estimate_parsers(commands)
     add_tracks_parser(commands)
     add_policy_parser(commands)
+    add_scenario_parser(commands)
     add_bridge_parser(commands)
     add_compare_parser(commands)
 

@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
+import yaml
 from pydantic import BeforeValidator, Field, model_validator
 
 from perception import Camera
@@ -153,6 +154,10 @@ class Scenario(StrictConfig):
         from ._scenario_template import ScenarioTemplate  # noqa: PLC0415 - it is made of scenarios
 
         return ScenarioTemplate.from_yaml(path).median()
+
+    def to_text(self) -> str:
+        """YAML for :meth:`ScenarioTemplate.from_text`: the scenario as plain data."""
+        return yaml.safe_dump(self.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
 
     def without_people(self) -> Scenario:
         """The same task in an empty hall: what the robot could do if nobody were there."""
