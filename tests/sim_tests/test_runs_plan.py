@@ -124,7 +124,7 @@ def test_a_planner_that_draws_from_global_chance_is_repeated_by_its_seed():
     first, *_, other = short_jobs(2, planners=["run_planners:Chancy"])
     np.random.seed(1)  # noqa: NPY002
     record = run_episode(first)
-    expected = np.random.RandomState(1).random()  # noqa: NPY002
+    expected = np.random.RandomState(1).random()
     assert np.random.random() == expected  # noqa: NPY002 - and ours is as it was
     assert run_episode(first) == record
     assert run_episode(other).path_length_m != record.path_length_m
