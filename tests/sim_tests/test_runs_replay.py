@@ -10,7 +10,7 @@ from sim_tests.runs import run_jobs
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
-    run_jobs(short_jobs(1, faults=["none", "ghosts"]), folder, workers=1)
+    run_jobs(short_jobs(1, faults=["none", "misses_30"]), folder, workers=1)
     return folder
 
 
@@ -29,7 +29,7 @@ def test_a_replay_that_ends_otherwise_says_in_what(run, tmp_path, capsys):
     rows = (run / "episodes.csv").read_text().replace(",true,false,,", ",false,false,,")
     (copy / "episodes.csv").write_text(rows)
     (copy / "jobs.jsonl").write_bytes((run / "jobs.jsonl").read_bytes())
-    assert main(["replay", str(copy), "short:0:blind:ghosts", "--no-video"]) == 1
+    assert main(["replay", str(copy), "short:0:blind:misses_30", "--no-video"]) == 1
     assert "success was false, is true" in capsys.readouterr().out
     assert [path.name for path in (copy / "replays").iterdir()] == ["episode_00002.png"]
 
