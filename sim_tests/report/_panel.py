@@ -1,0 +1,127 @@
+"""Intervals side by side: what the page draws as a small plot with a row an arm."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ._arm import Arm
+from ._estimates import Estimate
+from ._measure import Measure
+from ._scale import Scale
+from ._text import NOTHING, count, number, percent
+
+
+@dataclass(frozen=True, slots=True)
+class PanelRow:
+    """One interval: places in per cent of the panel's width, None for no data.
+
+    Attributes:
+        label: name of the arm.
+        look: of the arm's mark.
+        value: the estimate as text.
+        interval: its ends as text.
+        count: of episodes or pairs, as text.
+        place: of the estimate.
+        low: place of the interval's end.
+        high: place of the interval's end.
+    """
+
+    label: str
+    look: int
+    value: str
+    interval: str
+    count: str
+    place: float | None
+    low: float | None
+    high: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """A plot of intervals.
+
+    Attributes:
+        title: of the measure.
+        unit: of the numbers; those in per cent carry their sign.
+        hint: which way is better, empty where neither is.
+        meaning: one sentence.
+        rows: one an arm.
+        ticks: place and text of round values.
+        zero: place of 0, None where the axis has none inside.
+    """
+
+    title: str
+    unit: str
+    hint: str
+    meaning: str
+    rows: tuple[PanelRow, ...]
+    ticks: tuple[tuple[float, str], ...]
+    zero: float | None
+
+
+def panel(
+    measure: Measure,
+    rows: Sequence[tuple[Arm, str, Estimate | None]],
+    *,
+    scale: Scale | None = None,
+    signed: bool = False,
+) -> Panel:
+    """Draw up a panel.
+
+    Args:
+        measure: what is shown.
+        rows: arm, label and estimate of each row.
+        scale: shared with other panels; default one for these rows, in per cent for shares.
+        signed: writes a plus before gains, for differences.
+    """
+    factor = 100.0 if measure.share else 1.0
+    known = [estimate for _, _, estimate in rows if estimate is not None]
+    if scale is None:
+        scale = scale_over(known, factor)
+    hint = {"less": "less is better", "more": "more is better"}.get(measure.better, "")
+    inside = scale.low < 0.0 < scale.high
+    return Panel(
+        measure.title,
+        "" if measure.share else measure.unit,
+        hint,
+        measure.meaning,
+        tuple(_row(measure, scale, factor, signed, *row) for row in rows),
+        scale.ticks(),
+        scale.place(0.0) if inside else None,
+    )
+
+
+def scale_over(estimates: Sequence[Estimate], factor: float = 1.0) -> Scale:
+    """The axis that holds all intervals and 0."""
+    ends = [factor * end for each in estimates for end in (each.low, each.value, each.high)]
+    return Scale.over(ends, zero=True)
+
+
+def _row(
+    measure: Measure,
+    scale: Scale,
+    factor: float,
+    signed: bool,
+    arm: Arm,
+    label: str,
+    estimate: Estimate | None,
+) -> PanelRow:
+    if estimate is None:
+        return PanelRow(label, arm.look, NOTHING, "no data", "", None, None, None)
+
+    def text(value: float) -> str:
+        if measure.share:
+            return percent(value, sign=signed)
+        return number(value, measure.decimals, sign=signed)
+
+    return PanelRow(
+        label,
+        arm.look,
+        text(estimate.value),
+        f"{text(estimate.low)} to {text(estimate.high)}",
+        count(estimate.count),
+        scale.place(factor * estimate.value),
+        scale.place(factor * estimate.low),
+        scale.place(factor * estimate.high),
+    )
