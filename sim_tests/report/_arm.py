@@ -33,7 +33,7 @@ class Arm:
         look: number of its colour and shape.
         episodes: without a fault, those that failed left out.
         faulted: under faults, those that failed left out.
-        failed: how many episodes ended in an error.
+        errors: episodes that ended in an error.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Arm:
     look: int
     episodes: tuple[Episode, ...]
     faulted: tuple[Episode, ...]
-    failed: int
+    errors: tuple[Episode, ...]
 
 
 def arms_of(episodes: Iterable[Episode]) -> tuple[Arm, ...]:
@@ -53,7 +53,7 @@ def arms_of(episodes: Iterable[Episode]) -> tuple[Arm, ...]:
     for episode in episodes:
         record = episode.record
         groups.setdefault((record.policy, record.planner, record.perception), []).append(episode)
-    keys = sorted(groups, key=lambda key: ({"candidate": 1, "ceiling": 2}.get(_role(key), 0)))
+    keys = sorted(groups, key=lambda key: {"candidate": 1, "ceiling": 2}.get(_role(key), 0))
     free = [look for look in range(_LOOKS) if look not in (_REFERENCE_LOOK, _CEILING_LOOK)]
     arms = []
     candidates = 0
@@ -72,7 +72,7 @@ def arms_of(episodes: Iterable[Episode]) -> tuple[Arm, ...]:
                 look,
                 tuple(each for each in good if not each.record.fault),
                 tuple(each for each in good if each.record.fault),
-                len(groups[key]) - len(good),
+                tuple(each for each in groups[key] if each.record.error),
             )
         )
     return tuple(arms)

@@ -11,7 +11,6 @@ from ._estimates import mean_of
 from ._measure import MARGIN, TIME_LOST, VIOLATION
 from ._panel import Panel, panel, scale_over
 from ._text import count, plural
-from ._verdict import robot_contacts
 
 #: Value of ``awareness``, heading and meaning.
 GROUPS: Final = (
@@ -38,13 +37,13 @@ class AwarenessGroup:
     Attributes:
         title: of the group.
         meaning: one sentence.
-        counts: for each arm its name, episodes and contacts caused by the robot, as texts.
+        counts: for each arm its look, name, episodes and contacts caused by the robot, as texts.
         panels: measures on axes that all groups share.
     """
 
     title: str
     meaning: str
-    counts: tuple[tuple[str, int, str, str], ...]
+    counts: tuple[tuple[int, str, str, str], ...]
     panels: tuple[Panel, ...]
 
 
@@ -65,12 +64,7 @@ def split_by_awareness(arms: Sequence[Arm]) -> tuple[AwarenessGroup, ...]:
     }
     scales = {
         measure.key: scale_over(
-            [
-                each
-                for kind, _, _ in GROUPS
-                for each in estimates[kind, measure.key]
-                if each is not None
-            ]
+            [each for kind, _, _ in GROUPS for each in estimates[kind, measure.key] if each.known]
         )
         for measure in _MEASURES
     }
@@ -80,10 +74,9 @@ def split_by_awareness(arms: Sequence[Arm]) -> tuple[AwarenessGroup, ...]:
             continue
         counts = []
         for arm, episodes in parts[kind]:
-            contacts = robot_contacts(episodes)
-            hits = 0 if contacts is None else round(contacts.value * contacts.count)
-            said = f"{plural(hits, 'robot contact')}" if episodes else ""
-            counts.append((arm.name, arm.look, count(len(episodes)), said))
+            hits = sum(each.record.robot_contacts > 0 for each in episodes)
+            said = plural(hits, "robot contact") if episodes else ""
+            counts.append((arm.look, arm.name, count(len(episodes)), said))
         panels = tuple(
             panel(
                 measure,

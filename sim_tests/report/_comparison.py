@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
+from ..measures._interval import Interval
 from ._arm import Arm
 from ._episode import Episode
-from ._estimates import Estimate, difference_of, mean_of, share_of, won_back_of
+from ._estimates import difference_of, mean_of, of_attention, share_of, won_back_of
 from ._measure import FURTHER, MAIN, MARGIN, TIME_LOST, VIOLATION, Measure
 from ._panel import Panel, panel
-from ._verdict import of_attention
 
 _WON_BACK: Final = Measure(
     "won_back",
@@ -54,12 +54,10 @@ def compare(arms: Sequence[Arm]) -> Comparison:
     )
 
 
-def estimate(measure: Measure, arm: Arm) -> Estimate | None:
+def estimate(measure: Measure, arm: Arm) -> Interval:
     """A measure of one arm."""
-    if measure.share:
-        values = [measure.value(each.record) or 0.0 for each in arm.episodes]
-        return share_of(sum(value > 0.0 for value in values), len(values))
-    return mean_of(arm.episodes, measure.value)
+    reckon = share_of if measure.share else mean_of
+    return reckon(arm.episodes, measure.value)
 
 
 def _panel(measure: Measure, arms: Sequence[Arm]) -> Panel:
@@ -93,7 +91,7 @@ def _paired(reference: Arm, arms: Sequence[Arm]) -> tuple[Panel, ...]:
     for measure in (TIME_LOST, VIOLATION, MARGIN):
         changed = replace(measure, title=f"{measure.title}, less {reference.name}")
         rows = [
-            (arm, label, difference_of(*parts(arm, kind), measure.value))
+            (arm, label, difference_of(*parts(arm, kind), measure.key))
             for arm, label, kind in groups
         ]
         panels.append(panel(changed, rows, signed=True))

@@ -1,106 +1,85 @@
-"""Estimates with confidence intervals from episodes; the mathematics is in :mod:`..measures`."""
+"""Estimates from episodes of the report; the mathematics is that of :mod:`sim_tests.measures`.
+
+Everything here takes its own generator of seed 0, so that a figure does not depend on which others
+the page shows.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
-from scipy.stats import beta
 
+from ..measures._bootstrap import bootstrap_interval
 from ..measures._episode_record import EpisodeRecord
+from ..measures._interval import Interval
+from ..measures._pairs import (
+    paired_difference,
+    violation_excess,
+    violation_excess_of_time,
+    won_back,
+)
+from ..measures._proportions import proportion_interval
 from ._episode import Episode
-
-LEVEL: Final = 0.95
-_SEED: Final = 0
-_RESAMPLES: Final = 2000
 
 Value = Callable[[EpisodeRecord], "float | None"]
 
 
-@dataclass(frozen=True, slots=True)
-class Estimate:
-    """An estimate with its 95 % confidence interval.
-
-    Attributes:
-        value: the estimate.
-        low: end of the interval.
-        high: end of the interval.
-        count: of episodes, or of pairs of episodes, that it rests on.
-    """
-
-    value: float
-    low: float
-    high: float
-    count: int
+def records_of(episodes: Iterable[Episode]) -> tuple[EpisodeRecord, ...]:
+    """Their rows."""
+    return tuple(each.record for each in episodes)
 
 
-def mean_of(episodes: Iterable[Episode], value: Value) -> Estimate | None:
-    """The mean over the episodes that have a value; None without any."""
-    values = [number for each in episodes if (number := value(each.record)) is not None]
-    if not values:
-        return None
-    rng = np.random.default_rng(_SEED)
-    data = np.asarray(values)
-    means = data[rng.integers(len(data), size=(_RESAMPLES, len(data)))].mean(axis=1)
-    low, high = np.quantile(means, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
-    return Estimate(float(data.mean()), float(low), float(high), len(values))
+def of_attention(episodes: Iterable[Episode], attention: str) -> tuple[Episode, ...]:
+    """The episodes of scenarios of that attention."""
+    return tuple(each for each in episodes if each.record.attention == attention)
 
 
-def share_of(hits: int, count: int) -> Estimate | None:
-    """A share with the exact interval of Clopper and Pearson, one-sided for none of ``count``."""
-    if not count:
-        return None
-    if not hits:
-        return Estimate(0.0, 0.0, float(1.0 - (1.0 - LEVEL) ** (1.0 / count)), count)
-    tail = (1.0 - LEVEL) / 2.0
-    low = float(beta.ppf(tail, hits, count - hits + 1))
-    high = float(beta.ppf(1.0 - tail, hits + 1, count - hits)) if hits < count else 1.0
-    return Estimate(hits / count, low, high, count)
+def mean_of(episodes: Iterable[Episode], value: Value) -> Interval:
+    """The mean over the episodes that have a value, resampled within scenarios."""
+    known = [
+        ((each.record.scenario, each.record.scenario_version), number)
+        for each in episodes
+        if (number := value(each.record)) is not None
+    ]
+    return bootstrap_interval(
+        [number for _, number in known],
+        np.random.default_rng(0),
+        strata=[scenario for scenario, _ in known],
+    )
 
 
-def pairs_of(
-    reference: Iterable[Episode], episodes: Iterable[Episode]
-) -> list[tuple[EpisodeRecord, EpisodeRecord]]:
-    """Records of the same scenario, version and seed: the reference's and the other's."""
-    known = {each.pair: each.record for each in reference}
-    return [(known[each.pair], each.record) for each in episodes if each.pair in known]
+def plain_mean(episodes: Iterable[Episode], value: Value) -> float | None:
+    """The mean alone; None without a value."""
+    known = [number for each in episodes if (number := value(each.record)) is not None]
+    return float(np.mean(known)) if known else None
+
+
+def share_of(episodes: Sequence[Episode], value: Value) -> Interval:
+    """The share of episodes whose value is above 0, with its exact interval."""
+    hits = sum((value(each.record) or 0.0) > 0.0 for each in episodes)
+    return proportion_interval(hits, len(episodes))
 
 
 def difference_of(
-    reference: Iterable[Episode], episodes: Iterable[Episode], value: Value
-) -> Estimate | None:
-    """The mean paired difference, the others less the reference; None without a pair."""
-    differences = [
-        second - first
-        for one, other in pairs_of(reference, episodes)
-        if (first := value(one)) is not None and (second := value(other)) is not None
-    ]
-    if not differences:
-        return None
-    rng = np.random.default_rng(_SEED)
-    data = np.asarray(differences)
-    means = data[rng.integers(len(data), size=(_RESAMPLES, len(data)))].mean(axis=1)
-    low, high = np.quantile(means, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
-    return Estimate(float(data.mean()), float(low), float(high), len(data))
+    reference: Iterable[Episode], episodes: Iterable[Episode], field: str
+) -> Interval:
+    """The mean difference over pairs of the same scenario and seed: the others less the first."""
+    return paired_difference(records_of(reference), records_of(episodes), field)
 
 
-def won_back_of(reference: Sequence[Episode], episodes: Sequence[Episode]) -> Estimate | None:
+def won_back_of(reference: Iterable[Episode], episodes: Iterable[Episode]) -> Interval:
     """The share of the time that the reference loses which the others win back."""
-    pairs = [
-        (one.time_lost_s, other.time_lost_s)
-        for one, other in pairs_of(reference, episodes)
-        if one.time_lost_s is not None and other.time_lost_s is not None
-    ]
-    if not pairs:
-        return None
-    data = np.asarray(pairs)
-    if data[:, 0].sum() <= 0.0:
-        return None
-    rng = np.random.default_rng(_SEED)
-    sums = data[rng.integers(len(data), size=(_RESAMPLES, len(data)))].sum(axis=1)
-    ratio = 1.0 - sums[:, 1] / sums[:, 0]
-    low, high = np.quantile(ratio, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
-    total = data.sum(axis=0)
-    return Estimate(float(1.0 - total[1] / total[0]), float(low), float(high), len(data))
+    return won_back(records_of(reference), records_of(episodes))
+
+
+def excess_of(reference: Iterable[Episode], episodes: Iterable[Episode]) -> tuple[Interval, str]:
+    """How much longer the margin is violated, and in terms of what.
+
+    Relative to the violation of the reference; to its time where it violates nothing.
+    """
+    first, second = records_of(reference), records_of(episodes)
+    excess = violation_excess(first, second)
+    if excess.known:
+        return excess, "of its violation"
+    return violation_excess_of_time(first, second), "of its time"

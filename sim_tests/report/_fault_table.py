@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ._arm import Arm
 from ._episode import Episode
-from ._estimates import difference_of, mean_of
+from ._estimates import difference_of, plain_mean
 from ._measure import TIME_LOST, VIOLATION, Measure
 from ._text import NOTHING, count, number, percent
 from ._verdict import robot_contacts
@@ -38,13 +38,13 @@ def faults_of(arms: Sequence[Arm]) -> tuple[FaultRow, ...]:
         for fault in sorted({each.record.fault for each in arm.faulted}):
             episodes = tuple(each for each in arm.faulted if each.record.fault == fault)
             contacts = robot_contacts(episodes)
-            if contacts is None:
-                continue
-            hits = round(contacts.value * contacts.count)
+            hits = sum(each.record.robot_contacts > 0 for each in episodes)
             margins = [
-                each.record.min_margin_m for each in episodes if each.record.min_margin_m is not None
+                each.record.min_margin_m
+                for each in episodes
+                if each.record.min_margin_m is not None
             ]
-            lost, violated = (mean_of(episodes, each.value) for each in (TIME_LOST, VIOLATION))
+            lost, violated = (plain_mean(episodes, each.value) for each in (TIME_LOST, VIOLATION))
             rows.append(
                 FaultRow(
                     fault,
@@ -54,9 +54,9 @@ def faults_of(arms: Sequence[Arm]) -> tuple[FaultRow, ...]:
                     count(hits),
                     percent(contacts.high),
                     hits > 0,
-                    number(None if lost is None else lost.value, 1),
+                    number(lost, 1),
                     _more(arm, episodes, TIME_LOST, 1),
-                    number(None if violated is None else violated.value, 2),
+                    number(violated, 2),
                     _more(arm, episodes, VIOLATION, 2),
                     number(min(margins) if margins else None, 2),
                 )
@@ -65,8 +65,12 @@ def faults_of(arms: Sequence[Arm]) -> tuple[FaultRow, ...]:
 
 
 def _more(arm: Arm, episodes: Sequence[Episode], measure: Measure, decimals: int) -> str:
-    change = difference_of(arm.episodes, episodes, measure.value)
-    if change is None:
+    change = difference_of(arm.episodes, episodes, measure.key)
+    if not change.known:
         return NOTHING
-    ends = f"{number(change.low, decimals, sign=True)} to {number(change.high, decimals, sign=True)}"
+    if not change.bounded:
+        return number(change.value, decimals, sign=True)
+    ends = (
+        f"{number(change.low, decimals, sign=True)} to {number(change.high, decimals, sign=True)}"
+    )
     return f"{number(change.value, decimals, sign=True)} ({ends})"

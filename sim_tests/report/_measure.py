@@ -151,9 +151,7 @@ FURTHER: Final = (
         "less",
         "Way that people walked over their free ways, all people of an episode together.",
     ),
-    Measure(
-        "stops", "Stops", "", "less", "How often the robot came to a stand before the goal."
-    ),
+    Measure("stops", "Stops", "", "less", "How often the robot came to a stand before the goal."),
     Measure(
         "peak_deceleration_mps2",
         "Peak deceleration",

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ..measures._interval import Interval
 from ._arm import Arm
-from ._estimates import Estimate
 from ._measure import Measure
 from ._scale import Scale
 from ._text import NOTHING, count, number, percent
@@ -62,7 +63,7 @@ class Panel:
 
 def panel(
     measure: Measure,
-    rows: Sequence[tuple[Arm, str, Estimate | None]],
+    rows: Sequence[tuple[Arm, str, Interval]],
     *,
     scale: Scale | None = None,
     signed: bool = False,
@@ -76,7 +77,7 @@ def panel(
         signed: writes a plus before gains, for differences.
     """
     factor = 100.0 if measure.share else 1.0
-    known = [estimate for _, _, estimate in rows if estimate is not None]
+    known = [estimate for _, _, estimate in rows if estimate.known]
     if scale is None:
         scale = scale_over(known, factor)
     hint = {"less": "less is better", "more": "more is better"}.get(measure.better, "")
@@ -92,10 +93,10 @@ def panel(
     )
 
 
-def scale_over(estimates: Sequence[Estimate], factor: float = 1.0) -> Scale:
+def scale_over(estimates: Sequence[Interval], factor: float = 1.0) -> Scale:
     """The axis that holds all intervals and 0."""
     ends = [factor * end for each in estimates for end in (each.low, each.value, each.high)]
-    return Scale.over(ends, zero=True)
+    return Scale.over([end for end in ends if math.isfinite(end)], zero=True)
 
 
 def _row(
@@ -105,9 +106,9 @@ def _row(
     signed: bool,
     arm: Arm,
     label: str,
-    estimate: Estimate | None,
+    estimate: Interval,
 ) -> PanelRow:
-    if estimate is None:
+    if not estimate.known:
         return PanelRow(label, arm.look, NOTHING, "no data", "", None, None, None)
 
     def text(value: float) -> str:
@@ -119,9 +120,9 @@ def _row(
         label,
         arm.look,
         text(estimate.value),
-        f"{text(estimate.low)} to {text(estimate.high)}",
-        count(estimate.count),
+        f"{text(estimate.low)} to {text(estimate.high)}" if estimate.bounded else "not bounded",
+        count(estimate.n),
         scale.place(factor * estimate.value),
-        scale.place(factor * estimate.low),
-        scale.place(factor * estimate.high),
+        scale.place(factor * estimate.low) if estimate.bounded else None,
+        scale.place(factor * estimate.high) if estimate.bounded else None,
     )

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 from ._arm import Arm
 from ._episode import Episode
+from ._episode_list import outcome_of
 from ._scale import Scale
 from ._text import count, number, plural
 
@@ -24,14 +25,18 @@ class Mark:
     """One episode in the plot.
 
     Attributes:
-        key: its number, or a number of its own after all jobs.
+        line: of the list of all episodes; the mark links there.
+        label: what a screen reader says.
+        arm: number of its arm.
         look: of its arm.
         x: place across, per cent from the left.
         y: place down, per cent from the top.
         touched: the robot moved into a person.
     """
 
-    key: int
+    line: int
+    label: str
+    arm: int
     look: int
     x: float
     y: float
@@ -44,17 +49,18 @@ class Scatter:
 
     Attributes:
         marks: in the order in which they are drawn.
-        legend: look, name and number of marks of each arm.
+        legend: look, name, marks and number of each arm.
         x_ticks: place and text.
         y_ticks: place and text.
         x_zero: place of a margin of 0; None outside of the axis.
         band: height in per cent of the strip for episodes that never arrived, 0 without.
-        data: for the script: scenarios, arms, and a row a mark.
+        data: for the script: scenarios, arms, the replay command up to the number, and a row a
+            mark.
         left_out: what is not drawn and why, empty for nothing.
     """
 
     marks: tuple[Mark, ...]
-    legend: tuple[tuple[int, str, str], ...]
+    legend: tuple[tuple[int, str, str, int], ...]
     x_ticks: tuple[tuple[float, str], ...]
     y_ticks: tuple[tuple[float, str], ...]
     x_zero: float | None
@@ -63,8 +69,14 @@ class Scatter:
     left_out: str
 
 
-def scatter(arms: Sequence[Arm]) -> Scatter | None:
-    """Draw up the plot of all episodes without a fault; None when there is nothing to draw."""
+def scatter(arms: Sequence[Arm], listed: Sequence[Episode], replay_prefix: str) -> Scatter | None:
+    """Draw up the plot of all episodes without a fault; None when there is nothing to draw.
+
+    Args:
+        arms: what is compared.
+        listed: episodes as the page lists them.
+        replay_prefix: the command that replays an episode, up to its number.
+    """
     points = [(arm, each) for arm in arms for each in arm.episodes if _drawable(each)]
     total = sum(len(arm.episodes) for arm in arms)
     if not points:
@@ -79,6 +91,7 @@ def scatter(arms: Sequence[Arm]) -> Scatter | None:
     scenarios = sorted({each.record.scenario for _, each in shown})
     places = {name: index for index, name in enumerate(scenarios)}
     numbers = {arm.name: index for index, arm in enumerate(arms)}
+    lines = {id(each): index for index, each in enumerate(listed)}
     marks, rows = [], []
     # Contacts are drawn last, on top of everything.
     for arm, each in sorted(shown, key=lambda point: point[1].record.robot_contacts > 0):
@@ -88,7 +101,11 @@ def scatter(arms: Sequence[Arm]) -> Scatter | None:
         if record.time_to_goal_s is not None:
             y = round(100.0 - y_scale.place(_lost(each)) * (1.0 - band / 100.0), 2)
         touched = record.robot_contacts > 0
-        marks.append(Mark(key, arm.look, x_scale.place(_margin(each)), y, touched))
+        label = f"{arm.name}, {record.scenario}, seed {record.seed}"
+        x = x_scale.place(_margin(each))
+        marks.append(
+            Mark(lines.get(id(each), 0), label, numbers[arm.name], arm.look, x, y, touched)
+        )
         rows.append(
             [
                 key,
@@ -99,7 +116,7 @@ def scatter(arms: Sequence[Arm]) -> Scatter | None:
                 _short(record.min_separation_m),
                 _short(record.speed_at_min_separation_mps),
                 _short(record.time_lost_s),
-                _outcome(each),
+                outcome_of(each),
             ]
         )
     missing = []
@@ -113,8 +130,8 @@ def scatter(arms: Sequence[Arm]) -> Scatter | None:
     return Scatter(
         tuple(marks),
         tuple(
-            (arm.look, arm.name, count(sum(point[0] is arm for point in shown)))
-            for arm in arms
+            (arm.look, arm.name, count(sum(point[0] is arm for point in shown)), index)
+            for index, arm in enumerate(arms)
             if arm.episodes
         ),
         x_scale.ticks(8),
@@ -124,7 +141,12 @@ def scatter(arms: Sequence[Arm]) -> Scatter | None:
         ),
         x_scale.place(0.0) if x_scale.low < 0.0 < x_scale.high else None,
         band,
-        {"scenarios": scenarios, "arms": [arm.name for arm in arms], "rows": rows},
+        {
+            "scenarios": scenarios,
+            "arms": [arm.name for arm in arms],
+            "replay": replay_prefix,
+            "rows": rows,
+        },
         f"Not drawn: {'; '.join(missing)}." if missing else "",
     )
 
@@ -159,12 +181,3 @@ def _thinned(points: Sequence[tuple[Arm, Episode]]) -> list[tuple[Arm, Episode]]
 
 def _short(value: float | None) -> str:
     return number(value, 2)
-
-
-def _outcome(episode: Episode) -> str:
-    record = episode.record
-    if record.robot_contacts:
-        return "robot moved into a person"
-    if record.time_to_goal_s is None:
-        return "goal not reached"
-    return "a person walked into the robot" if record.person_contacts else ""

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ._arm import Arm, judged
 from ._episode import Episode
-from ._estimates import mean_of, won_back_of
+from ._estimates import plain_mean, won_back_of
 from ._measure import MARGIN, TIME_LOST, VIOLATION
-from ._text import count, number, percent
+from ._text import NOTHING, count, number, percent
 
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """A number: what it is sorted by (None last) and how it is written; ``bad`` stands out."""
+    """A number: what it is sorted by (None last), how it is written, and its style's classes."""
 
     sort: float | None
     text: str
-    bad: bool = False
+    classes: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +87,7 @@ def tabulate(arms: Sequence[Arm]) -> ScenarioTable:
             *_cells(arms, parts, _least_margin),
         ]
         total = sum(len(part) for part in parts.values())
-        rows.append(ScenarioRow(name, version, attention, total, tuple(cells)))
+        rows.append(ScenarioRow(name, version, attention, total, _ruled(cells, groups)))
     return ScenarioTable(tuple(groups), tuple(rows))
 
 
@@ -105,17 +105,15 @@ def _cells(
 
 def _contacts(episodes: Sequence[Episode]) -> Cell:
     hits = sum(each.record.robot_contacts > 0 for each in episodes)
-    return Cell(hits, count(hits), bad=hits > 0) if episodes else Cell(None, number(None))
+    return Cell(hits, count(hits), "bad" if hits else "") if episodes else Cell(None, NOTHING)
 
 
 def _time_lost(episodes: Sequence[Episode]) -> Cell:
-    mean = mean_of(episodes, TIME_LOST.value)
-    return _number(None if mean is None else mean.value, 1)
+    return _number(plain_mean(episodes, TIME_LOST.value), 1)
 
 
 def _violation(episodes: Sequence[Episode]) -> Cell:
-    mean = mean_of(episodes, VIOLATION.value)
-    return _number(None if mean is None else mean.value, 2)
+    return _number(plain_mean(episodes, VIOLATION.value), 2)
 
 
 def _least_margin(episodes: Sequence[Episode]) -> Cell:
@@ -125,10 +123,19 @@ def _least_margin(episodes: Sequence[Episode]) -> Cell:
 
 def _won_back(reference: Sequence[Episode], episodes: Sequence[Episode]) -> Cell:
     back = won_back_of(reference, episodes)
-    if back is None:
-        return Cell(None, number(None))
+    if not back.known:
+        return Cell(None, NOTHING)
     return Cell(round(back.value, 6), percent(back.value, 0))
 
 
 def _number(value: float | None, decimals: int) -> Cell:
     return Cell(None if value is None else round(value, 6), number(value, decimals))
+
+
+def _ruled(cells: Sequence[Cell], groups: Sequence[ColumnGroup]) -> tuple[Cell, ...]:
+    """The cells with a rule before each group."""
+    firsts = {sum(len(group.columns) for group in groups[:i]) for i in range(len(groups))}
+    return tuple(
+        replace(cell, classes=f"{cell.classes} first".strip()) if place in firsts else cell
+        for place, cell in enumerate(cells)
+    )

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from ..measures._interval import Interval
 from ._arm import Arm, judged
 from ._episode import Episode
-from ._estimates import Estimate, difference_of, share_of, won_back_of
-from ._measure import VIOLATION
-from ._text import count, number, percent, plural
+from ._estimates import excess_of, of_attention, share_of, won_back_of
+from ._measure import ROBOT_CONTACTS
+from ._text import NOTHING, count, percent, plural
 
 Tone = Literal["good", "bad", "open"]
 
@@ -50,135 +51,131 @@ def verdicts(arms: Sequence[Arm]) -> tuple[Verdict, ...]:
     return tuple(_verdict(arm, reference) for arm in judged(arms))
 
 
-def robot_contacts(episodes: Sequence[Episode]) -> Estimate | None:
+def robot_contacts(episodes: Sequence[Episode]) -> Interval:
     """The share of episodes in which the robot moved into a person."""
-    return share_of(sum(each.record.robot_contacts > 0 for each in episodes), len(episodes))
-
-
-def of_attention(episodes: Sequence[Episode], attention: str) -> tuple[Episode, ...]:
-    """The episodes of scenarios of that attention."""
-    return tuple(each for each in episodes if each.record.attention == attention)
+    return share_of(episodes, ROBOT_CONTACTS.value)
 
 
 def _verdict(arm: Arm, reference: Arm | None) -> Verdict:
     # Touching somebody counts whatever made it happen.
-    episodes = (*arm.episodes, *arm.faulted)
-    contacts = robot_contacts(episodes)
-    if contacts is None:
-        nothing = Card("Contacts caused by the robot", "–", "no episode finished", "no data", "open")
-        return Verdict(arm.name, arm.look, "No episode finished, so nothing can be said.", (nothing,))
+    contacts = robot_contacts((*arm.episodes, *arm.faulted))
+    if not contacts.n:
+        card = Card(
+            "Contacts caused by the robot", NOTHING, "no episode finished", "no data", "open"
+        )
+        return Verdict(arm.name, arm.look, "No episode finished, so nothing can be said.", (card,))
     cards = [_contact_card(arm, contacts)]
     sentence = _contact_sentence(contacts)
-    if reference is not None and arm is not reference:
+    if reference is None:
+        sentence += " Without the policy blind on the same seeds, time won back cannot be stated."
+    elif arm is not reference:
         who, back = _won_back(arm, reference)
         cards += [_won_back_card(who, back, reference), _violation_card(arm, reference)]
         sentence += _won_back_sentence(who, back, reference)
-    elif reference is None:
-        sentence += " Without the policy blind on the same seeds, time won back cannot be stated."
     cards.append(_arrival_card(arm))
     return Verdict(arm.name, arm.look, sentence, tuple(cards))
 
 
-def _hits(share: Estimate) -> int:
-    return round(share.value * share.count)
+def _hits(share: Interval) -> int:
+    return round(share.value * share.n)
 
 
-def _contact_card(arm: Arm, share: Estimate) -> Card:
+def _contact_card(arm: Arm, share: Interval) -> Card:
+    title = ROBOT_CONTACTS.title
     hits = _hits(share)
-    figure = f"{count(hits)} of {count(share.count)}"
+    figure = f"{count(hits)} of {count(share.n)}"
     under = f", {plural(len(arm.faulted), 'episode')} of them under faults" if arm.faulted else ""
     if hits:
         detail = f"{percent(share.low)} to {percent(share.high)} with 95 % confidence{under}"
-        return Card("Contacts caused by the robot", figure, detail, "contacts seen", "bad")
+        return Card(title, figure, detail, "contacts seen", "bad")
     detail = f"at most {percent(share.high)} with 95 % confidence{under}"
-    return Card("Contacts caused by the robot", figure, detail, "none seen", "good")
+    return Card(title, figure, detail, "none seen", "good")
 
 
-def _contact_sentence(share: Estimate) -> str:
+def _contact_sentence(share: Interval) -> str:
     hits = _hits(share)
     if hits:
         return (
-            f"The robot moved into a person in {count(hits)} of {plural(share.count, 'episode')} "
-            f"({percent(share.value)}): do not use it as it is."
+            f"The robot moved into a person in {count(hits)} of {plural(share.n, 'episode')} "
+            f"({percent(share.value)}): look at these before anything else."
         )
     return (
-        f"The robot moved into nobody in {plural(share.count, 'episode')}; a true rate of up to "
+        f"The robot moved into nobody in {plural(share.n, 'episode')}; a true rate of up to "
         f"{percent(share.high)} remains possible."
     )
 
 
-def _won_back(arm: Arm, reference: Arm) -> tuple[str, Estimate | None]:
+def _won_back(arm: Arm, reference: Arm) -> tuple[str, Interval]:
     """With attentive people where there are such scenarios, else with all."""
     attentive = won_back_of(
         of_attention(reference.episodes, "attentive"), of_attention(arm.episodes, "attentive")
     )
-    if attentive is not None:
+    if attentive.known:
         return "attentive people", attentive
     return "people", won_back_of(reference.episodes, arm.episodes)
 
 
-def _won_back_card(who: str, back: Estimate | None, reference: Arm) -> Card:
+def _won_back_card(who: str, back: Interval, reference: Arm) -> Card:
     title = f"Time won back with {who}"
-    if back is None:
-        return Card(title, "–", f"no pair with {reference.name} loses time", "no data", "open")
+    if not back.known:
+        return Card(title, NOTHING, f"no pair with {reference.name} loses time", "no data", "open")
     chip, tone = _direction(back, "gain shown", "loss shown", "no gain shown", more_is_good=True)
-    detail = (
-        f"{percent(back.low)} to {percent(back.high)} of what {reference.name} loses, "
-        f"{plural(back.count, 'pair')}"
-    )
+    detail = f"{_ends(back)} of what {reference.name} loses, {plural(back.n, 'pair')}"
     return Card(title, percent(back.value), detail, chip, tone)
 
 
-def _won_back_sentence(who: str, back: Estimate | None, reference: Arm) -> str:
-    if back is None:
-        return f" There is no pair with {reference.name} that would tell what it wins back."
-    interval = f"(95 % interval {percent(back.low)} to {percent(back.high)})"
+def _won_back_sentence(who: str, back: Interval, reference: Arm) -> str:
+    if not back.known:
+        return f" No pair with {reference.name} tells what it wins back."
     if back.low > 0.0:
         return (
             f" It wins back {percent(back.value)} of the time that {reference.name} loses to {who} "
-            f"{interval}."
+            f"(95 % interval {_ends(back)})."
         )
     if back.high < 0.0:
-        return f" It loses {percent(-back.value)} more time to {who} than {reference.name}."
-    return f" Whether it wins back time from {who} is not shown {interval}."
+        return (
+            f" It loses {percent(-back.value)} more time to {who} than {reference.name} (95 % "
+            f"interval {percent(-back.high)} to {percent(-back.low)})."
+        )
+    return f" Whether it wins back time from {who} is not shown (95 % interval {_ends(back)})."
 
 
 def _violation_card(arm: Arm, reference: Arm) -> Card:
     who = "unaware people"
-    change = difference_of(
-        of_attention(reference.episodes, "unaware"),
-        of_attention(arm.episodes, "unaware"),
-        VIOLATION.value,
-    )
-    if change is None:
-        who = "people"
-        change = difference_of(reference.episodes, arm.episodes, VIOLATION.value)
-    title = f"Margin violated with {who}, against {reference.name}"
-    if change is None:
-        return Card(title, "–", f"no pair with {reference.name}", "no data", "open")
-    chip, tone = _direction(change, "more", "less", "no difference shown", more_is_good=False)
+    parts = [of_attention(each.episodes, "unaware") for each in (reference, arm)]
+    if not all(parts):
+        who, parts = "people", [reference.episodes, arm.episodes]
+    change, base = excess_of(*parts)
+    title = f"Margin violated longer with {who}"
+    if not change.known:
+        return Card(title, NOTHING, f"no pair with {reference.name}", "no data", "open")
+    chip, tone = _direction(change, "longer", "shorter", "no change shown", more_is_good=False)
     detail = (
-        f"{number(change.low, sign=True)} to {number(change.high, sign=True)} s an episode, "
-        f"{plural(change.count, 'pair')}"
+        f"{_ends(change, sign=True)} against {reference.name}, {base}, {plural(change.n, 'pair')}"
     )
-    return Card(title, f"{number(change.value, sign=True)} s", detail, chip, tone)
+    return Card(title, percent(change.value, sign=True), detail, chip, tone)
 
 
 def _arrival_card(arm: Arm) -> Card:
-    arrived = share_of(
-        sum(each.record.time_to_goal_s is not None for each in arm.episodes), len(arm.episodes)
-    )
-    if arrived is None:
-        return Card("Goals reached", "–", "no episode without a fault", "no data", "open")
-    detail = f"{count(_hits(arrived))} of {plural(arrived.count, 'episode')}"
-    if arrived.value == 1.0:
+    arrived = sum(each.record.time_to_goal_s is not None for each in arm.episodes)
+    total = len(arm.episodes)
+    if not total:
+        return Card("Goals reached", NOTHING, "no episode without a fault", "no data", "open")
+    detail = f"{count(arrived)} of {plural(total, 'episode')}"
+    if arrived == total:
         return Card("Goals reached", percent(1.0), detail, "all", "good")
-    left = arrived.count - _hits(arrived)
-    return Card("Goals reached", percent(arrived.value, 1), detail, f"{count(left)} missed", "open")
+    chip = f"{count(total - arrived)} missed"
+    return Card("Goals reached", percent(arrived / total, 1), detail, chip, "open")
+
+
+def _ends(change: Interval, *, sign: bool = False) -> str:
+    if not change.bounded:
+        return "interval not bounded"
+    return f"{percent(change.low, sign=sign)} to {percent(change.high, sign=sign)}"
 
 
 def _direction(
-    change: Estimate, up: str, down: str, neither: str, *, more_is_good: bool
+    change: Interval, up: str, down: str, neither: str, *, more_is_good: bool
 ) -> tuple[str, Tone]:
     if change.low > 0.0:
         return up, "good" if more_is_good else "bad"

@@ -125,7 +125,12 @@ def made_up_run(
     run = {
         "command": "awarenav crossings --scenario all --episodes 20 --policy blind balanced oracle "
         "--perception keypoints --out crossings",
-        "versions": {"awarenav": "0.1.0", "python": "3.11.9", "numpy": "2.4.6", "pybullet": "3.2.7"},
+        "versions": {
+            "awarenav": "0.1.0",
+            "python": "3.11.9",
+            "numpy": "2.4.6",
+            "pybullet": "3.2.7",
+        },
         "settings": {"seed": 0, "episodes": seeds, "workers": 2, "perception": "keypoints"},
     }
     return MadeUpRun(tuple(records), tuple(jobs), run)
