@@ -21,7 +21,10 @@ from ._map_view import MapView
 from ._metrics import ContactEvent, SafetyMeter
 from ._pixel_eyes import pixel_timing
 from ._scenario import Scenario
+from ._scenario_template import ScenarioTemplate
 from ._stage import Stage, TrueView
+from .faults._fault import Fault
+from .faults._faulty_eyes import FaultInjection
 from .pictures._camera_timing import CameraTiming
 from .robot._amr import NOVA_CARTER
 from .robot._planner import LocalPlanner, SamplingPlanner
@@ -143,11 +146,12 @@ def run_crossing(
     noise: KeypointNoise | None = None,
     pipeline: AwarenessPipeline | None = None,
     observer: Observer | None = None,
+    fault: Fault | None = None,
 ) -> CrossingResult:
     """Run one crossing in PyBullet and measure it.
 
     Args:
-        scenario: a scenario, or the name of a shipped one.
+        scenario: a scenario, or the name of a shipped one, drawn by the seed.
         policy: a policy, the name of a preset, or a YAML file.
         planner: the local planner; default the reference :class:`SamplingPlanner` (a scenario that
             drives straight on needs none).
@@ -158,19 +162,22 @@ def run_crossing(
         pipeline: what pixels go through instead of the shipped networks; it has the camera of the
             pictures.
         observer: called after every control cycle with the frame and the stage, e.g. to render.
+        fault: what is wrong with camera and odometry; frames keep the truth about the robot.
 
     Raises:
         SimError: unknown scenario or perception, or an invalid command from the planner.
         NavError: unknown preset or unusable policy file.
         PerceptionError: for pixels, when the shipped networks cannot be loaded.
     """
-    scenario = Scenario.shipped(scenario) if isinstance(scenario, str) else scenario
+    if isinstance(scenario, str):
+        scenario = ScenarioTemplate.shipped(scenario).for_seed(seed)
     policy_name, policy = _resolve(policy)
     jitter_rng, camera_rng, timing_rng = np.random.default_rng(seed).spawn(3)
     jitter = scenario.start_jitter_s
     offsets = jitter_rng.uniform(-jitter, jitter, len(scenario.workers))
     cone = AttentionCone()
     meter = SafetyMeter(NOVA_CARTER)
+    injection = FaultInjection(fault, seed)
     with Stage(scenario, offsets) as stage:
         driver = planner if planner is not None else _default_planner(scenario, stage)
         camera_model, timing = _camera(scenario, perception)
@@ -182,8 +189,10 @@ def run_crossing(
             noise if noise is not None else KeypointNoise(),
             camera_rng,
             pipeline,
+            injection.T_camera_assumed,
         )
-        camera = TimedEyes(eyes, timing, timing_rng)
+        camera = injection.eyes(TimedEyes(eyes, timing, timing_rng), camera_model)
+        odometry = injection.odometry()
         tracker = _tracker(perception, policy, stage, camera_model)
         adapter = NavAdapter(policy, NOVA_CARTER)
         goal = np.array([scenario.robot.goal_x_m, scenario.robot.goal_y_m])
@@ -199,9 +208,13 @@ def run_crossing(
                 margins = stage.measure(meter, ticks_per_measurement * dt_s)
             T_odom_camera = stage.amr.T_odom_camera
             truth = stage.truth(cone, T_odom_camera)
+            state = stage.amr.state(t_s)
+            known = odometry.known(state, T_odom_camera)
             seen: tuple[tuple[PersonObservation, int], ...] = ()
             tracks: tuple[PersonTrack, ...] = ()
-            for sighting in camera.look(t_s, T_odom_camera, truth):
+            for sighting in camera.look(t_s, T_odom_camera, known.T_odom_camera, truth):
+                if sighting.stamp_s == seen_s:
+                    continue  # the same picture again is no new evidence
                 if seen_s - sighting.stamp_s > tracker.config.max_lag_s:
                     continue  # too old for the tracker to go back to
                 observations = tuple(observation for observation, _ in sighting.seen)
@@ -210,9 +223,8 @@ def run_crossing(
                     seen, seen_s = sighting.seen, sighting.stamp_s
             if seen_s != t_s:
                 tracks = tracker.predict(t_s)
-            state = stage.amr.state(t_s)
-            constraints = adapter.update(tracks, state, t_s, perception_stamp_s=seen_s)
-            command = driver.plan(state, goal, constraints, dt_s)
+            constraints = adapter.update(tracks, known.state, t_s, perception_stamp_s=seen_s)
+            command = driver.plan(known.state, goal, constraints, dt_s)
             stage.amr.command(*command)
             frame = CrossingFrame(
                 t_s,
