@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
+from ..measures._summary import BASELINE
+from ..measures._variants import Variant, labels
 from ._episode import Episode
 
 Role = Literal["reference", "candidate", "ceiling"]
 
-#: The policy that awareness is compared with, and the one that knows the truth.
-REFERENCE: Final = "blind"
+#: The policy that knows the truth.
 CEILING: Final = "oracle"
 # Looks of marks: see the shapes of the template and the colours of its style sheet.
 _LOOKS: Final = 6
@@ -24,16 +25,16 @@ class Arm:
     """One thing compared.
 
     Attributes:
-        name: as the page shows it; unique.
+        name: as tables call it; unique.
         policy: name of the policy.
         planner: name of the planner.
         perception: what the robot saw with.
         role: ``"reference"`` ignores awareness, ``"ceiling"`` knows the truth, the others are to
             be judged.
         look: number of its colour and shape.
-        episodes: without a fault, those that failed left out.
-        faulted: under faults, those that failed left out.
-        errors: episodes that ended in an error.
+        episodes: under the fault (or none) that most of the page is about; no errors among them.
+        others: under other faults; no errors among them.
+        errors: those that broke off.
     """
 
     name: str
@@ -43,36 +44,45 @@ class Arm:
     role: Role
     look: int
     episodes: tuple[Episode, ...]
-    faulted: tuple[Episode, ...]
+    others: tuple[Episode, ...]
     errors: tuple[Episode, ...]
 
 
-def arms_of(episodes: Iterable[Episode]) -> tuple[Arm, ...]:
-    """Sort episodes by what they are to be compared for: reference, candidates, ceiling."""
-    groups: dict[tuple[str, str, str], list[Episode]] = {}
+def arms_of(episodes: Sequence[Episode], fault: str) -> tuple[Arm, ...]:
+    """Sort episodes by what they are to be compared for: reference, candidates, ceiling.
+
+    Args:
+        episodes: all of a run.
+        fault: that most of the page is about, empty for none.
+    """
+    groups: dict[Variant, list[Episode]] = {}
     for episode in episodes:
         record = episode.record
-        groups.setdefault((record.policy, record.planner, record.perception), []).append(episode)
-    keys = sorted(groups, key=lambda key: {"candidate": 1, "ceiling": 2}.get(_role(key), 0))
+        variant = Variant(record.policy, record.planner, record.perception)
+        groups.setdefault(variant, []).append(episode)
+    names = labels(groups)
+    order = sorted(
+        groups, key=lambda each: ("reference", "candidate", "ceiling").index(_role(each))
+    )
     free = [look for look in range(_LOOKS) if look not in (_REFERENCE_LOOK, _CEILING_LOOK)]
-    arms = []
-    candidates = 0
-    for key in keys:
-        role = _role(key)
+    arms: list[Arm] = []
+    for variant in order:
+        role = _role(variant)
         look = {"reference": _REFERENCE_LOOK, "ceiling": _CEILING_LOOK}.get(role)
         if look is None:
-            look = free[candidates % len(free)]
-            candidates += 1
-        good = [episode for episode in groups[key] if not episode.record.error]
+            look = free[sum(arm.role == "candidate" for arm in arms) % len(free)]
+        good = [episode for episode in groups[variant] if not episode.record.error]
         arms.append(
             Arm(
-                _name(key, keys),
-                *key,
+                names[variant],
+                variant.policy,
+                variant.planner,
+                variant.perception,
                 role,
                 look,
-                tuple(each for each in good if not each.record.fault),
-                tuple(each for each in good if each.record.fault),
-                tuple(each for each in groups[key] if each.record.error),
+                tuple(each for each in good if each.record.fault == fault),
+                tuple(each for each in good if each.record.fault != fault),
+                tuple(each for each in groups[variant] if each.record.error),
             )
         )
     return tuple(arms)
@@ -83,15 +93,7 @@ def judged(arms: Sequence[Arm]) -> tuple[Arm, ...]:
     return tuple(arm for arm in arms if arm.role == "candidate") or tuple(arms)
 
 
-def _role(key: tuple[str, str, str]) -> Role:
-    if key[0] == REFERENCE:
+def _role(variant: Variant) -> Role:
+    if variant.policy == BASELINE:
         return "reference"
-    return "ceiling" if key[0] == CEILING else "candidate"
-
-
-def _name(key: tuple[str, str, str], keys: Sequence[tuple[str, str, str]]) -> str:
-    """The policy's name, and of planner and perception what it takes to tell arms apart."""
-    same = [other for other in keys if other[0] == key[0]]
-    parts = [key[0]]
-    parts += [key[place] for place in (1, 2) if len({other[place] for other in same}) > 1]
-    return " · ".join(parts)
+    return "ceiling" if variant.policy == CEILING else "candidate"

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from ._arm import Arm
-from ._estimates import mean_of
+from ._figures import Figures, estimate
 from ._measure import MARGIN, TIME_LOST, VIOLATION
 from ._panel import Panel, panel, scale_over
 from ._text import count, plural
@@ -47,45 +45,30 @@ class AwarenessGroup:
     panels: tuple[Panel, ...]
 
 
-def split_by_awareness(arms: Sequence[Arm]) -> tuple[AwarenessGroup, ...]:
+def split_by_awareness(figures: Figures) -> tuple[AwarenessGroup, ...]:
     """The groups that hold any episode."""
-    parts = {
-        kind: [
-            (arm, tuple(each for each in arm.episodes if each.record.awareness == kind))
-            for arm in arms
-            if arm.episodes
-        ]
+    rows = {
+        kind: [(arm, figures.by_awareness(arm, kind)) for arm in figures.shown]
         for kind, _, _ in GROUPS
     }
-    estimates = {
-        (kind, measure.key): [mean_of(episodes, measure.value) for _, episodes in parts[kind]]
-        for kind, _, _ in GROUPS
-        for measure in _MEASURES
-    }
-    scales = {
-        measure.key: scale_over(
-            [each for kind, _, _ in GROUPS for each in estimates[kind, measure.key] if each.known]
-        )
-        for measure in _MEASURES
-    }
+    scales = {}
+    for measure in _MEASURES:
+        estimates = [estimate(row, measure) for group in rows.values() for _, row in group]
+        scales[measure.key] = scale_over([each for each in estimates if each.known])
     groups = []
     for kind, title, meaning in GROUPS:
-        if not any(episodes for _, episodes in parts[kind]):
+        if all(row is None for _, row in rows[kind]):
             continue
         counts = []
-        for arm, episodes in parts[kind]:
-            hits = sum(each.record.robot_contacts > 0 for each in episodes)
+        for arm, row in rows[kind]:
+            episodes = 0 if row is None else row.robot_contact.n
+            hits = 0 if row is None or not episodes else round(row.robot_contact.value * episodes)
             said = plural(hits, "robot contact") if episodes else ""
-            counts.append((arm.look, arm.name, count(len(episodes)), said))
+            counts.append((arm.look, arm.name, count(episodes), said))
         panels = tuple(
             panel(
                 measure,
-                [
-                    (arm, arm.name, each)
-                    for (arm, _), each in zip(
-                        parts[kind], estimates[kind, measure.key], strict=True
-                    )
-                ],
+                [(arm, arm.name, estimate(row, measure)) for arm, row in rows[kind]],
                 scale=scales[measure.key],
             )
             for measure in _MEASURES

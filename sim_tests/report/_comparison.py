@@ -2,27 +2,51 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
-from ..measures._interval import Interval
-from ._arm import Arm
-from ._episode import Episode
-from ._estimates import difference_of, mean_of, of_attention, share_of, won_back_of
-from ._measure import FURTHER, MAIN, MARGIN, TIME_LOST, VIOLATION, Measure
+from ._figures import Figures, estimate
+from ._measure import FURTHER, MAIN, Measure
 from ._panel import Panel, panel
 
-_WON_BACK: Final = Measure(
-    "won_back",
-    "Time won back",
-    "%",
-    "more",
-    "Share of the time that the reference loses which the policy does not, on the same seeds.",
-    share=True,
-)
 #: Kinds of scenario by what their people look at.
 ATTENTIONS: Final = ("attentive", "mixed", "unaware")
+_PAIRED: Final = (
+    Measure(
+        "won_back",
+        "Time won back",
+        "%",
+        "more",
+        "Σ (time lost by the reference − by the policy) / Σ time lost by the reference, over pairs "
+        "of the same scenario and seed.",
+        share=True,
+    ),
+    Measure(
+        "time_lost_s",
+        "Difference in time lost",
+        "s",
+        "less",
+        "Mean over pairs: the policy's less the reference's.",
+    ),
+    Measure(
+        "violation_excess",
+        "Margin violated longer",
+        "%",
+        "less",
+        "Σ (time of violation of the policy − of the reference) / Σ that of the reference, over "
+        "pairs.",
+        share=True,
+    ),
+    Measure(
+        "min_separation_m",
+        "Difference in smallest separation",
+        "m",
+        "",
+        "Mean over pairs: the policy's less the reference's.",
+    ),
+)
+#: What pairs tell that episodes alone do not; for the definitions.
+PAIRED_ONLY: Final = (_PAIRED[0], _PAIRED[2])
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,67 +56,45 @@ class Comparison:
     Attributes:
         main: every arm, every scenario.
         further: measures for those who want more.
-        reference: name of the arm that differences are taken from, empty without.
-        paired: differences from it and time won back, by attention of the scenarios.
+        references: names of the arms that differences are taken from.
+        paired: differences from them and time won back, by attention of the scenarios.
     """
 
     main: tuple[Panel, ...]
     further: tuple[Panel, ...]
-    reference: str
+    references: tuple[str, ...]
     paired: tuple[Panel, ...]
 
 
-def compare(arms: Sequence[Arm]) -> Comparison:
-    """Draw up the comparison of arms over their episodes without a fault."""
-    shown = [arm for arm in arms if arm.episodes]
-    reference = next((arm for arm in shown if arm.role == "reference"), None)
+def compare(figures: Figures) -> Comparison:
+    """Draw up the comparison."""
+    groups = [
+        (arm, f"{arm.name}, {attention}", against)
+        for arm in figures.shown
+        for attention in ATTENTIONS
+        if (against := figures.against(arm, attention)) is not None and against.pairs
+    ]
+    paired = [
+        panel(
+            measure,
+            [(arm, label, getattr(against, measure.key)) for arm, label, against in groups],
+            signed=measure.key != "won_back",
+        )
+        for measure in _PAIRED
+        if any(getattr(against, measure.key).known for _, _, against in groups)
+    ]
     return Comparison(
-        tuple(_panel(measure, shown) for measure in MAIN if _known(measure, shown)),
-        tuple(_panel(measure, shown) for measure in FURTHER if _known(measure, shown)),
-        "" if reference is None else reference.name,
-        () if reference is None else _paired(reference, shown),
+        tuple(_panel(figures, measure) for measure in MAIN if _known(figures, measure)),
+        tuple(_panel(figures, measure) for measure in FURTHER if _known(figures, measure)),
+        tuple(dict.fromkeys(against.baseline for _, _, against in groups)),
+        tuple(paired),
     )
 
 
-def estimate(measure: Measure, arm: Arm) -> Interval:
-    """A measure of one arm."""
-    reckon = share_of if measure.share else mean_of
-    return reckon(arm.episodes, measure.value)
+def _panel(figures: Figures, measure: Measure) -> Panel:
+    rows = [(arm, arm.name, estimate(figures.whole(arm), measure)) for arm in figures.shown]
+    return panel(measure, rows)
 
 
-def _panel(measure: Measure, arms: Sequence[Arm]) -> Panel:
-    return panel(measure, [(arm, arm.name, estimate(measure, arm)) for arm in arms])
-
-
-def _known(measure: Measure, arms: Sequence[Arm]) -> bool:
-    return any(measure.value(each.record) is not None for arm in arms for each in arm.episodes)
-
-
-def _paired(reference: Arm, arms: Sequence[Arm]) -> tuple[Panel, ...]:
-    groups = [
-        (arm, f"{arm.name}, {attention}", attention)
-        for arm in arms
-        if arm is not reference
-        for attention in ATTENTIONS
-        if of_attention(arm.episodes, attention)
-    ]
-    if not groups:
-        return ()
-
-    def parts(arm: Arm, attention: str) -> tuple[Sequence[Episode], Sequence[Episode]]:
-        return of_attention(reference.episodes, attention), of_attention(arm.episodes, attention)
-
-    panels = [
-        panel(
-            _WON_BACK,
-            [(arm, label, won_back_of(*parts(arm, kind))) for arm, label, kind in groups],
-        )
-    ]
-    for measure in (TIME_LOST, VIOLATION, MARGIN):
-        changed = replace(measure, title=f"{measure.title}, less {reference.name}")
-        rows = [
-            (arm, label, difference_of(*parts(arm, kind), measure.key))
-            for arm, label, kind in groups
-        ]
-        panels.append(panel(changed, rows, signed=True))
-    return tuple(panels)
+def _known(figures: Figures, measure: Measure) -> bool:
+    return any(estimate(figures.whole(arm), measure).known for arm in figures.shown)

@@ -8,6 +8,7 @@ from typing import Final
 
 from ._arm import Arm
 from ._episode import Episode
+from ._figures import touched
 from ._run_folder import RunFolder
 from ._text import number, plural
 
@@ -44,7 +45,7 @@ class EpisodeList:
 
 def list_episodes(folder: RunFolder, arms: Sequence[Arm]) -> EpisodeList:
     """List all episodes, or those of the least margin where there are too many for a page."""
-    arm_of = {id(each): arm for arm in arms for each in (*arm.episodes, *arm.faulted, *arm.errors)}
+    arm_of = {id(each): arm for arm in arms for each in (*arm.episodes, *arm.others, *arm.errors)}
     chosen = list(folder.episodes)
     left_out = ""
     if len(chosen) > MOST_LINES:
@@ -62,7 +63,7 @@ def list_episodes(folder: RunFolder, arms: Sequence[Arm]) -> EpisodeList:
 def badness(episode: Episode) -> tuple[int, float, tuple[str, int, int]]:
     """A key to sort by, the worst first: robot contacts and errors, then the smallest margin."""
     record = episode.record
-    severe = 0 if record.robot_contacts else 1 if record.error else 2
+    severe = 0 if touched(record) else 1 if record.error else 2
     margin = float("inf") if record.min_margin_m is None else record.min_margin_m
     return severe, margin, episode.pair
 
@@ -72,7 +73,7 @@ def outcome_of(episode: Episode) -> str:
     record = episode.record
     if record.error:
         return f"failed: {record.error}"
-    if record.robot_contacts:
+    if touched(record):
         return "robot moved into a person"
     if record.person_contacts:
         return "a person walked into the robot"
@@ -92,6 +93,6 @@ def _line(folder: RunFolder, episode: Episode, arm: Arm) -> EpisodeLine:
         number(record.min_margin_m),
         number(record.min_separation_m),
         outcome_of(episode),
-        bool(record.error or record.robot_contacts),
+        bool(record.error or touched(record)),
         folder.replay(episode),
     )

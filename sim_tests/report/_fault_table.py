@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ..measures._pairs import paired_difference
 from ._arm import Arm
 from ._episode import Episode
-from ._estimates import difference_of, plain_mean
+from ._figures import Figures, robot_contacts, touched
 from ._measure import TIME_LOST, VIOLATION, Measure
 from ._text import NOTHING, count, number, percent
-from ._verdict import robot_contacts
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,20 +31,20 @@ class FaultRow:
     least_margin: str
 
 
-def faults_of(arms: Sequence[Arm]) -> tuple[FaultRow, ...]:
+def faults_of(figures: Figures) -> tuple[FaultRow, ...]:
     """A row a fault and arm, in the order of faults' names; empty without faults."""
     rows = []
-    for arm in arms:
-        for fault in sorted({each.record.fault for each in arm.faulted}):
-            episodes = tuple(each for each in arm.faulted if each.record.fault == fault)
+    for arm in figures.arms:
+        for fault in sorted({each.record.fault for each in arm.others}):
+            episodes = tuple(each for each in arm.others if each.record.fault == fault)
             contacts = robot_contacts(episodes)
-            hits = sum(each.record.robot_contacts > 0 for each in episodes)
+            hits = sum(touched(each.record) for each in episodes)
             margins = [
                 each.record.min_margin_m
                 for each in episodes
                 if each.record.min_margin_m is not None
             ]
-            lost, violated = (plain_mean(episodes, each.value) for each in (TIME_LOST, VIOLATION))
+            lost, violated = (_mean(episodes, each) for each in (TIME_LOST, VIOLATION))
             rows.append(
                 FaultRow(
                     fault,
@@ -65,7 +65,8 @@ def faults_of(arms: Sequence[Arm]) -> tuple[FaultRow, ...]:
 
 
 def _more(arm: Arm, episodes: Sequence[Episode], measure: Measure, decimals: int) -> str:
-    change = difference_of(arm.episodes, episodes, measure.key)
+    before, now = ([each.record for each in part] for part in (arm.episodes, episodes))
+    change = paired_difference(before, now, measure.key)
     if not change.known:
         return NOTHING
     if not change.bounded:
@@ -74,3 +75,8 @@ def _more(arm: Arm, episodes: Sequence[Episode], measure: Measure, decimals: int
         f"{number(change.low, decimals, sign=True)} to {number(change.high, decimals, sign=True)}"
     )
     return f"{number(change.value, decimals, sign=True)} ({ends})"
+
+
+def _mean(episodes: Sequence[Episode], measure: Measure) -> float | None:
+    known = [value for each in episodes if (value := getattr(each.record, measure.key)) is not None]
+    return sum(known) / len(known) if known else None

@@ -5,9 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from ..measures._episode_record import EpisodeRecord
-from ._estimates import Value
-
 
 @dataclass(frozen=True, slots=True)
 class Measure:
@@ -20,7 +17,8 @@ class Measure:
         better: ``"less"`` or ``"more"``; empty where neither is good in itself.
         meaning: one sentence.
         decimals: of numbers.
-        share: true for a yes or no of an episode, shown as the share of episodes.
+        share: true for a share, shown in per cent.
+        from_zero: its axis holds 0.
     """
 
     key: str
@@ -30,17 +28,7 @@ class Measure:
     meaning: str
     decimals: int = 2
     share: bool = False
-
-    @property
-    def value(self) -> Value:
-        """Of one episode; None where it does not apply."""
-        key = self.key
-
-        def read(record: EpisodeRecord) -> float | None:
-            value = getattr(record, key)
-            return None if value is None else float(value)
-
-        return read
+    from_zero: bool = True
 
 
 ROBOT_CONTACTS: Final = Measure(
@@ -61,11 +49,13 @@ PERSON_CONTACTS: Final = Measure(
 )
 SUCCESS: Final = Measure(
     "success",
-    "Arrived without a contact of its own",
+    "Arrived, touching nobody",
     "%",
     "more",
-    "Share of episodes in which the goal was reached and the robot moved into nobody.",
+    "Share of episodes in which the goal was reached and the robot moved into nobody; one that "
+    "failed counts as not reached.",
     share=True,
+    from_zero=False,
 )
 TIME_LOST: Final = Measure(
     "time_lost_s",
@@ -80,6 +70,7 @@ VIOLATION: Final = Measure(
     "s",
     "less",
     "Seconds an episode with the separation margin S − S_p below 0 at a moving robot.",
+    decimals=3,
 )
 MARGIN: Final = Measure(
     "min_margin_m",

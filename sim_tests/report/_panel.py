@@ -5,12 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 from ..measures._interval import Interval
 from ._arm import Arm
 from ._measure import Measure
 from ._scale import Scale
 from ._text import NOTHING, count, number, percent
+
+# Estimates from less than this part of the episodes of others do not stretch an axis.
+_FEW: Final = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,24 +83,34 @@ def panel(
     factor = 100.0 if measure.share else 1.0
     known = [estimate for _, _, estimate in rows if estimate.known]
     if scale is None:
-        scale = scale_over(known, factor)
+        scale = scale_over(known, factor, measure.from_zero)
     hint = {"less": "less is better", "more": "more is better"}.get(measure.better, "")
     inside = scale.low < 0.0 < scale.high
     return Panel(
         measure.title,
-        "" if measure.share else measure.unit,
+        measure.unit,
         hint,
         measure.meaning,
         tuple(_row(measure, scale, factor, signed, *row) for row in rows),
-        scale.ticks(),
+        scale.ticks(6),
         scale.place(0.0) if inside else None,
     )
 
 
-def scale_over(estimates: Sequence[Interval], factor: float = 1.0) -> Scale:
-    """The axis that holds all intervals and 0."""
-    ends = [factor * end for each in estimates for end in (each.low, each.value, each.high)]
-    return Scale.over([end for end in ends if math.isfinite(end)], zero=True)
+def scale_over(estimates: Sequence[Interval], factor: float = 1.0, from_zero: bool = True) -> Scale:
+    """The axis that holds all estimates, their intervals unless they are much wider, and 0.
+
+    The interval of a few episodes would squeeze all the others; it is cut off at the axis's end.
+    """
+    most = max((each.n for each in estimates), default=0)
+    ends = [factor * end for each in estimates for end in _ends(each, most)]
+    return Scale.over([end for end in ends if math.isfinite(end)], zero=from_zero)
+
+
+def _ends(estimate: Interval, most: int) -> tuple[float, ...]:
+    if estimate.n * _FEW < most:
+        return (estimate.value,)
+    return estimate.low, estimate.value, estimate.high
 
 
 def _row(

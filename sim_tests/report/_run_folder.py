@@ -62,10 +62,15 @@ class RunFolder:
             missing.append(f"The last row of {_EPISODES} is unfinished and left out.")
         jobs = _read_jobs(path / _JOBS, missing)
         run = _read_run(path / _RUN, missing)
-        episodes = _numbered(table.records, jobs)
-        if jobs and len(table.records) < len(jobs):
+        records, twice = _once(table.records)
+        if twice:
             missing.append(
-                f"{count(len(jobs) - len(table.records))} of {plural(len(jobs), 'episode')} have "
+                f"{plural(twice, 'row')} of {_EPISODES} repeat an episode; the first counts."
+            )
+        episodes = _numbered(records, jobs)
+        if jobs and len(records) < len(jobs):
+            missing.append(
+                f"{count(len(jobs) - len(records))} of {plural(len(jobs), 'episode')} have "
                 "not run yet; the same command with --resume runs them."
             )
         unknown = sum(episode.number is None for episode in episodes)
@@ -128,6 +133,14 @@ def _read_run(path: Path, missing: list[str]) -> dict[str, Any]:
         missing.append(f"{_RUN} holds no mapping: the command and the versions are not known.")
         return {}
     return content
+
+
+def _once(records: tuple[EpisodeRecord, ...]) -> tuple[tuple[EpisodeRecord, ...], int]:
+    """The first record of every episode, and how many others there were."""
+    first: dict[tuple[Key, str], EpisodeRecord] = {}
+    for record in records:
+        first.setdefault((_key(record), record.planner), record)
+    return tuple(first.values()), len(records) - len(first)
 
 
 def _numbered(records: tuple[EpisodeRecord, ...], jobs: tuple[Job, ...]) -> tuple[Episode, ...]:

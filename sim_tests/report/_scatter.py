@@ -9,6 +9,7 @@ from typing import Any, Final
 from ._arm import Arm
 from ._episode import Episode
 from ._episode_list import outcome_of
+from ._figures import touched
 from ._scale import Scale
 from ._text import count, number, plural
 
@@ -94,18 +95,16 @@ def scatter(arms: Sequence[Arm], listed: Sequence[Episode], replay_prefix: str) 
     lines = {id(each): index for index, each in enumerate(listed)}
     marks, rows = [], []
     # Contacts are drawn last, on top of everything.
-    for arm, each in sorted(shown, key=lambda point: point[1].record.robot_contacts > 0):
+    for arm, each in sorted(shown, key=lambda point: touched(point[1].record)):
         record = each.record
         key = -1 if each.number is None else each.number
         y = 0.5 * band
         if record.time_to_goal_s is not None:
             y = round(100.0 - y_scale.place(_lost(each)) * (1.0 - band / 100.0), 2)
-        touched = record.robot_contacts > 0
+        hit = touched(record)
         label = f"{arm.name}, {record.scenario}, seed {record.seed}"
         x = x_scale.place(_margin(each))
-        marks.append(
-            Mark(lines.get(id(each), 0), label, numbers[arm.name], arm.look, x, y, touched)
-        )
+        marks.append(Mark(lines.get(id(each), 0), label, numbers[arm.name], arm.look, x, y, hit))
         rows.append(
             [
                 key,
@@ -171,7 +170,7 @@ def _thinned(points: Sequence[tuple[Arm, Episode]]) -> list[tuple[Arm, Episode]]
         return list(points)
     order = sorted(
         range(len(points)),
-        key=lambda i: (points[i][1].record.robot_contacts == 0, _margin(points[i][1])),
+        key=lambda i: (not touched(points[i][1].record), _margin(points[i][1])),
     )
     worst, rest = order[: MOST_MARKS // 2], order[MOST_MARKS // 2 :]
     step = len(rest) / (MOST_MARKS - len(worst))

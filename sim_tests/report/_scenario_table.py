@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from ..measures._comparison import Comparison
+from ..measures._episode_record import EpisodeRecord
+from ..measures._summary_row import SummaryRow
 from ._arm import Arm, judged
-from ._episode import Episode
-from ._estimates import plain_mean, won_back_of
-from ._measure import MARGIN, TIME_LOST, VIOLATION
+from ._figures import Figures, estimate
+from ._measure import MARGIN, TIME_LOST, VIOLATION, Measure
 from ._text import NOTHING, count, number, percent
 
 
@@ -38,10 +40,9 @@ class ColumnGroup:
 
 @dataclass(frozen=True, slots=True)
 class ScenarioRow:
-    """One scenario: its name, version and attention, its number of episodes, and the cells."""
+    """One scenario: its name and version, its attention, number of episodes, and the cells."""
 
     name: str
-    version: int
     attention: str
     episodes: int
     cells: tuple[Cell, ...]
@@ -55,11 +56,10 @@ class ScenarioTable:
     rows: tuple[ScenarioRow, ...]
 
 
-def tabulate(arms: Sequence[Arm]) -> ScenarioTable:
-    """Draw up the table over the episodes without a fault."""
-    arms = [arm for arm in arms if arm.episodes]
-    reference = next((arm for arm in arms if arm.role == "reference"), None)
-    winners = [] if reference is None else [arm for arm in judged(arms) if arm is not reference]
+def tabulate(figures: Figures) -> ScenarioTable:
+    """Draw up the table."""
+    arms = figures.shown
+    winners = [arm for arm in judged(arms) if figures.against(arm) is not None]
     groups = [
         _group("Robot contacts", "episodes in which the robot moved into a person", arms),
         _group("Time lost, s", "mean over the empty hall", arms),
@@ -67,65 +67,52 @@ def tabulate(arms: Sequence[Arm]) -> ScenarioTable:
         _group("Margin violated, s", "mean an episode", arms),
         _group("Smallest margin, m", "the worst episode", arms),
     ]
-    found: dict[tuple[str, int, str], dict[str, list[Episode]]] = {}
-    for arm in arms:
-        for each in arm.episodes:
-            record = each.record
-            key = (record.scenario, record.scenario_version, record.attention)
-            found.setdefault(key, {}).setdefault(arm.name, []).append(each)
+    attention = {
+        scenario_part(each.record): (each.record.attention, each.record.scenario_version)
+        for arm in arms
+        for each in arm.episodes
+    }
     rows = []
-    for (name, version, attention), parts in sorted(found.items()):
+    for part in sorted(attention):
+        found = [figures.by_scenario(arm, part) for arm in arms]
         cells = [
-            *_cells(arms, parts, _contacts),
-            *_cells(arms, parts, _time_lost),
-            *(
-                _won_back(parts.get(reference.name, []), parts.get(arm.name, []))
-                for arm in winners
-                if reference is not None
-            ),
-            *_cells(arms, parts, _violation),
-            *_cells(arms, parts, _least_margin),
+            *(_contacts(row) for row in found),
+            *(_mean(row, TIME_LOST, 1) for row in found),
+            *(_won_back(figures.against(arm, part, scenario=True)) for arm in winners),
+            *(_mean(row, VIOLATION, 2) for row in found),
+            *(_number(None if row is None else row.worst.get(MARGIN.key), 2) for row in found),
         ]
-        total = sum(len(part) for part in parts.values())
-        rows.append(ScenarioRow(name, version, attention, total, _ruled(cells, groups)))
+        episodes = sum(row.episodes for row in found if row is not None)
+        rows.append(ScenarioRow(part, attention[part][0], episodes, _ruled(cells, groups)))
     return ScenarioTable(tuple(groups), tuple(rows))
+
+
+def scenario_part(record: EpisodeRecord) -> str:
+    """A scenario as the summary names it."""
+    version = "" if record.scenario_version == 1 else f" v{record.scenario_version}"
+    return record.scenario + version
 
 
 def _group(title: str, meaning: str, arms: Sequence[Arm]) -> ColumnGroup:
     return ColumnGroup(title, meaning, tuple((arm.look, arm.name) for arm in arms))
 
 
-def _cells(
-    arms: Sequence[Arm],
-    parts: dict[str, list[Episode]],
-    cell: Callable[[Sequence[Episode]], Cell],
-) -> list[Cell]:
-    return [cell(parts.get(arm.name, [])) for arm in arms]
-
-
-def _contacts(episodes: Sequence[Episode]) -> Cell:
-    hits = sum(each.record.robot_contacts > 0 for each in episodes)
-    return Cell(hits, count(hits), "bad" if hits else "") if episodes else Cell(None, NOTHING)
-
-
-def _time_lost(episodes: Sequence[Episode]) -> Cell:
-    return _number(plain_mean(episodes, TIME_LOST.value), 1)
-
-
-def _violation(episodes: Sequence[Episode]) -> Cell:
-    return _number(plain_mean(episodes, VIOLATION.value), 2)
-
-
-def _least_margin(episodes: Sequence[Episode]) -> Cell:
-    known = [value for each in episodes if (value := MARGIN.value(each.record)) is not None]
-    return _number(min(known) if known else None, 2)
-
-
-def _won_back(reference: Sequence[Episode], episodes: Sequence[Episode]) -> Cell:
-    back = won_back_of(reference, episodes)
-    if not back.known:
+def _contacts(row: SummaryRow | None) -> Cell:
+    if row is None or not row.robot_contact.n:
         return Cell(None, NOTHING)
-    return Cell(round(back.value, 6), percent(back.value, 0))
+    hits = round(row.robot_contact.value * row.robot_contact.n)
+    return Cell(hits, count(hits), "bad" if hits else "")
+
+
+def _mean(row: SummaryRow | None, measure: Measure, decimals: int) -> Cell:
+    mean = estimate(row, measure)
+    return _number(mean.value if mean.known else None, decimals)
+
+
+def _won_back(against: Comparison | None) -> Cell:
+    if against is None or not against.won_back.known:
+        return Cell(None, NOTHING)
+    return Cell(round(against.won_back.value, 6), percent(against.won_back.value, 0))
 
 
 def _number(value: float | None, decimals: int) -> Cell:

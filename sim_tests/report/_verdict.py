@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from ..measures._comparison import Comparison
 from ..measures._interval import Interval
 from ._arm import Arm, judged
-from ._episode import Episode
-from ._estimates import excess_of, of_attention, share_of, won_back_of
+from ._figures import Figures, robot_contacts
 from ._measure import ROBOT_CONTACTS
 from ._text import NOTHING, count, percent, plural
 
@@ -45,20 +44,14 @@ class Verdict:
     cards: tuple[Card, ...]
 
 
-def verdicts(arms: Sequence[Arm]) -> tuple[Verdict, ...]:
+def verdicts(figures: Figures) -> tuple[Verdict, ...]:
     """One verdict for each arm that is to be judged."""
-    reference = next((arm for arm in arms if arm.role == "reference"), None)
-    return tuple(_verdict(arm, reference) for arm in judged(arms))
+    return tuple(_verdict(figures, arm) for arm in judged(figures.arms))
 
 
-def robot_contacts(episodes: Sequence[Episode]) -> Interval:
-    """The share of episodes in which the robot moved into a person."""
-    return share_of(episodes, ROBOT_CONTACTS.value)
-
-
-def _verdict(arm: Arm, reference: Arm | None) -> Verdict:
+def _verdict(figures: Figures, arm: Arm) -> Verdict:
     # Touching somebody counts whatever made it happen.
-    contacts = robot_contacts((*arm.episodes, *arm.faulted))
+    contacts = robot_contacts((*arm.episodes, *arm.others))
     if not contacts.n:
         card = Card(
             "Contacts caused by the robot", NOTHING, "no episode finished", "no data", "open"
@@ -66,12 +59,15 @@ def _verdict(arm: Arm, reference: Arm | None) -> Verdict:
         return Verdict(arm.name, arm.look, "No episode finished, so nothing can be said.", (card,))
     cards = [_contact_card(arm, contacts)]
     sentence = _contact_sentence(contacts)
-    if reference is None:
+    whole = figures.against(arm)
+    if whole is not None:
+        attentive = figures.against(arm, "attentive")
+        known = attentive is not None and attentive.won_back.known
+        who, against = ("attentive people", attentive) if known and attentive else ("people", whole)
+        cards += [_won_back_card(who, against), _violation_card(figures, arm, whole)]
+        sentence += _won_back_sentence(who, against)
+    elif arm.role != "reference":
         sentence += " Without the policy blind on the same seeds, time won back cannot be stated."
-    elif arm is not reference:
-        who, back = _won_back(arm, reference)
-        cards += [_won_back_card(who, back, reference), _violation_card(arm, reference)]
-        sentence += _won_back_sentence(who, back, reference)
     cards.append(_arrival_card(arm))
     return Verdict(arm.name, arm.look, sentence, tuple(cards))
 
@@ -84,7 +80,7 @@ def _contact_card(arm: Arm, share: Interval) -> Card:
     title = ROBOT_CONTACTS.title
     hits = _hits(share)
     figure = f"{count(hits)} of {count(share.n)}"
-    under = f", {plural(len(arm.faulted), 'episode')} of them under faults" if arm.faulted else ""
+    under = f", {plural(len(arm.others), 'episode')} of them under faults" if arm.others else ""
     if hits:
         detail = f"{percent(share.low)} to {percent(share.high)} with 95 % confidence{under}"
         return Card(title, figure, detail, "contacts seen", "bad")
@@ -105,54 +101,45 @@ def _contact_sentence(share: Interval) -> str:
     )
 
 
-def _won_back(arm: Arm, reference: Arm) -> tuple[str, Interval]:
-    """With attentive people where there are such scenarios, else with all."""
-    attentive = won_back_of(
-        of_attention(reference.episodes, "attentive"), of_attention(arm.episodes, "attentive")
-    )
-    if attentive.known:
-        return "attentive people", attentive
-    return "people", won_back_of(reference.episodes, arm.episodes)
-
-
-def _won_back_card(who: str, back: Interval, reference: Arm) -> Card:
+def _won_back_card(who: str, against: Comparison) -> Card:
+    back, reference = against.won_back, against.baseline
     title = f"Time won back with {who}"
     if not back.known:
-        return Card(title, NOTHING, f"no pair with {reference.name} loses time", "no data", "open")
+        return Card(title, NOTHING, f"no pair with {reference} loses time", "no data", "open")
     chip, tone = _direction(back, "gain shown", "loss shown", "no gain shown", more_is_good=True)
-    detail = f"{_ends(back)} of what {reference.name} loses, {plural(back.n, 'pair')}"
+    detail = f"{_ends(back)} of what {reference} loses, {plural(back.n, 'pair')}"
     return Card(title, percent(back.value), detail, chip, tone)
 
 
-def _won_back_sentence(who: str, back: Interval, reference: Arm) -> str:
+def _won_back_sentence(who: str, against: Comparison) -> str:
+    back, reference = against.won_back, against.baseline
     if not back.known:
-        return f" No pair with {reference.name} tells what it wins back."
+        return f" No pair with {reference} tells what it wins back."
     if back.low > 0.0:
         return (
-            f" It wins back {percent(back.value)} of the time that {reference.name} loses to {who} "
+            f" It wins back {percent(back.value)} of the time that {reference} loses to {who} "
             f"(95 % interval {_ends(back)})."
         )
     if back.high < 0.0:
         return (
-            f" It loses {percent(-back.value)} more time to {who} than {reference.name} (95 % "
+            f" It loses {percent(-back.value)} more time to {who} than {reference} (95 % "
             f"interval {percent(-back.high)} to {percent(-back.low)})."
         )
     return f" Whether it wins back time from {who} is not shown (95 % interval {_ends(back)})."
 
 
-def _violation_card(arm: Arm, reference: Arm) -> Card:
-    who = "unaware people"
-    parts = [of_attention(each.episodes, "unaware") for each in (reference, arm)]
-    if not all(parts):
-        who, parts = "people", [reference.episodes, arm.episodes]
-    change, base = excess_of(*parts)
+def _violation_card(figures: Figures, arm: Arm, whole: Comparison) -> Card:
+    unaware = figures.against(arm, "unaware")
+    who, against = ("people", whole) if unaware is None else ("unaware people", unaware)
+    change, base = against.violation_excess, "of its violation"
+    if not change.known:  # the reference violates nothing
+        change, base = against.violation_excess_of_time, "of its time"
+    reference = against.baseline
     title = f"Margin violated longer with {who}"
     if not change.known:
-        return Card(title, NOTHING, f"no pair with {reference.name}", "no data", "open")
+        return Card(title, NOTHING, f"no pair with {reference}", "no data", "open")
     chip, tone = _direction(change, "longer", "shorter", "no change shown", more_is_good=False)
-    detail = (
-        f"{_ends(change, sign=True)} against {reference.name}, {base}, {plural(change.n, 'pair')}"
-    )
+    detail = f"{_ends(change, sign=True)} against {reference}, {base}, {plural(change.n, 'pair')}"
     return Card(title, percent(change.value, sign=True), detail, chip, tone)
 
 

@@ -6,18 +6,19 @@ from pathlib import Path
 from typing import Final
 
 from .._errors import SimError
-from ._arm import arms_of
 from ._awareness_split import split_by_awareness
-from ._comparison import compare
+from ._comparison import PAIRED_ONLY, compare
 from ._episode_list import list_episodes
 from ._failure import failures
 from ._fault_table import faults_of
+from ._figures import Figures
 from ._measure import FURTHER, MAIN
 from ._page import render_page
 from ._reproduction import reproduction, title_of
 from ._run_folder import RunFolder
 from ._scatter import scatter
 from ._scenario_table import tabulate
+from ._still import make_stills
 from ._text import plural
 from ._verdict import verdicts
 
@@ -44,26 +45,27 @@ def write_report(
             or the page cannot be written.
     """
     folder = RunFolder.read(out_dir)
-    arms = arms_of(folder.episodes)
+    figures = Figures.of(folder.episodes)
+    arms = figures.arms
     listed = list_episodes(folder, arms)
     errors = sum(len(arm.errors) for arm in arms)
     page = render_page(
         title=title_of(folder, len(arms)),
         folder=folder,
+        condition=f"under the fault {figures.fault}" if figures.fault else "without faults",
         arms=arms,
-        verdicts=verdicts(arms),
-        comparison=compare(arms),
-        groups=split_by_awareness(arms),
+        verdicts=verdicts(figures),
+        comparison=compare(figures),
+        groups=split_by_awareness(figures),
         scatter=scatter(arms, listed.episodes, folder.replay_prefix),
-        table=tabulate(arms),
-        stills=(),
-        stills_lead="",
-        faults=faults_of(arms),
+        table=tabulate(figures),
+        stills=make_stills(folder, arms, pictures=stills, progress=progress),
+        faults=faults_of(figures),
         failures=failures(folder),
         failed=f"{plural(errors, 'episode')} failed",
         episodes=listed,
         reproduction=reproduction(folder),
-        measures=(*MAIN, *FURTHER),
+        measures=(*MAIN, *FURTHER, *PAIRED_ONLY),
     )
     path = folder.path / REPORT if path is None else path
     part = path.with_name(path.name + ".part")

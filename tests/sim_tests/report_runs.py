@@ -37,7 +37,7 @@ SCENARIOS = (
     ("crowd_of_eight", "mixed", 12.6),
     ("paper_encounter", "attentive", 3.0),
 )
-#: Policy, perception, share of the blind robot's loss kept with attentive, mixed and unaware people.
+#: Policy, perception, share kept of what blind loses with attentive, mixed and unaware people.
 POLICIES = (
     ("blind", "keypoints", (1.0, 1.0, 1.0)),
     ("balanced", "keypoints", (0.46, 0.74, 0.99)),
