@@ -9,7 +9,7 @@ import signal
 from collections import deque
 from collections.abc import Iterator, Sequence
 from multiprocessing.connection import Connection, wait
-from typing import Final
+from typing import Final, cast
 
 from .._closing import Closing
 from ._episode import Attempt, attempt, failed
@@ -49,16 +49,15 @@ def run_in_processes(jobs: Sequence[Numbered], workers: int) -> Iterator[tuple[i
         stack.enter_context(_one_thread_each())
         idle = [_Worker(context) for _ in range(min(workers, len(waiting)))]
         busy: dict[Connection, tuple[_Worker, int, Job, int]] = {}
-        stack.callback(lambda: [worker.close() for worker in idle])
-        stack.callback(lambda: [worker.close() for worker, *_ in busy.values()])
+        stack.callback(lambda: _close_all(idle, busy))
         while waiting or busy:
             while waiting and idle:
                 number, job, deaths = waiting.popleft()
                 worker = idle.pop()
                 busy[worker.pipe] = (worker, number, job, deaths)
                 worker.give(job)
-            for ready in wait(list(busy)):
-                worker, number, job, deaths = busy.pop(ready)  # type: ignore[index]
+            for ready in cast(list[Connection], wait(list(busy))):
+                worker, number, job, deaths = busy.pop(ready)
                 result = worker.take()
                 if result is not None:
                     idle.append(worker)
@@ -70,6 +69,11 @@ def run_in_processes(jobs: Sequence[Numbered], workers: int) -> Iterator[tuple[i
                     waiting.appendleft((number, job, deaths + 1))
                 else:
                     yield number, died(job, worker.exit_code)
+
+
+def _close_all(idle: list[_Worker], busy: dict[Connection, tuple[_Worker, int, Job, int]]) -> None:
+    for worker in [*idle, *(each for each, *_ in busy.values())]:
+        worker.close()
 
 
 def died(job: Job, exit_code: int | None) -> Attempt:
