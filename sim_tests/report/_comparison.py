@@ -43,6 +43,7 @@ _PAIRED: Final = (
         "m",
         "",
         "Mean over pairs: the policy's less the reference's.",
+        decimals=3,
     ),
 )
 #: What pairs tell that episodes alone do not; for the definitions.

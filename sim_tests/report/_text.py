@@ -21,11 +21,15 @@ def number(value: float | None, decimals: int = 2, *, sign: bool = False) -> str
 
 
 def percent(share: float | None, decimals: int | None = None, *, sign: bool = False) -> str:
-    """A share in per cent; small ones get decimals unless told otherwise."""
+    """A share in per cent.
+
+    Small shares, and those near all, get decimals unless told otherwise: almost all is not all.
+    """
     if share is None or not math.isfinite(share):
         return NOTHING
     if decimals is None:
-        decimals = 0 if abs(share) >= 0.1 or share == 0.0 else 1 if abs(share) >= 0.01 else 2
+        rest = min(abs(share), abs(1.0 - abs(share)))
+        decimals = 0 if rest >= 0.1 or rest == 0.0 else 1 if rest >= 0.01 else 2
     return f"{number(100.0 * share, decimals, sign=sign)}{THIN}%"
 
 

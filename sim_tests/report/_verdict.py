@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal
 
 from ..measures._comparison import Comparison
 from ..measures._interval import Interval
@@ -11,6 +11,9 @@ from ._arm import Arm, judged
 from ._figures import Figures, robot_contacts
 from ._measure import ROBOT_CONTACTS
 from ._text import NOTHING, count, percent, plural
+
+# None seen says little while the true share may be larger than this.
+_TELLING: Final = 0.05
 
 Tone = Literal["good", "bad", "open"]
 
@@ -85,6 +88,8 @@ def _contact_card(arm: Arm, share: Interval) -> Card:
         detail = f"{percent(share.low)} to {percent(share.high)} with 95 % confidence{under}"
         return Card(title, figure, detail, "contacts seen", "bad")
     detail = f"at most {percent(share.high)} with 95 % confidence{under}"
+    if share.high > _TELLING:
+        return Card(title, figure, detail, "none seen, too few to tell", "open")
     return Card(title, figure, detail, "none seen", "good")
 
 
@@ -107,7 +112,7 @@ def _won_back_card(who: str, against: Comparison) -> Card:
     if not back.known:
         return Card(title, NOTHING, f"no pair with {reference} loses time", "no data", "open")
     chip, tone = _direction(back, "gain shown", "loss shown", "no gain shown", more_is_good=True)
-    detail = f"{_ends(back)} of what {reference} loses, {plural(back.n, 'pair')}"
+    detail = _detail(back, f"of what {reference} loses")
     return Card(title, percent(back.value), detail, chip, tone)
 
 
@@ -131,15 +136,15 @@ def _won_back_sentence(who: str, against: Comparison) -> str:
 def _violation_card(figures: Figures, arm: Arm, whole: Comparison) -> Card:
     unaware = figures.against(arm, "unaware")
     who, against = ("people", whole) if unaware is None else ("unaware people", unaware)
-    change, base = against.violation_excess, "of its violation"
+    change, base = against.violation_excess, "violation"
     if not change.known:  # the reference violates nothing
-        change, base = against.violation_excess_of_time, "of its time"
+        change, base = against.violation_excess_of_time, "time"
     reference = against.baseline
     title = f"Margin violated longer with {who}"
     if not change.known:
         return Card(title, NOTHING, f"no pair with {reference}", "no data", "open")
     chip, tone = _direction(change, "longer", "shorter", "no change shown", more_is_good=False)
-    detail = f"{_ends(change, sign=True)} against {reference}, {base}, {plural(change.n, 'pair')}"
+    detail = _detail(change, f"of {reference}'s {base}", sign=True)
     return Card(title, percent(change.value, sign=True), detail, chip, tone)
 
 
@@ -152,12 +157,18 @@ def _arrival_card(arm: Arm) -> Card:
     if arrived == total:
         return Card("Goals reached", percent(1.0), detail, "all", "good")
     chip = f"{count(total - arrived)} missed"
-    return Card("Goals reached", percent(arrived / total, 1), detail, chip, "open")
+    return Card("Goals reached", percent(arrived / total), detail, chip, "open")
+
+
+def _detail(change: Interval, base: str, *, sign: bool = False) -> str:
+    if not change.bounded:
+        return f"{base}; {plural(change.n, 'pair')}, too few for an interval"
+    return f"{_ends(change, sign=sign)} {base}, {plural(change.n, 'pair')}"
 
 
 def _ends(change: Interval, *, sign: bool = False) -> str:
     if not change.bounded:
-        return "interval not bounded"
+        return "not bounded"
     return f"{percent(change.low, sign=sign)} to {percent(change.high, sign=sign)}"
 
 

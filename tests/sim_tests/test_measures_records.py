@@ -27,7 +27,9 @@ records = st.builds(
     EpisodeRecord, **{field.name: KINDS[field.type] for field in fields(EpisodeRecord)}
 )
 PLAIN = EpisodeRecord("late_glance", 3, "balanced", "SamplingPlanner", "truth", success=True)
-in_one_folder = settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+in_one_folder = settings(
+    max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 
 
 @in_one_folder
