@@ -38,7 +38,8 @@ class Figures:
     @classmethod
     def of(cls, episodes: Sequence[Episode]) -> Figures:
         """Sum up the episodes of a run; each is there once."""
-        faults = [each.record.fault for each in episodes]
+        ran = [each for each in episodes if not each.record.error]
+        faults = [each.record.fault for each in ran or episodes]
         fault = "" if "" in faults or not faults else faults[0]
         arms = arms_of(episodes, fault)
         records = [each.record for each in episodes if each.record.fault == fault]

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from sim_tests.measures._episode_record import EpisodeRecord
+from sim_tests.measures._record_file import write_records
 from sim_tests.runs._job import Job
 
 #: Scenario, its attention, and the seconds that a blind robot loses in it.
@@ -57,28 +57,11 @@ class MadeUpRun:
     def write(self, out: Path) -> Path:
         """Write the three files of a run."""
         out.mkdir(parents=True, exist_ok=True)
-        write_rows(out / "episodes.csv", self.records)
+        write_records(out / "episodes.csv", self.records)
         lines = [json.dumps(asdict(job)) for job in self.jobs]
         (out / "jobs.jsonl").write_text("".join(f"{line}\n" for line in lines), "utf-8")
         (out / "run.json").write_text(json.dumps(self.run, indent=2), "utf-8")
         return out
-
-
-def write_rows(path: Path, records: Sequence[EpisodeRecord]) -> None:
-    """The table of episodes."""
-    names = [field.name for field in fields(EpisodeRecord)]
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(names)
-        writer.writerows([[_cell(getattr(each, name)) for name in names] for each in records])
-
-
-def _cell(value: Any) -> str:
-    if value is None:
-        return ""
-    if isinstance(value, bool):
-        return str(value).lower()
-    return f"{value:.6f}" if isinstance(value, float) else str(value)
 
 
 def made_up_run(
@@ -90,7 +73,7 @@ def made_up_run(
     seed: int = 0,
 ) -> MadeUpRun:
     """Episodes as likely as real ones: paired over policies, skewed, some never arriving."""
-    rng = np.random.default_rng(seed)
+    rng, fault_rng = np.random.default_rng(seed).spawn(2)
     records: list[EpisodeRecord] = []
     jobs: list[Job] = []
     for name, attention, lost_s in SCENARIOS[:scenarios]:
@@ -102,7 +85,7 @@ def made_up_run(
                 for fault in ("", *faults):
                     if fault and policy != "balanced":
                         continue
-                    own = rng.standard_normal(6)
+                    own = (fault_rng if fault else rng).standard_normal(6)
                     record = _episode(
                         EpisodeRecord(name, episode_seed, policy, "SamplingPlanner", perception),
                         attention,
