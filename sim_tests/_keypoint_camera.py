@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Final, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from perception import Camera, PersonDetection, PersonKeypoints
@@ -24,9 +25,9 @@ from ._sight import FACE_DEPTH_M, JOINT_DEPTH_M
 _LAYOUT: Final = "coco_wholebody"
 _LAYOUT_SIZE: Final = 133
 _HEAD: Final = slice(0, 5)
-# The depth image of a person is this wide at most; more would be slower, not better.
-_MAX_BODY_SAMPLES: Final = 48
-_HEAD_SAMPLES: Final = 28
+# Of the bodies that hide: a face asks for a finer head than joints ask for limbs.
+_HEAD_DETAIL: Final = 1
+_BODY_DETAIL: Final = 2
 # Fewer seen keypoints than this (about a quarter of a body) and a detector finds nobody.
 _MIN_SEEN: Final = 5
 _NEAR_M: Final = 0.1
@@ -63,17 +64,16 @@ class TrueBody(Protocol):
         ...
 
 
-class DepthSource(Protocol):
-    """What the camera asks of a renderer: depth of a rectangle of its image."""
+class Sight(Protocol):
+    """What the camera asks of the world: what stands in the way."""
 
-    def depth(
-        self,
-        camera: Camera,
-        T_odom_camera: Any,
-        roi_xyxy_px: Any = None,
-        size_px: tuple[int, int] | None = None,
-    ) -> FloatArray:
-        """Depth (h, w) in metres along the optical axis, infinite where there is nothing."""
+    def blocked(
+        self, eye_odom_m: FloatArray, ends_odom_m: FloatArray, detail: int
+    ) -> NDArray[np.bool_]:
+        """(K,) whether anything lies between the eye (3,) and each of the points (K, 3).
+
+        ``detail`` is of the bodies held against the lines: 0 the finest, 2 the coarsest.
+        """
         ...
 
 
@@ -91,7 +91,7 @@ class KeypointCamera:
 
     Args:
         camera: the camera model.
-        renderer: where depth comes from.
+        sight: what hides what.
         noise: how far keypoints are from the truth.
         rng: source of that noise.
     """
@@ -99,12 +99,12 @@ class KeypointCamera:
     def __init__(
         self,
         camera: Camera,
-        renderer: DepthSource,
+        sight: Sight,
         noise: KeypointNoise,
         rng: np.random.Generator,
     ) -> None:
         self._camera = camera
-        self._renderer = renderer
+        self._lines = sight
         self._noise = noise
         self._rng = rng
         self._sightings: tuple[_Sighting, ...] = ()
@@ -153,7 +153,7 @@ class KeypointCamera:
         )
         if np.count_nonzero(inside) < _MIN_SEEN:
             return None
-        seen = inside & self._unhidden(points, pixels, inside, T_odom_camera)
+        seen = inside & self._unhidden(points, points_odom, inside, origin)
         if missed or np.count_nonzero(seen) < _MIN_SEEN:
             return None
         noisy = np.where(seen[:, None], pixels + pixel_noise, 0.0)
@@ -177,33 +177,20 @@ class KeypointCamera:
         return PersonDetection(box, 0.9)
 
     def _unhidden(
-        self, points: FloatArray, pixels: FloatArray, inside: Any, T_odom_camera: FloatArray
+        self, points: FloatArray, points_odom: FloatArray, inside: Any, eye_odom_m: FloatArray
     ) -> Any:
-        """Which of the keypoints inside the image nothing hides, by two small depth images."""
+        """Which of the keypoints inside the image nothing hides."""
         rows = np.arange(len(points))
-        head = rows[_HEAD][inside[_HEAD]]
-        body = rows[5:][inside[5:]]
         unhidden = np.zeros(len(points), dtype=bool)
-        for chosen, tolerance, samples in (
-            (head, FACE_DEPTH_M, _HEAD_SAMPLES),
-            (body, JOINT_DEPTH_M, _MAX_BODY_SAMPLES),
+        for chosen, depth_m, detail in (
+            (rows[_HEAD][inside[_HEAD]], FACE_DEPTH_M, _HEAD_DETAIL),
+            (rows[5:][inside[5:]], JOINT_DEPTH_M, _BODY_DETAIL),
         ):
-            if not len(chosen):
-                continue
-            low = pixels[chosen].min(axis=0) - 2.0
-            high = pixels[chosen].max(axis=0) + 3.0
-            extent = high - low
-            step = max(float(extent.max()) / samples, 1.0)
-            size = np.maximum(np.ceil(extent / step), 1.0).astype(int)
-            # Image coordinates count pixel centres, the renderer counts pixel corners.
-            corner = low + 0.5
-            roi = np.concatenate([corner, corner + size * step])
-            depth = self._renderer.depth(
-                self._camera, T_odom_camera, roi, (int(size[0]), int(size[1]))
-            )
-            column, row = ((pixels[chosen] + 0.5 - corner) / step).astype(int).T
-            front = depth[np.clip(row, 0, size[1] - 1), np.clip(column, 0, size[0] - 1)]
-            unhidden[chosen] = points[chosen, 2] <= front + tolerance
+            if len(chosen):
+                # What lies deeper under the surface than the tolerance along the optical axis.
+                share = np.maximum(1.0 - depth_m / points[chosen, 2], 0.0)[:, None]
+                ends = eye_odom_m + share * (points_odom[chosen] - eye_odom_m)
+                unhidden[chosen] = ~self._lines.blocked(eye_odom_m, ends, detail)
         return unhidden
 
 

@@ -17,7 +17,9 @@ from perception.arrays import FloatArray
 from .._bullet import pybullet
 from ..hall._meshes import Mesh
 from ..pictures._culling import box_corners, in_view, to_camera
-from ._body_pose import link_transform
+from ..sightlines._sight_lines import PlacedSurface
+from ..sightlines._triangles import TriangleSet
+from ._body_pose import BodyPose, link_transform
 from ._skin_pieces import SkinPiece, skin_pieces
 from ._worker_asset import LEVELS, load_worker
 
@@ -32,11 +34,24 @@ _BANDS: Final = (5, 2, 1)
 _COARSEST_SAMPLES_PER_M: Final = (120.0, 60.0)
 # How far skin, clothes, hair and hats reach beyond the keypoints.
 _REACH_M: Final = 0.30
+# Nothing of a worker or of what is carried is farther from the centre line in any posture.
+_ARMS_LENGTH_M: Final = 1.0
 
 
 @lru_cache(maxsize=64)
 def _pieces(look: str, level: int) -> tuple[SkinPiece, ...]:
     return skin_pieces(load_worker(look).levels[level], _BANDS[level])
+
+
+@lru_cache(maxsize=64)
+def _surface(look: str, level: int) -> tuple[TriangleSet, NDArray[np.int64], FloatArray]:
+    """Triangles of all pieces, and the joint and share of each piece."""
+    pieces = _pieces(look, level)
+    return (
+        TriangleSet([(p.mesh.vertices_m, p.mesh.indices.reshape(-1, 3)) for p in pieces]),
+        np.array([piece.joint for piece in pieces]),
+        np.array([piece.share for piece in pieces]),
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,6 +86,27 @@ class WorkerSkin:
         self._visuals: Visuals | None = None
         self._levels: dict[int, _Level] = {}
         self._shown: set[int] = set()
+        self._surfaces: dict[int, tuple[BodyPose, PlacedSurface]] = {}
+
+    def reach_odom_m(self) -> FloatArray:
+        """(2, 3) low and high corner of a generous box about the worker, whatever the posture."""
+        x, y = self.worker.position_odom_m.tolist()
+        top = self.worker.stature_m + _REACH_M
+        return np.array(
+            [(x - _ARMS_LENGTH_M, y - _ARMS_LENGTH_M, -_REACH_M),
+             (x + _ARMS_LENGTH_M, y + _ARMS_LENGTH_M, top)]
+        )  # fmt: skip
+
+    def surface(self, detail: int) -> PlacedSurface:
+        """The skin as it is bent now, at a level of detail."""
+        pose = self.worker.pose
+        last = self._surfaces.get(detail)
+        if last is None or last[0] is not pose:
+            triangles, joints, shares = _surface(self.worker.asset.name, detail)
+            places = link_transform(self.worker.asset.joints_m, pose, joints, shares)
+            last = pose, PlacedSurface(triangles, places, pose.scale)
+            self._surfaces[detail] = last
+        return last[1]
 
     def bounds_odom_m(self) -> FloatArray:
         """(2, 3) low and high corner of a box about all of the worker."""
