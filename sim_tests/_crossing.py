@@ -23,6 +23,7 @@ from ._pixel_eyes import pixel_timing
 from ._scenario import Scenario
 from ._stage import Stage, TrueView
 from .pictures._camera_timing import CameraTiming
+from .pictures._visual_backend import RendererName
 from .robot._amr import NOVA_CARTER
 from .robot._planner import LocalPlanner, SamplingPlanner
 
@@ -138,6 +139,7 @@ def run_crossing(
     noise: KeypointNoise | None = None,
     pipeline: AwarenessPipeline | None = None,
     observer: Observer | None = None,
+    renderer: RendererName = "auto",
 ) -> CrossingResult:
     """Run one crossing in PyBullet and measure it.
 
@@ -153,6 +155,8 @@ def run_crossing(
         pipeline: what pixels go through instead of the shipped networks; it has the camera of the
             pictures.
         observer: called after every control cycle with the frame and the stage, e.g. to render.
+        renderer: what draws pictures: ``"tiny"``, ``"gl"``, ``"egl"``, or ``"auto"`` for the quickest
+            that works here. Two of them draw nearly, not exactly, the same pixels.
 
     Raises:
         SimError: unknown scenario or perception, or an invalid command from the planner.
@@ -166,7 +170,7 @@ def run_crossing(
     offsets = jitter_rng.uniform(-jitter, jitter, len(scenario.workers))
     cone = AttentionCone()
     meter = SafetyMeter(NOVA_CARTER)
-    with Stage(scenario, offsets) as stage:
+    with Stage(scenario, offsets, renderer) as stage:
         driver = planner if planner is not None else _default_planner(scenario, stage)
         camera_model, timing = _camera(scenario, perception)
         eyes = make_eyes(

@@ -20,6 +20,7 @@ from ._sight import sees
 from ._warehouse import Warehouse
 from .people._script import WorkerMotion, WorkerScript
 from .people._worker import MAX_HEAD_PITCH_RAD, MAX_HEAD_YAW_RAD, Worker
+from .pictures._visual_backend import RendererName
 from .robot._amr import NOVA_CARTER, Amr
 from .robot._amr_look import AmrLook
 
@@ -68,11 +69,17 @@ class Stage(Closing):
     Args:
         scenario: what happens.
         start_offsets_s: how much later each worker starts.
+        renderer: what draws it, should pictures be taken.
     """
 
-    def __init__(self, scenario: Scenario, start_offsets_s: FloatArray) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        start_offsets_s: FloatArray,
+        renderer: RendererName = "tiny",
+    ) -> None:
         self.scenario = scenario
-        self.warehouse = Warehouse(scenario.layout)
+        self.warehouse = Warehouse(scenario.layout, renderer=renderer)
         try:
             task = scenario.robot
             self.amr = Amr(

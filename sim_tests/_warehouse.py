@@ -37,7 +37,7 @@ class Warehouse(Closing):
     Args:
         layout: what stands where; None is :meth:`WarehouseLayout.crossing`.
         physics_dt_s: length of one step, in (0, 1/60].
-        renderer: ``"tiny"``, ``"egl"`` or ``"auto"``, what draws :attr:`visuals`.
+        renderer: ``"tiny"``, ``"gl"``, ``"egl"`` or ``"auto"``, what draws :attr:`visuals`.
         variant: number of the scenery's variant (goods, colours, wear).
 
     Attributes:

@@ -34,8 +34,6 @@ _BANDS: Final = (5, 2, 1)
 _COARSEST_SAMPLES_PER_M: Final = (120.0, 60.0)
 # How far skin, clothes, hair and hats reach beyond the keypoints.
 _REACH_M: Final = 0.30
-# Nothing of a worker or of what is carried is farther from the centre line in any posture.
-_ARMS_LENGTH_M: Final = 1.0
 
 
 @lru_cache(maxsize=64)
@@ -89,13 +87,8 @@ class WorkerSkin:
         self._surfaces: dict[int, tuple[BodyPose, PlacedSurface]] = {}
 
     def reach_odom_m(self) -> FloatArray:
-        """(2, 3) low and high corner of a generous box about the worker, whatever the posture."""
-        x, y = self.worker.position_odom_m.tolist()
-        top = self.worker.stature_m + _REACH_M
-        return np.array(
-            [(x - _ARMS_LENGTH_M, y - _ARMS_LENGTH_M, -_REACH_M),
-             (x + _ARMS_LENGTH_M, y + _ARMS_LENGTH_M, top)]
-        )  # fmt: skip
+        """As :meth:`Worker.reach_odom_m`."""
+        return self.worker.reach_odom_m()
 
     def surface(self, detail: int) -> PlacedSurface:
         """The skin as it is bent now, at a level of detail."""

@@ -70,14 +70,14 @@ class SightLines:
         self._occluders = [actor for actor in actors if isinstance(actor, Occluder)]
 
     def blocked(
-        self, eye_odom_m: FloatArray, ends_odom_m: FloatArray, detail: int
+        self, eye_odom_m: FloatArray, ends_odom_m: FloatArray, detail: NDArray[np.int64]
     ) -> NDArray[np.bool_]:
         """(K,) whether anything lies between the eye (3,) and each of the points (K, 3).
 
         Args:
             eye_odom_m: (3,).
             ends_odom_m: (K, 3).
-            detail: of bodies: 0 the finest, 2 the coarsest.
+            detail: (K,) of the bodies held against each line: 0 the finest, 2 the coarsest.
         """
         blocked = self._scenery.blocks(eye_odom_m, ends_odom_m)
         if not self._occluders:
@@ -87,10 +87,12 @@ class SightLines:
         along = np.broadcast_to(ends_odom_m - eye_odom_m, (len(boxes), *ends_odom_m.shape))
         near = meet_boxes(eyes, along, boxes)
         for number in np.flatnonzero(near.any(axis=1)).tolist():
-            asked = np.flatnonzero(near[number] & ~blocked)
-            surface = self._occluders[number].surface(detail) if asked.size else None
-            if surface is not None:
-                blocked[asked] = surface.blocks(eye_odom_m, ends_odom_m[asked])
+            open_lines = near[number] & ~blocked
+            for level in np.unique(detail[open_lines]).tolist():
+                surface = self._occluders[number].surface(level)
+                if surface is not None:
+                    asked = np.flatnonzero(open_lines & (detail == level))
+                    blocked[asked] = surface.blocks(eye_odom_m, ends_odom_m[asked])
         return blocked
 
 

@@ -50,19 +50,29 @@ class TriangleSet:
         packed = np.zeros((count, _CLUSTER, 3, 3))
         for row, (_, part) in enumerate(clusters):
             packed[row, : len(part)] = part
-        edges = np.empty((count, 3, _CLUSTER, 6))
-        for edge, (first, second) in enumerate(((1, 2), (2, 0), (0, 1))):
-            b, c = packed[:, :, first], packed[:, :, second]
-            edges[:, edge, :, :3] = np.cross(b, c)
-            edges[:, edge, :, 3:] = b - c
-        self._edges = np.ascontiguousarray(edges.reshape(count, 3 * _CLUSTER, 6).transpose(0, 2, 1))
-        self._normals = np.cross(packed[:, :, 1] - packed[:, :, 0], packed[:, :, 2] - packed[:, :, 0])
-        self._offsets = np.einsum("cti,cti->ct", packed[:, :, 0], self._normals)
+        first, second, third = packed[:, :, 0], packed[:, :, 1], packed[:, :, 2]
+        # (C, 6, 3 · 32): the three edges of every triangle, one kind of edge after another.
+        self._edges = np.ascontiguousarray(
+            np.concatenate(
+                [
+                    np.concatenate([np.cross(b, c), b - c], axis=2)
+                    for b, c in ((second, third), (third, first), (first, second))
+                ],
+                axis=1,
+            ).transpose(0, 2, 1)
+        )
+        normals = np.cross(second - first, third - first)
+        # (C, 4, 32) of each plane: n · p − n · first is how far p is before it.
+        self._planes = np.ascontiguousarray(
+            np.concatenate(
+                [-normals, np.einsum("cti,cti->ct", first, normals)[..., None]], axis=2
+            ).transpose(0, 2, 1)
+        )
 
     @property
     def triangles(self) -> int:
         """How many triangles there are."""
-        return int(np.count_nonzero(self._normals.any(axis=2)))
+        return int(np.count_nonzero(self._planes[:, :3].any(axis=1)))
 
     def blocks(self, eye_m: FloatArray, ends_m: FloatArray) -> NDArray[np.bool_]:
         """Whether a triangle lies between the eye and each of some points.
@@ -90,14 +100,29 @@ class TriangleSet:
         if not passed.any():
             return free
         chosen, eye, along = reached[passed], eye[passed], along[passed]
-        lines = np.concatenate([along, np.cross(along, eye[:, None])], axis=2)
-        sides = (lines @ self._edges[chosen]).reshape(len(chosen), -1, 3, _CLUSTER)
-        rate = sides.sum(axis=2)
-        inside = (sides.min(axis=2) >= 0.0) | (sides.max(axis=2) <= 0.0)
+        sides = _lines(eye, along) @ self._edges[chosen]
+        one, two, three = (sides[..., k * _CLUSTER : (k + 1) * _CLUSTER] for k in range(3))
+        rate = one + two + three
         # The plane is met at the share start / rate of the line.
-        start = self._offsets[chosen] - np.einsum("cti,ci->ct", self._normals[chosen], eye)
-        before_end = (start[:, None] * np.sign(rate) > 0.0) & (np.abs(start)[:, None] < np.abs(rate))
-        return np.asarray((inside & before_end).any(axis=(0, 2)))
+        ahead = np.concatenate([eye, np.ones((len(eye), 1))], axis=1)[:, None]
+        start = ahead @ self._planes[chosen]
+        met = (start * rate > 0.0) & (np.abs(start) < np.abs(rate))
+        met &= (np.minimum(np.minimum(one, two), three) >= 0.0) | (
+            np.maximum(np.maximum(one, two), three) <= 0.0
+        )
+        return np.asarray(met.any(axis=(0, 2)))
+
+
+def _lines(eye_m: FloatArray, along_m: FloatArray) -> FloatArray:
+    """(C, K, 6) Plücker coordinates [d, d × o] of lines from eyes (C, 3) along (C, K, 3)."""
+    out = np.empty((*along_m.shape[:2], 6))
+    out[..., :3] = along_m
+    x, y, z = along_m[..., 0], along_m[..., 1], along_m[..., 2]
+    ox, oy, oz = eye_m[:, 0, None], eye_m[:, 1, None], eye_m[:, 2, None]
+    out[..., 3] = y * oz - z * oy
+    out[..., 4] = z * ox - x * oz
+    out[..., 5] = x * oy - y * ox
+    return out
 
 
 def _clusters(centres_m: FloatArray) -> list[NDArray[np.int64]]:
@@ -117,9 +142,10 @@ def _clusters(centres_m: FloatArray) -> list[NDArray[np.int64]]:
 
 def meet_boxes(eye_m: FloatArray, along_m: FloatArray, boxes_m: FloatArray) -> NDArray[np.bool_]:
     """(C, K) whether segments from eyes (C, 3) along (C, K, 3) meet boxes (C, 2, 3), by slabs."""
-    safe = np.where(np.abs(along_m) < _TINY_M, _TINY_M, along_m)
-    first = (boxes_m[:, 0] - eye_m)[:, None] / safe
-    last = (boxes_m[:, 1] - eye_m)[:, None] / safe
-    enter = np.minimum(first, last).max(axis=2)
-    leave = np.maximum(first, last).min(axis=2)
+    share = 1.0 / np.where(np.abs(along_m) < _TINY_M, _TINY_M, along_m)
+    first = (boxes_m[:, 0] - eye_m)[:, None] * share
+    last = (boxes_m[:, 1] - eye_m)[:, None] * share
+    low, high = np.minimum(first, last), np.maximum(first, last)
+    enter = np.maximum(np.maximum(low[..., 0], low[..., 1]), low[..., 2])
+    leave = np.minimum(np.minimum(high[..., 0], high[..., 1]), high[..., 2])
     return np.asarray((enter <= leave) & (leave >= 0.0) & (enter <= 1.0))
