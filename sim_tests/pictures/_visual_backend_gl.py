@@ -22,7 +22,7 @@ from .._errors import SimError
 from ..hall._lighting import Lighting
 from ..hall._meshes import Mesh
 from ._view import View
-from ._visual_backend import BACKGROUND_RGB, BackendName, Drawing
+from ._visual_backend import BackendName, Drawing
 
 _VERTEX_SHADER: Final = """
 #version 330
