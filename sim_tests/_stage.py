@@ -154,9 +154,7 @@ class Stage(Closing):
     @property
     def robot_velocity_odom_mps(self) -> FloatArray:
         """(2,) velocity of the base origin."""
-        state = self.amr.state(self.t_s)
-        heading = state.heading_odom_rad
-        return state.speed_mps * np.array([math.cos(heading), math.sin(heading)])
+        return self.amr.velocity_odom_mps
 
     def truth(self, cone: AttentionCone, T_odom_camera: FloatArray) -> tuple[TrueView, ...]:
         """The truth about every worker, from the robot's camera."""

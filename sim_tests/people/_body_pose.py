@@ -82,7 +82,11 @@ def link_transforms(joints_m: FloatArray, pose: BodyPose) -> FloatArray:
 
 
 def link_transform(
-    joints_m: FloatArray, pose: BodyPose, joints: NDArray[np.int64], shares: FloatArray
+    joints_m: FloatArray,
+    pose: BodyPose,
+    joints: NDArray[np.int64],
+    shares: FloatArray,
+    links: FloatArray | None = None,
 ) -> FloatArray:
     """(N, 4, 4) of rigid pieces that follow only a share of a joint's rotation.
 
@@ -92,11 +96,13 @@ def link_transform(
         joints: (N,) joint of each piece, −1 for the pelvis.
         shares: (N,) in [0, 1]: the piece turns by the joint's rotation to this power, and follows
             all joints before it fully. Of no meaning for the pelvis.
+        links: of :func:`link_transforms` for this pose, if known.
 
     Returns:
         What takes the scaled body at rest to odom, as :func:`link_transforms` with share 1.
     """
-    links = link_transforms(joints_m, pose)
+    if links is None:
+        links = link_transforms(joints_m, pose)
     parents = np.where(joints < 0, -1, _PARENTS[joints])
     before = links[1 + parents]
     turning = np.where(joints < 0, 0.0, shares)[:, None]

@@ -19,7 +19,7 @@ from ..hall._meshes import Mesh
 from ..pictures._culling import box_corners, in_view, to_camera
 from ..sightlines._sight_lines import PlacedSurface
 from ..sightlines._triangles import TriangleSet
-from ._body_pose import BodyPose, link_transform
+from ._body_pose import BodyPose, link_transform, link_transforms
 from ._skin_pieces import SkinPiece, skin_pieces
 from ._worker_asset import LEVELS, load_worker
 
@@ -84,7 +84,9 @@ class WorkerSkin:
         self._visuals: Visuals | None = None
         self._levels: dict[int, _Level] = {}
         self._shown: set[int] = set()
-        self._surfaces: dict[int, tuple[BodyPose, PlacedSurface]] = {}
+        # Of the last pose asked for: its links, and the surface by level of detail.
+        self._links: tuple[BodyPose, FloatArray] | None = None
+        self._surfaces: dict[int, PlacedSurface] = {}
 
     def reach_odom_m(self) -> FloatArray:
         """As :meth:`Worker.reach_odom_m`."""
@@ -92,14 +94,16 @@ class WorkerSkin:
 
     def surface(self, detail: int) -> PlacedSurface:
         """The skin as it is bent now, at a level of detail."""
-        pose = self.worker.pose
-        last = self._surfaces.get(detail)
-        if last is None or last[0] is not pose:
-            triangles, joints, shares = _surface(self.worker.asset.name, detail)
-            places = link_transform(self.worker.asset.joints_m, pose, joints, shares)
-            last = pose, PlacedSurface(triangles, places, pose.scale)
-            self._surfaces[detail] = last
-        return last[1]
+        worker, pose = self.worker, self.worker.pose
+        joints_m = worker.asset.joints_m
+        if self._links is None or self._links[0] is not pose:
+            self._links = pose, link_transforms(joints_m, pose)
+            self._surfaces.clear()
+        if detail not in self._surfaces:
+            triangles, joints, shares = _surface(worker.asset.name, detail)
+            places = link_transform(joints_m, pose, joints, shares, self._links[1])
+            self._surfaces[detail] = PlacedSurface(triangles, places, pose.scale)
+        return self._surfaces[detail]
 
     def bounds_odom_m(self) -> FloatArray:
         """(2, 3) low and high corner of a box about all of the worker."""

@@ -88,11 +88,12 @@ class SightLines:
         near = meet_boxes(eyes, along, boxes)
         for number in np.flatnonzero(near.any(axis=1)).tolist():
             open_lines = near[number] & ~blocked
-            for level in np.unique(detail[open_lines]).tolist():
+            for level in sorted(set(detail[open_lines].tolist())):
                 surface = self._occluders[number].surface(level)
-                if surface is not None:
-                    asked = np.flatnonzero(open_lines & (detail == level))
-                    blocked[asked] = surface.blocks(eye_odom_m, ends_odom_m[asked])
+                if surface is None:
+                    break
+                asked = open_lines & (detail == level)
+                blocked[asked] = surface.blocks(eye_odom_m, ends_odom_m[asked])
         return blocked
 
 
