@@ -138,12 +138,12 @@ def test_turning_the_world_turns_the_walk(angle, shift):
         for n in range(121):
             t = n * TICK_S
             robot = RobotBody(
-                *place(-4.0 + 0.8 * t, 0.2),
+                *place(-2.6 + 0.8 * t, 0.2),
                 angle if turn else 0.0,
                 *way(0.8, 0.0),
                 0.36,
                 0.25,
-                (*place(-3.8 + 0.8 * t, 0.2), 1.4),
+                (*place(-2.4 + 0.8 * t, 0.2), 1.4),
             )
             other = Mover(*place(0.4, 3.0 - t), *way(0.0, -1.0))
             m = person.motion(t, Surroundings(robot, (other,), lambda: True))
