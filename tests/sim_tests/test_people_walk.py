@@ -163,7 +163,9 @@ coordinate = st.floats(-4.0, 4.0)
 
 @settings(max_examples=25, deadline=None)
 @given(
-    corners=st.lists(st.tuples(st.floats(-3.0, 15.0), st.floats(-7.5, 7.5)), min_size=2, max_size=4),
+    corners=st.lists(
+        st.tuples(st.floats(-3.0, 15.0), st.floats(-7.5, 7.5)), min_size=2, max_size=4
+    ),
     movers=st.lists(
         st.tuples(st.floats(-2, 2), st.floats(-2, 2), coordinate, coordinate), max_size=4
     ),
