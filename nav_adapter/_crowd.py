@@ -43,6 +43,7 @@ class Crowd:
         self._policy = policy
         self._timing = policy.timing
         inflation, speed, margins = policy.inflation, policy.speed, policy.margins
+        self._radius_of, self._human_speed_of = inflation.radius_m, speed.human_speed_mps
         self._floor_m, self._sigmas = margins.floor_m, margins.uncertainty_sigmas
         ceiling_m = margins.maximum_radius_m
         self._ceiling_m = math.inf if ceiling_m is None else ceiling_m
@@ -189,17 +190,19 @@ class Crowd:
         return position_sigma_m(track, min(now, track.stamp_s + self._timing.stop_after_s))
 
     def _bounded_m(self, radius_m: float) -> float:
-        return min(max(radius_m, self._floor_m), self._ceiling_m)
+        if radius_m < self._floor_m:
+            return self._floor_m
+        return self._ceiling_m if radius_m > self._ceiling_m else radius_m
 
     def _policy_radius_m(self, awareness_lower: float) -> float:
-        radius_m = self._policy.inflation.radius_m(awareness_lower)
+        radius_m = self._radius_of(awareness_lower)
         if not _is_plain(radius_m):
             name = f"{type(self._policy.inflation).__name__}.radius_m({awareness_lower:g})"
             radius_m = finite_number(name, radius_m, NavError)
         return self._bounded_m(radius_m)
 
     def _policy_human_speed_mps(self, awareness_lower: float) -> float:
-        speed_mps = self._policy.speed.human_speed_mps(awareness_lower)
+        speed_mps = self._human_speed_of(awareness_lower)
         if _is_plain(speed_mps) and speed_mps >= 0.0:
             return speed_mps
         name = f"{type(self._policy.speed).__name__}.human_speed_mps({awareness_lower:g})"

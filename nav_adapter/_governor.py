@@ -201,6 +201,9 @@ class SpeedGovernor:
         """
         (x, y), (vx, vy) = memory.place_odom_m, memory.velocity_odom_mps
         x, y = x - robot_x, y - robot_y
-        excess_mps = max(0.0, math.hypot(vx, vy) - self._crowd.unaware_human_speed_mps)
+        assumed_mps = self._crowd.human_speed_mps(memory)
+        excess_mps = math.hypot(vx, vy) - self._crowd.unaware_human_speed_mps
+        if excess_mps > 0.0:
+            assumed_mps += excess_mps
         closing_mps = -(vx * x + vy * y) / max(math.hypot(x, y), 1e-9)
-        return float(max(self._crowd.human_speed_mps(memory) + excess_mps, closing_mps))
+        return closing_mps if closing_mps > assumed_mps else assumed_mps

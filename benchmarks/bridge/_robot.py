@@ -6,6 +6,7 @@ import json
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -26,6 +27,7 @@ from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, CompressedImage, I
 from nav_adapter.ros2.messages.std_msgs import Header
 from nav_adapter.ros2.messages.tf2_msgs import TFMessage
 from perception import Camera
+from sim_tests import SimError
 
 #: Odometry between two pictures at any rate: the adapter's data never grow old.
 ODOMETRY_S = 0.02
@@ -42,13 +44,13 @@ class Robot:
     """
 
     def __init__(self, folder: Path, domain: int, compressed: bool) -> None:
+        frame = _first_frame(folder)
         self.node = DdsNode(domain)
         self._image = READ["compressed" if compressed else "image"]
         for topic in (self._image, READ["camera_info"], READ["odom"], READ["tf_static"]):
             self.node.advertise(replace(topic, reliable=True))
         for topic in PUBLISHED.values():
             self.node.subscribe(topic)
-        frame = json.loads((folder / "truth.jsonl").read_text().splitlines()[0])
         self.people = len(frame["people"])
         self._pixels = cv2.imread(str(folder / frame["frame"]))
         self._jpeg = cv2.imencode(".jpg", self._pixels)[1].tobytes() if compressed else b""
@@ -107,6 +109,15 @@ class Robot:
             if now >= self._odometry_due_s:
                 self.roll()
         return heard
+
+
+def _first_frame(folder: Path) -> dict[str, Any]:
+    file = folder / "truth.jsonl"
+    try:
+        frame: dict[str, Any] = json.loads(file.read_text().splitlines()[0])
+    except (OSError, IndexError, ValueError) as cause:
+        raise SimError(f"{file} is not what `awarenav render` writes: {cause}") from cause
+    return frame
 
 
 def _header(frame_id: str) -> Header:

@@ -144,6 +144,22 @@ def test_every_tick_says_everything_once() -> None:
     assert counts == dict.fromkeys([*once, "people", "detections", "markers"], 1)
 
 
+def test_what_nobody_wants_is_not_made() -> None:
+    wanted = {"speed_limit", "alerts"}
+    nav = Listener(camera=Camera(64, 48, 50.0, 50.0, 32.0, 24.0), wanted=wanted.__contains__)
+    nav.bridge.on_odometry(odometry(START_S))
+    nav.bridge.on_image(image(START_S), START_S)
+    constraints = nav.bridge.tick(START_S + 0.01)
+    assert set(nav.heard) == wanted
+    wanted.add("markers")
+    nav.bridge.tick(START_S + 0.02)
+    assert set(nav.heard) == wanted
+    assert constraints.limited_by == "robot maximum"  # whoever listens, it is worked out
+    # The last word goes to everybody: whoever is about to listen must hear it.
+    nav.bridge.stop(START_S + 0.03, "the end")
+    assert {"collision_polygons", "stop_zone", "people"} <= set(nav.heard)
+
+
 class OneWhoComes:
     """Sees one person who walks at the robot and never looks up."""
 

@@ -27,10 +27,12 @@ from nav_adapter.ros2 import (
     SLOWEST_MPS,
     AwarenessBridge,
     DdsNode,
+    McapRecorder,
     RobotFile,
     encode,
 )
 from sim_tests._cli import main
+from sim_tests.bridge._outlet import Outlet
 
 ROOT = Path(__file__).parents[2]
 ROBOT = ROOT / "docs" / "nav2" / "robot.yaml"
@@ -172,6 +174,26 @@ def test_a_frame_costs_less_than_two_cores_have_at_fifteen_hertz(picture: Pictur
     assert np.median(costs_s[5:]) < CORES / RATE_HZ
     assert len(bridge.tracks) == 1
     assert bridge.tracks[0].status == "confirmed"
+
+
+def test_only_what_somebody_hears_or_records_is_wanted(domain: int, tmp_path: Path) -> None:
+    node, other = DdsNode(domain), DdsNode(domain)
+    try:
+        outlet = Outlet(node, PUBLISHED, None)
+        # A latched topic must hold its last message for whoever comes.
+        assert {key for key in PUBLISHED if outlet.wants(key)} == {"grid"}
+        assert not outlet.wants("left out")
+        other.subscribe(PUBLISHED["people"])
+        end = time.monotonic() + PATIENCE_S
+        while not outlet.wants("people") and time.monotonic() < end:
+            time.sleep(0.01)
+        assert {key for key in PUBLISHED if outlet.wants(key)} == {"grid", "people"}
+        with McapRecorder(tmp_path / "all.mcap") as recorder:
+            recorded = Outlet(node, PUBLISHED, recorder)
+            assert all(recorded.wants(key) for key in PUBLISHED)
+    finally:
+        other.close()
+        node.close()
 
 
 def test_sigterm_ends_it_well_too(domain: int) -> None:

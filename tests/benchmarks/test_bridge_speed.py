@@ -1,0 +1,60 @@
+"""The benchmark of the bridge measures the bridge, and says so when it cannot."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
+
+from benchmarks.bridge._cli import main
+
+
+@pytest.fixture(autouse=True)
+def as_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The benchmark sets network and cores of its process for good."""
+    monkeypatch.setenv("CYCLONEDDS_URI", os.environ.get("CYCLONEDDS_URI", ""))
+    if hasattr(os, "sched_setaffinity"):
+        monkeypatch.setattr(os, "sched_setaffinity", lambda pid, cores: None)
+
+
+@pytest.mark.slow
+def test_pictures_come_back(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("pybullet", reason="the extra sim is not installed")
+    out = tmp_path / "figures.json"
+    # However slow this computer is: 0 or 1, and figures.
+    assert main(["--seconds", "2", "--rate", "10", "--out", str(out)]) in (0, 1)
+    said = capsys.readouterr().out
+    assert "1 of 1 people confirmed" in said
+    lines = [line.split() for line in said.splitlines() if line.startswith("bridge_")]
+    figures = {name: float(value) for name, value, _ in lines}
+    assert 0.0 < figures["bridge_pictures_per_s"] <= 12.0
+    # The networks alone take this long anywhere.
+    assert figures["bridge_cpu_per_picture"] > 1.0
+    assert figures["bridge_latency"] > 1.0
+    assert "bridge_latency" in out.read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--seconds", "0"], "must be a whole number of at least 1, got '0'"),
+        (["--out", "no/such/folder/x.json"], "a folder that exists"),
+    ],
+)
+def test_input_without_meaning_is_refused(
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        main(arguments)
+    assert stopped.value.code == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_folder_without_pictures_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["--render", str(tmp_path)]) == 2
+    assert "truth.jsonl" in capsys.readouterr().err
