@@ -155,8 +155,8 @@ def run_crossing(
         pipeline: what pixels go through instead of the shipped networks; it has the camera of the
             pictures.
         observer: called after every control cycle with the frame and the stage, e.g. to render.
-        renderer: what draws pictures: ``"tiny"``, ``"gl"``, ``"egl"``, or ``"auto"`` for the quickest
-            that works here. Two of them draw nearly, not exactly, the same pixels.
+        renderer: what draws pictures: ``"tiny"``, ``"gl"``, ``"egl"``, or ``"auto"`` for the
+            quickest that works here. Two of them draw nearly, not exactly, the same pixels.
 
     Raises:
         SimError: unknown scenario or perception, or an invalid command from the planner.
