@@ -14,6 +14,7 @@ from tracking import TrackingError
 
 from ._errors import SimError
 from .bridge._command import add_parser as add_bridge_parser
+from .catalogue._command import add_parser as add_scenario_parser
 from .estimates._command import add_parsers as add_estimate_parsers
 from .models._command import add_parser as add_models_parser
 from .policies._command import add_parser as add_policy_parser
@@ -116,6 +117,7 @@ def _parser() -> argparse.ArgumentParser:
     add_estimate_parsers(commands)
     add_tracks_parser(commands)
     add_policy_parser(commands)
+    add_scenario_parser(commands)
     add_bridge_parser(commands)
 
     bench = commands.add_parser(

@@ -21,7 +21,9 @@ from ._map_view import MapView
 from ._metrics import ContactEvent, SafetyMeter
 from ._pixel_eyes import pixel_timing
 from ._scenario import Scenario
+from ._scenario_template import ScenarioTemplate
 from ._stage import Stage, TrueView
+from .people._person_outcome import PersonOutcome
 from .pictures._camera_timing import CameraTiming
 from .pictures._visual_backend import RendererName
 from .robot._amr import NOVA_CARTER
@@ -85,6 +87,8 @@ class CrossingResult:
         violation_time_s: how long the margin was negative at a moving robot.
         duration_s: simulated time.
         frames: one a control cycle.
+        people: what became of those who react: ``people[i]`` is person ``i`` of the scenario, and
+            number ``len(scenario.workers) + i`` of everybody.
     """
 
     scenario: str
@@ -103,6 +107,7 @@ class CrossingResult:
     violation_time_s: float
     duration_s: float
     frames: tuple[CrossingFrame, ...]
+    people: tuple[PersonOutcome, ...] = ()
 
 
 class StraightOn:
@@ -144,7 +149,7 @@ def run_crossing(
     """Run one crossing in PyBullet and measure it.
 
     Args:
-        scenario: a scenario, or the name of a shipped one.
+        scenario: a scenario, or the name of a shipped one, drawn by the seed.
         policy: a policy, the name of a preset, or a YAML file.
         planner: the local planner; default the reference :class:`SamplingPlanner` (a scenario that
             drives straight on needs none).
@@ -163,14 +168,15 @@ def run_crossing(
         NavError: unknown preset or unusable policy file.
         PerceptionError: for pixels, when the shipped networks cannot be loaded.
     """
-    scenario = Scenario.shipped(scenario) if isinstance(scenario, str) else scenario
+    if isinstance(scenario, str):
+        scenario = ScenarioTemplate.shipped(scenario).for_seed(seed)
     policy_name, policy = _resolve(policy)
-    jitter_rng, camera_rng, timing_rng = np.random.default_rng(seed).spawn(3)
+    jitter_rng, camera_rng, timing_rng, people_rng = np.random.default_rng(seed).spawn(4)
     jitter = scenario.start_jitter_s
     offsets = jitter_rng.uniform(-jitter, jitter, len(scenario.workers))
     cone = AttentionCone()
     meter = SafetyMeter(NOVA_CARTER)
-    with Stage(scenario, offsets, renderer) as stage:
+    with Stage(scenario, offsets, people_rng, renderer=renderer) as stage:
         driver = planner if planner is not None else _default_planner(scenario, stage)
         camera_model, timing = _camera(scenario, perception)
         eyes = make_eyes(
@@ -233,7 +239,15 @@ def run_crossing(
                 break
             stage.advance(t_s + dt_s, meter)
         return _result(
-            scenario, seed, policy_name, type(driver).__name__, perception, meter, frames, reached_s
+            scenario,
+            seed,
+            policy_name,
+            type(driver).__name__,
+            perception,
+            meter,
+            frames,
+            reached_s,
+            stage.outcomes,
         )
 
 
@@ -290,6 +304,7 @@ def _result(
     meter: SafetyMeter,
     frames: list[CrossingFrame],
     reached_s: float | None,
+    people: tuple[PersonOutcome, ...],
 ) -> CrossingResult:
     causes = {contact.by for contact in meter.contacts}
     by = "robot" if "robot" in causes else "person" if causes else ""
@@ -310,4 +325,5 @@ def _result(
         violation_time_s=meter.violation_time_s,
         duration_s=frames[-1].t_s,
         frames=tuple(frames),
+        people=people,
     )
