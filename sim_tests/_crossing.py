@@ -171,8 +171,8 @@ def run_crossing(
             pictures.
         observer: called after every control cycle with the frame and the stage, e.g. to render.
         fault: what is wrong with camera and odometry; frames keep the truth about the robot.
-        renderer: what draws pictures: ``"tiny"``, ``"gl"``, ``"egl"``, or ``"auto"`` for the quickest
-            that works here. Two of them draw nearly, not exactly, the same pixels.
+        renderer: what draws pictures: ``"tiny"``, ``"gl"``, ``"egl"``, or ``"auto"`` for the
+            quickest that works here. Two of them draw nearly, not exactly, the same pixels.
 
     Raises:
         SimError: unknown scenario or perception, or an invalid command from the planner.
@@ -188,7 +188,7 @@ def run_crossing(
     cone = AttentionCone()
     meter = SafetyMeter(NOVA_CARTER)
     injection = FaultInjection(fault, seed)
-    with Stage(scenario, offsets, people_rng, renderer) as stage:
+    with Stage(scenario, offsets, people_rng, renderer=renderer) as stage:
         driver = planner if planner is not None else _default_planner(scenario, stage)
         camera_model, timing = _camera(scenario, perception)
         eyes = make_eyes(

@@ -89,6 +89,7 @@ class Stage(Closing):
         scenario: Scenario,
         start_offsets_s: FloatArray,
         people_rng: np.random.Generator | None = None,
+        *,
         renderer: RendererName = "tiny",
     ) -> None:
         self.scenario = scenario

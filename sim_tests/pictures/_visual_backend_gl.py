@@ -2,7 +2,8 @@
 
 Bodies live in a PyBullet client of their own, as with the other renderers, which knows their poses;
 what they look like is kept here. One picture takes one pass: beside the colour it writes the
-distance itself, which no near plane coarsens, and the body's number. moderngl is part of the optional dependency ``awarenav[sim]``.
+distance itself, which no near plane coarsens, and the body's number. moderngl is part of the
+optional dependency ``awarenav[sim]``.
 """
 
 from __future__ import annotations

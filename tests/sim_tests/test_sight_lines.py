@@ -188,7 +188,7 @@ def test_a_person_hides_another_and_a_box_the_chest(hall: tuple[Warehouse, list[
     navel = np.array([[3.72, 0.0, 1.05]])
     assert not lines.blocked(eye, navel, detail).any()
     far.place((4.0, 0.0), math.pi, activity="carry_box")
-    assert lines.blocked(eye, navel + [[0.1, 0.0, 0.0]], detail).all()
+    assert lines.blocked(eye, navel + np.array([0.1, 0.0, 0.0]), detail).all()
 
 
 def test_the_robot_stands_in_the_way_of_others_and_not_of_its_own_camera() -> None:
