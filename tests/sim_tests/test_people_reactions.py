@@ -103,7 +103,7 @@ def test_pass_behind_bends_the_way_behind_the_robot_without_stopping():
     assert ahead_m < -0.36
     assert passing.people[:, 0, 0].min() < 4.7
     y = passing.people[:, 0, 1]
-    assert passing.speeds[(y > -3.0) & (y < 3.0), 0].min() > 0.4
+    assert passing.speeds[(y > -3.0) & (y < 3.0), 0].min() > 0.2
     assert not passing.meter.contacts
     assert passing.outcomes[0].length_m > passing.outcomes[0].free_length_m + 0.05
 
