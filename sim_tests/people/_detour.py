@@ -1,4 +1,4 @@
-"""Round a robot that stands in the way."""
+"""Round a robot that stands in the way, and never with open eyes into one."""
 
 from __future__ import annotations
 
@@ -12,6 +12,10 @@ from ._surroundings import RobotBody
 _SLOW_MPS: Final = 0.15
 _FROM_M: Final = 3.0
 _ROOM_M: Final = 0.45
+# From the middle of the body to what it would touch, with a little to spare; and how soon before
+# one slows down for it.
+_STANDOFF_M: Final = 0.45
+_STANDOFF_S: Final = 0.5
 
 
 class Detour:
@@ -46,3 +50,21 @@ class Detour:
         off = math.asin(min(room / max(distance, 1e-6), 1.0))
         course = math.atan2(dy, dx) + self._side * off
         return Intent(math.cos(course), math.sin(course), intent.speed_mps)
+
+
+def kept_off(intent: Intent, x: float, y: float, robot: RobotBody) -> Intent:
+    """The intent, less what of it would lead straight into a robot that is known to be there."""
+    near_x, near_y = robot.nearest_m(x, y)
+    dx, dy = near_x - x, near_y - y
+    away = math.hypot(dx, dy)
+    if away > _FROM_M or away < 1e-6:
+        return intent
+    nx, ny = dx / away, dy / away
+    vx, vy = intent.speed_mps * intent.x, intent.speed_mps * intent.y
+    allowed = max(away - _STANDOFF_M, 0.0) / _STANDOFF_S
+    over = max(vx * nx + vy * ny - allowed, 0.0)
+    vx, vy = vx - over * nx, vy - over * ny
+    speed = math.hypot(vx, vy)
+    if over <= 0.0 or speed < 1e-6:
+        return intent if over <= 0.0 else Intent(intent.x, intent.y, 0.0)
+    return Intent(vx / speed, vy / speed, speed)

@@ -23,11 +23,13 @@ _DECIDING_S: Final = 0.3
 _OVER_S: Final = 3.0
 _FAR_M: Final = 6.0
 _MOVING_MPS: Final = 0.08
+# A robot this slow seems to wait itself.
+_CRAWLING_MPS: Final = 0.25
 # Who lets a robot pass keeps this far from the line that its middle follows, and waits for one that
-# stands, or cannot be seen, no longer than this.
+# waits itself no longer than some seconds, nor for any other for ever.
 _ASIDE_M: Final = 1.1
 _PATIENCE_S: Final = 3.0
-_LONGEST_WAIT_S: Final = 20.0
+_LONGEST_WAIT_S: Final = 15.0
 _APPROACH_HZ: Final = 2.5
 # Two who walk along the same line meet head on; behind or beside such a robot leads the way aside.
 _HEAD_ON_SINE: Final = 0.35
@@ -163,7 +165,8 @@ class Meeting:
         ahead = dx * ux + dy * uy
         side = ux * dy - uy * dx
         crossed = side * self._side < -_ASIDE_M
-        self._stood_s = 0.0 if moves else self._stood_s + dt_s
+        slow = math.hypot(robot.vx_mps, robot.vy_mps) < _CRAWLING_MPS
+        self._stood_s = max(self._stood_s + (dt_s if slow else -dt_s), 0.0)
         if ahead < -robot.half_length_m - _PASSED_M or crossed:
             self._settled = self._passed = True
         if self.reaction in ("wait", "pass_behind") or standing:

@@ -8,7 +8,6 @@ the body's velocity and acceleration. Scalars throughout: NumPy is slow on two f
 from __future__ import annotations
 
 import math
-from copy import copy
 from dataclasses import replace
 from typing import Final
 
@@ -80,6 +79,14 @@ class _Foot:
         self.lifted_at = 0.0
         self.since_s = math.inf
         self.pitch = self.from_pitch = 0.0
+
+    def copied(self) -> _Foot:
+        """The same state in a foot of its own."""
+        other = _Foot(self.place)
+        other.target, other.swinging, other.own = self.target, self.swinging, self.own
+        other.lifted_at, other.since_s = self.lifted_at, self.since_s
+        other.pitch, other.from_pitch = self.pitch, self.from_pitch
+        return other
 
 
 class OnlineFeet:
@@ -155,7 +162,7 @@ class OnlineFeet:
             self._vigour,
             self._twist,
             self._height_m,
-            [copy(foot) for foot in self._feet],
+            [foot.copied() for foot in self._feet],
             self._last,
         )
         x, y, heading = place

@@ -11,7 +11,7 @@ from perception.arrays import FloatArray
 
 from .._errors import SimError
 from ._course import Course
-from ._detour import Detour
+from ._detour import Detour, kept_off
 from ._errand import STILL_MPS, Errand
 from ._gait import Gait
 from ._gaze import Gaze
@@ -248,6 +248,8 @@ class Walker:
         wanted = self._meeting.react(t_s, TICK_S, (x, y), intent, robot, standing=not going)
         if going and robot is not None:
             wanted = self._detour.around(wanted, x, y, robot)
+        if robot is not None:
+            wanted = kept_off(wanted, x, y, robot)
         wanted, facing = self._recoiling(t_s, intent, wanted, going)
         ax, ay = self._acceleration((x, y, vx, vy), wanted, robot, around)
         self._turn(facing)
@@ -258,12 +260,12 @@ class Walker:
     ) -> RobotBody | None:
         """Set head and eyes; returns the robot as far as the person knows of it."""
         robot = around.robot
-        sees = False
-        if robot is not None:
-            sees = self._gaze.could_see(TICK_S, place, robot) and around.sees_robot()
+        if robot is None:
+            return None
+        sees = self._gaze.could_see(TICK_S, place, robot) and around.sees_robot()
         self._gaze.tick(t_s, TICK_S, place, robot, sees)
         felt = self._touch is not None and t_s - self._touch[2] <= _TOUCHING_S
-        if robot is not None and ((sees and self._gaze.noticed_s is not None) or felt):
+        if (sees and self._gaze.noticed_s is not None) or felt:
             self._known = (robot, t_s)
         if self._known is None or t_s - self._known[1] > _REMEMBERS_S:
             return None
