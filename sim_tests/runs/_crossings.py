@@ -21,7 +21,7 @@ from ._run_folder import ERRORS
 
 #: What the command line calls the reference planner.
 REFERENCE: Final = "reference"
-_REPORT: Final = "sim_tests.report"
+_REPORT: Final = "sim_tests.report._write_report"
 
 
 def crossings_command(options: argparse.Namespace) -> int:
