@@ -8,6 +8,8 @@ the body's velocity and acceleration. Scalars throughout: NumPy is slow on two f
 from __future__ import annotations
 
 import math
+from copy import copy
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -135,6 +137,36 @@ class OnlineFeet:
         self._walking = False
         self._vigour = self._twist = 0.0
         self._height_m = self._standing_m
+        self._before: (
+            tuple[float, bool, float, float, float, list[_Foot], Footing | None] | None
+        ) = None
+        self._last: Footing | None = None
+
+    def undo(self) -> None:
+        """Take the last step back: the body did not move."""
+        if self._before is not None:
+            (
+                self._phase,
+                self._walking,
+                self._vigour,
+                self._twist,
+                self._height_m,
+                self._feet,
+                self._last,
+            ) = self._before
+            self._before = None
+
+    def carried(self, dx_m: float, dy_m: float) -> Footing | None:
+        """The last posture moved as it is: somebody is thrown back. None before the first step."""
+        if self._last is None:
+            return None
+        for foot in self._feet:
+            foot.place = (foot.place[0] + dx_m, foot.place[1] + dy_m, foot.place[2])
+            foot.target = (foot.target[0] + dx_m, foot.target[1] + dy_m, foot.target[2])
+        left, right = ((x + dx_m, y + dy_m, *rest) for x, y, *rest in self._last.feet)
+        self._before = None
+        self._last = replace(self._last, feet=(left, right))
+        return self._last
 
     def step(
         self,
@@ -151,6 +183,15 @@ class OnlineFeet:
             velocity: of the body, m/s and rad/s.
             acceleration: of the body, m/s².
         """
+        self._before = (
+            self._phase,
+            self._walking,
+            self._vigour,
+            self._twist,
+            self._height_m,
+            [copy(foot) for foot in self._feet],
+            self._last,
+        )
         x, y, heading = place
         vx, vy, turning = velocity
         speed = math.hypot(vx, vy)
@@ -181,7 +222,8 @@ class OnlineFeet:
             if standing and not swings and not self._misplaced(x, y, facing, _REST_M, _REST_RAD):
                 self._walking = False
         rows = [self._ankle(side, dt_s, cadence, share, place) for side in (LEFT, RIGHT)]
-        return self._footing(dt_s, (rows[0], rows[1]), place)
+        self._last = self._footing(dt_s, (rows[0], rows[1]), place)
+        return self._last
 
     def _cadence_hz(self, ahead: float, aside: float, turning: float) -> float:
         """Cycles a second that speed and turning ask for together."""

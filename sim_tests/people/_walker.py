@@ -10,6 +10,7 @@ import numpy as np
 from perception.arrays import FloatArray
 
 from .._errors import SimError
+from ._detour import Detour
 from ._errand import STILL_MPS, Errand
 from ._gait import Gait
 from ._gaze import Gaze
@@ -85,6 +86,7 @@ class Walker:
         gaze_rng, meeting_rng = rng.spawn(2)
         self._gaze = Gaze(spec.glances, spec.stature_m, gaze_rng)
         self._meeting = Meeting(spec.reactions, meeting_rng)
+        self._detour = Detour()
         self._activity = Activity(spec.activity, spec.activity)
         self._boxes = boxes_odom_m
         self._reverse = math.pi if spec.backwards else 0.0
@@ -106,6 +108,7 @@ class Walker:
         self._touch: tuple[float, float, float] | None = None  # direction and when
         self._bumped_s = -math.inf
         self._now_s = 0.0
+        self._shown = self._showing = route.start
         self._feet: OnlineFeet | None = None
         self._stepped_s = 0.0
         self._free: tuple[float | None, float] | None = None
@@ -166,14 +169,19 @@ class Walker:
         """What the person does at ``t_s``, which never goes back."""
         self.advance(t_s, around)
         x, y, vx, vy = self._at(t_s)
+        self._shown, self._showing = self._showing, (x, y)
         after_s = t_s - self._tick * TICK_S
         heading = self._heading + self._turning * after_s
         if self._feet is None:
             gait = Gait(skeleton(self.spec.look, self.spec.stature_m))
             self._feet = OnlineFeet(gait, x, y, heading)
-        feet = self._feet.step(
-            t_s - self._stepped_s, (x, y, heading), (vx, vy, self._turning), self._push
-        )
+        feet = None
+        if t_s - self._bumped_s < _RECOIL_S:
+            feet = self._feet.carried(x - self._shown[0], y - self._shown[1])
+        if feet is None:
+            feet = self._feet.step(
+                t_s - self._stepped_s, (x, y, heading), (vx, vy, self._turning), self._push
+            )
         self._stepped_s = t_s
         head_yaw, head_pitch, eye_yaw, eye_pitch = self._gaze.at(after_s)
         return PersonMotion(
@@ -195,6 +203,14 @@ class Walker:
             self._decide(around)
         self._now_s = t_s
 
+    def hold(self) -> None:
+        """The last motion would have led into the robot: the body stays where it was before."""
+        left_s = (self._tick + 1) * TICK_S - self._now_s
+        self._set_off(self._now_s, (*self._shown, 0.0, 0.0), (0.0, 0.0), left_s)
+        self._showing = self._shown
+        if self._feet is not None:
+            self._feet.undo()
+
     def touch(self, towards_x: float, towards_y: float) -> None:
         """Body and robot touch: the person gets no farther that way, and has noticed.
 
@@ -207,10 +223,13 @@ class Walker:
             )
         if self._touch is None or self._now_s - self._touch[2] > _RECOIL_S:
             self._bumped_s = self._now_s
+            self._heading += self._turning * (self._now_s - self._tick * TICK_S)
+            self._turning = 0.0
             self._gaze.startle(self._now_s)
         self._touch = (towards_x, towards_y, self._now_s)
         x, y, vx, vy = self._at(self._now_s)
-        vx, vy = _without(vx, vy, towards_x, towards_y)
+        back = max(vx * towards_x + vy * towards_y + _RECOIL_MPS, 0.0)
+        vx, vy = vx - back * towards_x, vy - back * towards_y
         left_s = (self._tick + 1) * TICK_S - self._now_s
         self._set_off(self._now_s, (x, y, vx, vy), (0.0, 0.0), left_s)
 
@@ -262,6 +281,8 @@ class Walker:
             self._way_m = self._walked_m
         going = self._errand.going
         wanted = self._meeting.react(t_s, TICK_S, (x, y), intent, robot, standing=not going)
+        if going and robot is not None:
+            wanted = self._detour.around(wanted, x, y, robot)
         wanted, facing = self._recoiling(t_s, intent, wanted, going)
         ax, ay = self._acceleration((x, y, vx, vy), wanted, robot, around)
         self._turn(facing)
