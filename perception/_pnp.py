@@ -115,18 +115,13 @@ class PnpHeadPoseEstimator:
             people: keypoints of each person.
         """
         poses: list[HeadPose | None] = [None] * len(people)
-        whole: list[_Head] = []
-        for row, person in enumerate(people):
-            head = self._head(camera, person, row)
-            if head is None:
-                continue
-            if head.prior is None:
-                whole.append(head)
-            else:
-                poses[row] = self._refined(camera, [head])[0]
-        if whole:
-            for head, pose in zip(whole, self._refined(camera, whole), strict=True):
-                poses[head.row] = pose
+        found = [self._head(camera, person, row) for row, person in enumerate(people)]
+        heads = [head for head in found if head is not None]
+        for with_prior in (False, True):
+            alike = [head for head in heads if (head.prior is not None) == with_prior]
+            if alike:
+                for head, pose in zip(alike, self._refined(camera, alike), strict=True):
+                    poses[head.row] = pose
         return tuple(poses)
 
     def _head(self, camera: Camera, person: PersonKeypoints, row: int) -> _Head | None:
@@ -153,7 +148,7 @@ class PnpHeadPoseEstimator:
         return None if starts is None else _Head(row, model, rays, seen, *starts, prior)
 
     def _refined(self, camera: Camera, heads: list[_Head]) -> list[HeadPose | None]:
-        """Refine the starts of several heads in one go; a prior is that of all of them."""
+        """Refine the starts of several heads in one go; all of them have a prior, or none."""
         counts = [len(head.rotations) for head in heads]
         owner = np.repeat(np.arange(len(heads)), counts)
         poses = refine(
@@ -163,8 +158,9 @@ class PnpHeadPoseEstimator:
             self._std_px,
             np.concatenate([head.rotations for head in heads]),
             np.concatenate([head.translations_m for head in heads]),
-            heads[0].prior,
+            [head.prior for head in heads if head.prior is not None] or None,
             np.array([head.seen for head in heads], dtype=np.float64)[owner],
+            owner,
         )
         results: list[HeadPose | None] = []
         for index, head in enumerate(heads):

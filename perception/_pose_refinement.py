@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .arrays import FloatArray
 
@@ -33,6 +35,33 @@ class HeadPrior:
     pivot_head_m: FloatArray
     pivot_camera_m: FloatArray
     position_information: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Priors:
+    """The prior of each of B starts; arrays as in :class:`HeadPrior` with B in front.
+
+    ``rotation_information`` is in camera axes here.
+    """
+
+    rotation_camera_head: FloatArray
+    rotation_information: FloatArray
+    pivot_head_m: FloatArray
+    pivot_camera_m: FloatArray
+    position_information: FloatArray
+
+    @classmethod
+    def of(cls, priors: Sequence[HeadPrior], owner: NDArray[np.int64]) -> _Priors:
+        """Of starts whose heads are ``owner``."""
+        axes = np.array([prior.rotation_camera_head for prior in priors])
+        information = np.array([prior.rotation_information for prior in priors])
+        return cls(
+            axes[owner],
+            (axes @ information @ np.swapaxes(axes, 1, 2))[owner],
+            np.array([prior.pivot_head_m for prior in priors])[owner],
+            np.array([prior.pivot_camera_m for prior in priors])[owner],
+            np.array([prior.position_information for prior in priors])[owner],
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,7 +125,7 @@ def _linearise(
     weight_px: FloatArray,
     rotation: FloatArray,
     translation: FloatArray,
-    prior: HeadPrior | None,
+    prior: _Priors | None,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Cost (B,), gradient (B, 6), information (B, 6, 6) and pixel residuals (B, N, 2).
 
@@ -124,9 +153,8 @@ def _linearise(
         away = rotation_log(np.swapaxes(rotation, 1, 2) @ prior.rotation_camera_head)
         # In camera axes: R log(Rᵀ R0) is the turn that brings the head back to the prior.
         away = -np.einsum("bij,bj->bi", rotation, away)
-        axes = prior.rotation_camera_head
-        rotation_information = axes @ prior.rotation_information @ axes.T
-        pivot = np.einsum("bij,j->bi", rotation, prior.pivot_head_m)
+        rotation_information = prior.rotation_information
+        pivot = np.einsum("bij,bj->bi", rotation, prior.pivot_head_m)
         offset = pivot + translation - prior.pivot_camera_m
         motion = np.concatenate(
             [-skew(pivot), np.broadcast_to(np.eye(3), (len(pivot), 3, 3))], axis=-1
@@ -135,9 +163,11 @@ def _linearise(
         information = information + np.swapaxes(motion, 1, 2) @ weighted
         information[:, :3, :3] += rotation_information
         gradient = gradient + np.einsum("bji,bj->bi", weighted, offset)
-        gradient[:, :3] += away @ rotation_information
-        cost = cost + np.einsum("bi,ij,bj->b", away, rotation_information, away)
-        cost = cost + np.einsum("bi,ij,bj->b", offset, prior.position_information, offset)
+        turning = np.einsum("bij,bj->bi", rotation_information, away)
+        gradient[:, :3] += turning
+        cost = cost + np.einsum("bi,bi->b", away, turning)
+        shifting = np.einsum("bij,bj->bi", prior.position_information, offset)
+        cost = cost + np.einsum("bi,bi->b", offset, shifting)
     return cost, gradient, information, residual
 
 
@@ -148,10 +178,14 @@ def refine(
     keypoint_std_px: float,
     rotations: FloatArray,
     translations_m: FloatArray,
-    prior: HeadPrior | None,
+    priors: Sequence[HeadPrior] | None,
     seen: FloatArray | None = None,
+    owner: NDArray[np.int64] | None = None,
 ) -> list[RefinedPose]:
     """Levenberg–Marquardt from B starts at once, of one head or of several.
+
+    Each head stops by itself when none of its starts promises more: what others are refined with
+    it does not matter.
 
     Args:
         model_m: (N, 3) points in the head frame, or (B, N, 3) each start's own.
@@ -160,8 +194,9 @@ def refine(
         keypoint_std_px: standard deviation of the pixel noise.
         rotations: (B, 3, 3) starts.
         translations_m: (B, 3) starts.
-        prior: what the body says, or None; for starts of one head.
+        priors: what the body of each head says, or None.
         seen: (B, N) of ones, and zeros for points that do not count; default all count.
+        owner: (B,) the head that each start is of, starts of one head in a row; default one head.
 
     Returns:
         One local optimum a start, in the same order.
@@ -169,6 +204,10 @@ def refine(
     weight = focal_px / keypoint_std_px
     weight = weight[None, None] if seen is None else seen[..., None] * weight
     count = len(rotations)
+    owner = np.zeros(count, dtype=np.int64) if owner is None else owner
+    first = np.flatnonzero(np.diff(owner, prepend=-1))
+    prior = None if priors is None else _Priors.of(priors, owner)
+    active = np.ones(count, dtype=np.bool_)
     damping: FloatArray = np.full(count, 1e-3)
     rotation, translation = rotations, translations_m
     state = _linearise(model_m, rays, weight, rotation, translation, prior)
@@ -178,7 +217,9 @@ def refine(
         damped = information + (damping[:, None] * scale + 1e-9)[..., None] * np.eye(6)
         step = -np.linalg.solve(damped, gradient[..., None])[..., 0]
         # The decrease of the cost that the local model still promises, in units of χ².
-        if float(np.max(-np.sum(gradient * step, axis=1))) < _CONVERGED_CHI2:
+        promise = np.maximum.reduceat(-np.sum(gradient * step, axis=1), first)
+        active &= (promise >= _CONVERGED_CHI2)[owner]
+        if not active.any():
             break
         turn = step[:, :3]
         length = np.sqrt(np.einsum("bi,bi->b", turn, turn))[:, None]
@@ -186,7 +227,7 @@ def refine(
         trial_rotation = rotation_exp(turn) @ rotation
         trial_translation = translation + step[:, 3:]
         trial = _linearise(model_m, rays, weight, trial_rotation, trial_translation, prior)
-        better = trial[0] < cost
+        better = active & (trial[0] < cost)
         damping = np.where(better, 0.2 * damping, 10.0 * damping)
         if better.all():
             rotation, translation, state = trial_rotation, trial_translation, trial

@@ -52,7 +52,7 @@ def measure(repeats: int = 3) -> tuple[Metric, ...]:
     A peer runs in the same process: PyBullet stepping the empty hall, which no crossing can beat.
     """
     names = ("crossing_attentive", "crossing_distracted")
-    with tqdm(total=4, desc="bench", unit="figure", leave=False, file=sys.stderr) as bar:
+    with tqdm(total=6, desc="bench", unit="figure", leave=False, file=sys.stderr) as bar:
 
         def best(names: tuple[str, ...], perception: str) -> tuple[float, float]:
             runs = [_time_runs(names, perception) for _ in range(repeats)]
@@ -64,6 +64,8 @@ def measure(repeats: int = 3) -> tuple[Metric, ...]:
         truth = best(names, "truth")
         encounter = best(("paper_encounter",), "truth")
         keypoints = best(names, "keypoints")
+        crowd = best(("crowd_of_eight",), "keypoints")
+        pixels = best(("crossing_attentive",), "pixels")
     return (
         _factor("crossing_truth_real_time_factor", truth),
         Metric(
@@ -75,6 +77,15 @@ def measure(repeats: int = 3) -> tuple[Metric, ...]:
         ),
         _factor("encounter_60hz_truth_real_time_factor", encounter),
         _factor("crossing_keypoints_real_time_factor", keypoints),
+        Metric(
+            "crossing_keypoints_cost_over_bare_physics",
+            keypoints[1] / keypoints[0] / physics,
+            "x",
+            "lower",
+            0.5,
+        ),
+        _factor("crowd_of_eight_keypoints_real_time_factor", crowd),
+        _factor("crossing_pixels_real_time_factor", pixels),
     )
 
 

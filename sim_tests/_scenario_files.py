@@ -14,6 +14,8 @@ from ._names import not_one_of
 
 _FOLDER: Final = resources.files("sim_tests") / "scenarios"
 _DEFAULTS: Final = _FOLDER / "defaults"
+# The safe loader in C, ten times as fast, where PyYAML was built with it.
+_LOADER: Final[Any] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 def shipped_scenarios() -> tuple[str, ...]:
@@ -57,7 +59,7 @@ def parse(text: str, source: str) -> dict[str, Any]:
         SimError: for text that is not a YAML mapping, and for unknown defaults.
     """
     try:
-        data = yaml.safe_load(text)
+        data = yaml.load(text, _LOADER)  # noqa: S506 — one of the safe loaders
     except yaml.YAMLError as cause:
         raise SimError(f"{source} is not valid YAML: {cause}") from cause
     if not isinstance(data, dict):

@@ -125,6 +125,8 @@ class Stage(Closing):
         steps = 1.0 / (_BODY_UPDATE_HZ * self.warehouse.physics_dt_s)
         self._steps_per_body_update = max(round(steps), 1)
         self._close = [False] * len(self.workers)
+        half_length, half_width = np.abs(self.amr.profile.footprint_m).max(axis=0).tolist()
+        self._half_size_m: tuple[float, float] = (half_length, half_width)
         self._held = [False] * len(self.workers)
         self._velocity_mps: FloatArray | None = None
         self._place_workers()
@@ -260,19 +262,17 @@ class Stage(Closing):
         return -min((float(pair[8]) for pair in pairs), default=0.0)
 
     def _robot_body(self) -> RobotBody:
-        x, y = self.amr.T_odom_base[:2, 3].tolist()
-        state = self.amr.state(self.t_s)
-        heading, speed = state.heading_odom_rad, state.speed_mps
-        half_length, half_width = np.abs(self.amr.profile.footprint_m).max(axis=0).tolist()
+        T_odom_base = self.amr.T_odom_base
+        x, y = T_odom_base[:2, 3].tolist()
+        vx, vy = self.amr.velocity_odom_mps.tolist()
         camera_x, camera_y, camera_z = self.amr.T_odom_camera[:3, 3].tolist()
         return RobotBody(
             x,
             y,
-            heading,
-            speed * math.cos(heading),
-            speed * math.sin(heading),
-            half_length,
-            half_width,
+            math.atan2(T_odom_base[1, 0], T_odom_base[0, 0]),
+            vx,
+            vy,
+            *self._half_size_m,
             (camera_x, camera_y, camera_z),
         )
 

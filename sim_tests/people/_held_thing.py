@@ -61,8 +61,9 @@ class HeldThing:
         return np.array([place[:3, 3] - _REACH_M, place[:3, 3] + _REACH_M])
 
     def reach_odom_m(self) -> FloatArray:
-        """As :meth:`bounds_odom_m`."""
-        return self.bounds_odom_m()
+        """The worker's reach; a point with empty hands."""
+        reach = self._worker.reach_odom_m()
+        return reach if self._worker.held is not None else np.array([reach[0], reach[0]])
 
     def surface(self, detail: int) -> PlacedSurface | None:
         """The thing where it is now; None with empty hands. There is one level of detail."""

@@ -179,6 +179,7 @@ class Worker:
         self._x_m, self._y_m, self._heading_rad = x, y, heading
         self._activity, self._eyes = doing, eyes
         self._keypoints: FloatArray | None = None
+        self._reach: FloatArray | None = None
         self._pose: BodyPose | None = None
         self._head_rotation: FloatArray | None = None
         self._bend(footing, local, head)
@@ -288,13 +289,12 @@ class Worker:
 
     def reach_odom_m(self) -> FloatArray:
         """(2, 3) low and high corner of a generous box about all of the body in any posture."""
-        side, top = _REACH_M * self.skeleton.scale, 1.15 * self.skeleton.stature_m
-        return np.array(
-            [
-                (self._x_m - side, self._y_m - side, -0.1),
-                (self._x_m + side, self._y_m + side, top),
-            ]
-        )
+        if self._reach is None:
+            side, top = _REACH_M * self.skeleton.scale, 1.15 * self.skeleton.stature_m
+            x, y = self._x_m, self._y_m
+            self._reach = np.array([(x - side, y - side, -0.1), (x + side, y + side, top)])
+            self._reach.setflags(write=False)
+        return self._reach
 
     @property
     def keypoints_odom_m(self) -> FloatArray:

@@ -14,7 +14,7 @@ from perception.arrays import FloatArray
 
 from ..hall._layout import WarehouseLayout
 from ..hall._scenery import scenery
-from ._triangles import Surface, TriangleSet, meet_boxes
+from ._triangles import TriangleSet, meet_boxes
 
 _AT_HOME: Final = np.eye(4)[None]
 
@@ -99,16 +99,6 @@ class SightLines:
 
 @lru_cache(maxsize=8)  # many episodes play in the same hall
 def _scenery_triangles(layout: WarehouseLayout, variant: int) -> TriangleSet:
-    surfaces: list[Surface] = []
-    for chunk in scenery(layout, variant):
-        surfaces.append((chunk.mesh.vertices_m, chunk.mesh.indices.reshape(-1, 3)))
-    return TriangleSet([_joined(surfaces)])
-
-
-def _joined(surfaces: list[Surface]) -> Surface:
-    """All in one piece, since none of it moves."""
-    starts = np.cumsum([0, *(len(vertices) for vertices, _ in surfaces[:-1])])
-    return (
-        np.concatenate([vertices for vertices, _ in surfaces]),
-        np.concatenate([rows + start for (_, rows), start in zip(surfaces, starts, strict=True)]),
-    )
+    meshes = [chunk.mesh for chunk in scenery(layout, variant)]
+    surfaces = [(mesh.vertices_m, mesh.indices.reshape(-1, 3)) for mesh in meshes]
+    return TriangleSet(surfaces, together=True)

@@ -22,7 +22,7 @@ from perception.arrays import FloatArray
 Surface = tuple[FloatArray, NDArray[np.int64]]
 
 # Triangles are held against lines in clusters of so many, each with a box about it.
-_CLUSTER: Final = 32
+_CLUSTER: Final = 16
 _TINY_M: Final = 1e-12
 
 
@@ -31,17 +31,18 @@ class TriangleSet:
 
     Args:
         pieces: surface of each piece in a frame of its own, metres.
+        together: all pieces are in one frame instead, and count as one that does not bend.
     """
 
-    def __init__(self, pieces: Sequence[Surface]) -> None:
+    def __init__(self, pieces: Sequence[Surface], *, together: bool = False) -> None:
         corners = [vertices[triangles] for vertices, triangles in pieces]
         clusters = [
-            (number, piece[rows])
+            (0 if together else number, piece[rows])
             for number, piece in enumerate(corners)
             for rows in _clusters(piece.mean(axis=1))
         ]
         count = len(clusters)
-        self.pieces = len(pieces)
+        self.pieces = 1 if together else len(pieces)
         self._piece = np.array([number for number, _ in clusters], dtype=np.int64)
         self._boxes = np.array(
             [(part.min(axis=(0, 1)), part.max(axis=(0, 1))) for _, part in clusters]
@@ -84,7 +85,7 @@ class TriangleSet:
         Returns:
             (K,); a line that only ends on a triangle, or starts on it, is free.
         """
-        free = np.zeros(ends_m.shape[1], dtype=bool)
+        blocked = np.zeros(ends_m.shape[1], dtype=bool)
         low = np.minimum(ends_m.min(axis=1), eye_m)
         high = np.maximum(ends_m.max(axis=1), eye_m)
         reached = np.flatnonzero(
@@ -93,35 +94,38 @@ class TriangleSet:
             ).all(axis=1)
         )
         if not reached.size:
-            return free
+            return blocked
         piece = self._piece[reached]
-        eye, along = eye_m[piece], (ends_m - eye_m[:, None])[piece]
-        passed = meet_boxes(eye, along, self._boxes[reached]).any(axis=1)
-        if not passed.any():
-            return free
-        chosen, eye, along = reached[passed], eye[passed], along[passed]
-        sides = _lines(eye, along) @ self._edges[chosen]
-        one, two, three = (sides[..., k * _CLUSTER : (k + 1) * _CLUSTER] for k in range(3))
+        along = ends_m - eye_m[:, None]
+        eye = eye_m[piece]
+        # Few lines come near any one cluster: each pair of the two is looked at by itself.
+        near, line = _slabs(eye, _inverse(along)[:, piece], self._boxes[reached]).nonzero()
+        if not near.size:
+            return blocked
+        cluster = reached[near]
+        sides = (_lines(eye[near], along[piece[near], line])[:, None] @ self._edges[cluster])[:, 0]
+        one, two, three = (sides[:, k * _CLUSTER : (k + 1) * _CLUSTER] for k in range(3))
         rate = one + two + three
         # The plane is met at the share start / rate of the line.
-        ahead = np.concatenate([eye, np.ones((len(eye), 1))], axis=1)[:, None]
-        start = ahead @ self._planes[chosen]
+        origin = np.ones((len(near), 1, 4))
+        origin[:, 0, :3] = eye[near]
+        start = (origin @ self._planes[cluster])[:, 0]
         met = (start * rate > 0.0) & (np.abs(start) < np.abs(rate))
         met &= (np.minimum(np.minimum(one, two), three) >= 0.0) | (
             np.maximum(np.maximum(one, two), three) <= 0.0
         )
-        return np.asarray(met.any(axis=(0, 2)))
+        blocked[line[met.any(axis=1)]] = True
+        return blocked
 
 
 def _lines(eye_m: FloatArray, along_m: FloatArray) -> FloatArray:
-    """(C, K, 6) Plücker coordinates [d, d × o] of lines from eyes (C, 3) along (C, K, 3)."""
-    out = np.empty((*along_m.shape[:2], 6))
-    out[..., :3] = along_m
-    x, y, z = along_m[..., 0], along_m[..., 1], along_m[..., 2]
-    ox, oy, oz = eye_m[:, 0, None], eye_m[:, 1, None], eye_m[:, 2, None]
-    out[..., 3] = y * oz - z * oy
-    out[..., 4] = z * ox - x * oz
-    out[..., 5] = x * oy - y * ox
+    """(N, 6) Plücker coordinates [d, d × o] of lines from eyes (N, 3) along (N, 3)."""
+    out = np.empty((len(along_m), 6))
+    out[:, :3] = along_m
+    (x, y, z), (ox, oy, oz) = along_m.T, eye_m.T
+    out[:, 3] = y * oz - z * oy
+    out[:, 4] = z * ox - x * oz
+    out[:, 5] = x * oy - y * ox
     return out
 
 
@@ -142,10 +146,23 @@ def _clusters(centres_m: FloatArray) -> list[NDArray[np.int64]]:
 
 def meet_boxes(eye_m: FloatArray, along_m: FloatArray, boxes_m: FloatArray) -> NDArray[np.bool_]:
     """(C, K) whether segments from eyes (C, 3) along (C, K, 3) meet boxes (C, 2, 3), by slabs."""
-    share = 1.0 / np.where(np.abs(along_m) < _TINY_M, _TINY_M, along_m)
-    first = (boxes_m[:, 0] - eye_m)[:, None] * share
-    last = (boxes_m[:, 1] - eye_m)[:, None] * share
-    low, high = np.minimum(first, last), np.maximum(first, last)
-    enter = np.maximum(np.maximum(low[..., 0], low[..., 1]), low[..., 2])
-    leave = np.minimum(np.minimum(high[..., 0], high[..., 1]), high[..., 2])
-    return np.asarray((enter <= leave) & (leave >= 0.0) & (enter <= 1.0))
+    return _slabs(eye_m, _inverse(along_m), boxes_m)
+
+
+def _inverse(along_m: FloatArray) -> FloatArray:
+    """(3, C, K) one over each component of directions (C, K, 3), axis by axis."""
+    components = np.array(along_m.transpose(2, 0, 1), order="C")
+    components[np.abs(components) < _TINY_M] = _TINY_M
+    return np.asarray(1.0 / components)
+
+
+def _slabs(eye_m: FloatArray, inverse: FloatArray, boxes_m: FloatArray) -> NDArray[np.bool_]:
+    """As :func:`meet_boxes`; a segment is in a box for a share of it between enter and leave."""
+    enter: FloatArray | float = 0.0
+    leave: FloatArray | float = 1.0
+    for axis in range(3):
+        first = (boxes_m[:, 0, axis] - eye_m[:, axis])[:, None] * inverse[axis]
+        last = (boxes_m[:, 1, axis] - eye_m[:, axis])[:, None] * inverse[axis]
+        enter = np.maximum(enter, np.minimum(first, last))
+        leave = np.minimum(leave, np.maximum(first, last))
+    return np.asarray(enter <= leave)
