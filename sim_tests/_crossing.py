@@ -27,6 +27,7 @@ from .faults._fault import Fault
 from .faults._faulty_eyes import FaultInjection
 from .people._person_outcome import PersonOutcome
 from .pictures._camera_timing import CameraTiming
+from .pictures._visual_backend import RendererName
 from .robot._amr import NOVA_CARTER
 from .robot._planner import LocalPlanner, SamplingPlanner
 
@@ -91,9 +92,10 @@ class CrossingResult:
         violation_time_s: how long the margin was negative at a moving robot.
         duration_s: simulated time.
         frames: one a control cycle.
-        robot: what drove.
         people: what became of those who react: ``people[i]`` is person ``i`` of the scenario, and
-            number ``len(scenario.workers) + i`` of everybody.
+            number ``scripted + i`` of everybody.
+        scripted: how many follow a script; they come first wherever all are listed.
+        robot: what drove.
     """
 
     scenario: str
@@ -112,8 +114,9 @@ class CrossingResult:
     violation_time_s: float
     duration_s: float
     frames: tuple[CrossingFrame, ...]
-    robot: RobotProfile = NOVA_CARTER
     people: tuple[PersonOutcome, ...] = ()
+    scripted: int = 0
+    robot: RobotProfile = NOVA_CARTER
 
 
 class StraightOn:
@@ -151,6 +154,7 @@ def run_crossing(
     pipeline: AwarenessPipeline | None = None,
     observer: Observer | None = None,
     fault: Fault | None = None,
+    renderer: RendererName = "auto",
 ) -> CrossingResult:
     """Run one crossing in PyBullet and measure it.
 
@@ -167,6 +171,8 @@ def run_crossing(
             pictures.
         observer: called after every control cycle with the frame and the stage, e.g. to render.
         fault: what is wrong with camera and odometry; frames keep the truth about the robot.
+        renderer: what draws pictures: ``"tiny"``, ``"gl"``, ``"egl"``, or ``"auto"`` for the
+            quickest that works here. Two of them draw nearly, not exactly, the same pixels.
 
     Raises:
         SimError: unknown scenario or perception, or an invalid command from the planner.
@@ -182,7 +188,7 @@ def run_crossing(
     cone = AttentionCone()
     meter = SafetyMeter(NOVA_CARTER)
     injection = FaultInjection(fault, seed)
-    with Stage(scenario, offsets, people_rng) as stage:
+    with Stage(scenario, offsets, people_rng, renderer=renderer) as stage:
         driver = planner if planner is not None else _default_planner(scenario, stage)
         camera_model, timing = _camera(scenario, perception)
         eyes = make_eyes(
@@ -352,4 +358,5 @@ def _result(
         duration_s=frames[-1].t_s,
         frames=tuple(frames),
         people=people,
+        scripted=len(scenario.workers),
     )

@@ -28,6 +28,10 @@ _MOVING_MPS: Final = 0.08
 _ASIDE_M: Final = 1.1
 _PATIENCE_S: Final = 3.0
 _LONGEST_WAIT_S: Final = 20.0
+_APPROACH_HZ: Final = 2.5
+# Two who walk along the same line meet head on; behind or beside such a robot leads the way aside.
+_HEAD_ON_SINE: Final = 0.35
+_LEAST_ONWARD: Final = 0.3
 _PASSED_M: Final = 0.35
 _STOPPING_MPS2: Final = 1.2
 _SIDE_STEP_MPS: Final = 0.7
@@ -77,6 +81,7 @@ class Meeting:
         # The reaction has done its part; the robot has been met.
         self._settled = False
         self._passed = False
+        self._head_on = False
 
     @property
     def goes_first(self) -> bool:
@@ -110,9 +115,9 @@ class Meeting:
                 self._conflict_since_s = t_s
         elif t_s - self._conflict_s > _DECIDING_S:
             self._conflict_since_s = None
-        if self.reaction and t_s - max(self._conflict_s, self._began_s) > _OVER_S:
-            if robot is None or self._passed or _distance(place, robot) > _FAR_M:
-                self.reaction = ""
+        over = t_s - max(self._conflict_s, self._began_s) > _OVER_S
+        if over and (robot is None or self._passed or _distance(place, robot) > _FAR_M):
+            self.reaction = ""
         if robot is None:
             return intent
         if not self.reaction:
@@ -138,6 +143,8 @@ class Meeting:
         if abs(side) < 0.1:
             side = onward if abs(onward) > 0.1 else 1.0
         self._side = math.copysign(1.0, side)
+        across = self._line[0] * intent.y - self._line[1] * intent.x
+        self._head_on = abs(across) < _HEAD_ON_SINE
 
     def _carried_out(
         self,
@@ -159,37 +166,48 @@ class Meeting:
         self._stood_s = 0.0 if moves else self._stood_s + dt_s
         if ahead < -robot.half_length_m - _PASSED_M or crossed:
             self._settled = self._passed = True
-        if self._settled or self.reaction == "walk_on":
+        if self.reaction in ("wait", "pass_behind") or standing:
+            # No patience is endless.
+            late = t_s - self._began_s > _LONGEST_WAIT_S
+            self._settled = self._settled or self._stood_s > _PATIENCE_S or late
+        if self._settled or self.reaction == "walk_on" or (standing and self.reaction == "claim"):
             return intent
-        if self.reaction == "hurry" and not standing:
-            fastest = max(_HURRY_MPS, intent.speed_mps)
-            return Intent(intent.x, intent.y, min(_HURRY * intent.speed_mps, fastest))
-        if self.reaction == "claim" and not standing:
-            fastest = max(_HURRY_MPS, intent.speed_mps)
-            return Intent(intent.x, intent.y, min(_CLAIM * intent.speed_mps, fastest))
-        if self.reaction == "claim":
-            return intent
-        if self._stood_s > _PATIENCE_S or t_s - self._began_s > _LONGEST_WAIT_S:
-            self._settled = True
-            return intent
-        if self.reaction == "pass_behind" and not standing:
+        if standing:
+            return self._aside(intent, side, 0.0)
+        if self._head_on and self.reaction in ("wait", "pass_behind"):
+            return self._aside(intent, side, intent.speed_mps)
+        if self.reaction == "wait":
+            return self._waiting(intent, side)
+        if self.reaction == "pass_behind":
             return _behind(place, intent, robot, self._line)
-        return self._waiting(intent, side, standing)
+        haste = _HURRY if self.reaction == "hurry" else _CLAIM
+        fastest = max(_HURRY_MPS, intent.speed_mps)
+        return Intent(intent.x, intent.y, min(haste * intent.speed_mps, fastest))
 
-    def _waiting(self, intent: Intent, side: float, standing: bool) -> Intent:
+    def _waiting(self, intent: Intent, side: float) -> Intent:
         """Stops short of the robot's way, or gets off it."""
         room = side * self._side - _ASIDE_M
-        out_x, out_y = -self._line[1] * self._side, self._line[0] * self._side
         if room < 0.0:
-            return Intent(out_x, out_y, min(_SIDE_STEP_MPS, -2.0 * room))
-        inwards = -(intent.x * out_x + intent.y * out_y)
-        if standing:
-            return Intent(intent.x, intent.y, 0.0)
+            return self._aside(intent, side, 0.0)
+        inwards = (intent.x * self._line[1] - intent.y * self._line[0]) * self._side
         if inwards < 0.05:
             return intent
         most = math.sqrt(2.0 * _STOPPING_MPS2 * room / inwards)
-        most = min(most, 2.5 * room / inwards)
+        most = min(most, _APPROACH_HZ * room / inwards)
         return Intent(intent.x, intent.y, min(intent.speed_mps, most))
+
+    def _aside(self, intent: Intent, side: float, onward_mps: float) -> Intent:
+        """Off the robot's way, and on beside it with some speed."""
+        ux, uy = self._line
+        lacks = max(_ASIDE_M - side * self._side, 0.0)
+        out = min(_SIDE_STEP_MPS, 2.0 * lacks) * self._side
+        onward = math.copysign(onward_mps, intent.x * ux + intent.y * uy)
+        onward *= max(1.0 - lacks, _LEAST_ONWARD)
+        vx, vy = onward * ux - out * uy, onward * uy + out * ux
+        speed = math.hypot(vx, vy)
+        if speed < 1e-3:
+            return Intent(intent.x, intent.y, 0.0)
+        return Intent(vx / speed, vy / speed, speed)
 
 
 def _line_of(robot: RobotBody) -> tuple[float, float]:

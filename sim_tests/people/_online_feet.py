@@ -8,28 +8,35 @@ the body's velocity and acceleration. Scalars throughout: NumPy is slow on two f
 from __future__ import annotations
 
 import math
+from copy import copy
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from ._footing import Footing
-from ._gait import LEFT, LONGEST_SWING_S, RIGHT, Gait
-from ._gait import _ARM_SWING_RAD as ARM_SWING_RAD
-from ._gait import _LIFT_M as LIFT_M
-from ._gait import _LOADING_S as LOADING_S
-from ._gait import _LOADING_SHARE as LOADING_SHARE
-from ._gait import _MID_STANCE as MID_STANCE
-from ._gait import _PELVIS_LIST_RAD as PELVIS_LIST_RAD
-from ._gait import _PELVIS_TWIST as PELVIS_TWIST
-from ._gait import _PELVIS_YAW_RAD as PELVIS_YAW_RAD
-from ._gait import _ROLLING_S as ROLLING_S
-from ._gait import _ROLLING_SHARE as ROLLING_SHARE
-from ._gait import _SWAY_M as SWAY_M
-from ._gait import _THORAX_YAW_RAD as THORAX_YAW_RAD
-from ._gait import _USED_REACH as USED_REACH
-from ._gait import _WAY_ROUND_M as WAY_ROUND_M
-from ._gait import _landing_rad as landing_rad
-from ._gait import _off_rad as off_rad
+from ._gait import (
+    ARM_SWING_RAD,
+    LEFT,
+    LIFT_M,
+    LOADING_S,
+    LOADING_SHARE,
+    LONGEST_SWING_S,
+    MID_STANCE,
+    PELVIS_LIST_RAD,
+    PELVIS_TWIST,
+    PELVIS_YAW_RAD,
+    RIGHT,
+    ROLLING_S,
+    ROLLING_SHARE,
+    SWAY_M,
+    THORAX_YAW_RAD,
+    USED_REACH,
+    WAY_ROUND_M,
+    Gait,
+    landing_rad,
+    off_rad,
+)
 from ._skeleton import SIGNS
 
 # Slower than this and the body only shifts its weight.
@@ -67,7 +74,16 @@ _Place = tuple[float, float, float]  # x, y, yaw of a flat foot
 class _Foot:
     """One foot, standing or swinging."""
 
-    __slots__ = ("from_pitch", "lifted_at", "own", "pitch", "place", "since_s", "swinging", "target")
+    __slots__ = (
+        "from_pitch",
+        "lifted_at",
+        "own",
+        "pitch",
+        "place",
+        "since_s",
+        "swinging",
+        "target",
+    )
 
     def __init__(self, place: _Place) -> None:
         self.place = self.target = place
@@ -121,6 +137,36 @@ class OnlineFeet:
         self._walking = False
         self._vigour = self._twist = 0.0
         self._height_m = self._standing_m
+        self._before: (
+            tuple[float, bool, float, float, float, list[_Foot], Footing | None] | None
+        ) = None
+        self._last: Footing | None = None
+
+    def undo(self) -> None:
+        """Take the last step back: the body did not move."""
+        if self._before is not None:
+            (
+                self._phase,
+                self._walking,
+                self._vigour,
+                self._twist,
+                self._height_m,
+                self._feet,
+                self._last,
+            ) = self._before
+            self._before = None
+
+    def carried(self, dx_m: float, dy_m: float) -> Footing | None:
+        """The last posture moved as it is: somebody is thrown back. None before the first step."""
+        if self._last is None:
+            return None
+        for foot in self._feet:
+            foot.place = (foot.place[0] + dx_m, foot.place[1] + dy_m, foot.place[2])
+            foot.target = (foot.target[0] + dx_m, foot.target[1] + dy_m, foot.target[2])
+        left, right = ((x + dx_m, y + dy_m, *rest) for x, y, *rest in self._last.feet)
+        self._before = None
+        self._last = replace(self._last, feet=(left, right))
+        return self._last
 
     def step(
         self,
@@ -137,6 +183,15 @@ class OnlineFeet:
             velocity: of the body, m/s and rad/s.
             acceleration: of the body, m/s².
         """
+        self._before = (
+            self._phase,
+            self._walking,
+            self._vigour,
+            self._twist,
+            self._height_m,
+            [copy(foot) for foot in self._feet],
+            self._last,
+        )
         x, y, heading = place
         vx, vy, turning = velocity
         speed = math.hypot(vx, vy)
@@ -156,7 +211,9 @@ class OnlineFeet:
         cadence = self._cadence_hz(ahead, aside, turning)
         standing = speed <= _MOVING_MPS and abs(turning) <= _MOVING_RADPS
         facing = heading + self._twist
-        if not self._walking and (not standing or self._misplaced(x, y, facing, _STEP_M, _STEP_RAD)):
+        if not self._walking and (
+            not standing or self._misplaced(x, y, facing, _STEP_M, _STEP_RAD)
+        ):
             self._set_out(share, aside, turning)
         if self._walking:
             body = (x, y, facing, vx, vy, turning)
@@ -165,7 +222,8 @@ class OnlineFeet:
             if standing and not swings and not self._misplaced(x, y, facing, _REST_M, _REST_RAD):
                 self._walking = False
         rows = [self._ankle(side, dt_s, cadence, share, place) for side in (LEFT, RIGHT)]
-        return self._footing(dt_s, (rows[0], rows[1]), place)
+        self._last = self._footing(dt_s, (rows[0], rows[1]), place)
+        return self._last
 
     def _cadence_hz(self, ahead: float, aside: float, turning: float) -> float:
         """Cycles a second that speed and turning ask for together."""
@@ -176,9 +234,7 @@ class OnlineFeet:
         turn = turning / _TURN_PER_CYCLE_RAD
         return min(math.hypot(ahead / forward, aside / sideways, turn), _QUICKEST_HZ)
 
-    def _misplaced(
-        self, x: float, y: float, facing: float, far_m: float, far_rad: float
-    ) -> bool:
+    def _misplaced(self, x: float, y: float, facing: float, far_m: float, far_rad: float) -> bool:
         """Whether a foot stands too far from where it belongs when standing."""
         for side in (LEFT, RIGHT):
             nx, ny, nyaw = self._neutral(side, x, y, facing, 0.0)

@@ -133,6 +133,9 @@ class Replayed:
             activity=_IDLE,
         )
 
+    def hold(self) -> None:
+        """A recording goes on regardless."""
+
     def touch(self, towards_x: float, towards_y: float) -> None:
         """A recording takes no notice."""
 
@@ -201,9 +204,7 @@ def _check_columns(path: Path, names: list[str]) -> None:
         )
 
 
-def _recording(
-    path: Path, name: str, rows: list[tuple[int, dict[str, str | None]]]
-) -> Recording:
+def _recording(path: Path, name: str, rows: list[tuple[int, dict[str, str | None]]]) -> Recording:
     """One person's rows in order of time."""
     columns = ["t_s", "x_m", "y_m"]
     for column in _OPTIONAL:
