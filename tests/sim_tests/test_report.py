@@ -20,8 +20,6 @@ from sim_tests.measures._statistics import summarise, zero_of_n_upper
 from sim_tests.report._text import number, percent
 from sim_tests.report._write_report import write_report
 
-pytest.importorskip("jinja2")
-
 ROOT = Path(__file__).parents[2]
 HOSTILE = '<script>alert("x")</script>&\'`{{ 7 * 7 }}'
 

@@ -17,8 +17,6 @@ from sim_tests.report._write_report import write_report
 from sim_tests.runs._plan import plan_jobs
 from sim_tests.runs._run import run_jobs
 
-pytest.importorskip("jinja2")
-
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
