@@ -1,0 +1,18 @@
+"""The one place that imports Optuna."""
+
+from __future__ import annotations
+
+from .._errors import SimError
+
+try:
+    import cmaes  # noqa: F401 - the sampler imports it only when it samples
+    import optuna
+except ImportError as cause:  # pragma: no cover - depends on the installation
+    raise SimError(
+        "tuning and falsification need optuna and cmaes, of which one is not installed; both are "
+        "part of the extra 'bench': pip install 'awarenav[bench]'"
+    ) from cause
+
+optuna.logging.set_verbosity(optuna.logging.WARNING)
+
+__all__ = ["optuna"]
