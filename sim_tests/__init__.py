@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from ._errors import SimError
     from ._keypoint_camera import KeypointNoise
     from ._scenario import Scenario, shipped_scenarios
+    from ._scenario_template import ScenarioTemplate
     from ._warehouse import Warehouse
     from .people._worker import Worker
     from .pictures._renderer import CameraRenderer
@@ -32,6 +33,7 @@ __all__ = [
     "LocalPlanner",
     "SamplingPlanner",
     "Scenario",
+    "ScenarioTemplate",
     "SimError",
     "SimulatedCamera",
     "StraightOn",
@@ -50,6 +52,7 @@ _HOMES = {
     "LocalPlanner": "robot._planner",
     "SamplingPlanner": "robot._planner",
     "Scenario": "_scenario",
+    "ScenarioTemplate": "_scenario_template",
     "SimError": "_errors",
     "SimulatedCamera": "pictures._simulated_camera",
     "StraightOn": "_crossing",

@@ -21,6 +21,7 @@ from ._map_view import MapView
 from ._metrics import ContactEvent, SafetyMeter
 from ._pixel_eyes import pixel_timing
 from ._scenario import Scenario
+from ._scenario_template import ScenarioTemplate
 from ._stage import Stage, TrueView
 from .pictures._camera_timing import CameraTiming
 from .robot._amr import NOVA_CARTER
@@ -142,7 +143,7 @@ def run_crossing(
     """Run one crossing in PyBullet and measure it.
 
     Args:
-        scenario: a scenario, or the name of a shipped one.
+        scenario: a scenario, or the name of a shipped one, drawn by the seed.
         policy: a policy, the name of a preset, or a YAML file.
         planner: the local planner; default the reference :class:`SamplingPlanner` (a scenario that
             drives straight on needs none).
@@ -159,7 +160,8 @@ def run_crossing(
         NavError: unknown preset or unusable policy file.
         PerceptionError: for pixels, when the shipped networks cannot be loaded.
     """
-    scenario = Scenario.shipped(scenario) if isinstance(scenario, str) else scenario
+    if isinstance(scenario, str):
+        scenario = ScenarioTemplate.shipped(scenario).for_seed(seed)
     policy_name, policy = _resolve(policy)
     jitter_rng, camera_rng, timing_rng = np.random.default_rng(seed).spawn(3)
     jitter = scenario.start_jitter_s

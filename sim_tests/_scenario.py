@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import difflib
 import math
-from importlib import resources
-from typing import Annotated, Any, ClassVar
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal
 
-import yaml
 from pydantic import BeforeValidator, Field, model_validator
 
 from perception import Camera
 from tracking.config import StrictConfig
 
 from ._errors import SimError
+from ._scenario_files import shipped_scenarios
 from .hall._layout import LAYOUTS, WarehouseLayout
+from .people._person_spec import PersonSpec
 from .people._script import WorkerScript
 from .pictures._camera_timing import CameraTiming
 from .pictures._sensor import SensorConfig
@@ -91,20 +91,27 @@ class Scenario(StrictConfig):
 
     Attributes:
         name: identifier, also of the shipped file.
+        version: counts changes after which results do not compare with earlier ones.
         description: what happens, in one sentence.
+        attention: ``"attentive"`` where everybody notices the robot in time, ``"unaware"`` where
+            nobody does, ``"mixed"`` otherwise.
         duration_s: the longest an episode lasts.
         control_hz: frames, planning cycles and log rows a second.
         layout: the hall, a name of :data:`LAYOUTS` or a mapping of :class:`WarehouseLayout`.
         robot: the robot's task.
         camera: the robot's camera.
-        workers: what each worker does.
+        workers: scripted people: the same whatever the robot does.
         start_jitter_s: each worker starts up to this much earlier or later, drawn from the seed.
+        people: people who react.
+        replay_csv: a file of recorded people, relative to the scenario's own file.
     """
 
     error: ClassVar[type[ValueError]] = SimError
 
     name: str = Field(min_length=1)
+    version: int = Field(default=1, ge=1)
     description: str = ""
+    attention: Literal["attentive", "unaware", "mixed"] = "mixed"
     duration_s: float = Field(gt=0.0, le=600.0)
     control_hz: float = Field(default=20.0, gt=0.0, le=240.0)
     layout: Annotated[WarehouseLayout, BeforeValidator(_layout)] = WarehouseLayout.crossing()
@@ -112,32 +119,43 @@ class Scenario(StrictConfig):
     camera: CameraSpec = CameraSpec()
     workers: tuple[WorkerScript, ...] = ()
     start_jitter_s: float = Field(default=0.0, ge=0.0)
+    people: tuple[PersonSpec, ...] = ()
+    replay_csv: str | None = None
+
+    @model_validator(mode="after")
+    def _one_name_each(self) -> Scenario:
+        names = [person.name for person in self.people]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise ValueError(f"people must have names of their own, got {', '.join(twice)} twice")
+        return self
 
     @classmethod
     def shipped(cls, name: str) -> Scenario:
-        """Load one of the scenarios that come with the package; raises SimError for others."""
-        names = shipped_scenarios()
-        if name not in names:
-            near = difflib.get_close_matches(str(name), names, n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise SimError(
-                f"scenario must be one of {', '.join(map(repr, names))}, got {name!r}{hint}"
-            )
-        text = (resources.files("sim_tests") / "scenarios" / f"{name}.yaml").read_text("utf-8")
-        return cls.model_validate(yaml.safe_load(text))
+        """One of the scenarios that come with the package, its distributions at their medians.
+
+        Raises:
+            SimError: for another name; ``name@2`` also for another version.
+        """
+        from ._scenario_template import ScenarioTemplate  # noqa: PLC0415 - it is made of scenarios
+
+        return ScenarioTemplate.shipped(name).median()
+
+    @classmethod
+    def from_yaml(cls, path: str | Path) -> Scenario:
+        """Read a scenario's file, its distributions at their medians.
+
+        Raises:
+            SimError: naming file and key of what is wrong.
+        """
+        from ._scenario_template import ScenarioTemplate  # noqa: PLC0415 - it is made of scenarios
+
+        return ScenarioTemplate.from_yaml(path).median()
 
     def without_people(self) -> Scenario:
         """The same task in an empty hall: what the robot could do if nobody were there."""
-        return self.model_copy(update={"name": f"{self.name}_without_people", "workers": ()})
+        nobody: dict[str, Any] = {"workers": (), "people": (), "replay_csv": None}
+        return self.model_copy(update={"name": f"{self.name}_without_people", **nobody})
 
 
-def shipped_scenarios() -> tuple[str, ...]:
-    """Names of the scenarios that come with the package, sorted."""
-    folder = resources.files("sim_tests") / "scenarios"
-    return tuple(
-        sorted(
-            entry.name.removesuffix(".yaml")
-            for entry in folder.iterdir()
-            if entry.name.endswith(".yaml")
-        )
-    )
+__all__ = ["CameraSpec", "RobotTask", "Scenario", "shipped_scenarios"]

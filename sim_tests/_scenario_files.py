@@ -1,0 +1,93 @@
+"""Scenario files: where they are, and the defaults that they share."""
+
+from __future__ import annotations
+
+import copy
+from importlib import resources
+from pathlib import Path
+from typing import Any, Final
+
+import yaml
+
+from ._errors import SimError
+from ._names import not_one_of
+
+_FOLDER: Final = resources.files("sim_tests") / "scenarios"
+_DEFAULTS: Final = _FOLDER / "defaults"
+
+
+def shipped_scenarios() -> tuple[str, ...]:
+    """Names of the scenarios that come with the package, sorted."""
+    return _names_in(_FOLDER)
+
+
+def shipped_text(scenario_id: str) -> str:
+    """The YAML of a shipped scenario, by its name.
+
+    Raises:
+        SimError: for a name that is not shipped.
+    """
+    names = shipped_scenarios()
+    if scenario_id not in names:
+        raise SimError(not_one_of("scenario", scenario_id, names))
+    return (_FOLDER / f"{scenario_id}.yaml").read_text("utf-8")
+
+
+def read_text(path: Path) -> str:
+    """A user's file; raises SimError when it cannot be read."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError as cause:
+        raise SimError(f"cannot read {path}: {cause.strerror or cause}") from cause
+    except UnicodeDecodeError as cause:
+        raise SimError(f"{path} is not valid YAML: {cause}") from cause
+
+
+def parse(text: str, source: str) -> dict[str, Any]:
+    """The mapping in a scenario's YAML, with the shared defaults that it ``extends`` filled in.
+
+    ``extends: NAME`` takes the keys of ``scenarios/defaults/NAME.yaml`` that the file does not give
+    itself; mappings are merged key by key, everything else is replaced.
+
+    Args:
+        text: YAML.
+        source: what to call it in messages.
+
+    Raises:
+        SimError: for text that is not a YAML mapping, and for unknown defaults.
+    """
+    try:
+        data = yaml.safe_load(text)
+    except yaml.YAMLError as cause:
+        raise SimError(f"{source} is not valid YAML: {cause}") from cause
+    if not isinstance(data, dict):
+        raise SimError(f"{source} must hold a mapping of keys, got {type(data).__name__}")
+    if "extends" not in data:
+        return data
+    names = _names_in(_DEFAULTS)
+    name = data.pop("extends")
+    if name not in names:
+        raise SimError(f"{source}: {not_one_of('extends', name, names)}")
+    defaults = parse((_DEFAULTS / f"{name}.yaml").read_text("utf-8"), str(name))
+    return _merged(defaults, data)
+
+
+def _merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
+    merged = copy.deepcopy(below)
+    for key, value in above.items():
+        under = merged.get(key)
+        if isinstance(under, dict) and isinstance(value, dict):
+            merged[key] = _merged(under, value)
+        else:
+            merged[key] = value
+    return merged
+
+
+def _names_in(folder: Any) -> tuple[str, ...]:
+    return tuple(
+        sorted(
+            entry.name.removesuffix(".yaml")
+            for entry in folder.iterdir()
+            if entry.name.endswith(".yaml")
+        )
+    )
