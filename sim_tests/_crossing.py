@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotState
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile, RobotState
 from perception import AttentionCone, AwarenessPipeline, Camera, PersonObservation
 from perception.arrays import FloatArray
 from tracking import CameraView, PersonTrack, PersonTracker, TrackerConfig
@@ -41,7 +41,9 @@ class CrossingFrame:
     """All that was seen, thought and commanded in one control cycle.
 
     ``observed_workers[i]`` is the worker that ``observations[i]`` shows, −1 for none of them;
-    ``margins_m`` holds the separation margin of each worker.
+    ``margins_m`` and ``separations_m`` hold each worker's separation margin and the distance
+    between its surface and the robot's (a lower bound with centres more than 4 m apart), as last
+    measured, which is in every frame up to 20 a second.
     """
 
     t_s: float
@@ -54,6 +56,7 @@ class CrossingFrame:
     constraints: NavConstraints
     command: tuple[float, float]
     margins_m: tuple[float, ...]
+    separations_m: tuple[float, ...] = ()
 
     def observation_of(self, worker: int) -> PersonObservation | None:
         """What was seen of a worker in this frame, or None."""
@@ -85,6 +88,7 @@ class CrossingResult:
         violation_time_s: how long the margin was negative at a moving robot.
         duration_s: simulated time.
         frames: one a control cycle.
+        robot: what drove.
     """
 
     scenario: str
@@ -103,6 +107,7 @@ class CrossingResult:
     violation_time_s: float
     duration_s: float
     frames: tuple[CrossingFrame, ...]
+    robot: RobotProfile = NOVA_CARTER
 
 
 class StraightOn:
@@ -222,6 +227,7 @@ def run_crossing(
                 constraints,
                 command,
                 margins,
+                tuple(meter.separations_m),
             )
             frames.append(frame)
             if observer is not None:

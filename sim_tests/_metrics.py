@@ -36,6 +36,8 @@ class SafetyMeter:
     the protective separation of ISO 13855 and ISO/TS 15066 for their speeds towards each other, as
     the simulation knows them. It counts while the robot moves; a robot that stands has done what
     the standards ask of it, and its margin is S − C − Z.
+
+    ``separations_m`` holds the separation of each person at the latest measurement.
     """
 
     robot: RobotProfile
@@ -44,6 +46,7 @@ class SafetyMeter:
     violation_time_s: float = 0.0
     max_speed_near_mps: float = 0.0
     contacts: list[ContactEvent] = field(default_factory=list)
+    separations_m: list[float] = field(default_factory=list)
     _touching: set[int] = field(default_factory=set)
 
     def separation(
@@ -79,6 +82,7 @@ class SafetyMeter:
                 )
             )
         margin = separation_m - protective
+        self.separations_m.append(separation_m)
         self.min_separation_m = min(self.min_separation_m, separation_m)
         if moving:
             self.min_margin_m = min(self.min_margin_m, margin)

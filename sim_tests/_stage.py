@@ -136,6 +136,7 @@ class Stage(Closing):
         """Account for the separation of every worker; returns the separation margins."""
         velocity = self.robot_velocity_odom_mps
         margins = []
+        meter.separations_m.clear()
         for index, motion in enumerate(self._motions):
             separation, towards = self._separation(index)
             self._close[index] = separation < _TOUCH_WITHIN_M

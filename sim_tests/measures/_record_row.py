@@ -1,0 +1,129 @@
+"""An episode as a row of text and back: one schema for files, resumed runs and tables."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Sequence
+from dataclasses import MISSING, fields
+from typing import Any, Final, Literal, get_args
+
+from .._errors import SimError
+from ._episode_record import Awareness, EpisodeRecord
+
+Kind = Literal["text", "flag", "count", "number"]
+
+#: Numbers are written with so many decimals: micrometres, and far below what physics repeats.
+DECIMALS: Final = 6
+
+_KINDS: Final[dict[str, Kind]] = {
+    "str": "text",
+    "Awareness": "text",
+    "bool": "flag",
+    "int": "count",
+    "float | None": "number",
+}
+#: Columns of ``episodes.csv`` in their order, and what each holds.
+COLUMN_KINDS: Final[dict[str, Kind]] = {
+    field.name: _KINDS[str(field.type)] for field in fields(EpisodeRecord)
+}
+RECORD_COLUMNS: Final = tuple(COLUMN_KINDS)
+#: Columns that a table cannot do without; others take their defaults.
+NEEDED_COLUMNS: Final = tuple(
+    field.name for field in fields(EpisodeRecord) if field.default is MISSING
+)
+
+
+def rounded(value: float | None) -> float | None:
+    """A number as it will be read back from a file; None for None, NaN and infinity.
+
+    A record measured now and the same one read again are equal, so that a run that was resumed
+    gives what an uninterrupted one gives.
+    """
+    if value is None or not math.isfinite(value):
+        return None
+    return float(f"{value:.{DECIMALS}f}") + 0.0  # no negative zero
+
+
+def record_row(record: EpisodeRecord) -> list[str]:
+    """The cells of one episode in the order of :data:`RECORD_COLUMNS`.
+
+    Numbers have six decimals, what does not apply is empty, and line breaks in texts become
+    spaces, so that an episode is a line whatever its error message says.
+    """
+    return [_cell(kind, getattr(record, name)) for name, kind in COLUMN_KINDS.items()]
+
+
+def check_columns(columns: Sequence[str], source: str) -> None:
+    """Refuse a header that is not that of a table of episodes.
+
+    Raises:
+        SimError: a column is unknown, there twice, or a needed one is missing.
+    """
+    for name in columns:
+        if name not in COLUMN_KINDS:
+            near = difflib.get_close_matches(name, RECORD_COLUMNS, n=1)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            raise SimError(
+                f"{source} is not a table of episodes: unknown column {name[:80]!r}{hint} "
+                "(docs/metrics.md lists all)"
+            )
+        if list(columns).count(name) > 1:
+            raise SimError(f"{source} has the column {name!r} {list(columns).count(name)} times")
+    missing = [name for name in NEEDED_COLUMNS if name not in columns]
+    if missing:
+        raise SimError(f"{source} is not a table of episodes: it has no column {missing[0]!r}")
+
+
+def parse_row(columns: Sequence[str], cells: Sequence[str], source: str) -> EpisodeRecord:
+    """The episode of a row.
+
+    Args:
+        columns: the header, checked.
+        cells: as many texts.
+        source: file and line, for messages.
+
+    Raises:
+        SimError: a cell does not hold what its column says, or there are more or fewer cells.
+    """
+    if len(cells) != len(columns):
+        raise SimError(f"{source} has {len(cells)} cells, its header {len(columns)}")
+    values: dict[str, Any] = {
+        name: _value(name, cell, source) for name, cell in zip(columns, cells, strict=True)
+    }
+    return EpisodeRecord(**values)
+
+
+def _cell(kind: Kind, value: Any) -> str:
+    if kind == "number":
+        number = rounded(value)
+        return "" if number is None else f"{number:.{DECIMALS}f}"
+    if kind == "flag":
+        return str(bool(value)).lower()
+    if kind == "count":
+        return str(int(value))
+    # Before Python 3.11 the csv module refuses NUL.
+    return " ".join(str(value).replace("\0", "").splitlines())
+
+
+def _value(name: str, cell: str, source: str) -> Any:
+    kind = COLUMN_KINDS[name]
+    if kind == "flag":
+        if cell not in ("true", "false"):
+            raise SimError(f"{source}: {name} must be true or false, got {cell[:80]!r}")
+        return cell == "true"
+    if kind == "text":
+        if name == "awareness" and cell not in get_args(Awareness):
+            known = ", ".join(map(repr, get_args(Awareness)))
+            raise SimError(f"{source}: awareness must be one of {known}, got {cell[:80]!r}")
+        return cell
+    if kind == "number" and not cell:
+        return None
+    try:
+        number = int(cell) if kind == "count" else float(cell)
+    except ValueError as cause:
+        what = "a whole number" if kind == "count" else "a number or empty"
+        raise SimError(f"{source}: {name} must be {what}, got {cell[:80]!r}") from cause
+    if not math.isfinite(number):
+        raise SimError(f"{source}: {name} must be finite or empty, got {cell[:80]!r}")
+    return number
