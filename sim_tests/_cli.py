@@ -19,6 +19,7 @@ from .models._command import add_parser as add_models_parser
 from .policies._command import add_parser as add_policy_parser
 from .sets._command import add_parser as add_render_parser
 from .tracks._command import add_parser as add_tracks_parser
+from .tuning._command import add_parser as add_tune_parser
 
 # What the extra "sim" installs.
 _SIMULATOR_MODULES = ("av", "matplotlib", "pybullet")
@@ -117,6 +118,7 @@ def _parser() -> argparse.ArgumentParser:
     add_tracks_parser(commands)
     add_policy_parser(commands)
     add_bridge_parser(commands)
+    add_tune_parser(commands)
 
     bench = commands.add_parser(
         "bench",
