@@ -14,7 +14,7 @@ def test_shipped_scenarios_are_valid_and_round_trip(name, tmp_path):
 
 def test_attentive_and_distracted_differ_in_the_gaze_alone():
     first, second = (Scenario.shipped(f"crossing_{who}") for who in ("attentive", "distracted"))
-    same = {"name": "", "description": "", "workers": ()}
+    same = {"name": "", "description": "", "attention": "mixed", "workers": ()}
     assert first.model_copy(update=same) == second.model_copy(update=same)
     assert first.workers[0].path == second.workers[0].path
     assert first.workers[0].gaze != second.workers[0].gaze
