@@ -15,6 +15,7 @@ from tracking import TrackingError
 from ._errors import SimError
 from .bridge._command import add_parser as add_bridge_parser
 from .estimates._command import add_parsers as add_estimate_parsers
+from .measures._command import add_parser as add_compare_parser
 from .models._command import add_parser as add_models_parser
 from .policies._command import add_parser as add_policy_parser
 from .sets._command import add_parser as add_render_parser
@@ -119,6 +120,7 @@ def _parser() -> argparse.ArgumentParser:
     add_policy_parser(commands)
     add_bridge_parser(commands)
     add_tune_parser(commands)
+    add_compare_parser(commands)
 
     bench = commands.add_parser(
         "bench",

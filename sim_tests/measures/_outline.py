@@ -40,7 +40,8 @@ class Outline:
     def distance(self, points_base_m: FloatArray) -> FloatArray:
         """(N,) distance of N points; 0 inside."""
         gap = self.gap(points_base_m)
-        return np.hypot(gap[:, 0], gap[:, 1])
+        distance: FloatArray = np.hypot(gap[:, 0], gap[:, 1])
+        return distance
 
     def time_to_disc(
         self, centres_base_m: FloatArray, velocities_base_mps: FloatArray, radius_m: float

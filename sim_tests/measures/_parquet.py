@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from .._errors import SimError
 from ._episode_record import EpisodeRecord
-from ._record_row import COLUMN_KINDS, check_columns, parse_row, rounded
+from ._record_row import COLUMN_KINDS, check_columns, parse_row, plain_text, rounded
 
 try:
     import pyarrow as pa
@@ -61,6 +61,8 @@ def read_parquet(path: Path) -> tuple[EpisodeRecord, ...]:
 
 
 def _plain(value: Any) -> Any:
+    if isinstance(value, str):
+        return plain_text(value)
     return rounded(value) if isinstance(value, float) else value
 
 

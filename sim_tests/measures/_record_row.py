@@ -54,6 +54,11 @@ def record_row(record: EpisodeRecord) -> list[str]:
     return [_cell(kind, getattr(record, name)) for name, kind in COLUMN_KINDS.items()]
 
 
+def plain_text(text: str) -> str:
+    """A text on one line, and without NUL, which the csv module refuses before Python 3.11."""
+    return " ".join(text.replace("\0", "").splitlines())
+
+
 def check_columns(columns: Sequence[str], source: str) -> None:
     """Refuse a header that is not that of a table of episodes.
 
@@ -102,8 +107,7 @@ def _cell(kind: Kind, value: Any) -> str:
         return str(bool(value)).lower()
     if kind == "count":
         return str(int(value))
-    # Before Python 3.11 the csv module refuses NUL.
-    return " ".join(str(value).replace("\0", "").splitlines())
+    return plain_text(str(value))
 
 
 def _value(name: str, cell: str, source: str) -> Any:

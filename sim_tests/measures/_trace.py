@@ -77,7 +77,7 @@ class Trace:
     @property
     def people(self) -> int:
         """How many."""
-        return self.separation_m.shape[1]
+        return int(self.separation_m.shape[1])
 
     def to_base(self, vectors_odom: FloatArray) -> FloatArray:
         """(N, P, 2) vectors turned into the axes of the base frame of their instant."""

@@ -1,0 +1,90 @@
+"""Episodes by what was tried: policy, and planner, perception and fault where they differ."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Final
+
+from ._episode_record import EpisodeRecord
+
+_NO_FAULT: Final = "no fault"
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """What was tried.
+
+    Attributes:
+        policy: name.
+        planner: name.
+        perception: name.
+        fault: name, empty for none.
+        source: which table it comes from, empty when there is one.
+    """
+
+    policy: str
+    planner: str = ""
+    perception: str = ""
+    fault: str = ""
+    source: str = ""
+
+    @classmethod
+    def of(cls, record: EpisodeRecord, source: str = "") -> Variant:
+        """What was tried in an episode."""
+        return cls(record.policy, record.planner, record.perception, record.fault, source)
+
+
+def labels(variants: Iterable[Variant]) -> dict[Variant, str]:
+    """A name for each: the policy, followed by what differs among those given."""
+    found = list(dict.fromkeys(variants))
+    telling = [
+        field
+        for field in ("planner", "perception", "fault", "source")
+        if len({getattr(variant, field) for variant in found}) > 1
+    ]
+    # Where each policy was run in one way only, as an oracle that sees the truth, its name says it.
+    if len({variant.policy for variant in found}) == len(found):
+        telling = []
+    return {
+        variant: ", ".join(
+            [variant.policy, *(getattr(variant, field) or _NO_FAULT for field in telling)]
+        )
+        for variant in found
+    }
+
+
+def baselines_of(variant: Variant, variants: Iterable[Variant], policy: str) -> tuple[Variant, ...]:
+    """What a variant is compared with.
+
+    First the baseline policy in the likest conditions: with the same planner, and if there is a
+    choice from the same table, under the same fault and with the same perception, in this order.
+    Then the same variant in the first of several tables.
+
+    Args:
+        variant: to be compared.
+        variants: all there are; the first table's first.
+        policy: name of the baseline.
+    """
+    known = tuple(variants)
+    found: list[Variant] = []
+    candidates = [
+        each for each in known if each.policy == policy and each.planner == variant.planner
+    ]
+    if candidates and variant.policy != policy:
+        found.append(
+            max(
+                candidates,
+                key=lambda each: (
+                    each.source == variant.source,
+                    each.fault == variant.fault,
+                    not each.fault,
+                    each.perception == variant.perception,
+                ),
+            )
+        )
+    same = [replace(each, source="") for each in known]
+    earlier = known[same.index(replace(variant, source=""))]
+    if earlier != variant:
+        found.append(earlier)
+    return tuple(found)
