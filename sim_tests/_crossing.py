@@ -23,6 +23,8 @@ from ._pixel_eyes import pixel_timing
 from ._scenario import Scenario
 from ._scenario_template import ScenarioTemplate
 from ._stage import Stage, TrueView
+from .faults._fault import Fault
+from .faults._faulty_eyes import FaultInjection
 from .pictures._camera_timing import CameraTiming
 from .robot._amr import NOVA_CARTER
 from .robot._planner import LocalPlanner, SamplingPlanner
@@ -144,6 +146,7 @@ def run_crossing(
     noise: KeypointNoise | None = None,
     pipeline: AwarenessPipeline | None = None,
     observer: Observer | None = None,
+    fault: Fault | None = None,
 ) -> CrossingResult:
     """Run one crossing in PyBullet and measure it.
 
@@ -159,6 +162,7 @@ def run_crossing(
         pipeline: what pixels go through instead of the shipped networks; it has the camera of the
             pictures.
         observer: called after every control cycle with the frame and the stage, e.g. to render.
+        fault: what is wrong with camera and odometry; frames keep the truth about the robot.
 
     Raises:
         SimError: unknown scenario or perception, or an invalid command from the planner.
@@ -173,6 +177,7 @@ def run_crossing(
     offsets = jitter_rng.uniform(-jitter, jitter, len(scenario.workers))
     cone = AttentionCone()
     meter = SafetyMeter(NOVA_CARTER)
+    injection = FaultInjection(fault, seed)
     with Stage(scenario, offsets) as stage:
         driver = planner if planner is not None else _default_planner(scenario, stage)
         camera_model, timing = _camera(scenario, perception)
@@ -184,8 +189,10 @@ def run_crossing(
             noise if noise is not None else KeypointNoise(),
             camera_rng,
             pipeline,
+            injection.T_camera_assumed,
         )
-        camera = TimedEyes(eyes, timing, timing_rng)
+        camera = injection.eyes(TimedEyes(eyes, timing, timing_rng), camera_model)
+        odometry = injection.odometry()
         tracker = _tracker(perception, policy, stage, camera_model)
         adapter = NavAdapter(policy, NOVA_CARTER)
         goal = np.array([scenario.robot.goal_x_m, scenario.robot.goal_y_m])
@@ -201,9 +208,13 @@ def run_crossing(
                 margins = stage.measure(meter, ticks_per_measurement * dt_s)
             T_odom_camera = stage.amr.T_odom_camera
             truth = stage.truth(cone, T_odom_camera)
+            state = stage.amr.state(t_s)
+            known = odometry.known(state, T_odom_camera)
             seen: tuple[tuple[PersonObservation, int], ...] = ()
             tracks: tuple[PersonTrack, ...] = ()
-            for sighting in camera.look(t_s, T_odom_camera, truth):
+            for sighting in camera.look(t_s, T_odom_camera, known.T_odom_camera, truth):
+                if sighting.stamp_s == seen_s:
+                    continue  # the same picture again is no new evidence
                 if seen_s - sighting.stamp_s > tracker.config.max_lag_s:
                     continue  # too old for the tracker to go back to
                 observations = tuple(observation for observation, _ in sighting.seen)
@@ -212,9 +223,8 @@ def run_crossing(
                     seen, seen_s = sighting.seen, sighting.stamp_s
             if seen_s != t_s:
                 tracks = tracker.predict(t_s)
-            state = stage.amr.state(t_s)
-            constraints = adapter.update(tracks, state, t_s, perception_stamp_s=seen_s)
-            command = driver.plan(state, goal, constraints, dt_s)
+            constraints = adapter.update(tracks, known.state, t_s, perception_stamp_s=seen_s)
+            command = driver.plan(known.state, goal, constraints, dt_s)
             stage.amr.command(*command)
             frame = CrossingFrame(
                 t_s,

@@ -150,17 +150,26 @@ def make_eyes(
     noise: KeypointNoise,
     rng: np.random.Generator,
     pipeline: AwarenessPipeline | None = None,
+    T_camera_assumed: FloatArray | None = None,
 ) -> Eyes:
     """Return the eyes called ``kind``; raises SimError for others.
 
-    ``noise`` is of the keypoint camera; ``pipeline`` works on pixels, default the shipped networks.
+    ``noise`` is of the keypoint camera; ``pipeline`` works on pixels, default the shipped networks;
+    ``T_camera_assumed`` is as for :class:`~sim_tests._pixel_eyes.PixelEyes`.
     """
     spec = stage.scenario.camera
     makers: dict[str, Callable[[], Eyes]] = {
         "truth": TrueEyes,
         "keypoints": lambda: KeypointEyes(stage, camera, cone, noise, rng),
         "pixels": lambda: PixelEyes(
-            stage, camera, cone, spec.sensor, rng, pipeline, spec.scenery_divisor
+            stage,
+            camera,
+            cone,
+            spec.sensor,
+            rng,
+            pipeline,
+            spec.scenery_divisor,
+            T_camera_assumed,
         ),
     }
     if kind not in makers:

@@ -44,6 +44,8 @@ class PixelEyes:
         pipeline: None is an :class:`~perception.AwarenessPipeline` with the shipped networks.
         scenery_divisor: pixels a side of a block of scenery that is rendered as one; people are
             rendered as finely as they need.
+        T_camera_assumed: (4, 4) the camera as the robot believes it to be mounted, in the true
+            camera's frame; None where it is mounted as believed.
 
     Raises:
         PerceptionError: when the shipped networks cannot be loaded.
@@ -59,6 +61,7 @@ class PixelEyes:
         rng: np.random.Generator,
         pipeline: AwarenessPipeline | None = None,
         scenery_divisor: int = 1,
+        T_camera_assumed: FloatArray | None = None,
     ) -> None:
         self._stage = stage
         if pipeline is None:
@@ -75,6 +78,7 @@ class PixelEyes:
                 f"{camera.height_px} px, focal length {camera.fx_px:.1f} px, no distortion), got "
                 f"{theirs.width_px} x {theirs.height_px} px, {theirs.fx_px:.1f} px"
             )
+        self._T_camera_assumed = T_camera_assumed
         self._camera = SimulatedCamera(
             stage.warehouse,
             camera,
@@ -91,9 +95,10 @@ class PixelEyes:
         An observation that shows none of the workers has the index :data:`NOBODY`.
         """
         frame = self._camera.capture(stamp_s, T_odom_camera)
-        seen = self._pipeline.process(
-            frame.rgb, stamp_s, floor=FloorPlane.from_pose(frame.T_odom_camera)
-        )
+        assumed = frame.T_odom_camera
+        if self._T_camera_assumed is not None:
+            assumed = assumed @ self._T_camera_assumed
+        seen = self._pipeline.process(frame.rgb, stamp_s, floor=FloorPlane.from_pose(assumed))
         boxes = [_box_of(frame.actors == worker.actor) for worker in self._stage.workers]
         return tuple(zip(seen, who_is_who(seen, truth, boxes), strict=True))
 

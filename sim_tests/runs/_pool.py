@@ -1,0 +1,144 @@
+"""Worker processes on this computer; one that dies costs the episode it was at, and no other."""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import signal
+from collections import deque
+from collections.abc import Iterator, Sequence
+from multiprocessing.connection import Connection, wait
+from typing import Final
+
+from .._closing import Closing
+from ._episode import Attempt, attempt, failed
+from ._job import Job
+
+Numbered = tuple[int, Job]
+
+# Libraries that would take every core for one episode.
+_THREAD_SETTINGS: Final = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "NUMEXPR_NUM_THREADS",
+)
+_DEATHS_ALLOWED: Final = 1
+
+
+def run_here(jobs: Sequence[Numbered]) -> Iterator[tuple[int, Attempt]]:
+    """Run jobs one after another in this process."""
+    for number, job in jobs:
+        yield number, attempt(job)
+
+
+def run_in_processes(jobs: Sequence[Numbered], workers: int) -> Iterator[tuple[int, Attempt]]:
+    """Run jobs in processes of their own, and give each result as soon as it is there.
+
+    An episode whose process dies (killed, out of memory, a crash in compiled code) is run once
+    more; if it dies again, that is its result.
+
+    Args:
+        jobs: with their numbers.
+        workers: how many processes, ≥ 1.
+    """
+    waiting = deque((number, job, 0) for number, job in jobs)
+    context = multiprocessing.get_context("spawn")  # a fork would share the physics server
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(_one_thread_each())
+        idle = [_Worker(context) for _ in range(min(workers, len(waiting)))]
+        busy: dict[Connection, tuple[_Worker, int, Job, int]] = {}
+        stack.callback(lambda: [worker.close() for worker in idle])
+        stack.callback(lambda: [worker.close() for worker, *_ in busy.values()])
+        while waiting or busy:
+            while waiting and idle:
+                number, job, deaths = waiting.popleft()
+                worker = idle.pop()
+                busy[worker.pipe] = (worker, number, job, deaths)
+                worker.give(job)
+            for ready in wait(list(busy)):
+                worker, number, job, deaths = busy.pop(ready)  # type: ignore[index]
+                result = worker.take()
+                if result is not None:
+                    idle.append(worker)
+                    yield number, result
+                    continue
+                worker.close()
+                idle.append(_Worker(context))
+                if deaths < _DEATHS_ALLOWED:
+                    waiting.appendleft((number, job, deaths + 1))
+                else:
+                    yield number, died(job, worker.exit_code)
+
+
+def died(job: Job, exit_code: int | None) -> Attempt:
+    """What to say of an episode whose process died, each time it was run."""
+    how = "" if exit_code is None else f" (exit status {exit_code})"
+    if exit_code is not None and exit_code < 0:
+        how = f" ({signal.Signals(-exit_code).name})"
+    text = f"the process that ran it died{how}, and so did a second one"
+    return failed(job, f"WorkerDied: {text}", text)
+
+
+class _Worker(Closing):
+    """One process that runs one job after another."""
+
+    def __init__(self, context: multiprocessing.context.SpawnContext) -> None:
+        self.pipe, theirs = context.Pipe()
+        self._process = context.Process(target=_serve, args=(theirs,), daemon=True)
+        self._process.start()
+        theirs.close()  # so that the pipe ends when the process does
+
+    @property
+    def exit_code(self) -> int | None:
+        return self._process.exitcode
+
+    def close(self) -> None:
+        self._process.kill()
+        self._process.join()
+        self.pipe.close()
+
+    def give(self, job: Job) -> None:
+        with contextlib.suppress(OSError):  # it has died: taking its result will tell
+            self.pipe.send(job)
+
+    def take(self) -> Attempt | None:
+        """The result, or None from a process that has died."""
+        try:
+            result: Attempt = self.pipe.recv()
+        except Exception:  # the end of the pipe, or half an answer
+            self._process.join(5.0)
+            return None
+        return result
+
+
+def _serve(pipe: Connection) -> None:
+    """Run what comes through the pipe, until its other end is gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is interrupted, and ends this
+    one_thread()
+    with contextlib.suppress(EOFError, OSError):
+        while True:
+            pipe.send(attempt(pipe.recv()))
+
+
+def one_thread() -> None:
+    """Keep this process to one core, where its libraries can still be told."""
+    import cv2  # noqa: PLC0415 - heavy, and only workers need this
+
+    cv2.setNumThreads(1)
+
+
+@contextlib.contextmanager
+def _one_thread_each() -> Iterator[None]:
+    """Processes started meanwhile use one thread each."""
+    before = {name: os.environ.get(name) for name in _THREAD_SETTINGS}
+    os.environ.update(dict.fromkeys(_THREAD_SETTINGS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
