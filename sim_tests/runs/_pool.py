@@ -36,21 +36,42 @@ def run_here(jobs: Sequence[Numbered]) -> Iterator[tuple[int, Attempt]]:
 def run_in_processes(jobs: Sequence[Numbered], workers: int) -> Iterator[tuple[int, Attempt]]:
     """Run jobs in processes of their own, and give each result as soon as it is there.
 
-    An episode whose process dies (killed, out of memory, a crash in compiled code) is run once
-    more; if it dies again, that is its result.
+    See :class:`WorkerPool`; the processes live as long as this takes.
 
     Args:
         jobs: with their numbers.
         workers: how many processes, ≥ 1.
     """
-    waiting = deque((number, job, 0) for number, job in jobs)
-    context = multiprocessing.get_context("spawn")  # a fork would share the physics server
-    with contextlib.ExitStack() as stack:
-        stack.enter_context(_one_thread_each())
-        idle = [_Worker(context) for _ in range(min(workers, len(waiting)))]
-        busy: dict[Connection, tuple[_Worker, int, Job, int]] = {}
-        stack.callback(lambda: [worker.close() for worker in idle])
-        stack.callback(lambda: [worker.close() for worker, *_ in busy.values()])
+    with WorkerPool(min(workers, len(jobs))) as pool:
+        yield from pool.run(jobs)
+
+
+class WorkerPool(Closing):
+    """Processes that live on from one lot of jobs to the next.
+
+    An episode whose process dies (killed, out of memory, a crash in compiled code) is run once
+    more; if it dies again, that is its result.
+
+    Args:
+        workers: how many.
+    """
+
+    def __init__(self, workers: int) -> None:
+        self._context = multiprocessing.get_context("spawn")  # a fork would share the physics
+        with _one_thread_each():
+            self._idle = [_Worker(self._context) for _ in range(workers)]
+        self._busy: dict[Connection, tuple[_Worker, int, Job, int]] = {}
+
+    def close(self) -> None:
+        """End the processes, whatever they are at."""
+        for worker in (*self._idle, *(worker for worker, *_ in self._busy.values())):
+            worker.close()
+        self._idle, self._busy = [], {}
+
+    def run(self, jobs: Sequence[Numbered]) -> Iterator[tuple[int, Attempt]]:
+        """Run jobs, and give each result as soon as it is there; one lot at a time."""
+        waiting = deque((number, job, 0) for number, job in jobs)
+        idle, busy = self._idle, self._busy
         while waiting or busy:
             while waiting and idle:
                 number, job, deaths = waiting.popleft()
@@ -65,7 +86,8 @@ def run_in_processes(jobs: Sequence[Numbered], workers: int) -> Iterator[tuple[i
                     yield number, result
                     continue
                 worker.close()
-                idle.append(_Worker(context))
+                with _one_thread_each():
+                    idle.append(_Worker(self._context))
                 if deaths < _DEATHS_ALLOWED:
                     waiting.appendleft((number, job, deaths + 1))
                 else:

@@ -5,18 +5,17 @@ from __future__ import annotations
 import csv
 import json
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
-import numpy as np
-
+from .._scenario_template import ScenarioTemplate
 from .._tables import number_text
-from ._evaluation import Evaluation
-from ._importance import OBJECTIVES, importances
-from ._interval import bootstrap_interval
-from ._judge import policy_text
+from ..measures._interval import Interval
+from ..runs._plan import policy_text
+from ._evaluation import OBJECTIVES
+from ._importance import importances
 from ._tune import Candidate, Tuning
 
-_DRAWS_FROM: Final = 0  # the intervals' seed: figures of the same episodes are the same
+_LABELS = {"time_lost_s": "time lost", "violation_time_s": "time with a negative margin"}
 
 
 def write_tuning(tuning: Tuning, folder: Path) -> None:
@@ -27,61 +26,58 @@ def write_tuning(tuning: Tuning, folder: Path) -> None:
     _write_trials(tuning, folder / "trials.csv")
     _write_json(folder / "importances.json", importance)
     base = tuning.anchors[0]
-    policies = [(each, _figures(each, base)) for each in (*tuning.anchors, *tuning.chosen)]
     _write_json(
         folder / "chosen.json",
         {
-            "scenarios": [_name(text) for text in tuning.settings.scenarios],
+            "scenarios": _scenarios(tuning),
             "tuning_seeds": _ends(tuning.settings.tuning_seeds),
             "held_out_seeds": _ends(tuning.settings.held_out_seeds),
             "base": base.name,
             "base_on_front": not any(each.name == "beats_base" for each in tuning.chosen),
-            "policies": [figures for _, figures in policies],
+            "policies": [_figures(each, base) for each in (*tuning.anchors, *tuning.chosen)],
         },
     )
-    for candidate, figures in policies[len(tuning.anchors) :]:
+    for old in (folder / "chosen").glob("*.yaml"):  # of a shorter run of the same tuning
+        old.unlink()
+    for each in tuning.chosen:
         _write_text(
-            folder / "chosen" / f"{candidate.name}.yaml",
-            _header(tuning, candidate, figures) + policy_text(candidate.policy),
+            folder / "chosen" / f"{each.name}.yaml",
+            _header(tuning, each) + policy_text(each.policy),
         )
     draw_tuning(tuning, importance, folder / "pareto.png")
 
 
 def table_lines(tuning: Tuning) -> list[str]:
     """Presets and chosen policies, on the tuning and on the held-out seeds, as lines of text."""
-    head = f"{'policy':18s}{'trial':>6s}" + "".join(
-        f"  {name:>22s}{'violation':>20s}{'contacts':>9s}" for name in ("time lost", "held-out")
-    )
-    lines = [head]
+    lines = [
+        f"{'':24s}{'tuning seeds':^52s}  {'held-out seeds':^52s}",
+        f"{'policy':18s}{'trial':>6s}"
+        + 2 * f"{'time lost (s)':>21s}{'violation (s)':>21s}{'contacts':>10s}  ",
+    ]
     for each in (*tuning.anchors, *tuning.chosen):
-        cells = ""
-        for found in (each.tuning, each.held_out):
-            low, high = _interval(found.time_lost_s)
-            least, most = _interval(found.violation_time_s)
-            time_s, violation_s = found.objectives
-            cells += f"  {time_s:6.2f} [{low:5.2f}, {high:5.2f}] s"
-            cells += f"{violation_s:7.3f} [{least:.3f}, {most:.3f}] s"[:22].rjust(22)
-            cells += f"{found.robot_contacts:7d}"
         trial = "" if each.trial is None else str(each.trial)
-        lines.append(f"{each.name:18s}{trial:>6s}{cells}")
+        cells = f"{each.name:18s}{trial:>6s}"
+        for found in (each.tuning, each.held_out):
+            time_s, violation_s = (found.interval(name) for name in OBJECTIVES)
+            cells += f"{time_s.text(2):>21s}{violation_s.text(3):>21s}{found.robot_contacts:10d}  "
+        lines.append(cells.rstrip())
     return lines
 
 
 def _write_trials(tuning: Tuning, path: Path) -> None:
     front = {trial.number for trial in tuning.front}
     names = list(tuning.space.ranges)
+    notes = ("deficit_m", "robot_contacts", "reached")
     part = path.with_name(path.name + ".part")
     with part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        notes = ("deficit_m", "robot_contacts", "reached")
         writer.writerow(["trial", "state", *OBJECTIVES, *notes, "on_front", *names])
         for trial in tuning.trials:
-            values = trial.values or [None, None]
             writer.writerow(
                 [
                     trial.number,
                     trial.state.name.lower(),
-                    *map(number_text, values),
+                    *map(number_text, trial.values or [None, None]),
                     *(trial.user_attrs.get(note, "") for note in notes),
                     str(trial.number in front).lower(),
                     *(repr(trial.params[name]) for name in names),
@@ -97,66 +93,44 @@ def _figures(candidate: Candidate, base: Candidate) -> dict[str, Any]:
         ("held_out", candidate.held_out, base.held_out),
     ):
         figures[name] = {
-            "episodes": len(found.time_lost_s),
+            "episodes": len(found.records),
             "robot_contacts": found.robot_contacts,
             "reached_goal": found.reached,
-            **_means(found),
-            "minus_base": {
-                key: _mean(getattr(found, key) - getattr(other, key)) for key in OBJECTIVES
-            },
+            "deficit_m": round(found.deficit_m, 6),
+            **{key: _entry(found.interval(key)) for key in OBJECTIVES},
+            "minus_base": {key: _entry(found.minus(other, key)) for key in OBJECTIVES},
         }
     return figures
 
 
-def _means(found: Evaluation) -> dict[str, Any]:
-    return {key: _mean(getattr(found, key)) for key in (*OBJECTIVES, "deficit_m")}
+def _entry(interval: Interval) -> dict[str, Any]:
+    bounds = [round(interval.low, 6), round(interval.high, 6)] if interval.bounded else None
+    return {"mean": round(interval.value, 6), "interval_95": bounds}
 
 
-def _mean(values: Any) -> dict[str, Any]:
-    low, high = _interval(values)
-    return {"mean": round(float(values.mean()), 6), "interval_95": [round(low, 6), round(high, 6)]}
-
-
-def _interval(values: Any) -> tuple[float, float]:
-    return bootstrap_interval(values, np.random.default_rng(_DRAWS_FROM))
-
-
-def _header(tuning: Tuning, candidate: Candidate, figures: dict[str, Any]) -> str:
-    held, settings = figures["held_out"], tuning.settings
+def _header(tuning: Tuning, candidate: Candidate) -> str:
+    found, base, settings = candidate.held_out, tuning.anchors[0], tuning.settings
     lines = [
-        f"{candidate.name.replace('_', ' ')}: trial {candidate.trial} of a tuning of "
-        f"{settings.policy_name} with {len(tuning.trials)} trials ({settings.sampler}, seed "
-        f"{settings.seed}, perception {settings.perception}).",
-        f"On {held['episodes']} held-out episodes (seeds {_ends(settings.held_out_seeds)} in "
-        f"{', '.join(_name(text) for text in settings.scenarios)}), with 95 % intervals:",
+        f"{candidate.name.replace('_', ' ')}: trial {candidate.trial} of {len(tuning.trials)} in a "
+        f"tuning of {settings.policy_name} ({settings.sampler}, seed {settings.seed}, perception "
+        f"{settings.perception}).",
+        f"On {len(found.records)} held-out episodes (seeds {_ends(settings.held_out_seeds)} in "
+        f"{', '.join(_scenarios(tuning))}), means with 95 % intervals:",
     ]
-    for key, label, unit in (
-        ("time_lost_s", "time lost", "s"),
-        ("violation_time_s", "negative margin", "s"),
-        ("deficit_m", "deepest deficit", "m"),
-    ):
-        entry = held[key]
-        low, high = entry["interval_95"]
-        line = f"  {label}: {entry['mean']:.3f} {unit} [{low:.3f}, {high:.3f}]"
-        if key in held["minus_base"]:
-            versus = held["minus_base"][key]
-            low, high = versus["interval_95"]
-            line += (
-                f"; less that of {settings.policy_name}, paired: {versus['mean']:+.3f} "
-                f"[{low:+.3f}, {high:+.3f}]"
-            )
-        lines.append(line)
+    for key in OBJECTIVES:
+        lines.append(
+            f"  {_LABELS[key]} {found.interval(key).text(3)} s; less that of {base.name}, paired: "
+            f"{found.minus(base.held_out, key).text(3)} s"
+        )
     lines.append(
-        f"  contacts caused by the robot: {held['robot_contacts']}; goals reached: "
-        f"{held['reached_goal']}"
+        f"  contacts caused by the robot: {found.robot_contacts}; goals reached: {found.reached}; "
+        f"deepest negative margin {found.deficit_m:.3f} m"
     )
     return "".join(f"# {line}\n" for line in lines)
 
 
-def _name(scenario: str) -> str:
-    from .._scenario_template import ScenarioTemplate  # noqa: PLC0415 - brings the simulator
-
-    return ScenarioTemplate.from_text(scenario).id
+def _scenarios(tuning: Tuning) -> list[str]:
+    return [ScenarioTemplate.from_text(text).id for text in tuning.settings.scenarios]
 
 
 def _ends(seeds: range) -> str:

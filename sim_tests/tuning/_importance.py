@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import math
 import warnings
-from typing import Final
 
 from ..search._optuna import optuna
-
-#: In the order of the objectives.
-OBJECTIVES: Final = ("time_lost_s", "violation_time_s")
+from ._evaluation import OBJECTIVES
 
 
 def importances(study: optuna.Study) -> dict[str, dict[str, float]]:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
-
-import yaml
 
 from nav_adapter import AwarenessPolicy
 
@@ -14,7 +12,7 @@ from .._errors import SimError
 from .._scenario_template import ScenarioTemplate
 from ..measures._episode_record import EpisodeRecord
 from ..measures._record_file import read_records, write_records
-from ..runs._job import Job
+from ..runs._plan import plan_jobs
 from ..search._crew import Crew
 from ..search._file_lock import FileLock
 from ._evaluation import Evaluation
@@ -36,10 +34,7 @@ class Judge:
         self._settings = settings
         self._crew = crew
         self._folder = folder
-        templates = [ScenarioTemplate.from_text(text) for text in settings.scenarios]
-        self._scenarios: Callable[[int], Sequence[str]] = lambda seed: [
-            scenario_text(template, seed) for template in templates
-        ]
+        self._templates = [ScenarioTemplate.from_text(text) for text in settings.scenarios]
 
     def run(self, name: str, policy: AwarenessPolicy, seeds: Sequence[int]) -> Evaluation:
         """Run a policy, or read what it came to when it was run before, here or by another process.
@@ -76,30 +71,12 @@ class Judge:
     def _records(
         self, name: str, policy: AwarenessPolicy, seeds: Sequence[int]
     ) -> tuple[EpisodeRecord, ...]:
-        text = policy_text(policy)
-        settings = self._settings
         return self._crew.run(
-            [
-                Job(
-                    scenario=scenario,
-                    seed=seed,
-                    policy_name=name,
-                    policy=text,
-                    planner=settings.planner,
-                    perception=settings.perception,
-                )
-                for seed in seeds
-                for scenario in self._scenarios(seed)
-            ]
+            plan_jobs(
+                self._templates,
+                [(name, policy)],
+                seeds,
+                planners=[self._settings.planner],
+                perception=self._settings.perception,
+            )
         )
-
-
-def scenario_text(template: ScenarioTemplate, seed: int) -> str:
-    """YAML of the scenario that a template gives for a seed."""
-    scenario = template.for_seed(seed)
-    return yaml.safe_dump(scenario.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
-
-
-def policy_text(policy: AwarenessPolicy) -> str:
-    """YAML of a policy."""
-    return yaml.safe_dump(policy.model_dump(mode="json"), sort_keys=False, allow_unicode=True)

@@ -10,7 +10,7 @@ import numpy as np
 
 from .._figure_file import save_figure
 from .._figures import new_figure
-from ._importance import OBJECTIVES
+from ._evaluation import OBJECTIVES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -113,7 +113,10 @@ def tune(
     keep_settings(settings, folder, resume=resume)
     anchors = {settings.policy_name: base}
     for name in PRESETS:
-        anchors.setdefault(name, AwarenessPolicy.preset(name))
+        preset = AwarenessPolicy.preset(name)
+        if name in anchors and anchors[name] != preset:
+            raise SimError(f"a policy of your own needs a name of its own, got {name!r}")
+        anchors[name] = preset
     episodes = settings.episodes * len(settings.scenarios)
     with (
         TrialBook(folder, "tune", search, settings.trials) as book,
@@ -172,7 +175,7 @@ def _tried(ticket: Ticket, space: PolicySpace, judge: Judge, settings: TuneSetti
         found.objectives,
         {CONSTRAINT: float(found.robot_contacts)},
         {
-            "deficit_m": float(found.deficit_m.mean()),
+            "deficit_m": found.deficit_m,
             "robot_contacts": found.robot_contacts,
             "reached": found.reached,
         },

@@ -10,8 +10,8 @@ from nav_adapter import AwarenessPolicy
 from .._scenario_template import ScenarioTemplate
 from .._scenario_files import shipped_scenarios
 from ..policies._show import read_policy
+from ..runs._plan import policy_text
 from ._files import table_lines, write_tuning
-from ._judge import policy_text
 from ._policy_space import read_ranges, shipped_ranges
 from ._settings import TuneSettings
 from ._tune import Tuning, require_trials, tune
