@@ -20,13 +20,14 @@ from ..search._crew import Crew
 from ..search._optuna import optuna
 from ..search._outcome import Outcome
 from ..search._search import Method, Search
+from ..search._settings_file import keep_settings
 from ..search._ticket import Ticket
 from ..search._trial_book import TrialBook
 from ._evaluation import Evaluation
 from ._front import front, knee
 from ._judge import Judge
 from ._policy_space import PolicyRange, PolicySpace
-from ._settings import TuneSettings, keep_settings
+from ._settings import TuneSettings
 
 #: Evaluated beside the trials.
 PRESETS: Final = ("blind", "conservative", "balanced", "assertive")
@@ -110,7 +111,7 @@ def tune(
     )
     for text in settings.scenarios:
         ScenarioTemplate.from_text(text)
-    keep_settings(settings, folder, resume=resume)
+    keep_settings(settings, folder, "tune.json", "tuning", resume=resume, may_grow=["trials"])
     anchors = {settings.policy_name: base}
     for name in PRESETS:
         preset = AwarenessPolicy.preset(name)
