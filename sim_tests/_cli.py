@@ -14,10 +14,12 @@ from tracking import TrackingError
 
 from ._errors import SimError
 from .bridge._command import add_parser as add_bridge_parser
+from .catalogue._command import add_parser as add_scenario_parser
 from .estimates._command import add_parsers as add_estimate_parsers
 from .measures._command import add_parser as add_compare_parser
 from .models._command import add_parser as add_models_parser
 from .policies._command import add_parser as add_policy_parser
+from .runs._command import add_parsers as add_run_parsers
 from .sets._command import add_parser as add_render_parser
 from .tracks._command import add_parser as add_tracks_parser
 from .tuning._command import add_parser as add_tune_parser
@@ -80,44 +82,13 @@ def _parser() -> argparse.ArgumentParser:
     )
     demo.set_defaults(run=_demo)
 
-    crossings = commands.add_parser(
-        "crossings",
-        help="run closed-loop crossings and write episodes.csv",
-        description="Run every scenario with every policy and seed in closed loop; one row an "
-        "episode goes to episodes.csv as soon as it is done.",
-    )
-    crossings.add_argument(
-        "--scenario",
-        nargs="+",
-        default=["all"],
-        metavar="NAME",
-        help="shipped scenarios, YAML files, or 'all' that have a planner (default)",
-    )
-    crossings.add_argument(
-        "--policy",
-        nargs="+",
-        default=["blind", "balanced"],
-        metavar="NAME|FILE",
-        help="presets or policy YAML files (default: blind balanced)",
-    )
-    crossings.add_argument(
-        "--perception",
-        choices=["truth", "keypoints", "pixels"],
-        default="keypoints",
-        help="what the robot sees with (default: keypoints)",
-    )
-    crossings.add_argument(
-        "--episodes", type=_positive, default=1, metavar="N", help="seeds a scenario (default: 1)"
-    )
-    _add_out(crossings, "crossings")
-    _add_seed(crossings)
-    crossings.set_defaults(run=_crossings)
-
+    add_run_parsers(commands)
     add_render_parser(commands)
     add_models_parser(commands)
     add_estimate_parsers(commands)
     add_tracks_parser(commands)
     add_policy_parser(commands)
+    add_scenario_parser(commands)
     add_bridge_parser(commands)
     add_tune_parser(commands)
     add_compare_parser(commands)
@@ -138,13 +109,6 @@ def _parser() -> argparse.ArgumentParser:
     bench.add_argument("--out", type=Path, metavar="FILE", help="write the figures as a baseline")
     bench.set_defaults(run=_bench)
     return parser
-
-
-def _positive(text: str) -> int:
-    number = int(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"must be at least 1, got {number}")
-    return number
 
 
 def _add_out(parser: argparse.ArgumentParser, default: str) -> None:
@@ -172,20 +136,6 @@ def _demo(options: argparse.Namespace) -> int:
         seed=options.seed,
         video=not options.no_video,
         perception=options.perception,
-    )
-    return 0
-
-
-def _crossings(options: argparse.Namespace) -> int:
-    from ._batch import run_batch  # noqa: PLC0415
-
-    run_batch(
-        options.scenario,
-        options.policy,
-        perception=options.perception,
-        episodes=options.episodes,
-        seed=options.seed,
-        out=options.out,
     )
     return 0
 

@@ -15,7 +15,7 @@ from perception.arrays import FloatArray
 from tracking import CameraView, PersonTrack, PersonTracker, TrackerConfig
 
 from ._errors import SimError
-from ._eyes import TimedEyes, make_eyes
+from ._eyes import Sighting, TimedEyes, make_eyes
 from ._keypoint_camera import KeypointNoise
 from ._map_view import MapView
 from ._metrics import ContactEvent, SafetyMeter
@@ -25,6 +25,7 @@ from ._scenario_template import ScenarioTemplate
 from ._stage import Stage, TrueView
 from .faults._fault import Fault
 from .faults._faulty_eyes import FaultInjection
+from .people._person_outcome import PersonOutcome
 from .pictures._camera_timing import CameraTiming
 from .robot._amr import NOVA_CARTER
 from .robot._planner import LocalPlanner, SamplingPlanner
@@ -91,6 +92,8 @@ class CrossingResult:
         duration_s: simulated time.
         frames: one a control cycle.
         robot: what drove.
+        people: what became of those who react: ``people[i]`` is person ``i`` of the scenario, and
+            number ``len(scenario.workers) + i`` of everybody.
     """
 
     scenario: str
@@ -110,6 +113,7 @@ class CrossingResult:
     duration_s: float
     frames: tuple[CrossingFrame, ...]
     robot: RobotProfile = NOVA_CARTER
+    people: tuple[PersonOutcome, ...] = ()
 
 
 class StraightOn:
@@ -172,13 +176,13 @@ def run_crossing(
     if isinstance(scenario, str):
         scenario = ScenarioTemplate.shipped(scenario).for_seed(seed)
     policy_name, policy = _resolve(policy)
-    jitter_rng, camera_rng, timing_rng = np.random.default_rng(seed).spawn(3)
+    jitter_rng, camera_rng, timing_rng, people_rng = np.random.default_rng(seed).spawn(4)
     jitter = scenario.start_jitter_s
     offsets = jitter_rng.uniform(-jitter, jitter, len(scenario.workers))
     cone = AttentionCone()
     meter = SafetyMeter(NOVA_CARTER)
     injection = FaultInjection(fault, seed)
-    with Stage(scenario, offsets) as stage:
+    with Stage(scenario, offsets, people_rng) as stage:
         driver = planner if planner is not None else _default_planner(scenario, stage)
         camera_model, timing = _camera(scenario, perception)
         eyes = make_eyes(
@@ -210,17 +214,8 @@ def run_crossing(
             truth = stage.truth(cone, T_odom_camera)
             state = stage.amr.state(t_s)
             known = odometry.known(state, T_odom_camera)
-            seen: tuple[tuple[PersonObservation, int], ...] = ()
-            tracks: tuple[PersonTrack, ...] = ()
-            for sighting in camera.look(t_s, T_odom_camera, known.T_odom_camera, truth):
-                if sighting.stamp_s == seen_s:
-                    continue  # the same picture again is no new evidence
-                if seen_s - sighting.stamp_s > tracker.config.max_lag_s:
-                    continue  # too old for the tracker to go back to
-                observations = tuple(observation for observation, _ in sighting.seen)
-                tracks = tracker.update(observations, sighting.stamp_s, sighting.T_odom_camera)
-                if sighting.stamp_s > seen_s:
-                    seen, seen_s = sighting.seen, sighting.stamp_s
+            arrived = camera.look(t_s, T_odom_camera, known.T_odom_camera, truth)
+            seen, seen_s, tracks = _take_in(tracker, arrived, seen_s)
             if seen_s != t_s:
                 tracks = tracker.predict(t_s)
             constraints = adapter.update(tracks, known.state, t_s, perception_stamp_s=seen_s)
@@ -247,8 +242,39 @@ def run_crossing(
                 break
             stage.advance(t_s + dt_s, meter)
         return _result(
-            scenario, seed, policy_name, type(driver).__name__, perception, meter, frames, reached_s
+            scenario,
+            seed,
+            policy_name,
+            type(driver).__name__,
+            perception,
+            meter,
+            frames,
+            reached_s,
+            stage.outcomes,
         )
+
+
+def _take_in(
+    tracker: PersonTracker, sightings: tuple[Sighting, ...], seen_s: float
+) -> tuple[tuple[tuple[PersonObservation, int], ...], float, tuple[PersonTrack, ...]]:
+    """Give frames to the tracker.
+
+    Returns:
+        What the newest of them shows if it is newer than ``seen_s``, the newest stamp of all, and
+        the tracks if there were frames.
+    """
+    seen: tuple[tuple[PersonObservation, int], ...] = ()
+    tracks: tuple[PersonTrack, ...] = ()
+    for sighting in sightings:
+        if sighting.stamp_s == seen_s:
+            continue  # the same picture again is no new evidence
+        if seen_s - sighting.stamp_s > tracker.config.max_lag_s:
+            continue  # too old for the tracker to go back to
+        observations = tuple(observation for observation, _ in sighting.seen)
+        tracks = tracker.update(observations, sighting.stamp_s, sighting.T_odom_camera)
+        if sighting.stamp_s > seen_s:
+            seen, seen_s = sighting.seen, sighting.stamp_s
+    return seen, seen_s, tracks
 
 
 def _camera(scenario: Scenario, perception: str) -> tuple[Camera, CameraTiming]:
@@ -304,6 +330,7 @@ def _result(
     meter: SafetyMeter,
     frames: list[CrossingFrame],
     reached_s: float | None,
+    people: tuple[PersonOutcome, ...],
 ) -> CrossingResult:
     causes = {contact.by for contact in meter.contacts}
     by = "robot" if "robot" in causes else "person" if causes else ""
@@ -324,4 +351,5 @@ def _result(
         violation_time_s=meter.violation_time_s,
         duration_s=frames[-1].t_s,
         frames=tuple(frames),
+        people=people,
     )

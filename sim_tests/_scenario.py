@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
+import yaml
 from pydantic import BeforeValidator, Field, model_validator
 
 from perception import Camera
@@ -101,9 +102,11 @@ class Scenario(StrictConfig):
         robot: the robot's task.
         camera: the robot's camera.
         workers: scripted people: the same whatever the robot does.
-        start_jitter_s: each worker starts up to this much earlier or later, drawn from the seed.
-        people: people who react.
-        replay_csv: a file of recorded people, relative to the scenario's own file.
+        people: those who look, react and walk by themselves; every name once.
+        replay_csv: table of recorded people to replay, see :func:`read_recordings`; a path
+            relative to the scenario's own file.
+        start_jitter_s: each worker and each person starts up to this much earlier or later, drawn
+            from the seed.
     """
 
     error: ClassVar[type[ValueError]] = SimError
@@ -118,9 +121,9 @@ class Scenario(StrictConfig):
     robot: RobotTask
     camera: CameraSpec = CameraSpec()
     workers: tuple[WorkerScript, ...] = ()
-    start_jitter_s: float = Field(default=0.0, ge=0.0)
     people: tuple[PersonSpec, ...] = ()
     replay_csv: str | None = None
+    start_jitter_s: float = Field(default=0.0, ge=0.0)
 
     @model_validator(mode="after")
     def _one_name_each(self) -> Scenario:
@@ -151,6 +154,10 @@ class Scenario(StrictConfig):
         from ._scenario_template import ScenarioTemplate  # noqa: PLC0415 - it is made of scenarios
 
         return ScenarioTemplate.from_yaml(path).median()
+
+    def to_text(self) -> str:
+        """YAML for :meth:`ScenarioTemplate.from_text`: the scenario as plain data."""
+        return yaml.safe_dump(self.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
 
     def without_people(self) -> Scenario:
         """The same task in an empty hall: what the robot could do if nobody were there."""

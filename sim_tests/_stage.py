@@ -1,4 +1,4 @@
-"""The stage of one crossing: hall, robot and scripted workers, and the truth about them."""
+"""The stage of one crossing: hall, robot and people, and the truth about them."""
 
 from __future__ import annotations
 
@@ -18,8 +18,13 @@ from ._metrics import SafetyMeter
 from ._scenario import Scenario
 from ._sight import sees
 from ._warehouse import Warehouse
-from .people._script import WorkerMotion, WorkerScript
-from .people._worker import MAX_HEAD_PITCH_RAD, MAX_HEAD_YAW_RAD, Worker
+from .people._person_motion import Actor, PersonMotion
+from .people._person_outcome import PersonOutcome
+from .people._replayed import replayed_people
+from .people._scripted import Scripted
+from .people._surroundings import Mover, RobotBody, Surroundings
+from .people._walker import Walker
+from .people._worker import Worker
 from .robot._amr import NOVA_CARTER, Amr
 from .robot._amr_look import AmrLook
 
@@ -65,12 +70,21 @@ class TrueView:
 class Stage(Closing):
     """Everything that moves in one crossing.
 
+    People are numbered throughout: scripted workers first, then those who react, then those who
+    are replayed.
+
     Args:
         scenario: what happens.
-        start_offsets_s: how much later each worker starts.
+        start_offsets_s: how much later each scripted worker starts.
+        people_rng: what the people who react draw from; None is the generator of seed 0.
     """
 
-    def __init__(self, scenario: Scenario, start_offsets_s: FloatArray) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        start_offsets_s: FloatArray,
+        people_rng: np.random.Generator | None = None,
+    ) -> None:
         self.scenario = scenario
         self.warehouse = Warehouse(scenario.layout)
         try:
@@ -81,18 +95,26 @@ class Stage(Closing):
                 math.radians(task.start_heading_deg),
                 NOVA_CARTER,
             )
-            self.scripts: tuple[WorkerScript, ...] = scenario.workers
+            self.walkers = self._walkers(
+                np.random.default_rng(0) if people_rng is None else people_rng
+            )
+            self._cast: tuple[Actor, ...] = (
+                *(
+                    Scripted(script, float(offset))
+                    for script, offset in zip(scenario.workers, start_offsets_s, strict=True)
+                ),
+                *self.walkers,
+                *(() if scenario.replay_csv is None else replayed_people(scenario.replay_csv)),
+            )
             self.workers = tuple(
-                Worker(self.warehouse, script.stature_m, look=script.look, stride_m=script.stride_m)
-                for script in self.scripts
+                Worker(self.warehouse, actor.stature_m, look=actor.look, stride_m=actor.stride_m)
+                for actor in self._cast
             )
         except BaseException:
             self.warehouse.close()
             raise
         self.warehouse.add_actor(AmrLook.of(self.warehouse, self.amr))
-        self._walks = tuple(script.walk() for script in self.scripts)
-        self._offsets_s = start_offsets_s
-        self._motions: tuple[WorkerMotion, ...] = ()
+        self._motions: tuple[PersonMotion, ...] = ()
         steps = 1.0 / (_BODY_UPDATE_HZ * self.warehouse.physics_dt_s)
         self._steps_per_body_update = max(round(steps), 1)
         self._close = [False] * len(self.workers)
@@ -172,41 +194,75 @@ class Stage(Closing):
             )
         return tuple(views)
 
-    def _place_workers(self) -> None:
-        camera_x, camera_y, camera_z = self.amr.T_odom_camera[:3, 3].tolist()
-        motions = []
-        for worker, script, walk, offset in zip(
-            self.workers, self.scripts, self._walks, self._offsets_s, strict=True
+    @property
+    def outcomes(self) -> tuple[PersonOutcome, ...]:
+        """What has become of the people who react, in their order."""
+        return tuple(walker.outcome() for walker in self.walkers)
+
+    def _walkers(self, rng: np.random.Generator) -> tuple[Walker, ...]:
+        """The people who react, each with a generator of their own."""
+        jitter = self.scenario.start_jitter_s
+        walkers = []
+        for spec, own in zip(
+            self.scenario.people, rng.spawn(len(self.scenario.people)), strict=True
         ):
-            t_s = self.t_s - float(offset)
-            motion = walk.motion(t_s)
-            x, y = motion.position_odom_m.tolist()
-            # Eyes stand at about 0.94 of the stature.
-            up = camera_z - 0.94 * script.stature_m
-            azimuth, elevation = script.gaze_angles(
-                t_s,
-                motion.heading_odom_rad,
-                (
-                    math.atan2(camera_y - y, camera_x - x),
-                    math.atan2(up, math.hypot(camera_x - x, camera_y - y)),
-                ),
+            offset = float(own.uniform(-jitter, jitter))
+            boxes = self.warehouse.obstacle_boxes_odom
+            walkers.append(Walker(spec, own, boxes, offset_s=offset))
+        return tuple(walkers)
+
+    def _place_workers(self) -> None:
+        robot, movers = self._robot_body(), self._movers()
+        motions = []
+        for index, (worker, actor) in enumerate(zip(self.workers, self._cast, strict=True)):
+            around = Surroundings(
+                robot,
+                movers[:index] + movers[index + 1 :],
+                lambda worker=worker: self._sees_robot(worker),
             )
-            eye_yaw, eye_pitch = script.eye_angles(t_s)
-            yaw = math.remainder(azimuth - motion.heading_odom_rad, 2.0 * math.pi)
+            motion = actor.motion(self.t_s, around)
             worker.place(
                 motion.position_odom_m,
                 motion.heading_odom_rad,
                 motion.walked_m,
                 math.hypot(*motion.velocity_odom_mps.tolist()),
-                min(max(yaw, -MAX_HEAD_YAW_RAD), MAX_HEAD_YAW_RAD),
-                min(max(elevation, -MAX_HEAD_PITCH_RAD), MAX_HEAD_PITCH_RAD),
-                eye_yaw_rad=eye_yaw,
-                eye_pitch_rad=eye_pitch,
-                activity=script.activity(t_s),
+                motion.head_yaw_rad,
+                motion.head_pitch_rad,
+                eye_yaw_rad=motion.eye_yaw_rad,
+                eye_pitch_rad=motion.eye_pitch_rad,
+                activity=motion.activity,
                 feet=motion.feet,
             )
             motions.append(motion)
         self._motions = tuple(motions)
+
+    def _robot_body(self) -> RobotBody:
+        x, y = self.amr.T_odom_base[:2, 3].tolist()
+        state = self.amr.state(self.t_s)
+        heading, speed = state.heading_odom_rad, state.speed_mps
+        half_length, half_width = np.abs(self.amr.profile.footprint_m).max(axis=0).tolist()
+        camera_x, camera_y, camera_z = self.amr.T_odom_camera[:3, 3].tolist()
+        return RobotBody(
+            x,
+            y,
+            heading,
+            speed * math.cos(heading),
+            speed * math.sin(heading),
+            half_length,
+            half_width,
+            (camera_x, camera_y, camera_z),
+        )
+
+    def _movers(self) -> tuple[Mover, ...]:
+        """Where everybody was when last placed; nobody is anywhere before that."""
+        return tuple(
+            Mover(*motion.position_odom_m.tolist(), *motion.velocity_odom_mps.tolist())
+            for motion in self._motions
+        )
+
+    def _sees_robot(self, worker: Worker) -> bool:
+        camera = self.amr.T_odom_camera[:3, 3]
+        return sees(worker, camera, through=frozenset({self.amr.body}))
 
     def _separation(self, index: int) -> tuple[float, FloatArray]:
         """Distance between the surfaces and the direction (2,) from robot to worker."""
@@ -245,5 +301,6 @@ class Stage(Closing):
         if any(point[8] <= 0.0 for point in touching):
             _, towards = self._separation(index)
             meter.touch(self.t_s, index, robot_velocity_mps, towards)
+            self._cast[index].touch(*(-towards).tolist())
         else:
             meter.release(index)

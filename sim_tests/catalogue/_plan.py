@@ -38,8 +38,10 @@ def person_plan(spec: PersonSpec, t_s: FloatArray) -> tuple[FloatArray, FloatArr
     legs = np.linalg.norm(np.diff(corners, axis=0), axis=1)
     reached = np.concatenate([[0.0], np.cumsum(legs)])
     turn_m = spec.turns_back_at_m
-    turns = turn_m is not None and turn_m < reached[-1]
-    way_m = 2.0 * turn_m if turns and turn_m is not None else float(reached[-1])
+    if turn_m is None or turn_m >= reached[-1]:
+        turn_m, way_m = float(reached[-1]), float(reached[-1])
+    else:
+        way_m = 2.0 * turn_m
     # Knots of length over time: pauses are where time goes on and length does not.
     times, lengths = [spec.start_s], [0.0]
     for pause in sorted(spec.pauses, key=lambda each: each.at_m):
@@ -50,7 +52,7 @@ def person_plan(spec: PersonSpec, t_s: FloatArray) -> tuple[FloatArray, FloatArr
     times.append(times[-1] + (way_m - lengths[-1]) / spec.speed_mps)
     lengths.append(way_m)
     walked = np.interp(t_s, times, lengths)
-    along = np.where(walked > turn_m, 2.0 * turn_m - walked, walked) if turns else walked
+    along = np.where(walked > turn_m, 2.0 * turn_m - walked, walked)
     if len(corners) == 1:
         return np.repeat(corners, len(t_s), axis=0), walked
     columns = [np.interp(along, reached, corners[:, axis]) for axis in (0, 1)]

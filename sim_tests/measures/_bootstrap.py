@@ -123,8 +123,8 @@ def ratio_intervals(
             bottoms[rows] += weights @ bottom[group]
     applies = ((top != 0.0) | (bottom != 0.0)).sum(axis=0).tolist()
     return tuple(
-        _interval(*column, n, groups, level)
-        for *column, n in zip(top.T, bottom.T, tops.T, bottoms.T, applies, strict=True)
+        _interval(top[:, m], bottom[:, m], tops[:, m], bottoms[:, m], applies[m], groups, level)
+        for m in range(top.shape[1])
     )
 
 
@@ -174,8 +174,9 @@ def _draws(
     for start in range(0, resamples, some):
         count = min(some, resamples - start)
         drawn = rng.integers(0, size, (count, size - 1)) + size * np.arange(count)[:, None]
-        weights = np.bincount(drawn.ravel(), minlength=count * size).reshape(count, size)
-        yield slice(start, start + count), weights * (size / (size - 1))
+        times = np.bincount(drawn.ravel(), minlength=count * size).reshape(count, size)
+        weights: FloatArray = times * np.float64(size / (size - 1))
+        yield slice(start, start + count), weights
 
 
 def _acceleration(residuals: FloatArray, groups: list[NDArray[np.intp]]) -> float:

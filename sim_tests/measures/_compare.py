@@ -19,7 +19,8 @@ def compare_command(options: argparse.Namespace) -> int:
     """Read runs, print their tables, and write their episodes into one file if asked.
 
     Raises:
-        SimError: a run cannot be read, none is of the baseline policy, or an option is out of range.
+        SimError: a run cannot be read, a baseline asked for is not there, or an option is out of
+            range.
     """
     names = _names(options.runs)
     if options.seed < 0:

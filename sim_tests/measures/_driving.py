@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from scipy.signal import savgol_coeffs, savgol_filter
+from scipy.signal import savgol_filter
 
 from perception.arrays import FloatArray
 
-#: Speed is smoothed by a cubic over so long; see docs/metrics.md for what that lets through.
+#: Speed is smoothed by a parabola over so long; see docs/metrics.md for what that lets through.
 SMOOTHED_OVER_S: Final = 0.5
-_DEGREE: Final = 3
+_DEGREE: Final = 2
 #: A robot faster than this has set out; one slower than the standing speed has stopped.
 MOVING_SPEED_MPS: Final = 0.10
 
@@ -62,9 +62,9 @@ def peak_deceleration_and_jerk(
 ) -> tuple[float | None, float | None]:
     """Highest deceleration (m/s²) and magnitude of jerk (m/s³) of the actual speed.
 
-    The first and second derivatives of a cubic fitted to the speeds within ±0.25 s of each instant
-    (Savitzky and Golay 1964); near the ends the cubic of the first or last window serves.
-    Deceleration is the fall of the speed's magnitude, 0 if it never fell.
+    The first and second derivatives of a parabola fitted to the speeds within ±0.25 s of each
+    instant (Savitzky and Golay 1964), but for the first and last 0.25 s, where the fit would hang
+    over. Deceleration is the fall of the speed's magnitude, 0 if it never fell.
 
     Args:
         t_s: (N,) evenly spaced.
@@ -75,22 +75,18 @@ def peak_deceleration_and_jerk(
     """
     if len(t_s) < 2:
         return None, None
-    dt_s = float(t_s[-1] - t_s[0]) / (len(t_s) - 1)
-    window = max(2 * round(0.5 * SMOOTHED_OVER_S / dt_s) + 1, _DEGREE + 2)
+    window, dt_s = _window(float(t_s[-1] - t_s[0]) / (len(t_s) - 1))
     if len(t_s) < window:
         return None, None
+    whole = slice(window // 2, len(t_s) - window // 2)
     slope, bend = (
-        savgol_filter(speeds_mps, window, _DEGREE, deriv=order, delta=dt_s) for order in (1, 2)
+        savgol_filter(speeds_mps, window, _DEGREE, deriv=order, delta=dt_s)[whole]
+        for order in (1, 2)
     )
-    deceleration = -slope * np.sign(speeds_mps)
+    deceleration = -slope * np.sign(speeds_mps[whole])
     return max(float(deceleration.max()), 0.0), float(np.abs(bend).max())
 
 
-def noise_gains(dt_s: float) -> tuple[float, float]:
-    """Standard deviations of deceleration and jerk for one of 1 m/s in each speed, white."""
-    window = max(2 * round(0.5 * SMOOTHED_OVER_S / dt_s) + 1, _DEGREE + 2)
-    first, second = (
-        float(np.linalg.norm(savgol_coeffs(window, _DEGREE, deriv=order, delta=dt_s)))
-        for order in (1, 2)
-    )
-    return first, second
+def _window(dt_s: float) -> tuple[int, float]:
+    """How many speeds a fit takes, an odd number, and the time between them."""
+    return max(2 * round(0.5 * SMOOTHED_OVER_S / dt_s) + 1, _DEGREE + 3), dt_s

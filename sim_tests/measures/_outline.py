@@ -19,7 +19,9 @@ class Outline:
     """
 
     def __init__(self, footprint_m: FloatArray) -> None:
-        self._corners = footprint_m[ConvexHull(footprint_m).vertices]  # counter-clockwise
+        self._corners: FloatArray = footprint_m[
+            ConvexHull(footprint_m).vertices
+        ]  # counter-clockwise
         edges = np.roll(self._corners, -1, axis=0) - self._corners
         self._lengths = np.hypot(edges[:, 0], edges[:, 1])
         self._along = edges / self._lengths[:, None]
@@ -32,7 +34,7 @@ class Outline:
         along = np.clip(np.einsum("nmi,mi->nm", to, self._along), 0.0, self._lengths)
         gaps = to - along[..., None] * self._along
         nearest = np.argmin(np.einsum("nmi,nmi->nm", gaps, gaps), axis=1)
-        gap = gaps[np.arange(len(gaps)), nearest]
+        gap: FloatArray = gaps[np.arange(len(gaps)), nearest]
         inside = (np.einsum("nmi,mi->nm", to, self._outward) <= 0.0).all(axis=1)
         gap[inside] = 0.0
         return gap

@@ -166,7 +166,7 @@ def _comparison_table(comparisons: Sequence[Comparison]) -> str:
                 each.won_back.text(0, 100.0),
                 _signed(each.time_lost_s),
                 _signed(each.violation_excess, 0, 100.0),
-                _signed(each.violation_excess_of_time, 1, 100.0),
+                _signed(each.violation_excess_of_time, 2, 100.0),
                 share_text(each.violates_more),
             )
             for each in comparisons
@@ -216,9 +216,10 @@ def _part_table(rows: Sequence[SummaryRow]) -> str:
 
 def _notes(summary: Summary) -> list[str]:
     notes = [
-        "won back: share of the time that the other loses. violation: longer violation of the margin "
-        "S − S_p, relative to that of the other, and to the time it takes. least, margin, TTC, PET: "
-        "the worst of all episodes. (≤ x %): upper end of the exact interval. [?]: too few for one."
+        "won back: share of the time that the other loses. violation: longer violation of the\n"
+        "margin S − S_p, relative to that of the other, and to the time that it takes. least,\n"
+        "margin, violated, TTC, PET under safety: the worst of all episodes. (≤ x %): upper end\n"
+        "of the exact interval. [?]: too few for an interval. docs/metrics.md defines all figures."
     ]
     for row in summary.policies:
         if row.errors:
@@ -228,6 +229,12 @@ def _notes(summary: Summary) -> list[str]:
             )
         lost = row.means["time_lost_s"]
         ran = row.episodes - row.errors
+        astray = ran - row.means["time_to_goal_s"].n
+        if astray:
+            notes.append(
+                f"{row.variant}: {astray} of {ran} episodes did not reach the goal; they lost all "
+                "of their time, and have no time to goal"
+            )
         if lost.n < ran:
             notes.append(
                 f"{row.variant}: time lost is known for {lost.n} of {ran} episodes, those whose "

@@ -36,22 +36,19 @@ class Variant:
 
 
 def labels(variants: Iterable[Variant]) -> dict[Variant, str]:
-    """A name for each: the policy, followed by what differs among those given."""
+    """A name for each: the policy, and what tells it from others of the same policy."""
     found = list(dict.fromkeys(variants))
-    telling = [
-        field
-        for field in ("planner", "perception", "fault", "source")
-        if len({getattr(variant, field) for variant in found}) > 1
-    ]
-    # Where each policy was run in one way only, as an oracle that sees the truth, its name says it.
-    if len({variant.policy for variant in found}) == len(found):
-        telling = []
-    return {
-        variant: ", ".join(
-            [variant.policy, *(getattr(variant, field) or _NO_FAULT for field in telling)]
-        )
-        for variant in found
-    }
+
+    def label(variant: Variant) -> str:
+        same = [each for each in found if each.policy == variant.policy]
+        telling = [
+            getattr(variant, field) or _NO_FAULT
+            for field in ("planner", "perception", "fault", "source")
+            if len({getattr(each, field) for each in same}) > 1
+        ]
+        return ", ".join([variant.policy, *telling])
+
+    return {variant: label(variant) for variant in found}
 
 
 def baselines_of(variant: Variant, variants: Iterable[Variant], policy: str) -> tuple[Variant, ...]:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from tracking.config import StrictConfig
 
@@ -46,7 +46,10 @@ class Glances(StrictConfig):
         away_quartiles_s: of the same.
         watches: once the robot has been noticed, keeps looking as long as it can be seen.
         gives_up_after_s: looks away for good so long after the first glance; None never.
-        away_yaw_deg: where the head points between glances, left of the way.
+        looker_share: probability that the person ever looks at the robot at all. 1 for somebody
+            who does; about 0.81 brings the process nearest to the pedestrians that it was fitted
+            to, see :class:`GlanceProcess`.
+        away_yaw_deg: where the head points between glances, left of the way the body faces.
         away_pitch_deg: up; a phone is read at about −40.
     """
 
@@ -60,12 +63,28 @@ class Glances(StrictConfig):
     away_quartiles_s: tuple[float, float] = (0.63, 1.98)
     watches: bool = False
     gives_up_after_s: float | None = Field(default=None, ge=0.0)
+    looker_share: float = Field(default=1.0, ge=0.0, le=1.0)
     away_yaw_deg: float = Field(default=0.0, ge=-80.0, le=80.0)
     away_pitch_deg: float = Field(default=0.0, ge=-40.0, le=40.0)
 
+    @model_validator(mode="after")
+    def _quartiles_about_the_median(self) -> Glances:
+        for name in ("glance", "away"):
+            lower, upper = getattr(self, f"{name}_quartiles_s")
+            median = getattr(self, f"{name}_median_s")
+            if not 0.0 < lower <= median <= upper:
+                raise ValueError(
+                    f"{name}_quartiles_s must be above 0 and on either side of the median "
+                    f"{median:g} s, got {lower:g} and {upper:g} s"
+                )
+        return self
+
 
 class Reactions(StrictConfig):
-    """What a person on a conflicting course does who has seen the robot: shares, summing to 1.
+    """What a person on a conflicting course does who has seen the robot: shares of the whole.
+
+    What a mapping does not name gets none: ``{wait: 1}`` always waits. Shares are taken relative to
+    their sum.
 
     Attributes:
         walk_on: changes nothing.
@@ -82,6 +101,20 @@ class Reactions(StrictConfig):
     hurry: float = Field(default=0.15, ge=0.0, le=1.0)
     pass_behind: float = Field(default=0.15, ge=0.0, le=1.0)
     claim: float = Field(default=0.15, ge=0.0, le=1.0)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _unnamed_get_none(cls, data: Any) -> Any:
+        if isinstance(data, dict) and data:
+            return {**dict.fromkeys(cls.model_fields, 0.0), **data}
+        return data
+
+    @model_validator(mode="after")
+    def _some(self) -> Reactions:
+        shares = [getattr(self, name) for name in type(self).model_fields]
+        if not sum(shares) > 0.0:
+            raise ValueError("at least one share of reactions must be above 0, got all 0")
+        return self
 
 
 class PersonSpec(StrictConfig):

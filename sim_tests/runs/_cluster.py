@@ -58,13 +58,13 @@ def run_on_cluster(
     cluster = None
     try:
         if scheduler == LOCAL:
-            cluster = LocalCluster(  # type: ignore[no-untyped-call]
+            cluster = LocalCluster(
                 n_workers=workers,
                 threads_per_worker=1,
                 processes=True,
                 dashboard_address=None,
             )
-        client = Client(cluster if cluster is not None else scheduler, timeout=_CONNECT_S)  # type: ignore[no-untyped-call]
+        client = Client(cluster if cluster is not None else scheduler, timeout=_CONNECT_S)
     except (OSError, ValueError, ImportError) as cause:
         raise SimError(
             f"no Dask scheduler answers at {scheduler!r}: {cause}; give tcp://HOST:PORT of one "
@@ -73,9 +73,9 @@ def run_on_cluster(
     try:
         yield from _run(client, jobs, dict(versions))
     finally:
-        client.close()  # type: ignore[no-untyped-call]
+        client.close()
         if cluster is not None:
-            cluster.close()  # type: ignore[no-untyped-call]
+            cluster.close()
 
 
 def _run(
@@ -85,7 +85,7 @@ def _run(
     names = itertools.count()
     waiting = deque((number, job, 0) for number, job in jobs)
     out: dict[Any, tuple[int, Job, int]] = {}
-    finished = as_completed(raise_errors=False)  # type: ignore[no-untyped-call]
+    finished = as_completed(raise_errors=False)
 
     def send() -> None:
         ahead = _AHEAD * max(sum(client.nthreads().values()), 1)

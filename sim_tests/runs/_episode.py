@@ -11,9 +11,12 @@ from functools import lru_cache
 
 import numpy as np
 
+from perception import AttentionCone, AwarenessPipeline
+from perception.networks import OnnxSettings
+
 from .._crossing import CrossingResult, Observer, run_crossing
 from .._errors import SimError
-from .._scenario import Scenario
+from .._scenario import CameraSpec, Scenario
 from ..measures._driving import path_length_m
 from ..measures._episode_record import EpisodeRecord
 from ..measures._measure import measure
@@ -61,6 +64,7 @@ def observed_episode(
             seed=job.seed,
             observer=observer,
             fault=fault,
+            pipeline=_pipeline(scenario.camera) if job.perception == "pixels" else None,
         )
     time_s, length_m = (None, None)
     if scenario.robot.straight_on_speed_mps is None:
@@ -107,6 +111,18 @@ def _line(error: str) -> str:
 
 def _task_text(scenario: Scenario) -> str:
     return scenario.without_people().model_dump_json()
+
+
+# Networks load once a process, and run on the one core that an episode has.
+@lru_cache(maxsize=4)
+def _pipeline(camera: CameraSpec) -> AwarenessPipeline:
+    """What pixels go through, as :class:`~sim_tests._pixel_eyes.PixelEyes` makes it itself."""
+    return AwarenessPipeline(
+        camera.camera(camera.picture_scale),
+        cone=AttentionCone(),
+        eye_in_head_std_rad=0.0,
+        onnx_settings=OnnxSettings(intra_op_threads=1),
+    )
 
 
 # One process runs many episodes of few tasks.

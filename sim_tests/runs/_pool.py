@@ -9,7 +9,7 @@ import signal
 from collections import deque
 from collections.abc import Iterator, Sequence
 from multiprocessing.connection import Connection, wait
-from typing import Final
+from typing import Final, cast
 
 from .._closing import Closing
 from ._episode import Attempt, attempt, failed
@@ -64,8 +64,7 @@ class WorkerPool(Closing):
 
     def close(self) -> None:
         """End the processes, whatever they are at."""
-        for worker in (*self._idle, *(worker for worker, *_ in self._busy.values())):
-            worker.close()
+        _close_all(self._idle, self._busy)
         self._idle, self._busy = [], {}
 
     def run(self, jobs: Sequence[Numbered]) -> Iterator[tuple[int, Attempt]]:
@@ -78,8 +77,8 @@ class WorkerPool(Closing):
                 worker = idle.pop()
                 busy[worker.pipe] = (worker, number, job, deaths)
                 worker.give(job)
-            for ready in wait(list(busy)):
-                worker, number, job, deaths = busy.pop(ready)  # type: ignore[index]
+            for ready in cast(list[Connection], wait(list(busy))):
+                worker, number, job, deaths = busy.pop(ready)
                 result = worker.take()
                 if result is not None:
                     idle.append(worker)
@@ -92,6 +91,11 @@ class WorkerPool(Closing):
                     waiting.appendleft((number, job, deaths + 1))
                 else:
                     yield number, died(job, worker.exit_code)
+
+
+def _close_all(idle: list[_Worker], busy: dict[Connection, tuple[_Worker, int, Job, int]]) -> None:
+    for worker in [*idle, *(each for each, *_ in busy.values())]:
+        worker.close()
 
 
 def died(job: Job, exit_code: int | None) -> Attempt:

@@ -1,0 +1,446 @@
+"""A person with a mind of their own: looks, decides and walks, step by step."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import numpy as np
+
+from perception.arrays import FloatArray
+
+from .._errors import SimError
+from ._gait import Gait
+from ._gaze import Gaze
+from ._meeting import Intent, Meeting
+from ._obstacles import Obstacles
+from ._online_feet import OnlineFeet
+from ._person_motion import PersonMotion
+from ._person_outcome import PersonOutcome
+from ._person_spec import PersonSpec
+from ._postures import Activity
+from ._route import Route
+from ._skeleton import skeleton
+from ._social_force import RELAXATION_S, push_of_people, push_of_robot
+from ._surroundings import ALONE, RobotBody, Surroundings
+
+#: People decide so often; in between they go on as they began.
+TICK_S: Final = 1.0 / 20.0
+
+# What a person knows of a robot that is out of sight is worth something for so long.
+_REMEMBERS_S: Final = 3.0
+# Walking: how far ahead on the route one aims, how hard one brakes for a stop, what counts as there.
+_AIM_M: Final = 1.2
+_BRAKING_MPS2: Final = 0.9
+_APPROACH_HZ: Final = 2.5
+_BRAKING_S: Final = 0.1
+_THERE_M: Final = 0.1
+_ABOUT_THERE_M: Final = 0.5
+_STILL_MPS: Final = 0.15
+_PUSHED_AWAY_M: Final = 0.15
+_BACK_TO_PLACE_MPS: Final = 0.4
+# Nobody speeds up or swerves harder than this, nor gets pushed to more than this times the pace.
+_MOST_MPS2: Final = 3.0
+_MOST_PACE: Final = 1.3
+_LEAST_PACE_MPS: Final = 0.5
+# Whoever stands lets pushes weaker than this be; whoever goes first keeps off a robot this near.
+_UNMOVED_MPS2: Final = 1.0
+_TOO_NEAR_M: Final = 0.5
+# Turning the body.
+_TURN_RATE_HZ: Final = 4.0
+_TURN_RADPS: Final = 2.6
+_TURN_RADPS2: Final = 15.0
+_TURNED_RAD: Final = math.radians(60.0)
+_LEAST_TURNED: Final = 0.1
+# After running into the robot: a step back, and no step towards it while they touch.
+_RECOIL_S: Final = 0.7
+_RECOIL_MPS: Final = 0.4
+_TOUCHING_S: Final = 0.1
+# An undisturbed walk that takes longer than this times its plan never ends.
+_LONGEST: Final = 4.0
+
+
+class Walker:
+    """A person who walks a route, glances about and reacts to the robot.
+
+    Decisions are taken every :data:`TICK_S`; in between, place and angles follow closed forms, so
+    that how often somebody asks changes nothing but the steps of the feet.
+
+    Args:
+        spec: what the scenario says.
+        rng: for glances and reactions; the person's own.
+        boxes_odom_m: (N, 4) racks and walls, x_min, y_min, x_max, y_max.
+        offset_s: sets out so much later; never before 0.
+
+    Raises:
+        SimError: for a route with a corner inside a rack or a wall.
+    """
+
+    def __init__(
+        self,
+        spec: PersonSpec,
+        rng: np.random.Generator,
+        boxes_odom_m: Any,
+        *,
+        offset_s: float = 0.0,
+    ) -> None:
+        self.spec = spec
+        self._obstacles = Obstacles(boxes_odom_m)
+        self._route = Route.of(spec)
+        for number, point in enumerate(spec.route):
+            self._obstacles.refuse(f"route point {number} of {spec.name!r}", point.x_m, point.y_m)
+        gaze_rng, meeting_rng = rng.spawn(2)
+        self._gaze = Gaze(spec.glances, spec.stature_m, gaze_rng)
+        self._meeting = Meeting(spec.reactions, meeting_rng)
+        self._activity = Activity(spec.activity, spec.activity)
+        self._boxes = boxes_odom_m
+        self._start_s = max(spec.start_s + offset_s, 0.0)
+        self._reverse = math.pi if spec.backwards else 0.0
+        self._stands_facing = None if spec.heading_deg is None else math.radians(spec.heading_deg)
+        # Between ticks: place, velocity and acceleration since an instant, and the next tick's.
+        self._tick = -1
+        self._since_s = 0.0
+        self._from = (*self._route.start, 0.0, 0.0)
+        self._push = (0.0, 0.0)
+        self._next = self._from
+        ux, uy = self._route.direction(0.0)
+        along = math.atan2(uy, ux) + (self._reverse if self._route.length_m > 0.0 else 0.0)
+        self._heading = along if self._stands_facing is None else self._stands_facing
+        self._turning = 0.0
+        self._walked_m = 0.0
+        # Along the route.
+        self._along_m = 0.0
+        self._stop = 0
+        self._resumes_s: float | None = None
+        self._set_out_s: float | None = None
+        self._arrived_s: float | None = None
+        self._way_m: float | None = None
+        # About the robot.
+        self._known: tuple[RobotBody, float] | None = None
+        self._touch: tuple[float, float, float] | None = None  # direction and when
+        self._bumped_s = -math.inf
+        self._now_s = 0.0
+        self._feet: OnlineFeet | None = None
+        self._stepped_s = 0.0
+        self._free: tuple[float | None, float] | None = None
+
+    @property
+    def stature_m(self) -> float:
+        """Height of the body."""
+        return self.spec.stature_m
+
+    @property
+    def look(self) -> str | None:
+        """Name of a shipped worker."""
+        return self.spec.look
+
+    @property
+    def stride_m(self) -> float | None:
+        """The stride follows the speed."""
+        return None
+
+    @property
+    def noticed_s(self) -> float | None:
+        """When the person first looked at the robot."""
+        return self._gaze.noticed_s
+
+    @property
+    def reaction(self) -> str:
+        """What the person does about the robot now; empty for nothing."""
+        return self._meeting.reaction
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the end of the route was reached."""
+        return self._arrived_s is not None
+
+    def outcome(self) -> PersonOutcome:
+        """What has become of the person up to now."""
+        time_s = None
+        if self._arrived_s is not None and self._set_out_s is not None:
+            time_s = self._arrived_s - self._set_out_s
+        free_time_s, free_length_m = self._undisturbed()
+        return PersonOutcome(
+            name=self.spec.name,
+            noticed_s=self._gaze.noticed_s,
+            reaction=self._meeting.first_reaction,
+            time_s=time_s if free_time_s is not None else None,
+            free_time_s=free_time_s,
+            length_m=self._walked_m if self._way_m is None else self._way_m,
+            free_length_m=None if free_time_s is None else free_length_m,
+        )
+
+    def motion(self, t_s: float, around: Surroundings) -> PersonMotion:
+        """What the person does at ``t_s``, which never goes back."""
+        self.advance(t_s, around)
+        x, y, vx, vy = self._at(t_s)
+        after_s = t_s - self._tick * TICK_S
+        heading = self._heading + self._turning * after_s
+        if self._feet is None:
+            gait = Gait(skeleton(self.spec.look, self.spec.stature_m))
+            self._feet = OnlineFeet(gait, x, y, heading)
+        feet = self._feet.step(
+            t_s - self._stepped_s, (x, y, heading), (vx, vy, self._turning), self._push
+        )
+        self._stepped_s = t_s
+        head_yaw, head_pitch, eye_yaw, eye_pitch = self._gaze.at(after_s)
+        return PersonMotion(
+            position_odom_m=_pair(x, y),
+            velocity_odom_mps=_pair(vx, vy),
+            heading_odom_rad=heading,
+            walked_m=self._walked_m,
+            feet=feet,
+            head_yaw_rad=head_yaw,
+            head_pitch_rad=head_pitch,
+            eye_yaw_rad=eye_yaw,
+            eye_pitch_rad=eye_pitch,
+            activity=self._activity,
+        )
+
+    def advance(self, t_s: float, around: Surroundings) -> None:
+        """Take all decisions due up to ``t_s``."""
+        while (self._tick + 1) * TICK_S <= t_s + 1e-9:
+            self._decide(around)
+        self._now_s = t_s
+
+    def touch(self, towards_x: float, towards_y: float) -> None:
+        """Body and robot touch: the person gets no farther that way, and has noticed.
+
+        Raises:
+            SimError: for a direction that is not a unit vector.
+        """
+        if not math.isclose(math.hypot(towards_x, towards_y), 1.0, abs_tol=1e-6):
+            raise SimError(
+                f"the robot must lie in a direction of length 1, got ({towards_x}, {towards_y})"
+            )
+        if self._touch is None or self._now_s - self._touch[2] > _RECOIL_S:
+            self._bumped_s = self._now_s
+            self._gaze.startle(self._now_s)
+        self._touch = (towards_x, towards_y, self._now_s)
+        x, y, vx, vy = self._at(self._now_s)
+        vx, vy = _without(vx, vy, towards_x, towards_y)
+        left_s = (self._tick + 1) * TICK_S - self._now_s
+        self._set_off(self._now_s, (x, y, vx, vy), (0.0, 0.0), left_s)
+
+    def _at(self, t_s: float) -> tuple[float, float, float, float]:
+        """Place and velocity, from the last decision on."""
+        after_s = t_s - self._since_s
+        x, y, vx, vy = self._from
+        ax, ay = self._push
+        return (
+            x + (vx + 0.5 * ax * after_s) * after_s,
+            y + (vy + 0.5 * ay * after_s) * after_s,
+            vx + ax * after_s,
+            vy + ay * after_s,
+        )
+
+    def _set_off(
+        self,
+        since_s: float,
+        state: tuple[float, float, float, float],
+        push: tuple[float, float],
+        for_s: float,
+    ) -> None:
+        """Go on from a state with an acceleration; racks and walls hold off."""
+        x, y, vx, vy = state
+        ax, ay = push
+        there = (x + (vx + 0.5 * ax * for_s) * for_s, y + (vy + 0.5 * ay * for_s) * for_s)
+        held = self._obstacles.held_off((x, y), there)
+        if held == there or for_s <= 0.0:
+            self._next = (*there, vx + ax * for_s, vy + ay * for_s)
+        else:
+            ax = ay = 0.0
+            vx, vy = (held[0] - x) / for_s, (held[1] - y) / for_s
+            self._next = (*held, vx, vy)
+        self._since_s, self._from, self._push = since_s, (x, y, vx, vy), (ax, ay)
+
+    def _decide(self, around: Surroundings) -> None:
+        """One tick: where am I, what do I see, what do I want, what pushes me."""
+        first = self._tick < 0
+        self._tick += 1
+        t_s = self._tick * TICK_S
+        x, y, vx, vy = self._next
+        if not first:
+            self._walked_m += math.hypot(x - self._from[0], y - self._from[1])
+            self._heading += self._turning * TICK_S
+        place = (x, y, self._heading)
+        robot = self._look(t_s, place, around)
+        going = self._follow_route(t_s, x, y, math.hypot(vx, vy))
+        intent = self._intent(going, x, y)
+        wanted = self._meeting.react(t_s, TICK_S, (x, y), intent, robot, standing=not going)
+        wanted, facing = self._recoiling(t_s, intent, wanted, going)
+        ax, ay = self._acceleration((x, y, vx, vy), wanted, robot, around)
+        self._turn(facing)
+        self._set_off(t_s, (x, y, vx, vy), (ax, ay), TICK_S)
+
+    def _look(
+        self, t_s: float, place: tuple[float, float, float], around: Surroundings
+    ) -> RobotBody | None:
+        """Set head and eyes; returns the robot as far as the person knows of it."""
+        robot = around.robot
+        sees = False
+        if robot is not None:
+            sees = self._gaze.could_see(TICK_S, place, robot) and around.sees_robot()
+        self._gaze.tick(t_s, TICK_S, place, robot, sees)
+        felt = self._touch is not None and t_s - self._touch[2] <= _TOUCHING_S
+        if robot is not None and ((sees and self._gaze.noticed_s is not None) or felt):
+            self._known = (robot, t_s)
+        if self._known is None or t_s - self._known[1] > _REMEMBERS_S:
+            return None
+        return self._known[0].later(t_s - self._known[1])
+
+    def _follow_route(self, t_s: float, x: float, y: float, speed_mps: float) -> bool:
+        """Keep account of the way; returns whether the person is going."""
+        if t_s < self._start_s - 1e-9:
+            return False
+        if self._set_out_s is None:
+            self._set_out_s = t_s
+        if self._resumes_s is not None:
+            if t_s < self._resumes_s - 1e-9:
+                return False
+            self._resumes_s = None
+            self._stop += 1
+        stop = self._route.stops[self._stop]
+        self._along_m = self._route.progress(self._along_m, x, y, stop.at_m)
+        if stop.at_m - self._along_m > _THERE_M:
+            return True
+        last = math.isinf(stop.for_s)
+        end_x, end_y = self._route.at(stop.at_m)
+        if last and math.hypot(end_x - x, end_y - y) > _ABOUT_THERE_M:
+            return True
+        if last and self._arrived_s is None:
+            self._arrived_s = t_s
+            self._way_m = self._walked_m
+        if speed_mps < _STILL_MPS:
+            self._resumes_s = t_s + stop.for_s
+        return False
+
+    def _intent(self, going: bool, x: float, y: float) -> Intent:
+        """Along the route, or to where one stands."""
+        stop = self._route.stops[self._stop]
+        if not going:
+            at_m = stop.at_m if self._set_out_s is not None else 0.0
+            dx, dy = self._from_to(x, y, at_m)
+            away = math.hypot(dx, dy)
+            if away <= _PUSHED_AWAY_M and not (
+                self._set_out_s is not None and self._resumes_s is None
+            ):
+                return Intent(*self._route.direction(self._along_m), 0.0)
+            pace = min(_BACK_TO_PLACE_MPS, _APPROACH_HZ * away)
+            return Intent(dx / max(away, 1e-9), dy / max(away, 1e-9), pace)
+        dx, dy = self._from_to(x, y, min(self._along_m + _AIM_M, stop.at_m))
+        away = math.hypot(dx, dy)
+        ux, uy = (dx / away, dy / away) if away > 1e-6 else self._route.direction(self._along_m)
+        left_m = max(stop.at_m - self._along_m, away if math.isinf(stop.for_s) and away < _AIM_M else 0.0)
+        pace = min(
+            self.spec.speed_mps, math.sqrt(2.0 * _BRAKING_MPS2 * left_m), _APPROACH_HZ * left_m
+        )
+        return Intent(ux, uy, pace)
+
+    def _from_to(self, x: float, y: float, along_m: float) -> tuple[float, float]:
+        there_x, there_y = self._route.at(along_m)
+        return there_x - x, there_y - y
+
+    def _recoiling(
+        self, t_s: float, intent: Intent, wanted: Intent, going: bool
+    ) -> tuple[Intent, float]:
+        """What is wanted after a bump and a turn of the body, and which way to face for it."""
+        if self._touch is not None and t_s - self._bumped_s < _RECOIL_S:
+            return Intent(-self._touch[0], -self._touch[1], _RECOIL_MPS), self._heading
+        # Steps aside and back are taken without turning.
+        along = wanted.x * intent.x + wanted.y * intent.y
+        if not going:
+            facing = self._heading if self._stands_facing is None else self._stands_facing
+            return wanted, facing
+        if along < 0.2 and self._meeting.reaction == "wait":
+            return wanted, self._heading
+        facing = math.atan2(wanted.y, wanted.x) + self._reverse
+        off = abs(math.remainder(facing - self._heading, math.tau))
+        if off > _TURNED_RAD:
+            share = (math.pi - off) / (math.pi - _TURNED_RAD)
+            wanted = Intent(wanted.x, wanted.y, wanted.speed_mps * max(share, _LEAST_TURNED))
+        return wanted, facing
+
+    def _turn(self, facing: float) -> None:
+        """Set the body turning."""
+        off = math.remainder(facing - self._heading, math.tau)
+        rate = min(max(_TURN_RATE_HZ * off, -_TURN_RADPS), _TURN_RADPS)
+        most = _TURN_RADPS2 * TICK_S
+        self._turning += min(max(rate - self._turning, -most), most)
+
+    def _acceleration(
+        self,
+        state: tuple[float, float, float, float],
+        wanted: Intent,
+        robot: RobotBody | None,
+        around: Surroundings,
+    ) -> tuple[float, float]:
+        """Of the wish and of all that pushes, within human limits."""
+        x, y, vx, vy = state
+        want_x, want_y = wanted.speed_mps * wanted.x, wanted.speed_mps * wanted.y
+        slower = wanted.speed_mps < math.hypot(vx, vy)
+        within_s = _BRAKING_S if slower else RELAXATION_S
+        ax, ay = (want_x - vx) / within_s, (want_y - vy) / within_s
+        if self.spec.social:
+            px, py = self._pushes(state, robot, around)
+            if wanted.speed_mps > _STILL_MPS or math.hypot(px, py) > _UNMOVED_MPS2:
+                ax, ay = ax + px, ay + py
+        size = math.hypot(ax, ay)
+        if size > _MOST_MPS2:
+            ax, ay = ax * _MOST_MPS2 / size, ay * _MOST_MPS2 / size
+        next_x, next_y = vx + ax * TICK_S, vy + ay * TICK_S
+        fastest = _MOST_PACE * max(self.spec.speed_mps, wanted.speed_mps, _LEAST_PACE_MPS)
+        speed = math.hypot(next_x, next_y)
+        if speed > fastest:
+            next_x, next_y = next_x * fastest / speed, next_y * fastest / speed
+        if self._touch is not None and self._tick * TICK_S - self._touch[2] <= _TOUCHING_S:
+            next_x, next_y = _without(next_x, next_y, self._touch[0], self._touch[1])
+        return (next_x - vx) / TICK_S, (next_y - vy) / TICK_S
+
+    def _pushes(
+        self,
+        state: tuple[float, float, float, float],
+        robot: RobotBody | None,
+        around: Surroundings,
+    ) -> tuple[float, float]:
+        """Of racks, people, and the robot as far as it is known."""
+        x, y, vx, vy = state
+        ax, ay = self._obstacles.push(x, y)
+        px, py = push_of_people(x, y, vx, vy, around.others)
+        ax, ay = ax + px, ay + py
+        if robot is not None:
+            near_x, near_y = robot.nearest_m(x, y)
+            # Whoever goes first expects the robot to make way.
+            if not self._meeting.goes_first or math.hypot(near_x - x, near_y - y) < _TOO_NEAR_M:
+                px, py = push_of_robot(x, y, vx, vy, robot)
+                ax, ay = ax + px, ay + py
+        return ax, ay
+
+    def _undisturbed(self) -> tuple[float | None, float]:
+        """Time and length of the same walk without robot and people; None without an end."""
+        if self._free is None:
+            self._free = (None, 0.0)
+            if self._route.length_m > 0.0:
+                self._free = self._walk_alone()
+        return self._free
+
+    def _walk_alone(self) -> tuple[float | None, float]:
+        spec = self.spec.model_copy(update={"start_s": 0.0})
+        alone = Walker(spec, np.random.default_rng(0), self._boxes)
+        pauses = sum(stop.for_s for stop in self._route.stops[:-1])
+        longest_s = _LONGEST * (self._route.length_m / spec.speed_mps + 5.0) + pauses
+        while not alone.arrived:
+            alone.advance((alone._tick + 1) * TICK_S, ALONE)
+            if alone._tick * TICK_S > longest_s:
+                return None, 0.0
+        return alone._arrived_s, alone._walked_m
+
+
+def _pair(x: float, y: float) -> FloatArray:
+    return np.array([x, y])
+
+
+def _without(vx: float, vy: float, nx: float, ny: float) -> tuple[float, float]:
+    """A velocity less its part along a direction, if it goes that way."""
+    along = max(vx * nx + vy * ny, 0.0)
+    return vx - along * nx, vy - along * ny

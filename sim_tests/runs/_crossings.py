@@ -1,0 +1,113 @@
+"""What ``awarenav crossings`` does."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import sys
+from collections.abc import Iterable, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Final
+
+from perception import AwarenessPipeline, Camera
+
+from ..measures._episode_record import EpisodeRecord
+from ..measures._summary import summarise
+from ..measures._summary_text import table_text
+from ._plan import plan_jobs
+from ._run import run_jobs
+from ._run_folder import ERRORS
+
+#: What the command line calls the reference planner.
+REFERENCE: Final = "reference"
+_REPORT: Final = "sim_tests.report"
+
+
+def crossings_command(options: argparse.Namespace) -> int:
+    """Run episodes, print a short table, write the report.
+
+    Raises:
+        SimError: something unknown or unusable was asked for; nothing has run then.
+        NavError: an unknown preset or unusable policy file; nothing has run then.
+        PerceptionError: for pixels, when the shipped networks cannot be loaded; nothing has run.
+    """
+    jobs = plan_jobs(
+        options.scenario,
+        options.policy,
+        range(options.seed, options.seed + options.episodes),
+        planners=["" if each == REFERENCE else each for each in options.planner],
+        perception=options.perception,
+        faults=options.fault,
+    )
+    if options.perception == "pixels":
+        AwarenessPipeline(Camera.from_fov(640, 480, 1.0))  # says at once which networks are absent
+    records = run_jobs(
+        jobs,
+        options.out,
+        workers=options.workers,
+        scheduler=options.scheduler,
+        resume=options.resume,
+        progress=True,
+        about=_about(options),
+    )
+    print(short_table(records))
+    print(f"\nWritten to {options.out}: episodes.csv with {len(records)} episodes")
+    failed = [number for number, record in enumerate(records) if record.error]
+    if failed:
+        first = records[failed[0]]
+        print(
+            f"{len(failed)} of {len(records)} episodes failed; episode {failed[0]} "
+            f"({first.scenario}, seed {first.seed}): {first.error}\n"
+            f"{options.out / ERRORS} has the tracebacks",
+            file=sys.stderr,
+        )
+    if not options.no_report and find_spec(_REPORT) is not None:
+        _write_report(options.out)
+    return 1 if failed else 0
+
+
+def short_table(records: Iterable[EpisodeRecord]) -> str:
+    """One line a policy (and planner, perception and fault where there are several)."""
+    header = ("policy", "episodes", "success", "robot contacts", "time lost s", "least m", "failed")
+    rows: list[Sequence[str]] = []
+    for row in summarise(records).policies:
+        ran = row.episodes - row.errors
+        lost, least = row.means["time_lost_s"], row.worst.get("min_separation_m")
+        rows.append(
+            (
+                row.variant,
+                str(row.episodes),
+                f"{100.0 * row.success.value:.0f} %" if row.episodes else "–",
+                str(round(row.robot_contact.value * row.robot_contact.n)) if ran else "–",
+                f"{lost.value:.2f}" if lost.n else "–",
+                "–" if least is None else f"{least:.2f}",
+                str(row.errors),
+            )
+        )
+    return table_text(header, rows)
+
+
+def _about(options: argparse.Namespace) -> dict[str, Any]:
+    """What run.json says of the command; the same for a run and its resumption."""
+    settings: dict[str, Any] = {
+        "scenario": options.scenario,
+        "policy": options.policy,
+        "planner": [each or REFERENCE for each in options.planner],
+        "perception": options.perception,
+        "fault": options.fault,
+        "episodes": options.episodes,
+        "seed": options.seed,
+    }
+    words = ["awarenav", "crossings"]
+    for name, value in settings.items():
+        many = value if isinstance(value, list) else [value]
+        words += [f"--{name}", *map(str, many)]
+    return {"command": shlex.join([*words, "--out", str(options.out)]), "settings": settings}
+
+
+def _write_report(out: Path) -> None:
+    from importlib import import_module  # noqa: PLC0415 - the report is a part of its own
+
+    path = import_module(_REPORT).write_report(out)
+    print(f"Report: {path}")
