@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from io import BytesIO
 from pathlib import Path
 from typing import Final
 
@@ -21,12 +22,12 @@ from ..robot._amr import NOVA_CARTER
 from ._plan import closest_approaches, person_plan, robot_plan
 
 try:
-    from PIL import Image  # matplotlib brings it
     from matplotlib.axes import Axes
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.patches import Circle, Polygon, Rectangle, Wedge
     from matplotlib.ticker import MultipleLocator
+    from PIL import Image  # matplotlib brings it
 except ImportError as cause:  # pragma: no cover - depends on the installation
     raise MissingSimulatorError(
         "a drawing needs matplotlib, which is not installed; it is part of the extra 'sim': "
@@ -106,9 +107,9 @@ def save_drawing(figure: Figure, path: Path) -> None:
     if path.suffix.lower() != ".png":
         save_figure(figure, path)
         return
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()
-    picture = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+    drawn = BytesIO()
+    figure.savefig(drawn, format="png")
+    picture = Image.open(drawn).convert("RGB")
     part = path.with_name(path.name + ".part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -152,7 +152,7 @@ def test_validate_tells_good_files_from_bad_ones(capsys, tmp_path):
 
 
 def test_drawings_are_small_and_the_same_each_time(tmp_path, capsys):
-    names = ["crowd_of_eight", "paper_encounter", "behind_pallet_truck"]
+    names = ["crowd_of_eight", "intersection"]
     for folder in ("one", "two"):
         assert main(["scenario", "draw", *names, "--out", str(tmp_path / folder)]) == 0
     for name in names:
