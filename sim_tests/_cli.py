@@ -16,6 +16,7 @@ from ._errors import SimError
 from .bridge._command import add_parser as add_bridge_parser
 from .catalogue._command import add_parser as add_scenario_parser
 from .estimates._command import add_parsers as add_estimate_parsers
+from .falsify._command import add_parser as add_falsify_parser
 from .measures._command import add_parser as add_compare_parser
 from .models._command import add_parser as add_models_parser
 from .policies._command import add_parser as add_policy_parser
@@ -91,6 +92,7 @@ def _parser() -> argparse.ArgumentParser:
     add_scenario_parser(commands)
     add_bridge_parser(commands)
     add_tune_parser(commands)
+    add_falsify_parser(commands)
     add_compare_parser(commands)
 
     bench = commands.add_parser(

@@ -7,10 +7,9 @@ from pathlib import Path
 
 from nav_adapter import AwarenessPolicy
 
-from .._scenario_template import ScenarioTemplate
-from .._scenario_files import shipped_scenarios
 from ..policies._show import read_policy
 from ..runs._plan import policy_text
+from ..search._templates import named_templates
 from ._files import table_lines, write_tuning
 from ._policy_space import read_ranges, shipped_ranges
 from ._settings import TuneSettings
@@ -29,7 +28,7 @@ def tune_command(options: argparse.Namespace) -> int:
     settings = TuneSettings(
         policy_name=Path(options.policy).stem,
         policy=policy_text(policy),
-        scenarios=tuple(template.to_text() for template in templates(options.scenario)),
+        scenarios=tuple(template.to_text() for template in named_templates(options.scenario)),
         ranges={path: each.model_dump(mode="json") for path, each in ranges.items()},
         trials=options.trials,
         episodes=options.episodes,
@@ -50,19 +49,6 @@ def tune_command(options: argparse.Namespace) -> int:
     tune(settings, options.out, workers=options.workers, resume=options.resume, report=report)
     print(f"Written to {options.out}")
     return 0
-
-
-def templates(names: list[str]) -> list[ScenarioTemplate]:
-    """The scenarios of names and files; ``all`` stands for the shipped ones with a planner."""
-    found: dict[str, ScenarioTemplate] = {}
-    for name in names:
-        if name == "all":
-            shipped = [ScenarioTemplate.shipped(each) for each in shipped_scenarios()]
-            chosen = [t for t in shipped if t.median().robot.straight_on_speed_mps is None]
-        else:
-            chosen = [ScenarioTemplate.named(name)]
-        found |= {template.name: template for template in chosen}
-    return list(found.values())
 
 
 def _verdict(tuning: Tuning) -> list[str]:
