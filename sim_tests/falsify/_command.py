@@ -37,7 +37,11 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         ("--workers", 1, "processes that run episodes"),
     ):
         falsify.add_argument(
-            option, type=_positive, default=default, metavar="N", help=f"{what} (default: {default})"
+            option,
+            type=_positive,
+            default=default,
+            metavar="N",
+            help=f"{what} (default: {default})",
         )
     falsify.add_argument(
         "--perception",

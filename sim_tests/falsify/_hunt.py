@@ -138,5 +138,3 @@ def _is_exhausted(trials: Sequence[optuna.trial.FrozenTrial], generation: int) -
         return False
     best = np.array([trial.values[0] for trial in trials]).reshape(whole, generation).min(axis=1)
     return bool(best[-_PATIENCE:].min() > best[:-_PATIENCE].min() - _PROGRESS_M)
-
-

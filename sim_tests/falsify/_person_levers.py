@@ -57,8 +57,10 @@ def person_levers(person: Mapping[str, Any]) -> dict[str, Lever]:
                 "glance_median_s": Lever.of(0.3, 3.0, glances["glance_median_s"]),
                 "away_median_s": Lever.of(0.3, 4.0, glances["away_median_s"]),
             }
+        if 0.0 < glances["looker_share"] < 1.0:
+            levers["looks"] = Lever.of(0.0, 1.0, 1.0)
         if len(_possible(person)) > 1:
-            levers["reaction"] = Lever.of(0.0, 1.0, 0.5)
+            levers["reaction"] = Lever.of(0.0, 1.0, 1.0)
     return levers
 
 
@@ -82,8 +84,9 @@ def changed_person(person: Mapping[str, Any], values: Mapping[str, float]) -> di
     _look(changed["glances"], values)
     if "reaction" in values:
         possible = _possible(person)
-        row = min(int(values["reaction"] * len(possible)), len(possible) - 1)
-        changed["reactions"] = {**dict.fromkeys(_REACTIONS, 0.0), possible[row]: 1.0}
+        row = int(values["reaction"] * (len(possible) + 1))
+        if row < len(possible):  # else as the seed draws
+            changed["reactions"] = {**dict.fromkeys(_REACTIONS, 0.0), possible[row]: 1.0}
     return changed
 
 
@@ -103,6 +106,9 @@ def _look(glances: dict[str, Any], values: Mapping[str, float]) -> None:
             low, high = glances[f"{name}_quartiles_s"]
             glances[f"{name}_median_s"] = median
             glances[f"{name}_quartiles_s"] = [ratio * low, ratio * high]
+    looks = values.get("looks", 1.0)
+    if looks < 2.0 / 3.0:  # never, or surely; else as the seed draws
+        glances["looker_share"] = 0.0 if looks < 1.0 / 3.0 else 1.0
     after_s = values.get("gives_up_after_s")
     if after_s is not None and after_s < _LOOKS_ON_S:
         glances["gives_up_after_s"] = after_s

@@ -51,9 +51,7 @@ def _course(axes: Axes, falsification: Falsification) -> None:
         axes.scatter(places[near], scores[near], s=6, color=colour, alpha=0.6)
         touched = scores <= CONTACT
         if near.any():
-            axes.plot(
-                places[near], np.minimum.accumulate(scores[near]), color=colour, lw=1.4
-            )
+            axes.plot(places[near], np.minimum.accumulate(scores[near]), color=colour, lw=1.4)
         axes.scatter(
             places[touched],
             np.full(int(touched.sum()), axes.get_ylim()[0]),

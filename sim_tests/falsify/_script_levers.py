@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
@@ -51,14 +52,14 @@ def changed_script(script: Mapping[str, Any], values: Mapping[str, float]) -> di
     pace, later_s = values.get("pace", 1.0), values.get("later_s", 0.0)
 
     def when(t_s: float) -> float:
-        return later_s + begin + (t_s - begin) / pace + (pause_s if t_s > halt_s else 0.0)
+        return float(later_s + begin + (t_s - begin) / pace + (pause_s if t_s > halt_s else 0.0))
 
     rows = np.array(path, dtype=np.float64)
     if pause_s > 0.0:
         here = PchipInterpolator(rows[:, 0], rows[:, 1:])(halt_s)
         rows = np.array([*rows[rows[:, 0] <= halt_s], [halt_s, *here], *rows[rows[:, 0] > halt_s]])
         rows = rows[np.concatenate([[True], np.diff(rows[:, 0]) > 1e-6])]
-    elif len(rows) == 2:
+    elif len(rows) == 2 and values.get("aside_middle_m", 0.0) != 0.0:
         rows = np.array([rows[0], rows.mean(axis=0), rows[1]])
     points = bent(
         rows[:, 1:],
@@ -111,6 +112,6 @@ def _moved(keys: Any, when: Callable[[float], float]) -> list[dict[str, Any]]:
 
 
 def _apart(keys: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    for before, key in zip(keys, keys[1:], strict=False):
+    for before, key in itertools.pairwise(keys):
         key["t_s"] = max(key["t_s"], before["t_s"] + _CHANGE_S)
     return keys

@@ -25,7 +25,7 @@ def bent(points_m: FloatArray, first_m: float, middle_m: float, last_m: float) -
     """
     if len(points_m) == 1:
         return np.asarray(points_m + np.array([first_m, last_m]))
-    if len(points_m) == 2:
+    if len(points_m) == 2 and middle_m != 0.0:
         points_m = np.array([points_m[0], points_m.mean(axis=0), points_m[1]])
     pieces = np.diff(points_m, axis=0)
     lengths = np.linalg.norm(pieces, axis=1)

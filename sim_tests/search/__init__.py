@@ -1,1 +1,1 @@
-"""Searches that can be killed and resumed, by several processes: what tuning and falsifying share."""
+"""Searches that may be killed and shared by processes: for tuning and falsifying."""

@@ -60,10 +60,11 @@ class Search:
             )
         if method == "cmaes" and objectives != 1:
             raise SimError(f"cmaes searches for one objective, got {objectives}")
+        self._method = method
         self.space = dict(space)
         self.generation = generation
         self.objectives = objectives
-        self._distributions = {
+        self._distributions: dict[str, optuna.distributions.BaseDistribution] = {
             name: optuna.distributions.FloatDistribution(each.low, each.high, log=each.log)
             for name, each in self.space.items()
         }
@@ -88,9 +89,7 @@ class Search:
             with warnings.catch_warnings():
                 # Experimental arguments, and what a sampler does before it knows anything.
                 warnings.simplefilter("ignore")
-                self._asked = [
-                    self._study.ask(self._distributions) for _ in range(self.generation)
-                ]
+                self._asked = [self._study.ask(self._distributions) for _ in range(self.generation)]
             self._proposed = tuple(dict(trial.params) for trial in self._asked)
         return self._proposed
 
@@ -98,8 +97,11 @@ class Search:
         """What the trials of this generation came to, in order.
 
         Raises:
-            SimError: for another number of outcomes than of trials.
+            SimError: for another number of outcomes than of trials, and for constraints, which
+                CMA-ES knows nothing of.
         """
+        if self._method == "cmaes" and any(outcome.constraints for outcome in outcomes):
+            raise SimError("cmaes knows no constraints; put them into the objective")
         trials, self._asked = self._asked, []
         if len(outcomes) != len(trials):
             raise SimError(f"{len(trials)} trials were proposed, got {len(outcomes)} outcomes")

@@ -45,7 +45,11 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         ("--workers", 1, "processes that run episodes"),
     ):
         tune.add_argument(
-            option, type=_positive, default=default, metavar="N", help=f"{what} (default: {default})"
+            option,
+            type=_positive,
+            default=default,
+            metavar="N",
+            help=f"{what} (default: {default})",
         )
     tune.add_argument(
         "--sampler",

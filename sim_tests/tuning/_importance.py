@@ -17,9 +17,7 @@ def importances(study: optuna.Study) -> dict[str, dict[str, float]]:
     """
     done = [t for t in study.get_trials(deepcopy=False) if t.values is not None]
     names = sorted({name for trial in done for name in trial.params})
-    return {
-        objective: _one(study, row, names, done) for row, objective in enumerate(OBJECTIVES)
-    }
+    return {objective: _one(study, row, names, done) for row, objective in enumerate(OBJECTIVES)}
 
 
 def _one(

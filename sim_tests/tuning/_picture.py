@@ -25,9 +25,7 @@ _CHOSEN: Final = "#2e7d4f"
 _BARS: Final = 8
 
 
-def draw_tuning(
-    tuning: Tuning, importance: Mapping[str, Mapping[str, float]], path: Path
-) -> None:
+def draw_tuning(tuning: Tuning, importance: Mapping[str, Mapping[str, float]], path: Path) -> None:
     """Draw trials, front, presets and chosen policies, and the importances beside them."""
     figure = new_figure(12.0, 6.0)
     grid = figure.add_gridspec(2, 2, width_ratios=(1.7, 1.0))
@@ -51,10 +49,12 @@ def _front(axes: Axes, tuning: Tuning) -> None:
             ]
         )
         if points.size:
-            axes.scatter(*points.T, c=colour, marker=marker, s=26, label=label)
+            axes.scatter(
+                points[:, 0], points[:, 1], c=colour, marker=marker, s=26, label=label
+            )
     if tuning.front:
         line = np.array([trial.values for trial in tuning.front])
-        axes.plot(*line.T, color=_FRONT, drawstyle="steps-post", marker="o", ms=5, label="front")
+        axes.plot(line[:, 0], line[:, 1], color=_FRONT, drawstyle="steps-post", marker="o", ms=5, label="front")
     for anchor in tuning.anchors:
         x, y = anchor.tuning.objectives
         colour = _CONTACT if anchor.tuning.robot_contacts else _ANCHOR

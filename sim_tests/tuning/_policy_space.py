@@ -90,7 +90,9 @@ class PolicySpace:
             for place in (path, *each.also):
                 least = _LEAST.get(place)
                 if least is not None and each.low < least - 1e-9:
-                    raise SimError(f"{place}: must not be searched below {least:g}, got {each.low:g}")
+                    raise SimError(
+                        f"{place}: must not be searched below {least:g}, got {each.low:g}"
+                    )
                 for part, values in _OPTIONAL.items():
                     if place.startswith(part + ".") and _get(self._data, part) is None:
                         _put(self._data, part, dict(values))

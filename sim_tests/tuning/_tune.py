@@ -126,7 +126,9 @@ def tune(
     ):
         judge = Judge(settings, crew, folder)
         bar.set_postfix_str(f"{episodes} episodes a trial; presets first")
-        tuned = {name: judge.sure(name, each, settings.tuning_seeds) for name, each in anchors.items()}
+        tuned = {
+            name: judge.sure(name, each, settings.tuning_seeds) for name, each in anchors.items()
+        }
         bar.set_postfix_str("")
         while not book.done:
             bar.update(book.finished - bar.n)
