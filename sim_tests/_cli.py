@@ -20,6 +20,7 @@ from .falsify._command import add_parser as add_falsify_parser
 from .measures._command import add_parser as add_compare_parser
 from .models._command import add_parser as add_models_parser
 from .policies._command import add_parser as add_policy_parser
+from .report._command import add_parser as add_report_parser
 from .runs._command import add_parsers as add_run_parsers
 from .sets._command import add_parser as add_render_parser
 from .tracks._command import add_parser as add_tracks_parser
@@ -93,6 +94,7 @@ def _parser() -> argparse.ArgumentParser:
     add_bridge_parser(commands)
     add_tune_parser(commands)
     add_falsify_parser(commands)
+    add_report_parser(commands)
     add_compare_parser(commands)
 
     bench = commands.add_parser(

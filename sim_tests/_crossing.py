@@ -91,9 +91,10 @@ class CrossingResult:
         violation_time_s: how long the margin was negative at a moving robot.
         duration_s: simulated time.
         frames: one a control cycle.
-        robot: what drove.
         people: what became of those who react: ``people[i]`` is person ``i`` of the scenario, and
-            number ``len(scenario.workers) + i`` of everybody.
+            number ``scripted + i`` of everybody.
+        scripted: how many follow a script; they come first wherever all are listed.
+        robot: what drove.
     """
 
     scenario: str
@@ -112,8 +113,9 @@ class CrossingResult:
     violation_time_s: float
     duration_s: float
     frames: tuple[CrossingFrame, ...]
-    robot: RobotProfile = NOVA_CARTER
     people: tuple[PersonOutcome, ...] = ()
+    scripted: int = 0
+    robot: RobotProfile = NOVA_CARTER
 
 
 class StraightOn:
@@ -352,4 +354,5 @@ def _result(
         duration_s=frames[-1].t_s,
         frames=tuple(frames),
         people=people,
+        scripted=len(scenario.workers),
     )

@@ -103,8 +103,8 @@ class Scenario(StrictConfig):
         camera: the robot's camera.
         workers: scripted people: the same whatever the robot does.
         people: those who look, react and walk by themselves; every name once.
-        replay_csv: table of recorded people to replay, see :func:`read_recordings`; a path
-            relative to the scenario's own file.
+        replay_csv: table of recorded people to replay, see :func:`read_recordings`; relative
+            to the scenario's own file.
         start_jitter_s: each worker and each person starts up to this much earlier or later, drawn
             from the seed.
     """
@@ -126,11 +126,11 @@ class Scenario(StrictConfig):
     start_jitter_s: float = Field(default=0.0, ge=0.0)
 
     @model_validator(mode="after")
-    def _one_name_each(self) -> Scenario:
+    def _names_once(self) -> Scenario:
         names = [person.name for person in self.people]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
-            raise ValueError(f"people must have names of their own, got {', '.join(twice)} twice")
+            raise ValueError(f"names of people must be unique, got {', '.join(twice)} twice")
         return self
 
     @classmethod

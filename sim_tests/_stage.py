@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -195,6 +196,11 @@ class Stage(Closing):
         return tuple(views)
 
     @property
+    def motions(self) -> tuple[PersonMotion, ...]:
+        """What everybody does now."""
+        return self._motions
+
+    @property
     def outcomes(self) -> tuple[PersonOutcome, ...]:
         """What has become of the people who react, in their order."""
         return tuple(walker.outcome() for walker in self.walkers)
@@ -218,7 +224,7 @@ class Stage(Closing):
             around = Surroundings(
                 robot,
                 movers[:index] + movers[index + 1 :],
-                lambda worker=worker: self._sees_robot(worker),
+                partial(self._sees_robot, worker),
             )
             motion = actor.motion(self.t_s, around)
             worker.place(

@@ -181,9 +181,12 @@ def _draws(
 
 def _acceleration(residuals: FloatArray, groups: list[NDArray[np.intp]]) -> float:
     """Skewness of the empirical influence over six; the scale of the influence cancels."""
+    largest = float(np.abs(residuals).max())
+    if largest < np.finfo(np.float64).tiny:
+        return 0.0
     second = third = 0.0
     for group in groups:
-        influence = residuals[group] - residuals[group].mean()
+        influence = (residuals[group] - residuals[group].mean()) / largest
         second += float((influence**2).sum())
         third += float((influence**3).sum())
     return third / (6.0 * second**1.5) if second > 0.0 else 0.0

@@ -78,9 +78,7 @@ def post_encroachment_s(
 class _Paths:
     """Robot's and one person's way, at any instant."""
 
-    def __init__(
-        self, trace: Trace, person: int, outline: Outline, body_radius_m: float
-    ) -> None:
+    def __init__(self, trace: Trace, person: int, outline: Outline, body_radius_m: float) -> None:
         self._t_s = trace.t_s
         self._heading_rad = np.unwrap(trace.heading_odom_rad)
         self._robot_m = trace.robot_odom_m
@@ -91,7 +89,8 @@ class _Paths:
     def around(self, t_s: float) -> FloatArray:
         """Instants about one."""
         fine = t_s + np.linspace(-1.0, 1.0, _FINER) / _COMPARED_HZ
-        return fine[(fine >= self._t_s[0]) & (fine <= self._t_s[-1])]
+        there: FloatArray = fine[(fine >= self._t_s[0]) & (fine <= self._t_s[-1])]
+        return there
 
     def overlaps(
         self, robot_s: FloatArray, person_s: FloatArray, less_than_s: float
@@ -103,7 +102,9 @@ class _Paths:
         reach = self._outline.reach_m + self._radius_m
         near = np.einsum("nki,nki->nk", offsets, offsets) < reach**2
         row, column = np.nonzero(near & (apart_s < less_than_s))
-        turned = _turned(offsets[row, column], np.interp(robot_s, self._t_s, self._heading_rad)[row])
+        turned = _turned(
+            offsets[row, column], np.interp(robot_s, self._t_s, self._heading_rad)[row]
+        )
         kept = self._outline.distance(turned) < self._radius_m
         row, column = row[kept], column[kept]
         return row, column, apart_s[row, column]

@@ -63,9 +63,8 @@ def measure(
     nearest_m = trace.separation_m.min(axis=1, initial=np.inf)
     path_m = path_length_m(trace.robot_odom_m)
     deceleration, jerk = peak_deceleration_and_jerk(trace.t_s, trace.speed_mps)
-    people: tuple[PersonOutcome, ...] = getattr(result, "people", ())
-    delay_s, detour_m = human_cost(people)
-    awareness, reaction, error = _regard(result, trace, people)
+    delay_s, detour_m = human_cost(result.people)
+    awareness, reaction, error = _regard(result, trace)
     by_robot = [contact for contact in result.contacts if contact.by == "robot"]
     separation_m, speed_then = _closest(result, trace, nearest_m)
     return _rounded(
@@ -160,9 +159,7 @@ def _closest(
     return float(nearest_m[row]), abs(float(trace.speed_mps[row]))
 
 
-def _regard(
-    result: CrossingResult, trace: Trace, people: tuple[PersonOutcome, ...]
-) -> tuple[Awareness, str, float | None]:
+def _regard(result: CrossingResult, trace: Trace) -> tuple[Awareness, str, float | None]:
     """Awareness and reaction of the person who came nearest, and the error of α over all."""
     mean, lower = track_awareness(result, trace)
     error = awareness_error(trace.awareness, mean)
@@ -171,7 +168,10 @@ def _regard(
         return "", "", error
     row, person = closest
     verdict = awareness_class(trace.t_s, trace.awareness[:, person], lower[:, person], row)
-    reaction = people[person].reaction if len(people) == trace.people else ""
+    reacting = person - result.scripted
+    reaction = ""
+    if 0 <= reacting < len(result.people):
+        reaction = result.people[reacting].reaction
     return verdict, reaction, error
 
 

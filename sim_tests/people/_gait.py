@@ -34,10 +34,10 @@ _STANCE_SHARE_PER_MPS: Final = -0.04
 LONGEST_SWING_S: Final = 0.65
 # Toes come down after the heel has landed; the heel lifts before the toes: parts of a stance, and
 # the longest that either takes.
-_LOADING_SHARE: Final = 0.15
-_LOADING_S: Final = 0.18
-_ROLLING_SHARE: Final = 0.43
-_ROLLING_S: Final = 0.45
+LOADING_SHARE: Final = 0.15
+LOADING_S: Final = 0.18
+ROLLING_SHARE: Final = 0.43
+ROLLING_S: Final = 0.45
 _LANDING_RAD: Final = math.radians(-20.0)
 _TOE_OFF_RAD: Final = math.radians(40.0)
 # Walking backwards lands on the toes and leaves on the heel.
@@ -45,22 +45,22 @@ _BACK_LANDING_RAD: Final = math.radians(16.0)
 _BACK_OFF_RAD: Final = math.radians(-12.0)
 # Feet land a little less far ahead of the hips than they leave behind them.
 _OVER_SHARE: Final = 0.12
-_LIFT_M: Final = 0.035
+LIFT_M: Final = 0.035
 _TOE_OUT_RAD: Final = math.radians(6.0)
 # Walking brings the feet nearer to the line; the swinging foot makes way for the standing one.
 _NARROWER: Final = 0.40
-_WAY_ROUND_M: Final = 0.010
+WAY_ROUND_M: Final = 0.010
 
-_PELVIS_YAW_RAD: Final = 0.07
-_PELVIS_LIST_RAD: Final = 0.035
-_THORAX_YAW_RAD: Final = 0.06
-_PELVIS_TWIST: Final = 0.75
-_SWAY_M: Final = 0.016
-_ARM_SWING_RAD: Final = 0.36
+PELVIS_YAW_RAD: Final = 0.07
+PELVIS_LIST_RAD: Final = 0.035
+THORAX_YAW_RAD: Final = 0.06
+PELVIS_TWIST: Final = 0.75
+SWAY_M: Final = 0.016
+ARM_SWING_RAD: Final = 0.36
 # The body is highest over the middle of a stance.
-_MID_STANCE: Final = 0.30
+MID_STANCE: Final = 0.30
 # Knees are never locked: this much of a leg's reach is used, which leaves a bend of 7 degrees.
-_USED_REACH: Final = 0.998
+USED_REACH: Final = 0.998
 # The hips follow what the legs allow over this time, so that they neither jerk nor overstretch.
 _SMOOTHING_S: Final = 0.14
 _SAMPLES: Final = 96
@@ -166,11 +166,11 @@ class Gait:
             vigour: of the steps with which it lands and leaves.
         """
         duration = since_s + until_s
-        loading = np.minimum(_LOADING_SHARE * duration, _LOADING_S)
-        rolling = np.minimum(_ROLLING_SHARE * duration, _ROLLING_S)
+        loading = np.minimum(LOADING_SHARE * duration, LOADING_S)
+        rolling = np.minimum(ROLLING_SHARE * duration, ROLLING_S)
         landed = _smooth(np.clip(since_s / loading, 0.0, 1.0))
         rolled = np.clip(1.0 - until_s / rolling, 0.0, 1.0)
-        pitch = _landing_rad(vigour[0]) * (1.0 - landed) + _off_rad(vigour[1]) * rolled**2
+        pitch = landing_rad(vigour[0]) * (1.0 - landed) + off_rad(vigour[1]) * rolled**2
         return self._ankle(side, np.broadcast_to(place, (len(since_s), 3)), pitch, np.zeros(1))
 
     def swing(
@@ -197,20 +197,20 @@ class Gait:
             body: (N, 3) x, y, heading of the body meanwhile: the foot keeps to its side of it.
         """
         u = progress
-        off, land = _off_rad(vigour[0]), _landing_rad(vigour[1])
+        off, land = off_rad(vigour[0]), landing_rad(vigour[1])
         # The foot leaves with the rate at which it rolled, and lands with none.
-        rate = 2.0 * off * swing_s / min(_ROLLING_SHARE * stance_s, _ROLLING_S)
+        rate = 2.0 * off * swing_s / min(ROLLING_SHARE * stance_s, ROLLING_S)
         smooth = _smooth(u)
         pitch = off + (land - off) * smooth + rate * u * (1.0 - u) ** 2
         place = start + smooth[:, None] * (end - start)
         bump = np.minimum(1.6 * np.sin(math.pi * u) ** 2, 1.0)
         sin, cos = np.sin(body[:, 2]), np.cos(body[:, 2])
         beside = cos * (place[:, 1] - body[:, 1]) - sin * (place[:, 0] - body[:, 0])
-        clear = self._half_width_m(side, np.array(max(vigour, key=abs))) + _WAY_ROUND_M
+        clear = self._half_width_m(side, np.array(max(vigour, key=abs))) + WAY_ROUND_M
         aside = np.maximum(clear - SIGNS[side] * beside, 0.0) * bump
         reach = math.hypot(*(end - start)[:2]) + 0.25 * abs(float(end[2] - start[2]))
         reach += 4.0 * float(aside.max(initial=0.0))
-        lift = _LIFT_M * math.sqrt(min(reach / self._usual_m, 1.5)) * np.sin(math.pi * u)
+        lift = LIFT_M * math.sqrt(min(reach / self._usual_m, 1.5)) * np.sin(math.pi * u)
         place[:, 0] -= SIGNS[side] * aside * sin
         place[:, 1] += SIGNS[side] * aside * cos
         return self._ankle(side, place, pitch, lift)
@@ -240,14 +240,14 @@ class Gait:
             periodic: the last row is followed by the first.
         """
         turn = np.cos(math.tau * phase)
-        weight = np.cos(math.tau * (phase - _MID_STANCE))
+        weight = np.cos(math.tau * (phase - MID_STANCE))
         size = np.abs(vigour)
-        sway = _SWAY_M * np.minimum(2.0 * size, 1.0) * weight
+        sway = SWAY_M * np.minimum(2.0 * size, 1.0) * weight
         pelvis = np.column_stack(
-            [sway, -_PELVIS_YAW_RAD * vigour * turn, _PELVIS_LIST_RAD * size * weight]
+            [sway, -PELVIS_YAW_RAD * vigour * turn, PELVIS_LIST_RAD * size * weight]
         )
         if twist_rad is not None:
-            pelvis[:, 1] += _PELVIS_TWIST * twist_rad
+            pelvis[:, 1] += PELVIS_TWIST * twist_rad
         limit = np.minimum(
             self._hip_limits(feet, position_m, heading_rad, pelvis), self.standing_height_m
         )
@@ -260,9 +260,9 @@ class Gait:
                 feet[RIGHT],
                 height,
                 pelvis,
-                _THORAX_YAW_RAD * vigour * turn,
+                THORAX_YAW_RAD * vigour * turn,
                 vigour,
-                -_ARM_SWING_RAD * vigour * turn,
+                -ARM_SWING_RAD * vigour * turn,
             ]
         )
 
@@ -368,18 +368,18 @@ class Gait:
             hip_y = position_m[:, 1] + np.cos(heading_rad) * sway + sin * x + cos * across
             foot = feet[side]
             flat = (foot[:, 0] - hip_x) ** 2 + (foot[:, 1] - hip_y) ** 2
-            reach = _USED_REACH * self.skeleton.legs[side].reach_m
+            reach = USED_REACH * self.skeleton.legs[side].reach_m
             up = np.sqrt(np.maximum(reach * reach - flat, (0.5 * reach) ** 2))
             limits.append(foot[:, 2] + up - (y * np.sin(tilt) + z * np.cos(tilt)))
         return np.asarray(np.minimum(limits[0], limits[1]))
 
 
-def _landing_rad(vigour: float) -> float:
+def landing_rad(vigour: float) -> float:
     size = min(abs(vigour), 1.15)
     return size * (_LANDING_RAD if vigour >= 0.0 else _BACK_LANDING_RAD)
 
 
-def _off_rad(vigour: float) -> float:
+def off_rad(vigour: float) -> float:
     size = min(abs(vigour), 1.15)
     return size * (_TOE_OFF_RAD if vigour >= 0.0 else _BACK_OFF_RAD)
 

@@ -154,9 +154,7 @@ class Gaze:
         glancing = self._process.looking(t_s)
         return sees and (glances.watches or glancing)
 
-    def _towards(
-        self, place: tuple[float, float, float], robot: RobotBody
-    ) -> tuple[float, float]:
+    def _towards(self, place: tuple[float, float, float], robot: RobotBody) -> tuple[float, float]:
         """Yaw and pitch of the robot's camera from the body."""
         x, y, z = robot.camera_m
         dx, dy = x - place[0], y - place[1]

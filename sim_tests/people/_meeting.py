@@ -28,6 +28,7 @@ _MOVING_MPS: Final = 0.08
 _ASIDE_M: Final = 1.1
 _PATIENCE_S: Final = 3.0
 _LONGEST_WAIT_S: Final = 20.0
+_ALONG_SINE: Final = 0.35
 _PASSED_M: Final = 0.35
 _STOPPING_MPS2: Final = 1.2
 _SIDE_STEP_MPS: Final = 0.7
@@ -110,9 +111,9 @@ class Meeting:
                 self._conflict_since_s = t_s
         elif t_s - self._conflict_s > _DECIDING_S:
             self._conflict_since_s = None
-        if self.reaction and t_s - max(self._conflict_s, self._began_s) > _OVER_S:
-            if robot is None or self._passed or _distance(place, robot) > _FAR_M:
-                self.reaction = ""
+        over = t_s - max(self._conflict_s, self._began_s) > _OVER_S
+        if over and (robot is None or self._passed or _distance(place, robot) > _FAR_M):
+            self.reaction = ""
         if robot is None:
             return intent
         if not self.reaction:
@@ -159,22 +160,21 @@ class Meeting:
         self._stood_s = 0.0 if moves else self._stood_s + dt_s
         if ahead < -robot.half_length_m - _PASSED_M or crossed:
             self._settled = self._passed = True
-        if self._settled or self.reaction == "walk_on":
+        if self.reaction in ("wait", "pass_behind") or standing:
+            # No patience is endless.
+            late = t_s - self._began_s > _LONGEST_WAIT_S
+            self._settled = self._settled or self._stood_s > _PATIENCE_S or late
+        if self._settled or self.reaction == "walk_on" or (standing and self.reaction == "claim"):
             return intent
-        if self.reaction == "hurry" and not standing:
-            fastest = max(_HURRY_MPS, intent.speed_mps)
-            return Intent(intent.x, intent.y, min(_HURRY * intent.speed_mps, fastest))
-        if self.reaction == "claim" and not standing:
-            fastest = max(_HURRY_MPS, intent.speed_mps)
-            return Intent(intent.x, intent.y, min(_CLAIM * intent.speed_mps, fastest))
-        if self.reaction == "claim":
-            return intent
-        if self._stood_s > _PATIENCE_S or t_s - self._began_s > _LONGEST_WAIT_S:
-            self._settled = True
-            return intent
-        if self.reaction == "pass_behind" and not standing:
+        # Behind a robot that comes straight on one gets by stepping aside.
+        along = abs(ux * intent.y - uy * intent.x) < _ALONG_SINE
+        if self.reaction == "wait" or standing or (self.reaction == "pass_behind" and along):
+            return self._waiting(intent, side, standing)
+        if self.reaction == "pass_behind":
             return _behind(place, intent, robot, self._line)
-        return self._waiting(intent, side, standing)
+        haste = _HURRY if self.reaction == "hurry" else _CLAIM
+        fastest = max(_HURRY_MPS, intent.speed_mps)
+        return Intent(intent.x, intent.y, min(haste * intent.speed_mps, fastest))
 
     def _waiting(self, intent: Intent, side: float, standing: bool) -> Intent:
         """Stops short of the robot's way, or gets off it."""

@@ -13,23 +13,28 @@ from typing import Final
 import numpy as np
 
 from ._footing import Footing
-from ._gait import LEFT, LONGEST_SWING_S, RIGHT, Gait
-from ._gait import _ARM_SWING_RAD as ARM_SWING_RAD
-from ._gait import _LIFT_M as LIFT_M
-from ._gait import _LOADING_S as LOADING_S
-from ._gait import _LOADING_SHARE as LOADING_SHARE
-from ._gait import _MID_STANCE as MID_STANCE
-from ._gait import _PELVIS_LIST_RAD as PELVIS_LIST_RAD
-from ._gait import _PELVIS_TWIST as PELVIS_TWIST
-from ._gait import _PELVIS_YAW_RAD as PELVIS_YAW_RAD
-from ._gait import _ROLLING_S as ROLLING_S
-from ._gait import _ROLLING_SHARE as ROLLING_SHARE
-from ._gait import _SWAY_M as SWAY_M
-from ._gait import _THORAX_YAW_RAD as THORAX_YAW_RAD
-from ._gait import _USED_REACH as USED_REACH
-from ._gait import _WAY_ROUND_M as WAY_ROUND_M
-from ._gait import _landing_rad as landing_rad
-from ._gait import _off_rad as off_rad
+from ._gait import (
+    ARM_SWING_RAD,
+    LEFT,
+    LIFT_M,
+    LOADING_S,
+    LOADING_SHARE,
+    LONGEST_SWING_S,
+    MID_STANCE,
+    PELVIS_LIST_RAD,
+    PELVIS_TWIST,
+    PELVIS_YAW_RAD,
+    RIGHT,
+    ROLLING_S,
+    ROLLING_SHARE,
+    SWAY_M,
+    THORAX_YAW_RAD,
+    USED_REACH,
+    WAY_ROUND_M,
+    Gait,
+    landing_rad,
+    off_rad,
+)
 from ._skeleton import SIGNS
 
 # Slower than this and the body only shifts its weight.
@@ -67,7 +72,16 @@ _Place = tuple[float, float, float]  # x, y, yaw of a flat foot
 class _Foot:
     """One foot, standing or swinging."""
 
-    __slots__ = ("from_pitch", "lifted_at", "own", "pitch", "place", "since_s", "swinging", "target")
+    __slots__ = (
+        "from_pitch",
+        "lifted_at",
+        "own",
+        "pitch",
+        "place",
+        "since_s",
+        "swinging",
+        "target",
+    )
 
     def __init__(self, place: _Place) -> None:
         self.place = self.target = place
@@ -156,7 +170,9 @@ class OnlineFeet:
         cadence = self._cadence_hz(ahead, aside, turning)
         standing = speed <= _MOVING_MPS and abs(turning) <= _MOVING_RADPS
         facing = heading + self._twist
-        if not self._walking and (not standing or self._misplaced(x, y, facing, _STEP_M, _STEP_RAD)):
+        if not self._walking and (
+            not standing or self._misplaced(x, y, facing, _STEP_M, _STEP_RAD)
+        ):
             self._set_out(share, aside, turning)
         if self._walking:
             body = (x, y, facing, vx, vy, turning)
@@ -176,9 +192,7 @@ class OnlineFeet:
         turn = turning / _TURN_PER_CYCLE_RAD
         return min(math.hypot(ahead / forward, aside / sideways, turn), _QUICKEST_HZ)
 
-    def _misplaced(
-        self, x: float, y: float, facing: float, far_m: float, far_rad: float
-    ) -> bool:
+    def _misplaced(self, x: float, y: float, facing: float, far_m: float, far_rad: float) -> bool:
         """Whether a foot stands too far from where it belongs when standing."""
         for side in (LEFT, RIGHT):
             nx, ny, nyaw = self._neutral(side, x, y, facing, 0.0)

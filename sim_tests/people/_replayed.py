@@ -201,9 +201,7 @@ def _check_columns(path: Path, names: list[str]) -> None:
         )
 
 
-def _recording(
-    path: Path, name: str, rows: list[tuple[int, dict[str, str | None]]]
-) -> Recording:
+def _recording(path: Path, name: str, rows: list[tuple[int, dict[str, str | None]]]) -> Recording:
     """One person's rows in order of time."""
     columns = ["t_s", "x_m", "y_m"]
     for column in _OPTIONAL:

@@ -89,7 +89,7 @@ def _push(dx: float, dy: float, closing_x: float, closing_y: float) -> tuple[flo
     reach = _REACH_S * size
     base = _STRENGTH_MPS2 * math.exp(-distance / reach)
     slower = base * math.exp(-((_ALONG * reach * angle) ** 2))
-    # Whoever comes straight on is given way to the right: a small preference that breaks the tie, as
-    # people on the European continent have (ibid.).
+    # Whoever comes straight on is given way to the right: a small preference that breaks the tie,
+    # as people on the European continent have (ibid.).
     aside = base * math.exp(-((_ACROSS * reach * angle) ** 2)) * (1.0 if angle > -0.005 else -1.0)
     return -slower * tx + aside * ty, -slower * ty - aside * tx

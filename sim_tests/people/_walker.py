@@ -10,6 +10,7 @@ import numpy as np
 from perception.arrays import FloatArray
 
 from .._errors import SimError
+from ._errand import STILL_MPS, Errand
 from ._gait import Gait
 from ._gaze import Gaze
 from ._meeting import Intent, Meeting
@@ -29,16 +30,7 @@ TICK_S: Final = 1.0 / 20.0
 
 # What a person knows of a robot that is out of sight is worth something for so long.
 _REMEMBERS_S: Final = 3.0
-# Walking: how far ahead on the route one aims, how hard one brakes for a stop, what counts as there.
-_AIM_M: Final = 1.2
-_BRAKING_MPS2: Final = 0.9
-_APPROACH_HZ: Final = 2.5
 _BRAKING_S: Final = 0.1
-_THERE_M: Final = 0.1
-_ABOUT_THERE_M: Final = 0.5
-_STILL_MPS: Final = 0.15
-_PUSHED_AWAY_M: Final = 0.15
-_BACK_TO_PLACE_MPS: Final = 0.4
 # Nobody speeds up or swerves harder than this, nor gets pushed to more than this times the pace.
 _MOST_MPS2: Final = 3.0
 _MOST_PACE: Final = 1.3
@@ -86,7 +78,8 @@ class Walker:
     ) -> None:
         self.spec = spec
         self._obstacles = Obstacles(boxes_odom_m)
-        self._route = Route.of(spec)
+        route = Route.of(spec)
+        self._errand = Errand(route, spec.speed_mps, max(spec.start_s + offset_s, 0.0))
         for number, point in enumerate(spec.route):
             self._obstacles.refuse(f"route point {number} of {spec.name!r}", point.x_m, point.y_m)
         gaze_rng, meeting_rng = rng.spawn(2)
@@ -94,27 +87,20 @@ class Walker:
         self._meeting = Meeting(spec.reactions, meeting_rng)
         self._activity = Activity(spec.activity, spec.activity)
         self._boxes = boxes_odom_m
-        self._start_s = max(spec.start_s + offset_s, 0.0)
         self._reverse = math.pi if spec.backwards else 0.0
         self._stands_facing = None if spec.heading_deg is None else math.radians(spec.heading_deg)
         # Between ticks: place, velocity and acceleration since an instant, and the next tick's.
         self._tick = -1
         self._since_s = 0.0
-        self._from = (*self._route.start, 0.0, 0.0)
+        self._from = (*route.start, 0.0, 0.0)
         self._push = (0.0, 0.0)
         self._next = self._from
-        ux, uy = self._route.direction(0.0)
-        along = math.atan2(uy, ux) + (self._reverse if self._route.length_m > 0.0 else 0.0)
+        ux, uy = route.direction(0.0)
+        along = math.atan2(uy, ux) + (self._reverse if route.length_m > 0.0 else 0.0)
         self._heading = along if self._stands_facing is None else self._stands_facing
         self._turning = 0.0
         self._walked_m = 0.0
-        # Along the route.
-        self._along_m = 0.0
-        self._stop = 0
-        self._resumes_s: float | None = None
-        self._set_out_s: float | None = None
-        self._arrived_s: float | None = None
-        self._way_m: float | None = None
+        self._way_m: float | None = None  # walked until the end was reached
         # About the robot.
         self._known: tuple[RobotBody, float] | None = None
         self._touch: tuple[float, float, float] | None = None  # direction and when
@@ -145,6 +131,11 @@ class Walker:
         return self._gaze.noticed_s
 
     @property
+    def place_odom_m(self) -> tuple[float, float]:
+        """Where the person was when last asked, x and y."""
+        return self._at(self._now_s)[:2]
+
+    @property
     def reaction(self) -> str:
         """What the person does about the robot now; empty for nothing."""
         return self._meeting.reaction
@@ -152,13 +143,14 @@ class Walker:
     @property
     def arrived(self) -> bool:
         """Whether the end of the route was reached."""
-        return self._arrived_s is not None
+        return self._errand.arrived_s is not None
 
     def outcome(self) -> PersonOutcome:
         """What has become of the person up to now."""
         time_s = None
-        if self._arrived_s is not None and self._set_out_s is not None:
-            time_s = self._arrived_s - self._set_out_s
+        errand = self._errand
+        if errand.arrived_s is not None and errand.set_out_s is not None:
+            time_s = errand.arrived_s - errand.set_out_s
         free_time_s, free_length_m = self._undisturbed()
         return PersonOutcome(
             name=self.spec.name,
@@ -265,8 +257,10 @@ class Walker:
             self._heading += self._turning * TICK_S
         place = (x, y, self._heading)
         robot = self._look(t_s, place, around)
-        going = self._follow_route(t_s, x, y, math.hypot(vx, vy))
-        intent = self._intent(going, x, y)
+        intent = self._errand.intent(t_s, x, y, math.hypot(vx, vy))
+        if self._way_m is None and self.arrived:
+            self._way_m = self._walked_m
+        going = self._errand.going
         wanted = self._meeting.react(t_s, TICK_S, (x, y), intent, robot, standing=not going)
         wanted, facing = self._recoiling(t_s, intent, wanted, going)
         ax, ay = self._acceleration((x, y, vx, vy), wanted, robot, around)
@@ -288,58 +282,6 @@ class Walker:
         if self._known is None or t_s - self._known[1] > _REMEMBERS_S:
             return None
         return self._known[0].later(t_s - self._known[1])
-
-    def _follow_route(self, t_s: float, x: float, y: float, speed_mps: float) -> bool:
-        """Keep account of the way; returns whether the person is going."""
-        if t_s < self._start_s - 1e-9:
-            return False
-        if self._set_out_s is None:
-            self._set_out_s = t_s
-        if self._resumes_s is not None:
-            if t_s < self._resumes_s - 1e-9:
-                return False
-            self._resumes_s = None
-            self._stop += 1
-        stop = self._route.stops[self._stop]
-        self._along_m = self._route.progress(self._along_m, x, y, stop.at_m)
-        if stop.at_m - self._along_m > _THERE_M:
-            return True
-        last = math.isinf(stop.for_s)
-        end_x, end_y = self._route.at(stop.at_m)
-        if last and math.hypot(end_x - x, end_y - y) > _ABOUT_THERE_M:
-            return True
-        if last and self._arrived_s is None:
-            self._arrived_s = t_s
-            self._way_m = self._walked_m
-        if speed_mps < _STILL_MPS:
-            self._resumes_s = t_s + stop.for_s
-        return False
-
-    def _intent(self, going: bool, x: float, y: float) -> Intent:
-        """Along the route, or to where one stands."""
-        stop = self._route.stops[self._stop]
-        if not going:
-            at_m = stop.at_m if self._set_out_s is not None else 0.0
-            dx, dy = self._from_to(x, y, at_m)
-            away = math.hypot(dx, dy)
-            if away <= _PUSHED_AWAY_M and not (
-                self._set_out_s is not None and self._resumes_s is None
-            ):
-                return Intent(*self._route.direction(self._along_m), 0.0)
-            pace = min(_BACK_TO_PLACE_MPS, _APPROACH_HZ * away)
-            return Intent(dx / max(away, 1e-9), dy / max(away, 1e-9), pace)
-        dx, dy = self._from_to(x, y, min(self._along_m + _AIM_M, stop.at_m))
-        away = math.hypot(dx, dy)
-        ux, uy = (dx / away, dy / away) if away > 1e-6 else self._route.direction(self._along_m)
-        left_m = max(stop.at_m - self._along_m, away if math.isinf(stop.for_s) and away < _AIM_M else 0.0)
-        pace = min(
-            self.spec.speed_mps, math.sqrt(2.0 * _BRAKING_MPS2 * left_m), _APPROACH_HZ * left_m
-        )
-        return Intent(ux, uy, pace)
-
-    def _from_to(self, x: float, y: float, along_m: float) -> tuple[float, float]:
-        there_x, there_y = self._route.at(along_m)
-        return there_x - x, there_y - y
 
     def _recoiling(
         self, t_s: float, intent: Intent, wanted: Intent, going: bool
@@ -376,14 +318,14 @@ class Walker:
         around: Surroundings,
     ) -> tuple[float, float]:
         """Of the wish and of all that pushes, within human limits."""
-        x, y, vx, vy = state
+        _, _, vx, vy = state
         want_x, want_y = wanted.speed_mps * wanted.x, wanted.speed_mps * wanted.y
         slower = wanted.speed_mps < math.hypot(vx, vy)
         within_s = _BRAKING_S if slower else RELAXATION_S
         ax, ay = (want_x - vx) / within_s, (want_y - vy) / within_s
         if self.spec.social:
             px, py = self._pushes(state, robot, around)
-            if wanted.speed_mps > _STILL_MPS or math.hypot(px, py) > _UNMOVED_MPS2:
+            if wanted.speed_mps > STILL_MPS or math.hypot(px, py) > _UNMOVED_MPS2:
                 ax, ay = ax + px, ay + py
         size = math.hypot(ax, ay)
         if size > _MOST_MPS2:
@@ -420,20 +362,20 @@ class Walker:
         """Time and length of the same walk without robot and people; None without an end."""
         if self._free is None:
             self._free = (None, 0.0)
-            if self._route.length_m > 0.0:
+            if self._errand.route.length_m > 0.0:
                 self._free = self._walk_alone()
         return self._free
 
     def _walk_alone(self) -> tuple[float | None, float]:
         spec = self.spec.model_copy(update={"start_s": 0.0})
         alone = Walker(spec, np.random.default_rng(0), self._boxes)
-        pauses = sum(stop.for_s for stop in self._route.stops[:-1])
-        longest_s = _LONGEST * (self._route.length_m / spec.speed_mps + 5.0) + pauses
+        pauses = sum(stop.for_s for stop in self._errand.route.stops[:-1])
+        longest_s = _LONGEST * (self._errand.route.length_m / spec.speed_mps + 5.0) + pauses
         while not alone.arrived:
             alone.advance((alone._tick + 1) * TICK_S, ALONE)
             if alone._tick * TICK_S > longest_s:
                 return None, 0.0
-        return alone._arrived_s, alone._walked_m
+        return alone._errand.arrived_s, alone._walked_m
 
 
 def _pair(x: float, y: float) -> FloatArray:

@@ -28,6 +28,7 @@ def run_jobs(
     workers: int | None = None,
     scheduler: str | None = None,
     resume: bool = False,
+    afresh: bool = False,
     progress: bool = False,
     about: Mapping[str, Any] | None = None,
 ) -> tuple[EpisodeRecord, ...]:
@@ -44,6 +45,7 @@ def run_jobs(
         scheduler: a Dask scheduler's address (``"tcp://…"``), or ``"local"`` for a cluster of
             ``workers`` processes on this computer; None does without Dask.
         resume: go on with the same run in ``out_dir``.
+        afresh: replace an unfinished run in ``out_dir`` as well.
         progress: show on the standard error stream what is done and the time left.
         about: command and settings, kept in ``run.json``.
 
@@ -57,7 +59,13 @@ def run_jobs(
     if not jobs:
         raise SimError("jobs must be at least one episode, got none")
     count = cores() if workers is None else finite_number("workers", workers, SimError, minimum=1)
-    folder = RunFolder(Path(out_dir), jobs, resume, {"versions": versions(), **(about or {})})
+    folder = RunFolder(
+        Path(out_dir),
+        jobs,
+        {"versions": versions(), **(about or {})},
+        resume=resume,
+        afresh=afresh,
+    )
     with folder:
         left = [(number, job) for number, job in enumerate(jobs) if number not in folder.done]
         with tqdm(

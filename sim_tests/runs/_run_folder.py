@@ -37,19 +37,27 @@ class RunFolder(Closing):
     Args:
         path: of the folder, made when missing.
         jobs: all episodes of the run.
-        resume: go on with the run that the folder holds.
         about: what ``run.json`` says beside the state: versions, command, settings.
+        resume: go on with the run that the folder holds.
+        afresh: replace an unfinished run.
 
     Attributes:
         done: the records of an earlier part of this run, by the number of their job.
 
     Raises:
         SimError: the folder cannot be written, another process runs into it, it holds other
-            episodes than these (when resuming), or an unfinished run (when not).
+            episodes than these (when resuming), or an unfinished run (when neither resuming nor
+            beginning afresh).
     """
 
     def __init__(
-        self, path: Path, jobs: Sequence[Job], resume: bool, about: Mapping[str, Any]
+        self,
+        path: Path,
+        jobs: Sequence[Job],
+        about: Mapping[str, Any],
+        *,
+        resume: bool = False,
+        afresh: bool = False,
     ) -> None:
         self.path = path
         self._keys = {job_key(job): number for number, job in enumerate(jobs)}
@@ -65,7 +73,8 @@ class RunFolder(Closing):
                 self._check_plan(jobs)
                 self._take_up()
             else:
-                self._refuse_unfinished()
+                if not afresh:
+                    self._refuse_unfinished()
                 self._begin(jobs)
         except OSError as cause:
             self.close()

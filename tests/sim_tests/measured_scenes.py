@@ -42,7 +42,7 @@ def track_at(position, awareness, lower, ident=1, t_s=0.0):
 def crossing(
     times,
     robot,
-    people=(),
+    walks=(),
     *,
     awareness=None,
     tracked=None,
@@ -53,7 +53,7 @@ def crossing(
 ):
     """A result whose frames follow formulas.
 
-    ``robot(t)`` gives x, y, heading, speed; each of ``people``, of t, gives x, y, vx, vy;
+    ``robot(t)`` gives x, y, heading, speed; each of ``walks``, of t, gives x, y, vx, vy;
     ``awareness(t, person)`` the truth, ``tracked(t, person)`` α and lower bound or None.
     """
     frames = []
@@ -61,7 +61,7 @@ def crossing(
         x, y, heading, speed = robot(t)
         outline = footprint_at((x, y), heading)
         views, tracks, separations = [], [], []
-        for index, person in enumerate(people):
+        for index, person in enumerate(walks):
             px, py, vx, vy = person(t)
             true = 0.0 if awareness is None else awareness(t, index)
             views.append(
@@ -112,7 +112,7 @@ def crossing(
         "contact": bool(by),
         "contact_by": blamed,
         "contacts": tuple(contacts),
-        "min_separation_m": min((min(f.separations_m, default=math.inf) for f in frames)),
+        "min_separation_m": min(min(f.separations_m, default=math.inf) for f in frames),
         "time_to_goal_s": frames[-1].t_s if reached else None,
         "max_speed_within_2m_mps": 0.0,
         "min_margin_m": math.inf,

@@ -5,7 +5,8 @@ import pytest
 from sim_tests._bench import Metric, read_baseline, report, write_baseline
 from sim_tests._cli import main
 from sim_tests._errors import SimError
-from sim_tests._tables import ENCOUNTER_COLUMNS, EPISODE_COLUMNS
+from sim_tests._tables import ENCOUNTER_COLUMNS
+from sim_tests.measures._record_row import RECORD_COLUMNS
 
 SHORT = """
 name: short
@@ -22,7 +23,7 @@ def rows(path):
         return list(csv.reader(file))
 
 
-@pytest.mark.parametrize("command", [[], ["demo"], ["crossings"], ["bench"]])
+@pytest.mark.parametrize("command", [[], ["demo"], ["crossings"], ["replay"], ["bench"]])
 def test_help_says_what_a_command_does(command, capsys):
     with pytest.raises(SystemExit) as stop:
         main([*command, "--help"])
@@ -30,8 +31,9 @@ def test_help_says_what_a_command_does(command, capsys):
     text = capsys.readouterr().out
     assert "usage: awarenav" in text
     if command and command != ["bench"]:
-        assert "--seed" in text
         assert "--out" in text
+    if command in (["demo"], ["crossings"]):
+        assert "--seed" in text
 
 
 def test_crossings_write_a_row_an_episode_with_paired_seeds(tmp_path, capsys):
@@ -39,9 +41,13 @@ def test_crossings_write_a_row_an_episode_with_paired_seeds(tmp_path, capsys):
     scenario.write_text(SHORT)
     out = tmp_path / "out"
     arguments = ["crossings", "--scenario", str(scenario), "--episodes", "2", "--seed", "7"]
-    assert main([*arguments, "--out", str(out)]) == 0
+    arguments += ["--workers", "1", "--no-report", "--out", str(out)]
+    assert main(arguments) == 0
+    text = capsys.readouterr().out
+    assert "robot contacts" in text
+    assert "episodes.csv with 4 episodes" in text
     header, *body = rows(out / "episodes.csv")
-    assert tuple(header) == EPISODE_COLUMNS
+    assert tuple(header) == RECORD_COLUMNS
     assert [(row[1], row[2]) for row in body] == [
         ("7", "blind"),
         ("7", "balanced"),
@@ -49,8 +55,24 @@ def test_crossings_write_a_row_an_episode_with_paired_seeds(tmp_path, capsys):
         ("8", "balanced"),
     ]
     first = (out / "episodes.csv").read_bytes()
-    main([*arguments, "--out", str(out)])
+    main([*arguments, "--resume"])
+    main(arguments)
     assert (out / "episodes.csv").read_bytes() == first
+
+
+def test_crossings_that_fail_are_said_and_the_others_are_there(tmp_path, capsys):
+    scenario = tmp_path / "short.yaml"
+    scenario.write_text(SHORT)
+    arguments = ["crossings", "--scenario", str(scenario), "--perception", "truth"]
+    arguments += ["--planner", "run_planners:Raises", "reference", "--policy", "blind"]
+    arguments += ["--fault", "none", "misses_30", "--workers", "1", "--no-report"]
+    assert main([*arguments, "--out", str(tmp_path / "out")]) == 1
+    output = capsys.readouterr()
+    assert "2 of 4 episodes failed; episode 0 (short, seed 0): RuntimeError" in output.err
+    assert "errors.log has the tracebacks" in output.err
+    _, *body = rows(tmp_path / "out" / "episodes.csv")
+    assert [row[3] for row in body] == ["Raises", "SamplingPlanner"] * 2
+    assert [bool(row[-1]) for row in body] == [True, False] * 2
 
 
 @pytest.mark.parametrize(
@@ -59,6 +81,8 @@ def test_crossings_write_a_row_an_episode_with_paired_seeds(tmp_path, capsys):
         (["crossings", "--scenario", "nowhere"], "scenario must be one of"),
         (["crossings", "--policy", "brave"], "preset must be one of"),
         (["crossings", "--policy", "absent.yaml"], "absent.yaml"),
+        (["crossings", "--fault", "ghost"], "did you mean 'ghosts'"),
+        (["crossings", "--planner", "MyPlanner"], "module:Class"),
         (["bench", "--baseline", "{tmp}"], "baseline"),
     ],
 )

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -98,11 +97,19 @@ def test_people_are_delayed_by_what_is_over_their_free_walk():
 
 
 def test_the_reaction_is_that_of_who_came_nearest():
-    people = [walking((5.0, 3.0), (0.0, 0.0)), walking((5.0, 1.0), (0.0, 0.0))]
-    result = crossing(T_S, straight(1.0), people)
+    """Scripted workers come first, then those who react, then replayed ones."""
+    places = [(5.0, 3.0), (5.0, 1.0), (5.0, 2.0)]
+    people = [walking(place, (0.0, 0.0)) for place in places]
     outcomes = (outcome(reaction="wait"), outcome(reaction="hurry"))
-    known = {name: getattr(result, name) for name in result.__slots__}
-    assert measure(SimpleNamespace(**{**known, "people": outcomes})).reaction == "hurry"
+
+    def reaction(scripted, outcomes):
+        result = crossing(T_S, straight(1.0), people, people=outcomes, scripted=scripted)
+        return measure(result).reaction
+
+    assert reaction(0, outcomes) == "hurry"
+    assert reaction(1, outcomes) == "wait"
+    assert reaction(2, outcomes[:1]) == ""  # a scripted worker came nearest
+    assert reaction(0, outcomes[:1]) == ""  # a replayed one
 
 
 def test_the_error_of_awareness_is_over_those_with_a_track():

@@ -3,6 +3,7 @@
 import csv
 import math
 from dataclasses import fields, replace
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -11,8 +12,9 @@ from hypothesis import strategies as st
 from sim_tests import SimError
 from sim_tests._tables import EPISODE_COLUMNS
 from sim_tests.measures._episode_record import EpisodeRecord
+from sim_tests.measures._metric_info import METRIC_BY_NAME
 from sim_tests.measures._record_file import read_record_file, read_records, write_records
-from sim_tests.measures._record_row import RECORD_COLUMNS, record_row, rounded
+from sim_tests.measures._record_row import COLUMN_KINDS, RECORD_COLUMNS, record_row, rounded
 
 numbers = st.none() | st.floats(-1e6, 1e6).map(rounded)
 texts = st.text(st.characters(exclude_categories=("C", "Zl", "Zp")), max_size=20)
@@ -27,7 +29,9 @@ records = st.builds(
     EpisodeRecord, **{field.name: KINDS[field.type] for field in fields(EpisodeRecord)}
 )
 PLAIN = EpisodeRecord("late_glance", 3, "balanced", "SamplingPlanner", "truth", success=True)
-in_one_folder = settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+in_one_folder = settings(
+    max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 
 
 @in_one_folder
@@ -81,6 +85,17 @@ def test_the_columns_of_earlier_tables_come_first_and_alone_suffice(tmp_path):
         writer.writerow(EPISODE_COLUMNS)
         writer.writerow(record_row(PLAIN)[: len(EPISODE_COLUMNS)])
     assert read_records(path) == (PLAIN,)
+
+
+def test_the_documentation_defines_every_column():
+    text = (Path(__file__).parents[2] / "docs" / "metrics.md").read_text(encoding="utf-8")
+    assert [name for name in RECORD_COLUMNS if f"`{name}`" not in text] == []
+
+
+def test_every_number_is_known_to_the_tables():
+    numbers = {name for name, kind in COLUMN_KINDS.items() if kind in ("number", "count")}
+    elsewhere = {"seed", "scenario_version", "contacts", "duration_s", "time_without_people_s"}
+    assert numbers - elsewhere == set(METRIC_BY_NAME)
 
 
 def test_numbers_are_what_files_keep():

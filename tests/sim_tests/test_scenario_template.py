@@ -188,7 +188,7 @@ def test_distributions_belong_to_people_and_robot():
 
 def test_two_people_of_one_name_are_refused():
     twins = {**BASE, "people": BASE["people"] * 2}
-    with pytest.raises(SimError, match="names of their own, got worker twice"):
+    with pytest.raises(SimError, match="must be unique, got worker twice"):
         ScenarioTemplate(twins)
 
 

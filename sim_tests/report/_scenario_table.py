@@ -1,0 +1,128 @@
+"""A row a scenario, the arms side by side under each measure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from ..measures._comparison import Comparison
+from ..measures._episode_record import EpisodeRecord
+from ..measures._summary_row import SummaryRow
+from ._arm import Arm, judged
+from ._figures import Figures, estimate
+from ._measure import MARGIN, TIME_LOST, VIOLATION, Measure
+from ._text import NOTHING, count, number, percent
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """A number: what it is sorted by (None last), how it is written, and its style's classes."""
+
+    sort: float | None
+    text: str
+    classes: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ColumnGroup:
+    """A measure over several columns.
+
+    Attributes:
+        title: of the group.
+        meaning: what the numbers are.
+        columns: look and name of the arm of each column.
+    """
+
+    title: str
+    meaning: str
+    columns: tuple[tuple[int, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ScenarioRow:
+    """One scenario: its name and version, its attention, number of episodes, and the cells."""
+
+    name: str
+    attention: str
+    episodes: int
+    cells: tuple[Cell, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ScenarioTable:
+    """The table; cells of a row run through the columns of all groups."""
+
+    groups: tuple[ColumnGroup, ...]
+    rows: tuple[ScenarioRow, ...]
+
+
+def tabulate(figures: Figures) -> ScenarioTable:
+    """Draw up the table."""
+    arms = figures.shown
+    winners = [arm for arm in judged(arms) if figures.against(arm) is not None]
+    groups = [
+        _group("Robot contacts", "episodes in which the robot moved into a person", arms),
+        _group("Time lost, s", "mean over the empty hall", arms),
+        *([_group("Won back", "of what the reference loses", winners)] if winners else []),
+        _group("Margin violated, s", "mean an episode", arms),
+        _group("Smallest margin, m", "the worst episode", arms),
+    ]
+    attention = {
+        scenario_part(each.record): (each.record.attention, each.record.scenario_version)
+        for arm in arms
+        for each in arm.episodes
+    }
+    rows = []
+    for part in sorted(attention):
+        found = [figures.by_scenario(arm, part) for arm in arms]
+        cells = [
+            *(_contacts(row) for row in found),
+            *(_mean(row, TIME_LOST, 1) for row in found),
+            *(_won_back(figures.against(arm, part, scenario=True)) for arm in winners),
+            *(_mean(row, VIOLATION, 2) for row in found),
+            *(_number(None if row is None else row.worst.get(MARGIN.key), 2) for row in found),
+        ]
+        episodes = sum(row.episodes for row in found if row is not None)
+        rows.append(ScenarioRow(part, attention[part][0], episodes, _ruled(cells, groups)))
+    return ScenarioTable(tuple(groups), tuple(rows))
+
+
+def scenario_part(record: EpisodeRecord) -> str:
+    """A scenario as the summary names it."""
+    version = "" if record.scenario_version == 1 else f" v{record.scenario_version}"
+    return record.scenario + version
+
+
+def _group(title: str, meaning: str, arms: Sequence[Arm]) -> ColumnGroup:
+    return ColumnGroup(title, meaning, tuple((arm.look, arm.name) for arm in arms))
+
+
+def _contacts(row: SummaryRow | None) -> Cell:
+    if row is None or not row.robot_contact.n:
+        return Cell(None, NOTHING)
+    hits = round(row.robot_contact.value * row.robot_contact.n)
+    return Cell(hits, count(hits), "bad" if hits else "")
+
+
+def _mean(row: SummaryRow | None, measure: Measure, decimals: int) -> Cell:
+    mean = estimate(row, measure)
+    return _number(mean.value if mean.known else None, decimals)
+
+
+def _won_back(against: Comparison | None) -> Cell:
+    if against is None or not against.won_back.known:
+        return Cell(None, NOTHING)
+    return Cell(round(against.won_back.value, 6), percent(against.won_back.value, 0))
+
+
+def _number(value: float | None, decimals: int) -> Cell:
+    return Cell(None if value is None else round(value, 6), number(value, decimals))
+
+
+def _ruled(cells: Sequence[Cell], groups: Sequence[ColumnGroup]) -> tuple[Cell, ...]:
+    """The cells with a rule before each group."""
+    firsts = {sum(len(group.columns) for group in groups[:i]) for i in range(len(groups))}
+    return tuple(
+        replace(cell, classes=f"{cell.classes} first".strip()) if place in firsts else cell
+        for place, cell in enumerate(cells)
+    )
