@@ -16,6 +16,7 @@ from .._scenario import Scenario
 from .._scenario_template import ScenarioTemplate
 from ..measures._episode_record import EpisodeRecord
 from ..runs._job import Job
+from ..runs._planner_choice import make_planner
 from ..search._crew import Crew
 from ..search._file_lock import FileLock
 from ..search._outcome import Outcome
@@ -75,6 +76,8 @@ def falsify(
     templates = [ScenarioTemplate.from_text(text) for text in settings.scenarios]
     spaces = {each.name: PeopleSpace(each, settings.people) for each in templates}
     budget = _budget(settings, len(spaces))
+    if settings.planner:
+        make_planner(settings.planner, templates[0].median())  # says at once what is wrong with it
     keep_settings(settings, folder, SETTINGS_FILE, "falsification", resume=resume)
     with FileLock(folder / "locks" / "folder.lock", wait=False) as lock:
         if not lock.held:

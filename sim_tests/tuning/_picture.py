@@ -49,12 +49,18 @@ def _front(axes: Axes, tuning: Tuning) -> None:
             ]
         )
         if points.size:
-            axes.scatter(
-                points[:, 0], points[:, 1], c=colour, marker=marker, s=26, label=label
-            )
+            axes.scatter(points[:, 0], points[:, 1], c=colour, marker=marker, s=26, label=label)
     if tuning.front:
         line = np.array([trial.values for trial in tuning.front])
-        axes.plot(line[:, 0], line[:, 1], color=_FRONT, drawstyle="steps-post", marker="o", ms=5, label="front")
+        axes.plot(
+            line[:, 0],
+            line[:, 1],
+            color=_FRONT,
+            drawstyle="steps-post",
+            marker="o",
+            ms=5,
+            label="front",
+        )
     for anchor in tuning.anchors:
         x, y = anchor.tuning.objectives
         colour = _CONTACT if anchor.tuning.robot_contacts else _ANCHOR

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, cast
@@ -16,6 +16,7 @@ from nav_adapter import AwarenessPolicy
 
 from .._errors import SimError
 from .._scenario_template import ScenarioTemplate
+from ..runs._plan import plan_jobs
 from ..search._crew import Crew
 from ..search._optuna import optuna
 from ..search._outcome import Outcome
@@ -109,15 +110,20 @@ def tune(
         objectives=2,
         first=[space.base_parameters()],
     )
-    for text in settings.scenarios:
-        ScenarioTemplate.from_text(text)
-    keep_settings(settings, folder, "tune.json", "tuning", resume=resume, may_grow=["trials"])
+    plan_jobs(  # says at once what cannot be run
+        [ScenarioTemplate.from_text(text) for text in settings.scenarios],
+        [(settings.policy_name, base)],
+        settings.tuning_seeds,
+        planners=[settings.planner],
+        perception=settings.perception,
+    )
     anchors = {settings.policy_name: base}
     for name in PRESETS:
         preset = AwarenessPolicy.preset(name)
         if name in anchors and anchors[name] != preset:
             raise SimError(f"a policy of your own needs a name of its own, got {name!r}")
         anchors[name] = preset
+    keep_settings(settings, folder, "tune.json", "tuning", resume=resume, may_grow=["trials"])
     episodes = settings.episodes * len(settings.scenarios)
     with (
         TrialBook(folder, "tune", search, settings.trials) as book,
@@ -141,7 +147,7 @@ def tune(
         bar.update(book.finished - bar.n)
         bar.set_postfix_str("held-out seeds")
         trials = book.finished_trials()
-        best = _front(trials)
+        best = feasible_front(trials)
         held = settings.held_out_seeds
 
         def anchor(name: str, policy: AwarenessPolicy) -> Candidate:
@@ -185,7 +191,10 @@ def _tried(ticket: Ticket, space: PolicySpace, judge: Judge, settings: TuneSetti
     )
 
 
-def _front(trials: list[optuna.trial.FrozenTrial]) -> list[optuna.trial.FrozenTrial]:
+def feasible_front(
+    trials: Sequence[optuna.trial.FrozenTrial],
+) -> list[optuna.trial.FrozenTrial]:
+    """The trials on the front, by time lost, of those that keep every constraint."""
     good = [
         trial
         for trial in trials
