@@ -14,7 +14,7 @@ from ..search._optuna import optuna
 from ..search._outcome import Outcome
 from ..search._range import Range
 from ..search._search import Parameters, Search
-from ..search._trial_book import TrialBook
+from ..search._trial_book import NOTES, TrialBook
 
 # A round ends after so many generations whose last few brought less than this.
 _LEAST_GENERATIONS: Final = 8
@@ -127,7 +127,12 @@ class Hunt:
 
     def _find(self, number: int, trial: optuna.trial.FrozenTrial) -> Find:
         return Find(
-            self.name, number, trial.number, dict(trial.params), trial.values[0], trial.user_attrs
+            self.name,
+            number,
+            trial.number,
+            dict(trial.params),
+            trial.values[0],
+            trial.user_attrs.get(NOTES, {}),
         )
 
 

@@ -34,7 +34,12 @@ def draw_falsification(
     grid = figure.add_gridspec(2, _PANELS, height_ratios=(1.0, 1.2))
     _course(figure.add_subplot(grid[0, :]), falsification)
     for column, case in enumerate(cases[:_PANELS]):
-        _plan(figure.add_subplot(grid[1, column]), case)
+        axes = figure.add_subplot(grid[1, column])
+        _plan(axes, case)
+        if column == 0:
+            axes.plot([], [], color=_ROBOT, label="robot")
+            axes.plot([], [], color=_PERSON, label="person, gaze red")
+            axes.legend(loc="lower left", fontsize=8)
     save_figure(figure, path)
 
 
@@ -131,9 +136,12 @@ def _plan(axes: Axes, case: WorstCase) -> None:
     record = case.record
     touched = f", {record.contact_by} touched" if record.contact_by else ""
     margin = "none" if record.min_margin_m is None else f"{record.min_margin_m:.2f} m"
+    speed_mps = frame.robot_state.speed_mps
+    if case.result.contacts:
+        speed_mps = case.result.contacts[0].robot_speed_mps
     axes.set_title(
         f"{case.path.stem}: {case.find.scenario.replace('_', ' ')}\nmargin {margin}"
-        f"{touched}, at {frame.t_s:.1f} s, robot {frame.robot_state.speed_mps:.2f} m/s",
+        f"{touched}, at {frame.t_s:.1f} s, robot {speed_mps:.2f} m/s",
         fontsize=9,
         loc="left",
     )

@@ -58,15 +58,23 @@ class WorstCase:
         )
 
 
-def worst_finds(falsification: Falsification, most: int) -> list[Find]:
-    """The lowest scores, one for each kind of case: others of its scenario differ in a lever."""
+def worst_finds(
+    finds: Sequence[Find], ranges: Mapping[str, Mapping[str, Range]], most: int
+) -> list[Find]:
+    """The lowest scores, one for each kind of case: others of its scenario differ in a lever.
+
+    Args:
+        finds: to choose from.
+        ranges: of each scenario's levers.
+        most: how many.
+    """
     kept: list[Find] = []
-    for find in sorted(falsification.finds, key=lambda each: each.score):
+    for find in sorted(finds, key=lambda each: each.score):
         if len(kept) == most or find.score >= NOTHING:
             break
-        ranges = falsification.spaces[find.scenario].ranges
         if all(
-            other.scenario != find.scenario or _difference(find, other, ranges) >= _APART
+            other.scenario != find.scenario
+            or _difference(find, other, ranges[find.scenario]) >= _APART
             for other in kept
         ):
             kept.append(find)
@@ -80,7 +88,8 @@ def write_worst(falsification: Falsification, folder: Path, most: int) -> list[W
     for old in folder.glob("worst_*.yaml"):
         old.unlink()
     cases = []
-    for number, find in enumerate(worst_finds(falsification, most), start=1):
+    ranges = {name: space.ranges for name, space in falsification.spaces.items()}
+    for number, find in enumerate(worst_finds(falsification.finds, ranges, most), start=1):
         scenario = falsification.spaces[find.scenario].scenario(find.parameters)
         name = f"{find.scenario}_worst_{number:03d}"
         scenario = scenario.model_copy(

@@ -1,4 +1,4 @@
-"""The one place that imports Optuna."""
+"""The one place that imports Optuna and SQLAlchemy, which Optuna brings."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from .._errors import SimError
 try:
     import cmaes  # noqa: F401 - the sampler imports it only when it samples
     import optuna
+    from sqlalchemy import event
 except ImportError as cause:  # pragma: no cover - depends on the installation
     raise SimError(
         "tuning and falsification need optuna and cmaes, of which one is not installed; both are "
@@ -15,4 +16,4 @@ except ImportError as cause:  # pragma: no cover - depends on the installation
 
 optuna.logging.set_verbosity(optuna.logging.WARNING)
 
-__all__ = ["optuna"]
+__all__ = ["event", "optuna"]

@@ -11,6 +11,7 @@ from .._scenario_template import ScenarioTemplate
 from .._tables import number_text
 from ..measures._interval import Interval
 from ..runs._plan import policy_text
+from ..search._trial_book import NOTES
 from ._evaluation import OBJECTIVES
 from ._importance import importances
 from ._tune import Candidate, Tuning
@@ -78,7 +79,7 @@ def _write_trials(tuning: Tuning, path: Path) -> None:
                     trial.number,
                     trial.state.name.lower(),
                     *map(number_text, trial.values or [None, None]),
-                    *(trial.user_attrs.get(note, "") for note in notes),
+                    *(trial.user_attrs.get(NOTES, {}).get(note, "") for note in notes),
                     str(trial.number in front).lower(),
                     *(repr(trial.params[name]) for name in names),
                 ]

@@ -23,7 +23,7 @@ from ..search._outcome import Outcome
 from ..search._search import Method, Search
 from ..search._settings_file import keep_settings
 from ..search._ticket import Ticket
-from ..search._trial_book import TrialBook
+from ..search._trial_book import NOTES, TrialBook
 from ._evaluation import Evaluation
 from ._front import front, knee
 from ._judge import Judge
@@ -230,5 +230,5 @@ def _chosen(
 def require_trials(tuning: Tuning) -> None:
     """Raise SimError when no trial could be judged."""
     if not any(trial.state == optuna.trial.TrialState.COMPLETE for trial in tuning.trials):
-        first = next(iter(tuning.trials)).user_attrs.get("error", "")
+        first = next(iter(tuning.trials)).user_attrs.get(NOTES, {}).get("error", "")
         raise SimError(f"no trial could be judged; the first said: {first}")
