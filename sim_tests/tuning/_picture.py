@@ -23,6 +23,7 @@ _CONTACT: Final = "#b3261e"
 _ANCHOR: Final = "#d9822b"
 _CHOSEN: Final = "#2e7d4f"
 _BARS: Final = 8
+_MARKERS: Final = ("D", "s", "^", "v", "P")
 
 
 def draw_tuning(tuning: Tuning, importance: Mapping[str, Mapping[str, float]], path: Path) -> None:
@@ -61,14 +62,10 @@ def _front(axes: Axes, tuning: Tuning) -> None:
             ms=5,
             label="front",
         )
-    for anchor in tuning.anchors:
+    for anchor, marker in zip(tuning.anchors, _MARKERS, strict=False):
         x, y = anchor.tuning.objectives
         colour = _CONTACT if anchor.tuning.robot_contacts else _ANCHOR
-        axes.scatter([x], [y], marker="D", s=52, c=colour, zorder=3)
-        axes.annotate(
-            anchor.name, (x, y), xytext=(7, 7), textcoords="offset points", color="#8a4b0f"
-        )
-    axes.scatter([], [], marker="D", c=_ANCHOR, label="presets and base")
+        axes.scatter([x], [y], marker=marker, s=60, c=colour, zorder=3, label=anchor.name)
     places: dict[tuple[float, float], list[str]] = {}
     for chosen in tuning.chosen:
         places.setdefault(chosen.tuning.objectives, []).append(chosen.name.replace("_", " "))

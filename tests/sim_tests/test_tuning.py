@@ -3,6 +3,9 @@ from __future__ import annotations
 import itertools
 import json
 import math
+import subprocess
+import sys
+import time
 
 import pytest
 import yaml
@@ -199,13 +202,20 @@ _TUNE = [
 
 
 @pytest.mark.slow
-def test_a_tuning_writes_its_files_and_any_number_of_workers_the_same(tmp_path, capsys):
+def test_a_tuning_writes_its_files_and_killed_with_two_workers_the_same(tmp_path, capsys):
     one, two = tmp_path / "one", tmp_path / "two"
     assert main([*_TUNE, "--out", str(one)]) == 0
     printed = capsys.readouterr().out
     for name in (*_PRESETS, "least_time_lost", "knee", "least_violation"):
         assert f"\n{name}" in printed
-    assert main([*_TUNE, "--out", str(two), "--workers", "2"]) == 0
+    command = [sys.executable, "-m", "sim_tests._cli", *_TUNE, "--out", str(two)]
+    with subprocess.Popen([*command, "--workers", "2"]) as killed:
+        while killed.poll() is None and not (two / "evaluations" / "trial_0001-0-0.csv").exists():
+            time.sleep(0.05)
+        killed.kill()
+    assert killed.returncode == -9
+    assert main([*_TUNE, "--out", str(two), "--resume"]) == 0
+    capsys.readouterr()
     for name in ("trials.csv", "chosen.json", "importances.json"):
         assert (one / name).read_bytes() == (two / name).read_bytes()
     assert (one / "pareto.png").read_bytes()[:4] == b"\x89PNG"
