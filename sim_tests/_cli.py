@@ -16,6 +16,7 @@ from ._errors import SimError
 from .bridge._command import add_parser as add_bridge_parser
 from .catalogue._command import add_parser as add_scenario_parser
 from .estimates._command import add_parsers as add_estimate_parsers
+from .falsify._command import add_parser as add_falsify_parser
 from .measures._command import add_parser as add_compare_parser
 from .models._command import add_parser as add_models_parser
 from .policies._command import add_parser as add_policy_parser
@@ -23,6 +24,7 @@ from .report._command import add_parser as add_report_parser
 from .runs._command import add_parsers as add_run_parsers
 from .sets._command import add_parser as add_render_parser
 from .tracks._command import add_parser as add_tracks_parser
+from .tuning._command import add_parser as add_tune_parser
 
 # What the extra "sim" installs.
 _SIMULATOR_MODULES = ("av", "matplotlib", "pybullet")
@@ -90,6 +92,8 @@ def _parser() -> argparse.ArgumentParser:
     add_policy_parser(commands)
     add_scenario_parser(commands)
     add_bridge_parser(commands)
+    add_tune_parser(commands)
+    add_falsify_parser(commands)
     add_report_parser(commands)
     add_compare_parser(commands)
 

@@ -1,0 +1,1 @@
+"""Falsification: the people, within human limits, who come nearest to harm."""

@@ -1,0 +1,19 @@
+"""The one place that imports Optuna and SQLAlchemy, which Optuna brings."""
+
+from __future__ import annotations
+
+from .._errors import SimError
+
+try:
+    import cmaes  # noqa: F401 - the sampler imports it only when it samples
+    import optuna
+    from sqlalchemy import event
+except ImportError as cause:  # pragma: no cover - depends on the installation
+    raise SimError(
+        "tuning and falsification need optuna and cmaes, of which one is not installed; both are "
+        "part of the extra 'bench': pip install 'awarenav[bench]'"
+    ) from cause
+
+optuna.logging.set_verbosity(optuna.logging.WARNING)
+
+__all__ = ["event", "optuna"]

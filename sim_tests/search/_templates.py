@@ -1,0 +1,30 @@
+"""The scenarios that a search goes through."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from .._errors import SimError
+from .._scenario_template import ScenarioTemplate, shipped_templates
+
+
+def named_templates(names: Sequence[str]) -> tuple[ScenarioTemplate, ...]:
+    """The scenarios of names and YAML files; ``all`` stands for the shipped ones with a planner.
+
+    Raises:
+        SimError: for an unknown name, an unusable file, or two scenarios of one name.
+    """
+    found: dict[str, ScenarioTemplate] = {}
+    for name in names:
+        if name == "all":
+            chosen = tuple(
+                each
+                for each in shipped_templates()
+                if each.median().robot.straight_on_speed_mps is None
+            )
+        else:
+            chosen = (ScenarioTemplate.named(name),)
+        for template in chosen:
+            if found.setdefault(template.name, template) != template:
+                raise SimError(f"two scenarios are called {template.name!r}; give them other names")
+    return tuple(found.values())

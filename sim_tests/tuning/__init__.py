@@ -1,0 +1,1 @@
+"""Tuning of policies: time lost against the separation margin, without contacts."""

@@ -1,0 +1,60 @@
+"""``awarenav tune`` from its options to its last line."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from nav_adapter import AwarenessPolicy
+
+from ..policies._show import read_policy
+from ..runs._plan import policy_text
+from ..search._templates import named_templates
+from ._files import table_lines, write_tuning
+from ._policy_space import read_ranges, shipped_ranges
+from ._settings import TuneSettings
+from ._tune import Tuning, require_trials, tune
+
+
+def tune_command(options: argparse.Namespace) -> int:
+    """Run the command and return its exit status.
+
+    Raises:
+        SimError: for options that cannot be used.
+        NavError: for a policy that cannot be used.
+    """
+    policy: AwarenessPolicy = read_policy(options.policy)
+    ranges = shipped_ranges() if options.ranges is None else read_ranges(options.ranges)
+    settings = TuneSettings(
+        policy_name=Path(options.policy).stem,
+        policy=policy_text(policy),
+        scenarios=tuple(template.to_text() for template in named_templates(options.scenario)),
+        ranges={path: each.model_dump(mode="json") for path, each in ranges.items()},
+        trials=options.trials,
+        episodes=options.episodes,
+        held_out=options.held_out,
+        perception=options.perception,
+        planner=options.planner,
+        seed=options.seed,
+        sampler=options.sampler,
+        generation=options.generation,
+    )
+
+    def report(tuning: Tuning) -> None:
+        require_trials(tuning)
+        write_tuning(tuning, options.out)
+        print("\n".join(table_lines(tuning)))
+        print("\n".join(_verdict(tuning)))
+
+    tune(settings, options.out, workers=options.workers, resume=options.resume, report=report)
+    print(f"Written to {options.out}")
+    return 0
+
+
+def _verdict(tuning: Tuning) -> list[str]:
+    base = tuning.settings.policy_name
+    if not tuning.front:
+        return ["In every trial the robot moved into a person at least once: none was chosen."]
+    if any(each.name == "beats_base" for each in tuning.chosen):
+        return [f"beats_base is at least as good as {base} in both objectives on the tuning seeds."]
+    return [f"No trial is at least as good as {base} in both objectives: it lies on the front."]
