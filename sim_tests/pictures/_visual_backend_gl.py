@@ -260,7 +260,8 @@ def _start(process: int) -> tuple[Any, Any]:
             "'sim': pip install 'awarenav[sim]', or use renderer='tiny'"
         ) from cause
     try:
-        context = moderngl.create_context(standalone=True, backend="egl", require=330)
+        backend: Any = "egl"  # typed as a mapping of settings there, and a name in its examples
+        context = moderngl.create_context(standalone=True, backend=backend, require=330)
         return context, context.program(_VERTEX_SHADER, _FRAGMENT_SHADER)
     except Exception as cause:  # of whatever kind the driver's loader raises
         raise SimError(
