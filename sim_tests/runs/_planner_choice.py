@@ -43,7 +43,7 @@ def make_planner(planner: str, scenario: Scenario) -> LocalPlanner | None:
     if not planner:
         return None
     make, wants_boxes = _maker(planner)
-    boxes = {_BOXES: scenario.layout.obstacle_boxes_odom} if wants_boxes else {}
+    boxes = {_BOXES: scenario.planner_boxes_odom_m} if wants_boxes else {}
     made = make(NOVA_CARTER, **boxes)
     if not callable(getattr(made, "plan", None)):
         raise SimError(
