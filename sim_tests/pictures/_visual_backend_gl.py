@@ -64,8 +64,6 @@ void main() {
 _STAND_IN_M: Final = 0.01
 # Buffers are cleared with ones, so a body's mark is its number and two more.
 _FIRST_MARK: Final = 2
-# Sizes of pictures for which buffers are kept.
-_MOST_TARGETS: Final = 8
 
 
 class _Shape:
@@ -99,7 +97,7 @@ class GlBackend:
         # What each body shows, by link (−1: base).
         self._bodies: dict[int, list[tuple[int, _Shape]]] = {}
         self._hidden: set[int] = set()
-        self._targets: dict[tuple[int, int], Any] = {}
+        self._target: Any = None
 
     def close(self) -> None:
         """End the client and give back what the pictures were drawn from."""
@@ -113,8 +111,8 @@ class GlBackend:
                     buffer.release()
             for texture in self._textures:
                 texture.release()
-            for target in self._targets.values():
-                _release_target(target)
+            if self._target is not None:
+                _release_target(self._target)
 
     def texture(self, rgb: NDArray[np.uint8]) -> int:
         """Register a picture (H, W, 3)."""
@@ -160,14 +158,16 @@ class GlBackend:
         towards = np.asarray(light.direction_odom, dtype=np.float64)
         with self._context:
             target = self._target_of(view.width, view.height)
+            part = (0, 0, view.width, view.height)
             target.use()
+            target.viewport = part
             self._context.enable(self._context.DEPTH_TEST)
-            target.clear(1.0, 1.0, 1.0, 1.0)
+            target.clear(1.0, 1.0, 1.0, 1.0, viewport=part)
             program = self._program
             program["lamp"].value = tuple((towards / float(np.linalg.norm(towards))).tolist())
             program["strength"].value = (light.ambient, light.diffuse)
             self._draw_bodies(_clip_odom(view))
-            return _read(target, view)
+            return _read(target, part)
 
     def _draw_bodies(self, clip_odom: FloatArray) -> None:
         """Draw every body that is not hidden where PyBullet has it."""
@@ -224,19 +224,21 @@ class GlBackend:
         return texture
 
     def _target_of(self, width: int, height: int) -> Any:
-        """What to draw into; made anew only for another size."""
-        size = (width, height)
-        if size not in self._targets:
-            if len(self._targets) >= _MOST_TARGETS:
-                _release_target(self._targets.pop(next(iter(self._targets))))
-            self._targets[size] = self._context.framebuffer(
+        """What to draw into, at least so large; it grows with the pictures asked for."""
+        target = self._target
+        if target is None or target.width < width or target.height < height:
+            if target is not None:
+                width, height = max(width, target.width), max(height, target.height)
+                _release_target(target)
+            target = self._context.framebuffer(
                 [
-                    self._context.renderbuffer(size, 4),
-                    self._context.renderbuffer(size, 2, dtype="f4"),
+                    self._context.renderbuffer((width, height), 4),
+                    self._context.renderbuffer((width, height), 2, dtype="f4"),
                 ],
-                self._context.depth_renderbuffer(size),
+                self._context.depth_renderbuffer((width, height)),
             )
-        return self._targets[size]
+            self._target = target
+        return target
 
 
 @lru_cache(maxsize=1)
@@ -260,8 +262,8 @@ def _start(process: int) -> tuple[Any, Any]:
             "'sim': pip install 'awarenav[sim]', or use renderer='tiny'"
         ) from cause
     try:
-        backend: Any = "egl"  # typed as a mapping of settings there, and a name in its examples
-        context = moderngl.create_context(standalone=True, backend=backend, require=330)
+        where: dict[str, Any] = {"backend": "egl"}
+        context = moderngl.create_context(standalone=True, require=330, **where)
         return context, context.program(_VERTEX_SHADER, _FRAGMENT_SHADER)
     except Exception as cause:  # of whatever kind the driver's loader raises
         raise SimError(
@@ -277,10 +279,12 @@ def _clip_odom(view: View) -> FloatArray:
     return np.asarray(projection @ np.array(view.view_matrix()).reshape(4, 4).T)
 
 
-def _read(target: Any, view: View) -> Drawing:
-    size = (view.height, view.width)
-    rgba = np.frombuffer(target.read(components=4, attachment=0), dtype=np.uint8)
-    data = np.frombuffer(target.read(components=2, attachment=1, dtype="f4"), dtype=np.float32)
+def _read(target: Any, part: tuple[int, int, int, int]) -> Drawing:
+    size = (part[3], part[2])
+    rgba = np.frombuffer(target.read(part, components=4, attachment=0), dtype=np.uint8)
+    data = np.frombuffer(
+        target.read(part, components=2, attachment=1, dtype="f4"), dtype=np.float32
+    )
     depth, mark = data.reshape(*size, 2)[..., 0], data.reshape(*size, 2)[..., 1]
     body_ids = mark.astype(np.int32) - _FIRST_MARK
     depth_m = depth.astype(np.float64)
