@@ -1,6 +1,6 @@
 """Measures what many episodes cost: processor time, memory, storage, and what workers gain.
 
-    python benchmarks/runs_scale.py [--episodes 4] [--pixels] [--dask]
+    python -m benchmarks.runs_scale [--episodes 4] [--pixels] [--dask]
 
 Prints a Markdown table and a plan for a million episodes; docs/scale.md holds the figures of a
 quiet computer. Cost is processor time of one process, so that a busy computer changes little; what
@@ -43,7 +43,15 @@ def main() -> int:
     print("| perception | CPU s an episode | x real time | memory of a worker | 10⁶ episodes |")
     print("| --- | --- | --- | --- | --- |")
     for kind in kinds:
-        command = [sys.executable, __file__, "--of", kind, "--episodes", str(options.episodes)]
+        command = [
+            sys.executable,
+            "-m",
+            "benchmarks.runs_scale",
+            "--of",
+            kind,
+            "--episodes",
+            str(options.episodes),
+        ]
         cost_s, simulated_s, peak_mb = map(
             float,
             subprocess.run(command, check=True, capture_output=True, text=True).stdout.split(),
