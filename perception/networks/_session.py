@@ -11,11 +11,11 @@ from time import perf_counter, thread_time
 from typing import Any, Final
 
 import numpy as np
-import onnxruntime as ort  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from .._errors import PerceptionError
 from .._network_time import NETWORK_TIME
+from ._onnxruntime import ort
 
 _PROVIDERS: Final[dict[str, str]] = {
     "cpu": "CPUExecutionProvider",
