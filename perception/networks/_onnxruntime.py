@@ -11,6 +11,6 @@ import os
 
 os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
 
-import onnxruntime as ort  # type: ignore[import-untyped]  # noqa: E402 - reads the variable
+import onnxruntime as ort  # type: ignore[import-untyped]
 
 __all__ = ["ort"]
