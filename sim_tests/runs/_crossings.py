@@ -48,6 +48,7 @@ def crossings_command(options: argparse.Namespace) -> int:
         options.out,
         workers=options.workers,
         scheduler=options.scheduler,
+        time_limit_s=options.time_limit,
         resume=options.resume,
         progress=True,
         about=_about(options),
