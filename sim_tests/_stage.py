@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
 
@@ -15,7 +15,7 @@ from perception.arrays import FloatArray
 
 from ._bullet import pybullet
 from ._closing import Closing
-from ._metrics import SafetyMeter
+from ._metrics import STANDING_SPEED_MPS, SafetyMeter
 from ._scenario import Scenario
 from ._sight import sees
 from ._warehouse import Warehouse
@@ -37,6 +37,8 @@ _NEARER_THAN_BOUND_M: Final = 0.45
 # in the last control cycle; nobody closes it within one.
 _TOUCH_WITHIN_M: Final = 0.8
 _BODY_UPDATE_HZ: Final = 60.0
+# A body that moves deeper than this into the robot in one update is held.
+_DEEPER_M: Final = 0.002
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,6 +121,7 @@ class Stage(Closing):
         steps = 1.0 / (_BODY_UPDATE_HZ * self.warehouse.physics_dt_s)
         self._steps_per_body_update = max(round(steps), 1)
         self._close = [False] * len(self.workers)
+        self._held = [False] * len(self.workers)
         self._velocity_mps: FloatArray | None = None
         self._place_workers()
 
@@ -150,6 +153,8 @@ class Stage(Closing):
             came = now
             if earlier is not None and earlier @ earlier > now @ now:
                 came = earlier
+            if abs(self.amr.driven_speed_mps) <= STANDING_SPEED_MPS:
+                came = np.zeros(2)  # it stands: what moves it is who walks into it
             for index, close in enumerate(self._close):
                 if close:
                     self._look_for_contact(index, came, meter)
@@ -226,21 +231,31 @@ class Stage(Closing):
                 movers[:index] + movers[index + 1 :],
                 partial(self._sees_robot, worker),
             )
-            motion = actor.motion(self.t_s, around)
-            worker.place(
-                motion.position_odom_m,
-                motion.heading_odom_rad,
-                motion.walked_m,
-                math.hypot(*motion.velocity_odom_mps.tolist()),
-                motion.head_yaw_rad,
-                motion.head_pitch_rad,
-                eye_yaw_rad=motion.eye_yaw_rad,
-                eye_pitch_rad=motion.eye_pitch_rad,
-                activity=motion.activity,
-                feet=motion.feet,
-            )
-            motions.append(motion)
+            motions.append(self._put(index, worker, actor.motion(self.t_s, around)))
         self._motions = tuple(motions)
+
+    def _put(self, index: int, worker: Worker, motion: PersonMotion) -> PersonMotion:
+        """Pose a body; one that would move into the robot stays where it was.
+
+        Nothing moves a posed body, so one put into the robot would throw it over.
+        """
+        before = self._motions[index] if self._motions and self._close[index] else None
+        depth_m = 0.0 if before is None else self._depth_m(worker)
+        _pose(worker, motion)
+        self._held[index] = False
+        if before is None or self._depth_m(worker) < depth_m + _DEEPER_M:
+            return motion
+        _pose(worker, before)
+        self._held[index] = True
+        self._cast[index].hold()
+        return replace(before, velocity_odom_mps=np.zeros(2))
+
+    def _depth_m(self, worker: Worker) -> float:
+        """How far body and robot reach into each other, 0 when apart."""
+        pairs = pybullet.getClosestPoints(
+            self.amr.body, worker.body, 0.0, physicsClientId=self.warehouse.client
+        )
+        return -min((float(pair[8]) for pair in pairs), default=0.0)
 
     def _robot_body(self) -> RobotBody:
         x, y = self.amr.T_odom_base[:2, 3].tolist()
@@ -304,9 +319,24 @@ class Stage(Closing):
         touching = pybullet.getContactPoints(
             self.amr.body, self.workers[index].body, physicsClientId=self.warehouse.client
         )
-        if any(point[8] <= 0.0 for point in touching):
+        if self._held[index] or any(point[8] <= 0.0 for point in touching):
             _, towards = self._separation(index)
             meter.touch(self.t_s, index, robot_velocity_mps, towards)
             self._cast[index].touch(*(-towards).tolist())
         else:
             meter.release(index)
+
+
+def _pose(worker: Worker, motion: PersonMotion) -> None:
+    worker.place(
+        motion.position_odom_m,
+        motion.heading_odom_rad,
+        motion.walked_m,
+        math.hypot(*motion.velocity_odom_mps.tolist()),
+        motion.head_yaw_rad,
+        motion.head_pitch_rad,
+        eye_yaw_rad=motion.eye_yaw_rad,
+        eye_pitch_rad=motion.eye_pitch_rad,
+        activity=motion.activity,
+        feet=motion.feet,
+    )

@@ -71,6 +71,8 @@ class Errand:
             if t_s < self._resumes_s - 1e-9:
                 return False
             self._resumes_s = None
+            # On from the stop itself, also where the way leads back over itself.
+            self._along_m = self.route.stops[self._stop].at_m
             self._stop += 1
         stop = self.route.stops[self._stop]
         self._along_m = self.route.progress(self._along_m, x, y, stop.at_m)

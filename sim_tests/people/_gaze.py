@@ -86,7 +86,7 @@ class Gaze:
         t_s: float,
         dt_s: float,
         place: tuple[float, float, float],
-        robot: RobotBody | None,
+        robot: RobotBody,
         sees: bool,
     ) -> None:
         """Decide what to look at for the next ``dt_s`` and set head and eyes in motion.
@@ -101,9 +101,9 @@ class Gaze:
         yaw, pitch, eye_yaw, eye_pitch = self.at(dt_s)
         self._head, self._eyes = (yaw, pitch), (eye_yaw, eye_pitch)
         self.makes_out = sees
-        self.looking = robot is not None and self._decide(t_s, sees)
+        self.looking = self._decide(t_s, sees)
         target = self._away
-        if self.looking and robot is not None:
+        if self.looking:
             target = self._towards(place, robot)
             off = (target[0] - yaw - eye_yaw, target[1] - pitch - eye_pitch)
             if self.noticed_s is None and math.hypot(*off) < _ON_TARGET_RAD:

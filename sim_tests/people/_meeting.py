@@ -23,12 +23,17 @@ _DECIDING_S: Final = 0.3
 _OVER_S: Final = 3.0
 _FAR_M: Final = 6.0
 _MOVING_MPS: Final = 0.08
+# A robot this slow seems to wait itself.
+_CRAWLING_MPS: Final = 0.25
 # Who lets a robot pass keeps this far from the line that its middle follows, and waits for one that
-# stands, or cannot be seen, no longer than this.
+# waits itself no longer than some seconds, nor for any other for ever.
 _ASIDE_M: Final = 1.1
 _PATIENCE_S: Final = 3.0
-_LONGEST_WAIT_S: Final = 20.0
-_ALONG_SINE: Final = 0.35
+_LONGEST_WAIT_S: Final = 15.0
+_APPROACH_HZ: Final = 2.5
+# Two who walk along the same line meet head on; behind or beside such a robot leads the way aside.
+_HEAD_ON_SINE: Final = 0.35
+_LEAST_ONWARD: Final = 0.3
 _PASSED_M: Final = 0.35
 _STOPPING_MPS2: Final = 1.2
 _SIDE_STEP_MPS: Final = 0.7
@@ -78,6 +83,7 @@ class Meeting:
         # The reaction has done its part; the robot has been met.
         self._settled = False
         self._passed = False
+        self._head_on = False
 
     @property
     def goes_first(self) -> bool:
@@ -139,6 +145,8 @@ class Meeting:
         if abs(side) < 0.1:
             side = onward if abs(onward) > 0.1 else 1.0
         self._side = math.copysign(1.0, side)
+        across = self._line[0] * intent.y - self._line[1] * intent.x
+        self._head_on = abs(across) < _HEAD_ON_SINE
 
     def _carried_out(
         self,
@@ -157,7 +165,8 @@ class Meeting:
         ahead = dx * ux + dy * uy
         side = ux * dy - uy * dx
         crossed = side * self._side < -_ASIDE_M
-        self._stood_s = 0.0 if moves else self._stood_s + dt_s
+        slow = math.hypot(robot.vx_mps, robot.vy_mps) < _CRAWLING_MPS
+        self._stood_s = max(self._stood_s + (dt_s if slow else -dt_s), 0.0)
         if ahead < -robot.half_length_m - _PASSED_M or crossed:
             self._settled = self._passed = True
         if self.reaction in ("wait", "pass_behind") or standing:
@@ -166,30 +175,42 @@ class Meeting:
             self._settled = self._settled or self._stood_s > _PATIENCE_S or late
         if self._settled or self.reaction == "walk_on" or (standing and self.reaction == "claim"):
             return intent
-        # Behind a robot that comes straight on one gets by stepping aside.
-        along = abs(ux * intent.y - uy * intent.x) < _ALONG_SINE
-        if self.reaction == "wait" or standing or (self.reaction == "pass_behind" and along):
-            return self._waiting(intent, side, standing)
+        if standing:
+            return self._aside(intent, side, 0.0)
+        if self._head_on and self.reaction in ("wait", "pass_behind"):
+            return self._aside(intent, side, intent.speed_mps)
+        if self.reaction == "wait":
+            return self._waiting(intent, side)
         if self.reaction == "pass_behind":
             return _behind(place, intent, robot, self._line)
         haste = _HURRY if self.reaction == "hurry" else _CLAIM
         fastest = max(_HURRY_MPS, intent.speed_mps)
         return Intent(intent.x, intent.y, min(haste * intent.speed_mps, fastest))
 
-    def _waiting(self, intent: Intent, side: float, standing: bool) -> Intent:
+    def _waiting(self, intent: Intent, side: float) -> Intent:
         """Stops short of the robot's way, or gets off it."""
         room = side * self._side - _ASIDE_M
-        out_x, out_y = -self._line[1] * self._side, self._line[0] * self._side
         if room < 0.0:
-            return Intent(out_x, out_y, min(_SIDE_STEP_MPS, -2.0 * room))
-        inwards = -(intent.x * out_x + intent.y * out_y)
-        if standing:
-            return Intent(intent.x, intent.y, 0.0)
+            return self._aside(intent, side, 0.0)
+        inwards = (intent.x * self._line[1] - intent.y * self._line[0]) * self._side
         if inwards < 0.05:
             return intent
         most = math.sqrt(2.0 * _STOPPING_MPS2 * room / inwards)
-        most = min(most, 2.5 * room / inwards)
+        most = min(most, _APPROACH_HZ * room / inwards)
         return Intent(intent.x, intent.y, min(intent.speed_mps, most))
+
+    def _aside(self, intent: Intent, side: float, onward_mps: float) -> Intent:
+        """Off the robot's way, and on beside it with some speed."""
+        ux, uy = self._line
+        lacks = max(_ASIDE_M - side * self._side, 0.0)
+        out = min(_SIDE_STEP_MPS, 2.0 * lacks) * self._side
+        onward = math.copysign(onward_mps, intent.x * ux + intent.y * uy)
+        onward *= max(1.0 - lacks, _LEAST_ONWARD)
+        vx, vy = onward * ux - out * uy, onward * uy + out * ux
+        speed = math.hypot(vx, vy)
+        if speed < 1e-3:
+            return Intent(intent.x, intent.y, 0.0)
+        return Intent(vx / speed, vy / speed, speed)
 
 
 def _line_of(robot: RobotBody) -> tuple[float, float]:

@@ -8,9 +8,8 @@ the body's velocity and acceleration. Scalars throughout: NumPy is slow on two f
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Final
-
-import numpy as np
 
 from ._footing import Footing
 from ._gait import (
@@ -29,12 +28,12 @@ from ._gait import (
     ROLLING_SHARE,
     SWAY_M,
     THORAX_YAW_RAD,
-    USED_REACH,
     WAY_ROUND_M,
     Gait,
     landing_rad,
     off_rad,
 )
+from ._gait_figures import GaitFigures, Place
 from ._skeleton import SIGNS
 
 # Slower than this and the body only shifts its weight.
@@ -45,10 +44,6 @@ _STEP_M: Final = 0.07
 _STEP_RAD: Final = math.radians(20.0)
 _REST_M: Final = 0.05
 _REST_RAD: Final = math.radians(12.0)
-# Turning on the spot, so far in a cycle of two steps; sideways and backwards steps are short.
-_TURN_PER_CYCLE_RAD: Final = math.radians(60.0)
-_SIDE_STRIDE_SHARE: Final = 0.12
-_BACK_STRIDE_SHARE: Final = 0.75
 _SLOWEST_HZ: Final = 0.75
 _QUICKEST_HZ: Final = 1.8
 # A foot farther behind than this part of the stature makes the next steps quicker.
@@ -61,12 +56,6 @@ _TWISTING_MPS: Final = 0.3
 _SMOOTHING_S: Final = 0.15
 _RISING_S: Final = 0.12
 _PITCH_RADPS: Final = 8.0
-_TABLE_MPS: Final = 0.05
-_FASTEST_MPS: Final = 3.5
-_ROLL_RAD: Final = 0.005
-_ROLL_MAX_RAD: Final = 0.9
-
-_Place = tuple[float, float, float]  # x, y, yaw of a flat foot
 
 
 class _Foot:
@@ -83,13 +72,21 @@ class _Foot:
         "target",
     )
 
-    def __init__(self, place: _Place) -> None:
+    def __init__(self, place: Place) -> None:
         self.place = self.target = place
         self.swinging = False
         self.own = 0.0  # of the cycle since it landed
         self.lifted_at = 0.0
         self.since_s = math.inf
         self.pitch = self.from_pitch = 0.0
+
+    def copied(self) -> _Foot:
+        """The same state in a foot of its own."""
+        other = _Foot(self.place)
+        other.target, other.swinging, other.own = self.target, self.swinging, self.own
+        other.lifted_at, other.since_s = self.lifted_at, self.since_s
+        other.pitch, other.from_pitch = self.pitch, self.from_pitch
+        return other
 
 
 class OnlineFeet:
@@ -103,38 +100,46 @@ class OnlineFeet:
     """
 
     def __init__(self, gait: Gait, x_m: float, y_m: float, heading_rad: float) -> None:
-        bones = gait.skeleton
-        self._stature_m = bones.stature_m
-        speeds = np.arange(0.0, _FASTEST_MPS + _TABLE_MPS, _TABLE_MPS)
-        self._strides: list[float] = gait.stride_m(speeds).tolist()
-        self._shares: list[float] = gait.stance_share(speeds).tolist()
-        self._vigours: list[float] = gait.vigour(speeds).tolist()
-        self._usual_m = float(gait.stride_m(1.2))
-        self._standing_m = gait.standing_height_m
-        here, level = np.zeros((2, 2)), np.zeros(2)
-        # Ahead, and half the width standing and in a brisk walk.
-        neutral = [gait.neutral(side, here, level, np.array([0.0, 1.0])) for side in (LEFT, RIGHT)]
-        self._ahead = [float(rows[0, 0]) for rows in neutral]
-        self._wide = [abs(float(rows[0, 1])) for rows in neutral]
-        self._narrow = [abs(float(rows[1, 1])) for rows in neutral]
-        self._out = [float(rows[0, 2]) for rows in neutral]
-        pitches = np.arange(-_ROLL_MAX_RAD, _ROLL_MAX_RAD + _ROLL_RAD, _ROLL_RAD)
-        rolls = [sole.ankle(pitches) for sole in bones.soles]
-        self._rolls: list[tuple[list[float], list[float]]] = [
-            (ahead.tolist(), height.tolist()) for ahead, height in rolls
-        ]
-        hips = [
-            np.subtract(bones.joint_m(f"{side}_hip"), bones.hips_m) for side in ("left", "right")
-        ]
-        self._hips: list[list[float]] = [hip.tolist() for hip in hips]
-        self._reach_m = [USED_REACH * leg.reach_m for leg in bones.legs]
+        self._figures = GaitFigures(gait)
         self._feet = [
-            _Foot(self._neutral(side, x_m, y_m, heading_rad, 0.0)) for side in (LEFT, RIGHT)
+            _Foot(self._figures.neutral(side, x_m, y_m, heading_rad, 0.0)) for side in (LEFT, RIGHT)
         ]
         self._phase = 0.0
         self._walking = False
         self._vigour = self._twist = 0.0
-        self._height_m = self._standing_m
+        self._height_m = self._figures.standing_m
+        self._before: (
+            tuple[float, bool, float, float, float, list[_Foot], Footing | None] | None
+        ) = None
+        self._last: Footing | None = None
+
+    def undo(self) -> None:
+        """Take the last step back: the body did not move."""
+        if self._before is not None:
+            (
+                self._phase,
+                self._walking,
+                self._vigour,
+                self._twist,
+                self._height_m,
+                self._feet,
+                self._last,
+            ) = self._before
+            self._before = None
+
+    def carried(self, dx_m: float, dy_m: float) -> Footing | None:
+        """The last posture moved as it is: somebody is thrown back. None before the first step."""
+        if self._last is None:
+            return None
+        for foot in self._feet:
+            foot.place = (foot.place[0] + dx_m, foot.place[1] + dy_m, foot.place[2])
+            foot.target = (foot.target[0] + dx_m, foot.target[1] + dy_m, foot.target[2])
+        (ax, ay, az, ayaw, apitch), (bx, by, bz, byaw, bpitch) = self._last.feet
+        left = (ax + dx_m, ay + dy_m, az, ayaw, apitch)
+        right = (bx + dx_m, by + dy_m, bz, byaw, bpitch)
+        self._before = None
+        self._last = replace(self._last, feet=(left, right))
+        return self._last
 
     def step(
         self,
@@ -151,6 +156,15 @@ class OnlineFeet:
             velocity: of the body, m/s and rad/s.
             acceleration: of the body, m/s².
         """
+        self._before = (
+            self._phase,
+            self._walking,
+            self._vigour,
+            self._twist,
+            self._height_m,
+            [foot.copied() for foot in self._feet],
+            self._last,
+        )
         x, y, heading = place
         vx, vy, turning = velocity
         speed = math.hypot(vx, vy)
@@ -162,12 +176,12 @@ class OnlineFeet:
         self._twist += blend * (twist - self._twist)
         along = askew - self._twist
         ahead, aside = speed * math.cos(along), speed * math.sin(along)
-        vigour = math.copysign(_look_up(self._vigours, abs(ahead)), ahead)
+        vigour = self._figures.vigour(ahead)
         if speed <= _MOVING_MPS:
             vigour = 0.0
         self._vigour += blend * (vigour - self._vigour)
-        share = min(_look_up(self._shares, speed), 0.75)
-        cadence = self._cadence_hz(ahead, aside, turning)
+        share = min(self._figures.stance_share(speed), 0.75)
+        cadence = self._figures.cadence_hz(ahead, aside, turning)
         standing = speed <= _MOVING_MPS and abs(turning) <= _MOVING_RADPS
         facing = heading + self._twist
         if not self._walking and (
@@ -181,21 +195,13 @@ class OnlineFeet:
             if standing and not swings and not self._misplaced(x, y, facing, _REST_M, _REST_RAD):
                 self._walking = False
         rows = [self._ankle(side, dt_s, cadence, share, place) for side in (LEFT, RIGHT)]
-        return self._footing(dt_s, (rows[0], rows[1]), place)
-
-    def _cadence_hz(self, ahead: float, aside: float, turning: float) -> float:
-        """Cycles a second that speed and turning ask for together."""
-        forward = max(_look_up(self._strides, math.hypot(ahead, aside)), 1e-6)
-        if ahead < 0.0:
-            forward *= _BACK_STRIDE_SHARE
-        sideways = min(forward, _SIDE_STRIDE_SHARE * self._stature_m)
-        turn = turning / _TURN_PER_CYCLE_RAD
-        return min(math.hypot(ahead / forward, aside / sideways, turn), _QUICKEST_HZ)
+        self._last = self._footing(dt_s, (rows[0], rows[1]), place)
+        return self._last
 
     def _misplaced(self, x: float, y: float, facing: float, far_m: float, far_rad: float) -> bool:
         """Whether a foot stands too far from where it belongs when standing."""
         for side in (LEFT, RIGHT):
-            nx, ny, nyaw = self._neutral(side, x, y, facing, 0.0)
+            nx, ny, nyaw = self._figures.neutral(side, x, y, facing, 0.0)
             px, py, pyaw = self._feet[side].place
             if math.hypot(nx - px, ny - py) > far_m:
                 return True
@@ -223,7 +229,7 @@ class OnlineFeet:
         """Let the cycle go on: feet lift off, aim and land."""
         x, y, facing = body[:3]
         rate = max(cadence, _SLOWEST_HZ)
-        limit = _BEHIND_SHARE * self._stature_m
+        limit = _BEHIND_SHARE * self._figures.stature_m
         for foot in self._feet:
             if not foot.swinging and math.hypot(x - foot.place[0], y - foot.place[1]) > limit:
                 rate = max(rate, min(_CATCH_UP * rate, _QUICKEST_HZ))
@@ -238,7 +244,7 @@ class OnlineFeet:
                 foot.since_s += dt_s
                 other = self._feet[RIGHT - side]
                 if foot.own >= share and not wrapped and not other.swinging:
-                    goal = self._neutral(side, x, y, facing, 0.0)
+                    goal = self._figures.neutral(side, x, y, facing, 0.0)
                     if standing and _near(goal, foot.place):
                         continue
                     foot.swinging, foot.lifted_at = True, foot.own
@@ -256,7 +262,7 @@ class OnlineFeet:
         acceleration: tuple[float, float],
         rate: float,
         share: float,
-    ) -> _Place:
+    ) -> Place:
         """Where the swinging foot shall stand: under the body in the middle of its stance."""
         x, y, facing, vx, vy, turning = body
         over = 0.5 - 0.12 * min(max(2.0 * self._vigour, -1.0), 1.0)
@@ -272,27 +278,12 @@ class OnlineFeet:
         dx = vx * lasts_s + 0.5 * ax * lasts_s * lasts_s
         dy = vy * lasts_s + 0.5 * ay * lasts_s * lasts_s
         turn = min(max(turning * ahead_s, -0.7), 0.7)
-        goal = self._neutral(side, x + dx, y + dy, facing + turn, self._vigour)
+        goal = self._figures.neutral(side, x + dx, y + dy, facing + turn, self._vigour)
         start = self._feet[side].place
         return goal[0], goal[1], start[2] + math.remainder(goal[2] - start[2], math.tau)
 
-    def _neutral(self, side: int, x: float, y: float, facing: float, vigour: float) -> _Place:
-        """Where a flat foot belongs under a body."""
-        width = self._half_width_m(side, vigour)
-        cos, sin = math.cos(facing), math.sin(facing)
-        ahead, across = self._ahead[side], SIGNS[side] * width
-        return (
-            x + cos * ahead - sin * across,
-            y + sin * ahead + cos * across,
-            facing + self._out[side],
-        )
-
-    def _half_width_m(self, side: int, vigour: float) -> float:
-        wide, narrow = self._wide[side], self._narrow[side]
-        return wide + min(abs(vigour), 1.0) * (narrow - wide)
-
     def _ankle(
-        self, side: int, dt_s: float, cadence: float, share: float, place: _Place
+        self, side: int, dt_s: float, cadence: float, share: float, place: Place
     ) -> tuple[float, float, float, float, float]:
         """Ankle of a foot: x, y, z, yaw, pitch."""
         foot = self._feet[side]
@@ -314,13 +305,15 @@ class OnlineFeet:
             # The swinging foot makes way for the standing one.
             sin, cos = math.sin(place[2] + self._twist), math.cos(place[2] + self._twist)
             beside = cos * (y - place[1]) - sin * (x - place[0])
-            clear = self._half_width_m(side, vigour) + WAY_ROUND_M
+            clear = self._figures.half_width_m(side, vigour) + WAY_ROUND_M
             bump = min(1.6 * math.sin(math.pi * u) ** 2, 1.0)
             aside = max(clear - SIGNS[side] * beside, 0.0) * bump
             x -= SIGNS[side] * aside * sin
             y += SIGNS[side] * aside * cos
             reach += 4.0 * aside
-            lift = LIFT_M * math.sqrt(min(reach / self._usual_m, 1.5)) * math.sin(math.pi * u)
+            lift = (
+                LIFT_M * math.sqrt(min(reach / self._figures.usual_m, 1.5)) * math.sin(math.pi * u)
+            )
         else:
             stance_s = share / rate
             landed = min(foot.since_s / min(LOADING_SHARE * stance_s, LOADING_S), 1.0)
@@ -332,8 +325,7 @@ class OnlineFeet:
                 wanted += off_rad(vigour) * rolled * rolled
         most = _PITCH_RADPS * dt_s
         foot.pitch += min(max(wanted - foot.pitch, -most), most)
-        at = (foot.pitch + _ROLL_MAX_RAD) / _ROLL_RAD
-        ahead, height = (_mixed(column, at) for column in self._rolls[side])
+        ahead, height = self._figures.rolled(side, foot.pitch)
         return x + ahead * math.cos(yaw), y + ahead * math.sin(yaw), height + lift, yaw, foot.pitch
 
     def _footing(
@@ -342,7 +334,7 @@ class OnlineFeet:
         feet: tuple[
             tuple[float, float, float, float, float], tuple[float, float, float, float, float]
         ],
-        place: _Place,
+        place: Place,
     ) -> Footing:
         """Hips and trunk to feet."""
         vigour, size = self._vigour, abs(self._vigour)
@@ -352,7 +344,9 @@ class OnlineFeet:
         sway = SWAY_M * min(2.0 * size, 1.0) * weight
         yaw = -PELVIS_YAW_RAD * vigour * turn + PELVIS_TWIST * self._twist
         tilt = PELVIS_LIST_RAD * size * weight
-        highest = min(self._hip_limit_m(feet, place, sway, yaw, tilt), self._standing_m)
+        highest = min(
+            self._figures.hip_limit_m(feet, place, sway, yaw, tilt), self._figures.standing_m
+        )
         if highest < self._height_m:
             self._height_m = highest
         else:
@@ -368,43 +362,8 @@ class OnlineFeet:
             -ARM_SWING_RAD * vigour * turn,
         )
 
-    def _hip_limit_m(
-        self,
-        feet: tuple[tuple[float, ...], tuple[float, ...]],
-        place: _Place,
-        sway: float,
-        yaw: float,
-        tilt: float,
-    ) -> float:
-        """The highest that the hips may be for both ankles to be in reach."""
-        x, y, heading = place
-        cos, sin = math.cos(heading + yaw), math.sin(heading + yaw)
-        cos_tilt, sin_tilt = math.cos(tilt), math.sin(tilt)
-        x, y = x - math.sin(heading) * sway, y + math.cos(heading) * sway
-        lowest = math.inf
-        for side in (LEFT, RIGHT):
-            hip_x, hip_y, hip_z = self._hips[side]
-            across = hip_y * cos_tilt - hip_z * sin_tilt
-            dx = feet[side][0] - (x + cos * hip_x - sin * across)
-            dy = feet[side][1] - (y + sin * hip_x + cos * across)
-            reach = self._reach_m[side]
-            up = math.sqrt(max(reach * reach - dx * dx - dy * dy, (0.5 * reach) ** 2))
-            lowest = min(lowest, feet[side][2] + up - (hip_y * sin_tilt + hip_z * cos_tilt))
-        return lowest
 
-
-def _look_up(table: list[float], speed: float) -> float:
-    return _mixed(table, speed / _TABLE_MPS)
-
-
-def _mixed(table: list[float], at: float) -> float:
-    """The table at a row that need not be whole, within its ends."""
-    at = min(max(at, 0.0), len(table) - 1.001)
-    row = int(at)
-    return table[row] + (at - row) * (table[row + 1] - table[row])
-
-
-def _near(goal: _Place, place: _Place) -> bool:
+def _near(goal: Place, place: Place) -> bool:
     return (
         math.hypot(goal[0] - place[0], goal[1] - place[1]) < 0.03
         and abs(math.remainder(goal[2] - place[2], math.tau)) < _REST_RAD

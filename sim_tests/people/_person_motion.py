@@ -63,6 +63,10 @@ class Actor(Protocol):
         """What the person does at ``t_s``; time never goes back."""
         ...
 
+    def hold(self) -> None:
+        """The last motion would have led into the robot: the body stays where it was before."""
+        ...
+
     def touch(self, towards_x: float, towards_y: float) -> None:
         """Body and robot touch; the robot lies in this direction (a unit vector in odom)."""
         ...

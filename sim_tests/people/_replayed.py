@@ -133,6 +133,9 @@ class Replayed:
             activity=_IDLE,
         )
 
+    def hold(self) -> None:
+        """A recording goes on regardless."""
+
     def touch(self, towards_x: float, towards_y: float) -> None:
         """A recording takes no notice."""
 

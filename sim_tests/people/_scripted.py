@@ -71,5 +71,8 @@ class Scripted:
             activity=self.script.activity(t_s),
         )
 
+    def hold(self) -> None:
+        """A script goes on regardless."""
+
     def touch(self, towards_x: float, towards_y: float) -> None:
         """A script takes no notice."""

@@ -10,6 +10,8 @@ import numpy as np
 from perception.arrays import FloatArray
 
 from .._errors import SimError
+from ._course import Course
+from ._detour import Detour, kept_off
 from ._errand import STILL_MPS, Errand
 from ._gait import Gait
 from ._gaze import Gaze
@@ -85,16 +87,13 @@ class Walker:
         gaze_rng, meeting_rng = rng.spawn(2)
         self._gaze = Gaze(spec.glances, spec.stature_m, gaze_rng)
         self._meeting = Meeting(spec.reactions, meeting_rng)
+        self._detour = Detour()
         self._activity = Activity(spec.activity, spec.activity)
         self._boxes = boxes_odom_m
         self._reverse = math.pi if spec.backwards else 0.0
         self._stands_facing = None if spec.heading_deg is None else math.radians(spec.heading_deg)
-        # Between ticks: place, velocity and acceleration since an instant, and the next tick's.
+        self._course = Course(*route.start, self._obstacles)
         self._tick = -1
-        self._since_s = 0.0
-        self._from = (*route.start, 0.0, 0.0)
-        self._push = (0.0, 0.0)
-        self._next = self._from
         ux, uy = route.direction(0.0)
         along = math.atan2(uy, ux) + (self._reverse if route.length_m > 0.0 else 0.0)
         self._heading = along if self._stands_facing is None else self._stands_facing
@@ -106,6 +105,7 @@ class Walker:
         self._touch: tuple[float, float, float] | None = None  # direction and when
         self._bumped_s = -math.inf
         self._now_s = 0.0
+        self._shown = self._showing = route.start
         self._feet: OnlineFeet | None = None
         self._stepped_s = 0.0
         self._free: tuple[float | None, float] | None = None
@@ -133,7 +133,7 @@ class Walker:
     @property
     def place_odom_m(self) -> tuple[float, float]:
         """Where the person was when last asked, x and y."""
-        return self._at(self._now_s)[:2]
+        return self._course.at(self._now_s)[:2]
 
     @property
     def reaction(self) -> str:
@@ -165,15 +165,20 @@ class Walker:
     def motion(self, t_s: float, around: Surroundings) -> PersonMotion:
         """What the person does at ``t_s``, which never goes back."""
         self.advance(t_s, around)
-        x, y, vx, vy = self._at(t_s)
+        x, y, vx, vy = self._course.at(t_s)
+        self._shown, self._showing = self._showing, (x, y)
         after_s = t_s - self._tick * TICK_S
         heading = self._heading + self._turning * after_s
         if self._feet is None:
             gait = Gait(skeleton(self.spec.look, self.spec.stature_m))
             self._feet = OnlineFeet(gait, x, y, heading)
-        feet = self._feet.step(
-            t_s - self._stepped_s, (x, y, heading), (vx, vy, self._turning), self._push
-        )
+        feet = None
+        if t_s - self._bumped_s < _RECOIL_S:
+            feet = self._feet.carried(x - self._shown[0], y - self._shown[1])
+        if feet is None:
+            feet = self._feet.step(
+                t_s - self._stepped_s, (x, y, heading), (vx, vy, self._turning), self._course.push
+            )
         self._stepped_s = t_s
         head_yaw, head_pitch, eye_yaw, eye_pitch = self._gaze.at(after_s)
         return PersonMotion(
@@ -195,6 +200,14 @@ class Walker:
             self._decide(around)
         self._now_s = t_s
 
+    def hold(self) -> None:
+        """The last motion would have led into the robot: the body stays where it was before."""
+        left_s = (self._tick + 1) * TICK_S - self._now_s
+        self._course.set_off(self._now_s, (*self._shown, 0.0, 0.0), (0.0, 0.0), left_s)
+        self._showing = self._shown
+        if self._feet is not None:
+            self._feet.undo()
+
     def touch(self, towards_x: float, towards_y: float) -> None:
         """Body and robot touch: the person gets no farther that way, and has noticed.
 
@@ -207,53 +220,24 @@ class Walker:
             )
         if self._touch is None or self._now_s - self._touch[2] > _RECOIL_S:
             self._bumped_s = self._now_s
+            self._heading += self._turning * (self._now_s - self._tick * TICK_S)
+            self._turning = 0.0
             self._gaze.startle(self._now_s)
         self._touch = (towards_x, towards_y, self._now_s)
-        x, y, vx, vy = self._at(self._now_s)
-        vx, vy = _without(vx, vy, towards_x, towards_y)
+        x, y, vx, vy = self._course.at(self._now_s)
+        back = max(vx * towards_x + vy * towards_y + _RECOIL_MPS, 0.0)
+        vx, vy = vx - back * towards_x, vy - back * towards_y
         left_s = (self._tick + 1) * TICK_S - self._now_s
-        self._set_off(self._now_s, (x, y, vx, vy), (0.0, 0.0), left_s)
-
-    def _at(self, t_s: float) -> tuple[float, float, float, float]:
-        """Place and velocity, from the last decision on."""
-        after_s = t_s - self._since_s
-        x, y, vx, vy = self._from
-        ax, ay = self._push
-        return (
-            x + (vx + 0.5 * ax * after_s) * after_s,
-            y + (vy + 0.5 * ay * after_s) * after_s,
-            vx + ax * after_s,
-            vy + ay * after_s,
-        )
-
-    def _set_off(
-        self,
-        since_s: float,
-        state: tuple[float, float, float, float],
-        push: tuple[float, float],
-        for_s: float,
-    ) -> None:
-        """Go on from a state with an acceleration; racks and walls hold off."""
-        x, y, vx, vy = state
-        ax, ay = push
-        there = (x + (vx + 0.5 * ax * for_s) * for_s, y + (vy + 0.5 * ay * for_s) * for_s)
-        held = self._obstacles.held_off((x, y), there)
-        if held == there or for_s <= 0.0:
-            self._next = (*there, vx + ax * for_s, vy + ay * for_s)
-        else:
-            ax = ay = 0.0
-            vx, vy = (held[0] - x) / for_s, (held[1] - y) / for_s
-            self._next = (*held, vx, vy)
-        self._since_s, self._from, self._push = since_s, (x, y, vx, vy), (ax, ay)
+        self._course.set_off(self._now_s, (x, y, vx, vy), (0.0, 0.0), left_s)
 
     def _decide(self, around: Surroundings) -> None:
         """One tick: where am I, what do I see, what do I want, what pushes me."""
         first = self._tick < 0
         self._tick += 1
         t_s = self._tick * TICK_S
-        x, y, vx, vy = self._next
+        x, y, vx, vy = self._course.end
         if not first:
-            self._walked_m += math.hypot(x - self._from[0], y - self._from[1])
+            self._walked_m += math.dist((x, y), self._course.start)
             self._heading += self._turning * TICK_S
         place = (x, y, self._heading)
         robot = self._look(t_s, place, around)
@@ -262,22 +246,26 @@ class Walker:
             self._way_m = self._walked_m
         going = self._errand.going
         wanted = self._meeting.react(t_s, TICK_S, (x, y), intent, robot, standing=not going)
+        if going and robot is not None:
+            wanted = self._detour.around(wanted, x, y, robot)
+        if robot is not None:
+            wanted = kept_off(wanted, x, y, robot)
         wanted, facing = self._recoiling(t_s, intent, wanted, going)
         ax, ay = self._acceleration((x, y, vx, vy), wanted, robot, around)
         self._turn(facing)
-        self._set_off(t_s, (x, y, vx, vy), (ax, ay), TICK_S)
+        self._course.set_off(t_s, (x, y, vx, vy), (ax, ay), TICK_S)
 
     def _look(
         self, t_s: float, place: tuple[float, float, float], around: Surroundings
     ) -> RobotBody | None:
         """Set head and eyes; returns the robot as far as the person knows of it."""
         robot = around.robot
-        sees = False
-        if robot is not None:
-            sees = self._gaze.could_see(TICK_S, place, robot) and around.sees_robot()
+        if robot is None:
+            return None
+        sees = self._gaze.could_see(TICK_S, place, robot) and around.sees_robot()
         self._gaze.tick(t_s, TICK_S, place, robot, sees)
         felt = self._touch is not None and t_s - self._touch[2] <= _TOUCHING_S
-        if robot is not None and ((sees and self._gaze.noticed_s is not None) or felt):
+        if (sees and self._gaze.noticed_s is not None) or felt:
             self._known = (robot, t_s)
         if self._known is None or t_s - self._known[1] > _REMEMBERS_S:
             return None

@@ -127,6 +127,11 @@ class Amr:
             self._speed_mps, self._yaw_rate_radps = speed, yaw_rate
             self._drive()
 
+    @property
+    def driven_speed_mps(self) -> float:
+        """Speed that the motors ask for now; whoever pushes the robot does not change it."""
+        return self._speed_mps
+
     def state(self, stamp_s: float) -> RobotState:
         """Where the robot is and how it moves, from the physics."""
         T, speed, yaw_rate, _ = self._motion()

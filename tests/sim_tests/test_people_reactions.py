@@ -23,13 +23,14 @@ def test_one_who_has_not_seen_the_robot_walks_on_as_if_alone(unaware):
     np.testing.assert_allclose(unaware.people[:, 0, 0], 5.0, atol=1e-6)
 
 
-def test_walk_on_changes_nothing(unaware):
-    aware = film([crosser("walk_on")])
+def test_walk_on_changes_nothing():
+    unaware, aware = (film([crosser(reaction, start_s=1.5)]) for reaction in (None, "walk_on"))
     assert aware.outcomes[0].noticed_s is not None
     assert aware.outcomes[0].reaction == "walk_on"
-    # But for keeping off a robot that is nearly touched.
-    np.testing.assert_allclose(aware.people[:, 0], unaware.people[:, 0], atol=0.25)
-    assert aware.outcomes[0].time_s == pytest.approx(unaware.outcomes[0].time_s, abs=0.3)
+    assert aware.meter.min_separation_m > 0.3  # else one keeps off what one nearly touches
+    # Until there is something to decide, what is seen is kept away from a little.
+    np.testing.assert_allclose(aware.people[:, 0, :2], unaware.people[:, 0, :2], atol=0.1)
+    assert aware.outcomes[0].time_s == pytest.approx(unaware.outcomes[0].time_s, abs=0.1)
 
 
 def test_wait_stops_before_the_robots_way_until_it_has_passed():
@@ -102,7 +103,7 @@ def test_pass_behind_bends_the_way_behind_the_robot_without_stopping():
     assert ahead_m < -0.36
     assert passing.people[:, 0, 0].min() < 4.7
     y = passing.people[:, 0, 1]
-    assert passing.speeds[(y > -3.0) & (y < 3.0), 0].min() > 0.4
+    assert passing.speeds[(y > -3.0) & (y < 3.0), 0].min() > 0.2
     assert not passing.meter.contacts
     assert passing.outcomes[0].length_m > passing.outcomes[0].free_length_m + 0.05
 
@@ -150,7 +151,7 @@ def test_a_blind_person_runs_into_a_standing_robot_stops_there_and_finds_the_way
 
 
 def test_a_blind_person_who_walks_into_the_side_of_a_moving_robot_is_the_cause():
-    side = film([crosser(None, start_s=2.75)], seconds=9.0)
+    side = film([crosser(None, start_s=3.6)], seconds=9.0)
     assert side.meter.contacts
     assert side.meter.contacts[0].by == "person"
 

@@ -211,7 +211,7 @@ def test_versions_are_part_of_a_name():
         ScenarioTemplate.shipped("crossing_from_left@2")
 
 
-def test_a_crossing_by_name_is_drawn_by_its_seed(tmp_path):
+def test_a_drawn_crossing_starts_where_it_was_drawn():
     text = (
         "name: short\nduration_s: 0.5\n"
         "robot: {start_x_m: {uniform: {low: -1, high: 1}}, goal_x_m: 8}\n"
@@ -221,8 +221,19 @@ def test_a_crossing_by_name_is_drawn_by_its_seed(tmp_path):
     for seed in (1, 2):
         result = run_crossing(short.for_seed(seed), policy="balanced", seed=seed)
         starts.append(float(result.frames[0].robot_state.position_odom_m[0]))
-    assert starts == [short.for_seed(seed).robot.start_x_m for seed in (1, 2)]
+    drawn = [short.for_seed(seed).robot.start_x_m for seed in (1, 2)]
+    assert starts == pytest.approx(drawn, abs=1e-9)
 
 
 def test_shipped_templates_are_all_there_and_named_after_their_files():
     assert [each.name for each in shipped_templates()] == list(shipped_scenarios())
+
+
+def test_a_crossing_by_name_is_drawn_by_its_seed():
+    by_name = run_crossing("standing_in_aisle", policy="assertive", seed=2)
+    drawn = ScenarioTemplate.shipped("standing_in_aisle").for_seed(2)
+    given = run_crossing(drawn, policy="assertive", seed=2)
+    assert by_name.min_separation_m == given.min_separation_m
+    assert by_name.time_to_goal_s == given.time_to_goal_s
+    place = given.frames[0].truth[0].position_odom_m
+    assert place == pytest.approx([drawn.people[0].route[0].x_m, drawn.people[0].route[0].y_m])
