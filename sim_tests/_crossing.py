@@ -300,7 +300,7 @@ def _default_planner(scenario: Scenario, stage: Stage) -> LocalPlanner:
     straight = scenario.robot.straight_on_speed_mps
     if straight is not None:
         return StraightOn(straight)
-    return SamplingPlanner(NOVA_CARTER, stage.warehouse.obstacle_boxes_odom)
+    return SamplingPlanner(NOVA_CARTER, scenario.planner_boxes_odom_m)
 
 
 def _resolve(policy: AwarenessPolicy | str | Path) -> tuple[str, AwarenessPolicy]:

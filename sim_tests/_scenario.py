@@ -6,10 +6,12 @@ import math
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
+import numpy as np
 import yaml
 from pydantic import BeforeValidator, Field, model_validator
 
 from perception import Camera
+from perception.arrays import FloatArray
 from tracking.config import StrictConfig
 
 from ._errors import SimError
@@ -85,6 +87,21 @@ class RobotTask(StrictConfig):
     goal_tolerance_m: float = Field(default=0.25, gt=0.0)
     #: Drives straight on at this speed without a planner, as in the paper's encounter.
     straight_on_speed_mps: float | None = Field(default=None, gt=0.0)
+    #: The robot keeps to a lane this wide on either side of the straight way to its goal,
+    #: as fleets ask for with keep-out zones: the planner sees everything beyond as a wall, a local
+    #: one would else follow people into the aisles that they take. People walk where they like.
+    lane_half_width_m: float | None = Field(default=None, ge=0.5)
+
+    @model_validator(mode="after")
+    def _lane_along_an_axis(self) -> RobotTask:
+        along_axis = self.start_x_m == self.goal_x_m or self.start_y_m == self.goal_y_m
+        if self.lane_half_width_m is not None and not along_axis:
+            raise ValueError(
+                "lane_half_width_m needs a way along odom x or y, got one from "
+                f"({self.start_x_m:g}, {self.start_y_m:g}) to ({self.goal_x_m:g}, "
+                f"{self.goal_y_m:g}) m"
+            )
+        return self
 
 
 class Scenario(StrictConfig):
@@ -154,6 +171,23 @@ class Scenario(StrictConfig):
         from ._scenario_template import ScenarioTemplate  # noqa: PLC0415 - it is made of scenarios
 
         return ScenarioTemplate.from_yaml(path).median()
+
+    @property
+    def planner_boxes_odom_m(self) -> FloatArray:
+        """(N, 4) what a planner has to keep clear of: the hall's boxes and what is off the lane."""
+        boxes, task = self.layout.obstacle_boxes_odom, self.robot
+        half = task.lane_half_width_m
+        if half is None:
+            return boxes
+        hall = self.layout
+        x, y = task.start_x_m, task.start_y_m
+        low, high = (hall.x_min_m, hall.y_min_m), (hall.x_max_m, hall.y_max_m)
+        if task.start_y_m == task.goal_y_m:
+            beyond = [(low[0], low[1], high[0], y - half), (low[0], y + half, high[0], high[1])]
+        else:
+            beyond = [(low[0], low[1], x - half, high[1]), (x + half, low[1], high[0], high[1])]
+        real = [box for box in beyond if box[0] < box[2] and box[1] < box[3]]
+        return np.vstack([boxes, *np.array(real).reshape(-1, 1, 4)])
 
     def to_text(self) -> str:
         """YAML for :meth:`ScenarioTemplate.from_text`: the scenario as plain data."""

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from sim_tests import ScenarioTemplate, SimError, shipped_scenarios
+from sim_tests import ScenarioTemplate, SimError, run_crossing, shipped_scenarios
 from sim_tests._cli import main
 from sim_tests._scenario import RobotTask
 from sim_tests.catalogue._checks import meetings, problems
@@ -169,3 +169,42 @@ def test_drawings_are_small_and_the_same_each_time(tmp_path, capsys):
     assert not (tmp_path / "x.png").exists()
     with pytest.raises(SimError, match="did you mean 'late_glance'"):
         ScenarioTemplate.named("late_glanc")
+
+
+def test_the_lane_is_free_and_what_is_beyond_is_not():
+    scenario = ScenarioTemplate.shipped("crossing_from_left").median()
+    hall = scenario.layout.obstacle_boxes_odom
+    boxes = scenario.planner_boxes_odom_m
+    np.testing.assert_array_equal(boxes[: len(hall)], hall)
+    lane = scenario.robot.lane_half_width_m
+    for x in (0.0, 7.5, 12.0):
+        for y, closed in ((0.0, False), (lane - 0.01, False), (lane + 0.01, True), (-4.0, True)):
+            inside = (boxes[:, :2] < (x, y)).all(axis=1) & (boxes[:, 2:] > (x, y)).all(axis=1)
+            assert inside.any() == closed
+    plain = ScenarioTemplate.shipped("crossing_attentive").median()
+    np.testing.assert_array_equal(plain.planner_boxes_odom_m, plain.layout.obstacle_boxes_odom)
+    with pytest.raises(SimError, match="needs a way along odom x or y"):
+        ScenarioTemplate(
+            {
+                "name": "a",
+                "duration_s": 5.0,
+                "robot": {"goal_x_m": 5.0, "goal_y_m": 2.0, "lane_half_width_m": 1.0},
+            }
+        )
+
+
+def test_a_lane_along_y_is_the_lane_along_x_turned():
+    task = {"goal_x_m": 0.0, "goal_y_m": 4.0, "lane_half_width_m": 1.0}
+    turned = ScenarioTemplate({"name": "a", "duration_s": 5.0, "layout": "open", "robot": task})
+    beyond = turned.median().planner_boxes_odom_m[-2:]
+    np.testing.assert_allclose(beyond, [[-5.0, -7.0, -1.0, 7.0], [1.0, -7.0, 14.0, 7.0]])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(set(shipped_scenarios()) - {"paper_encounter"}))
+def test_the_robot_reaches_its_goal_and_runs_into_nobody(name):
+    template = ScenarioTemplate.shipped(name)
+    for seed in (0, 1):
+        result = run_crossing(template.for_seed(seed), policy="balanced", seed=seed)
+        assert result.success
+        assert result.contact_by != "robot"
