@@ -30,6 +30,8 @@ from .policies import (
     TimeBehaviour,
 )
 
+# Read once a process: presets are frozen, and an episode takes less time than its YAML.
+_PRESETS: dict[str, AwarenessPolicy] = {}
 _SHIPPED: dict[str, tuple[type[StrictConfig], ...]] = {
     "inflation": (InterpolatedInflation, TableInflation),
     "speed": (InterpolatedHumanSpeed, TableHumanSpeed),
@@ -125,6 +127,9 @@ class AwarenessPolicy(StrictConfig):
         Raises:
             NavError: there is no preset of that name.
         """
+        kept = _PRESETS.get(name) if cls is AwarenessPolicy else None
+        if kept is not None:
+            return kept
         folder = resources.files("nav_adapter.policies")
         files = {
             entry.name.removesuffix(".yaml"): entry
@@ -137,7 +142,10 @@ class AwarenessPolicy(StrictConfig):
             raise NavError(
                 f"preset must be one of {', '.join(map(repr, sorted(files)))}, got {name!r}{hint}"
             )
-        return cls.model_validate(yaml.safe_load(files[name].read_text(encoding="utf-8")))
+        policy = cls.model_validate(yaml.safe_load(files[name].read_text(encoding="utf-8")))
+        if cls is AwarenessPolicy:
+            _PRESETS[name] = policy
+        return policy
 
     def to_yaml(self, path: str | Path) -> None:
         """Write the policy for :meth:`from_yaml`; own policy objects cannot be written."""

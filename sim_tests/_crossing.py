@@ -27,6 +27,7 @@ from .faults._fault import Fault
 from .faults._faulty_eyes import FaultInjection
 from .people._person_outcome import PersonOutcome
 from .pictures._camera_timing import CameraTiming
+from .pictures._visual_backend import RendererName
 from .robot._amr import NOVA_CARTER
 from .robot._planner import LocalPlanner, SamplingPlanner
 
@@ -153,6 +154,7 @@ def run_crossing(
     pipeline: AwarenessPipeline | None = None,
     observer: Observer | None = None,
     fault: Fault | None = None,
+    renderer: RendererName = "auto",
 ) -> CrossingResult:
     """Run one crossing in PyBullet and measure it.
 
@@ -169,6 +171,8 @@ def run_crossing(
             pictures.
         observer: called after every control cycle with the frame and the stage, e.g. to render.
         fault: what is wrong with camera and odometry; frames keep the truth about the robot.
+        renderer: what draws pictures: ``"tiny"``, ``"gl"``, ``"egl"``, or ``"auto"`` for the
+            quickest that works here. Two of them draw nearly, not exactly, the same pixels.
 
     Raises:
         SimError: unknown scenario or perception, or an invalid command from the planner.
@@ -184,7 +188,7 @@ def run_crossing(
     cone = AttentionCone()
     meter = SafetyMeter(NOVA_CARTER)
     injection = FaultInjection(fault, seed)
-    with Stage(scenario, offsets, people_rng) as stage:
+    with Stage(scenario, offsets, people_rng, renderer=renderer) as stage:
         driver = planner if planner is not None else _default_planner(scenario, stage)
         camera_model, timing = _camera(scenario, perception)
         eyes = make_eyes(

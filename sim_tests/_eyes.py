@@ -16,7 +16,7 @@ from ._keypoint_camera import KeypointCamera, KeypointNoise
 from ._pixel_eyes import PixelEyes
 from ._stage import Stage, TrueView
 from .pictures._camera_timing import CameraTiming, FrameClock, FrameQueue
-from .pictures._renderer import CameraRenderer
+from .sightlines._sight_lines import SightLines
 
 PerceptionKind = Literal["truth", "keypoints", "pixels"]
 
@@ -74,7 +74,12 @@ class KeypointEyes:
         rng: np.random.Generator,
     ) -> None:
         self._stage = stage
-        self._keypoints = KeypointCamera(camera, CameraRenderer(stage.warehouse), noise, rng)
+        self._keypoints = KeypointCamera(
+            camera,
+            SightLines(stage.warehouse.layout, stage.warehouse.variant, stage.warehouse.actors),
+            noise,
+            rng,
+        )
         self._pipeline = AwarenessPipeline(
             camera,
             self._keypoints,

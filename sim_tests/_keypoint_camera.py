@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Final, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from perception import Camera, PersonDetection, PersonKeypoints
@@ -19,14 +20,14 @@ from perception.arrays import FloatArray
 from tracking.config import StrictConfig
 
 from ._errors import SimError
-from ._sight import FACE_DEPTH_M, JOINT_DEPTH_M
+from ._sight import FACE_DEPTH_M, FACE_KEYPOINTS, JOINT_DEPTH_M
 
 _LAYOUT: Final = "coco_wholebody"
 _LAYOUT_SIZE: Final = 133
-_HEAD: Final = slice(0, 5)
-# The depth image of a person is this wide at most; more would be slower, not better.
-_MAX_BODY_SAMPLES: Final = 48
-_HEAD_SAMPLES: Final = 28
+_KEYPOINTS: Final = 23
+# Of the bodies that hide: a face asks for a finer head than joints ask for limbs.
+_FACE_DETAIL: Final = 1
+_BODY_DETAIL: Final = 2
 # Fewer seen keypoints than this (about a quarter of a body) and a detector finds nobody.
 _MIN_SEEN: Final = 5
 _NEAR_M: Final = 0.1
@@ -62,18 +63,21 @@ class TrueBody(Protocol):
         """Body height."""
         ...
 
+    def reach_odom_m(self) -> FloatArray:
+        """(2, 3) low and high corner of a box about all keypoints; cheaper than they are."""
+        ...
 
-class DepthSource(Protocol):
-    """What the camera asks of a renderer: depth of a rectangle of its image."""
 
-    def depth(
-        self,
-        camera: Camera,
-        T_odom_camera: Any,
-        roi_xyxy_px: Any = None,
-        size_px: tuple[int, int] | None = None,
-    ) -> FloatArray:
-        """Depth (h, w) in metres along the optical axis, infinite where there is nothing."""
+class Sight(Protocol):
+    """What the camera asks of the world: what stands in the way."""
+
+    def blocked(
+        self, eye_odom_m: FloatArray, ends_odom_m: FloatArray, detail: NDArray[np.int64]
+    ) -> NDArray[np.bool_]:
+        """(K,) whether anything lies between the eye (3,) and each of the points (K, 3).
+
+        ``detail`` (K,) is of the bodies held against each line: 0 the finest, 2 the coarsest.
+        """
         ...
 
 
@@ -91,7 +95,7 @@ class KeypointCamera:
 
     Args:
         camera: the camera model.
-        renderer: where depth comes from.
+        sight: what hides what.
         noise: how far keypoints are from the truth.
         rng: source of that noise.
     """
@@ -99,15 +103,16 @@ class KeypointCamera:
     def __init__(
         self,
         camera: Camera,
-        renderer: DepthSource,
+        sight: Sight,
         noise: KeypointNoise,
         rng: np.random.Generator,
     ) -> None:
         self._camera = camera
-        self._renderer = renderer
+        self._lines = sight
         self._noise = noise
         self._rng = rng
         self._sightings: tuple[_Sighting, ...] = ()
+        self._sides = _frustum(camera)
 
     def look(self, T_odom_camera: FloatArray, workers: Sequence[TrueBody]) -> tuple[int, ...]:
         """Take a frame; returns which workers are in it, in the order of the detections."""
@@ -134,15 +139,16 @@ class KeypointCamera:
             ) from None
 
     def _sight(self, index: int, worker: TrueBody, T_odom_camera: FloatArray) -> _Sighting | None:
-        points_odom = worker.keypoints_odom_m
-        rotation, origin = T_odom_camera[:3, :3], T_odom_camera[:3, 3]
-        points = (points_odom - origin) @ rotation
-        count = len(points)
         # Every worker draws the same amount of noise whether seen or not: what happens to one
         # never changes the luck of another.
         missed = self._rng.random() < self._noise.miss_rate
-        pixel_noise = self._rng.normal(0.0, 1.0, (count, 2)) * self._noise.pixel_std_px
-        lift_noise = self._rng.normal(0.0, 1.0, count) * self._noise.lift_std_m
+        pixel_noise = self._rng.normal(0.0, 1.0, (_KEYPOINTS, 2)) * self._noise.pixel_std_px
+        lift_noise = self._rng.normal(0.0, 1.0, _KEYPOINTS) * self._noise.lift_std_m
+        rotation, origin = T_odom_camera[:3, :3], T_odom_camera[:3, 3]
+        if self._is_outside(worker.reach_odom_m(), T_odom_camera):
+            return None
+        points_odom = worker.keypoints_odom_m
+        points = (points_odom - origin) @ rotation
         pixels = self._camera.project(points)
         inside = (
             (points[:, 2] > _NEAR_M)
@@ -153,7 +159,7 @@ class KeypointCamera:
         )
         if np.count_nonzero(inside) < _MIN_SEEN:
             return None
-        seen = inside & self._unhidden(points, pixels, inside, T_odom_camera)
+        seen = inside & self._unhidden(points, points_odom, inside, origin)
         if missed or np.count_nonzero(seen) < _MIN_SEEN:
             return None
         noisy = np.where(seen[:, None], pixels + pixel_noise, 0.0)
@@ -166,6 +172,13 @@ class KeypointCamera:
         )
         return _Sighting(index, self._box(noisy[seen]), keypoints)
 
+    def _is_outside(self, box_odom_m: FloatArray, T_odom_camera: FloatArray) -> bool:
+        """True only when all of a box (2, 3) lies beyond one side of the picture."""
+        normals = self._sides @ T_odom_camera[:3, :3].T
+        middle = 0.5 * (box_odom_m[0] + box_odom_m[1]) - T_odom_camera[:3, 3]
+        half = 0.5 * (box_odom_m[1] - box_odom_m[0])
+        return bool((normals @ middle + np.abs(normals) @ half < 0.0).any())
+
     def _box(self, pixels: FloatArray) -> PersonDetection:
         low, high = pixels.min(axis=0), pixels.max(axis=0)
         # Keypoints lie inside the outline: hair, hands and shoes reach about a twelfth further.
@@ -177,34 +190,31 @@ class KeypointCamera:
         return PersonDetection(box, 0.9)
 
     def _unhidden(
-        self, points: FloatArray, pixels: FloatArray, inside: Any, T_odom_camera: FloatArray
+        self, points: FloatArray, points_odom: FloatArray, inside: Any, eye_odom_m: FloatArray
     ) -> Any:
-        """Which of the keypoints inside the image nothing hides, by two small depth images."""
-        rows = np.arange(len(points))
-        head = rows[_HEAD][inside[_HEAD]]
-        body = rows[5:][inside[5:]]
+        """Which of the keypoints inside the image nothing hides."""
         unhidden = np.zeros(len(points), dtype=bool)
-        for chosen, tolerance, samples in (
-            (head, FACE_DEPTH_M, _HEAD_SAMPLES),
-            (body, JOINT_DEPTH_M, _MAX_BODY_SAMPLES),
-        ):
-            if not len(chosen):
-                continue
-            low = pixels[chosen].min(axis=0) - 2.0
-            high = pixels[chosen].max(axis=0) + 3.0
-            extent = high - low
-            step = max(float(extent.max()) / samples, 1.0)
-            size = np.maximum(np.ceil(extent / step), 1.0).astype(int)
-            # Image coordinates count pixel centres, the renderer counts pixel corners.
-            corner = low + 0.5
-            roi = np.concatenate([corner, corner + size * step])
-            depth = self._renderer.depth(
-                self._camera, T_odom_camera, roi, (int(size[0]), int(size[1]))
-            )
-            column, row = ((pixels[chosen] + 0.5 - corner) / step).astype(int).T
-            front = depth[np.clip(row, 0, size[1] - 1), np.clip(column, 0, size[0] - 1)]
-            unhidden[chosen] = points[chosen, 2] <= front + tolerance
+        rows = np.flatnonzero(inside)
+        face = rows < FACE_KEYPOINTS
+        # A line ends where the surface may lie before the keypoint, along the optical axis.
+        tolerance = np.where(face, FACE_DEPTH_M, JOINT_DEPTH_M)
+        share = np.maximum(1.0 - tolerance / points[rows, 2], 0.0)[:, None]
+        ends = eye_odom_m + share * (points_odom[rows] - eye_odom_m)
+        detail = np.where(face, _FACE_DETAIL, _BODY_DETAIL)
+        unhidden[rows] = ~self._lines.blocked(eye_odom_m, ends, detail)
         return unhidden
+
+
+def _frustum(camera: Camera) -> FloatArray:
+    """(M, 3) normals, pointing inwards, of the planes that bound what a camera sees."""
+    ahead = np.array([[0.0, 0.0, 1.0]])
+    if camera.distortion is not None:  # whose picture is bounded by no planes
+        return ahead
+    left, top = (-0.5 - camera.cx_px) / camera.fx_px, (-0.5 - camera.cy_px) / camera.fy_px
+    right = (camera.width_px - 0.5 - camera.cx_px) / camera.fx_px
+    bottom = (camera.height_px - 0.5 - camera.cy_px) / camera.fy_px
+    sides = [(1.0, 0.0, -left), (-1.0, 0.0, right), (0.0, 1.0, -top), (0.0, -1.0, bottom)]
+    return np.concatenate([ahead, np.array(sides)])
 
 
 def _padded(values: FloatArray) -> FloatArray:

@@ -26,6 +26,7 @@ from .people._scripted import Scripted
 from .people._surroundings import Mover, RobotBody, Surroundings
 from .people._walker import Walker
 from .people._worker import Worker
+from .pictures._visual_backend import RendererName
 from .robot._amr import NOVA_CARTER, Amr
 from .robot._amr_look import AmrLook
 
@@ -80,6 +81,7 @@ class Stage(Closing):
         scenario: what happens.
         start_offsets_s: how much later each scripted worker starts.
         people_rng: what the people who react draw from; None is the generator of seed 0.
+        renderer: what draws it, should pictures be taken.
     """
 
     def __init__(
@@ -87,9 +89,11 @@ class Stage(Closing):
         scenario: Scenario,
         start_offsets_s: FloatArray,
         people_rng: np.random.Generator | None = None,
+        *,
+        renderer: RendererName = "tiny",
     ) -> None:
         self.scenario = scenario
-        self.warehouse = Warehouse(scenario.layout)
+        self.warehouse = Warehouse(scenario.layout, renderer=renderer)
         try:
             task = scenario.robot
             self.amr = Amr(
@@ -176,9 +180,7 @@ class Stage(Closing):
     @property
     def robot_velocity_odom_mps(self) -> FloatArray:
         """(2,) velocity of the base origin."""
-        state = self.amr.state(self.t_s)
-        heading = state.heading_odom_rad
-        return state.speed_mps * np.array([math.cos(heading), math.sin(heading)])
+        return self.amr.velocity_odom_mps
 
     def truth(self, cone: AttentionCone, T_odom_camera: FloatArray) -> tuple[TrueView, ...]:
         """The truth about every worker, from the robot's camera."""

@@ -37,7 +37,7 @@ class Warehouse(Closing):
     Args:
         layout: what stands where; None is :meth:`WarehouseLayout.crossing`.
         physics_dt_s: length of one step, in (0, 1/60].
-        renderer: ``"tiny"``, ``"egl"`` or ``"auto"``, what draws :attr:`visuals`.
+        renderer: ``"tiny"``, ``"gl"``, ``"egl"`` or ``"auto"``, what draws :attr:`visuals`.
         variant: number of the scenery's variant (goods, colours, wear).
 
     Attributes:
@@ -108,10 +108,20 @@ class Warehouse(Closing):
 
         Costs nothing until the first picture is taken.
         """
+        self._actors.append(actor)
         if self._visuals is not None:
             return self._visuals.add_actor(actor)
-        self._actors.append(actor)
         return len(self._actors) - 1
+
+    @property
+    def actors(self) -> tuple[Actor, ...]:
+        """All that :meth:`add_actor` was given."""
+        return tuple(self._actors)
+
+    @property
+    def variant(self) -> int:
+        """Number of the scenery's variant."""
+        return self._variant
 
     def close(self) -> None:
         """End the physics world and the picture world; a second call does nothing."""

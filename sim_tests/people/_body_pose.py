@@ -23,6 +23,9 @@ Quaternion = tuple[float, float, float, float]
 IDENTITY: Final[Quaternion] = (0.0, 0.0, 0.0, 1.0)
 
 _PARENTS: Final = np.array(PARENTS)
+# Rows of a cross product: y z − z y, z x − x z, x y − y x.
+_NEXT: Final = np.array([1, 2, 0])
+_AFTER: Final = np.array([2, 0, 1])
 
 
 def _depth(joint: int) -> int:
@@ -79,7 +82,11 @@ def link_transforms(joints_m: FloatArray, pose: BodyPose) -> FloatArray:
 
 
 def link_transform(
-    joints_m: FloatArray, pose: BodyPose, joints: NDArray[np.int64], shares: FloatArray
+    joints_m: FloatArray,
+    pose: BodyPose,
+    joints: NDArray[np.int64],
+    shares: FloatArray,
+    links: FloatArray | None = None,
 ) -> FloatArray:
     """(N, 4, 4) of rigid pieces that follow only a share of a joint's rotation.
 
@@ -89,11 +96,13 @@ def link_transform(
         joints: (N,) joint of each piece, −1 for the pelvis.
         shares: (N,) in [0, 1]: the piece turns by the joint's rotation to this power, and follows
             all joints before it fully. Of no meaning for the pelvis.
+        links: of :func:`link_transforms` for this pose, if known.
 
     Returns:
         What takes the scaled body at rest to odom, as :func:`link_transforms` with share 1.
     """
-    links = link_transforms(joints_m, pose)
+    if links is None:
+        links = link_transforms(joints_m, pose)
     parents = np.where(joints < 0, -1, _PARENTS[joints])
     before = links[1 + parents]
     turning = np.where(joints < 0, 0.0, shares)[:, None]
@@ -106,38 +115,61 @@ def link_transform(
     return pieces
 
 
-def skin_points(
-    joints_m: FloatArray, pose: BodyPose, points_m: FloatArray, weights: FloatArray
-) -> FloatArray:
-    """(N, 3) in odom of points of the asset, each bent by a share of every joint.
+class BentPoints:
+    """Points of an asset, each bent by a share of every joint.
 
     Args:
         joints_m: (16, 3) of the asset.
-        pose: the posture.
         points_m: (N, 3) at rest, body frame, unscaled.
         weights: (N, 16) share of each joint's rotation that a point follows.
     """
-    points = np.ascontiguousarray((points_m * pose.scale).T)
-    rotvecs = pose.joint_rotvecs
-    angles = np.sqrt(np.einsum("ij,ij->i", rotvecs, rotvecs)).tolist()
-    for joint in range(len(JOINTS) - 1, -1, -1):
-        angle = angles[joint]
-        if angle < 1e-12:
-            continue
-        rows = np.flatnonzero(weights[:, joint])
-        if not len(rows):
-            continue
-        kx, ky, kz = (rotvecs[joint] / angle).tolist()
-        centre = joints_m[joint][:, None] * pose.scale
-        x, y, z = arm = points[:, rows] - centre
-        turn = angle * weights[rows, joint]
-        sin, versine = np.sin(turn), 1.0 - np.cos(turn)
-        along = kx * x + ky * y + kz * z
-        across = np.stack([ky * z - kz * y, kz * x - kx * z, kx * y - ky * x])
-        axis = np.array([[kx], [ky], [kz]])
-        points[:, rows] = centre + arm + sin * across + versine * (along * axis - arm)
-    rotation, origin = pose.T_odom_body[:3, :3], pose.T_odom_body[:3, 3]
-    return np.asarray(points.T @ rotation.T + origin)
+
+    def __init__(self, joints_m: FloatArray, points_m: FloatArray, weights: FloatArray) -> None:
+        self._joints_m = joints_m
+        self._points_m = np.ascontiguousarray(points_m.T)
+        self._passes: list[tuple[NDArray[np.int64], NDArray[np.int64], FloatArray]] = []
+        # The last joint first; joints that move different points turn in one pass.
+        waiting = list(range(len(JOINTS) - 1, -1, -1))
+        while waiting:
+            now: list[int] = []
+            moved = np.zeros(len(points_m), dtype=bool)
+            for joint in waiting:
+                moves = weights[:, joint] != 0.0
+                if not (moved & moves).any():
+                    now.append(joint)
+                moved |= moves
+            waiting = [joint for joint in waiting if joint not in now]
+            rows = [np.flatnonzero(weights[:, joint]) for joint in now]
+            row = np.concatenate(rows)
+            owner = np.repeat(now, [len(each) for each in rows])
+            if row.size:
+                self._passes.append((row, owner, weights[row, owner]))
+
+    def odom_m(self, pose: BodyPose) -> FloatArray:
+        """(N, 3) in odom."""
+        points = self._points_m * pose.scale
+        rotvecs = pose.joint_rotvecs
+        angles = np.sqrt(np.einsum("ij,ij->i", rotvecs, rotvecs))
+        axes = (rotvecs / np.maximum(angles, 1e-12)[:, None]).T
+        centres = self._joints_m.T * pose.scale
+        for rows, joints, shares in self._passes:
+            axis, centre = axes[:, joints], centres[:, joints]
+            arm = points[:, rows] - centre
+            turn = angles[joints] * shares
+            along = axis[0] * arm[0] + axis[1] * arm[1] + axis[2] * arm[2]
+            across = axis[_NEXT] * arm[_AFTER] - axis[_AFTER] * arm[_NEXT]
+            points[:, rows] = (
+                centre + arm + np.sin(turn) * across + (1.0 - np.cos(turn)) * (along * axis - arm)
+            )
+        rotation, origin = pose.T_odom_body[:3, :3], pose.T_odom_body[:3, 3]
+        return np.asarray(points.T @ rotation.T + origin)
+
+
+def skin_points(
+    joints_m: FloatArray, pose: BodyPose, points_m: FloatArray, weights: FloatArray
+) -> FloatArray:
+    """(N, 3) in odom: :class:`BentPoints` for one pose."""
+    return BentPoints(joints_m, points_m, weights).odom_m(pose)
 
 
 def rotation_matrices(rotvecs: FloatArray) -> FloatArray:

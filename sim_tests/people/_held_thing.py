@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Set as AbstractSet
+from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -12,6 +13,8 @@ from perception.arrays import FloatArray
 
 from .._bullet import pybullet
 from ..hall._meshes import Mesh, box, merge
+from ..sightlines._sight_lines import PlacedSurface
+from ..sightlines._triangles import TriangleSet
 from ._postures import BOX_SIZE_M, PHONE_SIZE_M
 
 if TYPE_CHECKING:
@@ -57,6 +60,17 @@ class HeldThing:
             return np.array([self._worker.chest_odom_m] * 2)
         return np.array([place[:3, 3] - _REACH_M, place[:3, 3] + _REACH_M])
 
+    def reach_odom_m(self) -> FloatArray:
+        """As :meth:`bounds_odom_m`."""
+        return self.bounds_odom_m()
+
+    def surface(self, detail: int) -> PlacedSurface | None:
+        """The thing where it is now; None with empty hands. There is one level of detail."""
+        held, place = self._worker.held, self._worker.T_odom_held
+        if held is None or place is None:
+            return None
+        return PlacedSurface(_triangles(held), place[None])
+
     def build(self, visuals: Visuals) -> None:
         """Note where to draw; each thing is made when it is first held."""
         self._visuals = visuals
@@ -90,6 +104,16 @@ class HeldThing:
 
 def _shape(visuals: Visuals, held: str) -> int:
     """The shape of a thing about its middle."""
+    return visuals.shape(_mesh(held), texture=visuals.texture(_PALETTE))
+
+
+@lru_cache(maxsize=2)
+def _triangles(held: str) -> TriangleSet:
+    mesh = _mesh(held)
+    return TriangleSet([(mesh.vertices_m, mesh.indices.reshape(-1, 3))])
+
+
+def _mesh(held: str) -> Mesh:
     middle = (0.0, 0.0, 0.0)
     if held == "box":
         length, _, height = BOX_SIZE_M
@@ -99,7 +123,7 @@ def _shape(visuals: Visuals, held: str) -> int:
         thick, width, height = PHONE_SIZE_M
         screen = box((-0.5 * thick, 0.0, 0.0), (0.002, 0.9 * width, 0.92 * height))
         parts = [(box(middle, PHONE_SIZE_M), _SLAB_UV), (screen, _SCREEN_UV)]
-    return visuals.shape(_coloured(parts), texture=visuals.texture(_PALETTE))
+    return _coloured(parts)
 
 
 def _coloured(parts: list[tuple[Mesh, tuple[float, float]]]) -> Mesh:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -13,6 +14,7 @@ from perception.layouts import LEFT_SHOULDER, RIGHT_SHOULDER
 from .._errors import SimError
 from .._warehouse import Warehouse
 from ._body_pose import (
+    BentPoints,
     BodyPose,
     Quaternion,
     Vector,
@@ -25,7 +27,6 @@ from ._body_pose import (
     matrix,
     product,
     rotation_vector,
-    skin_points,
     turned,
 )
 from ._footing import Footing
@@ -45,6 +46,8 @@ MAX_EYE_YAW_RAD: Final = math.radians(35.0)
 MAX_EYE_PITCH_RAD: Final = math.radians(25.0)
 
 _STATURE_M: Final = 1.75
+# Nothing of a body of a shipped stature is farther from its centre line, however it walks.
+_REACH_M: Final = 1.0
 # The optical frame (x right, y down, z forward) in the head frame (x down, y forward, z right).
 _ROTATION_HEAD_OPTICAL: Final = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 _CHEST_SHOULDERS: Final = 0.7
@@ -283,14 +286,21 @@ class Worker:
         pose[:3, 3] = self.eyes_odom_m
         return pose
 
+    def reach_odom_m(self) -> FloatArray:
+        """(2, 3) low and high corner of a generous box about all of the body in any posture."""
+        side, top = _REACH_M * self.skeleton.scale, 1.15 * self.skeleton.stature_m
+        return np.array(
+            [
+                (self._x_m - side, self._y_m - side, -0.1),
+                (self._x_m + side, self._y_m + side, top),
+            ]
+        )
+
     @property
     def keypoints_odom_m(self) -> FloatArray:
         """(23, 3) COCO's 17 keypoints, then big toe, small toe and heel, left and right."""
         if self._keypoints is None:
-            asset = self.asset
-            self._keypoints = skin_points(
-                asset.joints_m, self.pose, asset.keypoints_m, asset.keypoint_weights
-            )
+            self._keypoints = _keypoints(self.asset).odom_m(self.pose)
             self._keypoints.setflags(write=False)
         return self._keypoints
 
@@ -351,6 +361,11 @@ class Worker:
         dx, dy = x - self._x_m, y - self._y_m
         ankle = (cos * dx + sin * dy, cos * dy - sin * dx, z)
         return ankle, yaw - self._heading_rad, pitch
+
+
+@lru_cache(maxsize=64)
+def _keypoints(asset: WorkerAsset) -> BentPoints:
+    return BentPoints(asset.joints_m, asset.keypoints_m, asset.keypoint_weights)
 
 
 def _activity(name: str) -> Activity:

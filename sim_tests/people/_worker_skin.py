@@ -17,7 +17,9 @@ from perception.arrays import FloatArray
 from .._bullet import pybullet
 from ..hall._meshes import Mesh
 from ..pictures._culling import box_corners, in_view, to_camera
-from ._body_pose import link_transform
+from ..sightlines._sight_lines import PlacedSurface
+from ..sightlines._triangles import TriangleSet
+from ._body_pose import BodyPose, link_transform, link_transforms
 from ._skin_pieces import SkinPiece, skin_pieces
 from ._worker_asset import LEVELS, load_worker
 
@@ -37,6 +39,17 @@ _REACH_M: Final = 0.30
 @lru_cache(maxsize=64)
 def _pieces(look: str, level: int) -> tuple[SkinPiece, ...]:
     return skin_pieces(load_worker(look).levels[level], _BANDS[level])
+
+
+@lru_cache(maxsize=64)
+def _surface(look: str, level: int) -> tuple[TriangleSet, NDArray[np.int64], FloatArray]:
+    """Triangles of all pieces, and the joint and share of each piece."""
+    pieces = _pieces(look, level)
+    return (
+        TriangleSet([(p.mesh.vertices_m, p.mesh.indices.reshape(-1, 3)) for p in pieces]),
+        np.array([piece.joint for piece in pieces]),
+        np.array([piece.share for piece in pieces]),
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,6 +84,26 @@ class WorkerSkin:
         self._visuals: Visuals | None = None
         self._levels: dict[int, _Level] = {}
         self._shown: set[int] = set()
+        # Of the last pose asked for: its links, and the surface by level of detail.
+        self._links: tuple[BodyPose, FloatArray] | None = None
+        self._surfaces: dict[int, PlacedSurface] = {}
+
+    def reach_odom_m(self) -> FloatArray:
+        """As :meth:`Worker.reach_odom_m`."""
+        return self.worker.reach_odom_m()
+
+    def surface(self, detail: int) -> PlacedSurface:
+        """The skin as it is bent now, at a level of detail."""
+        worker, pose = self.worker, self.worker.pose
+        joints_m = worker.asset.joints_m
+        if self._links is None or self._links[0] is not pose:
+            self._links = pose, link_transforms(joints_m, pose)
+            self._surfaces.clear()
+        if detail not in self._surfaces:
+            triangles, joints, shares = _surface(worker.asset.name, detail)
+            places = link_transform(joints_m, pose, joints, shares, self._links[1])
+            self._surfaces[detail] = PlacedSurface(triangles, places, pose.scale)
+        return self._surfaces[detail]
 
     def bounds_odom_m(self) -> FloatArray:
         """(2, 3) low and high corner of a box about all of the worker."""

@@ -64,7 +64,7 @@ class CoarseSceneryRenderer:
         hall = self._renderer.render(camera, T, size_px=coarse)
         if self._divisor == 1:
             return hall
-        view = _enlarged(hall, size)
+        view = _enlarged(hall, self._divisor)
         people = [actor for actor in self._warehouse.visuals.actors if actor.kind == "person"]
         places = [_corners_camera_m(actor.bounds_odom_m(), T) for actor in people]
         # Who is nearer is drawn later, so that a coarse rectangle never covers a near person.
@@ -91,7 +91,7 @@ class CoarseSceneryRenderer:
             return
         high = low + step * np.array([width, height])
         fine = self._renderer.render(camera, T_odom_camera, [*low, *high], (width, height))
-        part = _enlarged(fine, (width * step, height * step))
+        part = _enlarged(fine, step)
         rows, columns = slice(low[1], high[1]), slice(low[0], high[0])
         view.rgb[rows, columns] = part.rgb
         view.depth_m[rows, columns] = part.depth_m
@@ -99,11 +99,14 @@ class CoarseSceneryRenderer:
         view.actors[rows, columns] = part.actors
 
 
-def _enlarged(view: RenderedView, size: tuple[int, int]) -> RenderedView:
-    """The view with ``size`` (width, height) pixels: colours bilinear, all else nearest."""
+def _enlarged(view: RenderedView, factor: int) -> RenderedView:
+    """The view with ``factor`` times the pixels a side: colours bilinear, all else nearest."""
+    height, width = view.actors.shape
+    size = (factor * width, factor * height)
 
     def nearest(values: NDArray[Any]) -> Any:
-        return cv2.resize(values, size, interpolation=cv2.INTER_NEAREST_EXACT)
+        # The same as OpenCV's exact nearest neighbour, and quicker on one core.
+        return np.repeat(np.repeat(values, factor, axis=1), factor, axis=0)
 
     return RenderedView(
         np.asarray(cv2.resize(view.rgb, size, interpolation=cv2.INTER_LINEAR), dtype=np.uint8),

@@ -58,8 +58,7 @@ def probe() -> None:
             mesh = Mesh(flat.vertices_m, flat.normals, flat.indices, uv)
             shape = backend.shape(mesh.transformed(None, (shift, 0.0, 0.0)), colour, number)
             body = pybullet.createMultiBody(0.0, -1, shape, physicsClientId=backend.client)
-            if number is not None:
-                backend.dress(body, -1, number)
+            backend.dress(body, -1, shape, number)
         drawings.append(backend.draw(view, Lighting(), 1.9))
         backend.close()
     tiny, egl = drawings

@@ -34,7 +34,7 @@ class CameraFrame:
         rgb: (H, W, 3) uint8 as the sensor gives it.
         depth_m: (H, W) true, infinite where there is nothing.
         actors: (H, W) number of the actor in each pixel, −1 for scenery and nothing.
-        person_mask: (H, W) bool, where a person is seen.
+        people: numbers of the actors that are people.
     """
 
     stamp_s: float
@@ -42,7 +42,12 @@ class CameraFrame:
     rgb: NDArray[np.uint8]
     depth_m: FloatArray
     actors: NDArray[np.int32]
-    person_mask: NDArray[np.bool_]
+    people: tuple[int, ...]
+
+    @property
+    def person_mask(self) -> NDArray[np.bool_]:
+        """(H, W) where a person is seen."""
+        return np.isin(self.actors, self.people)
 
 
 class PictureRenderer(Protocol):
@@ -141,7 +146,7 @@ class SimulatedCamera:
             expose(rgb, self._sensor, self._noise_rng),
             view.depth_m,
             view.actors,
-            np.isin(view.actors, people),
+            tuple(people),
         )
 
     def _places(self) -> dict[int, FloatArray]:

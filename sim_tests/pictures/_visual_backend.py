@@ -14,9 +14,9 @@ from ..hall._lighting import Lighting
 from ..hall._meshes import Mesh
 from ._view import View
 
-BackendName = Literal["tiny", "egl"]
-RendererName = Literal["tiny", "egl", "auto"]
-RENDERERS: Final[tuple[RendererName, ...]] = ("tiny", "egl", "auto")
+BackendName = Literal["tiny", "egl", "gl"]
+RendererName = Literal["tiny", "egl", "gl", "auto"]
+RENDERERS: Final[tuple[RendererName, ...]] = ("tiny", "egl", "gl", "auto")
 BACKGROUND_RGB: Final = (255, 255, 255)
 
 
@@ -36,10 +36,14 @@ class Drawing:
 
 
 class PictureBackend(Protocol):
-    """A PyBullet client of its own that only draws."""
+    """A PyBullet client of its own that only draws.
+
+    ``shares_textures`` says that shapes with one picture keep one copy of it.
+    """
 
     name: BackendName
     client: int
+    shares_textures: bool
 
     def close(self) -> None:
         """End the client; a second call does nothing."""
@@ -53,8 +57,8 @@ class PictureBackend(Protocol):
         """Register a visual shape; returns PyBullet's id of it."""
         ...
 
-    def dress(self, body: int, link: int, texture: int) -> None:
-        """Put a texture on a link (−1: base) whose shape was registered with it."""
+    def dress(self, body: int, link: int, shape: int, texture: int | None) -> None:
+        """Let a link (−1: base) show its shape, with the texture that was registered with it."""
         ...
 
     def hide(self, body: int) -> None:

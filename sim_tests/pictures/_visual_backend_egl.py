@@ -55,6 +55,7 @@ class EglBackend:
     """
 
     name: BackendName = "egl"
+    shares_textures = False
     in_use: ClassVar[bool] = False
 
     def __init__(self) -> None:
@@ -119,7 +120,7 @@ class EglBackend:
                 )
             )
 
-    def dress(self, body: int, link: int, texture: int) -> None:
+    def dress(self, body: int, link: int, shape: int, texture: int | None) -> None:
         """Do nothing: the shape's material has the texture already."""
 
     def hide(self, body: int) -> None:

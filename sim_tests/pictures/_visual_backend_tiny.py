@@ -28,6 +28,7 @@ class TinyBackend:
     """See :class:`PictureBackend`. A body hidden by zero opacity costs 0.06 µs a picture."""
 
     name: BackendName = "tiny"
+    shares_textures = False
 
     def __init__(self) -> None:
         self.client: int = pybullet.connect(pybullet.DIRECT)
@@ -76,9 +77,12 @@ class TinyBackend:
             )
         )
 
-    def dress(self, body: int, link: int, texture: int) -> None:
+    def dress(self, body: int, link: int, shape: int, texture: int | None) -> None:
         """Put a texture on a link."""
-        pybullet.changeVisualShape(body, link, textureUniqueId=texture, physicsClientId=self.client)
+        if texture is not None:
+            pybullet.changeVisualShape(
+                body, link, textureUniqueId=texture, physicsClientId=self.client
+            )
 
     def hide(self, body: int) -> None:
         """Make a body fully transparent: the renderer then skips it."""

@@ -70,13 +70,13 @@ class Visuals(Closing):
 
     Args:
         layout: the hall whose scenery is built; None leaves the world empty.
-        renderer: ``"tiny"`` is PyBullet's software renderer, ``"egl"`` OpenGL without a window, and
-            ``"auto"`` OpenGL where it works.
+        renderer: ``"tiny"`` is PyBullet's software renderer, ``"gl"`` OpenGL without a window,
+            ``"egl"`` the same through PyBullet's plugin, and ``"auto"`` the quickest that works.
         variant: number of the scenery's variant (goods, colours, wear).
 
     Attributes:
         client: PyBullet's id of this world.
-        renderer: ``"tiny"`` or ``"egl"``, the one in use.
+        renderer: ``"tiny"``, ``"gl"`` or ``"egl"``, the one in use.
         culling: whether :meth:`prepare` hides what is not seen; the pictures are the same.
 
     Raises:
@@ -142,8 +142,12 @@ class Visuals(Closing):
             return self._backend.shape(mesh, colour, None)
         if mesh.uv is None:
             raise SimError("a mesh with a texture needs uv coordinates")
-        uv, picture = cut_texture(mesh.uv, mesh.indices.ravel(), self._pictures[texture])
-        key = _key(picture)
+        uv, picture = mesh.uv, self._pictures[texture]
+        if self._backend.shares_textures:
+            key = texture.to_bytes(8, "little")
+        else:
+            uv, picture = cut_texture(uv, mesh.indices.ravel(), picture)
+            key = _key(picture)
         if key not in self._loaded:
             self._loaded[key] = self._backend.texture(picture)
         loaded = self._loaded[key]
@@ -195,9 +199,8 @@ class Visuals(Closing):
             )
         )
         for link, own in enumerate((shape, *link_shapes), start=-1):
-            texture = self._texture_of_shape.get(own)
-            if texture is not None:
-                self._backend.dress(body, link, texture)
+            if own >= 0:
+                self._backend.dress(body, link, own, self._texture_of_shape.get(own))
         return body
 
     def add_static(self, mesh: Mesh, colour: Colour = WHITE, texture: int | None = None) -> int:

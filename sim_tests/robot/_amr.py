@@ -115,6 +115,11 @@ class Amr:
     def advance(self, dt_s: float) -> None:
         """Ramp the wheels towards the command by ``dt_s`` > 0; call it before each physics step."""
         dt = finite_number("dt_s", dt_s, SimError, minimum=0.0, exclusive_minimum=True)
+        if (
+            self._speed_mps == self._target_speed_mps
+            and self._yaw_rate_radps == self._target_yaw_rate_radps
+        ):
+            return
         speed = _ramped(
             self._speed_mps,
             self._target_speed_mps,
@@ -142,6 +147,13 @@ class Amr:
             speed_mps=speed,
             yaw_rate_radps=yaw_rate,
         )
+
+    @property
+    def velocity_odom_mps(self) -> FloatArray:
+        """(2,) velocity of the base origin, along the heading."""
+        T, speed, _, _ = self._motion()
+        heading = math.atan2(T[1, 0], T[0, 0])
+        return speed * np.array([math.cos(heading), math.sin(heading)])
 
     @property
     def T_odom_base(self) -> FloatArray:  # noqa: N802

@@ -17,6 +17,8 @@ from ..hall._meshes import Mesh, Region, box, ellipsoid, merge, quad, tube
 from ..hall._scenery_chunk import Colour
 from ..hall._texture_amr import AMR_ATLAS
 from ..hall._textures import scenery_texture
+from ..sightlines._sight_lines import PlacedSurface
+from ..sightlines._triangles import TriangleSet
 from ._amr import CAMERA_HEIGHT_M, TRACK_M, WHEEL_RADIUS_M, Amr
 
 if TYPE_CHECKING:
@@ -51,6 +53,12 @@ def amr_meshes() -> Mapping[str, tuple[Piece, ...]]:
         "left_wheel": ((_wheel(1.0), _WHITE, "amr"),),
         "right_wheel": ((_wheel(-1.0), _WHITE, "amr"),),
     }
+
+
+@lru_cache(maxsize=1)
+def _base_triangles() -> TriangleSet:
+    meshes = [mesh for mesh, _, _ in amr_meshes()["base_link"]]
+    return TriangleSet([(mesh.vertices_m, mesh.indices.reshape(-1, 3)) for mesh in meshes])
 
 
 def _outline(half_x: float, half_y: float, radius: float) -> FloatArray:
@@ -276,6 +284,14 @@ class AmrLook:
         middle = T[:3, :3] @ _BOUNDS_BASE_M.mean(axis=0) + T[:3, 3]
         half = np.abs(T[:3, :3]) @ (0.5 * (_BOUNDS_BASE_M[1] - _BOUNDS_BASE_M[0]))
         return np.stack([middle - half, middle + half])
+
+    def reach_odom_m(self) -> FloatArray:
+        """As :meth:`bounds_odom_m`."""
+        return self.bounds_odom_m()
+
+    def surface(self, detail: int) -> PlacedSurface:
+        """The robot without its wheels, which its body hides; there is one level of detail."""
+        return PlacedSurface(_base_triangles(), np.asarray(self._pose()[0])[None])
 
     def build(self, visuals: Visuals) -> None:
         """Make its bodies in the picture world."""

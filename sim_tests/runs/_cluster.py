@@ -12,7 +12,7 @@ from uuid import uuid4
 from .._errors import SimError
 from ._episode import Attempt, attempt, failed
 from ._job import Job
-from ._pool import Numbered, one_thread
+from ._pool import Numbered, one_thread, tidy
 from ._versions import versions as own_versions
 
 try:
@@ -120,4 +120,6 @@ def _remote(job: Job, versions: dict[str, str]) -> Attempt:
             return failed(job, f"SimError: {text}", text)
     with _one_at_a_time:
         one_thread()
-        return attempt(job)
+        result = attempt(job)
+        tidy()
+        return result

@@ -75,6 +75,13 @@ def _add_crossings(commands: argparse._SubParsersAction[argparse.ArgumentParser]
         help="run on a Dask cluster: tcp://HOST:PORT, or 'local' for one of --workers processes",
     )
     crossings.add_argument(
+        "--time-limit",
+        type=float,
+        metavar="S",
+        help="end an episode that takes longer by the clock, such as one whose planner hangs "
+        "(default: none)",
+    )
+    crossings.add_argument(
         "--out",
         type=Path,
         default=Path("crossings"),

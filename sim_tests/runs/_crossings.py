@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from perception import AwarenessPipeline, Camera
 
+from .._errors import SimError
 from ..measures._episode_record import EpisodeRecord
 from ..measures._summary import summarise
 from ..measures._summary_text import table_text
@@ -21,7 +22,7 @@ from ._run_folder import ERRORS
 
 #: What the command line calls the reference planner.
 REFERENCE: Final = "reference"
-_REPORT: Final = "sim_tests.report"
+_REPORT: Final = "sim_tests.report._write_report"
 
 
 def crossings_command(options: argparse.Namespace) -> int:
@@ -47,6 +48,7 @@ def crossings_command(options: argparse.Namespace) -> int:
         options.out,
         workers=options.workers,
         scheduler=options.scheduler,
+        time_limit_s=options.time_limit,
         resume=options.resume,
         progress=True,
         about=_about(options),
@@ -109,5 +111,9 @@ def _about(options: argparse.Namespace) -> dict[str, Any]:
 def _write_report(out: Path) -> None:
     from importlib import import_module  # noqa: PLC0415 - the report is a part of its own
 
-    path = import_module(_REPORT).write_report(out)
+    try:
+        path = import_module(_REPORT).write_report(out, progress=True)
+    except SimError as error:  # the episodes are there, and a page can be had any time
+        print(f"no report: {error}; then: awarenav report {out}", file=sys.stderr)
+        return
     print(f"Report: {path}")

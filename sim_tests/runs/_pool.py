@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
+import gc
 import multiprocessing
 import os
 import signal
+import time
 from collections import deque
 from collections.abc import Iterator, Sequence
 from multiprocessing.connection import Connection, wait
@@ -33,7 +36,9 @@ def run_here(jobs: Sequence[Numbered]) -> Iterator[tuple[int, Attempt]]:
         yield number, attempt(job)
 
 
-def run_in_processes(jobs: Sequence[Numbered], workers: int) -> Iterator[tuple[int, Attempt]]:
+def run_in_processes(
+    jobs: Sequence[Numbered], workers: int, time_limit_s: float | None = None
+) -> Iterator[tuple[int, Attempt]]:
     """Run jobs in processes of their own, and give each result as soon as it is there.
 
     See :class:`WorkerPool`; the processes live as long as this takes.
@@ -41,8 +46,9 @@ def run_in_processes(jobs: Sequence[Numbered], workers: int) -> Iterator[tuple[i
     Args:
         jobs: with their numbers.
         workers: how many processes, ≥ 1.
+        time_limit_s: as in :class:`WorkerPool`.
     """
-    with WorkerPool(min(workers, len(jobs))) as pool:
+    with WorkerPool(min(workers, len(jobs)), time_limit_s) as pool:
         yield from pool.run(jobs)
 
 
@@ -54,9 +60,12 @@ class WorkerPool(Closing):
 
     Args:
         workers: how many.
+        time_limit_s: an episode that takes longer by the clock is ended, and not run again; None
+            lets each take its time.
     """
 
-    def __init__(self, workers: int) -> None:
+    def __init__(self, workers: int, time_limit_s: float | None = None) -> None:
+        self._time_limit_s = time_limit_s
         self._context = multiprocessing.get_context("spawn")  # a fork would share the physics
         with _one_thread_each():
             self._idle = [_Worker(self._context) for _ in range(workers)]
@@ -77,20 +86,40 @@ class WorkerPool(Closing):
                 worker = idle.pop()
                 busy[worker.pipe] = (worker, number, job, deaths)
                 worker.give(job)
-            for ready in cast(list[Connection], wait(list(busy))):
-                worker, number, job, deaths = busy.pop(ready)
-                result = worker.take()
-                if result is not None:
+            ready = cast(
+                list[Connection], wait(list(busy), None if self._time_limit_s is None else 1)
+            )
+            for pipe in [*ready, *self._overdue(ready)]:
+                worker, number, job, deaths = busy.pop(pipe)
+                result = worker.take() if pipe in ready else self._ended(job)
+                if result is not None and pipe in ready:
                     idle.append(worker)
                     yield number, result
                     continue
                 worker.close()
                 with _one_thread_each():
                     idle.append(_Worker(self._context))
-                if deaths < _DEATHS_ALLOWED:
+                if result is not None:
+                    yield number, result
+                elif deaths < _DEATHS_ALLOWED:
                     waiting.appendleft((number, job, deaths + 1))
                 else:
                     yield number, died(job, worker.exit_code)
+
+    def _overdue(self, ready: Sequence[Connection]) -> list[Connection]:
+        limit_s = self._time_limit_s
+        if limit_s is None:
+            return []
+        latest_s = time.monotonic() - limit_s
+        return [
+            pipe
+            for pipe, (worker, *_) in self._busy.items()
+            if pipe not in ready and worker.since_s < latest_s
+        ]
+
+    def _ended(self, job: Job) -> Attempt:
+        text = f"ended after the time limit of {self._time_limit_s:g} s"
+        return failed(job, f"TimeLimit: {text}", text)
 
 
 def _close_all(idle: list[_Worker], busy: dict[Connection, tuple[_Worker, int, Job, int]]) -> None:
@@ -112,6 +141,7 @@ class _Worker(Closing):
 
     def __init__(self, context: multiprocessing.context.SpawnContext) -> None:
         self.pipe, theirs = context.Pipe()
+        self.since_s = 0.0
         self._process = context.Process(target=_serve, args=(theirs,), daemon=True)
         self._process.start()
         theirs.close()  # so that the pipe ends when the process does
@@ -126,6 +156,7 @@ class _Worker(Closing):
         self.pipe.close()
 
     def give(self, job: Job) -> None:
+        self.since_s = time.monotonic()
         with contextlib.suppress(OSError):  # it has died: taking its result will tell
             self.pipe.send(job)
 
@@ -146,6 +177,14 @@ def _serve(pipe: Connection) -> None:
     with contextlib.suppress(EOFError, OSError):
         while True:
             pipe.send(attempt(pipe.recv()))
+            tidy()
+
+
+def tidy() -> None:
+    """Give the system back what an episode has used; glibc alone keeps it, and it adds up."""
+    gc.collect()
+    with contextlib.suppress(AttributeError, OSError):  # another C library
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def one_thread() -> None:

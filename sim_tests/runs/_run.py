@@ -27,6 +27,7 @@ def run_jobs(
     *,
     workers: int | None = None,
     scheduler: str | None = None,
+    time_limit_s: float | None = None,
     resume: bool = False,
     afresh: bool = False,
     progress: bool = False,
@@ -44,6 +45,8 @@ def run_jobs(
         workers: processes; 1 runs in this one, None takes one a core.
         scheduler: a Dask scheduler's address (``"tcp://…"``), or ``"local"`` for a cluster of
             ``workers`` processes on this computer; None does without Dask.
+        time_limit_s: by the clock, for an episode; one that takes longer (a planner that hangs) is
+            ended and says so. None for no limit; not with a scheduler.
         resume: go on with the same run in ``out_dir``.
         afresh: replace an unfinished run in ``out_dir`` as well.
         progress: show on the standard error stream what is done and the time left.
@@ -59,6 +62,11 @@ def run_jobs(
     if not jobs:
         raise SimError("jobs must be at least one episode, got none")
     count = cores() if workers is None else finite_number("workers", workers, SimError, minimum=1)
+    limit_s = time_limit_s
+    if limit_s is not None:
+        limit_s = finite_number("time_limit_s", limit_s, SimError, minimum=1.0)
+        if scheduler is not None:
+            raise SimError("a time limit works in processes of this computer, not on a cluster")
     folder = RunFolder(
         Path(out_dir),
         jobs,
@@ -77,7 +85,7 @@ def run_jobs(
             file=sys.stderr,
             disable=not progress,
         ) as bar:
-            for number, result in _results(left, int(count), scheduler):
+            for number, result in _results(left, int(count), scheduler, limit_s):
                 folder.add(number, result.record, result.trace)
                 bar.update()
         return folder.finish()
@@ -92,12 +100,12 @@ def cores() -> int:
 
 
 def _results(
-    jobs: Sequence[Numbered], workers: int, scheduler: str | None
+    jobs: Sequence[Numbered], workers: int, scheduler: str | None, time_limit_s: float | None
 ) -> Iterator[tuple[int, Attempt]]:
     if scheduler is not None:
         from ._cluster import run_on_cluster  # noqa: PLC0415 - an extra, needed for this alone
 
         return run_on_cluster(jobs, scheduler, workers, versions())
-    if workers == 1:
+    if workers == 1 and time_limit_s is None:
         return run_here(jobs)
-    return run_in_processes(jobs, workers)
+    return run_in_processes(jobs, workers, time_limit_s)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import random
 import signal
+import time
 from pathlib import Path
 
 import numpy as np
@@ -54,6 +55,13 @@ class DiesOnce(Slow):
             marker.touch()
             os.kill(os.getpid(), signal.SIGKILL)
         return super().plan(robot_state, goal_odom_m, constraints, dt_s)
+
+
+class Hangs(Slow):
+    """Never answers."""
+
+    def plan(self, robot_state, goal_odom_m, constraints, dt_s):
+        time.sleep(3600.0)
 
 
 class NoPlan:

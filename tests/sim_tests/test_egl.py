@@ -166,7 +166,10 @@ def test_what_is_hidden_is_in_no_buffer(halls: tuple[Warehouse, Warehouse]) -> N
     assert set(np.unique(again.actors)) == {-1, 0, 1, 2}
 
 
-def test_one_egl_world_at_a_time_and_auto_falls_back(halls: tuple[Warehouse, Warehouse]) -> None:
+def test_one_egl_world_at_a_time_and_auto_falls_back(
+    halls: tuple[Warehouse, Warehouse], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(_visual_backends, "gl_works", lambda: False)
     assert halls[1].visuals.renderer == "egl"
     with pytest.raises(SimError, match="one world with EGL at a time"):
         Visuals(renderer="egl")
@@ -179,6 +182,7 @@ def test_one_egl_world_at_a_time_and_auto_falls_back(halls: tuple[Warehouse, War
 def test_where_egl_does_not_draw_it_is_refused_and_auto_is_tiny(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr(_visual_backends, "gl_works", lambda: False)
     monkeypatch.setattr(_visual_backends, "egl_works", lambda: False)
     monkeypatch.setattr(_visual_backends.EglBackend, "in_use", False)
     with pytest.raises(SimError, match="libEGL"):

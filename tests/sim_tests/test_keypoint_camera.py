@@ -25,21 +25,21 @@ class Body:
         self.keypoints_odom_m[:5, 2] = 1.7
         self.stature_m = stature_m
 
+    def reach_odom_m(self):
+        return np.array([self.keypoints_odom_m.min(axis=0), self.keypoints_odom_m.max(axis=0)])
+
 
 class Wall:
-    """A depth source with a wall at a distance over part of the image."""
+    """A wall at a distance over part of the picture."""
 
     def __init__(self, depth_m=np.inf, from_u_px=0.0):
         self.depth_m = depth_m
         self.from_u_px = from_u_px
-        self.samples = 0
 
-    def depth(self, camera, T_odom_camera, roi_xyxy_px=None, size_px=None):
-        width, height = size_px
-        self.samples += width * height
-        u = roi_xyxy_px[0] + (np.arange(width) + 0.5) / width * (roi_xyxy_px[2] - roi_xyxy_px[0])
-        row = np.where(u - 0.5 >= self.from_u_px, self.depth_m, np.inf)
-        return np.tile(row, (height, 1))
+    def blocked(self, eye_odom_m, ends_odom_m, detail):
+        points = (ends_odom_m - eye_odom_m) @ T_ODOM_CAMERA[:3, :3]
+        behind = points[:, 2] > self.depth_m
+        return behind & (CAMERA.project(points)[:, 0] >= self.from_u_px)
 
 
 def seen(body, wall=None, noise=EXACT, seed=0):
@@ -117,12 +117,6 @@ def test_the_luck_of_one_person_does_not_depend_on_another():
     first = alone.estimate(None, alone.detect(None))[0]
     same = together.estimate(None, together.detect(None))[0]
     np.testing.assert_array_equal(first.keypoints_px, same.keypoints_px)
-
-
-def test_the_depth_images_stay_small():
-    wall = Wall()
-    seen(Body(x_m=1.0), wall)
-    assert wall.samples < 48 * 48 + 40 * 40 + 1000
 
 
 def test_foreign_detections_and_impossible_noise_are_refused():

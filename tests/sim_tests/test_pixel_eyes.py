@@ -18,12 +18,13 @@ from perception import (
     PersonObservation,
 )
 from perception.networks._detector import OnnxPersonDetector
-from sim_tests import CameraRenderer, KeypointNoise, Scenario, SimError, run_crossing
+from sim_tests import KeypointNoise, Scenario, SimError, run_crossing
 from sim_tests._keypoint_camera import KeypointCamera
 from sim_tests._pixel_eyes import NOBODY, PIXEL_RATE_HZ, PixelEyes, pixel_timing, who_is_who
 from sim_tests._stage import Stage, TrueView
 from sim_tests.pictures._camera_timing import CameraTiming
 from sim_tests.pictures._sensor import SensorConfig
+from sim_tests.sightlines._sight_lines import SightLines
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
 MODELS = Path(__file__).resolve().parents[3] / "shared" / "models"
@@ -107,9 +108,8 @@ def test_one_worker_is_never_two_observations():
 
 def test_rendered_people_are_observed_where_they_are(stage: Stage):
     cone = AttentionCone()
-    keypoints = KeypointCamera(
-        CAMERA, CameraRenderer(stage.warehouse), KeypointNoise(), np.random.default_rng(0)
-    )
+    lines = SightLines(stage.warehouse.layout, actors=stage.warehouse.actors)
+    keypoints = KeypointCamera(CAMERA, lines, KeypointNoise(), np.random.default_rng(0))
     pipeline = AwarenessPipeline(CAMERA, keypoints, keypoints, cone=cone)
     eyes = PixelEyes(stage, CAMERA, cone, SensorConfig(), np.random.default_rng(0), pipeline)
     T_odom_camera = stage.amr.T_odom_camera

@@ -85,6 +85,21 @@ def test_episodes_and_processes_that_fail_cost_no_other(tmp_path, monkeypatch, s
     assert "episode 8: short, seed 0" in log
 
 
+@pytest.mark.slow
+def test_an_episode_that_never_ends_is_ended(tmp_path, serial):
+    jobs = short_jobs(1, planners=["run_planners:Hangs", ""])
+    records = run_jobs(jobs, tmp_path, workers=1, time_limit_s=20.0)
+    assert [record.error for record in records] == [
+        "TimeLimit: ended after the time limit of 20 s",
+        "TimeLimit: ended after the time limit of 20 s",
+        "",
+        "",
+    ]
+    assert records[2:] == read_records(serial / "episodes.csv")[:2]
+    with pytest.raises(SimError, match="not on a cluster"):
+        run_jobs(jobs, tmp_path / "other", time_limit_s=20.0, scheduler="local")
+
+
 def test_a_job_that_is_none_is_a_row_too():
     job = Job("nonsense: [", 3, "p", "also: nonsense")
     record = run_episode(job)

@@ -80,8 +80,14 @@ def test_chosen_tests_run_their_episodes_alone(folder):
     ("arguments", "message"),
     [
         (["--awarenav-planner", "nowhere:Planner"], "No module named 'nowhere'"),
-        (["--awarenav-policy", "brave"], "preset must be one of"),
-        (["--awarenav-episodes", "none"], "--awarenav-episodes must be a whole number"),
+        pytest.param(
+            ["--awarenav-policy", "brave"], "preset must be one of", marks=pytest.mark.slow
+        ),
+        pytest.param(
+            ["--awarenav-episodes", "none"],
+            "--awarenav-episodes must be a whole number",
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_options_that_cannot_be_used_are_said_once(folder, arguments, message):
