@@ -40,11 +40,20 @@ class ColumnGroup:
 
 @dataclass(frozen=True, slots=True)
 class ScenarioRow:
-    """One scenario: its name and version, its attention, number of episodes, and the cells."""
+    """One scenario.
+
+    Attributes:
+        name: and version.
+        attention: what its people look at.
+        episodes: of all arms.
+        contacts: caused by the robot, of all arms.
+        cells: the columns of the groups.
+    """
 
     name: str
     attention: str
     episodes: int
+    contacts: Cell
     cells: tuple[Cell, ...]
 
 
@@ -61,29 +70,26 @@ def tabulate(figures: Figures) -> ScenarioTable:
     arms = figures.shown
     winners = [arm for arm in judged(arms) if figures.against(arm) is not None]
     groups = [
-        _group("Robot contacts", "episodes in which the robot moved into a person", arms),
         _group("Time lost, s", "mean over the empty hall", arms),
         *([_group("Won back", "of what the reference loses", winners)] if winners else []),
         _group("Margin violated, s", "mean an episode", arms),
         _group("Smallest margin, m", "the worst episode", arms),
     ]
     attention = {
-        scenario_part(each.record): (each.record.attention, each.record.scenario_version)
-        for arm in arms
-        for each in arm.episodes
+        scenario_part(each.record): each.record.attention for arm in arms for each in arm.episodes
     }
     rows = []
     for part in sorted(attention):
         found = [figures.by_scenario(arm, part) for arm in arms]
         cells = [
-            *(_contacts(row) for row in found),
             *(_mean(row, TIME_LOST, 1) for row in found),
             *(_won_back(figures.against(arm, part, scenario=True)) for arm in winners),
             *(_mean(row, VIOLATION, 2) for row in found),
             *(_number(None if row is None else row.worst.get(MARGIN.key), 2) for row in found),
         ]
         episodes = sum(row.episodes for row in found if row is not None)
-        rows.append(ScenarioRow(part, attention[part][0], episodes, _ruled(cells, groups)))
+        contacts = _contacts([(arm.name, row) for arm, row in zip(arms, found, strict=True)])
+        rows.append(ScenarioRow(part, attention[part], episodes, contacts, _ruled(cells, groups)))
     return ScenarioTable(tuple(groups), tuple(rows))
 
 
@@ -97,11 +103,17 @@ def _group(title: str, meaning: str, arms: Sequence[Arm]) -> ColumnGroup:
     return ColumnGroup(title, meaning, tuple((arm.look, arm.name) for arm in arms))
 
 
-def _contacts(row: SummaryRow | None) -> Cell:
-    if row is None or not row.robot_contact.n:
-        return Cell(None, NOTHING)
-    hits = round(row.robot_contact.value * row.robot_contact.n)
-    return Cell(hits, count(hits), "bad" if hits else "")
+def _contacts(rows: Sequence[tuple[str, SummaryRow | None]]) -> Cell:
+    """How many episodes of which arms had a contact that the robot caused."""
+    hits = {
+        name: round(row.robot_contact.value * row.robot_contact.n)
+        for name, row in rows
+        if row is not None and row.robot_contact.n
+    }
+    total = sum(hits.values())
+    if not total:
+        return Cell(0, "0")
+    return Cell(total, ", ".join(f"{name} {count(n)}" for name, n in hits.items() if n), "bad")
 
 
 def _mean(row: SummaryRow | None, measure: Measure, decimals: int) -> Cell:

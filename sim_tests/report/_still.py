@@ -69,7 +69,7 @@ def make_stills(
     """
     worst = worst_of(arms)
     if not pictures:
-        return tuple(_still(folder, arm, each, (), "Made without pictures.") for arm, each in worst)
+        return tuple(_still(folder, arm, each, (), "") for arm, each in worst)
     stills = []
     with tqdm(worst, desc="stills", unit="episode", file=sys.stderr, disable=not progress) as bar:
         for arm, episode in bar:

@@ -22,9 +22,10 @@ from ..pictures._renderer import CameraRenderer
 from ..runs._episode import observed_episode
 from ..runs._job import Job
 
-_SIZE_PX: Final = (480, 360)
+_WIDTH_PX: Final = 540
 _JPEG_QUALITY: Final = 80
-_WINDOW_M: Final = (9.6, 7.2)
+# Width of the plan.
+_WINDOW_M: Final = 10.0
 # Paths are drawn through every so many frames.
 _EVERY: Final = 4
 # The table's figures have six decimals.
@@ -61,12 +62,13 @@ class _Watcher:
     def _draw(self, frame: CrossingFrame, stage: Stage) -> None:
         cone = AttentionCone()
         spec = stage.scenario.camera
-        camera = spec.camera(_SIZE_PX[0] / spec.width_px)
+        camera = spec.camera(_WIDTH_PX / spec.width_px)
         picture = CameraRenderer(stage.warehouse).rgb(camera, frame.T_odom_camera)
         self.camera = draw_camera_view(picture, camera, frame, stage, cone)
         worker = int(np.argmin(frame.margins_m))
         middle = 0.5 * (frame.robot_state.position_odom_m + frame.truth[worker].position_odom_m)
-        view = TopView(stage, _SIZE_PX, _window(middle))
+        size_px = (camera.width_px, camera.height_px)
+        view = TopView(stage, size_px, _window(middle, size_px))
         for earlier in self._frames[:-1:_EVERY]:
             view.draw(earlier, stage, cone)  # which lengthens the paths
         self.plan = view.draw(frame, stage, cone)
@@ -100,9 +102,12 @@ def pictures_of(job: Job, record: EpisodeRecord) -> tuple[tuple[tuple[str, str],
     ), ""
 
 
-def _window(middle_odom_m: FloatArray) -> tuple[float, float, float, float]:
+def _window(
+    middle_odom_m: FloatArray, size_px: tuple[int, int]
+) -> tuple[float, float, float, float]:
     x, y = middle_odom_m.tolist()
-    half_x, half_y = 0.5 * _WINDOW_M[0], 0.5 * _WINDOW_M[1]
+    half_x = 0.5 * _WINDOW_M
+    half_y = half_x * size_px[1] / size_px[0]
     return x - half_x, y - half_y, x + half_x, y + half_y
 
 

@@ -12,6 +12,8 @@ from ._figures import Figures, robot_contacts
 from ._measure import ROBOT_CONTACTS
 from ._text import NOTHING, count, percent, plural
 
+# Fewer pairs show nothing: their bootstrap interval is too narrow to be trusted.
+_FEW_PAIRS: Final = 20
 # None seen says little while the true share may be larger than this.
 _TELLING: Final = 0.05
 
@@ -120,6 +122,11 @@ def _won_back_sentence(who: str, against: Comparison) -> str:
     back, reference = against.won_back, against.baseline
     if not back.known:
         return f" No pair with {reference} tells what it wins back."
+    if back.n < _FEW_PAIRS:
+        return (
+            f" Over only {plural(back.n, 'pair')} with {reference} it wins back "
+            f"{percent(back.value)} of the time lost to {who}: too few to tell."
+        )
     if back.low > 0.0:
         return (
             f" It wins back {percent(back.value)} of the time that {reference} loses to {who} "
@@ -136,7 +143,7 @@ def _won_back_sentence(who: str, against: Comparison) -> str:
 def _violation_card(figures: Figures, arm: Arm, whole: Comparison) -> Card:
     unaware = figures.against(arm, "unaware")
     who, against = ("people", whole) if unaware is None else ("unaware people", unaware)
-    change, base = against.violation_excess, "violation"
+    change, base = against.violation_excess, "violation time"
     if not change.known:  # the reference violates nothing
         change, base = against.violation_excess_of_time, "time"
     reference = against.baseline
@@ -175,6 +182,8 @@ def _ends(change: Interval, *, sign: bool = False) -> str:
 def _direction(
     change: Interval, up: str, down: str, neither: str, *, more_is_good: bool
 ) -> tuple[str, Tone]:
+    if change.n < _FEW_PAIRS:
+        return "too few to tell", "open"
     if change.low > 0.0:
         return up, "good" if more_is_good else "bad"
     if change.high < 0.0:

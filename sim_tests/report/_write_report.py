@@ -60,6 +60,7 @@ def write_report(
         scatter=scatter(arms, listed.episodes, folder.replay_prefix),
         table=tabulate(figures),
         stills=make_stills(folder, arms, pictures=stills, progress=progress),
+        pictured=stills,
         faults=faults_of(figures),
         failures=failures(folder),
         failed=f"{plural(errors, 'episode')} failed",

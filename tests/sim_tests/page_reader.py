@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from html.parser import HTMLParser
 
-_VOID = {"meta", "link", "img", "input", "br", "hr", "col"}
+_VOID = {"meta", "link", "img", "input", "br", "hr", "col", "wbr"}
 _REFERRING = ("src", "href", "srcset", "action", "poster", "data", "xlink:href")
 
 

@@ -20,8 +20,6 @@ from sim_tests.measures._statistics import summarise, zero_of_n_upper
 from sim_tests.report._text import number, percent
 from sim_tests.report._write_report import write_report
 
-pytest.importorskip("jinja2")
-
 ROOT = Path(__file__).parents[2]
 HOSTILE = '<script>alert("x")</script>&\'`{{ 7 * 7 }}'
 
@@ -131,6 +129,21 @@ def test_few_episodes_prove_nothing(tmp_path: Path) -> None:
     assert "none seen, too few to tell" in page.text
     bound = percent(zero_of_n_upper(3))
     assert f"a true rate of up to {bound} remains possible" in page.text
+
+
+def test_few_pairs_show_nothing(tmp_path: Path) -> None:
+    """Four pairs that agree have an interval that leaves 0 out, and still prove little."""
+    page = report(made_up_run(scenarios=2, seeds=2), tmp_path)
+    assert "gain shown" not in page.text
+    assert "Over only 4 pairs with blind" in page.text
+
+
+@pytest.mark.parametrize(
+    ("share", "text"),
+    [(0.0, "0"), (1.0, "100"), (0.9975, "99.75"), (0.9999, "99.99"), (0.0004, "0.04"), (0.5, "50")],
+)
+def test_almost_all_is_not_all(share: float, text: str) -> None:
+    assert percent(share) == f"{text}\u202f%"
 
 
 def test_hostile_names_stay_text(tmp_path: Path) -> None:

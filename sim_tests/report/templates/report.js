@@ -80,6 +80,22 @@
     body.append(...keyed.map(([, row]) => row));
   }
 
+  // Pictures of an episode side by side, or each as wide as the card.
+  for (const pair of document.querySelectorAll(".pictures")) {
+    for (const picture of [...pair.children]) {
+      const button = document.createElement("button");
+      button.type = "button";
+      button.className = "zoom";
+      button.setAttribute("aria-expanded", "false");
+      picture.replaceWith(button);
+      button.append(picture);
+      button.addEventListener("click", () => {
+        const large = pair.classList.toggle("large");
+        for (const each of pair.children) each.setAttribute("aria-expanded", String(large));
+      });
+    }
+  }
+
   // A link to an episode opens the list that it stands in.
   function open() {
     const row = location.hash.startsWith("#e") && document.getElementById(location.hash.slice(1));
