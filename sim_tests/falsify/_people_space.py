@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 from pydantic import ValidationError
 
-from .._distributions import Distribution
+from .._distributions import Choice, Distribution, Integers
 from .._errors import SimError
 from .._scenario import Scenario
 from .._scenario_template import ScenarioTemplate
@@ -20,6 +20,8 @@ from ._way import RACK_CLEARANCE_M, ROBOT_CLEARANCE_M, clearance_m
 
 # What is not possible is drawn back towards the scenario as written, in these steps.
 _SHARES: Final = (1.0, 0.75, 0.5, 0.25, 0.0)
+# Searched by quantile, for what lies between their values does not exist.
+_DISCRETE: Final = (Choice, Integers)
 _PIECES: Final = {"workers": script_levers, "people": person_levers}
 
 
@@ -122,17 +124,13 @@ class PeopleSpace:
 
 def _own_lever(distribution: Distribution) -> Lever:
     low, high = distribution.bounds
-    if _is_discrete(distribution):
+    if isinstance(distribution, _DISCRETE):
         return Lever.of(0.0, 1.0, 0.5)
     return Lever.of(low, high, distribution.median)
 
 
 def _own_value(distribution: Distribution, value: float) -> float:
-    if _is_discrete(distribution):
+    if isinstance(distribution, _DISCRETE):
         return distribution.quantile(value)
     low, high = distribution.bounds
     return min(max(value, low), high)
-
-
-def _is_discrete(distribution: Distribution) -> bool:
-    return type(distribution).__name__ in ("Choice", "Integers")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -46,7 +47,7 @@ def keep_settings(
         _compare(path, json.loads(json.dumps(asdict(settings))), may_grow)
     elif resume:
         raise SimError(f"--resume: there is no {what} in {folder}, no {file}")
-    part = path.with_name(path.name + ".part")
+    part = path.with_name(f"{path.name}.{os.getpid()}.part")  # several may begin at once
     try:
         folder.mkdir(parents=True, exist_ok=True)
         part.write_text(json.dumps(asdict(settings), indent=1) + "\n", encoding="utf-8")

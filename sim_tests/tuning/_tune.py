@@ -18,6 +18,7 @@ from .._errors import SimError
 from .._scenario_template import ScenarioTemplate
 from ..runs._plan import plan_jobs
 from ..search._crew import Crew
+from ..search._file_lock import FileLock
 from ..search._optuna import optuna
 from ..search._outcome import Outcome
 from ..search._search import Method, Search
@@ -170,7 +171,8 @@ def tune(
                 for name, trial in _chosen(best, tuned[settings.policy_name]).items()
             ),
         )
-        report(tuning)
+        with FileLock(folder / "locks" / "report.lock"):  # several processes may end at once
+            report(tuning)
     return tuning
 
 
