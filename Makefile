@@ -31,7 +31,7 @@ lint: setup ## ruff, import layers, strict types
 
 bench: setup ## measure speed
 	$(AWARENAV) bench
-	$(PY) benchmarks/perception_speed.py
+	$(PY) -m benchmarks.perception_speed
 
 # The extra mediapipe brings another build of OpenCV along, so it is not in the lock.
 lock: setup ## pin the newest packages that pyproject.toml allows, for every supported Python
