@@ -1,6 +1,6 @@
 """Measures perception: frames a second, the time outside the networks, and rtmlib beside it.
 
-    python benchmarks/perception_speed.py
+    python -m benchmarks.perception_speed
 
 The clip is rendered: 640×480 pixels, two people. Time outside the networks is processor time of the
 calling thread less that in the networks, which run on one thread; rtmlib (see requirements.txt)

@@ -15,6 +15,13 @@ _ITERATIONS: Final = 8
 # Far below one, the scale of the noise.
 _CONVERGED_CHI2: Final = 1e-2
 _MIN_DEPTH_M: Final = 0.05
+_EYE: Final = np.eye(3)
+_EYE_6: Final = np.eye(6)
+# (3, 9): a vector times it is the rows of its cross product's matrix, one after the other.
+_SKEW: Final = np.array(
+    [[0, 0, 0, 0, 0, -1, 0, 1, 0], [0, 0, 1, 0, 0, 0, -1, 0, 0], [0, -1, 0, 1, 0, 0, 0, 0, 0]],
+    dtype=np.float64,
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,11 +87,7 @@ class RefinedPose:
 
 def skew(vectors: FloatArray) -> FloatArray:
     """(…, 3) to (…, 3, 3) with ``skew(a) @ b == cross(a, b)``."""
-    out = np.zeros((*vectors.shape, 3))
-    x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
-    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -z, y, -x
-    out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = z, -y, x
-    return out
+    return np.asarray((vectors @ _SKEW).reshape(*vectors.shape, 3))
 
 
 def rotation_exp(vectors: FloatArray) -> FloatArray:
@@ -92,25 +95,26 @@ def rotation_exp(vectors: FloatArray) -> FloatArray:
     angle = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))[..., None, None]
     cross = skew(vectors)
     small = angle < 1e-8
-    safe = np.where(small, 1.0, angle)
-    first = np.where(small, 1.0, np.sin(angle) / safe)
-    second = np.where(small, 0.5, (1.0 - np.cos(angle)) / safe**2)
-    return np.asarray(np.eye(3) + first * cross + second * (cross @ cross))
+    if not small.any():
+        first, second = np.sin(angle) / angle, (1.0 - np.cos(angle)) / angle**2
+    else:
+        safe = np.where(small, 1.0, angle)
+        first = np.where(small, 1.0, np.sin(angle) / safe)
+        second = np.where(small, 0.5, (1.0 - np.cos(angle)) / safe**2)
+    return np.asarray(_EYE + first * cross + second * (cross @ cross))
 
 
 def rotation_log(rotations: FloatArray) -> FloatArray:
     """Rotations (…, 3, 3) to rotation vectors (…, 3) of length at most π."""
-    trace = np.trace(rotations, axis1=-2, axis2=-1)
-    angle = np.arccos(np.clip(0.5 * (trace - 1.0), -1.0, 1.0))
-    axis = np.stack(
-        [
-            rotations[..., 2, 1] - rotations[..., 1, 2],
-            rotations[..., 0, 2] - rotations[..., 2, 0],
-            rotations[..., 1, 0] - rotations[..., 0, 1],
-        ],
-        axis=-1,
-    )
-    length = np.linalg.norm(axis, axis=-1)
+    trace = rotations[..., 0, 0] + rotations[..., 1, 1] + rotations[..., 2, 2]
+    angle = np.arccos(np.minimum(np.maximum(0.5 * (trace - 1.0), -1.0), 1.0))
+    axis = np.empty(rotations.shape[:-1])
+    axis[..., 0] = rotations[..., 2, 1] - rotations[..., 1, 2]
+    axis[..., 1] = rotations[..., 0, 2] - rotations[..., 2, 0]
+    axis[..., 2] = rotations[..., 1, 0] - rotations[..., 0, 1]
+    length = np.sqrt(np.einsum("...i,...i->...", axis, axis))
+    if length.min(initial=1.0) > 1e-6:
+        return np.asarray((angle / length)[..., None] * axis)
     # Near a half turn the antisymmetric part vanishes; the diagonal still gives the axis.
     diagonal = np.sqrt(np.maximum(0.5 * (1.0 + np.diagonal(rotations, axis1=-2, axis2=-1)), 0.0))
     turned = np.where(axis < 0.0, -diagonal, diagonal)
@@ -140,7 +144,9 @@ def _linearise(
     slope[..., 0, 0] = slope[..., 1, 1] = 1.0 / depth
     slope[..., :, 2] = -image / depth[..., None]
     slope *= weight_px[..., None]
-    jacobian = np.concatenate([slope @ -skew(turned), slope], axis=-1)
+    jacobian = np.empty((*depth.shape, 2, 6))
+    np.matmul(slope, skew(-turned), out=jacobian[..., :3])
+    jacobian[..., 3:] = slope
     flat = jacobian.reshape(len(rotation), -1, 6)
     flat_residual = residual.reshape(len(rotation), -1)
     information = np.swapaxes(flat, 1, 2) @ flat
@@ -156,9 +162,9 @@ def _linearise(
         rotation_information = prior.rotation_information
         pivot = np.einsum("bij,bj->bi", rotation, prior.pivot_head_m)
         offset = pivot + translation - prior.pivot_camera_m
-        motion = np.concatenate(
-            [-skew(pivot), np.broadcast_to(np.eye(3), (len(pivot), 3, 3))], axis=-1
-        )
+        motion = np.empty((len(pivot), 3, 6))
+        motion[..., :3] = skew(-pivot)
+        motion[..., 3:] = _EYE
         weighted = prior.position_information @ motion
         information = information + np.swapaxes(motion, 1, 2) @ weighted
         information[:, :3, :3] += rotation_information
@@ -214,7 +220,7 @@ def refine(
     for _ in range(_ITERATIONS):
         cost, gradient, information, _ = state
         scale = np.einsum("bii->bi", information)
-        damped = information + (damping[:, None] * scale + 1e-9)[..., None] * np.eye(6)
+        damped = information + (damping[:, None] * scale + 1e-9)[..., None] * _EYE_6
         step = -np.linalg.solve(damped, gradient[..., None])[..., 0]
         # The decrease of the cost that the local model still promises, in units of χ².
         promise = np.maximum.reduceat(-np.sum(gradient * step, axis=1), first)

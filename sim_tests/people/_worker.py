@@ -181,6 +181,7 @@ class Worker:
         self._keypoints: FloatArray | None = None
         self._reach: FloatArray | None = None
         self._pose: BodyPose | None = None
+        self._links: FloatArray | None = None
         self._head_rotation: FloatArray | None = None
         self._bend(footing, local, head)
         self._body.put(self._hips_odom_m, self._pelvis, self._joints, doing.held == "box")
@@ -219,7 +220,7 @@ class Worker:
         """
         if self.held is None:
             return None
-        links = link_transforms(self.asset.joints_m, self.pose)
+        links = self.links_odom
         if self.held == "phone":
             return np.asarray(links[1 + _RIGHT_WRIST] @ self._arms.T_hand_phone)
         T_thorax_box = np.eye(4)
@@ -239,6 +240,14 @@ class Worker:
                 array.setflags(write=False)
             self._pose = BodyPose(T_odom_body, self.skeleton.scale, rotvecs)
         return self._pose
+
+    @property
+    def links_odom(self) -> FloatArray:
+        """(17, 4, 4) of :func:`link_transforms` now."""
+        if self._links is None:
+            self._links = link_transforms(self.asset.joints_m, self.pose)
+            self._links.setflags(write=False)
+        return self._links
 
     @property
     def chest_odom_m(self) -> FloatArray:

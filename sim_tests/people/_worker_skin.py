@@ -19,7 +19,7 @@ from ..hall._meshes import Mesh
 from ..pictures._culling import box_corners, in_view, to_camera
 from ..sightlines._sight_lines import PlacedSurface
 from ..sightlines._triangles import TriangleSet
-from ._body_pose import BodyPose, link_transform, link_transforms
+from ._body_pose import BodyPose, link_transform
 from ._skin_pieces import SkinPiece, skin_pieces
 from ._worker_asset import LEVELS, load_worker
 
@@ -84,8 +84,8 @@ class WorkerSkin:
         self._visuals: Visuals | None = None
         self._levels: dict[int, _Level] = {}
         self._shown: set[int] = set()
-        # Of the last pose asked for: its links, and the surface by level of detail.
-        self._links: tuple[BodyPose, FloatArray] | None = None
+        # The last pose asked for, and its surface by level of detail.
+        self._surface_pose: BodyPose | None = None
         self._surfaces: dict[int, PlacedSurface] = {}
 
     def reach_odom_m(self) -> FloatArray:
@@ -95,13 +95,13 @@ class WorkerSkin:
     def surface(self, detail: int) -> PlacedSurface:
         """The skin as it is bent now, at a level of detail."""
         worker, pose = self.worker, self.worker.pose
-        joints_m = worker.asset.joints_m
-        if self._links is None or self._links[0] is not pose:
-            self._links = pose, link_transforms(joints_m, pose)
+        if self._surface_pose is not pose:
+            self._surface_pose = pose
             self._surfaces.clear()
         if detail not in self._surfaces:
-            triangles, joints, shares = _surface(worker.asset.name, detail)
-            places = link_transform(joints_m, pose, joints, shares, self._links[1])
+            asset = worker.asset
+            triangles, joints, shares = _surface(asset.name, detail)
+            places = link_transform(asset.joints_m, pose, joints, shares, worker.links_odom)
             self._surfaces[detail] = PlacedSurface(triangles, places, pose.scale)
         return self._surfaces[detail]
 

@@ -99,22 +99,8 @@ def encounter_in_pixels():
     return run_crossing(scenario, policy="balanced", perception="pixels", seed=0)
 
 
-# The robot stands at the edge of this worker's cone, where a degree is worth 0.02: the head network
-# is 6° to 9° off in this view, and says so.
-PARTLY_AWARE = pytest.mark.xfail(
-    strict=True, reason="the head network is 6° to 9° off in this view"
-)
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "case",
-    [
-        pytest.param(case, marks=PARTLY_AWARE if case.meaning == "partial awareness" else ())
-        for case in CASES
-    ],
-    ids=lambda case: case.meaning,
-)
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.meaning)
 def test_the_papers_encounter_in_pixels(encounter_in_pixels, case):
     (row,) = [r for r in case_values(encounter_in_pixels) if r[0] is case and r[1] == "pixels"]
     _, _, alpha, forward, lateral = row
