@@ -36,6 +36,7 @@ PRESETS: Final = ("blind", "conservative", "balanced", "assertive")
 #: Trials in which the robot moved into a person are not chosen.
 CONSTRAINT: Final = "robot_contacts"
 _POLL_S: Final = 0.5
+_MOST_CHOSEN: Final = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,27 +126,29 @@ def tune(
             raise SimError(f"a policy of your own needs a name of its own, got {name!r}")
         anchors[name] = preset
     keep_settings(settings, folder, "tune.json", "tuning", resume=resume, may_grow=["trials"])
-    episodes = settings.episodes * len(settings.scenarios)
+    each_trial, each_held = (
+        seeds * len(settings.scenarios) for seeds in (settings.episodes, settings.held_out)
+    )
     with (
         TrialBook(folder, "tune", search, settings.trials) as book,
-        tqdm(total=settings.trials, desc="tune", unit="trial", file=sys.stderr) as bar,
-        Crew(workers) as crew,
+        tqdm(desc="tune", unit="episode", smoothing=0.05, file=sys.stderr) as bar,
+        Crew(workers, lambda record: bar.update()) as crew,
     ):
         judge = Judge(settings, crew, folder)
-        bar.set_postfix_str(f"{episodes} episodes a trial; presets first")
+        left = settings.trials - book.finished
+        bar.total = each_trial * (left + len(anchors)) + each_held * (len(anchors) + _MOST_CHOSEN)
+        bar.set_postfix_str("presets")
         tuned = {
             name: judge.sure(name, each, settings.tuning_seeds) for name, each in anchors.items()
         }
-        bar.set_postfix_str("")
         while not book.done:
-            bar.update(book.finished - bar.n)
+            bar.set_postfix_str(f"{book.finished} of {settings.trials} trials")
             tickets = book.claim(1)
             if not tickets:
                 bar.set_postfix_str("others work on the rest of this generation")
                 time.sleep(_POLL_S)
             for ticket in tickets:
                 book.tell(ticket, _tried(ticket, space, judge, settings))
-        bar.update(book.finished - bar.n)
         bar.set_postfix_str("held-out seeds")
         trials = book.finished_trials()
         best = feasible_front(trials)
@@ -171,6 +174,8 @@ def tune(
                 for name, trial in _chosen(best, tuned[settings.policy_name]).items()
             ),
         )
+        bar.total = bar.n  # whatever was known before, and reasons that share a trial
+        bar.close()
         with FileLock(folder / "locks" / "report.lock"):  # several processes may end at once
             report(tuning)
     return tuning
