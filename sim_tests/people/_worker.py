@@ -46,8 +46,7 @@ MAX_EYE_YAW_RAD: Final = math.radians(35.0)
 MAX_EYE_PITCH_RAD: Final = math.radians(25.0)
 
 _STATURE_M: Final = 1.75
-# Nothing of a body of a shipped stature is farther from its centre line, however it walks.
-_REACH_M: Final = 1.0
+_REACH_M: Final = 1.0  # nothing of a body is farther from its centre line
 # The optical frame (x right, y down, z forward) in the head frame (x down, y forward, z right).
 _ROTATION_HEAD_OPTICAL: Final = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 _CHEST_SHOULDERS: Final = 0.7
@@ -246,7 +245,6 @@ class Worker:
         """(17, 4, 4) of :func:`link_transforms` now."""
         if self._links is None:
             self._links = link_transforms(self.asset.joints_m, self.pose)
-            self._links.setflags(write=False)
         return self._links
 
     @property
@@ -300,9 +298,8 @@ class Worker:
         """(2, 3) low and high corner of a generous box about all of the body in any posture."""
         if self._reach is None:
             side, top = _REACH_M * self.skeleton.scale, 1.15 * self.skeleton.stature_m
-            x, y = self._x_m, self._y_m
-            self._reach = np.array([(x - side, y - side, -0.1), (x + side, y + side, top)])
-            self._reach.setflags(write=False)
+            low, high = self.position_odom_m - side, self.position_odom_m + side
+            self._reach = np.array([(*low, -0.1), (*high, top)])
         return self._reach
 
     @property
