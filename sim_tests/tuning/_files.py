@@ -120,7 +120,7 @@ def _header(tuning: Tuning, candidate: Candidate) -> str:
     ]
     for key in OBJECTIVES:
         lines.append(
-            f"  {_LABELS[key]} {found.interval(key).text(3)} s; less that of {base.name}, paired: "
+            f"  {_LABELS[key]} {found.interval(key).text(3)} s; minus that of {base.name}, paired: "
             f"{found.minus(base.held_out, key).text(3)} s"
         )
     lines.append(

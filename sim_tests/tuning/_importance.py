@@ -34,4 +34,4 @@ def _one(
             target=lambda trial: trial.values[row],
         )
     known = {name: value for name, value in found.items() if math.isfinite(value)}
-    return nothing | dict(sorted(known.items(), key=lambda each: -each[1]))
+    return dict(sorted((nothing | known).items(), key=lambda each: -each[1]))

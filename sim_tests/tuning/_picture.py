@@ -69,15 +69,16 @@ def _front(axes: Axes, tuning: Tuning) -> None:
     places: dict[tuple[float, float], list[str]] = {}
     for chosen in tuning.chosen:
         places.setdefault(chosen.tuning.objectives, []).append(chosen.name.replace("_", " "))
-    for (x, y), names in places.items():
+    for row, ((x, y), names) in enumerate(sorted(places.items())):
+        below = row % 2 == 0  # neighbours' names do not cover each other
         axes.scatter([x], [y], marker="o", s=120, facecolors="none", edgecolors=_CHOSEN, lw=2)
         axes.annotate(
             ",\n".join(names),
             (x, y),
-            xytext=(9, -7),
+            xytext=(9, -7 if below else 7),
             textcoords="offset points",
             color=_CHOSEN,
-            va="top",
+            va="top" if below else "bottom",
         )
     settings = tuning.settings
     axes.set_title(

@@ -189,7 +189,7 @@ _FALSIFY = ["falsify", "--scenario", "crossing_from_left", "--perception", "trut
 
 @pytest.mark.slow
 def test_a_floor_that_was_taken_away_is_found_and_the_worst_cases_replay(tmp_path, capsys):
-    options = [*_FALSIFY, "--unsafe-no-floor", "--episodes", "24"]
+    options = [*_FALSIFY, "--unsafe-no-floor", "--episodes", "12"]
     one, two = tmp_path / "one", tmp_path / "two"
     assert main([*options, "--out", str(one)]) == 1
     printed = capsys.readouterr()
