@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from .._arguments import count
+
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add ``falsify`` to the commands."""
@@ -38,7 +40,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     ):
         falsify.add_argument(
             option,
-            type=_positive,
+            type=count,
             default=default,
             metavar="N",
             help=f"{what} (default: {default})",
@@ -67,13 +69,6 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     )
     falsify.add_argument("--resume", action="store_true", help="go on with what is in --out")
     falsify.set_defaults(run=_falsify)
-
-
-def _positive(text: str) -> int:
-    number = int(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"must be at least 1, got {number}")
-    return number
 
 
 def _falsify(options: argparse.Namespace) -> int:

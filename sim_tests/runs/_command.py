@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from .._arguments import count
+
 
 def add_parsers(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add ``crossings`` and ``replay`` to the commands."""
@@ -61,13 +63,13 @@ def _add_crossings(commands: argparse._SubParsersAction[argparse.ArgumentParser]
         help="shipped faults, YAML files, or 'none' (default); each is a run of its own",
     )
     crossings.add_argument(
-        "--episodes", type=_positive, default=1, metavar="N", help="seeds a scenario (default: 1)"
+        "--episodes", type=count, default=1, metavar="N", help="seeds a scenario (default: 1)"
     )
     crossings.add_argument(
         "--seed", type=_seed, default=0, metavar="N", help="the first of them (default: 0)"
     )
     crossings.add_argument(
-        "--workers", type=_positive, metavar="N", help="processes (default: one a core)"
+        "--workers", type=count, metavar="N", help="processes (default: one a core)"
     )
     crossings.add_argument(
         "--scheduler",
@@ -115,13 +117,6 @@ def _add_replay(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -
     )
     replay.add_argument("--no-video", action="store_true", help="draw the map only (faster)")
     replay.set_defaults(run=_replay)
-
-
-def _positive(text: str) -> int:
-    number = _whole(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"must be at least 1, got {number}")
-    return number
 
 
 def _seed(text: str) -> int:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from .._arguments import count
+
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add ``tune`` to the commands."""
@@ -46,7 +48,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     ):
         tune.add_argument(
             option,
-            type=_positive,
+            type=count,
             default=default,
             metavar="N",
             help=f"{what} (default: {default})",
@@ -75,13 +77,6 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     )
     tune.add_argument("--resume", action="store_true", help="go on with what is in --out")
     tune.set_defaults(run=_tune)
-
-
-def _positive(text: str) -> int:
-    number = int(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"must be at least 1, got {number}")
-    return number
 
 
 def _tune(options: argparse.Namespace) -> int:
