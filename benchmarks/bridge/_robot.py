@@ -47,7 +47,10 @@ class Robot:
         frame = _first_frame(folder)
         self.node = DdsNode(domain)
         self._image = READ["compressed" if compressed else "image"]
-        for topic in (self._image, READ["camera_info"], READ["odom"], READ["tf_static"]):
+        # Pictures as camera drivers send them: what is lost of a reliable one stays in the way of
+        # the next for a reader that asks for none of it again.
+        self.node.advertise(self._image)
+        for topic in (READ["camera_info"], READ["odom"], READ["tf_static"]):
             self.node.advertise(replace(topic, reliable=True))
         for topic in PUBLISHED.values():
             self.node.subscribe(topic)
