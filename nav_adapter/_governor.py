@@ -21,6 +21,10 @@ from ._separation import highest_speed_mps, protective_separation_m
 
 # A robot that stands may start off either way, or turn on the spot.
 _STANDING_MPS: Final = 0.05
+# Who walks at more than this share of the speed assumed of the unaware may turn to the robot; who
+# is faster than it by the second share runs.
+_BRISK_SHARE: Final = 0.75
+_RUNNING_SHARE: Final = 0.25
 _RULES: Final = ("speed and separation", "distance zone", "cap near people")
 
 
@@ -64,6 +68,7 @@ class SpeedGovernor:
         self._crowd = crowd
         self._footprint = Footprint(robot.footprint_m)
         self._turn_rad = math.radians(policy.rules.turn_within_stop_deg)
+        self._people_turn_rad = math.radians(policy.rules.people_turn_deg)
 
     def limit(
         self,
@@ -192,18 +197,38 @@ class SpeedGovernor:
         return bool((needed_m <= gaps_m).any(axis=0).all())
 
     def _human_speed_mps(self, memory: PersonMemory, robot_x: float, robot_y: float) -> float:
-        """The policy's assumption, but at least the speed at which the track closes in.
+        """The policy's assumption, but at least the speed at which the track may close in.
 
         Awareness is a reason to expect that somebody will not step towards the robot, not a reason
         to overlook that they do. What a person walks faster than an unaware one may is added: an
-        attentive runner cannot stop as fast as an attentive walker, and an unaware one is already
-        faster than the walking speed of the standard.
+        attentive runner cannot stop as fast as an attentive walker. Of somebody a quarter faster
+        than that, awareness is a reason for nothing: who runs is assumed to run at the robot.
         """
         (x, y), (vx, vy) = memory.place_odom_m, memory.velocity_odom_mps
         x, y = x - robot_x, y - robot_y
         assumed_mps = self._crowd.human_speed_mps(memory)
-        excess_mps = math.hypot(vx, vy) - self._crowd.unaware_human_speed_mps
+        distance_m = max(math.hypot(x, y), 1e-9)
+        closing_mps = -(vx * x + vy * y) / distance_m
+        walking_mps, unaware_mps = math.hypot(vx, vy), self._crowd.unaware_human_speed_mps
+        if walking_mps > _BRISK_SHARE * unaware_mps:
+            across_mps = abs(vx * y - vy * x) / distance_m
+            closing_mps = self._turned_mps(closing_mps, across_mps, walking_mps)
+        excess_mps = walking_mps - unaware_mps
         if excess_mps > 0.0:
-            assumed_mps += excess_mps
-        closing_mps = -(vx * x + vy * y) / max(math.hypot(x, y), 1e-9)
+            running = min(excess_mps / max(_RUNNING_SHARE * unaware_mps, 1e-9), 1.0)
+            runner_mps = assumed_mps + running * (walking_mps - assumed_mps)
+            assumed_mps = max(assumed_mps + excess_mps, runner_mps)
         return closing_mps if closing_mps > assumed_mps else assumed_mps
+
+    def _turned_mps(self, closing_mps: float, across_mps: float, walking_mps: float) -> float:
+        """Speed towards the robot of a brisk walker who turns to it as far as may be.
+
+        Somebody at normal pace who has seen the robot stops within a step; who is faster carries on
+        and may be rounding a corner just now.
+        """
+        unaware_mps = self._crowd.unaware_human_speed_mps
+        brisk = (walking_mps / max(unaware_mps, 1e-9) - _BRISK_SHARE) / (1.0 - _BRISK_SHARE)
+        turn_rad = self._people_turn_rad * min(brisk, 1.0)
+        if math.atan2(across_mps, closing_mps) <= turn_rad:
+            return walking_mps
+        return closing_mps * math.cos(turn_rad) + across_mps * math.sin(turn_rad)

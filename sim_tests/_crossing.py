@@ -15,7 +15,7 @@ from perception.arrays import FloatArray
 from tracking import CameraView, PersonTrack, PersonTracker, TrackerConfig
 
 from ._errors import SimError
-from ._eyes import Sighting, TimedEyes, make_eyes
+from ._eyes import ORACLE, Sighting, TimedEyes, make_eyes
 from ._keypoint_camera import KeypointNoise
 from ._map_view import MapView
 from ._metrics import ContactEvent, SafetyMeter
@@ -164,7 +164,8 @@ def run_crossing(
         planner: the local planner; default the reference :class:`SamplingPlanner` (a scenario that
             drives straight on needs none).
         perception: ``"truth"``, ``"keypoints"`` or ``"pixels"``: the rendered camera through the
-            shipped networks, at 10 frames a second where the scenario names no rate.
+            shipped networks, at 10 frames a second where the scenario names no rate; ``"oracle"``
+            is the truth about everybody whom no rack hides from the robot.
         seed: the same seed gives the same result, bit for bit.
         noise: of the keypoint camera.
         pipeline: what pixels go through instead of the shipped networks; it has the camera of the
@@ -296,7 +297,7 @@ def _tracker(
     config = TrackerConfig(awareness=policy.filter)
     if perception == "truth":  # which sees all around
         return PersonTracker(config)
-    view = CameraView(camera, max_range_m=_SEEN_WITHIN_M)
+    view = None if perception == ORACLE else CameraView(camera, max_range_m=_SEEN_WITHIN_M)
     return PersonTracker(config, view=MapView.of(stage.warehouse, view))
 
 

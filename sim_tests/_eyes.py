@@ -10,15 +10,19 @@ import numpy as np
 
 from perception import AttentionCone, AwarenessPipeline, Camera, PersonObservation
 from perception.arrays import FloatArray
+from tracking import View
 
 from ._errors import SimError
 from ._keypoint_camera import KeypointCamera, KeypointNoise
+from ._map_view import MapView
 from ._pixel_eyes import PixelEyes
 from ._stage import Stage, TrueView
 from .pictures._camera_timing import CameraTiming, FrameClock, FrameQueue
 from .sightlines._sight_lines import SightLines
 
 PerceptionKind = Literal["truth", "keypoints", "pixels"]
+#: One more, for comparison: the truth about everybody, all around, whom no rack hides.
+ORACLE: Final = "oracle"
 
 # The truth is handed on with a spread small enough to be believed and large enough to be a number.
 _TRUE_POSITION_STD_M: Final = 0.01
@@ -37,12 +41,20 @@ class Eyes(Protocol):
 
 
 class TrueEyes:
-    """α and position straight from the simulator, all around and through walls."""
+    """α and position straight from the simulator.
+
+    Args:
+        view: whom these eyes can see; None looks all around and through walls.
+    """
+
+    def __init__(self, view: View | None = None) -> None:
+        self._view = view
 
     def observe(
         self, stamp_s: float, T_odom_camera: FloatArray, truth: tuple[TrueView, ...]
     ) -> tuple[tuple[PersonObservation, int], ...]:
-        """Return every worker within 20 m as it is."""
+        """Return every worker within 20 m who can be seen as it is."""
+        seen = self._seen(T_odom_camera, truth)
         return tuple(
             (
                 PersonObservation(
@@ -58,8 +70,16 @@ class TrueEyes:
                 index,
             )
             for index, view in enumerate(truth)
-            if float(np.linalg.norm(view.position_camera_m)) <= _TRUE_RANGE_M
+            if seen[index] and float(np.linalg.norm(view.position_camera_m)) <= _TRUE_RANGE_M
         )
+
+    def _seen(self, T_odom_camera: FloatArray, truth: tuple[TrueView, ...]) -> list[bool]:
+        if self._view is None or not truth:
+            return [True] * len(truth)
+        positions_camera = np.array([view.position_camera_m for view in truth])
+        positions_odom = positions_camera @ T_odom_camera[:2, :3].T + T_odom_camera[:2, 3]
+        visible: list[bool] = (self._view.visibility(positions_odom, T_odom_camera) > 0.0).tolist()
+        return visible
 
 
 class KeypointEyes:
@@ -165,6 +185,7 @@ def make_eyes(
     spec = stage.scenario.camera
     makers: dict[str, Callable[[], Eyes]] = {
         "truth": TrueEyes,
+        ORACLE: lambda: TrueEyes(MapView.of(stage.warehouse)),
         "keypoints": lambda: KeypointEyes(stage, camera, cone, noise, rng),
         "pixels": lambda: PixelEyes(
             stage,

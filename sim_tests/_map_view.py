@@ -21,21 +21,22 @@ class MapView:
     """A view for the tracker: in the camera's field, in range, and with no rack in between.
 
     Attributes:
-        camera: the field and the range.
+        camera: the field and the range; None looks all around and as far as may be.
         boxes_odom_m: (N, 4) what is high enough to hide a person.
     """
 
-    camera: CameraView
+    camera: CameraView | None
     boxes_odom_m: FloatArray
 
     @classmethod
-    def of(cls, warehouse: Warehouse, camera: CameraView) -> MapView:
+    def of(cls, warehouse: Warehouse, camera: CameraView | None = None) -> MapView:
         """The view in a hall whose racks and walls the robot knows."""
         high = warehouse.layout.obstacle_heights_m >= _HIDING_HEIGHT_M
         return cls(camera, warehouse.obstacle_boxes_odom[high])
 
     def visibility(self, positions_odom_m: FloatArray, T_odom_camera: FloatArray) -> FloatArray:
         """Return (N,) in [0, 1]; see :class:`tracking.View`."""
-        open_field = self.camera.visibility(positions_odom_m, T_odom_camera)
         hidden = crosses_boxes(self.boxes_odom_m, T_odom_camera[:2, 3], positions_odom_m)
-        return np.where(hidden, 0.0, open_field)
+        if self.camera is None:
+            return np.where(hidden, 0.0, 1.0)
+        return np.where(hidden, 0.0, self.camera.visibility(positions_odom_m, T_odom_camera))

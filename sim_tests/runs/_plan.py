@@ -14,15 +14,13 @@ from nav_adapter import AwarenessPolicy
 from perception.arrays import finite_number
 
 from .._errors import SimError
-from .._eyes import PerceptionKind
+from .._eyes import ORACLE, PerceptionKind
 from .._names import not_one_of
 from .._scenario_template import ScenarioTemplate, shipped_templates
 from ..faults._fault import Fault
 from ._job import Job
 from ._planner_choice import make_planner, planner_label
 
-#: The policy that is ``balanced`` and knows the truth: what better perception could win at most.
-ORACLE: Final = "oracle"
 #: As a fault: none.
 NO_FAULT: Final = "none"
 
@@ -52,8 +50,9 @@ def plan_jobs(
     Args:
         scenarios: templates, shipped names, YAML files, or ``"all"``: those that are shipped and
             need a planner.
-        policies: presets' names, YAML files, ``"oracle"`` (``balanced``, and perception is the
-            truth), or pairs of a name for the tables and a policy.
+        policies: presets' names, YAML files, ``"oracle"`` (``balanced`` with perception that knows
+            the truth: what better eyes could win at most), or pairs of a name for the tables and a
+            policy.
         seeds: of the episodes, the same for all.
         planners: ``"module:Class"``, or empty for the reference planner.
         perception: ``"truth"``, ``"keypoints"`` or ``"pixels"``.
@@ -164,7 +163,7 @@ def _policy(policy: str | tuple[str, AwarenessPolicy], perception: str) -> tuple
         name, given = policy
         return name, policy_text(given), perception
     if policy == ORACLE:
-        return ORACLE, policy_text(AwarenessPolicy.preset("balanced")), "truth"
+        return ORACLE, policy_text(AwarenessPolicy.preset("balanced")), ORACLE
     if policy.endswith((".yaml", ".yml")):
         return Path(policy).stem, policy_text(AwarenessPolicy.from_yaml(policy)), perception
     return policy, policy_text(AwarenessPolicy.preset(policy)), perception

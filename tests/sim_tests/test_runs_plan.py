@@ -46,7 +46,7 @@ def test_a_job_holds_all_that_it_needs():
 def test_the_oracle_is_balanced_and_knows_the_truth():
     blind, oracle = plan_jobs([short()], ["balanced", ORACLE], [0], perception="keypoints")
     assert oracle.policy == blind.policy
-    assert (blind.perception, oracle.perception) == ("keypoints", "truth")
+    assert (blind.perception, oracle.perception) == ("keypoints", "oracle")
     assert oracle.policy_name == "oracle"
 
 
