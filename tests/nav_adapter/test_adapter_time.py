@@ -56,6 +56,31 @@ def test_a_glance_shorter_than_the_hold_shrinks_nothing() -> None:
         assert radius(result) == 1.0
 
 
+@pytest.mark.parametrize("late_s", [0.0, 0.2, 0.3, 0.45])
+def test_frames_that_come_late_take_back_the_doubt_of_first_sight(late_s: float) -> None:
+    """A slow camera still says where somebody is; only its word on awareness is too old."""
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    radii = []
+    for step in range(60):
+        now = step * PERIOD_S
+        sigma_m = 0.4 if step == 0 else 0.05
+        track = person(now, sigma_m=sigma_m, unseen_s=late_s, awareness_lower=0.0)
+        radii.append(radius(adapter.update((track,), robot_at(now), now)))
+    assert radii[0] == pytest.approx(1.0 + 2.0 * 0.4)
+    assert radii[-1] == pytest.approx(1.0 + 2.0 * 0.05)
+    assert max(before - after for before, after in pairwise(radii)) <= RATE_MPS * PERIOD_S + 1e-9
+
+
+def test_what_comes_late_proves_no_awareness() -> None:
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    for step in range(60):
+        now = step * PERIOD_S
+        track = person(now, unseen_s=0.3, awareness_lower=1.0)
+        result = adapter.update((track,), robot_at(now), now)
+        assert radius(result) == 1.0
+        assert result.obstacles[0].awareness_lower == 0.0
+
+
 def test_growth_is_instant() -> None:
     adapter = NavAdapter(AwarenessPolicy(), ROBOT)
     watch(adapter, 2.0)
