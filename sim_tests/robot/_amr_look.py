@@ -57,7 +57,8 @@ def amr_meshes() -> Mapping[str, tuple[Piece, ...]]:
 
 @lru_cache(maxsize=1)
 def _base_triangles() -> TriangleSet:
-    meshes = [mesh for mesh, _, _ in amr_meshes()["base_link"]]
+    # Part by part: most lines of sight start above them all and come near none.
+    meshes = [*_body(), *_deck(), *_post(), *_casters()]
     return TriangleSet([(mesh.vertices_m, mesh.indices.reshape(-1, 3)) for mesh in meshes])
 
 
@@ -291,7 +292,9 @@ class AmrLook:
 
     def surface(self, detail: int) -> PlacedSurface:
         """The robot without its wheels, which its body hides; there is one level of detail."""
-        return PlacedSurface(_base_triangles(), np.asarray(self._pose()[0])[None])
+        triangles = _base_triangles()
+        places = np.broadcast_to(self._pose()[0], (triangles.pieces, 4, 4))
+        return PlacedSurface(triangles, places)
 
     def build(self, visuals: Visuals) -> None:
         """Make its bodies in the picture world."""

@@ -89,6 +89,7 @@ class SightLines:
         surfaces: list[PlacedSurface] = []
         asked: list[NDArray[np.bool_]] = []
         for number in np.flatnonzero(near.any(axis=1)).tolist():
+            last: TriangleSet | None = None
             for level, lines in levels:
                 held = near[number] & lines
                 if not held.any():
@@ -96,6 +97,10 @@ class SightLines:
                 surface = self._occluders[number].surface(level)
                 if surface is None:
                     break
+                if surface.triangles is last:
+                    asked[-1] |= held  # there is one level of detail
+                    continue
+                last = surface.triangles
                 surfaces.append(surface)
                 asked.append(held)
         if surfaces:
@@ -115,18 +120,15 @@ def _blocked_by(
     little more than one.
     """
     blocked = np.zeros(len(ends_odom_m), dtype=bool)
-    sets = [surface.triangles for surface in surfaces]
-    pieces = [one.pieces for one in sets]
+    sets = tuple(surface.triangles for surface in surfaces)
+    joined = _joined(sets)
     places = np.concatenate([surface.T_odom_piece for surface in surfaces])
-    scales = np.repeat([surface.scale for surface in surfaces], pieces)[:, None]
-    piece_boxes = np.concatenate([one.piece_boxes_m for one in sets], axis=2)
+    scales = np.repeat([surface.scale for surface in surfaces], joined.pieces)[:, None]
     # Most lines pass most pieces by: only pairs of the two that come near each other are looked at.
-    middles = (0.5 * (piece_boxes[0] + piece_boxes[1])).T * scales
-    halves = (0.5 * (piece_boxes[1] - piece_boxes[0])).T * scales
-    radii = np.sqrt((halves * halves).sum(axis=1)) + _MARGIN_M
+    middles, radii = joined.middles_m * scales, joined.radii_m * scales[:, 0] + _MARGIN_M
     rotations, origins = places[:, :3, :3], places[:, :3, 3]
     away = (rotations @ middles[:, :, None])[..., 0] + (origins - eye_odom_m)
-    near = _near(away, radii, ends_odom_m - eye_odom_m) & np.repeat(asked, pieces, axis=0)
+    near = _near(away, radii, ends_odom_m - eye_odom_m) & np.repeat(asked, joined.pieces, axis=0)
     piece, line = near.nonzero()
     if not piece.size:
         return blocked
@@ -135,14 +137,14 @@ def _blocked_by(
     segments = (segments - origins[piece][:, None]) @ (rotations / scales[..., None])[piece]
     eye, along = segments[:, 0], segments[:, 1] - segments[:, 0]
     eyes, inverse = np.ascontiguousarray(eye.T), inverse_of(along.T)
-    held = np.flatnonzero(meet_own_boxes(eyes, inverse, piece_boxes[..., piece]))
+    held = np.flatnonzero(meet_own_boxes(eyes, inverse, joined.piece_boxes_m[..., piece]))
     piece = piece[held]
     # Each pair with every cluster of triangles of its piece.
-    counts = np.concatenate([one.counts for one in sets])
-    many, firsts = counts[piece], np.cumsum(counts) - counts
+    many = joined.counts[piece]
     pair = np.repeat(held, many)
-    cluster = np.arange(len(pair)) + np.repeat(firsts[piece] - np.cumsum(many) + many, many)
-    boxes = np.concatenate([one.boxes_m for one in sets], axis=2)[..., cluster]
+    skipped = joined.starts[piece] - np.cumsum(many) + many
+    cluster = np.arange(len(pair)) + np.repeat(skipped, many)
+    boxes = joined.boxes_m[..., cluster]
     met = np.flatnonzero(meet_own_boxes(eyes[:, pair], inverse[:, pair], boxes))
     pair, cluster = pair[met], cluster[met]
     # Pairs are in the order of the pieces, and so of the sets.
@@ -160,6 +162,40 @@ def _blocked_by(
         )
         blocked[line[pair[meets]]] = True
     return blocked
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Joined:
+    """What several sets of triangles have in common tables.
+
+    ``pieces`` (S,) says how many each has; of every piece of all of them, ``middles_m`` (P, 3),
+    ``radii_m`` (P,) and ``piece_boxes_m`` (2, 3, P) bound it, ``starts`` and ``counts`` (P,) are
+    its clusters; ``boxes_m`` (2, 3, C) is about each cluster.
+    """
+
+    pieces: NDArray[np.int64]
+    middles_m: FloatArray
+    radii_m: FloatArray
+    piece_boxes_m: FloatArray
+    starts: NDArray[np.int64]
+    counts: NDArray[np.int64]
+    boxes_m: FloatArray
+
+
+@lru_cache(maxsize=128)  # the same few bodies hide each other for many frames
+def _joined(sets: tuple[TriangleSet, ...]) -> _Joined:
+    piece_boxes = np.concatenate([one.piece_boxes_m for one in sets], axis=2)
+    counts = np.concatenate([one.counts for one in sets])
+    halves = 0.5 * (piece_boxes[1] - piece_boxes[0])
+    return _Joined(
+        np.array([one.pieces for one in sets]),
+        (0.5 * (piece_boxes[0] + piece_boxes[1])).T,
+        np.sqrt((halves * halves).sum(axis=0)),
+        piece_boxes,
+        np.cumsum(counts) - counts,
+        counts,
+        np.concatenate([one.boxes_m for one in sets], axis=2),
+    )
 
 
 def _near(away_m: FloatArray, radii_m: FloatArray, along_m: FloatArray) -> NDArray[np.bool_]:
