@@ -183,10 +183,9 @@ class KeypointCamera:
         low, high = pixels.min(axis=0), pixels.max(axis=0)
         # Keypoints lie inside the outline: hair, hands and shoes reach about a twelfth further.
         margin = 0.08 * float((high - low).max())
+        corners = np.array([low - margin, high + margin])
         limit = np.array([self._camera.width_px, self._camera.height_px])
-        box = np.concatenate(
-            [np.clip(low - margin, 0.0, limit), np.clip(high + margin, 0.0, limit)]
-        )
+        box = np.minimum(np.maximum(corners, 0.0), limit).ravel()
         return PersonDetection(box, 0.9)
 
     def _unhidden(
