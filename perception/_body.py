@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import compress
 from typing import Final
 
@@ -92,6 +93,14 @@ def place_bodies(
     min_score: float = DEFAULT_MIN_SCORE,
 ) -> tuple[BodyPlacement | None, ...]:
     """Return :func:`place_body` of several people at once."""
+    return _place_bodies(camera, tuple(people), keypoint_std_px, min_score)
+
+
+# Finding a head and placing its body ask for the same person alone in a frame, who never changes.
+@lru_cache(maxsize=1)
+def _place_bodies(
+    camera: Camera, people: tuple[PersonKeypoints, ...], keypoint_std_px: float, min_score: float
+) -> tuple[BodyPlacement | None, ...]:
     scales = metric_scales(people, min_score)
     width = min((min(len(person.scores), _BODY_AND_FEET) for person in people), default=0)
     if not width:

@@ -117,11 +117,9 @@ class PnpHeadPoseEstimator:
         poses: list[HeadPose | None] = [None] * len(people)
         found = [self._head(camera, person, row) for row, person in enumerate(people)]
         heads = [head for head in found if head is not None]
-        for with_prior in (False, True):
-            alike = [head for head in heads if (head.prior is not None) == with_prior]
-            if alike:
-                for head, pose in zip(alike, self._refined(camera, alike), strict=True):
-                    poses[head.row] = pose
+        if heads:
+            for head, pose in zip(heads, self._refined(camera, heads), strict=True):
+                poses[head.row] = pose
         return tuple(poses)
 
     def _head(self, camera: Camera, person: PersonKeypoints, row: int) -> _Head | None:
@@ -148,7 +146,7 @@ class PnpHeadPoseEstimator:
         return None if starts is None else _Head(row, model, rays, seen, *starts, prior)
 
     def _refined(self, camera: Camera, heads: list[_Head]) -> list[HeadPose | None]:
-        """Refine the starts of several heads in one go; all of them have a prior, or none."""
+        """Refine the starts of several heads in one go."""
         counts = [len(head.rotations) for head in heads]
         owner = np.repeat(np.arange(len(heads)), counts)
         poses = refine(
@@ -158,7 +156,7 @@ class PnpHeadPoseEstimator:
             self._std_px,
             np.concatenate([head.rotations for head in heads]),
             np.concatenate([head.translations_m for head in heads]),
-            [head.prior for head in heads if head.prior is not None] or None,
+            [head.prior for head in heads],
             np.array([head.seen for head in heads], dtype=np.float64)[owner],
             owner,
         )

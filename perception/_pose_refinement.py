@@ -16,6 +16,7 @@ _ITERATIONS: Final = 8
 _CONVERGED_CHI2: Final = 1e-2
 _MIN_DEPTH_M: Final = 0.05
 _EYE: Final = np.eye(3)
+_EYE_2: Final = np.eye(2)
 _EYE_6: Final = np.eye(6)
 # (3, 9): a vector times it is the rows of its cross product's matrix, one after the other.
 _SKEW: Final = np.array(
@@ -48,8 +49,10 @@ class HeadPrior:
 class _Priors:
     """The prior of each of B starts; arrays as in :class:`HeadPrior` with B in front.
 
-    ``rotation_information`` is in camera axes here.
+    ``rotation_information`` is in camera axes here; ``rows`` are those of the starts among all.
     """
+
+    rows: slice | NDArray[np.int64]
 
     rotation_camera_head: FloatArray
     rotation_information: FloatArray
@@ -58,16 +61,27 @@ class _Priors:
     position_information: FloatArray
 
     @classmethod
-    def of(cls, priors: Sequence[HeadPrior], owner: NDArray[np.int64]) -> _Priors:
-        """Of starts whose heads are ``owner``."""
-        axes = np.array([prior.rotation_camera_head for prior in priors])
-        information = np.array([prior.rotation_information for prior in priors])
+    def of(
+        cls, priors: Sequence[HeadPrior | None] | None, owner: NDArray[np.int64]
+    ) -> _Priors | None:
+        """Of starts whose heads are ``owner``; None where no head has one."""
+        known = [prior for prior in priors or () if prior is not None]
+        if priors is None or not known:
+            return None
+        rows: slice | NDArray[np.int64] = slice(None)
+        if len(known) < len(priors):
+            has = np.array([prior is not None for prior in priors])
+            rows = np.flatnonzero(has[owner])
+            owner = (np.cumsum(has) - 1)[owner[rows]]
+        axes = np.array([prior.rotation_camera_head for prior in known])
+        information = np.array([prior.rotation_information for prior in known])
         return cls(
+            rows,
             axes[owner],
             (axes @ information @ np.swapaxes(axes, 1, 2))[owner],
-            np.array([prior.pivot_head_m for prior in priors])[owner],
-            np.array([prior.pivot_camera_m for prior in priors])[owner],
-            np.array([prior.position_information for prior in priors])[owner],
+            np.array([prior.pivot_head_m for prior in known])[owner],
+            np.array([prior.pivot_camera_m for prior in known])[owner],
+            np.array([prior.position_information for prior in known])[owner],
         )
 
 
@@ -94,10 +108,10 @@ def rotation_exp(vectors: FloatArray) -> FloatArray:
     """Rodrigues' formula: rotation vectors (…, 3) to rotations (…, 3, 3)."""
     angle = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))[..., None, None]
     cross = skew(vectors)
-    small = angle < 1e-8
-    if not small.any():
-        first, second = np.sin(angle) / angle, (1.0 - np.cos(angle)) / angle**2
+    if np.minimum.reduce(angle, axis=None, initial=1.0) >= 1e-8:
+        first, second = np.sin(angle) / angle, (1.0 - np.cos(angle)) / (angle * angle)
     else:
+        small = angle < 1e-8
         safe = np.where(small, 1.0, angle)
         first = np.where(small, 1.0, np.sin(angle) / safe)
         second = np.where(small, 0.5, (1.0 - np.cos(angle)) / safe**2)
@@ -135,28 +149,32 @@ def _linearise(
 
     The state is a rotation in camera axes applied from the left, then the translation.
     """
-    turned = model @ np.swapaxes(rotation, 1, 2)
+    turned = model @ rotation.swapaxes(1, 2)
     points = turned + translation[:, None]
-    depth = np.maximum(points[..., 2], _MIN_DEPTH_M)
-    image = points[..., :2] / depth[..., None]
+    nearest = points[..., 2]
+    depth = np.maximum(nearest, _MIN_DEPTH_M)
+    deep = depth[..., None]
+    image = points[..., :2] / deep
     residual = (image - rays) * weight_px
-    slope = np.zeros((*depth.shape, 2, 3))
-    slope[..., 0, 0] = slope[..., 1, 1] = 1.0 / depth
-    slope[..., :, 2] = -image / depth[..., None]
-    slope *= weight_px[..., None]
     jacobian = np.empty((*depth.shape, 2, 6))
+    slope = jacobian[..., 3:]
+    slope[..., :2] = _EYE_2 / deep[..., None]
+    np.divide(image, -deep, out=slope[..., 2])
+    slope *= weight_px[..., None]
     np.matmul(slope, skew(-turned), out=jacobian[..., :3])
-    jacobian[..., 3:] = slope
     flat = jacobian.reshape(len(rotation), -1, 6)
     flat_residual = residual.reshape(len(rotation), -1)
-    information = np.swapaxes(flat, 1, 2) @ flat
+    information = flat.swapaxes(1, 2) @ flat
     gradient = np.einsum("bki,bk->bi", flat, flat_residual)
-    cost = np.sum(flat_residual**2, axis=1)
+    cost = np.add.reduce(flat_residual * flat_residual, axis=1)
     # A point behind the camera must never look like a good fit.
-    behind = np.maximum(_MIN_DEPTH_M - points[..., 2], 0.0)
-    cost += 1e6 * np.sum(behind * (weight_px[..., 0] > 0.0), axis=1)
+    if np.minimum.reduce(nearest, axis=None) < _MIN_DEPTH_M:
+        behind = np.maximum(_MIN_DEPTH_M - nearest, 0.0)
+        cost += 1e6 * np.add.reduce(behind * (weight_px[..., 0] > 0.0), axis=1)
     if prior is not None:
-        away = rotation_log(np.swapaxes(rotation, 1, 2) @ prior.rotation_camera_head)
+        rows = prior.rows
+        rotation, translation = rotation[rows], translation[rows]
+        away = rotation_log(rotation.swapaxes(1, 2) @ prior.rotation_camera_head)
         # In camera axes: R log(Rᵀ R0) is the turn that brings the head back to the prior.
         away = -np.einsum("bij,bj->bi", rotation, away)
         rotation_information = prior.rotation_information
@@ -166,14 +184,16 @@ def _linearise(
         motion[..., :3] = skew(-pivot)
         motion[..., 3:] = _EYE
         weighted = prior.position_information @ motion
-        information = information + np.swapaxes(motion, 1, 2) @ weighted
-        information[:, :3, :3] += rotation_information
-        gradient = gradient + np.einsum("bji,bj->bi", weighted, offset)
+        own_information = information[rows] + motion.swapaxes(1, 2) @ weighted
+        own_information[:, :3, :3] += rotation_information
+        information[rows] = own_information
+        own_gradient = gradient[rows] + np.einsum("bji,bj->bi", weighted, offset)
         turning = np.einsum("bij,bj->bi", rotation_information, away)
-        gradient[:, :3] += turning
-        cost = cost + np.einsum("bi,bi->b", away, turning)
+        own_gradient[:, :3] += turning
+        gradient[rows] = own_gradient
         shifting = np.einsum("bij,bj->bi", prior.position_information, offset)
-        cost = cost + np.einsum("bi,bi->b", offset, shifting)
+        own_cost = cost[rows] + np.einsum("bi,bi->b", away, turning)
+        cost[rows] = own_cost + np.einsum("bi,bi->b", offset, shifting)
     return cost, gradient, information, residual
 
 
@@ -184,7 +204,7 @@ def refine(
     keypoint_std_px: float,
     rotations: FloatArray,
     translations_m: FloatArray,
-    priors: Sequence[HeadPrior] | None,
+    priors: Sequence[HeadPrior | None] | None,
     seen: FloatArray | None = None,
     owner: NDArray[np.int64] | None = None,
 ) -> list[RefinedPose]:
@@ -200,7 +220,7 @@ def refine(
         keypoint_std_px: standard deviation of the pixel noise.
         rotations: (B, 3, 3) starts.
         translations_m: (B, 3) starts.
-        priors: what the body of each head says, or None.
+        priors: what the body of each head says, None where it says nothing, or None for all.
         seen: (B, N) of ones, and zeros for points that do not count; default all count.
         owner: (B,) the head that each start is of, starts of one head in a row; default one head.
 
@@ -212,20 +232,20 @@ def refine(
     count = len(rotations)
     owner = np.zeros(count, dtype=np.int64) if owner is None else owner
     first = np.flatnonzero(np.diff(owner, prepend=-1))
-    prior = None if priors is None else _Priors.of(priors, owner)
+    prior = _Priors.of(priors, owner)
     active = np.ones(count, dtype=np.bool_)
     damping: FloatArray = np.full(count, 1e-3)
     rotation, translation = rotations, translations_m
     state = _linearise(model_m, rays, weight, rotation, translation, prior)
     for _ in range(_ITERATIONS):
         cost, gradient, information, _ = state
-        scale = np.einsum("bii->bi", information)
+        scale = information.reshape(count, 36)[:, ::7]  # the diagonals
         damped = information + (damping[:, None] * scale + 1e-9)[..., None] * _EYE_6
         step = -np.linalg.solve(damped, gradient[..., None])[..., 0]
         # The decrease of the cost that the local model still promises, in units of χ².
-        promise = np.maximum.reduceat(-np.sum(gradient * step, axis=1), first)
+        promise = np.maximum.reduceat(-np.add.reduce(gradient * step, axis=1), first)
         active &= (promise >= _CONVERGED_CHI2)[owner]
-        if not active.any():
+        if not np.logical_or.reduce(active):
             break
         turn = step[:, :3]
         length = np.sqrt(np.einsum("bi,bi->b", turn, turn))[:, None]
@@ -234,17 +254,19 @@ def refine(
         trial_translation = translation + step[:, 3:]
         trial = _linearise(model_m, rays, weight, trial_rotation, trial_translation, prior)
         better = active & (trial[0] < cost)
-        damping = np.where(better, 0.2 * damping, 10.0 * damping)
-        if better.all():
+        damping = damping * np.where(better, 0.2, 10.0)
+        if np.logical_and.reduce(better):
             rotation, translation, state = trial_rotation, trial_translation, trial
-            continue
-        rotation = np.where(better[:, None, None], trial_rotation, rotation)
-        translation = np.where(better[:, None], trial_translation, translation)
-        kept = [
-            np.where(better.reshape(-1, *([1] * (new.ndim - 1))), new, old)
-            for new, old in zip(trial, state, strict=True)
-        ]
-        state = (kept[0], kept[1], kept[2], kept[3])
+        elif np.logical_or.reduce(better):
+            one = better[:, None]
+            rotation = np.where(one[..., None], trial_rotation, rotation)
+            translation = np.where(one, trial_translation, translation)
+            state = (
+                np.where(better, trial[0], cost),
+                np.where(one, trial[1], gradient),
+                np.where(one[..., None], trial[2], information),
+                np.where(one[..., None], trial[3], state[3]),
+            )
     cost, _, information, residual = state
     error_px = keypoint_std_px * np.sqrt(np.einsum("bni,bni->bn", residual, residual))
     return [

@@ -145,7 +145,7 @@ class KeypointCamera:
         pixel_noise = self._rng.normal(0.0, 1.0, (_KEYPOINTS, 2)) * self._noise.pixel_std_px
         lift_noise = self._rng.normal(0.0, 1.0, _KEYPOINTS) * self._noise.lift_std_m
         rotation, origin = T_odom_camera[:3, :3], T_odom_camera[:3, 3]
-        if self._is_outside(worker.reach_odom_m(), T_odom_camera):
+        if missed or self._is_outside(worker.reach_odom_m(), T_odom_camera):
             return None
         points_odom = worker.keypoints_odom_m
         points = (points_odom - origin) @ rotation
@@ -160,7 +160,7 @@ class KeypointCamera:
         if np.count_nonzero(inside) < _MIN_SEEN:
             return None
         seen = inside & self._unhidden(points, points_odom, inside, origin)
-        if missed or np.count_nonzero(seen) < _MIN_SEEN:
+        if np.count_nonzero(seen) < _MIN_SEEN:
             return None
         noisy = np.where(seen[:, None], pixels + pixel_noise, 0.0)
         # A lifting network knows proportions, not stature: its skeleton has the average size.
@@ -183,10 +183,9 @@ class KeypointCamera:
         low, high = pixels.min(axis=0), pixels.max(axis=0)
         # Keypoints lie inside the outline: hair, hands and shoes reach about a twelfth further.
         margin = 0.08 * float((high - low).max())
+        corners = np.array([low - margin, high + margin])
         limit = np.array([self._camera.width_px, self._camera.height_px])
-        box = np.concatenate(
-            [np.clip(low - margin, 0.0, limit), np.clip(high + margin, 0.0, limit)]
-        )
+        box = np.minimum(np.maximum(corners, 0.0), limit).ravel()
         return PersonDetection(box, 0.9)
 
     def _unhidden(

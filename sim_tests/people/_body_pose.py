@@ -32,11 +32,14 @@ def _depth(joint: int) -> int:
     return 0 if PARENTS[joint] < 0 else 1 + _depth(PARENTS[joint])
 
 
+def _generation(depth: int) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Joints so far from the pelvis, and the rows of them and their parents among links."""
+    joints = np.array([joint for joint in range(len(JOINTS)) if _depth(joint) == depth])
+    return joints, 1 + joints, 1 + _PARENTS[joints]
+
+
 # Joints equally far from the pelvis turn in one pass; row 0 of a table of links is the pelvis.
-_GENERATIONS: Final = tuple(
-    np.array([joint for joint in range(len(JOINTS)) if _depth(joint) == depth])
-    for depth in range(1 + max(_depth(joint) for joint in range(len(JOINTS))))
-)
+_GENERATIONS: Final = tuple(map(_generation, range(1 + max(map(_depth, range(len(JOINTS)))))))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,13 +74,14 @@ def link_transforms(joints_m: FloatArray, pose: BodyPose) -> FloatArray:
     links = np.zeros((1 + len(JOINTS), 4, 4))
     links[:, 3, 3] = 1.0
     links[0] = pose.T_odom_body
-    for joints in _GENERATIONS:
-        before = links[1 + _PARENTS[joints]]
-        turn, centre = turns[joints], centres[joints]
+    shifts = centres - np.einsum("nij,nj->ni", turns, centres)
+    for joints, rows, parents in _GENERATIONS:
+        before = links[parents]
         rotation = before[:, :3, :3]
-        shift = centre - np.einsum("nij,nj->ni", turn, centre)
-        links[1 + joints, :3, :3] = rotation @ turn
-        links[1 + joints, :3, 3] = before[:, :3, 3] + np.einsum("nij,nj->ni", rotation, shift)
+        place = before[:, :3, 3] + np.einsum("nij,nj->ni", rotation, shifts[joints])
+        before[:, :3, :3] = rotation @ turns[joints]
+        before[:, :3, 3] = place
+        links[rows] = before
     return links
 
 
@@ -127,7 +131,8 @@ class BentPoints:
     def __init__(self, joints_m: FloatArray, points_m: FloatArray, weights: FloatArray) -> None:
         self._joints_m = joints_m
         self._points_m = np.ascontiguousarray(points_m.T)
-        self._passes: list[tuple[NDArray[np.int64], NDArray[np.int64], FloatArray]] = []
+        self._passes: list[tuple[NDArray[np.int64], slice]] = []
+        owners, shares, begin = [], [], 0
         # The last joint first; joints that move different points turn in one pass.
         waiting = list(range(len(JOINTS) - 1, -1, -1))
         while waiting:
@@ -142,24 +147,31 @@ class BentPoints:
             rows = [np.flatnonzero(weights[:, joint]) for joint in now]
             row = np.concatenate(rows)
             owner = np.repeat(now, [len(each) for each in rows])
-            if row.size:
-                self._passes.append((row, owner, weights[row, owner]))
+            self._passes.append((row, slice(begin, begin + row.size)))
+            owners.append(owner)
+            shares.append(weights[row, owner])
+            begin += row.size
+        # Of all passes, one after the other.
+        self._owner, self._share = np.concatenate(owners), np.concatenate(shares)
 
     def odom_m(self, pose: BodyPose) -> FloatArray:
         """(N, 3) in odom."""
         points = self._points_m * pose.scale
         rotvecs = pose.joint_rotvecs
         angles = np.sqrt(np.einsum("ij,ij->i", rotvecs, rotvecs))
-        axes = (rotvecs / np.maximum(angles, 1e-12)[:, None]).T
-        centres = self._joints_m.T * pose.scale
-        for rows, joints, shares in self._passes:
-            axis, centre = axes[:, joints], centres[:, joints]
+        axes = (rotvecs / np.maximum(angles, 1e-12)[:, None]).T[:, self._owner]
+        centres = (self._joints_m.T * pose.scale)[:, self._owner]
+        turns = angles[self._owner] * self._share
+        sines, versines = np.sin(turns), 1.0 - np.cos(turns)
+        nexts, afters = axes[_NEXT], axes[_AFTER]
+        for rows, now in self._passes:
+            axis, centre = axes[:, now], centres[:, now]
             arm = points[:, rows] - centre
-            turn = angles[joints] * shares
-            along = axis[0] * arm[0] + axis[1] * arm[1] + axis[2] * arm[2]
-            across = axis[_NEXT] * arm[_AFTER] - axis[_AFTER] * arm[_NEXT]
+            parts = axis * arm
+            along = parts[0] + parts[1] + parts[2]
+            across = nexts[:, now] * arm[_AFTER] - afters[:, now] * arm[_NEXT]
             points[:, rows] = (
-                centre + arm + np.sin(turn) * across + (1.0 - np.cos(turn)) * (along * axis - arm)
+                centre + arm + sines[now] * across + versines[now] * (along * axis - arm)
             )
         rotation, origin = pose.T_odom_body[:3, :3], pose.T_odom_body[:3, 3]
         return np.asarray(points.T @ rotation.T + origin)

@@ -34,6 +34,8 @@ _HALF_LENGTH_M: Final = 0.3625
 _HALF_WIDTH_M: Final = 0.25
 # Low and high corner of all of the robot in its base frame, a little generous.
 _BOUNDS_BASE_M: Final = np.array([[-0.38, -0.26, -0.01], [0.38, 0.26, 1.46]])
+_MIDDLE_BASE_M: Final = _BOUNDS_BASE_M.mean(axis=0)
+_HALF_BASE_M: Final = 0.5 * (_BOUNDS_BASE_M[1] - _BOUNDS_BASE_M[0])
 _ABOUT_X: Final = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # z to y
 
 _at = AMR_ATLAS.region
@@ -57,7 +59,8 @@ def amr_meshes() -> Mapping[str, tuple[Piece, ...]]:
 
 @lru_cache(maxsize=1)
 def _base_triangles() -> TriangleSet:
-    meshes = [mesh for mesh, _, _ in amr_meshes()["base_link"]]
+    # Part by part: most lines of sight start above them all and come near none.
+    meshes = [*_body(), *_deck(), *_post(), *_casters()]
     return TriangleSet([(mesh.vertices_m, mesh.indices.reshape(-1, 3)) for mesh in meshes])
 
 
@@ -250,12 +253,16 @@ class AmrLook:
     Args:
         pose: gives where it is now: T_odom_base (4, 4) and the turn of the left and of the right
             wheel about base y, radians.
+        base_pose: gives T_odom_base alone, where that is quicker.
     """
 
     kind: Final = "robot"
 
-    def __init__(self, pose: Callable[[], Pose]) -> None:
+    def __init__(
+        self, pose: Callable[[], Pose], base_pose: Callable[[], FloatArray] | None = None
+    ) -> None:
         self._pose = pose
+        self._base_pose = (lambda: np.asarray(pose()[0])) if base_pose is None else base_pose
         self._visuals: Visuals | None = None
         self._parts: list[tuple[int, FloatArray, int]] = []
         self._shown = True
@@ -276,14 +283,14 @@ class AmrLook:
             )
             return amr.T_odom_base, left[0], right[0]
 
-        return cls(pose)
+        return cls(pose, lambda: amr.T_odom_base)
 
     def bounds_odom_m(self) -> FloatArray:
         """(2, 3) low and high corner of a box that holds the robot now."""
-        T = np.asarray(self._pose()[0])
-        middle = T[:3, :3] @ _BOUNDS_BASE_M.mean(axis=0) + T[:3, 3]
-        half = np.abs(T[:3, :3]) @ (0.5 * (_BOUNDS_BASE_M[1] - _BOUNDS_BASE_M[0]))
-        return np.stack([middle - half, middle + half])
+        T = self._base_pose()
+        middle = T[:3, :3] @ _MIDDLE_BASE_M + T[:3, 3]
+        half = np.abs(T[:3, :3]) @ _HALF_BASE_M
+        return np.array([middle - half, middle + half])
 
     def reach_odom_m(self) -> FloatArray:
         """As :meth:`bounds_odom_m`."""
@@ -291,7 +298,9 @@ class AmrLook:
 
     def surface(self, detail: int) -> PlacedSurface:
         """The robot without its wheels, which its body hides; there is one level of detail."""
-        return PlacedSurface(_base_triangles(), np.asarray(self._pose()[0])[None])
+        triangles = _base_triangles()
+        places = np.broadcast_to(self._base_pose(), (triangles.pieces, 4, 4))
+        return PlacedSurface(triangles, places)
 
     def build(self, visuals: Visuals) -> None:
         """Make its bodies in the picture world."""

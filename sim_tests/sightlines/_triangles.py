@@ -42,18 +42,25 @@ class TriangleSet:
             for rows in _clusters(piece.mean(axis=1))
         ]
         count = len(clusters)
+        self.clusters = count
         self.pieces = 1 if together else len(pieces)
         self._piece = np.array([number for number, _ in clusters], dtype=np.int64)
         self._boxes = np.array(
             [(part.min(axis=(0, 1)), part.max(axis=(0, 1))) for _, part in clusters]
         ).reshape(count, 2, 3)
+        #: (P,) first cluster of each piece, and how many it has
+        self.starts = np.searchsorted(self._piece, np.arange(self.pieces))
+        self.counts = np.bincount(self._piece, minlength=self.pieces)
+        #: (2, 3, C) low and high corners about each cluster, and (2, 3, P) about each piece
+        self.boxes_m = np.ascontiguousarray(self._boxes.transpose(1, 2, 0))
+        self.piece_boxes_m = _about(self.boxes_m, self.starts, self.counts)
         # What fills up a cluster is a triangle without area, which no line meets.
         packed = np.zeros((count, _CLUSTER, 3, 3))
         for row, (_, part) in enumerate(clusters):
             packed[row, : len(part)] = part
         first, second, third = packed[:, :, 0], packed[:, :, 1], packed[:, :, 2]
         # (C, 6, 3 · 32): the three edges of every triangle, one kind of edge after another.
-        self._edges = np.ascontiguousarray(
+        self.edges = np.ascontiguousarray(
             np.concatenate(
                 [
                     np.concatenate([np.cross(b, c), b - c], axis=2)
@@ -64,7 +71,7 @@ class TriangleSet:
         )
         normals = np.cross(second - first, third - first)
         # (C, 4, 32) of each plane: n · p − n · first is how far p is before it.
-        self._planes = np.ascontiguousarray(
+        self.planes = np.ascontiguousarray(
             np.concatenate(
                 [-normals, np.einsum("cti,cti->ct", first, normals)[..., None]], axis=2
             ).transpose(0, 2, 1)
@@ -73,7 +80,7 @@ class TriangleSet:
     @property
     def triangles(self) -> int:
         """How many triangles there are."""
-        return int(np.count_nonzero(self._planes[:, :3].any(axis=1)))
+        return int(np.count_nonzero(self.planes[:, :3].any(axis=1)))
 
     def blocks(self, eye_m: FloatArray, ends_m: FloatArray) -> NDArray[np.bool_]:
         """Whether a triangle lies between the eye and each of some points.
@@ -103,19 +110,32 @@ class TriangleSet:
         if not near.size:
             return blocked
         cluster = reached[near]
-        sides = (_lines(eye[near], along[piece[near], line])[:, None] @ self._edges[cluster])[:, 0]
-        one, two, three = (sides[:, k * _CLUSTER : (k + 1) * _CLUSTER] for k in range(3))
-        rate = one + two + three
-        # The plane is met at the share start / rate of the line.
-        origin = np.ones((len(near), 1, 4))
-        origin[:, 0, :3] = eye[near]
-        start = (origin @ self._planes[cluster])[:, 0]
-        met = (start * rate > 0.0) & (np.abs(start) < np.abs(rate))
-        met &= (np.minimum(np.minimum(one, two), three) >= 0.0) | (
-            np.maximum(np.maximum(one, two), three) <= 0.0
+        met = meet_triangles(
+            self.edges[cluster], self.planes[cluster], eye[near], along[piece[near], line]
         )
-        blocked[line[met.any(axis=1)]] = True
+        blocked[line[met]] = True
         return blocked
+
+
+def meet_triangles(
+    edges: FloatArray, planes: FloatArray, eye_m: FloatArray, along_m: FloatArray
+) -> NDArray[np.bool_]:
+    """(N,) whether each segment from eyes (N, 3) along (N, 3) meets a cluster of its own.
+
+    ``edges`` (N, 6, 48) and ``planes`` (N, 4, 16) are rows of those of a :class:`TriangleSet`.
+    """
+    sides = (_lines(eye_m, along_m)[:, None] @ edges)[:, 0]
+    one, two, three = (sides[:, k * _CLUSTER : (k + 1) * _CLUSTER] for k in range(3))
+    rate = one + two + three
+    # The plane is met at the share start / rate of the line.
+    origin = np.ones((len(edges), 1, 4))
+    origin[:, 0, :3] = eye_m
+    start = (origin @ planes)[:, 0]
+    met = (start * rate > 0.0) & (np.abs(start) < np.abs(rate))
+    met &= (np.minimum(np.minimum(one, two), three) >= 0.0) | (
+        np.maximum(np.maximum(one, two), three) <= 0.0
+    )
+    return np.asarray(np.logical_or.reduce(met, axis=1))
 
 
 def _lines(eye_m: FloatArray, along_m: FloatArray) -> FloatArray:
@@ -126,6 +146,16 @@ def _lines(eye_m: FloatArray, along_m: FloatArray) -> FloatArray:
     out[:, 3] = y * oz - z * oy
     out[:, 4] = z * ox - x * oz
     out[:, 5] = x * oy - y * ox
+    return out
+
+
+def _about(boxes_m: FloatArray, starts: NDArray[np.int64], counts: NDArray[np.int64]) -> FloatArray:
+    """(2, 3, P) about the boxes (2, 3, C) of each piece; a point at 0 about none."""
+    out = np.zeros((2, 3, len(starts)))
+    for piece, (start, count) in enumerate(zip(starts.tolist(), counts.tolist(), strict=True)):
+        if count:
+            own = boxes_m[..., start : start + count]
+            out[0, :, piece], out[1, :, piece] = own[0].min(axis=1), own[1].max(axis=1)
     return out
 
 
@@ -147,6 +177,30 @@ def _clusters(centres_m: FloatArray) -> list[NDArray[np.int64]]:
 def meet_boxes(eye_m: FloatArray, along_m: FloatArray, boxes_m: FloatArray) -> NDArray[np.bool_]:
     """(C, K) whether segments from eyes (C, 3) along (C, K, 3) meet boxes (C, 2, 3), by slabs."""
     return _slabs(eye_m, _inverse(along_m), boxes_m)
+
+
+def meet_own_boxes(
+    eye_m: FloatArray, inverse: FloatArray, boxes_m: FloatArray
+) -> NDArray[np.bool_]:
+    """(N,) whether each segment meets a box of its own.
+
+    Args:
+        eye_m: (3, N) where the segments begin.
+        inverse: (3, N) of :func:`inverse_of` of them.
+        boxes_m: (2, 3, N) low and high corners.
+    """
+    first, last = boxes_m - eye_m
+    first *= inverse
+    last *= inverse
+    enter, leave = np.minimum(first, last), np.maximum(first, last)
+    entered = np.maximum(np.maximum(enter[0], enter[1]), np.maximum(enter[2], 0.0))
+    left = np.minimum(np.minimum(leave[0], leave[1]), np.minimum(leave[2], 1.0))
+    return np.asarray(entered <= left)
+
+
+def inverse_of(along_m: FloatArray) -> FloatArray:
+    """One over each component of directions (…), which may be 0."""
+    return np.asarray(1.0 / np.where(np.abs(along_m) < _TINY_M, _TINY_M, along_m))
 
 
 def _inverse(along_m: FloatArray) -> FloatArray:
