@@ -108,7 +108,7 @@ class Crowd:
         if newly_seen_s == 0.0:
             # No new frame, no new evidence: also not from a tracker that claims otherwise.
             lower = min(lower, before.awareness_lower)
-        # A frame that comes late proves no awareness, but it shows where somebody is, and how surely:
+        # A frame that comes late proves no awareness, but it shows where somebody is:
         # else a slow camera would leave the doubt of first sight for ever.
         pays = not stale and track.status == "confirmed"
         paid_s = min(newly_seen_s, timing.fresh_within_s) if pays else 0.0
