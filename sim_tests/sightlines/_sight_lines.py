@@ -14,7 +14,15 @@ from perception.arrays import FloatArray
 
 from ..hall._layout import WarehouseLayout
 from ..hall._scenery import scenery
-from ._triangles import TriangleSet, inverse_of, meet_boxes, meet_own_boxes, meet_triangles
+from ._triangles import (
+    CLUSTER,
+    SIDES,
+    TriangleSet,
+    inverse_of,
+    meet_boxes,
+    meet_own_boxes,
+    meet_triangles,
+)
 
 # What rounding may leave of a line that just touches a sphere.
 _MARGIN_M: Final = 1e-6
@@ -147,20 +155,19 @@ def _blocked_by(
     boxes = joined.boxes_m[..., cluster]
     met = np.flatnonzero(meet_own_boxes(eyes[:, pair], inverse[:, pair], boxes))
     pair, cluster = pair[met], cluster[met]
+    if not cluster.size:
+        return blocked
+    edges, planes = np.empty((len(cluster), 6, SIDES)), np.empty((len(cluster), 4, CLUSTER))
     # Pairs are in the order of the pieces, and so of the sets.
-    edges, planes, begin, first = [], [], 0, 0
+    begin, first = 0, 0
     for one in sets:
         end = int(np.searchsorted(cluster, first + one.clusters))
         if end > begin:
             rows = cluster[begin:end] - first
-            edges.append(one.edges[rows])
-            planes.append(one.planes[rows])
+            one.edges.take(rows, axis=0, out=edges[begin:end], mode="clip")
+            one.planes.take(rows, axis=0, out=planes[begin:end], mode="clip")
         begin, first = end, first + one.clusters
-    if edges:
-        meets = meet_triangles(
-            np.concatenate(edges), np.concatenate(planes), eye[pair], along[pair]
-        )
-        blocked[line[pair[meets]]] = True
+    blocked[line[pair[meet_triangles(edges, planes, eye[pair], along[pair])]]] = True
     return blocked
 
 

@@ -21,8 +21,10 @@ from perception.arrays import FloatArray
 #: Vertices (V, 3) in metres and triangles (T, 3) of rows of them.
 Surface = tuple[FloatArray, NDArray[np.int64]]
 
-# Triangles are held against lines in clusters of so many, each with a box about it.
-_CLUSTER: Final = 16
+#: Triangles are held against lines in clusters of so many, each with a box about it, …
+CLUSTER: Final = 16
+#: … and of so many sides.
+SIDES: Final = 3 * CLUSTER
 _TINY_M: Final = 1e-12
 
 
@@ -55,7 +57,7 @@ class TriangleSet:
         self.boxes_m = np.ascontiguousarray(self._boxes.transpose(1, 2, 0))
         self.piece_boxes_m = _about(self.boxes_m, self.starts, self.counts)
         # What fills up a cluster is a triangle without area, which no line meets.
-        packed = np.zeros((count, _CLUSTER, 3, 3))
+        packed = np.zeros((count, CLUSTER, 3, 3))
         for row, (_, part) in enumerate(clusters):
             packed[row, : len(part)] = part
         first, second, third = packed[:, :, 0], packed[:, :, 1], packed[:, :, 2]
@@ -125,7 +127,7 @@ def meet_triangles(
     ``edges`` (N, 6, 48) and ``planes`` (N, 4, 16) are rows of those of a :class:`TriangleSet`.
     """
     sides = (_lines(eye_m, along_m)[:, None] @ edges)[:, 0]
-    one, two, three = (sides[:, k * _CLUSTER : (k + 1) * _CLUSTER] for k in range(3))
+    one, two, three = (sides[:, k * CLUSTER : (k + 1) * CLUSTER] for k in range(3))
     rate = one + two + three
     # The plane is met at the share start / rate of the line.
     origin = np.ones((len(edges), 1, 4))
@@ -164,7 +166,7 @@ def _clusters(centres_m: FloatArray) -> list[NDArray[np.int64]]:
     waiting, done = [np.arange(len(centres_m))], []
     while waiting:
         rows = waiting.pop()
-        if len(rows) <= _CLUSTER:
+        if len(rows) <= CLUSTER:
             if len(rows):
                 done.append(rows)
             continue
