@@ -56,8 +56,8 @@ class SamplingPlanner:
       the gap that waiting would leave is safe too, so that the robot can get out. Towards people a
       standing robot may always turn on the spot; in front of it, it keeps the room to do so.
     * It should be *good*: near the goal soon, facing it, away from people, boxes and the strip that
-      a walking person is about to use, without needless turning. Where someone stands in front of
-      the goal, the goal is swung to the tangent past that person.
+      a walking person is about to use, with room to people's bodies, without needless turning.
+      Where someone stands in front of the goal, it is swung to the tangent past that person.
 
     If nothing is safe the robot brakes as hard as it may along its present curve. It never
     reverses. The command depends on the arguments alone: there is no memory between calls. People
@@ -285,6 +285,11 @@ class SamplingPlanner:
             weighted = worst * self._late_people
             # The worst moment decides; the mean still shows the way out to a robot that is inside.
             cost += (weighted.max(axis=1) + weighted.sum(axis=1) / len(t_s)).sum(axis=0)
+            gaps_m = scene.body_gap_m(rectangles, t_s, config.standing_speed_mps)
+            if len(gaps_m):
+                room = (_closeness(gaps_m, config.room_m).sum(axis=1) / len(t_s)).max(axis=0)
+                # Between ways only: nearness is no reason to stop, the limit sees to that.
+                cost += config.room_weight * (room - room.min(axis=1, keepdims=True))
             cost += config.keep_right_weight * np.maximum(turning, 0.0)
         if scene.has_boxes:
             close = _closeness(scene.box_gap_m(rectangles), config.static_comfort_m)

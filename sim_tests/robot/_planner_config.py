@@ -65,6 +65,12 @@ class PlannerConfig(StrictConfig):
     """Cost of facing away from the goal (by π) at the end of the roll-out."""
     person_weight: float = Field(default=1.5, ge=0.0)
     """Cost of touching a person's radius now."""
+    room_m: float = Field(default=2.0, gt=0.0, le=5.0)
+    """Gap to the body of somebody who stands, in metres, below which nearness costs between ways
+    that are driven at the same speed: near people every limit is low, whatever their radius, so the
+    robot passes at a distance where there is room."""
+    room_weight: float = Field(default=2.0, ge=0.0)
+    """Weight of that."""
     front_weight: float = Field(default=0.6, ge=0.0)
     """Cost of being in the strip that a person walks through now."""
     static_weight: float = Field(default=0.5, ge=0.0)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nav_adapter import NavConstraints, RobotProfile, RobotState
+from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
 
 from ._planner_clearance import Rectangles, box_gap_m, disc_gap_m, strip_distance_m
@@ -108,6 +109,22 @@ class Scene:
             self._x_m + self._vx_mps * t_s,
             self._y_m + self._vy_mps * t_s,
             self._radius_m,
+        )
+
+    def body_gap_m(self, robot: Rectangles, t_s: FloatArray, standing_mps: float) -> FloatArray:
+        """(S, T, V, W) gap to the body of everyone slower than that whose disc the robot is not in.
+
+        Walkers are passed by what they are about to use, see :meth:`strip_gap_m`; and who is in a
+        disc has to get out of it first.
+        """
+        speed2 = self._vx_mps**2 + self._vy_mps**2
+        apart_m = np.hypot(self._x_m, self._y_m) - self._radius_m - robot.half_width_m
+        counts = ((speed2 < standing_mps**2) & (apart_m > 0.0)).ravel()
+        return disc_gap_m(
+            robot,
+            (self._x_m + self._vx_mps * t_s)[counts],
+            (self._y_m + self._vy_mps * t_s)[counts],
+            np.asarray(BODY_RADIUS_M),
         )
 
     def strip_gap_m(self, robot: Rectangles, t_s: FloatArray, ahead_s: float) -> FloatArray:
