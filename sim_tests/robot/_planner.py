@@ -239,7 +239,9 @@ class SamplingPlanner:
         moving, waiting = self._footprint.at(poses, room_m), self._footprint.at(_STANDING, room_m)
         clearance_m = self.config.clearance_m
         if scene.has_people:
-            enough = np.minimum(clearance_m, scene.people_gap_m(waiting, t_s) - _SLACK_M)
+            # Of people the gap that is there counts, without that room: else it could be used up.
+            still = self._footprint.at(_STANDING)
+            enough = np.minimum(clearance_m, scene.people_gap_m(still, t_s) - _SLACK_M)
             safe &= (scene.people_gap_m(moving, t_s) >= enough).all(axis=(0, 1))
             # Always a way out: the corners keep to the turning circle and to the speed limit.
             safe |= v <= 0.0
