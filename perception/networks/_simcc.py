@@ -53,8 +53,8 @@ def peaks(axes: Sequence[NDArray[Any]]) -> tuple[FloatArray, FloatArray]:
             curve = np.where(values.min(axis=2, keepdims=True) > 0.0, curve, values)
         before, middle, after = curve[..., 0], curve[..., 1], curve[..., 2]
         shift = 0.5 * (before - after) / (before - 2.0 * middle + after)
-    # At either end of an axis, and where the three make no peak, the bin itself is the place. Midway
-    # between two bins rounding may carry the place a little past the middle.
+    # At either end of an axis, and where the three make no peak, the bin itself is the place.
+    # Midway between two bins rounding may carry it a little past the middle.
     inner = (np.abs(shift) < 0.501) & (top > 0) & (top < last)
     place = top + np.where(inner, shift, 0.0)
     good = np.isfinite(height)
