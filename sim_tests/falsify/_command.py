@@ -32,7 +32,11 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         help="shipped scenarios, YAML files, or 'all' that have a planner and people (default)",
     )
     for option, default, what in (
-        ("--episodes", 2000, "in all: half to the scenarios alike, the rest to the worst third"),
+        (
+            "--episodes",
+            2000,
+            "at least: half to all scenarios alike, the rest to the worst third",
+        ),
         ("--generation", 12, "episodes a generation of the search"),
         ("--people", 2, "how many people of a scenario are varied"),
         ("--worst", 10, "cases to write"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -167,7 +168,10 @@ def _search(
 
 
 def _budget(settings: FalsifySettings, scenarios: int) -> tuple[int, int, int]:
-    """Episodes a scenario at first, in all for those that are kept, and how many are kept."""
+    """Episodes a scenario at first, in all for those that are kept, and how many are kept.
+
+    Together at least as many as were asked for, in whole generations.
+    """
     size = settings.generation
     if settings.episodes < size * scenarios:
         raise SimError(
@@ -176,7 +180,7 @@ def _budget(settings: FalsifySettings, scenarios: int) -> tuple[int, int, int]:
         )
     kept = max(scenarios // _SHARE_KEPT, 1)
     if scenarios == 1:
-        return (settings.episodes // size * size,) * 2 + (0,)
+        return (math.ceil(settings.episodes / size) * size,) * 2 + (0,)
     first = max(int(_FIRST_HALF * settings.episodes / scenarios) // size, 1) * size
-    more = (settings.episodes - first * scenarios) // kept // size * size
+    more = math.ceil(max(settings.episodes - first * scenarios, 0) / (kept * size)) * size
     return first, first + more, kept
