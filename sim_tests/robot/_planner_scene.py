@@ -104,12 +104,7 @@ class Scene:
 
     def people_gap_m(self, robot: Rectangles, t_s: FloatArray) -> FloatArray:
         """(P, T, V, W) gap between the robot and each person's disc, ``t_s`` from now."""
-        return disc_gap_m(
-            robot,
-            self._x_m + self._vx_mps * t_s,
-            self._y_m + self._vy_mps * t_s,
-            self._radius_m,
-        )
+        return disc_gap_m(robot, *self._places_m(t_s), self._radius_m)
 
     def body_gap_m(self, robot: Rectangles, t_s: FloatArray, standing_mps: float) -> FloatArray:
         """(S, T, V, W) gap to the body of everyone slower than that whose disc the robot is not in.
@@ -120,26 +115,27 @@ class Scene:
         speed2 = self._vx_mps**2 + self._vy_mps**2
         apart_m = np.hypot(self._x_m, self._y_m) - self._radius_m - robot.half_width_m
         counts = ((speed2 < standing_mps**2) & (apart_m > 0.0)).ravel()
-        return disc_gap_m(
-            robot,
-            (self._x_m + self._vx_mps * t_s)[counts],
-            (self._y_m + self._vy_mps * t_s)[counts],
-            np.asarray(BODY_RADIUS_M),
-        )
+        x_m, y_m = self._places_m(t_s)
+        return disc_gap_m(robot, x_m[counts], y_m[counts], np.asarray(BODY_RADIUS_M))
 
     def strip_gap_m(self, robot: Rectangles, t_s: FloatArray, ahead_s: float) -> FloatArray:
         """(P, T, V, W) gap to what each person's disc sweeps from ``t_s`` on for ``ahead_s``.
 
         The robot counts as a disc of half its width.
         """
+        x_m, y_m = self._places_m(t_s)
         distance = strip_distance_m(
-            robot.centers.x_m - (self._x_m + self._vx_mps * t_s),
-            robot.centers.y_m - (self._y_m + self._vy_mps * t_s),
+            robot.centers.x_m - x_m,
+            robot.centers.y_m - y_m,
             self._vx_mps,
             self._vy_mps,
             ahead_s,
         )
         return np.asarray(distance - (self._radius_m + robot.half_width_m))
+
+    def _places_m(self, t_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(P, T, 1, 1) x and y of everybody, ``t_s`` from now."""
+        return self._x_m + self._vx_mps * t_s, self._y_m + self._vy_mps * t_s
 
     def box_gap_m(self, robot: Rectangles) -> FloatArray:
         """(T, V, W) gap between the robot and the nearest box, a lower bound."""

@@ -89,22 +89,28 @@ class WorkerPool(Closing):
             ready = cast(
                 list[Connection], wait(list(busy), None if self._time_limit_s is None else 1)
             )
-            for pipe in [*ready, *self._overdue(ready)]:
+            overdue = self._overdue(ready)
+            for pipe in ready:
                 worker, number, job, deaths = busy.pop(pipe)
-                result = worker.take() if pipe in ready else self._ended(job)
-                if result is not None and pipe in ready:
+                result = worker.take()
+                if result is not None:
                     idle.append(worker)
                     yield number, result
                     continue
-                worker.close()
-                with _one_thread_each():
-                    idle.append(_Worker(self._context))
-                if result is not None:
-                    yield number, result
-                elif deaths < _DEATHS_ALLOWED:
+                self._replace(worker)
+                if deaths < _DEATHS_ALLOWED:
                     waiting.appendleft((number, job, deaths + 1))
                 else:
                     yield number, died(job, worker.exit_code)
+            for pipe in overdue:
+                worker, number, job, _ = busy.pop(pipe)
+                self._replace(worker)
+                yield number, self._ended(job)
+
+    def _replace(self, worker: _Worker) -> None:
+        worker.close()
+        with _one_thread_each():
+            self._idle.append(_Worker(self._context))
 
     def _overdue(self, ready: Sequence[Connection]) -> list[Connection]:
         limit_s = self._time_limit_s

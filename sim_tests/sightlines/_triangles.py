@@ -207,9 +207,7 @@ def inverse_of(along_m: FloatArray) -> FloatArray:
 
 def _inverse(along_m: FloatArray) -> FloatArray:
     """(3, C, K) one over each component of directions (C, K, 3), axis by axis."""
-    components = np.array(along_m.transpose(2, 0, 1), order="C")
-    components[np.abs(components) < _TINY_M] = _TINY_M
-    return np.asarray(1.0 / components)
+    return inverse_of(np.ascontiguousarray(along_m.transpose(2, 0, 1)))
 
 
 def _slabs(eye_m: FloatArray, inverse: FloatArray, boxes_m: FloatArray) -> NDArray[np.bool_]:

@@ -73,7 +73,9 @@ def domain(monkeypatch: pytest.MonkeyPatch) -> int:
 def robot(domain: int) -> Iterator[DdsNode]:
     """The robot's side: sends a camera and odometry, hears what Nav2 hears."""
     node = DdsNode(domain)
-    for key in ("image", "compressed", "camera_info", "odom", "tf_static"):
+    for key in ("image", "compressed"):  # as camera drivers send them
+        node.advertise(READ[key])
+    for key in ("camera_info", "odom", "tf_static"):
         node.advertise(replace(READ[key], reliable=True))
     for topic in PUBLISHED.values():
         node.subscribe(topic)

@@ -11,11 +11,13 @@ from hypothesis import strategies as st
 from sim_tests import Scenario, SimError
 from sim_tests._cli import main
 from sim_tests._scenario_template import ScenarioTemplate
+from sim_tests.falsify._falsify import _budget
 from sim_tests.falsify._hunt import Hunt
 from sim_tests.falsify._people_space import PeopleSpace
 from sim_tests.falsify._person_levers import way_of
 from sim_tests.falsify._score import CONTACT, NOTHING, score
 from sim_tests.falsify._script_levers import peaks, script_way
+from sim_tests.falsify._settings import FalsifySettings
 from sim_tests.falsify._way import RACK_CLEARANCE_M, bent, clearance_m
 from sim_tests.falsify._worst import worst_finds
 from sim_tests.measures._episode_record import EpisodeRecord
@@ -130,6 +132,21 @@ def test_scores_put_what_is_worse_below():
     assert len(set(scores)) == len(scores)
     assert scores[1] <= CONTACT < scores[2]
     assert score(_record(error="died", robot_contacts=1)) == NOTHING == scores[-1]
+
+
+@given(episodes=st.integers(1, 5000), scenarios=st.integers(1, 40), generation=st.integers(2, 40))
+def test_a_search_has_at_least_the_episodes_asked_for_in_whole_generations(
+    episodes, scenarios, generation
+):
+    settings = FalsifySettings("p", "", (), episodes, 1, "truth", "", 0, generation)
+    if episodes < generation * scenarios:
+        with pytest.raises(SimError, match="at least one generation"):
+            _budget(settings, scenarios)
+        return
+    first, more, kept = _budget(settings, scenarios)
+    total = first * scenarios + (more - first) * kept
+    assert episodes <= total < episodes + generation * max(kept, 1)
+    assert first % generation == more % generation == 0 < first <= more
 
 
 _PLANTED = {"a": 0.83, "b": 0.12}
