@@ -12,21 +12,13 @@ import cv2
 import numpy as np
 import yaml
 
+from ._camera_info import read_camera_info
 from ._errors import PerceptionError
 from .arrays import FloatArray, finite_array, finite_number, set_fields
 
 # OpenCV accepts these numbers of coefficients: plumb_bob has 5, rational_polynomial 8.
 _DISTORTION_SIZES: Final = (4, 5, 8, 12, 14)
 _DISTORTION_MODELS: Final = ("plumb_bob", "rational_polynomial")
-# Fields of sensor_msgs/CameraInfo (ROS 2 in lower case, ROS 1 in upper) by the calibrator's names.
-_MESSAGE_KEYS: Final = {
-    "width": "image_width",
-    "height": "image_height",
-    "k": "camera_matrix",
-    "K": "camera_matrix",
-    "d": "distortion_coefficients",
-    "D": "distortion_coefficients",
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,41 +98,25 @@ class Camera:
         distortion models plumb_bob and rational_polynomial are accepted; raises
         :class:`PerceptionError` naming the file and what is missing otherwise.
         """
-        path = Path(path)
+        info = read_camera_info(path)
+        if np.any(info.coefficients) and info.model not in _DISTORTION_MODELS:
+            raise PerceptionError(
+                f"{path}: distortion_model must be one of {', '.join(_DISTORTION_MODELS)}, "
+                f"got {info.model!r}; rectify the images first, or cut flat views from a fisheye's "
+                "(perception.surround)"
+            )
+        matrix = info.matrix
         try:
-            # Echoed messages end in "---"; the first one counts.
-            data = next(yaml.safe_load_all(path.read_text(encoding="utf-8")), None)
-        except OSError as cause:
-            raise PerceptionError(f"cannot read {path}: {cause.strerror or cause}") from cause
-        except (yaml.YAMLError, UnicodeDecodeError) as cause:
-            raise PerceptionError(f"{path} is not valid YAML: {cause}") from cause
-        if not isinstance(data, dict):
-            raise PerceptionError(f"{path} must hold the keys of a ROS camera_info file")
-        data = {_MESSAGE_KEYS.get(key, key): value for key, value in data.items()}
-        model = data.get("distortion_model") or "plumb_bob"
-        try:
-            matrix = np.reshape(_entries(data["camera_matrix"]), (3, 3))
-            coefficients = _entries(data.get("distortion_coefficients", []))
-            if np.any(coefficients) and model not in _DISTORTION_MODELS:
-                raise PerceptionError(
-                    f"distortion_model must be one of {', '.join(_DISTORTION_MODELS)}, "
-                    f"got {model!r}; rectify the images first"
-                )
             return cls(
-                data["image_width"],
-                data["image_height"],
+                info.width_px,
+                info.height_px,
                 matrix[0, 0],
                 matrix[1, 1],
                 matrix[0, 2],
                 matrix[1, 2],
-                coefficients if np.size(coefficients) else None,
+                info.coefficients if info.coefficients.size else None,
             )
-        except KeyError as missing:
-            raise PerceptionError(
-                f"{path} lacks the key {missing}; a camera_info file has image_width, "
-                "image_height, camera_matrix and distortion_coefficients"
-            ) from None
-        except (TypeError, ValueError) as cause:
+        except ValueError as cause:
             raise PerceptionError(f"{path}: {cause}") from cause
 
     def to_yaml(self, path: str | Path) -> None:
@@ -201,8 +177,3 @@ class Camera:
             )
         undistorted = cv2.undistortPoints(pixels.reshape(-1, 1, 2), self.matrix, self.distortion)
         return np.asarray(undistorted, dtype=np.float64).reshape(-1, 2)
-
-
-def _entries(value: Any) -> Any:
-    """The numbers of a ROS matrix, written as a mapping with ``data`` or as a plain list."""
-    return np.asarray(value["data"] if isinstance(value, dict) else value, dtype=np.float64)

@@ -5,6 +5,17 @@ from __future__ import annotations
 import argparse
 
 
+def add_camera(parser: argparse.ArgumentParser) -> None:
+    """Add ``--camera``."""
+    parser.add_argument(
+        "--camera",
+        default="",
+        metavar="NAME|FILE",
+        help="another camera on the robot: 'forward' (120 degrees, that of the shipped scenarios), "
+        "'surround' (360 degrees), or a YAML file (default: that of each scenario)",
+    )
+
+
 def count(text: str) -> int:
     """A whole number of at least 1, as the ``type`` of an argument."""
     try:

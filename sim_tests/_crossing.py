@@ -12,7 +12,7 @@ import numpy as np
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile, RobotState
 from perception import AttentionCone, AwarenessPipeline, Camera, PersonObservation
 from perception.arrays import FloatArray
-from tracking import CameraView, PersonTrack, PersonTracker, TrackerConfig
+from tracking import CameraView, PersonTrack, PersonTracker, SurroundView, TrackerConfig
 
 from ._errors import SimError
 from ._eyes import ORACLE, Sighting, TimedEyes, make_eyes
@@ -297,8 +297,14 @@ def _tracker(
     config = TrackerConfig(awareness=policy.filter)
     if perception == "truth":  # which sees all around
         return PersonTracker(config)
-    view = None if perception == ORACLE else CameraView(camera, max_range_m=_SEEN_WITHIN_M)
-    return PersonTracker(config, view=MapView.of(stage.warehouse, view))
+    if perception == ORACLE:
+        return PersonTracker(config, view=MapView.of(stage.warehouse))
+    views = stage.scenario.camera.flat_views(camera)
+    flat = CameraView(camera, max_range_m=_SEEN_WITHIN_M)
+    view = SurroundView((flat,) * len(views), tuple(each.rotation_camera_view for each in views))
+    return PersonTracker(
+        config, view=MapView.of(stage.warehouse, flat if len(views) == 1 else view)
+    )
 
 
 def _default_planner(scenario: Scenario, stage: Stage) -> LocalPlanner:

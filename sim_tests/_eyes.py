@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, Literal, Protocol, get_args
+from typing import Final, Literal, get_args
 
 import numpy as np
 
 from perception import AttentionCone, AwarenessPipeline, Camera, PersonObservation
 from perception.arrays import FloatArray
+from perception.surround import FlatView
 from tracking import View
 
 from ._errors import SimError
+from ._eyes_protocol import Eyes
 from ._keypoint_camera import KeypointCamera, KeypointNoise
 from ._map_view import MapView
 from ._pixel_eyes import PixelEyes
 from ._stage import Stage, TrueView
+from ._surround_eyes import SurroundEyes
 from .pictures._camera_timing import CameraTiming, FrameClock, FrameQueue
+from .pictures._coarse_scenery import CoarseSceneryRenderer
 from .sightlines._sight_lines import SightLines
 
 PerceptionKind = Literal["truth", "keypoints", "pixels"]
@@ -28,16 +31,6 @@ ORACLE: Final = "oracle"
 _TRUE_POSITION_STD_M: Final = 0.01
 _TRUE_AWARENESS_STD: Final = 0.02
 _TRUE_RANGE_M: Final = 20.0
-
-
-class Eyes(Protocol):
-    """Makes the observations of one frame."""
-
-    def observe(
-        self, stamp_s: float, T_odom_camera: FloatArray, truth: tuple[TrueView, ...]
-    ) -> tuple[tuple[PersonObservation, int], ...]:
-        """Return each observation with the index of the worker that it shows, −1 for none."""
-        ...
 
 
 class TrueEyes:
@@ -92,14 +85,10 @@ class KeypointEyes:
         cone: AttentionCone,
         noise: KeypointNoise,
         rng: np.random.Generator,
+        sight: SightLines,
     ) -> None:
         self._stage = stage
-        self._keypoints = KeypointCamera(
-            camera,
-            SightLines(stage.warehouse.layout, stage.warehouse.variant, stage.warehouse.actors),
-            noise,
-            rng,
-        )
+        self._keypoints = KeypointCamera(camera, sight, noise, rng)
         self._pipeline = AwarenessPipeline(
             camera,
             self._keypoints,
@@ -182,23 +171,50 @@ def make_eyes(
     ``noise`` is of the keypoint camera; ``pipeline`` works on pixels, default the shipped networks;
     ``T_camera_assumed`` is as for :class:`~sim_tests._pixel_eyes.PixelEyes`.
     """
-    spec = stage.scenario.camera
-    makers: dict[str, Callable[[], Eyes]] = {
-        "truth": TrueEyes,
-        ORACLE: lambda: TrueEyes(MapView.of(stage.warehouse)),
-        "keypoints": lambda: KeypointEyes(stage, camera, cone, noise, rng),
-        "pixels": lambda: PixelEyes(
-            stage,
-            camera,
-            cone,
-            spec.sensor,
-            rng,
-            pipeline,
-            spec.scenery_divisor,
-            T_camera_assumed,
-        ),
-    }
-    if kind not in makers:
+    if kind == "truth":
+        return TrueEyes()
+    if kind == ORACLE:
+        return TrueEyes(MapView.of(stage.warehouse))
+    views = stage.scenario.camera.flat_views(camera)
+    if kind == "keypoints":
+        warehouse = stage.warehouse
+        sight = SightLines(warehouse.layout, warehouse.variant, warehouse.actors)
+        eyes: list[Eyes] = [KeypointEyes(stage, camera, cone, noise, rng, sight) for _ in views]
+    elif kind == "pixels":
+        eyes = _pixel_eyes(stage, views, cone, rng, pipeline, T_camera_assumed)
+    else:
         valid = ", ".join(map(repr, get_args(PerceptionKind)))
         raise SimError(f"perception must be one of {valid}, got {kind!r}")
-    return makers[kind]()
+    return eyes[0] if len(views) == 1 else SurroundEyes(views, eyes)
+
+
+def _pixel_eyes(
+    stage: Stage,
+    views: tuple[FlatView, ...],
+    cone: AttentionCone,
+    rng: np.random.Generator,
+    pipeline: AwarenessPipeline | None,
+    T_camera_assumed: FloatArray | None,
+) -> list[Eyes]:
+    """Eyes for every view; they share networks and renderer."""
+    spec, camera = stage.scenario.camera, views[0].camera
+    renderer = CoarseSceneryRenderer(stage.warehouse, spec.scenery_divisor)
+    if pipeline is None:
+        # Workers in a crossing turn their heads; their eyes follow.
+        pipeline = AwarenessPipeline(camera, cone=cone, eye_in_head_std_rad=0.0)
+    return [
+        PixelEyes(
+            stage,
+            camera,
+            spec.sensor,
+            view_rng,
+            pipeline,
+            renderer,
+            None
+            if T_camera_assumed is None
+            else view.T_camera_view.T @ T_camera_assumed @ view.T_camera_view,
+        )
+        for view, view_rng in zip(
+            views, [rng] if len(views) == 1 else rng.spawn(len(views)), strict=True
+        )
+    ]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from perception.arrays import FloatArray
-from tracking import CameraView
+from tracking import View
 
 from ._line_of_sight import crosses_boxes
 from ._warehouse import Warehouse
@@ -21,15 +21,15 @@ class MapView:
     """A view for the tracker: in the camera's field, in range, and with no rack in between.
 
     Attributes:
-        camera: the field and the range; None looks all around and as far as may be.
+        camera: field and range of the camera; None looks all around and as far as may be.
         boxes_odom_m: (N, 4) what is high enough to hide a person.
     """
 
-    camera: CameraView | None
+    camera: View | None
     boxes_odom_m: FloatArray
 
     @classmethod
-    def of(cls, warehouse: Warehouse, camera: CameraView | None = None) -> MapView:
+    def of(cls, warehouse: Warehouse, camera: View | None = None) -> MapView:
         """The view in a hall whose racks and walls the robot knows."""
         high = warehouse.layout.obstacle_heights_m >= _HIDING_HEIGHT_M
         return cls(camera, warehouse.obstacle_boxes_odom[high])

@@ -9,15 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from perception import AttentionCone, AwarenessPipeline, Camera, FloorPlane, PersonObservation
+from perception import AwarenessPipeline, Camera, FloorPlane, PersonObservation
 from perception.arrays import FloatArray
 
 from ._errors import SimError
 from ._stage import Stage, TrueView
 from .pictures._camera_timing import CameraTiming
-from .pictures._coarse_scenery import CoarseSceneryRenderer
 from .pictures._sensor import SensorConfig
-from .pictures._simulated_camera import SimulatedCamera
+from .pictures._simulated_camera import PictureRenderer, SimulatedCamera
 
 #: Index of an observation that shows none of the workers.
 NOBODY: Final = -1
@@ -38,17 +37,14 @@ class PixelEyes:
     Args:
         stage: what is seen.
         camera: of the robot.
-        cone: the attention cone.
         sensor: noise, exposure and blur.
         rng: of the sensor's noise.
-        pipeline: None is an :class:`~perception.AwarenessPipeline` with the shipped networks.
-        scenery_divisor: pixels a side of a block of scenery that is rendered as one; people are
-            rendered as finely as they need.
+        pipeline: what the pictures go through.
+        renderer: of the pictures; None is a :class:`~sim_tests.CameraRenderer`.
         T_camera_assumed: (4, 4) the camera as the robot believes it to be mounted, in the true
             camera's frame; None where it is mounted as believed.
 
     Raises:
-        PerceptionError: when the shipped networks cannot be loaded.
         SimError: for a pipeline with another camera.
     """
 
@@ -56,17 +52,13 @@ class PixelEyes:
         self,
         stage: Stage,
         camera: Camera,
-        cone: AttentionCone,
         sensor: SensorConfig,
         rng: np.random.Generator,
-        pipeline: AwarenessPipeline | None = None,
-        scenery_divisor: int = 1,
+        pipeline: AwarenessPipeline,
+        renderer: PictureRenderer | None = None,
         T_camera_assumed: FloatArray | None = None,
     ) -> None:
         self._stage = stage
-        if pipeline is None:
-            # Workers in a crossing turn their heads; their eyes follow.
-            pipeline = AwarenessPipeline(camera, cone=cone, eye_in_head_std_rad=0.0)
         self._pipeline = pipeline
         theirs = self._pipeline.camera
         # The renderer draws without distortion, whatever the pipeline believes.
@@ -84,7 +76,7 @@ class PixelEyes:
             camera,
             sensor=sensor,
             rng=rng,
-            renderer=CoarseSceneryRenderer(stage.warehouse, scenery_divisor),
+            renderer=renderer,
         )
 
     def observe(

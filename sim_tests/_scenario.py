@@ -12,6 +12,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from perception import Camera
 from perception.arrays import FloatArray
+from perception.surround import FlatView, ring_of_views
 from tracking.config import StrictConfig
 
 from ._errors import SimError
@@ -34,13 +35,21 @@ def _layout(value: Any) -> Any:
 
 
 class CameraSpec(StrictConfig):
-    """The robot's camera: image size, horizontal field of view, sensor and timing."""
+    """The robot's camera: image size, horizontal field of view, sensor and timing.
+
+    A camera that sees more than a pinhole can, a fisheye or a panorama, has several flat views cut
+    from its picture (:mod:`perception.surround`); sizes and angles are those of each.
+    """
 
     error: ClassVar[type[ValueError]] = SimError
 
     width_px: int = Field(default=1280, ge=16, le=8192)
     height_px: int = Field(default=960, ge=16, le=8192)
     horizontal_fov_deg: float = Field(default=90.0, gt=0.0, lt=180.0)
+    #: Headings of the flat views from straight ahead, left positive; the first is 0.
+    views_deg: tuple[float, ...] = (0.0,)
+    #: In front of the head of the robot's post, or on its top, from where nothing hides the sides.
+    mount: Literal["front", "top"] = "front"
     #: Share of these pixels a side that the pictures of ``perception="pixels"`` have: half as many
     #: are rendered four times as fast.
     picture_scale: float = Field(default=1.0, gt=0.0, le=1.0)
@@ -65,8 +74,22 @@ class CameraSpec(StrictConfig):
             )
         return self
 
+    @model_validator(mode="after")
+    def _first_view_ahead(self) -> CameraSpec:
+        if not self.views_deg or self.views_deg[0] != 0.0:
+            raise ValueError(
+                f"views_deg must begin with 0, straight ahead, got {list(self.views_deg)}"
+            )
+        if not all(-180.0 <= heading <= 180.0 for heading in self.views_deg):
+            raise ValueError(f"views_deg must lie in [-180, 180], got {list(self.views_deg)}")
+        return self
+
+    def flat_views(self, camera: Camera) -> tuple[FlatView, ...]:
+        """The views, each with this camera model."""
+        return ring_of_views(camera, np.radians(self.views_deg))
+
     def camera(self, scale: float = 1.0) -> Camera:
-        """The camera model, or one of the same view with ``scale`` times the pixels a side."""
+        """The camera model of a view, or one with ``scale`` times the pixels a side."""
         return Camera.from_fov(
             round(self.width_px * scale),
             round(self.height_px * scale),

@@ -14,6 +14,7 @@ from ._names import not_one_of
 
 _FOLDER: Final = resources.files("sim_tests") / "scenarios"
 _DEFAULTS: Final = _FOLDER / "defaults"
+_CAMERAS: Final = _FOLDER / "cameras"
 # The safe loader in C, ten times as fast, where PyYAML was built with it.
 _LOADER: Final[Any] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
@@ -33,6 +34,25 @@ def shipped_text(scenario_id: str) -> str:
     if scenario_id not in names:
         raise SimError(not_one_of("scenario", scenario_id, names))
     return (_FOLDER / f"{scenario_id}.yaml").read_text("utf-8")
+
+
+def shipped_cameras() -> tuple[str, ...]:
+    """Names of the cameras that come with the package, sorted."""
+    return _names_in(_CAMERAS)
+
+
+def camera_data(name: str) -> dict[str, Any]:
+    """The keys of a scenario's ``camera``, from a YAML file or a shipped camera's name.
+
+    Raises:
+        SimError: for a name that is not shipped and a file that cannot be read.
+    """
+    if name.endswith((".yaml", ".yml")):
+        return parse(read_text(Path(name)), name)
+    names = shipped_cameras()
+    if name not in names:
+        raise SimError(f"{not_one_of('camera', name, names)}, or a YAML file")
+    return parse((_CAMERAS / f"{name}.yaml").read_text("utf-8"), name)
 
 
 def read_text(path: Path) -> str:

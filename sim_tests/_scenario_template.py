@@ -18,7 +18,7 @@ from ._distributions import DISTRIBUTIONS, Distribution, error_text, read_distri
 from ._errors import SimError
 from ._names import not_one_of
 from ._scenario import Scenario
-from ._scenario_files import parse, read_text, shipped_scenarios, shipped_text
+from ._scenario_files import camera_data, parse, read_text, shipped_scenarios, shipped_text
 
 # Where numbers may vary; hall, camera and clock belong to the question that is asked.
 _VARIABLE: Final = ("people", "workers", "robot")
@@ -167,6 +167,22 @@ class ScenarioTemplate:
                 value = distribution.median
             _put(data, path, finite_number(path, value, SimError))
         return self._validated(data)
+
+    def with_camera(self, name: str) -> ScenarioTemplate:
+        """The same scenario with another camera on the robot.
+
+        Args:
+            name: of a shipped camera (``"forward"``, ``"surround"``), or a YAML file with the keys
+                of :class:`CameraSpec`; empty for the scenario's own.
+
+        Raises:
+            SimError: for other names, and for a camera that is not valid.
+        """
+        if not name:
+            return self
+        return ScenarioTemplate(
+            {**self._data, "camera": camera_data(name)}, f"{self._source} with camera {name}"
+        )
 
     def to_text(self) -> str:
         """YAML for :meth:`from_text`, which stands for itself: shared defaults are written out."""

@@ -101,6 +101,7 @@ class Stage(Closing):
                 (task.start_x_m, task.start_y_m),
                 math.radians(task.start_heading_deg),
                 NOVA_CARTER,
+                camera_mount=scenario.camera.mount,
             )
             self.walkers = self._walkers(
                 np.random.default_rng(0) if people_rng is None else people_rng

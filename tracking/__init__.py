@@ -6,6 +6,7 @@ from . import _clash  # noqa: F401 - first: refuses a foreign package of one of 
 from ._camera_view import CameraView
 from ._config import AwarenessFilterConfig, TrackerConfig
 from ._errors import TrackingError
+from ._surround_view import SurroundView
 from ._track import PersonTrack, TrackStatus
 from ._tracker import PersonTracker
 from ._view import View
@@ -15,6 +16,7 @@ __all__ = [
     "CameraView",
     "PersonTrack",
     "PersonTracker",
+    "SurroundView",
     "TrackStatus",
     "TrackerConfig",
     "TrackingError",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from .._arguments import count
+from .._arguments import add_camera, count
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -55,6 +55,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         default="keypoints",
         help="what the robot sees with (default: keypoints)",
     )
+    add_camera(falsify)
     driver = falsify.add_mutually_exclusive_group()
     driver.add_argument(
         "--planner", default="", metavar="MODULE:CLASS", help="default: the reference planner"

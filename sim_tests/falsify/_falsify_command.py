@@ -23,7 +23,7 @@ def falsify_command(options: argparse.Namespace) -> int:
         SimError: for options that cannot be used.
         NavError: for a policy that cannot be used.
     """
-    templates = named_templates(options.scenario)
+    templates = named_templates(options.scenario, options.camera)
     settings = FalsifySettings(
         policy_name=Path(options.policy).stem,
         policy=policy_text(read_policy(options.policy)),

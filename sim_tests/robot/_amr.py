@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from importlib import resources
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import numpy as np
 
@@ -32,6 +32,9 @@ CAMERA_HEIGHT_M: Final = 1.4
 # Just ahead of the camera's housing, so that the robot does not see itself.
 CAMERA_FORWARD_M: Final = 0.165
 
+# Where a camera that looks all around sits: above the head and the beacon on the post.
+_ABOVE_POST_M: Final = (0.12, 0.0, 1.55)
+
 # Ample for 98 kg at 1 m/s² on two wheels (7 N·m each), too little to spin the tyres on the floor.
 _MAX_WHEEL_TORQUE_NM: Final = 25.0
 _ON_FLOOR_TYRE_FRICTION: Final = 1.0
@@ -52,6 +55,7 @@ class Amr:
         heading_odom_rad: start, counter-clockwise from odom x.
         profile: its limits; the body is that of :data:`NOVA_CARTER` whatever they are.
         camera_pitch_rad: how far the camera looks down, in (−π/2, π/2).
+        camera_mount: ``"front"`` of the head on the post, or on its ``"top"``.
 
     Attributes:
         body: PyBullet's id of the robot.
@@ -69,6 +73,7 @@ class Amr:
         heading_odom_rad: float = 0.0,
         profile: RobotProfile = NOVA_CARTER,
         camera_pitch_rad: float = 0.0,
+        camera_mount: Literal["front", "top"] = "front",
     ) -> None:
         x, y = finite_array("position_odom_m", position_odom_m, (2,), SimError).tolist()
         heading = finite_number("heading_odom_rad", heading_odom_rad, SimError)
@@ -76,7 +81,7 @@ class Amr:
             "camera_pitch_rad", camera_pitch_rad, SimError, minimum=-1.57, maximum=1.57
         )
         self.profile = profile
-        self.T_base_camera = _camera_pose(pitch)
+        self.T_base_camera = _camera_pose(pitch, camera_mount == "top")
         self._warehouse = warehouse
         self._client = warehouse.client
         source = resources.files("sim_tests") / "assets" / "amr.urdf"
@@ -231,13 +236,13 @@ class Amr:
         )
 
 
-def _camera_pose(pitch_rad: float) -> FloatArray:
+def _camera_pose(pitch_rad: float, on_top: bool) -> FloatArray:
     """T_base_camera of a camera on the post that looks down by ``pitch_rad``."""
     cos, sin = math.cos(pitch_rad), math.sin(pitch_rad)
     down = np.array([[cos, 0.0, sin], [0.0, 1.0, 0.0], [-sin, 0.0, cos]])  # about base y
     pose = np.eye(4)
     pose[:3, :3] = down @ _ROTATION_BASE_OPTICAL
-    pose[:3, 3] = (CAMERA_FORWARD_M, 0.0, CAMERA_HEIGHT_M)
+    pose[:3, 3] = _ABOVE_POST_M if on_top else (CAMERA_FORWARD_M, 0.0, CAMERA_HEIGHT_M)
     pose.setflags(write=False)
     return pose
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from .._arguments import count
+from .._arguments import add_camera, count
 
 
 def add_parsers(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -55,6 +55,7 @@ def _add_crossings(commands: argparse._SubParsersAction[argparse.ArgumentParser]
         default="keypoints",
         help="what the robot sees with (default: keypoints)",
     )
+    add_camera(crossings)
     crossings.add_argument(
         "--fault",
         nargs="+",

@@ -39,6 +39,7 @@ def crossings_command(options: argparse.Namespace) -> int:
         range(options.seed, options.seed + options.episodes),
         planners=["" if each == REFERENCE else each for each in options.planner],
         perception=options.perception,
+        camera=options.camera,
         faults=options.fault,
     )
     if options.perception == "pixels":
@@ -101,6 +102,8 @@ def _about(options: argparse.Namespace) -> dict[str, Any]:
         "episodes": options.episodes,
         "seed": options.seed,
     }
+    if options.camera:
+        settings["camera"] = options.camera
     words = ["awarenav", "crossings"]
     for name, value in settings.items():
         many = value if isinstance(value, list) else [value]

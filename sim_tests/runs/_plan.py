@@ -44,6 +44,7 @@ def plan_jobs(
     planners: Sequence[str] = ("",),
     perception: str = "keypoints",
     faults: Sequence[str | Fault] = ("",),
+    camera: str = "",
 ) -> tuple[Job, ...]:
     """Every scenario with every seed under every fault, planner and policy, in that order.
 
@@ -57,6 +58,7 @@ def plan_jobs(
         planners: ``"module:Class"``, or empty for the reference planner.
         perception: ``"truth"``, ``"keypoints"`` or ``"pixels"``.
         faults: shipped names, YAML files, ``"none"`` or empty for none, or faults.
+        camera: a shipped name or a YAML file, in place of every scenario's own; empty for those.
 
     Raises:
         SimError: something of that is unknown or unusable, or two episodes could not be told apart
@@ -65,7 +67,9 @@ def plan_jobs(
     """
     if perception not in get_args(PerceptionKind):
         raise SimError(not_one_of("perception", perception, get_args(PerceptionKind)))
-    templates = [template for each in scenarios for template in _templates(each)]
+    templates = [
+        template.with_camera(camera) for each in scenarios for template in _templates(each)
+    ]
     named = [_policy(each, perception) for each in policies]
     broken = [_fault(each) for each in faults]
     numbers = [_seed(seed) for seed in seeds]

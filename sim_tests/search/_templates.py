@@ -8,11 +8,14 @@ from .._errors import SimError
 from .._scenario_template import ScenarioTemplate, shipped_templates
 
 
-def named_templates(names: Sequence[str]) -> tuple[ScenarioTemplate, ...]:
+def named_templates(names: Sequence[str], camera: str = "") -> tuple[ScenarioTemplate, ...]:
     """The scenarios of names and YAML files; ``all`` stands for the shipped ones with a planner.
 
+    ``camera`` is as for :meth:`ScenarioTemplate.with_camera`.
+
     Raises:
-        SimError: for an unknown name, an unusable file, or two scenarios of one name.
+        SimError: for an unknown name, an unusable file, a camera that is none, or two
+            scenarios of one name.
     """
     found: dict[str, ScenarioTemplate] = {}
     for name in names:
@@ -24,7 +27,7 @@ def named_templates(names: Sequence[str]) -> tuple[ScenarioTemplate, ...]:
             )
         else:
             chosen = (ScenarioTemplate.named(name),)
-        for template in chosen:
+        for template in (each.with_camera(camera) for each in chosen):
             if found.setdefault(template.name, template) != template:
                 raise SimError(f"two scenarios are called {template.name!r}; give them other names")
     return tuple(found.values())

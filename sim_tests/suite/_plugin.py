@@ -16,6 +16,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         ("planner", "MODULE:CLASS", "", "your planner (default: the reference planner)"),
         ("policy", "NAME|FILE", "balanced", "preset or policy YAML file (default: balanced)"),
         ("perception", "KIND", "keypoints", "truth, keypoints or pixels (default: keypoints)"),
+        ("camera", "NAME|FILE", "", "forward, surround or YAML file (default: the scenarios')"),
         ("fault", "NAME|FILE", "none", "shipped fault or YAML file (default: none)"),
         ("episodes", "N", "3", "seeds a scenario (default: 3)"),
         ("seed", "N", "0", "the first of them (default: 0)"),

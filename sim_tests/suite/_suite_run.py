@@ -49,6 +49,7 @@ class SuitePlan:
             planners=[option("planner")],
             perception=option("perception"),
             faults=[option("fault")],
+            camera=option("camera"),
         )
         file, workers = option("thresholds"), option("workers")
         thresholds = Thresholds.from_yaml(file) if file else Thresholds()

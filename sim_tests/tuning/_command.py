@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from .._arguments import count
+from .._arguments import add_camera, count
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -66,6 +66,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         default="keypoints",
         help="what the robot sees with (default: keypoints)",
     )
+    add_camera(tune)
     tune.add_argument(
         "--planner", default="", metavar="MODULE:CLASS", help="default: the reference planner"
     )

@@ -29,7 +29,9 @@ def tune_command(options: argparse.Namespace) -> int:
     settings = TuneSettings(
         policy_name=Path(options.policy).stem,
         policy=policy_text(policy),
-        scenarios=tuple(template.to_text() for template in named_templates(options.scenario)),
+        scenarios=tuple(
+            template.to_text() for template in named_templates(options.scenario, options.camera)
+        ),
         ranges={path: each.model_dump(mode="json") for path, each in ranges.items()},
         trials=options.trials,
         episodes=options.episodes,

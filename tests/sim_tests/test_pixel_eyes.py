@@ -111,7 +111,7 @@ def test_rendered_people_are_observed_where_they_are(stage: Stage):
     lines = SightLines(stage.warehouse.layout, actors=stage.warehouse.actors)
     keypoints = KeypointCamera(CAMERA, lines, KeypointNoise(), np.random.default_rng(0))
     pipeline = AwarenessPipeline(CAMERA, keypoints, keypoints, cone=cone)
-    eyes = PixelEyes(stage, CAMERA, cone, SensorConfig(), np.random.default_rng(0), pipeline)
+    eyes = PixelEyes(stage, CAMERA, SensorConfig(), np.random.default_rng(0), pipeline)
     T_odom_camera = stage.amr.T_odom_camera
     truth = stage.truth(cone, T_odom_camera)
     keypoints.look(T_odom_camera, stage.workers)

@@ -122,6 +122,21 @@ def test_a_rectangle_may_reach_outside_the_image(renderer: CameraRenderer) -> No
     np.testing.assert_allclose(wide[10:250, 20:340], renderer.depth(OFF_CENTRE, T), rtol=2e-3)
 
 
+@pytest.mark.parametrize("heading_deg", [90.0, -90.0])
+def test_corners_in_the_cameras_plane_do_no_harm(
+    renderer: CameraRenderer, heading_deg: float
+) -> None:
+    """The floor's tiles meet at y = 0, where this camera stands; 1 cm beside they do no harm."""
+    camera = Camera.from_fov(160, 160, math.radians(110.0))
+    at, beside = (
+        renderer.render(camera, level_pose((0.12, y_m, 1.55), math.radians(heading_deg)))
+        for y_m in (0.0, 0.01)
+    )
+    different = np.abs(at.rgb.astype(int) - beside.rgb).max(axis=2) > 40
+    assert different.mean() < 0.03
+    np.testing.assert_allclose(at.depth_m[120:], beside.depth_m[120:], rtol=0.03)
+
+
 def test_nothing_is_infinitely_far(renderer: CameraRenderer) -> None:
     view = renderer.render(OFF_CENTRE, level_pose((-30.0, 0.0, 1.4), math.pi))
     assert np.isinf(view.depth_m).all()

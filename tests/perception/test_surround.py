@@ -1,0 +1,305 @@
+"""Wide lenses, the flat views cut from them, and everybody once."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from perception import AwarenessPipeline, Camera, FloorPlane, PerceptionError, PersonObservation
+from perception.surround import (
+    FisheyeLens,
+    FlatView,
+    PanoramaLens,
+    SurroundPipeline,
+    merge_views,
+    ring_of_views,
+)
+
+BENT = (-0.02, 0.004, -0.001, 0.0002)
+FLAT = Camera.from_fov(220, 160, math.radians(110.0))
+RING = ring_of_views(FLAT, np.radians([0.0, 90.0, 180.0, -90.0]))
+
+
+def person(position: np.ndarray, **changes: object) -> PersonObservation:
+    """Seen there, by a camera whose depth is less sure than its angles."""
+    known = PersonObservation(
+        stamp_s=1.0,
+        position_camera_m=position,
+        position_covariance_m2=np.diag([0.05, 0.05, 0.15]) ** 2,
+        gaze_camera=np.array([0.0, 0.0, -1.0]),
+        awareness=0.5,
+        awareness_std=0.1,
+        score=0.9,
+        box_xyxy_px=None,
+    )
+    return replace(known, **changes)
+
+
+def at(bearing_rad: float, range_m: float) -> np.ndarray:
+    """A place in the camera's frame, bearings left positive."""
+    return np.array([-range_m * math.sin(bearing_rad), 0.2, range_m * math.cos(bearing_rad)])
+
+
+def views_of(place: np.ndarray, rng: np.random.Generator) -> list[tuple[int, np.ndarray]]:
+    """The views whose picture holds a place, and the place in each, with noise of 3 cm."""
+    shown = []
+    for number, view in enumerate(RING):
+        inside = view.rotation_camera_view.T @ place
+        u = FLAT.project([inside])[0, 0]
+        if inside[2] > 0.0 and -0.5 <= u <= FLAT.width_px - 0.5:
+            shown.append((number, inside + rng.normal(0.0, 0.03, 3)))
+    return shown
+
+
+def test_fisheye_agrees_with_opencv() -> None:
+    lens = FisheyeLens(1280, 960, 300.0, 310.0, 640.0, 470.0, np.array(BENT))
+    points = np.random.default_rng(0).uniform([-8, -8, 0.7], [8, 8, 8], (500, 3))
+    expected, _ = cv2.fisheye.projectPoints(
+        points[:, None],
+        np.zeros(3),
+        np.zeros(3),
+        np.array([[300.0, 0, 640.0], [0, 310.0, 470.0], [0, 0, 1]]),
+        np.array(BENT),
+    )
+    np.testing.assert_allclose(lens.project(points), expected[:, 0], atol=1e-6)
+
+
+@given(st.floats(0.0, math.radians(99.9)), st.floats(-math.pi, math.pi))
+def test_an_undistorted_fisheye_is_equidistant_beyond_a_right_angle(angle, around):
+    lens = FisheyeLens(1000, 1000, 250.0, 250.0, 500.0, 500.0)
+    ray = [
+        math.sin(angle) * math.cos(around),
+        math.sin(angle) * math.sin(around),
+        math.cos(angle),
+    ]
+    away = lens.project([ray])[0] - 500.0
+    assert np.hypot(*away) == pytest.approx(250.0 * angle, abs=1e-6)
+
+
+def test_a_fisheye_sees_nothing_beyond_its_circle() -> None:
+    lens = FisheyeLens(1000, 1000, 250.0, 250.0, 500.0, 500.0, max_angle_rad=math.radians(95.0))
+    pixels = lens.project([at(1.6, 2.0) * [1, 0, 1], at(1.7, 2.0), [0.0, 0.0, -1.0]])
+    assert np.isfinite(pixels[0]).all()
+    assert np.isnan(pixels[1:]).all()
+
+
+def test_a_fisheye_that_folds_is_refused() -> None:
+    with pytest.raises(PerceptionError, match=r"must grow up to max_angle_rad = 1\.7"):
+        FisheyeLens(1000, 1000, 250.0, 250.0, 500.0, 500.0, np.array([-0.5, 0, 0, 0]))
+    with pytest.raises(PerceptionError, match=r"max_angle_rad must lie in \(0, pi\], got 4 rad"):
+        FisheyeLens(1000, 1000, 250.0, 250.0, 500.0, 500.0, max_angle_rad=4.0)
+
+
+def test_a_ros_calibration_of_a_fisheye_is_read(tmp_path) -> None:
+    path = tmp_path / "camera.yaml"
+    info = {
+        "image_width": 1280,
+        "image_height": 960,
+        "camera_matrix": {
+            "rows": 3,
+            "cols": 3,
+            "data": [300.0, 0, 640.0, 0, 310.0, 470.0, 0, 0, 1],
+        },
+        "distortion_model": "equidistant",
+        "distortion_coefficients": {"rows": 1, "cols": 4, "data": list(BENT)},
+    }
+    path.write_text(yaml.safe_dump(info))
+    lens = FisheyeLens.from_yaml(path)
+    assert (lens.width_px, lens.fy_px, lens.cy_px) == (1280, 310.0, 470.0)
+    np.testing.assert_array_equal(lens.coefficients, BENT)
+    with pytest.raises(PerceptionError, match=r"perception\.surround"):
+        Camera.from_yaml(path)
+    path.write_text(yaml.safe_dump({**info, "distortion_model": "plumb_bob"}))
+    with pytest.raises(PerceptionError, match=r"Camera\.from_yaml reads others"):
+        FisheyeLens.from_yaml(path)
+
+
+@given(st.floats(-3.1, 3.1), st.floats(-1.5, 1.5))
+def test_a_panorama_maps_angles_evenly(heading, down):
+    lens = PanoramaLens(720, 360)
+    ray = [math.sin(heading) * math.cos(down), math.sin(down), math.cos(heading) * math.cos(down)]
+    u, v = lens.project([ray])[0]
+    assert u == pytest.approx(359.5 + math.degrees(heading) * 2.0, abs=1e-6)
+    assert v == pytest.approx(179.5 + math.degrees(down) * 2.0, abs=1e-6)
+
+
+def directions_of(lens, height: int, width: int) -> np.ndarray:
+    """A picture (H, W, 3) that shows in every direction the direction itself, as a colour."""
+    if isinstance(lens, PanoramaLens):
+        heading = ((np.arange(width) + 0.5) / width - 0.5) * 2.0 * math.pi
+        down = ((np.arange(height) + 0.5) / height - 0.5) * math.pi
+        heading, down = np.meshgrid(heading, down)
+        rays = np.stack(
+            [np.sin(heading) * np.cos(down), np.sin(down), np.cos(heading) * np.cos(down)], axis=-1
+        )
+    else:
+        u, v = np.meshgrid(np.arange(width), np.arange(height))
+        x, y = (u - lens.cx_px) / lens.fx_px, (v - lens.cy_px) / lens.fy_px
+        angle = np.hypot(x, y)
+        share = np.sinc(angle / math.pi)
+        rays = np.stack([share * x, share * y, np.cos(angle)], axis=-1)
+    return np.round(127.5 * (rays + 1.0)).astype(np.uint8)
+
+
+@pytest.mark.parametrize(
+    "lens",
+    [
+        PanoramaLens(1440, 720),
+        FisheyeLens(900, 900, 220.0, 220.0, 450.0, 450.0, max_angle_rad=math.radians(110.0)),
+    ],
+    ids=["panorama", "fisheye"],
+)
+def test_each_view_shows_what_lies_in_its_directions(lens) -> None:
+    views = (*RING, *ring_of_views(Camera.from_fov(120, 90, 1.0), [0.6]))
+    pipeline = SurroundPipeline(lens, views, AwarenessPipeline)
+    picture = directions_of(lens, lens.height_px, lens.width_px)
+    for view, flat in zip(views, pipeline.flat_pictures(picture), strict=True):
+        camera = view.camera
+        u, v = np.meshgrid(np.arange(camera.width_px, dtype=float), np.arange(camera.height_px))
+        rays = np.column_stack(
+            [camera.normalise(np.column_stack([u.ravel(), v.ravel()])), np.ones(u.size)]
+        )
+        rays = rays / np.linalg.norm(rays, axis=1, keepdims=True) @ view.rotation_camera_view.T
+        wanted = 127.5 * (rays.reshape(*u.shape, 3) + 1.0)
+        seen = np.isfinite(lens.project(rays)).all(axis=1).reshape(u.shape)
+        inner = cv2.erode(seen.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+        assert inner.any() or view is RING[2]
+        assert np.abs(flat[inner] - wanted[inner]).max(initial=0.0) <= 2.5
+        if isinstance(lens, PanoramaLens):
+            assert seen.all()
+        else:
+            beyond = cv2.erode((~seen).astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+            assert not flat[beyond].any()
+
+
+def test_an_observation_turns_as_a_whole() -> None:
+    seen = person(np.array([0.3, 0.2, 2.0]), gaze_camera=np.array([0.6, 0.0, -0.8]))
+    for view, place, gaze in zip(
+        RING,
+        [(0.3, 0.2, 2.0), (-2.0, 0.2, 0.3), (-0.3, 0.2, -2.0), (2.0, 0.2, -0.3)],
+        [(0.6, 0.0, -0.8), (0.8, 0.0, 0.6), (-0.6, 0.0, 0.8), (-0.8, 0.0, -0.6)],
+        strict=True,
+    ):
+        turned = view.in_camera(seen)
+        np.testing.assert_allclose(turned.position_camera_m, place, atol=1e-12)
+        np.testing.assert_allclose(turned.gaze_camera, gaze, atol=1e-12)
+        np.testing.assert_allclose(
+            np.linalg.eigvalsh(turned.position_covariance_m2),
+            np.linalg.eigvalsh(seen.position_covariance_m2),
+        )
+        assert (turned.awareness, turned.awareness_std) == (0.5, 0.1)
+
+
+@given(
+    st.lists(st.tuples(st.floats(-math.pi, math.pi), st.floats(0.8, 9.0)), min_size=1, max_size=6),
+    st.integers(0, 2**32 - 1),
+)
+def test_people_apart_are_reported_once_each(people, seed):
+    rng = np.random.default_rng(seed)
+    places = [at(*each) for each in people]
+    apart = [places[0]]
+    for place in places[1:]:
+        if all(np.linalg.norm(place - other) > 1.2 for other in apart):
+            apart.append(place)
+    seen: list[list[PersonObservation]] = [[] for _ in RING]
+    for place in apart:
+        for number, inside in views_of(place, rng):
+            seen[number].append(person(inside))
+    merged = merge_views(RING, seen)
+    assert len(merged) == len(apart)
+    for place in apart:
+        nearest = min(np.linalg.norm(each.observation.position_camera_m - place) for each in merged)
+        assert nearest < 0.3
+
+
+@given(st.floats(0.6, 1.0), st.floats(1.0, 5.0), st.integers(0, 2**32 - 1))
+def test_shoulder_to_shoulder_in_the_overlap_stay_two(bearing, range_m, seed):
+    """Both show in both views, or one in one only: nobody disappears."""
+    rng = np.random.default_rng(seed)
+    half = 0.3 / range_m
+    seen: list[list[PersonObservation]] = [[] for _ in RING]
+    for place in (at(bearing - half, range_m), at(bearing + half, range_m)):
+        for number, inside in views_of(place, rng):
+            seen[number].append(person(inside))
+    both = [len(rows) for rows in seen[:2]]
+    merged = merge_views(RING, seen)
+    if both == [2, 2]:
+        assert len(merged) == 2
+    assert max(both) <= len(merged) <= 2
+
+
+def test_of_a_pair_the_more_central_one_stays_and_surer_people_stay_apart() -> None:
+    place = at(math.radians(40.0), 3.0)
+    ahead, left = (RING[n].rotation_camera_view.T @ place for n in (0, 1))
+    merged = merge_views(RING, [[person(ahead, score=0.7)], [person(left, score=0.8)], [], []])
+    assert [(each.view, each.row) for each in merged] == [(0, 0)]
+    # 0.6 m apart: one person where either place is hardly known, two where both are.
+    aside = RING[1].rotation_camera_view.T @ np.add(place, [0.0, 0.0, 0.6])
+    for std_m, people in ((0.3, 1), (0.02, 2)):
+        sure = np.eye(3) * std_m**2
+        both = merge_views(
+            RING,
+            [
+                [person(ahead, position_covariance_m2=sure)],
+                [person(aside, position_covariance_m2=sure)],
+                [],
+                [],
+            ],
+        )
+        assert len(both) == people
+
+
+def test_two_in_one_view_are_never_one() -> None:
+    place = at(0.0, 2.0)
+    merged = merge_views(RING[:1], [[person(place), person(np.add(place, [0.1, 0.0, 0.0]))]])
+    assert [each.row for each in merged] == [0, 1]
+
+
+def test_a_box_is_carried_to_the_picture_it_was_cut_from() -> None:
+    lens = PanoramaLens(1440, 720)
+    corners = np.array([80.0, 30.0, 140.0, 130.0])
+    for view in RING:
+        box = view.box_in(lens, corners)
+        if view is RING[2]:  # behind, across the seam
+            assert box is None
+            continue
+        assert box is not None
+        inside = np.random.default_rng(0).uniform(corners[:2], corners[2:], (50, 2))
+        rays = np.column_stack([FLAT.normalise(inside), np.ones(50)])
+        pixels = lens.project(rays @ view.rotation_camera_view.T)
+        assert (pixels >= box[:2] - 0.5).all()
+        assert (pixels <= box[2:] + 0.5).all()
+    narrow = FisheyeLens(400, 400, 100.0, 100.0, 200.0, 200.0, max_angle_rad=1.0)
+    assert RING[1].box_in(narrow, corners) is None
+
+
+def test_what_does_not_fit_is_refused() -> None:
+    lens = PanoramaLens(360, 180)
+    with pytest.raises(PerceptionError, match="at least one view"):
+        SurroundPipeline(lens, ())
+    pipeline = SurroundPipeline(lens, RING)
+    with pytest.raises(PerceptionError, match=r"\(180, 360, 3\), got \(90, 360, 3\)"):
+        pipeline.process(np.zeros((90, 360, 3), np.uint8), 0.0)
+    with pytest.raises(PerceptionError, match="uint8"):
+        pipeline.process(np.zeros((180, 360, 3)), 0.0)
+    with pytest.raises(PerceptionError, match=r"one list of observations a view \(4\), got 1"):
+        merge_views(RING, [[]])
+    with pytest.raises(PerceptionError, match="at least one heading"):
+        ring_of_views(FLAT, [])
+    with pytest.raises(PerceptionError, match="rotation"):
+        FlatView(FLAT, np.diag([1.0, 1.0, -1.0]))
+    with pytest.raises(PerceptionError, match="whole number of pixels"):
+        PanoramaLens(3.5, 2)  # type: ignore[arg-type]
+
+
+def test_an_empty_panorama_shows_nobody_also_with_a_floor() -> None:
+    pipeline = SurroundPipeline(PanoramaLens(360, 180), RING)
+    floor = FloorPlane(np.array([0.0, -1.0, 0.0]), 1.5)
+    assert pipeline.process(np.zeros((180, 360, 3), np.uint8), 0.0, floor) == ()
