@@ -36,10 +36,42 @@ class InterpolatedHumanSpeed(AwarenessRamp):
             speed of ISO 13855.
         aware_human_speed_mps: for a person who has, at most the unaware value. Not zero: somebody
             who sees the robot may still drift into its way, but will not walk into it.
+        watching_above: α from which a person counts as looking straight at the robot, in
+            (``aware_above``, 1]; the robot stands 19° off the gaze at α = 0.8 with the default
+            attention cone. None, the default, for no difference between them and the aware.
+        watching_human_speed_mps: for such a person, at most the aware value; it is reached from
+            there along a smoothstep. Who has the robot in the corner of the eye may not have
+            noticed it, who looks straight at it has.
     """
 
     unaware_human_speed_mps: float = Field(default=1.6, ge=0.0, le=10.0)
     aware_human_speed_mps: float = Field(default=0.35, ge=0.0, le=10.0)
+
+    watching_above: float | None = Field(default=None, gt=0.0, le=1.0)
+    watching_human_speed_mps: float | None = Field(default=None, ge=0.0, le=10.0)
+
+    @model_validator(mode="after")
+    def _watching_is_more_than_aware(self) -> InterpolatedHumanSpeed:
+        above, speed_mps = self.watching_above, self.watching_human_speed_mps
+        if (above is None) != (speed_mps is None):
+            raise ValueError(
+                "watching_above and watching_human_speed_mps belong together, got "
+                f"{above} and {speed_mps}"
+            )
+        if above is None or speed_mps is None:
+            return self
+        if above <= self.aware_above:
+            raise ValueError(
+                f"watching_above must exceed aware_above, got {above:g} and {self.aware_above:g}"
+            )
+        if speed_mps > self.aware_human_speed_mps:
+            raise ValueError(
+                "watching_human_speed_mps must be at most aware_human_speed_mps, got "
+                f"{speed_mps:g} m/s and {self.aware_human_speed_mps:g} m/s"
+            )
+        if self.shape == "two_level":
+            raise ValueError("two levels have no third: leave out watching_above")
+        return self
 
     @model_validator(mode="after")
     def _awareness_never_hastens(self) -> InterpolatedHumanSpeed:
@@ -53,4 +85,9 @@ class InterpolatedHumanSpeed(AwarenessRamp):
     def human_speed_mps(self, awareness_lower: float) -> float:
         """Assumed speed for a lower bound of α; non-increasing in it."""
         share = self.blend(awareness_lower)
-        return (1.0 - share) * self.unaware_human_speed_mps + share * self.aware_human_speed_mps
+        above, watching_mps = self.watching_above, self.watching_human_speed_mps
+        if share < 1.0 or above is None or watching_mps is None:
+            return (1.0 - share) * self.unaware_human_speed_mps + share * self.aware_human_speed_mps
+        position = min((awareness_lower - self.aware_above) / (above - self.aware_above), 1.0)
+        share = min(position * position * (3.0 - 2.0 * position), 1.0)
+        return (1.0 - share) * self.aware_human_speed_mps + share * watching_mps
