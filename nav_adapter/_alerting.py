@@ -18,6 +18,8 @@ from .policies import AlertRules
 _STANDING_MPS: Final = 0.05
 # Two people who do not move against each other have no closest approach.
 _SAME_VELOCITY_MPS: Final = 1e-3
+# Nearer to zero than this, whether they approach is a matter of rounding.
+_CLOSING_M2PS: Final = 1e-9
 _SOUNDS: Final[frozenset[AlertKind]] = frozenset(("horn", "voice"))
 
 
@@ -107,7 +109,7 @@ def _closest_approach(
     vx, vy = vx - velocity[0], vy - velocity[1]
     speed2 = vx * vx + vy * vy
     closing = -(x * vx + y * vy)
-    if speed2 < _SAME_VELOCITY_MPS**2 or closing <= 0.0:
+    if speed2 < _SAME_VELOCITY_MPS**2 or closing <= _CLOSING_M2PS:
         return math.inf, max(math.hypot(x, y) - reach_m, 0.0)
     time_s = closing / speed2
     return time_s, max(math.hypot(x + time_s * vx, y + time_s * vy) - reach_m, 0.0)

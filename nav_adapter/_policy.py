@@ -80,7 +80,9 @@ class AwarenessPolicy(StrictConfig):
 
     Attributes:
         inflation: radius of a person over ``awareness_lower``: a ramp, a table or an own object.
-        speed: assumed human speed over ``awareness_lower``: a ramp, a table or an own object.
+        speed: assumed human speed over ``awareness_lower``: a ramp, a table or an own object. The
+            default has a level for people who watch the robot; a ``speed`` of one's own has none
+            unless it says so.
         outline: what the obstacles' polygons add to their circles; by default nothing.
         rules: speed limits beside speed and separation, and whom limits are about.
         alerts: who is warned and when, or none.
@@ -96,7 +98,7 @@ class AwarenessPolicy(StrictConfig):
         InterpolatedInflation()
     )
     speed: Annotated[SpeedPolicy, _ShippedOrOwn("speed", "human_speed_mps")] = (
-        InterpolatedHumanSpeed()
+        InterpolatedHumanSpeed(watching_above=0.8, watching_human_speed_mps=0.15)
     )
     outline: ObstacleOutline = ObstacleOutline()
     rules: SpeedRules = SpeedRules()

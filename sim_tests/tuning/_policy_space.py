@@ -34,6 +34,7 @@ _LEAST: Final = {
 _AT_MOST: Final = (
     ("inflation.unaware_radius_m", "inflation.aware_radius_m"),
     ("speed.unaware_human_speed_mps", "speed.aware_human_speed_mps"),
+    ("speed.aware_human_speed_mps", "speed.watching_human_speed_mps"),
     ("filter.evidence_time_constant_s", "filter.unseen_time_constant_s"),
     ("filter.unseen_time_constant_s", "filter.no_face_time_constant_s"),
     ("outline.unaware_ahead_s", "outline.aware_ahead_s"),
@@ -44,6 +45,7 @@ _AT_MOST: Final = (
 _ABOVE: Final = (
     ("inflation.unaware_below", "inflation.aware_above", 0.05),
     ("speed.unaware_below", "speed.aware_above", 0.05),
+    ("speed.aware_above", "speed.watching_above", 0.05),
     ("outline.unaware_below", "outline.aware_above", 0.05),
     ("rules.zones.stop_within_m", "rules.zones.full_speed_beyond_m", 0.1),
 )
@@ -118,9 +120,10 @@ class PolicySpace:
             for place in (path, *self.ranges[path].also):
                 _put(data, place, value)
         for larger, smaller in _AT_MOST:
-            _put(data, smaller, min(_get(data, smaller), _get(data, larger)))
+            if _both(data, larger, smaller):
+                _put(data, smaller, min(_get(data, smaller), _get(data, larger)))
         for below, above, gap in _ABOVE:
-            if _get(data, below) is not None:
+            if _both(data, below, above):
                 _put(data, above, max(_get(data, above), _get(data, below) + gap))
         ceiling_m = data["margins"]["maximum_radius_m"]
         if ceiling_m is not None:
@@ -177,6 +180,11 @@ def _get(data: Mapping[str, Any], place: str) -> Any:
             return None
         node = node[key]
     return node
+
+
+def _both(data: Mapping[str, Any], *places: str) -> bool:
+    """Whether the policy has a value in all of these places."""
+    return all(_get(data, place) is not None for place in places)
 
 
 def _put(data: dict[str, Any], place: str, value: Any) -> None:

@@ -60,11 +60,19 @@ def inflations(draw: st.DrawFn) -> InterpolatedInflation | TableInflation:
 def human_speeds(draw: st.DrawFn) -> InterpolatedHumanSpeed | TableHumanSpeed:
     if draw(st.booleans()):
         return TableHumanSpeed(table_mps=draw(tables(0.0, 2.5)))
-    aware = draw(finite(0.0, 1.6))
+    aware, ramp = draw(finite(0.0, 1.6)), draw(ramps())
+    watching = {}
+    above = ramp.get("aware_above", 0.6)
+    if ramp.get("shape") != "two_level" and above < 0.99 and draw(st.booleans()):
+        watching = {
+            "watching_above": draw(finite(above + 0.005, 1.0)),
+            "watching_human_speed_mps": draw(finite(0.0, 1.0)) * aware,
+        }
     return InterpolatedHumanSpeed(
         unaware_human_speed_mps=aware + draw(finite(0.0, 1.0)),
         aware_human_speed_mps=aware,
-        **draw(ramps()),
+        **watching,
+        **ramp,
     )
 
 

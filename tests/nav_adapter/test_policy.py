@@ -3,6 +3,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from nav_policies import human_speeds, inflations, policies
@@ -55,7 +56,33 @@ def test_both_ends_are_reached_exactly(
         assert inflation.radius_m(1.0) == inflation.aware_radius_m
     if isinstance(speed, InterpolatedHumanSpeed):
         assert speed.human_speed_mps(0.0) == speed.unaware_human_speed_mps
-        assert speed.human_speed_mps(1.0) == speed.aware_human_speed_mps
+        watching_mps = speed.watching_human_speed_mps
+        wanted = speed.aware_human_speed_mps if watching_mps is None else watching_mps
+        assert speed.human_speed_mps(1.0) == wanted
+
+
+def test_who_watches_is_told_from_who_is_merely_aware() -> None:
+    speed = AwarenessPolicy().speed
+    assert [speed.human_speed_mps(alpha) for alpha in (0.0, 0.6, 0.8, 1.0)] == [
+        1.6,
+        0.35,
+        0.15,
+        0.15,
+    ]
+    assert speed.human_speed_mps(0.7) == pytest.approx(0.25)
+    assert speed.human_speed_mps(float("nan")) == 1.6
+    # Without them, and up to the aware, nothing is different.
+    plain = InterpolatedHumanSpeed()
+    for alpha in np.linspace(0.0, 0.6, 31):
+        assert speed.human_speed_mps(alpha) == plain.human_speed_mps(alpha)
+    assert plain.human_speed_mps(1.0) == 0.35
+    # A file that says something about speed says all of it.
+    assert (
+        AwarenessPolicy.model_validate(
+            {"speed": {"aware_human_speed_mps": 0.5}}
+        ).speed.human_speed_mps(1.0)
+        == 0.5
+    )
 
 
 def test_shapes() -> None:
@@ -131,6 +158,19 @@ def test_presets() -> None:
         ("margins: {minimum_clearance_m: 0.05}", "margins.minimum_clearance_m"),
         ("inflation: {aware_radius_m: 1.2}", "at most unaware_radius_m, got 1.2 m and 1 m"),
         ("speed: {aware_human_speed_mps: 2}", "at most unaware_human_speed_mps, got 2 m/s"),
+        ("speed: {watching_above: 0.8}", "belong together, got 0.8 and None"),
+        (
+            "speed: {watching_above: 0.6, watching_human_speed_mps: 0.1}",
+            "watching_above must exceed aware_above, got 0.6 and 0.6",
+        ),
+        (
+            "speed: {watching_above: 0.8, watching_human_speed_mps: 0.5}",
+            "at most aware_human_speed_mps, got 0.5 m/s and 0.35 m/s",
+        ),
+        (
+            "speed: {shape: two_level, watching_above: 0.8, watching_human_speed_mps: 0.1}",
+            "two levels have no third",
+        ),
         ("speed: {unaware_below: 0.7}", "aware_above must exceed unaware_below"),
         ("inflation: {unaware_radius_m: .nan}", "inflation.unaware_radius_m"),
         ("timing: {stop_after_s: 0.4}", "stale_after_s <= stop_after_s must hold"),
