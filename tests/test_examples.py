@@ -72,7 +72,16 @@ def test_the_plug_in_example_shows_room_shrinking_for_an_aware_person():
     assert limits[-1] > limits[12]
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/rendering.md", "docs/planners.md"])
+@pytest.mark.parametrize(
+    "page",
+    [
+        "README.md",
+        "docs/perception.md",
+        "docs/tracking.md",
+        "docs/rendering.md",
+        "docs/planners.md",
+    ],
+)
 def test_a_page_shows_code_that_runs(page):
     """Python blocks of the page, in order, in one namespace."""
     blocks = re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(), re.S)
