@@ -105,15 +105,9 @@ class Camera:
                 f"got {info.model!r}; rectify the images first, or cut flat views from a fisheye's "
                 "(perception.surround)"
             )
-        matrix = info.matrix
         try:
             return cls(
-                info.width_px,
-                info.height_px,
-                matrix[0, 0],
-                matrix[1, 1],
-                matrix[0, 2],
-                matrix[1, 2],
+                *info.intrinsics,
                 info.coefficients if info.coefficients.size else None,
             )
         except ValueError as cause:

@@ -41,6 +41,12 @@ class CameraInfo:
     coefficients: FloatArray
     model: str
 
+    @property
+    def intrinsics(self) -> tuple[int, int, float, float, float, float]:
+        """Width, height, fx, fy, cx, cy, in the order of the camera models' arguments."""
+        (fx, _, cx), (_, fy, cy), _ = self.matrix.tolist()
+        return self.width_px, self.height_px, fx, fy, cx, cy
+
 
 def read_camera_info(path: str | Path) -> CameraInfo:
     """Read the file that ``camera_calibration`` writes, or a message as ``ros2 topic echo`` does.

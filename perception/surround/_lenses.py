@@ -107,15 +107,9 @@ class FisheyeLens:
                 f"{path}: distortion_model of a fisheye must be one of "
                 f"{', '.join(_KANNALA_BRANDT)}, got {info.model!r}; Camera.from_yaml reads others"
             )
-        matrix = info.matrix
         try:
             return cls(
-                info.width_px,
-                info.height_px,
-                matrix[0, 0],
-                matrix[1, 1],
-                matrix[0, 2],
-                matrix[1, 2],
+                *info.intrinsics,
                 info.coefficients if info.coefficients.size else None,
                 max_angle_rad,
             )
