@@ -14,7 +14,7 @@ import yaml
 
 from ._camera_info import read_camera_info
 from ._errors import PerceptionError
-from .arrays import FloatArray, finite_array, finite_number, set_fields
+from .arrays import FloatArray, finite_array, finite_number, pixel_count, set_fields
 
 # OpenCV accepts these numbers of coefficients: plumb_bob has 5, rational_polynomial 8.
 _DISTORTION_SIZES: Final = (4, 5, 8, 12, 14)
@@ -47,12 +47,7 @@ class Camera:
     distortion: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        size: dict[str, int] = {}
-        for name in ("width_px", "height_px"):
-            number = finite_number(name, getattr(self, name), minimum=1.0)
-            if number != int(number):
-                raise PerceptionError(f"{name} must be a whole number of pixels, got {number:g}")
-            size[name] = int(number)
+        size = {name: pixel_count(name, getattr(self, name)) for name in ("width_px", "height_px")}
         distortion = self.distortion
         if distortion is not None:
             distortion = finite_array("distortion", np.ravel(distortion), ("N",))

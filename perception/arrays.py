@@ -187,6 +187,14 @@ def unit_vector(name: str, value: Any, error: type[ValueError] = PerceptionError
     return unit
 
 
+def pixel_count(name: str, value: Any) -> int:
+    """Return a width or height: a whole number of at least 1."""
+    number = finite_number(name, value, minimum=1.0)
+    if number != int(number):
+        raise PerceptionError(f"{name} must be a whole number of pixels, got {number:g}")
+    return int(number)
+
+
 def set_fields(instance: object, **values: Any) -> None:
     """Assign checked values to the fields of a frozen dataclass from its ``__post_init__``."""
     for field, value in values.items():

@@ -6,7 +6,7 @@ from typing import Protocol
 
 from pydantic import Field, model_validator
 
-from ._ramp import AwarenessRamp
+from ._ramp import AwarenessRamp, smoothstep
 
 
 class SpeedPolicy(Protocol):
@@ -46,7 +46,6 @@ class InterpolatedHumanSpeed(AwarenessRamp):
 
     unaware_human_speed_mps: float = Field(default=1.6, ge=0.0, le=10.0)
     aware_human_speed_mps: float = Field(default=0.35, ge=0.0, le=10.0)
-
     watching_above: float | None = Field(default=None, gt=0.0, le=1.0)
     watching_human_speed_mps: float | None = Field(default=None, ge=0.0, le=10.0)
 
@@ -89,5 +88,5 @@ class InterpolatedHumanSpeed(AwarenessRamp):
         if share < 1.0 or above is None or watching_mps is None:
             return (1.0 - share) * self.unaware_human_speed_mps + share * self.aware_human_speed_mps
         position = min((awareness_lower - self.aware_above) / (above - self.aware_above), 1.0)
-        share = min(position * position * (3.0 - 2.0 * position), 1.0)
+        share = smoothstep(position)
         return (1.0 - share) * self.aware_human_speed_mps + share * watching_mps

@@ -12,6 +12,11 @@ from tracking.config import StrictConfig
 from .._errors import NavError
 
 
+def smoothstep(position: float) -> float:
+    """From 0 at 0 to 1 at 1 without a kink at either end; ``position`` lies in [0, 1]."""
+    return min(position * position * (3.0 - 2.0 * position), 1.0)
+
+
 class AwarenessRamp(StrictConfig):
     """A monotone blend over the lower bound of α: 0 is "unaware", 1 is "aware".
 
@@ -66,7 +71,7 @@ class AwarenessRamp(StrictConfig):
                 max(0.5 + 0.5 * math.tanh(half * (2.0 * position - 1.0)) / math.tanh(half), 0.0),
                 1.0,
             )
-        return min(position * position * (3.0 - 2.0 * position), 1.0)
+        return smoothstep(position)
 
     def holds(self, awareness_lower: float, held: bool) -> bool:
         """Whether a person stays at the aware level who was ``held`` there at the last sighting.

@@ -11,7 +11,7 @@ import numpy as np
 
 from .._camera_info import read_camera_info
 from .._errors import PerceptionError
-from ..arrays import FloatArray, finite_array, finite_number, set_fields
+from ..arrays import FloatArray, finite_array, finite_number, pixel_count, set_fields
 
 _DEFAULT_MAX_ANGLE_RAD: Final = math.radians(100.0)
 _KANNALA_BRANDT: Final = ("equidistant", "fisheye")
@@ -80,7 +80,7 @@ class FisheyeLens:
             )
         set_fields(
             self,
-            **{name: _pixels(name, getattr(self, name)) for name in ("width_px", "height_px")},
+            **{name: pixel_count(name, getattr(self, name)) for name in ("width_px", "height_px")},
             **{
                 name: finite_number(name, getattr(self, name), minimum=0.0, exclusive_minimum=True)
                 for name in ("fx_px", "fy_px")
@@ -148,7 +148,7 @@ class PanoramaLens:
 
     def __post_init__(self) -> None:
         for name in ("width_px", "height_px"):
-            set_fields(self, **{name: _pixels(name, getattr(self, name))})
+            set_fields(self, **{name: pixel_count(name, getattr(self, name))})
 
     def project(self, points_camera_m: Any) -> FloatArray:
         """Points (N, 3) in the camera frame to pixels (N, 2), u from −0.5 to width − 0.5."""
@@ -166,10 +166,3 @@ def _bent(angle_rad: FloatArray, coefficients: FloatArray) -> FloatArray:
     k1, k2, k3, k4 = coefficients.tolist()
     factor = 1.0 + square * (k1 + square * (k2 + square * (k3 + square * k4)))
     return np.asarray(angle_rad * factor)
-
-
-def _pixels(name: str, value: Any) -> int:
-    number = finite_number(name, value, minimum=1.0)
-    if number != int(number):
-        raise PerceptionError(f"{name} must be a whole number of pixels, got {number:g}")
-    return int(number)
