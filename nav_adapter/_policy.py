@@ -98,7 +98,7 @@ class AwarenessPolicy(StrictConfig):
         InterpolatedInflation()
     )
     speed: Annotated[SpeedPolicy, _ShippedOrOwn("speed", "human_speed_mps")] = (
-        InterpolatedHumanSpeed(watching_above=0.8, watching_human_speed_mps=0.15)
+        InterpolatedHumanSpeed(watching_above=0.8, watching_human_speed_mps=0.05)
     )
     outline: ObstacleOutline = ObstacleOutline()
     rules: SpeedRules = SpeedRules()
