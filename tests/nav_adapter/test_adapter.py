@@ -52,7 +52,7 @@ def test_one_person_in_closed_form() -> None:
     assert obstacle.height_m == 1.75
     limit = max_speed_mps(
         2.0 - 0.3625 - BODY_RADIUS_M,
-        0.15,
+        0.05,
         deceleration_mps2=1.0,
         reaction_time_s=0.3,
         clearance_m=0.1,

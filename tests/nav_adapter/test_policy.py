@@ -66,10 +66,10 @@ def test_who_watches_is_told_from_who_is_merely_aware() -> None:
     assert [speed.human_speed_mps(alpha) for alpha in (0.0, 0.6, 0.8, 1.0)] == [
         1.6,
         0.35,
-        0.15,
-        0.15,
+        0.05,
+        0.05,
     ]
-    assert speed.human_speed_mps(0.7) == pytest.approx(0.25)
+    assert speed.human_speed_mps(0.7) == pytest.approx(0.2)
     assert speed.human_speed_mps(float("nan")) == 1.6
     # Without them, and up to the aware, nothing is different.
     plain = InterpolatedHumanSpeed()
