@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
+import logging
 import threading
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
@@ -70,12 +72,22 @@ def run_on_cluster(
             f"no Dask scheduler answers at {scheduler!r}: {cause}; give tcp://HOST:PORT of one "
             "that runs, or 'local'"
         ) from cause
-    try:
-        yield from _run(client, jobs, dict(versions))
-    finally:
-        client.close()
+    with contextlib.ExitStack() as ending:  # in the opposite order
         if cluster is not None:
-            cluster.close()
+            ending.callback(cluster.close)
+        ending.callback(client.close)
+        if cluster is not None:
+            ending.callback(_silence, client)
+        yield from _run(client, jobs, dict(versions))
+
+
+def _silence(client: Any) -> None:
+    """Let the workers of a local cluster say no more.
+
+    Their heartbeats may find the scheduler gone while all is closed, and report it in many lines.
+    """
+    with contextlib.suppress(OSError):  # a scheduler that has gone already
+        client.run(logging.disable, logging.CRITICAL, on_error="ignore")
 
 
 def _run(

@@ -56,6 +56,16 @@ def test_an_episode_that_kills_every_worker_is_a_row_and_costs_no_other(tmp_path
     assert "KilledWorker" in records[2].error
 
 
+def test_a_run_on_a_local_cluster_ends_without_a_word_of_it(tmp_path, capfd, monkeypatch):
+    # Workers that report so often would find the scheduler gone if it went first.
+    monkeypatch.setattr("distributed.scheduler.heartbeat_interval", lambda workers: 0.01)
+    records = run_jobs(short_jobs(2), tmp_path / "run", workers=2, scheduler="local")
+    assert all(record.success for record in records)
+    said = capfd.readouterr()
+    # Reports of the workers, which are processes of their own.
+    assert "distributed" not in said.err + said.out
+
+
 def test_a_scheduler_that_does_not_answer_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr("sim_tests.runs._cluster._CONNECT_S", 0.5)
     with pytest.raises(SimError, match="no Dask scheduler answers"):
