@@ -23,6 +23,8 @@ _NO_STEP_RAD: Final = math.radians(8.0)
 # Turning on the spot: so far in a cycle of two steps. Sideways, feet must not cross.
 _TURN_PER_CYCLE_RAD: Final = math.radians(60.0)
 _SIDE_STRIDE_SHARE: Final = 0.12
+# No step of a short dash is longer than this part of the stature.
+_LONGEST_STEP_SHARE: Final = 0.5
 _BACK_STRIDE_SHARE: Final = 0.75
 # Steps of a start and a stop follow each other no slower than this and no faster.
 _SLOWEST_HZ: Final = 0.7
@@ -78,6 +80,7 @@ def footstep_table(
 
     The body may walk ahead, backwards, sideways and in curves, turn on the spot, start and stop.
     A stance stays where it is, steps follow each other as the speed asks, feet end side by side.
+    Faster than 1.0 m/s sideways or backwards, which nobody walks, feet fly and hips may dip.
 
     Args:
         gait: of the body.
@@ -191,6 +194,8 @@ def _step_through(
     times, cadence = track.times_s[first : last + 1], track.cadence_hz[first : last + 1]
     cycles = _cycles(cadence, dt_s)
     steps = max(round(2.0 * float(cycles[-1])), 1)
+    way_m = float(np.hypot(*np.diff(track.position_m[first : last + 1], axis=0).T).sum())
+    steps = max(steps, math.ceil(way_m / (_LONGEST_STEP_SHARE * gait.skeleton.stature_m)))
     stretch = 0.5 * steps / float(cycles[-1])
     # Before and after, the feet go on at the pace of the first and the last step.
     before, after = (
