@@ -80,7 +80,8 @@ def footstep_table(
 
     The body may walk ahead, backwards, sideways and in curves, turn on the spot, start and stop.
     A stance stays where it is, steps follow each other as the speed asks, feet end side by side.
-    Faster than 1.0 m/s sideways or backwards, which nobody walks, feet fly and hips may dip.
+    Sideways or backwards above 1.0 m/s, with sharp turns, a foot may exceed 10 m/s and the hips
+    dip by more than a quarter.
 
     Args:
         gait: of the body.

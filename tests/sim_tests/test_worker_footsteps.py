@@ -153,20 +153,15 @@ def test_all_workers_keep_their_feet(cast: dict[str, Worker], look: str) -> None
 corners = st.lists(st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0)), min_size=2, max_size=4)
 
 
-# Nobody walks as fast sideways or backwards as ahead.
-paces = st.booleans().flatmap(
-    lambda ahead: st.tuples(st.floats(0.4, 1.5 if ahead else 1.0), st.just(ahead))
-)
-
-
-@given(corners, paces, st.floats(-180.0, 180.0))
-@example([(0.25, 0.0), (0.25, 0.0), (1.375, 0.0)], (1.5, True), 0.0)  # a dash from standing
+@given(corners, st.floats(0.4, 1.5), st.floats(-180.0, 180.0), st.booleans())
+@example([(0.25, 0.0), (0.25, 0.0), (1.375, 0.0)], 1.5, 0.0, True)  # a dash from standing
 @settings(max_examples=15, deadline=None)
 def test_stances_stay_put_whatever_the_walk(
-    places: list, pace: tuple[float, bool], heading_deg: float
+    places: list, speed_mps: float, heading_deg: float, ahead: bool
 ) -> None:
-    """Of any script: a flat foot does not move, one foot is always down, hips stay up."""
-    speed_mps, ahead = pace
+    """Of any script: a flat foot does not move; up to 1.0 m/s, or ahead, hips stay up."""
+    # Faster sideways or backwards with sharp turns, feet are known to be too quick: footstep_table.
+    walkable = ahead or speed_mps <= 1.0
     times = np.cumsum(
         [0.0, *(max(math.dist(*pair) / speed_mps, 0.5) for pair in itertools.pairwise(places))]
     )
@@ -182,9 +177,9 @@ def test_stances_stay_put_whatever_the_walk(
         both = flat[1:, side] & flat[:-1, side]
         moved = np.abs(np.diff(feet[:, side, [0, 1, 3]], axis=0))[both]
         assert moved.max(initial=0.0) < 1e-6
-        assert np.abs(np.diff(feet[:, side, :3], axis=0)).max() * HZ < 10.0
+        assert np.abs(np.diff(feet[:, side, :3], axis=0)).max() * HZ < (10.0 if walkable else 20.0)
     hips = np.array([row.hip_height_m for row in rows])
-    assert hips.min() > 0.75 * hips[0]
+    assert hips.min() > (0.75 if walkable else 0.5) * hips[0]
     assert hips.max() <= hips[0] + 1e-9
 
 
