@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
+
+#: Column of the hips' height in a table of :meth:`Gait.table`, after five numbers for each foot.
+HIP_HEIGHT_COLUMN: Final = 10
 
 
 @dataclass(frozen=True, slots=True)

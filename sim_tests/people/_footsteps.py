@@ -11,6 +11,7 @@ from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
 from perception.arrays import FloatArray
 
+from ._footing import HIP_HEIGHT_COLUMN
 from ._gait import LEFT, LONGEST_SWING_S, RIGHT, Gait
 
 # Slower than this and the body only shifts its weight.
@@ -35,7 +36,16 @@ _QUICKEST_STEP_S: Final = 0.2
 # One foot lands this part of a cycle after the body has begun to move, the last after it stopped.
 _QUARTER: Final = 0.25
 _BOTH_FEET_S: Final = 0.04
+# A foot is not left farther behind than this part of the stature: the body then runs, the other
+# foot still in the air for so long. Nor does one land farther ahead.
 _BEHIND_SHARE: Final = 0.335
+_AHEAD_SHARE: Final = 0.29
+_FLIGHT_S: Final = 0.12
+# Where the hips would sink below this part of their height, or a foot be too quick, steps keep
+# ever nearer to the body.
+_LOWEST_HIPS: Final = 0.76
+_QUICKEST_FOOT_MPS: Final = 9.9
+_REACHES: Final = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5)
 _TRIMMED_CYCLES: Final = 0.04
 # In a pause that is walked through, the feet go on so fast.
 _PAUSE_HZ: Final = 0.6
@@ -80,8 +90,6 @@ def footstep_table(
 
     The body may walk ahead, backwards, sideways and in curves, turn on the spot, start and stop.
     A stance stays where it is, steps follow each other as the speed asks, feet end side by side.
-    Sideways or backwards above 1.0 m/s, with sharp turns, a foot may exceed 10 m/s and the hips
-    dip by more than a quarter.
 
     Args:
         gait: of the body.
@@ -113,15 +121,35 @@ def footstep_table(
         # Around a start and a stop steps are those of the walk.
         minimum_filter1d(gait.stance_share(speed), 2 * round(_EARLIER_S / dt_s) + 1),
     )
+    best, best_strain = np.empty(0), math.inf
+    for reach in _REACHES:
+        feet, phase = _feet_and_phase(gait, track, _walks(moving, dt_s), reach)
+        table = gait.table(
+            feet, position_odom_m, heading_odom_rad, phase, vigour, dt_s, twist_rad=twist
+        )
+        quickest = float(np.abs(np.diff(feet[..., :3], axis=1)).max()) / dt_s
+        lowest = float(table[:, HIP_HEIGHT_COLUMN].min()) / gait.standing_height_m
+        strain = max(_LOWEST_HIPS / lowest, quickest / _QUICKEST_FOOT_MPS)
+        if strain < best_strain:
+            best, best_strain = table, strain
+        if strain <= 1.0:
+            break
+    return best
+
+
+def _feet_and_phase(
+    gait: Gait, track: _Track, walks: list[tuple[int, int]], reach: float
+) -> tuple[FloatArray, FloatArray]:
+    """(2, N, 5) of both feet, and (N,) cycles since the left one landed."""
     contacts = tuple(
-        [_Contact(_neutral(gait, side, track, times_s[0]), -math.inf)] for side in (LEFT, RIGHT)
+        [_Contact(_neutral(gait, side, track, track.times_s[0]), -math.inf)]
+        for side in (LEFT, RIGHT)
     )
-    phase = np.zeros(len(times_s))
-    for first, last in _walks(moving, dt_s):
+    phase = np.zeros(len(track.times_s))
+    for first, last in walks:
         if _needs_steps(track, first, last, contacts, gait):
-            _step_through(gait, track, first, last, contacts, phase)
-    feet = np.stack([_foot(gait, side, contacts[side], track) for side in (LEFT, RIGHT)])
-    return gait.table(feet, position_odom_m, heading_odom_rad, phase, vigour, dt_s, twist_rad=twist)
+            _step_through(gait, track, first, last, contacts, phase, reach)
+    return np.stack([_foot(gait, side, contacts[side], track) for side in (LEFT, RIGHT)]), phase
 
 
 def _smoothed(values: FloatArray, window: int) -> FloatArray:
@@ -183,8 +211,10 @@ def _step_through(
     last: int,
     contacts: tuple[list[_Contact], ...],
     phase: FloatArray,
+    reach: float,
 ) -> None:
     """Add the steps of one stretch of motion; fills ``phase`` from the left foot's landings."""
+    stature_m = gait.skeleton.stature_m
     end_s = track.times_s[last]
     dt_s = float(track.times_s[1] - track.times_s[0])
     cycles = _cycles(track.cadence_hz[first : last + 1], dt_s)
@@ -196,7 +226,7 @@ def _step_through(
     cycles = _cycles(cadence, dt_s)
     steps = max(round(2.0 * float(cycles[-1])), 1)
     way_m = float(np.hypot(*np.diff(track.position_m[first : last + 1], axis=0).T).sum())
-    steps = max(steps, math.ceil(way_m / (_LONGEST_STEP_SHARE * gait.skeleton.stature_m)))
+    steps = max(steps, math.ceil(way_m / (reach * _LONGEST_STEP_SHARE * stature_m)))
     stretch = 0.5 * steps / float(cycles[-1])
     # Before and after, the feet go on at the pace of the first and the last step.
     before, after = (
@@ -224,31 +254,52 @@ def _step_through(
     for n, at in enumerate(land_s):
         side = (lead + n) % 2
         contact = contacts[side][-1]
-        earliest = max(contact.land_s, float(land_s[n - 1]) if n else -math.inf) + _BOTH_FEET_S
-        left_s = _left_behind_s(track, contact, float(off_s[n]), gait.skeleton.stature_m)
-        contact.off_s = max(left_s, earliest)
+        left_s = _left_behind_s(track, contact, float(off_s[n]), stature_m, reach)
+        other_s = float(land_s[n - 1]) if n else -math.inf
+        if left_s < off_s[n]:
+            other_s -= _FLIGHT_S
+        contact.off_s = max(left_s, max(contact.land_s, other_s) + _BOTH_FEET_S)
         contact.off_vigour = _at(track, track.vigour, contact.off_s)
-        if n + 2 < len(land_s):
-            over = float(gait.over_share(np.array(_at(track, track.vigour, at))))
-            here, there = (_at(track, covered, t) for t in (at, off_s[n + 2]))
-            middle_s = float(np.interp(here + over * (there - here), covered, track.times_s))
-        else:
-            middle_s = end_s
-        place = _neutral(gait, side, track, middle_s)
+        place = (
+            _landing_place(gait, side, track, covered, (float(at), float(off_s[n + 2])), reach)
+            if n + 2 < len(land_s)
+            else _neutral(gait, side, track, end_s)
+        )
         contacts[side].append(_Contact(place, float(at), land_vigour=_at(track, track.vigour, at)))
-    reach = slice(max(first - round(0.5 / dt_s), 0), last + 1 + round(0.5 / dt_s))
+    rows = slice(max(first - round(0.5 / dt_s), 0), last + 1 + round(0.5 / dt_s))
     left_landing = _QUARTER + 0.5 * (lead != LEFT)
-    phase[reach] = np.interp(track.times_s[reach], knots_s, knots) - left_landing
+    phase[rows] = np.interp(track.times_s[rows], knots_s, knots) - left_landing
 
 
-def _left_behind_s(track: _Track, contact: _Contact, off_s: float, stature_m: float) -> float:
+def _landing_place(
+    gait: Gait,
+    side: int,
+    track: _Track,
+    covered: FloatArray,
+    stance_s: tuple[float, float],
+    reach: float,
+) -> FloatArray:
+    """(3,) where a foot lands that stands for ``stance_s``: under the body's place midway."""
+    over = float(gait.over_share(np.array(_at(track, track.vigour, stance_s[0]))))
+    here, there = (_at(track, covered, t) for t in stance_s)
+    middle_s = float(np.interp(here + over * (there - here), covered, track.times_s))
+    place, under = (_neutral(gait, side, track, t) for t in (middle_s, stance_s[0]))
+    ahead_m = math.dist(place[:2], under[:2])
+    furthest_m = reach * _AHEAD_SHARE * gait.skeleton.stature_m
+    return place if ahead_m <= furthest_m else under + furthest_m / ahead_m * (place - under)
+
+
+def _left_behind_s(
+    track: _Track, contact: _Contact, off_s: float, stature_m: float, reach: float
+) -> float:
     """When a stance foot has to go: at ``off_s``, or sooner if the body gets out of its reach."""
     first, last = np.searchsorted(track.times_s, (contact.land_s, off_s))
     away = np.hypot(*(track.position_m[first:last] - contact.place[:2]).T)
     # What is ahead at first comes nearer; only what falls behind counts.
     if last - first < 2:
         return off_s
-    behind = np.flatnonzero((away > _BEHIND_SHARE * stature_m) & (np.gradient(away) > 0.0))
+    furthest_m = reach * _BEHIND_SHARE * stature_m
+    behind = np.flatnonzero((away > furthest_m) & (np.gradient(away) > 0.0))
     return float(track.times_s[first + behind[0]]) if len(behind) else off_s
 
 

@@ -155,13 +155,14 @@ corners = st.lists(st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0)), min_si
 
 @given(corners, st.floats(0.4, 1.5), st.floats(-180.0, 180.0), st.booleans())
 @example([(0.25, 0.0), (0.25, 0.0), (1.375, 0.0)], 1.5, 0.0, True)  # a dash from standing
+@example([(1.2, 0.2), (-1.8, -0.5), (-0.9, -1.2)], 1.5, -70.0, False)  # and one sideways
+@example([(1.2, -1.8), (-1.1, 1.7), (0.4, -1.0), (-0.9, 0.1)], 1.5, 0.0, False)  # sharp turns
+@example([(0.2, 1.9), (0.2, 1.9), (1.0, 1.6)], 1.5, 17.0, False)  # a short one askew
 @settings(max_examples=15, deadline=None)
 def test_stances_stay_put_whatever_the_walk(
     places: list, speed_mps: float, heading_deg: float, ahead: bool
 ) -> None:
-    """Of any script: a flat foot does not move; up to 1.0 m/s, or ahead, hips stay up."""
-    # Faster sideways or backwards with sharp turns, feet are known to be too quick: footstep_table.
-    walkable = ahead or speed_mps <= 1.0
+    """Of any script: a flat foot does not move, hips stay up, no foot is faster than 10 m/s."""
     times = np.cumsum(
         [0.0, *(max(math.dist(*pair) / speed_mps, 0.5) for pair in itertools.pairwise(places))]
     )
@@ -177,9 +178,9 @@ def test_stances_stay_put_whatever_the_walk(
         both = flat[1:, side] & flat[:-1, side]
         moved = np.abs(np.diff(feet[:, side, [0, 1, 3]], axis=0))[both]
         assert moved.max(initial=0.0) < 1e-6
-        assert np.abs(np.diff(feet[:, side, :3], axis=0)).max() * HZ < (10.0 if walkable else 20.0)
+        assert np.abs(np.diff(feet[:, side, :3], axis=0)).max() * HZ < 10.0
     hips = np.array([row.hip_height_m for row in rows])
-    assert hips.min() > (0.75 if walkable else 0.5) * hips[0]
+    assert hips.min() > 0.75 * hips[0]
     assert hips.max() <= hips[0] + 1e-9
 
 
