@@ -18,6 +18,7 @@ from perception.arrays import FloatArray, finite_number
 
 from .._errors import SimError
 from ._footing import Footing
+from ._quick_feet import unhurried
 from ._skeleton import SIGNS, Skeleton
 
 #: The foot that a step belongs to, in the order of every pair.
@@ -50,8 +51,6 @@ _TOE_OUT_RAD: Final = math.radians(6.0)
 # Walking brings the feet nearer to the line; the swinging foot makes way for the standing one.
 _NARROWER: Final = 0.40
 WAY_ROUND_M: Final = 0.010
-# A foot that has no time for the whole way round passes nearer.
-_QUICKEST_FOOT_MPS: Final = 9.0
 
 PELVIS_YAW_RAD: Final = 0.07
 PELVIS_LIST_RAD: Final = 0.035
@@ -210,7 +209,7 @@ class Gait:
         beside = cos * (place[:, 1] - body[:, 1]) - sin * (place[:, 0] - body[:, 0])
         clear = self._half_width_m(side, np.array(max(vigour, key=abs))) + WAY_ROUND_M
         aside = np.maximum(clear - SIGNS[side] * beside, 0.0) * bump
-        aside *= _unhurried(
+        aside *= unhurried(
             place[:, :2], aside, (-SIGNS[side] * sin, SIGNS[side] * cos), u * swing_s
         )
         reach = math.hypot(*(end - start)[:2]) + 0.25 * abs(float(end[2] - start[2]))
@@ -387,24 +386,6 @@ def landing_rad(vigour: float) -> float:
 def off_rad(vigour: float) -> float:
     size = min(abs(vigour), 1.15)
     return size * (_TOE_OFF_RAD if vigour >= 0.0 else _BACK_OFF_RAD)
-
-
-def _unhurried(
-    place_m: FloatArray,
-    aside_m: FloatArray,
-    direction: tuple[FloatArray, FloatArray],
-    times_s: FloatArray,
-) -> float:
-    """Share of a way round, in [0, 1], that keeps a foot within its quickest."""
-    dt_s = np.diff(times_s)[:, None]
-    straight = np.diff(place_m, axis=0) / dt_s
-    way = np.diff(aside_m[:, None] * np.column_stack(direction), axis=0) / dt_s
-    # The largest share s with |straight + s way| at most the quickest, in every interval.
-    square, mixed = (way**2).sum(axis=1), (way * straight).sum(axis=1)
-    spare = _QUICKEST_FOOT_MPS**2 - (straight**2).sum(axis=1)
-    moves = square > 1e-12
-    root = np.sqrt(np.maximum(mixed[moves] ** 2 + square[moves] * spare[moves], 0.0))
-    return float(np.clip(((root - mixed[moves]) / square[moves]).min(initial=1.0), 0.0, 1.0))
 
 
 def _smooth(u: FloatArray) -> FloatArray:
