@@ -44,7 +44,7 @@ _FLIGHT_S: Final = 0.12
 # Where the hips would sink below this part of their height, or a foot be too quick, steps keep
 # ever nearer to the body.
 _LOWEST_HIPS: Final = 0.76
-_QUICKEST_FOOT_MPS: Final = 9.9
+_TOO_QUICK_MPS: Final = 9.9
 _REACHES: Final = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5)
 _TRIMMED_CYCLES: Final = 0.04
 # In a pause that is walked through, the feet go on so fast.
@@ -121,15 +121,16 @@ def footstep_table(
         # Around a start and a stop steps are those of the walk.
         minimum_filter1d(gait.stance_share(speed), 2 * round(_EARLIER_S / dt_s) + 1),
     )
+    walks = _walks(moving, dt_s)
     best, best_strain = np.empty(0), math.inf
     for reach in _REACHES:
-        feet, phase = _feet_and_phase(gait, track, _walks(moving, dt_s), reach)
+        feet, phase = _feet_and_phase(gait, track, walks, reach)
         table = gait.table(
             feet, position_odom_m, heading_odom_rad, phase, vigour, dt_s, twist_rad=twist
         )
         quickest = float(np.abs(np.diff(feet[..., :3], axis=1)).max()) / dt_s
         lowest = float(table[:, HIP_HEIGHT_COLUMN].min()) / gait.standing_height_m
-        strain = max(_LOWEST_HIPS / lowest, quickest / _QUICKEST_FOOT_MPS)
+        strain = max(_LOWEST_HIPS / lowest, quickest / _TOO_QUICK_MPS)
         if strain < best_strain:
             best, best_strain = table, strain
         if strain <= 1.0:
