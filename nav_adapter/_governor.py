@@ -47,8 +47,9 @@ class SpeedGovernor:
     """Turns people into a speed limit.
 
     Separations run from the robot to a person's body circle (radius 0.30 m), less the uncertainty
-    of their position and the way driven since the robot's state. Two bounds on how near the robot
-    comes while it stops are known, and the better one counts:
+    of their position (more of it for people out of sight) and the way driven since the robot's
+    state. Two bounds on how near the robot comes while it stops are known, and the better one
+    counts:
 
     - it comes nearer by its stopping distance at most, measured from its footprint;
     - where it turns by at most ``turn_within_stop_deg`` off its direction of travel while it stops,
@@ -82,7 +83,6 @@ class SpeedGovernor:
         if not people:
             return SpeedLimit(maximum_mps, "robot maximum", True)
         count = len(people)
-        sigmas = self._policy.margins.uncertainty_sigmas
         lost_m = BODY_RADIUS_M + abs(robot_state.speed_mps) * robot_age_s
         # Carrying a person on may only bring them nearer: they may have turned round since.
         positions = np.array(
@@ -91,7 +91,7 @@ class SpeedGovernor:
         robot_x, robot_y = robot_state.position_odom_m.tolist()
         rows = [
             (
-                lost_m + sigmas * m.sigma_m,
+                lost_m + self._doubt_m(m, now),
                 max(0.0, now - m.track.stamp_s),
                 self._human_speed_mps(m, robot_x, robot_y),
             )
@@ -125,6 +125,14 @@ class SpeedGovernor:
         names = [name for name, used in zip(_RULES, self._rules_used(), strict=True) if used]
         rule = lowest.index((limit_mps, person))
         return SpeedLimit(limit_mps, f"track {list(people)[person]}: {names[rule]}", suffices)
+
+    def _doubt_m(self, memory: PersonMemory, now: float) -> float:
+        """How much nearer than estimated a person may be."""
+        margins = self._policy.margins
+        sigmas = margins.uncertainty_sigmas
+        if now - memory.seen_stamp_s > self._policy.timing.fresh_within_s:
+            sigmas = max(sigmas, margins.unseen_sigmas)
+        return sigmas * memory.sigma_m
 
     def _rules_used(self) -> tuple[bool, bool, bool]:
         rules = self._policy.rules

@@ -122,10 +122,11 @@ def highest_speed_mps(
     some = spare > 0.0
     if some.shape != below.shape:
         some = np.broadcast_to(some, np.broadcast(below, spare).shape)
+    # A root of a product too small for a float is 0 as well, and is no licence to drive.
     speed: FloatArray = np.divide(
         2.0 * a * spare,
         below,
-        out=np.where(some, np.inf, 0.0),
+        out=np.where(some & (share == 0.0), np.inf, 0.0),
         where=some & (below > 0.0),
     )
     return speed

@@ -23,6 +23,9 @@ class SafetyMargins(StrictConfig):
         uncertainty_sigmas: how many standard deviations of a person's position (along its most
             uncertain direction) enlarge the obstacle and shorten the separation. 2 holds 98 % of a
             normal error towards the robot.
+        unseen_sigmas: how many shorten the separation of somebody unseen for ``fresh_within_s``; at
+            least ``uncertainty_sigmas`` count. Nothing corrects a prediction out of sight, and who
+            has left the view may have begun to run.
         maximum_radius_m: ceiling of every obstacle radius, uncertainty included, or none. It keeps
             an uncertain track from filling an aisle; the speed limit is not affected by it.
     """
@@ -32,6 +35,7 @@ class SafetyMargins(StrictConfig):
     minimum_clearance_m: float = Field(default=0.10, ge=0.10, le=2.0)
     separation_clearance_m: float = Field(default=0.10, ge=0.0, le=2.0)
     uncertainty_sigmas: float = Field(default=2.0, ge=0.0, le=5.0)
+    unseen_sigmas: float = Field(default=2.5, ge=0.0, le=5.0)
     maximum_radius_m: float | None = Field(default=None, gt=0.0, le=20.0)
 
     @property

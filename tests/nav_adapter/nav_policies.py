@@ -100,6 +100,7 @@ def policies(draw: st.DrawFn) -> AwarenessPolicy:
             minimum_clearance_m=draw(finite(0.1, 0.5)),
             separation_clearance_m=draw(finite(0.0, 0.5)),
             uncertainty_sigmas=draw(finite(0.0, 3.0)),
+            unseen_sigmas=draw(finite(0.0, 4.0)),
             maximum_radius_m=draw(st.sampled_from([None, 2.1])),
         ),
         timing=TimeBehaviour(

@@ -13,7 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from nav_scenes import FLOOR_M, ROBOT, crowds, finite, person, robot_at
 
-from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, max_speed_mps
+from nav_adapter.policies import SafetyMargins
+from perception.anthropometry import BODY_RADIUS_M
 from tracking import PersonTrack
 
 PERIOD_S = 0.05
@@ -250,6 +252,31 @@ def test_two_levels_in_a_loop() -> None:
     gone = adapter.update((person(now, awareness_lower=0.7),), robot_at(now + 0.3), now + 0.3)
     assert gone.speed_limit_mps <= limits[0]
     assert radius(gone) == 1.0
+
+
+@given(seen_sigmas=finite(0.0, 3.0), unseen_sigmas=finite(0.0, 4.0), sigma_m=finite(0.0, 0.4))
+def test_a_place_out_of_sight_is_doubted_more(
+    seen_sigmas: float, unseen_sigmas: float, sigma_m: float
+) -> None:
+    margins = SafetyMargins(uncertainty_sigmas=seen_sigmas, unseen_sigmas=unseen_sigmas)
+    policy = AwarenessPolicy(margins=margins)
+    gap_m = 3.0 - float(ROBOT.footprint_m[:, 0].max()) - BODY_RADIUS_M
+
+    def limit_mps(unseen_s: float) -> float:
+        adapter = NavAdapter(policy, ROBOT)
+        track = person(position=(3.0, 0.0), sigma_m=sigma_m, unseen_s=unseen_s)
+        return adapter.update((track,), robot_at(), 0.0).speed_limit_mps
+
+    for unseen_s, sigmas in ((0.24, seen_sigmas), (0.26, max(seen_sigmas, unseen_sigmas))):
+        separation_mps = max_speed_mps(
+            gap_m - sigmas * sigma_m,
+            policy.speed.human_speed_mps(0.0),
+            deceleration_mps2=ROBOT.max_deceleration_mps2,
+            reaction_time_s=ROBOT.reaction_time_s,
+            clearance_m=margins.separation_clearance_m,
+        )
+        expected_mps = min(ROBOT.max_speed_mps, float(separation_mps))
+        assert limit_mps(unseen_s) == pytest.approx(expected_mps, abs=1e-9)
 
 
 def test_a_long_silence_does_not_blow_people_up() -> None:

@@ -22,6 +22,11 @@ def test_published_figures() -> None:
     np.testing.assert_allclose(limits, [0.21, 0.64, 1.01, 1.63], atol=0.005)
 
 
+def test_a_separation_too_small_to_reckon_with_gives_no_speed() -> None:
+    limit = max_speed_mps(5e-324, 0.0, deceleration_mps2=0.25, reaction_time_s=0.0, clearance_m=0.0)
+    assert limit == 0.0
+
+
 @given(separation=finite(0.0, 30.0), human=finite(0.0, 3.0), **SETTINGS)
 def test_speed_is_the_root_of_the_protective_separation(
     separation: float,

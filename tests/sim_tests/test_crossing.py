@@ -160,6 +160,13 @@ def test_noise_and_missed_people_cost_time_not_clearance():
     assert result.violation_time_s == 0.0
 
 
+def test_a_runner_who_leaves_the_view_as_he_sets_off_is_not_driven_into():
+    """He comes faster than anybody out of sight is assumed to; the doubt about his place counts."""
+    result = run_crossing("runs_out", policy="balanced", perception="keypoints", seed=4)
+    assert not result.contact
+    assert result.success
+
+
 def with_timing(scenario, **timing):
     camera = scenario.camera.model_copy(update={"timing": CameraTiming(**timing)})
     return scenario.model_copy(update={"camera": camera})

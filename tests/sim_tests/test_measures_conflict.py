@@ -8,6 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from measured_scenes import ACROSS_M, ALONG_M, BODY_RADIUS_M, straight, trace, walking
 from shapely.geometry import Point, Polygon
+from shapely.ops import nearest_points
 
 from sim_tests import NOVA_CARTER
 from sim_tests.measures._conflict import min_time_to_collision_s, post_encroachment_s
@@ -76,7 +77,11 @@ def test_discs_first_touch_the_outline_then_and_not_before(x, y, vx, vy):
 
     assert Outline(corners).distance(centre)[0] == pytest.approx(distance(0.0), abs=1e-9)
     if distance(0.0) < radius:
-        nearer = distance(1e-4) < distance(0.0) or distance(0.0) == 0.0
+        nearest, _ = nearest_points(hull, Point(x, y))
+        parting_mps = np.dot((x - nearest.x, y - nearest.y), (vx, vy)) / max(distance(0.0), 1e-9)
+        # Between nearing and parting no rounding decides.
+        assume(distance(0.0) == 0.0 or abs(parting_mps) > 1e-9)
+        nearer = distance(0.0) == 0.0 or parting_mps < 0.0
         assert time == (0.0 if nearer else math.inf)
     elif math.isinf(time):
         reach = (math.hypot(x, y) + 2.0) / math.hypot(vx, vy)

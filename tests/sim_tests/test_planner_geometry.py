@@ -43,7 +43,9 @@ def test_stopping_integral_is_the_integral_of_a_stop(
         return v if s <= hold_s else v * max(0.0, 1.0 - (s - hold_s) / max(stop_s, 1e-12))
 
     bounds = [min(bound, t) for bound in (0.0, hold_s, hold_s + stop_s, math.inf)]
-    exact = sum(quad(value, *pair)[0] for pair in pairwise(bounds))
+    # The rule for quadrature cannot be scaled down to an interval of subnormal length.
+    pieces = [pair for pair in pairwise(bounds) if pair[1] - pair[0] > 1e-300]
+    exact = sum(quad(value, *pair)[0] for pair in pieces)
     result = stopping_integral(np.array(v), np.array(stop_s), hold_s, np.array(t))
     assert float(result) == pytest.approx(exact, abs=1e-8)
 
