@@ -90,6 +90,7 @@ def footstep_table(
 
     The body may walk ahead, backwards, sideways and in curves, turn on the spot, start and stop.
     A stance stays where it is, steps follow each other as the speed asks, feet end side by side.
+    Where steps are quick both feet may be in the air for a moment.
 
     Args:
         gait: of the body.
