@@ -8,6 +8,8 @@ from typing import Final
 MINUS: Final = "\N{MINUS SIGN}"
 THIN: Final = "\N{NARROW NO-BREAK SPACE}"
 NOTHING: Final = "–"
+# What sums of floats leave between all and all.
+_ROUNDING: Final = 1e-9
 
 
 def number(value: float | None, decimals: int = 2, *, sign: bool = False) -> str:
@@ -29,7 +31,7 @@ def percent(share: float | None, decimals: int | None = None, *, sign: bool = Fa
         return NOTHING
     if decimals is None:
         rest = min(abs(share), abs(1.0 - abs(share)))
-        decimals = 0 if rest >= 0.1 or rest == 0.0 else 1 if rest >= 0.01 else 2
+        decimals = 0 if rest >= 0.1 or rest < _ROUNDING else 1 if rest >= 0.01 else 2
     return f"{number(100.0 * share, decimals, sign=sign)}{THIN}%"
 
 

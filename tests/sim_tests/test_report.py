@@ -140,7 +140,15 @@ def test_few_pairs_show_nothing(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("share", "text"),
-    [(0.0, "0"), (1.0, "100"), (0.9975, "99.75"), (0.9999, "99.99"), (0.0004, "0.04"), (0.5, "50")],
+    [
+        (0.0, "0"),
+        (1.0, "100"),
+        (1.0 - 2e-16, "100"),
+        (0.9975, "99.75"),
+        (0.9999, "99.99"),
+        (0.0004, "0.04"),
+        (0.5, "50"),
+    ],
 )
 def test_almost_all_is_not_all(share: float, text: str) -> None:
     assert percent(share) == f"{text}\u202f%"
