@@ -64,7 +64,8 @@ class Outline:
         """
         to = centres_base_m[:, None, :] - self._corners
         velocity = velocities_base_mps[:, None, :]
-        with np.errstate(divide="ignore", invalid="ignore"):
+        # A velocity all but along an edge reaches it after longer than a float can say: never.
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             outwards = np.einsum("nki,mi->nm", velocity, self._outward)
             to_edge = (radius_m - np.einsum("nmi,mi->nm", to, self._outward)) / outwards
             met = np.einsum("nmi,mi->nm", to + to_edge[..., None] * velocity, self._along)

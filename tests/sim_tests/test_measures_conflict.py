@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from measured_scenes import ACROSS_M, ALONG_M, BODY_RADIUS_M, straight, trace, walking
 from shapely.geometry import Point, Polygon
@@ -62,6 +62,8 @@ def test_nobody_there_means_no_figure():
 
 
 @given(coordinates, coordinates, speeds, speeds)
+@example(x=0.0, y=0.0, vx=2.2250738585e-313, vy=1.0)
+@example(x=0.75, y=0.0, vx=-2.86e-175, vy=1.0)
 def test_discs_first_touch_the_outline_then_and_not_before(x, y, vx, vy):
     """Against shapely, on an outline without symmetry whose corners are given clockwise."""
     corners = np.array([[-0.4, -0.2], [-0.3, 0.3], [0.2, 0.4], [0.6, 0.0], [0.1, 0.0]])
