@@ -172,7 +172,7 @@ def test_two_bones_bring_their_tip_where_it_is_wanted(
     np.testing.assert_allclose(tip, target, atol=1e-6)
     # The hinge lies in the plane of the target and the wanted direction, on that side of it.
     hinge = np.array(turned(turn, bones.axis))
-    assert np.linalg.det([hinge, target, lateral]) == pytest.approx(0.0, abs=1e-6)
+    assert np.cross(hinge, target) @ lateral == pytest.approx(0.0, abs=1e-6)
     across = np.cross(target, lateral)
     assert np.cross(target, hinge) @ across > 0.0
 
