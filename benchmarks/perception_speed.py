@@ -11,7 +11,6 @@ allows, or when ours costs more than rtmlib's.
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import sys
 import tempfile
@@ -25,21 +24,13 @@ import cv2
 import numpy as np
 import onnxruntime as ort
 
-from perception import (
-    AwarenessPipeline,
-    Camera,
-    PerceptionError,
-    PersonDetection,
-    PersonDetector,
-)
-from perception._network_time import NETWORK_TIME
-from perception.networks import OnnxSettings
-from perception.networks._detector import OnnxPersonDetector
-from perception.networks._head import OnnxHeadPoseEstimator
-from perception.networks._pose import OnnxPoseEstimator
+from awarenav.baseline import Metric, write_baseline
+from awarenav.errors import AwarenavError
+from benchmarks._harness import make_parser, parse
+from perception import AwarenessPipeline, Camera, PersonDetection, PersonDetector
+from perception.networks import NETWORK_TIME, OnnxPersonDetector, OnnxPoseEstimator, OnnxSettings
+from perception.networks.heads import OnnxHeadPoseEstimator
 from perception.shipped import DETECTOR, HEAD, POSE, shipped_model_path
-from sim_tests import SimError
-from sim_tests._bench import Metric, read_baseline, write_baseline
 
 ONE_THREAD = OnnxSettings(intra_op_threads=1)
 TWO_THREADS = OnnxSettings(intra_op_threads=2)
@@ -108,9 +99,8 @@ class TwoPeople:
 
 def clip(frames: int) -> tuple[Camera, list[Frame]]:
     """Render pictures with two people in them."""
-    from sim_tests.sets._frame_records import read_records  # noqa: PLC0415 - needs the simulator
-    from sim_tests.sets._render import render  # noqa: PLC0415
-    from sim_tests.sets._render_config import RenderConfig  # noqa: PLC0415
+    from awarenav.records import read_records  # noqa: PLC0415 - needs the simulator
+    from sim_tests.dataset import RenderConfig, render  # noqa: PLC0415
 
     config = RenderConfig(frames=3 * frames, scenes=1, people=2, max_range_m=6.0, seed=4)
     with tempfile.TemporaryDirectory() as folder:
@@ -118,7 +108,9 @@ def clip(frames: int) -> tuple[Camera, list[Frame]]:
         camera = Camera.from_yaml(Path(folder) / "camera.yaml")
         pairs = [record for record in records if len(record["people"]) == 2][:frames]
         if not pairs:
-            raise SimError(f"none of {config.frames} pictures shows two people; take more --frames")
+            raise AwarenavError(
+                f"none of {config.frames} pictures shows two people; take more --frames"
+            )
         return camera, [
             Frame(
                 cv2.cvtColor(cv2.imread(str(Path(folder) / record["frame"])), cv2.COLOR_BGR2RGB),
@@ -265,9 +257,11 @@ def report(metrics: Sequence[Metric], baseline: dict[str, Metric]) -> tuple[str,
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(
-        description="Measure frames a second and the time outside the networks, with rtmlib's on "
-        "the same model files in the same run beside it."
+    parser = make_parser(
+        "benchmarks.perception_speed",
+        "Measure frames a second and the time outside the networks, with rtmlib on the same model "
+        "files in the same run beside it.",
+        BASELINE,
     )
     shared = Path(__file__).resolve().parents[2] / "shared" / "models"
     parser.add_argument(
@@ -276,21 +270,12 @@ def main() -> int:
     parser.add_argument(
         "--frames", type=int, default=12, metavar="N", help="pictures of the clip (default: 12)"
     )
-    parser.add_argument(
-        "--baseline",
-        type=Path,
-        default=BASELINE,
-        metavar="FILE",
-        help=f"figures to compare with, if it exists (default: {BASELINE.name} beside this file)",
-    )
-    parser.add_argument("--out", type=Path, metavar="FILE", help="write the figures as a baseline")
-    options = parser.parse_args()
+    options, baseline = parse(parser, None)
     if options.frames < 1:
         parser.error(f"--frames must be at least 1, got {options.frames}")
     try:
-        baseline = read_baseline(options.baseline) if options.baseline.exists() else {}
         metrics = measure(options.models, options.frames)
-    except (PerceptionError, SimError) as error:
+    except AwarenavError as error:
         print(f"{parser.prog}: {error}", file=sys.stderr)
         return 2
     text, good = report(metrics, baseline)

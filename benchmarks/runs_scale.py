@@ -17,9 +17,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from sim_tests.runs import Job, plan_jobs, run_jobs
-from sim_tests.runs._episode import attempt
-from sim_tests.runs._pool import tidy
+from sim_tests.study.runs import Job, attempt, plan_jobs, run_jobs, tidy
 
 #: Cheap, middling and costly ones; what follows is their mean.
 SCENARIOS = ("crossing_attentive", "crossing_from_left", "blind_corner", "crowd_of_eight")

@@ -5,7 +5,13 @@ The parts of a policy are in :mod:`nav_adapter.policies`.
 
 from __future__ import annotations
 
-from . import _clash  # noqa: F401 - first: refuses a foreign package of one of our names
+from pathlib import Path
+from runpy import run_path
+
+# By path: importing it by name would first run whatever now calls itself perception.
+_CLASH = Path(__file__).parents[1] / "perception" / "_clash.py"
+run_path(str(_CLASH))["require_sole_owner"](__name__)
+
 from ._adapter import NavAdapter
 from ._alert import Alert
 from ._constraints import NavConstraints, PersonObstacle

@@ -11,10 +11,10 @@ from tracking import PersonTrack
 from ._alert import Alert
 from ._alerting import AlertBook, alerts_due
 from ._constraints import NavConstraints
-from ._crowd import Crowd
 from ._errors import NavError
-from ._governor import SpeedGovernor, SpeedLimit
+from ._governor import GovernedSpeed, SpeedGovernor
 from ._memory import PersonMemory
+from ._obstacle_rules import ObstacleRules
 from ._obstacles import obstacles_of
 from ._policy import AwarenessPolicy
 from ._robot import RobotProfile, RobotState
@@ -58,8 +58,8 @@ class NavAdapter:
             raise NavError(f"robot must be a RobotProfile, got {type(robot).__name__}")
         self._policy = policy
         self._robot = robot
-        self._crowd = Crowd(policy)
-        self._governor = SpeedGovernor(policy, robot, self._crowd)
+        self._rules = ObstacleRules(policy)
+        self._governor = SpeedGovernor(policy, robot, self._rules)
         self._people: dict[int, PersonMemory] = {}
         self._book = AlertBook()
         self._latest: NavConstraints | None = None
@@ -109,8 +109,8 @@ class NavAdapter:
         people = self._people
         if self._latest is not None and now - self._latest.stamp_s > timing.stale_after_s:
             # Nobody has asked meanwhile, and nobody is known to be aware any more.
-            people = self._crowd.doubted(people)
-        people = self._crowd.after(people, current, now, stale)
+            people = self._rules.after_silence(people)
+        people = self._rules.updated(people, current, now, stale)
         limit = self._governor.limit(people, robot_state, now, robot_age_s)
         for name, age_s in (("perception", perception_age_s), ("robot state", robot_age_s)):
             if age_s > timing.stop_after_s:
@@ -166,8 +166,8 @@ class NavAdapter:
         return self.update(tracks, robot_state, now, perception_stamp_s=seen)
 
     def _recovering(
-        self, limit: SpeedLimit, robot_state: RobotState, now: float, stale: bool
-    ) -> tuple[SpeedLimit, float | None]:
+        self, limit: GovernedSpeed, robot_state: RobotState, now: float, stale: bool
+    ) -> tuple[GovernedSpeed, float | None]:
         """The limit under a ceiling that rises from stale data on, and that ceiling if any.
 
         The ceiling rises to the robot's maximum whatever the limit is meanwhile, so that more

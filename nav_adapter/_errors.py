@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from perception.errors import AwarenavError
 
-class NavError(ValueError):
-    """Input that the adapter cannot use; the message says what was given and what is valid."""
+
+class NavError(AwarenavError):
+    """Input that navigation cannot use; the message says what was given and what is valid."""

@@ -12,9 +12,9 @@ import numpy as np
 from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
 
-from ._crowd import Crowd
 from ._footprint import Footprint
 from ._memory import PersonMemory
+from ._obstacle_rules import ObstacleRules
 from ._policy import AwarenessPolicy
 from ._robot import RobotProfile, RobotState
 from ._separation import highest_speed_mps, protective_separation_m
@@ -29,7 +29,7 @@ _RULES: Final = ("speed and separation", "distance zone", "cap near people")
 
 
 @dataclass(frozen=True, slots=True)
-class SpeedLimit:
+class GovernedSpeed:
     """A limit and where it comes from.
 
     Attributes:
@@ -60,13 +60,13 @@ class SpeedGovernor:
     Args:
         policy: margins and rules.
         robot: footprint, braking and reaction time.
-        crowd: gives the human speeds.
+        rules: gives the human speeds.
     """
 
-    def __init__(self, policy: AwarenessPolicy, robot: RobotProfile, crowd: Crowd) -> None:
+    def __init__(self, policy: AwarenessPolicy, robot: RobotProfile, rules: ObstacleRules) -> None:
         self._policy = policy
         self._robot = robot
-        self._crowd = crowd
+        self._rules = rules
         self._footprint = Footprint(robot.footprint_m)
         self._turn_rad = math.radians(policy.rules.turn_within_stop_deg)
         self._people_turn_rad = math.radians(policy.rules.people_turn_deg)
@@ -77,11 +77,11 @@ class SpeedGovernor:
         robot_state: RobotState,
         now: float,
         robot_age_s: float,
-    ) -> SpeedLimit:
+    ) -> GovernedSpeed:
         """The limit at ``now`` for a robot whose state is ``robot_age_s`` old."""
         maximum_mps = self._robot.max_speed_mps
         if not people:
-            return SpeedLimit(maximum_mps, "robot maximum", True)
+            return GovernedSpeed(maximum_mps, "robot maximum", True)
         count = len(people)
         lost_m = BODY_RADIUS_M + abs(robot_state.speed_mps) * robot_age_s
         # Carrying a person on may only bring them nearer: they may have turned round since.
@@ -121,10 +121,10 @@ class SpeedGovernor:
             gaps_m, shares, human_mps, age_s, speed_mps
         )
         if limit_mps >= maximum_mps:
-            return SpeedLimit(maximum_mps, "robot maximum", suffices)
+            return GovernedSpeed(maximum_mps, "robot maximum", suffices)
         names = [name for name, used in zip(_RULES, self._rules_used(), strict=True) if used]
         rule = lowest.index((limit_mps, person))
-        return SpeedLimit(limit_mps, f"track {list(people)[person]}: {names[rule]}", suffices)
+        return GovernedSpeed(limit_mps, f"track {list(people)[person]}: {names[rule]}", suffices)
 
     def _doubt_m(self, memory: PersonMemory, now: float) -> float:
         """How much nearer than estimated a person may be."""
@@ -214,10 +214,10 @@ class SpeedGovernor:
         """
         (x, y), (vx, vy) = memory.place_odom_m, memory.velocity_odom_mps
         x, y = x - robot_x, y - robot_y
-        assumed_mps = self._crowd.human_speed_mps(memory)
+        assumed_mps = self._rules.human_speed_mps(memory)
         distance_m = max(math.hypot(x, y), 1e-9)
         closing_mps = -(vx * x + vy * y) / distance_m
-        walking_mps, unaware_mps = math.hypot(vx, vy), self._crowd.unaware_human_speed_mps
+        walking_mps, unaware_mps = math.hypot(vx, vy), self._rules.unaware_human_speed_mps
         if walking_mps > _BRISK_SHARE * unaware_mps:
             across_mps = abs(vx * y - vy * x) / distance_m
             closing_mps = self._turned_mps(closing_mps, across_mps, walking_mps)
@@ -234,7 +234,7 @@ class SpeedGovernor:
         Somebody at normal pace who has seen the robot stops within a step; who is faster carries on
         and may be rounding a corner just now.
         """
-        unaware_mps = self._crowd.unaware_human_speed_mps
+        unaware_mps = self._rules.unaware_human_speed_mps
         brisk = (walking_mps / max(unaware_mps, 1e-9) - _BRISK_SHARE) / (1.0 - _BRISK_SHARE)
         turn_rad = self._people_turn_rad * min(brisk, 1.0)
         if math.atan2(across_mps, closing_mps) <= turn_rad:

@@ -29,10 +29,10 @@ class PersonMemory(NamedTuple):
         awareness_lower: the bound that was acted on.
         radius_m: the obstacle's radius.
         sigma_m: standard deviation of the position along its most uncertain direction.
-        paid_s: how much time of being seen has been counted for this person.
+        visible_s: time in sight that has been counted for this person.
         ahead_m: how far the obstacle's polygon reaches ahead of its circle.
         facing_odom: unit vector of the way the person walks, or last walked.
-        allowed: what has been allowed lately, newest last: (``paid_s`` until which, radius, ahead).
+        history: latest sizes, newest last: (``visible_s`` until which it held, radius, ahead).
         inflation_held: whether the inflation policy's hysteresis holds the person "aware".
         speed_held: the same of the speed policy.
     """
@@ -45,10 +45,10 @@ class PersonMemory(NamedTuple):
     awareness_lower: float
     radius_m: float
     sigma_m: float
-    paid_s: float
+    visible_s: float
     ahead_m: float
     facing_odom: Pair
-    allowed: tuple[tuple[float, float, float], ...]
+    history: tuple[tuple[float, float, float], ...]
     inflation_held: bool
     speed_held: bool
 

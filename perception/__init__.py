@@ -6,7 +6,6 @@ from . import _clash  # noqa: F401 - first: refuses a foreign package of one of 
 from ._attention import AttentionCone
 from ._camera import Camera
 from ._detection import PersonDetection
-from ._errors import PerceptionError
 from ._floor import FloorPlane
 from ._fusion import FusedHeadPoseEstimator
 from ._head_pose import HeadPose
@@ -15,9 +14,9 @@ from ._observation import PersonObservation
 from ._pipeline import AwarenessPipeline
 from ._pnp import PnpHeadPoseEstimator
 from ._protocols import HeadPoseEstimator, PersonDetector, PoseEstimator
-from .networks._detector import OnnxPersonDetector
-from .networks._head import OnnxHeadPoseEstimator
-from .networks._pose import OnnxPoseEstimator
+from .errors import PerceptionError
+from .networks import OnnxPersonDetector, OnnxPoseEstimator
+from .networks.heads import OnnxHeadPoseEstimator
 
 __all__ = [
     "AttentionCone",

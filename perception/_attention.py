@@ -9,8 +9,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._errors import PerceptionError
 from .arrays import FloatArray, finite_number, set_fields
+from .errors import PerceptionError
 
 #: Half of θ_FOV = 120°, the horizontal field that head orientation alone can vouch for.
 DEFAULT_HALF_ANGLE_RAD: Final = math.radians(60.0)

@@ -13,8 +13,8 @@ import numpy as np
 import yaml
 
 from ._camera_info import read_camera_info
-from ._errors import PerceptionError
 from .arrays import FloatArray, finite_array, finite_number, pixel_count, set_fields
+from .errors import PerceptionError
 
 # OpenCV accepts these numbers of coefficients: plumb_bob has 5, rational_polynomial 8.
 _DISTORTION_SIZES: Final = (4, 5, 8, 12, 14)

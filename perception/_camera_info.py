@@ -9,10 +9,10 @@ from typing import Any, Final
 import numpy as np
 import yaml
 
-from ._errors import PerceptionError
 from .arrays import FloatArray
+from .errors import PerceptionError
 
-# Fields of sensor_msgs/CameraInfo (ROS 2 in lower case, ROS 1 in upper) by the calibrator's names.
+# Fields of sensor_msgs/Calibration (ROS 2 in lower case, ROS 1 in upper) by the calibrator's names.
 _MESSAGE_KEYS: Final = {
     "width": "image_width",
     "height": "image_height",
@@ -24,7 +24,7 @@ _MESSAGE_KEYS: Final = {
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CameraInfo:
+class Calibration:
     """What a file says; only its shapes are checked.
 
     Attributes:
@@ -48,7 +48,7 @@ class CameraInfo:
         return self.width_px, self.height_px, fx, fy, cx, cy
 
 
-def read_camera_info(path: str | Path) -> CameraInfo:
+def read_camera_info(path: str | Path) -> Calibration:
     """Read the file that ``camera_calibration`` writes, or a message as ``ros2 topic echo`` does.
 
     Raises:
@@ -66,7 +66,7 @@ def read_camera_info(path: str | Path) -> CameraInfo:
         raise PerceptionError(f"{path} must hold the keys of a ROS camera_info file")
     data = {_MESSAGE_KEYS.get(key, key): value for key, value in data.items()}
     try:
-        return CameraInfo(
+        return Calibration(
             data["image_width"],
             data["image_height"],
             np.reshape(_entries(data["camera_matrix"]), (3, 3)),

@@ -1,8 +1,8 @@
 """Reports a clash of import names, naming the distribution that causes it.
 
 Other distributions install a package called ``perception`` too, and installers let one overwrite
-another's files without a word. Each of our packages imports its ``_clash`` module first; the line
-that does so also tells our own ``__init__.py`` from a foreign one, without running either.
+another's files without a word. Each of our packages runs this file first; the line that does
+so also tells our own ``__init__.py`` from a foreign one, without running either.
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ from importlib.machinery import all_suffixes
 from importlib.util import find_spec
 from pathlib import Path
 
-_PACKAGES = ("perception", "tracking", "nav_adapter", "sim_tests")  # each needs those before it
+# Each needs those before it.
+_PACKAGES = ("perception", "tracking", "nav_adapter", "awarenav", "sim_tests")
 _MARKER = b"_clash"
 _SITE = Path(__file__).parents[1]
 

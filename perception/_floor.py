@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ._errors import PerceptionError
 from .arrays import FloatArray, finite_number, rigid_transform, set_fields, unit_vector
+from .errors import PerceptionError
 
 # A ray flatter than this meets the floor too far away to say where.
 _HORIZON_SINE = 0.02

@@ -7,12 +7,12 @@ from typing import Final
 import numpy as np
 
 from ._camera import Camera
-from ._errors import PerceptionError
 from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
 from ._pose_refinement import rotation_exp, rotation_log
-from ._protocols import HeadPoseEstimator, ImageRgb
-from .arrays import FloatArray
+from ._protocols import HeadPoseEstimator
+from .arrays import FloatArray, ImageRgb
+from .errors import PerceptionError
 
 # What chance exceeds once in a hundred times: χ² of three degrees of freedom for the rotation, of
 # six for the whole pose.

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
-
-import numpy as np
 
 from .arrays import (
     FloatArray,
@@ -15,10 +12,6 @@ from .arrays import (
     rotation_matrix,
     set_fields,
 )
-
-#: (3,) the middle of the head in the paper's head frame: between the ears and a little above them.
-HEAD_CENTRE_HEAD_M: Final[FloatArray] = np.array([-0.045, -0.090, 0.0])
-HEAD_CENTRE_HEAD_M.setflags(write=False)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

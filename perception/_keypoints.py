@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ._errors import PerceptionError
 from .arrays import FloatArray, finite_array, finite_number, set_fields
+from .errors import PerceptionError
 from .layouts import KeypointLayout, keypoint_layout
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ._errors import PerceptionError
 from .arrays import (
     FloatArray,
     covariance_matrix,
@@ -13,6 +12,7 @@ from .arrays import (
     set_fields,
     unit_vector,
 )
+from .errors import PerceptionError
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -5,28 +5,30 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
 from ._attention import AttentionCone
-from ._awareness import AwarenessEstimate, estimate_awareness
 from ._camera import Camera
-from ._errors import PerceptionError
 from ._evidence import judge_face
 from ._floor import FloorPlane
 from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
 from ._metric_scale import DEFAULT_MIN_SCORE
-from ._network_time import NETWORK_TIME
 from ._observation import PersonObservation
 from ._placement import place_people
 from ._pnp import PnpHeadPoseEstimator
-from ._protocols import HeadPoseEstimator, ImageRgb, PersonDetector, PoseEstimator
-from .arrays import finite_array, finite_number
-
-if TYPE_CHECKING:
-    from .networks._session import OnnxSettings
+from ._protocols import HeadPoseEstimator, PersonDetector, PoseEstimator
+from .arrays import ImageRgb, finite_array, finite_number
+from .awareness import AwarenessEstimate, estimate_awareness
+from .errors import PerceptionError
+from .networks import NETWORK_TIME, OnnxSettings
+from .shipped import (
+    shipped_detector,
+    shipped_head_pose_estimator,
+    shipped_pose_estimator,
+)
 
 _CAMERA_CENTRE: Final = np.zeros((1, 3))
 #: Spread of the eyes in the head, sideways and up and down: what the workers of the simulator have.
@@ -118,16 +120,14 @@ class AwarenessPipeline:
         self._eye_std_rad = _eye_std(eye_in_head_std_rad)
         shipped_pose = pose_estimator is None
         if detector is None or pose_estimator is None:
-            from . import shipped  # noqa: PLC0415 - networks load only where they are wanted
-
             if detector is None:
-                detector = shipped.shipped_detector(onnx_settings, camera)
+                detector = shipped_detector(onnx_settings, camera)
             if pose_estimator is None:
-                pose_estimator = shipped.shipped_pose_estimator(onnx_settings)
+                pose_estimator = shipped_pose_estimator(onnx_settings)
         if head_pose_estimator is None:
             head_pose_estimator = PnpHeadPoseEstimator(self._std_px, self._min_score)
             if shipped_pose:
-                head_pose_estimator = shipped.shipped_head_pose_estimator(onnx_settings)
+                head_pose_estimator = shipped_head_pose_estimator(onnx_settings)
         self._detector: PersonDetector = detector
         self._pose_estimator: PoseEstimator = pose_estimator
         self._head_pose_estimator: HeadPoseEstimator = head_pose_estimator

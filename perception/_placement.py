@@ -10,15 +10,15 @@ from typing import Final
 import numpy as np
 
 from . import layouts as kp
-from ._body import BOX_LEAST_TRACE_M2, BodyPlacement, place_bodies, place_boxes
 from ._camera import Camera
 from ._depth_cues import DepthCue, combine_cues
 from ._detection import PersonDetection
 from ._floor import FloorPlane
-from ._head_pose import HEAD_CENTRE_HEAD_M, HeadPose
+from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
-from .anthropometry import STATURE_RELATIVE_STD
+from .anthropometry import HEAD_CENTRE_HEAD_M, STATURE_RELATIVE_STD
 from .arrays import FloatArray
+from .body import BOX_LEAST_TRACE_M2, BodyPlacement, place_bodies, place_boxes
 
 Placement = tuple[FloatArray, FloatArray]
 

@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import layouts as kp
-from ._body import BodyPlacement, place_body
 from ._camera import Camera
-from ._errors import PerceptionError
 from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
 from ._metric_scale import DEFAULT_MIN_SCORE, metric_scale
 from ._pose_refinement import HeadPrior, RefinedPose, refine, rotation_exp, rotation_log, skew
 from .anthropometry import HEAD_KEYPOINTS, HEAD_TEMPLATE_M
 from .arrays import FloatArray, finite_number
+from .body import BodyPlacement, place_body
+from .errors import PerceptionError
 from .head_frame import lifted_head_model
 
 HeadModel = Literal["template", "lifted"]

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from typing import Protocol, runtime_checkable
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ._camera import Camera
 from ._detection import PersonDetection
 from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
-
-ImageRgb = NDArray[np.uint8]
+from .arrays import ImageRgb
 
 
 @runtime_checkable

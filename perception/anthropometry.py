@@ -108,6 +108,10 @@ HEAD_TEMPLATE_M: Final[FloatArray] = _locked(
     ]
 )
 
+#: (3,) the middle of the head in the paper's head frame: between the ears and a little above them.
+HEAD_CENTRE_HEAD_M: Final[FloatArray] = np.array([-0.045, -0.090, 0.0])
+HEAD_CENTRE_HEAD_M.setflags(write=False)
+
 #: Midpoint of the eyes in the head frame: the apex of the attention cone.
 EYES_HEAD_M: Final[FloatArray] = HEAD_TEMPLATE_M[1:3].mean(axis=0)
 

@@ -14,9 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ._errors import PerceptionError
+from .errors import PerceptionError
 
 FloatArray = NDArray[np.float64]
+#: (H, W, 3) uint8, red first.
+ImageRgb = NDArray[np.uint8]
 
 # A rotation read from a file or sent over a wire carries rounding of about this size.
 _ROTATION_TOLERANCE = 1e-4

@@ -10,9 +10,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._errors import PerceptionError
 from .anthropometry import HEAD_TEMPLATE_M
 from .arrays import FloatArray, finite_array
+from .errors import PerceptionError
 
 # Below this sine two directions count as parallel and span no frame.
 _PARALLEL_SINE: Final = 1e-3

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Final
 
-from ._errors import PerceptionError
+from .errors import PerceptionError
 
 COCO_NAMES: Final[tuple[str, ...]] = (
     "nose",

@@ -1,175 +1,54 @@
-"""The networks that come with the package: which they are, and how each is loaded unaltered.
-
-``models/manifest.json`` names every shipped file with its size and sha256. It is written by
-:func:`write_manifest` when ``training/`` exports the networks, together with the facts that each
-network's card states.
-"""
+"""The networks that come with the package, loaded and verified."""
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
-import re
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-from ._errors import PerceptionError
+from ._camera import Camera
+from ._manifest import (
+    DETECTOR,
+    HEAD,
+    POSE,
+    ShippedModel,
+    shipped_model,
+    shipped_model_path,
+    shipped_models,
+    verify_shipped_model,
+    write_manifest,
+)
+from .networks import OnnxModel, OnnxPersonDetector, OnnxPoseEstimator, OnnxSettings
+from .networks.heads import OnnxHeadPoseEstimator
 
-if TYPE_CHECKING:
-    from ._camera import Camera
-    from .networks._detector import OnnxPersonDetector
-    from .networks._head import OnnxHeadPoseEstimator
-    from .networks._pose import OnnxPoseEstimator
-    from .networks._session import OnnxModel, OnnxSettings
-
-DETECTOR: Final = "person_detector"
-POSE: Final = "person_pose"
-HEAD: Final = "head_pose"
+__all__ = [
+    "DETECTOR",
+    "HEAD",
+    "POSE",
+    "ShippedModel",
+    "detector_input_size",
+    "load_shipped",
+    "shipped_detector",
+    "shipped_head_pose_estimator",
+    "shipped_model",
+    "shipped_model_path",
+    "shipped_models",
+    "shipped_pose_estimator",
+    "verify_shipped_model",
+    "write_manifest",
+]
 
 # The picture that the detector was trained on, and the focal length of a 60° camera in it.
 _DETECTOR_WIDTH_PX, _DETECTOR_HEIGHT_PX, _DETECTOR_STRIDE = 320, 256, 32
 _DETECTOR_FOCAL_PX: Final = 160.0 / math.tan(math.radians(30.0))
 _DETECTOR_MAX_ENLARGEMENT: Final = 2.0
 
-_FOLDER: Final = Path(__file__).parent / "models"
-_MANIFEST: Final = "manifest.json"
-_NAME: Final = re.compile(r"[a-z0-9_]+")
-_SHA256: Final = re.compile(r"[0-9a-f]{64}")
-_REMEDY: Final = "put it back: pip install --force-reinstall --no-deps awarenav"
-
-
-@dataclass(frozen=True, slots=True)
-class ShippedModel:
-    """One network of the box.
-
-    Attributes:
-        name: what it is asked for by, as ``"person_detector"``; its file is ``name + ".onnx"`` and
-            its card ``name + ".md"``.
-        sha256: of the file, 64 lower-case hexadecimal digits.
-        size_bytes: of the file.
-        licence: SPDX identifier.
-        input: shape and colour order, in words.
-        summary: what it is for, in a sentence.
-    """
-
-    name: str
-    sha256: str
-    size_bytes: int
-    licence: str
-    input: str
-    summary: str
-
-    def __post_init__(self) -> None:
-        texts = (self.name, self.sha256, self.licence, self.input, self.summary)
-        if not all(isinstance(text, str) and text for text in texts):
-            raise PerceptionError(f"a shipped model needs every text, got {texts}")
-        if not _NAME.fullmatch(self.name):
-            raise PerceptionError(f"name must match {_NAME.pattern}, got {self.name!r}")
-        if not _SHA256.fullmatch(self.sha256):
-            raise PerceptionError(
-                f"sha256 must be 64 lower-case hexadecimal digits, got {self.sha256!r}"
-            )
-        if type(self.size_bytes) is not int or self.size_bytes < 1:
-            raise PerceptionError(f"size_bytes must be at least 1, got {self.size_bytes!r}")
-
-    @property
-    def file(self) -> str:
-        """Name of the file beside the manifest."""
-        return f"{self.name}.onnx"
-
-
-def shipped_models(folder: Path | None = None) -> tuple[ShippedModel, ...]:
-    """Return the networks that the manifest lists; the files are not looked at.
-
-    Args:
-        folder: of the manifest; default the package's own.
-
-    Raises:
-        PerceptionError: for a manifest that is missing or is none.
-    """
-    path = (_FOLDER if folder is None else folder) / _MANIFEST
-    try:
-        entries = json.loads(path.read_text(encoding="utf-8"))["models"]
-        return tuple(ShippedModel(**entry) for entry in entries)
-    except OSError as cause:
-        raise PerceptionError(
-            f"the list of shipped networks {path} cannot be read ({cause.strerror or cause}); "
-            f"{_REMEDY}"
-        ) from cause
-    except (ValueError, KeyError, TypeError) as cause:
-        wanted = ", ".join(field.name for field in fields(ShippedModel))
-        raise PerceptionError(
-            f"{path} must hold a list 'models' of objects with {wanted}: {cause}; {_REMEDY}"
-        ) from cause
-
-
-def shipped_model(name: str, folder: Path | None = None) -> ShippedModel:
-    """Return the manifest's entry of a shipped network.
-
-    Raises:
-        PerceptionError: for a name that the manifest does not list, saying which it does.
-    """
-    known = shipped_models(folder)
-    for model in known:
-        if model.name == name:
-            return model
-    listed = ", ".join(repr(model.name) for model in known) or "none"
-    raise PerceptionError(f"this build ships no network {name!r}; it ships: {listed}")
-
-
-def shipped_model_path(name: str, folder: Path | None = None) -> Path:
-    """Return the path of a shipped network's file, which is there but has not been verified.
-
-    Raises:
-        PerceptionError: for an unknown name, or a file that is missing.
-    """
-    model = shipped_model(name, folder)
-    path = (_FOLDER if folder is None else folder) / model.file
-    if not path.is_file():
-        raise PerceptionError(
-            f"the shipped network {path} is missing (sha256 {model.sha256}, "
-            f"{model.size_bytes} bytes); {_REMEDY}"
-        )
-    return path
-
-
-def verify_shipped_model(name: str, folder: Path | None = None) -> Path:
-    """Return the path of a shipped network whose file has the sha256 of the manifest.
-
-    Raises:
-        PerceptionError: for an unknown name, a missing file, or another content, with both hashes.
-    """
-    model = shipped_model(name, folder)
-    path = shipped_model_path(name, folder)
-    found, size_bytes = _digest(path)
-    if found != model.sha256:
-        raise PerceptionError(
-            f"the shipped network {path} has been altered: its sha256 is {found} "
-            f"({size_bytes} bytes), expected {model.sha256} ({model.size_bytes} bytes); {_REMEDY}"
-        )
-    return path
-
 
 def load_shipped(
     name: str, settings: OnnxSettings | None = None, folder: Path | None = None
 ) -> OnnxModel:
-    """Load a shipped network, its sha256 checked on the very bytes that are loaded.
-
-    Raises:
-        PerceptionError: as :func:`verify_shipped_model`, and when onnxruntime cannot run it as the
-            settings ask.
-    """
-    from .networks._session import OnnxModel  # noqa: PLC0415 - onnxruntime loads when it is needed
-
-    path = shipped_model_path(name, folder)
-    try:
-        return OnnxModel(path, settings=settings, sha256=shipped_model(name, folder).sha256)
-    except PerceptionError:
-        verify_shipped_model(name, folder)  # says what to do where the file is to blame
-        raise
+    """Load a shipped network; see :meth:`OnnxModel.shipped`."""
+    return OnnxModel.shipped(name, settings, folder)
 
 
 def shipped_detector(
@@ -185,8 +64,6 @@ def shipped_detector(
         camera: whose pictures it will see; a wide field gets a larger input.
         score_threshold: people with less confidence are dropped.
     """
-    from .networks._detector import OnnxPersonDetector  # noqa: PLC0415
-
     return OnnxPersonDetector(
         load_shipped(DETECTOR, settings),
         score_threshold=score_threshold,
@@ -213,71 +90,9 @@ def detector_input_size(camera: Camera) -> tuple[int, int]:
 
 def shipped_pose_estimator(settings: OnnxSettings | None = None) -> OnnxPoseEstimator:
     """Return the shipped body pose network; errors as :func:`load_shipped`."""
-    from .networks._pose import OnnxPoseEstimator  # noqa: PLC0415
-
     return OnnxPoseEstimator(load_shipped(POSE, settings))
 
 
 def shipped_head_pose_estimator(settings: OnnxSettings | None = None) -> OnnxHeadPoseEstimator:
     """Return the shipped head pose network; errors as :func:`load_shipped`."""
-    from .networks._head import OnnxHeadPoseEstimator  # noqa: PLC0415
-
     return OnnxHeadPoseEstimator(load_shipped(HEAD, settings))
-
-
-def write_manifest(folder: Path, entries: Sequence[Mapping[str, str]]) -> Path:
-    """Write the manifest of the networks in ``folder``, and its facts into their cards.
-
-    Args:
-        folder: holds ``name.onnx`` of every entry. Where ``name.md`` lies beside it, its lines
-            that begin with ``- sha256:``, ``- size_bytes:``, ``- licence:`` and ``- input:`` are
-            written anew; each must be there once.
-        entries: of each network ``name``, ``licence``, ``input`` and ``summary``; size and sha256
-            are taken from the file.
-
-    Returns:
-        The manifest's path; it and the cards appear whole or not at all, the manifest last.
-
-    Raises:
-        PerceptionError: for a file that is missing, or a card without one of the lines.
-    """
-    models = []
-    cards: dict[Path, str] = {}
-    for entry in entries:
-        path = folder / f"{entry['name']}.onnx"
-        card = path.with_suffix(".md")
-        try:
-            sha256, size_bytes = _digest(path)
-            text = card.read_text(encoding="utf-8") if card.exists() else None
-        except OSError as cause:
-            raise PerceptionError(f"cannot read {cause.filename}: {cause.strerror}") from cause
-        model = ShippedModel(**entry, sha256=sha256, size_bytes=size_bytes)
-        models.append(model)
-        if text is not None:
-            cards[card] = _with_facts(card, text, model)
-    for card, text in cards.items():
-        _write_whole(card, text)
-    manifest = folder / _MANIFEST
-    content = {"models": [asdict(model) for model in models]}
-    _write_whole(manifest, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
-    return manifest
-
-
-def _with_facts(card: Path, text: str, model: ShippedModel) -> str:
-    for fact in ("sha256", "size_bytes", "licence", "input"):
-        line = f"- {fact}: {getattr(model, fact)}".replace("\\", r"\\")  # no group references
-        text, count = re.subn(rf"^- {fact}: .*$", line, text, flags=re.MULTILINE)
-        if count != 1:
-            raise PerceptionError(f"{card} must have one line '- {fact}: …', got {count}")
-    return text
-
-
-def _digest(path: Path) -> tuple[str, int]:
-    content = path.read_bytes()
-    return hashlib.sha256(content).hexdigest(), len(content)
-
-
-def _write_whole(path: Path, text: str) -> None:
-    partial = path.with_name(path.name + ".part")
-    partial.write_text(text, encoding="utf-8")
-    partial.replace(path)

@@ -6,23 +6,27 @@ line can say so where it is missing.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from runpy import run_path
 
-from . import _clash  # noqa: F401 - first: refuses a foreign package of one of our names
+# By path: importing it by name would first run whatever now calls itself perception.
+_CLASH = Path(__file__).parents[1] / "perception" / "_clash.py"
+run_path(str(_CLASH))["require_sole_owner"](__name__)
+
+from typing import TYPE_CHECKING
+
+from awarenav.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from ._crossing import CrossingFrame, CrossingResult, StraightOn, run_crossing
-    from ._errors import SimError
-    from ._keypoint_camera import KeypointNoise
-    from ._scenario import Scenario, shipped_scenarios
-    from ._scenario_template import ScenarioTemplate
-    from ._warehouse import Warehouse
-    from .people._worker import Worker
-    from .pictures._renderer import CameraRenderer
-    from .pictures._simulated_camera import SimulatedCamera
-    from .robot._amr import NOVA_CARTER
-    from .robot._planner import LocalPlanner, SamplingPlanner
+    from .actors.body import Worker
+    from .actors.robot import NOVA_CARTER
+    from .crossing import CrossingFrame, CrossingResult, StraightOn, run_crossing
+    from .crossing.eyes import KeypointNoise
+    from .crossing.planner import LocalPlanner, SamplingPlanner
+    from .scenario import Scenario, ScenarioTemplate, shipped_scenarios
+    from .world import Warehouse
+    from .world.camera import CameraRenderer, SimulatedCamera
+    from .world.errors import SimError
 
 __all__ = [
     "NOVA_CARTER",
@@ -43,27 +47,32 @@ __all__ = [
     "shipped_scenarios",
 ]
 
-_HOMES = {
-    "NOVA_CARTER": "robot._amr",
-    "CameraRenderer": "pictures._renderer",
-    "CrossingFrame": "_crossing",
-    "CrossingResult": "_crossing",
-    "KeypointNoise": "_keypoint_camera",
-    "LocalPlanner": "robot._planner",
-    "SamplingPlanner": "robot._planner",
-    "Scenario": "_scenario",
-    "ScenarioTemplate": "_scenario_template",
-    "SimError": "_errors",
-    "SimulatedCamera": "pictures._simulated_camera",
-    "StraightOn": "_crossing",
-    "Warehouse": "_warehouse",
-    "Worker": "people._worker",
-    "run_crossing": "_crossing",
-    "shipped_scenarios": "_scenario",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f".{_HOMES[name]}", __name__), name)
+__getattr__ = lazy_names(
+    __name__,
+    {
+        ".crossing": (
+            "CrossingFrame",
+            "CrossingResult",
+            "StraightOn",
+            "run_crossing",
+        ),
+        ".world.errors": ("SimError",),
+        ".crossing.eyes": ("KeypointNoise",),
+        ".scenario": (
+            "Scenario",
+            "ScenarioTemplate",
+            "shipped_scenarios",
+        ),
+        ".world": ("Warehouse",),
+        ".actors.body": ("Worker",),
+        ".world.camera": (
+            "CameraRenderer",
+            "SimulatedCamera",
+        ),
+        ".actors.robot": ("NOVA_CARTER",),
+        ".crossing.planner": (
+            "LocalPlanner",
+            "SamplingPlanner",
+        ),
+    },
+)

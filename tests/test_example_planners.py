@@ -6,11 +6,10 @@ import importlib
 import subprocess
 import sys
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
+from paths import ROOT
 
-ROOT = Path(__file__).parents[1]
 PLANNERS = {
     "ir-sim": ("irsim", "velocity_obstacles", "VelocityObstaclePlanner"),
     "do-mpc": ("do_mpc", "model_predictive", "ModelPredictivePlanner"),

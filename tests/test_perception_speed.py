@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import importlib.util
 import sys
-from pathlib import Path
 
 import pytest
+from paths import ROOT
 
-from sim_tests._bench import Metric
+from awarenav.baseline import Metric
 
-SCRIPT = Path(__file__).parents[1] / "benchmarks" / "perception_speed.py"
+SCRIPT = ROOT / "benchmarks" / "perception_speed.py"
 
 
 @pytest.fixture(scope="module")

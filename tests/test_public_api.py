@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import importlib
 import inspect
-from pathlib import Path
 
 import pytest
+from paths import ROOT
 
-ROOT = Path(__file__).parents[1]
 MAX_LINES = 400
 MAX_NAMES = 17
 

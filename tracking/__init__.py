@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from . import _clash  # noqa: F401 - first: refuses a foreign package of one of our names
-from ._camera_view import CameraView
+from pathlib import Path
+from runpy import run_path
+
+# By path: importing it by name would first run whatever now calls itself perception.
+_CLASH = Path(__file__).parents[1] / "perception" / "_clash.py"
+run_path(str(_CLASH))["require_sole_owner"](__name__)
+
 from ._config import AwarenessFilterConfig, TrackerConfig
 from ._errors import TrackingError
-from ._surround_view import SurroundView
 from ._track import PersonTrack, TrackStatus
 from ._tracker import PersonTracker
-from ._view import View
+from ._views import CameraView, SurroundView, View
 
 __all__ = [
     "AwarenessFilterConfig",

@@ -6,9 +6,9 @@ import numpy as np
 
 from perception.arrays import FloatArray
 
-from ._awareness_filter import AwarenessBelief, drift, forget, measure
 from ._config import AwarenessFilterConfig
 from ._table import BoolArray, TrackTable
+from .awareness_filter import AwarenessBelief, drift, forget, measure
 
 
 def belief_of(tracks: TrackTable) -> AwarenessBelief:

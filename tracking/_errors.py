@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from perception.errors import AwarenavError
 
-class TrackingError(ValueError):
+
+class TrackingError(AwarenavError):
     """Input that the tracker cannot use; the message says what was given and what is valid."""

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 from ._errors import TrackingError
-from ._frame import Frame
+from ._measurement import Frame
 from ._step import TrackerState
 
 # Memory has a bound at any frame rate, and so has the work that one late frame can cause.

@@ -1,4 +1,7 @@
-"""What a frame says in the odom frame: places on the floor plane, their noise, evidence."""
+"""What a frame says in the odom frame: places on the floor plane, their noise, evidence.
+
+One frame as the tracker remembers it: checked, and in the odom frame.
+"""
 
 from __future__ import annotations
 
@@ -11,9 +14,9 @@ import numpy as np
 from perception import PersonObservation
 from perception.arrays import FloatArray
 
-from ._awareness_filter import evidence
 from ._config import TrackerConfig
 from ._errors import TrackingError
+from .awareness_filter import evidence
 
 # Beyond these a number may be finite but is no place a robot drives, and its square may overflow.
 _MAX_POSITION_M: Final = 1e7
@@ -158,3 +161,18 @@ def floor_covariances(covariances_m2: FloatArray, floor_m: float) -> FloatArray:
         floored[below, 1, 1] = floor + scale * (yy - low)[below]
         floored[below, 0, 1] = floored[below, 1, 0] = scale * xy[below]
     return floored
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """What the camera saw at one instant, and from where.
+
+    Attributes:
+        stamp_s: time of the frame.
+        T_odom_camera: (4, 4) where the camera was.
+        measurements: of the people it shows.
+    """
+
+    stamp_s: float
+    T_odom_camera: FloatArray
+    measurements: Measurements

@@ -13,8 +13,7 @@ from perception.arrays import FloatArray, covariance_matrix, rigid_transform
 
 from ._config import TrackerConfig
 from ._errors import TrackingError
-from ._frame import Frame
-from ._measurement import Measurements
+from ._measurement import Frame, Measurements
 from ._step import TrackerState
 from ._table import TrackTable
 from .config import StrictConfig

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from ._attention import belief_of
-from ._awareness_filter import drift, estimate
 from ._config import TrackerConfig
-from ._life import lost
 from ._step import TrackerState, moved
 from ._table import BoolArray, TrackTable
 from ._track import PersonTrack, TrackStatus, trusted_track
+from ._track_management import lost
+from .awareness_filter import drift, estimate
 
 
 def snapshots(

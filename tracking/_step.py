@@ -10,14 +10,14 @@ from scipy.stats import chi2
 
 from ._association import Gates, associate
 from ._attention import attend
-from ._awareness_filter import prior
 from ._config import TrackerConfig
-from ._frame import Frame
 from ._kalman import correct
-from ._life import after_hits, damped_time_s, gone, lost, missed_time_s
+from ._measurement import Frame
 from ._motion import carry
 from ._table import BoolArray, IndexArray, TrackTable
-from ._view import View
+from ._track_management import after_hits, damped_time_s, gone, lost, missed_time_s
+from ._views import View
+from .awareness_filter import prior
 
 
 @dataclass(frozen=True, slots=True, eq=False)

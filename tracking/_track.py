@@ -5,13 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import Any, Final, Literal, cast, get_args
 
-from perception.arrays import (
-    FloatArray,
-    covariance_matrix,
-    finite_array,
-    finite_number,
-    set_fields,
-)
+from perception.arrays import FloatArray, covariance_matrix, finite_array, finite_number, set_fields
 
 from ._errors import TrackingError
 

@@ -12,15 +12,14 @@ from perception.arrays import covariance_matrix, finite_number, rigid_transform
 
 from ._config import TrackerConfig
 from ._errors import TrackingError
-from ._frame import Frame
 from ._history import History
-from ._measurement import measurements_of
+from ._measurement import Frame, measurements_of
 from ._saved_state import frame_of, record_of, state_of, to_plain
 from ._snapshot import snapshots
 from ._step import TrackerState, advance, gates_of
 from ._table import TrackTable
 from ._track import PersonTrack
-from ._view import View
+from ._views import View
 
 
 class PersonTracker:

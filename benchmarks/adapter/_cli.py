@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from tqdm import tqdm
 
-from sim_tests import SimError
-from sim_tests._arguments import count
-from sim_tests._bench import Metric, read_baseline, write_baseline
+from awarenav.baseline import Metric
 
+from .._harness import count, finish, make_parser, parse
 from ._cost import CYCLE, cost_ms
 
 BASELINE = Path(__file__).with_name("baseline.json")
@@ -25,33 +23,19 @@ PEOPLE = (20, 100, 500)
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the benchmark; 0 when all is as it should be, 1 when a figure is not, 2 for bad input."""
-    parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.adapter",
-        description="Measure the processor time of a control cycle with 20, 100 and 500 people on "
+    parser = make_parser(
+        "benchmarks.adapter",
+        "Measure the processor time of a control cycle with 20, 100 and 500 people on "
         "a map of 200 × 200 cells of 5 cm: NavAdapter.update, circles and the costmap; beside it "
         "the painter that also clears, and the same costmap painted naively with shapely.",
+        BASELINE,
     )
     parser.add_argument("--frames", type=count, default=60, metavar="N", help="default: 60")
     parser.add_argument("--repeats", type=count, default=5, metavar="N", help="default: 5")
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="default: 0")
-    parser.add_argument(
-        "--baseline",
-        type=Path,
-        default=BASELINE,
-        metavar="FILE",
-        help=f"figures to compare with, if it exists (default: {BASELINE.name} beside this file)",
-    )
-    parser.add_argument("--out", type=Path, metavar="FILE", help="write the figures as JSON")
-    options = parser.parse_args(arguments)
+    options, baseline = parse(parser, arguments)
     if options.seed < 0:
         parser.error(f"--seed must be 0 or more, got {options.seed}")
-    if options.out is not None and not options.out.parent.is_dir():
-        parser.error(f"--out must be a file in a folder that exists, got {options.out}")
-    try:
-        baseline = read_baseline(options.baseline) if options.baseline.exists() else {}
-    except SimError as error:
-        print(f"{parser.prog}: {error}", file=sys.stderr)
-        return 2
 
     costs: dict[int, dict[str, float]] = {}
     for people in tqdm(PEOPLE, unit="crowd", leave=False, file=sys.stderr):
@@ -71,17 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     metrics = _metrics(costs)
     for metric in metrics:
         print(f"{metric.name:44s}{metric.value:9.3f} {metric.unit}")
-    missed = [
-        f"{metric.name}: {metric.value:.3g} {metric.unit}, {baseline[metric.name].value:.3g} before"
-        for metric in metrics
-        if metric.name in baseline and metric.is_worse_than(baseline[metric.name])
-    ]
-    missed += _missed(costs, metrics)
-    for line in missed:
-        print(f"NOT AS WANTED  {line}")
-    if options.out is not None:
-        write_baseline(options.out, metrics)
-    return 1 if missed else 0
+    return finish(metrics, _missed(costs, metrics), baseline, options.out)
 
 
 def _metrics(costs: dict[int, dict[str, float]]) -> list[Metric]:

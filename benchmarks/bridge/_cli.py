@@ -8,11 +8,11 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from nav_adapter import NavError
-from sim_tests import SimError
-from sim_tests._arguments import count
-from sim_tests._bench import Metric, read_baseline, write_baseline
-from sim_tests._cli import main as awarenav
+from awarenav.baseline import Metric
+from awarenav.cli import main as awarenav
+from awarenav.errors import AwarenavError
+
+from .._harness import count, finish, make_parser, parse
 
 BASELINE = Path(__file__).with_name("baseline.json")
 #: Pictures a second on two cores.
@@ -21,12 +21,13 @@ WANTED_HZ = 15.0
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the benchmark; 0 when all is as it should be, 1 when a figure is not, 2 for bad input."""
-    parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.bridge",
-        description="Send one rendered picture of 640 × 480 again and again over DDS on loopback "
+    parser = make_parser(
+        "benchmarks.bridge",
+        "Send one rendered picture of 640 × 480 again and again over DDS on loopback "
         "to `awarenav bridge` with the networks in the box, with odometry at 50 Hz and a listener "
         "on every topic, and count what comes back. Bridge, sender and listener share the cores. "
         "Anything else that runs on them slows it: use a computer that does nothing else.",
+        BASELINE,
     )
     parser.add_argument("--seconds", type=count, default=20, metavar="S", help="default: 20")
     parser.add_argument(
@@ -43,37 +44,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         metavar="DIR",
         help="an `awarenav render` folder instead of a new one",
     )
-    parser.add_argument(
-        "--baseline",
-        type=Path,
-        default=BASELINE,
-        metavar="FILE",
-        help=f"figures to compare with, if it exists (default: {BASELINE.name} beside this file)",
-    )
-    parser.add_argument("--out", type=Path, metavar="FILE", help="write the figures as JSON")
-    options = parser.parse_args(arguments)
-    if options.out is not None and not options.out.parent.is_dir():
-        parser.error(f"--out must be a file in a folder that exists, got {options.out}")
+    options, baseline = parse(parser, arguments)
     try:
-        baseline = read_baseline(options.baseline) if options.baseline.exists() else {}
         metrics = _metrics(options)
-    except (SimError, NavError) as error:
+    except AwarenavError as error:
         print(f"{parser.prog}: {error}", file=sys.stderr)
         return 2
     for metric in metrics:
         print(f"{metric.name:24s}{metric.value:9.2f} {metric.unit}")
-    missed = [
-        f"{metric.name}: {metric.value:.3g} {metric.unit}, {baseline[metric.name].value:.3g} before"
-        for metric in metrics
-        if metric.name in baseline and metric.is_worse_than(baseline[metric.name])
-    ]
+    missed = []
     if metrics[0].value < min(WANTED_HZ, options.rate):
         missed.append(f"{metrics[0].value:.1f} pictures a second, {WANTED_HZ:g} wanted")
-    for line in missed:
-        print(f"NOT AS WANTED  {line}")
-    if options.out is not None:
-        write_baseline(options.out, metrics)
-    return 1 if missed else 0
+    return finish(metrics, missed, baseline, options.out)
 
 
 def _metrics(options: argparse.Namespace) -> list[Metric]:
@@ -99,4 +81,4 @@ def _render(folder: Path, people: int) -> None:
     size = ["--frames", "1", "--scenes", "1", "--people", str(people), "--range", "2", "4"]
     status = awarenav(["render", *size, "--seed", "3", "--processes", "1", "--out", str(folder)])
     if status != 0:
-        raise SimError(f"awarenav render has ended with status {status}")
+        raise AwarenavError(f"awarenav render has ended with status {status}")

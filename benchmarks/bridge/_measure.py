@@ -33,7 +33,7 @@ _SLOW_S = 0.4
 
 
 @dataclass(frozen=True, slots=True)
-class Figures:
+class BridgeFigures:
     """What was measured.
 
     Attributes:
@@ -49,7 +49,9 @@ class Figures:
     people: int
 
 
-def measure(folder: Path, seconds: float, rate_hz: float, cores: int, compressed: bool) -> Figures:
+def measure(
+    folder: Path, seconds: float, rate_hz: float, cores: int, compressed: bool
+) -> BridgeFigures:
     """Send a picture again and again to a bridge that shares ``cores`` cores with the sender.
 
     Raises:
@@ -74,7 +76,7 @@ def measure(folder: Path, seconds: float, rate_hz: float, cores: int, compressed
                 frames += len(robot.listen(due_s))
             took_s = time.monotonic() - began_s
             cpu_s = _cpu_s(process.pid) - cpu_before_s
-            return Figures(
+            return BridgeFigures(
                 frames / took_s, 1e3 * _latency_s(robot), 1e3 * cpu_s / max(frames, 1), people
             )
     finally:
@@ -90,7 +92,7 @@ def _bridge(folder: Path, domain: int, compressed: bool) -> Iterator[subprocess.
     arguments = ["--robot", str(file), "--domain", str(domain), "--rate", "1"]
     if compressed:
         arguments += ["--compressed", "--image", "camera/image_raw/compressed"]
-    command = [sys.executable, "-m", "sim_tests._cli", "bridge", *arguments]
+    command = [sys.executable, "-m", "awarenav", "bridge", *arguments]
     with (folder / "bridge.log").open("w") as log:
         process = subprocess.Popen(command, stderr=log, text=True)
         try:

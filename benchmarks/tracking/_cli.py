@@ -11,11 +11,10 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from sim_tests import SimError
-from sim_tests._arguments import count
-from sim_tests._bench import Metric, read_baseline, write_baseline
+from awarenav.baseline import Metric
 from tracking import TrackerConfig, TrackingError
 
+from .._harness import count, finish, make_parser, parse
 from ._consistency import on_own_model, on_walkers, open_gates
 from ._contender import Contender, run
 from ._cost import cost_ms
@@ -27,7 +26,6 @@ from ._figures import (
     missed_scores,
     score_line,
     score_metrics,
-    worse_than,
 )
 from ._judges import Scores, judge
 from ._measurements import OCCLUDED, OPEN, record
@@ -50,19 +48,18 @@ _NEEDS = {"norfair": "norfair", "stonesoup-gnn": "stonesoup", "stonesoup-jpda": 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the benchmark; 0 when all is as it should be, 1 when a figure is not, 2 for bad input."""
     parser = _parser()
-    options = parser.parse_args(arguments)
+    options, baseline = parse(parser, arguments)
     try:
         config = (
             TrackerConfig() if options.config is None else TrackerConfig.from_yaml(options.config)
         )
-        baseline = read_baseline(options.baseline) if options.baseline.exists() else {}
         missing = [m for m in ("motmetrics", "trackeval") if find_spec(m) is None]
         if "scores" in options.parts and missing:
             parser.error(
                 f"{' and '.join(missing)} not found; see benchmarks/tracking/requirements.txt "
                 "or leave out the scores (--parts cost,consistency)"
             )
-    except (SimError, TrackingError) as error:
+    except TrackingError as error:
         print(f"{parser.prog}: {error}", file=sys.stderr)
         return 2
     makers = _makers(options.trackers, config)
@@ -74,20 +71,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _cost(options, makers, metrics, missed)
     if "consistency" in options.parts:
         _consistency(options, config, metrics, missed)
-    if _is_standard(options):
-        missed += worse_than(baseline, metrics)
-    for line in missed:
-        print(f"NOT AS WANTED  {line}")
-    if options.out is not None:
-        write_baseline(options.out, metrics)
-    return 1 if missed else 0
+    return finish(metrics, missed, baseline if _is_standard(options) else {}, options.out)
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.tracking",
-        description="Run several trackers on the same simulated walkers, judge them with "
+    parser = make_parser(
+        "benchmarks.tracking",
+        "Run several trackers on the same simulated walkers, judge them with "
         "motmetrics and TrackEval, compare their processor time, and check the covariance of ours.",
+        BASELINE,
     )
     parser.add_argument(
         "--people",
@@ -148,14 +140,6 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--config", type=Path, metavar="FILE", help="YAML of TrackerConfig for ours"
     )
-    parser.add_argument(
-        "--baseline",
-        type=Path,
-        default=BASELINE,
-        metavar="FILE",
-        help=f"figures to compare with, if it exists (default: {BASELINE.name} beside this file)",
-    )
-    parser.add_argument("--out", type=Path, metavar="FILE", help="write the figures as JSON")
     return parser
 
 

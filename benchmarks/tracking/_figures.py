@@ -7,7 +7,7 @@ from dataclasses import asdict
 
 import numpy as np
 
-from sim_tests._bench import Metric
+from awarenav.baseline import Metric
 
 from ._judges import Scores
 
@@ -93,12 +93,3 @@ def missed_costs(people: int, cost_ms: Mapping[str, float]) -> list[str]:
                     f"cost at {people} people: {ratio:.2f} of {peer}'s, at most {most:g} wanted"
                 )
     return missed
-
-
-def worse_than(baseline: Mapping[str, Metric], metrics: Sequence[Metric]) -> list[str]:
-    """Return what is worse than the baseline allows."""
-    return [
-        f"{metric.name}: {metric.value:.3g} {metric.unit}, was {baseline[metric.name].value:.3g}"
-        for metric in metrics
-        if metric.name in baseline and metric.is_worse_than(baseline[metric.name])
-    ]

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from perception import AttentionCone, HeadPose, PersonObservation
-from perception._awareness import estimate_awareness
+from perception.awareness import estimate_awareness
 from tracking import PersonTracker, TrackerConfig
 
 from ._attention import (

@@ -12,10 +12,10 @@ from typing import Final
 import numpy as np
 from tqdm import tqdm
 
-from sim_tests import SimError
-from sim_tests._bench import Direction, Metric, read_baseline, write_baseline
+from awarenav.baseline import Direction, Metric
 from tracking import AwarenessFilterConfig, TrackerConfig
 
+from .._harness import finish, make_parser, parse
 from ._attention import Attention, FloatArray, simulate
 from ._camera import Measured, look, track
 from ._filters import Filter, Jumps, LogitGaussian, Smoothed, held
@@ -158,27 +158,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
                         options.plot, test.attention, test.measured, awareness, lower, threshold,
                         options.person,
                     )  # fmt: skip
-    faults += [
-        f"{metric.name} = {metric.value:.4g} is worse than the baseline's "
-        f"{baseline[metric.name].value:.4g}"
-        for metric in found
-        if metric.name in baseline and metric.is_worse_than(baseline[metric.name])
-    ]
-    for fault in faults:
-        print(fault)
-    if options.out is not None:
-        write_baseline(options.out, found)
-    return 1 if faults else 0
+    return finish(found, faults, baseline, options.out)
 
 
 def _parse(arguments: Sequence[str] | None) -> tuple[argparse.Namespace, dict[str, Metric]]:
     """Read the command line and the baseline that it names."""
-    parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.tracking_awareness",
-        description="Judge awareness over time on simulated attention: people walk about in front "
+    parser = make_parser(
+        "benchmarks.tracking_awareness",
+        "Judge awareness over time on simulated attention: people walk about in front "
         "of a robot and glance at it, a camera measures α ± σ with errors that last, misses them, "
         "loses their faces. The threshold on the lower bound is set on the training seed for 1 % "
         "false awareness and judged on the test seed.",
+        BASELINE,
     )
     parser.add_argument("--people", type=int, default=40, metavar="N", help="default: 40")
     parser.add_argument(
@@ -189,28 +180,15 @@ def _parse(arguments: Sequence[str] | None) -> tuple[argparse.Namespace, dict[st
     parser.add_argument("--only-ours", action="store_true", help="leave the other filters out")
     parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw one person at 20 Hz")
     parser.add_argument("--person", type=int, default=0, metavar="N", help="whom to draw")
-    parser.add_argument("--out", type=Path, metavar="FILE", help="write the figures as a baseline")
-    parser.add_argument(
-        "--baseline",
-        type=Path,
-        default=BASELINE,
-        metavar="FILE",
-        help="figures to compare with, of the same seeds and sizes",
-    )
-    options = parser.parse_args(arguments)
+    options, baseline = parse(parser, arguments)
     if options.people < 1 or not 5.0 <= options.duration <= 3600.0:
         parser.error("--people must be at least 1 and --duration 5 to 3600 s")
     if not 0 <= options.person < options.people:
         parser.error(f"--person must be 0 to {options.people - 1}, got {options.person}")
     if options.train_seed < 0 or options.test_seed < 0 or options.train_seed == options.test_seed:
         parser.error("--train-seed and --test-seed must be two different numbers of 0 or more")
-    for name, path in (("--plot", options.plot), ("--out", options.out)):
-        if path is not None and not path.absolute().parent.is_dir():
-            parser.error(f"{name}: there is no folder {path.parent}")
+    if options.plot is not None and not options.plot.absolute().parent.is_dir():
+        parser.error(f"--plot: there is no folder {options.plot.parent}")
     if options.plot is not None and options.plot.suffix != ".png":
         parser.error(f"--plot must name a .png file, got {options.plot}")
-    try:
-        baseline = read_baseline(options.baseline) if options.baseline.exists() else {}
-    except SimError as error:
-        parser.error(str(error))
     return options, baseline

@@ -16,7 +16,7 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from tracking import AwarenessFilterConfig
-from tracking import _awareness_filter as gaussian
+from tracking import awareness_filter as gaussian
 
 from ._attention import BoolArray, FloatArray
 from ._camera import Measured

@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-from ._alert_rules import AlertRules
-from ._distance_zones import DistanceZones
 from ._human_speed import InterpolatedHumanSpeed, SpeedPolicy
-from ._inflation import InflationPolicy, InterpolatedInflation
-from ._margins import SafetyMargins
-from ._near_cap import NearCap
-from ._outline import ObstacleOutline
-from ._speed_rules import SpeedRules
-from ._table_human_speed import TableHumanSpeed
-from ._table_inflation import TableInflation
-from ._timing import TimeBehaviour
+from ._inflation import InflationPolicy, InterpolatedInflation, ObstacleOutline
+from ._margins import AlertRules, SafetyMargins, TimeBehaviour
+from ._speed_rules import DistanceZones, NearCap, SpeedRules
+from ._tables import TableHumanSpeed, TableInflation
 
 __all__ = [
     "AlertRules",

@@ -1,4 +1,9 @@
-"""The distances that no awareness can take away."""
+"""The distances that no awareness can take away.
+
+How fast confidence may be won, and how long data may be trusted.
+
+When to warn somebody.
+"""
 
 from __future__ import annotations
 
@@ -56,3 +61,66 @@ class SafetyMargins(StrictConfig):
         """The radius between floor and ceiling."""
         bounded = max(radius_m, self.floor_m)
         return bounded if self.maximum_radius_m is None else min(bounded, self.maximum_radius_m)
+
+
+class TimeBehaviour(StrictConfig):
+    """Time behaviour of the adapter. Growth needs no setting: it is instant.
+
+    Attributes:
+        shrink_rate_mps: how fast an obstacle may shrink while its person is being seen.
+        shrink_after_s: an obstacle shrinks only to what awareness has allowed for this long; time
+            in which frames show the person counts, other time does not.
+        fresh_within_s: a person unseen for longer counts as unaware. Must exceed the camera's
+            period plus the delay of perception.
+        hold_s: a confirmed person who disappears from the input is kept, unaware and moving on,
+            until this long after they were last seen.
+        stale_after_s: when perception or the robot's state is older, everyone counts as unaware.
+        stop_after_s: when it is older than this, the speed limit is 0.
+    """
+
+    error: ClassVar[type[ValueError]] = NavError
+
+    shrink_rate_mps: float = Field(default=0.5, gt=0.0, le=5.0)
+    shrink_after_s: float = Field(default=0.2, ge=0.0, le=5.0)
+    fresh_within_s: float = Field(default=0.25, gt=0.0, le=1.0)
+    hold_s: float = Field(default=1.0, ge=0.0, le=10.0)
+    stale_after_s: float = Field(default=0.5, gt=0.0, le=5.0)
+    stop_after_s: float = Field(default=1.5, gt=0.0, le=10.0)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> TimeBehaviour:
+        if not self.fresh_within_s <= self.stale_after_s <= self.stop_after_s:
+            raise ValueError(
+                "fresh_within_s <= stale_after_s <= stop_after_s must hold, got "
+                f"{self.fresh_within_s:g} s, {self.stale_after_s:g} s, {self.stop_after_s:g} s"
+            )
+        return self
+
+
+class AlertRules(StrictConfig):
+    """Who is warned, how, and how often at most.
+
+    Warned are people whose lower bound of α is under ``unaware_below``, on a course that passes the
+    moving robot within ``miss_within_m``. Of the alerts whose time is reached the loudest is asked
+    for: horn before voice before light.
+
+    Attributes:
+        unaware_below: α under which a person is worth a warning.
+        miss_within_m: gap between robot and body at the closest approach, at constant velocities,
+            that makes a course conflicting.
+        light_within_s: time to the closest approach from which light is asked for; 0 is never.
+        voice_within_s: the same for a spoken warning.
+        horn_within_s: the same for the horn.
+        repeat_after_s: the same person gets the same alert again no sooner.
+        quiet_s: two sounds, to whomever, lie at least so far apart.
+    """
+
+    error: ClassVar[type[ValueError]] = NavError
+
+    unaware_below: float = Field(default=0.3, ge=0.0, le=1.0)
+    miss_within_m: float = Field(default=0.5, ge=0.0, le=5.0)
+    light_within_s: float = Field(default=5.0, ge=0.0, le=30.0)
+    voice_within_s: float = Field(default=3.5, ge=0.0, le=30.0)
+    horn_within_s: float = Field(default=2.0, ge=0.0, le=30.0)
+    repeat_after_s: float = Field(default=3.0, ge=0.0, le=60.0)
+    quiet_s: float = Field(default=1.0, ge=0.0, le=60.0)

@@ -8,13 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from perception import (
-    AwarenessPipeline,
-    Camera,
-    FloorPlane,
-    PerceptionError,
-    PersonObservation,
-)
+from perception import AwarenessPipeline, Camera, FloorPlane, PerceptionError, PersonObservation
 from perception.arrays import FloatArray
 from tracking import CameraView, PersonTrack, PersonTracker, TrackerConfig, TrackingError
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 from .._errors import NavError
-from ._cdr import decode, encode, sample, topic_type  # first: says what to install
+from ._cdr import decode, encode, sample, topic_type
 from ._topics import Topic
 from .messages import Message
 

@@ -14,12 +14,7 @@ from .._constraints import NavConstraints
 from .._robot import RobotProfile, RobotState
 from ._speed_limit import SLOWEST_MPS
 from ._stamps import header
-from .messages.geometry_msgs import (
-    Point32,
-    PolygonInstance,
-    PolygonInstanceStamped,
-    PolygonStamped,
-)
+from .messages.geometry_msgs import Point32, PolygonInstance, PolygonInstanceStamped, PolygonStamped
 from .messages.geometry_msgs import Polygon as PolygonMessage
 
 #: Id of the polygon that stops the robot; tracks have ids from 0.

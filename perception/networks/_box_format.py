@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from .._errors import PerceptionError
+from ..errors import PerceptionError
 
 CORNERS: Final = "xyxy"
 CENTRE: Final = "cxcywh"

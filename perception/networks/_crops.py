@@ -8,8 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .._protocols import ImageRgb
-from ..arrays import FloatArray
+from ..arrays import FloatArray, ImageRgb
 
 #: How much larger than the box the crop is, in RTMPose's configs and ours.
 BOX_PADDING: Final = 1.25

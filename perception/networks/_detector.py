@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._detection import PersonDetection
-from .._errors import PerceptionError
-from .._protocols import ImageRgb
-from ..arrays import finite_number
+from ..arrays import ImageRgb, finite_number
+from ..errors import PerceptionError
 from ._detector_decoders import Floats
 from ._detector_layouts import DetectorLayout, Trial, metadata_size, recognise
 from ._image import rgb_image

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from .._errors import PerceptionError
+from ..errors import PerceptionError
 from ._box_format import BoxFormatVote
 from ._detector_decoders import (
     STRIDES,

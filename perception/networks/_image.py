@@ -7,8 +7,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from .._errors import PerceptionError
-from .._protocols import ImageRgb
+from ..arrays import ImageRgb
+from ..errors import PerceptionError
 
 # OpenCV addresses the pixels of a warped picture with 16-bit integers.
 _MAX_SIDE_PX: Final = 32766

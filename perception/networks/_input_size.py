@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .._errors import PerceptionError
+from ..errors import PerceptionError
 from ._session import OnnxModel
 
 

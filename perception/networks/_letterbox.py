@@ -9,8 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .._protocols import ImageRgb
-from ..arrays import FloatArray
+from ..arrays import FloatArray, ImageRgb
 from ._pixels import PixelFormat
 
 _GREY: Final = 114

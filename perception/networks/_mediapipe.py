@@ -21,10 +21,9 @@ import numpy as np
 
 from .. import layouts as kp
 from .._detection import PersonDetection
-from .._errors import PerceptionError
 from .._keypoints import PersonKeypoints
-from .._protocols import ImageRgb
-from ..arrays import FloatArray, finite_number
+from ..arrays import FloatArray, ImageRgb, finite_number
+from ..errors import PerceptionError
 from ._image import rgb_image
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .._errors import PerceptionError
+from ..errors import PerceptionError
 from ._session import OnnxTensor
 
 _INPUT_DTYPES: Final = ("float32", "float16", "uint8")

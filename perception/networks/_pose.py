@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._detection import PersonDetection
-from .._errors import PerceptionError
 from .._keypoints import PersonKeypoints
-from .._protocols import ImageRgb
-from ..arrays import FloatArray, finite_number
+from ..arrays import FloatArray, ImageRgb, finite_number
+from ..errors import PerceptionError
 from ..layouts import keypoint_layout
 from ._crops import BOX_PADDING, PersonCrops
 from ._image import rgb_image

@@ -8,8 +8,8 @@ from typing import Any, Final
 
 from numpy.typing import NDArray
 
-from .._errors import PerceptionError
 from ..arrays import finite_number
+from ..errors import PerceptionError
 from ._session import OnnxModel
 from ._simcc import Z_RANGE_M
 

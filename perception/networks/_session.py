@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,9 +14,26 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from .._errors import PerceptionError
-from .._network_time import NETWORK_TIME
+from .._manifest import shipped_model, shipped_model_path, verify_shipped_model
+from ..errors import PerceptionError
 from ._onnxruntime import ort
+
+
+class NetworkTime(threading.local):
+    """Time that the calling thread has spent in networks since it began, each thread its own.
+
+    Attributes:
+        elapsed_s: by the clock.
+        processor_s: of the processor, in that thread; a network's other threads do not count.
+    """
+
+    elapsed_s: float = 0.0
+    processor_s: float = 0.0
+
+
+#: Every :class:`~perception.networks.OnnxModel` adds to it.
+NETWORK_TIME = NetworkTime()
+
 
 _PROVIDERS: Final[dict[str, str]] = {
     "cpu": "CPUExecutionProvider",
@@ -124,6 +142,28 @@ class OnnxModel:
         self.outputs = tuple(_tensor(entry) for entry in self._session.get_outputs())
         self.metadata: dict[str, str] = dict(self._session.get_modelmeta().custom_metadata_map)
         self._names = [tensor.name for tensor in self.outputs]
+
+    @classmethod
+    def shipped(
+        cls, name: str, settings: OnnxSettings | None = None, folder: Path | None = None
+    ) -> OnnxModel:
+        """Load a shipped network, its sha256 checked on the very bytes that are loaded.
+
+        Args:
+            name: of the manifest, as ``"person_detector"``.
+            settings: providers and threads.
+            folder: of the manifest; default the package's own.
+
+        Raises:
+            PerceptionError: for an unknown name, a missing or altered file, and when onnxruntime
+                cannot run it as the settings ask.
+        """
+        path = shipped_model_path(name, folder)
+        try:
+            return cls(path, settings=settings, sha256=shipped_model(name, folder).sha256)
+        except PerceptionError:
+            verify_shipped_model(name, folder)  # says what to do where the file is to blame
+            raise
 
     def __repr__(self) -> str:
         return f"OnnxModel({self.name}: {self.layout})"

@@ -10,8 +10,8 @@ from typing import Any, Final, Protocol
 import numpy as np
 
 from .._camera_info import read_camera_info
-from .._errors import PerceptionError
 from ..arrays import FloatArray, finite_array, finite_number, pixel_count, set_fields
+from ..errors import PerceptionError
 
 _DEFAULT_MAX_ANGLE_RAD: Final = math.radians(100.0)
 _KANNALA_BRANDT: Final = ("equidistant", "fisheye")

@@ -9,8 +9,8 @@ from typing import Final
 
 import numpy as np
 
-from .._errors import PerceptionError
 from .._observation import PersonObservation
+from ..errors import PerceptionError
 from ._views import FlatView
 
 # Two sightings are of one person up to here: χ² of two degrees of freedom, exceeded once in a

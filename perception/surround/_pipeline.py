@@ -9,11 +9,11 @@ import cv2
 import numpy as np
 
 from .._camera import Camera
-from .._errors import PerceptionError
 from .._floor import FloorPlane
 from .._observation import PersonObservation
 from .._pipeline import AwarenessPipeline
-from .._protocols import ImageRgb
+from ..arrays import ImageRgb
+from ..errors import PerceptionError
 from ._lenses import PanoramaLens, WideLens
 from ._merging import SeenInView, merge_views
 from ._views import FlatView

@@ -10,9 +10,9 @@ from typing import Any, Final
 import numpy as np
 
 from .._camera import Camera
-from .._errors import PerceptionError
 from .._observation import PersonObservation
 from ..arrays import FloatArray, finite_array, rotation_matrix, set_fields
+from ..errors import PerceptionError
 from ._lenses import WideLens
 
 # Points a side of a box that is carried from a view to the picture.

@@ -1,1 +1,1 @@
-"""Searches that may be killed and shared by processes: for tuning and falsifying."""
+"""Searches that can be killed, resumed and shared by processes; tuning and falsification."""

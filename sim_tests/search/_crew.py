@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from .._closing import Closing
-from ..measures._episode_record import EpisodeRecord
-from ..runs._job import Job
-from ..runs._pool import WorkerPool, run_here
+from awarenav.closing import Closing
+
+from ..study.measures import EpisodeRecord
+from ..study.runs import Job, WorkerPool, run_here
 
 
 class Crew(Closing):

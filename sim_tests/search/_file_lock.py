@@ -6,8 +6,9 @@ import fcntl
 import os
 from pathlib import Path
 
-from .._closing import Closing
-from .._errors import SimError
+from awarenav.closing import Closing
+
+from ..world.errors import SimError
 
 
 class FileLock(Closing):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .._errors import SimError
+from ..world.errors import SimError
 
 try:
     import cmaes  # noqa: F401 - the sampler imports it only when it samples

@@ -1,15 +1,67 @@
-"""A search that proposes trials in generations and is told what they came to."""
+"""What a trial came to.
+
+The interval in which a parameter is searched.
+
+A search that proposes trials in generations and is told what they came to.
+"""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import Literal
+from dataclasses import dataclass, field
+from typing import ClassVar, Literal
 
-from .._errors import SimError
+from pydantic import Field, model_validator
+
+from tracking.config import StrictConfig
+
+from ..world.errors import SimError
 from ._optuna import optuna
-from ._outcome import Outcome
-from ._range import Range
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a trial came to.
+
+    Attributes:
+        values: the objectives, smaller is better; None for a trial that could not be judged.
+        constraints: by name; kept where at most 0.
+        notes: figures to keep beside the trial, plain JSON values.
+    """
+
+    values: tuple[float, ...] | None
+    constraints: Mapping[str, float] = field(default_factory=dict)
+    notes: Mapping[str, object] = field(default_factory=dict)
+
+
+class Range(StrictConfig):
+    """The interval in which a parameter is searched.
+
+    Attributes:
+        low: smallest value.
+        high: largest value, above ``low``.
+        log: search in the logarithm.
+    """
+
+    error: ClassVar[type[ValueError]] = SimError
+
+    low: float
+    high: float
+    log: bool = Field(default=False)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Range:
+        if self.high <= self.low:
+            raise ValueError(f"high must exceed low, got {self.low:g} to {self.high:g}")
+        if self.log and self.low <= 0.0:
+            raise ValueError(f"low must be above 0 for log: true, got {self.low:g}")
+        return self
+
+    def clipped(self, value: float) -> float:
+        """The value, or the nearer end."""
+        return min(max(value, self.low), self.high)
+
 
 Method = Literal["tpe", "nsga2", "cmaes"]
 Parameters = dict[str, float]

@@ -9,7 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .._errors import SimError
+from ..world.errors import SimError
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

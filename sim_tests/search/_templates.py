@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from .._errors import SimError
-from .._scenario_template import ScenarioTemplate, shipped_templates
+from ..scenario import ScenarioTemplate, shipped_templates
+from ..world.errors import SimError
 
 
 def named_templates(names: Sequence[str], camera: str = "") -> tuple[ScenarioTemplate, ...]:

@@ -62,5 +62,7 @@ def test_input_without_meaning_is_refused(
 def test_a_broken_baseline_is_said(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
     broken = tmp_path / "baseline.json"
     broken.write_text("{}")
-    assert main(["--baseline", str(broken)]) == 2
+    with pytest.raises(SystemExit) as stopped:
+        main(["--baseline", str(broken)])
+    assert stopped.value.code == 2
     assert "is not a baseline" in capsys.readouterr().err

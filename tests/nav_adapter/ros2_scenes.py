@@ -5,10 +5,10 @@ from __future__ import annotations
 import dataclasses
 import os
 import random
-from pathlib import Path
 from typing import Any
 
 from nav_scenes import ROBOT, person, robot_at
+from paths import ROOT
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints
@@ -16,7 +16,6 @@ from nav_adapter.ros2 import Frames, outgoing
 from nav_adapter.ros2.messages import Message
 from tracking import PersonTrack
 
-ROOT = Path(__file__).parents[2]
 STAMP_S = 1_700_000_000.25
 
 # Packages that rosbags does not bring along, from their own .msg files.

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
 from nav_scenes import ROBOT
+from paths import ROOT
 
 from nav_adapter import AwarenessPolicy
 from nav_adapter.settled import settled_human_speed_mps, settled_radius_m, settled_speed_limit_mps
 from perception.arrays import FloatArray
 
-TEXT = (Path(__file__).parents[2] / "docs" / "policies.md").read_text(encoding="utf-8")
+TEXT = (ROOT / "docs" / "policies.md").read_text(encoding="utf-8")
 ENDS = np.array([0.0, 1.0])
 DISTANCE_M = np.linspace(0.0, 6.0, 6001)
 
@@ -61,9 +61,9 @@ def test_the_file_shown_is_a_policy() -> None:
 
 
 def test_every_test_that_the_safety_argument_names_exists() -> None:
-    root = Path(__file__).parents[2]
+    root = ROOT
     safety = (root / "docs" / "safety.md").read_text(encoding="utf-8")
-    named = re.findall(r"`((?:tests/\w+/)?test_\w+\.py)?(?:::(test_\w+))?`", safety)
+    named = re.findall(r"`((?:tests/[\w/]+/)?test_\w+\.py)?(?:::(test_\w+))?`", safety)
     file = ""
     checked = 0
     for path, function in named:

@@ -8,14 +8,15 @@ from pathlib import Path
 from typing import Any, get_args
 
 import yaml
+from paths import ROOT
 
+from awarenav.bridge.command import bridge
 from nav_adapter import Alert, NavConstraints
 from nav_adapter._alert import AlertKind
 from nav_adapter.ros2 import PUBLISHED, READ, SLOWEST_MPS, RobotFile, Topic, alerts
 from nav_adapter.ros2.messages import ros_type
-from sim_tests._cli import _parser
 
-DOCS = Path(__file__).parents[2] / "docs"
+DOCS = ROOT / "docs"
 TEXT = (DOCS / "nav2.md").read_text(encoding="utf-8")
 
 
@@ -67,10 +68,15 @@ def test_the_launch_file_starts_a_command_that_there_is() -> None:
     (program,) = [entry["executable"] for entry in launch if "executable" in entry]
     defaults = {entry["arg"]["name"]: entry["arg"]["default"] for entry in launch if "arg" in entry}
     command = re.sub(r"\$\(var (\w+)\)", lambda match: defaults[match[1]], program["cmd"])
-    options = _parser().parse_args(shlex.split(command)[1:])
-    assert options.command == "bridge"
-    assert options.robot == Path("robot.yaml")
+    name, *words = shlex.split(command)[1:]
+    assert name == "bridge"
+    assert _options(words)["robot"] == Path("robot.yaml")
 
 
 def _default(name: str) -> Any:
-    return getattr(_parser().parse_args(["bridge", "--robot", "x"]), name)
+    return _options(["--robot", "x"])[name]
+
+
+def _options(words: list[str]) -> dict[str, Any]:
+    with bridge.make_context("bridge", words) as context:
+        return context.params

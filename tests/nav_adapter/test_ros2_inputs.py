@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from nav_scenes import finite
+from paths import ROOT
 from scipy.spatial.transform import Rotation
 
 from nav_adapter import NavError
@@ -249,7 +250,7 @@ def test_a_camera_mount_looks_where_it_says() -> None:
 
 
 def test_the_robot_file_of_the_docs_is_valid(tmp_path: Path) -> None:
-    example = Path(__file__).parents[2] / "docs" / "nav2" / "robot.yaml"
+    example = ROOT / "docs" / "nav2" / "robot.yaml"
     robot = RobotFile.from_yaml(example)
     assert robot.profile().max_speed_mps == 1.5
     assert robot.camera is not None

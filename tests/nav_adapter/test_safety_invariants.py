@@ -13,13 +13,7 @@ from nav_policies import policies, robots
 from nav_scenes import crowds, finite, moved_person, moved_robot, numbers, robot_at
 from shapely.geometry import Point
 
-from nav_adapter import (
-    AwarenessPolicy,
-    NavAdapter,
-    NavConstraints,
-    RobotProfile,
-    max_speed_mps,
-)
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile, max_speed_mps
 from perception.anthropometry import BODY_RADIUS_M
 from tracking import PersonTrack
 

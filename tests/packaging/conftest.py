@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from paths import ROOT
 
-ROOT = Path(__file__).parents[2]
 # A checkout on the caller's path would stand in for the installed wheel and hide what is missing.
 _ENVIRONMENT = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
 

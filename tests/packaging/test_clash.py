@@ -128,6 +128,13 @@ def test_checkout_imports_without_a_scan(monkeypatch: pytest.MonkeyPatch) -> Non
     _clash.require_sole_owner("sim_tests")
 
 
-def test_loaders_are_the_same_file(root: Path) -> None:
-    loaders = {(root / name / "_clash.py").read_text() for name in ("tracking", "nav_adapter")}
-    assert loaders == {(root / "sim_tests" / "_clash.py").read_text()}
+def test_every_package_runs_the_guard_before_it_imports_anything_of_ours(root: Path) -> None:
+    for name in ("tracking", "nav_adapter", "awarenav", "sim_tests"):
+        lines = (root / name / "__init__.py").read_text().splitlines()
+        guard = next(number for number, line in enumerate(lines) if "require_sole_owner" in line)
+        first = next(
+            number
+            for number, line in enumerate(lines)
+            if line.lstrip().startswith(("from .", "from awarenav", "from perception"))
+        )
+        assert guard < first, name

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-PACKAGES = {"perception", "tracking", "nav_adapter", "sim_tests"}
+PACKAGES = {"perception", "tracking", "nav_adapter", "awarenav", "sim_tests"}
 CORE = ("perception", "tracking", "nav_adapter")
 
 # Prints what importing and using the core pulled in.
@@ -44,7 +44,7 @@ def metadata_file(wheel: Path, name: str) -> str:
         return archive.read(path).decode()
 
 
-def test_wheel_owns_its_four_top_level_names_and_no_others(wheel: Path) -> None:
+def test_wheel_owns_its_five_top_level_names_and_no_others(wheel: Path) -> None:
     tops = {name.split("/")[0] for name in names_in(wheel)}
     assert {top for top in tops if not top.endswith(".dist-info")} == PACKAGES
     assert len(tops) == len(PACKAGES) + 1
@@ -68,7 +68,7 @@ def test_wheel_ships_every_file_of_the_package(wheel: Path, root: Path, package:
 
 def test_wheel_carries_the_licence_and_the_command(wheel: Path, root: Path) -> None:
     assert metadata_file(wheel, "licenses/LICENSE") == (root / "LICENSE").read_text()
-    assert "awarenav = sim_tests._cli:main" in metadata_file(wheel, "entry_points.txt")
+    assert "awarenav = awarenav.cli:main" in metadata_file(wheel, "entry_points.txt")
     metadata = Parser().parsestr(metadata_file(wheel, "METADATA"))
     assert metadata["License-Expression"] == "Apache-2.0"
     needed = [line for line in metadata.get_all("Requires-Dist", []) if "extra ==" not in line]

@@ -5,9 +5,9 @@ import pytest
 from synthetic_people import person_at
 
 from perception import Camera, PersonKeypoints
-from perception._body import place_body, place_box
 from perception._metric_scale import metric_scale
 from perception.anthropometry import LIMBS, MEAN_STATURE_M
+from perception.body import place_body, place_box
 
 CAMERA = Camera.from_fov(1280, 960, math.radians(60.0))
 

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from perception import AttentionCone, Camera, HeadPose, PersonKeypoints
-from perception._awareness import awareness_of, cone_scores, estimate_awareness
 from perception._evidence import judge_face
 from perception.anthropometry import EYES_HEAD_M
+from perception.awareness import awareness_of, cone_scores, estimate_awareness
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
 CONE = AttentionCone()

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from perception import AttentionCone, HeadPose, PerceptionError, PersonKeypoints
-from perception._awareness import estimate_awareness
 from perception._fusion import FusedHeadPoseEstimator, fuse_heads
+from perception.awareness import estimate_awareness
 
 FACING = np.stack([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]], axis=1)
 POSITION = np.array([0.2, -0.3, 3.0])

@@ -8,16 +8,8 @@ from scipy.spatial.transform import Rotation
 from synthetic_people import person_at
 
 from perception import Camera, PerceptionError, PnpHeadPoseEstimator
-from perception.anthropometry import (
-    HEAD_TEMPLATE_M,
-    NECK_TO_NOSE_FORWARD_M,
-    NECK_TO_NOSE_UP_M,
-)
-from perception.head_frame import (
-    anatomical_head_rotation,
-    lifted_head_model,
-    printed_head_rotation,
-)
+from perception.anthropometry import HEAD_TEMPLATE_M, NECK_TO_NOSE_FORWARD_M, NECK_TO_NOSE_UP_M
+from perception.head_frame import anatomical_head_rotation, lifted_head_model, printed_head_rotation
 
 NECK_HEAD_M = np.array([NECK_TO_NOSE_UP_M, -NECK_TO_NOSE_FORWARD_M, 0.0])
 

@@ -13,12 +13,12 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from perception import Camera, PerceptionError, PersonKeypoints
-from perception._head_pose import HEAD_CENTRE_HEAD_M
-from perception.networks._head import OnnxHeadPoseEstimator
-from perception.networks._head_crop import crop_to_image, head_crop
-from perception.networks._head_layouts import _orthonormal
-from perception.networks._ray_view import focal_px, looking_at, ray_axes
-from perception.networks._session import OnnxModel
+from perception.anthropometry import HEAD_CENTRE_HEAD_M
+from perception.networks import OnnxModel
+from perception.networks.heads import OnnxHeadPoseEstimator, ray_axes
+from perception.networks.heads._crops import crop_to_image, head_crop
+from perception.networks.heads._layouts import _orthonormal
+from perception.networks.heads._ray_view import focal_px, looking_at
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
 FACING_HEAD = np.stack([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]], axis=1)

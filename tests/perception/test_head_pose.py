@@ -9,8 +9,8 @@ from scipy.stats import chi2
 from synthetic_people import person_at
 
 from perception import AttentionCone, Camera, PersonKeypoints, PnpHeadPoseEstimator
-from perception._awareness import awareness_of
 from perception.anthropometry import HEAD_TEMPLATE_M
+from perception.awareness import awareness_of
 
 CAMERA = Camera(1280, 960, 1100.0, 1100.0, 640.0, 480.0)
 EAR_TO_NOSE_M = 0.1107

@@ -3,18 +3,18 @@ from __future__ import annotations
 import importlib.util
 import json
 import sys
-from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from paths import SHARED
 
 from perception import PerceptionError, PersonDetection, PersonKeypoints, PoseEstimator
 from perception.layouts import LEFT_ANKLE, LEFT_SHOULDER, NOSE, RIGHT_ANKLE, RIGHT_SHOULDER
 from perception.networks import _mediapipe
 from perception.networks._mediapipe import MediaPipePoseEstimator
 
-IMAGES = Path(__file__).resolve().parents[3] / "shared" / "images"
+IMAGES = SHARED / "images"
 TRUTH = IMAGES / "truth_coco_wholebody_mmpose.json"
 
 HAS_MEDIAPIPE = importlib.util.find_spec("mediapipe") is not None

@@ -16,7 +16,7 @@ from perception import (
     PersonObservation,
 )
 from perception._floor import FloorPlane
-from perception._network_time import NETWORK_TIME
+from perception.networks import NETWORK_TIME
 
 CAMERA = Camera.from_fov(1280, 960, math.radians(60.0))
 FRAME = np.zeros((960, 1280, 3), np.uint8)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from paths import ROOT
 
 from perception import PerceptionError
 from perception.shipped import (
@@ -25,7 +26,7 @@ from perception.shipped import (
     write_manifest,
 )
 
-FOLDER = Path(__file__).parents[2] / "perception" / "models"
+FOLDER = ROOT / "perception" / "models"
 NAMES = (DETECTOR, POSE, HEAD)
 CARD = """# Something
 
@@ -139,7 +140,7 @@ def test_missing_file_is_refused(box):
 
 def test_trouble_of_another_kind_is_not_blamed_on_the_file():
     # Whoever asks for a GPU that is not there has an unaltered file.
-    from perception.networks._session import OnnxSettings  # noqa: PLC0415
+    from perception.networks import OnnxSettings  # noqa: PLC0415
 
     with pytest.raises(PerceptionError, match="provider") as refused:
         load_shipped(DETECTOR, OnnxSettings(providers=("tensorrt",)))

@@ -12,7 +12,7 @@ from scipy.integrate import quad
 from scipy.stats import norm
 
 from tracking import AwarenessFilterConfig
-from tracking._awareness_filter import (
+from tracking.awareness_filter import (
     AwarenessBelief,
     drift,
     estimate,

@@ -13,7 +13,7 @@ from tracking_scenes import CAMERA, PERIOD_S, FloatArray, camera_at, observe
 
 from perception import Camera
 from tracking import CameraView, PersonTrack, PersonTracker, TrackerConfig, TrackingError, View
-from tracking._hiding import open_share
+from tracking._track_management import open_share
 
 CONFIG = TrackerConfig()
 LENS = Camera.from_fov(640, 480, math.radians(60.0))

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from perception import Camera
-from perception.networks._head_crop import head_crop
-from perception.networks._ray_view import looking_at
-from sim_tests.hall._layout import LAYOUTS
-from sim_tests.sets._render_config import RenderConfig
+from perception.networks.heads._crops import head_crop
+from perception.networks.heads._ray_view import looking_at
+from sim_tests.dataset import RenderConfig
+from sim_tests.world.hall import LAYOUTS
 from training.networks._augment import similarity, warp, with_surroundings
 from training.networks._head_sample import HeadSample, cropped
 from training.networks._recipe import Recipe

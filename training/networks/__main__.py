@@ -19,7 +19,7 @@ from torch import nn
 
 from perception import OnnxPoseEstimator
 from perception.shipped import write_manifest
-from sim_tests.people._worker_asset import load_worker
+from sim_tests.actors.body import load_worker
 
 from ._calibrate import limb_scale
 from ._detector_net import DetectorNet

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from perception.networks._head_crop import OUTSIDE_GREY
+from perception.networks.heads import OUTSIDE_GREY
 
 
 def with_surroundings(

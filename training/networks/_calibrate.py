@@ -9,8 +9,8 @@ from typing import Any, Final
 import numpy as np
 
 from perception import Camera, OnnxPoseEstimator, PersonDetection
-from perception._body import place_bodies
 from perception.anthropometry import MEAN_STATURE_M
+from perception.body import place_bodies
 from perception.layouts import LEFT_HIP, RIGHT_HIP
 
 from ._samples import Frame, picture, read_shards

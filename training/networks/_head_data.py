@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from perception.networks._ray_view import ray_axes, ray_stretch
+from perception.networks.heads import ray_axes, ray_stretch
 
 from ._augment import covered, degraded, inside_of, warp, with_surroundings
 from ._fit import Batch

@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from perception.networks._ray_view import ray_axes, ray_stretch
+from perception.networks.heads import ray_axes, ray_stretch
 
 from ._augment import inside_of, similarity, warp
 

@@ -13,15 +13,7 @@ from torch.nn import functional as F  # noqa: N812
 from ._blocks import cross_entropy, soft_labels
 from ._fit import Batch, fit
 from ._head_data import LATE, HeadData
-from ._head_net import (
-    BINS,
-    SPAN,
-    HeadNet,
-    averaged,
-    head_rotation,
-    keypoint_means,
-    spread_factor,
-)
+from ._head_net import BINS, SPAN, HeadNet, averaged, head_rotation, keypoint_means, spread_factor
 from ._photograph import photographed
 from ._recipe import Recipe
 

@@ -19,14 +19,12 @@ import cv2
 import numpy as np
 from tqdm import tqdm
 
-from perception._head_pose import HEAD_CENTRE_HEAD_M
-from perception.anthropometry import HEAD_TEMPLATE_M
+from perception.anthropometry import HEAD_CENTRE_HEAD_M, HEAD_TEMPLATE_M
 from perception.layouts import LEFT_HIP, RIGHT_HIP
-from perception.networks._ray_view import ray_axes
-from sim_tests._sight import keypoints_in_front
-from sim_tests.people._worker import Worker
-from sim_tests.sets._render_config import RenderConfig
-from sim_tests.sets._render_scene import RenderScene, pose_at_random
+from perception.networks.heads import ray_axes
+from sim_tests.actors.body import Worker
+from sim_tests.dataset import RenderConfig, RenderScene, random_pose
+from sim_tests.world import keypoints_in_front
 
 from ._recipe import Recipe
 from ._samples import HEAD_SIDE_M, Frame, Patch, PersonTruth
@@ -135,7 +133,7 @@ def _patches(
             for attitude in range(1 if whole else 4):
                 if attitude:
                     x, y = worker.position_odom_m.tolist()
-                    pose_at_random(worker, (x, y), T_odom_camera[:3, 3], rng)
+                    random_pose(worker, (x, y), T_odom_camera[:3, 3], rng)
                 box = _rectangle(camera, T_odom_camera, worker, whole=whole)
                 low = np.clip(np.floor(box[:2]), 0, size).astype(int)
                 high = np.clip(np.ceil(box[2:]), 0, size).astype(int)

@@ -15,7 +15,7 @@ from ._make import make
 from ._people import PEOPLE
 from ._random import random_person
 
-_FOLDER = Path(__file__).parents[2] / "sim_tests" / "assets" / "workers"
+_FOLDER = Path(__file__).parents[2] / "sim_tests" / "actors" / "body" / "workers"
 
 
 def main() -> None:

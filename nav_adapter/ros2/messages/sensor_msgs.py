@@ -4,17 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .._message import (
-    Bool,
-    Float64,
-    Float64x9,
-    Float64x12,
-    Message,
-    String,
-    UInt8,
-    UInt8s,
-    UInt32,
-)
+from .._message import Bool, Float64, Float64x9, Float64x12, Message, String, UInt8, UInt8s, UInt32
 from .std_msgs import Header
 
 

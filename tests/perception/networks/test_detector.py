@@ -10,9 +10,8 @@ import pytest
 from onnx_graphs import cell_centres, cell_count, colour_rtmdet, colour_yolov8, colour_yolox, fixed
 
 from perception import PerceptionError, PersonDetector
-from perception.networks._detector import OnnxPersonDetector
+from perception.networks import OnnxModel, OnnxPersonDetector
 from perception.networks._letterbox import LetterboxGeometry
-from perception.networks._session import OnnxModel
 
 HEIGHT, WIDTH = 256, 320
 CELLS = cell_count(HEIGHT, WIDTH)

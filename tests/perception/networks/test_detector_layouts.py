@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from onnx_graphs import cell_centres, cell_count, fixed, red_point_pose
 
 from perception import PerceptionError
+from perception.networks import OnnxPersonDetector
 from perception.networks._box_format import BoxFormatVote
-from perception.networks._detector import OnnxPersonDetector
 
 SIZE = (256, 320)
 CELLS = cell_count(*SIZE)

@@ -11,14 +11,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from paths import ROOT, SHARED
 
 from perception import PersonDetection
-from perception.networks._detector import OnnxPersonDetector
-from perception.networks._session import OnnxModel, OnnxSettings
+from perception.networks import OnnxModel, OnnxPersonDetector, OnnxSettings
 
-SHARED = Path(__file__).resolve().parents[4] / "shared"
 MODELS, IMAGES = SHARED / "models", SHARED / "images"
-REFERENCE = Path(__file__).resolve().parents[2] / "sim_tests" / "genuine_detectors.py"
+REFERENCE = ROOT / "tests" / "genuine_detectors.py"
 TRUTH = IMAGES / "truth_coco_wholebody_mmpose.json"
 LAYOUTS = {
     "rtmdet_nano_person_320_mmpose": ("RTMDet", (320, 320)),

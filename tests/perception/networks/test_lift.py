@@ -9,8 +9,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from perception import Camera, PersonKeypoints
-from perception._body import place_body
 from perception.anthropometry import LIMBS
+from perception.body import place_body
 from perception.networks._lift import lift, metres_per_pixel
 
 FOCAL_PX = 500.0

@@ -9,10 +9,8 @@ from hypothesis import strategies as st
 from onnx_graphs import Graph, fixed, red_point_pose, simcc
 
 from perception import PerceptionError, PersonDetection, PersonKeypoints, PoseEstimator
-from perception.networks import _pose
+from perception.networks import OnnxModel, OnnxPoseEstimator, _pose
 from perception.networks._crops import PersonCrops
-from perception.networks._pose import OnnxPoseEstimator
-from perception.networks._session import OnnxModel
 
 PICTURE = np.zeros((480, 640, 3), np.uint8)
 MIDDLE = PersonDetection(np.array([220.0, 60.0, 380.0, 440.0]), 0.9)

@@ -13,8 +13,8 @@ import pytest
 from onnx_graphs import fixed, red_point_pose
 
 from perception import PerceptionError
-from perception._network_time import NETWORK_TIME
-from perception.networks._session import OnnxModel, OnnxSettings, as_onnx_model
+from perception.networks import NETWORK_TIME, OnnxModel, OnnxSettings
+from perception.networks._session import as_onnx_model
 
 ROWS = np.arange(12.0).reshape(1, 2, 6)
 

@@ -1,0 +1,136 @@
+"""Awareness-aware navigation: robots that move differently around people who have seen them.
+
+The names of the four packages behind it, imported when they are first used:
+``awarenav.AwarenessPipeline``, ``awarenav.PersonTracker``, ``awarenav.NavAdapter`` and the types
+between them. The command line is :mod:`awarenav.cli`; closed-loop crossings are :mod:`sim_tests`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from runpy import run_path
+
+# By path: importing it by name would first run whatever now calls itself perception.
+_CLASH = Path(__file__).parents[1] / "perception" / "_clash.py"
+run_path(str(_CLASH))["require_sole_owner"](__name__)
+
+from typing import TYPE_CHECKING
+
+from .lazy import lazy_names
+
+if TYPE_CHECKING:
+    from nav_adapter import (
+        AwarenessPolicy,
+        InflationPolicy,
+        NavAdapter,
+        NavConstraints,
+        NavError,
+        PersonObstacle,
+        RobotProfile,
+        RobotState,
+        SpeedPolicy,
+        boxes,
+        circles,
+        paint_costmap,
+        points,
+        polygons,
+    )
+    from perception import (
+        AttentionCone,
+        AwarenessPipeline,
+        Camera,
+        HeadPose,
+        HeadPoseEstimator,
+        OnnxHeadPoseEstimator,
+        OnnxPersonDetector,
+        OnnxPoseEstimator,
+        PerceptionError,
+        PersonDetection,
+        PersonDetector,
+        PersonKeypoints,
+        PersonObservation,
+        PnpHeadPoseEstimator,
+        PoseEstimator,
+    )
+    from perception.errors import AwarenavError
+    from tracking import PersonTrack, PersonTracker, TrackerConfig, TrackingError
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "AttentionCone",
+    "AwarenavError",
+    "AwarenessPipeline",
+    "AwarenessPolicy",
+    "Camera",
+    "HeadPose",
+    "HeadPoseEstimator",
+    "InflationPolicy",
+    "NavAdapter",
+    "NavConstraints",
+    "NavError",
+    "OnnxHeadPoseEstimator",
+    "OnnxPersonDetector",
+    "OnnxPoseEstimator",
+    "PerceptionError",
+    "PersonDetection",
+    "PersonDetector",
+    "PersonKeypoints",
+    "PersonObservation",
+    "PersonObstacle",
+    "PersonTrack",
+    "PersonTracker",
+    "PnpHeadPoseEstimator",
+    "PoseEstimator",
+    "RobotProfile",
+    "RobotState",
+    "SpeedPolicy",
+    "TrackerConfig",
+    "TrackingError",
+    "boxes",
+    "circles",
+    "paint_costmap",
+    "points",
+    "polygons",
+]
+
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "nav_adapter": (
+            "AwarenessPolicy",
+            "InflationPolicy",
+            "NavAdapter",
+            "NavConstraints",
+            "NavError",
+            "PersonObstacle",
+            "RobotProfile",
+            "RobotState",
+            "SpeedPolicy",
+            "boxes",
+            "circles",
+            "paint_costmap",
+            "points",
+            "polygons",
+        ),
+        "perception": (
+            "AttentionCone",
+            "AwarenessPipeline",
+            "Camera",
+            "HeadPose",
+            "HeadPoseEstimator",
+            "OnnxHeadPoseEstimator",
+            "OnnxPersonDetector",
+            "OnnxPoseEstimator",
+            "PerceptionError",
+            "PersonDetection",
+            "PersonDetector",
+            "PersonKeypoints",
+            "PersonObservation",
+            "PnpHeadPoseEstimator",
+            "PoseEstimator",
+        ),
+        "perception.errors": ("AwarenavError",),
+        "tracking": ("PersonTrack", "PersonTracker", "TrackerConfig", "TrackingError"),
+    },
+)

@@ -1,0 +1,97 @@
+"""Measured figures and a committed baseline that they are compared with."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Literal
+
+from .errors import AwarenavError
+from .files import json_text, write_text
+
+Direction = Literal["higher", "lower"]
+
+
+@dataclass(frozen=True, slots=True)
+class Metric:
+    """One measured figure.
+
+    Attributes:
+        name: unique in a baseline.
+        value: measured.
+        unit: of the value.
+        direction: which way is better.
+        tolerance: relative worsening against the baseline that still counts as equal.
+    """
+
+    name: str
+    value: float
+    unit: str
+    direction: Direction
+    tolerance: float
+
+    def is_worse_than(self, baseline: Metric) -> bool:
+        """True when the value is worse than the baseline by more than its tolerance."""
+        if baseline.direction == "higher":
+            return self.value < baseline.value * (1.0 - baseline.tolerance)
+        return self.value > baseline.value * (1.0 + baseline.tolerance)
+
+
+def write_baseline(path: Path, metrics: Iterable[Metric]) -> None:
+    """Write metrics as a baseline; the file appears whole or not at all."""
+    write_text(path, json_text({"metrics": [asdict(metric) for metric in metrics]}))
+
+
+def read_baseline(path: Path) -> dict[str, Metric]:
+    """Read a baseline by metric name.
+
+    Raises:
+        AwarenavError: for a file that cannot be read or is no baseline.
+    """
+    try:
+        entries = json.loads(path.read_text(encoding="utf-8"))["metrics"]
+        return {entry["name"]: Metric(**entry) for entry in entries}
+    except OSError as cause:
+        raise AwarenavError(
+            f"cannot read the baseline {path}: {cause.strerror or cause}"
+        ) from cause
+    except (ValueError, KeyError, TypeError) as cause:
+        raise AwarenavError(
+            f"{path} is not a baseline: it must hold a list 'metrics' of name, value, unit, "
+            f"direction and tolerance ({cause})"
+        ) from cause
+
+
+def worse_than(baseline: Mapping[str, Metric], metrics: Iterable[Metric]) -> list[str]:
+    """Return a line for each metric that is worse than its baseline by more than its tolerance."""
+    return [
+        f"{metric.name}: {metric.value:.3g} {metric.unit}, {baseline[metric.name].value:.3g} before"
+        for metric in metrics
+        if metric.name in baseline and metric.is_worse_than(baseline[metric.name])
+    ]
+
+
+def comparison_text(
+    metrics: Iterable[Metric],
+    baseline: Mapping[str, Metric],
+    goals: Mapping[str, float] | None = None,
+) -> tuple[str, bool]:
+    """The metrics as text beside the baseline, and whether none is worse than it.
+
+    Goals are printed too; a busy or slow computer that misses one fails nothing.
+    """
+    lines = [f"{'metric':42s}{'now':>10s}{'baseline':>10s}  unit"]
+    good = True
+    for metric in metrics:
+        known = baseline.get(metric.name)
+        verdict = ""
+        if known is not None and metric.is_worse_than(known):
+            verdict, good = "   WORSE", False
+        before = "-" if known is None else f"{known.value:.1f}"
+        goal = (goals or {}).get(metric.name)
+        if goal is not None:
+            verdict = f"   goal {goal:g}{'' if metric.value >= goal else ' NOT REACHED'}{verdict}"
+        lines.append(f"{metric.name:42s}{metric.value:10.1f}{before:>10s}  {metric.unit}{verdict}")
+    return "\n".join(lines), good

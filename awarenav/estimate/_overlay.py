@@ -1,0 +1,275 @@
+"""Draws what was understood of a picture into it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from perception import AttentionCone, Camera, PersonKeypoints, PersonObservation
+from perception import layouts as kp
+from perception.arrays import FloatArray, ImageRgb
+from tracking import PersonTrack
+
+from ..drawing import (
+    NIGHT,
+    WHITE,
+    Colour,
+    Lettering,
+    awareness_colour,
+    dot,
+    drawable,
+    line,
+    plate,
+    tint,
+)
+from ._estimator import FrameEstimate
+
+_LEFT: Final[Colour] = (126, 200, 255)
+_RIGHT: Final[Colour] = (255, 196, 128)
+_BONES: Final = (
+    (kp.LEFT_SHOULDER, kp.RIGHT_SHOULDER, WHITE),
+    (kp.LEFT_HIP, kp.RIGHT_HIP, WHITE),
+    (kp.LEFT_SHOULDER, kp.LEFT_HIP, _LEFT),
+    (kp.LEFT_SHOULDER, kp.LEFT_ELBOW, _LEFT),
+    (kp.LEFT_ELBOW, kp.LEFT_WRIST, _LEFT),
+    (kp.LEFT_HIP, kp.LEFT_KNEE, _LEFT),
+    (kp.LEFT_KNEE, kp.LEFT_ANKLE, _LEFT),
+    (kp.RIGHT_SHOULDER, kp.RIGHT_HIP, _RIGHT),
+    (kp.RIGHT_SHOULDER, kp.RIGHT_ELBOW, _RIGHT),
+    (kp.RIGHT_ELBOW, kp.RIGHT_WRIST, _RIGHT),
+    (kp.RIGHT_HIP, kp.RIGHT_KNEE, _RIGHT),
+    (kp.RIGHT_KNEE, kp.RIGHT_ANKLE, _RIGHT),
+)
+_FACE: Final = (
+    (kp.NOSE, WHITE),
+    (kp.LEFT_EYE, _LEFT),
+    (kp.RIGHT_EYE, _RIGHT),
+    (kp.LEFT_EAR, _LEFT),
+    (kp.RIGHT_EAR, _RIGHT),
+)
+#: Keypoints scored below this are not drawn.
+_SEEN: Final = 0.3
+_CONE_LENGTH_M: Final = 0.24
+_RIM: Final = np.linspace(0.0, 2.0 * math.pi, 24, endpoint=False)[:, None]
+
+
+@dataclass(frozen=True, slots=True)
+class _Person:
+    observation: PersonObservation
+    keypoints: PersonKeypoints | None
+    track: PersonTrack | None
+
+
+def draw_overlay(estimate: FrameEstimate, cone: AttentionCone) -> ImageRgb:
+    """Draw boxes, skeletons, attention cones, α with its standard deviation, and distances.
+
+    The colour of box and cone is α: red is unaware, green aware, grey without evidence. The gauge
+    under a person's figures shows α, a band of one standard deviation and, with a tracker, a tick
+    at the lower bound that navigation acts on.
+
+    Args:
+        estimate: of a frame that has a picture.
+        cone: the attention cone.
+
+    Returns:
+        A new picture of the same size.
+    """
+    assert estimate.frame.image_rgb is not None
+    image: ImageRgb = estimate.frame.image_rgb.copy()
+    unit = max(image.shape[0] / 480.0, 0.5)
+    tracks = {track.id: track for track in estimate.tracks or ()}
+    people = [
+        _Person(observation, keypoints, None if track_id is None else tracks.get(track_id))
+        for observation, keypoints, track_id in zip(
+            estimate.observations, estimate.keypoints, estimate.track_ids, strict=True
+        )
+    ]
+    # Far people first: those in front are drawn over them.
+    people.sort(key=lambda each: -float(each.observation.position_camera_m[2]))
+    for person in people:
+        _draw_gaze(image, estimate.camera, person, cone, unit)
+    for person in people:
+        if person.keypoints is not None:
+            _draw_skeleton(image, person.keypoints, unit)
+        _draw_box(image, person.observation, unit)
+    letters = Lettering(round(18 * unit))
+    taken: list[tuple[int, int, int, int]] = []
+    for person in reversed(people):
+        taken.append(_draw_figures(image, person, letters, taken, estimate.camera))
+    _draw_caption(image, estimate, letters)
+    return image
+
+
+def _draw_gaze(
+    image: ImageRgb, camera: Camera, person: _Person, cone: AttentionCone, unit: float
+) -> None:
+    gaze = person.observation.gaze_camera
+    apex = _head(camera, person)
+    if gaze is None or apex is None:
+        return
+    colour = awareness_colour(person.observation.awareness)
+    # The picture ends at the camera, and so does what is drawn of a gaze that comes close to it.
+    length = min(_CONE_LENGTH_M, 0.5 * float(apex[2]))
+    rim = camera.project(np.vstack([apex, apex + length * _rim(gaze, cone.half_angle_rad)]))
+    if drawable(rim):
+        # A gaze away from the camera lies behind the body that it is drawn over.
+        tint(image, rim, colour, 0.26 if gaze[2] < 0.0 else 0.13)
+        line(image, np.vstack([rim[1:], rim[1:2]]), colour, 1)
+    ray = camera.project(np.stack([apex, apex + 1.4 * length * gaze]))
+    if drawable(ray):
+        line(image, ray, NIGHT, round(4 * unit))
+        line(image, ray, colour, max(round(2 * unit), 1))
+        dot(image, ray[0], 3.0 * unit, colour)
+
+
+def _rim(gaze: FloatArray, half_angle_rad: float) -> FloatArray:
+    """(24, 3) rim of a cone of length 1 along the gaze."""
+    side = np.cross(gaze, (0.0, 1.0, 0.0) if abs(gaze[1]) < 0.9 else (1.0, 0.0, 0.0))
+    side /= np.linalg.norm(side)
+    ring = np.cos(_RIM) * side + np.sin(_RIM) * np.cross(gaze, side)
+    return np.asarray(gaze + math.tan(half_angle_rad) * ring)
+
+
+def _head(camera: Camera, person: _Person) -> FloatArray | None:
+    """Where the cone begins: at the head's keypoints, as deep as the body; else atop the box."""
+    keypoints, box = person.keypoints, person.observation.box_xyxy_px
+    pixel = None
+    if keypoints is not None:
+        head = list(range(kp.NOSE, kp.RIGHT_EAR + 1))
+        weight = np.where(keypoints.scores[head] >= _SEEN, keypoints.scores[head], 0.0)
+        if weight.sum() > 0.0:
+            pixel = weight @ keypoints.keypoints_px[head] / weight.sum()
+    if pixel is None:
+        if box is None:
+            return None
+        pixel = np.array([0.5 * (box[0] + box[2]), box[1] + 0.08 * (box[3] - box[1])])
+    depth = float(person.observation.position_camera_m[2])
+    if depth <= 0.0:
+        return None
+    return np.append(depth * camera.normalise(pixel[None])[0], depth)
+
+
+def _draw_skeleton(image: ImageRgb, person: PersonKeypoints, unit: float) -> None:
+    points, seen = person.keypoints_px, person.scores >= _SEEN
+    thin, thick = max(round(1.6 * unit), 1), max(round(3.4 * unit), 3)
+    bones = [
+        (points[[one, other]], colour)
+        for one, other, colour in _BONES
+        if seen[one] and seen[other] and drawable(points[[one, other]])
+    ]
+    for ends, _ in bones:
+        line(image, ends, NIGHT, thick)
+    for ends, colour in bones:
+        line(image, ends, colour, thin)
+    for index, colour in _FACE:
+        if seen[index] and drawable(points[index]):
+            dot(image, points[index], 2.4 * unit, NIGHT)
+            dot(image, points[index], 1.6 * unit, colour)
+
+
+def _draw_box(image: ImageRgb, observation: PersonObservation, unit: float) -> None:
+    """Brackets at the corners, which hide less than a frame."""
+    box = observation.box_xyxy_px
+    if box is None or not drawable(box):
+        return
+    # Boxes count from the picture's corner, drawing from the centre of its first pixel.
+    left, top, right, bottom = (box - 0.5).tolist()
+    arm = max(min(0.22 * (right - left), 0.22 * (bottom - top), 26.0 * unit), 2.0)
+    colour = awareness_colour(observation.awareness)
+    for u, v, du, dv in (
+        (left, top, arm, arm),
+        (right, top, -arm, arm),
+        (right, bottom, -arm, -arm),
+        (left, bottom, arm, -arm),
+    ):
+        corner = [(u + du, v), (u, v), (u, v + dv)]
+        line(image, corner, NIGHT, round(4 * unit))
+        line(image, corner, colour, max(round(2 * unit), 1))
+
+
+def _draw_figures(
+    image: ImageRgb,
+    person: _Person,
+    letters: Lettering,
+    taken: list[tuple[int, int, int, int]],
+    camera: Camera,
+) -> tuple[int, int, int, int]:
+    """Distance, α and gauge on a plate over the head; returns the plate's rectangle."""
+    observation, track = person.observation, person.track
+    alpha, spread = observation.awareness, observation.awareness_std
+    distance = f"{np.linalg.norm(observation.position_camera_m):.1f} m"
+    first = distance if track is None else f"#{track.id} · {distance}"
+    second = "no evidence" if alpha is None else f"α {alpha:.2f} ± {spread:.2f}"
+    gap = max(letters.height_px // 4, 3)
+    gauge = max(letters.height_px // 3, 4)
+    width = max(letters.width(first), letters.width(second), 4 * letters.height_px) + 2 * gap
+    height = 2 * letters.height_px + gauge + 3 * gap
+    anchor = observation.box_xyxy_px
+    if anchor is None:
+        u, v = camera.project(observation.position_camera_m[None])[0].tolist()
+        anchor = np.array([u, v, u, v]) if math.isfinite(u) else np.zeros(4)
+    left = round(float(np.clip(0.5 * (anchor[0] + anchor[2] - width), 0, image.shape[1] - width)))
+    top = round(float(np.clip(anchor[1] - height - gap, 0, image.shape[0] - height)))
+    for other in sorted(taken):
+        if (
+            left < other[2]
+            and other[0] < left + width
+            and top < other[3]
+            and other[1] < top + height
+        ):
+            top = other[3] + 2 if other[3] + 2 + height <= image.shape[0] else other[1] - height - 2
+    box = (left, top, left + width, top + height)
+    plate(image, box)
+    colour = awareness_colour(alpha)
+    line(image, [(left, top), (left, top + height - 1)], colour, max(gap // 2, 2))
+    row = top + gap // 2
+    letters.write(image, first, (left + gap, row), WHITE)
+    letters.write(image, second, (left + gap, row + letters.height_px), WHITE)
+    bar = (left + gap, row + 2 * letters.height_px + gap // 2, left + width - gap, gauge)
+    _draw_gauge(image, bar, observation, track)
+    return box
+
+
+def _draw_gauge(
+    image: ImageRgb,
+    bar: tuple[int, int, int, int],
+    observation: PersonObservation,
+    track: PersonTrack | None,
+) -> None:
+    left, top, right, height = bar
+    span = right - left
+    _fill(image, left, top, right, top + height, (74, 78, 88))
+    alpha, spread = observation.awareness, observation.awareness_std
+    if alpha is not None and spread is not None:
+        colour = awareness_colour(alpha)
+        low, high = max(alpha - spread, 0.0), min(alpha + spread, 1.0)
+        faint = tuple((np.array(colour) * 0.55 + 30.0).astype(int).tolist())
+        _fill(image, left, top, left + round(alpha * span), top + height, colour)
+        _fill(
+            image,
+            left + round(low * span),
+            top + height // 3,
+            left + max(round(high * span), round(low * span) + 1),
+            top + height - height // 3,
+            (faint[0], faint[1], faint[2]),
+        )
+    if track is not None:
+        tick = left + round(track.awareness_lower * (span - 2))
+        _fill(image, tick, top - 2, tick + 2, top + height + 2, WHITE)
+
+
+def _fill(image: ImageRgb, left: int, top: int, right: int, bottom: int, colour: Colour) -> None:
+    image[max(top, 0) : max(bottom, 0), max(left, 0) : max(right, 0)] = colour
+
+
+def _draw_caption(image: ImageRgb, estimate: FrameEstimate, letters: Lettering) -> None:
+    count = len(estimate.observations)
+    people = "nobody" if not count else "1 person" if count == 1 else f"{count} people"
+    text = f"{estimate.frame.stamp_s:.2f} s · {people}"
+    gap = letters.height_px // 3
+    top = image.shape[0] - letters.height_px - gap
+    plate(image, (0, top - gap // 2, letters.width(text) + 3 * gap, image.shape[0]), 0.55)
+    letters.write(image, text, (gap, top), WHITE)

@@ -1,0 +1,169 @@
+"""Image topics of ROS 1 and ROS 2 recordings; the one place that imports ``rosbags``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from nav_adapter import NavError
+from nav_adapter.ros2 import camera_of, picture_of
+from nav_adapter.ros2.messages.sensor_msgs import CameraInfo
+from perception import Camera
+from perception.arrays import ImageRgb
+
+from ..errors import AwarenavError
+from ._source import SourceFrame
+
+try:
+    from rosbags.highlevel import AnyReader
+    from rosbags.typesys import Stores, get_typestore
+except ImportError as cause:  # pragma: no cover - depends on the installation
+    raise AwarenavError(
+        "reading recordings needs the package rosbags, which is not installed; it is the extra "
+        "'rosbag': pip install 'awarenav[rosbag]'"
+    ) from cause
+
+_IMAGE: Final = "sensor_msgs/msg/Image"
+_COMPRESSED: Final = "sensor_msgs/msg/CompressedImage"
+_INFO: Final = "sensor_msgs/msg/CameraInfo"
+
+
+class BagSource:
+    """One image topic of a recording: rosbag2 folder, ``.db3``, ``.mcap``, or a ROS 1 ``.bag``.
+
+    Frames carry the stamp of their message's header. The ``camera_info`` topic beside the images
+    is their camera.
+
+    Args:
+        path: of the recording.
+        topic: of the images (sensor_msgs Image or CompressedImage); None is the only one there is.
+
+    Raises:
+        AwarenavError: for a file that is no recording, or for a topic that is not there.
+    """
+
+    def __init__(self, path: Path, topic: str | None = None) -> None:
+        self._path = path
+        try:
+            self._reader = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
+            self._reader.open()
+        # The library lets errors of its storage layers through beside its own.
+        except Exception as cause:
+            raise AwarenavError(f"cannot read the recording {path}: {cause}") from cause
+        try:
+            self._topic = self._choose(topic)
+            self.camera = self._camera_info()
+        except BaseException:
+            self._reader.close()
+            raise
+        self._connections = [each for each in self._reader.connections if each.topic == self._topic]
+        self.count: int | None = sum(each.msgcount for each in self._connections) or None
+        duration_s = self._reader.duration * 1.0e-9
+        self.rate_hz: float | None = None
+        if self.count is not None and self.count > 1 and duration_s > 0.0:
+            self.rate_hz = (self.count - 1) / duration_s
+        self.live = False
+
+    def frames(self) -> Iterator[SourceFrame]:
+        """Yield the topic's pictures, numbered from 000000."""
+        messages = self._reader.messages(connections=self._connections)
+        last_s, number = -math.inf, 0
+        while True:
+            name = f"{number:06d}"
+            try:
+                connection, recorded_ns, raw = next(messages)
+                message: Any = self._reader.deserialize(raw, connection.msgtype)
+            except StopIteration:
+                return
+            except Exception as cause:
+                problem = f"{self._path}, message {number}: {cause}; the rest cannot be read"
+                yield SourceFrame(name, max(last_s, 0.0), None, None, problem)
+                return
+            stamp_s = _stamp_s(message)
+            if stamp_s is None:
+                stamp_s = recorded_ns * 1.0e-9
+            last_s = stamp_s
+            try:
+                image = _picture(message, f"{self._topic}, message {number}")
+                yield SourceFrame(name, stamp_s, image)
+            except AwarenavError as error:
+                yield SourceFrame(name, stamp_s, None, None, str(error))
+            number += 1
+
+    def close(self) -> None:
+        """Close the recording."""
+        self._reader.close()
+
+    def _choose(self, topic: str | None) -> str:
+        images = sorted(
+            {
+                each.topic
+                for each in self._reader.connections
+                if each.msgtype in (_IMAGE, _COMPRESSED)
+            }
+        )
+        if not images:
+            raise AwarenavError(f"{self._path} has no topic of type {_IMAGE} or {_COMPRESSED}")
+        if topic is not None and topic not in images:
+            raise AwarenavError(f"--topic must be one of {', '.join(images)}, got {topic}")
+        if topic is None and len(images) > 1:
+            raise AwarenavError(
+                f"{self._path} has several image topics: choose --topic {' | '.join(images)}"
+            )
+        return images[0] if topic is None else topic
+
+    def _camera_info(self) -> Camera | None:
+        """The first message of the ``camera_info`` topic in the namespace of the images."""
+        parts = self._topic.split("/")
+        homes = [
+            "/".join(parts[:length]) + "/camera_info" for length in range(len(parts) - 1, 0, -1)
+        ]
+        for home in homes[:2]:  # beside image_raw, or beside image_raw/compressed's parent
+            connections = [
+                each
+                for each in self._reader.connections
+                if each.topic == home and each.msgtype == _INFO
+            ]
+            for connection, _, raw in (
+                self._reader.messages(connections=connections) if connections else ()
+            ):
+                message: Any = self._reader.deserialize(raw, connection.msgtype)
+                return _camera(message, home)
+        return None
+
+
+def _camera(message: Any, topic: str) -> Camera | None:
+    # ROS 1 spells the matrices in capitals. An uncalibrated driver sends zeros.
+    matrix = np.asarray(getattr(message, "k", getattr(message, "K", ())), dtype=float).reshape(-1)
+    distortion = np.asarray(getattr(message, "d", getattr(message, "D", ())), dtype=float)
+    if matrix.size != 9 or not matrix[0] > 0.0:
+        return None
+    info = CameraInfo(
+        height=int(message.height),
+        width=int(message.width),
+        distortion_model=str(message.distortion_model),
+        d=tuple(distortion.tolist()),
+        k=tuple(matrix.tolist()),
+    )
+    try:
+        return camera_of(info)
+    except NavError as cause:
+        raise AwarenavError(f"{topic}: {cause}") from cause
+
+
+def _stamp_s(message: Any) -> float | None:
+    """The header's stamp; None for zero, which is what a driver without a clock sends."""
+    stamp = message.header.stamp
+    seconds = float(stamp.sec) + 1.0e-9 * float(stamp.nanosec)
+    return seconds if seconds > 0.0 else None
+
+
+def _picture(message: Any, name: str) -> ImageRgb:
+    try:
+        return picture_of(message)
+    except NavError as cause:
+        raise AwarenavError(f"{name}: {cause}") from cause

@@ -1,0 +1,44 @@
+"""Text files that appear whole or not at all, and how numbers are written in them."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from .errors import AwarenavError
+
+
+def write_text(path: Path, text: str, error: type[AwarenavError] = AwarenavError) -> None:
+    """Write a UTF-8 file whole or not at all; folders that are missing are made.
+
+    Raises:
+        AwarenavError: or ``error``, for a place that cannot be written.
+    """
+    part = path.with_name(path.name + ".part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part.write_text(text, encoding="utf-8")
+        part.replace(path)
+    except OSError as cause:
+        raise error(f"cannot write {path}: {cause.strerror or cause}") from cause
+
+
+def json_text(value: Any) -> str:
+    """Return a value as indented JSON with a newline at the end; null for NaN and infinities."""
+    return json.dumps(_finite(value), indent=2, ensure_ascii=False) + "\n"
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _finite(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(each) for each in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def csv_number(value: float | None) -> str:
+    """Return a number with six decimals; empty for None, NaN and infinities."""
+    return "" if value is None or not math.isfinite(value) else f"{value:.6f}"

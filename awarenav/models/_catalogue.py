@@ -1,0 +1,95 @@
+"""The catalogue of networks for a real robot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import ClassVar, Final, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from tracking.config import StrictConfig
+
+from ..errors import AwarenavError, not_one_of
+
+Role = Literal["detector", "pose", "head"]
+
+_FILE: Final = Path(__file__).parent / "catalogue.yaml"
+
+
+class RealModel(StrictConfig):
+    """A network that ``awarenav models fetch`` gets from its publisher's address."""
+
+    #: What it is asked for by.
+    name: str = Field(pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$")
+    role: Role
+    #: Of the ONNX file, or of the ZIP archive that holds it.
+    url: str = Field(pattern=r"^https?://")
+    #: Path of the ONNX file in the archive, or the end of it; None when the address is the file.
+    member: str | None = None
+    #: Of the ONNX file; None when it is not known, and what is fetched first is then held to.
+    sha256: str | None = Field(None, pattern=r"^[0-9a-f]{64}$")
+    #: Of the ONNX file, roughly.
+    size_mb: float = Field(gt=0.0)
+    licence: str
+    publisher: str
+    purpose: str
+    note: str | None = None
+
+    @property
+    def file(self) -> str:
+        """Name of the fetched file."""
+        return f"{self.name}.onnx"
+
+    @field_validator("licence")
+    @classmethod
+    def _no_copyleft(cls, value: str) -> str:
+        if "GPL" in value.upper():
+            raise ValueError(f"{value} networks are named under 'elsewhere', not fetched")
+        return value
+
+    @model_validator(mode="after")
+    def _member_of_an_archive(self) -> RealModel:
+        if (self.member is not None) != self.url.endswith(".zip"):
+            raise ValueError(f"{self.name}: 'member' belongs to an address that ends in .zip")
+        return self
+
+
+class NamedModel(StrictConfig):
+    """A network that the command names and does not fetch."""
+
+    name: str
+    role: Role
+    licence: str
+    why: str
+
+
+class Catalogue(StrictConfig):
+    """All networks for a real robot, by unique names."""
+
+    error: ClassVar[type[ValueError]] = AwarenavError
+
+    models: tuple[RealModel, ...]
+    elsewhere: tuple[NamedModel, ...] = ()
+
+    @field_validator("models")
+    @classmethod
+    def _unique(cls, value: tuple[RealModel, ...]) -> tuple[RealModel, ...]:
+        names = [model.name for model in value]
+        if len(set(names)) < len(names):
+            raise ValueError(f"names must be unique, got {', '.join(names)}")
+        return value
+
+    @classmethod
+    def shipped(cls) -> Catalogue:
+        """Read the catalogue of this package."""
+        return cls.from_yaml(_FILE)
+
+    def __getitem__(self, name: str) -> RealModel:
+        """Return the model called ``name``; AwarenavError says which there are."""
+        for model in self.models:
+            if model.name == name:
+                return model
+        for other in self.elsewhere:
+            if name.lower() in other.name.lower():
+                raise AwarenavError(f"{other.name} ({other.licence}) is not fetched: {other.why}")
+        raise AwarenavError(not_one_of("model", name, [model.name for model in self.models]))

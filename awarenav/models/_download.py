@@ -1,0 +1,213 @@
+"""Downloads that go on where they broke off and appear whole or not at all."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import re
+import shutil
+import ssl
+import sys
+import time
+import urllib.error
+import urllib.request
+from pathlib import Path
+from typing import IO, Final
+
+from tqdm import tqdm
+
+from ..errors import AwarenavError
+
+_CHUNK_BYTES: Final = 1 << 18
+_SPARE_BYTES: Final = 64 << 20  # left free on the disk
+_AGENT: Final = "awarenav"
+_CONTENT_RANGE: Final = re.compile(r"bytes (\d+)-\d+/(\d+)")
+_NOT_SATISFIABLE: Final = 416
+_PARTIAL: Final = 206
+_CONNECTION_ERRORS: Final = (
+    urllib.error.URLError,
+    http.client.HTTPException,
+    ssl.SSLError,
+    ConnectionError,
+    TimeoutError,
+)
+
+
+class BrokenDownloadError(AwarenavError):
+    """A download that stopped early; what has come is kept and the next attempt goes on from it."""
+
+
+class _NoDowngrade(urllib.request.HTTPRedirectHandler):
+    """Follows redirects, and none that leads from https to something else."""
+
+    def redirect_request(
+        self,
+        req: urllib.request.Request,
+        fp: IO[bytes],
+        code: int,
+        msg: str,
+        headers: http.client.HTTPMessage,
+        newurl: str,
+    ) -> urllib.request.Request | None:
+        if req.full_url.startswith("https:") and not newurl.startswith("https:"):
+            raise AwarenavError(
+                f"{req.full_url} redirects to {newurl}, which is not encrypted: refused"
+            )
+        return super().redirect_request(req, fp, code, msg, headers, newurl)
+
+
+def download(
+    url: str,
+    target: Path,
+    *,
+    attempts: int = 4,
+    pause_s: float = 1.0,
+    timeout_s: float = 30.0,
+    progress: bool = True,
+) -> None:
+    """Download ``url`` to ``target``, which appears when the last byte has come.
+
+    Until then the bytes are in ``target`` with the suffix ``.part``, beside a note of what they are
+    part of. An attempt, in this run or a later one, goes on from there when the server still has
+    the same file (HTTP Range with If-Range, RFC 9110) and starts anew otherwise.
+
+    Args:
+        url: http or https.
+        target: in a folder that exists.
+        attempts: how often in this run, while the connection breaks.
+        pause_s: before the second attempt; it doubles each time.
+        timeout_s: of a silent connection.
+        progress: a bar on stderr.
+
+    Raises:
+        BrokenDownloadError: every attempt broke off; run it again to go on.
+        AwarenavError: no such file on the server, a full disk, or no connection.
+    """
+    for attempt in range(attempts):
+        if attempt:
+            time.sleep(pause_s * 2 ** (attempt - 1))
+        try:
+            _attempt(url, target, timeout_s, progress)
+        except BrokenDownloadError:
+            if attempt == attempts - 1:
+                raise
+        else:
+            _part(target).replace(target)
+            _note(target).unlink(missing_ok=True)
+            return
+
+
+def _attempt(url: str, target: Path, timeout_s: float, progress: bool) -> None:
+    request = urllib.request.Request(
+        url, headers={"User-Agent": _AGENT, "Accept-Encoding": "identity"}
+    )
+    part = _part(target)
+    have, validator = _resumable(url, target)
+    if have:
+        request.add_header("Range", f"bytes={have}-")
+        request.add_header("If-Range", validator)
+    opener = urllib.request.build_opener(_NoDowngrade)
+    try:
+        with opener.open(request, timeout=timeout_s) as response:
+            start, total = _placed(response, have)
+            if start != have:
+                _discard(target)
+            _check_room(target, total, start)
+            _write_note(url, target, response.headers)
+            with part.open("ab" if start else "wb") as file:
+                _copy(response, file, target.name, start, total, progress)
+    except urllib.error.HTTPError as cause:
+        with cause:
+            if cause.code == _NOT_SATISFIABLE:
+                _discard(target)
+                raise BrokenDownloadError(f"{url}: the file on the server has changed") from cause
+            busy = cause.code == http.HTTPStatus.TOO_MANY_REQUESTS or cause.code >= 500
+            kind = BrokenDownloadError if busy else AwarenavError
+            raise kind(f"{url}: the server answers {cause.code} {cause.reason}") from cause
+    except _CONNECTION_ERRORS as cause:
+        reason = getattr(cause, "reason", None) or cause or type(cause).__name__
+        size = part.stat().st_size if part.exists() else 0
+        what = f"broke off after {size} bytes ({reason})" if size else f"no connection ({reason})"
+        raise BrokenDownloadError(f"{url}: {what}; run it again to go on") from cause
+    except OSError as cause:
+        raise AwarenavError(f"cannot write {part}: {cause.strerror or cause}") from cause
+
+
+def _copy(
+    response: http.client.HTTPResponse,
+    file: IO[bytes],
+    name: str,
+    start: int,
+    total: int | None,
+    progress: bool,
+) -> None:
+    done = start
+    with tqdm(
+        total=total,
+        initial=start,
+        desc=name,
+        unit="B",
+        unit_scale=True,
+        file=sys.stderr,
+        disable=not progress,
+    ) as bar:
+        while chunk := response.read(_CHUNK_BYTES):
+            file.write(chunk)
+            done += len(chunk)
+            bar.update(len(chunk))
+    if total is not None and done != total:
+        raise http.client.IncompleteRead(b"", total - done)
+
+
+def _placed(response: http.client.HTTPResponse, have: int) -> tuple[int, int | None]:
+    """Where the answer's first byte belongs, and the size of the whole file if it is told."""
+    length = response.headers.get("Content-Length")
+    if response.status != _PARTIAL:
+        return 0, None if length is None else int(length)
+    found = _CONTENT_RANGE.fullmatch(response.headers.get("Content-Range", "").strip())
+    if found is None or int(found[1]) != have:
+        raise http.client.HTTPException(
+            f"asked from byte {have}, got {response.headers.get('Content-Range')!r}"
+        )
+    return have, int(found[2])
+
+
+def _resumable(url: str, target: Path) -> tuple[int, str]:
+    """How many bytes of what ``url`` had are here, and what identifies that state of it."""
+    part, note = _part(target), _note(target)
+    try:
+        known = json.loads(note.read_text(encoding="utf-8"))
+        if known["url"] == url and known["validator"]:
+            return part.stat().st_size, str(known["validator"])
+    except (OSError, ValueError, KeyError, TypeError):
+        pass  # no note, or none that can be used: start anew
+    return 0, ""
+
+
+def _write_note(url: str, target: Path, headers: http.client.HTTPMessage) -> None:
+    tag = headers.get("ETag", "")
+    # If-Range takes strong tags only; a date stands in where there is none.
+    validator = headers.get("Last-Modified", "") if tag.startswith("W/") or not tag else tag
+    _note(target).write_text(json.dumps({"url": url, "validator": validator}), encoding="utf-8")
+
+
+def _check_room(target: Path, total: int | None, start: int) -> None:
+    free = shutil.disk_usage(target.parent).free
+    if total is not None and total - start > free - _SPARE_BYTES:
+        raise AwarenavError(
+            f"{target.parent} has {free / 1e6:.0f} MB free; {target.name} needs "
+            f"{(total - start + _SPARE_BYTES) / 1e6:.0f} MB"
+        )
+
+
+def _part(target: Path) -> Path:
+    return target.with_name(target.name + ".part")
+
+
+def _note(target: Path) -> Path:
+    return target.with_name(target.name + ".part.json")
+
+
+def _discard(target: Path) -> None:
+    _part(target).unlink(missing_ok=True)
+    _note(target).unlink(missing_ok=True)

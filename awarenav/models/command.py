@@ -1,0 +1,88 @@
+"""The command ``awarenav models``."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Final
+
+import click
+
+from ..cli import argument, command, group, option, options
+
+_SHA256: Final = re.compile(r"[0-9a-fA-F]{64}")
+_FOLDER: Final = (
+    "Folder of downloaded networks (default: $AWARENAV_MODELS, or awarenav/models in the user's "
+    "cache)."
+)
+
+
+def _hexadecimal(
+    context: click.Context, parameter: click.Parameter, text: str | None
+) -> str | None:
+    if text is not None and not _SHA256.fullmatch(text):
+        raise click.BadParameter(f"must be 64 hexadecimal digits, got {text!r}")
+    return None if text is None else text.lower()
+
+
+@group("models")
+def models() -> None:
+    """List, verify and download networks.
+
+    The shipped networks are made for the simulator. Others, for a real robot, are downloaded from
+    their publishers.
+    """
+
+
+@command("list", short_help="List the shipped networks, and those that can be downloaded.")
+@options.out_file(None, _FOLDER, metavar="DIR")
+@options.as_json("the list")
+def list_models(out: Path | None, *, as_json: bool) -> int:
+    """List the shipped networks and the networks for a real robot.
+
+    Shows size, sha256 and whether the file is unaltered; for a real robot also licence, address and
+    whether it is downloaded.
+    """
+    from ._run import list_command  # noqa: PLC0415 - help needs no networks
+
+    return list_command(out, as_json=as_json)
+
+
+@command(
+    "verify",
+    short_help="Check the sha256 of every network.",
+    epilog="Exit status: 0 all are unaltered; 1 a file is missing or altered.",
+)
+@options.out_file(None, _FOLDER, metavar="DIR")
+@options.as_json()
+def verify(out: Path | None, *, as_json: bool) -> int:
+    """Check the sha256 of the shipped and of the downloaded networks."""
+    from ._run import verify_command  # noqa: PLC0415 - help needs no networks
+
+    return verify_command(out, as_json=as_json)
+
+
+@command("fetch", short_help="Download networks for a real robot.")
+@argument("names", nargs=-1, required=True, metavar="NAME...", help="As yolox-tiny or rtmpose-m.")
+@option(
+    "--sha256",
+    callback=_hexadecimal,
+    metavar="HEX",
+    help="The ONNX file's sha256, from a source you trust; for a single NAME.",
+)
+@options.out_file(None, _FOLDER, metavar="DIR")
+def fetch(names: tuple[str, ...], sha256: str | None, out: Path | None) -> int:
+    """Download networks by the names that `awarenav models list` shows.
+
+    An interrupted download continues when the command is run again; a file appears when it is
+    complete and verified. Where no sha256 is known beforehand, the first download is trusted, its
+    sha256 is kept in models.lock.json, and later downloads must match it.
+    """
+    from ._run import fetch_command  # noqa: PLC0415 - help needs no networks
+
+    return fetch_command(names, sha256, out)
+
+
+models.add_command(list_models)
+models.add_command(verify)
+models.add_command(fetch)

@@ -1,0 +1,16 @@
+"""Radius, assumed human speed and speed limit of a policy: ``awarenav policy``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from awarenav.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from ._show import read_policy
+
+__all__ = [
+    "read_policy",
+]
+
+__getattr__ = lazy_names(__name__, {"._show": ("read_policy",)})

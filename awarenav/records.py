@@ -1,0 +1,194 @@
+"""Frames and the people in them as JSON Lines: one schema for truth and for estimates.
+
+``{"frame", "stamp_s", "T_odom_camera", "people": [{"id", "box_xyxy_px", "position_camera_m",
+"gaze_camera", "awareness", "awareness_std", "score", "keypoints": {name: [u, v, score]}}]}``; more
+keys may be present. Boxes count pixels from the picture's corner, maxima exclusive; keypoints are
+in the coordinates of :meth:`perception.Camera.project`: a pixel's centre is a whole number.
+
+
+A person of a frame's record, read and checked for judging.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from perception.arrays import (
+    FloatArray,
+    covariance_matrix,
+    finite_array,
+    finite_number,
+    unit_vector,
+)
+
+from .errors import AwarenavError
+
+Record = dict[str, Any]
+
+_KEYS: Final = ("frame", "stamp_s", "T_odom_camera", "people")
+
+
+def record_line(record: Record) -> str:
+    """One line of a JSON Lines file; refuses what JSON cannot say, such as NaN."""
+    try:
+        return json.dumps(record, separators=(", ", ": "), allow_nan=False) + "\n"
+    except ValueError as cause:
+        raise AwarenavError(
+            f"frame {record.get('frame')!r} holds a number that is not finite"
+        ) from cause
+
+
+def read_records(path: Path) -> list[Record]:
+    """Read a JSON Lines file of frames; a last line that was cut off in writing is left out.
+
+    Raises:
+        AwarenavError: for a file that cannot be read or a line that is no frame, with its number.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as cause:
+        raise AwarenavError(f"cannot read {path}: {cause}") from cause
+    lines = text.split("\n")
+    records = []
+    for number, line in enumerate(lines, start=1):
+        if not line.strip():
+            continue
+        try:
+            record = json.loads(line)
+        except json.JSONDecodeError as cause:
+            if number == len(lines):  # no newline after it: the writer was interrupted
+                break
+            raise AwarenavError(f"{path}, line {number}: not JSON ({cause})") from cause
+        if not isinstance(record, dict) or any(key not in record for key in _KEYS):
+            raise AwarenavError(f"{path}, line {number}: a frame needs the keys {', '.join(_KEYS)}")
+        records.append(record)
+    return records
+
+
+def write_records(path: Path, records: Iterable[Record]) -> None:
+    """Write a whole file at once: readers see the old one or the new one, never half of one."""
+    part = path.with_name(path.name + ".part")
+    with part.open("w", encoding="utf-8") as file:
+        file.writelines(record_line(record) for record in records)
+        file.flush()
+        os.fsync(file.fileno())
+    part.replace(path)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PersonRecord:
+    """One person of a record; what the record does not say is None.
+
+    Attributes:
+        box_xyxy_px: (4,).
+        position_camera_m: (3,) the body's centre line at chest height.
+        position_covariance_m2: (3, 3).
+        gaze_camera: (3,) unit vector.
+        head_forward_camera: (3,) unit vector: the head's forward axis where ``gaze_camera`` holds
+            the eyes' direction (rendered truth).
+        awareness: α in [0, 1].
+        awareness_std: ≥ 0.
+        score: in [0, 1].
+        occlusion: share of the person that something else hides; 0 where the record is silent.
+        truncation: share of the person outside the picture; 0 where the record is silent.
+    """
+
+    box_xyxy_px: FloatArray | None
+    position_camera_m: FloatArray | None
+    position_covariance_m2: FloatArray | None
+    gaze_camera: FloatArray | None
+    head_forward_camera: FloatArray | None
+    awareness: float | None
+    awareness_std: float | None
+    score: float
+    occlusion: float
+    truncation: float
+
+    @property
+    def height_px(self) -> float:
+        """Height of the box; infinite without one, so that no limit leaves the person out."""
+        box = self.box_xyxy_px
+        return math.inf if box is None else float(box[3] - box[1])
+
+    @property
+    def range_m(self) -> float | None:
+        """Distance from the camera."""
+        position = self.position_camera_m
+        return None if position is None else float(np.linalg.norm(position))
+
+    @property
+    def facing_rad(self) -> float | None:
+        """Angle between the head's forward axis and the way to the camera: 0 faces it."""
+        forward = self.gaze_camera if self.head_forward_camera is None else self.head_forward_camera
+        if forward is None or self.position_camera_m is None or not self.range_m:
+            return None
+        cosine = -float(forward @ self.position_camera_m) / self.range_m
+        return math.acos(min(max(cosine, -1.0), 1.0))
+
+
+def read_person(person: Any, where: str) -> PersonRecord:
+    """Read one entry of ``people``; raises AwarenavError naming ``where`` for bad values."""
+    if not isinstance(person, dict):
+        raise AwarenavError(f"{where}: a person must be a mapping, got {person!r:.60}")
+
+    def array(name: str, shape: tuple[int, ...]) -> FloatArray | None:
+        value = person.get(name)
+        return (
+            None if value is None else finite_array(f"{where}: {name}", value, shape, AwarenavError)
+        )
+
+    def unit(name: str) -> FloatArray | None:
+        value = person.get(name)
+        return None if value is None else unit_vector(f"{where}: {name}", value, AwarenavError)
+
+    def share(name: str, default: float | None) -> float | None:
+        value = person.get(name)
+        if value is None:
+            return default
+        return finite_number(f"{where}: {name}", value, AwarenavError, minimum=0.0, maximum=1.0)
+
+    covariance = person.get("position_covariance_m2")
+    std = person.get("awareness_std")
+    return PersonRecord(
+        box_xyxy_px=array("box_xyxy_px", (4,)),
+        position_camera_m=array("position_camera_m", (3,)),
+        position_covariance_m2=None
+        if covariance is None
+        else covariance_matrix(f"{where}: position_covariance_m2", covariance, 3, AwarenavError),
+        gaze_camera=unit("gaze_camera"),
+        head_forward_camera=unit("head_forward_camera"),
+        awareness=share("awareness", None),
+        awareness_std=None
+        if std is None
+        else finite_number(f"{where}: awareness_std", std, AwarenavError, minimum=0.0),
+        score=share("score", 1.0) or 0.0,
+        occlusion=share("occlusion", 0.0) or 0.0,
+        truncation=share("truncation", 0.0) or 0.0,
+    )
+
+
+def people_by_frame(records: list[Record], path: Any) -> dict[str, list[PersonRecord]]:
+    """The people of every frame by its name; raises AwarenavError for a frame that comes twice."""
+    frames: dict[str, list[PersonRecord]] = {}
+    for record in records:
+        name = str(record["frame"])
+        if name in frames:
+            raise AwarenavError(f"{path}: frame {name!r} comes twice")
+        people = record["people"]
+        if not isinstance(people, list):
+            raise AwarenavError(
+                f"{path}, frame {name!r}: people must be a list, got {people!r:.60}"
+            )
+        frames[name] = [
+            read_person(person, f"{path}, frame {name!r}, person {index}")
+            for index, person in enumerate(people)
+        ]
+    return frames

@@ -1,0 +1,121 @@
+"""Identities as the file itself gives them, without a tracker of ours."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any, get_args
+
+import numpy as np
+
+from perception.arrays import finite_array, finite_number
+from tracking import TrackStatus
+
+from ..errors import AwarenavError
+from ._history import HistoryBook, TrackRun, TrackSample, camera_pose
+from ._recording import RecordedFrame, Recording, count, floor_covariance
+
+
+def given_tracks(recording: Recording) -> TrackRun:
+    """The tracks of a file that has some: of its ``tracks``, else of its people's ids.
+
+    People without a tracker have an α only where a frame measured one, and no lower bound.
+
+    Raises:
+        AwarenavError: for a file without any identity, or a track that is none.
+    """
+    # A file may hold frames out of order; identities need no order to be tracked in.
+    frames = sorted(recording.frames, key=lambda frame: frame.stamp_s)
+    tracked = any(frame.tracks is not None for frame in frames)
+    named = any(id is not None for frame in frames for id in frame.ids)
+    if not tracked and not named and any(frame.observations for frame in frames):
+        raise AwarenavError(
+            f"{recording.path} gives its people no ids; leave out --ids to track them here"
+        )
+    book = HistoryBook()
+    nameless = 0
+    for frame in frames:
+        samples = _of_tracks(frame, str(recording.path)) if tracked else _of_people(frame)
+        book.note(frame.stamp_s, samples)
+        nameless += sum(id is None for id in frame.ids)
+    remarks = [f"{count(nameless, 'observation')} without an id left out"] if nameless else []
+    poses = [camera_pose(frame.T_odom_camera) for frame in frames]
+    return TrackRun(
+        book.histories(),
+        np.array([frame.stamp_s for frame in frames]),
+        np.array(poses).reshape(-1, 3),
+        tuple(remarks),
+        "tracks of the file" if tracked else "ids of the file",
+    )
+
+
+def _of_tracks(frame: RecordedFrame, path: str) -> Iterator[tuple[int, TrackSample]]:
+    measured = dict(zip(frame.ids, frame.observations, strict=True))
+    for index, track in enumerate(frame.tracks or ()):
+        where = f"{path}, frame {frame.name!r}, track {index}"
+        id, status = track.get("id"), track.get("status")
+        if isinstance(id, bool) or not isinstance(id, int):
+            raise AwarenavError(f"{where}: id must be a whole number, got {id!r:.60}")
+        if status not in get_args(TrackStatus):
+            raise AwarenavError(
+                f"{where}: status must be one of {', '.join(get_args(TrackStatus))}, "
+                f"got {status!r:.60}"
+            )
+
+        observation = measured.get(id)
+        yield (
+            id,
+            TrackSample(
+                stamp_s=frame.stamp_s,
+                status=str(status),
+                is_frame=True,
+                seen=_number(track, "time_since_seen_s", where) == 0.0,
+                position_odom_m=finite_array(
+                    f"{where}: position_odom_m", track.get("position_odom_m"), (2,), AwarenavError
+                ),
+                velocity_odom_mps=finite_array(
+                    f"{where}: velocity_odom_mps",
+                    track.get("velocity_odom_mps"),
+                    (2,),
+                    AwarenavError,
+                ),
+                position_covariance_m2=None,
+                awareness=_number(track, "awareness", where, 1.0),
+                awareness_std=_number(track, "awareness_std", where),
+                awareness_lower=_number(track, "awareness_lower", where, 1.0),
+                measured_awareness=None if observation is None else observation.awareness,
+                measured_awareness_std=None if observation is None else observation.awareness_std,
+            ),
+        )
+
+
+def _number(track: dict[str, Any], name: str, where: str, maximum: float = math.inf) -> float:
+    return finite_number(
+        f"{where}: {name}", track.get(name), AwarenavError, minimum=0.0, maximum=maximum
+    )
+
+
+def _of_people(frame: RecordedFrame) -> Iterator[tuple[int, TrackSample]]:
+    positions = frame.positions_odom_m()
+    for id, observation, position in zip(frame.ids, frame.observations, positions, strict=True):
+        if id is None:
+            continue
+        yield (
+            id,
+            TrackSample(
+                stamp_s=frame.stamp_s,
+                status="given",
+                is_frame=True,
+                seen=True,
+                position_odom_m=position,
+                velocity_odom_mps=None,
+                position_covariance_m2=floor_covariance(
+                    frame.T_odom_camera, observation.position_covariance_m2
+                ),
+                awareness=math.nan,
+                awareness_std=math.nan,
+                awareness_lower=math.nan,
+                measured_awareness=observation.awareness,
+                measured_awareness_std=observation.awareness_std,
+            ),
+        )

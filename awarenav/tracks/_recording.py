@@ -1,0 +1,194 @@
+"""One line of an estimates file, checked and ready for the tracker.
+
+An estimates or truth file as frames for the tracker, in the order of its lines.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from perception import PersonObservation
+from perception.arrays import FloatArray, finite_number, rigid_transform
+
+from ..errors import AwarenavError
+from ..estimate import fixed_camera_pose
+from ..records import PersonRecord, Record, read_person, read_records
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RecordedFrame:
+    """A frame whose camera pose is known or assumed.
+
+    Attributes:
+        name: of the frame.
+        stamp_s: when it was taken.
+        T_odom_camera: (4, 4).
+        observations: of the people that have a position.
+        ids: of each observation what the file says it is; None where it does not say.
+        tracks: the line's own tracks as ``awarenav estimate --tracks`` writes them, else None.
+    """
+
+    name: str
+    stamp_s: float
+    T_odom_camera: FloatArray
+    observations: tuple[PersonObservation, ...]
+    ids: tuple[int | None, ...]
+    tracks: tuple[dict[str, Any], ...] | None
+
+    def positions_odom_m(self) -> list[FloatArray]:
+        """Where each observation is on the floor plane, (2,) each."""
+        T = self.T_odom_camera
+        return [T[:2, :3] @ each.position_camera_m + T[:2, 3] for each in self.observations]
+
+
+#: Standard deviation taken, per axis, for a position without a covariance, as in a truth file.
+ASSUMED_POSITION_STD_M: Final = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """What a file holds.
+
+    Attributes:
+        path: of the file.
+        frames: in the order of the lines.
+        remarks: sentences about everything that was left out or assumed.
+        without_covariance: observations with the assumed position covariance.
+    """
+
+    path: Path
+    frames: tuple[RecordedFrame, ...]
+    remarks: tuple[str, ...]
+    without_covariance: int
+
+
+def read_recording(path: Path) -> Recording:
+    """Read a JSON Lines file of frames.
+
+    A last line that was cut off in writing, a frame without a camera pose beside frames that have
+    one, and a person without a position are left out, each with a remark. Where no frame has a
+    pose, the camera is taken to stand still.
+
+    Raises:
+        AwarenavError: for a file that cannot be read, or a line or value that is none, naming it.
+    """
+    records = read_records(path)
+    counts: Counter[str] = Counter(cut=_lines(path) - len(records))
+    still = all(record["T_odom_camera"] is None for record in records)
+    frames = []
+    for record in records:
+        if record["T_odom_camera"] is None and not still:
+            counts["unplaced"] += 1
+            continue
+        frames.append(_frame(record, f"{path}, frame {record['frame']!r}", counts))
+    if still and frames:
+        counts["still"] = len(frames)
+    return Recording(path, tuple(frames), tuple(_remarks(counts)), counts["without covariance"])
+
+
+def _lines(path: Path) -> int:
+    """Lines that are not blank."""
+    with path.open(encoding="utf-8") as file:
+        return sum(1 for line in file if line.strip())
+
+
+def _frame(record: Record, where: str, counts: Counter[str]) -> RecordedFrame:
+    stamp_s = finite_number(f"{where}: stamp_s", record["stamp_s"], AwarenavError)
+    pose = record["T_odom_camera"]
+    T = (
+        fixed_camera_pose()
+        if pose is None
+        else rigid_transform(f"{where}: T_odom_camera", pose, AwarenavError)
+    )
+    if not isinstance(record["people"], list):
+        raise AwarenavError(f"{where}: people must be a list, got {record['people']!r:.60}")
+    observations, ids = [], []
+    for index, entry in enumerate(record["people"]):
+        person = read_person(entry, f"{where}, person {index}")
+        observation = _observation(person, stamp_s, counts)
+        if observation is not None:
+            observations.append(observation)
+            ids.append(_identity(entry.get("id"), f"{where}, person {index}"))
+    return RecordedFrame(
+        name=str(record["frame"]),
+        stamp_s=stamp_s,
+        T_odom_camera=T,
+        observations=tuple(observations),
+        ids=tuple(ids),
+        tracks=_tracks(record.get("tracks"), where),
+    )
+
+
+def _observation(
+    person: PersonRecord, stamp_s: float, counts: Counter[str]
+) -> PersonObservation | None:
+    if person.position_camera_m is None:
+        counts["nowhere"] += 1
+        return None
+    covariance = person.position_covariance_m2
+    if covariance is None:
+        counts["without covariance"] += 1
+        covariance = ASSUMED_POSITION_STD_M**2 * np.eye(3)
+    awareness, std = person.awareness, person.awareness_std
+    if awareness is not None and std is None:
+        counts["without std"] += 1
+        awareness = None  # of unknown worth, and so no evidence
+    return PersonObservation(
+        stamp_s=stamp_s,
+        position_camera_m=person.position_camera_m,
+        position_covariance_m2=covariance,
+        gaze_camera=person.gaze_camera,
+        awareness=awareness,
+        awareness_std=None if awareness is None else std,
+        score=person.score,
+        box_xyxy_px=person.box_xyxy_px,
+    )
+
+
+def _identity(value: Any, where: str) -> int | None:
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise AwarenavError(f"{where}: id must be a whole number or null, got {value!r:.60}")
+    return value
+
+
+def _tracks(value: Any, where: str) -> tuple[dict[str, Any], ...] | None:
+    if value is None:
+        return None
+    if not isinstance(value, list) or not all(isinstance(track, dict) for track in value):
+        raise AwarenavError(f"{where}: tracks must be a list of mappings, got {value!r:.60}")
+    return tuple(value)
+
+
+def _remarks(counts: Counter[str]) -> list[str]:
+    said = {
+        "cut": "the last line was cut off in writing and is left out",
+        "still": "no frame has a T_odom_camera: the camera is taken to stand still, and odom is "
+        "the floor under it",
+        "unplaced": "{} without T_odom_camera left out, since other frames have one",
+        "nowhere": "{} without position_camera_m left out",
+        "without std": "{} with an awareness but no awareness_std: taken as no evidence",
+    }
+    things = {"unplaced": "frame"}
+    return [
+        sentence.format(count(counts[key], things.get(key, "observation")))
+        for key, sentence in said.items()
+        if counts[key] > 0
+    ]
+
+
+def count(number: int, name: str, plural: str | None = None) -> str:
+    """A number and what is counted, in the plural where it must be."""
+    return f"{number} {name}" if number == 1 else f"{number} {plural or name + 's'}"
+
+
+def floor_covariance(T_odom_camera: FloatArray, covariance_camera_m2: FloatArray) -> FloatArray:
+    """(2, 2) covariance on the odom floor plane of one (3, 3) in the camera frame."""
+    turn = T_odom_camera[:2, :3]
+    return np.asarray(turn @ covariance_camera_m2 @ turn.T)

@@ -1,0 +1,1 @@
+"""Robots and people of a crossing: their bodies and their behaviour."""

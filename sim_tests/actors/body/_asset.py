@@ -1,0 +1,185 @@
+"""The shipped workers: skinned meshes, joints and keypoints of a parametric body model.
+
+``training/workers`` makes the files; this module reads them. A body stands at rest: upright, arms
+hanging, knees and head straight, in its own frame (x forward, y left, z up, origin on the floor
+below the hip midpoint). Every joint's rotation is written in axes parallel to that frame at rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import resources
+from pathlib import Path
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from perception.arrays import FloatArray
+
+from ...world.errors import SimError
+
+#: Joints in the order of every array; a parent precedes its children.
+JOINTS: Final = (
+    "spine",
+    "neck",
+    "left_eye",
+    "right_eye",
+    "left_shoulder",
+    "left_elbow",
+    "left_wrist",
+    "right_shoulder",
+    "right_elbow",
+    "right_wrist",
+    "left_hip",
+    "left_knee",
+    "left_ankle",
+    "right_hip",
+    "right_knee",
+    "right_ankle",
+)
+#: Parent of each joint in :data:`JOINTS`, −1 for the pelvis.
+PARENTS: Final = (-1, 0, 1, 1, 0, 4, 5, 0, 7, 8, -1, 10, 11, -1, 13, 14)
+#: Levels of detail, finest first.
+LEVELS: Final = 3
+
+
+@dataclass(frozen=True, eq=False)
+class SkinMesh:
+    """One level of detail of a body's surface at rest.
+
+    Attributes:
+        vertices_m: (V, 3).
+        normals: (V, 3) unit.
+        uv: (V, 2), (0, 0) at the lower left of the texture.
+        triangles: (T, 3) rows of vertices, counter-clockwise as seen from outside.
+        weights: (V, 16) in [0, 1]: how much of each joint's rotation a vertex follows; 1 for
+            everything beyond the joint, between 0 and 1 where skin bends.
+        texture_rgb: (H, W, 3) uint8.
+    """
+
+    vertices_m: FloatArray
+    normals: FloatArray
+    uv: FloatArray
+    triangles: NDArray[np.int64]
+    weights: FloatArray
+    texture_rgb: NDArray[np.uint8]
+
+
+@dataclass(frozen=True, eq=False)
+class Capsule:
+    """A collision shape: the part of the body beyond ``joint`` (−1: the pelvis), at rest."""
+
+    joint: int
+    start_m: tuple[float, float, float]
+    end_m: tuple[float, float, float]
+    radius_m: float
+
+
+@dataclass(frozen=True, eq=False)
+class WorkerAsset:
+    """A worker as shipped.
+
+    Attributes:
+        name: by which it was loaded.
+        description: who this is, in a line.
+        stature_m: height with shoes and without hat or helmet.
+        joints_m: (16, 3) at rest, in the order of :data:`JOINTS`.
+        keypoints_m: (23, 3) at rest: COCO's 17, then big toe, small toe and heel, left and right;
+            where the body model's own definitions put them.
+        keypoint_weights: (23, 16) as :attr:`SkinMesh.weights`.
+        capsules: collision shapes.
+        levels: surfaces, finest first.
+    """
+
+    name: str
+    description: str
+    stature_m: float
+    joints_m: FloatArray
+    keypoints_m: FloatArray
+    keypoint_weights: FloatArray
+    capsules: tuple[Capsule, ...]
+    levels: tuple[SkinMesh, ...]
+
+
+def worker_names() -> tuple[str, ...]:
+    """Names of the shipped workers, sorted."""
+    folder = resources.files("sim_tests.actors.body") / "workers"
+    return tuple(
+        sorted(
+            entry.name.removesuffix(".npz")
+            for entry in folder.iterdir()
+            if entry.name.endswith(".npz")
+        )
+    )
+
+
+@lru_cache(maxsize=64)
+def load_worker(name: str) -> WorkerAsset:
+    """Read a shipped worker, or one from the ``.npz`` file that ``training/workers`` has made.
+
+    Raises:
+        SimError: for a name that is not shipped or a file that is not there.
+    """
+    if name.endswith(".npz"):
+        folder, stem = Path(name).parent, Path(name).stem
+        if not Path(name).is_file():
+            raise SimError(f"there is no worker {name!r}")
+    else:
+        folder, stem = Path(str(resources.files("sim_tests.actors.body"))) / "workers", name
+        if name not in worker_names():
+            raise SimError(
+                f"worker must be one of {', '.join(worker_names())} or an .npz file, got {name!r}"
+            )
+    with (folder / f"{stem}.npz").open("rb") as file, np.load(file, allow_pickle=False) as data:
+        arrays = {key: data[key] for key in data.files}
+    levels = tuple(
+        _skin(arrays, level, _picture(folder / f"{stem}_lod{level}.jpg")) for level in range(LEVELS)
+    )
+    capsules = tuple(
+        Capsule(int(joint), tuple(row[:3]), tuple(row[3:6]), row[6])
+        for joint, row in zip(
+            arrays["capsule_joints"].tolist(), arrays["capsules_m"].tolist(), strict=True
+        )
+    )
+    return WorkerAsset(
+        name=name,
+        description=str(arrays["description"]),
+        stature_m=float(arrays["stature_m"]),
+        joints_m=_locked(arrays["joints_m"]),
+        keypoints_m=_locked(arrays["keypoints_m"]),
+        keypoint_weights=_locked(arrays["keypoint_weights"]),
+        capsules=capsules,
+        levels=levels,
+    )
+
+
+def _skin(arrays: dict[str, NDArray[np.generic]], level: int, rgb: NDArray[np.uint8]) -> SkinMesh:
+    """Undo the quantisation: 0.1 mm, 1/127, 1/65535 and 1/255."""
+
+    def get(key: str, scale: float) -> FloatArray:
+        return _locked(arrays[f"lod{level}_{key}"].astype(np.float64) * scale)
+
+    normals = get("normals", 1.0 / 127.0)
+    lengths = np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+    return SkinMesh(
+        vertices_m=get("vertices", 1e-4),
+        normals=_locked(normals / lengths),
+        uv=get("uv", 1.0 / 65535.0),
+        triangles=arrays[f"lod{level}_triangles"].astype(np.int64),
+        weights=get("weights", 1.0 / 255.0),
+        texture_rgb=rgb,
+    )
+
+
+def _picture(file: Path) -> NDArray[np.uint8]:
+    bgr = cv2.imdecode(np.frombuffer(file.read_bytes(), np.uint8), cv2.IMREAD_COLOR)
+    return np.ascontiguousarray(np.asarray(bgr, dtype=np.uint8)[..., ::-1])
+
+
+def _locked(array: NDArray[np.generic]) -> FloatArray:
+    out = np.array(array, dtype=np.float64)
+    out.setflags(write=False)
+    return out

@@ -1,0 +1,196 @@
+"""The worker's body in the physics world: capsules on spherical joints, and the box carried."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+from ...world import PERSON_GROUP, RAY_GROUP, ROBOT_GROUP, Warehouse
+from ...world.bullet import pybullet
+from ._asset import JOINTS, PARENTS, Capsule
+from ._pose import IDENTITY, Quaternion, Vector
+from ._postures import BOX_SIZE_M, arm_postures
+from ._skeleton import Skeleton
+
+_SPINE: Final = JOINTS.index("spine")
+# The box hangs from the thorax by a slide that takes it away.
+_BOX: Final = len(JOINTS)
+# Rows of JOINTS, and the box, in the order in which PyBullet numbers links: depth first. Eyes do
+# not collide.
+_LINKS: Final = (
+    *(row for row in range(JOINTS.index("left_hip")) if not JOINTS[row].endswith("_eye")),
+    _BOX,
+    *range(JOINTS.index("left_hip"), len(JOINTS)),
+)
+_LINK_PARENTS: Final = (*PARENTS, _SPINE)
+# Spherical joints need masses. These are so large, and their motors so unwilling to move, that a
+# robot that pushes for seconds moves a limb by less than a millimetre.
+_LINK_MASS_KG: Final = 1000.0
+_HOLDING_NM: Final = 1e5
+# A box that nobody carries waits where nothing comes.
+_PARKED_M: Final = -100.0
+
+
+class WorkerBody:
+    """One kinematic multibody: it goes where it is put and stays there, whoever pushes.
+
+    Its base is the pelvis with the hips' midpoint as origin (x forward, y left, z up at rest).
+
+    Args:
+        warehouse: the world to stand in.
+        skeleton: bones and capsules.
+
+    Attributes:
+        body: PyBullet's id of it.
+    """
+
+    def __init__(self, warehouse: Warehouse, skeleton: Skeleton) -> None:
+        self._client = warehouse.client
+        self._hips_m = skeleton.hips_m
+        rows = (-1, *_LINKS)
+        centres = {row: skeleton.joint_m(name) for row, name in enumerate(JOINTS)}
+        centres |= {-1: skeleton.hips_m, _BOX: arm_postures(skeleton).box_m}
+        shapes = [
+            self._box()
+            if row == _BOX
+            else self._capsules(
+                [c for c in skeleton.asset.capsules if c.joint == row],
+                skeleton.scale,
+                centres[row],
+            )
+            for row in rows
+        ]
+        count = len(_LINKS)
+        self.body = int(
+            pybullet.createMultiBody(
+                baseMass=0.0,
+                baseCollisionShapeIndex=shapes[0],
+                baseVisualShapeIndex=-1,
+                basePosition=skeleton.hips_m,
+                linkMasses=[_LINK_MASS_KG] * count,
+                linkCollisionShapeIndices=shapes[1:],
+                linkVisualShapeIndices=[-1] * count,
+                linkPositions=[_minus(centres[row], centres[_LINK_PARENTS[row]]) for row in _LINKS],
+                linkOrientations=[IDENTITY] * count,
+                linkInertialFramePositions=[(0.0, 0.0, 0.0)] * count,
+                linkInertialFrameOrientations=[IDENTITY] * count,
+                linkParentIndices=[rows.index(_LINK_PARENTS[row]) for row in _LINKS],
+                linkJointTypes=[
+                    pybullet.JOINT_PRISMATIC if row == _BOX else pybullet.JOINT_SPHERICAL
+                    for row in _LINKS
+                ],
+                linkJointAxis=[(0.0, 0.0, 1.0)] * count,
+                flags=pybullet.URDF_ENABLE_SLEEPING,
+                physicsClientId=self._client,
+            )
+        )
+        self._joints = list(range(count))
+        for joint, row in enumerate(_LINKS):
+            if row == _BOX:
+                pybullet.setJointMotorControl2(
+                    self.body,
+                    joint,
+                    pybullet.VELOCITY_CONTROL,
+                    targetVelocity=0.0,
+                    force=_HOLDING_NM,
+                    physicsClientId=self._client,
+                )
+            else:
+                pybullet.setJointMotorControlMultiDof(
+                    self.body,
+                    joint,
+                    pybullet.POSITION_CONTROL,
+                    targetPosition=IDENTITY,
+                    targetVelocity=(0.0, 0.0, 0.0),
+                    positionGain=0.0,
+                    velocityGain=1.0,
+                    force=(_HOLDING_NM,) * 3,
+                    physicsClientId=self._client,
+                )
+        for link in range(-1, count):
+            pybullet.setCollisionFilterGroupMask(
+                self.body, link, PERSON_GROUP, ROBOT_GROUP | RAY_GROUP, physicsClientId=self._client
+            )
+
+    def put(
+        self,
+        hips_odom_m: Vector,
+        pelvis_odom: Quaternion,
+        joints: Sequence[Quaternion],
+        with_box: bool,
+    ) -> None:
+        """Set the pose.
+
+        Args:
+            hips_odom_m: midpoint of the hips.
+            pelvis_odom: turn of the pelvis.
+            joints: turn of every joint in :data:`JOINTS`, in axes parallel to the body's at rest.
+            with_box: whether the box is in the hands.
+        """
+        slide = (0.0 if with_box else _PARKED_M,)
+        pybullet.resetBasePositionAndOrientation(
+            self.body, hips_odom_m, pelvis_odom, physicsClientId=self._client
+        )
+        pybullet.resetJointStatesMultiDof(
+            self.body,
+            self._joints,
+            [slide if row == _BOX else joints[row] for row in _LINKS],
+            physicsClientId=self._client,
+        )
+        # A sleeping body costs nothing in a step; a robot that touches it wakes it.
+        pybullet.changeDynamics(
+            self.body,
+            -1,
+            activationState=pybullet.ACTIVATION_STATE_SLEEP,
+            physicsClientId=self._client,
+        )
+
+    def _capsules(self, capsules: list[Capsule], scale: float, centre_m: Vector) -> int:
+        """One collision shape of all capsules of a link; −1 without any."""
+        if not capsules:
+            return -1
+        ends = [
+            [_minus(_scaled(end, scale), centre_m) for end in (capsule.start_m, capsule.end_m)]
+            for capsule in capsules
+        ]
+        return int(
+            pybullet.createCollisionShapeArray(
+                shapeTypes=[pybullet.GEOM_CAPSULE] * len(capsules),
+                radii=[capsule.radius_m * scale for capsule in capsules],
+                lengths=[max(math.dist(start, end), 1e-4) for start, end in ends],
+                collisionFramePositions=[
+                    [0.5 * (a + b) for a, b in zip(start, end, strict=True)] for start, end in ends
+                ],
+                collisionFrameOrientations=[_from_z(_minus(end, start)) for start, end in ends],
+                physicsClientId=self._client,
+            )
+        )
+
+    def _box(self) -> int:
+        return int(
+            pybullet.createCollisionShape(
+                pybullet.GEOM_BOX,
+                halfExtents=[0.5 * side for side in BOX_SIZE_M],
+                physicsClientId=self._client,
+            )
+        )
+
+
+def _scaled(vector: Vector, scale: float) -> Vector:
+    return (vector[0] * scale, vector[1] * scale, vector[2] * scale)
+
+
+def _minus(first: Vector, second: Vector) -> Vector:
+    return (first[0] - second[0], first[1] - second[1], first[2] - second[2])
+
+
+def _from_z(direction: Vector) -> Quaternion:
+    """The shortest turn from z to a direction; capsules lie along z."""
+    x, y, z = direction
+    length = math.sqrt(x * x + y * y + z * z)
+    if length < 1e-9 or z < -length * (1.0 - 1e-9):
+        return IDENTITY  # a capsule is the same upside down
+    w = 1.0 + z / length
+    norm = math.sqrt((x * x + y * y) / (length * length) + w * w)
+    return (-y / length / norm, x / length / norm, 0.0, w / norm)

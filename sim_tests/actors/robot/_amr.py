@@ -1,0 +1,258 @@
+"""A mobile robot that drives through its wheels, with a camera on a post."""
+
+from __future__ import annotations
+
+import math
+from importlib import resources
+from typing import Any, Final, Literal
+
+import numpy as np
+
+from nav_adapter import RobotProfile, RobotState
+from perception.arrays import FloatArray, finite_array, finite_number
+
+from ...world import ROBOT_GROUP, Warehouse
+from ...world.bullet import pybullet
+from ...world.errors import SimError
+
+#: Nova Carter's published outline, its centre midway between the drive wheels.
+NOVA_CARTER: Final = RobotProfile(
+    footprint_m=np.array([[0.3625, 0.25], [-0.3625, 0.25], [-0.3625, -0.25], [0.3625, -0.25]]),
+    max_speed_mps=1.5,
+    max_acceleration_mps2=1.0,
+    max_deceleration_mps2=1.0,
+    reaction_time_s=0.3,
+)
+
+WHEEL_RADIUS_M: Final = 0.14
+TRACK_M: Final = 0.414
+MAX_YAW_RATE_RADPS: Final = 1.5
+MAX_YAW_ACCELERATION_RADPS2: Final = 3.0
+CAMERA_HEIGHT_M: Final = 1.4
+# Just ahead of the camera's housing, so that the robot does not see itself.
+CAMERA_FORWARD_M: Final = 0.165
+
+# Where a camera that looks all around sits: above the head and the beacon on the post.
+_ABOVE_POST_M: Final = (0.12, 0.0, 1.55)
+
+# Ample for 98 kg at 1 m/s² on two wheels (7 N·m each), too little to spin the tyres on the floor.
+_MAX_WHEEL_TORQUE_NM: Final = 25.0
+_ON_FLOOR_TYRE_FRICTION: Final = 1.0
+# The axes of the optical frame (x right, y down, z forward) in the base frame, as columns.
+_ROTATION_BASE_OPTICAL: Final = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+
+
+class Amr:
+    """A differential-drive robot in a warehouse.
+
+    The base frame lies on the floor midway between the drive wheels (REP-105's base_footprint):
+    x forward, y left, z up. Speeds follow the command through acceleration limits and velocity
+    motors with a torque limit on the two wheel joints; nothing but these motors moves it.
+
+    Args:
+        warehouse: the world that it drives in.
+        position_odom_m: (2,) start, metres.
+        heading_odom_rad: start, counter-clockwise from odom x.
+        profile: its limits; the body is that of :data:`NOVA_CARTER` whatever they are.
+        camera_pitch_rad: how far the camera looks down, in (−π/2, π/2).
+        camera_mount: ``"front"`` of the head on the post, or on its ``"top"``.
+
+    Attributes:
+        body: PyBullet's id of the robot.
+        profile: as given.
+        T_base_camera: (4, 4) pose of the optical frame in the base frame.
+
+    Raises:
+        SimError: for arguments that are not finite or out of range.
+    """
+
+    def __init__(
+        self,
+        warehouse: Warehouse,
+        position_odom_m: Any = (0.0, 0.0),
+        heading_odom_rad: float = 0.0,
+        profile: RobotProfile = NOVA_CARTER,
+        camera_pitch_rad: float = 0.0,
+        camera_mount: Literal["front", "top"] = "front",
+    ) -> None:
+        x, y = finite_array("position_odom_m", position_odom_m, (2,), SimError).tolist()
+        heading = finite_number("heading_odom_rad", heading_odom_rad, SimError)
+        pitch = finite_number(
+            "camera_pitch_rad", camera_pitch_rad, SimError, minimum=-1.57, maximum=1.57
+        )
+        self.profile = profile
+        self.T_base_camera = _camera_pose(pitch, camera_mount == "top")
+        self._warehouse = warehouse
+        self._client = warehouse.client
+        source = resources.files("sim_tests.actors.robot") / "amr.urdf"
+        with resources.as_file(source) as path:
+            self.body: int = pybullet.loadURDF(
+                str(path),
+                basePosition=[x, y, 0.0],
+                baseOrientation=[0.0, 0.0, math.sin(0.5 * heading), math.cos(0.5 * heading)],
+                # A cylinder made of facets would roll bumpily.
+                flags=pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_USE_IMPLICIT_CYLINDER,
+                physicsClientId=self._client,
+            )
+        self._set_up_dynamics()
+        # PyBullet reports the pose of the base link's centre of mass; this leads back to its frame.
+        dynamics = pybullet.getDynamicsInfo(self.body, -1, physicsClientId=self._client)
+        self._com_base_m = np.array(dynamics[3])
+        self._target_speed_mps = 0.0
+        self._target_yaw_rate_radps = 0.0
+        self._speed_mps = 0.0
+        self._yaw_rate_radps = 0.0
+        self._read_at_step = -1
+        self._last_motion = (np.eye(4), 0.0, 0.0, np.eye(4))
+        self._drive()
+
+    def command(self, speed_mps: float, yaw_rate_radps: float) -> None:
+        """Set what the robot shall do from now on: m/s forwards and rad/s counter-clockwise.
+
+        Beyond the robot's limits the command is cut to them, as its motor controller would.
+        """
+        speed = finite_number("speed_mps", speed_mps, SimError)
+        yaw_rate = finite_number("yaw_rate_radps", yaw_rate_radps, SimError)
+        limit = self.profile.max_speed_mps
+        self._target_speed_mps = min(max(speed, -limit), limit)
+        self._target_yaw_rate_radps = min(max(yaw_rate, -MAX_YAW_RATE_RADPS), MAX_YAW_RATE_RADPS)
+
+    def advance(self, dt_s: float) -> None:
+        """Ramp the wheels towards the command by ``dt_s`` > 0; call it before each physics step."""
+        dt = finite_number("dt_s", dt_s, SimError, minimum=0.0, exclusive_minimum=True)
+        if (
+            self._speed_mps == self._target_speed_mps
+            and self._yaw_rate_radps == self._target_yaw_rate_radps
+        ):
+            return
+        speed = _ramped(
+            self._speed_mps,
+            self._target_speed_mps,
+            self.profile.max_acceleration_mps2 * dt,
+            self.profile.max_deceleration_mps2 * dt,
+        )
+        change = MAX_YAW_ACCELERATION_RADPS2 * dt
+        yaw_rate = _ramped(self._yaw_rate_radps, self._target_yaw_rate_radps, change, change)
+        if speed != self._speed_mps or yaw_rate != self._yaw_rate_radps:
+            self._speed_mps, self._yaw_rate_radps = speed, yaw_rate
+            self._drive()
+
+    @property
+    def driven_speed_mps(self) -> float:
+        """Speed that the motors ask for now; whoever pushes the robot does not change it."""
+        return self._speed_mps
+
+    def state(self, stamp_s: float) -> RobotState:
+        """Where the robot is and how it moves, from the physics."""
+        T, speed, yaw_rate, _ = self._motion()
+        return RobotState(
+            stamp_s=stamp_s,
+            position_odom_m=T[:2, 3],
+            heading_odom_rad=math.atan2(T[1, 0], T[0, 0]),
+            speed_mps=speed,
+            yaw_rate_radps=yaw_rate,
+        )
+
+    @property
+    def velocity_odom_mps(self) -> FloatArray:
+        """(2,) velocity of the base origin, along the heading."""
+        T, speed, _, _ = self._motion()
+        heading = math.atan2(T[1, 0], T[0, 0])
+        return speed * np.array([math.cos(heading), math.sin(heading)])
+
+    @property
+    def T_odom_base(self) -> FloatArray:  # noqa: N802
+        """(4, 4) pose of the base frame in odom, with the slight pitch of the real motion."""
+        return self._motion()[0]
+
+    @property
+    def T_odom_camera(self) -> FloatArray:  # noqa: N802
+        """(4, 4) pose of the camera's optical frame in odom."""
+        return self._motion()[3]
+
+    def _motion(self) -> tuple[FloatArray, float, float, FloatArray]:
+        """T_odom_base, speed (m/s), yaw rate (rad/s) and T_odom_camera; read once a step."""
+        if self._read_at_step == self._warehouse.steps:
+            return self._last_motion
+        self._read_at_step = self._warehouse.steps
+        com, quaternion = pybullet.getBasePositionAndOrientation(
+            self.body, physicsClientId=self._client
+        )
+        velocity, angular = pybullet.getBaseVelocity(self.body, physicsClientId=self._client)
+        rotation = np.array(pybullet.getMatrixFromQuaternion(quaternion)).reshape(3, 3)
+        arm = rotation @ -self._com_base_m
+        T = np.eye(4)
+        T[:3, :3] = rotation
+        T[:3, 3] = com + arm
+        (wx, wy, wz), (x, y, z) = angular, arm
+        turning = (wy * z - wz * y, wz * x - wx * z, wx * y - wy * x)
+        origin_velocity = np.array(velocity) + turning
+        T.setflags(write=False)
+        T_odom_camera = np.asarray(T @ self.T_base_camera)
+        T_odom_camera.setflags(write=False)
+        speed = float(origin_velocity @ rotation[:, 0])
+        self._last_motion = T, speed, float(angular[2]), T_odom_camera
+        return self._last_motion
+
+    def _set_up_dynamics(self) -> None:
+        links = {
+            pybullet.getJointInfo(self.body, joint, physicsClientId=self._client)[
+                12
+            ].decode(): joint
+            for joint in range(pybullet.getNumJoints(self.body, physicsClientId=self._client))
+        }
+        self._wheels = [links["left_wheel"], links["right_wheel"]]
+        for link in (-1, *links.values()):
+            rolls = link in self._wheels
+            pybullet.changeDynamics(
+                self.body,
+                link,
+                # Casters and body slide freely; only the tyres hold.
+                lateralFriction=_ON_FLOOR_TYRE_FRICTION if rolls else 0.0,
+                rollingFriction=0.0,
+                spinningFriction=0.0,
+                restitution=0.0,
+                linearDamping=0.0,
+                angularDamping=0.0,
+                jointDamping=0.0,
+                physicsClientId=self._client,
+            )
+            pybullet.setCollisionFilterGroupMask(
+                self.body, link, ROBOT_GROUP, -1, physicsClientId=self._client
+            )
+
+    def _drive(self) -> None:
+        turn = 0.5 * TRACK_M * self._yaw_rate_radps
+        pybullet.setJointMotorControlArray(
+            self.body,
+            self._wheels,
+            pybullet.VELOCITY_CONTROL,
+            targetVelocities=[
+                (self._speed_mps - turn) / WHEEL_RADIUS_M,
+                (self._speed_mps + turn) / WHEEL_RADIUS_M,
+            ],
+            forces=[_MAX_WHEEL_TORQUE_NM, _MAX_WHEEL_TORQUE_NM],
+            physicsClientId=self._client,
+        )
+
+
+def _camera_pose(pitch_rad: float, on_top: bool) -> FloatArray:
+    """T_base_camera of a camera on the post that looks down by ``pitch_rad``."""
+    cos, sin = math.cos(pitch_rad), math.sin(pitch_rad)
+    down = np.array([[cos, 0.0, sin], [0.0, 1.0, 0.0], [-sin, 0.0, cos]])  # about base y
+    pose = np.eye(4)
+    pose[:3, :3] = down @ _ROTATION_BASE_OPTICAL
+    pose[:3, 3] = _ABOVE_POST_M if on_top else (CAMERA_FORWARD_M, 0.0, CAMERA_HEIGHT_M)
+    pose.setflags(write=False)
+    return pose
+
+
+def _ramped(now: float, target: float, rise: float, fall: float) -> float:
+    """One step from ``now`` towards ``target``: away from zero by ``rise``, towards it by ``fall``.
+
+    A change of sign passes through zero first.
+    """
+    if now * target < 0.0 or abs(target) < abs(now):
+        end = target if now * target >= 0.0 else 0.0
+        return max(now - fall, end) if now > 0.0 else min(now + fall, end)
+    return min(now + rise, target) if target > now else max(now - rise, target)

@@ -1,1 +1,0 @@
-"""The scenarios: what there is, what they look like and whether they bring people together."""

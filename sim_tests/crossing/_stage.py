@@ -1,0 +1,348 @@
+"""The stage of one crossing: hall, robot and people, and the truth about them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Final
+
+import numpy as np
+
+from awarenav.closing import Closing
+from perception import AttentionCone
+from perception.anthropometry import BODY_RADIUS_M
+from perception.arrays import FloatArray
+
+from ..actors.behaviour import (
+    MovingBody,
+    PersonBehaviour,
+    PersonMotion,
+    PersonOutcome,
+    RobotBody,
+    Scripted,
+    Surroundings,
+    Walker,
+    replayed_people,
+)
+from ..actors.body import Worker
+from ..actors.robot import NOVA_CARTER, Amr, AmrLook
+from ..scenario import Scenario
+from ..world import Warehouse, sees
+from ..world.bullet import pybullet
+from ..world.render import RendererName
+from ._metrics import STANDING_SPEED_MPS, SafetyMeter
+
+# Surfaces are measured exactly once centres are nearer than this; farther away a bound will do.
+_EXACT_WITHIN_M: Final = 4.0
+# How far the true separation of a body with arms down lies above its bound.
+_NEARER_THAN_BOUND_M: Final = 0.45
+# Bodies move at their full rate and physics looks for contacts once surfaces were nearer than this
+# in the last control cycle; nobody closes it within one.
+_TOUCH_WITHIN_M: Final = 0.8
+_BODY_UPDATE_HZ: Final = 60.0
+# A body that moves deeper than this into the robot in one update is held.
+_DEEPER_M: Final = 0.002
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrueView:
+    """The truth about one worker at one instant.
+
+    Attributes:
+        position_camera_m: (3,) centre line at chest height, camera frame.
+        gaze_camera: (3,) unit vector of the gaze, eyes included.
+        awareness: cone score of the true gaze at the robot; 0 without a line of sight.
+        position_odom_m: (2,).
+        velocity_odom_mps: (2,).
+    """
+
+    position_camera_m: FloatArray
+    gaze_camera: FloatArray
+    awareness: float
+    position_odom_m: FloatArray
+    velocity_odom_mps: FloatArray
+
+    @property
+    def d_fwd_m(self) -> float:
+        """Distance along the robot's heading, from the camera."""
+        return float(self.position_camera_m[2])
+
+    @property
+    def d_lat_m(self) -> float:
+        """Lateral offset from the robot's heading, left positive."""
+        return -float(self.position_camera_m[0])
+
+
+class Stage(Closing):
+    """Everything that moves in one crossing.
+
+    People are numbered throughout: scripted workers first, then those who react, then those who
+    are replayed.
+
+    Args:
+        scenario: what happens.
+        start_offsets_s: how much later each scripted worker starts.
+        people_rng: what the people who react draw from; None is the generator of seed 0.
+        renderer: what draws it, should pictures be taken.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        start_offsets_s: FloatArray,
+        people_rng: np.random.Generator | None = None,
+        *,
+        renderer: RendererName = "tiny",
+    ) -> None:
+        self.scenario = scenario
+        self.warehouse = Warehouse(scenario.layout, renderer=renderer)
+        try:
+            task = scenario.robot
+            self.amr = Amr(
+                self.warehouse,
+                (task.start_x_m, task.start_y_m),
+                math.radians(task.start_heading_deg),
+                NOVA_CARTER,
+                camera_mount=scenario.camera.mount,
+            )
+            self.walkers = self._walkers(
+                np.random.default_rng(0) if people_rng is None else people_rng
+            )
+            self._cast: tuple[PersonBehaviour, ...] = (
+                *(
+                    Scripted(script, float(offset))
+                    for script, offset in zip(scenario.workers, start_offsets_s, strict=True)
+                ),
+                *self.walkers,
+                *(() if scenario.replay_csv is None else replayed_people(scenario.replay_csv)),
+            )
+            self.workers = tuple(
+                Worker(self.warehouse, actor.stature_m, look=actor.look, stride_m=actor.stride_m)
+                for actor in self._cast
+            )
+        except BaseException:
+            self.warehouse.close()
+            raise
+        self.warehouse.add_actor(AmrLook.of(self.warehouse, self.amr))
+        self._motions: tuple[PersonMotion, ...] = ()
+        steps = 1.0 / (_BODY_UPDATE_HZ * self.warehouse.physics_dt_s)
+        self._steps_per_body_update = max(round(steps), 1)
+        self._close = [False] * len(self.workers)
+        half_length, half_width = np.abs(self.amr.profile.footprint_m).max(axis=0).tolist()
+        self._half_size_m: tuple[float, float] = (half_length, half_width)
+        self._held = [False] * len(self.workers)
+        self._velocity_mps: FloatArray | None = None
+        self._place_workers()
+
+    def close(self) -> None:
+        """End the physics world."""
+        self.warehouse.close()
+
+    @property
+    def t_s(self) -> float:
+        """Simulated time."""
+        return self.warehouse.time_s
+
+    def advance(self, until_s: float, meter: SafetyMeter) -> None:
+        """Run physics to ``until_s``, moving the workers and recording contacts."""
+        while self.t_s < until_s - 0.5 * self.warehouse.physics_dt_s:
+            # Far from the robot a body that moves once a control cycle touches nobody either.
+            if any(self._close) and self.warehouse.steps % self._steps_per_body_update == 0:
+                self._place_workers()
+            self.amr.advance(self.warehouse.physics_dt_s)
+            # A collision slows the robot in the step that finds it, and in the one before, which
+            # lets it come just as far as the body: what counts is how it came.
+            earlier, now = self._velocity_mps, None
+            if any(self._close):
+                now = self.robot_velocity_odom_mps
+            self._velocity_mps = now
+            self.warehouse.step()
+            if now is None:
+                continue
+            came = now
+            if earlier is not None and earlier @ earlier > now @ now:
+                came = earlier
+            if abs(self.amr.driven_speed_mps) <= STANDING_SPEED_MPS:
+                came = np.zeros(2)  # it stands: what moves it is who walks into it
+            for index, close in enumerate(self._close):
+                if close:
+                    self._look_for_contact(index, came, meter)
+        self._place_workers()
+
+    def measure(self, meter: SafetyMeter, dt_s: float) -> tuple[float, ...]:
+        """Account for the separation of every worker; returns the separation margins."""
+        velocity = self.robot_velocity_odom_mps
+        margins = []
+        meter.separations_m.clear()
+        for index, motion in enumerate(self._motions):
+            separation, towards = self._separation(index)
+            self._close[index] = separation < _TOUCH_WITHIN_M
+            margins.append(
+                meter.separation(separation, velocity, motion.velocity_odom_mps, towards, dt_s)
+            )
+        return tuple(margins)
+
+    @property
+    def robot_velocity_odom_mps(self) -> FloatArray:
+        """(2,) velocity of the base origin."""
+        return self.amr.velocity_odom_mps
+
+    def truth(self, cone: AttentionCone, T_odom_camera: FloatArray) -> tuple[TrueView, ...]:
+        """The truth about every worker, from the robot's camera."""
+        rotation, origin = T_odom_camera[:3, :3], T_odom_camera[:3, 3]
+        views = []
+        for worker, motion in zip(self.workers, self._motions, strict=True):
+            gaze = worker.gaze_odom
+            alpha = float(cone.scores(worker.eyes_odom_m, gaze, origin))
+            if alpha > 0.0 and not sees(worker, origin, through=frozenset({self.amr.body})):
+                alpha = 0.0
+            views.append(
+                TrueView(
+                    (worker.chest_odom_m - origin) @ rotation,
+                    gaze @ rotation,
+                    alpha,
+                    motion.position_odom_m,
+                    motion.velocity_odom_mps,
+                )
+            )
+        return tuple(views)
+
+    @property
+    def motions(self) -> tuple[PersonMotion, ...]:
+        """What everybody does now."""
+        return self._motions
+
+    @property
+    def outcomes(self) -> tuple[PersonOutcome, ...]:
+        """What has become of the people who react, in their order."""
+        return tuple(walker.outcome() for walker in self.walkers)
+
+    def _walkers(self, rng: np.random.Generator) -> tuple[Walker, ...]:
+        """The people who react, each with a generator of their own."""
+        jitter = self.scenario.start_jitter_s
+        walkers = []
+        for spec, own in zip(
+            self.scenario.people, rng.spawn(len(self.scenario.people)), strict=True
+        ):
+            offset = float(own.uniform(-jitter, jitter))
+            boxes = self.warehouse.obstacle_boxes_odom
+            walkers.append(Walker(spec, own, boxes, offset_s=offset))
+        return tuple(walkers)
+
+    def _place_workers(self) -> None:
+        robot, movers = self._robot_body(), self._movers()
+        motions = []
+        for index, (worker, actor) in enumerate(zip(self.workers, self._cast, strict=True)):
+            around = Surroundings(
+                robot,
+                movers[:index] + movers[index + 1 :],
+                partial(self._sees_robot, worker),
+            )
+            motions.append(self._put(index, worker, actor.motion(self.t_s, around)))
+        self._motions = tuple(motions)
+
+    def _put(self, index: int, worker: Worker, motion: PersonMotion) -> PersonMotion:
+        """Pose a body; one that would move into the robot stays where it was.
+
+        Nothing moves a posed body, so one put into the robot would throw it over.
+        """
+        before = self._motions[index] if self._motions and self._close[index] else None
+        depth_m = 0.0 if before is None else self._depth_m(worker)
+        _pose(worker, motion)
+        self._held[index] = False
+        if before is None or self._depth_m(worker) < depth_m + _DEEPER_M:
+            return motion
+        _pose(worker, before)
+        self._held[index] = True
+        self._cast[index].hold()
+        return replace(before, velocity_odom_mps=np.zeros(2))
+
+    def _depth_m(self, worker: Worker) -> float:
+        """How far body and robot reach into each other, 0 when apart."""
+        pairs = pybullet.getClosestPoints(
+            self.amr.body, worker.body, 0.0, physicsClientId=self.warehouse.client
+        )
+        return -min((float(pair[8]) for pair in pairs), default=0.0)
+
+    def _robot_body(self) -> RobotBody:
+        T_odom_base = self.amr.T_odom_base
+        x, y = T_odom_base[:2, 3].tolist()
+        vx, vy = self.amr.velocity_odom_mps.tolist()
+        camera_x, camera_y, camera_z = self.amr.T_odom_camera[:3, 3].tolist()
+        return RobotBody(
+            x,
+            y,
+            math.atan2(T_odom_base[1, 0], T_odom_base[0, 0]),
+            vx,
+            vy,
+            *self._half_size_m,
+            (camera_x, camera_y, camera_z),
+        )
+
+    def _movers(self) -> tuple[MovingBody, ...]:
+        """Where everybody was when last placed; nobody is anywhere before that."""
+        return tuple(
+            MovingBody(*motion.position_odom_m.tolist(), *motion.velocity_odom_mps.tolist())
+            for motion in self._motions
+        )
+
+    def _sees_robot(self, worker: Worker) -> bool:
+        camera = self.amr.T_odom_camera[:3, 3]
+        return sees(worker, camera, through=frozenset({self.amr.body}))
+
+    def _separation(self, index: int) -> tuple[float, FloatArray]:
+        """Distance between the surfaces and the direction (2,) from robot to worker."""
+        base = self.amr.T_odom_base[:2, 3]
+        centre = self._motions[index].position_odom_m - base
+        distance = float(np.linalg.norm(centre))
+        towards = centre / max(distance, 1e-9)
+        bound = distance - self.amr.profile.circumscribed_radius_m - BODY_RADIUS_M
+        if distance > _EXACT_WITHIN_M:
+            return bound, towards
+        # Pairs of shapes farther apart than asked for cost nothing, and one is always nearer than
+        # this, but for what is carried on the far side.
+        for within in (max(bound, 0.0) + _NEARER_THAN_BOUND_M, _EXACT_WITHIN_M):
+            pairs = pybullet.getClosestPoints(
+                self.amr.body,
+                self.workers[index].body,
+                within,
+                physicsClientId=self.warehouse.client,
+            )
+            if pairs:
+                break
+        else:
+            return bound, towards
+        closest = min(pairs, key=lambda pair: pair[8])
+        gap = np.array(closest[6][:2]) - np.array(closest[5][:2])
+        length = float(np.linalg.norm(gap))
+        separation = max(float(closest[8]), 0.0)
+        return separation, gap / length if separation > 0.0 and length > 1e-3 else towards
+
+    def _look_for_contact(
+        self, index: int, robot_velocity_mps: FloatArray, meter: SafetyMeter
+    ) -> None:
+        touching = pybullet.getContactPoints(
+            self.amr.body, self.workers[index].body, physicsClientId=self.warehouse.client
+        )
+        if self._held[index] or any(point[8] <= 0.0 for point in touching):
+            _, towards = self._separation(index)
+            meter.touch(self.t_s, index, robot_velocity_mps, towards)
+            self._cast[index].touch(*(-towards).tolist())
+        else:
+            meter.release(index)
+
+
+def _pose(worker: Worker, motion: PersonMotion) -> None:
+    worker.place(
+        motion.position_odom_m,
+        motion.heading_odom_rad,
+        motion.walked_m,
+        math.hypot(*motion.velocity_odom_mps.tolist()),
+        motion.head_yaw_rad,
+        motion.head_pitch_rad,
+        eye_yaw_rad=motion.eye_yaw_rad,
+        eye_pitch_rad=motion.eye_pitch_rad,
+        activity=motion.activity,
+        feet=motion.feet,
+    )

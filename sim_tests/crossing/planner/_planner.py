@@ -1,0 +1,357 @@
+"""A reference local planner: what a crossing is driven by when no other planner is given."""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nav_adapter import NavConstraints, RobotProfile, RobotState
+from perception.arrays import FloatArray, finite_array, finite_number
+
+from ...world.errors import SimError
+from ._config import PlannerConfig
+from ._rollout import (
+    Poses,
+    detour_bearing_rad,
+    follow_arcs,
+    ramp_integral,
+    stopping_integral,
+    window,
+)
+from ._scene import FootprintBox, Scene
+
+# Poses of a braking robot that are judged, the last one at rest: at most 0.1 s apart at 1.5 m/s and
+# 1 m/s², in which even two who approach at 3 m/s cut a corner by less than the clearance.
+_BRAKING_SAMPLES = 16
+# A motion may bring the robot nearer than waiting would by no more than this: rounding, not a step.
+_SLACK_M = 1e-3
+# Costs closer than this are a tie, which the order of the samples settles, not the rounding.
+_TIE = 1e-9
+# Slower than this a robot stands.
+_STANDING_MPS = 0.02
+_STANDING = Poses(*(np.asarray(value) for value in (0.0, 0.0, 1.0, 0.0)))
+
+
+@runtime_checkable
+class LocalPlanner(Protocol):
+    """Anything that drives a robot to a goal within the adapter's constraints."""
+
+    def plan(
+        self,
+        robot_state: RobotState,
+        goal_odom_m: FloatArray,
+        constraints: NavConstraints,
+        dt_s: float,
+    ) -> tuple[float, float]:
+        """Return ``(speed_mps, yaw_rate_radps)`` for the next ``dt_s``; the goal is (2,)."""
+        ...
+
+
+class SamplingPlanner:
+    """Drive a differential-drive robot to a goal among moving people and fixed boxes.
+
+    A dynamic-window planner (Fox, Burgard and Thrun 1997) whose candidates are a target speed and a
+    yaw rate that is held for a while. Each is rolled out in closed form and judged twice:
+
+    * It must be *safe*: one tick of it followed by full braking keeps ``clearance_m`` to every box
+      and, until the robot stands, to every person's disc moving on at constant velocity. Where that
+      gap is already gone, because a radius grew or a person walked up, motion that leaves at least
+      the gap that waiting would leave is safe too, so that the robot can get out. Towards people a
+      standing robot may always turn on the spot; in front of it, it keeps the room to do so.
+    * It should be *good*: near the goal soon, facing it, away from people, boxes and the strip that
+      a walking person is about to use, with room to people's bodies, without needless turning.
+      Where someone stands in front of the goal, it is swung to the tangent past that person.
+
+    If nothing is safe the robot brakes as hard as it may along its present curve. It never
+    reverses. The command depends on the arguments alone: there is no memory between calls. People
+    and goal are judged in the robot's frame, so turning or shifting the world changes nothing.
+
+    Args:
+        robot: footprint and limits. The footprint counts with its bounding rectangle.
+        static_boxes_odom_m: (N, 4) fixed obstacles x_min, y_min, x_max, y_max; None for none.
+        config: sampling and preferences; None for the defaults.
+
+    Raises:
+        SimError: if the boxes are not finite or a minimum is not below its maximum.
+    """
+
+    def __init__(
+        self,
+        robot: RobotProfile,
+        static_boxes_odom_m: ArrayLike | None = None,
+        config: PlannerConfig | None = None,
+    ) -> None:
+        self.robot = robot
+        self.config = config = config if config is not None else PlannerConfig()
+        self._footprint = FootprintBox.of(robot)
+        self._boxes_odom_m = _checked_boxes(static_boxes_odom_m)
+
+        def along_time(first: float, last: float, samples: int) -> FloatArray:
+            return np.linspace(first, last, samples, dtype=np.float64)[:, None, None]
+
+        samples = max(2, math.ceil(config.horizon_s / config.step_s))
+        self._t_s = along_time(config.horizon_s / samples, config.horizon_s, samples)
+        self._turn_t_s = np.minimum(self._t_s, config.turn_time_s)
+        self._late_people = along_time(1.0, config.late_weight, samples)
+        self._late_static = along_time(1.0, config.late_static_weight, samples)
+        self._braking_share = along_time(0.0, 1.0, _BRAKING_SAMPLES)
+        self._speed_share = np.linspace(0.0, 1.0, config.speed_samples)
+        spread = np.linspace(-1.0, 1.0, config.yaw_rate_samples)
+        # Two more are filled in for each plan: "go on as now" and "face the goal".
+        self._yaw_share = np.append(np.sign(spread) * np.abs(spread) ** 1.5, [0.0, 0.0])
+
+    def plan(
+        self,
+        robot_state: RobotState,
+        goal_odom_m: ArrayLike,
+        constraints: NavConstraints,
+        dt_s: float,
+    ) -> tuple[float, float]:
+        """Choose the command for the next tick.
+
+        Args:
+            robot_state: where the robot is and how it moves.
+            goal_odom_m: (2,) where its base origin is to go.
+            constraints: people as discs and the speed limit, at the instant of the state.
+            dt_s: how long the command will be held, > 0.
+
+        Returns:
+            ``(speed_mps, yaw_rate_radps)``. The speed is within what the robot reaches in
+            ``dt_s``, never negative, and above ``constraints.speed_limit_mps`` only where full
+            braking does not get below it in one tick. The yaw rate is such that no corner of the
+            footprint turns about the base origin faster than the speed limit, with the same
+            exception.
+
+        Raises:
+            SimError: if the goal is not two finite numbers or ``dt_s`` is not positive.
+        """
+        goal_odom_m = finite_array("goal_odom_m", goal_odom_m, (2,), SimError)
+        dt_s = finite_number("dt_s", dt_s, SimError, minimum=0.0, exclusive_minimum=True)
+        goal_x_m, goal_y_m = _in_base(robot_state, goal_odom_m)
+        goal_distance_m = math.hypot(goal_x_m, goal_y_m)
+        limit_mps = min(constraints.speed_limit_mps, self.robot.max_speed_mps)
+        if limit_mps <= 0.0 or goal_distance_m <= self.config.goal_tolerance_m:
+            return self._brake(robot_state, dt_s)
+
+        speeds = self._target_speeds(limit_mps, goal_distance_m)
+        reach_m = max(robot_state.speed_mps, float(speeds[-1])) * self.config.horizon_s
+        scene = Scene(robot_state, constraints, self._near(robot_state, reach_m))
+        bearing_rad = self._bearing(goal_x_m, goal_y_m, scene)
+        yaw_rates = self._target_yaw_rates(robot_state, limit_mps, bearing_rad)
+        speed_now, yaw_rate_now = robot_state.speed_mps, robot_state.yaw_rate_radps
+        fall = self.robot.max_deceleration_mps2 * dt_s
+        rise = self.robot.max_acceleration_mps2 * dt_s
+        yaw_step = self.config.max_yaw_acceleration_radps2 * dt_s
+        speed_commands = np.maximum(window(speeds, speed_now, fall, rise), 0.0)
+        yaw_commands = window(yaw_rates, yaw_rate_now, yaw_step, yaw_step)
+
+        # Most candidates differ only in where they lead: few distinct commands are in the window.
+        rows, row_of = _distinct(speed_commands)
+        columns, column_of = _distinct(yaw_commands)
+        safe = self._safe(rows, columns, speed_now, dt_s, scene)
+        if not safe.any():
+            return self._brake(robot_state, dt_s)
+        cost = self._cost(speeds, yaw_rates, robot_state, (goal_distance_m, bearing_rad), scene)
+        cost[~safe[row_of[:, None], column_of]] = np.inf
+        row, column = divmod(int(np.argmax(cost <= cost.min() + _TIE)), len(yaw_rates))
+        return float(speed_commands[row]), float(yaw_commands[column])
+
+    def _brake(self, robot_state: RobotState, dt_s: float) -> tuple[float, float]:
+        """Full braking along the present curve, as far as the yaw acceleration allows."""
+        speed, yaw_rate = max(robot_state.speed_mps, 0.0), robot_state.yaw_rate_radps
+        stop_s = speed / self.robot.max_deceleration_mps2
+        yaw_stop_s = max(stop_s, abs(yaw_rate) / self.config.max_yaw_acceleration_radps2)
+        return (
+            speed * (1.0 - dt_s / stop_s) if stop_s > dt_s else 0.0,
+            yaw_rate * (1.0 - dt_s / yaw_stop_s) if yaw_stop_s > dt_s else 0.0,
+        )
+
+    def _target_speeds(self, limit_mps: float, goal_distance_m: float) -> FloatArray:
+        """(V,) from 0 to the limit, or to what can still stop at the goal."""
+        gentle_mps2 = self.config.goal_deceleration_fraction * self.robot.max_deceleration_mps2
+        top_mps = min(limit_mps, math.sqrt(2.0 * gentle_mps2 * goal_distance_m))
+        return np.asarray(top_mps * self._speed_share)
+
+    def _bearing(self, goal_x_m: float, goal_y_m: float, scene: Scene) -> float:
+        """Where to head: to the goal, or past whoever stands in front of it."""
+        bearing_rad = math.atan2(goal_y_m, goal_x_m)
+        if bearing_rad > math.pi - 1e-6:  # behind: turn the same way whatever the rounding
+            bearing_rad -= math.tau
+        config = self.config
+        margin_m = self._footprint.half_size_m[1] + config.clearance_m + config.detour_margin_m
+        discs = scene.standing_discs_m(config.standing_speed_mps, margin_m)
+        if not discs:
+            return bearing_rad
+
+        c, s = math.cos(bearing_rad), math.sin(bearing_rad)
+
+        def is_free(x_m: float, y_m: float) -> bool:
+            pose = Poses(*(np.asarray(value) for value in (x_m, y_m, c, s)))
+            return bool(scene.box_gap_m(self._footprint.at(pose)) >= config.clearance_m)
+
+        goal_distance_m = math.hypot(goal_x_m, goal_y_m)
+        return detour_bearing_rad(bearing_rad, goal_distance_m, discs, is_free)
+
+    def _target_yaw_rates(
+        self, robot_state: RobotState, limit_mps: float, bearing_rad: float
+    ) -> FloatArray:
+        """(W,) both ways up to the limit, then the present rate and the one that faces the goal."""
+        # People stand beside the robot too: its corners keep to the speed limit as it turns.
+        top_radps = min(self.config.max_yaw_rate_radps, limit_mps / self._footprint.reach_m)
+        yaw_rates = np.asarray(top_radps * self._yaw_share)
+        wishes = (robot_state.yaw_rate_radps, bearing_rad / self.config.turn_time_s)
+        yaw_rates[-2:] = [min(max(wish, -top_radps), top_radps) for wish in wishes]
+        return yaw_rates
+
+    def _near(self, robot_state: RobotState, reach_m: float) -> FloatArray:
+        """The boxes that a roll-out of length ``reach_m`` or full braking could come close to."""
+        boxes = self._boxes_odom_m
+        if not len(boxes):
+            return boxes
+        braking_m = 0.5 * robot_state.speed_mps**2 / self.robot.max_deceleration_mps2
+        margin_m = max(self.config.static_comfort_m, self.config.clearance_m)
+        near_m = max(reach_m, braking_m) + self._footprint.reach_m + margin_m
+        position = robot_state.position_odom_m
+        apart = np.maximum(boxes[:, :2] - position, position - boxes[:, 2:]).max(axis=1)
+        return np.asarray(boxes[apart <= near_m])
+
+    def _safe(
+        self,
+        speeds: FloatArray,
+        yaw_rates: FloatArray,
+        speed_now_mps: float,
+        dt_s: float,
+        scene: Scene,
+    ) -> NDArray[np.bool_]:
+        """(V, W) whether one tick of a command and full braking after it keep the clearance."""
+        safe = np.ones((len(speeds), len(yaw_rates)), dtype=bool)
+        if not (scene.has_people or scene.has_boxes):
+            return safe
+        v, w = speeds[:, None], yaw_rates
+        stop_s = v / self.robot.max_deceleration_mps2
+        yaw_stop_s = np.maximum(stop_s, np.abs(w) / self.config.max_yaw_acceleration_radps2)
+        t_s = dt_s + yaw_stop_s * self._braking_share
+        # During the tick the speed is between what it was and the command: count the larger.
+        extra_m = np.maximum(speed_now_mps - v, 0.0) * dt_s
+        poses = follow_arcs(
+            stopping_integral(v, stop_s, dt_s, t_s) + extra_m,
+            stopping_integral(w, yaw_stop_s, dt_s, t_s),
+        )
+        # A robot that never reverses must not drive to where it cannot turn on the spot.
+        room_m = np.where(v > 0.0, self._footprint.turning_room_m, 0.0)
+        moving, waiting = self._footprint.at(poses, room_m), self._footprint.at(_STANDING, room_m)
+        clearance_m = self.config.clearance_m
+        if scene.has_people:
+            # Of people the gap that is there counts, without that room: else it could be used up.
+            still = self._footprint.at(_STANDING)
+            enough = np.minimum(clearance_m, scene.people_gap_m(still, t_s) - _SLACK_M)
+            safe &= (scene.people_gap_m(moving, t_s) >= enough).all(axis=(0, 1))
+            # Always a way out: the corners keep to the turning circle and to the speed limit.
+            safe |= v <= 0.0
+        if scene.has_boxes:
+            enough = np.minimum(clearance_m, scene.box_gap_m(waiting) - _SLACK_M)
+            safe &= (scene.box_gap_m(moving) >= enough).all(axis=0)
+        return safe
+
+    def _cost(
+        self,
+        speeds: FloatArray,
+        yaw_rates: FloatArray,
+        robot_state: RobotState,
+        goal: tuple[float, float],
+        scene: Scene,
+    ) -> FloatArray:
+        """(V, W) cost of each candidate over the horizon, dimensionless.
+
+        ``goal`` is the distance to it (m) and the bearing to head for (rad).
+        """
+        config, robot, t_s = self.config, self.robot, self._t_s
+        v, w = speeds[:, None], yaw_rates
+        rate = np.where(
+            v > robot_state.speed_mps, robot.max_acceleration_mps2, robot.max_deceleration_mps2
+        )
+        # The roll-out ends when it has gone as far as the goal is: nobody drives past it.
+        goal_distance_m, bearing_rad = goal
+        path = np.minimum(ramp_integral(robot_state.speed_mps, v, rate, t_s), goal_distance_m)
+        yaw_acceleration = config.max_yaw_acceleration_radps2
+        turn = ramp_integral(robot_state.yaw_rate_radps, w, yaw_acceleration, self._turn_t_s)
+        poses = follow_arcs(path, turn)
+
+        cost = self._goal_cost(poses, goal_distance_m, bearing_rad)
+        turning = yaw_rates / config.max_yaw_rate_radps
+        change = turning - robot_state.yaw_rate_radps / config.max_yaw_rate_radps
+        cost += config.turn_weight * turning**2 + config.smoothness_weight * np.abs(change)
+        rectangles = self._footprint.at(poses)
+        if scene.has_people:
+            close = _closeness(scene.people_gap_m(rectangles, t_s), config.person_comfort_m)
+            strip_gap = scene.strip_gap_m(rectangles, t_s, config.front_time_s)
+            ahead = _closeness(strip_gap, config.person_comfort_m)
+            worst = config.person_weight * close + config.front_weight * ahead
+            weighted = worst * self._late_people
+            # The worst moment decides; the mean still shows the way out to a robot that is inside.
+            cost += (weighted.max(axis=1) + weighted.sum(axis=1) / len(t_s)).sum(axis=0)
+            gaps_m = scene.body_gap_m(rectangles, t_s, config.standing_speed_mps)
+            if len(gaps_m):
+                room = (_closeness(gaps_m, config.room_m).sum(axis=1) / len(t_s)).max(axis=0)
+                # Between ways only: nearness is no reason to stop, the limit sees to that.
+                cost += config.room_weight * (room - room.min(axis=1, keepdims=True))
+            cost += config.keep_right_weight * np.maximum(turning, 0.0)
+        if scene.has_boxes:
+            close = _closeness(scene.box_gap_m(rectangles), config.static_comfort_m)
+            worst_box = (close * self._late_static).max(axis=0)
+            if abs(robot_state.speed_mps) < _STANDING_MPS:
+                # A turn on the spot is the way out: the swing of its corners costs nothing.
+                now = scene.box_gap_m(self._footprint.at(_STANDING))
+                worst_box[0] = _closeness(now, config.static_comfort_m)
+            cost += config.static_weight * worst_box
+        return cost
+
+    def _goal_cost(self, poses: Poses, goal_distance_m: float, bearing_rad: float) -> FloatArray:
+        """(V, W) cost of being far from the goal, on average, and of facing away from it."""
+        to_x = goal_distance_m * math.cos(bearing_rad) - poses.x_m
+        to_y = goal_distance_m * math.sin(bearing_rad) - poses.y_m
+        distance = np.sqrt(to_x * to_x + to_y * to_y)
+        full_gain_m = 0.5 * self.robot.max_speed_mps * self.config.horizon_s
+        farther_m = distance.sum(axis=0) / len(distance) - goal_distance_m
+        c, s = poses.cos_heading[-1], poses.sin_heading[-1]
+        off_rad = np.arctan2(to_y[-1] * c - to_x[-1] * s, to_x[-1] * c + to_y[-1] * s)
+        # At the goal there is no direction to face.
+        away = np.minimum(distance[-1] / self.config.goal_tolerance_m, 1.0)
+        facing = (self.config.heading_weight / math.pi) * np.abs(off_rad) * away
+        return np.asarray(farther_m / full_gain_m + facing)
+
+
+def _in_base(robot_state: RobotState, point_odom_m: FloatArray) -> tuple[float, float]:
+    x, y = (point_odom_m - robot_state.position_odom_m).tolist()
+    c, s = math.cos(robot_state.heading_odom_rad), math.sin(robot_state.heading_odom_rad)
+    return c * x + s * y, c * y - s * x
+
+
+def _distinct(values: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
+    """The distinct values in order of appearance, and for each value its index among them."""
+    index: dict[float, int] = {}
+    index_of = [index.setdefault(value, len(index)) for value in values.tolist()]
+    return np.array(list(index)), np.array(index_of, dtype=np.intp)
+
+
+def _closeness(gap_m: FloatArray, comfort_m: float) -> FloatArray:
+    """0 from ``comfort_m`` on, growing quadratically to 1 at contact, and 1 inside."""
+    share = np.minimum(np.maximum(1.0 - gap_m / comfort_m, 0.0), 1.0)
+    return np.asarray(share * share)
+
+
+def _checked_boxes(boxes: ArrayLike | None) -> FloatArray:
+    if boxes is None:
+        return np.zeros((0, 4))
+    checked = finite_array("static_boxes_odom_m", boxes, ("N", 4), SimError)
+    wrong = np.flatnonzero((checked[:, :2] >= checked[:, 2:]).any(axis=1))
+    if len(wrong):
+        row = int(wrong[0])
+        raise SimError(
+            "static_boxes_odom_m must hold x_min < x_max and y_min < y_max in metres, "
+            f"row {row} is {checked[row].tolist()}"
+        )
+    return checked

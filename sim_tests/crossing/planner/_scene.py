@@ -1,0 +1,230 @@
+"""Gaps between a moving rectangle and discs, strips and boxes, for many poses at once.
+
+What surrounds the robot at the instant of a plan, and how far any pose would be from it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from nav_adapter import NavConstraints, RobotProfile, RobotState
+from perception.anthropometry import BODY_RADIUS_M
+from perception.arrays import FloatArray
+
+from ._rollout import Poses
+
+
+class Rectangles(NamedTuple):
+    """Rectangles of the same width at many poses.
+
+    Attributes:
+        centers: poses of the centres, heading along the length.
+        half_length_m: one number, or one a pose.
+        half_width_m: one number.
+    """
+
+    centers: Poses
+    half_length_m: FloatArray | float
+    half_width_m: float
+
+
+def disc_gap_m(
+    rectangles: Rectangles,
+    x_m: FloatArray,
+    y_m: FloatArray,
+    radius_m: FloatArray,
+) -> FloatArray:
+    """Distance from rectangles to discs; negative where they overlap.
+
+    Exact while the disc's centre is outside the rectangle; inside, minus the radius.
+
+    Args:
+        rectangles: the first shape.
+        x_m: disc centres in the frame of the rectangles, broadcast against their poses.
+        y_m: the same along y.
+        radius_m: of the discs.
+    """
+    centers, half_length, half_width = rectangles
+    c, s = centers.cos_heading, centers.sin_heading
+    rel_x, rel_y = centers.x_m - x_m, centers.y_m - y_m
+    along = np.maximum(np.abs(rel_x * c + rel_y * s) - half_length, 0.0)
+    across = np.maximum(np.abs(rel_y * c - rel_x * s) - half_width, 0.0)
+    return np.asarray(np.sqrt(along * along + across * across) - radius_m)
+
+
+def strip_distance_m(
+    rel_x_m: FloatArray,
+    rel_y_m: FloatArray,
+    velocity_x_mps: FloatArray,
+    velocity_y_mps: FloatArray,
+    ahead_s: float,
+) -> FloatArray:
+    """Distance from points to the segments that walkers cover in the next ``ahead_s``.
+
+    ``rel_x_m`` and ``rel_y_m`` are point minus walker. For someone who stands it is the distance
+    to that person.
+    """
+    speed2 = velocity_x_mps * velocity_x_mps + velocity_y_mps * velocity_y_mps
+    inverse = 1.0 / np.maximum(speed2, 1e-12)
+    along_s = rel_x_m * (velocity_x_mps * inverse) + rel_y_m * (velocity_y_mps * inverse)
+    along_s = np.minimum(np.maximum(along_s, 0.0), ahead_s)
+    off_x = rel_x_m - velocity_x_mps * along_s
+    off_y = rel_y_m - velocity_y_mps * along_s
+    return np.asarray(np.sqrt(off_x * off_x + off_y * off_y))
+
+
+def box_gap_m(rectangles: Rectangles, boxes_m: FloatArray) -> FloatArray:
+    """Lower bound of the distance from rectangles to the nearest axis-aligned box.
+
+    A rectangle counts with its axis-aligned bounding box, and a diagonal gap with its larger
+    component: exact along a wall, smaller than the distance past a corner, never larger. Negative
+    where the bounding box overlaps a box; infinite without boxes.
+
+    Args:
+        rectangles: in the frame of the boxes.
+        boxes_m: (N, 4) x_min, y_min, x_max, y_max.
+    """
+    centers, half_length, half_width = rectangles
+    cos_abs, sin_abs = np.abs(centers.cos_heading), np.abs(centers.sin_heading)
+    extent_x = half_length * cos_abs + half_width * sin_abs
+    extent_y = half_length * sin_abs + half_width * cos_abs
+    x_low, x_high = centers.x_m - extent_x, centers.x_m + extent_x
+    y_low, y_high = centers.y_m - extent_y, centers.y_m + extent_y
+    nearest = np.full(np.shape(x_low), np.inf)
+    for x_min, y_min, x_max, y_max in boxes_m.tolist():
+        gap_x = np.maximum(x_min - x_high, x_low - x_max)
+        gap_y = np.maximum(y_min - y_high, y_low - y_max)
+        nearest = np.minimum(nearest, np.maximum(gap_x, gap_y))
+    return nearest
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FootprintBox:
+    """The bounding rectangle of a robot's outline, along its axes.
+
+    Attributes:
+        center_m: (x, y) in the base frame.
+        half_size_m: half the length and half the width.
+        reach_m: distance from the base origin to the farthest corner.
+        turning_room_m: how far the circle of that radius reaches beyond the front edge.
+    """
+
+    center_m: tuple[float, float]
+    half_size_m: tuple[float, float]
+    reach_m: float
+    turning_room_m: float
+
+    @classmethod
+    def of(cls, robot: RobotProfile) -> FootprintBox:
+        """Bound the outline of ``robot``."""
+        x_min, y_min = robot.footprint_m.min(axis=0).tolist()
+        x_max, y_max = robot.footprint_m.max(axis=0).tolist()
+        reach = math.hypot(max(-x_min, x_max), max(-y_min, y_max))
+        return cls(
+            (0.5 * (x_min + x_max), 0.5 * (y_min + y_max)),
+            (0.5 * (x_max - x_min), 0.5 * (y_max - y_min)),
+            reach,
+            reach - x_max,
+        )
+
+    def at(self, base_poses: Poses, room_m: FloatArray | float = 0.0) -> Rectangles:
+        """The footprint at these base poses, with its front edge moved out by ``room_m``."""
+        x, y, c, s = base_poses
+        along = self.center_m[0] + 0.5 * room_m
+        across = self.center_m[1]
+        if np.ndim(along) or along != 0.0:
+            x, y = np.asarray(x + along * c), np.asarray(y + along * s)
+        if across != 0.0:
+            x, y = np.asarray(x - across * s), np.asarray(y + across * c)
+        half_length, half_width = self.half_size_m
+        return Rectangles(Poses(x, y, c, s), half_length + 0.5 * room_m, half_width)
+
+
+class Scene:
+    """People and boxes around the robot, asked in the base frame of the instant of the plan.
+
+    People are held as (P, 1, 1, 1) arrays, so that the gaps of (T, V, W) poses come out as
+    (P, T, V, W).
+
+    Args:
+        robot_state: the base pose.
+        constraints: the people.
+        boxes_odom_m: (N, 4) x_min, y_min, x_max, y_max.
+    """
+
+    def __init__(
+        self,
+        robot_state: RobotState,
+        constraints: NavConstraints,
+        boxes_odom_m: FloatArray,
+    ) -> None:
+        self._boxes_odom_m = boxes_odom_m
+        self.has_boxes = bool(len(boxes_odom_m))
+        self.has_people = bool(constraints.obstacles)
+        x0, y0 = robot_state.position_odom_m.tolist()
+        c, s = math.cos(robot_state.heading_odom_rad), math.sin(robot_state.heading_odom_rad)
+        self._base_odom = Poses(*(np.asarray(value) for value in (x0, y0, c, s)))
+        self._rows: list[tuple[float, float, float, float]] = []
+        self._radii = [person.radius_m for person in constraints.obstacles]
+        for person in constraints.obstacles:
+            x, y = person.center_odom_m.tolist()
+            vx, vy = person.velocity_odom_mps.tolist()
+            x, y = x - x0, y - y0
+            self._rows.append((c * x + s * y, c * y - s * x, c * vx + s * vy, c * vy - s * vx))
+        columns = np.array(self._rows, dtype=np.float64).reshape(-1, 4).T.reshape(4, -1, 1, 1, 1)
+        self._x_m, self._y_m, self._vx_mps, self._vy_mps = columns
+        self._radius_m = np.array(self._radii, dtype=np.float64).reshape(-1, 1, 1, 1)
+
+    def standing_discs_m(
+        self, speed_mps: float, margin_m: float
+    ) -> list[tuple[float, float, float]]:
+        """(x, y, radius + margin) of everyone slower than ``speed_mps``."""
+        return [
+            (x, y, radius + margin_m)
+            for (x, y, vx, vy), radius in zip(self._rows, self._radii, strict=True)
+            if vx * vx + vy * vy < speed_mps * speed_mps
+        ]
+
+    def people_gap_m(self, robot: Rectangles, t_s: FloatArray) -> FloatArray:
+        """(P, T, V, W) gap between the robot and each person's disc, ``t_s`` from now."""
+        return disc_gap_m(robot, *self._places_m(t_s), self._radius_m)
+
+    def body_gap_m(self, robot: Rectangles, t_s: FloatArray, standing_mps: float) -> FloatArray:
+        """(S, T, V, W) gap to the body of everyone slower than that whose disc the robot is not in.
+
+        Walkers are passed by what they are about to use, see :meth:`strip_gap_m`; and who is in a
+        disc has to get out of it first.
+        """
+        speed2 = self._vx_mps**2 + self._vy_mps**2
+        apart_m = np.hypot(self._x_m, self._y_m) - self._radius_m - robot.half_width_m
+        counts = ((speed2 < standing_mps**2) & (apart_m > 0.0)).ravel()
+        x_m, y_m = self._places_m(t_s)
+        return disc_gap_m(robot, x_m[counts], y_m[counts], np.asarray(BODY_RADIUS_M))
+
+    def strip_gap_m(self, robot: Rectangles, t_s: FloatArray, ahead_s: float) -> FloatArray:
+        """(P, T, V, W) gap to what each person's disc sweeps from ``t_s`` on for ``ahead_s``.
+
+        The robot counts as a disc of half its width.
+        """
+        x_m, y_m = self._places_m(t_s)
+        distance = strip_distance_m(
+            robot.centers.x_m - x_m,
+            robot.centers.y_m - y_m,
+            self._vx_mps,
+            self._vy_mps,
+            ahead_s,
+        )
+        return np.asarray(distance - (self._radius_m + robot.half_width_m))
+
+    def _places_m(self, t_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(P, T, 1, 1) x and y of everybody, ``t_s`` from now."""
+        return self._x_m + self._vx_mps * t_s, self._y_m + self._vy_mps * t_s
+
+    def box_gap_m(self, robot: Rectangles) -> FloatArray:
+        """(T, V, W) gap between the robot and the nearest box, a lower bound."""
+        centers_odom = robot.centers.seen_from(self._base_odom)
+        return box_gap_m(robot._replace(centers=centers_odom), self._boxes_odom_m)

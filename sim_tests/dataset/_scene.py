@@ -1,0 +1,290 @@
+"""One randomised scene: a hall, its light, a cast of workers, and snapshots of them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from awarenav.closing import Closing
+from awarenav.records import Record
+from perception import Camera
+from perception.arrays import FloatArray
+
+from ..actors.body import MAX_HEAD_PITCH_RAD, MAX_HEAD_YAW_RAD, Worker, load_worker, worker_names
+from ..world import Warehouse, crosses_boxes
+from ..world.camera import CameraRenderer, expose
+from ..world.errors import SimError
+from ..world.hall import LAYOUTS, LIGHTINGS, Lighting, WarehouseLayout
+from ._config import RenderConfig
+from ._truth import frame_truth
+
+_CAMERA_CLEARANCE_M: Final = 0.6
+_PERSON_CLEARANCE_M: Final = 0.40
+_PERSON_SPACING_M: Final = 0.8
+# A robot looks along its way, not at a shelf before its lens.
+_OPEN_AHEAD_M: Final = 3.0
+# So much of a person's width lies within the picture, to either side of the middle.
+_HALF_WIDTH_M: Final = 0.28
+# Share of the people who may stand out of the camera's line of sight, behind a rack or a pallet.
+_HIDDEN_SHARE: Final = 0.08
+# Share of the people who may stand before or behind another.
+_OVERLAP_SHARE: Final = 0.15
+_TRIES: Final = 40
+_CAMERA_TRIES: Final = 500
+_ACTIVITIES: Final = ("none", "carry_box", "phone")
+_ACTIVITY_SHARES: Final = (0.64, 0.18, 0.18)
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    x_m: float
+    y_m: float
+
+
+class RenderScene(Closing):
+    """A hall with a cast; :meth:`snapshot` rearranges it at random and takes a picture.
+
+    Args:
+        config: what is rendered.
+        number: which scene, from 0.
+
+    Attributes:
+        warehouse: the hall.
+        workers: the cast.
+        renderer: what the camera sees.
+    """
+
+    def __init__(self, config: RenderConfig, number: int) -> None:
+        self._config = config
+        self.number = number
+        rng = np.random.default_rng([config.seed, 1, number])
+        halls = config.layouts or tuple(LAYOUTS)
+        self.layout_name = halls[number % len(halls)]
+        lights = np.random.default_rng([config.seed, 4]).permutation(list(LIGHTINGS)).tolist()
+        self.lighting_name = str(lights[number % len(lights)])
+        first, last = config.variants
+        self.warehouse = Warehouse(
+            WarehouseLayout.named(self.layout_name), variant=int(rng.integers(first, last + 1))
+        )
+        try:
+            self.workers = tuple(
+                Worker(self.warehouse, _stature_m(look, rng), look=look)
+                for look in _cast(config, number)
+            )
+            self.renderer = CameraRenderer(
+                self.warehouse,
+                lighting=Lighting.preset(self.lighting_name),
+                shadows=True,
+                supersampling=config.supersampling,
+            )
+        except BaseException:
+            self.warehouse.close()
+            raise
+
+    def close(self) -> None:
+        """End the scene."""
+        self.warehouse.close()
+
+    @property
+    def camera(self) -> Camera:
+        """The camera of every picture."""
+        return self._config.camera
+
+    def snapshot(self, frame: int) -> tuple[NDArray[np.uint8], Record]:
+        """Picture number ``frame`` (H, W, 3) and the truth about it; the same every time."""
+        rng = np.random.default_rng([self._config.seed, 2, frame])
+        T_odom_camera = self.arrange(rng)
+        camera = self._config.camera
+        view = self.renderer.render(camera, T_odom_camera)
+        people = frame_truth(self.renderer, camera, T_odom_camera, view, self.workers)
+        record: Record = {
+            "frame": f"{frame:06d}.png",
+            # Snapshots are not a film: a second apart, no tracker takes them for one.
+            "stamp_s": float(frame),
+            "T_odom_camera": np.round(T_odom_camera, 6).tolist(),
+            "people": people,
+            "scene": self.number,
+            "layout": self.layout_name,
+            "lighting": self.lighting_name,
+        }
+        return expose(view.rgb, self._config.sensor, rng), record
+
+    def clear(self) -> None:
+        """Send everybody out of the hall."""
+        for worker in self.workers:
+            worker.place((self.warehouse.layout.x_min_m - 9.0, 0.0), 0.0)
+
+    def arrange(self, rng: np.random.Generator) -> FloatArray:
+        """Put camera and people somewhere at random; returns T_odom_camera (4, 4)."""
+        config = self._config
+        wanted = int(rng.integers(1, len(self.workers) + 1))
+        cast = rng.permutation(len(self.workers))[:wanted]
+        self.clear()
+        places: list[_Place] = []
+        for _ in range(_CAMERA_TRIES):
+            T_odom_camera, heading = self._camera_pose(rng)
+            places = self._places(T_odom_camera[:3, 3], heading, wanted, rng)
+            if places:
+                break
+        else:
+            raise SimError(
+                f"hall {self.layout_name!r} has no room for people {config.min_range_m:g} to "
+                f"{config.max_range_m:g} m before a camera; use shorter ranges"
+            )
+        for row, place in zip(cast.tolist(), places, strict=False):
+            random_pose(
+                self.workers[row], (place.x_m, place.y_m), T_odom_camera[:3, 3], rng, config.eyes
+            )
+        return T_odom_camera
+
+    def _camera_pose(self, rng: np.random.Generator) -> tuple[FloatArray, float]:
+        layout = self.warehouse.layout
+        low = np.array([layout.x_min_m, layout.y_min_m])
+        high = np.array([layout.x_max_m, layout.y_max_m])
+        while True:
+            x, y = rng.uniform(low, high)
+            heading = float(rng.uniform(-math.pi, math.pi))
+            ahead = x + _OPEN_AHEAD_M * math.cos(heading), y + _OPEN_AHEAD_M * math.sin(heading)
+            boxes = self.warehouse.obstacle_boxes_odom
+            if _clearance_m(boxes, x, y) > _CAMERA_CLEARANCE_M and not _blocked(
+                boxes, (x, y), ahead
+            ):
+                break
+        height = float(np.clip(rng.normal(1.4, 0.06), 1.2, 1.6))
+        pitch, roll = rng.normal(0.0, np.radians([3.0, 0.7]))
+        return _pose_matrix((x, y, height), heading, float(pitch), float(roll)), heading
+
+    def _places(
+        self, origin: FloatArray, heading: float, wanted: int, rng: np.random.Generator
+    ) -> list[_Place]:
+        """Up to ``wanted`` free places in view, none on top of another."""
+        config, boxes = self._config, self.warehouse.obstacle_boxes_odom
+        layout = self.warehouse.layout
+        half_fov = 0.5 * math.radians(config.horizontal_fov_deg)
+        places: list[_Place] = []
+        for _ in range(_TRIES):
+            distance = rng.uniform(config.min_range_m, config.max_range_m)
+            margin = math.asin(min(_HALF_WIDTH_M / distance, 0.9 * math.sin(half_fov)))
+            azimuth = heading + rng.uniform(-1.0, 1.0) * (half_fov - margin)
+            may_hide = bool(places) and rng.random() < _HIDDEN_SHARE
+            x = float(origin[0] + distance * math.cos(azimuth))
+            y = float(origin[1] + distance * math.sin(azimuth))
+            inside = layout.x_min_m < x < layout.x_max_m and layout.y_min_m < y < layout.y_max_m
+            if not inside or _clearance_m(boxes, x, y) < _PERSON_CLEARANCE_M:
+                continue
+            may_overlap = rng.random() < _OVERLAP_SHARE
+            if any(_collide(place, _Place(x, y), origin, may_overlap) for place in places):
+                continue
+            if not may_hide and _blocked(boxes, (float(origin[0]), float(origin[1])), (x, y)):
+                continue
+            places.append(_Place(x, y))
+            if len(places) == wanted:
+                break
+        return places
+
+
+def _cast(config: RenderConfig, number: int) -> list[str]:
+    """Who plays in a scene: the whole troupe comes round, in a shuffled order."""
+    names = list(config.workers or worker_names())
+    order = np.random.default_rng([config.seed, 3]).permutation(len(names)).tolist()
+    first = number * config.people
+    return [names[order[(first + k) % len(names)]] for k in range(config.people)]
+
+
+def _stature_m(look: str, rng: np.random.Generator) -> float:
+    """Each body appears a little larger or smaller than it was made."""
+    stature = load_worker(look).stature_m
+    return float(np.clip(stature * rng.normal(1.0, 0.012), 1.45, 2.05))
+
+
+def random_pose(
+    worker: Worker,
+    position_odom_m: tuple[float, float],
+    camera_odom_m: FloatArray,
+    rng: np.random.Generator,
+    eyes: str = "wander",
+) -> None:
+    """Any heading, any activity, the head anywhere that a neck allows.
+
+    Args:
+        worker: who.
+        position_odom_m: (2,) where.
+        camera_odom_m: (3,) the robot's camera, at which three in ten look.
+        rng: of all of it.
+        eyes: see :class:`RenderConfig`.
+    """
+    x, y = position_odom_m
+    heading = float(rng.uniform(-math.pi, math.pi))
+    activity = str(rng.choice(_ACTIVITIES, p=_ACTIVITY_SHARES))
+    speed = 0.0 if rng.random() < 0.4 else float(rng.uniform(0.5, 2.0))
+    walked = float(rng.uniform(0.0, 4.0))
+    kind = rng.random()
+    yaw, pitch = rng.normal(0.0, math.radians(25.0)), rng.normal(-0.05, math.radians(10.0))
+    if activity == "phone":
+        yaw, pitch = 0.3 * yaw, math.radians(-30.0) + 0.6 * pitch
+    elif kind < 0.3:  # at the robot, where the neck reaches that far
+        away = math.atan2(camera_odom_m[1] - y, camera_odom_m[0] - x)
+        yaw = math.remainder(away - heading, math.tau) + 0.2 * yaw
+    elif kind < 0.5:
+        yaw = rng.uniform(-MAX_HEAD_YAW_RAD, MAX_HEAD_YAW_RAD)
+    eye_yaw = float(np.clip(rng.normal(0.0, 0.12), -0.5, 0.5))
+    eye_pitch = float(np.clip(rng.normal(0.0, 0.06), -0.3, 0.3))
+    wander = float(eyes == "wander")
+    worker.place(
+        (x, y),
+        heading,
+        walked_m=walked,
+        speed_mps=speed,
+        head_yaw_rad=float(np.clip(yaw, -MAX_HEAD_YAW_RAD, MAX_HEAD_YAW_RAD)),
+        head_pitch_rad=float(np.clip(pitch, -MAX_HEAD_PITCH_RAD, MAX_HEAD_PITCH_RAD)),
+        eye_yaw_rad=wander * eye_yaw,
+        eye_pitch_rad=wander * eye_pitch,
+        activity=activity,
+    )
+
+
+def _pose_matrix(
+    position_odom_m: tuple[float, float, float], heading: float, pitch: float, roll: float
+) -> FloatArray:
+    """T_odom_camera of a level robot's camera that looks down by ``pitch``."""
+    ch, sh, cp, sp = math.cos(heading), math.sin(heading), math.cos(pitch), math.sin(pitch)
+    forward = np.array([cp * ch, cp * sh, -sp])
+    right = np.array([sh, -ch, 0.0])
+    down = np.cross(forward, right)
+    cr, sr = math.cos(roll), math.sin(roll)
+    pose = np.eye(4)
+    pose[:3, 0] = cr * right + sr * down
+    pose[:3, 1] = -sr * right + cr * down
+    pose[:3, 2] = forward
+    pose[:3, 3] = position_odom_m
+    return pose
+
+
+def _collide(first: _Place, second: _Place, origin: FloatArray, may_overlap: bool) -> bool:
+    """Whether two people stand too close, or one before the other as seen from the camera."""
+    if math.hypot(first.x_m - second.x_m, first.y_m - second.y_m) < _PERSON_SPACING_M:
+        return True
+    a, b = (
+        (
+            math.atan2(p.y_m - origin[1], p.x_m - origin[0]),
+            _HALF_WIDTH_M / math.hypot(p.x_m - origin[0], p.y_m - origin[1]),
+        )
+        for p in (first, second)
+    )
+    return not may_overlap and abs(math.remainder(a[0] - b[0], math.tau)) < a[1] + b[1]
+
+
+def _clearance_m(boxes: FloatArray, x: float, y: float) -> float:
+    """Distance of a point from the nearest of (N, 4) boxes; 0 inside one."""
+    dx = np.maximum(np.maximum(boxes[:, 0] - x, x - boxes[:, 2]), 0.0)
+    dy = np.maximum(np.maximum(boxes[:, 1] - y, y - boxes[:, 3]), 0.0)
+    return float(np.hypot(dx, dy).min())
+
+
+def _blocked(boxes: FloatArray, start: tuple[float, float], end: tuple[float, float]) -> bool:
+    """Whether the straight line between two points crosses one of (N, 4) boxes."""
+    return bool(crosses_boxes(boxes, start, end)[0])

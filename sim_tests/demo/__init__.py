@@ -1,0 +1,1 @@
+"""The demonstration and the speed benchmark: ``awarenav demo`` and ``awarenav bench``."""

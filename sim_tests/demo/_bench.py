@@ -1,0 +1,109 @@
+"""Measures how fast crossings run, against real time and against bare physics in the same run."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Final
+
+from tqdm import tqdm
+
+from awarenav.baseline import Metric, comparison_text, read_baseline, write_baseline
+from awarenav.files import json_text
+
+from ..crossing import run_crossing
+from ..scenario import Scenario
+from ..world import Warehouse
+from ..world.hall import WarehouseLayout
+
+#: What the project asks of a quiet computer: keypoints on one core, pixels with networks on two.
+GOALS: Final = {
+    "crossing_keypoints_real_time_factor": 15.0,
+    "crossing_pixels_real_time_factor": 1.0,
+}
+
+
+def measure(repeats: int = 3) -> tuple[Metric, ...]:
+    """Time crossings on this machine; the best of ``repeats`` counts, since noise only slows.
+
+    A peer runs in the same process: PyBullet stepping the empty hall, which no crossing can beat.
+    """
+    names = ("crossing_attentive", "crossing_distracted")
+    with tqdm(total=6, desc="bench", unit="figure", leave=False, file=sys.stderr) as bar:
+
+        def best(names: tuple[str, ...], perception: str) -> tuple[float, float]:
+            runs = [_time_runs(names, perception) for _ in range(repeats)]
+            bar.update()
+            return min(runs, key=lambda run: run[1])
+
+        physics = min(_time_bare_physics() for _ in range(repeats))
+        bar.update()
+        truth = best(names, "truth")
+        encounter = best(("paper_encounter",), "truth")
+        keypoints = best(names, "keypoints")
+        crowd = best(("crowd_of_eight",), "keypoints")
+        pixels = best(("crossing_attentive",), "pixels")
+    return (
+        _factor("crossing_truth_real_time_factor", truth),
+        Metric(
+            "crossing_truth_cost_over_bare_physics",
+            truth[1] / truth[0] / physics,
+            "x",
+            "lower",
+            0.5,
+        ),
+        _factor("encounter_60hz_truth_real_time_factor", encounter),
+        _factor("crossing_keypoints_real_time_factor", keypoints),
+        Metric(
+            "crossing_keypoints_cost_over_bare_physics",
+            keypoints[1] / keypoints[0] / physics,
+            "x",
+            "lower",
+            0.5,
+        ),
+        _factor("crowd_of_eight_keypoints_real_time_factor", crowd),
+        _factor("crossing_pixels_real_time_factor", pixels),
+    )
+
+
+def _factor(name: str, run: tuple[float, float]) -> Metric:
+    # A bare speed depends on the machine; the wide tolerance only catches a change of kind.
+    return Metric(name, run[0] / run[1], "x real time", "higher", 0.6)
+
+
+def _time_bare_physics() -> float:
+    """Wall seconds a simulated second for the empty hall."""
+    with Warehouse(WarehouseLayout.crossing()) as warehouse:
+        steps = round(5.0 / warehouse.physics_dt_s)
+        start = time.perf_counter()
+        for _ in range(steps):
+            warehouse.step()
+        return (time.perf_counter() - start) / 5.0
+
+
+def _time_runs(names: Iterable[str], perception: str) -> tuple[float, float]:
+    """Simulated and wall seconds of the named crossings, loading the world included."""
+    simulated = 0.0
+    start = time.perf_counter()
+    for name in names:
+        result = run_crossing(Scenario.shipped(name), policy="balanced", perception=perception)
+        simulated += result.duration_s
+    return simulated, time.perf_counter() - start
+
+
+def bench_command(baseline_path: Path, out: Path | None, *, as_json: bool = False) -> int:
+    """Measure, print the figures beside the baseline and return the exit status.
+
+    Raises:
+        AwarenavError: for a baseline that cannot be read, and a file that cannot be written.
+    """
+    baseline = read_baseline(baseline_path) if baseline_path.exists() else {}
+    metrics = measure()
+    text, good = comparison_text(metrics, baseline, GOALS)
+    print(json_text([asdict(metric) for metric in metrics]) if as_json else text)
+    if out is not None:
+        write_baseline(out, metrics)
+    return 0 if good else 1

@@ -1,0 +1,188 @@
+"""The demonstration: the paper's encounter, then what awareness buys in a crossing."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
+
+from awarenav.files import json_text
+from perception import AwarenessPipeline, Camera
+
+from ..crossing import CrossingResult, run_crossing
+from ..scenario import Scenario
+from ._encounter import case_values, run_encounter
+from ._figures import plot_comparison
+from ._tables import EpisodeTable
+
+
+@dataclass(frozen=True, slots=True)
+class ComparisonRow:
+    """One line of the comparison: what it is called and how it went."""
+
+    label: str
+    result: CrossingResult
+
+
+def compare_policies(
+    seed: int = 0, perception: str = "keypoints", progress: bool = False
+) -> tuple[ComparisonRow, ...]:
+    """Run the same crossing with nobody there, blind, and aware with two kinds of worker.
+
+    The worker walks the same way in every run; only where he looks and what the robot makes of it
+    differ.
+    """
+    attentive = Scenario.shipped("crossing_attentive")
+    distracted = Scenario.shipped("crossing_distracted")
+    runs = (
+        ("nobody there", attentive.without_people(), "balanced"),
+        ("awareness-blind", attentive, "blind"),
+        ("aware, attentive worker", attentive, "balanced"),
+        ("aware, distracted worker", distracted, "balanced"),
+    )
+    rows = []
+    with tqdm(runs, desc="crossings", unit="run", disable=not progress, file=sys.stderr) as bar:
+        for label, scenario, policy in bar:
+            result = run_crossing(scenario, policy=policy, perception=perception, seed=seed)
+            rows.append(ComparisonRow(label, result))
+    return tuple(rows)
+
+
+def comparison_table(rows: tuple[ComparisonRow, ...]) -> str:
+    """The comparison as text."""
+    header = (
+        f"{'':26s}{'time to':>9s}{'smallest':>12s}{'top speed':>12s}{'margin':>12s}{'':>10s}\n"
+        f"{'crossing':26s}{'goal':>9s}{'separation':>12s}{'within 2 m':>12s}{'violated':>12s}"
+        f"{'contacts':>10s}"
+    )
+    lines = [header, "-" * 81]
+    for row in rows:
+        result = row.result
+        goal = "never" if result.time_to_goal_s is None else f"{result.time_to_goal_s:.2f} s"
+        nobody = not result.frames or not result.frames[0].truth
+        lines.append(
+            f"{row.label:26s}{goal:>9s}"
+            + (
+                f"{'-':>12s}{'-':>12s}{'-':>12s}{'-':>10s}"
+                if nobody
+                else f"{result.min_separation_m:>10.2f} m{result.max_speed_within_2m_mps:>8.2f} m/s"
+                f"{result.violation_time_s:>10.2f} s{len(result.contacts):>10d}"
+            )
+        )
+    return "\n".join(lines)
+
+
+def delay_won_back(rows: tuple[ComparisonRow, ...]) -> float | None:
+    """The share of the blind robot's delay that awareness of an attentive worker wins back."""
+    free, blind, aware = (row.result.time_to_goal_s for row in rows[:3])
+    if free is None or blind is None or aware is None or blind <= free:
+        return None
+    return (blind - aware) / (blind - free)
+
+
+def encounter_table(result: CrossingResult) -> str:
+    """The encounter's three cases beside the paper's, as text."""
+    lines = [f"{'case':27s}{'':11s}{'alpha':>8s}{'d_fwd':>9s}{'d_lat':>9s}", "-" * 64]
+    last = None
+    for case, perception, alpha, forward, lateral in case_values(result):
+        if case is not last:
+            lines.append(
+                f"{case.t_s:5.2f} s {case.meaning:19s}{'paper':11s}{case.awareness:8.2f}"
+                f"{case.d_fwd_m:7.2f} m{case.d_lat_m:7.2f} m"
+            )
+            last = case
+        cells = [
+            "-" if value is None else f"{value:.2f}{unit}"
+            for value, unit in ((alpha, ""), (forward, " m"), (lateral, " m"))
+        ]
+        lines.append(f"{'':27s}{perception:11s}{cells[0]:>8s}{cells[1]:>9s}{cells[2]:>9s}")
+    return "\n".join(lines)
+
+
+def _tables(
+    encounter: CrossingResult, rows: tuple[ComparisonRow, ...], share: float | None
+) -> dict[str, Any]:
+    """Both tables as plain data."""
+    return {
+        "encounter": [
+            {
+                "t_s": case.t_s,
+                "meaning": case.meaning,
+                "perception": perception,
+                "awareness": alpha,
+                "d_fwd_m": forward,
+                "d_lat_m": lateral,
+            }
+            for case, perception, alpha, forward, lateral in case_values(encounter)
+        ],
+        "crossings": [
+            {
+                "crossing": row.label,
+                "time_to_goal_s": row.result.time_to_goal_s,
+                "min_separation_m": row.result.min_separation_m,
+                "max_speed_within_2m_mps": row.result.max_speed_within_2m_mps,
+                "violation_time_s": row.result.violation_time_s,
+                "contacts": len(row.result.contacts),
+            }
+            for row in rows
+        ],
+        "delay_won_back": share,
+    }
+
+
+def run_demo(
+    out: Path,
+    *,
+    seed: int = 0,
+    video: bool = True,
+    perception: str = "keypoints",
+    as_json: bool = False,
+) -> None:
+    """Run the demonstration and write its files.
+
+    Args:
+        out: folder for ``encounter.png``, ``encounter.mp4``, ``encounter.csv``, ``crossings.png``
+            and ``episodes.csv``; made when missing.
+        seed: of everything random.
+        video: whether to render the video.
+        perception: ``"keypoints"``, or ``"pixels"``: rendered, through the shipped networks.
+        as_json: print the tables as JSON.
+    """
+    if perception == "pixels":
+        AwarenessPipeline(Camera.from_fov(640, 480, 1.0))  # says at once which networks are absent
+    # Words would spoil JSON.
+    words = sys.stderr if as_json else sys.stdout
+    out.mkdir(parents=True, exist_ok=True)
+    scenario = Scenario.shipped("paper_encounter")
+    print(f"The encounter of the paper: {scenario.duration_s:g} s", file=words)
+    total = round(scenario.duration_s * scenario.control_hz)
+    with tqdm(total=total, desc="encounter", unit="frame", file=sys.stderr) as bar:
+
+        def advance(done: int) -> None:
+            bar.update(done - bar.n)
+
+        encounter = run_encounter(
+            out, seed=seed, video=video, perception=perception, progress=advance
+        )
+    print(encounter_table(encounter), file=words)
+    print("\nThe same crossing, with and without awareness", file=words)
+    rows = compare_policies(seed, perception, progress=True)
+    with EpisodeTable(out / "episodes.csv") as table:
+        for row in rows:
+            table.add(row.result)
+    plot_comparison(out / "crossings.png", [(row.label, row.result) for row in rows])
+    print(comparison_table(rows), file=words)
+    share = delay_won_back(rows)
+    if share is not None:
+        print(
+            f"\nAn attentive worker gives back {share:.0%} of the time that the blind robot loses.",
+            file=words,
+        )
+    if as_json:
+        print(json_text(_tables(encounter, rows, share)), end="")
+    names = ["encounter.png", *(["encounter.mp4"] if video else []), "encounter.csv"]
+    written = ", ".join([*names, "crossings.png", "episodes.csv"])
+    print(f"\nWritten to {out}: {written}", file=words)

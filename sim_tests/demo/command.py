@@ -1,0 +1,42 @@
+"""The commands ``awarenav demo`` and ``awarenav bench``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from awarenav.cli import FilePath, command, option, options
+
+
+@command("demo")
+@options.out_folder("demo")
+@options.seed()
+@option("--no-video", is_flag=True, help="Write no video (faster).")
+@options.perception(["keypoints", "pixels"], note=" 'pixels' takes many minutes.")
+@options.as_json("the tables")
+def demo(out: Path, seed: int, *, no_video: bool, perception: str, as_json: bool) -> int:
+    """Run the paper's 25 s encounter, and one crossing with and without awareness.
+
+    Prints the tables and writes encounter.png, encounter.mp4, encounter.csv, crossings.png and
+    episodes.csv.
+    """
+    from ._demo import run_demo  # noqa: PLC0415 - help needs no simulator
+
+    run_demo(out, seed=seed, video=not no_video, perception=perception, as_json=as_json)
+    return 0
+
+
+@command("bench", epilog="Exit status: 0 success; 1 a figure is worse than its tolerance allows.")
+@option(
+    "--baseline",
+    type=FilePath(),
+    default="benchmarks/baseline.json",
+    metavar="FILE",
+    help="Baseline to compare with, if it exists.",
+)
+@options.out_file(None, "Write the figures as a baseline.")
+@options.as_json()
+def bench(baseline: Path, out: Path | None, *, as_json: bool) -> int:
+    """Time crossings against real time and against bare physics, and compare with a baseline."""
+    from ._bench import bench_command  # noqa: PLC0415 - help needs no simulator
+
+    return bench_command(baseline, out, as_json=as_json)

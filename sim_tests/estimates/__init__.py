@@ -1,1 +1,0 @@
-"""Estimates of people in pictures from anywhere, and how good they are against the truth."""

@@ -1,1 +1,0 @@
-"""Falsification: the people, within human limits, who come nearest to harm."""

@@ -1,1 +1,0 @@
-"""What goes wrong between camera, odometry and tracker, as data, and its injection."""

@@ -1,1 +1,0 @@
-"""The warehouse as data and meshes: layouts, racks, goods, props, textures, light."""

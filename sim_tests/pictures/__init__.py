@@ -1,1 +1,0 @@
-"""The picture world and the camera: drawing, culling, noise, blur, timing."""

@@ -1,1 +1,0 @@
-"""Policies shown: radius, human speed and speed limit over awareness and distance."""

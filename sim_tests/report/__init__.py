@@ -1,1 +1,0 @@
-"""The page that a run is judged by: one self-contained HTML file."""

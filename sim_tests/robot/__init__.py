@@ -1,1 +1,0 @@
-"""The robot: its physics, its looks, and the reference planner that drives it."""

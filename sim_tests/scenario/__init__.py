@@ -1,0 +1,44 @@
+"""Crossings as data: hall, robot task, camera, people, and distributions of their numbers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from awarenav.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from ._distributions import Choice, Distribution, Integers
+    from ._files import shipped_scenarios
+    from ._scenario import CameraSpec, Scenario
+    from ._template import ScenarioTemplate, shipped_templates
+
+__all__ = [
+    "CameraSpec",
+    "Choice",
+    "Distribution",
+    "Integers",
+    "Scenario",
+    "ScenarioTemplate",
+    "shipped_scenarios",
+    "shipped_templates",
+]
+
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "._distributions": (
+            "Choice",
+            "Distribution",
+            "Integers",
+        ),
+        "._files": ("shipped_scenarios",),
+        "._scenario": (
+            "CameraSpec",
+            "Scenario",
+        ),
+        "._template": (
+            "ScenarioTemplate",
+            "shipped_templates",
+        ),
+    },
+)

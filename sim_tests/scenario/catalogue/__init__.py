@@ -1,0 +1,1 @@
+"""The shipped scenarios listed, explained, drawn and checked: ``awarenav scenario``."""

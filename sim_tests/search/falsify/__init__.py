@@ -1,0 +1,1 @@
+"""Situations searched in which a policy does worst: ``awarenav falsify``."""

@@ -1,0 +1,1 @@
+"""Policies searched for little time lost and little margin violated: ``awarenav tune``."""

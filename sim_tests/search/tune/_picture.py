@@ -1,0 +1,104 @@
+"""The picture of a tuning: every trial, the front, the presets, and what decided."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from awarenav.figures import new_figure, save_figure
+
+from ._evaluation import OBJECTIVES
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from ._tune import Tuning
+
+_TRIAL: Final = "#9aa3ad"
+_FRONT: Final = "#1f5fa8"
+_CONTACT: Final = "#b3261e"
+_ANCHOR: Final = "#d9822b"
+_CHOSEN: Final = "#2e7d4f"
+_BARS: Final = 8
+_MARKERS: Final = ("D", "s", "^", "v", "P")
+
+
+def draw_tuning(tuning: Tuning, importance: Mapping[str, Mapping[str, float]], path: Path) -> None:
+    """Draw trials, front, presets and chosen policies, and the importances beside them."""
+    figure = new_figure(12.0, 6.0)
+    grid = figure.add_gridspec(2, 2, width_ratios=(1.7, 1.0))
+    _front(figure.add_subplot(grid[:, 0]), tuning)
+    for row, name in enumerate(OBJECTIVES):
+        _bars(figure.add_subplot(grid[row, 1]), name, importance[name])
+    save_figure(figure, path)
+
+
+def _front(axes: Axes, tuning: Tuning) -> None:
+    judged = [trial for trial in tuning.trials if trial.values is not None]
+    for touched, colour, marker, label in (
+        (False, _TRIAL, "o", "trial"),
+        (True, _CONTACT, "x", "trial with a contact caused by the robot"),
+    ):
+        points = np.array(
+            [
+                trial.values
+                for trial in judged
+                if any(value > 0.0 for value in trial.constraints.values()) == touched
+            ]
+        )
+        if points.size:
+            axes.scatter(points[:, 0], points[:, 1], c=colour, marker=marker, s=26, label=label)
+    if tuning.front:
+        line = np.array([trial.values for trial in tuning.front])
+        axes.plot(
+            line[:, 0],
+            line[:, 1],
+            color=_FRONT,
+            drawstyle="steps-post",
+            marker="o",
+            ms=5,
+            label="front",
+        )
+    for anchor, marker in zip(tuning.anchors, _MARKERS, strict=False):
+        x, y = anchor.tuning.objectives
+        colour = _CONTACT if anchor.tuning.robot_contacts else _ANCHOR
+        axes.scatter([x], [y], marker=marker, s=60, c=colour, zorder=3, label=anchor.name)
+    places: dict[tuple[float, float], list[str]] = {}
+    for chosen in tuning.chosen:
+        places.setdefault(chosen.tuning.objectives, []).append(chosen.name.replace("_", " "))
+    for row, ((x, y), names) in enumerate(sorted(places.items())):
+        below = row % 2 == 0  # neighbours' names do not cover each other
+        axes.scatter([x], [y], marker="o", s=120, facecolors="none", edgecolors=_CHOSEN, lw=2)
+        axes.annotate(
+            ",\n".join(names),
+            (x, y),
+            xytext=(9, -7 if below else 7),
+            textcoords="offset points",
+            color=_CHOSEN,
+            va="top" if below else "bottom",
+        )
+    settings = tuning.settings
+    axes.set_title(
+        f"{len(tuning.trials)} trials, {settings.episodes} seeds in "
+        f"{len(settings.scenarios)} scenarios each",
+        loc="left",
+        fontsize=10,
+    )
+    axes.set_xlabel("mean time lost (s an episode)")
+    axes.set_ylabel("mean time with a negative separation margin (s an episode)")
+    axes.grid(alpha=0.25)
+    axes.margins(0.12)
+    axes.legend(loc="upper right", fontsize=8)
+
+
+def _bars(axes: Axes, objective: str, importance: Mapping[str, float]) -> None:
+    first = sorted(importance.items(), key=lambda each: -each[1])[:_BARS][::-1]
+    names, values = [name for name, _ in first], [value for _, value in first]
+    axes.barh(names, values, color=_FRONT)
+    axes.set_title(f"what decided {objective.replace('_', ' ')[:-2]}", loc="left", fontsize=10)
+    axes.tick_params(labelsize=8)
+    axes.set_xlim(0.0, max(1e-9, *values) * 1.1 if any(values) else 1.0)
+    axes.grid(alpha=0.25, axis="x")

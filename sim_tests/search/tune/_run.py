@@ -1,0 +1,100 @@
+"""``awarenav tune`` from its options to its last line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from awarenav.policies import read_policy
+from nav_adapter import AwarenessPolicy
+
+from ...crossing.eyes import PerceptionKind
+from ...study.runs import policy_text
+from .._search import Method
+from .._templates import named_templates
+from ._evaluation import OBJECTIVES
+from ._files import table_lines, write_tuning
+from ._judge import TuneSettings
+from ._policy_space import read_ranges, shipped_ranges
+from ._tune import Tuning, require_trials, tune
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TuneOptions:
+    """The options of ``awarenav tune``."""
+
+    policy: str
+    scenario: tuple[str, ...]
+    ranges: Path | None
+    trials: int
+    episodes: int
+    held_out: int
+    generation: int
+    sampler: Method
+    perception: PerceptionKind
+    camera: str
+    planner: str
+    seed: int
+    workers: int
+    out: Path
+    resume: bool
+    as_json: bool
+
+
+def tune_command(options: TuneOptions) -> int:
+    """Run the command and return its exit status.
+
+    Raises:
+        SimError: for options that cannot be used.
+        NavError: for a policy that cannot be used.
+    """
+    policy: AwarenessPolicy = read_policy(options.policy)
+    ranges = shipped_ranges() if options.ranges is None else read_ranges(options.ranges)
+    settings = TuneSettings(
+        policy_name=Path(options.policy).stem,
+        policy=policy_text(policy),
+        scenarios=tuple(
+            template.to_text() for template in named_templates(options.scenario, options.camera)
+        ),
+        ranges={path: each.model_dump(mode="json") for path, each in ranges.items()},
+        trials=options.trials,
+        episodes=options.episodes,
+        held_out=options.held_out,
+        perception=options.perception,
+        planner=options.planner,
+        seed=options.seed,
+        sampler=options.sampler,
+        generation=options.generation,
+    )
+
+    def report(tuning: Tuning) -> None:
+        require_trials(tuning)
+        write_tuning(tuning, options.out)
+        if options.as_json:
+            print((options.out / "chosen.json").read_text(encoding="utf-8"), end="")
+            return
+        print("\n".join(table_lines(tuning)))
+        print("\n".join(_verdict(tuning)))
+
+    tune(settings, options.out, workers=options.workers, resume=options.resume, report=report)
+    if not options.as_json:
+        print(f"Written to {options.out}")
+    return 0
+
+
+def _verdict(tuning: Tuning) -> list[str]:
+    base = tuning.anchors[0]
+    if not tuning.front:
+        return ["In every trial the robot moved into a person at least once: none was chosen."]
+    better = next((each for each in tuning.chosen if each.name == "beats_base"), None)
+    if better is None:
+        return [
+            f"No trial is at least as good as {base.name} in both objectives on the tuning seeds: "
+            "it lies on the front."
+        ]
+    time_s, violation_s = (better.held_out.minus(base.held_out, name) for name in OBJECTIVES)
+    return [
+        f"beats_base is at least as good as {base.name} in both objectives on the tuning seeds. "
+        f"On the held-out ones it differs by {time_s.text(2)} s of time lost and "
+        f"{violation_s.text(3)} s of violation."
+    ]

@@ -1,1 +1,0 @@
-"""Sets of rendered pictures with the truth about the people in them."""

@@ -1,1 +1,0 @@
-"""Lines of sight held against the surfaces that pictures show, without drawing a picture."""

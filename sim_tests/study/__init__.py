@@ -1,0 +1,1 @@
+"""Many crossings: runs, measures, the report, and the test suite for planners."""

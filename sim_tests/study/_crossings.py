@@ -1,0 +1,142 @@
+"""What ``awarenav crossings`` does."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from awarenav.files import json_text
+from perception import AwarenessPipeline, Camera
+
+from ..crossing.eyes import PerceptionKind
+from ..world.errors import SimError
+from .measures import EpisodeRecord, summarise, table_text
+from .runs import ERRORS, plan_jobs, run_jobs
+
+#: What the command line calls the reference planner.
+REFERENCE: Final = "reference"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CrossingsOptions:
+    """The options of ``awarenav crossings``."""
+
+    scenario: tuple[str, ...]
+    policy: tuple[str, ...]
+    planner: tuple[str, ...]
+    perception: PerceptionKind
+    camera: str
+    fault: tuple[str, ...]
+    episodes: int
+    seed: int
+    workers: int | None
+    scheduler: str | None
+    time_limit: float | None
+    out: Path
+    resume: bool
+    no_report: bool
+    as_json: bool
+
+
+def crossings_command(options: CrossingsOptions) -> int:
+    """Run episodes, print a short table, write the report.
+
+    Raises:
+        SimError: something unknown or unusable was asked for; nothing has run then.
+        NavError: an unknown preset or unusable policy file; nothing has run then.
+        PerceptionError: for pixels, when the shipped networks cannot be loaded; nothing has run.
+    """
+    jobs = plan_jobs(
+        options.scenario,
+        options.policy,
+        range(options.seed, options.seed + options.episodes),
+        planners=options.planner,
+        perception=options.perception,
+        camera=options.camera,
+        faults=options.fault,
+    )
+    if options.perception == "pixels":
+        AwarenessPipeline(Camera.from_fov(640, 480, 1.0))  # says at once which networks are absent
+    records = run_jobs(
+        jobs,
+        options.out,
+        workers=options.workers,
+        scheduler=options.scheduler,
+        time_limit_s=options.time_limit,
+        resume=options.resume,
+        progress=True,
+        about=_about(options),
+    )
+    if options.as_json:
+        print(json_text([asdict(row) for row in summarise(records).policies]), end="")
+    else:
+        print(short_table(records))
+        print(f"\nWritten to {options.out}: episodes.csv with {len(records)} episodes")
+    failed = [number for number, record in enumerate(records) if record.error]
+    if failed:
+        first = records[failed[0]]
+        print(
+            f"{len(failed)} of {len(records)} episodes failed; episode {failed[0]} "
+            f"({first.scenario}, seed {first.seed}): {first.error}\n"
+            f"{options.out / ERRORS} has the tracebacks",
+            file=sys.stderr,
+        )
+    if not options.no_report:
+        _write_report(options.out, as_json=options.as_json)
+    return 1 if failed else 0
+
+
+def short_table(records: Iterable[EpisodeRecord]) -> str:
+    """One line a policy (and planner, perception and fault where there are several)."""
+    header = ("policy", "episodes", "success", "robot contacts", "time lost s", "least m", "failed")
+    rows: list[Sequence[str]] = []
+    for row in summarise(records).policies:
+        ran = row.episodes - row.errors
+        lost, least = row.means["time_lost_s"], row.worst.get("min_separation_m")
+        rows.append(
+            (
+                row.variant,
+                str(row.episodes),
+                f"{100.0 * row.success.value:.0f} %" if row.episodes else "–",
+                str(round(row.robot_contact.value * row.robot_contact.n)) if ran else "–",
+                f"{lost.value:.2f}" if lost.n else "–",
+                "–" if least is None else f"{least:.2f}",
+                str(row.errors),
+            )
+        )
+    return table_text(header, rows)
+
+
+def _about(options: CrossingsOptions) -> dict[str, Any]:
+    """What run.json says of the command; the same for a run and its resumption."""
+    settings: dict[str, Any] = {
+        "scenario": list(options.scenario),
+        "policy": list(options.policy),
+        "planner": [each or REFERENCE for each in options.planner],
+        "perception": options.perception,
+        "fault": list(options.fault),
+        "episodes": options.episodes,
+        "seed": options.seed,
+    }
+    if options.camera:
+        settings["camera"] = options.camera
+    words = ["awarenav", "crossings"]
+    for name, value in settings.items():
+        many = value if isinstance(value, list) else [value]
+        words += [f"--{name}", *map(str, many)]
+    return {"command": shlex.join([*words, "--out", str(options.out)]), "settings": settings}
+
+
+def _write_report(out: Path, *, as_json: bool) -> None:
+    try:
+        from .report import write_report  # noqa: PLC0415 - needs the extra bench
+
+        path = write_report(out, progress=True)
+    except SimError as error:  # the episodes are there, and a page can be made any time
+        print(f"no report: {error}; then: awarenav report {out}", file=sys.stderr)
+        return
+    print(f"Report: {path}", file=sys.stderr if as_json else sys.stdout)

@@ -1,0 +1,111 @@
+"""Measures of crossings and their statistics: ``awarenav compare``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from awarenav.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from ._bootstrap import bootstrap_interval, ratio_interval, ratio_intervals
+    from ._driving import path_length_m
+    from ._interval import Interval, proportion_interval, zero_of_n_upper
+    from ._measure import measure
+    from ._pairs import (
+        paired,
+        paired_difference,
+        violates_more,
+        violation_excess,
+        violation_excess_of_time,
+        won_back,
+    )
+    from ._record import RECORD_COLUMNS, EpisodeRecord, record_row
+    from ._record_file import read_record_file, read_records, write_records
+    from ._summary import BASELINE, Comparison, Summary, SummaryRow, summarise, summarise_sources
+    from ._summary_text import summary_text, table_text
+    from ._variants import Variant, labels
+
+__all__ = [
+    "BASELINE",
+    "RECORD_COLUMNS",
+    "Comparison",
+    "EpisodeRecord",
+    "Interval",
+    "Summary",
+    "SummaryRow",
+    "Variant",
+    "bootstrap_interval",
+    "labels",
+    "measure",
+    "paired",
+    "paired_difference",
+    "path_length_m",
+    "proportion_interval",
+    "ratio_interval",
+    "ratio_intervals",
+    "read_record_file",
+    "read_records",
+    "record_row",
+    "summarise",
+    "summarise_sources",
+    "summary_text",
+    "table_text",
+    "violates_more",
+    "violation_excess",
+    "violation_excess_of_time",
+    "won_back",
+    "write_records",
+    "zero_of_n_upper",
+]
+
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "._bootstrap": (
+            "bootstrap_interval",
+            "ratio_interval",
+            "ratio_intervals",
+        ),
+        "._driving": ("path_length_m",),
+        "._interval": (
+            "Interval",
+            "proportion_interval",
+            "zero_of_n_upper",
+        ),
+        "._measure": ("measure",),
+        "._pairs": (
+            "paired",
+            "paired_difference",
+            "violates_more",
+            "violation_excess",
+            "violation_excess_of_time",
+            "won_back",
+        ),
+        "._record": (
+            "EpisodeRecord",
+            "RECORD_COLUMNS",
+            "record_row",
+        ),
+        "._record_file": (
+            "read_record_file",
+            "read_records",
+            "write_records",
+        ),
+        "._summary": (
+            "BASELINE",
+            "Comparison",
+            "Summary",
+            "SummaryRow",
+            "summarise",
+            "summarise_sources",
+        ),
+        "._summary_text": (
+            "summary_text",
+            "table_text",
+        ),
+        "._variants": (
+            "Variant",
+            "labels",
+        ),
+    },
+)

@@ -1,0 +1,88 @@
+"""What ``awarenav compare`` does."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Final
+
+from awarenav.files import json_text
+
+from ...world.errors import SimError
+from ._record_file import read_records, write_records
+from ._summary import summarise_sources
+from ._summary_text import summary_text
+
+EPISODES_NAME: Final = "episodes.csv"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CompareOptions:
+    """The options of ``awarenav compare``."""
+
+    runs: tuple[Path, ...]
+    baseline: str
+    level: float
+    seed: int
+    out: Path | None
+    as_json: bool
+
+
+def compare_command(options: CompareOptions) -> int:
+    """Read runs, print their tables, and write their episodes into one file if asked.
+
+    Raises:
+        SimError: a run cannot be read, a baseline asked for is not there, or an option is out of
+            range.
+    """
+    names = _names(options.runs)
+    if not 0.0 < options.level < 1.0:
+        raise SimError(f"--level must lie in (0, 1), got {options.level:g}")
+    if options.out is not None and options.out.suffix not in (".csv", ".parquet"):
+        raise SimError(f"--out must be a .csv or .parquet file, got {options.out}")
+    sources = {
+        name: read_records(_table(path)) for name, path in zip(names, options.runs, strict=True)
+    }
+    everything = [record for records in sources.values() for record in records]
+    if not everything:
+        raise SimError(f"no episodes yet in {', '.join(map(str, options.runs))}")
+    _check_baseline(options.baseline, sorted({record.policy for record in everything}))
+    summary = summarise_sources(
+        sources, baseline=options.baseline, level=options.level, seed=options.seed
+    )
+    print(json_text(asdict(summary)).rstrip() if options.as_json else summary_text(summary))
+    if options.out is not None:
+        write_records(options.out, everything)
+    return 0
+
+
+def _table(path: Path) -> Path:
+    return path / EPISODES_NAME if path.is_dir() else path
+
+
+def _names(runs: Sequence[Path]) -> list[str]:
+    """A name for each run: the shortest end of its path that no other has."""
+    if len(runs) == 1:
+        return [""]
+    parts = [run.resolve().parts for run in runs]
+    if len(set(parts)) < len(parts):
+        raise SimError(f"each run once, got {', '.join(map(str, runs))}")
+    depth = next(
+        depth
+        for depth in range(1, max(map(len, parts)) + 1)
+        if len({part[-depth:] for part in parts}) == len(parts)
+    )
+    return ["/".join(part[-depth:]) for part in parts]
+
+
+def _check_baseline(baseline: str, policies: Sequence[str]) -> None:
+    if baseline in policies or (baseline == "blind" and len(policies) >= 1):
+        return  # the default needs not be there: then nothing is compared
+    near = difflib.get_close_matches(baseline, policies, n=1)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    raise SimError(
+        f"--baseline must be one of the policies {', '.join(map(repr, policies))}, "
+        f"got {baseline!r}{hint}"
+    )

@@ -1,0 +1,108 @@
+"""A figure with its confidence interval.
+
+Shares of episodes: exact intervals, and what none of n says.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from scipy.stats import beta
+
+from perception.arrays import finite_number
+
+from ...world.errors import SimError
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """A figure and what the data leave open about it.
+
+    Attributes:
+        value: the estimate; NaN when there is none.
+        low: lower end of the interval, −inf where the data do not bound it.
+        high: upper end, +inf where the data do not bound it.
+        n: episodes, or pairs of them, behind it.
+        left_out: episodes or pairs that could not say anything.
+    """
+
+    value: float
+    low: float
+    high: float
+    n: int
+    left_out: int = 0
+
+    @property
+    def known(self) -> bool:
+        """There is an estimate."""
+        return math.isfinite(self.value)
+
+    @property
+    def bounded(self) -> bool:
+        """The interval is finite on both sides."""
+        return math.isfinite(self.low) and math.isfinite(self.high)
+
+    def text(self, decimals: int = 2, scale: float = 1.0) -> str:
+        """``"1.23 [1.01, 1.50]"``; ``"1.23 [?]"`` without bounds, a dash without a value.
+
+        Args:
+            decimals: of all three.
+            scale: multiplies all three, 100 for per cent.
+        """
+        if not self.known:
+            return "–"
+        value = number_text(self.value * scale, decimals)
+        if not self.bounded:
+            return f"{value} [?]"
+        low, high = (number_text(bound * scale, decimals) for bound in (self.low, self.high))
+        return f"{value} [{low}, {high}]"
+
+
+def number_text(value: float, decimals: int) -> str:
+    """A number with so many decimals, without a negative zero."""
+    text = f"{value:.{decimals}f}"
+    return text.lstrip("-") if float(text) == 0.0 else text
+
+
+def zero_of_n_upper(n: int, level: float = 0.95) -> float:
+    """Upper bound of a share of which n independent trials showed none: 1 − (1 − level)^(1/n).
+
+    The one-sided bound of Clopper and Pearson (1934), about 3/n at 95 %; 1 without trials.
+
+    Raises:
+        SimError: n < 0, or level outside (0, 1).
+    """
+    n, level = _checked(n, n, level)
+    return 1.0 if n == 0 else float(1.0 - (1.0 - level) ** (1.0 / n))
+
+
+def proportion_interval(count: int, n: int, level: float = 0.95) -> Interval:
+    """The share ``count`` of ``n`` with its exact interval (Clopper and Pearson 1934).
+
+    Two-sided; for none and for all of n the one free end is the one-sided bound, as in
+    :func:`zero_of_n_upper`.
+
+    Raises:
+        SimError: not 0 ≤ count ≤ n, or level outside (0, 1).
+    """
+    n, level = _checked(count, n, level)
+    if n == 0:
+        return Interval(float("nan"), 0.0, 1.0, 0)
+    if count == 0:
+        return Interval(0.0, 0.0, zero_of_n_upper(n, level), n)
+    if count == n:
+        return Interval(1.0, 1.0 - zero_of_n_upper(n, level), 1.0, n)
+    tail = 0.5 * (1.0 - level)
+    low = float(beta.ppf(tail, count, n - count + 1))
+    high = float(beta.ppf(1.0 - tail, count + 1, n - count))
+    return Interval(count / n, low, high, n)
+
+
+def _checked(count: int, n: int, level: float) -> tuple[int, float]:
+    if not 0 <= count <= n:
+        raise SimError(f"a share must be of 0 to n episodes, got {count} of {n}")
+    level = finite_number("level", level, SimError, minimum=0.0, exclusive_minimum=True)
+    if level >= 1.0:
+        raise SimError(f"level must lie in (0, 1), got {level:g}")
+    return n, level

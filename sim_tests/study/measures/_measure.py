@@ -1,0 +1,182 @@
+"""From a crossing to its row: every measure of docs/metrics.md."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from perception.arrays import FloatArray
+
+from ...crossing import STANDING_SPEED_MPS
+from ._awareness import awareness_class, awareness_error, nearest_person, track_awareness
+from ._conflict import Outline, min_time_to_collision_s, post_encroachment_s
+from ._driving import (
+    count_stops,
+    path_length_m,
+    peak_deceleration_and_jerk,
+    success_weighted_path_length,
+)
+from ._record import Awareness, EpisodeRecord, rounded
+from ._trace import Trace
+
+if TYPE_CHECKING:
+    from ...actors.behaviour import PersonOutcome
+    from ...crossing import CrossingResult
+
+#: Zones of E. T. Hall, The Hidden Dimension (1966): far edges of the intimate and personal one.
+INTIMATE_M: Final = 0.45
+PERSONAL_M: Final = 1.2
+
+
+def measure(
+    result: CrossingResult,
+    *,
+    time_without_people_s: float | None = None,
+    length_without_people_m: float | None = None,
+    scenario_version: int = 1,
+    attention: str = "mixed",
+    fault: str = "",
+) -> EpisodeRecord:
+    """All measures of a crossing; docs/metrics.md defines them.
+
+    Numbers are rounded to the six decimals that files keep: a record read again is equal.
+
+    Args:
+        result: the crossing.
+        time_without_people_s: time to goal of the same task without people; None if the goal was
+            not reached then, or nobody ran it.
+        length_without_people_m: way driven in it.
+        scenario_version: as the scenario says.
+        attention: as the scenario says.
+        fault: name of the fault, empty for none.
+
+    Raises:
+        SimError: a result without frames, or whose frames do not hold all people.
+    """
+    trace = Trace.of(result)
+    outline = Outline(result.robot.footprint_m)
+    nearest_m = trace.separation_m.min(axis=1, initial=np.inf)
+    path_m = path_length_m(trace.robot_odom_m)
+    deceleration, jerk = peak_deceleration_and_jerk(trace.t_s, trace.speed_mps)
+    delay_s, detour_m = human_cost(result.people)
+    awareness, reaction, error = _regard(result, trace)
+    by_robot = [contact for contact in result.contacts if contact.by == "robot"]
+    separation_m, speed_then = _closest(result, trace, nearest_m)
+    return _rounded(
+        EpisodeRecord(
+            scenario=result.scenario,
+            seed=result.seed,
+            policy=result.policy,
+            planner=result.planner,
+            perception=result.perception,
+            success=result.success,
+            contact=result.contact,
+            contact_by=result.contact_by,
+            min_separation_m=separation_m,
+            time_to_goal_s=result.time_to_goal_s,
+            max_speed_within_2m_mps=result.max_speed_within_2m_mps if trace.people else None,
+            min_margin_m=result.min_margin_m,
+            violation_time_s=result.violation_time_s,
+            contacts=len(result.contacts),
+            duration_s=result.duration_s,
+            scenario_version=scenario_version,
+            attention=attention,
+            fault=fault,
+            time_without_people_s=time_without_people_s,
+            time_lost_s=time_lost_s(
+                result.time_to_goal_s, result.duration_s, time_without_people_s
+            ),
+            path_length_m=path_m,
+            spl=success_weighted_path_length(result.success, path_m, length_without_people_m),
+            speed_at_min_separation_mps=speed_then,
+            min_time_to_collision_s=min_time_to_collision_s(trace, outline),
+            post_encroachment_s=post_encroachment_s(trace, outline),
+            intimate_s=trace.time_with(nearest_m < INTIMATE_M),
+            personal_s=trace.time_with(nearest_m < PERSONAL_M),
+            robot_contacts=len(by_robot),
+            person_contacts=len(result.contacts) - len(by_robot),
+            contact_speed_mps=max((c.robot_speed_mps for c in by_robot), default=None),
+            peak_deceleration_mps2=deceleration,
+            peak_jerk_mps3=jerk,
+            stops=count_stops(
+                trace.speed_mps, result.time_to_goal_s is not None, STANDING_SPEED_MPS
+            ),
+            human_delay_s=delay_s,
+            human_detour_m=detour_m,
+            warnings=sum(len(frame.constraints.alerts) for frame in result.frames),
+            awareness_error=error,
+            awareness=awareness,
+            reaction=reaction,
+        )
+    )
+
+
+def time_lost_s(
+    time_to_goal_s: float | None, duration_s: float, time_without_people_s: float | None
+) -> float | None:
+    """Time over that of the same task without people.
+
+    An episode that does not reach its goal loses all of its duration. None where the task cannot
+    be done without people either, or nobody tried.
+    """
+    if time_without_people_s is None:
+        return None
+    return duration_s if time_to_goal_s is None else time_to_goal_s - time_without_people_s
+
+
+def human_cost(people: Iterable[PersonOutcome]) -> tuple[float | None, float | None]:
+    """Delay (s) and detour (m) of all who reached the end of their way, over their free walks.
+
+    Both None when nobody did. People who were still on their way when the episode ended are left
+    out: what they lost is not known.
+    """
+    arrived = [
+        (person.time_s - person.free_time_s, person.length_m - person.free_length_m)
+        for person in people
+        if person.time_s is not None
+        and person.free_time_s is not None
+        and person.free_length_m is not None
+    ]
+    if not arrived:
+        return None, None
+    return sum(delay for delay, _ in arrived), sum(detour for _, detour in arrived)
+
+
+def _closest(
+    result: CrossingResult, trace: Trace, nearest_m: FloatArray
+) -> tuple[float | None, float | None]:
+    """Smallest separation and the robot's speed then; a contact is a separation of 0."""
+    if not trace.people:
+        return None, None
+    if result.contacts:
+        return 0.0, max(contact.robot_speed_mps for contact in result.contacts)
+    row = int(np.argmin(nearest_m))
+    return float(nearest_m[row]), abs(float(trace.speed_mps[row]))
+
+
+def _regard(result: CrossingResult, trace: Trace) -> tuple[Awareness, str, float | None]:
+    """Awareness and reaction of the person who came nearest, and the error of α over all."""
+    mean, lower = track_awareness(result, trace)
+    error = awareness_error(trace.awareness, mean)
+    closest = nearest_person(trace.separation_m)
+    if closest is None:
+        return "", "", error
+    row, person = closest
+    verdict = awareness_class(trace.t_s, trace.awareness[:, person], lower[:, person], row)
+    reacting = person - result.scripted
+    reaction = ""
+    if 0 <= reacting < len(result.people):
+        reaction = result.people[reacting].reaction
+    return verdict, reaction, error
+
+
+def _rounded(record: EpisodeRecord) -> EpisodeRecord:
+    numbers = {
+        field.name: rounded(getattr(record, field.name))
+        for field in fields(record)
+        if field.type == "float | None"
+    }
+    return replace(record, **numbers)  # type: ignore[arg-type]

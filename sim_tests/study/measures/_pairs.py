@@ -1,0 +1,183 @@
+"""Policies against each other on the same scenarios and seeds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from ...world.errors import SimError
+from ._bootstrap import bootstrap_interval, ratio_interval
+from ._interval import Interval, proportion_interval
+from ._record import COLUMN_KINDS, EpisodeRecord
+
+Pair = tuple[EpisodeRecord, EpisodeRecord]
+
+# Two violation times that differ by less are equal.
+_SAME_TIME_S: Final = 1e-6
+
+
+def paired(base: Iterable[EpisodeRecord], other: Iterable[EpisodeRecord]) -> tuple[Pair, ...]:
+    """Episodes of the same scenario, version and seed, ordered by these.
+
+    The same seed sets the same people on their way; what they do then may depend on the robot.
+
+    Raises:
+        SimError: one side has an episode twice.
+    """
+    first, second = _by_key(base), _by_key(other)
+    return tuple((first[key], second[key]) for key in sorted(first.keys() & second.keys()))
+
+
+def paired_difference(
+    base: Iterable[EpisodeRecord],
+    other: Iterable[EpisodeRecord],
+    field: str,
+    rng: np.random.Generator | None = None,
+    level: float = 0.95,
+) -> Interval:
+    """Mean of ``other`` − ``base`` over pairs, with its bootstrap interval within scenarios.
+
+    Pairs in which the figure does not apply to both are left out and counted.
+
+    Args:
+        base: episodes of one policy.
+        other: episodes of the other.
+        field: a number, count or flag of :class:`EpisodeRecord`.
+        rng: draws the resamples; None for one of seed 0.
+        level: of confidence.
+
+    Raises:
+        SimError: one side has an episode twice, or the field holds no number.
+    """
+    if COLUMN_KINDS.get(field, "text") == "text":
+        raise SimError(f"field must be a number of an episode, got {field!r}")
+    pairs = paired(base, other)
+    kept = _with_numbers(pairs, field)
+    differences = [_number(second, field) - _number(first, field) for first, second in kept]
+    interval = bootstrap_interval(differences, _rng(rng), level, strata=_scenarios(kept))
+    return replace(interval, left_out=len(pairs) - len(kept))
+
+
+def won_back(
+    blind: Iterable[EpisodeRecord],
+    policy: Iterable[EpisodeRecord],
+    rng: np.random.Generator | None = None,
+    level: float = 0.95,
+) -> Interval:
+    """Share of the time that ``blind`` loses which ``policy`` wins back.
+
+    Σ (lost by blind − lost by policy) / Σ lost by blind over pairs: of all time lost, not a mean
+    of shares, in which an episode that lost next to nothing would weigh as much as any. Its
+    interval comes from resampling pairs within scenarios.
+
+    Args:
+        blind: episodes of the policy compared with.
+        policy: episodes of the other.
+        rng: draws the resamples; None for one of seed 0.
+        level: of confidence.
+
+    Returns:
+        NaN if ``blind`` loses no time; pairs without the same task without people are left out.
+
+    Raises:
+        SimError: one side has an episode twice.
+    """
+    return _ratio(paired(blind, policy), "time_lost_s", "time_lost_s", -1.0, rng, level)
+
+
+def violation_excess(
+    blind: Iterable[EpisodeRecord],
+    policy: Iterable[EpisodeRecord],
+    rng: np.random.Generator | None = None,
+    level: float = 0.95,
+) -> Interval:
+    """How much longer ``policy`` violates the margin, relative to the violation of ``blind``.
+
+    Σ (violation of policy − of blind) / Σ violation of blind over pairs; 0.02 is 2 % more.
+
+    Returns:
+        NaN if ``blind`` never violates the margin; see :func:`violation_excess_of_time` then.
+    """
+    return _ratio(paired(blind, policy), "violation_time_s", "violation_time_s", 1.0, rng, level)
+
+
+def violation_excess_of_time(
+    blind: Iterable[EpisodeRecord],
+    policy: Iterable[EpisodeRecord],
+    rng: np.random.Generator | None = None,
+    level: float = 0.95,
+) -> Interval:
+    """How much longer ``policy`` violates the margin, relative to the time that ``blind`` takes."""
+    return _ratio(paired(blind, policy), "violation_time_s", "duration_s", 1.0, rng, level)
+
+
+def violates_more(
+    blind: Iterable[EpisodeRecord], policy: Iterable[EpisodeRecord], level: float = 0.95
+) -> Interval:
+    """Share of pairs in which ``policy`` violates the margin for longer than ``blind``; exact."""
+    pairs = _with_numbers(paired(blind, policy), "violation_time_s")
+    more = sum(
+        _number(second, "violation_time_s") > _number(first, "violation_time_s") + _SAME_TIME_S
+        for first, second in pairs
+    )
+    return proportion_interval(more, len(pairs), level)
+
+
+def _ratio(
+    pairs: tuple[Pair, ...],
+    field: str,
+    over: str,
+    sign: float,
+    rng: np.random.Generator | None,
+    level: float,
+) -> Interval:
+    """Σ sign·(policy − blind) of one field over Σ of another of blind."""
+    kept = _with_numbers(_with_numbers(pairs, field), over)
+    interval = ratio_interval(
+        [sign * (_number(second, field) - _number(first, field)) for first, second in kept],
+        [_number(first, over) for first, _ in kept],
+        _rng(rng),
+        level,
+        strata=_scenarios(kept),
+    )
+    return replace(interval, left_out=len(pairs) - len(kept))
+
+
+def _with_numbers(pairs: Sequence[Pair], field: str) -> tuple[Pair, ...]:
+    return tuple(
+        pair
+        for pair in pairs
+        if all(not record.error and getattr(record, field) is not None for record in pair)
+    )
+
+
+def _number(record: EpisodeRecord, field: str) -> float:
+    value = float(getattr(record, field))
+    if not math.isfinite(value):
+        raise SimError(f"{field} of {record.scenario}, seed {record.seed} is not finite: {value}")
+    return value
+
+
+def _scenarios(pairs: Sequence[Pair]) -> list[tuple[str, int]]:
+    return [(first.scenario, first.scenario_version) for first, _ in pairs]
+
+
+def _by_key(records: Iterable[EpisodeRecord]) -> dict[tuple[str, int, int], EpisodeRecord]:
+    found: dict[tuple[str, int, int], EpisodeRecord] = {}
+    for record in records:
+        key = (record.scenario, record.scenario_version, record.seed)
+        if key in found:
+            raise SimError(
+                f"scenario {record.scenario!r}, seed {record.seed} is there twice for policy "
+                f"{record.policy!r}: pairs need one episode each"
+            )
+        found[key] = record
+    return found
+
+
+def _rng(rng: np.random.Generator | None) -> np.random.Generator:
+    return np.random.default_rng(0) if rng is None else rng

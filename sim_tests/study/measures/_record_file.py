@@ -1,0 +1,110 @@
+"""Tables of episodes on disk: ``episodes.csv``, and the same as Parquet."""
+
+from __future__ import annotations
+
+import csv
+import io
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from ...world.errors import SimError
+from ._record import RECORD_COLUMNS, EpisodeRecord, check_columns, parse_row, record_row
+
+_PARQUET_SUFFIX: Final = ".parquet"
+
+
+@dataclass(frozen=True, slots=True)
+class RecordFile:
+    """What a table of episodes held.
+
+    Attributes:
+        records: one for each whole row, in their order.
+        torn: text of a last row that an interruption left unfinished; empty without one.
+        whole_bytes: length of the file up to the end of its last whole row: cut it there to go on.
+    """
+
+    records: tuple[EpisodeRecord, ...]
+    torn: str
+    whole_bytes: int
+
+
+def read_record_file(path: Path | str) -> RecordFile:
+    """Read ``episodes.csv``, with or without an unfinished last row.
+
+    A row counts once its line end is written. Columns may come in any order, and those that an
+    earlier version did not write take their defaults.
+
+    Raises:
+        SimError: the file cannot be read, is no table of episodes, or a whole row is wrong.
+    """
+    path = Path(path)
+    try:
+        content = path.read_bytes()
+    except OSError as cause:
+        raise SimError(f"cannot read the episodes {path}: {cause.strerror or cause}") from cause
+    whole_bytes = content.rfind(b"\n") + 1
+    torn = content[whole_bytes:].decode("utf-8", errors="replace")
+    try:
+        text = content[:whole_bytes].decode("utf-8-sig")  # a spreadsheet may have put a mark there
+        rows = list(csv.reader(io.StringIO(text, newline=""), strict=True))
+    except (UnicodeDecodeError, csv.Error) as cause:
+        raise SimError(f"{path} is not a table of episodes: {cause}") from cause
+    if not rows:
+        if torn and not ",".join(RECORD_COLUMNS).startswith(torn):
+            raise SimError(f"{path} is not a table of episodes: it has no line end")
+        return RecordFile((), torn, 0)
+    header, *body = rows
+    check_columns(header, str(path))
+    records = [
+        parse_row(header, cells, f"{path}, line {line}")
+        for line, cells in enumerate(body, start=2)
+        if cells
+    ]
+    return RecordFile(tuple(records), torn, whole_bytes)
+
+
+def read_records(path: Path | str) -> tuple[EpisodeRecord, ...]:
+    """The episodes of a CSV file, or of a Parquet file by its suffix.
+
+    An unfinished last row is left out and reported on the standard error stream.
+
+    Raises:
+        SimError: as :func:`read_record_file`.
+    """
+    if Path(path).suffix == _PARQUET_SUFFIX:
+        from ._parquet import read_parquet  # noqa: PLC0415 - an extra, needed for this alone
+
+        return read_parquet(Path(path))
+    found = read_record_file(path)
+    if found.torn:
+        print(
+            f"{path}: the last row is unfinished and left out: {found.torn[:60]!r}",
+            file=sys.stderr,
+        )
+    return found.records
+
+
+def write_records(path: Path | str, records: Iterable[EpisodeRecord]) -> None:
+    """Write episodes as CSV, or as Parquet by its suffix; the file appears whole or not at all.
+
+    Raises:
+        SimError: the file cannot be written.
+    """
+    path = Path(path)
+    if path.suffix == _PARQUET_SUFFIX:
+        from ._parquet import write_parquet  # noqa: PLC0415 - an extra, needed for this alone
+
+        write_parquet(path, tuple(records))
+        return
+    partial = path.with_name(path.name + ".part")
+    try:
+        with partial.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(RECORD_COLUMNS)
+            writer.writerows(record_row(record) for record in records)
+        partial.replace(path)
+    except OSError as cause:
+        raise SimError(f"cannot write the episodes {path}: {cause.strerror or cause}") from cause

@@ -1,0 +1,91 @@
+"""What the measures of an episode are made from: its truth as arrays over time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from perception.arrays import FloatArray
+
+from ...world.errors import SimError
+
+if TYPE_CHECKING:
+    from ...crossing import CrossingResult
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trace:
+    """The true course of an episode: N instants, P people.
+
+    Attributes:
+        t_s: (N,) increasing.
+        robot_odom_m: (N, 2) base origin.
+        heading_odom_rad: (N,).
+        speed_mps: (N,) of the base origin along the heading.
+        people_odom_m: (N, P, 2) centre lines.
+        people_odom_mps: (N, P, 2).
+        awareness: (N, P) true α.
+        separation_m: (N, P) between the surfaces; a lower bound with centres more than 4 m apart.
+    """
+
+    t_s: FloatArray
+    robot_odom_m: FloatArray
+    heading_odom_rad: FloatArray
+    speed_mps: FloatArray
+    people_odom_m: FloatArray
+    people_odom_mps: FloatArray
+    awareness: FloatArray
+    separation_m: FloatArray
+
+    @classmethod
+    def of(cls, result: CrossingResult) -> Trace:
+        """The course of a crossing.
+
+        Raises:
+            SimError: it has no frames, or the number of people changes on the way.
+        """
+        frames = result.frames
+        if not frames:
+            raise SimError("an episode without frames cannot be measured")
+        people = len(frames[0].truth)
+        if any(
+            len(frame.truth) != people or len(frame.separations_m) != people for frame in frames
+        ):
+            raise SimError(
+                f"every frame must hold the truth and the separation of all {people} people"
+            )
+        count = len(frames)
+        states = [frame.robot_state for frame in frames]
+
+        def of_people(name: str, size: tuple[int, ...]) -> FloatArray:
+            rows = [[getattr(view, name) for view in frame.truth] for frame in frames]
+            return np.array(rows, dtype=np.float64).reshape(count, people, *size)
+
+        return cls(
+            t_s=np.array([frame.t_s for frame in frames]),
+            robot_odom_m=np.array([state.position_odom_m for state in states]),
+            heading_odom_rad=np.array([state.heading_odom_rad for state in states]),
+            speed_mps=np.array([state.speed_mps for state in states]),
+            people_odom_m=of_people("position_odom_m", (2,)),
+            people_odom_mps=of_people("velocity_odom_mps", (2,)),
+            awareness=of_people("awareness", ()),
+            separation_m=np.array([frame.separations_m for frame in frames]).reshape(count, people),
+        )
+
+    @property
+    def people(self) -> int:
+        """How many."""
+        return int(self.separation_m.shape[1])
+
+    def to_base(self, vectors_odom: FloatArray) -> FloatArray:
+        """(N, P, 2) vectors turned into the axes of the base frame of their instant."""
+        cos = np.cos(self.heading_odom_rad)[:, None]
+        sin = np.sin(self.heading_odom_rad)[:, None]
+        x, y = vectors_odom[..., 0], vectors_odom[..., 1]
+        return np.stack([cos * x + sin * y, cos * y - sin * x], axis=-1)
+
+    def time_with(self, condition: FloatArray) -> float:
+        """How long a condition (N,) held, each instant standing for the time to the next, s."""
+        return float(np.diff(self.t_s) @ condition[:-1].astype(np.float64))

@@ -1,0 +1,114 @@
+"""Pictures of an episode's worst instant: what the robot's camera saw, and the plan."""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from perception import AttentionCone
+from perception.arrays import FloatArray
+
+from ...crossing import STANDING_SPEED_MPS, CrossingFrame, Stage, TopView, draw_camera_view
+from ...world.camera import CameraRenderer
+from ..measures import EpisodeRecord
+from ..runs import Job, observed_episode
+
+_WIDTH_PX: Final = 540
+_JPEG_QUALITY: Final = 80
+# Width of the plan.
+_WINDOW_M: Final = 10.0
+# Paths are drawn through every so many frames.
+_EVERY: Final = 4
+# The table's figures have six decimals.
+_SAME_M: Final = 1e-5
+
+Image = NDArray[np.uint8]
+
+
+class _Enough(Exception):  # noqa: N818 - no error
+    """The instant has been drawn; the rest of the episode need not run."""
+
+
+class _Watcher:
+    """Draws the first instant at which the margin of a moving robot comes down to a value."""
+
+    def __init__(self, margin_m: float) -> None:
+        self._margin_m = margin_m
+        self._frames: list[CrossingFrame] = []
+        self.least_m = float("inf")
+        self.camera: Image | None = None
+        self.plan: Image | None = None
+        self.t_s = 0.0
+
+    def __call__(self, frame: CrossingFrame, stage: Stage) -> None:
+        self._frames.append(frame)
+        speed = abs(frame.robot_state.speed_mps)
+        if not frame.margins_m or speed <= STANDING_SPEED_MPS:
+            return
+        self.least_m = min(self.least_m, *frame.margins_m)
+        if self.least_m <= self._margin_m + _SAME_M:
+            self._draw(frame, stage)
+            raise _Enough
+
+    def _draw(self, frame: CrossingFrame, stage: Stage) -> None:
+        cone = AttentionCone()
+        spec = stage.scenario.camera
+        camera = spec.camera(_WIDTH_PX / spec.width_px)
+        picture = CameraRenderer(stage.warehouse).rgb(camera, frame.T_odom_camera)
+        self.camera = draw_camera_view(picture, camera, frame, stage, cone)
+        worker = int(np.argmin(frame.margins_m))
+        middle = 0.5 * (frame.robot_state.position_odom_m + frame.truth[worker].position_odom_m)
+        size_px = (camera.width_px, camera.height_px)
+        view = TopView(stage, size_px, _window(middle, size_px))
+        for earlier in self._frames[:-1:_EVERY]:
+            view.draw(earlier, stage, cone)  # which lengthens the paths
+        self.plan = view.draw(frame, stage, cone)
+        self.t_s = frame.t_s
+
+
+def pictures_of(job: Job, record: EpisodeRecord) -> tuple[tuple[tuple[str, str], ...], str]:
+    """Run an episode again up to its least margin.
+
+    Args:
+        job: the episode.
+        record: its row.
+
+    Returns:
+        Pictures as ``data:`` addresses with what they show, and what is wrong, empty for nothing.
+    """
+    if record.min_margin_m is None:
+        return (), "No picture: the robot never moved near anybody."
+    watcher = _Watcher(record.min_margin_m)
+    with contextlib.suppress(_Enough):
+        observed_episode(job, watcher)
+    if watcher.camera is None or watcher.plan is None:
+        return (), (
+            f"No picture: run again, the smallest margin was {watcher.least_m:.2f} m. This "
+            "installation does not repeat the run."
+        )
+    when = f"at {watcher.t_s:.2f} s"
+    return (
+        (_address(watcher.camera, ".jpg"), f"What the robot's camera saw {when}"),
+        (_address(watcher.plan, ".png"), f"Robot and people from above {when}"),
+    ), ""
+
+
+def _window(
+    middle_odom_m: FloatArray, size_px: tuple[int, int]
+) -> tuple[float, float, float, float]:
+    x, y = middle_odom_m.tolist()
+    half_x = 0.5 * _WINDOW_M
+    half_y = half_x * size_px[1] / size_px[0]
+    return x - half_x, y - half_y, x + half_x, y + half_y
+
+
+def _address(picture: Image, ending: str) -> str:
+    options = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY] if ending == ".jpg" else []
+    _, data = cv2.imencode(ending, cv2.cvtColor(picture, cv2.COLOR_RGB2BGR), options)
+    kind = {".jpg": "jpeg", ".png": "png"}[ending]
+    return f"data:image/{kind};base64,{base64.b64encode(data.tobytes()).decode()}"

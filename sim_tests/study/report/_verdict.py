@@ -1,0 +1,190 @@
+"""What a reader in a hurry takes away: a sentence and four figures, none claiming too much."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from ..measures import Comparison, Interval
+from ._arm import Arm, judged
+from ._figures import Figures, robot_contacts
+from ._measure import ROBOT_CONTACTS
+from ._text import NOTHING, count, percent, plural
+
+# Fewer pairs show nothing: their bootstrap interval is too narrow to be trusted.
+_FEW_PAIRS: Final = 20
+# None seen says little while the true share may be larger than this.
+_TELLING: Final = 0.05
+
+Tone = Literal["good", "bad", "open"]
+
+
+@dataclass(frozen=True, slots=True)
+class Card:
+    """One figure.
+
+    Attributes:
+        title: what it is.
+        figure: the number, large.
+        detail: its uncertainty.
+        chip: what it amounts to, in two or three words.
+        tone: of the chip; ``"open"`` where nothing can be said.
+    """
+
+    title: str
+    figure: str
+    detail: str
+    chip: str
+    tone: Tone
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What can be said about one arm."""
+
+    name: str
+    look: int
+    sentence: str
+    cards: tuple[Card, ...]
+
+
+def verdicts(figures: Figures) -> tuple[Verdict, ...]:
+    """One verdict for each arm that is to be judged."""
+    return tuple(_verdict(figures, arm) for arm in judged(figures.arms))
+
+
+def _verdict(figures: Figures, arm: Arm) -> Verdict:
+    # Touching somebody counts whatever made it happen.
+    contacts = robot_contacts((*arm.episodes, *arm.others))
+    if not contacts.n:
+        card = Card(
+            "Contacts caused by the robot", NOTHING, "no episode finished", "no data", "open"
+        )
+        return Verdict(arm.name, arm.look, "No episode finished, so nothing can be said.", (card,))
+    cards = [_contact_card(arm, contacts)]
+    sentence = _contact_sentence(contacts)
+    whole = figures.against(arm)
+    if whole is not None:
+        attentive = figures.against(arm, "attentive")
+        known = attentive is not None and attentive.won_back.known
+        who, against = ("attentive people", attentive) if known and attentive else ("people", whole)
+        cards += [_won_back_card(who, against), _violation_card(figures, arm, whole)]
+        sentence += _won_back_sentence(who, against)
+    elif arm.role != "reference":
+        sentence += " Without the policy blind on the same seeds, time won back cannot be stated."
+    cards.append(_arrival_card(arm))
+    return Verdict(arm.name, arm.look, sentence, tuple(cards))
+
+
+def _hits(share: Interval) -> int:
+    return round(share.value * share.n)
+
+
+def _contact_card(arm: Arm, share: Interval) -> Card:
+    title = ROBOT_CONTACTS.title
+    hits = _hits(share)
+    figure = f"{count(hits)} of {count(share.n)}"
+    under = f", {plural(len(arm.others), 'episode')} of them under faults" if arm.others else ""
+    if hits:
+        detail = f"{percent(share.low)} to {percent(share.high)} with 95 % confidence{under}"
+        return Card(title, figure, detail, "contacts seen", "bad")
+    detail = f"at most {percent(share.high)} with 95 % confidence{under}"
+    if share.high > _TELLING:
+        return Card(title, figure, detail, "none seen, too few to tell", "open")
+    return Card(title, figure, detail, "none seen", "good")
+
+
+def _contact_sentence(share: Interval) -> str:
+    hits = _hits(share)
+    if hits:
+        return (
+            f"The robot moved into a person in {count(hits)} of {plural(share.n, 'episode')} "
+            f"({percent(share.value)}): look at these before anything else."
+        )
+    return (
+        f"The robot moved into nobody in {plural(share.n, 'episode')}; a true rate of up to "
+        f"{percent(share.high)} remains possible."
+    )
+
+
+def _won_back_card(who: str, against: Comparison) -> Card:
+    back, reference = against.won_back, against.baseline
+    title = f"Time won back with {who}"
+    if not back.known:
+        return Card(title, NOTHING, f"no pair with {reference} loses time", "no data", "open")
+    chip, tone = _direction(back, "gain shown", "loss shown", "no gain shown", more_is_good=True)
+    detail = _detail(back, f"of what {reference} loses")
+    return Card(title, percent(back.value), detail, chip, tone)
+
+
+def _won_back_sentence(who: str, against: Comparison) -> str:
+    back, reference = against.won_back, against.baseline
+    if not back.known:
+        return f" No pair with {reference} tells what it wins back."
+    if back.n < _FEW_PAIRS:
+        return (
+            f" Over only {plural(back.n, 'pair')} with {reference} it wins back "
+            f"{percent(back.value)} of the time lost to {who}: too few to tell."
+        )
+    if back.low > 0.0:
+        return (
+            f" It wins back {percent(back.value)} of the time that {reference} loses to {who} "
+            f"(95 % interval {_ends(back)})."
+        )
+    if back.high < 0.0:
+        return (
+            f" It loses {percent(-back.value)} more time to {who} than {reference} (95 % "
+            f"interval {percent(-back.high)} to {percent(-back.low)})."
+        )
+    return f" Whether it wins back time from {who} is not shown (95 % interval {_ends(back)})."
+
+
+def _violation_card(figures: Figures, arm: Arm, whole: Comparison) -> Card:
+    unaware = figures.against(arm, "unaware")
+    who, against = ("people", whole) if unaware is None else ("unaware people", unaware)
+    change, base = against.violation_excess, "violation time"
+    if not change.known:  # the reference violates nothing
+        change, base = against.violation_excess_of_time, "time"
+    reference = against.baseline
+    title = f"Margin violated longer with {who}"
+    if not change.known:
+        return Card(title, NOTHING, f"no pair with {reference}", "no data", "open")
+    chip, tone = _direction(change, "longer", "shorter", "no change shown", more_is_good=False)
+    detail = _detail(change, f"of {reference}'s {base}", sign=True)
+    return Card(title, percent(change.value, sign=True), detail, chip, tone)
+
+
+def _arrival_card(arm: Arm) -> Card:
+    arrived = sum(each.record.time_to_goal_s is not None for each in arm.episodes)
+    total = len(arm.episodes)
+    if not total:
+        return Card("Goals reached", NOTHING, "no episode without a fault", "no data", "open")
+    detail = f"{count(arrived)} of {plural(total, 'episode')}"
+    if arrived == total:
+        return Card("Goals reached", percent(1.0), detail, "all", "good")
+    chip = f"{count(total - arrived)} missed"
+    return Card("Goals reached", percent(arrived / total), detail, chip, "open")
+
+
+def _detail(change: Interval, base: str, *, sign: bool = False) -> str:
+    if not change.bounded:
+        return f"{base}; {plural(change.n, 'pair')}, too few for an interval"
+    return f"{_ends(change, sign=sign)} {base}, {plural(change.n, 'pair')}"
+
+
+def _ends(change: Interval, *, sign: bool = False) -> str:
+    if not change.bounded:
+        return "not bounded"
+    return f"{percent(change.low, sign=sign)} to {percent(change.high, sign=sign)}"
+
+
+def _direction(
+    change: Interval, up: str, down: str, neither: str, *, more_is_good: bool
+) -> tuple[str, Tone]:
+    if change.n < _FEW_PAIRS:
+        return "too few to tell", "open"
+    if change.low > 0.0:
+        return up, "good" if more_is_good else "bad"
+    if change.high < 0.0:
+        return down, "bad" if more_is_good else "good"
+    return neither, "open"

@@ -1,0 +1,233 @@
+"""The film and the map of one episode.
+
+What ``awarenav replay`` does: one episode of a run again, seen from above and by the robot.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from awarenav.closing import Closing
+from awarenav.video import VideoWriter
+from perception import AttentionCone
+
+from ...crossing import CrossingFrame, Stage, TopView, draw_camera_view
+from ...world.camera import CameraRenderer
+from ...world.errors import SimError
+from ..measures import RECORD_COLUMNS, EpisodeRecord, read_record_file, record_row
+from ._episode import observed_episode
+from ._job import Job
+from ._plan import describe, job_key, template_of
+from ._run_folder import EPISODES, key_of, read_jobs
+
+Image = NDArray[np.uint8]
+
+_VIDEO_HZ: Final = 10
+_HEIGHT_PX: Final = 480
+_MAP_WIDTH_PX: Final = 720
+_MAP_MARGIN_M: Final = 3.0
+_MAP_PX_PER_M: Final = 60.0
+
+
+class ReplayPictures(Closing):
+    """Films an episode and keeps the map of its closest moment, the paths of all drawn up to it.
+
+    Args:
+        map_path: PNG of the map.
+        video_path: MP4, the robot's camera beside the map; None for none.
+
+    Attributes:
+        written: what has been written.
+    """
+
+    def __init__(self, map_path: Path, video_path: Path | None) -> None:
+        self._map_path = map_path
+        self._video_path = video_path
+        self._cone = AttentionCone()
+        self._view: TopView | None = None
+        self._video: VideoWriter | None = None
+        self._ticks = 0
+        self._closest_m = float("inf")
+        self._closest: Image | None = None
+        self.written: list[Path] = []
+
+    def close(self) -> None:
+        """Finish the film; an interrupted one is still a film."""
+        if self._video is not None:
+            self._video.close()
+            self._video = None
+
+    def finish(self) -> None:
+        """Write the map and finish the film."""
+        self.close()
+        if self._video_path is not None and self._video_path.exists():
+            self.written.append(self._video_path)
+        if self._closest is not None:
+            cv2.imwrite(str(self._map_path), cv2.cvtColor(self._closest, cv2.COLOR_RGB2BGR))
+            self.written.append(self._map_path)
+
+    def add(self, frame: CrossingFrame, stage: Stage) -> None:
+        """Take one control cycle."""
+        every = max(round(stage.scenario.control_hz / _VIDEO_HZ), 1)
+        number, self._ticks = self._ticks, self._ticks + 1
+        nearest_m = min(frame.separations_m, default=float("inf"))
+        closer = nearest_m < self._closest_m or self._closest is None
+        if number % every and not closer:
+            return
+        if self._view is None:
+            self._view = TopView(stage, (_MAP_WIDTH_PX, _HEIGHT_PX), _window(stage))
+        above = self._view.draw(frame, stage, self._cone)
+        if closer:
+            self._closest_m, self._closest = nearest_m, above
+        if self._video_path is not None and number % every == 0:
+            self._film(frame, stage, above)
+
+    def _film(self, frame: CrossingFrame, stage: Stage, above: Image) -> None:
+        spec = stage.scenario.camera
+        camera = spec.camera(_HEIGHT_PX / spec.height_px)
+        picture = CameraRenderer(stage.warehouse).rgb(camera, frame.T_odom_camera)
+        drawn = draw_camera_view(picture, camera, frame, stage, self._cone)
+        both = np.hstack([drawn, above])
+        both = both[:, : both.shape[1] // 2 * 2]
+        if self._video is None:
+            size = (both.shape[1], both.shape[0])
+            self._video = VideoWriter(self._video_path, _VIDEO_HZ, size)  # type: ignore[arg-type]
+        self._video.add(both)
+
+
+def _window(stage: Stage) -> tuple[float, float, float, float]:
+    """x_min, y_min, x_max, y_max (m): the robot's way and what is near it."""
+    task = stage.scenario.robot
+    xs, ys = (task.start_x_m, task.goal_x_m), (task.start_y_m, task.goal_y_m)
+    return (
+        min(xs) - _MAP_MARGIN_M,
+        min(ys) - _MAP_MARGIN_M,
+        max(xs) + _MAP_MARGIN_M,
+        max(ys) + _MAP_MARGIN_M,
+    )
+
+
+_FOLDER: Final = "replays"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReplayOptions:
+    """The options of ``awarenav replay``."""
+
+    folder: Path
+    episode: str
+    out: Path | None
+    no_video: bool
+
+
+def replay_command(options: ReplayOptions) -> int:
+    """Run an episode again, write its pictures and say whether its row is the same.
+
+    Raises:
+        SimError: the folder holds no run, or not this episode.
+    """
+    jobs = read_jobs(options.folder)
+    number = find_episode(jobs, options.episode)
+    job = jobs[number]
+    print(f"Episode {number}: {describe(job_key(job))}")
+    out = options.out if options.out is not None else options.folder / _FOLDER
+    out.mkdir(parents=True, exist_ok=True)
+    name = f"episode_{number:05d}"
+    scenario = template_of(job.scenario).for_seed(job.seed)
+    total = round(scenario.duration_s * scenario.control_hz)
+    with (
+        tqdm(total=total, desc="replay", unit="frame", file=sys.stderr) as bar,
+        ReplayPictures(
+            out / f"{name}.png", None if options.no_video else out / f"{name}.mp4"
+        ) as pictures,
+    ):
+
+        def observe(frame: CrossingFrame, stage: Stage) -> None:
+            pictures.add(frame, stage)
+            bar.update()
+
+        record = observed_episode(job, observe)[1]
+        pictures.finish()
+    for path in pictures.written:
+        print(f"Written: {path}")
+    print(_in_words(record))
+    return _compared(options.folder, job, record)
+
+
+def find_episode(jobs: Sequence[Job], episode: str) -> int:
+    """The number of an episode from its number, or from SCENARIO:SEED:POLICY[:PLANNER][:FAULT].
+
+    Raises:
+        SimError: there is none such, or more than one.
+    """
+    if episode.isdecimal():
+        number = int(episode)
+        if number >= len(jobs):
+            raise SimError(
+                f"the run has {len(jobs)} episodes, numbered 0 to {len(jobs) - 1}, got {number}"
+            )
+        return number
+    parts = episode.split(":")
+    if len(parts) < 3 or not parts[1].isdecimal():
+        raise SimError(
+            "the episode must be its number, or SCENARIO:SEED:POLICY (and :PLANNER or :FAULT where "
+            f"that is not enough), got {episode!r}"
+        )
+    keys = [job_key(job) for job in jobs]
+    found = [
+        number
+        for number, key in enumerate(keys)
+        if [key.scenario, str(key.seed), key.policy] == parts[:3]
+        and all(part in (key.planner, key.fault, key.perception) for part in parts[3:])
+    ]
+    if len(found) == 1:
+        return found[0]
+    if not found:
+        near = [key for key in keys if key.scenario == parts[0]][:1] or keys[:1]
+        example = f"{near[0].scenario}:{near[0].seed}:{near[0].policy}"
+        raise SimError(f"the run has no episode {episode!r}; one that it has is {example}")
+    listed = "; ".join(f"{number}: {describe(keys[number])}" for number in found[:6])
+    raise SimError(f"{episode!r} is {len(found)} episodes of the run, give one's number: {listed}")
+
+
+def _compared(folder: Path, job: Job, record: EpisodeRecord) -> int:
+    key = job_key(job)
+    before = [each for each in read_record_file(folder / EPISODES).records if key_of(each) == key]
+    if not before:
+        print(f"{folder / EPISODES} has no row of this episode yet")
+        return 0
+    pairs = zip(RECORD_COLUMNS, record_row(before[0]), record_row(record), strict=True)
+    changed = [(name, was, now) for name, was, now in pairs if was != now]
+    if not changed:
+        print(f"The same row as in {folder / EPISODES}.")
+        return 0
+    print(
+        f"Not the row in {folder / EPISODES}: "
+        + "; ".join(
+            f"{name} was {was or 'empty'}, is {now or 'empty'}" for name, was, now in changed
+        )
+    )
+    return 1
+
+
+def _in_words(record: EpisodeRecord) -> str:
+    goal = "goal not reached"
+    if record.time_to_goal_s is not None:
+        goal = f"goal after {record.time_to_goal_s:.2f} s"
+    parts = [goal]
+    if record.min_separation_m is not None:
+        parts.append(f"least separation {record.min_separation_m:.2f} m")
+    if record.min_margin_m is not None:
+        parts.append(f"least margin {record.min_margin_m:.2f} m")
+    if record.contact:
+        parts.append(f"contact, caused by the {record.contact_by}")
+    return ", ".join(parts)

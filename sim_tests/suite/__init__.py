@@ -1,1 +1,0 @@
-"""The crossings as a test-suite: ``pytest --pyargs sim_tests --awarenav-planner MODULE:CLASS``."""

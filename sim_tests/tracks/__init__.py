@@ -1,1 +1,0 @@
-"""Who was followed through a file of estimates, drawn: paths in odom and awareness over time."""

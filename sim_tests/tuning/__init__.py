@@ -1,1 +1,0 @@
-"""Tuning of policies: time lost against the separation margin, without contacts."""

@@ -1,0 +1,175 @@
+"""Pictures and depth of the simulated hall, exact to the pixel convention of the camera model."""
+
+from __future__ import annotations
+
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass
+from typing import Any, Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from perception import Camera
+from perception.arrays import FloatArray, finite_number
+
+from .._warehouse import Warehouse
+from ..errors import SimError
+from ..hall import Lighting
+from ..render import Drawing, RenderView
+from ._floor_shadows import shade_floor
+
+_MAX_SUPERSAMPLING: Final = 8
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RenderedView:
+    """One rendered view; row v, column u.
+
+    Attributes:
+        rgb: (h, w, 3) uint8.
+        depth_m: (h, w) distance along the optical axis z; infinite where there is nothing.
+        body_ids: (h, w) int32, PyBullet's id in the picture world of the body seen in the pixel,
+            −1 where there is nothing.
+        actors: (h, w) int32, number of the actor seen in the pixel (:meth:`Visuals.add_actor`), −1
+            for scenery and nothing.
+    """
+
+    rgb: NDArray[np.uint8]
+    depth_m: FloatArray
+    body_ids: NDArray[np.int32]
+    actors: NDArray[np.int32]
+
+
+class CameraRenderer:
+    """Renders what an undistorted camera sees of a warehouse's picture world.
+
+    A pixel's sample lies where :meth:`perception.Camera.project` puts that pixel's centre (integer
+    coordinates, as in OpenCV), so truth projected through the camera falls on the picture.
+
+    Args:
+        warehouse: what is rendered.
+        lighting: of the hall; None is the default, bright one.
+        shadows: overrides the lighting's; actors then cast shadows on the floor.
+        near_m: nothing closer is drawn, > 0.
+        far_m: nothing farther is drawn, > near_m.
+        supersampling: n averages n × n samples a pixel, 1 to 8. Depth and ids are never averaged:
+            they are those of one sample, the one at the pixel's centre for an odd n and the one
+            half a sample right of and below it for an even n.
+    """
+
+    def __init__(
+        self,
+        warehouse: Warehouse,
+        *,
+        lighting: Lighting | None = None,
+        shadows: bool | None = None,
+        near_m: float = 0.05,
+        far_m: float = 60.0,
+        supersampling: int = 1,
+    ) -> None:
+        self._warehouse = warehouse
+        light = Lighting() if lighting is None else lighting
+        self._light = light if shadows is None else light.model_copy(update={"shadows": shadows})
+        # The renderers know coloured light for one of their two terms at most.
+        levels = np.arange(256)[:, None] * np.asarray(light.colour_rgb)
+        self._tint = (
+            None if light.colour_rgb == (1.0, 1.0, 1.0) else np.rint(levels).astype(np.uint8)[None]
+        )
+        self._near_m = finite_number(
+            "near_m", near_m, SimError, minimum=0.0, exclusive_minimum=True
+        )
+        self._far_m = finite_number(
+            "far_m", far_m, SimError, minimum=self._near_m, exclusive_minimum=True
+        )
+        if supersampling not in range(1, _MAX_SUPERSAMPLING + 1):
+            raise SimError(
+                f"supersampling must be a whole number from 1 to {_MAX_SUPERSAMPLING}, "
+                f"got {supersampling!r}"
+            )
+        self._supersampling = int(supersampling)
+
+    def rgb(self, camera: Camera, T_odom_camera: Any) -> NDArray[np.uint8]:
+        """The camera's picture (H, W, 3)."""
+        return self.render(camera, T_odom_camera).rgb
+
+    def depth(
+        self,
+        camera: Camera,
+        T_odom_camera: Any,
+        roi_xyxy_px: Any = None,
+        size_px: tuple[int, int] | None = None,
+    ) -> FloatArray:
+        """Depth (h, w) in metres along the optical axis; arguments as in :meth:`render`."""
+        view = self._view(camera, T_odom_camera, roi_xyxy_px, size_px)
+        return self._draw(view, None).depth_m
+
+    def render(
+        self,
+        camera: Camera,
+        T_odom_camera: Any,
+        roi_xyxy_px: Any = None,
+        size_px: tuple[int, int] | None = None,
+        only: AbstractSet[int] | None = None,
+    ) -> RenderedView:
+        """Render the whole image or a rectangle of it.
+
+        Args:
+            camera: without distortion.
+            T_odom_camera: (4, 4), optical frame to odom.
+            roi_xyxy_px: (4,) u_min, v_min, u_max, v_max in pixels counted from the image's corner,
+                the maxima exclusive as in ``image[v_min:v_max, u_min:u_max]``; it may reach outside
+                the image. None is the whole image.
+            size_px: width and height of the result; None is one sample a pixel of the rectangle,
+                and then the result equals that part of the whole image.
+            only: numbers of the actors to draw, without scenery: their silhouettes.
+
+        Raises:
+            SimError: for a camera with distortion, an empty rectangle or a size below one pixel.
+        """
+        view = self._view(camera, T_odom_camera, roi_xyxy_px, size_px)
+        factor = self._supersampling
+        if factor == 1:
+            drawing = self._draw(view, only, shadows=self._light.shadows)
+            rgb = drawing.rgb
+        else:
+            fine = self._draw(view.finer(factor), only, shadows=self._light.shadows)
+            rgb = np.asarray(
+                cv2.resize(fine.rgb, (view.width, view.height), interpolation=cv2.INTER_AREA),
+                dtype=np.uint8,
+            )
+            middle = slice(factor // 2, None, factor)
+            drawing = Drawing(
+                rgb,
+                np.ascontiguousarray(fine.depth_m[middle, middle]),
+                np.ascontiguousarray(fine.body_ids[middle, middle]),
+            )
+        if self._tint is not None:
+            rgb = np.asarray(cv2.LUT(rgb, self._tint), dtype=np.uint8)
+        actors = self._warehouse.visuals.actor_numbers(drawing.body_ids)
+        return RenderedView(rgb, drawing.depth_m, drawing.body_ids, actors)
+
+    def _view(
+        self,
+        camera: Camera,
+        T_odom_camera: Any,
+        roi_xyxy_px: Any,
+        size_px: tuple[int, int] | None,
+    ) -> RenderView:
+        return RenderView.of_rectangle(
+            camera,
+            T_odom_camera,
+            roi_xyxy_px,
+            size_px,
+            near_m=self._near_m,
+            far_m=self._far_m,
+        )
+
+    def _draw(
+        self, view: RenderView, only: AbstractSet[int] | None, *, shadows: bool = False
+    ) -> Drawing:
+        visuals = self._warehouse.visuals
+        drawing = visuals.draw(view, self._light, visuals.prepare(view, only))
+        if shadows and only is None:
+            shade_floor(visuals, view, drawing, self._light)
+        return drawing

@@ -1,0 +1,87 @@
+"""How a hall is lit: named set-ups within what PyBullet's renderers offer."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, ClassVar, Final
+
+from pydantic import Field, model_validator
+
+from awarenav.errors import not_one_of
+from tracking.config import StrictConfig
+
+from ..errors import SimError
+
+_Share = Annotated[float, Field(ge=0.0, le=1.0)]
+# Up to here a white surface that faces the light is not washed out by more than a trace.
+_BRIGHTEST: Final = 1.06
+
+
+class Lighting(StrictConfig):
+    """One far light and an even ambient light; a surface shows both, times its own colour.
+
+    A face of colour c whose normal makes the angle φ with the direction to the light shows
+    ``c * colour_rgb * (ambient + diffuse * max(0, cos φ))``.
+    """
+
+    error: ClassVar[type[ValueError]] = SimError
+
+    #: From the scene towards the light, odom; any length > 0.
+    direction_odom: tuple[float, float, float] = (-3.0, 4.0, 8.0)
+    #: Colour of both lights.
+    colour_rgb: tuple[_Share, _Share, _Share] = (1.0, 1.0, 1.0)
+    ambient: float = Field(default=0.66, ge=0.0, le=1.0)
+    diffuse: float = Field(default=0.40, ge=0.0, le=1.0)
+    #: Highlights on glossy surfaces; goods and clothes have none.
+    specular: float = Field(default=0.0, ge=0.0, le=1.0)
+    #: Cast shadows. PyBullet's software renderer takes two to three times as long for them and, in
+    #: a roofed hall, shows next to none: the soft shade where things stand is painted instead.
+    shadows: bool = False
+
+    @model_validator(mode="after")
+    def _can_be_shown(self) -> Lighting:
+        if math.hypot(*self.direction_odom) < 1e-6:
+            raise ValueError(
+                f"direction_odom must point towards the light, got {self.direction_odom}"
+            )
+        if self.ambient + self.diffuse > _BRIGHTEST:
+            raise ValueError(
+                f"ambient + diffuse must be at most {_BRIGHTEST:g}, or surfaces that face the "
+                f"light wash out, got {self.ambient:g} + {self.diffuse:g}"
+            )
+        return self
+
+    @classmethod
+    def preset(cls, name: str) -> Lighting:
+        """One of :data:`LIGHTINGS` by its name; raises SimError for others."""
+        if name not in LIGHTINGS:
+            raise SimError(not_one_of("lighting", name, LIGHTINGS))
+        return LIGHTINGS[name]
+
+
+#: Set-ups by name. Bright LED panels are the default: high and off to one side, so that faces and
+#: folds of cloth keep their shape.
+LIGHTINGS: Final[dict[str, Lighting]] = {
+    "bright_led": Lighting(),
+    "overcast_skylight": Lighting(
+        direction_odom=(1.0, -1.0, 9.0), colour_rgb=(0.94, 0.97, 1.0), ambient=0.74, diffuse=0.26
+    ),
+    "warm_sodium": Lighting(
+        direction_odom=(2.0, 3.0, 8.0), colour_rgb=(1.0, 0.87, 0.66), ambient=0.52, diffuse=0.42
+    ),
+    "dock_daylight": Lighting(
+        direction_odom=(9.0, -2.5, 3.0), colour_rgb=(1.0, 0.99, 0.95), ambient=0.46, diffuse=0.58
+    ),
+    "low_sun": Lighting(
+        direction_odom=(-4.0, -5.0, 5.5),
+        colour_rgb=(1.0, 0.93, 0.80),
+        ambient=0.44,
+        diffuse=0.60,
+    ),
+    "dim_evening": Lighting(
+        direction_odom=(-2.0, -3.0, 8.0), colour_rgb=(1.0, 0.95, 0.86), ambient=0.40, diffuse=0.36
+    ),
+    "night": Lighting(
+        direction_odom=(3.0, 1.0, 6.0), colour_rgb=(0.86, 0.92, 1.0), ambient=0.27, diffuse=0.34
+    ),
+}

@@ -1,0 +1,253 @@
+"""Small triangle meshes for what the camera sees: boxes, ellipsoids and tapered tubes.
+
+Collision shapes are separate and simpler; these meshes are visual only.
+
+
+One local piece of scenery, as it is drawn.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perception.arrays import FloatArray
+
+_BOX_CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+# Corners of the six faces, counter-clockwise as seen from outside.
+_BOX_FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+_UNIT_BOX = _BOX_CORNERS[np.array(_BOX_FACES)].reshape(24, 3)
+# The centre of a face of the unit box is its normal.
+_BOX_NORMALS = np.repeat(_UNIT_BOX.reshape(6, 4, 3).mean(axis=1), 4, axis=0)
+_BOX_INDICES = (np.array((0, 1, 2, 0, 2, 3)) + 4 * np.arange(6)[:, None]).ravel()
+# Upright pictures on the four sides; on top v runs along y, on the bottom against it.
+_BOX_UV = np.array(
+    [
+        *((1, 0), (1, 1), (0, 1), (0, 0)),
+        *((0, 0), (1, 0), (1, 1), (0, 1)),
+        *((0, 0), (1, 0), (1, 1), (0, 1)),
+        *((1, 0), (1, 1), (0, 1), (0, 0)),
+        *((0, 1), (0, 0), (1, 0), (1, 1)),
+        *((0, 0), (1, 0), (1, 1), (0, 1)),
+    ],
+    dtype=np.float64,
+)
+_QUAD_UV = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
+
+#: The faces of a box in the order of its vertices: each face has four of them.
+BOX_FACES: Final = ("-x", "+x", "-y", "+y", "-z", "+z")
+
+#: A rectangle of a texture: u and v of its lower left corner, then of its upper right one.
+Region = tuple[float, float, float, float]
+WHOLE: Final[Region] = (0.0, 0.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles with a normal a vertex.
+
+    Attributes:
+        vertices_m: (N, 3).
+        normals: (N, 3) unit vectors pointing outwards.
+        indices: (3 T,) three vertex rows a triangle, counter-clockwise as seen from outside.
+        uv: (N, 2) texture coordinates, (0, 0) at the picture's lower left; None without a texture.
+    """
+
+    vertices_m: FloatArray
+    normals: FloatArray
+    indices: NDArray[np.int64]
+    uv: FloatArray | None = None
+
+    def transformed(
+        self, rotation: FloatArray | None = None, translation_m: Sequence[float] = (0.0, 0.0, 0.0)
+    ) -> Mesh:
+        """Rotate (3, 3), then translate."""
+        turn = np.eye(3) if rotation is None else rotation
+        return Mesh(
+            self.vertices_m @ turn.T + np.asarray(translation_m),
+            self.normals @ turn.T,
+            self.indices,
+            self.uv,
+        )
+
+    @property
+    def triangles(self) -> int:
+        """How many triangles it has: what drawing it costs."""
+        return len(self.indices) // 3
+
+
+def merge(meshes: Iterable[Mesh]) -> Mesh:
+    """One mesh that draws all of ``meshes``: fewer bodies to keep in the simulator.
+
+    Texture coordinates are kept when every mesh has them.
+    """
+    parts = list(meshes)
+    uvs = [part.uv for part in parts if part.uv is not None]
+    offsets = np.cumsum([0, *(len(part.vertices_m) for part in parts[:-1])])
+    return Mesh(
+        np.concatenate([part.vertices_m for part in parts]),
+        np.concatenate([part.normals for part in parts]),
+        np.concatenate([part.indices + at for part, at in zip(parts, offsets, strict=True)]),
+        np.concatenate(uvs) if len(uvs) == len(parts) else None,
+    )
+
+
+def box(
+    center_m: Sequence[float],
+    size_m: Sequence[float],
+    regions: Region | Mapping[str, Region] = WHOLE,
+) -> Mesh:
+    """An axis-aligned box with flat faces.
+
+    Args:
+        center_m: its centre.
+        size_m: its extents along the axes.
+        regions: what its faces show of a texture. A mapping from names in :data:`BOX_FACES` to
+            regions makes those faces only: what no one can see need not be drawn.
+    """
+    vertices = _UNIT_BOX * (0.5 * np.asarray(size_m)) + np.asarray(center_m)
+    if not isinstance(regions, Mapping):
+        return Mesh(vertices, _BOX_NORMALS, _BOX_INDICES, _mapped(_BOX_UV, regions))
+    faces = np.array([BOX_FACES.index(name) for name in regions])
+    rows = (4 * faces[:, None] + np.arange(4)).ravel()
+    uv = np.concatenate(
+        [
+            _mapped(_BOX_UV[4 * face : 4 * face + 4], region)
+            for face, region in zip(faces, regions.values(), strict=True)
+        ]
+    )
+    return Mesh(vertices[rows], _BOX_NORMALS[rows], _BOX_INDICES[: 6 * len(faces)], uv)
+
+
+def quad(corners_m: Sequence[Sequence[float]], region: Region = WHOLE) -> Mesh:
+    """A flat four-cornered face, seen only from the side on which it runs counter-clockwise.
+
+    ``region`` of a texture spans it from the first corner (lower left) to the third.
+    """
+    corners = np.asarray(corners_m, dtype=np.float64)
+    normal = np.cross(corners[1] - corners[0], corners[3] - corners[0])
+    unit = normal / np.linalg.norm(normal)
+    return Mesh(
+        corners, np.tile(unit, (4, 1)), np.array((0, 1, 2, 0, 2, 3)), _mapped(_QUAD_UV, region)
+    )
+
+
+def _mapped(uv: FloatArray, region: Region) -> FloatArray:
+    """Unit texture coordinates moved into a region of the texture."""
+    u_min, v_min, u_max, v_max = region
+    return np.asarray(np.array((u_min, v_min)) + uv * np.array((u_max - u_min, v_max - v_min)))
+
+
+def ellipsoid(
+    center_m: Sequence[float],
+    semi_axes_m: Sequence[float],
+    sides: int = 14,
+    rings: int = 9,
+    region: Region = WHOLE,
+) -> Mesh:
+    """An ellipsoid with smooth normals; its poles lie on z, the top of the texture at +z."""
+    polar = np.linspace(0.0, math.pi, rings + 1)[:, None]
+    around = np.linspace(0.0, 2.0 * math.pi, sides + 1)[None, :]
+    unit = np.stack(
+        [
+            np.sin(polar) * np.cos(around),
+            np.sin(polar) * np.sin(around),
+            np.cos(polar) * np.ones_like(around),
+        ],
+        axis=-1,
+    ).reshape(-1, 3)
+    axes = np.asarray(semi_axes_m)
+    normals = unit / axes
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return Mesh(
+        unit * axes + np.asarray(center_m),
+        normals,
+        _grid_indices(rings + 1, sides + 1),
+        _mapped(_grid_uv(rings + 1, sides + 1), region),
+    )
+
+
+def tube(
+    sections_m: Sequence[Sequence[float]],
+    sides: int = 12,
+    region: Region = WHOLE,
+    end_region: Region | None = None,
+) -> Mesh:
+    """A closed tube along −z through elliptic sections (x, y, z, semi-axis x, semi-axis y).
+
+    Sections run from the highest z to the lowest; the ends are closed by flat fans. A texture's
+    ``region`` is wrapped around it, its top at the first section; ``end_region`` (None: the same)
+    lies flat on both ends.
+    """
+    sections = np.asarray(sections_m, dtype=np.float64)
+    around = np.linspace(0.0, 2.0 * math.pi, sides + 1)
+    ring = np.stack([np.cos(around), np.sin(around)], axis=-1)
+    side = np.empty((len(sections), sides + 1, 3))
+    side[..., :2] = sections[:, None, :2] + ring[None] * sections[:, None, 3:5]
+    side[..., 2] = sections[:, None, 2]
+    along = np.gradient(side, axis=0)
+    tangent = np.stack([-ring[:, 1], ring[:, 0], np.zeros(sides + 1)], axis=-1)
+    tangent = tangent[None] * np.concatenate(
+        [sections[:, None, 3:5], np.ones((len(sections), 1, 1))], axis=-1
+    )
+    normals = np.cross(along, tangent).reshape(-1, 3)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    parts = [
+        Mesh(
+            side.reshape(-1, 3),
+            normals,
+            _grid_indices(len(sections), sides + 1),
+            _mapped(_grid_uv(len(sections), sides + 1), region),
+        )
+    ]
+    flat = np.concatenate([np.zeros((1, 2)), ring[:-1]]) * 0.5 + 0.5
+    end_uv = _mapped(flat, region if end_region is None else end_region)
+    for row, up in ((0, 1.0), (-1, -1.0)):
+        rim = side[row, :-1]
+        fan = np.array([(0, k + 1, (k + 1) % sides + 1) for k in range(sides)])
+        parts.append(
+            Mesh(
+                np.concatenate([rim.mean(axis=0, keepdims=True), rim]),
+                np.tile((0.0, 0.0, up), (sides + 1, 1)),
+                (fan if up > 0.0 else fan[:, ::-1]).ravel(),
+                end_uv,
+            )
+        )
+    return merge(parts)
+
+
+def _grid_indices(rows: int, columns: int) -> NDArray[np.int64]:
+    """Two triangles a cell of a grid whose rows run downwards and columns counter-clockwise."""
+    row, column = np.meshgrid(np.arange(rows - 1), np.arange(columns - 1), indexing="ij")
+    corner = (row * columns + column).ravel()
+    below = corner + columns
+    return np.stack([corner, below, below + 1, corner, below + 1, corner + 1], axis=-1).ravel()
+
+
+def _grid_uv(rows: int, columns: int) -> FloatArray:
+    """(rows * columns, 2) unit texture coordinates of a grid, its first row at the top."""
+    v, u = np.meshgrid(np.linspace(1.0, 0.0, rows), np.linspace(0.0, 1.0, columns), indexing="ij")
+    return np.stack([u, v], axis=-1).reshape(-1, 2)
+
+
+Colour = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SceneryChunk:
+    """A piece of scenery small enough to be left out where the camera does not see it.
+
+    Attributes:
+        mesh: in odom, metres, with texture coordinates.
+        colour: RGB, 0 to 1; it multiplies the texture.
+        texture: a name for :func:`scenery_texture`, or None for the plain colour.
+    """
+
+    mesh: Mesh
+    colour: Colour
+    texture: str | None

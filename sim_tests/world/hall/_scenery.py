@@ -1,0 +1,89 @@
+"""Every texture of the scenery by name, painted on first use and kept.
+
+What the camera sees of a warehouse: racks with goods, props, hall and floor paint, in chunks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache, lru_cache, partial
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from awarenav.errors import not_one_of
+
+from ..errors import SimError
+from ._layout import WarehouseLayout
+from ._meshes import Colour, SceneryChunk
+from ._scenery_hall import ceiling_chunks, floor_chunks, wall_chunks
+from ._scenery_paint import paint_chunks
+from ._scenery_props import prop_chunk
+from ._scenery_racks import rack_chunks
+from ._texture_amr import amr_texture
+from ._texture_goods import GOODS_SETS, goods_texture
+from ._texture_hall import (
+    ceiling_texture,
+    fixture_texture,
+    floor_texture,
+    paint_texture,
+    wall_texture,
+)
+
+_MAKERS: Final[dict[str, Callable[[], NDArray[np.uint8]]]] = {
+    **{f"goods{k}": partial(goods_texture, k) for k in range(GOODS_SETS)},
+    **{f"floor{k}": partial(floor_texture, k) for k in range(2)},
+    "wall": wall_texture,
+    "ceiling": ceiling_texture,
+    "paint": paint_texture,
+    "fixtures": fixture_texture,
+    "amr": amr_texture,
+}
+
+TEXTURE_NAMES: Final = tuple(_MAKERS)
+
+
+@cache
+def scenery_texture(name: str) -> NDArray[np.uint8]:
+    """The picture (H, W, 3) of a texture, row 0 at v = 1; read-only, the same bytes every time.
+
+    Raises:
+        SimError: for a name that is not in :data:`TEXTURE_NAMES`.
+    """
+    if name not in _MAKERS:
+        raise SimError(not_one_of("texture", name, TEXTURE_NAMES))
+    return _MAKERS[name]()
+
+
+__all__ = ["Colour", "SceneryChunk", "scenery", "scenery_texture"]
+
+
+@lru_cache(maxsize=8)  # many episodes play in the same hall
+def scenery(layout: WarehouseLayout, variant: int = 0) -> tuple[SceneryChunk, ...]:
+    """The pieces that a hall is drawn from; the same arguments give the same bytes.
+
+    What usually hides other things comes first: a renderer with a depth buffer then shades fewer
+    pixels twice.
+
+    Args:
+        layout: what stands where.
+        variant: chooses goods, prints, tones and what hangs on the walls; a whole number ≥ 0.
+
+    Raises:
+        SimError: for a variant that is none.
+    """
+    if isinstance(variant, bool) or not isinstance(variant, int) or variant < 0:
+        raise SimError(f"variant must be a whole number of at least 0, got {variant!r}")
+    return (
+        *(
+            chunk
+            for number, rack in enumerate(layout.racks)
+            for chunk in rack_chunks(rack, number, variant)
+        ),
+        *(prop_chunk(prop, number, variant) for number, prop in enumerate(layout.props)),
+        *wall_chunks(layout, variant),
+        *paint_chunks(layout, variant),
+        *floor_chunks(layout, variant),
+        *ceiling_chunks(layout),
+    )

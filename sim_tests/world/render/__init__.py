@@ -1,0 +1,22 @@
+"""The picture world: what cameras see, drawn by OpenGL without a window or by PyBullet."""
+
+from __future__ import annotations
+
+from ._backend import RENDERERS, Drawing, RendererName
+from ._backend_gl import gl_works
+from ._culling import box_corners, in_view, to_camera
+from ._view import RenderView
+from ._visuals import VisualActor, Visuals
+
+__all__ = [
+    "RENDERERS",
+    "Drawing",
+    "RenderView",
+    "RendererName",
+    "VisualActor",
+    "Visuals",
+    "box_corners",
+    "gl_works",
+    "in_view",
+    "to_camera",
+]

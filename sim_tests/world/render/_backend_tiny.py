@@ -1,0 +1,151 @@
+"""Drawing with PyBullet's software renderer: it works everywhere."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..bullet import pybullet
+from ..errors import SimError
+from ..hall import Lighting, Mesh
+from ._backend import BackendName, Drawing
+from ._view import RenderView
+
+# Half a metre before the far plane counts as nothing: float32 depth is coarse out there.
+_FAR_MARGIN_M: Final = 0.5
+# Column i is sampled at the fraction i / width of the frustum and, since the picture is flipped,
+# row j at (j + 1) / height from the top; shifted so, the samples are the middles of the cells.
+_SHIFT_SAMPLES: Final = (0.5, -0.5)
+# A vertex exactly in the camera's plane has no image; the renderer draws its triangles anywhere.
+# Halls are full of corners at round coordinates: a camera along an odom axis moves aside by a hair.
+_ALONG_AXIS: Final = 1.0 - 1e-9
+_HAIR_M: Final = 1.37e-4
+
+
+class TinyBackend:
+    """See :class:`PictureBackend`. A body hidden by zero opacity costs 0.06 µs a picture."""
+
+    name: BackendName = "tiny"
+    shares_textures = False
+
+    def __init__(self) -> None:
+        self.client: int = pybullet.connect(pybullet.DIRECT)
+        if self.client < 0:
+            raise SimError("PyBullet could not start another picture world")
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        self._textures = 0
+        # Colour (r, g, b) of every link that shows something, by body.
+        self._colours: dict[int, tuple[tuple[int, tuple[float, float, float]], ...]] = {}
+
+    def close(self) -> None:
+        """End the client."""
+        if self._folder is not None:
+            self._folder.cleanup()
+            self._folder = None
+        if self.client >= 0:
+            pybullet.disconnect(physicsClientId=self.client)
+            self.client = -1
+
+    def texture(self, rgb: NDArray[np.uint8]) -> int:
+        """Register a picture (H, W, 3)."""
+        # PyBullet takes textures from files only; this format is the fastest to write and to read.
+        if self._folder is None:
+            self._folder = tempfile.TemporaryDirectory(prefix="awarenav-")
+        self._textures += 1
+        path = write_picture(Path(self._folder.name) / f"{self._textures}.bmp", rgb)
+        number = int(pybullet.loadTexture(str(path), physicsClientId=self.client))
+        path.unlink()
+        if number < 0:
+            raise SimError(f"PyBullet did not take a texture of shape {rgb.shape}")
+        return number
+
+    def shape(self, mesh: Mesh, colour: tuple[float, float, float], texture: int | None) -> int:
+        """Register a visual shape; its texture is put on by :meth:`dress`."""
+        uv = {} if mesh.uv is None else {"uvs": mesh.uv.tolist()}
+        return int(
+            pybullet.createVisualShape(
+                pybullet.GEOM_MESH,
+                vertices=mesh.vertices_m.tolist(),
+                indices=mesh.indices.ravel().tolist(),
+                normals=mesh.normals.tolist(),
+                rgbaColor=[*colour, 1.0],
+                specularColor=[0.0, 0.0, 0.0],
+                physicsClientId=self.client,
+                **uv,
+            )
+        )
+
+    def dress(self, body: int, link: int, shape: int, texture: int | None) -> None:
+        """Put a texture on a link."""
+        if texture is not None:
+            pybullet.changeVisualShape(
+                body, link, textureUniqueId=texture, physicsClientId=self.client
+            )
+
+    def hide(self, body: int) -> None:
+        """Make a body fully transparent: the renderer then skips it."""
+        self._set_opacity(body, 0.0)
+
+    def reveal(self, body: int) -> None:
+        """Make a body opaque again."""
+        self._set_opacity(body, 1.0)
+
+    def _set_opacity(self, body: int, opacity: float) -> None:
+        colours = self._colours.get(body)
+        if colours is None:
+            shapes = pybullet.getVisualShapeData(body, physicsClientId=self.client)
+            colours = tuple((shape[1], tuple(shape[7][:3])) for shape in shapes)
+            self._colours[body] = colours
+        for link, colour in colours:
+            pybullet.changeVisualShape(
+                body, link, rgbaColor=(*colour, opacity), physicsClientId=self.client
+            )
+
+    def draw(self, view: RenderView, light: Lighting, least_depth_m: float) -> Drawing:
+        """Draw the view as if the light were white."""
+        width, height = view.width, view.height
+        _, _, rgba, depth, bodies = pybullet.getCameraImage(
+            width,
+            height,
+            _off_the_corners(view),
+            view.projection_matrix(_SHIFT_SAMPLES),
+            lightDirection=light.direction_odom,
+            lightColor=(1.0, 1.0, 1.0),
+            lightAmbientCoeff=light.ambient,
+            lightDiffuseCoeff=light.diffuse,
+            lightSpecularCoeff=light.specular,
+            shadow=0,
+            renderer=pybullet.ER_TINY_RENDERER,
+            physicsClientId=self.client,
+        )
+        near, far = view.near_m, view.far_m
+        buffer = np.asarray(depth, dtype=np.float64).reshape(height, width)
+        depth_m = far * near / (far - (far - near) * buffer)
+        depth_m[depth_m > far - _FAR_MARGIN_M] = np.inf
+        return Drawing(
+            np.ascontiguousarray(
+                np.asarray(rgba, dtype=np.uint8).reshape(height, width, 4)[..., :3]
+            ),
+            depth_m,
+            np.asarray(bodies, dtype=np.int32).reshape(height, width),
+        )
+
+
+def _off_the_corners(view: RenderView) -> list[float]:
+    """The view matrix, moved along the optical axis where that lies along an axis of odom."""
+    matrix = view.view_matrix()
+    if float(np.abs(view.T_odom_camera[:3, 2]).max()) > _ALONG_AXIS:
+        matrix[14] += _HAIR_M
+    return matrix
+
+
+def write_picture(path: Path, rgb: NDArray[np.uint8]) -> Path:
+    """Write (H, W, 3) to a file of the type that its name says; returns the path."""
+    if not cv2.imwrite(str(path), np.ascontiguousarray(rgb[..., ::-1])):
+        raise SimError(f"cannot write the texture {path.name}")
+    return path

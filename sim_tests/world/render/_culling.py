@@ -1,0 +1,133 @@
+"""Which boxes a view does not show, so that nothing is drawn in vain; plain geometry on arrays.
+
+Every answer errs on the side of drawing: a box is left out only when no sample of the picture can
+fall on anything inside it.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perception.arrays import FloatArray
+
+from ._view import RenderView
+
+BoolArray = NDArray[np.bool_]
+
+# The software renderer works in single precision: a sample may round to a box's edge.
+_SLACK_SAMPLES: Final = 0.05
+_SLACK_TANGENT: Final = 1e-4
+_SLACK_M: Final = 1e-3
+_TINY: Final = 1e-12
+_UNIT_CORNERS: Final = np.array(
+    [[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)]
+)
+
+
+def box_corners(boxes_m: FloatArray) -> FloatArray:
+    """(N, 8, 3) corners of axis-aligned boxes (N, 2, 3), low and high corner."""
+    low, high = boxes_m[:, None, 0], boxes_m[:, None, 1]
+    return np.asarray(low + _UNIT_CORNERS * (high - low))
+
+
+def to_camera(view: RenderView, corners_odom_m: FloatArray) -> FloatArray:
+    """Corners (N, 8, 3) in the view's optical frame."""
+    rotation, origin = view.T_odom_camera[:3, :3], view.T_odom_camera[:3, 3]
+    flat = corners_odom_m.reshape(-1, 3) @ rotation - origin @ rotation
+    return np.asarray(flat.reshape(corners_odom_m.shape))
+
+
+def in_view(view: RenderView, corners_camera_m: FloatArray) -> BoolArray:
+    """(N,) False for a box (N, 8, 3) outside the frustum or between the samples.
+
+    A box in front of the camera projects into the rectangle around its projected corners; when no
+    sample lies in there, none falls on the box. One that reaches behind the near plane is held
+    against the frustum's side planes only.
+    """
+    x, y, z = corners_camera_m[..., 0], corners_camera_m[..., 1], corners_camera_m[..., 2]
+    low_z, high_z = z.min(axis=1), z.max(axis=1)
+    shown: BoolArray = (high_z >= view.near_m - _SLACK_M) & (low_z <= view.far_m + _SLACK_M)
+    ahead = low_z > 0.5 * view.near_m
+    straddling = shown & ~ahead
+    if straddling.any():
+        some = x[straddling], y[straddling], z[straddling]
+        shown[straddling] = _between_planes(view, *some)
+    rows = np.flatnonzero(shown & ahead)
+    depth = z[rows]
+    for along, edge, far_edge, samples in (
+        (x[rows], view.left, view.right, view.width),
+        (y[rows], view.top, view.bottom, view.height),
+    ):
+        scale = samples / (far_edge - edge)
+        at = (along / depth - edge) * scale - 0.5  # sample i lies at i
+        first = np.ceil(at.min(axis=1) - _SLACK_SAMPLES)
+        last = np.floor(at.max(axis=1) + _SLACK_SAMPLES)
+        shown[rows] &= np.maximum(first, 0.0) <= np.minimum(last, samples - 1.0)
+    return shown
+
+
+def _between_planes(view: RenderView, x: FloatArray, y: FloatArray, z: FloatArray) -> BoolArray:
+    slack = _SLACK_TANGENT * np.abs(z) + _SLACK_M
+    return np.asarray(
+        (x - view.left * z > -slack).any(axis=1)
+        & (x - view.right * z < slack).any(axis=1)
+        & (y - view.top * z > -slack).any(axis=1)
+        & (y - view.bottom * z < slack).any(axis=1)
+    )
+
+
+def least_depth_m(view: RenderView, corners_camera_m: FloatArray) -> FloatArray:
+    """(N,) a depth that no visible part of a box (N, 8, 3) goes below; at least the near plane.
+
+    Beside the lowest corner it uses the frustum's sides: what lies 1.4 m below the camera is not
+    seen before the lower edge of the picture has come down to it.
+    """
+    low, high = corners_camera_m.min(axis=1), corners_camera_m.max(axis=1)
+    out = np.maximum(low[:, 2], view.near_m)
+    for axis, edge, far_edge in ((0, view.left, view.right), (1, view.top, view.bottom)):
+        if far_edge > 0.0:
+            np.maximum(out, low[:, axis] / far_edge, out=out)
+        if edge < 0.0:
+            np.maximum(out, high[:, axis] / edge, out=out)
+    return np.asarray(out)
+
+
+def hidden_behind(
+    view: RenderView, corners_odom_m: FloatArray, occluders_odom_m: FloatArray
+) -> BoolArray:
+    """(N,) True for a box (N, 8, 3) that lies wholly behind one of the solid occluders (M, 2, 3).
+
+    The shadow that a convex body casts from a point is convex, so a box whose eight corners lie in
+    it lies in it altogether. A corner is in the shadow when the segment from the camera to it meets
+    the occluder. An occluder that the near plane may cut open hides nothing.
+    """
+    hidden = np.zeros(len(corners_odom_m), dtype=bool)
+    eye = view.T_odom_camera[:3, 3]
+    nearest = np.clip(eye, occluders_odom_m[:, 0], occluders_odom_m[:, 1])
+    slant = np.sqrt(
+        1.0 + max(abs(view.left), abs(view.right)) ** 2 + max(abs(view.top), abs(view.bottom)) ** 2
+    )
+    whole = np.linalg.norm(nearest - eye, axis=1) > slant * view.near_m + _SLACK_M
+    solids = occluders_odom_m[whole]
+    if not len(solids) or not len(corners_odom_m):
+        return hidden
+    # A hidden box has a hidden centre, and few have: the corners are looked at for those only.
+    centres = corners_odom_m.mean(axis=1)
+    box, solid = np.nonzero(_meets(eye, centres[:, None, :], solids[None]))
+    behind = _meets(eye, corners_odom_m[box], solids[solid][:, None]).all(axis=1)
+    hidden[box[behind]] = True
+    return hidden
+
+
+def _meets(eye: FloatArray, ends: FloatArray, boxes: FloatArray) -> BoolArray:
+    """Whether segments from ``eye`` to ``ends`` (…, 3) meet boxes (…, 2, 3), by slabs."""
+    along = ends - eye
+    along = np.where(np.abs(along) < _TINY, _TINY, along)
+    first = (boxes[..., 0, :] - eye) / along
+    last = (boxes[..., 1, :] - eye) / along
+    enter = np.minimum(first, last).max(axis=-1)
+    leave = np.maximum(first, last).min(axis=-1)
+    return np.asarray((enter <= leave) & (leave >= 0.0) & (enter <= 1.0))

@@ -1,0 +1,175 @@
+"""The part of the world that a picture shows: a pinhole frustum over a grid of samples."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from perception import Camera
+from perception.arrays import FloatArray, finite_array, rigid_transform
+
+from ..errors import SimError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RenderView:
+    """A rectangle of a camera's image plane, divided into equal cells with a sample in each middle.
+
+    Edges are tangents: an edge at ``left`` is the plane x = left · z of the optical frame (x right,
+    y down, z forward).
+
+    Attributes:
+        T_odom_camera: (4, 4) optical frame to odom.
+        left: tangent of the rectangle's left edge.
+        right: > left.
+        top: tangent of the rectangle's upper edge.
+        bottom: > top.
+        width: samples a row.
+        height: samples a column.
+        near_m: nothing closer is drawn.
+        far_m: nothing farther is drawn.
+    """
+
+    T_odom_camera: FloatArray
+    left: float
+    right: float
+    top: float
+    bottom: float
+    width: int
+    height: int
+    near_m: float
+    far_m: float
+
+    @classmethod
+    def of_rectangle(
+        cls,
+        camera: Camera,
+        T_odom_camera: Any,
+        roi_xyxy_px: Any = None,
+        size_px: tuple[int, int] | None = None,
+        *,
+        near_m: float = 0.05,
+        far_m: float = 60.0,
+    ) -> RenderView:
+        """The view of a rectangle of an undistorted camera's image.
+
+        Args:
+            camera: without distortion.
+            T_odom_camera: (4, 4), optical frame to odom.
+            roi_xyxy_px: (4,) u_min, v_min, u_max, v_max in pixels counted from the image's corner;
+                None is the whole image.
+            size_px: samples a row and a column; None is one a pixel of the rectangle.
+            near_m: nothing closer is drawn, > 0.
+            far_m: nothing farther is drawn.
+
+        Raises:
+            SimError: for a camera with distortion, an empty rectangle or a size below one sample.
+        """
+        if camera.distortion is not None:
+            raise SimError(
+                "the renderer makes undistorted pictures; use a camera with distortion=None"
+            )
+        T = rigid_transform("T_odom_camera", T_odom_camera, SimError)
+        if roi_xyxy_px is None:
+            u_min, v_min, u_max, v_max = 0.0, 0.0, float(camera.width_px), float(camera.height_px)
+        else:
+            u_min, v_min, u_max, v_max = finite_array(
+                "roi_xyxy_px", roi_xyxy_px, (4,), SimError
+            ).tolist()
+        if u_max <= u_min or v_max <= v_min:
+            raise SimError(
+                "roi_xyxy_px must have u_min < u_max and v_min < v_max, got "
+                f"({u_min:g}, {v_min:g}, {u_max:g}, {v_max:g}) px"
+            )
+        width, height = (
+            (math.ceil(u_max - u_min), math.ceil(v_max - v_min)) if size_px is None else size_px
+        )
+        if width < 1 or height < 1:
+            raise SimError(f"size_px must be at least (1, 1), got ({width}, {height})")
+        # The image's corner lies half a pixel before the centre of its first pixel.
+        return cls(
+            T,
+            left=(u_min - 0.5 - camera.cx_px) / camera.fx_px,
+            right=(u_max - 0.5 - camera.cx_px) / camera.fx_px,
+            top=(v_min - 0.5 - camera.cy_px) / camera.fy_px,
+            bottom=(v_max - 0.5 - camera.cy_px) / camera.fy_px,
+            width=int(width),
+            height=int(height),
+            near_m=near_m,
+            far_m=far_m,
+        )
+
+    @property
+    def samples_per_m(self) -> float:
+        """How many samples a metre spans that lies across the view at 1 m distance."""
+        return self.width / (self.right - self.left)
+
+    def finer(self, factor: int) -> RenderView:
+        """The same rectangle with ``factor`` times the samples each way."""
+        return self.changed(width=self.width * factor, height=self.height * factor)
+
+    def tiles(self, max_width: int, max_height: int) -> list[tuple[slice, slice, RenderView]]:
+        """Cut the grid into pieces no larger than given: rows, columns and the view of each."""
+        step_u = (self.right - self.left) / self.width
+        step_v = (self.bottom - self.top) / self.height
+        out = []
+        for row in range(0, self.height, max_height):
+            for column in range(0, self.width, max_width):
+                width = min(max_width, self.width - column)
+                height = min(max_height, self.height - row)
+                out.append(
+                    (
+                        slice(row, row + height),
+                        slice(column, column + width),
+                        self.changed(
+                            left=self.left + column * step_u,
+                            right=self.left + (column + width) * step_u,
+                            top=self.top + row * step_v,
+                            bottom=self.top + (row + height) * step_v,
+                            width=width,
+                            height=height,
+                        ),
+                    )
+                )
+        return out
+
+    def changed(self, **fields: Any) -> RenderView:
+        """A copy with other values of some attributes."""
+        values = {name: getattr(self, name) for name in self.__slots__}
+        return RenderView(**{**values, **fields})
+
+    def view_matrix(self) -> list[float]:
+        """OpenGL's view matrix, column by column: its camera looks along −z with y up."""
+        rotation, origin = self.T_odom_camera[:3, :3], self.T_odom_camera[:3, 3]
+        out = np.eye(4)
+        out[:3, :3] = rotation.T * np.array([[1.0], [-1.0], [-1.0]])
+        out[:3, 3] = out[:3, :3] @ -origin
+        return [float(value) for value in out.T.flat]
+
+    def projection_matrix(
+        self, shift_samples: tuple[float, float] = (0.0, 0.0), near_m: float | None = None
+    ) -> list[float]:
+        """OpenGL's projection matrix of the frustum, column by column.
+
+        Args:
+            shift_samples: moves the frustum right and down by so many cells of the grid, for a
+                renderer that does not sample in the middle of a cell.
+            near_m: another near plane.
+        """
+        near, far = self.near_m if near_m is None else near_m, self.far_m
+        shift_u = shift_samples[0] * (self.right - self.left) / self.width
+        shift_v = shift_samples[1] * (self.bottom - self.top) / self.height
+        left, right = self.left + shift_u, self.right + shift_u
+        top, bottom = -(self.top + shift_v), -(self.bottom + shift_v)
+        out = np.zeros((4, 4))
+        out[0, 0] = 2.0 / (right - left)
+        out[1, 1] = 2.0 / (top - bottom)
+        out[0, 2] = (right + left) / (right - left)
+        out[1, 2] = (top + bottom) / (top - bottom)
+        out[2, 2] = -(far + near) / (far - near)
+        out[2, 3] = -2.0 * far * near / (far - near)
+        out[3, 2] = -1.0
+        return [float(value) for value in out.T.flat]

@@ -1,0 +1,71 @@
+"""A rendered picture with a person, as a robot that stands still would send it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from awarenav.cli import main
+from nav_adapter.ros2._stamps import to_time
+from nav_adapter.ros2.messages.geometry_msgs import (
+    Quaternion,
+    Transform,
+    TransformStamped,
+    Twist,
+    TwistWithCovariance,
+    Vector3,
+)
+from nav_adapter.ros2.messages.nav_msgs import Odometry
+from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, CompressedImage, Image
+from nav_adapter.ros2.messages.std_msgs import Header
+from nav_adapter.ros2.messages.tf2_msgs import TFMessage
+from perception import Camera
+from perception.arrays import FloatArray
+
+
+class Picture:
+    """One rendered picture with a person, as a robot that stands still would send it."""
+
+    def __init__(self, folder: Path) -> None:
+        lines = (folder / "truth.jsonl").read_text().splitlines()
+        frame = next(line for line in map(json.loads, lines) if len(line["people"]) == 1)
+        self.bgr = cv2.imread(str(folder / frame["frame"]))
+        self.camera = Camera.from_yaml(folder / "camera.yaml")
+        self.T_base_camera: FloatArray = np.array(frame["T_odom_camera"])
+        (truth,) = frame["people"]
+        self.place_m = (self.T_base_camera @ [*truth["position_camera_m"], 1.0])[:2]
+
+    def image(self, stamp_s: float) -> Image:
+        height, width, _ = self.bgr.shape
+        header = Header(to_time(stamp_s), "camera")
+        return Image(header, height, width, "bgr8", 0, 3 * width, self.bgr.tobytes())
+
+    def compressed(self, stamp_s: float) -> CompressedImage:
+        data = cv2.imencode(".png", self.bgr)[1].tobytes()
+        return CompressedImage(Header(to_time(stamp_s), "camera"), "png", data)
+
+    def info(self, stamp_s: float) -> CameraInfo:
+        k = tuple(self.camera.matrix.ravel().tolist())
+        size = self.camera.height_px, self.camera.width_px
+        return CameraInfo(Header(to_time(stamp_s), "camera"), *size, "plumb_bob", (), k)
+
+    def mounted(self) -> TFMessage:
+        turn = Rotation.from_matrix(self.T_base_camera[:3, :3]).as_quat().tolist()
+        place = Vector3(*self.T_base_camera[:3, 3].tolist())
+        header = Header(frame_id="base_link")
+        return TFMessage((TransformStamped(header, "camera", Transform(place, Quaternion(*turn))),))
+
+
+def odometry(stamp_s: float) -> Odometry:
+    twist = TwistWithCovariance(Twist(Vector3(0.5, 0.0, 0.0)))
+    return Odometry(Header(to_time(stamp_s), "odom"), "base_link", twist=twist)
+
+
+def rendered(folder: Path) -> Picture:
+    size = ["--frames", "2", "--people", "1", "--scenes", "1", "--range", "2", "4", "--seed", "3"]
+    assert main(["render", *size, "--processes", "1", "--out", str(folder)]) == 0
+    return Picture(folder)

@@ -1,0 +1,265 @@
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from paths import ROOT
+
+pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
+pytest.importorskip("mcap", reason="the extra ros2 is not installed")
+
+from bridge_picture import Picture, odometry, rendered
+from rosbags.highlevel import AnyReader
+
+from awarenav.bridge._run import Outlet
+from awarenav.cli import main
+from nav_adapter import AwarenessPolicy
+from nav_adapter.ros2 import (
+    PUBLISHED,
+    READ,
+    SLOWEST_MPS,
+    AwarenessBridge,
+    DdsNode,
+    McapRecorder,
+    RobotFile,
+    encode,
+)
+
+ROBOT = ROOT / "docs" / "nav2" / "robot.yaml"
+PATIENCE_S = 60.0
+RATE_HZ = 15.0
+CORES = 2
+
+
+@pytest.fixture(scope="module")
+def picture(tmp_path_factory: pytest.TempPathFactory) -> Picture:
+    pytest.importorskip("pybullet", reason="the extra sim is not installed")
+    return rendered(tmp_path_factory.mktemp("render"))
+
+
+@pytest.fixture(scope="module")
+def robot_without_mount(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("robot") / "robot.yaml"
+    RobotFile.from_yaml(ROBOT).model_copy(update={"camera": None}).to_yaml(path)
+    return path
+
+
+@pytest.fixture
+def domain(monkeypatch: pytest.MonkeyPatch) -> int:
+    interface = '<NetworkInterface name="lo" multicast="false"/>'
+    monkeypatch.setenv(
+        "CYCLONEDDS_URI",
+        f"<CycloneDDS><Domain><General><Interfaces>{interface}</Interfaces>"
+        "<AllowMulticast>false</AllowMulticast></General><Discovery>"
+        '<ParticipantIndex>auto</ParticipantIndex><Peers><Peer address="localhost"/></Peers>'
+        "</Discovery></Domain></CycloneDDS>",
+    )
+    path = os.pathsep.join(part for part in (str(ROOT), os.environ.get("PYTHONPATH")) if part)
+    monkeypatch.setenv("PYTHONPATH", path)
+    return random.SystemRandom().randint(1, 200)
+
+
+@pytest.fixture
+def robot(domain: int) -> Iterator[DdsNode]:
+    """The robot's side: sends a camera and odometry, hears what Nav2 hears."""
+    node = DdsNode(domain)
+    for key in ("image", "compressed"):  # as camera drivers send them
+        node.advertise(READ[key])
+    for key in ("camera_info", "odom", "tf_static"):
+        node.advertise(replace(READ[key], reliable=True))
+    for topic in PUBLISHED.values():
+        node.subscribe(topic)
+    yield node
+    node.close()
+
+
+def command(domain: int, *arguments: str) -> list[str]:
+    return [sys.executable, "-m", "awarenav", "bridge", "--domain", str(domain), *arguments]
+
+
+def drive(robot: DdsNode, picture: Picture, heard: dict, done, *, compressed: bool = False) -> bool:
+    """Send frames until ``done``, with what Nav2 hears in ``heard``."""
+    robot.publish(READ["tf_static"], picture.mounted())
+    end = time.monotonic() + PATIENCE_S
+    while time.monotonic() < end:
+        now = time.time()
+        robot.publish(READ["odom"], odometry(now))
+        robot.publish(READ["camera_info"], picture.info(now))
+        if compressed:
+            robot.publish(READ["compressed"], picture.compressed(now))
+        else:
+            robot.publish(READ["image"], picture.image(now))
+        time.sleep(0.04)
+        for key, topic in PUBLISHED.items():
+            heard[key] += robot.take(topic)
+        if done(heard):
+            return True
+    return False
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("compressed", [False, True], ids=["raw", "compressed"])
+def test_an_image_on_dds_comes_back_as_a_person_and_a_speed_limit(
+    robot: DdsNode,
+    domain: int,
+    picture: Picture,
+    robot_without_mount: Path,
+    tmp_path: Path,
+    compressed: bool,
+) -> None:
+    recording = tmp_path / "run.mcap"
+    arguments = ["--robot", str(robot_without_mount), "--record", str(recording)]
+    if compressed:
+        arguments += ["--compressed", "--image", "/camera/image_raw/compressed"]
+    heard: dict = defaultdict(list)
+
+    def confirmed(heard: dict) -> bool:
+        people = heard["people"][-1].people if heard["people"] else ()
+        return any(each.reliability == 1.0 for each in people)
+
+    with subprocess.Popen(command(domain, *arguments), stderr=subprocess.PIPE, text=True) as bridge:
+        try:
+            assert drive(robot, picture, heard, confirmed, compressed=compressed)
+            bridge.send_signal(signal.SIGINT)
+            _, said = bridge.communicate(timeout=PATIENCE_S)
+        finally:
+            bridge.kill()
+    # Before anything was known it stood still; then the person limits it; last it stands again.
+    assert heard["speed_limit"][0].speed_limit == SLOWEST_MPS
+    (person,) = heard["people"][-1].people
+    assert np.hypot(*(np.array([person.position.x, person.position.y]) - picture.place_m)) < 0.35
+    assert SLOWEST_MPS < heard["speed_limit"][-1].speed_limit < 1.5
+    (found,) = heard["detections"][-1].detections
+    assert found.id == person.name
+    assert bridge.returncode == 0, said
+    assert "Traceback" not in said
+    assert "a stop was published" in said
+    with AnyReader([recording]) as reader:
+        last = {
+            connection.topic: reader.deserialize(raw, connection.msgtype)
+            for connection, _, raw in reader.messages()
+        }
+    assert last["/speed_limit"].speed_limit == SLOWEST_MPS
+    assert {"/odom", "/tf_static", *(f"/{t.name}" for t in PUBLISHED.values())} == set(last)
+
+
+@pytest.mark.slow
+def test_a_frame_costs_less_than_two_cores_have_at_fifteen_hertz(picture: Picture) -> None:
+    robot = RobotFile.from_yaml(ROBOT)
+    sent: list = []
+    bridge = AwarenessBridge(
+        AwarenessPolicy.preset("balanced"),
+        robot.profile(),
+        lambda key, message: sent.append(encode(message)),
+        T_base_camera=picture.T_base_camera,
+        camera=picture.camera,
+    )
+    costs_s = []
+    for tick in range(25):
+        now = 1000.0 + tick / RATE_HZ
+        frame = picture.image(now)
+        began_s = time.process_time()
+        bridge.on_odometry(odometry(now))
+        assert bridge.on_image(frame, now)
+        bridge.tick(now)
+        costs_s.append(time.process_time() - began_s)
+    assert np.median(costs_s[5:]) < CORES / RATE_HZ
+    assert len(bridge.tracks) == 1
+    assert bridge.tracks[0].status == "confirmed"
+
+
+def test_only_what_somebody_hears_or_records_is_wanted(domain: int, tmp_path: Path) -> None:
+    node, other = DdsNode(domain), DdsNode(domain)
+    try:
+        outlet = Outlet(node, PUBLISHED, None)
+        # A latched topic must hold its last message for whoever comes.
+        assert {key for key in PUBLISHED if outlet.wants(key)} == {"grid"}
+        assert not outlet.wants("left out")
+        other.subscribe(PUBLISHED["people"])
+        end = time.monotonic() + PATIENCE_S
+        while not outlet.wants("people") and time.monotonic() < end:
+            time.sleep(0.01)
+        assert {key for key in PUBLISHED if outlet.wants(key)} == {"grid", "people"}
+        with McapRecorder(tmp_path / "all.mcap") as recorder:
+            recorded = Outlet(node, PUBLISHED, recorder)
+            assert all(recorded.wants(key) for key in PUBLISHED)
+    finally:
+        other.close()
+        node.close()
+
+
+def test_sigterm_ends_it_well_too(domain: int) -> None:
+    with subprocess.Popen(
+        command(domain, "--robot", str(ROBOT)), stderr=subprocess.PIPE, text=True
+    ) as bridge:
+        try:
+            assert bridge.stderr is not None
+            while "reading" not in bridge.stderr.readline():
+                assert bridge.poll() is None
+            time.sleep(0.2)
+            bridge.terminate()
+            _, said = bridge.communicate(timeout=PATIENCE_S)
+        finally:
+            bridge.kill()
+    assert bridge.returncode == 0, said
+    assert "ended after 0 frames" in said
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["--robot", "nowhere.yaml"], "cannot read nowhere.yaml"),
+        (["--robot", str(ROBOT), "--policy", "bold"], "preset must be one of"),
+        (["--robot", str(ROBOT), "--rate", "0"], "--rate"),
+        (["--robot", str(ROBOT), "--detector", "nowhere"], "--detector must be"),
+        (["--robot", str(ROBOT), "--seconds", "-1"], "--seconds"),
+        (["--robot", str(ROBOT), "--domain", "300"], "0 to 232"),
+        (["--robot", str(ROBOT), "--topic", "speed=x"], "--topic must be KEY=TOPIC"),
+        (["--robot", str(ROBOT), "--topic", "people=speed_limit"], "share a topic"),
+        (["--robot", str(ROBOT), "--only", "speed"], "--only must name some of"),
+        (["--robot", str(ROBOT), "--image", "a b"], "a topic must consist of"),
+        (["--robot", str(ROBOT), "--record", "nowhere/run.mcap"], "cannot write nowhere"),
+        (["--robot", str(ROBOT), "--camera", "nowhere.yaml"], "cannot read nowhere.yaml"),
+    ],
+)
+def test_bad_input_is_refused_in_a_line(
+    arguments: list[str], text: str, domain: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["bridge", "--domain", str(domain), *arguments]) == 2
+    said = capsys.readouterr().err
+    assert text in said
+    assert said.splitlines()[-1].startswith("awarenav bridge: ")
+
+
+def test_a_domain_in_the_environment_that_is_no_number_is_refused(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", "zero")
+    assert main(["bridge", "--robot", str(ROBOT)]) == 2
+    assert "ROS_DOMAIN_ID must be a number" in capsys.readouterr().err
+
+
+def test_a_while_without_a_robot_ends_by_itself(
+    domain: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recording = tmp_path / "quiet.mcap"
+    arguments = ["--robot", str(ROBOT), "--domain", str(domain), "--seconds", "0.3"]
+    only = ["--only", "speed_limit", "--topic", "speed_limit=/robot_1/limit"]
+    assert main(["bridge", *arguments, *only, "--record", str(recording)]) == 0
+    assert "/robot_1/limit" in capsys.readouterr().err
+    with AnyReader([recording]) as reader:
+        limits = {
+            (connection.topic, reader.deserialize(raw, connection.msgtype).speed_limit)
+            for connection, _, raw in reader.messages()
+        }
+    assert limits == {("/robot_1/limit", SLOWEST_MPS)}

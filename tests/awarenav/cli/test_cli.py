@@ -1,0 +1,114 @@
+import csv
+
+import pytest
+
+from awarenav.cli import main
+from sim_tests.demo._tables import ENCOUNTER_COLUMNS
+from sim_tests.study.measures import RECORD_COLUMNS
+
+SHORT = """
+name: short
+description: Two seconds.
+duration_s: 2.0
+robot: {goal_x_m: 1.0}
+workers:
+  - path: [{t_s: 0.0, x_m: 3.0, y_m: -1.0}]
+"""
+
+
+def rows(path):
+    with path.open(newline="") as file:
+        return list(csv.reader(file))
+
+
+@pytest.mark.parametrize("command", [[], ["demo"], ["crossings"], ["replay"], ["bench"]])
+def test_help_says_what_a_command_does(command, capsys):
+    assert main([*command, "--help"]) == 0
+    text = capsys.readouterr().out
+    assert "Usage: awarenav" in text
+    if command and command != ["bench"]:
+        assert "--out" in text
+    if command in (["demo"], ["crossings"]):
+        assert "--seed" in text
+
+
+def test_crossings_write_a_row_an_episode_with_paired_seeds(tmp_path, capsys):
+    scenario = tmp_path / "short.yaml"
+    scenario.write_text(SHORT)
+    out = tmp_path / "out"
+    arguments = ["crossings", "--scenario", str(scenario), "--episodes", "2", "--seed", "7"]
+    arguments += ["--workers", "1", "--no-report", "--out", str(out)]
+    assert main(arguments) == 0
+    text = capsys.readouterr().out
+    assert "robot contacts" in text
+    assert "episodes.csv with 4 episodes" in text
+    header, *body = rows(out / "episodes.csv")
+    assert tuple(header) == RECORD_COLUMNS
+    assert [(row[1], row[2]) for row in body] == [
+        ("7", "blind"),
+        ("7", "balanced"),
+        ("8", "blind"),
+        ("8", "balanced"),
+    ]
+    first = (out / "episodes.csv").read_bytes()
+    main([*arguments, "--resume"])
+    main(arguments)
+    assert (out / "episodes.csv").read_bytes() == first
+
+
+def test_crossings_that_fail_are_said_and_the_others_are_there(tmp_path, capsys):
+    scenario = tmp_path / "short.yaml"
+    scenario.write_text(SHORT)
+    arguments = ["crossings", "--scenario", str(scenario), "--perception", "truth"]
+    arguments += ["--planner", "run_planners:Raises", "reference", "--policy", "blind"]
+    arguments += ["--fault", "none", "misses_30", "--workers", "1", "--no-report"]
+    assert main([*arguments, "--out", str(tmp_path / "out")]) == 1
+    output = capsys.readouterr()
+    assert "2 of 4 episodes failed; episode 0 (short, seed 0): RuntimeError" in output.err
+    assert "errors.log has the tracebacks" in output.err
+    _, *body = rows(tmp_path / "out" / "episodes.csv")
+    assert [row[3] for row in body] == ["Raises", "SamplingPlanner"] * 2
+    assert [bool(row[-1]) for row in body] == [True, False] * 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["crossings", "--scenario", "nowhere"], "scenario must be one of"),
+        (["crossings", "--policy", "brave"], "preset must be one of"),
+        (["crossings", "--policy", "absent.yaml"], "absent.yaml"),
+        (["crossings", "--fault", "ghost"], "did you mean 'ghosts'"),
+        (["crossings", "--planner", "MyPlanner"], "module:Class"),
+        (["bench", "--baseline", "{tmp}"], "baseline"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_status_2(arguments, message, tmp_path, capsys):
+    arguments = [argument.replace("{tmp}", str(tmp_path)) for argument in arguments]
+    if arguments[0] == "crossings":
+        arguments += ["--out", str(tmp_path / "out")]
+    assert main(arguments) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert "Traceback" not in error
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.slow
+def test_demo_writes_its_tables_pictures_and_video(tmp_path, capsys):
+    assert main(["demo", "--out", str(tmp_path), "--no-video"]) == 0
+    text = capsys.readouterr().out
+    for line in ("awareness-blind", "aware, attentive worker", "aware, distracted worker"):
+        assert line in text
+    header, *body = rows(tmp_path / "encounter.csv")
+    assert tuple(header) == ENCOUNTER_COLUMNS
+    assert len(body) == 3000
+    assert {row[1] for row in body} == {"truth", "keypoints"}
+    for picture in ("encounter.png", "crossings.png"):
+        assert (tmp_path / picture).read_bytes().startswith(b"\x89PNG")
+    _, *episodes = rows(tmp_path / "episodes.csv")
+    assert [(row[0], row[2]) for row in episodes] == [
+        ("crossing_attentive_without_people", "balanced"),
+        ("crossing_attentive", "blind"),
+        ("crossing_attentive", "balanced"),
+        ("crossing_distracted", "balanced"),
+    ]

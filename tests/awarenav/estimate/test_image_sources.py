@@ -1,0 +1,268 @@
+"""Where frames come from: files, folders, videos, cameras, recordings."""
+
+from __future__ import annotations
+
+import json
+import threading
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from numbered_pictures import number_of, numbered
+
+from awarenav.errors import AwarenavError
+from awarenav.estimate._open_source import open_source
+from awarenav.estimate._source import SourceFrame, as_rgb, read_picture
+from awarenav.estimate._source_pictures import PictureSource
+from awarenav.estimate._source_video import VideoSource
+from awarenav.estimate._threads import ReadAhead, WriteBehind
+from awarenav.video import VideoWriter
+from perception import Camera
+
+RED = np.zeros((4, 6, 3), np.uint8)
+RED[..., 0], RED[..., 1] = 200, 16
+
+
+def save(path: Path, picture: np.ndarray) -> Path:
+    assert cv2.imwrite(str(path), picture)
+    return path
+
+
+def film(path: Path, count: int, rate_hz: int = 12) -> Path:
+    with VideoWriter(path, rate_hz, (64, 48)) as video:
+        for number in range(count):
+            video.add(numbered(number, (64, 48)))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("picture", "expected"),
+    [
+        (RED[..., ::-1], RED),
+        (np.dstack([RED[..., ::-1], np.zeros((4, 6), np.uint8)]), RED),
+        (RED[..., 0], np.repeat(RED[..., :1], 3, axis=2)),
+        (RED[..., ::-1].astype(np.uint16) * 257, RED),
+    ],
+    ids=["colour", "transparent", "grey", "16 bits"],
+)
+def test_every_kind_of_picture_becomes_rgb(tmp_path, picture, expected):
+    assert np.array_equal(read_picture(save(tmp_path / "a.png", picture)), expected)
+
+
+@pytest.mark.parametrize(
+    "array",
+    [np.zeros((4, 4), np.float32), np.zeros((4, 4, 2), np.uint8), np.zeros((0, 4), np.uint8)],
+)
+def test_arrays_that_are_no_picture_are_refused(array):
+    with pytest.raises(AwarenavError, match="8 or 16 bits, got"):
+        as_rgb(array, "it")
+
+
+@pytest.mark.parametrize("data", [b"", b"no picture", b"\x89PNG\r\n\x1a\n"])
+def test_files_that_are_no_picture_are_refused_by_name(tmp_path, data):
+    path = tmp_path / "a.png"
+    path.write_bytes(data)
+    with pytest.raises(AwarenavError, match=r"a\.png"):
+        read_picture(path)
+
+
+def test_a_folder_is_read_in_the_order_of_its_numbers(tmp_path):
+    for number in (10, 9, 1):
+        save(tmp_path / f"shot{number}.png", numbered(number))
+    save(tmp_path / "contact_sheet.png", numbered(0))
+    (tmp_path / "notes.txt").write_text("no picture")
+    source = PictureSource(tmp_path, interval_s=0.5)
+    frames = list(source.frames())
+    assert [frame.name for frame in frames] == ["shot1.png", "shot9.png", "shot10.png"]
+    assert [number_of(frame.image_rgb) for frame in frames] == [1, 9, 10]
+    assert [frame.stamp_s for frame in frames] == [0.0, 0.5, 1.0]
+    assert source.count == 3
+    assert source.camera is None
+
+
+def test_a_rendered_set_tells_stamps_poses_and_camera_but_never_people(tmp_path):
+    camera = Camera.from_fov(64, 48, 1.0)
+    camera.to_yaml(tmp_path / "camera.yaml")
+    save(tmp_path / "000000.png", numbered(0))
+    pose = np.eye(4)
+    pose[2, 3] = 1.4
+    record = {"frame": "000000.png", "stamp_s": 7.5, "T_odom_camera": pose.tolist()}
+    (tmp_path / "truth.jsonl").write_text(json.dumps({**record, "people": "not for us"}) + "\n")
+    source = PictureSource(tmp_path)
+    (frame,) = source.frames()
+    assert frame.stamp_s == 7.5
+    assert np.array_equal(frame.T_odom_camera, pose)
+    assert np.array_equal(source.camera.matrix, camera.matrix)
+
+
+def test_a_picture_that_cannot_be_read_is_a_problem_of_its_own(tmp_path):
+    for number in range(3):
+        save(tmp_path / f"{number}.png", numbered(number))
+    whole = (tmp_path / "1.png").read_bytes()
+    (tmp_path / "1.png").write_bytes(whole[: len(whole) // 3])
+    frames = list(PictureSource(tmp_path).frames())
+    assert [frame.image_rgb is None for frame in frames] == [False, True, False]
+    assert "1.png" in frames[1].problem
+
+
+def test_a_video_has_the_stamps_of_its_frames(tmp_path):
+    source = VideoSource.of_file(str(film(tmp_path / "a.mp4", 12)))
+    frames = list(source.frames())
+    source.close()
+    assert source.count == 12
+    assert source.rate_hz == pytest.approx(12.0)
+    assert [frame.stamp_s for frame in frames] == pytest.approx(
+        [k / 12 for k in range(12)], abs=2e-3
+    )
+    assert [number_of(frame.image_rgb) for frame in frames] == list(range(12))
+    assert all(not frame.problem for frame in frames)
+
+
+def cut_film(tmp_path: Path) -> Path:
+    """A video whose index comes first and whose frames end early, in the middle of one."""
+    import av  # noqa: PLC0415
+
+    rng = np.random.default_rng(0)
+    path = tmp_path / "whole.mp4"
+    with av.open(str(path), "w", options={"movflags": "faststart"}) as container:
+        stream = container.add_stream("libx264", rate=10)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        stream.options = {"g": "1", "bf": "0"}
+        for _ in range(40):
+            noise = rng.integers(0, 255, (48, 64, 3)).astype(np.uint8)
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(noise, format="rgb24")))
+        container.mux(stream.encode())
+    data = path.read_bytes()
+    cut = tmp_path / "cut.mp4"
+    cut.write_bytes(data[: len(data) * 6 // 10])
+    return cut
+
+
+def test_a_video_that_ends_in_the_middle_of_a_frame_keeps_what_came_before(tmp_path):
+    source = VideoSource.of_file(str(cut_film(tmp_path)))
+    *frames, last = source.frames()
+    source.close()
+    assert 15 <= len(frames) <= 30
+    assert all(frame.image_rgb is not None for frame in frames)
+    assert last.image_rgb is None
+    assert f"ends after {len(frames)} of 40 frames" in last.problem
+
+
+def test_a_camera_that_is_unplugged_is_a_problem_after_its_last_frame(tmp_path):
+    capture = cv2.VideoCapture(str(film(tmp_path / "a.mp4", 5)))
+    source = VideoSource("0", capture, live=True)
+    *frames, last = source.frames()
+    source.close()
+    assert len(frames) == 5
+    assert source.count is None
+    stamps = [frame.stamp_s for frame in frames]
+    assert stamps == sorted(set(stamps))
+    assert "unplugged" in last.problem
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("absent.mp4", r"no such file.*did you mean .*absent\.mov"),
+        ("absent.mov", "cannot open video"),
+        ("empty", "holds no picture"),
+        ("99", "cannot open camera"),
+    ],
+)
+def test_sources_that_are_none_are_refused(tmp_path, name, message):
+    (tmp_path / "absent.mov").write_bytes(b"no video")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(AwarenavError, match=message):
+        open_source(name if name.isdigit() else str(tmp_path / name))
+
+
+def test_a_topic_is_for_recordings(tmp_path):
+    path = save(tmp_path / "a.png", numbered(0))
+    with pytest.raises(AwarenavError, match="--topic is for ROS recordings"):
+        open_source(str(path), topic="/image")
+
+
+class Counting:
+    """A source of numbered pictures that may wait for a sign, or fail."""
+
+    camera = rate_hz = None
+
+    def __init__(self, count, *, live=False, error=None):
+        self.count = count
+        self.live = live
+        self.closed = False
+        self.made = 0
+        self.go_on = threading.Event()
+        self._error = error
+
+    def frames(self):
+        for number in range(self.count):
+            self.made += 1
+            yield SourceFrame(str(number), float(number), numbered(number % 30))
+        self.go_on.set()
+        if self._error is not None:
+            raise self._error
+
+    def close(self):
+        self.closed = True
+
+
+@pytest.mark.parametrize(
+    ("options", "names"),
+    [
+        ({}, range(50)),
+        ({"every": 7}, range(0, 50, 7)),
+        ({"limit": 3}, range(3)),
+        ({"every": 20, "limit": 2}, (0, 20)),
+    ],
+)
+def test_reading_ahead_keeps_every_frame_in_order(options, names):
+    source = Counting(50)
+    with ReadAhead(source, **options) as frames:
+        assert [frame.name for frame in frames] == [str(number) for number in names]
+    assert source.closed
+
+
+def test_reading_ahead_stays_a_few_frames_ahead_and_stops_when_told():
+    source = Counting(1000)
+    with ReadAhead(source) as frames:
+        next(iter(frames))
+    assert source.closed
+    assert source.made < 20
+
+
+def test_what_goes_wrong_in_reading_is_raised_after_the_frames_before_it():
+    source = Counting(3, error=AwarenavError("the cable"))
+    names = []
+    with pytest.raises(AwarenavError, match="the cable"), ReadAhead(source) as frames:
+        names.extend(frame.name for frame in frames)
+    assert names == ["0", "1", "2"]
+    assert source.closed
+
+
+def test_a_live_source_gives_its_newest_frame():
+    source = Counting(100, live=True)
+    with ReadAhead(source) as frames:
+        assert source.go_on.wait(10.0)
+        assert [frame.name for frame in frames][-1] == "99"
+
+
+def test_work_is_done_in_order_and_its_error_comes_back():
+    done: list[int] = []
+    with WriteBehind(done.append) as behind:
+        for number in range(100):
+            behind.put(number)
+    assert done == list(range(100))
+
+    def fail(number):
+        raise OSError("disk full")
+
+    with pytest.raises(OSError, match="disk full"):
+        hand_over(WriteBehind(fail), 100)
+
+
+def hand_over(behind: WriteBehind[int], count: int) -> None:
+    with behind:
+        for number in range(count):
+            behind.put(number)

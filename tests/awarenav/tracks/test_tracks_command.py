@@ -1,0 +1,298 @@
+"""``awarenav tracks`` as a newcomer runs it."""
+
+from __future__ import annotations
+
+import csv
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from paths import ROOT
+from recorded_crossing import record_crossing
+from track_lines import lines, pose, standing, walking
+
+from awarenav import figures as _canvas
+from awarenav.cli import main
+from awarenav.records import write_records
+from awarenav.tracks._follow import follow
+from awarenav.tracks._recording import read_recording
+from awarenav.tracks._tables import CSV_COLUMNS
+from perception import Camera
+from sim_tests import Scenario
+from tracking import AwarenessFilterConfig, TrackerConfig
+
+WALKERS = [walking(4.0, -2.0, 0.0, 1.0), standing(5.0, 1.0)]
+HEADS = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
+
+# Two people walk past each other in front of the robot; only the first looks at it.
+CROSSING = """
+name: two_workers
+description: Two workers pass each other in front of the robot.
+duration_s: 5.5
+layout:
+  x_min_m: -5.0
+  y_min_m: -8.5
+  x_max_m: 17.0
+  y_max_m: 8.5
+  cross_aisle_x_m: 7.5
+  cross_aisle_width_m: 4.6
+robot: {goal_x_m: 13.0}
+camera: {width_px: 1920, height_px: 1200, horizontal_fov_deg: 120.0}
+workers:
+  - path: [{t_s: 0.0, x_m: 8.0, y_m: -3.4}, {t_s: 5.1, x_m: 8.0, y_m: 2.2}]
+    gaze: [{t_s: 0.0, look: robot}]
+  - path: [{t_s: 0.0, x_m: 6.8, y_m: 3.6}, {t_s: 6.5, x_m: 7.0, y_m: -3.6}]
+    heading: [{t_s: 0.0, heading_deg: 270.0}]
+    gaze: [{t_s: 0.0, look: ahead}]
+"""
+
+
+@pytest.fixture
+def estimates(tmp_path):
+    path = tmp_path / "estimates.jsonl"
+    write_records(path, lines(WALKERS, hidden=lambda k, who: who == 0 and 15 < k < 22))
+    return path
+
+
+def run(path, *arguments):
+    return main(["tracks", str(path), *map(str, arguments)])
+
+
+def rows(path):
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_help_says_what_it_does(capsys):
+    assert main(["tracks", "--help"]) == 0
+    text = capsys.readouterr().out
+    for option in ("--out", "--csv", "--truth", "--config", "--ids", "--camera", "--most"):
+        assert option in text
+
+
+@pytest.mark.parametrize("ending", list(HEADS))
+def test_a_plot_is_a_whole_file_and_the_same_every_time(estimates, tmp_path, ending):
+    first, second = tmp_path / f"a{ending}", tmp_path / "new" / f"b{ending}"
+    assert run(estimates, "--out", first) == 0
+    assert run(estimates, "--out", second) == 0
+    assert first.read_bytes().startswith(HEADS[ending])
+    assert first.read_bytes() == second.read_bytes()
+    assert [each.name for each in second.parent.iterdir()] == [second.name]
+
+
+def test_a_line_a_track_says_when_it_lived_and_how_aware_it_was(estimates, capsys):
+    assert run(estimates, "--out", "none") == 0
+    header, *body = capsys.readouterr().out.splitlines()
+    words = ["id", "born", "(s)", "confirmed", "(s)", "died", "(s)", "seen", "coasted"]
+    assert header.split() == [*words, "mean", "α", "lower"]
+    histories = follow(read_recording(estimates)).histories
+    assert [line.split()[0] for line in body] == ["1", "2"]
+    for line, history in zip(body, histories, strict=True):
+        _, born, confirmed, died, seen, coasted, alpha, lower = line.split()
+        assert (born, confirmed, died) == ("0.00", f"{history.confirmed_s:.2f}", "–")
+        assert (int(seen), int(coasted)) == (history.seen_frames, 40 - history.seen_frames)
+        assert float(alpha) == pytest.approx(history.mean("awareness"), abs=0.0051)
+        assert float(lower) == pytest.approx(history.mean("awareness_lower"), abs=0.0051)
+    assert histories[0].seen_frames == 34
+
+
+def test_the_table_holds_every_track_at_every_frame(estimates, tmp_path):
+    path = tmp_path / "tracks.csv"
+    assert run(estimates, "--out", "none", "--csv", path) == 0
+    table = rows(path)
+    assert tuple(table[0]) == CSV_COLUMNS
+    samples = {
+        (repr(sample.stamp_s), str(history.id)): sample
+        for history in follow(read_recording(estimates)).histories
+        for sample in history.frames
+    }
+    assert [(row["stamp_s"], row["id"]) for row in table] == sorted(
+        samples, key=lambda key: (float(key[0]), int(key[1]))
+    )
+    for row in table:
+        sample = samples[row["stamp_s"], row["id"]]
+        assert row["status"] == sample.status
+        assert row["seen"] == str(sample.seen).lower()
+        assert float(row["x_odom_m"]) == pytest.approx(sample.position_odom_m[0], abs=1e-6)
+        std = np.sqrt(sample.position_covariance_m2[1, 1])
+        assert float(row["y_std_m"]) == pytest.approx(std, abs=1e-6)
+        assert float(row["awareness_lower"]) == pytest.approx(sample.awareness_lower, abs=1e-6)
+        assert (row["measured_awareness"] == "") == (sample.measured_awareness is None)
+
+
+def test_settings_and_camera_come_from_files(tmp_path, capsys):
+    path = tmp_path / "estimates.jsonl"
+    write_records(path, lines([standing(4.0, 0.0)], frames=60, hidden=lambda k, who: k > 10))
+
+    def died_s(*arguments):
+        assert run(path, "--out", "none", *arguments) == 0
+        return float(capsys.readouterr().out.splitlines()[1].split()[3])
+
+    unknown_view_s = died_s()
+    config = tmp_path / "tracker.yaml"
+    TrackerConfig(max_coast_s=1.5).to_yaml(config)
+    assert died_s("--config", config) < unknown_view_s - 1.0
+    Camera.from_fov(640, 480, 1.2).to_yaml(tmp_path / "elsewhere.yaml")
+    known_view_s = died_s("--camera", tmp_path / "elsewhere.yaml")
+    assert known_view_s < unknown_view_s - 1.0
+    (tmp_path / "elsewhere.yaml").rename(tmp_path / "camera.yaml")
+    assert died_s() == known_view_s
+
+
+def test_a_half_written_line_is_said_and_the_rest_is_shown(estimates, capsys):
+    estimates.write_text(estimates.read_text("utf-8")[:-20], "utf-8")
+    assert run(estimates, "--out", "none") == 0
+    said = capsys.readouterr()
+    assert "the last line was cut off in writing and is left out" in said.err
+    assert len(said.out.splitlines()) == 3
+
+
+def test_late_frames_are_said(tmp_path, capsys):
+    records = lines(WALKERS, frames=30)
+    records[8], records[9] = records[9], records[8]
+    records.append(records.pop(3))
+    path = tmp_path / "late.jsonl"
+    write_records(path, records)
+    assert run(path, "--out", "none") == 0
+    error = capsys.readouterr().err
+    assert "1 late frame put back in time" in error
+    assert "1 late frame refused by the tracker and not used" in error
+
+
+@pytest.mark.parametrize(("step_m", "said"), [(0.2, False), (4.0, True)])
+def test_single_pictures_are_no_drive(tmp_path, capsys, step_m, said):
+    path = tmp_path / "set.jsonl"
+    write_records(path, lines(WALKERS, frames=6, camera=lambda t: pose(10.0 * step_m * t)))
+    assert run(path, "--out", "none") == 0
+    error = capsys.readouterr().err
+    assert (f"the camera jumps by {step_m:.1f} m from frame to frame" in error) == said
+
+
+def test_no_people_at_all_is_said_and_drawn(tmp_path, capsys):
+    path = tmp_path / "nobody.jsonl"
+    write_records(path, lines([], frames=5))
+    assert run(path, "--out", tmp_path / "nobody.png") == 0
+    assert "no people in 5 frames" in capsys.readouterr().out
+    assert (tmp_path / "nobody.png").read_bytes().startswith(HEADS[".png"])
+
+
+def test_who_was_never_confirmed_is_counted(tmp_path, capsys):
+    path = tmp_path / "clutter.jsonl"
+    write_records(path, lines(WALKERS, frames=20, hidden=lambda k, who: who == 1 and k != 7))
+    assert run(path, "--out", "none") == 0
+    assert capsys.readouterr().out.splitlines()[-1] == "1 track never confirmed"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--out", "{tmp}/tracks.txt"], "--out must end in .png, .svg, .pdf or be none"),
+        (["--csv", "{tmp}"], "--csv must be a file"),
+        (["--csv", "{tmp}/estimates.jsonl"], "would replace what is read"),
+        (["--csv", "{tmp}/out.png"], "--out and --csv are the same file"),
+        (["--config", "{tmp}/absent.yaml"], "absent.yaml"),
+        (["--config", "{tmp}/estimates.jsonl"], "estimates.jsonl"),
+        (["--camera", "{tmp}/absent.yaml"], "absent.yaml"),
+        (["--truth", "{tmp}/absent.jsonl"], "absent.jsonl"),
+        (["--truth", "{tmp}/estimates.jsonl"], "people of a truth file need an id"),
+        (["--ids"], "leave out --ids to track them here"),
+    ],
+)
+def test_bad_input_is_said_and_nothing_is_written(estimates, tmp_path, capsys, arguments, message):
+    out = tmp_path / "out.png"
+    arguments = [argument.replace("{tmp}", str(tmp_path)) for argument in arguments]
+    before = sorted(tmp_path.iterdir())
+    assert run(estimates, "--out", out, *arguments) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert "Traceback" not in error
+    assert sorted(tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize("text", ["{}\n", '{"frame": 1}\n{}\n', "no JSON\n\n"])
+def test_a_file_that_holds_no_frames_is_refused(tmp_path, capsys, text):
+    path = tmp_path / "other.jsonl"
+    path.write_text(text)
+    assert run(path, "--out", tmp_path / "out.png") == 2
+    assert "other.jsonl, line 1" in capsys.readouterr().err
+    assert not (tmp_path / "out.png").exists()
+
+
+def test_an_interruption_leaves_the_old_plot_and_no_half_one(estimates, tmp_path, monkeypatch):
+    out = tmp_path / "out.png"
+    out.write_bytes(b"old")
+
+    def interrupted(figure, file, **options):
+        Path(file).write_bytes(HEADS[".png"])
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(_canvas.Figure, "savefig", interrupted)
+    assert run(estimates, "--out", out) == 130
+    assert out.read_bytes() == b"old"
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["estimates.jsonl", "out.png"]
+
+
+@pytest.mark.parametrize(
+    ("missing", "out", "status", "message"),
+    [
+        ("pybullet", "out.png", 0, "Written to"),
+        ("matplotlib", "none", 0, "id  born"),
+        ("matplotlib", "out.png", 2, "needs matplotlib"),
+    ],
+)
+def test_it_runs_without_the_simulator(estimates, missing, out, status, message):
+    script = (
+        f"import sys; sys.modules[{missing!r}] = None; from awarenav.cli import main; "
+        f"sys.exit(main(['tracks', 'estimates.jsonl', '--out', {out!r}]))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        cwd=estimates.parent,
+        env={"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == status, done.stderr
+    assert message in done.stdout + done.stderr
+
+
+def test_two_workers_of_a_crossing_are_two_tracks_and_only_one_is_aware(tmp_path, capsys):
+    scenario = tmp_path / "two.yaml"
+    scenario.write_text(CROSSING)
+    record_crossing(Scenario.from_yaml(scenario), tmp_path)
+    path, table = tmp_path / "estimates.jsonl", tmp_path / "tracks.csv"
+    truth = tmp_path / "truth.jsonl"
+    out = tmp_path / "two.png"
+    assert run(path, "--truth", truth, "--out", out, "--csv", table) == 0
+    lines_of_tracks = [
+        line.split()
+        for line in capsys.readouterr().out.splitlines()[1:]
+        if line.strip()[0].isdigit()
+    ]
+    assert sorted(line[-1] for line in lines_of_tracks) == ["0", "1"]
+    lower = {line[-1]: float(line[-2]) for line in lines_of_tracks}
+    assert lower["0"] > 0.2
+    assert lower["1"] < 0.05
+    assert max(float(row["awareness_lower"]) for row in rows(table)) > 0.5
+    assert out.read_bytes().startswith(HEADS[".png"])
+
+
+def test_the_page_about_tracking_shows_code_that_runs():
+    page = (ROOT / "docs" / "tracking.md").read_text("utf-8")
+    blocks = re.findall(r"```python\n(.*?)```", page, re.S)
+    assert blocks
+    for block in blocks:
+        exec(compile(block, "docs/tracking.md", "exec"), {})
+
+
+def test_the_page_about_tracking_names_settings_that_exist():
+    page = (ROOT / "docs" / "tracking.md").read_text("utf-8")
+    settings = {*TrackerConfig.model_fields, *AwarenessFilterConfig.model_fields}
+    named = set(re.findall(r"`([a-z_0-9]+_(?:m|s|mps|m2ps3|hits|cost|probability|std))`", page))
+    assert len(named) > 12
+    assert named <= settings | {"stamp_s"}

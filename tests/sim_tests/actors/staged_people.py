@@ -1,0 +1,101 @@
+"""A robot that drives straight on among people, without perception or planner: quick to run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sim_tests import Scenario
+from sim_tests.actors.behaviour import PersonOutcome
+from sim_tests.actors.robot import NOVA_CARTER
+from sim_tests.crossing import Stage
+from sim_tests.crossing._metrics import SafetyMeter
+
+DT_S = 0.05
+
+
+@dataclass(frozen=True)
+class Film:
+    """What happened: rows of all people over time, and the robot."""
+
+    times_s: np.ndarray
+    people: np.ndarray  # (T, P, 4) x, y, vx, vy
+    headings: np.ndarray  # (T, P)
+    heads: np.ndarray  # (T, P) yaw
+    robot: np.ndarray  # (T, 2)
+    outcomes: tuple[PersonOutcome, ...]
+    meter: SafetyMeter
+
+    @property
+    def speeds(self) -> np.ndarray:
+        """(T, P) of the people."""
+        return np.hypot(self.people[:, :, 2], self.people[:, :, 3])
+
+    def crossing(self, person: int = 0) -> tuple[float, float]:
+        """When the person crosses y = 0 upwards, and how far ahead of the robot's middle."""
+        y = self.people[:, person, 1]
+        at = int(np.flatnonzero((y[:-1] < 0.0) & (y[1:] >= 0.0))[0])
+        return float(self.times_s[at]), float(self.people[at, person, 0] - self.robot[at, 0])
+
+
+def film(
+    people: list[dict[str, Any]],
+    *,
+    robot_mps: float = 0.8,
+    seconds: float = 12.0,
+    seed: int = 0,
+    layout: str = "open",
+    robot: dict[str, float] | None = None,
+    **scenario: Any,
+) -> Film:
+    """Run a stage with a robot that drives straight on."""
+    task = {"goal_x_m": 12.0, **(robot or {})}
+    case = Scenario.model_validate(
+        {
+            "name": "film",
+            "duration_s": seconds,
+            "layout": layout,
+            "robot": task,
+            "people": people,
+            **scenario,
+        }
+    )
+    meter = SafetyMeter(NOVA_CARTER)
+    times, rows, headings, heads, places = [], [], [], [], []
+    offsets = np.zeros(len(case.workers))
+    with Stage(case, offsets, np.random.default_rng(seed)) as stage:
+        stage.amr.command(robot_mps, 0.0)
+        for tick in range(round(seconds / DT_S)):
+            stage.measure(meter, DT_S)
+            motions = stage.motions
+            times.append(stage.t_s)
+            rows.append([[*m.position_odom_m, *m.velocity_odom_mps] for m in motions])
+            headings.append([m.heading_odom_rad for m in motions])
+            heads.append([m.head_yaw_rad for m in motions])
+            places.append(stage.amr.T_odom_base[:2, 3].copy())
+            stage.advance((tick + 1) * DT_S, meter)
+        outcomes = stage.outcomes
+    return Film(
+        np.array(times),
+        np.array(rows),
+        np.array(headings),
+        np.array(heads),
+        np.array(places),
+        outcomes,
+        meter,
+    )
+
+
+def crosser(reaction: str | None, **fields: Any) -> dict[str, Any]:
+    """Somebody who crosses the robot's way at x = 5 m upwards, seen or unseen by them."""
+    person: dict[str, Any] = {
+        "name": "crosser",
+        "route": [{"x_m": 5.0, "y_m": -4.0}, {"x_m": 5.0, "y_m": 4.0}],
+        "start_s": 2.4,
+        "glances": {"watches": True, "notices_within_m": 12.0 if reaction else 0.0},
+    }
+    if reaction:
+        person["reactions"] = {reaction: 1.0}
+    return {**person, **fields}

@@ -1,0 +1,106 @@
+"""The robot's look: where the robot is, wheels turned, never before its own camera."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from perception import Camera
+from sim_tests import SimError
+from sim_tests.actors.robot import NOVA_CARTER, Amr, AmrLook
+from sim_tests.actors.robot._amr import CAMERA_FORWARD_M, CAMERA_HEIGHT_M, WHEEL_RADIUS_M
+from sim_tests.actors.robot._look import amr_meshes
+from sim_tests.world import Warehouse
+from sim_tests.world.bullet import pybullet
+from sim_tests.world.camera import CameraRenderer
+from sim_tests.world.hall import WarehouseLayout
+
+
+def test_it_fills_its_footprint_and_stands_on_the_floor() -> None:
+    ((base, _, _),) = amr_meshes()["base_link"]
+    low, high = base.vertices_m.min(axis=0), base.vertices_m.max(axis=0)
+    footprint = NOVA_CARTER.footprint_m
+    np.testing.assert_allclose(low[:2], footprint.min(axis=0), atol=0.005)
+    np.testing.assert_allclose(high[:2], footprint.max(axis=0), atol=0.005)
+    assert low[2] == pytest.approx(0.0, abs=1e-6)
+    assert CAMERA_HEIGHT_M < high[2] < 1.5
+    for link in ("left_wheel", "right_wheel"):
+        ((wheel, _, _),) = amr_meshes()[link]
+        radius = np.hypot(wheel.vertices_m[:, 0], wheel.vertices_m[:, 2]).max()
+        assert radius == pytest.approx(WHEEL_RADIUS_M, abs=1e-9)
+    assert sum(piece[0].triangles for pieces in amr_meshes().values() for piece in pieces) < 1500
+
+
+def test_nothing_of_it_is_before_its_camera() -> None:
+    ((base, _, _),) = amr_meshes()["base_link"]
+    ahead = base.vertices_m[:, 0] - CAMERA_FORWARD_M
+    off_axis = np.abs(base.vertices_m[:, 2] - CAMERA_HEIGHT_M)
+    # Whatever lies ahead of the lens lies more than 45° below its axis.
+    assert (off_axis[ahead > 0.0] > ahead[ahead > 0.0]).all()
+    assert (ahead[off_axis < 0.3] < 0.0).all()
+
+
+@pytest.mark.parametrize("heading_rad", [0.0, 2.5, math.pi, -1.2])
+def test_it_is_drawn_where_the_robot_is_and_its_camera_does_not_see_it(heading_rad: float) -> None:
+    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
+        amr = Amr(warehouse, (2.0, 1.0), heading_rad)
+        look = AmrLook.of(warehouse, amr)
+        number = warehouse.visuals.add_actor(look)
+        for _ in range(60):
+            amr.command(1.0, 0.5)
+            amr.advance(warehouse.physics_dt_s)
+            warehouse.step()
+        renderer = CameraRenderer(warehouse)
+        wide = Camera.from_fov(160, 120, math.radians(90.0))
+        assert not (renderer.render(wide, amr.T_odom_camera).actors == number).any()
+        above = np.eye(4)
+        above[:3, :3] = np.diag([1.0, -1.0, -1.0])  # u along odom x, v against odom y
+        above[:3, 3] = (*amr.T_odom_base[:2, 3], 4.0)
+        camera = Camera(400, 400, 400.0, 400.0, 199.5, 199.5)
+        view = renderer.render(camera, above)
+        rows, columns = np.nonzero(view.actors == number)
+        depth = view.depth_m[rows, columns]
+        seen = np.stack(
+            [(columns - 199.5) * depth / 400.0, -(rows - 199.5) * depth / 400.0, 4.0 - depth], -1
+        )
+        rotation = amr.T_odom_base[:3, :3]
+        in_base = seen @ rotation
+        outline = NOVA_CARTER.footprint_m
+        assert (in_base[:, :2] > outline.min(axis=0) - 0.02).all()
+        assert (in_base[:, :2] < outline.max(axis=0) + 0.02).all()
+        # Seen from above its cover shows, 12 mm smaller all round, to the pixel of 9 mm.
+        np.testing.assert_allclose(np.ptp(in_base[:, :2], axis=0), (0.70, 0.476), atol=0.025)
+        low, high = look.bounds_odom_m()
+        world = seen + np.array([*amr.T_odom_base[:2, 3], 0.0])
+        assert (world > low - 0.01).all()
+        assert (world < high + 0.01).all()
+
+
+def test_its_wheels_turn_as_far_as_it_has_rolled() -> None:
+    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
+        amr = Amr(warehouse)
+        look = AmrLook.of(warehouse, amr)
+        warehouse.visuals.add_actor(look)
+        for _ in range(150):
+            amr.command(0.6, 0.0)
+            amr.advance(warehouse.physics_dt_s)
+            warehouse.step()
+        look.build(warehouse.visuals)
+        look.show(200.0)
+        rolled = amr.T_odom_base[0, 3] / WHEEL_RADIUS_M
+        for body in sorted(look.bodies())[1:]:
+            _, quaternion = pybullet.getBasePositionAndOrientation(
+                body, physicsClientId=warehouse.visuals.client
+            )
+            rotation = np.array(pybullet.getMatrixFromQuaternion(quaternion)).reshape(3, 3)
+            turned = math.atan2(rotation[0, 2], rotation[0, 0])
+            assert math.remainder(turned - rolled, math.tau) == pytest.approx(0.0, abs=0.02)
+
+
+def test_a_look_without_bodies_says_so() -> None:
+    look = AmrLook(lambda: (np.eye(4), 0.0, 0.0))
+    assert look.bodies() == frozenset()
+    with pytest.raises(SimError, match="build"):
+        look.show(100.0)

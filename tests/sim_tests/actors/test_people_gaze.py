@@ -1,0 +1,179 @@
+"""Glances: their statistics against closed forms, and what head and eyes make of them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.stats import norm
+
+from sim_tests import SimError
+from sim_tests.actors.behaviour import RobotBody
+from sim_tests.actors.behaviour._gaze import Gaze, GlanceProcess, LogNormalDuration
+from sim_tests.actors.behaviour._spec import Glances
+
+GLANCE = LogNormalDuration.fitted(0.83, (0.47, 1.50))
+AWAY = LogNormalDuration.fitted(1.03, (0.63, 1.98))
+#: Share of pedestrians who had looked within the last 0.5, 1, 2, 3 s before crossing.
+OBSERVED = {0.5: 0.41, 1.0: 0.54, 2.0: 0.75, 3.0: 0.82}
+
+
+def survival(length: LogNormalDuration, t_s: float) -> float:
+    return float(norm.sf(math.log(t_s / length.median_s) / length.sigma)) if t_s > 0.0 else 1.0
+
+
+def looked_within(tau_s: float) -> float:
+    """Of a stationary alternating process: looks now, or has looked away for less than tau."""
+    recent, _ = quad(lambda age: survival(AWAY, age), 0.0, tau_s)
+    return (GLANCE.mean_s + recent) / (GLANCE.mean_s + AWAY.mean_s)
+
+
+@pytest.mark.parametrize("length", [GLANCE, AWAY])
+def test_lengths_have_the_median_mean_and_quartile_ratio_that_they_were_fitted_to(length):
+    rng = np.random.default_rng(1)
+    drawn = np.array([length.draw_s(rng) for _ in range(20_000)])
+    lower, median, upper = np.quantile(drawn, (0.25, 0.5, 0.75))
+    assert median == pytest.approx(length.median_s, rel=0.03)
+    assert math.log(upper / lower) == pytest.approx(2.0 * norm.ppf(0.75) * length.sigma, rel=0.04)
+    assert drawn.mean() == pytest.approx(length.mean_s, rel=0.05)
+
+
+def test_the_fit_gives_the_quartiles_of_the_data():
+    for length, (lower, upper) in ((GLANCE, (0.47, 1.50)), (AWAY, (0.63, 1.98))):
+        spread = math.exp(norm.ppf(0.75) * length.sigma)
+        assert spread**2 == pytest.approx(upper / lower)
+        # The medians lie a little beside the middle of the quartiles: a lognormal cannot follow.
+        assert length.median_s / spread == pytest.approx(lower, rel=0.10)
+        assert length.median_s * spread == pytest.approx(upper, rel=0.10)
+
+
+def test_residual_lengths_are_those_of_renewal_theory():
+    """The mean of what is left is E[X²] / 2 E[X]."""
+    rng = np.random.default_rng(2)
+    left = np.array([AWAY.residual_s(rng) for _ in range(40_000)])
+    expected = 0.5 * AWAY.mean_s * math.exp(AWAY.sigma**2)
+    assert left.mean() == pytest.approx(expected, rel=0.06)
+    shares = [(left > t).mean() for t in (0.5, 1.0, 2.0)]
+    exact = [1.0 - quad(lambda a: survival(AWAY, a), 0.0, t)[0] / AWAY.mean_s for t in (0.5, 1, 2)]
+    np.testing.assert_allclose(shares, exact, atol=0.012)
+
+
+def test_a_stationary_start_stays_stationary_and_gives_the_figures_that_are_stated():
+    count, grid_s = 3000, 0.1
+    looking = np.zeros((count, 51), dtype=bool)
+    for row, rng in zip(looking, np.random.default_rng(3).spawn(count), strict=True):
+        process = GlanceProcess(GLANCE, AWAY, rng)
+        process.begin_anywhere(0.0)
+        row[:] = [process.looking(grid_s * n) for n in range(51)]
+    share = GLANCE.mean_s / (GLANCE.mean_s + AWAY.mean_s)
+    error = 4.0 * math.sqrt(share * (1.0 - share) / count)
+    for at in (0, 10, 30, 50):
+        assert looking[:, at].mean() == pytest.approx(share, abs=error)
+    stated = {0.5: 0.62, 1.0: 0.74, 2.0: 0.87, 3.0: 0.93}
+    for tau_s, figure in stated.items():
+        assert looked_within(tau_s) == pytest.approx(figure, abs=0.006)
+        back = round(tau_s / grid_s)
+        # A grid of 0.1 s misses glances shorter than that: the truth lies a little above.
+        simulated = looking[:, 50 - back :].any(axis=1).mean()
+        assert simulated == pytest.approx(figure, abs=0.035)
+
+
+def test_the_share_of_lookers_that_is_nearest_to_the_data():
+    process = np.array([looked_within(tau_s) for tau_s in OBSERVED])
+    data = np.array(list(OBSERVED.values()))
+    share = float(data @ process / (process @ process))
+    assert share == pytest.approx(0.81, abs=0.005)
+    np.testing.assert_allclose(share * process, [0.50, 0.60, 0.70, 0.75], atol=0.006)
+    assert np.sqrt(np.mean((share * process - data) ** 2)) < 0.08
+    assert np.sqrt(np.mean((process - data) ** 2)) > 0.15
+
+
+def robot_at(x: float, y: float, height_m: float = 1.4) -> RobotBody:
+    return RobotBody(x, y, 0.0, 0.0, 0.0, 0.36, 0.25, (x, y, height_m))
+
+
+def watch(gaze: Gaze, path, seconds: float, sees=lambda t: True, dt_s: float = 0.05):
+    """Rows t, head yaw, head pitch, eye yaw, eye pitch, looking of a person at the origin."""
+    rows = []
+    for n in range(round(seconds / dt_s)):
+        t = n * dt_s
+        robot = path(t)
+        seen = gaze.could_see(dt_s, (0.0, 0.0, 0.0), robot) and sees(t)
+        gaze.tick(t, dt_s, (0.0, 0.0, 0.0), robot, seen)
+        rows.append((t, *gaze.at(dt_s), gaze.looking))
+    return np.array(rows)
+
+
+def test_heads_turn_smoothly_at_human_speed_through_the_front_and_eyes_lead():
+    """A robot that passes behind somebody's back is lost on one side and found on the other."""
+    gaze = Gaze(Glances(watches=True, notices_within_m=20.0), 1.75, np.random.default_rng(0))
+
+    def around(t: float) -> RobotBody:
+        angle = min(1.2 + 0.8 * t, 2.0 * math.pi - 1.2)  # from the left, behind, to the right
+        return robot_at(4.0 * math.cos(angle), 4.0 * math.sin(angle))
+
+    rows = watch(gaze, around, 8.0)
+    t, yaw, eyes = rows[:, 0], rows[:, 1], rows[:, 3]
+    rate = np.diff(yaw) / np.diff(t)
+    assert np.abs(rate).max() <= 3.2 + 1e-6
+    assert np.abs(np.diff(rate)).max() <= 25.0 * 0.05 + 1e-6
+    assert np.abs(yaw).max() <= math.radians(80.0) + 1e-9
+    assert np.abs(eyes).max() <= math.radians(35.0) + 1e-9
+    # First to the left as far as it goes, in the end to the right; never through the back.
+    assert yaw.max() > 1.35
+    assert yaw[-1] == pytest.approx(-1.2, abs=0.05)
+    assert np.abs(np.diff(yaw)).max() < 0.2
+    assert (eyes[5:12] > 0.2).any()
+    assert np.abs(eyes[-5:]).max() < 0.02
+
+
+def test_nobody_notices_what_is_behind_hidden_or_far():
+    def noticed(where, sees=lambda t: True, **glances):
+        gaze = Gaze(Glances(watches=True, **glances), 1.75, np.random.default_rng(0))
+        watch(gaze, lambda t: robot_at(*where), 6.0, sees)
+        return gaze.noticed_s
+
+    assert noticed((-3.0, 0.5)) is None
+    assert noticed((3.0, 0.0), lambda t: False) is None
+    assert noticed((13.0, 0.0)) is None
+    assert noticed((3.0, 0.0), notices_within_m=0.0) is None
+    assert noticed((3.0, 0.0), looker_share=0.0) is None
+    # Nor one who looks the other way: the head, not the body, has the eyes.
+    assert noticed((0.0, -3.0), away_yaw_deg=80.0) is None
+    assert noticed((0.0, -3.0)) is not None
+    assert noticed((3.0, 0.0), lambda t: t > 2.0) == pytest.approx(2.3, abs=0.2)
+    assert noticed((3.0, 0.0), first_glance_delay_s=1.5) == pytest.approx(1.5, abs=0.2)
+
+
+def test_glances_alternate_and_end_for_good_when_given_up():
+    def looks(**glances) -> np.ndarray:
+        gaze = Gaze(Glances(**glances), 1.75, np.random.default_rng(4))
+        return watch(gaze, lambda t: robot_at(5.0, 1.0), 40.0)[:, 5]
+
+    looking = looks()
+    assert 0.2 < looking[100:].mean() < 0.7
+    assert np.count_nonzero(np.diff(looking)) > 10
+    assert looks(watches=True)[20:].all()
+    ended = looks(watches=True, gives_up_after_s=3.0)
+    assert ended[20:60].all()
+    assert not ended[70:].any()
+
+
+def test_a_phone_is_looked_at_between_glances():
+    gaze = Gaze(
+        Glances(notices_within_m=0.0, away_yaw_deg=10.0, away_pitch_deg=-40.0),
+        1.75,
+        np.random.default_rng(0),
+    )
+    rows = watch(gaze, lambda t: robot_at(4.0, 0.0), 3.0)
+    np.testing.assert_allclose(np.degrees(rows[:, 1]), 10.0, atol=1e-9)
+    np.testing.assert_allclose(np.degrees(rows[:, 2]), -40.0, atol=1e-9)
+
+
+def test_quartiles_must_lie_about_the_median():
+    with pytest.raises(SimError, match="either side of the median"):
+        LogNormalDuration.fitted(1.0, (1.2, 2.0))
+    with pytest.raises(ValueError, match="glance_quartiles_s"):
+        Glances(glance_median_s=2.0)

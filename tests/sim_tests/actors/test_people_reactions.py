@@ -1,0 +1,246 @@
+"""What people do about a robot, on a real stage."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from staged_people import crosser, film
+
+from sim_tests import Scenario, SimError, run_crossing
+from sim_tests.crossing import Stage
+
+
+@pytest.fixture(scope="module")
+def unaware():
+    return film([crosser(None)])
+
+
+def test_one_who_has_not_seen_the_robot_walks_on_as_if_alone(unaware):
+    (outcome,) = unaware.outcomes
+    assert outcome.noticed_s is None
+    assert outcome.reaction == ""
+    assert outcome.time_s == pytest.approx(outcome.free_time_s, abs=1e-9)
+    np.testing.assert_allclose(unaware.people[:, 0, 0], 5.0, atol=1e-6)
+
+
+def test_walk_on_changes_nothing():
+    unaware, aware = (film([crosser(reaction, start_s=1.5)]) for reaction in (None, "walk_on"))
+    assert aware.outcomes[0].noticed_s is not None
+    assert aware.outcomes[0].reaction == "walk_on"
+    assert aware.meter.min_separation_m > 0.3  # else one keeps off what one nearly touches
+    # Until there is something to decide, what is seen is kept away from a little.
+    np.testing.assert_allclose(aware.people[:, 0, :2], unaware.people[:, 0, :2], atol=0.1)
+    assert aware.outcomes[0].time_s == pytest.approx(unaware.outcomes[0].time_s, abs=0.1)
+
+
+def test_wait_stops_before_the_robots_way_until_it_has_passed():
+    waiting = film([crosser("wait")], seconds=14.0)
+    assert waiting.outcomes[0].reaction == "wait"
+    _, ahead_m = waiting.crossing()
+    assert ahead_m < -0.36  # the robot is past
+    before = waiting.robot[:, 0] < 5.0
+    assert waiting.people[before, 0, 1].max() < -0.8
+    assert waiting.speeds[:, 0][waiting.people[:, 0, 1] < -0.8][60:].min() < 0.1
+    assert not waiting.meter.contacts
+    assert waiting.outcomes[0].time_s > waiting.outcomes[0].free_time_s + 1.0
+
+
+def test_who_waits_for_a_robot_that_stands_waits_no_longer_than_some_seconds():
+    """The robot drives, then stops for good short of the crossing."""
+    result = run_crossing(
+        Scenario.model_validate(
+            {
+                "name": "stands",
+                "duration_s": 16.0,
+                "layout": "open",
+                # It stops where its goal is, before the person's way.
+                "robot": {"goal_x_m": 3.4, "goal_tolerance_m": 0.01},
+                "people": [crosser("wait")],
+            }
+        ),
+        policy="balanced",
+        planner=_StopsAt(3.2),
+    )
+    y = np.array([frame.truth[0].position_odom_m[1] for frame in result.frames])
+    still = np.count_nonzero(np.abs(np.diff(y[40:])) < 0.002) * 0.05
+    assert result.people[0].reaction == "wait"
+    assert result.people[0].time_s is not None
+    assert still > 1.0
+    assert y[-1] > 3.5
+
+
+class _StopsAt:
+    """Drives straight on at 0.8 m/s and stops at x."""
+
+    def __init__(self, x_m: float) -> None:
+        self._x_m = x_m
+
+    def plan(self, robot_state, goal_odom_m, constraints, dt_s):
+        return (0.8 if robot_state.position_odom_m[0] < self._x_m - 0.32 else 0.0), 0.0
+
+
+def test_hurry_goes_first_and_faster_within_human_limits():
+    hurrying = film([crosser("hurry", start_s=2.0)])
+    assert hurrying.outcomes[0].reaction == "hurry"
+    assert 1.3 * 1.34 < hurrying.speeds.max() <= 2.0 + 1e-6
+    _, ahead_m = hurrying.crossing()
+    assert ahead_m > 0.36
+    assert hurrying.outcomes[0].time_s < hurrying.outcomes[0].free_time_s - 0.5
+
+
+def test_claim_goes_first_without_haste():
+    claiming = film([crosser("claim", start_s=2.0)])
+    assert claiming.outcomes[0].reaction == "claim"
+    assert 1.36 < claiming.speeds.max() <= 1.1 * 1.34 + 1e-6
+    _, ahead_m = claiming.crossing()
+    assert ahead_m > 0.0
+
+
+def test_pass_behind_bends_the_way_behind_the_robot_without_stopping():
+    passing = film([crosser("pass_behind")])
+    assert passing.outcomes[0].reaction == "pass_behind"
+    _, ahead_m = passing.crossing()
+    assert ahead_m < -0.36
+    assert passing.people[:, 0, 0].min() < 4.7
+    y = passing.people[:, 0, 1]
+    assert passing.speeds[(y > -3.0) & (y < 3.0), 0].min() > 0.2
+    assert not passing.meter.contacts
+    assert passing.outcomes[0].length_m > passing.outcomes[0].free_length_m + 0.05
+
+
+@pytest.mark.parametrize("reaction", ["wait", "pass_behind"])
+def test_head_on_one_who_makes_way_steps_out_of_it(reaction):
+    head_on = film(
+        [crosser(reaction, route=[{"x_m": 9.0, "y_m": 0.0}, {"x_m": -2.0, "y_m": 0.0}])],
+        seconds=9.0,
+    )
+    assert head_on.outcomes[0].reaction == reaction
+    assert not head_on.meter.contacts
+    assert head_on.meter.min_separation_m > 0.2
+
+
+def test_reactions_are_drawn_by_their_shares():
+    shares = {"wait": 0.5, "claim": 0.5}
+    drawn = [
+        film([crosser(None) | {"reactions": shares, "glances": {"watches": True}}],
+             seconds=4.0, seed=seed).outcomes[0].reaction
+        for seed in range(12)
+    ]  # fmt: skip
+    assert set(drawn) == {"wait", "claim"}
+
+
+def test_a_blind_person_runs_into_a_standing_robot_stops_there_and_finds_the_way_round():
+    bump = film(
+        [crosser(None, start_s=0.0, glances={"notices_within_m": 0.0})],
+        robot_mps=0.0,
+        seconds=14.0,
+        robot={"start_x_m": 5.0, "goal_x_m": 12.0},
+    )
+    assert bump.meter.contacts
+    assert {contact.by for contact in bump.meter.contacts} == {"person"}
+    touch_s = bump.meter.contacts[0].t_s
+    after = np.searchsorted(bump.times_s, touch_s)
+    assert bump.speeds[after + 1 : after + 4, 0].min() < 0.5
+    # Nobody walks through a robot, nor moves it.
+    inside = (np.abs(bump.people[:, 0, 0] - bump.robot[:, 0]) < 0.36) & (
+        np.abs(bump.people[:, 0, 1] - bump.robot[:, 1]) < 0.25
+    )
+    assert not inside.any()
+    assert np.abs(bump.robot - bump.robot[0]).max() < 0.1
+    assert bump.people[-1, 0, 1] > 3.0
+
+
+def test_a_blind_person_who_walks_into_the_side_of_a_moving_robot_is_the_cause():
+    side = film([crosser(None, start_s=3.6)], seconds=9.0)
+    assert side.meter.contacts
+    assert side.meter.contacts[0].by == "person"
+
+
+def test_who_stands_behind_racks_never_notices():
+    hidden = film(
+        [
+            {
+                "name": "hidden",
+                "route": [{"x_m": 1.0, "y_m": 3.9}, {"x_m": 4.0, "y_m": 3.9}],
+                "glances": {"watches": True, "away_yaw_deg": -60.0},
+            }
+        ],
+        layout="crossing",
+        seconds=4.0,
+    )
+    assert hidden.outcomes[0].noticed_s is None
+    assert hidden.outcomes[0].reaction == ""
+
+
+def test_at_a_blind_corner_one_notices_only_when_the_rack_lets_one():
+    corner = film(
+        [crosser("wait", route=[{"x_m": 6.0, "y_m": -5.0}, {"x_m": 6.0, "y_m": 5.0}])],
+        layout="crossing",
+        seconds=8.0,
+        robot_mps=0.6,
+    )
+    noticed_s = corner.outcomes[0].noticed_s
+    at = int(np.searchsorted(corner.times_s, noticed_s))
+    x, y = corner.people[at, 0, :2]
+    rx, ry = corner.robot[at]
+    # The straight line to the robot passes the corner of the rack at (4.5, -1.6).
+    line_y = y + (4.5 - x) * (ry - y) / (rx - x)
+    assert line_y > -1.6 - 0.2
+    assert noticed_s > 2.4 + 1.0
+
+
+def test_people_react_alike_in_the_same_episode_and_apart_in_others():
+    case = [crosser(None) | {"glances": {}, "reactions": {}}]
+    first, again, other = (film(case, seed=seed, seconds=7.0) for seed in (5, 5, 6))
+    assert first.people.tobytes() == again.people.tobytes()
+    assert first.heads.tobytes() == again.heads.tobytes()
+    assert first.heads.tobytes() != other.heads.tobytes()
+
+
+def test_scripted_reacting_and_replayed_people_stand_in_that_order(tmp_path):
+    table = tmp_path / "one.csv"
+    table.write_text("t_s,id,x_m,y_m\n0,a,9,3\n2,a,10,3\n")
+    case = Scenario.model_validate(
+        {
+            "name": "all kinds",
+            "duration_s": 1.0,
+            "layout": "open",
+            "robot": {"goal_x_m": 12.0},
+            "workers": [{"path": [{"t_s": 0.0, "x_m": 7.0, "y_m": -3.0}]}],
+            "people": [{"name": "p", "route": [{"x_m": 8.0, "y_m": 2.0}]}],
+            "replay_csv": str(table),
+        }
+    )
+    result = run_crossing(case, policy="balanced")
+    xs = [view.position_odom_m[0] for view in result.frames[0].truth]
+    assert xs == pytest.approx([7.0, 8.0, 9.0])
+    assert [person.name for person in result.people] == ["p"]
+    assert not run_crossing(case.without_people(), policy="balanced").frames[0].truth
+
+
+def test_reactions_that_are_not_named_get_no_share():
+    person = crosser("wait")
+    case = {"name": "x", "duration_s": 1.0, "robot": {"goal_x_m": 1.0}, "people": [person, person]}
+    with pytest.raises(ValueError, match="names of people must be unique"):
+        Scenario.model_validate(case)
+    case["people"] = [person | {"reactions": {"wait": 0.0}}]
+    with pytest.raises(ValueError, match="at least one share"):
+        Scenario.model_validate(case)
+    case["people"] = [person]
+    reactions = Scenario.model_validate(case).people[0].reactions
+    assert reactions.wait == 1.0
+    assert reactions.walk_on == reactions.claim == reactions.hurry == 0.0
+
+
+def test_a_route_into_a_rack_ends_the_stage_cleanly():
+    case = Scenario.model_validate(
+        {
+            "name": "x",
+            "duration_s": 1.0,
+            "layout": "crossing",
+            "robot": {"goal_x_m": 1.0},
+            "people": [{"name": "p", "route": [{"x_m": 0.0, "y_m": 2.2}]}],
+        }
+    )
+    with pytest.raises(SimError, match="inside a rack"):
+        Stage(case, np.zeros(0))

@@ -1,0 +1,113 @@
+"""Recorded people: exact at their rows, smooth between them, and what a table must hold."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from sim_tests import SimError
+from sim_tests.actors.behaviour import replayed_people
+from sim_tests.actors.behaviour._person import ALONE
+from sim_tests.actors.behaviour._replayed import Replayed, read_recordings
+
+TABLE = """t_s, id, x_m, y_m, heading_rad, head_yaw_rad
+0.0, anna, 0.0, 0.0, 3.0, 0.0
+0.4, anna, 0.5, 0.1, 3.1, 0.2
+0.0, 7, 5.0, 5.0, ,
+0.8, anna, 1.0, 0.1, -3.1, -0.4
+1.0, 7, 5.0, 6.0, ,
+"""
+
+
+@pytest.fixture
+def table(tmp_path):
+    path = tmp_path / "people.csv"
+    path.write_text(TABLE)
+    return path
+
+
+def test_rows_are_met_exactly(table):
+    anna, seven = replayed_people(table)
+    assert (anna.recording.name, seven.recording.name) == ("anna", "7")
+    assert anna.look != seven.look
+    for t, x, y, heading, yaw in (
+        (0.0, 0.0, 0.0, 3.0, 0.0),
+        (0.4, 0.5, 0.1, 3.1, 0.2),
+        (0.8, 1.0, 0.1, -3.1, -0.4),
+    ):
+        motion = anna.motion(t, ALONE)
+        np.testing.assert_allclose(motion.position_odom_m, [x, y], atol=1e-12)
+        assert math.remainder(motion.heading_odom_rad - heading, math.tau) == pytest.approx(0.0)
+        assert motion.head_yaw_rad == pytest.approx(yaw, abs=1e-12)
+
+
+def test_between_rows_velocity_is_the_slope_and_headings_go_the_short_way(table):
+    anna, seven = replayed_people(table)
+    for t in np.linspace(0.02, 0.78, 20):
+        before, now, after = (anna.motion(t + dt, ALONE) for dt in (-1e-5, 0.0, 1e-5))
+        slope = (after.position_odom_m - before.position_odom_m) / 2e-5
+        np.testing.assert_allclose(now.velocity_odom_mps, slope, atol=1e-3)
+        assert 3.0 <= now.heading_odom_rad <= math.tau - 3.1 + 1e-9
+    # Without headings the body faces the way it walks; outside of the rows it stands.
+    assert seven.motion(0.5, ALONE).heading_odom_rad == pytest.approx(math.pi / 2)
+    for t, y in ((-1.0, 5.0), (4.0, 6.0)):
+        motion = seven.motion(t, ALONE)
+        np.testing.assert_allclose(motion.position_odom_m, [5.0, y])
+        np.testing.assert_allclose(motion.velocity_odom_mps, 0.0)
+
+
+def test_order_of_rows_and_columns_does_not_matter(table, tmp_path):
+    header, *rows = [[cell.strip() for cell in row.split(",")] for row in TABLE.splitlines()]
+    order = [5, 1, 4, 0, 3, 2]
+    other = tmp_path / "other.csv"
+    lines = [header, *sorted(rows, reverse=True)]
+    other.write_text("\n".join(",".join(row[n] for n in order) for row in lines))
+    here = {recording.name: recording for recording in read_recordings(table)}
+    for recording in read_recordings(other):
+        np.testing.assert_array_equal(
+            recording.positions_odom_m, here[recording.name].positions_odom_m
+        )
+        np.testing.assert_array_equal(recording.times_s, here[recording.name].times_s)
+
+
+def test_one_row_is_somebody_who_stands(tmp_path):
+    path = tmp_path / "one.csv"
+    path.write_text("t_s,id,x_m,y_m,heading_rad\n2.0,a,1.0,-1.0,0.5\n")
+    (recording,) = read_recordings(path)
+    motion = Replayed(recording).motion(7.0, ALONE)
+    np.testing.assert_allclose(motion.position_odom_m, [1.0, -1.0])
+    assert motion.heading_odom_rad == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "misses t_s, id, x_m, y_m"),
+        ("t_s,id,x_m\n", "misses y_m"),
+        ("t_s,id,x_m,y_m,speed\n", "unknown columns 'speed'"),
+        ("t_s,id,x_m,y_m,x_m\n", "names x_m twice"),
+        ("t_s,id,x_m,y_m\n", "holds no rows"),
+        ("t_s,id,x_m,y_m\n0,a,1,north\n", "line 2: y_m must be a finite number, got 'north'"),
+        ("t_s,id,x_m,y_m\n0,a,1\n", "line 2: y_m must be a finite number"),
+        ("t_s,id,x_m,y_m\n0,a,nan,1\n", "line 2: x_m must be a finite number"),
+        ("t_s,id,x_m,y_m\n0,,1,1\n", "line 2: id is empty"),
+        ("t_s,id,x_m,y_m\n0,a,1,1\n0,a,2,1\n", "two rows for t_s = 0 s"),
+        ("t_s,id,x_m,y_m\n0,a,1,1\n0.1,a,9,1\n", "line 3: 'a' moves 8 m in 0.1 s"),
+        (
+            "t_s,id,x_m,y_m,heading_rad\n0,a,1,1,0\n1,a,2,1,\n",
+            "line 3: heading_rad of 'a' is empty here",
+        ),
+    ],
+)
+def test_what_a_table_must_hold(tmp_path, text, message):
+    path = tmp_path / "bad.csv"
+    path.write_text(text)
+    with pytest.raises(SimError, match=message):
+        read_recordings(path)
+
+
+def test_a_file_that_is_not_there(tmp_path):
+    with pytest.raises(SimError, match="cannot read recorded people from"):
+        read_recordings(tmp_path / "none.csv")

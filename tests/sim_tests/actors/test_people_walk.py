@@ -1,0 +1,253 @@
+"""Walking: routes, stops, racks, feet; without a robot."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sim_tests import SimError
+from sim_tests.actors.behaviour import MovingBody, PersonSpec, RobotBody, Surroundings, Walker
+from sim_tests.actors.behaviour._forces import BODY_M
+from sim_tests.actors.behaviour._person import ALONE
+from sim_tests.actors.behaviour._walker import TICK_S
+from sim_tests.world.hall import WarehouseLayout
+
+NO_BOXES = np.empty((0, 4))
+HALL = WarehouseLayout.crossing().obstacle_boxes_odom
+
+
+def walker(route, boxes=NO_BOXES, seed: int = 0, **fields) -> Walker:
+    points = [{"x_m": x, "y_m": y} for x, y in route]
+    spec = PersonSpec.model_validate({"name": "walker", "route": points, **fields})
+    return Walker(spec, np.random.default_rng(seed), boxes)
+
+
+def walk(person: Walker, seconds: float, around=ALONE, hz: float = 20.0) -> np.ndarray:
+    """Rows t, x, y, vx, vy, heading."""
+    rows = []
+    for n in range(round(seconds * hz) + 1):
+        m = person.motion(n / hz, around)
+        rows.append((n / hz, *m.position_odom_m, *m.velocity_odom_mps, m.heading_odom_rad))
+    return np.array(rows)
+
+
+def test_an_undisturbed_walk_takes_the_free_time_exactly():
+    for fields in (
+        {},
+        {"start_s": 1.33},
+        {"pauses": [{"at_m": 2.0, "for_s": 1.5}]},
+        {"turns_back_at_m": 3.0},
+        {"backwards": True},
+        {"speed_mps": 2.0, "heading_deg": 170.0},
+    ):
+        person = walker([(0, 0), (4, 0), (6, 3)], **fields)
+        walk(person, 20.0)
+        outcome = person.outcome()
+        assert person.arrived
+        assert outcome.time_s == pytest.approx(outcome.free_time_s, abs=1e-9)
+        assert outcome.length_m == pytest.approx(outcome.free_length_m, abs=1e-9)
+
+
+def test_free_time_is_length_over_speed_plus_starting_stopping_and_pauses():
+    long, longer = (walker([(0, 0), (length, 0)]).outcome() for length in (6.0, 9.0))
+    # Free walking in the middle: three metres more take so much longer, to a tick.
+    assert longer.free_time_s - long.free_time_s == pytest.approx(3.0 / 1.34, abs=1.5 * TICK_S)
+    assert 6.0 / 1.34 < long.free_time_s < 6.0 / 1.34 + 2.5
+    assert long.free_length_m == pytest.approx(5.9, abs=0.1)
+    paused = walker([(0, 0), (6, 0)], pauses=[{"at_m": 3.0, "for_s": 2.0}]).outcome()
+    assert 2.0 < paused.free_time_s - long.free_time_s < 5.0
+
+
+def test_stops_are_where_and_as_long_as_asked():
+    rows = walk(walker([(0, 0), (8, 0)], pauses=[{"at_m": 3.0, "for_s": 2.0}]), 14.0)
+    standing = rows[(np.hypot(rows[:, 3], rows[:, 4]) < 0.05) & (rows[:, 1] > 1) & (rows[:, 1] < 7)]
+    np.testing.assert_allclose(standing[:, 1], 3.0, atol=0.1)
+    assert standing[-1, 0] - standing[0, 0] == pytest.approx(2.0, abs=0.5)
+    assert rows[-1, 1] == pytest.approx(8.0, abs=0.1)
+
+
+def test_turning_back_ends_where_it_began_and_faces_the_way_back():
+    rows = walk(walker([(0, 0), (8, 0)], turns_back_at_m=3.0), 12.0)
+    assert rows[:, 1].max() == pytest.approx(3.0, abs=0.15)
+    assert rows[-1, 1] == pytest.approx(0.0, abs=0.1)
+    assert math.cos(rows[-1, 5]) == pytest.approx(-1.0, abs=0.01)
+
+
+def test_walking_backwards_the_back_is_ahead():
+    rows = walk(walker([(0, 0), (6, 0)], backwards=True), 3.0)
+    assert rows[-1, 3] > 1.2
+    np.testing.assert_allclose(np.cos(rows[:, 5]), -1.0, atol=1e-9)
+
+
+def test_standing_somewhere_faces_as_asked_and_has_no_free_time():
+    person = walker([(2, 1)], heading_deg=-90.0)
+    rows = walk(person, 3.0)
+    np.testing.assert_allclose(rows[:, 1:5], [[2, 1, 0, 0]] * len(rows), atol=1e-9)
+    np.testing.assert_allclose(rows[:, 5], -math.pi / 2)
+    assert person.outcome().free_time_s is None
+    assert person.outcome().time_s is None
+
+
+@pytest.mark.parametrize("speed", [0.5, 1.34, 2.0, 3.0])
+def test_starts_and_stops_are_smooth_and_nobody_is_faster_than_told(speed):
+    rows = walk(walker([(0, 0), (10, 0)], speed_mps=speed), 10.0 / speed + 4.0)
+    v = np.hypot(rows[:, 3], rows[:, 4])
+    assert v.max() <= speed + 1e-9
+    assert v.max() > 0.97 * speed
+    assert np.abs(np.diff(v)).max() <= 3.0 * TICK_S + 1e-9
+    assert rows[-1, 1] == pytest.approx(10.0, abs=0.1)
+
+
+def test_how_often_one_asks_changes_nothing():
+    route = [(4.5, -4.0), (6.0, 0.0), (7.0, 5.0)]
+    other = Surroundings(None, (MovingBody(5.5, -1.0, 0.0, -0.5),), lambda: False)
+    rare = walk(walker(route, HALL), 6.0, other, hz=20.0)
+    often = walk(walker(route, HALL), 6.0, other, hz=60.0)[::3]
+    np.testing.assert_allclose(often, rare, atol=1e-9)
+
+
+def test_the_same_seed_walks_the_same_way_to_the_bit():
+    def rows():
+        around = Surroundings(
+            RobotBody(2.0, 0.0, 0.0, 0.8, 0.0, 0.36, 0.25, (2.2, 0.0, 1.4)),
+            (MovingBody(5.5, -1.0, 0.0, 0.5),),
+            lambda: True,
+        )
+        return walk(walker([(5, -3), (5, 3)], HALL, seed=9), 6.0, around)
+
+    assert rows().tobytes() == rows().tobytes()
+
+
+@pytest.mark.parametrize(("angle", "shift"), [(0.7, (3.0, -2.0)), (math.pi / 2, (0.0, 0.0))])
+def test_turning_the_world_turns_the_walk(angle, shift):
+    cos, sin = math.cos(angle), math.sin(angle)
+    R = np.array([[cos, -sin], [sin, cos]])
+
+    def moved(x, y):
+        return (R @ [x, y] + shift).tolist()
+
+    def rows(turn: bool) -> np.ndarray:
+        place = moved if turn else (lambda x, y: [x, y])
+        way = (lambda x, y: (R @ [x, y]).tolist()) if turn else (lambda x, y: [x, y])
+        person = walker([place(0, -3), place(0, 3), place(2, 4)], reactions={"pass_behind": 1.0})
+        out = []
+        for n in range(121):
+            t = n * TICK_S
+            robot = RobotBody(
+                *place(-2.6 + 0.8 * t, 0.2),
+                angle if turn else 0.0,
+                *way(0.8, 0.0),
+                0.36,
+                0.25,
+                (*place(-2.4 + 0.8 * t, 0.2), 1.4),
+            )
+            other = MovingBody(*place(0.4, 3.0 - t), *way(0.0, -1.0))
+            m = person.motion(t, Surroundings(robot, (other,), lambda: True))
+            heading = m.heading_odom_rad
+            out.append((*m.position_odom_m, math.cos(heading), math.sin(heading), m.head_yaw_rad))
+        assert person.outcome().reaction == "pass_behind"
+        return np.array(out)
+
+    here, there = rows(False), rows(True)
+    np.testing.assert_allclose(there[:, :2], here[:, :2] @ R.T + shift, atol=1e-6)
+    np.testing.assert_allclose(there[:, 2:4], here[:, 2:4] @ R.T, atol=1e-6)
+    np.testing.assert_allclose(there[:, 4], here[:, 4], atol=1e-6)
+
+
+coordinate = st.floats(-4.0, 4.0)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    corners=st.lists(
+        st.tuples(st.floats(-3.0, 15.0), st.floats(-7.5, 7.5)), min_size=2, max_size=4
+    ),
+    movers=st.lists(
+        st.tuples(st.floats(-2, 2), st.floats(-2, 2), coordinate, coordinate), max_size=4
+    ),
+    speed=st.floats(0.5, 3.0),
+    seed=st.integers(0, 5),
+)
+def test_nobody_gets_into_a_rack_whatever_pushes(corners, movers, speed, seed):
+    try:
+        person = walker(corners, HALL, seed=seed, speed_mps=speed)
+    except SimError:
+        return  # the route itself leads into a rack, and is refused
+    x, y = corners[0]
+    least = min(BODY_M, float(_distances(np.array([[x, y]])).min()))
+    for n in range(140):
+        t = 0.1 * n
+        # People who come at the walker from all sides, wherever that is.
+        crowd = tuple(
+            MovingBody(x + dx * math.cos(t), y + dy * math.cos(t), vx, vy)
+            for dx, dy, vx, vy in movers
+        )
+        robot = RobotBody(x - 0.5, y, 0.0, 1.0, 0.0, 0.36, 0.25, (x, y, 1.4))
+        person.advance(t, Surroundings(robot, crowd, lambda: True))
+        x, y = person.place_odom_m
+        assert float(_distances(np.array([[x, y]])).min()) >= least - 1e-6
+
+
+def _distances(points: np.ndarray) -> np.ndarray:
+    nearest = np.clip(points[:, None], HALL[None, :, :2], HALL[None, :, 2:])
+    return np.linalg.norm(points[:, None] - nearest, axis=2)
+
+
+def test_a_route_through_a_rack_is_refused_by_name():
+    with pytest.raises(SimError, match=r"route point 1 of 'walker' lies inside a rack"):
+        walker([(0.0, 0.0), (0.0, 2.2)], HALL)
+
+
+def test_two_people_who_meet_head_on_pass_each_other():
+    left, right = walker([(0, 0), (8, 0)]), walker([(8, 0), (0, 0)])
+    nearest = math.inf
+    states = [(0.0, 0.0, 0.0, 0.0), (8.0, 0.0, 0.0, 0.0)]
+    for n in range(240):
+        around = [Surroundings(None, (MovingBody(*states[1 - i]),), lambda: False) for i in (0, 1)]
+        motions = [p.motion(n * TICK_S, a) for p, a in zip((left, right), around, strict=True)]
+        states = [(*m.position_odom_m, *m.velocity_odom_mps) for m in motions]
+        nearest = min(nearest, math.dist(states[0][:2], states[1][:2]))
+    assert nearest > 0.4
+    assert left.arrived
+    assert right.arrived
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {},
+        {"speed_mps": 0.5},
+        {"speed_mps": 2.0},
+        {"backwards": True, "speed_mps": 0.8},
+        {"pauses": [{"at_m": 2.0, "for_s": 1.0}]},
+        {"turns_back_at_m": 2.0},
+    ],
+)
+def test_a_foot_that_stands_stays_and_legs_reach_it(fields):
+    person = walker([(0, 0), (4, 0), (5, 2)], **fields)
+    before = None
+    steps = [0, 0]
+    standing_m = person.motion(0.0, ALONE).feet.feet[0][2]
+    for n in range(1, 480):
+        m = person.motion(n / 60.0, ALONE)
+        x, y = m.position_odom_m
+        for side, foot in enumerate(m.feet.feet):
+            assert foot[2] >= standing_m - 0.01
+            assert math.hypot(foot[0] - x, foot[1] - y) < 0.85
+            if before is None:
+                continue
+            last = before.feet[side]
+            flat = all(abs(f[4]) < 1e-6 and f[2] < standing_m + 1e-6 for f in (foot, last))
+            if flat:
+                assert math.dist(foot[:2], last[:2]) < 1e-6
+            steps[side] += foot[2] > standing_m + 0.02 >= last[2]
+        before = m.feet
+        assert 0.4 < m.feet.hip_height_m < 1.1
+    assert min(steps) >= 3
+    # In the end the feet stand side by side.
+    (ax, ay, *_), (bx, by, *_) = m.feet.feet
+    assert math.hypot(ax - bx, ay - by) < 0.4

@@ -1,0 +1,408 @@
+"""The worker: kinematics, head and gaze, and that PyBullet's links are where the truth says."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from perception import layouts as kp
+from perception.anthropometry import HEAD_TEMPLATE_M
+from sim_tests import SimError
+from sim_tests.actors.body import (
+    MAX_EYE_PITCH_RAD,
+    MAX_EYE_YAW_RAD,
+    MAX_HEAD_PITCH_RAD,
+    MAX_HEAD_YAW_RAD,
+    Gait,
+    Worker,
+    load_worker,
+    worker_names,
+)
+from sim_tests.actors.body._asset import JOINTS, PARENTS
+from sim_tests.actors.body._pose import (
+    BodyPose,
+    about,
+    link_transform,
+    link_transforms,
+    matrix,
+    product,
+    quaternion,
+    rotation_matrices,
+    rotation_vector,
+    skin_points,
+    slerp,
+)
+from sim_tests.actors.robot import Amr
+from sim_tests.world import Warehouse
+from sim_tests.world.bullet import pybullet
+from sim_tests.world.hall import WarehouseLayout
+
+# PyBullet numbers links depth first, without the eyes; the slide of the carried box is one too.
+LINKS = [
+    *(name for name in JOINTS[: JOINTS.index("left_hip")] if not name.endswith("_eye")),
+    "box",
+    *JOINTS[JOINTS.index("left_hip") :],
+]
+
+heads = {
+    "head_yaw_rad": st.floats(-MAX_HEAD_YAW_RAD, MAX_HEAD_YAW_RAD),
+    "head_pitch_rad": st.floats(-MAX_HEAD_PITCH_RAD, MAX_HEAD_PITCH_RAD),
+    "eye_yaw_rad": st.floats(-MAX_EYE_YAW_RAD, MAX_EYE_YAW_RAD),
+    "eye_pitch_rad": st.floats(-MAX_EYE_PITCH_RAD, MAX_EYE_PITCH_RAD),
+}
+postures = st.fixed_dictionaries(
+    {
+        "position_odom_m": st.tuples(st.floats(-4.0, 4.0), st.floats(-4.0, 4.0)),
+        "heading_odom_rad": st.floats(-7.0, 7.0),
+        "walked_m": st.floats(-20.0, 20.0),
+        "speed_mps": st.floats(0.0, 2.0),
+        "activity": st.sampled_from(["none", "carry_box", "phone"]),
+        **heads,
+    }
+)
+angles = st.floats(-1.5, 1.5)
+rotvecs = st.tuples(angles, angles, angles)
+
+
+@pytest.fixture(scope="module")
+def hall() -> Iterator[Warehouse]:
+    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
+        yield warehouse
+
+
+@pytest.fixture(scope="module")
+def worker(hall: Warehouse) -> Worker:
+    return Worker(hall, 1.82)
+
+
+def _links(hall: Warehouse, worker: Worker) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Rotation and origin of every link in PyBullet."""
+    out = {}
+    for row, name in enumerate(LINKS):
+        state = pybullet.getLinkState(
+            worker.body, row, computeForwardKinematics=True, physicsClientId=hall.client
+        )
+        rotation = np.array(pybullet.getMatrixFromQuaternion(state[5])).reshape(3, 3)
+        out[name] = rotation, np.array(state[4])
+    return out
+
+
+@given(postures)
+@settings(max_examples=60, deadline=None)
+def test_truth_is_where_pybullet_has_the_links(
+    hall: Warehouse, worker: Worker, posture: dict
+) -> None:
+    worker.place(**posture)
+    transforms = link_transforms(worker.asset.joints_m, worker.pose)
+    links = _links(hall, worker)
+    for row, name in enumerate(JOINTS):
+        if name.endswith("_eye"):
+            continue
+        rotation, origin = links[name]
+        joint = transforms[1 + row] @ [*worker.skeleton.joints_m[row], 1.0]
+        np.testing.assert_allclose(origin, joint[:3], atol=1e-5)
+        np.testing.assert_allclose(rotation, transforms[1 + row, :3, :3], atol=1e-5)
+    head, _ = links["neck"]
+    np.testing.assert_allclose(
+        np.column_stack([-head[:, 2], head[:, 0], -head[:, 1]]),
+        worker.rotation_odom_head,
+        atol=1e-5,
+    )
+    if worker.held == "box":
+        T = worker.T_odom_held
+        assert T is not None
+        np.testing.assert_allclose(links["box"][1], T[:3, 3], atol=1e-5)
+    else:
+        assert links["box"][1][2] < -50.0
+
+
+@given(postures)
+@settings(max_examples=60, deadline=None)
+def test_shortcuts_agree_with_the_whole_body(worker: Worker, posture: dict) -> None:
+    """Head, eyes and chest are computed alone; the keypoints come from the whole pose."""
+    worker.place(**posture)
+    points = worker.keypoints_odom_m
+    assert points.shape == (23, 3)
+    np.testing.assert_allclose(worker.position_nose_odom_m, points[kp.NOSE], atol=1e-9)
+    # Shoulders give a little with the arms, hips with the legs.
+    np.testing.assert_allclose(
+        worker.chest_odom_m,
+        0.7 * points[5:7].mean(axis=0) + 0.3 * points[11:13].mean(axis=0),
+        atol=0.025,
+    )
+    np.testing.assert_array_equal(worker.position_odom_m, posture["position_odom_m"])
+    # The chest is over the body's centre line but for the sway and lean of a walk.
+    assert np.linalg.norm(worker.chest_odom_m[:2] - posture["position_odom_m"]) < 0.09
+    # The face is rigid, and near the template that perception fits to it.
+    face = (points[[0, 3, 4]] - points[0]) @ worker.rotation_odom_head
+    rest = worker.asset.keypoints_m[[0, 3, 4]] * worker.skeleton.scale
+    expected = (rest - rest[0]) @ np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]])
+    np.testing.assert_allclose(face, expected, atol=1e-9)
+    np.testing.assert_allclose(face, HEAD_TEMPLATE_M[[0, 3, 4]], atol=0.025)
+
+
+@given(postures, st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))
+@settings(max_examples=40, deadline=None)
+def test_a_body_looks_the_same_anywhere(
+    worker: Worker, posture: dict, turn_rad: float, x_m: float, y_m: float
+) -> None:
+    worker.place(**posture)
+    points, gaze = np.array(worker.keypoints_odom_m), worker.gaze_odom
+    turn = np.eye(3)
+    turn[:2, :2] = [
+        [math.cos(turn_rad), -math.sin(turn_rad)],
+        [math.sin(turn_rad), math.cos(turn_rad)],
+    ]
+    position = turn[:2, :2] @ posture["position_odom_m"] + (x_m, y_m)
+    heading = posture["heading_odom_rad"] + turn_rad
+    worker.place(**{**posture, "position_odom_m": position, "heading_odom_rad": heading})
+    np.testing.assert_allclose(worker.keypoints_odom_m, points @ turn.T + (x_m, y_m, 0), atol=1e-9)
+    np.testing.assert_allclose(worker.gaze_odom, turn @ gaze, atol=1e-9)
+
+
+@pytest.mark.parametrize("look", worker_names())
+def test_stands_upright_on_the_floor_as_tall_as_asked(hall: Warehouse, look: str) -> None:
+    for stature_m in (1.52, 1.93):
+        worker = Worker(hall, stature_m, look=look, position_odom_m=(2.0, 1.0))
+        asset = worker.asset
+        assert worker.pose.scale == pytest.approx(stature_m / asset.stature_m)
+        skin = asset.levels[1]
+        points = skin_points(asset.joints_m, worker.pose, skin.vertices_m, skin.weights)
+        assert points[:, 2].min() == pytest.approx(0.0, abs=0.005)
+        # Nearly its pose at rest: unlocked knees lower it by millimetres, feet point out a little.
+        rest = asset.keypoints_m * worker.pose.scale + [2.0, 1.0, 0.0]
+        np.testing.assert_allclose(worker.keypoints_odom_m, rest, atol=0.04)
+        assert worker.eyes_odom_m[2] / stature_m == pytest.approx(0.935, abs=0.02)
+        # What a ray from above meets first is the head.
+        x, y, _ = worker.eyes_odom_m - 0.06 * worker.gaze_odom
+        hit = pybullet.rayTest((x, y, 3.0), (x, y, 0.0), physicsClientId=hall.client)[0]
+        assert hit[0] == worker.body
+        assert hit[3][2] == pytest.approx(stature_m, abs=0.07)
+        pybullet.removeBody(worker.body, physicsClientId=hall.client)
+
+
+@given(st.floats(-3.0, 3.0), st.fixed_dictionaries(heads), st.floats(0.0, 2.0))
+@settings(max_examples=60, deadline=None)
+def test_head_and_eyes_turn_by_the_angles_given_and_nothing_else_does(
+    worker: Worker, heading_rad: float, head: dict, speed_mps: float
+) -> None:
+    worker.place((1.0, -1.0), heading_rad, 0.3, speed_mps)
+    body = np.array(worker.keypoints_odom_m[7:])
+    worker.place((1.0, -1.0), heading_rad, 0.3, speed_mps, **head)
+    np.testing.assert_allclose(worker.keypoints_odom_m[7:], body, atol=1e-12)  # the rest stays
+    azimuth, pitch = heading_rad + head["head_yaw_rad"], head["head_pitch_rad"]
+    down, forward, right = worker.rotation_odom_head.T
+    ahead = (
+        math.cos(pitch) * math.cos(azimuth),
+        math.cos(pitch) * math.sin(azimuth),
+        math.sin(pitch),
+    )
+    np.testing.assert_allclose(forward, ahead, atol=1e-9)
+    np.testing.assert_allclose(right[2], 0.0, atol=1e-9)  # the head is never tilted sideways
+    np.testing.assert_allclose(np.cross(down, forward), right, atol=1e-9)
+    eyes = worker.T_odom_eyes
+    np.testing.assert_allclose(eyes[:3, 2], forward, atol=1e-12)
+    np.testing.assert_allclose(eyes[:3, 1], down, atol=1e-12)
+    np.testing.assert_allclose(eyes[:3, 3], worker.eyes_odom_m, atol=1e-12)
+    # The gaze leaves the head's axis by the eyes' yaw and pitch.
+    yaw, up = head["eye_yaw_rad"], head["eye_pitch_rad"]
+    gaze = np.array([-down, forward, -right]) @ worker.gaze_odom  # up, ahead, left
+    np.testing.assert_allclose(
+        gaze, (math.sin(up), math.cos(up) * math.cos(yaw), math.cos(up) * math.sin(yaw)), atol=1e-9
+    )
+    # Eyeballs turn with it: their pupils look along the gaze.
+    transforms = link_transforms(worker.asset.joints_m, worker.pose)
+    for eye in ("left_eye", "right_eye"):
+        axis = transforms[1 + JOINTS.index(eye), :3, 0]
+        np.testing.assert_allclose(axis, worker.gaze_odom, atol=1e-9)
+
+
+def test_an_offset_of_the_eyes_leaves_head_and_apex_where_they_are(worker: Worker) -> None:
+    worker.place((0.0, 0.0), 0.4, head_yaw_rad=0.5, head_pitch_rad=-0.2)
+    head, apex, gaze = worker.rotation_odom_head, worker.eyes_odom_m, worker.gaze_odom
+    np.testing.assert_allclose(gaze, head[:, 1], atol=1e-12)
+    worker.place(
+        (0.0, 0.0), 0.4, head_yaw_rad=0.5, head_pitch_rad=-0.2, eye_yaw_rad=0.3, eye_pitch_rad=0.1
+    )
+    np.testing.assert_array_equal(worker.rotation_odom_head, head)
+    np.testing.assert_array_equal(worker.eyes_odom_m, apex)
+    assert math.acos(float(worker.gaze_odom @ gaze)) == pytest.approx(
+        math.acos(math.cos(0.3) * math.cos(0.1)), abs=1e-9
+    )
+
+
+@given(st.lists(rotvecs, min_size=16, max_size=16), st.floats(0.8, 1.2), rotvecs)
+@settings(max_examples=40, deadline=None)
+def test_kinematics_against_scipy_joint_by_joint(
+    bends: list, scale: float, turn: tuple[float, float, float]
+) -> None:
+    """Links, pieces and skin against a plain product of turns about joints."""
+    asset = load_worker("giulia")
+    T_odom_body = np.eye(4)
+    T_odom_body[:3, :3] = Rotation.from_rotvec(turn).as_matrix()
+    T_odom_body[:3, 3] = (1.0, 2.0, 0.1)
+    pose = BodyPose(T_odom_body, scale, np.array(bends))
+
+    def about_joint(joint: int, share: float) -> np.ndarray:
+        step = np.eye(4)
+        step[:3, :3] = Rotation.from_rotvec(share * np.array(bends[joint])).as_matrix()
+        centre = asset.joints_m[joint] * scale
+        step[:3, 3] = centre - step[:3, :3] @ centre
+        return step
+
+    def link(joint: int) -> np.ndarray:
+        return T_odom_body if joint < 0 else link(PARENTS[joint]) @ about_joint(joint, 1.0)
+
+    links = link_transforms(asset.joints_m, pose)
+    for joint in range(-1, 16):
+        np.testing.assert_allclose(links[1 + joint], link(joint), atol=1e-9)
+    joints = np.repeat(np.arange(-1, 16), 3)
+    shares = np.tile([0.0, 0.4, 1.0], 17)
+    pieces = link_transform(asset.joints_m, pose, joints, shares)
+    for joint, share, piece in zip(joints.tolist(), shares.tolist(), pieces, strict=True):
+        expected = T_odom_body if joint < 0 else link(PARENTS[joint]) @ about_joint(joint, share)
+        np.testing.assert_allclose(piece, expected, atol=1e-9)
+    # A point whose weights are whole moves with its link; a share of a joint moves it part of it.
+    weights = np.zeros((2, 16))
+    elbow, shoulder = JOINTS.index("left_elbow"), JOINTS.index("left_shoulder")
+    weights[:, [0, shoulder]] = 1.0
+    weights[:, elbow] = [1.0, 0.3]
+    points = np.array([[0.1, 0.3, 0.9], [0.0, 0.25, 1.1]])
+    whole = np.column_stack([points * scale, np.ones(2)])
+    moved = skin_points(asset.joints_m, pose, points, weights)
+    np.testing.assert_allclose(moved[0], (link(elbow) @ whole[0])[:3], atol=1e-9)
+    part = link(shoulder) @ about_joint(elbow, 0.3)
+    np.testing.assert_allclose(moved[1], (part @ whole[1])[:3], atol=1e-9)
+
+
+@given(rotvecs, rotvecs, st.floats(0.0, 1.0))
+@settings(deadline=None)
+def test_quaternions_against_scipy(first: tuple, second: tuple, share: float) -> None:
+    one, other = (Rotation.from_rotvec(v) for v in (first, second))
+    p, q = (tuple(r.as_quat().tolist()) for r in (one, other))
+    np.testing.assert_allclose(matrix(product(p, q)), (one * other).as_matrix(), atol=1e-12)
+    np.testing.assert_allclose(rotation_matrices(np.array([first]))[0], one.as_matrix(), atol=1e-9)
+    np.testing.assert_allclose(rotation_vector(p), one.as_rotvec(), atol=1e-9)
+    columns = tuple(tuple(column) for column in one.as_matrix().T.tolist())
+    np.testing.assert_allclose(matrix(quaternion(*columns)), one.as_matrix(), atol=1e-9)
+    middle = one * Rotation.from_rotvec(share * (one.inv() * other).as_rotvec())
+    np.testing.assert_allclose(matrix(slerp(p, q, share)), middle.as_matrix(), atol=1e-9)
+    length = float(np.linalg.norm(first))
+    if length > 1e-6:
+        axis = tuple((np.array(first) / length).tolist())
+        np.testing.assert_allclose(matrix(about(axis, length)), one.as_matrix(), atol=1e-9)
+
+
+def test_limbs_keep_their_lengths(worker: Worker) -> None:
+    """Between joints; keypoints sit on skin that bends, so theirs change by a little."""
+    rest = worker.skeleton.joints_m
+    for walked in np.linspace(0.0, 1.5, 13):
+        worker.place((0.3, 0.1), 1.0, walked, 1.4, activity="phone")
+        links = link_transforms(worker.asset.joints_m, worker.pose)
+        at = np.einsum("jab,jb->ja", links[1:], np.column_stack([rest, np.ones(16)]))[:, :3]
+        for joint, parent in enumerate(PARENTS):
+            if parent >= 0:
+                assert np.linalg.norm(at[joint] - at[parent]) == pytest.approx(
+                    np.linalg.norm(rest[joint] - rest[parent]), abs=1e-9
+                )
+
+
+def test_posture_depends_on_the_arguments_alone(worker: Worker) -> None:
+    arguments = ((0.7, 0.2), 1.0, 3.3, 1.1, 0.4, -0.2)
+    worker.place(*arguments)
+    first = worker.keypoints_odom_m.tobytes()
+    worker.place((-3.0, 1.0), -2.0, 17.0, 0.4, activity="carry_box", eye_yaw_rad=0.2)
+    worker.place(*arguments)
+    assert worker.keypoints_odom_m.tobytes() == first
+
+
+def test_explicit_feet_are_those_of_the_gait(worker: Worker) -> None:
+    """Feet given in odom and the stateless gait meet in the same body."""
+    gait = Gait(worker.skeleton)
+    worker.place((0.0, 0.0), 0.0, 0.4, 1.2)
+    stateless = np.array(worker.keypoints_odom_m)
+    worker.place((0.0, 0.0), 0.0, feet=gait.footing(0.4, 1.2))
+    np.testing.assert_allclose(worker.keypoints_odom_m, stateless, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("position_odom_m", (0.0, float("nan"))),
+        ("position_odom_m", (0.0, 1.0, 2.0)),
+        ("heading_odom_rad", float("inf")),
+        ("walked_m", "far"),
+        ("speed_mps", -0.1),
+        ("speed_mps", 9.0),
+        ("head_yaw_rad", 1.5),
+        ("head_pitch_rad", -0.8),
+        ("eye_yaw_rad", 0.7),
+        ("eye_pitch_rad", -0.5),
+        ("activity", "dance"),
+    ],
+)
+def test_unusable_placements_are_refused_and_move_nothing(
+    hall: Warehouse, worker: Worker, name: str, value: object
+) -> None:
+    worker.place((0.5, 0.5), 0.5, 0.5, 0.5, 0.5, 0.5, activity="phone")
+    before = worker.keypoints_odom_m.tobytes()
+    base = pybullet.getBasePositionAndOrientation(worker.body, physicsClientId=hall.client)
+    good = {"position_odom_m": (1.0, 1.0), "heading_odom_rad": 0.0}
+    with pytest.raises(SimError, match=name):
+        worker.place(**{**good, name: value})
+    assert worker.keypoints_odom_m.tobytes() == before
+    assert worker.held == "phone"
+    assert base == pybullet.getBasePositionAndOrientation(worker.body, physicsClientId=hall.client)
+
+
+def test_unusable_bodies_are_refused(hall: Warehouse) -> None:
+    bodies = pybullet.getNumBodies(physicsClientId=hall.client)
+    with pytest.raises(SimError, match="stature_m"):
+        Worker(hall, 0.9)
+    with pytest.raises(SimError, match="stride_m"):
+        Worker(hall, 1.7, stride_m=3.0)
+    with pytest.raises(SimError, match="nobody"):
+        Worker(hall, 1.7, look="nobody")
+    with pytest.raises(SimError, match="position_odom_m"):
+        Worker(hall, 1.7, position_odom_m=(0.0, math.inf))
+    assert pybullet.getNumBodies(physicsClientId=hall.client) == bodies
+
+
+def test_physics_leaves_a_worker_where_it_was_put(hall: Warehouse, worker: Worker) -> None:
+    worker.place((2.0, 2.0), 0.5, 0.3, 1.0, activity="carry_box")
+    before = _links(hall, worker)
+    for _ in range(240):
+        hall.step()
+    after = _links(hall, worker)
+    for name in LINKS:
+        np.testing.assert_allclose(after[name][1], before[name][1], atol=2e-4)
+
+
+def test_capsules_are_where_the_body_is_and_stop_what_runs_into_them() -> None:
+    """A robot meets shins and feet, is stopped, and moves no limb."""
+    with Warehouse(WarehouseLayout.open_floor()) as hall:
+        amr = Amr(hall)
+        worker = Worker(hall, 1.8, look="ivan", position_odom_m=(1.3, 0.05), heading_odom_rad=2.8)
+        before = _links(hall, worker)
+        touched = False
+        for _ in range(700):
+            amr.command(0.6, 0.0)
+            amr.advance(hall.physics_dt_s)
+            hall.step()
+            touched |= any(
+                point[8] <= 0.0
+                for point in pybullet.getContactPoints(
+                    amr.body, worker.body, physicsClientId=hall.client
+                )
+            )
+        assert touched
+        assert float(amr.T_odom_base[0, 3]) < 1.3 - 0.2
+        after = _links(hall, worker)
+        for name in LINKS:
+            np.testing.assert_allclose(after[name][1], before[name][1], atol=2e-3)

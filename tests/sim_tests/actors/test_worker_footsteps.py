@@ -1,0 +1,215 @@
+"""Feet of scripted walks: straight, in curves, turning, starting, stopping, backwards."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from perception import layouts as kp
+from sim_tests.actors.behaviour import WorkerScript
+from sim_tests.actors.body import Gait, Worker, load_worker, skeleton, worker_names
+from sim_tests.actors.body._asset import JOINTS
+from sim_tests.actors.body._pose import link_transforms
+from sim_tests.scenario import Scenario, shipped_scenarios
+from sim_tests.world import Warehouse
+from sim_tests.world.hall import WarehouseLayout
+
+HZ = 40.0
+TOUCHING_M = 0.004
+ANKLES = [JOINTS.index(f"{side}_ankle") for side in ("left", "right")]
+
+
+def script(path: list, heading: tuple = ()) -> WorkerScript:
+    return WorkerScript(
+        path=[{"t_s": t, "x_m": x, "y_m": y} for t, x, y in path],
+        heading=[{"t_s": t, "heading_deg": h} for t, h in heading],
+    )
+
+
+def circle(radius_m: float, speed_mps: float) -> list:
+    share = np.linspace(0.0, 1.0, 25)
+    duration = math.tau * radius_m / speed_mps
+    x, y = radius_m * np.sin(math.tau * share), radius_m * (1.0 - np.cos(math.tau * share))
+    return list(zip((duration * share).tolist(), x.tolist(), y.tolist(), strict=True))
+
+
+WALKS = {
+    "straight, 0.5 m/s": script([(0, 0, 0), (8, 4, 0)]),
+    "straight, 1.2 m/s": script([(0, 0, 0), (4, 4.8, 0)]),
+    "straight, 2.0 m/s": script([(0, 0, 0), (3, 6, 0)]),
+    "a slow shuffle": script([(0, 0, 0), (8, 0.8, 0)]),
+    "creeping": script([(0, 0, 0), (8, 0.16, 0)]),
+    "one short step": script([(0, 0, 0), (1, 0.2, 0)]),
+    "a wide curve": script(circle(3.0, 1.2)),
+    "a tight curve": script(circle(1.0, 0.8)),
+    "all the way round on the spot": script([(0, 0, 0)], ((0, 0), (6, 360))),
+    "a quick turn to the right": script([(0, 0, 0)], ((0, 0), (1, -90))),
+    "starting and stopping": script(
+        [(0, 0, 0), (2, 2, 0), (3.5, 2, 0), (5.5, 4, 0), (6, 4, 0), (7.5, 4.7, 0)]
+    ),
+    "round a corner": script([(0, 0, 0), (2, 2, 0), (4.5, 2, 2.5)]),
+    "backwards": script([(0, 0, 0), (4, 2.4, 0)], ((0, 180),)),
+    "askew": script([(0, 0, 0), (4, 3, 0)], ((0, 30),)),
+    "about-turn": script([(0, 0, 0), (3, 2.4, 0), (6, 0, 0)], ((0, 0), (2.3, 0), (3.9, 180))),
+    **{
+        f"{name}, worker {number}": worker
+        for name in shipped_scenarios()
+        for number, worker in enumerate(Scenario.shipped(name).workers)
+    },
+}
+
+
+@pytest.fixture(scope="module")
+def hall() -> Iterator[Warehouse]:
+    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
+        yield warehouse
+
+
+@pytest.fixture(scope="module")
+def cast(hall: Warehouse) -> dict[str, Worker]:
+    return {name: Worker(hall, load_worker(name).stature_m, look=name) for name in worker_names()}
+
+
+def _times(walk: WorkerScript) -> np.ndarray:
+    keys = [key.t_s for key in (*walk.path, *walk.heading)]
+    return np.arange(min(keys) - 1.0, max(keys) + 1.5, 1.0 / HZ)
+
+
+def _film(worker: Worker, walk: WorkerScript) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Soles (2, N, V, 3), ankles by the legs minus where they were asked (N, 2, 3), keypoints."""
+    walk = walk.model_copy(update={"look": worker.asset.name, "stature_m": worker.stature_m})
+    asset, scale = worker.asset, worker.skeleton.scale
+    skin = asset.levels[1]
+    soles = []
+    for ankle in ANKLES:
+        shoe = skin.vertices_m[skin.weights[:, ankle] > 0.98] * scale
+        soles.append(np.column_stack([shoe, np.ones(len(shoe))]))
+    frames: tuple[list, list] = ([], [])
+    errors, keypoints = [], []
+    for t_s in _times(walk):
+        motion = walk.motion(float(t_s))
+        worker.place(motion.position_odom_m, motion.heading_odom_rad, feet=motion.feet)
+        links = link_transforms(asset.joints_m, worker.pose)
+        for side, ankle in enumerate(ANKLES):
+            frames[side].append((soles[side] @ links[1 + ankle].T)[:, :3])
+            place = links[1 + ankle] @ [*(asset.joints_m[ankle] * scale), 1.0]
+            errors.append(place[:3] - motion.feet.feet[side][:3])
+        keypoints.append(worker.keypoints_odom_m)
+    return np.array(frames, dtype=object), np.array(errors), np.array(keypoints)
+
+
+def _slip_m(shoe: np.ndarray) -> float:
+    """How far any point of a sole moves over the floor between landing and leaving."""
+    worst, touched, start = 0.0, np.zeros(len(shoe[0]), dtype=bool), shoe[0][:, :2].copy()
+    for frame in shoe:
+        touches = frame[:, 2] < TOUCHING_M
+        start[touches & ~touched] = frame[touches & ~touched, :2]
+        moved = np.linalg.norm(frame[:, :2] - start, axis=1)[touches]
+        worst = max(worst, float(moved.max(initial=0.0)))
+        touched = touches
+    return worst
+
+
+@pytest.mark.parametrize("name", WALKS)
+def test_feet_stand_where_they_landed(cast: dict[str, Worker], name: str) -> None:
+    """No sole slides, sinks or floats, legs reach their feet, and nothing jumps."""
+    soles, errors, keypoints = _film(cast["daniel"], WALKS[name])
+    lowest = []
+    for side in (0, 1):
+        shoe = np.array(soles[side].tolist(), dtype=np.float64)
+        assert _slip_m(shoe) < 0.03
+        lowest.append(shoe[..., 2].min(axis=1))
+        assert lowest[-1].min() > -0.005
+    assert np.minimum(*lowest).max() < 0.005
+    np.testing.assert_allclose(errors, 0.0, atol=1e-6)
+    speed = np.linalg.norm(np.diff(keypoints, axis=0), axis=2) * HZ
+    assert speed.max() < 8.0
+    assert speed[:, [kp.NOSE, kp.LEFT_SHOULDER, kp.LEFT_HIP]].max() < 3.0
+    # At the end the feet stand side by side under the body.
+    ankles = keypoints[-1, [kp.LEFT_ANKLE, kp.RIGHT_ANKLE], :2]
+    hips = keypoints[-1, [kp.LEFT_HIP, kp.RIGHT_HIP], :2]
+    assert np.linalg.norm(ankles.mean(axis=0) - hips.mean(axis=0)) < 0.06
+    assert 0.12 < np.linalg.norm(ankles[0] - ankles[1]) < 0.30
+
+
+@pytest.mark.parametrize("look", worker_names())
+def test_all_workers_keep_their_feet(cast: dict[str, Worker], look: str) -> None:
+    soles, errors, _ = _film(cast[look], WALKS["round a corner"])
+    for side in (0, 1):
+        shoe = np.array(soles[side].tolist(), dtype=np.float64)
+        assert _slip_m(shoe) < 0.03
+        assert shoe[..., 2].min() > -0.005
+    np.testing.assert_allclose(errors, 0.0, atol=1e-6)
+
+
+corners = st.lists(st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0)), min_size=2, max_size=4)
+
+
+@given(corners, st.floats(0.4, 1.5), st.floats(-180.0, 180.0), st.booleans())
+@example([(0.25, 0.0), (0.25, 0.0), (1.375, 0.0)], 1.5, 0.0, True)  # a dash from standing
+@example([(1.2, 0.2), (-1.8, -0.5), (-0.9, -1.2)], 1.5, -70.0, False)  # and one sideways
+@example([(1.2, -1.8), (-1.1, 1.7), (0.4, -1.0), (-0.9, 0.1)], 1.5, 0.0, False)  # sharp turns
+@example([(0.2, 1.9), (0.2, 1.9), (1.0, 1.6)], 1.5, 17.0, False)  # a short one askew
+@settings(max_examples=15, deadline=None)
+def test_stances_stay_put_whatever_the_walk(
+    places: list, speed_mps: float, heading_deg: float, ahead: bool
+) -> None:
+    """Of any script: a flat foot does not move, hips stay up, no foot is faster than 10 m/s."""
+    times = np.cumsum(
+        [0.0, *(max(math.dist(*pair) / speed_mps, 0.5) for pair in itertools.pairwise(places))]
+    )
+    path = [(t, x, y) for t, (x, y) in zip(times.tolist(), places, strict=True)]
+    # Nobody turns faster than half a turn a second.
+    end = max(times[-1], abs(heading_deg) / 180.0)
+    walk = script(path, () if ahead else ((0.0, heading_deg), (end, 0.0)))
+    rows = [walk.motion(float(t)).feet for t in _times(walk)]
+    feet = np.array([row.feet for row in rows])
+    flat_height = feet[0, :, 2]
+    flat = (np.abs(feet[..., 4]) < 1e-9) & (np.abs(feet[..., 2] - flat_height) < 1e-6)
+    for side in (0, 1):
+        both = flat[1:, side] & flat[:-1, side]
+        moved = np.abs(np.diff(feet[:, side, [0, 1, 3]], axis=0))[both]
+        assert moved.max(initial=0.0) < 1e-6
+        assert np.abs(np.diff(feet[:, side, :3], axis=0)).max() * HZ < 10.0
+    hips = np.array([row.hip_height_m for row in rows])
+    assert hips.min() > 0.75 * hips[0]
+    assert hips.max() <= hips[0] + 1e-9
+
+
+def test_a_straight_walk_is_that_of_the_stateless_gait() -> None:
+    """In the middle of a long walk the plan and the formula agree, but for the phase."""
+    walk = script([(0, 0, 0), (10, 12.0, 0)])
+    times = np.arange(3.0, 7.0, 1.0 / HZ)
+    motions = [walk.motion(float(t)) for t in times]
+    planned = np.array([np.array(m.feet.feet)[:, 0] - m.position_odom_m[0] for m in motions])
+    # Each foot comes as far ahead and falls as far behind as the gait says.
+    stateless = Gait(skeleton(None, 1.75))
+    stride = float(stateless.stride_m(1.2))
+    formula = np.array(
+        [np.array(stateless.footing(s, 1.2).feet)[:, 0] for s in np.linspace(0.0, stride, 200)]
+    )
+    np.testing.assert_allclose(planned.max(axis=0), formula.max(axis=0), atol=0.03)
+    np.testing.assert_allclose(planned.min(axis=0), formula.min(axis=0), atol=0.03)
+
+
+def test_place_and_time_do_not_matter() -> None:
+    """The same walk elsewhere, a quarter turn on, and later: the same feet, moved with it."""
+    path, turn = [(0, 0, 0), (2, 2, 0.3), (4, 2.5, 2)], 0.5 * math.pi
+    cos, sin = math.cos(turn), math.sin(turn)
+    moved = [(t + 7, 3 + cos * x - sin * y, -1 + sin * x + cos * y) for t, x, y in path]
+    here, there = script(path), script(moved)
+    for t_s in np.linspace(-1.0, 5.0, 40):
+        first, second = here.motion(float(t_s)).feet, there.motion(float(t_s) + 7.0).feet
+        assert first.hip_height_m == pytest.approx(second.hip_height_m, abs=1e-6)
+        for foot, other in zip(first.feet, second.feet, strict=True):
+            expected = (3 + cos * foot[0] - sin * foot[1], -1 + sin * foot[0] + cos * foot[1])
+            np.testing.assert_allclose(other[:3], (*expected, foot[2]), atol=1e-5)
+            assert math.remainder(other[3] - foot[3] - turn, math.tau) == pytest.approx(
+                0.0, abs=1e-5
+            )

@@ -1,0 +1,188 @@
+"""Rendered pictures through the whole pipeline, in the closed loop."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from paths import SHARED
+
+from perception import (
+    AttentionCone,
+    AwarenessPipeline,
+    Camera,
+    PersonDetection,
+    PersonKeypoints,
+    PersonObservation,
+)
+from perception.networks import OnnxPersonDetector
+from sim_tests import KeypointNoise, Scenario, SimError, run_crossing
+from sim_tests.crossing import Stage
+from sim_tests.crossing._stage import TrueView
+from sim_tests.crossing.eyes import NOBODY, PIXEL_RATE_HZ, pixel_timing
+from sim_tests.crossing.eyes._keypoint_camera import KeypointCamera
+from sim_tests.crossing.eyes._pixel_eyes import PixelEyes, who_is_who
+from sim_tests.world.camera import CameraTiming, SensorConfig
+from sim_tests.world.sightlines import SightLines
+
+CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
+MODELS = SHARED / "models"
+RTMDET = MODELS / "rtmdet_nano_person_320_mmpose.onnx"
+
+TWO = """
+name: two_workers
+description: One worker ahead on the left looks at the robot, one on the right looks away.
+duration_s: 1.0
+control_hz: 20.0
+layout: open
+robot: {goal_x_m: 6.0}
+camera: {width_px: 640, height_px: 480, horizontal_fov_deg: 60.0}
+workers:
+  - path: [{t_s: 0.0, x_m: 4.0, y_m: 0.8}]
+    gaze: [{t_s: 0.0, look: robot}]
+    heading: [{t_s: 0.0, heading_deg: 180.0}]
+  - path: [{t_s: 0.0, x_m: 4.5, y_m: -1.0}]
+    heading: [{t_s: 0.0, heading_deg: 0.0}]
+"""
+
+
+@pytest.fixture(scope="module")
+def scenario(tmp_path_factory: pytest.TempPathFactory) -> Scenario:
+    path = tmp_path_factory.mktemp("scenario") / "two.yaml"
+    path.write_text(TWO)
+    return Scenario.from_yaml(path)
+
+
+@pytest.fixture
+def stage(scenario: Scenario) -> Iterator[Stage]:
+    with Stage(scenario, np.zeros(2)) as stage:
+        yield stage
+
+
+class Blind:
+    """Sees no keypoints: the pipeline then places people by their boxes, without awareness."""
+
+    def estimate(
+        self, image_rgb: np.ndarray, detections: tuple[PersonDetection, ...]
+    ) -> tuple[PersonKeypoints, ...]:
+        nothing = PersonKeypoints(np.zeros((17, 2)), np.zeros((17, 3)), np.zeros(17), "coco")
+        return (nothing,) * len(detections)
+
+
+def observation(x_m: float, z_m: float, box: tuple[float, ...] | None) -> PersonObservation:
+    return PersonObservation(
+        0.0, [x_m, 0.0, z_m], 0.01 * np.eye(3), None, None, None, 0.9,
+        None if box is None else np.array(box),
+    )  # fmt: skip
+
+
+def view(x_m: float, z_m: float) -> TrueView:
+    return TrueView(
+        np.array([x_m, 0.0, z_m]), np.array([0.0, 0.0, -1.0]), 0.5, np.zeros(2), np.zeros(2)
+    )
+
+
+def test_observations_are_given_to_the_workers_they_show():
+    truth = (view(-1.0, 3.0), view(1.0, 4.0), view(0.0, 9.0))
+    boxes = [np.array([50.0, 50, 150, 350]), np.array([400.0, 80, 480, 320]), None]
+    seen = (
+        observation(1.1, 4.2, (402, 84, 478, 322)),  # by box and place
+        observation(-1.0, 4.5, (52, 50, 150, 340)),  # by box alone
+        observation(0.1, 8.9, (300, 100, 330, 200)),  # where a worker is of whom nothing shows
+        observation(3.0, 3.0, (600, 100, 640, 200)),  # a ghost
+    )
+    assert who_is_who(seen, truth, boxes) == (1, 0, NOBODY, NOBODY)
+    assert who_is_who(seen[:2], (), []) == (NOBODY, NOBODY)
+    assert who_is_who((), truth, boxes) == ()
+
+
+def test_one_worker_is_never_two_observations():
+    truth, boxes = (view(0.0, 3.0),), [np.array([100.0, 100, 200, 400])]
+    twice = (
+        observation(0.3, 3.0, (110, 100, 220, 400)),
+        observation(0.0, 3.0, (100, 100, 200, 400)),
+    )
+    assert who_is_who(twice, truth, boxes) == (NOBODY, 0)
+
+
+def test_rendered_people_are_observed_where_they_are(stage: Stage):
+    cone = AttentionCone()
+    lines = SightLines(stage.warehouse.layout, actors=stage.warehouse.actors)
+    keypoints = KeypointCamera(CAMERA, lines, KeypointNoise(), np.random.default_rng(0))
+    pipeline = AwarenessPipeline(CAMERA, keypoints, keypoints, cone=cone)
+    eyes = PixelEyes(stage, CAMERA, SensorConfig(), np.random.default_rng(0), pipeline)
+    T_odom_camera = stage.amr.T_odom_camera
+    truth = stage.truth(cone, T_odom_camera)
+    keypoints.look(T_odom_camera, stage.workers)
+    seen = eyes.observe(0.25, T_odom_camera, truth)
+    assert sorted(worker for _, worker in seen) == [0, 1]
+    for found, worker in seen:
+        assert found.stamp_s == 0.25
+        true = truth[worker].position_camera_m
+        assert np.linalg.norm(found.position_camera_m - true) < 0.05 * np.linalg.norm(true)
+    alpha = {worker: found.awareness or 0.0 for found, worker in seen}
+    assert alpha[0] > 0.6
+    assert alpha[1] < 0.1
+
+
+def test_a_camera_without_a_rate_takes_ten_frames_a_second():
+    assert pixel_timing(CameraTiming()).rate_hz == PIXEL_RATE_HZ
+    assert pixel_timing(CameraTiming(rate_hz=4.0, drop_rate=0.1)) == CameraTiming(
+        rate_hz=4.0, drop_rate=0.1
+    )
+
+
+@pytest.mark.skipif(not RTMDET.is_file(), reason=f"needs {RTMDET.name} in the folder of models")
+def test_a_crossing_is_driven_by_what_a_genuine_detector_sees_in_the_pictures(scenario: Scenario):
+    detector = OnnxPersonDetector(RTMDET)
+    results = []
+    for _ in range(2):
+        pipeline = AwarenessPipeline(CAMERA, detector, Blind())
+        results.append(
+            run_crossing(scenario, policy="balanced", perception="pixels", pipeline=pipeline)
+        )
+    result = results[0]
+    assert result.perception == "pixels"
+    stamps = [frame.t_s for frame in result.frames if frame.observations]
+    assert np.diff(stamps) == pytest.approx(1.0 / PIXEL_RATE_HZ, abs=0.051)
+    assert len(stamps) >= 8
+    workers = set()
+    for frame in result.frames:
+        for found, worker in zip(frame.observations, frame.observed_workers, strict=True):
+            # A box alone tells nothing of awareness, and no evidence is never awareness.
+            assert found.awareness is None
+            left, _, right, _ = found.box_xyxy_px
+            # A sliver of a person at the picture's border has no height to tell the range by.
+            cut_off = left < 1.0 or right > CAMERA.width_px - 1.0
+            if worker != NOBODY and not cut_off:
+                workers.add(worker)
+                true = frame.truth[worker].position_camera_m
+                assert np.linalg.norm(found.position_camera_m - true) < 0.3 * np.linalg.norm(true)
+        assert all(track.awareness_lower < 0.1 for track in frame.tracks)
+    assert workers == {0, 1}
+    first, second = ([frame.command for frame in each.frames] for each in results)
+    assert first == second
+
+
+def test_pictures_can_be_smaller_than_the_camera(scenario: Scenario):
+    half = scenario.camera.model_copy(update={"picture_scale": 0.5})
+    small = scenario.model_copy(update={"camera": half, "duration_s": 0.2})
+    camera = half.camera(0.5)
+    sizes = []
+
+    class Looker(Blind):
+        def detect(self, image_rgb: np.ndarray) -> tuple[PersonDetection, ...]:
+            sizes.append(image_rgb.shape)
+            return ()
+
+    pipeline = AwarenessPipeline(camera, Looker(), Looker())
+    run_crossing(small, policy="balanced", perception="pixels", pipeline=pipeline)
+    assert set(sizes) == {(240, 320, 3)}
+
+
+def test_a_pipeline_for_another_camera_is_refused(scenario: Scenario):
+    other = AwarenessPipeline(Camera.from_fov(640, 480, 1.2), Blind(), Blind())  # type: ignore[arg-type]
+    with pytest.raises(SimError, match="camera"):
+        run_crossing(scenario, policy="balanced", perception="pixels", pipeline=other)

@@ -1,0 +1,144 @@
+"""The mathematics under the reference planner, against quadrature and exact geometry."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from scipy.integrate import quad
+
+from sim_tests.crossing.planner._rollout import (
+    Poses,
+    detour_bearing_rad,
+    follow_arcs,
+    ramp_integral,
+    stopping_integral,
+)
+from sim_tests.crossing.planner._scene import Rectangles, box_gap_m, disc_gap_m, strip_distance_m
+
+HALF_LENGTH_M, HALF_WIDTH_M = 0.3625, 0.25
+
+
+@given(
+    st.floats(-2, 2),
+    st.floats(-2, 2),
+    st.floats(0.1, 3),
+    st.one_of(st.just(0.0), st.floats(1e-6, 4)),
+)
+def test_ramp_integral_is_the_integral_of_a_ramp(v0: float, v1: float, a: float, t: float) -> None:
+    def value(s: float) -> float:
+        return v0 + math.copysign(min(a * s, abs(v1 - v0)), v1 - v0)
+
+    kink = min(abs(v1 - v0) / a, t)
+    exact = quad(value, 0.0, kink)[0] + quad(value, kink, t)[0]
+    result = ramp_integral(v0, np.array(v1), a, np.array(t))
+    assert float(result) == pytest.approx(exact, abs=1e-9)
+
+
+@given(st.floats(-2, 2), st.floats(0, 2), st.floats(0, 0.5), st.floats(0, 4))
+def test_stopping_integral_is_the_integral_of_a_stop(
+    v: float, stop_s: float, hold_s: float, t: float
+) -> None:
+    def value(s: float) -> float:
+        return v if s <= hold_s else v * max(0.0, 1.0 - (s - hold_s) / max(stop_s, 1e-12))
+
+    bounds = [min(bound, t) for bound in (0.0, hold_s, hold_s + stop_s, math.inf)]
+    # The rule for quadrature cannot be scaled down to an interval of subnormal length.
+    pieces = [pair for pair in pairwise(bounds) if pair[1] - pair[0] > 1e-300]
+    exact = sum(quad(value, *pair)[0] for pair in pieces)
+    result = stopping_integral(np.array(v), np.array(stop_s), hold_s, np.array(t))
+    assert float(result) == pytest.approx(exact, abs=1e-8)
+
+
+@given(st.floats(0.0, 1.5), st.floats(-1.5, 1.5))
+def test_follow_arcs_is_exact_for_a_constant_twist(speed: float, yaw_rate: float) -> None:
+    t = np.arange(0.2, 3.01, 0.2)
+    poses = follow_arcs(speed * t, yaw_rate * t)
+    half = 0.5 * yaw_rate * t
+    chord = speed * t * np.sinc(half / math.pi)
+    np.testing.assert_allclose(poses.x_m, chord * np.cos(half), atol=1e-7)
+    np.testing.assert_allclose(poses.y_m, chord * np.sin(half), atol=1e-7)
+
+
+pose_data = st.tuples(st.floats(-2, 2), st.floats(-2, 2), st.floats(-4, 4))
+
+
+coordinate = st.floats(-4.0, 4.0)
+
+
+def rectangle(x: float, y: float, heading: float) -> tuple[Rectangles, shapely.Polygon]:
+    c, s = math.cos(heading), math.sin(heading)
+    arrays = [np.asarray(value) for value in (x, y, c, s)]
+    corners = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * (HALF_LENGTH_M, HALF_WIDTH_M)
+    polygon = shapely.Polygon(corners @ np.array([[c, s], [-s, c]]) + np.array([x, y]))
+    return Rectangles(Poses(*arrays), HALF_LENGTH_M, HALF_WIDTH_M), polygon
+
+
+@given(pose_data, coordinate, coordinate, st.floats(0.1, 1.5))
+def test_disc_gap_is_the_distance(
+    pose: tuple[float, float, float], x: float, y: float, radius: float
+) -> None:
+    rectangles, polygon = rectangle(*pose)
+    gap = disc_gap_m(rectangles, np.asarray(x), np.asarray(y), np.asarray(radius))
+    assert float(gap) == pytest.approx(polygon.distance(shapely.Point(x, y)) - radius, abs=1e-9)
+
+
+@given(pose_data, coordinate, coordinate, st.floats(0.1, 2.0), st.floats(0.1, 2.0))
+def test_box_gap_is_never_more_than_the_distance(
+    pose: tuple[float, float, float], x: float, y: float, length: float, width: float
+) -> None:
+    rectangles, polygon = rectangle(*pose)
+    boxes = np.array([[x, y, x + length, y + width]])
+    assert float(box_gap_m(rectangles, boxes)) <= polygon.distance(shapely.box(*boxes[0])) + 1e-9
+
+
+@given(pose_data)
+def test_box_gap_is_the_distance_along_a_wall(pose: tuple[float, float, float]) -> None:
+    rectangles, polygon = rectangle(*pose)
+    wall = np.array([[-9.0, 3.0, 9.0, 4.0]])
+    gap = float(box_gap_m(rectangles, wall))
+    assert gap == pytest.approx(polygon.distance(shapely.box(*wall[0])), abs=1e-9)
+
+
+@given(coordinate, coordinate, st.floats(-1.6, 1.6), st.floats(-1.6, 1.6), st.floats(0.0, 2.0))
+def test_strip_distance_is_the_distance_to_the_way_ahead(
+    x: float, y: float, vx: float, vy: float, ahead_s: float
+) -> None:
+    assume(math.hypot(vx, vy) * ahead_s > 1e-6)
+    way = shapely.LineString([(0.0, 0.0), (vx * ahead_s, vy * ahead_s)])
+    distance = strip_distance_m(*(np.asarray(value) for value in (x, y, vx, vy)), ahead_s)
+    assert float(distance) == pytest.approx(way.distance(shapely.Point(x, y)), abs=1e-5)
+
+
+@given(st.floats(-3, 3), st.floats(0.5, 5.0), st.floats(-math.pi, math.pi), st.floats(0.2, 2.0))
+def test_a_detour_leaves_what_hides_the_goal_by_the_nearer_side(
+    goal_bearing: float, distance: float, bearing: float, radius: float
+) -> None:
+    disc = (distance * math.cos(bearing), distance * math.sin(bearing), radius)
+    chosen = detour_bearing_rad(goal_bearing, 6.0, [disc], lambda _x, _y: True)
+
+    def off_disc(angle: float) -> float:
+        return abs(math.remainder(angle - bearing, math.tau))
+
+    half_angle = math.asin(min(1.0, radius / distance))
+    assume(abs(off_disc(goal_bearing) - half_angle) > 1e-6)
+    if off_disc(goal_bearing) > half_angle:
+        assert chosen == goal_bearing
+    else:
+        assert off_disc(chosen) == pytest.approx(half_angle, abs=1e-7)
+        turn = abs(math.remainder(chosen - goal_bearing, math.tau))
+        assert turn <= half_angle + 0.05 + 1e-7  # up to the preference for the right
+
+
+def test_a_detour_takes_the_side_that_boxes_leave_open_and_none_if_both_are_closed() -> None:
+    disc = (3.0, 0.0, 1.0)
+    half_angle = math.asin(1.0 / 3.0)
+    assert detour_bearing_rad(0.0, 6.0, [disc], lambda _x, _y: True) == pytest.approx(-half_angle)
+    assert detour_bearing_rad(0.0, 6.0, [disc], lambda _x, y: y > 0) == pytest.approx(half_angle)
+    assert detour_bearing_rad(0.0, 6.0, [disc], lambda _x, _y: False) == 0.0
+    assert detour_bearing_rad(0.0, 2.5, [disc], lambda _x, _y: True) == 0.0  # the goal is nearer

@@ -1,0 +1,224 @@
+"""A camera that looks all around: a rendered panorama, and crossings with it."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from perception import AttentionCone, Camera, FloorPlane
+from perception.surround import PanoramaLens, SurroundPipeline, ring_of_views
+from sim_tests import CameraRenderer, Scenario, SimError, run_crossing
+from sim_tests.crossing import Stage
+from sim_tests.crossing.eyes import KeypointNoise, _eyes, make_eyes
+from sim_tests.crossing.eyes._eyes import Eyes, SurroundEyes
+from sim_tests.scenario import CameraSpec, ScenarioTemplate, shipped_templates
+from sim_tests.search._templates import named_templates
+from sim_tests.study.runs import plan_jobs
+from sim_tests.study.runs._plan import template_of
+
+CONE = AttentionCone()
+# Three workers about the robot: ahead on the left border of two views, behind across the seam of a
+# panorama, and to the right, who looks away.
+THREE = """
+name: three_around
+description: Three workers stand around the robot.
+duration_s: 1.0
+control_hz: 20.0
+layout: open
+robot: {goal_x_m: 6.0}
+workers:
+  - path: [{t_s: 0.0, x_m: 2.0, y_m: 2.0}]
+    gaze: [{t_s: 0.0, look: robot}]
+    heading: [{t_s: 0.0, heading_deg: -135.0}]
+  - path: [{t_s: 0.0, x_m: -2.6, y_m: 0.0}]
+    gaze: [{t_s: 0.0, look: robot}]
+    heading: [{t_s: 0.0, heading_deg: 0.0}]
+  - path: [{t_s: 0.0, x_m: 0.0, y_m: -2.4}]
+    heading: [{t_s: 0.0, heading_deg: -90.0}]
+"""
+
+
+@pytest.fixture(scope="module")
+def scenario(tmp_path_factory: pytest.TempPathFactory) -> Scenario:
+    path = tmp_path_factory.mktemp("scenario") / "three.yaml"
+    path.write_text(THREE)
+    return ScenarioTemplate.from_yaml(path).with_camera("surround").median()
+
+
+def panorama(stage: Stage, T_odom_camera: np.ndarray, width_px: int) -> np.ndarray:
+    """The whole sphere as a 360° camera gives it, put together from the six faces of a cube."""
+    size = width_px // 3
+    face = Camera.from_fov(size, size, 0.5 * math.pi)
+    renderer = CameraRenderer(stage.warehouse)
+    heading = ((np.arange(width_px) + 0.5) / width_px - 0.5) * 2.0 * math.pi
+    down = ((np.arange(width_px // 2) + 0.5) / (width_px // 2) - 0.5) * math.pi
+    heading, down = np.meshgrid(heading, down)
+    rays = np.stack(
+        [np.sin(heading) * np.cos(down), np.sin(down), np.cos(heading) * np.cos(down)], axis=-1
+    )
+    picture = np.zeros((*heading.shape, 3), np.uint8)
+    turns = [
+        view.rotation_camera_view for view in ring_of_views(face, np.radians([0, 90, 180, -90]))
+    ]
+    turns += [np.array([[1, 0, 0], [0, 0, side], [0, -side, 0]], float) for side in (1, -1)]
+    for turn in turns:
+        T = np.array(T_odom_camera)
+        T[:3, :3] = T_odom_camera[:3, :3] @ turn
+        inside = rays @ turn
+        here = inside[..., 2] >= np.abs(inside).max(axis=-1) - 1e-9
+        pixels = np.nan_to_num(face.project(inside.reshape(-1, 3)), nan=-1.0).astype(np.float32)
+        u, v = (each.reshape(here.shape) for each in pixels.T)
+        drawn = renderer.render(face, T).rgb
+        flat = cv2.remap(drawn, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        picture[here] = flat[here]
+    return picture
+
+
+def test_the_shipped_networks_find_everybody_in_a_panorama(scenario: Scenario) -> None:
+    lens = PanoramaLens(2400, 1200)
+    flat = Camera.from_fov(1092, 828, math.radians(110.0))
+    pipeline = SurroundPipeline(lens, ring_of_views(flat, np.radians([0, 90, 180, -90])))
+    with Stage(scenario, np.zeros(3)) as stage:
+        T_odom_camera = stage.amr.T_odom_camera
+        truth = stage.truth(CONE, T_odom_camera)
+        picture = panorama(stage, T_odom_camera, lens.width_px)
+        seen = pipeline.process(picture, 0.0, FloorPlane.from_pose(T_odom_camera))
+    assert len(seen) == 3
+    for known, seam in zip(truth, (False, True, False), strict=True):
+        nearest = min(
+            seen, key=lambda each: np.linalg.norm(each.position_camera_m - known.position_camera_m)
+        )
+        assert np.linalg.norm(nearest.position_camera_m - known.position_camera_m) < 0.35
+        assert (nearest.box_xyxy_px is None) == seam
+        if not seam and nearest.box_xyxy_px is not None:
+            left, top, right, bottom = nearest.box_xyxy_px
+            u, v = lens.project([known.position_camera_m])[0]
+            assert left < u < right
+            assert top < v < bottom
+        if known.awareness > 0.9:
+            assert nearest.awareness is not None
+            assert nearest.awareness > 0.6
+        else:
+            assert nearest.awareness is None or nearest.awareness < 0.2
+
+
+def test_a_surround_camera_sees_everybody_once_and_nobody_else(scenario: Scenario) -> None:
+    noise = KeypointNoise(miss_rate=0.0)
+    with Stage(scenario, np.zeros(3)) as stage:
+        camera = scenario.camera.camera()
+        rng = np.random.default_rng(0)
+        eyes = make_eyes("keypoints", stage, camera, CONE, noise, rng)
+        assert isinstance(eyes, SurroundEyes)
+        T_odom_camera = stage.amr.T_odom_camera
+        truth = stage.truth(CONE, T_odom_camera)
+        for _ in range(50):
+            seen = {worker: each for each, worker in eyes.observe(0.0, T_odom_camera, truth)}
+            assert sorted(seen) == [0, 1, 2]
+            for worker, observation in seen.items():
+                away = observation.position_camera_m - truth[worker].position_camera_m
+                spread = observation.position_covariance_m2 + 0.1**2 * np.eye(3)
+                assert away @ np.linalg.solve(spread, away) < 25.0
+            # Who looks at the robot is seen to, from whichever view.
+            assert all((seen[worker].awareness or 0.0) > 0.7 for worker in (0, 1))
+
+
+class Noted:
+    """Eyes of one view, with a note of whom they have seen in this frame."""
+
+    def __init__(self, eyes: Eyes, shown: list[int]) -> None:
+        self._eyes, self._shown = eyes, shown
+
+    def observe(self, *frame: Any) -> Any:
+        rows = self._eyes.observe(*frame)
+        self._shown += [worker for _, worker in rows]
+        return rows
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["crowd_of_eight", "standing_in_aisle"])
+def test_in_a_crossing_everybody_is_seen_once(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whom several views show is reported once, and whom one shows is not lost, save rarely."""
+    tally: Counter[str] = Counter()
+
+    class Counted(SurroundEyes):
+        def __init__(self, views: Any, eyes: Any) -> None:
+            self._shown: list[int] = []
+            super().__init__(views, [Noted(each, self._shown) for each in eyes])
+
+        def observe(self, *frame: Any) -> Any:
+            self._shown.clear()
+            rows = super().observe(*frame)
+            shown, told = Counter(self._shown), Counter(worker for _, worker in rows)
+            tally["in several views"] += len(self._shown) - len(shown)
+            tally["twice"] += sum(told.values()) - len(told)
+            tally["seen"] += len(shown)
+            tally["lost"] += len(shown.keys() - told.keys())
+            return rows
+
+    monkeypatch.setattr(_eyes, "SurroundEyes", Counted)
+    template = ScenarioTemplate.shipped(name).with_camera("surround")
+    result = run_crossing(template.for_seed(0), policy="balanced", perception="keypoints")
+    assert result.success
+    assert tally["in several views"] > 50
+    assert tally["twice"] <= 0.02 * tally["in several views"]
+    assert tally["lost"] <= 0.002 * tally["seen"]
+
+
+@pytest.mark.slow
+def test_who_has_passed_is_still_seen() -> None:
+    """A worker beside and behind the robot leaves the field of the camera ahead, not of this."""
+    template = ScenarioTemplate.shipped("standing_in_aisle")
+    behind = {}
+    for camera in ("forward", "surround"):
+        result = run_crossing(
+            template.with_camera(camera).for_seed(0), policy="balanced", perception="keypoints"
+        )
+        behind[camera] = sum(
+            observation.position_camera_m[2] < 0.0
+            for frame in result.frames
+            for observation in frame.observations
+        )
+    assert behind["forward"] == 0
+    assert behind["surround"] > 20
+
+
+def test_the_camera_of_a_scenario_can_be_replaced(tmp_path: Path) -> None:
+    for template in shipped_templates():
+        if template.name != "paper_encounter":  # which has a camera of its own
+            assert template.with_camera("forward").median() == template.median()
+        assert template.with_camera("") is template
+        around = template.with_camera("surround")
+        assert around.median().camera.views_deg == (0.0, 90.0, 180.0, -90.0)
+        assert around.id == template.id
+        assert around.parameters().keys() == template.parameters().keys()
+    own = tmp_path / "own.yaml"
+    own.write_text("{width_px: 640, height_px: 480, horizontal_fov_deg: 60.0}")
+    template = ScenarioTemplate.shipped("runs_out").with_camera(str(own))
+    assert template.median().camera.width_px == 640
+    assert ScenarioTemplate.from_text(template.to_text()) == template
+    with pytest.raises(SimError, match="'forward', 'surround', got 'surround2'"):
+        template.with_camera("surround2")
+    own.write_text("{width: 640}")
+    with pytest.raises(SimError, match="width_px"):
+        template.with_camera(str(own))
+
+
+def test_all_plans_take_a_camera() -> None:
+    jobs = plan_jobs(["runs_out"], ["blind"], [0], camera="surround")
+    assert template_of(jobs[0].scenario).median().camera.mount == "top"
+    (template,) = named_templates(["runs_out"], "surround")
+    assert template.median().camera.mount == "top"
+
+
+def test_views_that_cannot_be_are_refused() -> None:
+    with pytest.raises(ValidationError, match=r"must begin with 0, straight ahead, got \[90"):
+        CameraSpec(views_deg=(90.0, 0.0))
+    with pytest.raises(ValidationError, match=r"must lie in \[-180, 180\]"):
+        CameraSpec(views_deg=(0.0, 270.0))

@@ -1,0 +1,169 @@
+"""``awarenav render``: reproducible, resumable, and true to its pictures."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from awarenav.cli import main
+from awarenav.records import read_records
+from perception import Camera
+from sim_tests import SimError
+from sim_tests.dataset import RenderConfig, RenderScene, render
+from sim_tests.dataset._config import picture_size
+
+CONFIG = RenderConfig(frames=8, scenes=3, people=2, width_px=192, height_px=144, seed=5)
+
+
+@pytest.fixture(scope="module")
+def rendered(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("render")
+    render(CONFIG, out, processes=1, progress=False)
+    return out
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {entry.name: entry.read_bytes() for entry in folder.iterdir()}
+
+
+def test_the_same_settings_give_the_same_bytes_with_any_number_of_processes(
+    rendered: Path, tmp_path: Path
+) -> None:
+    render(CONFIG, tmp_path, processes=2, progress=False)
+    assert contents(tmp_path) == contents(rendered)
+
+
+def test_an_interrupted_run_is_continued_to_the_same_bytes(rendered: Path, tmp_path: Path) -> None:
+    whole = contents(rendered)
+    for name, data in whole.items():
+        (tmp_path / name).write_bytes(data)
+    lines = (rendered / "truth.jsonl").read_text("utf-8").splitlines(keepends=True)
+    # Killed in the middle of a line, with a picture that nothing is written about yet.
+    (tmp_path / "truth.jsonl").write_text("".join(lines[:4]) + lines[5][:60], "utf-8")
+    (tmp_path / "000001.png").unlink()
+    kept = (tmp_path / "000003.png").stat().st_mtime_ns
+    render(CONFIG, tmp_path, processes=1, progress=False)
+    assert contents(tmp_path) == whole
+    assert (tmp_path / "000003.png").stat().st_mtime_ns == kept
+
+
+def test_a_folder_with_other_pictures_is_left_alone(rendered: Path) -> None:
+    before = contents(rendered)
+    with pytest.raises(SimError, match=r"other settings \(seed: 5, asked for 6\)"):
+        render(CONFIG.model_copy(update={"seed": 6}), rendered, progress=False)
+    assert contents(rendered) == before
+
+
+def test_a_file_of_somebody_else_is_not_overwritten(tmp_path: Path) -> None:
+    (tmp_path / "truth.jsonl").write_text("mine\n", "utf-8")
+    with pytest.raises(SimError, match="another folder"):
+        render(CONFIG, tmp_path, progress=False)
+    assert (tmp_path / "truth.jsonl").read_text("utf-8") == "mine\n"
+
+
+def test_truth_agrees_with_itself_and_with_the_pictures(rendered: Path) -> None:
+    camera = Camera.from_yaml(rendered / "camera.yaml")
+    records = read_records(rendered / "truth.jsonl")
+    assert [record["frame"] for record in records] == [f"{k:06d}.png" for k in range(8)]
+    people = 0
+    for record in records:
+        picture = cv2.imread(str(rendered / record["frame"]))
+        assert picture is not None
+        assert picture.shape == (144, 192, 3)
+        T = np.array(record["T_odom_camera"])
+        assert T[:3, :3] @ T[:3, :3].T == pytest.approx(np.eye(3), abs=1e-5)
+        for person in record["people"]:
+            people += 1
+            low, high = np.split(np.array(person["box_xyxy_px"]), 2)
+            assert (low >= 0).all()
+            assert (low < high).all()
+            assert (high <= (192, 144)).all()
+            assert np.linalg.norm(person["gaze_camera"]) == pytest.approx(1.0, abs=1e-5)
+            assert 0.0 <= person["awareness"] <= 1.0
+            assert 0.0 <= person["occlusion"] <= 1.0
+            assert 0.0 <= person["truncation"] <= 1.0
+            x, _, z = person["position_camera_m"]
+            assert CONFIG.min_range_m - 0.2 <= np.hypot(x, z) <= CONFIG.max_range_m + 0.2
+            for name, (u, v, seen) in person["keypoints"].items():
+                point = np.array(person["keypoints_camera_m"][name])
+                if point[2] > 0.2:
+                    assert camera.project(point[None])[0] == pytest.approx((u, v), abs=0.3)
+                if seen:
+                    assert (np.array([u, v]) >= low - 3.0).all()
+                    assert (np.array([u, v]) <= high + 2.0).all()
+            ears = [np.array(person["keypoints_camera_m"][f"{s}_ear"]) for s in ("left", "right")]
+            nose = np.array(person["keypoints_camera_m"]["nose"])
+            forward = nose - 0.5 * (ears[0] + ears[1])
+            cosine = forward @ person["head_forward_camera"] / np.linalg.norm(forward)
+            assert cosine > np.cos(np.radians(15.0))
+    assert people >= 8
+
+
+def test_nobody_is_aware_who_faces_away(rendered: Path) -> None:
+    people = [p for r in read_records(rendered / "truth.jsonl") for p in r["people"]]
+    for person in people:
+        nose = np.array(person["keypoints_camera_m"]["nose"])
+        angle = np.arccos(-nose @ person["gaze_camera"] / np.linalg.norm(nose))
+        if angle > np.radians(62.0):
+            assert person["awareness"] == 0.0
+        elif person["awareness"] > 0.0:
+            expected = 1.0 - np.tan(angle) / np.tan(np.radians(60.0))
+            assert person["awareness"] == pytest.approx(expected, abs=0.12)
+
+
+def test_the_command_renders_and_says_where(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["--frames", "2", "--size", "96x72", "--seed", "3", "--processes", "1"]
+    assert main(["render", *arguments, "--out", str(tmp_path / "set")]) == 0
+    assert "2 pictures" in capsys.readouterr().out
+    assert {entry.name for entry in (tmp_path / "set").iterdir()} == {
+        "000000.png",
+        "000001.png",
+        "camera.yaml",
+        "contact_sheet.png",
+        "render.yaml",
+        "truth.jsonl",
+    }
+    for line in (tmp_path / "set" / "truth.jsonl").read_text("utf-8").splitlines():
+        json.loads(line)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--size", "640"], "WIDTHxHEIGHT"),
+        (["--size", "8x8"], "width_px"),
+        (["--fov", "200"], "horizontal_fov_deg"),
+        (["--people", "50"], "people"),
+    ],
+)
+def test_settings_out_of_range_are_refused_by_name(
+    arguments: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["render", *arguments, "--out", str(tmp_path / "x")]) == 2
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "x").exists()
+
+
+def test_ranges_longer_than_the_hall_are_refused() -> None:
+    far = CONFIG.model_copy(update={"min_range_m": 29.0, "max_range_m": 30.0})
+    with RenderScene(far, 0) as scene, pytest.raises(SimError, match="29 to 30 m"):
+        scene.snapshot(0)
+
+
+def test_sizes_are_read() -> None:
+    assert picture_size("1280x720") == (1280, 720)
+
+
+def test_pictures_are_spread_over_the_scenes() -> None:
+    config = RenderConfig(frames=50, scenes=7)
+    scenes = [config.scene_of(frame) for frame in range(50)]
+    assert scenes == sorted(scenes)
+    assert set(scenes) == set(range(7))
+    assert RenderConfig(frames=3, scenes=10).scene_count == 3
+    assert RenderConfig(frames=400).scene_count == 20

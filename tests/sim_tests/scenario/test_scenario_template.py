@@ -1,0 +1,239 @@
+import copy
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
+
+from sim_tests import Scenario, ScenarioTemplate, SimError, run_crossing, shipped_scenarios
+from sim_tests.scenario import shipped_templates
+from sim_tests.scenario._distributions import read_distribution
+
+BASE = {
+    "name": "mine",
+    "duration_s": 20.0,
+    "layout": "crossing",
+    "robot": {"goal_x_m": 11.0},
+    "people": [
+        {
+            "name": "worker",
+            "route": [{"x_m": 6.0, "y_m": {"uniform": {"low": 5.0, "high": 6.0}}}, [6.0, -6.0]],
+            "speed_mps": {"normal": {"mean": 1.3, "std": 0.2, "low": 0.9, "high": 1.5}},
+            "start_s": {"uniform": {"low": 0.0, "high": 2.0}},
+        }
+    ],
+}
+BASE["people"][0]["route"][1] = {"x_m": 6.0, "y_m": -6.0}
+
+shares = st.floats(0.0, 1.0)
+limits = st.tuples(st.floats(-50.0, 50.0), st.floats(0.1, 20.0)).map(
+    lambda pair: {"low": pair[0], "high": pair[0] + pair[1]}
+)
+
+
+def template(**changes):
+    data = copy.deepcopy(BASE)
+    data["people"][0].update(changes)
+    return ScenarioTemplate(data)
+
+
+@given(limits, shares, shares)
+def test_quantiles_stay_within_bounds_and_rise(ends, one, other):
+    middle = 0.5 * (ends["low"] + ends["high"])
+    for distribution in (
+        read_distribution("x", "uniform", ends),
+        read_distribution("x", "normal", {**ends, "mean": middle, "std": 1.0}),
+        read_distribution("x", "choice", [ends["high"], ends["low"]]),
+        read_distribution("x", "integers", {"low": -3, "high": 8}),
+        read_distribution("x", "lognormal", {"median": 0.83, "quartiles": [0.47, 1.5]}),
+    ):
+        low, high = distribution.bounds
+        first, second = (distribution.quantile(share) for share in sorted((one, other)))
+        assert low <= first <= second <= high
+
+
+def test_draws_follow_the_distribution_that_is_named():
+    share = (np.arange(4000) + 0.5) / 4000
+    normal = read_distribution("x", "normal", {"mean": 1.3, "std": 0.2, "low": 0.9, "high": 1.5})
+    expected = stats.truncnorm((0.9 - 1.3) / 0.2, (1.5 - 1.3) / 0.2, 1.3, 0.2)
+    drawn = np.array([normal.quantile(each) for each in share])
+    np.testing.assert_allclose(drawn, expected.ppf(share), atol=1e-9)
+
+    # Length of a glance at a vehicle: its quartiles come back.
+    glance = read_distribution(
+        "x", "lognormal", {"median": 0.83, "quartiles": [0.47, 1.5], "low": 1e-3, "high": 1e3}
+    )
+    spread = np.log(1.5 / 0.47) / 2.0
+    quartiles = [glance.quantile(each) for each in (0.25, 0.5, 0.75)]
+    np.testing.assert_allclose(np.log(quartiles), np.log(0.83) + spread * np.array([-1, 0, 1]))
+
+    integers = read_distribution("x", "integers", {"low": 2, "high": 5})
+    values, counts = np.unique([integers.quantile(each) for each in share], return_counts=True)
+    assert values.tolist() == [2, 3, 4, 5]
+    assert set(counts.tolist()) == {1000}
+
+
+def test_parameters_are_the_distributions_by_path():
+    paths = template().parameters()
+    assert list(paths) == ["people.0.route.0.y_m", "people.0.speed_mps", "people.0.start_s"]
+    assert paths["people.0.start_s"].bounds == (0.0, 2.0)
+
+
+def test_the_same_generator_draws_the_same_scenario():
+    first, again = (template().sample(np.random.default_rng(3)) for _ in range(2))
+    assert first == again == template().for_seed(3)
+    assert first != template().for_seed(4)
+
+
+def test_a_parameter_more_changes_no_other_and_neither_does_their_order():
+    plain = template().for_seed(7).people[0]
+    fewer = template(start_s=1.0).for_seed(7).people[0]
+    assert (fewer.speed_mps, fewer.route) == (plain.speed_mps, plain.route)
+    more = template(stature_m={"uniform": {"low": 1.6, "high": 1.9}}).for_seed(7).people[0]
+    assert (more.speed_mps, more.start_s, more.route) == (
+        plain.speed_mps,
+        plain.start_s,
+        plain.route,
+    )
+    data = copy.deepcopy(BASE)
+    data["people"][0] = dict(reversed(data["people"][0].items()))
+    assert ScenarioTemplate(data).for_seed(7).people[0] == plain
+
+
+def test_draws_of_many_seeds_are_uniform_and_not_correlated():
+    drawn = np.array(
+        [
+            (person.start_s / 2.0, person.route[0].y_m - 5.0)
+            for person in (template().for_seed(seed).people[0] for seed in range(400))
+        ]
+    )
+    for column in drawn.T:
+        assert stats.kstest(column, "uniform").pvalue > 0.01
+    assert abs(np.corrcoef(drawn.T)[0, 1]) < 0.15
+
+
+def test_given_values_replace_draws_and_medians_stand_for_the_rest():
+    person = template().with_values({"people.0.speed_mps": 1.0}).people[0]
+    assert person.speed_mps == 1.0
+    assert person.start_s == 1.0
+    assert person.route[0].y_m == 5.5
+    with pytest.raises(SimError, match=r"did you mean 'people\.0\.speed_mps'"):
+        template().with_values({"people.0.speed": 1.0})
+    with pytest.raises(SimError, match=r"people\.0\.speed_mps.*greater than 0"):
+        template().with_values({"people.0.speed_mps": -1.0})
+    with pytest.raises(SimError, match="finite"):
+        template().with_values({"people.0.start_s": float("nan")})
+
+
+@pytest.mark.parametrize("name", shipped_scenarios())
+def test_shipped_templates_round_trip_through_text_and_pickle(name):
+    shipped = ScenarioTemplate.shipped(name)
+    assert ScenarioTemplate.from_text(shipped.to_text()) == shipped
+    assert pickle.loads(pickle.dumps(shipped)) == shipped
+    drawn = shipped.for_seed(5)
+    again = ScenarioTemplate.from_text(drawn.to_text())
+    assert again.parameters() == {}
+    assert again.for_seed(99) == drawn
+
+
+def test_a_file_takes_shared_defaults_and_its_recording_from_beside_it(tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text(
+        "name: mine\nextends: crossing_hall\nreplay_csv: people.csv\nrobot: {start_x_m: -1.0}\n"
+    )
+    mine = ScenarioTemplate.from_yaml(path).median()
+    hall = Scenario.shipped("crossing_attentive")
+    assert (mine.layout, mine.camera) == (hall.layout, hall.camera)
+    assert (mine.robot.start_x_m, mine.robot.goal_x_m) == (-1.0, hall.robot.goal_x_m)
+    assert mine.replay_csv == str(tmp_path / "people.csv")
+    assert Scenario.from_yaml(path) == mine
+    nobody = mine.without_people()
+    assert (nobody.people, nobody.workers, nobody.replay_csv) == ((), (), None)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"speed_mps": {"unifrom": {"low": 1, "high": 2}}}, "did you mean 'uniform'"),
+        ({"speed_mps": {"uniform": {"low": 2, "high": 1}}}, r"people\.0\.speed_mps: uniform: low"),
+        ({"speed_mps": {"uniform": {"low": 1, "hihg": 2}}}, "did you mean 'high'"),
+        ({"speed_mps": {"uniform": [1, 2]}}, r"people\.0\.speed_mps: uniform must be a mapping"),
+        ({"speed_mps": {"choice": 3}}, "choice must be a list of numbers"),
+        ({"speed_mps": {"choice": []}}, r"people\.0\.speed_mps: choice"),
+        ({"speed_mps": {"choice": ["fast"]}}, r"people\.0\.speed_mps: choice"),
+        (
+            {"speed_mps": {"normal": {"mean": 3, "std": 0.1, "low": 1, "high": 2}}},
+            "mean must lie from low 1 to high 2, got 3",
+        ),
+        ({"speed_mps": {"lognormal": {"median": 1, "quartiles": [1.2, 2]}}}, "quartiles must"),
+        ({"speed_mps": {"uniform": {"low": 1, "high": 2}, "unit": "m/s"}}, "stands alone"),
+        ({"spede_mps": 1.0}, "did you mean 'speed_mps'"),
+        ({"speed_mps": "fast"}, r"people\.0\.speed_mps.*got 'fast'"),
+        ({"name": {"choice": [1, 2]}}, r"people\.0\.name"),
+    ],
+)
+def test_what_cannot_be_is_refused_by_its_path(change, said):
+    with pytest.raises(SimError, match=said):
+        template(**change)
+
+
+def test_distributions_belong_to_people_and_robot():
+    with pytest.raises(SimError, match="duration_s: only numbers under people, workers, robot"):
+        ScenarioTemplate({**BASE, "duration_s": {"uniform": {"low": 10, "high": 20}}})
+    varied = {**BASE, "robot": {"goal_x_m": {"choice": [10.0, 12.0]}}}
+    assert {ScenarioTemplate(varied).for_seed(seed).robot.goal_x_m for seed in range(9)} == {10, 12}
+
+
+def test_two_people_of_one_name_are_refused():
+    twins = {**BASE, "people": BASE["people"] * 2}
+    with pytest.raises(SimError, match="must be unique, got worker twice"):
+        ScenarioTemplate(twins)
+
+
+def test_files_that_are_no_scenarios_are_refused_by_name(tmp_path):
+    with pytest.raises(SimError, match=r"cannot read .*none\.yaml"):
+        ScenarioTemplate.from_yaml(tmp_path / "none.yaml")
+    for text, said in (
+        ("a: [", r"mine\.yaml is not valid YAML"),
+        ("- a", r"mine\.yaml must hold a mapping"),
+        ("name: a\nextends: crossing_hal", "did you mean 'crossing_hall'"),
+    ):
+        (tmp_path / "mine.yaml").write_text(text)
+        with pytest.raises(SimError, match=said):
+            ScenarioTemplate.from_yaml(tmp_path / "mine.yaml")
+
+
+def test_versions_are_part_of_a_name():
+    assert ScenarioTemplate.shipped("crossing_from_left@1").id == "crossing_from_left@1"
+    with pytest.raises(SimError, match="has version 1, got 'crossing_from_left@2'"):
+        ScenarioTemplate.shipped("crossing_from_left@2")
+
+
+def test_a_drawn_crossing_starts_where_it_was_drawn():
+    text = (
+        "name: short\nduration_s: 0.5\n"
+        "robot: {start_x_m: {uniform: {low: -1, high: 1}}, goal_x_m: 8}\n"
+    )
+    short = ScenarioTemplate.from_text(text)
+    starts = []
+    for seed in (1, 2):
+        result = run_crossing(short.for_seed(seed), policy="balanced", seed=seed)
+        starts.append(float(result.frames[0].robot_state.position_odom_m[0]))
+    drawn = [short.for_seed(seed).robot.start_x_m for seed in (1, 2)]
+    assert starts == pytest.approx(drawn, abs=1e-9)
+
+
+def test_shipped_templates_are_all_there_and_named_after_their_files():
+    assert [each.name for each in shipped_templates()] == list(shipped_scenarios())
+
+
+def test_a_crossing_by_name_is_drawn_by_its_seed():
+    by_name = run_crossing("standing_in_aisle", policy="assertive", seed=2)
+    drawn = ScenarioTemplate.shipped("standing_in_aisle").for_seed(2)
+    given = run_crossing(drawn, policy="assertive", seed=2)
+    assert by_name.min_separation_m == given.min_separation_m
+    assert by_name.time_to_goal_s == given.time_to_goal_s
+    place = given.frames[0].truth[0].position_odom_m
+    assert place == pytest.approx([drawn.people[0].route[0].x_m, drawn.people[0].route[0].y_m])

@@ -1,0 +1,255 @@
+from __future__ import annotations
+
+import itertools
+import json
+import math
+import subprocess
+import sys
+import time
+
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from awarenav.cli import main
+from nav_adapter import AwarenessPolicy
+from sim_tests import SimError
+from sim_tests.search._optuna import optuna
+from sim_tests.search.tune._evaluation import Evaluation, front, knee
+from sim_tests.search.tune._files import importances
+from sim_tests.search.tune._policy_space import PolicySpace, read_ranges, shipped_ranges
+from sim_tests.search.tune._tune import feasible_front
+from sim_tests.study.measures import EpisodeRecord
+
+_PRESETS = ("blind", "conservative", "balanced", "assertive")
+_SPACES = {name: PolicySpace(AwarenessPolicy.preset(name)) for name in _PRESETS}
+_NAMES = list(shipped_ranges())
+
+shares = st.fixed_dictionaries({name: st.floats(0.0, 1.0) for name in _NAMES})
+points = st.lists(
+    st.tuples(st.integers(0, 6).map(float), st.integers(0, 6).map(float)), min_size=1, max_size=20
+)
+
+
+def _at(space: PolicySpace, share: dict[str, float]) -> dict[str, float]:
+    return {n: (1.0 - share[n]) * r.low + share[n] * r.high for n, r in space.ranges.items()}
+
+
+@given(name=st.sampled_from(_PRESETS), share=shares)
+def test_every_point_of_the_space_is_a_policy_that_keeps_the_floor(name, share):
+    space = _SPACES[name]
+    policy = space.policy(_at(space, share))
+    for alpha in (0.0, 0.3, 0.6, 1.0):
+        assert policy.margins.bounded_m(policy.inflation.radius_m(alpha)) >= 0.40
+    assert policy.speed.human_speed_mps(0.0) >= 1.6
+    assert policy.margins.separation_clearance_m >= 0.10
+    assert AwarenessPolicy.model_validate(policy.model_dump(mode="json")) == policy
+
+
+@pytest.mark.parametrize("name", _PRESETS)
+def test_the_base_policy_lies_in_its_space_where_the_ranges_hold_it(name):
+    base, space = AwarenessPolicy.preset(name), _SPACES[name]
+    policy = space.policy(space.base_parameters())
+    for path, each in space.ranges.items():
+        value = _number(base.model_dump(), path)
+        if value is not None and each.low <= value <= each.high:
+            assert _number(policy.model_dump(), path) == pytest.approx(value), path
+
+
+def _number(data: dict, path: str) -> float | None:
+    for key in path.split("."):
+        data = None if data is None else data.get(key)
+    return data
+
+
+def test_one_parameter_may_set_several_places():
+    space = _SPACES["balanced"]
+    policy = space.policy({**space.base_parameters(), "inflation.aware_above": 0.77})
+    assert policy.inflation.aware_above == policy.speed.aware_above == 0.77
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("inflation.aware_radius_m: {low: 0.2, high: 0.8}", "not be searched below 0.4"),
+        ("speed.unaware_human_speed_mps: {low: 1.0, high: 1.8}", "not be searched below 1.6"),
+        ("margins.minimum_clearance_m: {low: 0.05, high: 0.8}", "not be searched below 0.1"),
+        (
+            "inflation.unaware_radius_m: {low: 0.5, high: 1.0, also: [inflation.aware_radius_m]}\n"
+            "inflation.aware_radius: {low: 0.4, high: 0.8}",
+            "no number 'inflation.aware_radius'; did you mean 'inflation.aware_radius_m'",
+        ),
+        ("inflation.shape: {low: 0.4, high: 0.8}", "no number 'inflation.shape'"),
+        ("timing.hold_s: {low: 5.0, high: 50.0}", "policy that cannot be"),
+    ],
+)
+def test_ranges_that_must_not_be_searched_are_refused(tmp_path, text, message):
+    path = tmp_path / "ranges.yaml"
+    path.write_text(text)
+    with pytest.raises(SimError, match=message):
+        PolicySpace(AwarenessPolicy.preset("balanced"), read_ranges(path))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "must hold places"),
+        ("timing.hold_s: [1, 2", "not valid YAML"),
+        ("timing.hold_s: {low: 2.0, high: 1.0}", "high must exceed low"),
+        ("timing.hold_s: {low: 2.0, hihg: 3.0}", "did you mean 'high'"),
+    ],
+)
+def test_files_of_ranges_that_cannot_be_read_say_why(tmp_path, text, message):
+    path = tmp_path / "ranges.yaml"
+    path.write_text(text)
+    with pytest.raises(SimError, match=message):
+        read_ranges(path)
+
+
+@given(points)
+def test_the_front_is_what_nothing_dominates(given_points):
+    rows = front(given_points)
+    for row, point in enumerate(given_points):
+        beaten = any(
+            other != point and other[0] <= point[0] and other[1] <= point[1]
+            for other in given_points
+        )
+        assert beaten == (point not in [given_points[each] for each in rows]), row
+    on_front = [given_points[row] for row in rows]
+    assert all(a[0] < b[0] and a[1] > b[1] for a, b in itertools.pairwise(on_front))
+
+
+def test_the_knee_is_where_the_front_bends():
+    bent = [(0.0, 10.0), (1.0, 2.0), (5.0, 1.0), (10.0, 0.0)]
+    assert knee(bent) == 1
+    # Units do not matter.
+    assert knee([(1000.0 * x, 0.01 * y) for x, y in bent]) == 1
+    assert knee(bent[:2]) == knee(bent[:1]) == 0
+
+
+def _trial(number: int, values: tuple[float, float], contacts: float):
+    trial = optuna.trial.create_trial(values=values, constraints={"robot_contacts": contacts})
+    trial.number = number
+    return trial
+
+
+def test_a_trial_with_a_contact_that_the_robot_caused_is_on_no_front():
+    trials = [_trial(0, (3.0, 3.0), 0.0), _trial(1, (1.0, 1.0), 1.0), _trial(2, (2.0, 4.0), 0.0)]
+    assert [trial.number for trial in feasible_front(trials)] == [2, 0]
+    assert feasible_front(trials[1:2]) == []
+
+
+def _study(values) -> optuna.Study:
+    study = optuna.create_study(directions=["minimize"] * 2)
+    for x, y in itertools.product(range(6), repeat=2):
+        a, b = x / 5.0, y / 5.0
+        distribution = optuna.distributions.FloatDistribution(0.0, 1.0)
+        study.add_trial(
+            optuna.trial.create_trial(
+                params={"matters": a, "idle": b},
+                distributions={"matters": distribution, "idle": distribution},
+                values=values(a, b),
+            )
+        )
+    return study
+
+
+def test_importances_are_finite_sum_to_one_and_name_what_matters():
+    found = importances(_study(lambda a, b: (a + 0.01 * b, 7.0)))
+    first = found["time_lost_s"]
+    assert sum(first.values()) == pytest.approx(1.0)
+    assert first["matters"] > 0.8
+    # An objective in which no trial differs is decided by nothing.
+    assert found["violation_time_s"] == {"matters": 0.0, "idle": 0.0}
+    assert all(math.isfinite(v) for each in found.values() for v in each.values())
+
+
+def _record(seed: int, **values) -> EpisodeRecord:
+    return EpisodeRecord("s", seed, "p", "q", "truth", **values)
+
+
+def test_an_evaluation_counts_contacts_and_errors_and_means():
+    found = Evaluation.of(
+        [
+            _record(2, time_lost_s=3.0, violation_time_s=0.5, min_margin_m=-0.2, robot_contacts=2),
+            _record(0, error="no"),
+            _record(1, time_lost_s=1.0, violation_time_s=0.0, min_margin_m=0.7, time_to_goal_s=9.0),
+        ]
+    )
+    assert found.objectives == (2.0, 0.25)
+    assert found.deficit_m == pytest.approx(0.1)
+    assert (found.robot_contacts, found.reached, found.errors) == (1, 1, ("no",))
+    assert found.minus(found, "time_lost_s").value == 0.0
+
+
+_TUNE = [
+    "tune",
+    "--scenario",
+    "crossing_attentive",
+    "--trials",
+    "4",
+    "--generation",
+    "3",
+    "--episodes",
+    "1",
+    "--held-out",
+    "1",
+    "--perception",
+    "truth",
+]
+
+
+@pytest.mark.slow
+def test_a_tuning_writes_its_files_and_killed_with_two_workers_the_same(tmp_path, capsys):
+    one, two = tmp_path / "one", tmp_path / "two"
+    assert main([*_TUNE, "--out", str(one)]) == 0
+    printed = capsys.readouterr().out
+    for name in (*_PRESETS, "least_time_lost", "knee", "least_violation"):
+        assert f"\n{name}" in printed
+    command = [sys.executable, "-m", "awarenav", *_TUNE, "--out", str(two)]
+    with subprocess.Popen([*command, "--workers", "2"]) as killed:
+        while killed.poll() is None and not (two / "evaluations" / "trial_0001-0-0.csv").exists():
+            time.sleep(0.05)
+        killed.kill()
+    assert killed.returncode == -9
+    assert main([*_TUNE, "--out", str(two), "--resume"]) == 0
+    capsys.readouterr()
+    for name in ("trials.csv", "chosen.json", "importances.json"):
+        assert (one / name).read_bytes() == (two / name).read_bytes()
+    assert (one / "pareto.png").read_bytes()[:4] == b"\x89PNG"
+    chosen = json.loads((one / "chosen.json").read_text())
+    assert chosen["tuning_seeds"] == "0 to 0"
+    assert chosen["held_out_seeds"] == "1000000 to 1000000"
+    for path in (one / "chosen").iterdir():
+        policy = AwarenessPolicy.from_yaml(path)
+        assert path.read_text().startswith("# ")
+        assert policy.margins.floor_m >= 0.40
+    # Resumed, a tuning that is done runs nothing and says the same.
+    assert main([*_TUNE, "--out", str(one), "--resume"]) == 0
+    assert capsys.readouterr().out.endswith(printed)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--policy", "balancd"], "did you mean 'balanced'"),
+        (["--scenario", "crossing_atentive"], "did you mean 'crossing_attentive'"),
+        (["--ranges", "nowhere.yaml"], "cannot read nowhere.yaml"),
+        (["--resume"], "there is no tuning"),
+        (["--generation", "1"], "at least 2 trials"),
+        (["--planner", "nowhere"], "module:Class"),
+    ],
+)
+def test_a_tuning_that_cannot_be_says_why_and_leaves_nothing(tmp_path, capsys, options, message):
+    out = tmp_path / "out"
+    assert main([*_TUNE, "--out", str(out), *options]) == 2
+    assert message in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_a_policy_of_ones_own_needs_a_name_of_its_own(tmp_path, capsys):
+    path = tmp_path / "blind.yaml"
+    path.write_text(yaml.safe_dump({"inflation": {"unaware_radius_m": 1.2}}))
+    assert main([*_TUNE, "--policy", str(path), "--out", str(tmp_path / "out")]) == 2
+    assert "a name of its own, got 'blind'" in capsys.readouterr().err

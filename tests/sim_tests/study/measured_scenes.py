@@ -1,0 +1,157 @@
+"""Crossings made from formulas, whose measures are known."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from shapely.geometry import Point, Polygon
+
+from nav_adapter import NavConstraints, RobotState
+from sim_tests import NOVA_CARTER, CrossingFrame, CrossingResult
+from sim_tests.crossing._stage import TrueView
+from sim_tests.study.measures._trace import Trace
+from tracking import PersonTrack
+
+BODY_RADIUS_M = 0.30
+ALONG_M, ACROSS_M = 0.3625, 0.25  # half the robot's length and width
+
+
+def footprint_at(position, heading):
+    cos, sin = math.cos(heading), math.sin(heading)
+    turn = np.array([[cos, -sin], [sin, cos]])
+    return Polygon(NOVA_CARTER.footprint_m @ turn.T + np.asarray(position))
+
+
+def track_at(position, awareness, lower, ident=1, t_s=0.0):
+    return PersonTrack(
+        id=ident,
+        stamp_s=t_s,
+        status="confirmed",
+        position_odom_m=np.asarray(position, dtype=float),
+        velocity_odom_mps=np.zeros(2),
+        covariance_odom=np.eye(4),
+        awareness=awareness,
+        awareness_std=0.1,
+        awareness_lower=lower,
+        height_m=1.75,
+        time_since_seen_s=0.0,
+    )
+
+
+def crossing(
+    times,
+    robot,
+    walks=(),
+    *,
+    awareness=None,
+    tracked=None,
+    contacts=(),
+    reached=True,
+    alerts=None,
+    **values,
+):
+    """A result whose frames follow formulas.
+
+    ``robot(t)`` gives x, y, heading, speed; each of ``walks``, of t, gives x, y, vx, vy;
+    ``awareness(t, person)`` the truth, ``tracked(t, person)`` α and lower bound or None.
+    """
+    frames = []
+    for t in np.asarray(times).tolist():
+        x, y, heading, speed = robot(t)
+        outline = footprint_at((x, y), heading)
+        views, tracks, separations = [], [], []
+        for index, person in enumerate(walks):
+            px, py, vx, vy = person(t)
+            true = 0.0 if awareness is None else awareness(t, index)
+            views.append(
+                TrueView(
+                    np.zeros(3),
+                    np.array([0.0, 0.0, 1.0]),
+                    true,
+                    np.array([px, py]),
+                    np.array([vx, vy]),
+                )
+            )
+            said = None if tracked is None else tracked(t, index)
+            if said is not None:
+                tracks.append(track_at((px + 0.1, py), *said, ident=index + 1, t_s=t))
+            separations.append(max(outline.distance(Point(px, py)) - BODY_RADIUS_M, 0.0))
+        constraints = NavConstraints(
+            stamp_s=t,
+            obstacles=(),
+            speed_limit_mps=1.5,
+            limited_by="nothing",
+            stale=False,
+            alerts=() if alerts is None else alerts(t),
+        )
+        frames.append(
+            CrossingFrame(
+                t_s=t,
+                robot_state=RobotState(t, np.array([x, y]), heading, speed, 0.0),
+                T_odom_camera=np.eye(4),
+                truth=tuple(views),
+                observations=(),
+                observed_workers=(),
+                tracks=tuple(tracks),
+                constraints=constraints,
+                command=(speed, 0.0),
+                margins_m=tuple(separations),
+                separations_m=tuple(separations),
+            )
+        )
+    by = {contact.by for contact in contacts}
+    blamed = "robot" if "robot" in by else "person" if by else ""
+    values = {
+        "scenario": "made_up",
+        "seed": 0,
+        "policy": "balanced",
+        "planner": "Formula",
+        "perception": "truth",
+        "success": reached and blamed != "robot",
+        "contact": bool(by),
+        "contact_by": blamed,
+        "contacts": tuple(contacts),
+        "min_separation_m": min(min(f.separations_m, default=math.inf) for f in frames),
+        "time_to_goal_s": frames[-1].t_s if reached else None,
+        "max_speed_within_2m_mps": 0.0,
+        "min_margin_m": math.inf,
+        "violation_time_s": 0.0,
+        "duration_s": frames[-1].t_s,
+        "frames": tuple(frames),
+        **values,
+    }
+    return CrossingResult(**values)
+
+
+def straight(speed_mps, start=(0.0, 0.0), heading=0.0):
+    """A robot that drives straight on."""
+    cos, sin = math.cos(heading), math.sin(heading)
+    return lambda t: (
+        start[0] + speed_mps * t * cos,
+        start[1] + speed_mps * t * sin,
+        heading,
+        speed_mps,
+    )
+
+
+def walking(start, velocity):
+    """A person who walks straight on."""
+    return lambda t: (start[0] + velocity[0] * t, start[1] + velocity[1] * t, *velocity)
+
+
+def trace(times, robot, people):
+    """The same as arrays, without separations and awareness: quick to make."""
+    poses = np.array([robot(t) for t in times])
+    walks = np.array([[person(t) for person in people] for t in times])
+    nothing = np.zeros((len(times), len(people)))
+    return Trace(
+        t_s=np.asarray(times, dtype=float),
+        robot_odom_m=poses[:, :2],
+        heading_odom_rad=poses[:, 2],
+        speed_mps=poses[:, 3],
+        people_odom_m=walks.reshape(len(times), len(people), 4)[..., :2],
+        people_odom_mps=walks.reshape(len(times), len(people), 4)[..., 2:],
+        awareness=nothing,
+        separation_m=nothing,
+    )

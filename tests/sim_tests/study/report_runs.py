@@ -1,0 +1,190 @@
+"""Folders as a run leaves them, with made-up episodes: what reports are tried on."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sim_tests.study.measures import EpisodeRecord, write_records
+from sim_tests.study.runs import Job
+
+#: Scenario, its attention, and the seconds that a blind robot loses in it.
+SCENARIOS = (
+    ("crossing_from_the_left", "attentive", 4.1),
+    ("crossing_from_the_right", "attentive", 4.4),
+    ("late_glance", "mixed", 4.6),
+    ("looks_away_halfway", "mixed", 4.0),
+    ("reads_a_phone", "unaware", 5.2),
+    ("stops_midway", "mixed", 7.9),
+    ("turns_back", "mixed", 6.1),
+    ("runs_out", "unaware", 3.2),
+    ("head_on_in_an_aisle", "attentive", 6.8),
+    ("overtaking", "unaware", 8.3),
+    ("being_overtaken", "unaware", 1.2),
+    ("blind_corner", "mixed", 3.6),
+    ("behind_a_pallet_truck", "mixed", 3.9),
+    ("standing_in_the_aisle", "attentive", 9.4),
+    ("two_people_one_aware", "mixed", 5.8),
+    ("group_crossing", "attentive", 7.2),
+    ("carrying_a_box", "unaware", 5.0),
+    ("walking_backwards", "unaware", 4.7),
+    ("crowd_of_eight", "mixed", 12.6),
+    ("paper_encounter", "attentive", 3.0),
+)
+#: Policy, perception, share kept of what blind loses with attentive, mixed and unaware people.
+POLICIES = (
+    ("blind", "keypoints", (1.0, 1.0, 1.0)),
+    ("balanced", "keypoints", (0.46, 0.74, 0.99)),
+    ("oracle", "truth", (0.33, 0.58, 0.97)),
+)
+_PLACES = {"attentive": 0, "mixed": 1, "unaware": 2}
+
+
+@dataclass(frozen=True)
+class MadeUpRun:
+    """What is written: episodes, their jobs in the same order, and what ``run.json`` says."""
+
+    records: tuple[EpisodeRecord, ...]
+    jobs: tuple[Job, ...]
+    run: dict[str, Any]
+
+    def write(self, out: Path) -> Path:
+        """Write the three files of a run."""
+        out.mkdir(parents=True, exist_ok=True)
+        write_records(out / "episodes.csv", self.records)
+        lines = [json.dumps(asdict(job)) for job in self.jobs]
+        (out / "jobs.jsonl").write_text("".join(f"{line}\n" for line in lines), "utf-8")
+        (out / "run.json").write_text(json.dumps(self.run, indent=2), "utf-8")
+        return out
+
+
+def made_up_run(
+    *,
+    scenarios: int = len(SCENARIOS),
+    seeds: int = 20,
+    policies: Sequence[str] = tuple(name for name, _, _ in POLICIES),
+    faults: Sequence[str] = (),
+    seed: int = 0,
+) -> MadeUpRun:
+    """Episodes as likely as real ones: paired over policies, skewed, some never arriving."""
+    rng, fault_rng = np.random.default_rng(seed).spawn(2)
+    records: list[EpisodeRecord] = []
+    jobs: list[Job] = []
+    for name, attention, lost_s in SCENARIOS[:scenarios]:
+        for episode_seed in range(seeds):
+            common = rng.standard_normal(6)
+            for policy, perception, kept in POLICIES:
+                if policy not in policies:
+                    continue
+                for fault in ("", *faults):
+                    if fault and policy != "balanced":
+                        continue
+                    own = (fault_rng if fault else rng).standard_normal(6)
+                    record = _episode(
+                        EpisodeRecord(name, episode_seed, policy, "SamplingPlanner", perception),
+                        attention,
+                        fault,
+                        lost_s * kept[_PLACES[attention]],
+                        0.8 * common + 0.6 * own,
+                    )
+                    records.append(record)
+                    jobs.append(
+                        Job(
+                            scenario=f"name: {name}\nversion: 1\nattention: {attention}\n",
+                            seed=episode_seed,
+                            policy_name=policy,
+                            policy="inflation: {shape: linear}\n",
+                            perception=perception,
+                            fault_name=fault,
+                            fault=f"name: {fault}\n" if fault else "",
+                        )
+                    )
+    run = {
+        "command": "awarenav crossings --scenario all --episodes 20 --policy blind balanced oracle "
+        "--perception keypoints --out crossings",
+        "versions": {
+            "awarenav": "0.1.0",
+            "python": "3.11.9",
+            "numpy": "2.4.6",
+            "pybullet": "3.2.7",
+        },
+        "settings": {"seed": 0, "episodes": seeds, "workers": 2, "perception": "keypoints"},
+    }
+    return MadeUpRun(tuple(records), tuple(jobs), run)
+
+
+def _episode(
+    task: EpisodeRecord, attention: str, fault: str, lost_s: float, z: np.ndarray
+) -> EpisodeRecord:
+    free_s = 11.0 + 0.4 * float(z[0])
+    delay_s = max(lost_s * float(np.exp(0.35 * z[1])) + (1.1 if fault else 0.0), 0.0)
+    arrived = z[2] < 2.45
+    time_s = free_s + delay_s
+    margin_m = 0.42 + 0.33 * float(z[3]) - (0.45 if task.scenario == "runs_out" else 0.0)
+    violation_s = max(-margin_m, 0.0) * 1.4
+    separation_m = max(0.55 + 0.4 * margin_m + 0.1 * float(z[4]), 0.05)
+    walked_into = z[4] < -2.6
+    truly_aware = {"attentive": z[5] > -1.4, "mixed": z[5] > 0.1, "unaware": False}[attention]
+    recognised = truly_aware and z[4] > -0.7
+    fooled = not truly_aware and z[4] > 1.9
+    if task.policy == "oracle":
+        recognised, fooled = truly_aware, False
+    stands = {
+        (True, True): "aware",
+        (True, False): "missed_aware",
+        (False, True): "falsely_aware",
+        (False, False): "unaware",
+    }[(bool(truly_aware), bool(recognised or fooled))]
+    return replace(
+        task,
+        success=bool(arrived),
+        contact=bool(walked_into),
+        contact_by="person" if walked_into else "",
+        contacts=int(walked_into),
+        person_contacts=int(walked_into),
+        min_separation_m=0.0 if walked_into else separation_m,
+        time_to_goal_s=time_s if arrived else None,
+        max_speed_within_2m_mps=float(np.clip(0.9 + 0.2 * z[1], 0.1, 1.5)),
+        min_margin_m=margin_m,
+        violation_time_s=violation_s,
+        duration_s=time_s if arrived else 40.0,
+        attention=attention,
+        fault=fault,
+        time_without_people_s=free_s,
+        time_lost_s=delay_s if arrived else 40.0 - free_s,
+        path_length_m=14.2 + 0.2 * abs(float(z[0])),
+        spl=float(np.clip(0.97 - 0.01 * abs(z[0]), 0.0, 1.0)) if arrived else 0.0,
+        speed_at_min_separation_mps=float(np.clip(0.35 + 0.22 * z[4], 0.0, 1.5)),
+        min_time_to_collision_s=float(np.clip(2.0 + 0.6 * z[3], 0.2, 8.0)),
+        post_encroachment_s=float(np.clip(1.8 + 0.7 * z[4], 0.1, 9.0)),
+        intimate_s=max(float(-z[3]) - 1.0, 0.0),
+        personal_s=max(1.2 + 0.6 * float(z[4]), 0.0),
+        peak_deceleration_mps2=float(np.clip(0.85 + 0.1 * z[1], 0.2, 1.3)),
+        peak_jerk_mps3=float(np.clip(4.0 + z[1], 0.5, 9.0)),
+        stops=int(z[2] > 0.6) + int(z[1] > 1.2),
+        human_delay_s=max(0.3 + 0.4 * float(z[0]), 0.0),
+        human_detour_m=max(0.1 + 0.1 * float(z[5]), 0.0),
+        warnings=int(z[3] < -0.8),
+        awareness_error=float(np.clip(0.12 + 0.05 * z[5], 0.0, 1.0)),
+        awareness=stands,
+        reaction="wait" if truly_aware else "",
+    )
+
+
+def failed(record: EpisodeRecord, why: str) -> EpisodeRecord:
+    """The same episode, had it failed."""
+    return EpisodeRecord(
+        record.scenario,
+        record.seed,
+        record.policy,
+        record.planner,
+        record.perception,
+        attention=record.attention,
+        fault=record.fault,
+        error=why,
+    )

@@ -1,0 +1,29 @@
+"""Short episodes for tests of runs."""
+
+from __future__ import annotations
+
+from sim_tests.scenario import ScenarioTemplate
+from sim_tests.study.runs import plan_jobs
+
+SHORT = """
+name: {name}
+description: Two seconds.
+duration_s: 2.0
+control_hz: 10.0
+layout: {{x_min_m: -3.0, y_min_m: -3.0, x_max_m: 6.0, y_max_m: 3.0}}
+robot: {{goal_x_m: 0.6}}
+workers:
+  - path:
+      - {{t_s: 0.0, x_m: {{uniform: {{low: 3.0, high: 4.0}}}}, y_m: -1.0}}
+"""
+
+
+def short(name: str = "short") -> ScenarioTemplate:
+    """A robot that has 0.6 m to go, and somebody who stands somewhere."""
+    return ScenarioTemplate.from_text(SHORT.format(name=name))
+
+
+def short_jobs(episodes: int = 2, **options):
+    """Episodes of it from the truth, with two policies."""
+    given = {"perception": "truth", **options}
+    return plan_jobs([short()], ["blind", "balanced"], range(episodes), **given)

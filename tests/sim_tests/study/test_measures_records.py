@@ -1,0 +1,176 @@
+"""Tables of episodes: what is written is read again, and what is broken is said."""
+
+import csv
+import math
+from dataclasses import fields, replace
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from paths import ROOT
+
+from sim_tests import SimError
+from sim_tests.demo._tables import EPISODE_COLUMNS
+from sim_tests.study.measures import (
+    RECORD_COLUMNS,
+    EpisodeRecord,
+    read_record_file,
+    read_records,
+    record_row,
+    write_records,
+)
+from sim_tests.study.measures._metric_info import METRIC_BY_NAME
+from sim_tests.study.measures._record import COLUMN_KINDS, rounded
+
+numbers = st.none() | st.floats(-1e6, 1e6).map(rounded)
+texts = st.text(st.characters(exclude_categories=("C", "Zl", "Zp")), max_size=20)
+KINDS = {
+    "str": texts,
+    "bool": st.booleans(),
+    "int": st.integers(-(2**40), 2**40),
+    "float | None": numbers,
+    "Awareness": st.sampled_from(["", "aware", "unaware", "falsely_aware", "missed_aware"]),
+}
+records = st.builds(
+    EpisodeRecord, **{field.name: KINDS[field.type] for field in fields(EpisodeRecord)}
+)
+PLAIN = EpisodeRecord("late_glance", 3, "balanced", "SamplingPlanner", "truth", success=True)
+in_one_folder = settings(
+    max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+
+
+@in_one_folder
+@given(st.lists(records, max_size=4))
+def test_csv_gives_back_every_field(tmp_path, episodes):
+    path = tmp_path / "episodes.csv"
+    write_records(path, episodes)
+    assert read_records(path) == tuple(episodes)
+    before = path.read_bytes()
+    write_records(path, read_records(path))
+    assert path.read_bytes() == before
+
+
+@in_one_folder
+@given(st.lists(records, max_size=4))
+def test_parquet_gives_back_every_field(tmp_path, episodes):
+    pytest.importorskip("pyarrow")
+    path = tmp_path / "episodes.parquet"
+    write_records(path, episodes)
+    assert read_records(path) == tuple(episodes)
+
+
+@in_one_folder
+@given(st.lists(records, min_size=1, max_size=3), st.data())
+def test_a_file_cut_anywhere_gives_its_whole_rows(tmp_path, episodes, data):
+    path = tmp_path / "episodes.csv"
+    write_records(path, episodes)
+    whole = path.read_bytes()
+    cut = data.draw(st.integers(0, len(whole)))
+    path.write_bytes(whole[:cut])
+    found = read_record_file(path)
+    lines = whole[:cut].count(b"\n")
+    assert found.records == tuple(episodes[: max(lines - 1, 0)])
+    assert found.whole_bytes == whole[:cut].rfind(b"\n") + 1
+    assert bool(found.torn) == (cut > found.whole_bytes)
+
+
+def test_an_unfinished_row_is_reported_and_left_out(tmp_path, capsys):
+    path = tmp_path / "episodes.csv"
+    write_records(path, [PLAIN, PLAIN])
+    path.write_bytes(path.read_bytes()[:-10])
+    assert read_records(path) == (PLAIN,)
+    assert "the last row is unfinished" in capsys.readouterr().err
+
+
+def test_the_columns_of_earlier_tables_come_first_and_alone_suffice(tmp_path):
+    assert RECORD_COLUMNS[: len(EPISODE_COLUMNS)] == EPISODE_COLUMNS
+    path = tmp_path / "episodes.csv"
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(EPISODE_COLUMNS)
+        writer.writerow(record_row(PLAIN)[: len(EPISODE_COLUMNS)])
+    assert read_records(path) == (PLAIN,)
+
+
+def test_the_documentation_defines_every_column():
+    text = (ROOT / "docs" / "metrics.md").read_text(encoding="utf-8")
+    assert [name for name in RECORD_COLUMNS if f"`{name}`" not in text] == []
+
+
+def test_every_number_is_known_to_the_tables():
+    numbers = {name for name, kind in COLUMN_KINDS.items() if kind in ("number", "count")}
+    elsewhere = {"seed", "scenario_version", "contacts", "duration_s", "time_without_people_s"}
+    assert numbers - elsewhere == set(METRIC_BY_NAME)
+
+
+def test_numbers_are_what_files_keep():
+    assert rounded(1.23456789) == 1.234568
+    assert math.copysign(1.0, rounded(-1e-9)) == 1.0
+    assert rounded(math.inf) is rounded(math.nan) is rounded(None) is None
+
+
+def test_an_error_of_many_lines_is_one_row(tmp_path):
+    path = tmp_path / "episodes.csv"
+    write_records(path, [replace(PLAIN, error="ValueError: a\nb\r\n\0c, 'd'")])
+    assert path.read_bytes().count(b"\n") == 2
+    assert read_records(path)[0].error == "ValueError: a b c, 'd'"
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("scenario,seed", "scenario,speed"), "unknown column 'speed'; did you mean 'seed'"),
+        (("scenario,seed", "seed,seed"), "column 'seed' 2 times"),
+        (("scenario,", ""), "no column 'scenario'"),
+        ((",true,", ",yes,"), "line 2: success must be true or false, got 'yes'"),
+        (("glance,3,", "glance,3.5,"), "line 2: seed must be a whole number, got '3.5'"),
+        (("late_glance,", "late,glance,"), "line 2 has 41 cells, its header 40"),
+        (("mixed", "mixed,nan"), "cells"),
+        (("scenario", "\x00\x01"), "not a table of episodes"),
+    ],
+)
+def test_foreign_files_are_refused_by_name_and_line(tmp_path, change, message):
+    path = tmp_path / "episodes.csv"
+    write_records(path, [PLAIN])
+    text = path.read_text()
+    assert change[0] in text
+    path.write_text(text.replace(*change, 1))
+    with pytest.raises(SimError, match=message):
+        read_records(path)
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "fast"])
+def test_numbers_that_are_none_are_refused(tmp_path, value):
+    path = tmp_path / "episodes.csv"
+    write_records(path, [replace(PLAIN, time_to_goal_s=1.0)])
+    path.write_text(path.read_text().replace("1.000000", value))
+    with pytest.raises(SimError, match=r"line 2: time_to_goal_s must be"):
+        read_records(path)
+
+
+def test_absent_and_binary_files_are_said(tmp_path):
+    with pytest.raises(SimError, match="cannot read the episodes"):
+        read_records(tmp_path / "episodes.csv")
+    picture = tmp_path / "picture.csv"
+    picture.write_bytes(b"\x89PNG\n\xff\xfe\n")
+    with pytest.raises(SimError, match="not a table of episodes"):
+        read_records(picture)
+    empty = tmp_path / "empty.csv"
+    empty.write_bytes(b"")
+    assert read_records(empty) == ()
+
+
+def test_a_write_that_fails_leaves_the_old_table(tmp_path):
+    path = tmp_path / "episodes.csv"
+    write_records(path, [PLAIN])
+
+    def breaking():
+        yield PLAIN
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_records(path, breaking())
+    assert read_records(path) == (PLAIN,)
+    with pytest.raises(SimError, match="cannot write the episodes"):
+        write_records(tmp_path / "absent" / "episodes.csv", [PLAIN])

@@ -1,0 +1,218 @@
+"""Summaries: what is counted, compared and left out; and the command that prints them."""
+
+import random
+from dataclasses import replace
+
+import pytest
+
+from awarenav.cli import main
+from sim_tests import SimError
+from sim_tests.study.measures import (
+    EpisodeRecord,
+    Variant,
+    labels,
+    read_records,
+    summarise,
+    summary_text,
+    write_records,
+    zero_of_n_upper,
+)
+from sim_tests.study.measures._variants import baselines_of
+
+ATTENTION = {"late_glance": "attentive", "reads_a_phone": "unaware"}
+LOST_S = {"blind": 6.0, "balanced": 3.0, "oracle": 2.0}
+
+
+def episode(scenario, seed, policy, **values):
+    lost = LOST_S[policy] + 0.1 * seed
+    known = {
+        "success": True,
+        "min_separation_m": 0.5 + 0.01 * seed,
+        "time_to_goal_s": 10.0 + lost,
+        "time_lost_s": lost,
+        "min_margin_m": 0.2,
+        "violation_time_s": 0.0,
+        "duration_s": 10.0 + lost,
+        "attention": ATTENTION[scenario],
+        "awareness": "aware" if ATTENTION[scenario] == "attentive" else "unaware",
+        **values,
+    }
+    perception = "truth" if policy == "oracle" else "keypoints"
+    return EpisodeRecord(scenario, seed, policy, "SamplingPlanner", perception, **known)
+
+
+RECORDS = [
+    episode(scenario, seed, policy)
+    for scenario in ATTENTION
+    for seed in range(5)
+    for policy in LOST_S
+]
+
+
+def only(rows, **values):
+    found = [row for row in rows if all(getattr(row, k) == v for k, v in values.items())]
+    assert len(found) == 1
+    return found[0]
+
+
+def test_a_row_a_policy_and_one_for_each_part():
+    summary = summarise(RECORDS)
+    assert [row.variant for row in summary.policies] == ["blind", "balanced", "oracle"]
+    row = only(summary.policies, variant="balanced")
+    assert (row.episodes, row.errors, row.success.value) == (10, 0, 1.0)
+    assert row.robot_contact.high == zero_of_n_upper(10)
+    assert row.means["time_lost_s"].value == pytest.approx(3.2)
+    assert row.worst["min_separation_m"] == 0.5
+    assert row.worst["time_lost_s"] == pytest.approx(3.4)
+    assert {row.part for row in summary.scenarios} == set(ATTENTION)
+    assert {row.part for row in summary.attentions} == {"attentive", "unaware"}
+    assert {row.part for row in summary.awareness} == {"aware", "unaware"}
+    assert all(row.episodes == 5 for row in (*summary.scenarios, *summary.awareness))
+
+
+def test_every_policy_is_compared_with_the_baseline():
+    summary = summarise(RECORDS)
+    every = only(summary.comparisons, variant="balanced", part="")
+    assert (every.baseline, every.pairs) == ("blind", 10)
+    assert every.won_back.value == pytest.approx(3.0 / 6.2)
+    assert every.time_lost_s.value == pytest.approx(-3.0)
+    assert only(summary.comparisons, variant="oracle", part="attentive").pairs == 5
+    assert only(summary.scenario_comparisons, variant="oracle", part="late_glance").pairs == 5
+    other = summarise(RECORDS, baseline="balanced")
+    assert {each.baseline for each in other.comparisons} == {"balanced"}
+    assert summarise(RECORDS, baseline="absent").comparisons == ()
+
+
+def test_the_order_of_rows_changes_nothing():
+    shuffled = list(RECORDS)
+    random.Random(1).shuffle(shuffled)
+    assert summary_text(summarise(shuffled)) == summary_text(summarise(RECORDS))
+    assert summarise(shuffled) == summarise(RECORDS)
+
+
+def test_errors_are_no_success_and_in_no_mean():
+    broken = [replace(r, error="it broke", success=False) if r.seed == 0 else r for r in RECORDS]
+    summary = summarise(broken)
+    row = only(summary.policies, variant="balanced")
+    assert (row.episodes, row.errors) == (10, 2)
+    assert row.success.value == pytest.approx(0.8)
+    assert row.robot_contact.n == row.means["time_lost_s"].n == 8
+    assert only(summary.comparisons, variant="balanced", part="").won_back.left_out == 2
+    assert "2 of 10 episodes broke off with an error" in summary_text(summary)
+
+
+def test_an_episode_that_goes_astray_is_said():
+    lost = [
+        replace(r, success=False, time_to_goal_s=None, time_lost_s=40.0)
+        if (r.policy, r.seed) == ("balanced", 1)
+        else r
+        for r in RECORDS
+    ]
+    summary = summarise(lost)
+    assert "balanced: 2 of 10 episodes did not reach the goal" in summary_text(summary)
+    assert only(summary.comparisons, variant="balanced", part="").won_back.value < 0.0
+
+
+def test_contacts_show_in_every_table():
+    touched = [
+        replace(r, robot_contacts=1, contact_by="robot", success=False)
+        if (r.policy, r.seed, r.scenario) == ("balanced", 2, "late_glance")
+        else r
+        for r in RECORDS
+    ]
+    text = summary_text(summarise(touched))
+    assert "1 of 10 (≤ 45 %)" in text
+    assert only(summarise(touched).policies, variant="balanced").robot_contact.value == 0.1
+
+
+def test_no_episodes_are_no_tables():
+    assert summary_text(summarise([])) == "no episodes"
+    alone = summarise(RECORDS[:1])
+    assert "[?]" in summary_text(alone)
+
+
+def test_variants_are_named_by_what_tells_them_apart():
+    variants = [
+        Variant("blind", "P", "keypoints"),
+        Variant("balanced", "P", "keypoints"),
+        Variant("balanced", "P", "keypoints", "late_frames"),
+        Variant("oracle", "P", "truth"),
+    ]
+    assert list(labels(variants).values()) == [
+        "blind",
+        "balanced, no fault",
+        "balanced, late_frames",
+        "oracle",
+    ]
+
+
+def test_the_baseline_is_of_the_same_planner_and_the_likest_conditions():
+    plain, faulty = Variant("blind", "P", "keypoints"), Variant("blind", "P", "keypoints", "late")
+    both = [plain, faulty, Variant("blind", "Q", "keypoints")]
+    for fault, expected in (("late", faulty), ("", plain), ("misses", plain)):
+        tried = Variant("x", "P", "truth", fault)
+        assert baselines_of(tried, [*both, tried], "blind") == (expected,)
+    lonely = Variant("x", "R", "keypoints")
+    assert baselines_of(lonely, [*both, lonely], "blind") == ()
+
+
+@pytest.fixture
+def run_folder(tmp_path):
+    folder = tmp_path / "before"
+    folder.mkdir()
+    write_records(folder / "episodes.csv", RECORDS)
+    return folder
+
+
+def test_the_command_prints_the_tables(run_folder, capsys):
+    assert main(["compare", str(run_folder)]) == 0
+    text = capsys.readouterr().out
+    assert text.strip() == summary_text(summarise(RECORDS))
+    assert "48 [" in text  # 3.0 of 6.2 s
+    assert max(len(line) for line in text.splitlines()) <= 130
+
+
+def test_two_runs_are_compared_with_each_other(run_folder, tmp_path, capsys):
+    after = tmp_path / "after"
+    after.mkdir()
+    better = [replace(r, time_lost_s=0.5 * r.time_lost_s) for r in RECORDS]
+    write_records(after / "episodes.csv", better)
+    out = tmp_path / "all.csv"
+    assert main(["compare", str(run_folder), str(after), "--out", str(out)]) == 0
+    text = capsys.readouterr().out
+    line = next(
+        line
+        for line in text.splitlines()
+        if line.startswith("balanced, after") and "balanced, before" in line
+    )
+    assert "50 [50, 50]" in line
+    assert len(read_records(out)) == 2 * len(RECORDS)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["{run}/absent"], "cannot read the episodes"),
+        (["{run}", "--baseline", "balancd"], "did you mean 'balanced'"),
+        (["{run}", "--level", "95"], "--level must lie in (0, 1), got 95"),
+        (["{run}", "--seed", "-1"], "must be a whole number of at least 0, got '-1'"),
+        (["{run}", "{run}"], "each run once"),
+        (["{run}", "--out", "table.txt"], "--out must be a .csv or .parquet file"),
+    ],
+)
+def test_bad_input_to_compare_is_one_line(run_folder, capsys, arguments, message):
+    assert main(["compare", *(a.replace("{run}", str(run_folder)) for a in arguments)]) == 2
+    captured = capsys.readouterr()
+    assert message in captured.err
+    assert captured.out == ""
+
+
+def test_a_run_without_a_whole_row_has_nothing_to_compare(run_folder, capsys):
+    (run_folder / "episodes.csv").write_text("scenario,seed,pol")
+    assert main(["compare", str(run_folder)]) == 2
+    assert "no episodes yet" in capsys.readouterr().err
+
+
+def test_an_episode_that_is_there_twice_is_refused():
+    with pytest.raises(SimError, match="is there twice"):
+        summarise([*RECORDS, RECORDS[0]])

@@ -1,0 +1,72 @@
+"""The same episodes on a Dask cluster whose workers are killed."""
+
+import os
+import signal
+import threading
+
+import pytest
+from run_scenes import short_jobs
+
+from sim_tests import SimError
+from sim_tests.study.runs import run_jobs
+
+distributed = pytest.importorskip("distributed")
+
+pytestmark = [
+    pytest.mark.slow,
+    # Dask's own sockets and its event loop's end.
+    pytest.mark.filterwarnings("ignore::ResourceWarning"),
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+]
+
+
+@pytest.fixture
+def cluster():
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+    ) as running:
+        yield running
+
+
+def test_a_killed_worker_changes_nothing(cluster, tmp_path):
+    jobs = short_jobs(15)
+    run_jobs(jobs, tmp_path / "serial", workers=1)
+    path = tmp_path / "dask" / "episodes.csv"
+    victim = cluster.workers[0].pid
+    killed = threading.Event()
+
+    def kill():
+        while not path.exists() or path.read_bytes().count(b"\n") < 4:
+            killed.wait(0.02)
+        os.kill(victim, signal.SIGKILL)
+        killed.set()
+
+    killer = threading.Thread(target=kill)
+    killer.start()
+    run_jobs(jobs, path.parent, scheduler=cluster.scheduler_address)
+    killer.join()
+    assert killed.is_set()
+    assert path.read_bytes() == (tmp_path / "serial" / "episodes.csv").read_bytes()
+
+
+def test_an_episode_that_kills_every_worker_is_a_row_and_costs_no_other(tmp_path):
+    jobs = short_jobs(1) + short_jobs(1, planners=["run_planners:Dies"])[:1]
+    records = run_jobs(jobs, tmp_path / "run", workers=2, scheduler="local")
+    assert [record.success for record in records] == [True, True, False]
+    assert "KilledWorker" in records[2].error
+
+
+def test_a_run_on_a_local_cluster_ends_without_a_word_of_it(tmp_path, capfd, monkeypatch):
+    # Workers that report so often would find the scheduler gone if it went first.
+    monkeypatch.setattr("distributed.scheduler.heartbeat_interval", lambda workers: 0.01)
+    records = run_jobs(short_jobs(2), tmp_path / "run", workers=2, scheduler="local")
+    assert all(record.success for record in records)
+    said = capfd.readouterr()
+    # Reports of the workers, which are processes of their own.
+    assert "distributed" not in said.err + said.out
+
+
+def test_a_scheduler_that_does_not_answer_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("sim_tests.study.runs._cluster._CONNECT_S", 0.5)
+    with pytest.raises(SimError, match="no Dask scheduler answers"):
+        run_jobs(short_jobs(1), tmp_path, scheduler="tcp://127.0.0.1:9")

@@ -1,0 +1,56 @@
+"""An episode of a run again: the same row, said so; pictures of it."""
+
+import pytest
+from run_scenes import short_jobs
+
+from awarenav.cli import main
+from sim_tests.study.runs import run_jobs
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("run")
+    run_jobs(short_jobs(1, faults=["none", "misses_30"]), folder, workers=1)
+    return folder
+
+
+def test_a_replay_gives_the_same_row_a_film_and_a_map(run, tmp_path, capsys):
+    assert main(["replay", str(run), "1", "--out", str(tmp_path)]) == 0
+    text = capsys.readouterr().out
+    assert "Episode 1: short, seed 0, policy balanced" in text
+    assert "The same row as in" in text
+    assert (tmp_path / "episode_00001.png").read_bytes().startswith(b"\x89PNG")
+    assert b"ftyp" in (tmp_path / "episode_00001.mp4").read_bytes()[:16]
+
+
+def test_a_replay_that_ends_otherwise_says_in_what(run, tmp_path, capsys):
+    copy = tmp_path / "copy"
+    copy.mkdir()
+    rows = (run / "episodes.csv").read_text().replace(",true,false,,", ",false,false,,")
+    (copy / "episodes.csv").write_text(rows)
+    (copy / "jobs.jsonl").write_bytes((run / "jobs.jsonl").read_bytes())
+    assert main(["replay", str(copy), "short:0:blind:misses_30", "--no-video"]) == 1
+    assert "success was false, is true" in capsys.readouterr().out
+    assert [path.name for path in (copy / "replays").iterdir()] == ["episode_00002.png"]
+
+
+@pytest.mark.parametrize(
+    ("episode", "message"),
+    [
+        ("4", "the run has 4 episodes, numbered 0 to 3, got 4"),
+        ("short", "SCENARIO:SEED:POLICY"),
+        ("short:7:blind", "one that it has is short:0:blind"),
+        ("short:0:blind", "is 2 episodes of the run, give one's number: 0: short, seed 0"),
+    ],
+)
+def test_episodes_that_are_not_there_are_refused(run, episode, message, capsys):
+    assert main(["replay", str(run), episode, "--no-video"]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_folders_that_hold_no_run_are_refused(tmp_path, capsys):
+    assert main(["replay", str(tmp_path), "0"]) == 2
+    assert "is not the folder of a run" in capsys.readouterr().err
+    (tmp_path / "jobs.jsonl").write_text('{"scenario": "x"}\n')
+    assert main(["replay", str(tmp_path), "0"]) == 2
+    assert "line 1 is not an episode" in capsys.readouterr().err

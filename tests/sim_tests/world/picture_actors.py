@@ -1,0 +1,84 @@
+"""Small things that move, for tests of what the camera sees."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from perception.arrays import FloatArray
+from sim_tests.world.bullet import pybullet
+from sim_tests.world.hall import Mesh, ellipsoid, quad
+from sim_tests.world.render import RenderView, Visuals
+
+CHECKS = np.kron(np.indices((4, 4)).sum(axis=0) % 2, np.ones((8, 8)))[..., None] * np.array(
+    [200, 40, 30]
+) + np.array([30, 90, 60])
+
+
+class Shown:
+    """An actor of one shape at a place; remembers at which level of detail it was shown."""
+
+    kind = "prop"
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        position_m: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        colour: tuple[float, float, float] = (1.0, 1.0, 1.0),
+        texture_rgb: np.ndarray | None = None,
+        kind: str = "prop",
+    ) -> None:
+        self.mesh = mesh
+        self.position_m = np.array(position_m, dtype=float)
+        self.kind = kind
+        self.shown: list[float | None] = []
+        self.builds = 0
+        self.body = -1
+        self._colour = colour
+        self._texture_rgb = texture_rgb
+
+    def bounds_odom_m(self) -> FloatArray:
+        vertices = self.mesh.vertices_m
+        return np.array([vertices.min(axis=0), vertices.max(axis=0)]) + self.position_m
+
+    def build(self, visuals: Visuals) -> None:
+        self.builds += 1
+        self._visuals = visuals
+        texture = None
+        if self._texture_rgb is not None:
+            texture = visuals.texture(self._texture_rgb.astype(np.uint8))
+        self.body = visuals.add_body(visuals.shape(self.mesh, self._colour, texture))
+
+    def show(self, pixels_per_m: float | None, view: RenderView | None = None) -> None:
+        self.shown.append(pixels_per_m)
+        if pixels_per_m is None:
+            self._visuals.hide(self.body)
+            return
+        self._visuals.reveal(self.body)
+        pybullet.resetBasePositionAndOrientation(
+            self.body,
+            self.position_m.tolist(),
+            (0.0, 0.0, 0.0, 1.0),
+            physicsClientId=self._visuals.client,
+        )
+
+    def bodies(self) -> frozenset[int]:
+        return frozenset({self.body})
+
+
+def ball(radius_m: float = 0.06, **others: object) -> Shown:
+    """A round actor."""
+    mesh = ellipsoid((0.0, 0.0, 0.0), (radius_m,) * 3, sides=24, rings=16)
+    return Shown(mesh, **others)  # type: ignore[arg-type]
+
+
+def upright_square(half_m: float = 0.5) -> Mesh:
+    """A square across odom x that faces −x, its picture upright."""
+    corners = [
+        (0.0, half_m, -half_m),
+        (0.0, -half_m, -half_m),
+        (0.0, -half_m, half_m),
+        (0.0, half_m, half_m),
+    ]
+    flat = quad(corners)
+    uv = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
+    return Mesh(flat.vertices_m, flat.normals, flat.indices, uv)

@@ -1,0 +1,151 @@
+"""Frames are taken, lost and delivered as the settings say."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from perception.arrays import FloatArray
+from sim_tests import SimError
+from sim_tests.crossing.eyes import TimedEyes
+from sim_tests.world.camera import CameraTiming, FrameClock, FrameQueue
+
+
+def _frames(timing: CameraTiming, count: int, seed: int = 0) -> list[tuple[float, float | None]]:
+    return list(itertools.islice(timing.frames(np.random.default_rng(seed), 5.0), count))
+
+
+def test_a_perfect_camera_delivers_every_frame_at_once() -> None:
+    assert CameraTiming().perfect
+    assert _frames(CameraTiming(rate_hz=25.0), 4) == [(t, t) for t in (5.0, 5.04, 5.08, 5.12)]
+
+
+def test_losses_and_delays_have_the_asked_statistics() -> None:
+    timing = CameraTiming(rate_hz=30.0, drop_rate=0.2, latency_s=0.05, latency_jitter_s=0.03)
+    count = 20_000
+    frames = _frames(timing, count)
+    delays = np.array([end - stamp for stamp, end in frames if end is not None])
+    lost = 1.0 - len(delays) / count
+    assert lost == pytest.approx(0.2, abs=5.0 * math.sqrt(0.2 * 0.8 / count))
+    assert delays.min() >= 0.05 - 1e-9
+    assert delays.max() <= 0.08 + 1e-9
+    # A uniform distribution: mean in the middle, variance of its width squared over twelve.
+    assert delays.mean() == pytest.approx(0.065, abs=5.0 * 0.03 / math.sqrt(12.0 * len(delays)))
+    assert delays.var() == pytest.approx(0.03**2 / 12.0, rel=0.05)
+
+
+def test_one_frames_fate_changes_no_others() -> None:
+    """More losses take frames away; those that are left arrive exactly when they did."""
+    settings_of = {"rate_hz": 30.0, "latency_s": 0.02, "latency_jitter_s": 0.05}
+    few = _frames(CameraTiming(drop_rate=0.1, **settings_of), 300)
+    many = _frames(CameraTiming(drop_rate=0.5, **settings_of), 300)
+    assert _frames(CameraTiming(drop_rate=0.1, **settings_of), 300) == few
+    for one, other in zip(few, many, strict=True):
+        assert other in (one, (one[0], None))
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    st.floats(5.0, 60.0),
+    st.floats(0.0, 0.5),
+    st.floats(0.0, 0.3),
+    st.floats(0.0, 0.3),
+    st.integers(0, 99),
+)
+def test_the_queue_hands_out_each_frame_once_when_it_has_arrived(
+    rate_hz: float, drop_rate: float, latency_s: float, jitter_s: float, seed: int
+) -> None:
+    timing = CameraTiming(
+        rate_hz=rate_hz, drop_rate=drop_rate, latency_s=latency_s, latency_jitter_s=jitter_s
+    )
+    frames = _frames(timing, 40, seed)
+    queue: FrameQueue[tuple[float, float]] = FrameQueue()
+    kept = [(stamp, end) for stamp, end in frames if end is not None]
+    received: list[tuple[float, float]] = []
+    waiting = list(frames)
+    for now in np.arange(5.0, frames[-1][0] + 1.0, 0.017):
+        while waiting and waiting[0][0] <= now:
+            stamp, end = waiting.pop(0)
+            queue.put(stamp, end, (stamp, end if end is not None else math.nan))
+        arrived = queue.take(float(now))
+        assert all(end <= now + 1e-5 for _, end in arrived)
+        received += arrived
+    assert sorted(received) == sorted(kept)
+    assert [end for _, end in received] == sorted(end for _, end in received)
+    assert len(queue) == 0
+
+
+def test_frames_that_arrive_together_come_in_the_order_they_were_taken() -> None:
+    queue: FrameQueue[str] = FrameQueue()
+    queue.put(2.0, 3.0, "second")
+    queue.put(1.0, 3.0, "first")
+    queue.put(1.5, None, "lost")
+    assert queue.take(2.9) == ()
+    assert len(queue) == 2
+    assert queue.take(3.0) == ("first", "second")
+    with pytest.raises(SimError, match="delivery_s"):
+        queue.put(2.0, 1.9, "before it was taken")
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "tick_hz", "per_second"),
+    [(None, 20.0, 20), (10.0, 60.0, 10), (30.0, 60.0, 30), (60.0, 20.0, 20), (24.0, 60.0, 24)],
+)
+def test_a_clock_takes_as_many_frames_as_the_slower_of_rate_and_ticks(
+    rate_hz: float | None, tick_hz: float, per_second: int
+) -> None:
+    clock = FrameClock(CameraTiming(rate_hz=rate_hz), np.random.default_rng(0))
+    taken = [k / tick_hz for k in range(round(10 * tick_hz)) if clock.tick(k / tick_hz)[0]]
+    assert len(taken) == 10 * per_second
+    if rate_hz is not None:
+        # None before its time, none later than a tick after it.
+        late = np.array(taken) * rate_hz % 1.0 / rate_hz
+        assert np.minimum(late, 1.0 / rate_hz - late).max() < 1.0 / tick_hz + 1e-9
+
+
+def test_a_camera_without_a_rate_does_not_run_on_its_own() -> None:
+    with pytest.raises(SimError, match="rate_hz"):
+        next(CameraTiming().frames(np.random.default_rng(0)))
+
+
+class _Counting:
+    """Eyes that see nobody and remember when they looked."""
+
+    def __init__(self) -> None:
+        self.looked_s: list[float] = []
+
+    def observe(self, stamp_s: float, T_odom_camera: FloatArray, truth: object) -> tuple[()]:
+        self.looked_s.append(stamp_s)
+        return ()
+
+
+def test_timed_eyes_learn_late_of_what_they_saw_then() -> None:
+    eyes = _Counting()
+    timing = CameraTiming(rate_hz=10.0, latency_s=0.12, drop_rate=0.25)
+    timed = TimedEyes(eyes, timing, np.random.default_rng(2))
+    learned = []
+    for tick in range(200):
+        now = tick / 20.0
+        pose = np.eye(4) * (1.0 + tick)
+        for sighting in timed.look(now, pose, ()):
+            assert now - sighting.stamp_s == pytest.approx(0.15)  # the first tick after 0.12 s
+            assert sighting.T_odom_camera[0, 0] == pytest.approx(1.0 + 20.0 * sighting.stamp_s)
+            learned.append(sighting.stamp_s)
+    # A frame that is lost is not looked at; two were still on their way at the end.
+    assert eyes.looked_s[: len(learned)] == learned
+    assert len(eyes.looked_s) - len(learned) <= 2
+    assert len(learned) == pytest.approx(75, abs=15)
+
+
+def test_perfect_timing_is_looking_now() -> None:
+    eyes = _Counting()
+    timed = TimedEyes(eyes, CameraTiming(), np.random.default_rng(2))
+    for tick in range(50):
+        (sighting,) = timed.look(tick / 60.0, np.eye(4), ())
+        assert sighting.stamp_s == tick / 60.0
+    assert len(eyes.looked_s) == 50

@@ -1,0 +1,223 @@
+"""OpenGL through moderngl draws the software renderer's pictures, several worlds at a time."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from camera_poses import level_pose
+from picture_actors import CHECKS, Shown, ball, upright_square
+
+from perception import Camera
+from sim_tests import SimError
+from sim_tests.actors.body import Worker
+from sim_tests.world import Warehouse
+from sim_tests.world.bullet import pybullet
+from sim_tests.world.camera import CameraRenderer, RenderedView
+from sim_tests.world.hall import Lighting, Mesh, WarehouseLayout, box
+from sim_tests.world.render import RenderView, Visuals, gl_works
+
+CAMERA = Camera(320, 240, 270.0, 260.0, 171.3, 110.6)
+AHEAD = level_pose((0.0, 0.0, 1.4), 0.05, 0.08)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _needs_gl() -> None:
+    if not gl_works():
+        pytest.skip("no OpenGL here: install moderngl and libEGL (Mesa's will do)")
+
+
+@pytest.fixture(scope="module")
+def halls() -> Iterator[tuple[Warehouse, Warehouse]]:
+    layout = WarehouseLayout.crossing()
+    with Warehouse(layout) as tiny, Warehouse(layout, renderer="gl") as opengl:
+        assert (tiny.visuals.renderer, opengl.visuals.renderer) == ("tiny", "gl")
+        for hall in (tiny, opengl):
+            for actor in (
+                ball(0.35, position_m=(2.3, 0.5, 1.1), colour=(0.9, 0.6, 0.2), kind="person"),
+                Shown(upright_square(0.4), (3.0, -0.6, 1.2), texture_rgb=CHECKS),
+                Shown(box((0.0, 0.0, 0.0), (0.3, 0.5, 1.6)), (4.5, 0.3, 0.8), (0.2, 0.5, 0.9)),
+            ):
+                hall.visuals.add_actor(actor)
+            Worker(hall, 1.75, position_odom_m=(3.4, 0.2), heading_odom_rad=2.5)
+        yield tiny, opengl
+
+
+def _pair(halls: tuple[Warehouse, Warehouse], *args: object, **light: object) -> list[RenderedView]:
+    lighting = Lighting(**light)  # type: ignore[arg-type]
+    return [CameraRenderer(hall, lighting=lighting).render(*args) for hall in halls]
+
+
+@pytest.mark.parametrize("heading", [0.05, -0.1, 0.2])
+def test_bodies_and_depth_agree(halls: tuple[Warehouse, Warehouse], heading: float) -> None:
+    tiny, opengl = _pair(halls, CAMERA, level_pose((0.2, 0.1, 1.4), heading, 0.05))
+    same = tiny.body_ids == opengl.body_ids
+    assert same.mean() > 0.99
+    for number in np.unique(tiny.actors):
+        first, second = tiny.actors == number, opengl.actors == number
+        assert (first & second).sum() / (first | second).sum() >= 0.98
+        if first.sum() > 1000:  # no shift of even a few hundredths of a pixel between the two
+            offset = np.argwhere(first).mean(axis=0) - np.argwhere(second).mean(axis=0)
+            assert np.abs(offset).max() < 0.05
+    np.testing.assert_array_equal(np.isinf(tiny.depth_m), tiny.body_ids < 0)
+    np.testing.assert_array_equal(np.isinf(opengl.depth_m), opengl.body_ids < 0)
+    error = np.abs(tiny.depth_m - opengl.depth_m)[same & (tiny.depth_m < 8.0)]
+    assert np.quantile(error, 0.99) < 2e-3
+
+
+def test_depth_of_a_plane_is_exact(halls: tuple[Warehouse, Warehouse]) -> None:
+    view = CameraRenderer(halls[1]).render(CAMERA, level_pose((0.0, -0.6, 1.2), 0.0))
+    assert (view.actors == 1).sum() > 1000
+    np.testing.assert_allclose(view.depth_m[view.actors == 1], 3.0, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    "light",
+    [
+        {},
+        {"ambient": 0.3, "diffuse": 0.6, "direction_odom": (-6.0, 5.0, 3.0)},
+        {"ambient": 0.4, "diffuse": 0.5, "colour_rgb": (1.0, 0.8, 0.6)},
+    ],
+)
+def test_colours_agree(halls: tuple[Warehouse, Warehouse], light: dict[str, object]) -> None:
+    tiny, opengl = _pair(halls, CAMERA, AHEAD, **light)
+    difference = np.abs(opengl.rgb.astype(int) - tiny.rgb)
+    same = tiny.body_ids == opengl.body_ids
+    # A texel's edge may fall to either side of a sample; elsewhere only rounding differs.
+    assert np.quantile(difference[same], 0.9) <= 2.0
+    assert difference.mean() < 3.0
+
+
+def test_a_rectangle_is_that_part_of_the_whole(halls: tuple[Warehouse, Warehouse]) -> None:
+    renderer = CameraRenderer(halls[1])
+    whole = renderer.render(CAMERA, AHEAD)
+    again = renderer.render(CAMERA, AHEAD)
+    np.testing.assert_array_equal(again.rgb, whole.rgb)
+    np.testing.assert_array_equal(again.depth_m, whole.depth_m)
+    for u0, v0, u1, v1 in ((100, 40, 220, 200), (0, 0, 77, 33)):
+        part = renderer.render(CAMERA, AHEAD, (u0, v0, u1, v1))
+        assert (part.body_ids == whole.body_ids[v0:v1, u0:u1]).mean() > 0.99
+
+
+def test_what_is_hidden_is_in_no_buffer(halls: tuple[Warehouse, Warehouse]) -> None:
+    renderer = CameraRenderer(halls[1])
+    alone = renderer.render(CAMERA, AHEAD, only={0})
+    assert set(np.unique(alone.actors)) == {-1, 0}
+    assert (alone.rgb[alone.actors < 0] == 255).all()
+    assert np.isinf(alone.depth_m[alone.actors < 0]).all()
+    assert {-1, 0, 1, 2} <= set(np.unique(renderer.render(CAMERA, AHEAD).actors))
+
+
+def test_links_are_drawn_where_their_joints_turn_them() -> None:
+    view = RenderView.of_rectangle(CAMERA, level_pose((-2.0, 0.0, 0.0), 0.0))
+    drawings = []
+    for renderer in ("tiny", "gl"):
+        with Visuals(renderer=renderer) as visuals:  # type: ignore[arg-type]
+            arm = visuals.shape(box((0.0, 0.0, 0.3), (0.1, 0.1, 0.6)), (0.8, 0.3, 0.2))
+            body = visuals.add_body(
+                visuals.shape(box((0.0, 0.0, 0.0), (0.2, 0.2, 0.2))), (arm,), np.zeros((1, 3))
+            )
+            pybullet.resetJointStateMultiDof(
+                body, 0, [0.38, 0.0, 0.0, 0.92], physicsClientId=visuals.client
+            )
+            drawings.append(visuals.draw(view, Lighting(), visuals.prepare(view)))
+    tiny, opengl = (drawing.body_ids >= 0 for drawing in drawings)
+    assert tiny.sum() > 1000
+    assert (tiny & opengl).sum() / (tiny | opengl).sum() > 0.98
+
+
+def test_worlds_do_not_disturb_each_other_and_end_twice() -> None:
+    view = RenderView.of_rectangle(CAMERA, level_pose((-2.0, 0.0, 0.0), 0.0))
+    first, second = Visuals(renderer="gl"), Visuals(renderer="auto")
+    assert second.renderer == "gl"
+    first.add_static(box((0.0, 0.0, 0.0), (0.5, 0.5, 0.5)), (0.9, 0.1, 0.1))
+    assert (second.draw(view, Lighting(), second.prepare(view)).body_ids < 0).all()
+    second.close()
+    second.close()
+    drawn = first.draw(view, Lighting(), first.prepare(view))
+    assert (drawn.body_ids == 0).sum() > 1000
+    red = drawn.rgb[drawn.body_ids == 0].mean(axis=0)
+    assert red[0] > 3.0 * red[1]
+    first.close()
+    with pytest.raises(SimError, match="closed"):
+        first.prepare(view)
+
+
+@pytest.mark.parametrize("width", [64, 65, 70])
+def test_textures_of_any_width_lie_straight(width: int) -> None:
+    """Also those of which only a part is used."""
+    right, down = np.meshgrid(np.linspace(0.0, 250.0, width), np.linspace(0.0, 250.0, 50))
+    picture = np.stack([right, down, 250.0 - right], axis=-1).astype(np.uint8)
+    square = upright_square(0.5)
+    part = Mesh(
+        square.vertices_m, square.normals, square.indices, 0.2 + 0.5 * np.asarray(square.uv)
+    )
+    view = RenderView.of_rectangle(CAMERA, level_pose((-2.0, 0.0, 0.0), 0.0))
+    even = Lighting(ambient=1.0, diffuse=0.0)
+    for mesh in (square, part):
+        drawings = []
+        for renderer in ("tiny", "gl"):
+            with Visuals(renderer=renderer) as visuals:  # type: ignore[arg-type]
+                visuals.add_static(mesh, texture=visuals.texture(picture))
+                drawings.append(visuals.draw(view, even, visuals.prepare(view)).rgb.astype(int))
+        # Half a texel's step apart at most, as one of them blends neighbours; at the rim it blends
+        # the picture's two ends.
+        inside = (drawings[0] != 255).all(axis=2) & (drawings[1] != 255).all(axis=2)
+        assert inside.sum() > 10_000
+        assert np.quantile(np.abs(drawings[0] - drawings[1])[inside], 0.95) <= 6.0
+
+
+def test_large_pictures_agree_everywhere(halls: tuple[Warehouse, Warehouse]) -> None:
+    camera = Camera(1300, 900, 1100.0, 1100.0, 650.0, 450.0)
+    tiny, opengl = _pair(halls, camera, AHEAD)
+    assert opengl.rgb.shape == (900, 1300, 3)
+    same = tiny.body_ids == opengl.body_ids
+    assert same.mean() > 0.99
+    for band in (same[:, 1014:1034], same[758:778]):
+        assert band.mean() > 0.97
+
+
+def test_the_length_of_the_lights_direction_does_not_matter(
+    halls: tuple[Warehouse, Warehouse],
+) -> None:
+    near, far = ((-3e-3, 4e-3, 8e-3), (-3e3, 4e3, 8e3))
+    for one, other in zip(
+        _pair(halls, CAMERA, AHEAD, direction_odom=near),
+        _pair(halls, CAMERA, AHEAD, direction_odom=far),
+        strict=True,
+    ):
+        np.testing.assert_array_equal(one.rgb, other.rgb)
+
+
+def test_opengl_is_silent_starts_again_and_leaves_no_files(tmp_path: Path) -> None:
+    program = (
+        "import numpy as np\n"
+        "from sim_tests.world.render import RenderView, Visuals\n"
+        "from sim_tests.world.hall import Lighting, box\n"
+        "from perception import Camera\n"
+        "view = RenderView.of_rectangle(Camera(64, 48, 60.0, 60.0, 31.5, 23.5), np.eye(4))\n"
+        "for _ in range(2):\n"
+        "    with Visuals(renderer='gl') as visuals:\n"
+        "        visuals.add_static(box((0.0, 0.0, 2.0), (0.5, 0.5, 0.5)), (0.9, 0.2, 0.2))\n"
+        "        visuals.texture(np.zeros((4, 4, 3), np.uint8))\n"
+        "        least = visuals.prepare(view)\n"
+        "        assert (visuals.draw(view, Lighting(), least).body_ids == 0).sum() > 100\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={
+            **os.environ,
+            "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
+            "TMPDIR": str(tmp_path),
+        },
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,158 @@
+"""Halls as data: what stands where, what is refused, and that known halls stay as they are."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from sim_tests import SimError
+from sim_tests.world.hall import LAYOUTS, WarehouseLayout
+from sim_tests.world.hall._layout import RackBox
+from sim_tests.world.hall._props import PROP_PARTS, Prop
+
+_HALL = {"x_min_m": 0.0, "y_min_m": 0.0, "x_max_m": 5.0, "y_max_m": 5.0}
+
+
+def _blocked(layout: WarehouseLayout, start: tuple[float, float], end: tuple[float, float]) -> bool:
+    """Whether an obstacle's footprint lies on the way; sampled every centimetre."""
+    steps = math.ceil(100.0 * math.dist(start, end)) + 1
+    points = np.linspace(start, end, steps)[:, None]
+    boxes = layout.obstacle_boxes_odom
+    return bool(((points > boxes[:, :2]) & (points < boxes[:, 2:])).all(axis=2).any())
+
+
+def test_crossing_has_the_boxes_that_its_results_were_measured_with() -> None:
+    expected = [
+        *[(-3.3, 1.6, 4.5, 2.7), (7.5, 1.6, 15.3, 2.7)],
+        *[(-3.3, 5.1, 4.5, 6.2), (7.5, 5.1, 15.3, 6.2)],
+        *[(-3.3, -2.7, 4.5, -1.6), (7.5, -2.7, 15.3, -1.6)],
+        *[(-3.3, -6.2, 4.5, -5.1), (7.5, -6.2, 15.3, -5.1)],
+        (-5.2, -8.7, -5.0, 8.7),
+        (17.0, -8.7, 17.2, 8.7),
+        (-5.0, -8.7, 17.0, -8.5),
+        (-5.0, 8.5, 17.0, 8.7),
+    ]
+    layout = WarehouseLayout.crossing()
+    np.testing.assert_allclose(layout.obstacle_boxes_odom, expected, atol=1e-12)
+    np.testing.assert_array_equal(layout.obstacle_heights_m, [4.0] * 8 + [6.0] * 4)
+
+
+def test_open_floor_has_the_boxes_that_its_results_were_measured_with() -> None:
+    expected = [
+        (-1.75, 4.65, 11.75, 5.75),
+        (-1.75, -5.75, 11.75, -4.65),
+        (-5.2, -7.2, -5.0, 7.2),
+        (14.0, -7.2, 14.2, 7.2),
+        (-5.0, -7.2, 14.0, -7.0),
+        (-5.0, 7.0, 14.0, 7.2),
+    ]
+    boxes = WarehouseLayout.open_floor().obstacle_boxes_odom
+    np.testing.assert_allclose(boxes, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_every_hall_leaves_the_robot_its_aisle_and_keeps_things_apart(name: str) -> None:
+    layout = WarehouseLayout.named(name)
+    boxes = layout.obstacle_boxes_odom
+    assert boxes.shape == (len(layout.obstacle_heights_m), 4)
+    assert (boxes[:, :2] < boxes[:, 2:]).all()
+    assert (layout.obstacle_heights_m > 0.0).all()
+    assert not _blocked(layout, (-3.0, 0.0), (5.5, 0.0))
+    racks = [rack.box_odom_m for rack in layout.racks]
+    parts = [box for prop in layout.props for box in prop.boxes_odom_m]
+    for i, a in enumerate(racks):
+        for b in (*racks[i + 1 :], *parts):
+            shared = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])
+            assert min(shared) < 1e-9, (a, b)
+    for i, prop in enumerate(layout.props):
+        for other in layout.props[i + 1 :]:
+            for a in prop.boxes_odom_m:
+                for b in other.boxes_odom_m:
+                    shared = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])
+                    assert min(shared) < 1e-9, (prop, other)
+
+
+def test_the_blind_corner_is_blind() -> None:
+    layout = WarehouseLayout.blind_corner()
+    assert _blocked(layout, (1.0, 0.0), (6.0, 6.0))
+    assert _blocked(layout, (3.0, 0.0), (6.0, 5.0))
+    assert not _blocked(layout, (5.8, 0.5), (6.0, 6.0))
+    assert not _blocked(layout, (6.0, 0.0), (6.0, 11.0))
+    assert not _blocked(layout, (-3.0, 0.0), (6.0, 0.0))
+
+
+def test_aisles_are_crossed_by_one() -> None:
+    layout = WarehouseLayout.aisles()
+    assert not _blocked(layout, (7.8, -10.0), (7.8, 10.0))
+    for y in (-9.0, -4.0, 0.0, 4.0, 9.0):
+        assert not _blocked(layout, (-2.5, y), (3.0, y))
+    assert _blocked(layout, (2.0, -9.0), (2.0, 9.0))
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_halls_survive_yaml(name: str, tmp_path: Path) -> None:
+    layout = WarehouseLayout.named(name)
+    layout.to_yaml(tmp_path / "hall.yaml")
+    assert WarehouseLayout.from_yaml(tmp_path / "hall.yaml") == layout
+
+
+def test_unusable_halls_are_refused_by_name(tmp_path: Path) -> None:
+    with pytest.raises(ValidationError, match=r"the rack at \(5, 2\) m reaches outside the hall"):
+        WarehouseLayout(**_HALL, racks=(RackBox(x_m=5.0, y_m=2.0, length_m=2.0, width_m=1.0),))
+    with pytest.raises(ValidationError, match=r"the bin at \(4\.9, 2\) m reaches outside the hall"):
+        WarehouseLayout(**_HALL, props=(Prop(kind="bin", x_m=4.9, y_m=2.0),))
+    with pytest.raises(ValidationError, match="x_min_m < x_max_m"):
+        WarehouseLayout(**{**_HALL, "x_max_m": -1.0})
+    with pytest.raises(ValidationError, match="did you mean 'racks'"):
+        WarehouseLayout(**_HALL, rack=())
+    with pytest.raises(SimError, match="did you mean 'crossing'"):
+        WarehouseLayout.named("crosing")
+    (tmp_path / "hall.yaml").write_text("x_min_m: .nan\n")
+    with pytest.raises(SimError, match=r"hall\.yaml"):
+        WarehouseLayout.from_yaml(tmp_path / "hall.yaml")
+
+
+def test_unusable_props_are_refused_by_name() -> None:
+    with pytest.raises(ValidationError, match="did you mean 'forklift'"):
+        Prop(kind="forklif", x_m=0.0, y_m=0.0)
+    with pytest.raises(ValidationError, match="kind must be one of"):
+        Prop(kind=3, x_m=0.0, y_m=0.0)
+    with pytest.raises(ValidationError, match="yaw_deg"):
+        Prop(kind="bin", x_m=0.0, y_m=0.0, yaw_deg=400.0)
+    with pytest.raises(ValidationError, match="x_m"):
+        Prop(kind="bin", x_m=math.nan, y_m=0.0)
+
+
+@given(
+    st.sampled_from(sorted(PROP_PARTS)),
+    st.floats(-360.0, 360.0),
+    st.floats(-9.0, 9.0),
+    st.floats(-9.0, 9.0),
+)
+def test_a_props_boxes_bound_its_turned_parts(kind: str, yaw: float, x: float, y: float) -> None:
+    prop = Prop(kind=kind, x_m=x, y_m=y, yaw_deg=yaw)
+    c, s = math.cos(math.radians(yaw)), math.sin(math.radians(yaw))
+    rotation = np.array([[c, -s], [s, c]])
+    for part, box in zip(PROP_PARTS[kind], prop.boxes_odom_m, strict=True):
+        half = 0.5 * np.array([part.length_m, part.width_m])
+        corners = [
+            (part.x_m + sx * half[0], part.y_m + sy * half[1]) for sx in (-1, 1) for sy in (-1, 1)
+        ]
+        odom = np.array(corners) @ rotation.T + (x, y)
+        np.testing.assert_allclose(box[:2], odom.min(axis=0), atol=1e-9)
+        np.testing.assert_allclose(box[2:], odom.max(axis=0), atol=1e-9)
+
+
+@pytest.mark.parametrize("quarters", range(-4, 5))
+def test_quarter_turns_are_exact(quarters: int) -> None:
+    ((x_min, y_min, x_max, y_max),) = Prop(
+        kind="pallet", x_m=0.0, y_m=0.0, yaw_deg=90.0 * quarters
+    ).boxes_odom_m
+    size = (1.2, 0.8) if quarters % 2 == 0 else (0.8, 1.2)
+    assert (x_max - x_min, y_max - y_min) == size

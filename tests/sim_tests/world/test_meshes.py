@@ -1,0 +1,62 @@
+"""Triangle meshes: closed, facing outwards, pictures upright on their sides."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from sim_tests.world.hall import Mesh, box, ellipsoid, merge, quad, tube
+from sim_tests.world.hall._meshes import BOX_FACES
+
+
+def _volume_m3(mesh: Mesh) -> float:
+    """By the divergence theorem; positive when the triangles face outwards."""
+    a, b, c = (mesh.vertices_m[mesh.indices.reshape(-1, 3)[:, k]] for k in range(3))
+    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
+
+
+def test_volumes_are_those_of_the_solids() -> None:
+    assert _volume_m3(box((1.0, 2.0, 3.0), (0.5, 0.6, 0.7))) == pytest.approx(0.5 * 0.6 * 0.7)
+    # An inscribed prism of n sides has n/2 sin(2π/n) of its circle's r².
+    drum = tube([(0, 0, 1.0, 0.3, 0.3), (0, 0, 0.0, 0.3, 0.3)], 20)
+    assert _volume_m3(drum) == pytest.approx(10 * math.sin(math.tau / 20) * 0.09)
+    egg = ellipsoid((1.0, 0.0, 0.0), (0.3, 0.2, 0.1), 40, 30)
+    assert _volume_m3(egg) == pytest.approx(4.0 / 3.0 * math.pi * 0.006, rel=0.02)
+
+
+@pytest.mark.parametrize("face", BOX_FACES[:4])
+def test_a_picture_stands_upright_on_each_side_of_a_box(face: str) -> None:
+    side = box((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), {face: (0.25, 0.5, 0.75, 1.0)})
+    assert side.uv is not None
+    assert side.triangles == 2
+    axis, sign = "xyz".index(face[1]), 1.0 if face[0] == "+" else -1.0
+    outward = np.zeros(3)
+    outward[axis] = sign
+    np.testing.assert_array_equal(side.vertices_m[:, axis], 0.5 * sign)
+    np.testing.assert_array_equal(side.normals, np.tile(outward, (4, 1)))
+    right = np.cross([0.0, 0.0, 1.0], outward)  # as seen by who looks at the face
+    np.testing.assert_allclose(side.uv[:, 0], 0.5 + 0.5 * side.vertices_m @ right, atol=1e-12)
+    np.testing.assert_allclose(side.uv[:, 1], 0.75 + 0.5 * side.vertices_m[:, 2], atol=1e-12)
+
+
+def test_some_faces_are_a_part_of_the_whole_box() -> None:
+    whole, part = (
+        box((0, 0, 0), (1, 2, 3)),
+        box((0, 0, 0), (1, 2, 3), dict.fromkeys(BOX_FACES, (0.0, 0.0, 1.0, 1.0))),
+    )
+    np.testing.assert_array_equal(whole.vertices_m, part.vertices_m)
+    np.testing.assert_array_equal(whole.uv, part.uv)
+    np.testing.assert_array_equal(whole.indices, part.indices)
+
+
+def test_merging_keeps_every_triangle_and_its_picture() -> None:
+    parts = [box((0, 0, 0), (1, 1, 1)), quad([(0, 0, 2), (1, 0, 2), (1, 1, 2), (0, 1, 2)])]
+    both = merge(parts)
+    assert both.triangles == 14
+    assert both.uv is not None
+    corners = both.vertices_m[both.indices[-6:]]
+    np.testing.assert_array_equal(corners, parts[1].vertices_m[parts[1].indices])
+    plain = Mesh(parts[1].vertices_m, parts[1].normals, parts[1].indices)
+    assert merge([parts[0], plain]).uv is None

@@ -1,0 +1,251 @@
+"""Rendered pictures and depth fall where the camera model projects the truth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from camera_poses import level_pose
+from picture_actors import Shown, ball
+
+from perception import Camera
+from sim_tests import SimError
+from sim_tests.actors.robot import Amr, AmrLook
+from sim_tests.world import Warehouse
+from sim_tests.world.camera import CameraRenderer
+from sim_tests.world.hall import Lighting, WarehouseLayout
+
+_AWAY = (0.0, 0.0, -50.0)
+OFF_CENTRE = Camera(320, 240, 270.0, 260.0, 171.3, 110.6)
+
+
+@pytest.fixture(scope="module")
+def hall() -> Iterator[Warehouse]:
+    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
+        yield warehouse
+
+
+@pytest.fixture(scope="module")
+def renderer(hall: Warehouse) -> CameraRenderer:
+    return CameraRenderer(hall)
+
+
+@pytest.fixture(scope="module")
+def red_ball(hall: Warehouse) -> tuple[int, Shown]:
+    actor = ball(position_m=_AWAY, colour=(1.0, 0.0, 0.0))
+    return hall.visuals.add_actor(actor), actor
+
+
+@pytest.fixture
+def target(red_ball: tuple[int, Shown]) -> Iterator[tuple[int, Shown]]:
+    """A red ball with its number among the actors; it waits underground."""
+    yield red_ball
+    red_ball[1].position_m = np.array(_AWAY)
+
+
+def test_a_ball_appears_where_it_is_projected(
+    renderer: CameraRenderer, target: tuple[int, Shown]
+) -> None:
+    number, actor = target
+    rng = np.random.default_rng(3)
+    errors = []
+    for _ in range(24):
+        T = level_pose((0.0, 0.0, 1.4), rng.uniform(-3.0, 3.0), rng.uniform(-0.2, 0.3))
+        camera_m = np.array([rng.uniform(-0.8, 0.8), rng.uniform(-0.6, 0.6), rng.uniform(2.0, 3.5)])
+        actor.position_m = T[:3, :3] @ camera_m + T[:3, 3]
+        view = renderer.render(OFF_CENTRE, T)
+        rows, columns = np.nonzero(view.actors == number)
+        assert len(rows) > 50
+        centroid = np.array([columns.mean(), rows.mean()])
+        errors.append(centroid - OFF_CENTRE.project(camera_m[None])[0])
+        front = view.depth_m[rows, columns].min()
+        assert front == pytest.approx(camera_m[2] - 0.06, abs=0.003)  # the ball has facets
+        np.testing.assert_array_equal(view.actors == number, view.body_ids == actor.body)
+    # One ball's centroid depends on which pixels its edge takes; all together show any offset.
+    assert np.abs(np.mean(errors, axis=0)).max() < 0.06
+    assert np.linalg.norm(errors, axis=1).max() < 0.2
+
+
+@pytest.mark.parametrize("pitch_rad", [0.35, 1.2])
+def test_depth_of_the_floor_is_exact(renderer: CameraRenderer, pitch_rad: float) -> None:
+    T = level_pose((0.0, 0.0, 1.4), 0.3, pitch_rad)
+    view = renderer.render(OFF_CENTRE, T)
+    rows, columns = np.mgrid[:240, :320]
+    rays = np.stack(
+        [
+            (columns - OFF_CENTRE.cx_px) / OFF_CENTRE.fx_px,
+            (rows - OFF_CENTRE.cy_px) / OFF_CENTRE.fy_px,
+            np.ones_like(rows, dtype=float),
+        ],
+        axis=-1,
+    )
+    falls = rays @ T[2, :3]  # odom z a metre of depth
+    expected = np.where(falls < 0.0, -1.4 / falls, np.inf)
+    near = expected < 3.5  # farther away the racks and walls begin
+    assert near.sum() > 10_000
+    # Paint lies up to 4 mm above the floor.
+    np.testing.assert_allclose(view.depth_m[near], expected[near], rtol=4e-3)
+
+
+def test_a_rectangle_is_that_part_of_the_whole(
+    renderer: CameraRenderer, target: tuple[int, Shown]
+) -> None:
+    target[1].position_m = np.array((2.0, 0.1, 1.5))
+    T = level_pose((0.0, 0.0, 1.4), 0.0)
+    whole = renderer.render(OFF_CENTRE, T)
+    for u0, v0, u1, v1 in ((100, 40, 220, 200), (0, 0, 77, 33), (159, 100, 160, 101)):
+        part = renderer.render(OFF_CENTRE, T, (u0, v0, u1, v1))
+        assert part.rgb.shape == (v1 - v0, u1 - u0, 3)
+        same = part.body_ids == whole.body_ids[v0:v1, u0:u1]
+        # A sample on the very edge of a triangle may round to either side.
+        assert same.mean() > 0.995
+        close = np.isclose(part.depth_m, whole.depth_m[v0:v1, u0:u1], rtol=2e-3)
+        assert close[same].mean() > 0.998
+
+
+def test_a_coarser_grid_samples_the_middle_of_its_cells(renderer: CameraRenderer) -> None:
+    T = level_pose((0.0, 0.0, 1.4), 0.3, 1.2)
+    coarse = renderer.depth(OFF_CENTRE, T, (60.0, 30.0, 180.0, 210.0), (40, 60))
+    assert coarse.shape == (60, 40)
+    fine = renderer.depth(OFF_CENTRE, T)
+    # Cells of 3 by 3 pixels: the middle of a cell is the middle one of its pixels.
+    np.testing.assert_allclose(coarse, fine[31:210:3, 61:180:3], rtol=2e-3)
+
+
+def test_a_rectangle_may_reach_outside_the_image(renderer: CameraRenderer) -> None:
+    T = level_pose((0.0, 0.0, 1.4), 0.3, 1.2)
+    wide = renderer.depth(OFF_CENTRE, T, (-20, -10, 340, 250))
+    np.testing.assert_allclose(wide[10:250, 20:340], renderer.depth(OFF_CENTRE, T), rtol=2e-3)
+
+
+@pytest.mark.parametrize("heading_deg", [90.0, -90.0])
+def test_corners_in_the_cameras_plane_do_no_harm(
+    renderer: CameraRenderer, heading_deg: float
+) -> None:
+    """The floor's tiles meet at y = 0, where this camera stands; 1 cm beside they do no harm."""
+    camera = Camera.from_fov(160, 160, math.radians(110.0))
+    at, beside = (
+        renderer.render(camera, level_pose((0.12, y_m, 1.55), math.radians(heading_deg)))
+        for y_m in (0.0, 0.01)
+    )
+    different = np.abs(at.rgb.astype(int) - beside.rgb).max(axis=2) > 40
+    assert different.mean() < 0.03
+    np.testing.assert_allclose(at.depth_m[120:], beside.depth_m[120:], rtol=0.03)
+
+
+def test_nothing_is_infinitely_far(renderer: CameraRenderer) -> None:
+    view = renderer.render(OFF_CENTRE, level_pose((-30.0, 0.0, 1.4), math.pi))
+    assert np.isinf(view.depth_m).all()
+    assert (view.body_ids == -1).all()
+
+
+def test_pictures_are_repeatable_and_not_empty(renderer: CameraRenderer) -> None:
+    T = level_pose((0.0, 0.0, 1.4), 0.0)
+    picture = renderer.rgb(OFF_CENTRE, T)
+    assert picture.shape == (240, 320, 3)
+    assert picture.dtype == np.uint8
+    np.testing.assert_array_equal(picture, renderer.rgb(OFF_CENTRE, T))
+    assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 100
+
+
+def test_robots_camera_sees_others_and_not_itself() -> None:
+    with Warehouse(WarehouseLayout.open_floor()) as hall:
+        amr = Amr(hall)
+        robot = hall.visuals.add_actor(AmrLook.of(hall, amr))
+        head = hall.visuals.add_actor(ball(0.12, position_m=(2.5, 0.0, 1.65)))
+        renderer = CameraRenderer(hall)
+        camera = Camera.from_fov(320, 240, math.radians(90.0))
+        view = renderer.render(camera, amr.T_odom_camera)
+        assert not (view.actors == robot).any()
+        assert (view.actors == head).any()
+        # Whoever looks at the robot sees it, about where its body is.
+        camera = Camera.from_fov(320, 240, math.radians(60.0))
+        T = level_pose((2.5, 0.3, 1.65), math.pi, 0.3)
+        view = renderer.render(camera, T)
+        assert (view.actors == robot).mean() > 0.02
+        points = np.array([[0.2, 0.0, 0.3], [0.2, 0.0, 0.2]])
+        columns, rows = np.rint(camera.project((points - T[:3, 3]) @ T[:3, :3])).astype(int).T
+        assert (view.actors[rows, columns] == robot).all()
+
+
+@pytest.mark.parametrize("factor", [2, 3])
+def test_supersampling_averages_the_finer_picture(hall: Warehouse, factor: int) -> None:
+    T = level_pose((0.0, 0.0, 1.4), 0.4)
+    smooth = CameraRenderer(hall, supersampling=factor).render(OFF_CENTRE, T)
+    once = CameraRenderer(hall)
+    fine = once.render(OFF_CENTRE, T, (0, 0, 320, 240), (320 * factor, 240 * factor))
+    mean = fine.rgb.reshape(240, factor, 320, factor, 3).astype(float).mean(axis=(1, 3))
+    np.testing.assert_allclose(smooth.rgb, mean, atol=0.51)
+    middle = factor // 2
+    np.testing.assert_array_equal(smooth.depth_m, fine.depth_m[middle::factor, middle::factor])
+    np.testing.assert_array_equal(smooth.body_ids, fine.body_ids[middle::factor, middle::factor])
+    if factor % 2:  # an odd grid has a sample at the pixel's centre
+        plain = once.render(OFF_CENTRE, T)
+        same = smooth.body_ids == plain.body_ids
+        assert same.mean() > 0.995
+        np.testing.assert_allclose(smooth.depth_m[same], plain.depth_m[same], rtol=2e-3)
+
+
+def test_light_has_colour_and_strength(hall: Warehouse) -> None:
+    """A surface shows its own colour · the light's · (ambient + diffuse · cos)."""
+    T = level_pose((0.0, 0.0, 1.4), 0.3, 1.2)
+
+    def floor(**light: object) -> np.ndarray:
+        lighting = Lighting(**light)  # type: ignore[arg-type]
+        return CameraRenderer(hall, lighting=lighting).rgb(OFF_CENTRE, T)[60:200].astype(float)
+
+    white = floor(ambient=1.0, diffuse=0.0)
+    half = floor(ambient=0.2, diffuse=0.6, direction_odom=(0.0, math.sqrt(3.0), 1.0))
+    np.testing.assert_allclose(half, white * (0.2 + 0.6 * 0.5), atol=2.1)
+    below = floor(ambient=0.4, diffuse=0.6, direction_odom=(0.0, 0.0, -1.0))
+    np.testing.assert_allclose(below, white * 0.4, atol=2.1)
+    warm = floor(
+        ambient=0.5, diffuse=0.4, direction_odom=(0.0, 0.0, 1.0), colour_rgb=(1.0, 0.8, 0.5)
+    )
+    np.testing.assert_allclose(warm, white * 0.9 * np.array([1.0, 0.8, 0.5]), atol=2.1)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (7, 3), (641, 479)])
+def test_odd_sizes_are_as_good_as_even_ones(
+    renderer: CameraRenderer, size: tuple[int, int]
+) -> None:
+    T = level_pose((0.0, 0.0, 1.4), 0.3, 1.2)
+    depth = renderer.depth(OFF_CENTRE, T, (60.0, 60.0, 180.0, 180.0), size)
+    assert depth.shape == size[::-1]
+    u = 59.5 + (np.arange(size[0]) + 0.5) * 120.0 / size[0]
+    v = 59.5 + (np.arange(size[1]) + 0.5) * 120.0 / size[1]
+    right, down = np.meshgrid(
+        (u - OFF_CENTRE.cx_px) / OFF_CENTRE.fx_px, (v - OFF_CENTRE.cy_px) / OFF_CENTRE.fy_px
+    )
+    rays = np.stack([right, down, np.ones_like(right)], axis=-1)
+    np.testing.assert_allclose(depth, -1.4 / (rays @ T[2, :3]), rtol=4e-3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"roi_xyxy_px": (10, 10, 10, 20)}, "roi_xyxy_px"),
+        ({"roi_xyxy_px": (0, 0, float("nan"), 20)}, "roi_xyxy_px"),
+        ({"size_px": (0, 10)}, "size_px"),
+        ({"T_odom_camera": np.ones((4, 4))}, "T_odom_camera"),
+        ({"camera": Camera(32, 24, 30, 30, 16, 12, np.array([0.1, 0, 0, 0, 0]))}, "undistorted"),
+    ],
+)
+def test_unusable_requests_are_refused(
+    renderer: CameraRenderer, arguments: dict, message: str
+) -> None:
+    good = {"camera": OFF_CENTRE, "T_odom_camera": np.eye(4)}
+    with pytest.raises(SimError, match=message):
+        renderer.render(**{**good, **arguments})
+
+
+def test_unusable_ranges_are_refused(hall: Warehouse) -> None:
+    with pytest.raises(SimError, match="near_m"):
+        CameraRenderer(hall, near_m=0.0)
+    with pytest.raises(SimError, match="far_m"):
+        CameraRenderer(hall, near_m=1.0, far_m=0.5)
+    for factor in (0, 9, 1.5):
+        with pytest.raises(SimError, match="supersampling"):
+            CameraRenderer(hall, supersampling=factor)  # type: ignore[arg-type]

@@ -1,0 +1,227 @@
+"""What is drawn of a hall: fills what it collides with, stays inside, is the same every time."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from genuine_detectors import MODELS, REQUIRED, GenuineDetector
+
+from perception import Camera
+from sim_tests import SimError
+from sim_tests.world import Warehouse
+from sim_tests.world.camera import CameraRenderer
+from sim_tests.world.hall import (
+    LAYOUTS,
+    LIGHTINGS,
+    Lighting,
+    Mesh,
+    WarehouseLayout,
+    merge,
+    scenery,
+    scenery_texture,
+)
+from sim_tests.world.hall._layout import RackBox
+from sim_tests.world.hall._meshes import SceneryChunk
+from sim_tests.world.hall._props import PROP_PARTS, Prop
+from sim_tests.world.hall._scenery import TEXTURE_NAMES
+from sim_tests.world.hall._scenery_props import prop_chunk
+from sim_tests.world.hall._scenery_racks import rack_chunks
+
+_VARIANTS = (0, 1, 6)
+# So far may a mesh stick out of what it collides with.
+_PROUD_M = 0.03
+
+
+def _bytes(chunks: tuple[SceneryChunk, ...]) -> bytes:
+    return b"".join(
+        chunk.mesh.vertices_m.tobytes()
+        + chunk.mesh.indices.tobytes()
+        + np.asarray(chunk.mesh.uv).tobytes()
+        + repr((chunk.colour, chunk.texture)).encode()
+        for chunk in chunks
+    )
+
+
+def _hits(mesh: Mesh, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """(N,) whether segments meet a triangle from either side (Möller and Trumbore, 1997)."""
+    a, b, c = (mesh.vertices_m[mesh.indices.reshape(-1, 3)[:, k]] for k in range(3))
+    out = np.zeros(len(starts), dtype=bool)
+    for row, (start, along) in enumerate(zip(starts, ends - starts, strict=True)):
+        across = np.cross(along, c - a)
+        volume = np.einsum("ij,ij->i", b - a, across)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            u = np.einsum("ij,ij->i", start - a, across) / volume
+            turned = np.cross(start - a, b - a)
+            v = turned @ along / volume
+            t = np.einsum("ij,ij->i", c - a, turned) / volume
+            inside = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1.0 + 1e-9)
+        out[row] = (inside & (t >= -1e-9) & (t <= 1.0 + 1e-9)).any()
+    return out
+
+
+def _on_face(
+    rng: np.random.Generator, low: np.ndarray, high: np.ndarray, face: int, margin_m: float
+) -> np.ndarray:
+    """A point on face 0–3 (−x, +x, −y, +y) or 4 (+z) of a box, not at its rim."""
+    point = rng.uniform(low + margin_m, high - margin_m)
+    axis = face // 2
+    point[axis] = high[axis] if face in (1, 3, 4) else low[axis]
+    return point
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+@pytest.mark.parametrize("variant", _VARIANTS)
+def test_chunks_are_well_formed_and_stay_inside_the_hall(name: str, variant: int) -> None:
+    layout = WarehouseLayout.named(name)
+    chunks = scenery(layout, variant)
+    for chunk in chunks:
+        mesh = chunk.mesh
+        assert mesh.uv is not None
+        assert mesh.uv.shape == (len(mesh.vertices_m), 2)
+        assert mesh.uv.min() >= 0.0
+        assert mesh.uv.max() <= 1.0
+        np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1.0, atol=1e-6)
+        assert all(0.0 <= share <= 1.0 for share in chunk.colour)
+        assert chunk.texture in TEXTURE_NAMES
+        low, high = mesh.vertices_m.min(axis=0), mesh.vertices_m.max(axis=0)
+        assert (low >= np.array([layout.x_min_m, layout.y_min_m, 0.0]) - 1e-9).all()
+        inner = np.array([layout.x_max_m, layout.y_max_m, layout.wall_height_m])
+        assert (high <= inner + 1e-9).all()
+        # Small enough that a view leaves most of a hall out.
+        assert np.linalg.norm(high - low) < 9.0
+        corners = mesh.vertices_m[mesh.indices.reshape(-1, 3)]
+        facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        area = np.linalg.norm(facing, axis=1)
+        assert area.min() > 1e-8
+        shaded = mesh.normals[mesh.indices.reshape(-1, 3)].mean(axis=1)
+        outward = np.einsum("ij,ij->i", facing, shaded) > 0.0
+        # The ceiling and its lamps alone take the light from above though they face down.
+        overhead = corners[:, :, 2].min(axis=1) > layout.wall_height_m - 0.5
+        assert (outward | (overhead & (facing[:, 2] < 0.0))).all()
+
+
+def test_the_crossing_is_cheap_to_draw() -> None:
+    assert sum(chunk.mesh.triangles for chunk in scenery(WarehouseLayout.crossing())) <= 9000
+    for name in LAYOUTS:
+        chunks = scenery(WarehouseLayout.named(name))
+        assert sum(chunk.mesh.triangles for chunk in chunks) <= 13000
+        assert len({chunk.texture for chunk in chunks}) <= 8
+
+
+def test_the_same_hall_is_the_same_picture() -> None:
+    layout = WarehouseLayout.staging_hall()
+    first = _bytes(scenery(layout, 3))
+    scenery.cache_clear()
+    assert _bytes(scenery(layout, 3)) == first
+    assert _bytes(scenery(layout, 4)) != first
+    with pytest.raises(SimError, match="variant must be"):
+        scenery(layout, -1)
+
+
+@pytest.mark.parametrize(
+    "rack",
+    [
+        RackBox(x_m=1.0, y_m=-2.0, length_m=7.8, width_m=1.1),
+        RackBox(x_m=0.0, y_m=3.0, length_m=1.1, width_m=5.0),
+        RackBox(x_m=0.0, y_m=0.0, length_m=2.0, width_m=0.7, height_m=2.2),
+    ],
+)
+def test_nothing_is_seen_through_a_rack_and_nothing_sticks_out(rack: RackBox) -> None:
+    mesh = merge(chunk.mesh for chunk in rack_chunks(rack, 2, 0))
+    x_min, y_min, x_max, y_max = rack.box_odom_m
+    low, high = np.array([x_min, y_min, 0.0]), np.array([x_max, y_max, rack.height_m])
+    assert (mesh.vertices_m >= low - _PROUD_M).all()
+    assert (mesh.vertices_m <= high + _PROUD_M).all()
+    rng = np.random.default_rng(5)
+    pairs = [(a, b) for a in range(5) for b in range(5) if a != b]
+    chords = [pairs[k % len(pairs)] for k in range(300)]
+    starts = np.array([_on_face(rng, low, high, a, 0.01) for a, _ in chords])
+    ends = np.array([_on_face(rng, low, high, b, 0.01) for _, b in chords])
+    assert _hits(mesh, starts, ends).all()
+
+
+@pytest.mark.parametrize("kind", PROP_PARTS)
+@pytest.mark.parametrize("yaw_deg", [0.0, 90.0, 217.0])
+def test_a_prop_fills_its_boxes_and_does_not_stick_out(kind: str, yaw_deg: float) -> None:
+    prop = Prop(kind=kind, x_m=1.0, y_m=-2.0, yaw_deg=yaw_deg)
+    mesh = prop_chunk(prop, 1, 0).mesh
+    boxes, heights = np.array(prop.boxes_odom_m), np.array(prop.heights_m)
+    x, y, z = mesh.vertices_m.T[:, :, None]
+    inside = (
+        (x >= boxes[:, 0] - _PROUD_M)
+        & (x <= boxes[:, 2] + _PROUD_M)
+        & (y >= boxes[:, 1] - _PROUD_M)
+        & (y <= boxes[:, 3] + _PROUD_M)
+        & (z >= -1e-9)
+        & (z <= heights + _PROUD_M)
+    )
+    assert inside.any(axis=1).all()
+    assert mesh.vertices_m[:, 2].max() > heights.max() - 0.06
+    if yaw_deg == 217.0:  # the box is then larger than the thing
+        return
+    rng = np.random.default_rng(6)
+    for box, height in zip(boxes, heights, strict=True):
+        low, high = np.array([*box[:2], 0.0]), np.array([*box[2:], height])
+        if height < 0.4:  # forks: sight passes far above them
+            continue
+        starts = rng.uniform(low, high, (120, 3))
+        ends = starts.copy()
+        axis = np.arange(120) % 2
+        rows = np.arange(120)
+        starts[rows, axis], ends[rows, axis] = low[axis], high[axis]
+        assert _hits(mesh, starts, ends).mean() > 0.8, (kind, box)
+
+
+def test_textures_are_painted_alike_every_time() -> None:
+    for name in TEXTURE_NAMES:
+        first = scenery_texture(name)
+        assert first.dtype == np.uint8
+        assert first.ndim == 3
+        assert max(first.shape) <= 1024
+        assert not first.flags.writeable
+        assert first.std() > 5.0
+    kept = {name: scenery_texture(name).tobytes() for name in TEXTURE_NAMES}
+    assert len(set(kept.values())) == len(kept)
+    scenery_texture.cache_clear()
+    assert {name: scenery_texture(name).tobytes() for name in TEXTURE_NAMES} == kept
+    with pytest.raises(SimError, match="did you mean 'goods0'"):
+        scenery_texture("good0")
+
+
+def _free_pose(layout: WarehouseLayout, rng: np.random.Generator) -> np.ndarray:
+    """T_odom_camera at the robot's eye level, 0.4 m clear of everything."""
+    boxes = layout.obstacle_boxes_odom
+    while True:
+        x = rng.uniform(layout.x_min_m + 0.5, layout.x_max_m - 0.5)
+        y = rng.uniform(layout.y_min_m + 0.5, layout.y_max_m - 0.5)
+        near = (np.array([x, y]) > boxes[:, :2] - 0.4) & (np.array([x, y]) < boxes[:, 2:] + 0.4)
+        if not near.all(axis=1).any():
+            break
+    heading = rng.uniform(-math.pi, math.pi)
+    c, s = math.cos(heading), math.sin(heading)
+    pose = np.eye(4)
+    pose[:3, :3] = np.array([[s, 0.0, c], [-c, 0.0, s], [0.0, -1.0, 0.0]])
+    pose[:3, 3] = (x, y, 1.4)
+    return pose
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("detector", REQUIRED)
+def test_nobody_is_seen_in_an_empty_hall(detector: str) -> None:
+    if not (MODELS / f"{detector}.onnx").exists():
+        pytest.skip(f"the genuine detector {detector} is not here")
+    network = GenuineDetector(detector)
+    rng = np.random.default_rng(8)
+    camera = Camera.from_fov(640, 480, math.radians(75.0))
+    lights = sorted(LIGHTINGS)
+    highest = []
+    for number, name in enumerate(LAYOUTS):
+        with Warehouse(WarehouseLayout.named(name), variant=number) as warehouse:
+            for _ in range(4):
+                light = Lighting.preset(lights[rng.integers(len(lights))])
+                renderer = CameraRenderer(warehouse, lighting=light)
+                picture = renderer.rgb(camera, _free_pose(warehouse.layout, rng))
+                highest.append(network.people(picture).scores.max(initial=0.0))
+    assert max(highest) < 0.5

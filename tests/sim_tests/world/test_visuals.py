@@ -1,0 +1,191 @@
+"""The picture world: actors, textures, what is hidden, and that the physics never notices."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from camera_poses import level_pose
+from picture_actors import CHECKS, Shown, ball, upright_square
+
+from perception import Camera
+from sim_tests import SimError
+from sim_tests.actors.robot import Amr
+from sim_tests.world import Warehouse
+from sim_tests.world.bullet import pybullet
+from sim_tests.world.camera import CameraRenderer
+from sim_tests.world.hall import Lighting, Mesh, WarehouseLayout, box
+from sim_tests.world.render import RenderView, Visuals
+
+CAMERA = Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
+AHEAD = level_pose((0.0, 0.0, 1.4), 0.0)
+
+
+@pytest.fixture
+def hall() -> Iterator[Warehouse]:
+    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
+        yield warehouse
+
+
+def test_an_actor_is_built_once_and_told_when_it_is_out_of_view(hall: Warehouse) -> None:
+    actor = ball(position_m=(3.0, 0.0, 1.4))
+    number = hall.visuals.add_actor(actor)
+    renderer = CameraRenderer(hall)
+    view = renderer.render(CAMERA, AHEAD)
+    assert (view.actors == number).sum() == (view.body_ids == actor.body).sum() > 20
+    assert set(np.unique(view.actors)) == {-1, number}
+    away = renderer.render(CAMERA, level_pose((0.0, 0.0, 1.4), math.pi))
+    assert not (away.actors == number).any()
+    renderer.render(CAMERA, level_pose((0.0, 0.0, 1.4), math.pi))
+    back = renderer.render(CAMERA, AHEAD)
+    np.testing.assert_array_equal(back.rgb, view.rgb)
+    # 150 px across a metre at 1 m distance.
+    assert actor.shown == [pytest.approx(50.0), None, pytest.approx(50.0)]
+    assert actor.builds == 1
+
+
+def test_an_actor_that_is_never_seen_is_never_built(hall: Warehouse) -> None:
+    behind_the_rack = ball(position_m=(5.0, 6.3, 1.0))
+    hall.visuals.add_actor(behind_the_rack)
+    CameraRenderer(hall).render(CAMERA, level_pose((5.0, 0.0, 1.4), 0.5 * math.pi))
+    assert behind_the_rack.builds == 0
+
+
+def test_level_of_detail_follows_the_grid_and_not_the_rectangle(hall: Warehouse) -> None:
+    actor = ball(position_m=(2.0, 0.0, 1.4))
+    hall.visuals.add_actor(actor)
+    renderer = CameraRenderer(hall)
+    renderer.render(CAMERA, AHEAD)
+    renderer.render(CAMERA, AHEAD, (70, 50, 90, 70))
+    renderer.render(CAMERA, AHEAD, (70, 50, 90, 70), (40, 40))
+    CameraRenderer(hall, supersampling=2).render(CAMERA, AHEAD)
+    assert actor.shown == pytest.approx([75.0, 75.0, 150.0, 150.0])
+
+
+def test_only_shows_silhouettes_through_everything(hall: Warehouse) -> None:
+    visuals = hall.visuals
+    near = ball(0.3, position_m=(2.0, 0.0, 1.4))
+    far = ball(0.3, position_m=(4.0, 0.0, 1.4))
+    in_the_rack = ball(0.3, position_m=(5.0, 5.9, 1.0))
+    first, second, third = (visuals.add_actor(actor) for actor in (near, far, in_the_rack))
+    renderer = CameraRenderer(hall)
+    whole = renderer.render(CAMERA, AHEAD)
+    assert not (whole.actors == second).any()  # wholly behind the nearer one
+    alone = renderer.render(CAMERA, AHEAD, only={second})
+    assert set(np.unique(alone.actors)) == {-1, second}
+    assert (alone.actors == second).sum() == pytest.approx(
+        math.pi * (0.3 / 4.0 * 150) ** 2, rel=0.05
+    )
+    # Nothing but the silhouette: no depth, and white.
+    assert np.isinf(alone.depth_m[alone.actors < 0]).all()
+    assert (alone.rgb[alone.actors < 0] == 255).all()
+    sideways = level_pose((5.0, 0.0, 1.4), 0.5 * math.pi)
+    assert (renderer.render(CAMERA, sideways, only={first, third}).actors == third).any()
+    np.testing.assert_array_equal(renderer.render(CAMERA, AHEAD).rgb, whole.rgb)
+
+
+def test_a_texture_lies_as_its_coordinates_say_and_multiplies_the_colour() -> None:
+    quarters = np.zeros((8, 8, 3), np.uint8)
+    quarters[:4, :4], quarters[:4, 4:] = (200, 0, 0), (0, 200, 0)
+    quarters[4:, :4], quarters[4:, 4:] = (0, 0, 200), (200, 200, 200)
+    even = Lighting(ambient=1.0, diffuse=0.0)
+    with Warehouse(WarehouseLayout.open_floor()) as hall:
+        square = Shown(upright_square(), (2.0, 0.0, 1.4), (1.0, 1.0, 0.5), quarters)
+        hall.visuals.add_actor(square)
+        rgb = CameraRenderer(hall, lighting=even).rgb(CAMERA, AHEAD)
+    seen = rgb[[45, 45, 75, 75], [65, 95, 65, 95]].astype(int)
+    wanted = [[200, 0, 0], [0, 200, 0], [0, 0, 100], [200, 200, 100]]
+    np.testing.assert_allclose(seen, wanted, atol=2)
+
+
+def test_equal_textures_are_kept_once_and_odd_ones_refused() -> None:
+    with Visuals() as visuals:
+        first = visuals.texture(CHECKS.astype(np.uint8))
+        assert visuals.texture(CHECKS.astype(np.uint8).copy()) == first
+        assert visuals.texture(np.zeros((32, 32, 3), np.uint8)) != first
+        with pytest.raises(SimError, match="uint8"):
+            visuals.texture(CHECKS)
+        with pytest.raises(SimError, match="uint8"):
+            visuals.texture(np.zeros((8, 8), np.uint8))
+        square = upright_square()
+        bare = Mesh(square.vertices_m, square.normals, square.indices)
+        with pytest.raises(SimError, match="uv"):
+            visuals.shape(bare, texture=first)
+
+
+def test_hidden_bodies_of_many_links_leave_no_trace() -> None:
+    """A chain of three boxes on spherical joints: posed, hidden, and shown again."""
+    with Visuals() as visuals:
+        texture = visuals.texture(CHECKS.astype(np.uint8))
+        square = upright_square(0.2)
+        shapes = tuple(visuals.shape(square, texture=texture) for _ in range(2))
+        body = visuals.add_body(
+            visuals.shape(box((0.0, 0.0, 0.0), (0.1, 0.3, 0.3)), (0.2, 0.4, 0.9)),
+            shapes,
+            np.array([(0.0, 0.5, 0.0), (0.0, 0.5, 0.0)]),
+            (-1, 0),
+        )
+        view = RenderView.of_rectangle(CAMERA, level_pose((-3.0, 0.5, 0.0), 0.0))
+        light = Lighting(ambient=1.0, diffuse=0.0)
+        shown = visuals.draw(view, light, 0.1)
+        assert (shown.body_ids == body).sum() > 500
+        columns = np.flatnonzero((shown.body_ids == body).any(axis=0))
+        half_turn = (0.0, 0.0, 1.0, 0.0)
+        pybullet.resetJointStatesMultiDof(body, [1], [half_turn], physicsClientId=visuals.client)
+        turned = visuals.draw(view, light, 0.1)
+        # Its face is towards the other side now: a face is drawn from in front only.
+        assert np.flatnonzero((turned.body_ids == body).any(axis=0)).min() > columns.min()
+        visuals.hide(body)
+        gone = visuals.draw(view, light, 0.1)
+        assert (gone.body_ids == -1).all()
+        assert np.isinf(gone.depth_m).all()
+        visuals.reveal(body)
+        again = visuals.draw(view, light, 0.1)
+        np.testing.assert_array_equal(again.rgb, turned.rgb)
+
+
+def test_pictures_never_change_the_physics() -> None:
+    def drive(look: bool) -> bytes:
+        with Warehouse() as hall:
+            amr = Amr(hall)
+            amr.command(1.0, 0.3)
+            bodies = pybullet.getNumBodies(physicsClientId=hall.client)
+            for step in range(60):
+                if look and step % 20 == 0:
+                    hall.visuals.add_actor(ball(position_m=(1.0, 0.0, 0.2)))
+                    CameraRenderer(hall).rgb(CAMERA, amr.T_odom_camera)
+                amr.advance(hall.physics_dt_s)
+                hall.step()
+            assert pybullet.getNumBodies(physicsClientId=hall.client) == bodies
+            return amr.T_odom_base.tobytes()
+
+    assert drive(True) == drive(False)
+
+
+def test_a_closed_hall_shows_nothing_more() -> None:
+    warehouse = Warehouse()
+    visuals = warehouse.visuals
+    client = visuals.client
+    warehouse.close()
+    assert not pybullet.isConnected(client)
+    with pytest.raises(SimError, match="closed"):
+        visuals.prepare(RenderView.of_rectangle(CAMERA, AHEAD))
+    never_seen = Warehouse()
+    never_seen.close()
+    with pytest.raises(SimError, match="closed"):
+        _ = never_seen.visuals
+
+
+def test_an_unknown_renderer_is_refused_before_anything_starts() -> None:
+    with pytest.raises(SimError, match="did you mean 'tiny'"):
+        Warehouse(renderer="tinny")  # type: ignore[arg-type]
+
+
+def test_where_opengl_does_not_start_auto_is_the_software_renderer(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("sim_tests.world.render._visuals.gl_works", lambda: False)
+    with Visuals(renderer="auto") as visuals:
+        assert visuals.renderer == "tiny"

@@ -1,0 +1,155 @@
+"""The hall: layouts as data, physics that keeps to closed forms, worlds that do not meet."""
+
+from __future__ import annotations
+
+import importlib.util
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from perception import Camera
+from sim_tests import SimError
+from sim_tests.actors.body import Worker
+from sim_tests.actors.robot import Amr
+from sim_tests.world import ROBOT_GROUP, Warehouse
+from sim_tests.world import bullet as _bullet
+from sim_tests.world._warehouse import GRAVITY_MPS2
+from sim_tests.world.bullet import pybullet
+from sim_tests.world.camera import CameraRenderer
+from sim_tests.world.errors import MissingSimulatorError
+from sim_tests.world.hall import LAYOUTS, WarehouseLayout
+
+
+def _ball(warehouse: Warehouse, position_m: tuple[float, float, float]) -> int:
+    shape = pybullet.createCollisionShape(
+        pybullet.GEOM_SPHERE, radius=0.1, physicsClientId=warehouse.client
+    )
+    ball = pybullet.createMultiBody(
+        1.0, shape, basePosition=position_m, physicsClientId=warehouse.client
+    )
+    pybullet.changeDynamics(
+        ball, -1, linearDamping=0.0, restitution=0.0, physicsClientId=warehouse.client
+    )
+    pybullet.setCollisionFilterGroupMask(
+        ball, -1, ROBOT_GROUP, -1, physicsClientId=warehouse.client
+    )
+    return int(ball)
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_planners_boxes_are_where_the_physics_has_them(name: str) -> None:
+    layout = WarehouseLayout.named(name)
+    rng = np.random.default_rng(0)
+    low, high = (layout.x_min_m, layout.y_min_m), (layout.x_max_m, layout.y_max_m)
+    points = rng.uniform(low, high, (400, 2))
+    with Warehouse(layout) as warehouse:
+        hits = pybullet.rayTestBatch(
+            [(*point, 10.0) for point in points.tolist()],
+            [(*point, -1.0) for point in points.tolist()],
+            physicsClientId=warehouse.client,
+        )
+        boxes = warehouse.obstacle_boxes_odom
+        static = warehouse.static_bodies
+    tops = np.array([hit[3][2] for hit in hits])
+    under = np.all((points[:, None] > boxes[:, :2]) & (points[:, None] < boxes[:, 2:]), axis=2)
+    expected = np.where(under, layout.obstacle_heights_m, 0.0).max(axis=1)
+    assert 20 < np.count_nonzero(expected) < 380
+    np.testing.assert_allclose(tops, expected, atol=1e-6)
+    assert {hit[0] for hit in hits} <= static
+
+
+def test_aisles_of_the_crossing_are_free() -> None:
+    layout = WarehouseLayout.crossing()
+    for x_min, y_min, x_max, y_max in (
+        (-2.0, -1.5, 14.0, 1.5),
+        (4.5, layout.y_min_m + 0.1, 7.5, layout.y_max_m - 0.1),
+    ):
+        for box in layout.obstacle_boxes_odom:
+            apart = box[0] >= x_max or box[2] <= x_min or box[1] >= y_max or box[3] <= y_min
+            assert apart, box
+
+
+def test_a_ball_falls_as_newton_says_and_stays_on_the_floor() -> None:
+    with Warehouse() as warehouse:
+        ball = _ball(warehouse, (0.0, 0.0, 2.1))
+        steps = 120
+        for _ in range(steps):
+            warehouse.step()
+        height = pybullet.getBasePositionAndOrientation(ball, physicsClientId=warehouse.client)[0][
+            2
+        ]
+        # Semi-implicit Euler: n (n + 1) / 2 steps of g dt² instead of n² / 2.
+        fallen = 0.5 * steps * (steps + 1) * GRAVITY_MPS2 * warehouse.physics_dt_s**2
+        assert warehouse.time_s == pytest.approx(0.5)
+        assert height == pytest.approx(2.1 - fallen, abs=1e-6)
+        for _ in range(240):
+            warehouse.step()
+        position, _ = pybullet.getBasePositionAndOrientation(ball, physicsClientId=warehouse.client)
+        assert position[2] == pytest.approx(0.1, abs=1e-3)
+
+
+def _run(steps: int = 120) -> bytes:
+    """All that a crossing's physics and pictures give, as bytes."""
+    with Warehouse() as warehouse:
+        amr, worker = Amr(warehouse), Worker(warehouse, 1.8)
+        amr.command(1.2, 0.2)
+        trace = []
+        for step in range(steps):
+            if step % 4 == 0:
+                worker.place((3.0, 1.0 - 0.01 * step), -1.5, 0.01 * step, 1.2, 0.3, 0.1)
+            amr.advance(warehouse.physics_dt_s)
+            warehouse.step()
+            trace.append(amr.T_odom_camera)
+        camera = Camera.from_fov(160, 120, 1.0)
+        view = CameraRenderer(warehouse).render(camera, amr.T_odom_camera)
+        return np.array(trace).tobytes() + view.rgb.tobytes() + view.depth_m.tobytes()
+
+
+def test_same_inputs_give_the_same_bytes() -> None:
+    assert _run() == _run()
+
+
+def test_worlds_do_not_meet() -> None:
+    alone = _run(60)
+    with Warehouse(WarehouseLayout.open_floor()) as other:
+        _ball(other, (1.0, 0.0, 0.5))
+        other.step()
+        assert _run(60) == alone
+        other.step()
+        assert other.time_s == pytest.approx(2 * other.physics_dt_s)
+
+
+@pytest.mark.parametrize("dt_s", [0.0, -0.1, 0.5, float("nan")])
+def test_unusable_steps_are_refused(dt_s: float) -> None:
+    with pytest.raises(SimError, match="physics_dt_s"):
+        Warehouse(physics_dt_s=dt_s)
+
+
+def test_a_missing_simulator_is_named_with_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pybullet", None)
+    assert _bullet.__file__ is not None
+    spec = importlib.util.spec_from_file_location("sim_tests.world.bullet_again", _bullet.__file__)
+    assert spec is not None
+    assert spec.loader is not None
+    with pytest.raises(MissingSimulatorError, match=r"awarenav\[sim\]"):
+        spec.loader.exec_module(importlib.util.module_from_spec(spec))
+
+
+def test_the_simulator_starts_silently() -> None:
+    program = (
+        "from sim_tests.world import Warehouse\nwith Warehouse() as warehouse: warehouse.step()"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert (done.stdout, done.stderr) == ("", "")
+
+
+def test_a_closed_hall_says_so() -> None:
+    warehouse = Warehouse()
+    warehouse.close()
+    warehouse.close()
+    with pytest.raises(SimError, match="closed"):
+        warehouse.step()

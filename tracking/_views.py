@@ -1,0 +1,186 @@
+"""What the tracker asks of whoever knows where the camera can see.
+
+The view of a pinhole camera: inside the image, and neither too far away nor too near.
+
+The view of a camera whose picture is cut into several flat ones.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+
+from perception import Camera
+from perception.arrays import (
+    FloatArray,
+    finite_array,
+    finite_number,
+    rigid_transform,
+    rotation_matrix,
+    set_fields,
+)
+
+from ._errors import TrackingError
+
+
+@runtime_checkable
+class View(Protocol):
+    """Where a frame would have shown a person, had one been there.
+
+    People who hide others are not a view's business: the tracker knows where they are. Racks and
+    walls may be. A view must not remember anything from call to call: frames that come late are
+    asked about again.
+    """
+
+    def visibility(self, positions_odom_m: FloatArray, T_odom_camera: FloatArray) -> FloatArray:
+        """Return (N,) in [0, 1]: the chance that a person at each position would be detected.
+
+        Args:
+            positions_odom_m: (N, 2) on the floor plane.
+            T_odom_camera: (4, 4) where the camera was.
+        """
+        ...
+
+
+# Image borders of a lens with much distortion are curved; a rectangle in x/z and y/z through the
+# middles of the four sides stands for them. Projecting people instead would fold those far outside
+# the image back into it.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraView:
+    """People whose body's centre is in the image and within range should be seen.
+
+    The answer falls linearly from 1 to 0 over a margin at the left and right of the image, where
+    bodies are cut off, and over the last fifth of the range. The floor is at z = 0 in odom.
+
+    Attributes:
+        camera: its intrinsics.
+        max_range_m: > 0, horizontal distance beyond which nobody is expected to be detected.
+        min_range_m: ≥ 0, nearer than this too little of a body is in the image.
+        side_margin: in [0, 0.5), width of the margin at each side as a share of the image's width.
+        chest_height_m: ≥ 0, height of the point that stands for a body.
+    """
+
+    camera: Camera
+    max_range_m: float = 8.0
+    min_range_m: float = 0.5
+    side_margin: float = 0.05
+    chest_height_m: float = 1.2
+    _limits: tuple[float, float, float, float] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        camera = self.camera
+        if not isinstance(camera, Camera):
+            raise TrackingError(f"camera must be a Camera, got {type(camera).__name__}")
+        set_fields(
+            self,
+            max_range_m=finite_number(
+                "max_range_m", self.max_range_m, TrackingError, minimum=0.0, exclusive_minimum=True
+            ),
+            chest_height_m=finite_number(
+                "chest_height_m", self.chest_height_m, TrackingError, minimum=0.0
+            ),
+            side_margin=finite_number(
+                "side_margin", self.side_margin, TrackingError, minimum=0.0, maximum=0.49
+            ),
+        )
+        set_fields(
+            self,
+            min_range_m=finite_number(
+                "min_range_m",
+                self.min_range_m,
+                TrackingError,
+                minimum=0.0,
+                maximum=self.max_range_m,
+            ),
+        )
+        right, bottom = camera.width_px - 0.5, camera.height_px - 0.5
+        sides = camera.normalise(
+            [
+                [-0.5, camera.cy_px],
+                [right, camera.cy_px],
+                [camera.cx_px, -0.5],
+                [camera.cx_px, bottom],
+            ]
+        )
+        set_fields(
+            self,
+            _limits=(
+                float(sides[0, 0]),
+                float(sides[1, 0]),
+                float(sides[2, 1]),
+                float(sides[3, 1]),
+            ),
+        )
+
+    def visibility(self, positions_odom_m: Any, T_odom_camera: Any) -> FloatArray:
+        """Return (N,) in [0, 1] for people at ``positions_odom_m`` (N, 2).
+
+        Raises:
+            TrackingError: for positions that are no finite (N, 2) and for a ``T_odom_camera``
+                that is no rigid transform.
+        """
+        places = finite_array("positions_odom_m", positions_odom_m, ("N", 2), TrackingError)
+        T = rigid_transform("T_odom_camera", T_odom_camera, TrackingError)
+        chests = np.column_stack((places, np.full(len(places), self.chest_height_m)))
+        x, y, z = ((chests - T[:3, 3]) @ T[:3, :3]).T
+        ranges = np.hypot(*(places - T[:2, 3]).T)
+        ahead = z > 1e-6
+        depth = np.where(ahead, z, 1.0)
+        left, right, top, bottom = self._limits
+        aside, up = x / depth, y / depth
+        inside = ahead & (up >= top) & (up <= bottom) & (ranges >= self.min_range_m)
+        margin = max(self.side_margin * (right - left), 1e-9)
+        from_side = np.minimum(aside - left, right - aside) / margin
+        from_range = (self.max_range_m - ranges) / (0.2 * self.max_range_m)
+        return np.where(inside, np.clip(np.minimum(from_side, from_range), 0.0, 1.0), 0.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SurroundView:
+    """People who should be seen in any of several views about one optical centre.
+
+    Attributes:
+        views: V, each of its own optical frame; a :class:`CameraView` for each flat camera.
+        rotations_camera_view: V rotations (3, 3) from each view's optical frame to the camera's, as
+            :class:`perception.surround.FlatView` has them.
+    """
+
+    views: tuple[View, ...]
+    rotations_camera_view: tuple[FloatArray, ...]
+
+    def __post_init__(self) -> None:
+        views = tuple(self.views)
+        rotations = tuple(
+            rotation_matrix(f"rotations_camera_view[{index}]", rotation, TrackingError)
+            for index, rotation in enumerate(self.rotations_camera_view)
+        )
+        if not views or len(views) != len(rotations):
+            raise TrackingError(
+                "views and rotations_camera_view must be of one length, at least 1, got "
+                f"{len(views)} and {len(rotations)}"
+            )
+        for view in views:
+            if not isinstance(view, View):
+                raise TrackingError(
+                    "views must have a method visibility(positions_odom_m, T_odom_camera), "
+                    f"got {type(view).__name__}"
+                )
+        set_fields(self, views=views, rotations_camera_view=rotations)
+
+    def visibility(self, positions_odom_m: Any, T_odom_camera: Any) -> FloatArray:
+        """Return (N,) in [0, 1]: of each person in the view that shows them best.
+
+        Raises:
+            TrackingError: as the views do, and for a ``T_odom_camera`` that is no rigid transform.
+        """
+        T_odom_camera = rigid_transform("T_odom_camera", T_odom_camera, TrackingError)
+        shown = []
+        for view, rotation in zip(self.views, self.rotations_camera_view, strict=True):
+            T_odom_view = np.array(T_odom_camera)
+            T_odom_view[:3, :3] = T_odom_camera[:3, :3] @ rotation
+            shown.append(view.visibility(positions_odom_m, T_odom_view))
+        return np.asarray(np.max(shown, axis=0))

@@ -1,0 +1,185 @@
+"""Awareness over time: a Gaussian filter in logit(α) with a lower bound that keeps its word.
+
+Between measurements the belief follows an Ornstein–Uhlenbeck process towards a low prior. It is
+stationary at the prior, so uncertainty grows while nothing is known but never beyond the prior's,
+and its solution is exact for any time step. The lower bound is remembered: without evidence it may
+fall, never rise, however the belief moves.
+
+Every function works on one person (numbers) as on many at once (arrays of equal shape).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from statistics import NormalDist
+from typing import Final, TypeAlias
+
+import numpy as np
+from scipy.special import expit
+
+from perception.arrays import FloatArray
+
+from ._config import AwarenessFilterConfig
+
+Value: TypeAlias = "float | FloatArray"
+
+# Nodes and weights for the expectation of a function of a standard normal variable.
+_NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(11)
+_GAUSS_HERMITE_NODES: Final = _NODES
+_GAUSS_HERMITE_WEIGHTS: Final = _WEIGHTS / _WEIGHTS.sum()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AwarenessBelief:
+    """What is believed of α, in logit units.
+
+    Attributes:
+        mean: of logit(α).
+        variance: of logit(α), > 0.
+        bound: the remembered lower bound of logit(α); −∞ until evidence has lifted it.
+    """
+
+    mean: Value
+    variance: Value
+    bound: Value = -math.inf
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FilteredAwareness:
+    """A belief in units of α: median, standard deviation (≤ 0.5) and one-sided lower bound."""
+
+    awareness: Value
+    awareness_std: Value
+    awareness_lower: Value
+
+
+def logit(awareness: Value) -> Value:
+    """Return ln(α / (1 − α)) for α strictly between 0 and 1."""
+    if isinstance(awareness, np.ndarray):
+        return np.asarray(np.log(awareness / (1.0 - awareness)))
+    return math.log(awareness / (1.0 - awareness))
+
+
+def sigmoid(value: Value) -> Value:
+    """Return 1 / (1 + exp(−value)), the inverse of :func:`logit`; 0 at −∞."""
+    result: Value = expit(value)
+    return result
+
+
+def prior(config: AwarenessFilterConfig) -> AwarenessBelief:
+    """Return the belief about a person of whom nothing is known; its lower bound is α = 0."""
+    return AwarenessBelief(logit(config.prior_awareness), config.prior_std_logit**2)
+
+
+def drift(
+    belief: AwarenessBelief, dt_s: float, time_constant_s: Value, config: AwarenessFilterConfig
+) -> AwarenessBelief:
+    """Return the belief after ``dt_s`` ≥ 0 without evidence.
+
+    Exact for any step: φ = exp(−dt/τ), mean → m₀ + φ (mean − m₀), variance → P₀ + φ² (variance −
+    P₀). The remembered bound becomes the lowest value that mean − z √variance takes on the way.
+    """
+    if dt_s <= 0.0:
+        return belief
+    prior_mean, prior_variance = logit(config.prior_awareness), config.prior_std_logit**2
+    z = _quantile(config.lower_bound_confidence)
+    offset, excess = belief.mean - prior_mean, belief.variance - prior_variance
+    phi = np.exp(-dt_s / time_constant_s)
+    mean = prior_mean + phi * offset
+    variance = prior_variance + phi * phi * excess
+    before = belief.mean - z * np.sqrt(belief.variance)
+    after = mean - z * np.sqrt(np.maximum(variance, 0.0))
+    lowest = np.minimum(np.minimum(belief.bound, before), after)
+    # A belief surer and lower than the prior dips while its variance grows and then climbs
+    # towards the prior: setting the derivative by φ to zero gives the turning point.
+    dips = (offset < 0.0) & (excess < 0.0)
+    if np.any(dips):
+        squared = offset * offset
+        divisor = np.where(dips, z * z * excess * excess - squared * excess, 1.0)
+        turn2 = np.where(dips, squared * prior_variance / divisor, 0.0)
+        turns = (phi * phi < turn2) & (turn2 < 1.0)
+        if np.any(turns):
+            turn2 = np.where(turns, turn2, 1.0)
+            spread = np.sqrt(np.maximum(prior_variance + turn2 * excess, 0.0))
+            at_turn = prior_mean + np.sqrt(turn2) * offset - z * spread
+            lowest = np.where(turns, np.minimum(lowest, at_turn), lowest)
+    return AwarenessBelief(mean, variance, lowest)
+
+
+def evidence(
+    awareness: Value, awareness_std: Value, config: AwarenessFilterConfig
+) -> tuple[FloatArray, FloatArray]:
+    """Return a measured α as mean and variance of logit(α), NaN where it says too little.
+
+    The Gaussian in logit(α) whose two one-σ points are those of α, α ± σ clipped to [ε, 1 − ε]. In
+    mid-range that is the logit's derivative, σ / (α (1 − α)); near 0 and 1 the derivative has no
+    bound and would turn a confident "unaware" (α = 0, σ = 0.05) into next to nothing.
+
+    NaN in, for no measured α, gives NaN.
+    """
+    awareness, awareness_std = np.asarray(awareness), np.asarray(awareness_std)
+    low, high = config.clip_awareness, 1.0 - config.clip_awareness
+    below = logit(np.minimum(np.maximum(awareness - awareness_std, low), high))
+    above = logit(np.minimum(np.maximum(awareness + awareness_std, low), high))
+    std = np.maximum(0.5 * (above - below), config.min_evidence_std_logit)
+    usable = awareness_std <= config.max_evidence_std
+    return np.where(usable, 0.5 * (above + below), np.nan), np.where(usable, std * std, np.nan)
+
+
+def measure(
+    belief: AwarenessBelief,
+    mean: Value,
+    variance: Value,
+    interval_s: float,
+    config: AwarenessFilterConfig,
+) -> AwarenessBelief:
+    """Return the belief after one measurement of logit(α) and reset the remembered bound by it.
+
+    Args:
+        belief: at the instant of the measurement.
+        mean: of the measurement, from :func:`evidence`.
+        variance: of the measurement, from :func:`evidence`.
+        interval_s: > 0, time that this measurement stands for; below ``evidence_correlation_s``
+            the variance grows in proportion, so that information per second has a limit.
+        config: settings.
+    """
+    effective = variance * max(1.0, config.evidence_correlation_s / interval_s)
+    gain = belief.variance / (belief.variance + effective)
+    corrected = belief.mean + gain * (mean - belief.mean)
+    remaining = belief.variance * (1.0 - gain)
+    z = _quantile(config.lower_bound_confidence)
+    return AwarenessBelief(corrected, remaining, corrected - z * np.sqrt(remaining))
+
+
+def forget(belief: AwarenessBelief, config: AwarenessFilterConfig) -> AwarenessBelief:
+    """Return the prior, with a lower bound no higher than the belief's or the prior's own."""
+    fresh = prior(config)
+    own = fresh.mean - _quantile(config.lower_bound_confidence) * config.prior_std_logit
+    bound = np.minimum(belief.bound, own)
+    return AwarenessBelief(fresh.mean, fresh.variance, bound)
+
+
+def estimate(belief: AwarenessBelief, config: AwarenessFilterConfig) -> FilteredAwareness:
+    """Return a belief in units of α.
+
+    The awareness is sigmoid(mean), the median of the logit-normal distribution; the standard
+    deviation is that of the distribution by Gauss–Hermite quadrature, so it never exceeds 0.5.
+    The lower bound is (sigmoid(bound) − ε) / (1 − ε), not below 0: no measurement tells an α below
+    ε from 0, which a logit cannot reach, so what is no more than ε must not count for anything.
+    """
+    mean, std = np.asarray(belief.mean), np.sqrt(belief.variance)
+    # The sigmoid is (1 + tanh(x / 2)) / 2, and tanh the faster function of an array.
+    values = np.tanh((0.5 * mean)[..., None] + (0.5 * std)[..., None] * _GAUSS_HERMITE_NODES)
+    # Sums along the last axis, which do not depend on how many people there are.
+    deviation = values - (values * _GAUSS_HERMITE_WEIGHTS).sum(axis=-1)[..., None]
+    second = (deviation * deviation * _GAUSS_HERMITE_WEIGHTS).sum(axis=-1)
+    clip = config.clip_awareness
+    lower = np.maximum((expit(belief.bound) - clip) / (1.0 - clip), 0.0)
+    return FilteredAwareness(expit(belief.mean), 0.5 * np.sqrt(second), lower)
+
+
+@lru_cache(maxsize=32)
+def _quantile(confidence: float) -> float:
+    return NormalDist().inv_cdf(confidence)
