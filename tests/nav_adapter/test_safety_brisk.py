@@ -48,6 +48,18 @@ def test_a_brisk_walker_counts_as_turning_to_the_robot(course_deg: float) -> Non
     assert limit_mps(UNAWARE_MPS, math.radians(course_deg)) == pytest.approx(expected, abs=1e-12)
 
 
+@given(share=finite(0.75, 1.0), course=finite(math.pi / 2, math.pi))
+def test_the_turn_grows_with_the_pace_from_three_quarters_of_the_unaware_speed(
+    share: float, course: float
+) -> None:
+    """None at 0.75 of the speed assumed of an unaware person, the whole 45° at that speed."""
+    turn_rad = math.radians(45.0) * (share - 0.75) / 0.25
+    off_rad = max(math.pi - course - turn_rad, 0.0)
+    closing_mps = max(AWARE_MPS, share * UNAWARE_MPS * math.cos(off_rad))
+    found = limit_mps(share * UNAWARE_MPS, course)
+    assert found == pytest.approx(limit_for(closing_mps), abs=1e-9)
+
+
 @given(walking=finite(0.0, 1.2), course=finite(math.pi / 2, math.pi))
 def test_at_normal_pace_only_the_closing_speed_counts(walking: float, course: float) -> None:
     closing_mps = max(AWARE_MPS, -walking * math.cos(course))
