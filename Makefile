@@ -5,10 +5,12 @@ VENV := .venv
 PY := $(VENV)/bin/python
 AWARENAV := $(VENV)/bin/awarenav
 PYTEST_ARGS ?=
+# One worker process per core; a worker that is done takes tests from the others.
+PYTEST := $(PY) -m pytest -n auto --dist worksteal
 export PYTHON
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint bench lock clean
+.PHONY: help setup demo test mutants lint bench lock clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{printf "%-14s %s\n", $$1, $$2}'
@@ -21,7 +23,10 @@ demo: setup ## run the paper's encounter and the three crossings; results in dem
 
 # Cheap checks first, so that a slip shows in seconds.
 test: lint ## lint, then every test; the wheel is built, installed and imported too
-	$(PY) -m pytest $(PYTEST_ARGS)
+	$(PYTEST) $(PYTEST_ARGS)
+
+mutants: setup ## change constants of safety and geometry, one at a time: every change must fail a test
+	$(PY) -m tools.mutants
 
 lint: setup ## ruff, import layers, strict types
 	$(PY) -m ruff check .

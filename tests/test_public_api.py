@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import importlib
 import inspect
+from importlib import metadata
 
 import pytest
 from paths import ROOT
+
+import awarenav
 
 MAX_LINES = 400
 MAX_NAMES = 17
@@ -108,7 +111,30 @@ def test_contract_is_kept(package: str) -> None:
         assert taken[: len(parameters)] == parameters, f"{package}.{name} takes {taken}"
 
 
-@pytest.mark.parametrize("package", PACKAGES)
+def test_awarenav_gives_the_names_of_the_contract() -> None:
+    names = [
+        (package, name)
+        for package, contract in CONTRACT.items()
+        if package != "sim_tests"
+        for name in contract
+    ]
+    assert names
+    for package, name in names:
+        assert name in awarenav.__all__
+        assert getattr(awarenav, name) is getattr(importlib.import_module(package), name)
+    for package, error in (
+        ("perception", "PerceptionError"),
+        ("tracking", "TrackingError"),
+        ("nav_adapter", "NavError"),
+        ("sim_tests", "SimError"),
+    ):
+        assert issubclass(getattr(importlib.import_module(package), error), awarenav.AwarenavError)
+    assert awarenav.__version__ == metadata.version("awarenav")
+    with pytest.raises(AttributeError, match="no attribute 'NavAdaptor'"):
+        awarenav.NavAdaptor  # noqa: B018
+
+
+@pytest.mark.parametrize("package", [*PACKAGES, "awarenav"])
 def test_modules_are_short_and_marked_as_typed(package: str) -> None:
     folder = ROOT / package
     lengths = {

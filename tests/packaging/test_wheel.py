@@ -9,15 +9,17 @@ from email.parser import Parser
 from pathlib import Path
 from typing import Any
 
+import cv2
+import numpy as np
 import pytest
 
 PACKAGES = {"perception", "tracking", "nav_adapter", "awarenav", "sim_tests"}
-CORE = ("perception", "tracking", "nav_adapter")
+CORE = ("perception", "tracking", "nav_adapter", "awarenav")
 
 # Prints what importing and using the core pulled in.
 CORE_CODE = """
 import importlib.util, json, sys
-import nav_adapter, perception, tracking
+import awarenav, nav_adapter, perception, tracking
 robot = nav_adapter.RobotProfile(
     footprint_m=[[0.4, 0.3], [-0.4, 0.3], [-0.4, -0.3], [0.4, -0.3]], max_speed_mps=1.5,
     max_acceleration_mps2=1.0, max_deceleration_mps2=1.0, reaction_time_s=0.3)
@@ -25,7 +27,9 @@ state = nav_adapter.RobotState(0.0, [0.0, 0.0], 0.0, 0.0, 0.0)
 adapter = nav_adapter.NavAdapter(nav_adapter.AwarenessPolicy(), robot)
 constraints = adapter.update(tracking.PersonTracker().predict(0.0), state, 0.0)
 print(json.dumps({
-    "files": {core.__name__: core.__file__ for core in (perception, tracking, nav_adapter)},
+    "files": {
+        each.__name__: each.__file__ for each in (perception, tracking, nav_adapter, awarenav)
+    },
     "found": [name for name in ("pybullet", "av") if importlib.util.find_spec(name)],
     "imported": [name for name in ("pybullet", "matplotlib", "av", "tqdm") if name in sys.modules],
     "obstacles": nav_adapter.circles(constraints).shape,
@@ -90,7 +94,7 @@ def test_wheel_carries_the_networks_unaltered(wheel: Path) -> None:
 
 @pytest.mark.slow
 def test_core_installs_and_runs_without_the_simulator(
-    wheel: Path, root: Path, environment: Any
+    wheel: Path, root: Path, environment: Any, tmp_path: Path
 ) -> None:
     environment.pip("install", "--quiet", "--constraint", root / "requirements.lock", wheel)
 
@@ -105,8 +109,22 @@ def test_core_installs_and_runs_without_the_simulator(
     assert seen["obstacles"] == [0, 5]
 
     assert environment.command("awarenav", "--help").returncode == 0
-    verified = environment.command("awarenav", "models", "verify")
-    assert verified.returncode == 0, verified.stdout + verified.stderr
+    (tmp_path / "images").mkdir()
+    for number in range(2):
+        noise = np.random.default_rng(number).integers(0, 255, (240, 320, 3), dtype=np.uint8)
+        assert cv2.imwrite(str(tmp_path / "images" / f"{number:06d}.png"), noise)
+    estimates = tmp_path / "estimates.jsonl"
+    for arguments in (
+        ("models", "verify"),
+        ("models", "list", "--json"),
+        ("estimate", tmp_path / "images", "--out", estimates),
+        ("judge", estimates, estimates),
+        ("tracks", estimates, "--out", "none"),
+        ("policy", "show", "balanced", "--out", "none"),
+        ("bridge", "--help"),
+    ):
+        ran = environment.command("awarenav", *map(str, arguments))
+        assert ran.returncode == 0, f"{arguments}: {ran.stdout}{ran.stderr}"
     refused = environment.command("awarenav", "demo", "--out", "demo")
     assert refused.returncode == 2, refused.stderr
     assert "awarenav[sim]" in refused.stderr

@@ -46,7 +46,11 @@ class _Given:
 def observed(person: PersonKeypoints, head: HeadPose | None) -> PersonObservation:
     given = _Given(person, head)
     pipeline = AwarenessPipeline(
-        CAMERA, given, given, given, keypoint_std_px=KEYPOINT_STD_PX  # type: ignore[arg-type]
+        CAMERA,
+        given,
+        given,
+        given,
+        keypoint_std_px=KEYPOINT_STD_PX,  # type: ignore[arg-type]
     )
     (observation,) = pipeline.process(IMAGE, 0.0)
     return observation
