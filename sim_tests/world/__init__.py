@@ -1,4 +1,4 @@
-"""The simulated hall: its physics, its pictures, and lines of sight in it."""
+"""The simulated warehouse: its physics, its rendering, its cameras, and lines of sight in it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from awarenav.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from ._sight import (
+    from ._visibility import (
         FACE_DEPTH_M,
         FACE_KEYPOINTS,
         JOINT_DEPTH_M,
@@ -15,11 +15,12 @@ if TYPE_CHECKING:
         keypoints_in_front,
         sees,
     )
-    from ._warehouse import PERSON_GROUP, RAY_GROUP, ROBOT_GROUP, Warehouse
+    from ._warehouse import GRAVITY_MPS2, PERSON_GROUP, RAY_GROUP, ROBOT_GROUP, Warehouse
 
 __all__ = [
     "FACE_DEPTH_M",
     "FACE_KEYPOINTS",
+    "GRAVITY_MPS2",
     "JOINT_DEPTH_M",
     "PERSON_GROUP",
     "RAY_GROUP",
@@ -33,7 +34,7 @@ __all__ = [
 __getattr__ = lazy_names(
     __name__,
     {
-        "._sight": (
+        "._visibility": (
             "FACE_DEPTH_M",
             "FACE_KEYPOINTS",
             "JOINT_DEPTH_M",
@@ -42,6 +43,7 @@ __getattr__ = lazy_names(
             "sees",
         ),
         "._warehouse": (
+            "GRAVITY_MPS2",
             "PERSON_GROUP",
             "RAY_GROUP",
             "ROBOT_GROUP",

@@ -1,10 +1,11 @@
-"""The simulated hall: it owns the physics and everything in it that stands still."""
+"""The simulated warehouse: the physics world with floor, walls, racks and props."""
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
+from types import TracebackType
 from typing import Final
 
-from awarenav.closing import Closing
 from awarenav.errors import not_one_of
 from perception.arrays import FloatArray, finite_number
 
@@ -16,32 +17,32 @@ from .render import RENDERERS, RendererName, VisualActor, Visuals
 GRAVITY_MPS2: Final = 9.81
 DEFAULT_PHYSICS_DT_S: Final = 1.0 / 240.0
 
-# Collision groups: people are moved, not simulated, so they meet only robots. Bit 1 is Bullet's
-# own group of rays: whatever admits it is hit by ray tests.
+# Collision groups. People are placed, not simulated, so they collide with robots only. Bit 1 is
+# Bullet's own group of ray tests: they hit every body whose mask has this bit.
 RAY_GROUP: Final = 1
 STATIC_GROUP: Final = 2
 ROBOT_GROUP: Final = 4
 PERSON_GROUP: Final = 8
 
 
-class Warehouse(Closing):
-    """A physics world of its own with floor, walls and racks; use it as a context manager.
+class Warehouse(AbstractContextManager["Warehouse"]):
+    """A physics world with floor, walls, racks and props; use it as a context manager.
 
-    Every instance starts a fresh PyBullet world (no window), so two with the same inputs give the
-    same bytes. Robots and people join by being constructed with it. What a camera sees is a second
-    world, :attr:`visuals`, so that pictures never change the physics.
+    Every instance starts a PyBullet world of its own without a window, so the same inputs give the
+    same bytes. Robots and people are constructed with the warehouse that they join. Cameras see a
+    second world, :attr:`visuals`, so that rendering never changes the physics.
 
     Args:
-        layout: what stands where; None is :meth:`WarehouseLayout.crossing`.
+        layout: the hall; None is :meth:`WarehouseLayout.crossing`.
         physics_dt_s: length of one step, in (0, 1/60].
-        renderer: ``"tiny"``, ``"gl"`` or ``"auto"``, what draws :attr:`visuals`.
+        renderer: ``"tiny"``, ``"gl"`` or ``"auto"``, the renderer of :attr:`visuals`.
         variant: number of the scenery's variant (goods, colours, wear).
 
     Attributes:
         layout: as given.
         physics_dt_s: as given.
-        client: PyBullet's id of this world.
-        obstacle_boxes_odom: (N, 4) x_min, y_min, x_max, y_max of racks and walls, metres.
+        client: PyBullet's id of this world; −1 once it is closed.
+        obstacle_boxes_odom: (N, 4) x_min, y_min, x_max, y_max of racks, walls and props, metres.
 
     Raises:
         SimError: for a step that is not in range, an unknown renderer, and after :meth:`close`.
@@ -88,19 +89,19 @@ class Warehouse(Closing):
 
     @property
     def visuals(self) -> Visuals:
-        """The picture world, made when it is first asked for; it never touches the physics."""
+        """The render world, made on first use; it never changes the physics."""
         if self._visuals is None:
             if self.client < 0:
-                raise SimError("the warehouse is closed: there is nothing left to see")
+                raise SimError("the warehouse is closed: it has no visuals any more")
             self._visuals = Visuals(self.layout, self._renderer, self._variant)
             for actor in self._actors:
                 self._visuals.add_actor(actor)
         return self._visuals
 
     def add_actor(self, actor: VisualActor) -> int:
-        """Let something that moves be seen in pictures; returns its number in them.
+        """Add something that moves to the images; return its number in them.
 
-        Costs nothing until the first picture is taken.
+        It costs nothing until the first image is rendered.
         """
         self._actors.append(actor)
         if self._visuals is not None:
@@ -109,16 +110,24 @@ class Warehouse(Closing):
 
     @property
     def actors(self) -> tuple[VisualActor, ...]:
-        """All that :meth:`add_actor` was given."""
+        """The actors in the order of their numbers."""
         return tuple(self._actors)
 
     @property
     def variant(self) -> int:
-        """Number of the scenery's variant."""
+        """The number of the scenery's variant."""
         return self._variant
 
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
     def close(self) -> None:
-        """End the physics world and the picture world; a second call does nothing."""
+        """End the physics world and the render world; a second call does nothing."""
         if self._visuals is not None:
             self._visuals.close()
         if self.client >= 0:
@@ -127,23 +136,23 @@ class Warehouse(Closing):
 
     @property
     def steps(self) -> int:
-        """Physics steps since the start."""
+        """The number of physics steps since the start."""
         return self._steps
 
     @property
     def time_s(self) -> float:
-        """Simulated time since the start, a whole number of steps."""
+        """The simulated time since the start, a whole number of steps."""
         return self._steps * self.physics_dt_s
 
     @property
     def static_bodies(self) -> frozenset[int]:
-        """PyBullet's ids of the floor, the walls and the racks."""
+        """PyBullet's ids of the floor, the racks, the walls and the props."""
         return self._static_bodies
 
     def step(self) -> None:
         """Advance the physics by ``physics_dt_s``."""
         if self.client < 0:
-            raise SimError("the warehouse is closed: it can no longer step")
+            raise SimError("the warehouse is closed: it cannot step any more")
         pybullet.stepSimulation(physicsClientId=self.client)
         self._steps += 1
 
@@ -163,7 +172,7 @@ class Warehouse(Closing):
             restitution=0.0,
             physicsClientId=self.client,
         )
-        self._set_static(body)
+        self._make_static(body)
         return body
 
     def _add_boxes(self) -> list[int]:
@@ -183,11 +192,11 @@ class Warehouse(Closing):
                 useMaximalCoordinates=True,
                 physicsClientId=self.client,
             )
-            self._set_static(body)
+            self._make_static(body)
             bodies.append(int(body))
         return bodies
 
-    def _set_static(self, body: int) -> None:
+    def _make_static(self, body: int) -> None:
         pybullet.setCollisionFilterGroupMask(
             body, -1, STATIC_GROUP, ROBOT_GROUP | RAY_GROUP, physicsClientId=self.client
         )

@@ -1,8 +1,7 @@
-"""The one place that imports PyBullet.
+"""PyBullet, imported in this module only.
 
 PyBullet is the optional dependency ``awarenav[sim]``. Its extension module writes its build time to
-the process's standard error when it is loaded; that line is dropped so that a command's output
-holds only what the command says.
+standard error when it is loaded; that line is dropped, so a command prints only its own output.
 """
 
 from __future__ import annotations
@@ -14,30 +13,29 @@ from collections.abc import Iterator
 
 from .errors import MissingSimulatorError
 
+__all__ = ["pybullet"]
+
+_STDERR = 2
+
 
 @contextlib.contextmanager
-def muted(*descriptors: int) -> Iterator[None]:
-    """Send file descriptors to the null device; C code bypasses ``sys.stdout``.
-
-    Args:
-        descriptors: which; none given means both standard output and standard error.
-    """
-    kept = {}
+def _muted_stderr() -> Iterator[None]:
+    """Send the process's standard error to the null device; C code bypasses ``sys.stderr``."""
+    copy: int | None = None
     _flush_c_streams()
-    for descriptor in descriptors or (1, 2):
-        # A process may have been started without the stream: then there is nothing to mute.
-        with contextlib.suppress(OSError):
-            kept[descriptor] = os.dup(descriptor)
+    # A process may have been started without the stream: then there is nothing to mute.
+    with contextlib.suppress(OSError):
+        copy = os.dup(_STDERR)
     null = os.open(os.devnull, os.O_WRONLY)
     try:
-        for descriptor in kept:
-            os.dup2(null, descriptor)
+        if copy is not None:
+            os.dup2(null, _STDERR)
         yield
     finally:
-        # What C code has printed waits in its buffer and would come out later.
+        # Buffered output of C code must not appear later.
         _flush_c_streams()
-        for descriptor, copy in kept.items():
-            os.dup2(copy, descriptor)
+        if copy is not None:
+            os.dup2(copy, _STDERR)
             os.close(copy)
         os.close(null)
 
@@ -48,12 +46,10 @@ def _flush_c_streams() -> None:
 
 
 try:
-    with muted(2):
+    with _muted_stderr():
         import pybullet
 except ImportError as cause:
     raise MissingSimulatorError(
         "the simulation needs PyBullet, which is not installed; it is the extra 'sim': "
         "pip install 'awarenav[sim]' (wheels exist for Python 3.10 and 3.11)"
     ) from cause
-
-__all__ = ["muted", "pybullet"]

@@ -6,8 +6,8 @@ from awarenav.errors import AwarenavError, MissingExtraError
 
 
 class SimError(AwarenavError):
-    """Input that the simulation cannot use; the message says what was given and what is valid."""
+    """An input that the simulation cannot use; the message says what was given and is valid."""
 
 
 class MissingSimulatorError(SimError, MissingExtraError):
-    """PyBullet cannot be imported; the message names the extra that installs it."""
+    """PyBullet is not installed; the message names the extra that installs it."""

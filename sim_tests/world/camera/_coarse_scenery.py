@@ -1,4 +1,4 @@
-"""Pictures whose scenery is rendered coarsely and whose people are not: fast and sharp."""
+"""A faster renderer: coarse scenery, with people at full resolution."""
 
 from __future__ import annotations
 
@@ -15,28 +15,29 @@ from .._warehouse import Warehouse
 from ..errors import SimError
 from ._renderer import CameraRenderer, RenderedView
 
-#: People have at least so many samples a metre, as far as the camera has the pixels for it.
+#: The least samples per metre on a person, if the camera has that many pixels.
 FINE_PX_PER_M: Final = 240.0
-# Of the hall around a person that is rendered as finely.
+# Width of the scenery around a person that is rendered as finely.
 _PADDING_M: Final = 0.15
-_NEAREST_M: Final = 0.05
-_CORNERS: Final = np.array(
+_NEAR_M: Final = 0.05
+_UNIT_CORNERS: Final = np.array(
     [[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=np.int64
 )
 
 
 class CoarseSceneryRenderer:
-    """Renders as :class:`CameraRenderer` does, but scenery with one sample in a block of pixels.
+    """Renders like :class:`CameraRenderer`, but with one sample per block of pixels for scenery.
 
-    The software renderer's time goes with the samples, and a wide picture is mostly hall. Each
-    person's rectangle is rendered anew with as many samples as they need and put over the enlarged
-    hall; nearest-neighbour enlargement keeps depths and ids true ones.
+    The software renderer's time is proportional to the samples, and a wide image is mostly hall.
+    The whole image is rendered coarsely and enlarged; then the rectangle of each person is rendered
+    again with more samples. Depths and ids are enlarged by nearest neighbour, so each of them is
+    one that was rendered.
 
     Args:
-        warehouse: what is rendered.
-        divisor: pixels along a side of a block of scenery, ≥ 1; it must divide the picture's width
-            and height.
-        renderer: None is a :class:`CameraRenderer` with its defaults.
+        warehouse: the warehouse to render.
+        divisor: side of a block of scenery in pixels, ≥ 1; it must divide the image's width and
+            height.
+        renderer: renders both; None is a :class:`CameraRenderer` with its defaults.
     """
 
     def __init__(
@@ -49,7 +50,7 @@ class CoarseSceneryRenderer:
         self._renderer = CameraRenderer(warehouse) if renderer is None else renderer
 
     def render(self, camera: Camera, T_odom_camera: Any) -> RenderedView:
-        """Render the whole picture.
+        """Render the whole image.
 
         Raises:
             SimError: for a camera with distortion, and for a size that the divisor does not divide.
@@ -58,27 +59,27 @@ class CoarseSceneryRenderer:
         size = (camera.width_px, camera.height_px)
         if any(length % self._divisor for length in size):
             raise SimError(
-                f"blocks of {self._divisor} pixels must fill the picture, got {size[0]} x {size[1]}"
+                f"blocks of {self._divisor} pixels must fill the image, got {size[0]} x {size[1]}"
             )
-        coarse = (size[0] // self._divisor, size[1] // self._divisor)
-        hall = self._renderer.render(camera, T, size_px=coarse)
+        coarse_size = (size[0] // self._divisor, size[1] // self._divisor)
+        coarse = self._renderer.render(camera, T, size_px=coarse_size)
         if self._divisor == 1:
-            return hall
-        view = _enlarged(hall, self._divisor)
+            return coarse
+        view = _enlarged(coarse, self._divisor)
         people = [actor for actor in self._warehouse.visuals.actors if actor.kind == "person"]
-        places = [_corners_camera_m(actor.bounds_odom_m(), T) for actor in people]
-        # Who is nearer is drawn later, so that a coarse rectangle never covers a near person.
-        for corners in sorted(places, key=lambda points: -float(points[:, 2].min())):
+        boxes = [_corners_camera_m(actor.bounds_odom_m(), T) for actor in people]
+        # Nearer people are drawn later, so a coarser rectangle never covers a nearer person.
+        for corners in sorted(boxes, key=lambda points: -float(points[:, 2].min())):
             self._refine(view, camera, T, corners)
         return view
 
     def _refine(
         self, view: RenderedView, camera: Camera, T_odom_camera: FloatArray, corners: FloatArray
     ) -> None:
-        """Render the rectangle around some points (8, 3) in camera axes with finer samples."""
-        if corners[:, 2].max() <= _NEAREST_M:
+        """Render the rectangle around a box's corners (8, 3), in the optical frame, more finely."""
+        if corners[:, 2].max() <= _NEAR_M:
             return
-        depth_m = max(float(corners[:, 2].min()), _NEAREST_M)
+        depth_m = max(float(corners[:, 2].min()), _NEAR_M)
         step = min(max(int(camera.fx_px / depth_m / FINE_PX_PER_M), 1), self._divisor)
         if step == self._divisor:
             return
@@ -100,12 +101,12 @@ class CoarseSceneryRenderer:
 
 
 def _enlarged(view: RenderedView, factor: int) -> RenderedView:
-    """The view with ``factor`` times the pixels a side: colours bilinear, all else nearest."""
+    """Return the view at ``factor`` times the size: colours bilinear, everything else nearest."""
     height, width = view.actors.shape
     size = (factor * width, factor * height)
 
     def nearest(values: NDArray[Any]) -> Any:
-        # The same as OpenCV's exact nearest neighbour, and quicker on one core.
+        # The same as OpenCV's exact nearest neighbour, and faster on one core.
         return np.repeat(np.repeat(values, factor, axis=1), factor, axis=0)
 
     return RenderedView(
@@ -117,16 +118,19 @@ def _enlarged(view: RenderedView, factor: int) -> RenderedView:
 
 
 def _corners_camera_m(bounds_odom_m: FloatArray, T_odom_camera: FloatArray) -> FloatArray:
-    """(8, 3) corners of an upright box (2, 3), a little larger, in camera axes."""
+    """Return the corners (8, 3) of an upright box (2, 3) with padding, in the optical frame."""
     low, high = bounds_odom_m[0] - _PADDING_M, bounds_odom_m[1] + _PADDING_M
-    corners = np.where(_CORNERS == 1, high, low)
+    corners = np.where(_UNIT_CORNERS == 1, high, low)
     return np.asarray((corners - T_odom_camera[:3, 3]) @ T_odom_camera[:3, :3])
 
 
 def _rectangle(camera: Camera, corners: FloatArray) -> FloatArray:
-    """(4,) around the corners in pixels from the picture's corner; all of it for one beside us."""
-    if corners[:, 2].min() <= _NEAREST_M:
+    """Return the rectangle (4,) around the corners, in pixels from the image's corner.
+
+    It is the whole image if a corner lies beside or behind the camera.
+    """
+    if corners[:, 2].min() <= _NEAR_M:
         return np.array([0.0, 0.0, camera.width_px, camera.height_px])
-    # Cells of the picture count from its corner, half a pixel from where pixel 0 has its centre.
+    # The image's corner lies half a pixel before the centre of pixel 0.
     pixels = camera.project(corners) + 0.5
     return np.concatenate([pixels.min(axis=0), pixels.max(axis=0)])

@@ -1,8 +1,8 @@
-"""Motion blur: what moves while the shutter is open smears along its path in the image.
+"""Motion blur: things that move while the shutter is open smear along their path in the image.
 
-The picture is taken at the middle of the exposure. Every pixel's path is straight and even, from
-half the exposure before to half of it after; light is averaged along it, linearly. Actors move over
-the scenery as layers of their own, so that their outlines smear as well.
+An image is rendered for the middle of the exposure. Each pixel's path is straight and at constant
+speed, from half the exposure before to half of it after; linear light is averaged along it. Each
+actor is a layer over the scenery, so its outline smears as well.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from perception.arrays import FloatArray, finite_array, finite_number, rigid_tra
 from ..errors import SimError
 from ._sensor import to_linear, to_srgb
 
-# Smears shorter than this are not seen; longer ones are averaged from so many samples at most.
-_LEAST_PX: Final = 0.05
-_MOST_SAMPLES: Final = 64
-# What is infinitely far does not move with the camera's translation.
+# Shorter smears are left out; longer ones are averaged from at most this number of samples.
+_MIN_SMEAR_PX: Final = 0.05
+_MAX_SAMPLES: Final = 64
+# Stands for an infinite depth, which a translation of the camera does not move in the image.
 _HORIZON_M: Final = 1.0e6
 
 Floats = NDArray[np.float32]
@@ -39,16 +39,16 @@ def motion_field(
     velocities_odom_mps: Mapping[int, Any] | None = None,
     exposure_s: float = 0.0,
 ) -> FloatArray:
-    """How far each pixel's content moves in the image during the exposure, (H, W, 2) pixels.
+    """Return the motion (H, W, 2) of each pixel's content during the exposure, in pixels.
 
     Args:
         camera: without distortion, of the size of ``depth_m``.
         depth_m: (H, W) along the optical axis, infinite where there is nothing.
         T_odom_camera_open: (4, 4) pose at the start of the exposure.
         T_odom_camera_close: (4, 4) pose at its end.
-        actors: (H, W) number of the actor seen in each pixel; needed with velocities.
-        velocities_odom_mps: (2,) velocity on the floor of each actor that moves.
-        exposure_s: how long the actors move, ≥ 0.
+        actors: (H, W) number of the actor in each pixel; needed with velocities.
+        velocities_odom_mps: (2,) velocity on the floor of each actor that moves, by its number.
+        exposure_s: the time during which the actors move, ≥ 0.
     """
     first = rigid_transform("T_odom_camera_open", T_odom_camera_open, SimError)
     last = rigid_transform("T_odom_camera_close", T_odom_camera_close, SimError)
@@ -59,8 +59,8 @@ def motion_field(
     points = np.stack(
         [(u - camera.cx_px) / camera.fx_px * z, (v - camera.cy_px) / camera.fy_px * z, z], axis=-1
     )
-    step = np.linalg.inv(last) @ first
-    moved = points @ step[:3, :3].T + step[:3, 3]
+    T_close_open = np.linalg.inv(last) @ first
+    moved = points @ T_close_open[:3, :3].T + T_close_open[:3, 3]
     if actors is not None:
         for number, velocity in (velocities_odom_mps or {}).items():
             on_floor = finite_array(f"velocities_odom_mps[{number}]", velocity, (2,), SimError)
@@ -79,14 +79,15 @@ def motion_field(
 def motion_blur(
     rgb: NDArray[np.uint8], field_px: FloatArray, actors: NDArray[np.int32] | None = None
 ) -> NDArray[np.uint8]:
-    """Smear a picture (H, W, 3) along its motion field (H, W, 2).
+    """Return an image smeared along its motion field.
 
     Args:
-        rgb: sRGB.
-        field_px: from :func:`motion_field`.
-        actors: (H, W) number of the actor in each pixel, −1 for scenery; None is one layer.
+        rgb: (H, W, 3) sRGB.
+        field_px: (H, W, 2) from :func:`motion_field`.
+        actors: (H, W) number of the actor in each pixel, −1 for scenery; None treats the image as
+            one layer.
     """
-    if not np.abs(field_px).max(initial=0.0) >= _LEAST_PX:
+    if not np.abs(field_px).max(initial=0.0) >= _MIN_SMEAR_PX:
         return np.array(rgb, dtype=np.uint8)
     light = to_linear(rgb).astype(np.float32)
     field = field_px.astype(np.float32)
@@ -94,8 +95,8 @@ def motion_blur(
     scenery = np.ones(rgb.shape[:2], np.float32)
     for number in numbers:
         scenery[actors == number] = 0.0
-    # Where an actor stood the scenery is unknown: what is seen around it stands in.
-    reach = _reach(field)
+    # The scenery behind an actor is unknown; it is filled in from the scenery around the actor.
+    reach = math.ceil(0.5 * float(np.abs(field).max())) + 1
     behind = _filled(light, scenery, reach)
     out = _smeared(behind, _filled(field, scenery, reach))
     for number in numbers:
@@ -105,20 +106,16 @@ def motion_blur(
             slice(max(int(rows.min()) - reach, 0), int(rows.max()) + reach + 1),
             slice(max(int(columns.min()) - reach, 0), int(columns.max()) + reach + 1),
         )
-        cover = mask[around]
-        own = _filled(field[around], cover, reach)
-        layer = np.dstack([light[around] * cover[..., None], cover])
-        smeared = _smeared(layer, own)
+        coverage = mask[around]
+        actor_field = _filled(field[around], coverage, reach)
+        layer = np.dstack([light[around] * coverage[..., None], coverage])
+        smeared = _smeared(layer, actor_field)
         out[around] = smeared[..., :3] + (1.0 - smeared[..., 3:]) * out[around]
     return to_srgb(out.astype(np.float64))
 
 
-def _reach(field: Floats) -> int:
-    return math.ceil(0.5 * float(np.abs(field).max())) + 1
-
-
 def _filled(values: Floats, known: Floats, reach: int) -> Floats:
-    """Values (H, W, C) with the unknown ones replaced by the mean of the known ones around."""
+    """Return values (H, W, C), the unknown ones set to the mean of known ones within ``reach``."""
     if known.all():
         return values
     size = (2 * reach + 1, 2 * reach + 1)
@@ -130,11 +127,14 @@ def _filled(values: Floats, known: Floats, reach: int) -> Floats:
 
 
 def _smeared(values: Floats, field: Floats) -> Floats:
-    """Mean of ``values`` (H, W, C) along each pixel's path, two samples a pixel of the longest."""
+    """Return the mean of ``values`` (H, W, C) along each pixel's path.
+
+    The number of samples is two per pixel of the longest path.
+    """
     longest = float(np.linalg.norm(field, axis=2).max(initial=0.0))
-    if longest < _LEAST_PX:
+    if longest < _MIN_SMEAR_PX:
         return np.array(values, dtype=np.float32)
-    samples = min(max(math.ceil(2.0 * longest), 2), _MOST_SAMPLES)
+    samples = min(max(math.ceil(2.0 * longest), 2), _MAX_SAMPLES)
     height, width = values.shape[:2]
     u, v = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
     total = np.zeros_like(values)

@@ -1,4 +1,4 @@
-"""Pictures and depth of the simulated hall, exact to the pixel convention of the camera model."""
+"""The camera renderer: images, depth and ids, exact to the camera model's pixel convention."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ _MAX_SUPERSAMPLING: Final = 8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RenderedView:
-    """One rendered view; row v, column u.
+    """A rendered image with the depth and the ids of each pixel; row v, column u.
 
     Attributes:
         rgb: (h, w, 3) uint8.
         depth_m: (h, w) distance along the optical axis z; infinite where there is nothing.
-        body_ids: (h, w) int32, PyBullet's id in the picture world of the body seen in the pixel,
-            −1 where there is nothing.
-        actors: (h, w) int32, number of the actor seen in the pixel (:meth:`Visuals.add_actor`), −1
-            for scenery and nothing.
+        body_ids: (h, w) int32, PyBullet's id of the body in the render world, −1 where there is
+            nothing.
+        actors: (h, w) int32, number of the actor (:meth:`Visuals.add_actor`), −1 for scenery and
+            where there is nothing.
     """
 
     rgb: NDArray[np.uint8]
@@ -42,20 +42,20 @@ class RenderedView:
 
 
 class CameraRenderer:
-    """Renders what an undistorted camera sees of a warehouse's picture world.
+    """Renders a warehouse as an undistorted camera sees it.
 
-    A pixel's sample lies where :meth:`perception.Camera.project` puts that pixel's centre (integer
-    coordinates, as in OpenCV), so truth projected through the camera falls on the picture.
+    A pixel is sampled at its centre, which :meth:`perception.Camera.project` puts at integer
+    coordinates as OpenCV does. Truth projected through the camera therefore falls on the image.
 
     Args:
-        warehouse: what is rendered.
-        lighting: of the hall; None is the default, bright one.
-        shadows: overrides the lighting's; actors then cast shadows on the floor.
-        near_m: nothing closer is drawn, > 0.
+        warehouse: the warehouse to render.
+        lighting: the hall's lighting; None is ``bright_led``.
+        shadows: whether actors cast shadows on the floor; None is the lighting's own setting.
+        near_m: nothing nearer is drawn, > 0.
         far_m: nothing farther is drawn, > near_m.
-        supersampling: n averages n × n samples a pixel, 1 to 8. Depth and ids are never averaged:
-            they are those of one sample, the one at the pixel's centre for an odd n and the one
-            half a sample right of and below it for an even n.
+        supersampling: n averages n × n samples per pixel, 1 to 8. Depth and ids are never
+            averaged. They come from one sample: at the pixel's centre for an odd n, half a sample
+            right of and below it for an even n.
     """
 
     def __init__(
@@ -71,7 +71,7 @@ class CameraRenderer:
         self._warehouse = warehouse
         light = Lighting() if lighting is None else lighting
         self._light = light if shadows is None else light.model_copy(update={"shadows": shadows})
-        # The renderers know coloured light for one of their two terms at most.
+        # The renderers colour one of the two lights at most, so the image is tinted instead.
         levels = np.arange(256)[:, None] * np.asarray(light.colour_rgb)
         self._tint = (
             None if light.colour_rgb == (1.0, 1.0, 1.0) else np.rint(levels).astype(np.uint8)[None]
@@ -90,7 +90,7 @@ class CameraRenderer:
         self._supersampling = int(supersampling)
 
     def rgb(self, camera: Camera, T_odom_camera: Any) -> NDArray[np.uint8]:
-        """The camera's picture (H, W, 3)."""
+        """Return the camera's image (H, W, 3)."""
         return self.render(camera, T_odom_camera).rgb
 
     def depth(
@@ -100,7 +100,7 @@ class CameraRenderer:
         roi_xyxy_px: Any = None,
         size_px: tuple[int, int] | None = None,
     ) -> FloatArray:
-        """Depth (h, w) in metres along the optical axis; arguments as in :meth:`render`."""
+        """Return the depth (h, w) along the optical axis; arguments as in :meth:`render`."""
         view = self._view(camera, T_odom_camera, roi_xyxy_px, size_px)
         return self._draw(view, None).depth_m
 
@@ -117,12 +117,13 @@ class CameraRenderer:
         Args:
             camera: without distortion.
             T_odom_camera: (4, 4), optical frame to odom.
-            roi_xyxy_px: (4,) u_min, v_min, u_max, v_max in pixels counted from the image's corner,
-                the maxima exclusive as in ``image[v_min:v_max, u_min:u_max]``; it may reach outside
+            roi_xyxy_px: (4,) u_min, v_min, u_max, v_max in pixels from the image's corner, the
+                maxima exclusive as in ``image[v_min:v_max, u_min:u_max]``; it may reach outside
                 the image. None is the whole image.
-            size_px: width and height of the result; None is one sample a pixel of the rectangle,
-                and then the result equals that part of the whole image.
-            only: numbers of the actors to draw, without scenery: their silhouettes.
+            size_px: width and height of the result; None is one sample per pixel of the
+                rectangle, and the result then equals that part of the whole image.
+            only: numbers of the actors to draw, without scenery, for their silhouettes; None
+                draws everything.
 
         Raises:
             SimError: for a camera with distortion, an empty rectangle or a size below one pixel.
@@ -169,7 +170,8 @@ class CameraRenderer:
         self, view: RenderView, only: AbstractSet[int] | None, *, shadows: bool = False
     ) -> Drawing:
         visuals = self._warehouse.visuals
-        drawing = visuals.draw(view, self._light, visuals.prepare(view, only))
+        visuals.prepare(view, only)
+        drawing = visuals.draw(view, self._light)
         if shadows and only is None:
             shade_floor(visuals, view, drawing, self._light)
         return drawing

@@ -1,4 +1,4 @@
-"""What an image sensor does to a clean picture: exposure, vignetting, photon and read noise."""
+"""The image sensor: exposure, vignetting, photon noise and read noise of a rendered image."""
 
 from __future__ import annotations
 
@@ -14,27 +14,28 @@ from tracking.config import StrictConfig
 
 from ..errors import SimError
 
-# Above so many electrons the Poisson distribution is a normal one for every purpose here.
+# From this number of electrons on, the Poisson distribution is replaced by a normal one.
 _MANY_ELECTRONS: Final = 60.0
-_CODES: Final = 65536
+# Steps of linear light in the table of sRGB codes.
+_LIGHT_STEPS: Final = 65536
 
 
 class SensorConfig(StrictConfig):
-    """How a camera turns light into numbers; the default adds nothing.
+    """The settings of an image sensor; the default leaves the image unchanged.
 
-    Noise follows the photon transfer curve of EMVA 1288: a pixel that has collected N electrons
-    has the variance N + read_noise_e². Channels are independent; there is no colour mosaic.
+    Noise follows the photon transfer curve of EMVA 1288: a pixel with N electrons has the variance
+    N + read_noise_e². The colour channels are independent; there is no colour mosaic.
 
     Attributes:
-        exposure_s: how long the shutter is open; it sets the length of motion blur only, its
-            brightness is :attr:`exposure_ev`.
-        exposure_ev: brightness in stops: +1 is twice the light.
-        shot_noise: whether light comes in photons.
-        full_well_e: electrons of a saturated pixel at no gain.
-        gain_db: amplification; 6 dB is half the light for the same picture, and twice the ISO.
-        read_noise_e: standard deviation of the electronics, in electrons.
-        vignetting: share of the light lost in the corners, falling off as cos⁴ does.
-        motion_blur: whether movement during the exposure smears.
+        exposure_s: exposure time; it sets the length of motion blur only. Brightness is set by
+            :attr:`exposure_ev`.
+        exposure_ev: brightness in stops; +1 is twice the light.
+        shot_noise: whether photons are counted, which adds Poisson noise.
+        full_well_e: electrons of a saturated pixel at 0 dB gain.
+        gain_db: amplification; 6 dB needs half the light for the same image and doubles the ISO.
+        read_noise_e: standard deviation of the read noise, in electrons.
+        vignetting: share of the light lost in the corners; the falloff follows cos⁴.
+        motion_blur: whether things that move during the exposure smear.
     """
 
     error: ClassVar[type[ValueError]] = SimError
@@ -50,28 +51,28 @@ class SensorConfig(StrictConfig):
 
     @property
     def white_e(self) -> float:
-        """Electrons that make a pixel white."""
+        """The number of electrons of a white pixel."""
         return float(self.full_well_e * 10.0 ** (-self.gain_db / 20.0))
 
 
 def expose(rgb: Any, config: SensorConfig, rng: np.random.Generator) -> NDArray[np.uint8]:
-    """Return the picture (H, W, 3) uint8 sRGB as the sensor gives it.
+    """Return an image (H, W, 3) uint8 sRGB as the sensor delivers it.
 
-    The generator is used for noise only, so without noise nothing is drawn from it. Motion blur
-    needs more than a picture: see :func:`sim_tests.world.camera._motion_blur.motion_blur`.
+    The generator is used for noise only: without noise, nothing is drawn from it. Motion blur is
+    not included: see :func:`motion_blur`.
 
     Raises:
-        SimError: for anything but a picture of bytes.
+        SimError: for an image that is not uint8 of shape (H, W, 3).
     """
-    picture = np.asarray(rgb)
-    if picture.dtype != np.uint8 or picture.ndim != 3 or picture.shape[2] != 3:
-        raise SimError(f"rgb must be uint8 of shape (H, W, 3), got {picture.dtype} {picture.shape}")
+    image = np.asarray(rgb)
+    if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
+        raise SimError(f"rgb must be uint8 of shape (H, W, 3), got {image.dtype} {image.shape}")
     noisy = config.shot_noise or config.read_noise_e > 0.0
     if not noisy and config.exposure_ev == 0.0 and config.vignetting == 0.0:
-        return np.array(picture, dtype=np.uint8)
-    light = to_linear(picture) * 2.0**config.exposure_ev
+        return np.array(image, dtype=np.uint8)
+    light = to_linear(image) * 2.0**config.exposure_ev
     if config.vignetting > 0.0:
-        light *= _falloff(picture.shape[0], picture.shape[1], config.vignetting)[..., None]
+        light *= _falloff(image.shape[0], image.shape[1], config.vignetting)[..., None]
     if noisy:
         light = collected_electrons(light, config, rng) / config.white_e
     return to_srgb(light)
@@ -80,7 +81,7 @@ def expose(rgb: Any, config: SensorConfig, rng: np.random.Generator) -> NDArray[
 def collected_electrons(
     light: FloatArray, config: SensorConfig, rng: np.random.Generator
 ) -> FloatArray:
-    """Electrons read from pixels that light of this strength falls on; 1 is white, any shape."""
+    """Return the electrons read from pixels, noise included; light of 1 is white, any shape."""
     expected = light * config.white_e
     spread = np.full_like(expected, config.read_noise_e**2)
     if config.shot_noise:
@@ -93,14 +94,15 @@ def collected_electrons(
 
 
 def to_linear(srgb: NDArray[np.uint8]) -> FloatArray:
-    """Light, 0 to 1, from sRGB bytes (IEC 61966-2-1)."""
+    """Return linear light, 0 to 1, from sRGB codes (IEC 61966-2-1)."""
     return np.asarray(_decoding()[srgb])
 
 
 def to_srgb(light: FloatArray) -> NDArray[np.uint8]:
-    """SRGB bytes from light; below 0 is black, above 1 white."""
-    codes = np.clip(light * (_CODES - 1.0) + 0.5, 0.0, _CODES - 1.0).astype(np.uint16)
-    return np.asarray(_encoding()[codes])
+    """Return sRGB codes from linear light; values below 0 are black, above 1 white."""
+    top = _LIGHT_STEPS - 1.0
+    steps = np.clip(light * top + 0.5, 0.0, top).astype(np.uint16)
+    return np.asarray(_encoding()[steps])
 
 
 @lru_cache(maxsize=1)
@@ -111,13 +113,13 @@ def _decoding() -> FloatArray:
 
 @lru_cache(maxsize=1)
 def _encoding() -> NDArray[np.uint8]:
-    light = np.arange(_CODES) / (_CODES - 1.0)
+    light = np.arange(_LIGHT_STEPS) / (_LIGHT_STEPS - 1.0)
     code = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1.0 / 2.4) - 0.055)
     return np.rint(255.0 * code).astype(np.uint8)
 
 
 def _falloff(height: int, width: int, lost: float) -> FloatArray:
-    """(H, W) share of the light that is left: cos⁴ = 1 / (1 + tan²)², 1 − ``lost`` in a corner."""
+    """Return the share (H, W) of light that remains: cos⁴ = 1 / (1 + tan²)²; corner: 1 − lost."""
     x = (np.arange(width) + 0.5) / width * 2.0 - 1.0
     y = (np.arange(height) + 0.5) / height * 2.0 - 1.0
     square = x[None, :] ** 2 * width**2 + y[:, None] ** 2 * height**2

@@ -1,4 +1,4 @@
-"""A camera as a robot has it: rendered pictures, a real sensor's flaws, and delays."""
+"""The simulated camera of a robot: renderer, image sensor and frame timing together."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from ._renderer import CameraRenderer, RenderedView
 from ._sensor import SensorConfig, expose
 from ._timing import CameraTiming, FrameClock, FrameQueue
 
-# Two captures farther apart than this say nothing about how things move between them.
-_CONTINUOUS_S: Final = 0.25
+# Motion is estimated from the last capture, unless it is older than this.
+_MAX_GAP_S: Final = 0.25
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraFrame:
-    """One frame.
+    """One frame, with the truth of each pixel.
 
     Attributes:
         stamp_s: the middle of the exposure.
         T_odom_camera: (4, 4) at that instant.
-        rgb: (H, W, 3) uint8 as the sensor gives it.
-        depth_m: (H, W) true, infinite where there is nothing.
+        rgb: (H, W, 3) uint8 as the sensor delivers it.
+        depth_m: (H, W) true depth, infinite where there is nothing.
         actors: (H, W) number of the actor in each pixel, −1 for scenery and nothing.
         people: numbers of the actors that are people.
     """
@@ -46,31 +46,31 @@ class CameraFrame:
 
     @property
     def person_mask(self) -> NDArray[np.bool_]:
-        """(H, W) where a person is seen."""
+        """The pixels (H, W) that show a person."""
         return np.isin(self.actors, self.people)
 
 
 class PictureRenderer(Protocol):
-    """Renders what a camera sees."""
+    """Renders the image of a camera."""
 
     def render(self, camera: Camera, T_odom_camera: Any) -> RenderedView:
-        """The whole picture."""
+        """Return the whole image."""
         ...
 
 
 class SimulatedCamera:
-    """Takes frames of a warehouse and delivers them as late as a real camera would.
+    """Takes frames of a warehouse and delivers them with the delay of a real camera.
 
     Args:
-        warehouse: what is seen.
+        warehouse: the warehouse that the camera sees.
         camera: without distortion.
         sensor: exposure, noise, vignetting, motion blur.
         timing: frame rate, losses and delays.
-        rng: of noise, losses and delays; needed unless the camera is perfect.
+        rng: draws noise, losses and delays; needed unless the camera is perfect.
         renderer: None is a :class:`CameraRenderer` with its defaults.
 
     Raises:
-        SimError: when chance is asked for without ``rng``.
+        SimError: for noise, losses or delays without ``rng``.
     """
 
     def __init__(
@@ -90,7 +90,7 @@ class SimulatedCamera:
         noisy = self._sensor.shot_noise or self._sensor.read_noise_e > 0.0
         if rng is None and (noisy or not timing.perfect):
             raise SimError("rng must be given for a camera with noise, losses or delays")
-        # Noise and delays draw from generators of their own: one never changes the other.
+        # Noise and timing have a generator each, so that one never changes the other.
         self._noise_rng, timing_rng = (rng or np.random.default_rng(0)).spawn(2)
         self._clock = FrameClock(timing, timing_rng)
         self._renderer: PictureRenderer = (
@@ -102,7 +102,7 @@ class SimulatedCamera:
     def tick(self, now_s: float, T_odom_camera: Any) -> tuple[CameraFrame, ...]:
         """Take a frame if one is due at ``now_s``; return the frames that have arrived by then.
 
-        A frame is taken at the first tick at or after its time and stamped with that tick. A frame
+        A frame is taken at the first tick at or after its time, and stamped with that tick. A frame
         that will be lost is not rendered.
         """
         now = finite_number("now_s", now_s, SimError)
@@ -117,24 +117,23 @@ class SimulatedCamera:
         T_odom_camera: Any,
         velocities_odom_mps: Mapping[int, Any] | None = None,
     ) -> CameraFrame:
-        """Take a frame now, whatever the timing.
+        """Take a frame now, independent of the timing.
 
         Args:
             stamp_s: the middle of its exposure.
             T_odom_camera: (4, 4) at that instant.
-            velocities_odom_mps: (2,) velocity of each actor that moves, for motion blur; None takes
-                it, as the camera's own motion, from the last capture if that was just before.
+            velocities_odom_mps: (2,) velocity of each actor that moves, by its number, for motion
+                blur. None estimates it from the last capture, as is the camera's own motion, if
+                that is at most 0.25 s old.
         """
         stamp = finite_number("stamp_s", stamp_s, SimError)
         T = rigid_transform("T_odom_camera", T_odom_camera, SimError)
         view = self._renderer.render(self._camera, T)
         rgb = view.rgb
         if self._sensor.motion_blur:
-            places = self._places()
-            rgb = self._smear(
-                stamp, T, view.rgb, view.depth_m, view.actors, places, velocities_odom_mps
-            )
-            self._last = stamp, T, places
+            centres = self._actor_centres()
+            rgb = self._blurred(stamp, T, view, centres, velocities_odom_mps)
+            self._last = stamp, T, centres
         people = [
             number
             for number, actor in enumerate(self._warehouse.visuals.actors)
@@ -149,48 +148,51 @@ class SimulatedCamera:
             tuple(people),
         )
 
-    def _places(self) -> dict[int, FloatArray]:
-        """Where the middle of each actor is, (2,) in odom."""
+    def _actor_centres(self) -> dict[int, FloatArray]:
+        """Return the centre (2,) of each actor in odom."""
         return {
             number: actor.bounds_odom_m()[:, :2].mean(axis=0)
             for number, actor in enumerate(self._warehouse.visuals.actors)
         }
 
-    def _smear(
+    def _blurred(
         self,
         stamp_s: float,
         T_odom_camera: FloatArray,
-        rgb: NDArray[np.uint8],
-        depth_m: FloatArray,
-        actors: NDArray[np.int32],
-        places: dict[int, FloatArray],
+        view: RenderedView,
+        centres: dict[int, FloatArray],
         velocities_odom_mps: Mapping[int, Any] | None,
     ) -> NDArray[np.uint8]:
+        """Return the view's image with motion blur."""
         exposure_s = self._sensor.exposure_s
-        first = last = T_odom_camera
+        T_open = T_close = T_odom_camera
         velocities = velocities_odom_mps or {}
-        if self._last is not None and 0.0 < stamp_s - self._last[0] <= _CONTINUOUS_S:
-            before_s, T_before, were = self._last
-            share = exposure_s / (stamp_s - before_s)
-            first, last = _around(T_before, T_odom_camera, share)
+        if self._last is not None and 0.0 < stamp_s - self._last[0] <= _MAX_GAP_S:
+            last_s, T_last, last_centres = self._last
+            share = exposure_s / (stamp_s - last_s)
+            T_open, T_close = _poses_around(T_last, T_odom_camera, share)
             if velocities_odom_mps is None:
                 velocities = {
-                    number: (place - were[number]) / (stamp_s - before_s)
-                    for number, place in places.items()
-                    if number in were
+                    number: (centre - last_centres[number]) / (stamp_s - last_s)
+                    for number, centre in centres.items()
+                    if number in last_centres
                 }
-        field = motion_field(self._camera, depth_m, first, last, actors, velocities, exposure_s)
-        return motion_blur(rgb, field, actors)
+        field = motion_field(
+            self._camera, view.depth_m, T_open, T_close, view.actors, velocities, exposure_s
+        )
+        return motion_blur(view.rgb, field, view.actors)
 
 
-def _around(T_before: FloatArray, T_now: FloatArray, share: float) -> tuple[FloatArray, FloatArray]:
-    """Poses half of ``share`` of the last motion before and after the pose now."""
-    turn, _ = cv2.Rodrigues(T_before[:3, :3].T @ T_now[:3, :3])
-    shift = T_now[:3, 3] - T_before[:3, 3]
-    out = []
+def _poses_around(
+    T_last: FloatArray, T_now: FloatArray, share: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return the poses half of ``share`` of the last motion before and after the present pose."""
+    turn, _ = cv2.Rodrigues(T_last[:3, :3].T @ T_now[:3, :3])
+    shift = T_now[:3, 3] - T_last[:3, 3]
+    poses = []
     for half in (-0.5 * share, 0.5 * share):
         pose = np.array(T_now)
         pose[:3, :3] = T_now[:3, :3] @ cv2.Rodrigues(half * turn)[0]
         pose[:3, 3] += half * shift
-        out.append(pose)
-    return out[0], out[1]
+        poses.append(pose)
+    return poses[0], poses[1]

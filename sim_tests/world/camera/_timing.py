@@ -1,4 +1,4 @@
-"""When a camera's frames are taken, lost and delivered."""
+"""Frame timing: capture, loss and delayed delivery of a camera's frames."""
 
 from __future__ import annotations
 
@@ -16,18 +16,19 @@ from tracking.config import StrictConfig
 from ..errors import SimError
 
 FrameT = TypeVar("FrameT")
-# Slack for times that are sums of many steps.
-_EARLY_S: Final = 1.0e-6
+# Tolerance for times that are sums of many steps.
+_TOLERANCE_S: Final = 1.0e-6
 
 
 class CameraTiming(StrictConfig):
-    """Frame rate, losses and delays of a camera; the default is a perfect one.
+    """Frame rate, losses and delays of a camera; the default is a perfect camera.
 
     Attributes:
-        rate_hz: frames a second; None is one whenever the robot asks, every control cycle.
-        drop_rate: share of the frames that never arrive, each on its own.
-        latency_s: from a frame's capture to its delivery, at least.
-        latency_jitter_s: up to so much more, evenly distributed. A frame may overtake another.
+        rate_hz: frames per second; None is one frame per control cycle of the robot.
+        drop_rate: probability that a frame is lost, independent of the others.
+        latency_s: least time from a frame's capture to its delivery.
+        latency_jitter_s: greatest additional delay, uniformly distributed; a frame may overtake
+            another.
     """
 
     error: ClassVar[type[ValueError]] = SimError
@@ -39,23 +40,23 @@ class CameraTiming(StrictConfig):
 
     @property
     def perfect(self) -> bool:
-        """Whether every frame arrives at the instant at which it is taken."""
+        """True if every frame arrives at the instant of its capture."""
         return not (self.drop_rate or self.latency_s or self.latency_jitter_s)
 
     def delivery_s(self, stamp_s: float, rng: np.random.Generator) -> float | None:
-        """When a frame taken at ``stamp_s`` arrives, or None when it is lost.
+        """Return the arrival time of a frame taken at ``stamp_s``, or None if it is lost.
 
-        Every frame draws the same amount of chance, so one frame's fate changes no other's.
+        Every frame draws two numbers, so the loss of one frame does not change the others.
         """
-        lost, late = rng.random(2).tolist()
-        if lost < self.drop_rate:
+        loss, delay = rng.random(2).tolist()
+        if loss < self.drop_rate:
             return None
-        return float(stamp_s + self.latency_s + late * self.latency_jitter_s)
+        return float(stamp_s + self.latency_s + delay * self.latency_jitter_s)
 
     def frames(
         self, rng: np.random.Generator, start_s: float = 0.0
     ) -> Iterator[tuple[float, float | None]]:
-        """Stamp and delivery (None: lost) of one frame after another, without end.
+        """Yield stamp and delivery time (None: lost) of one frame after another, without end.
 
         Raises:
             SimError: without a frame rate.
@@ -71,13 +72,13 @@ class CameraTiming(StrictConfig):
 
 
 class FrameClock:
-    """Says at each tick of the simulation whether a frame is taken, and when it will arrive.
+    """The clock of a camera: decides at each tick of the simulation whether a frame is taken.
 
     A frame is taken at the first tick at or after its time.
 
     Args:
-        timing: of the camera.
-        rng: of losses and delays.
+        timing: timing of the camera.
+        rng: draws losses and delays.
     """
 
     def __init__(self, timing: CameraTiming, rng: np.random.Generator) -> None:
@@ -87,54 +88,53 @@ class FrameClock:
         self._next = 0
 
     def tick(self, now_s: float) -> tuple[bool, float | None]:
-        """Whether a frame is taken now, and when it arrives (None: never)."""
+        """Return whether a frame is taken now, and its delivery time (None: lost, or not taken)."""
         now = finite_number("now_s", now_s, SimError)
         rate_hz = self._timing.rate_hz
         if rate_hz is not None:
             if self._start_s is None:
                 self._start_s = now
-            passed = int((now - self._start_s + _EARLY_S) * rate_hz)
-            if passed < self._next:
+            due = int((now - self._start_s + _TOLERANCE_S) * rate_hz)
+            if due < self._next:
                 return False, None
-            self._next = passed + 1
+            self._next = due + 1
         return True, self._timing.delivery_s(now, self._rng)
 
 
 @dataclass(frozen=True, slots=True, order=True)
-class _Waiting:
+class _Delivery:
+    """The delivery of one frame; deliveries are ordered by time, then stamp, then number."""
+
     delivery_s: float
     stamp_s: float
     number: int
 
 
 class FrameQueue(Generic[FrameT]):
-    """Frames on their way; hands each out once, when it has arrived.
-
-    A frame knows its own capture stamp, however late it comes.
-    """
+    """A queue of frames that have been captured but not delivered; it returns each frame once."""
 
     def __init__(self) -> None:
-        self._waiting: list[_Waiting] = []
+        self._deliveries: list[_Delivery] = []
         self._frames: dict[int, FrameT] = {}
         self._count = 0
 
     def put(self, stamp_s: float, delivery_s: float | None, frame: FrameT) -> None:
-        """Send a frame on its way; one that is lost (None) is forgotten at once."""
+        """Add a frame; a lost frame (delivery None) is dropped at once."""
         if delivery_s is None:
             return
         stamp = finite_number("stamp_s", stamp_s, SimError)
         arrival = finite_number("delivery_s", delivery_s, SimError, minimum=stamp)
-        heapq.heappush(self._waiting, _Waiting(arrival, stamp, self._count))
+        heapq.heappush(self._deliveries, _Delivery(arrival, stamp, self._count))
         self._frames[self._count] = frame
         self._count += 1
 
     def take(self, now_s: float) -> tuple[FrameT, ...]:
-        """Every frame that has arrived by ``now_s``, in order of arrival."""
-        out = []
-        while self._waiting and self._waiting[0].delivery_s <= now_s + _EARLY_S:
-            out.append(self._frames.pop(heapq.heappop(self._waiting).number))
-        return tuple(out)
+        """Remove and return the frames that have arrived by ``now_s``, in order of arrival."""
+        arrived = []
+        while self._deliveries and self._deliveries[0].delivery_s <= now_s + _TOLERANCE_S:
+            arrived.append(self._frames.pop(heapq.heappop(self._deliveries).number))
+        return tuple(arrived)
 
     def __len__(self) -> int:
-        """How many frames are on their way."""
-        return len(self._waiting)
+        """Return the number of frames that are still to be delivered."""
+        return len(self._deliveries)

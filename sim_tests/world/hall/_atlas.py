@@ -1,16 +1,20 @@
-"""Small pictures packed into one texture, so that one body can show many materials."""
+"""Texture atlases: small images packed into one texture, so one mesh can show many materials."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from ._meshes import Region
+import numpy as np
+from numpy.typing import NDArray
+
+from ._canvas import Canvas, Rgb, finished, plain
+from ._meshes import WHOLE, Region
 
 
 @dataclass(frozen=True, slots=True)
 class AtlasCell:
-    """A rectangle of an atlas in pixels from its upper left corner."""
+    """A rectangle of an atlas, in pixels from its upper left corner."""
 
     left_px: int
     top_px: int
@@ -19,18 +23,18 @@ class AtlasCell:
 
 
 class Atlas:
-    """Where each named picture lies in a square texture.
+    """The layout of a square texture that is divided into named cells.
 
     Args:
         size_px: side of the texture.
-        sizes_px: width and height of each picture; they are packed in rows, in this order.
+        sizes_px: width and height of each cell; the cells are packed in rows, in this order.
 
     Attributes:
         size_px: as given.
-        cells: the place of each picture.
+        cells: the place of each cell by its name.
 
     Raises:
-        ValueError: where the pictures do not fit.
+        ValueError: when the cells do not fit.
     """
 
     def __init__(self, size_px: int, sizes_px: Mapping[str, tuple[int, int]]) -> None:
@@ -41,19 +45,16 @@ class Atlas:
             if left + width > size_px:
                 left, top, tallest = 0, top + tallest, 0
             if top + height > size_px or width > size_px:
-                raise ValueError(f"picture {name!r} no longer fits into an atlas of {size_px} px")
+                raise ValueError(f"cell {name!r} does not fit into an atlas of {size_px} px")
             self.cells[name] = AtlasCell(left, top, width, height)
             left += width
             tallest = max(tallest, height)
 
-    def region(
-        self,
-        name: str,
-        part: Region = (0.0, 0.0, 1.0, 1.0),
-    ) -> Region:
-        """Texture coordinates of a picture, or of a part of it (u, v from its lower left corner).
+    def region(self, name: str, part: Region = WHOLE) -> Region:
+        """Return the texture coordinates of a cell, or of ``part`` of it.
 
-        The outermost half texel is left out: the nearest texel is then always one of the picture.
+        ``part`` counts u and v from 0 to 1, from the cell's lower left corner. The outermost half
+        texel of a cell is left out, so the nearest texel always belongs to the cell.
         """
         cell = self.cells[name]
         width, height = cell.width_px - 1, cell.height_px - 1
@@ -65,3 +66,20 @@ class Atlas:
             (left + part[2] * width) / self.size_px,
             (bottom + part[3] * height) / self.size_px,
         )
+
+    def painted(
+        self, background: Rgb, paint: Callable[[Canvas, str, int], None]
+    ) -> NDArray[np.uint8]:
+        """Return the texture (size, size, 3), read-only.
+
+        Args:
+            background: colour of the gaps, and of every cell before it is painted.
+            paint: called for one cell after another with its canvas, its name and its number.
+        """
+        texture = plain(self.size_px, self.size_px, background)
+        for number, (name, cell) in enumerate(self.cells.items()):
+            canvas = plain(cell.width_px, cell.height_px, background)
+            paint(canvas, name, number)
+            bottom, right = cell.top_px + cell.height_px, cell.left_px + cell.width_px
+            texture[cell.top_px : bottom, cell.left_px : right] = canvas
+        return finished(texture)

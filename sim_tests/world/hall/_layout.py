@@ -1,9 +1,9 @@
-"""Where racks, props, walls and painted lines stand: a warehouse as data."""
+"""The layout of a warehouse as data: walls, aisles, racks and props, and the shipped layouts."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import ClassVar, Final
+from collections.abc import Callable, Sequence
+from typing import Annotated, ClassVar, Final
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -15,6 +15,10 @@ from tracking.config import StrictConfig
 from ..errors import SimError
 from ._props import Prop
 
+_Positive = Annotated[float, Field(gt=0.0)]
+# Depth of the racks of every shipped layout.
+_RACK_DEPTH_M: Final = 1.1
+
 
 class RackBox(StrictConfig):
     """A pallet rack as the box that it fills; it stands on the floor, its sides along the axes."""
@@ -25,22 +29,21 @@ class RackBox(StrictConfig):
     x_m: float
     y_m: float
     #: Extent along odom x.
-    length_m: float = Field(gt=0.0)
+    length_m: _Positive
     #: Extent along odom y.
-    width_m: float = Field(gt=0.0)
-    height_m: float = Field(default=4.0, gt=0.0)
+    width_m: _Positive
+    height_m: _Positive = 4.0
 
     @property
     def box_odom_m(self) -> tuple[float, float, float, float]:
-        """x_min, y_min, x_max, y_max in odom."""
+        """The bounds x_min, y_min, x_max, y_max."""
         half_x, half_y = 0.5 * self.length_m, 0.5 * self.width_m
         return self.x_m - half_x, self.y_m - half_y, self.x_m + half_x, self.y_m + half_y
 
 
 class WarehouseLayout(StrictConfig):
-    """A walled hall whose robot aisle runs along odom x about y = 0.
+    """A walled hall; the robot's aisle runs along odom x, centred on y = 0.
 
-    ``cross_aisle_x_m`` is where an aisle along y crosses it (a zebra is painted there), or None.
     Raises pydantic's ``ValidationError`` (a ``ValueError``) or, from a file, :class:`SimError`.
     """
 
@@ -51,18 +54,19 @@ class WarehouseLayout(StrictConfig):
     y_min_m: float
     x_max_m: float
     y_max_m: float
-    wall_height_m: float = Field(default=6.0, gt=0.0)
+    wall_height_m: _Positive = 6.0
     #: Width of the robot's aisle between its painted lines.
-    aisle_width_m: float = Field(default=3.0, gt=0.0)
+    aisle_width_m: _Positive = 3.0
+    #: Centre of an aisle along y that crosses the robot's aisle at a painted zebra; None: no aisle.
     cross_aisle_x_m: float | None = None
-    cross_aisle_width_m: float = Field(default=3.0, gt=0.0)
+    cross_aisle_width_m: _Positive = 3.0
     racks: tuple[RackBox, ...] = ()
     props: tuple[Prop, ...] = ()
-    #: Coulomb friction of the floor; PyBullet multiplies it with that of the wheel.
-    floor_friction: float = Field(default=0.9, gt=0.0)
+    #: Coulomb friction of the floor; PyBullet multiplies it by the wheel's.
+    floor_friction: _Positive = 0.9
 
     @model_validator(mode="after")
-    def _stands_inside(self) -> WarehouseLayout:
+    def _fits_inside(self) -> WarehouseLayout:
         if not (self.x_min_m < self.x_max_m and self.y_min_m < self.y_max_m):
             raise ValueError(
                 "the hall must have x_min_m < x_max_m and y_min_m < y_max_m, got "
@@ -93,40 +97,31 @@ class WarehouseLayout(StrictConfig):
 
     @classmethod
     def crossing(cls) -> WarehouseLayout:
-        """Racks on both sides of a 3 m aisle along x, crossed at x = 6 m by a 3 m aisle along y."""
-        racks = [
-            RackBox(x_m=x, y_m=side * y, length_m=length, width_m=1.1)
-            for side in (1.0, -1.0)
-            for y in (2.15, 5.65)
-            for x, length in ((0.6, 7.8), (11.4, 7.8))
-        ]
+        """Return a 3 m aisle along x between racks, crossed at x = 6 m by a 3 m aisle along y."""
         return cls(
             x_min_m=-5.0,
             y_min_m=-8.5,
             x_max_m=17.0,
             y_max_m=8.5,
             cross_aisle_x_m=6.0,
-            racks=tuple(racks),
+            racks=_racks_on_both_sides((2.15, 5.65), (0.6, 11.4), 7.8),
         )
 
     @classmethod
     def open_floor(cls) -> WarehouseLayout:
-        """A wide free floor with racks along its sides, as in the encounter of the paper."""
-        racks = [
-            RackBox(x_m=5.0, y_m=side * 5.2, length_m=13.5, width_m=1.1) for side in (1.0, -1.0)
-        ]
+        """Return a wide free floor with racks along its sides, as in the paper's encounter."""
         return cls(
             x_min_m=-5.0,
             y_min_m=-7.0,
             x_max_m=14.0,
             y_max_m=7.0,
             aisle_width_m=4.0,
-            racks=tuple(racks),
+            racks=_racks_on_both_sides((5.2,), (5.0,), 13.5),
         )
 
     @classmethod
     def blind_corner(cls) -> WarehouseLayout:
-        """A 3 m aisle along x that turns left at x = 6 m, racks hiding what comes from there."""
+        """Return a 3 m aisle along x that turns left at x = 6 m, behind racks that hide it."""
         return cls(
             x_min_m=-4.5,
             y_min_m=-4.5,
@@ -134,10 +129,10 @@ class WarehouseLayout(StrictConfig):
             y_max_m=12.5,
             cross_aisle_x_m=6.0,
             racks=(
-                RackBox(x_m=2.75, y_m=-2.15, length_m=11.7, width_m=1.1),
-                RackBox(x_m=0.6, y_m=2.15, length_m=7.8, width_m=1.1),
-                RackBox(x_m=3.95, y_m=6.65, length_m=1.1, width_m=7.9),
-                RackBox(x_m=8.05, y_m=4.5, length_m=1.1, width_m=12.2),
+                _rack(2.75, -2.15, 11.7),
+                _rack(0.6, 2.15, 7.8),
+                RackBox(x_m=3.95, y_m=6.65, length_m=_RACK_DEPTH_M, width_m=7.9),
+                RackBox(x_m=8.05, y_m=4.5, length_m=_RACK_DEPTH_M, width_m=12.2),
             ),
             props=(
                 Prop(kind="pallet_truck", x_m=7.0, y_m=8.6, yaw_deg=90.0),
@@ -152,13 +147,7 @@ class WarehouseLayout(StrictConfig):
 
     @classmethod
     def aisles(cls) -> WarehouseLayout:
-        """Five aisles along x between six rows of racks; one 3 m aisle along y crosses them all."""
-        racks = [
-            RackBox(x_m=x, y_m=side * y, length_m=9.1, width_m=1.1)
-            for side in (1.0, -1.0)
-            for y in (2.15, 5.85, 7.0)
-            for x in (1.75, 13.85)
-        ]
+        """Return five aisles along x between six rows of racks; a 3 m aisle along y crosses all."""
         return cls(
             x_min_m=-5.0,
             y_min_m=-10.5,
@@ -166,7 +155,7 @@ class WarehouseLayout(StrictConfig):
             y_max_m=10.5,
             wall_height_m=7.0,
             cross_aisle_x_m=7.8,
-            racks=tuple(racks),
+            racks=_racks_on_both_sides((2.15, 5.85, 7.0), (1.75, 13.85), 9.1),
             props=(
                 Prop(kind="stacker", x_m=-3.95, y_m=6.4, yaw_deg=180.0),
                 Prop(kind="pallet_truck", x_m=12.4, y_m=4.85, yaw_deg=180.0),
@@ -183,11 +172,11 @@ class WarehouseLayout(StrictConfig):
 
     @classmethod
     def staging_hall(cls) -> WarehouseLayout:
-        """A wide hall: racks on its left, pallets waiting at the doors on its right, trucks parked.
+        """Return a wide hall: racks on its left, waiting pallets and parked trucks on its right.
 
-        The robot's aisle is 4 m wide; people come out between the pallets.
+        The robot's aisle is 4 m wide; people step out between the pallets.
         """
-        lanes = [
+        pallets = [
             Prop(kind=kind, x_m=x, y_m=y, yaw_deg=90.0)
             for x, kinds in (
                 (-2.4, ("pallet_wrapped", "pallet_wrapped", "pallet_goods")),
@@ -210,13 +199,13 @@ class WarehouseLayout(StrictConfig):
             cross_aisle_x_m=6.5,
             cross_aisle_width_m=2.6,
             racks=(
-                RackBox(x_m=0.9, y_m=4.3, length_m=7.8, width_m=1.1),
-                RackBox(x_m=12.1, y_m=4.3, length_m=7.8, width_m=1.1),
-                RackBox(x_m=0.9, y_m=5.45, length_m=7.8, width_m=1.1),
-                RackBox(x_m=12.1, y_m=5.45, length_m=7.8, width_m=1.1),
+                _rack(0.9, 4.3, 7.8),
+                _rack(12.1, 4.3, 7.8),
+                _rack(0.9, 5.45, 7.8),
+                _rack(12.1, 5.45, 7.8),
             ),
             props=(
-                *lanes,
+                *pallets,
                 Prop(kind="forklift", x_m=11.2, y_m=-5.0, yaw_deg=-90.0),
                 Prop(kind="pallet_truck", x_m=0.6, y_m=-4.4, yaw_deg=90.0),
                 Prop(kind="stacker", x_m=16.6, y_m=2.2, yaw_deg=-90.0),
@@ -236,14 +225,14 @@ class WarehouseLayout(StrictConfig):
 
     @classmethod
     def named(cls, name: str) -> WarehouseLayout:
-        """One of the layouts of :data:`LAYOUTS` by its name; raises SimError for others."""
+        """Return one of :data:`LAYOUTS` by its name; raises SimError for other names."""
         if name not in LAYOUTS:
             raise SimError(not_one_of("layout", name, LAYOUTS))
         return LAYOUTS[name]()
 
     @property
     def obstacle_boxes_odom(self) -> FloatArray:
-        """(N, 4) x_min, y_min, x_max, y_max of racks, the four walls, then props, metres."""
+        """The bounds (N, 4) x_min, y_min, x_max, y_max in metres: racks, the four walls, props."""
         x_min, y_min, x_max, y_max = self.x_min_m, self.y_min_m, self.x_max_m, self.y_max_m
         thick = self.wall_thickness_m
         walls = [
@@ -259,7 +248,7 @@ class WarehouseLayout(StrictConfig):
 
     @property
     def obstacle_heights_m(self) -> FloatArray:
-        """(N,) how far each of :attr:`obstacle_boxes_odom` reaches up from the floor."""
+        """The heights (N,) of :attr:`obstacle_boxes_odom` above the floor."""
         racks = [rack.height_m for rack in self.racks]
         props = [height for prop in self.props for height in prop.heights_m]
         heights = np.array([*racks, *[self.wall_height_m] * 4, *props])
@@ -268,11 +257,23 @@ class WarehouseLayout(StrictConfig):
 
     @property
     def wall_thickness_m(self) -> float:
-        """Thickness of the outer walls, outside the hall's extent."""
+        """The thickness of the outer walls, outside the hall's extent."""
         return 0.2
 
 
-#: The halls that come with the package.
+def _rack(x_m: float, y_m: float, length_m: float) -> RackBox:
+    """Return a rack along x."""
+    return RackBox(x_m=x_m, y_m=y_m, length_m=length_m, width_m=_RACK_DEPTH_M)
+
+
+def _racks_on_both_sides(
+    y_m: Sequence[float], x_m: Sequence[float], length_m: float
+) -> tuple[RackBox, ...]:
+    """Return racks along x at every distance ``y_m`` and every ``x_m``: the left side's first."""
+    return tuple(_rack(x, side * y, length_m) for side in (1.0, -1.0) for y in y_m for x in x_m)
+
+
+#: The shipped layouts by name.
 LAYOUTS: Final[dict[str, Callable[[], WarehouseLayout]]] = {
     "crossing": WarehouseLayout.crossing,
     "open": WarehouseLayout.open_floor,

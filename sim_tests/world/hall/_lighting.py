@@ -1,4 +1,4 @@
-"""How a hall is lit: named set-ups within what PyBullet's renderers offer."""
+"""The lighting of a hall: one directional light, ambient light, and presets of both."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from tracking.config import StrictConfig
 from ..errors import SimError
 
 _Share = Annotated[float, Field(ge=0.0, le=1.0)]
-# Up to here a white surface that faces the light is not washed out by more than a trace.
-_BRIGHTEST: Final = 1.06
+# Largest ambient + diffuse: a white surface that faces the light is then barely washed out.
+_MAX_BRIGHTNESS: Final = 1.06
 
 
 class Lighting(StrictConfig):
-    """One far light and an even ambient light; a surface shows both, times its own colour.
+    """A directional light and an ambient light of the same colour.
 
     A face of colour c whose normal makes the angle φ with the direction to the light shows
     ``c * colour_rgb * (ambient + diffuse * max(0, cos φ))``.
@@ -26,41 +26,41 @@ class Lighting(StrictConfig):
 
     error: ClassVar[type[ValueError]] = SimError
 
-    #: From the scene towards the light, odom; any length > 0.
+    #: From the scene towards the light, in odom; any length > 0.
     direction_odom: tuple[float, float, float] = (-3.0, 4.0, 8.0)
     #: Colour of both lights.
     colour_rgb: tuple[_Share, _Share, _Share] = (1.0, 1.0, 1.0)
     ambient: float = Field(default=0.66, ge=0.0, le=1.0)
     diffuse: float = Field(default=0.40, ge=0.0, le=1.0)
-    #: Highlights on glossy surfaces; goods and clothes have none.
+    #: Strength of highlights, which only the renderer ``"tiny"`` draws; matt surfaces have none.
     specular: float = Field(default=0.0, ge=0.0, le=1.0)
-    #: Cast shadows. PyBullet's software renderer takes two to three times as long for them and, in
-    #: a roofed hall, shows next to none: the soft shade where things stand is painted instead.
+    #: Whether people, robots and other actors cast shadows on the floor. The soft shade around
+    #: racks and props is always there: it is painted on the floor.
     shadows: bool = False
 
     @model_validator(mode="after")
-    def _can_be_shown(self) -> Lighting:
+    def _is_usable(self) -> Lighting:
         if math.hypot(*self.direction_odom) < 1e-6:
             raise ValueError(
                 f"direction_odom must point towards the light, got {self.direction_odom}"
             )
-        if self.ambient + self.diffuse > _BRIGHTEST:
+        if self.ambient + self.diffuse > _MAX_BRIGHTNESS:
             raise ValueError(
-                f"ambient + diffuse must be at most {_BRIGHTEST:g}, or surfaces that face the "
-                f"light wash out, got {self.ambient:g} + {self.diffuse:g}"
+                f"ambient + diffuse must be at most {_MAX_BRIGHTNESS:g}, or surfaces that face "
+                f"the light wash out, got {self.ambient:g} + {self.diffuse:g}"
             )
         return self
 
     @classmethod
     def preset(cls, name: str) -> Lighting:
-        """One of :data:`LIGHTINGS` by its name; raises SimError for others."""
+        """Return one of :data:`LIGHTINGS` by its name; raises SimError for other names."""
         if name not in LIGHTINGS:
             raise SimError(not_one_of("lighting", name, LIGHTINGS))
         return LIGHTINGS[name]
 
 
-#: Set-ups by name. Bright LED panels are the default: high and off to one side, so that faces and
-#: folds of cloth keep their shape.
+#: Presets by name. ``bright_led``, the default, lights from high up and from one side, so that
+#: faces and folds of cloth keep their shape.
 LIGHTINGS: Final[dict[str, Lighting]] = {
     "bright_led": Lighting(),
     "overcast_skylight": Lighting(

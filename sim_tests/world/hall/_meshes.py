@@ -1,9 +1,6 @@
-"""Small triangle meshes for what the camera sees: boxes, ellipsoids and tapered tubes.
+"""Triangle meshes for rendering: boxes, ellipsoids, tapered tubes, and chunks of scenery.
 
-Collision shapes are separate and simpler; these meshes are visual only.
-
-
-One local piece of scenery, as it is drawn.
+Collision shapes are separate and simpler.
 """
 
 from __future__ import annotations
@@ -18,14 +15,30 @@ from numpy.typing import NDArray
 
 from perception.arrays import FloatArray
 
+#: The faces of a box in the order of its vertices: each face has four of them.
+BOX_FACES: Final = ("-x", "+x", "-y", "+y", "-z", "+z")
+
+#: Red, green and blue, 0 to 1.
+Colour = tuple[float, float, float]
+#: A rectangle of a texture: u and v of its lower left corner, then of its upper right one.
+Region = tuple[float, float, float, float]
+WHOLE: Final[Region] = (0.0, 0.0, 1.0, 1.0)
+
 _BOX_CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 # Corners of the six faces, counter-clockwise as seen from outside.
-_BOX_FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
-_UNIT_BOX = _BOX_CORNERS[np.array(_BOX_FACES)].reshape(24, 3)
+_BOX_FACE_CORNERS = (
+    (0, 1, 3, 2),
+    (4, 6, 7, 5),
+    (0, 4, 5, 1),
+    (2, 3, 7, 6),
+    (0, 2, 6, 4),
+    (1, 5, 7, 3),
+)
+_UNIT_BOX = _BOX_CORNERS[np.array(_BOX_FACE_CORNERS)].reshape(24, 3)
 # The centre of a face of the unit box is its normal.
 _BOX_NORMALS = np.repeat(_UNIT_BOX.reshape(6, 4, 3).mean(axis=1), 4, axis=0)
 _BOX_INDICES = (np.array((0, 1, 2, 0, 2, 3)) + 4 * np.arange(6)[:, None]).ravel()
-# Upright pictures on the four sides; on top v runs along y, on the bottom against it.
+# Textures stand upright on the four sides; on top v runs along y, on the bottom against it.
 _BOX_UV = np.array(
     [
         *((1, 0), (1, 1), (0, 1), (0, 0)),
@@ -39,23 +52,16 @@ _BOX_UV = np.array(
 )
 _QUAD_UV = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
 
-#: The faces of a box in the order of its vertices: each face has four of them.
-BOX_FACES: Final = ("-x", "+x", "-y", "+y", "-z", "+z")
-
-#: A rectangle of a texture: u and v of its lower left corner, then of its upper right one.
-Region = tuple[float, float, float, float]
-WHOLE: Final[Region] = (0.0, 0.0, 1.0, 1.0)
-
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles with a normal a vertex.
+    """Triangles with one normal per vertex.
 
     Attributes:
         vertices_m: (N, 3).
         normals: (N, 3) unit vectors pointing outwards.
-        indices: (3 T,) three vertex rows a triangle, counter-clockwise as seen from outside.
-        uv: (N, 2) texture coordinates, (0, 0) at the picture's lower left; None without a texture.
+        indices: (3 T,) rows of vertices, three per triangle, counter-clockwise from outside.
+        uv: (N, 2) texture coordinates, (0, 0) at the texture's lower left; None without a texture.
     """
 
     vertices_m: FloatArray
@@ -66,7 +72,7 @@ class Mesh:
     def transformed(
         self, rotation: FloatArray | None = None, translation_m: Sequence[float] = (0.0, 0.0, 0.0)
     ) -> Mesh:
-        """Rotate (3, 3), then translate."""
+        """Return a copy that is rotated (3, 3) and then translated."""
         turn = np.eye(3) if rotation is None else rotation
         return Mesh(
             self.vertices_m @ turn.T + np.asarray(translation_m),
@@ -77,14 +83,14 @@ class Mesh:
 
     @property
     def triangles(self) -> int:
-        """How many triangles it has: what drawing it costs."""
+        """The number of triangles: the cost of drawing it."""
         return len(self.indices) // 3
 
 
 def merge(meshes: Iterable[Mesh]) -> Mesh:
-    """One mesh that draws all of ``meshes``: fewer bodies to keep in the simulator.
+    """Return one mesh of all triangles; the simulator then needs fewer bodies.
 
-    Texture coordinates are kept when every mesh has them.
+    The result has texture coordinates if every mesh has them.
     """
     parts = list(meshes)
     uvs = [part.uv for part in parts if part.uv is not None]
@@ -102,22 +108,22 @@ def box(
     size_m: Sequence[float],
     regions: Region | Mapping[str, Region] = WHOLE,
 ) -> Mesh:
-    """An axis-aligned box with flat faces.
+    """Return an axis-aligned box with flat faces.
 
     Args:
         center_m: its centre.
         size_m: its extents along the axes.
-        regions: what its faces show of a texture. A mapping from names in :data:`BOX_FACES` to
-            regions makes those faces only: what no one can see need not be drawn.
+        regions: the part of a texture on every face, or one part per face of :data:`BOX_FACES`.
+            A mapping makes only the faces that it names, so hidden faces cost nothing.
     """
     vertices = _UNIT_BOX * (0.5 * np.asarray(size_m)) + np.asarray(center_m)
     if not isinstance(regions, Mapping):
-        return Mesh(vertices, _BOX_NORMALS, _BOX_INDICES, _mapped(_BOX_UV, regions))
+        return Mesh(vertices, _BOX_NORMALS, _BOX_INDICES, _in_region(_BOX_UV, regions))
     faces = np.array([BOX_FACES.index(name) for name in regions])
     rows = (4 * faces[:, None] + np.arange(4)).ravel()
     uv = np.concatenate(
         [
-            _mapped(_BOX_UV[4 * face : 4 * face + 4], region)
+            _in_region(_BOX_UV[4 * face : 4 * face + 4], region)
             for face, region in zip(faces, regions.values(), strict=True)
         ]
     )
@@ -125,20 +131,20 @@ def box(
 
 
 def quad(corners_m: Sequence[Sequence[float]], region: Region = WHOLE) -> Mesh:
-    """A flat four-cornered face, seen only from the side on which it runs counter-clockwise.
+    """Return a flat face of four corners, visible from the side where they run counter-clockwise.
 
-    ``region`` of a texture spans it from the first corner (lower left) to the third.
+    The texture's ``region`` reaches from the first corner (lower left) to the third.
     """
     corners = np.asarray(corners_m, dtype=np.float64)
     normal = np.cross(corners[1] - corners[0], corners[3] - corners[0])
     unit = normal / np.linalg.norm(normal)
     return Mesh(
-        corners, np.tile(unit, (4, 1)), np.array((0, 1, 2, 0, 2, 3)), _mapped(_QUAD_UV, region)
+        corners, np.tile(unit, (4, 1)), np.array((0, 1, 2, 0, 2, 3)), _in_region(_QUAD_UV, region)
     )
 
 
-def _mapped(uv: FloatArray, region: Region) -> FloatArray:
-    """Unit texture coordinates moved into a region of the texture."""
+def _in_region(uv: FloatArray, region: Region) -> FloatArray:
+    """Return unit texture coordinates (N, 2) moved into a region of the texture."""
     u_min, v_min, u_max, v_max = region
     return np.asarray(np.array((u_min, v_min)) + uv * np.array((u_max - u_min, v_max - v_min)))
 
@@ -150,7 +156,7 @@ def ellipsoid(
     rings: int = 9,
     region: Region = WHOLE,
 ) -> Mesh:
-    """An ellipsoid with smooth normals; its poles lie on z, the top of the texture at +z."""
+    """Return an ellipsoid with smooth normals; the top of the texture lies at its +z pole."""
     polar = np.linspace(0.0, math.pi, rings + 1)[:, None]
     around = np.linspace(0.0, 2.0 * math.pi, sides + 1)[None, :]
     unit = np.stack(
@@ -168,7 +174,7 @@ def ellipsoid(
         unit * axes + np.asarray(center_m),
         normals,
         _grid_indices(rings + 1, sides + 1),
-        _mapped(_grid_uv(rings + 1, sides + 1), region),
+        _in_region(_grid_uv(rings + 1, sides + 1), region),
     )
 
 
@@ -178,11 +184,13 @@ def tube(
     region: Region = WHOLE,
     end_region: Region | None = None,
 ) -> Mesh:
-    """A closed tube along −z through elliptic sections (x, y, z, semi-axis x, semi-axis y).
+    """Return a closed tube along −z through elliptic sections.
 
-    Sections run from the highest z to the lowest; the ends are closed by flat fans. A texture's
-    ``region`` is wrapped around it, its top at the first section; ``end_region`` (None: the same)
-    lies flat on both ends.
+    Args:
+        sections_m: (x, y, z, semi-axis x, semi-axis y) of each, from the highest z to the lowest.
+        sides: number of flat sides.
+        region: the part of a texture wrapped around the tube, its top at the first section.
+        end_region: the part on both flat ends; None is the same as ``region``.
     """
     sections = np.asarray(sections_m, dtype=np.float64)
     around = np.linspace(0.0, 2.0 * math.pi, sides + 1)
@@ -202,11 +210,11 @@ def tube(
             side.reshape(-1, 3),
             normals,
             _grid_indices(len(sections), sides + 1),
-            _mapped(_grid_uv(len(sections), sides + 1), region),
+            _in_region(_grid_uv(len(sections), sides + 1), region),
         )
     ]
     flat = np.concatenate([np.zeros((1, 2)), ring[:-1]]) * 0.5 + 0.5
-    end_uv = _mapped(flat, region if end_region is None else end_region)
+    end_uv = _in_region(flat, region if end_region is None else end_region)
     for row, up in ((0, 1.0), (-1, -1.0)):
         rim = side[row, :-1]
         fan = np.array([(0, k + 1, (k + 1) % sides + 1) for k in range(sides)])
@@ -222,7 +230,7 @@ def tube(
 
 
 def _grid_indices(rows: int, columns: int) -> NDArray[np.int64]:
-    """Two triangles a cell of a grid whose rows run downwards and columns counter-clockwise."""
+    """Return two triangles per cell of a grid: rows run downwards, columns counter-clockwise."""
     row, column = np.meshgrid(np.arange(rows - 1), np.arange(columns - 1), indexing="ij")
     corner = (row * columns + column).ravel()
     below = corner + columns
@@ -230,22 +238,19 @@ def _grid_indices(rows: int, columns: int) -> NDArray[np.int64]:
 
 
 def _grid_uv(rows: int, columns: int) -> FloatArray:
-    """(rows * columns, 2) unit texture coordinates of a grid, its first row at the top."""
+    """Return unit texture coordinates (rows · columns, 2) of a grid, its first row at the top."""
     v, u = np.meshgrid(np.linspace(1.0, 0.0, rows), np.linspace(0.0, 1.0, columns), indexing="ij")
     return np.stack([u, v], axis=-1).reshape(-1, 2)
 
 
-Colour = tuple[float, float, float]
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class SceneryChunk:
-    """A piece of scenery small enough to be left out where the camera does not see it.
+    """A piece of scenery, small enough that a view can leave most chunks out.
 
     Attributes:
-        mesh: in odom, metres, with texture coordinates.
-        colour: RGB, 0 to 1; it multiplies the texture.
-        texture: a name for :func:`scenery_texture`, or None for the plain colour.
+        mesh: in odom, with texture coordinates.
+        colour: multiplies the texture.
+        texture: a name for :func:`scenery_texture`; None shows the plain colour.
     """
 
     mesh: Mesh

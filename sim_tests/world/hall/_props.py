@@ -1,4 +1,4 @@
-"""Things that stand about in a hall: pallets, trucks, containers, shelves, bins, posts."""
+"""Props of a hall as data: pallets, trucks, containers, shelves, bins, barriers and posts."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..errors import SimError
 
 
 class PropPart(NamedTuple):
-    """A box of a prop, standing on the floor, in the prop's frame (x forward, y left)."""
+    """A solid box of a prop; it stands on the floor, in the prop's frame (x forward, y left)."""
 
     x_m: float
     y_m: float
@@ -25,18 +25,18 @@ class PropPart(NamedTuple):
     height_m: float
 
 
-def _one(length_m: float, width_m: float, height_m: float) -> tuple[PropPart, ...]:
+def _single(length_m: float, width_m: float, height_m: float) -> tuple[PropPart, ...]:
     return (PropPart(0.0, 0.0, length_m, width_m, height_m),)
 
 
-#: The solid boxes of every kind of prop. Euro pallets are 1.2 m by 0.8 m.
+#: The solid boxes of every kind of prop. Euro pallets are 1.2 m × 0.8 m.
 PROP_PARTS: Final[dict[str, tuple[PropPart, ...]]] = {
-    "pallet": _one(1.2, 0.8, 0.15),
-    "pallet_stack": _one(1.2, 0.8, 1.04),
-    "pallet_goods": _one(1.2, 0.8, 1.30),
-    "pallet_wrapped": _one(1.2, 0.8, 1.75),
-    "pallet_sacks": _one(1.2, 0.8, 0.95),
-    "pallet_drums": _one(1.2, 0.8, 1.02),
+    "pallet": _single(1.2, 0.8, 0.15),
+    "pallet_stack": _single(1.2, 0.8, 1.04),
+    "pallet_goods": _single(1.2, 0.8, 1.30),
+    "pallet_wrapped": _single(1.2, 0.8, 1.75),
+    "pallet_sacks": _single(1.2, 0.8, 0.95),
+    "pallet_drums": _single(1.2, 0.8, 1.02),
     "pallet_truck": (
         PropPart(-0.2, 0.0, 1.15, 0.54, 0.20),
         PropPart(0.48, 0.0, 0.21, 0.40, 0.56),
@@ -53,24 +53,24 @@ PROP_PARTS: Final[dict[str, tuple[PropPart, ...]]] = {
         PropPart(-0.06, 0.0, 1.38, 1.06, 2.10),
         PropPart(-1.0, 0.0, 0.5, 1.06, 1.05),
     ),
-    "roller_container": _one(0.8, 0.7, 1.70),
-    "shelf": _one(1.2, 0.45, 2.0),
-    "crates": _one(0.6, 0.4, 1.25),
-    "bin": _one(0.6, 0.55, 1.08),
-    "barrier": _one(2.0, 0.12, 0.42),
-    "post": _one(0.16, 0.16, 1.0),
+    "roller_container": _single(0.8, 0.7, 1.70),
+    "shelf": _single(1.2, 0.45, 2.0),
+    "crates": _single(0.6, 0.4, 1.25),
+    "bin": _single(0.6, 0.55, 1.08),
+    "barrier": _single(2.0, 0.12, 0.42),
+    "post": _single(0.16, 0.16, 1.0),
 }
 
-
-_AROUND: Final = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+# Corners of a rectangle of half extents 1, counter-clockwise from its back right.
+_UNIT_CORNERS: Final = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
 
 
 class Prop(StrictConfig):
-    """A thing on the floor: what it is and where.
+    """A thing on the floor: its kind and its place.
 
     Its frame has x forward (forks point along −x for pallet truck and stacker, along +x for the
-    forklift) and its origin near the middle of its footprint. What it collides with is the
-    axis-aligned bound of each of its parts: exact at multiples of 90°, larger in between.
+    forklift) and its origin near the middle of its footprint. Its collision shape is the
+    axis-aligned bound of each part: exact at multiples of 90°, larger in between.
     """
 
     error: ClassVar[type[ValueError]] = SimError
@@ -91,7 +91,7 @@ class Prop(StrictConfig):
 
     @property
     def turn(self) -> tuple[float, float]:
-        """Cosine and sine of the yaw, exact at multiples of 90°."""
+        """The cosine and sine of the yaw, exact at multiples of 90°."""
         quarters = self.yaw_deg / 90.0
         if quarters == round(quarters):
             return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[round(quarters) % 4]
@@ -100,20 +100,20 @@ class Prop(StrictConfig):
 
     @property
     def corners_odom_m(self) -> FloatArray:
-        """(K, 4, 2) corners of each part's footprint, counter-clockwise from its back right."""
+        """Corners (K, 4, 2) of each part's footprint, counter-clockwise from its back right."""
         cos, sin = self.turn
         parts = np.array([part[:4] for part in PROP_PARTS[self.kind]])
-        corners = parts[:, None, :2] + 0.5 * _AROUND * parts[:, None, 2:]
+        corners = parts[:, None, :2] + 0.5 * _UNIT_CORNERS * parts[:, None, 2:]
         return np.asarray(corners @ np.array([[cos, sin], [-sin, cos]]) + (self.x_m, self.y_m))
 
     @property
     def boxes_odom_m(self) -> tuple[tuple[float, float, float, float], ...]:
-        """x_min, y_min, x_max, y_max in odom of each part."""
+        """The bounds x_min, y_min, x_max, y_max of each part."""
         corners = self.corners_odom_m
         bounds = np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1)
         return tuple((x0, y0, x1, y1) for x0, y0, x1, y1 in bounds.tolist())
 
     @property
     def heights_m(self) -> tuple[float, ...]:
-        """Height of each part."""
+        """The height of each part."""
         return tuple(part.height_m for part in PROP_PARTS[self.kind])

@@ -1,4 +1,4 @@
-"""What lies on a pallet: cartons, film, crates, sacks, drums."""
+"""Meshes of pallets and their loads: cartons, wrapped goods, crates, sacks and drums."""
 
 from __future__ import annotations
 
@@ -11,105 +11,107 @@ import numpy as np
 from ._meshes import Mesh, box
 from ._texture_goods import CARTONS, CRATES, GOODS_ATLAS, STACKS, WRAPS
 
-#: ``"cartons"`` of one kind, perhaps one more on top, two ``"heaps"`` of different cartons,
-#: ``"pallets"`` without goods, ``"nothing"`` at all, or what the word says.
+#: The load of a pallet: ``"cartons"`` are of one kind, ``"heaps"`` are two stacks of different
+#: cartons, ``"pallets"`` is a stack of empty pallets, and ``"nothing"`` has not even a pallet.
 Load = Literal["cartons", "heaps", "wrapped", "crates", "sacks", "drums", "pallets", "nothing"]
 
-#: Height of a euro pallet and of the sliver of air above it.
+#: Height of a euro pallet with a narrow gap above it.
 PALLET_M: Final = 0.148
 _WOOD_M: Final = 0.144
-_MOST_PALLETS_M: Final = 1.06
-_MOST_DRUM_M: Final = 0.9
+_MAX_STACK_M: Final = 1.06
+_MAX_DRUM_M: Final = 0.9
+# Cells of the goods atlas for the tops of loads, and the cells for the sides with their number.
 _TOPS: Final = {"wrapped": "wrap_top", "crates": "crates_top", "sacks": "wrap_top", "drums": "dark"}
-# How much of the room each load takes at least.
-_LEAST: Final = {"wrapped": 0.8, "crates": 0.6, "sacks": 0.45, "drums": 0.8}
+_SIDE_CELLS: Final[dict[str, tuple[str, int]]] = {
+    "cartons": ("stack", STACKS),
+    "heaps": ("stack", STACKS),
+    "wrapped": ("wrap", WRAPS),
+    "crates": ("crates", CRATES),
+    "sacks": ("sacks", 2),
+    "drums": ("drums", 2),
+}
+# The least share of the free height that a load fills.
+_MIN_FILL: Final = {"wrapped": 0.8, "crates": 0.6, "sacks": 0.45, "drums": 0.8}
 _SIDES: Final = ("-x", "+x", "-y", "+y")
 
-_at = GOODS_ATLAS.region
+_region = GOODS_ATLAS.region
 
 
 def pallet_load(
     load: Load,
     foot_m: tuple[float, float, float],
     size_m: tuple[float, float],
-    room_m: float,
+    max_height_m: float,
     rng: np.random.Generator,
 ) -> Iterator[Mesh]:
-    """A pallet with goods.
+    """Yield the meshes of a pallet and its load.
 
     Args:
-        load: what lies on it.
-        foot_m: the middle of its underside.
-        size_m: of the pallet along x and y.
-        room_m: pallet and goods are together at most so high.
+        load: the load.
+        foot_m: the middle of the pallet's underside.
+        size_m: extents of the pallet along x and y.
+        max_height_m: greatest height of pallet and goods together.
         rng: draws heights and prints.
     """
     if load == "nothing":
         return
     x, y, z = foot_m
     if load == "pallets":
-        count = max(1, math.floor(min(room_m, _MOST_PALLETS_M) / PALLET_M))
+        count = max(1, math.floor(min(max_height_m, _MAX_STACK_M) / PALLET_M))
         yield from pallets(count, foot_m, size_m)
         return
     yield from pallets(1, foot_m, size_m)
-    base, tall = z + PALLET_M, max(room_m - PALLET_M, 0.1)
-    wide, deep = size_m[0] - 0.04, size_m[1] - 0.04
+    base, free = z + PALLET_M, max(max_height_m - PALLET_M, 0.1)
+    width, depth = size_m[0] - 0.04, size_m[1] - 0.04
     if load == "cartons":
-        full = tall * float(rng.uniform(0.55, 1.0))
+        height = free * float(rng.uniform(0.55, 1.0))
         number = int(rng.integers(STACKS))
-        yield goods_box((x, y, base), (wide, deep, full), f"stack{number}", f"top{number % 4}")
-        if full < 0.72 * tall:
-            edge = min(0.42, tall - full, 0.5 * wide)
-            aside = float(rng.choice((-1.0, 1.0))) * (0.5 * (wide - edge) - 0.02)
-            one = f"carton{rng.integers(CARTONS)}"
-            high = edge * float(rng.uniform(0.7, 1.0))
-            yield goods_box((x + aside, y, base + full), (edge, 0.86 * deep, high), one, "top0")
+        size = (width, depth, height)
+        yield goods_box((x, y, base), size, f"stack{number}", f"top{number % 4}")
+        if height < 0.72 * free:  # one more carton on top
+            edge = min(0.42, free - height, 0.5 * width)
+            aside = float(rng.choice((-1.0, 1.0))) * (0.5 * (width - edge) - 0.02)
+            carton = f"carton{rng.integers(CARTONS)}"
+            size = (edge, 0.86 * depth, edge * float(rng.uniform(0.7, 1.0)))
+            yield goods_box((x + aside, y, base + height), size, carton, "top0")
     elif load == "heaps":
         split = float(rng.uniform(0.42, 0.58))
         for share, middle in ((split, 0.5 * (split - 1.0)), (1.0 - split, 0.5 * split)):
-            full = tall * float(rng.uniform(0.45, 0.95))
-            several = full >= 0.7
-            name = f"stack{rng.integers(STACKS)}" if several else f"carton{rng.integers(CARTONS)}"
-            size = (share * wide - 0.015, deep, full)
-            yield goods_box((x + middle * wide, y, base), size, name, "top1")
+            height = free * float(rng.uniform(0.45, 0.95))
+            several = height >= 0.7
+            side = f"stack{rng.integers(STACKS)}" if several else f"carton{rng.integers(CARTONS)}"
+            size = (share * width - 0.015, depth, height)
+            yield goods_box((x + middle * width, y, base), size, side, "top1")
     else:
-        full = tall * float(rng.uniform(_LEAST[load], 1.0))
+        height = free * float(rng.uniform(_MIN_FILL[load], 1.0))
         if load == "drums":
-            full = min(full, _MOST_DRUM_M)
-        yield goods_box((x, y, base), (wide, deep, full), picture_of(load, rng), _TOPS[load])
+            height = min(height, _MAX_DRUM_M)
+        yield goods_box((x, y, base), (width, depth, height), side_cell(load, rng), _TOPS[load])
 
 
-def picture_of(load: Load, rng: np.random.Generator) -> str:
-    """Name of a picture in the atlas that shows such a load from the side."""
-    kinds = {
-        "cartons": ("stack", STACKS),
-        "heaps": ("stack", STACKS),
-        "wrapped": ("wrap", WRAPS),
-        "crates": ("crates", CRATES),
-        "sacks": ("sacks", 2),
-        "drums": ("drums", 2),
-    }
-    name, count = kinds[load]
+def side_cell(load: Load, rng: np.random.Generator) -> str:
+    """Return the name of an atlas cell that shows a load from the side."""
+    name, count = _SIDE_CELLS[load]
     return f"{name}{rng.integers(count)}"
 
 
 def pallets(
     count: int, foot_m: tuple[float, float, float], size_m: tuple[float, float]
 ) -> Iterator[Mesh]:
-    """Empty pallets on top of each other."""
+    """Yield empty pallets on top of each other."""
     x, y, z = foot_m
     for k in range(count):
-        regions = {name: _at("pallet_side") for name in _SIDES}
+        regions = {name: _region("pallet_side") for name in _SIDES}
         if k == count - 1:
-            regions["+z"] = _at("pallet_top")
+            regions["+z"] = _region("pallet_top")
         yield box((x, y, z + (k + 0.5) * PALLET_M), (*size_m, _WOOD_M), regions)
 
 
 def goods_box(
     foot_m: tuple[float, float, float], size_m: tuple[float, float, float], side: str, top: str
 ) -> Mesh:
-    """A box that stands on ``foot_m``: one picture on its sides, another on top, none below."""
+    """Return a box that stands on ``foot_m``, with one atlas cell on its sides and one on top."""
     x, y, z = foot_m
-    regions = {name: _at(side) for name in _SIDES}
-    regions["+z"] = _at(top)
+    regions = {name: _region(side) for name in _SIDES}
+    regions["+z"] = _region(top)
     return box((x, y, z + 0.5 * size_m[2]), size_m, regions)

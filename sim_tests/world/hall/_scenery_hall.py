@@ -1,4 +1,4 @@
-"""The hall itself: slab, walls with doors and signs, ceiling with beams and lamps."""
+"""Meshes of the building: floor slab, walls with doors and signs, ceiling with beams and lamps."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 from perception.arrays import FloatArray
 
 from ._layout import WarehouseLayout
-from ._meshes import Colour, Mesh, Region, SceneryChunk, box, merge, quad
+from ._meshes import WHOLE, Colour, Mesh, Region, SceneryChunk, box, merge, quad
 from ._texture_goods import GOODS_ATLAS
 from ._texture_hall import FIXTURE_ATLAS, TILE_M
 
-# Widths and heights of what hangs on a wall, and the height of its lower edge.
+# Width and height of each wall fixture, and the height of its lower edge, metres.
 _FIXTURES: Final[dict[str, tuple[float, float, float]]] = {
     "dock": (3.2, 3.4, 0.0),
     "dock_open": (3.2, 3.4, 0.0),
@@ -34,21 +34,25 @@ _FIXTURES: Final[dict[str, tuple[float, float, float]]] = {
     "number2": (0.7, 0.7, 3.5),
     "number3": (0.7, 0.7, 3.5),
 }
-_PROUD_M: Final = 0.012
-Points = list[tuple[float, float, float]]
-# In front of a dock door so much is free of racks.
+# Distance of a fixture's face from the wall.
+_OFFSET_M: Final = 0.012
+# Depth that is free of racks in front of a dock door.
 _DOCK_DEPTH_M: Final = 2.0
+_WHITE: Final[Colour] = (1.0, 1.0, 1.0)
+_SIDES: Final = ("-x", "+x", "-y", "+y")
+
+_Point = tuple[float, float, float]
 
 
 def tiles(low: float, high: float) -> list[tuple[float, float]]:
-    """Cut an extent into pieces of about :data:`TILE_M`."""
+    """Return the ends of the pieces of about :data:`TILE_M` that an extent is cut into."""
     count = max(1, round((high - low) / TILE_M))
     step = (high - low) / count
     return [(low + k * step, low + (k + 1) * step) for k in range(count)]
 
 
 def hall_tones(variant: int) -> tuple[Colour, Colour]:
-    """Tint of the floor (its paint too) and of the walls."""
+    """Return the tint of the floor with its markings, and the tint of the walls."""
     if variant == 0:
         return (0.98, 0.98, 0.98), (1.0, 1.0, 1.0)
     rng = np.random.default_rng((57, variant))
@@ -64,7 +68,7 @@ def _colour(rgb: FloatArray) -> Colour:
 
 
 def floor_chunks(layout: WarehouseLayout, variant: int) -> Iterator[SceneryChunk]:
-    """One tile of slab a chunk; turned textures keep the pattern from repeating."""
+    """Yield one chunk per tile of the slab; turned textures keep the pattern from repeating."""
     floor, _ = hall_tones(variant)
     for i, (x0, x1) in enumerate(tiles(layout.x_min_m, layout.x_max_m)):
         for j, (y0, y1) in enumerate(tiles(layout.y_min_m, layout.y_max_m)):
@@ -87,26 +91,28 @@ class _Wall(NamedTuple):
     along_y: float
     length_m: float
 
-    def at(self, s: float, z: float, proud: float = 0.0) -> tuple[float, float, float]:
-        """The point ``s`` from the left end, ``z`` up and ``proud`` of the wall."""
+    def point(self, s: float, z: float, offset: float) -> _Point:
+        """Return the point ``s`` from the left end, at height ``z``, ``offset`` from the wall."""
         return (
-            self.x_m + self.along_x * s + self.along_y * proud,
-            self.y_m + self.along_y * s - self.along_x * proud,
+            self.x_m + self.along_x * s + self.along_y * offset,
+            self.y_m + self.along_y * s - self.along_x * offset,
             z,
         )
 
-    def piece(self, left: float, right: float, low: float, high: float, proud: float) -> Points:
-        """Corners of a rectangle on it, counter-clockwise from its lower left."""
+    def rectangle(
+        self, left: float, right: float, low: float, high: float, offset: float
+    ) -> list[_Point]:
+        """Return the corners of a rectangle, counter-clockwise from its lower left."""
         return [
-            self.at(left, low, proud),
-            self.at(right, low, proud),
-            self.at(right, high, proud),
-            self.at(left, high, proud),
+            self.point(left, low, offset),
+            self.point(right, low, offset),
+            self.point(right, high, offset),
+            self.point(left, high, offset),
         ]
 
 
 def wall_chunks(layout: WarehouseLayout, variant: int) -> Iterator[SceneryChunk]:
-    """Pieces of wall, and what hangs on each piece; walls are seen from inside only."""
+    """Yield the pieces of the walls and the fixtures on them; walls are visible from inside."""
     _, tone = hall_tones(variant)
     height = layout.wall_height_m
     x_min, y_min, x_max, y_max = layout.x_min_m, layout.y_min_m, layout.x_max_m, layout.y_max_m
@@ -118,22 +124,23 @@ def wall_chunks(layout: WarehouseLayout, variant: int) -> Iterator[SceneryChunk]
     )
     for number, wall in enumerate(walls):
         for k, (a, b) in enumerate(tiles(0.0, wall.length_m)):
-            yield SceneryChunk(quad(wall.piece(a, b, 0.0, height, 0.0)), tone, "wall")
+            yield SceneryChunk(quad(wall.rectangle(a, b, 0.0, height, 0.0)), tone, "wall")
             rng = np.random.default_rng((59, variant, number, k))
-            x, y, _ = wall.at(0.5 * (a + b), 0.0, 0.5 * _DOCK_DEPTH_M)
+            x, y, _ = wall.point(0.5 * (a + b), 0.0, 0.5 * _DOCK_DEPTH_M)
             fixtures = []
             for name, s in _fixtures(rng, b - a, k, _is_free(layout, x, y)):
-                width, tall, low = _FIXTURES[name]
-                if low + tall <= height:
+                width, fixture_height, low = _FIXTURES[name]
+                high = low + fixture_height
+                if high <= height:
                     left = a + s - 0.5 * width
-                    corners = wall.piece(left, left + width, low, low + tall, _PROUD_M)
+                    corners = wall.rectangle(left, left + width, low, high, _OFFSET_M)
                     fixtures.append(quad(corners, FIXTURE_ATLAS.region(name)))
             if fixtures:
-                yield SceneryChunk(merge(fixtures), (1.0, 1.0, 1.0), "fixtures")
+                yield SceneryChunk(merge(fixtures), _WHITE, "fixtures")
 
 
 def _is_free(layout: WarehouseLayout, x: float, y: float) -> bool:
-    """Whether racks leave room for a dock about this point."""
+    """Return whether no rack stands where a dock door centred on this point needs free floor."""
     half = 0.5 * _DOCK_DEPTH_M
     for rack in layout.racks:
         x_min, y_min, x_max, y_max = rack.box_odom_m
@@ -145,7 +152,7 @@ def _is_free(layout: WarehouseLayout, x: float, y: float) -> bool:
 def _fixtures(
     rng: np.random.Generator, width: float, k: int, free: bool
 ) -> Iterator[tuple[str, float]]:
-    """Names and places, from the left edge, of what hangs on a piece of wall."""
+    """Yield the names of the fixtures on a piece of wall, and their distance from its left end."""
     middle = 0.5 * width
     if free and width > 3.4 and rng.random() < 0.55:
         yield ("dock_open" if rng.random() < 0.3 else "dock"), middle + 0.1
@@ -174,15 +181,15 @@ def _fixtures(
 
 
 def ceiling_chunks(layout: WarehouseLayout) -> Iterator[SceneryChunk]:
-    """Sheet, beams and lamps over each tile, seen from below only.
+    """Yield the sheet, the beam and the lamp over each tile; they are visible from below only.
 
-    Lit from below by the bright floor, they would be as dark as an underside in PyBullet's light;
-    their normals point up so that they take the light that falls on the floor.
+    A real ceiling is lit by the bright floor, but the renderers' light leaves every underside
+    dark. Normals of the ceiling therefore point up, to catch the light that falls on the floor.
     """
     height = layout.wall_height_m
     for x0, x1 in tiles(layout.x_min_m, layout.x_max_m):
         for y0, y1 in tiles(layout.y_min_m, layout.y_max_m):
-            sheet = _overhead(x0, y0, x1, y1, height, (0.0, 0.0, 1.0, 1.0))
+            sheet = _underside(x0, y0, x1, y1, height, WHOLE)
             yield SceneryChunk(_lit_from_above(sheet), (0.9, 0.9, 0.9), "ceiling")
             x, y = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
             steel = GOODS_ATLAS.region("steel")
@@ -191,22 +198,18 @@ def ceiling_chunks(layout: WarehouseLayout) -> Iterator[SceneryChunk]:
                 (0.2, y1 - y0, 0.4),
                 dict.fromkeys(("-x", "+x", "-z"), steel),
             )
-            lamp = _overhead(
+            lamp = _underside(
                 x - 0.75, y - 0.14, x + 0.75, y + 0.14, height - 0.25, GOODS_ATLAS.region("lamp")
             )
-            tray = box(
-                (x, y, height - 0.2),
-                (1.5, 0.28, 0.09),
-                dict.fromkeys(("-x", "+x", "-y", "+y"), steel),
-            )
-            yield SceneryChunk(
-                merge([beam, tray, _lit_from_above(lamp)]), (1.0, 1.0, 1.0), "goods0"
-            )
+            tray = box((x, y, height - 0.2), (1.5, 0.28, 0.09), dict.fromkeys(_SIDES, steel))
+            yield SceneryChunk(merge([beam, tray, _lit_from_above(lamp)]), _WHITE, "goods0")
 
 
-def _overhead(x0: float, y0: float, x1: float, y1: float, z: float, region: Region) -> Mesh:
+def _underside(x0: float, y0: float, x1: float, y1: float, z: float, region: Region) -> Mesh:
+    """Return a horizontal rectangle that is visible from below."""
     return quad([(x0, y0, z), (x0, y1, z), (x1, y1, z), (x1, y0, z)], region)
 
 
 def _lit_from_above(mesh: Mesh) -> Mesh:
+    """Return a downward-facing mesh with normals that point up."""
     return Mesh(mesh.vertices_m, -mesh.normals, mesh.indices, mesh.uv)

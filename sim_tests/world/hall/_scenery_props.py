@@ -1,4 +1,4 @@
-"""Meshes of the props, each part filling its collision box."""
+"""Meshes of the props; each part fills its collision box."""
 
 from __future__ import annotations
 
@@ -10,16 +10,25 @@ import numpy as np
 
 from ._meshes import Mesh, Region, SceneryChunk, box, merge, tube
 from ._props import PROP_PARTS, Prop
-from ._scenery_goods import PALLET_M, Load, goods_box, pallets, picture_of
+from ._scenery_goods import PALLET_M, Load, goods_box, pallets, side_cell
 from ._texture_goods import CARTONS, CRATES, GOODS_ATLAS, GOODS_SETS
 
 _Maker = Callable[[np.random.Generator], Iterator[Mesh]]
-_ALL: Final = ("-x", "+x", "-y", "+y", "+z")
-_at = GOODS_ATLAS.region
+_SIDES: Final = ("-x", "+x", "-y", "+y")
+_FACES: Final = {
+    "front": "+x",
+    "back": "-x",
+    "left": "+y",
+    "right": "-y",
+    "top": "+z",
+    "under": "-z",
+}
+_EURO_PALLET_M: Final = (1.2, 0.8)
+_region = GOODS_ATLAS.region
 
 
 def prop_chunk(prop: Prop, number: int, variant: int) -> SceneryChunk:
-    """The prop in odom; ``number`` and ``variant`` choose tones and prints."""
+    """Return the prop in odom; ``number`` and ``variant`` choose tones and prints."""
     rng = np.random.default_rng((60, variant, number))
     cos, sin = prop.turn
     rotation = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
@@ -31,42 +40,47 @@ def prop_chunk(prop: Prop, number: int, variant: int) -> SceneryChunk:
 def _solid(
     center: tuple[float, float, float], size: tuple[float, float, float], side: str, top: str = ""
 ) -> Mesh:
-    """A box with one picture on its sides and another on top."""
-    regions: dict[str, Region] = dict.fromkeys(_ALL[:4], _at(side))
-    return box(center, size, {**regions, "+z": _at(top or side)})
+    """Return a box with one atlas cell on its sides and another on top (none: the same)."""
+    regions: dict[str, Region] = dict.fromkeys(_SIDES, _region(side))
+    return box(center, size, {**regions, "+z": _region(top or side)})
 
 
 def _faces(
     center: tuple[float, float, float], size: tuple[float, float, float], **names: str
 ) -> Mesh:
-    """A box whose faces are named ``front`` (+x), ``back``, ``left``, ``right``, ``top``."""
-    faces = {"front": "+x", "back": "-x", "left": "+y", "right": "-y", "top": "+z", "under": "-z"}
-    return box(center, size, {faces[key]: _at(name) for key, name in names.items()})
+    """Return a box with the atlas cells given by face (``front``, ``back``, ``left``, …) only."""
+    return box(center, size, {_FACES[key]: _region(name) for key, name in names.items()})
 
 
-def _loaded(load: Load) -> _Maker:
-    """A pallet with goods up to the top of its collision box."""
-    height = PROP_PARTS[f"pallet_{load if load != 'cartons' else 'goods'}"][0].height_m
-    room = height - PALLET_M
+def _around(name: str) -> dict[str, str]:
+    """Return arguments of :func:`_faces` for one cell on all four sides."""
+    return dict.fromkeys(("front", "back", "left", "right"), name)
+
+
+def _loaded_pallet(load: Load) -> _Maker:
+    """Return the maker of a pallet with goods up to the top of its collision box."""
+    total = PROP_PARTS[f"pallet_{load if load != 'cartons' else 'goods'}"][0].height_m
+    free = total - PALLET_M
     tops: dict[Load, str] = {"cartons": "top0", "drums": "dark"}
 
     def make(rng: np.random.Generator) -> Iterator[Mesh]:
-        yield from pallets(1, (0.0, 0.0, 0.0), (1.2, 0.8))
-        full = room * float(rng.uniform(0.62, 0.8)) if load == "cartons" else room
-        side, top = picture_of(load, rng), tops.get(load, "wrap_top")
-        yield goods_box((0.0, 0.0, PALLET_M), (1.17, 0.77, full), side, top)
-        if load == "cartons":  # the last layer: two heaps of other cartons
+        yield from pallets(1, (0.0, 0.0, 0.0), _EURO_PALLET_M)
+        height = free * float(rng.uniform(0.62, 0.8)) if load == "cartons" else free
+        side, top = side_cell(load, rng), tops.get(load, "wrap_top")
+        yield goods_box((0.0, 0.0, PALLET_M), (1.17, 0.77, height), side, top)
+        if load == "cartons":  # the last layer: two stacks of other cartons
             for x, length in ((-0.3, 0.56), (0.3, 0.58)):
-                tall = (room - full) * float(rng.uniform(0.85, 1.0))
+                upper = (free - height) * float(rng.uniform(0.85, 1.0))
                 carton = f"carton{rng.integers(CARTONS)}"
-                yield goods_box((x, 0.0, PALLET_M + full), (length, 0.76, tall), carton, "top1")
+                size = (length, 0.76, upper)
+                yield goods_box((x, 0.0, PALLET_M + height), size, carton, "top1")
 
     return make
 
 
-def _pallets(count: int) -> _Maker:
+def _empty_pallets(count: int) -> _Maker:
     def make(_: np.random.Generator) -> Iterator[Mesh]:
-        yield from pallets(count, (0.0, 0.0, 0.0), (1.2, 0.8))
+        yield from pallets(count, (0.0, 0.0, 0.0), _EURO_PALLET_M)
 
     return make
 
@@ -99,10 +113,6 @@ def _stacker(_: np.random.Generator) -> Iterator[Mesh]:
     yield _faces((0.66, 0.0, 1.12), (0.2, 0.3, 0.05), **_around("dark"), top="dark")
 
 
-def _around(name: str) -> dict[str, str]:
-    return dict.fromkeys(("front", "back", "left", "right"), name)
-
-
 def _forklift(_: np.random.Generator) -> Iterator[Mesh]:
     for y in (-0.3, 0.3):
         yield _solid((1.35, y, 0.08), (1.0, 0.14, 0.05), "dark")
@@ -119,7 +129,7 @@ def _forklift(_: np.random.Generator) -> Iterator[Mesh]:
     for x, radius in ((0.34, 0.3), (-0.9, 0.24)):
         for side in (-1.0, 1.0):
             wheel = tube(
-                [(0, 0, 0.09, radius, radius), (0, 0, -0.09, radius, radius)], 12, _at("rubber")
+                [(0, 0, 0.09, radius, radius), (0, 0, -0.09, radius, radius)], 12, _region("rubber")
             )
             turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
             yield wheel.transformed(turn, (x, side * 0.45, radius))
@@ -156,7 +166,9 @@ def _crates(rng: np.random.Generator) -> Iterator[Mesh]:
 
 def _bin(rng: np.random.Generator) -> Iterator[Mesh]:
     colour = ("green", "blue", "dark", "grey")[int(rng.integers(4))]
-    body = tube([(0, 0, 0.95, 0.41, 0.37), (0, 0, 0.1, 0.33, 0.31)], 4, _at(colour), _at("dark"))
+    body = tube(
+        [(0, 0, 0.95, 0.41, 0.37), (0, 0, 0.1, 0.33, 0.31)], 4, _region(colour), _region("dark")
+    )
     half = math.sqrt(0.5)
     eighth = np.array([[half, -half, 0.0], [half, half, 0.0], [0.0, 0.0, 1.0]])
     yield body.transformed(eighth)
@@ -174,18 +186,21 @@ def _barrier(_: np.random.Generator) -> Iterator[Mesh]:
 
 def _post(_: np.random.Generator) -> Iterator[Mesh]:
     yield tube(
-        [(0, 0, 1.0, 0.07, 0.07), (0, 0, 0.05, 0.075, 0.075)], 8, _at("hazard"), _at("yellow")
+        [(0, 0, 1.0, 0.07, 0.07), (0, 0, 0.05, 0.075, 0.075)],
+        8,
+        _region("hazard"),
+        _region("yellow"),
     )
     yield _solid((0.0, 0.0, 0.025), (0.16, 0.16, 0.05), "dark")
 
 
 _MAKERS: Final[dict[str, _Maker]] = {
-    "pallet": _pallets(1),
-    "pallet_stack": _pallets(7),
-    "pallet_goods": _loaded("cartons"),
-    "pallet_wrapped": _loaded("wrapped"),
-    "pallet_sacks": _loaded("sacks"),
-    "pallet_drums": _loaded("drums"),
+    "pallet": _empty_pallets(1),
+    "pallet_stack": _empty_pallets(7),
+    "pallet_goods": _loaded_pallet("cartons"),
+    "pallet_wrapped": _loaded_pallet("wrapped"),
+    "pallet_sacks": _loaded_pallet("sacks"),
+    "pallet_drums": _loaded_pallet("drums"),
     "pallet_truck": _pallet_truck,
     "stacker": _stacker,
     "forklift": _forklift,

@@ -1,7 +1,7 @@
-"""Pallet racks with goods in them, a bay at a time.
+"""Meshes of pallet racks and their goods, one bay at a time.
 
-A rack is closed in the middle, at both ends and on top: what blocks a ray in the physics also
-blocks the picture, and nothing is ever seen through its box.
+A rack is closed along its middle, at both ends and on top. The camera therefore never sees through
+a rack's box, which blocks every ray in the physics world too.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from ._texture_goods import GOODS_ATLAS, GOODS_SETS, SIGNS
 
 _POST_M: Final = 0.10
 _BEAM_M: Final = 0.12
-# Above the goods there is air for the forks.
+# Free height above the goods, for the forks.
 _HEADROOM_M: Final = 0.16
 _QUARTER_TURN: Final = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-_UNIT: Final = ((1.0, -1.0), (-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0))
-# How often a place holds what.
-_SHARES: Final[dict[Load, float]] = {
+_LABEL_CORNERS: Final = ((1.0, -1.0), (-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0))
+# The probability of each load of a storage place.
+_LOAD_PROBABILITIES: Final[dict[Load, float]] = {
     "cartons": 0.34,
     "heaps": 0.16,
     "wrapped": 0.17,
@@ -34,11 +34,11 @@ _SHARES: Final[dict[Load, float]] = {
     "nothing": 0.04,
 }
 
-_at = GOODS_ATLAS.region
+_region = GOODS_ATLAS.region
 
 
 def rack_chunks(rack: RackBox, number: int, variant: int) -> Iterator[SceneryChunk]:
-    """One chunk a bay; ``number`` and ``variant`` choose what lies in it."""
+    """Yield one chunk per bay in odom; ``number`` and ``variant`` choose the goods."""
     along_x = rack.length_m >= rack.width_m
     length, depth = (rack.length_m, rack.width_m) if along_x else (rack.width_m, rack.length_m)
     bays = max(1, round(length / 2.6))
@@ -58,18 +58,18 @@ def rack_chunks(rack: RackBox, number: int, variant: int) -> Iterator[SceneryChu
 
 
 def _levels(height: float) -> list[float]:
-    """Heights of the places that goods stand on."""
+    """Return the heights that goods stand on."""
     levels = max(1, round(height / 1.35))
     return [k * height / levels for k in range(levels)]
 
 
 def _frame(low: float, high: float, depth: float, height: float) -> Iterator[Mesh]:
-    """Posts, beams, decks, the closed middle and the closed top of a bay from ``low`` to ``high``.
+    """Yield the posts, beams, labels, decks and middle wall of a bay from ``low`` to ``high``.
 
     Neighbouring bays have one half each of the posts between them.
     """
     half, middle = 0.5 * depth, 0.5 * (low + high)
-    dark, length = _at("backing"), high - low
+    dark, length = _region("backing"), high - low
     for side in (1.0, -1.0):
         left, right = (middle + end * side * 0.5 * length for end in (1.0, -1.0))
         wall = 0.01 * side
@@ -86,43 +86,43 @@ def _frame(low: float, high: float, depth: float, height: float) -> Iterator[Mes
                     height / 2,
                 ),
                 (0.5 * _POST_M, _POST_M, height),
-                {outward: _at("upright"), inward: _at("upright")},
+                {outward: _region("upright"), inward: _region("upright")},
             )
         for level in (*_levels(height)[1:], height):
             yield box(
                 (middle, side * (half - 0.04), level - 0.5 * _BEAM_M),
                 (length - _POST_M, 0.06, _BEAM_M),
-                {outward: _at("beam"), "-z": _at("orange")},
+                {outward: _region("beam"), "-z": _region("orange")},
             )
-        # Labels are faces of their own: PyBullet's software renderer distorts the texture of a
-        # long face that reaches behind the camera.
+        # Labels are separate faces: PyBullet's software renderer distorts the texture of a long
+        # face that reaches behind the camera.
         for level in _levels(height)[1:]:
             for share in (-0.25, 0.25):
                 s, y, z = middle + share * length, side * (half - 0.006), level - 0.5 * _BEAM_M
-                plate = [(s + side * u * 0.08, y, z + v * 0.035) for u, v in _UNIT]
-                yield quad(plate, _at("label"))
+                plate = [(s + side * u * 0.08, y, z + v * 0.035) for u, v in _LABEL_CORNERS]
+                yield quad(plate, _region("label"))
     for level in (*_levels(height)[1:], height):
         yield box(
             (middle, 0.0, level - 0.015),
             (length, depth - 0.1 if level < height else depth, 0.03),
-            {"+z": _at("deck"), "-z": _at("deck")},
+            {"+z": _region("deck"), "-z": _region("deck")},
         )
 
 
 def _ends(
     first: bool, last: bool, low: float, high: float, depth: float, height: float, number: int
 ) -> Iterator[Mesh]:
-    """Sheets that close the ends of the rack, with its sign."""
+    """Yield the sheets that close the ends of the rack, each with the rack's sign."""
     half = 0.5 * depth
     for s, out, present in ((low, -1.0, first), (high, 1.0, last)):
         if not present:
             continue
         corners = [(s, -half * out, 0.0), (s, half * out, 0.0)]
         sheet = [*corners, (s, half * out, height), (s, -half * out, height)]
-        yield quad(sheet, _at("end"))
-        # Its inner side, seen past the goods from within the bay.
-        yield quad([(x - 0.005 * out, -y, z) for x, y, z in sheet], _at("ladder"))
-        sign = _at(f"sign{number % SIGNS}")
+        yield quad(sheet, _region("end"))
+        # Inner side of the sheet, visible past the goods.
+        yield quad([(x - 0.005 * out, -y, z) for x, y, z in sheet], _region("ladder"))
+        sign = _region(f"sign{number % SIGNS}")
         y, z = 0.36 * half * out, min(2.1, 0.75 * height)
         plate = [(-1, -0.5), (1, -0.5), (1, 0.5), (-1, 0.5)]
         yield quad([(s + 0.01 * out, u * y, z + v * 0.36 * half) for u, v in plate], sign)
@@ -131,15 +131,17 @@ def _ends(
 def _goods(
     low: float, high: float, depth: float, height: float, rng: np.random.Generator
 ) -> Iterator[Mesh]:
-    """Two or three pallets on every level."""
+    """Yield the pallets on every level of a bay, two or three on each in a usual one."""
     levels = _levels(height)
-    room = (levels[1] if len(levels) > 1 else height) - _BEAM_M - _HEADROOM_M
+    max_height = (levels[1] if len(levels) > 1 else height) - _BEAM_M - _HEADROOM_M
     inner = high - low - _POST_M
     for level in levels:
         places = 3 if inner > 2.4 and rng.random() < 0.6 else max(1, round(inner / 1.25))
         pitch = inner / places
-        kinds = rng.choice(len(_SHARES), size=places, p=tuple(_SHARES.values()))
+        probabilities = tuple(_LOAD_PROBABILITIES.values())
+        kinds = rng.choice(len(probabilities), size=places, p=probabilities)
         for place, kind in enumerate(kinds.tolist()):
             s = low + 0.5 * _POST_M + (place + 0.5) * pitch + float(rng.uniform(-0.02, 0.02))
             size = (min(pitch - 0.06, 1.2), depth - 0.16)
-            yield from pallet_load(tuple(_SHARES)[kind], (s, 0.0, level), size, room, rng)
+            load = tuple(_LOAD_PROBABILITIES)[kind]
+            yield from pallet_load(load, (s, 0.0, level), size, max_height, rng)

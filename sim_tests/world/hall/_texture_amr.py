@@ -1,4 +1,4 @@
-"""The atlas of the robot: painted shell, rubber, hubs, lenses, lights and a label."""
+"""The texture of the robot: painted shell, rubber, hubs, lenses, lights and a label."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._atlas import Atlas
-from ._texture_paint import Canvas, Rgb, band, fade, grain, plain, polygon, sealed, text
+from ._canvas import Canvas, Rgb, band, disc, fade, grain, text
 
-_PLAIN: Final[dict[str, Rgb]] = {
+_MATERIALS: Final[dict[str, Rgb]] = {
     "shell": (222, 224, 226),
     "trim": (34, 126, 104),
     "dark": (44, 46, 50),
@@ -35,23 +35,21 @@ AMR_ATLAS: Final = Atlas(
         "lens": (32, 32),
         "deck": (64, 64),
         "puck": (64, 32),
-        **dict.fromkeys(_PLAIN, (16, 16)),
+        **dict.fromkeys(_MATERIALS, (16, 16)),
     },
 )
 
 
 def amr_texture() -> NDArray[np.uint8]:
-    """(256, 256, 3) picture of :data:`AMR_ATLAS`."""
-    canvas = plain(AMR_ATLAS.size_px, AMR_ATLAS.size_px, (128, 128, 128))
-    for number, (name, cell) in enumerate(AMR_ATLAS.cells.items()):
-        one = plain(cell.width_px, cell.height_px, _PLAIN.get(name, _PLAIN["shell"]))
+    """Return the texture (256, 256, 3) of :data:`AMR_ATLAS`."""
+
+    def paint(canvas: Canvas, name: str, number: int) -> None:
+        canvas[:] = _MATERIALS.get(name, _MATERIALS["shell"])
         if name in _PAINTERS:
-            _PAINTERS[name](one)
-        grain(one, np.random.default_rng((56, number)), 0.008)
-        canvas[
-            cell.top_px : cell.top_px + cell.height_px, cell.left_px : cell.left_px + cell.width_px
-        ] = one
-    return sealed(canvas)
+            _PAINTERS[name](canvas)
+        grain(canvas, np.random.default_rng((56, number)), 0.008)
+
+    return AMR_ATLAS.painted((128, 128, 128), paint)
 
 
 def _flank(canvas: Canvas) -> None:
@@ -80,24 +78,19 @@ def _tyre(canvas: Canvas) -> None:
 
 def _hub(canvas: Canvas) -> None:
     canvas[:] = (34, 34, 36)
-    angles = np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False)
-
-    def disc(radius: float, rgb: Rgb, x: float = 0.5, y: float = 0.5) -> None:
-        polygon(canvas, [(x + radius * np.cos(a), y + radius * np.sin(a)) for a in angles], rgb)
-
-    disc(0.36, (158, 162, 166))
-    disc(0.31, (112, 116, 120))
+    disc(canvas, 0.36, (158, 162, 166), corners=32)
+    disc(canvas, 0.31, (112, 116, 120), corners=32)
     for k in range(5):
         turn = 2.0 * np.pi * k / 5
-        disc(0.075, (46, 48, 52), 0.5 + 0.2 * np.cos(turn), 0.5 + 0.2 * np.sin(turn))
-    disc(0.09, (196, 200, 204))
+        centre = (0.5 + 0.2 * np.cos(turn), 0.5 + 0.2 * np.sin(turn))
+        disc(canvas, 0.075, (46, 48, 52), centre, corners=32)
+    disc(canvas, 0.09, (196, 200, 204), corners=32)
 
 
 def _lens(canvas: Canvas) -> None:
     canvas[:] = (44, 46, 50)
-    angles = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
     for radius, rgb in ((0.42, (16, 18, 22)), (0.3, (34, 42, 66)), (0.12, (120, 140, 180))):
-        polygon(canvas, [(0.5 + radius * np.cos(a), 0.5 + radius * np.sin(a)) for a in angles], rgb)
+        disc(canvas, radius, rgb)
 
 
 def _deck(canvas: Canvas) -> None:
@@ -114,7 +107,7 @@ def _puck(canvas: Canvas) -> None:
 
 
 def _tote_side(canvas: Canvas) -> None:
-    canvas[:] = _PLAIN["tote"]
+    canvas[:] = _MATERIALS["tote"]
     for k in range(9):
         band(canvas, (k / 8 - 0.01, 0.14, k / 8 + 0.01, 0.96), (36, 70, 128))
     band(canvas, (0.0, 0.0, 1.0, 0.12), (62, 106, 180))

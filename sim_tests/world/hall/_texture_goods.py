@@ -1,4 +1,4 @@
-"""The atlas of racks, goods and props: cartons, pallets, film, crates, steel, signs."""
+"""The textures of racks, goods and props: cartons, pallets, film, crates, steel, signs."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._atlas import Atlas
-from ._texture_goods_paint import GOODS_PAINTERS
-from ._texture_paint import Rgb, grain, plain, sealed
+from ._canvas import Canvas, Rgb, grain
+from ._texture_goods_painters import GOODS_PAINTERS
 
-#: Sets of goods to choose from: a variant of the scenery uses one of them.
+#: Number of goods textures; a variant of the scenery uses one of them.
 GOODS_SETS: Final = 4
-# How many pictures there are of each kind.
+# Number of cells of each kind in the atlas.
 CARTONS: Final = 8
 STACKS: Final = 10
 WRAPS: Final = 4
@@ -72,18 +72,18 @@ GOODS_ATLAS: Final = Atlas(
 
 
 def goods_texture(variant: int) -> NDArray[np.uint8]:
-    """(1024, 1024, 3) picture of :data:`GOODS_ATLAS`; ``variant`` draws tones, prints, layouts."""
-    canvas = plain(GOODS_ATLAS.size_px, GOODS_ATLAS.size_px, (128, 128, 128))
-    for number, (name, cell) in enumerate(GOODS_ATLAS.cells.items()):
+    """Return the texture (1024, 1024, 3) of :data:`GOODS_ATLAS`.
+
+    ``variant`` seeds the tones, prints and arrangements.
+    """
+
+    def paint(canvas: Canvas, name: str, number: int) -> None:
         rng = np.random.default_rng((20260, variant, number))
-        family = name.rstrip("0123456789")
-        index = int(name[len(family) :] or 0)
-        painted = plain(cell.width_px, cell.height_px, _MATERIALS.get(name, (128, 128, 128)))
         if name in _MATERIALS:
-            grain(painted, rng, 0.0 if name == "lamp" else 0.02)
+            canvas[:] = _MATERIALS[name]
+            grain(canvas, rng, 0.0 if name == "lamp" else 0.02)
         else:
-            GOODS_PAINTERS[family](painted, rng, index)
-        canvas[
-            cell.top_px : cell.top_px + cell.height_px, cell.left_px : cell.left_px + cell.width_px
-        ] = painted
-    return sealed(canvas)
+            kind = name.rstrip("0123456789")
+            GOODS_PAINTERS[kind](canvas, rng, int(name[len(kind) :] or 0))
+
+    return GOODS_ATLAS.painted((128, 128, 128), paint)

@@ -1,4 +1,4 @@
-"""Textures of the hall itself: slab, wall panels, ceiling, floor paint, doors and signs."""
+"""Textures of the building: floor slab, wall, ceiling, floor markings, doors and signs."""
 
 from __future__ import annotations
 
@@ -9,23 +9,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._atlas import Atlas
-from ._texture_paint import (
+from ._canvas import (
     Canvas,
     band,
+    disc,
     fade,
+    finished,
     grain,
     noise,
     plain,
     polygon,
-    sealed,
     shade_edges,
     stripes,
     text,
 )
 
-#: Side of the square of floor or ceiling, and width of the piece of wall, that a texture covers.
+#: Extent that a texture covers: side of a square of floor or ceiling, width of a piece of wall.
 TILE_M: Final = 4.0
-# What paint wears down to and shades end in: the mean of the slab's textures.
+# The mean colour of the slab's textures: worn paint shows it, and shades end in it.
 _SLAB_RGB: Final = (158.0, 157.0, 152.0)
 
 FIXTURE_ATLAS: Final = Atlas(
@@ -52,7 +53,7 @@ FIXTURE_ATLAS: Final = Atlas(
     },
 )
 
-PAINT_ATLAS: Final = Atlas(
+MARKING_ATLAS: Final = Atlas(
     256,
     {
         "line": (256, 24),
@@ -66,7 +67,7 @@ PAINT_ATLAS: Final = Atlas(
 
 
 def floor_texture(number: int) -> NDArray[np.uint8]:
-    """(512, 512, 3) a slab of 4 m between saw-cut joints, lighter in the middle, under a lamp."""
+    """Return (512, 512, 3) of 4 m of slab between saw-cut joints, lighter under a lamp."""
     rng = np.random.default_rng((51, number))
     canvas = plain(512, 512, (158, 157, 152))
     grain(canvas, rng, 0.035, 3)
@@ -105,11 +106,11 @@ def floor_texture(number: int) -> NDArray[np.uint8]:
     for edge in (slice(0, 2), slice(510, 512)):
         canvas[edge] *= 0.72
         canvas[:, edge] *= 0.72
-    return sealed(canvas)
+    return finished(canvas)
 
 
 def wall_texture() -> NDArray[np.uint8]:
-    """(512, 256, 3) 4 m of wall: block base below sheet panels, a pilaster at its left edge."""
+    """Return (512, 256, 3) of 4 m of wall: blocks below sheet panels, a pilaster on the left."""
     rng = np.random.default_rng(52)
     canvas = plain(256, 512, (206, 208, 206))
     phase = (np.arange(256) * 20 / 256) % 1.0  # sheet profile: 0.2 m pitch
@@ -139,11 +140,11 @@ def wall_texture() -> NDArray[np.uint8]:
     for k in range(4):
         canvas[-90 + 22 * k : -80 + 22 * k, :22] = (44, 44, 46)
     fade(canvas, 0.8, 1.02)
-    return sealed(canvas)
+    return finished(canvas)
 
 
 def ceiling_texture() -> NDArray[np.uint8]:
-    """(256, 256, 3) 4 m of trapezoidal sheet with purlins; lamps are bodies of their own."""
+    """Return (256, 256, 3) of 4 m of trapezoidal sheet with purlins; lamps have their own mesh."""
     rng = np.random.default_rng(53)
     canvas = plain(256, 256, (150, 154, 156))
     canvas[::8] *= 0.86
@@ -154,41 +155,38 @@ def ceiling_texture() -> NDArray[np.uint8]:
     x = (np.arange(256) + 0.5) / 64.0 - 2.0
     glow = np.exp(-(x[:, None] ** 2 / 0.5 + x[None, :] ** 2 / 2.5))
     canvas *= (0.86 + 0.26 * glow)[..., None].astype(np.float32)
-    return sealed(canvas)
+    return finished(canvas)
 
 
-def paint_texture() -> NDArray[np.uint8]:
-    """(256, 256, 3) picture of :data:`PAINT_ATLAS`: worn lines, a bar, shades, an arrow."""
+def marking_texture() -> NDArray[np.uint8]:
+    """Return the texture (256, 256, 3) of :data:`MARKING_ATLAS`: worn paint, and shades."""
     rng = np.random.default_rng(54)
-    canvas = plain(PAINT_ATLAS.size_px, PAINT_ATLAS.size_px, _SLAB_RGB)
-    for name, cell in PAINT_ATLAS.cells.items():
-        one = plain(cell.width_px, cell.height_px, _SLAB_RGB)
+
+    def paint(canvas: Canvas, name: str, _: int) -> None:
         if name == "line":
-            one[:] = (222, 180, 48)
+            canvas[:] = (222, 180, 48)
         elif name == "zebra":
-            one[:] = (226, 226, 218)
+            canvas[:] = (226, 226, 218)
         elif name == "arrow":
-            polygon(one, [(0.1, 0.42), (0.55, 0.42), (0.55, 0.2), (0.95, 0.5)], (222, 180, 48))
-            polygon(one, [(0.1, 0.42), (0.1, 0.58), (0.55, 0.58), (0.55, 0.42)], (222, 180, 48))
-            polygon(one, [(0.55, 0.5), (0.55, 0.8), (0.95, 0.5)], (222, 180, 48))
+            polygon(canvas, [(0.1, 0.42), (0.55, 0.42), (0.55, 0.2), (0.95, 0.5)], (222, 180, 48))
+            polygon(canvas, [(0.1, 0.42), (0.1, 0.58), (0.55, 0.58), (0.55, 0.42)], (222, 180, 48))
+            polygon(canvas, [(0.55, 0.5), (0.55, 0.8), (0.95, 0.5)], (222, 180, 48))
         elif name == "place":  # a storage place: a white frame on the slab
             for box in ((0, 0, 1, 0.05), (0, 0.95, 1, 1), (0, 0, 0.045, 1), (0.955, 0, 1, 1)):
-                band(one, box, (216, 216, 208))
+                band(canvas, box, (216, 216, 208))
         elif name == "shade":  # from the open floor (below) into the dark under a rack (above)
-            fade(one, 0.5, 1.0)
+            fade(canvas, 0.5, 1.0)
         else:
-            one *= 0.42
-        grain(one, rng, 0.02)
+            canvas *= 0.42
+        grain(canvas, rng, 0.02)
         if name in ("line", "zebra", "arrow", "place"):
-            _wear(one, rng)
-        canvas[
-            cell.top_px : cell.top_px + cell.height_px, cell.left_px : cell.left_px + cell.width_px
-        ] = one
-    return sealed(canvas)
+            _wear(canvas, rng)
+
+    return MARKING_ATLAS.painted(_SLAB_RGB, paint)
 
 
 def _wear(canvas: Canvas, rng: np.random.Generator) -> None:
-    """Let the slab show through where wheels have taken the paint off."""
+    """Let the slab show through where wheels have worn the paint off."""
     height, width = canvas.shape[:2]
     field = noise(rng, height, width, max(2, height // 10), max(2, width // 10))
     fine = noise(rng, height, width, max(3, height // 3), max(3, width // 3))
@@ -197,33 +195,26 @@ def _wear(canvas: Canvas, rng: np.random.Generator) -> None:
 
 
 def fixture_texture() -> NDArray[np.uint8]:
-    """(512, 512, 3) picture of :data:`FIXTURE_ATLAS`: what hangs on the walls."""
-    canvas = plain(FIXTURE_ATLAS.size_px, FIXTURE_ATLAS.size_px, (200, 200, 200))
-    for number, (name, cell) in enumerate(FIXTURE_ATLAS.cells.items()):
+    """Return the texture (512, 512, 3) of :data:`FIXTURE_ATLAS`: doors, signs and equipment."""
+
+    def paint(canvas: Canvas, name: str, number: int) -> None:
         rng = np.random.default_rng((55, number))
-        one = plain(cell.width_px, cell.height_px, (200, 200, 200))
-        _fixture(one, name, rng)
-        canvas[
-            cell.top_px : cell.top_px + cell.height_px, cell.left_px : cell.left_px + cell.width_px
-        ] = one
-    return sealed(canvas)
+        if name.startswith("dock"):
+            _dock(canvas, rng, name == "dock_open")
+        elif name.startswith("number"):
+            canvas[:] = (40, 72, 128)
+            text(canvas, str(int(name[6:]) + 1), (0.5, 0.5), 0.6, (236, 236, 232))
+        elif name == "hazard":
+            stripes(canvas, 5, (230, 184, 34), (36, 36, 38))
+        else:
+            _FIXTURE_PAINTERS[name](canvas, rng)
+        grain(canvas, rng, 0.012)
 
-
-def _fixture(canvas: Canvas, name: str, rng: np.random.Generator) -> None:
-    if name.startswith("dock"):
-        _dock(canvas, rng, name == "dock_open")
-    elif name.startswith("number"):
-        canvas[:] = (40, 72, 128)
-        text(canvas, str(int(name[6:]) + 1), (0.5, 0.5), 0.6, (236, 236, 232))
-    elif name == "hazard":
-        stripes(canvas, 5, (230, 184, 34), (36, 36, 38))
-    else:
-        _SMALL[name](canvas, rng)
-    grain(canvas, rng, 0.012)
+    return FIXTURE_ATLAS.painted((200, 200, 200), paint)
 
 
 def _dock(canvas: Canvas, rng: np.random.Generator, is_open: bool) -> None:
-    """A sectional dock door in its seal; open: the dim inside of a trailer behind it."""
+    """Paint a sectional dock door in its seal, or an open one with a dim trailer behind it."""
     canvas[:] = (44, 46, 48)
     inner = (0.08, 0.08, 0.92, 1.0)
     band(canvas, inner, (188, 192, 192))
@@ -241,8 +232,8 @@ def _dock(canvas: Canvas, rng: np.random.Generator, is_open: bool) -> None:
         band(canvas, (0.2, 0.58, 0.48, 0.88), (150, 120, 84))
         band(canvas, (0.5, 0.64, 0.76, 0.88), (134, 106, 74))
         band(canvas, (0.2, 0.725, 0.76, 0.735), (90, 68, 46))
-    # Guards at the foot of the frame, plain: narrow stripes one above the other look like a
-    # hi-vis vest to a person detector.
+    # The guards at the foot of the frame are plain: a person detector takes narrow stripes one
+    # above the other for a hi-vis vest.
     for x in (0.0, 0.92):
         band(canvas, (x, 0.84, x + 0.08, 1.0), (224, 178, 38))
     fade(canvas, 0.94, 1.0)
@@ -264,7 +255,7 @@ def _exit(canvas: Canvas, _: np.random.Generator) -> None:
 
 
 def _extinguisher(canvas: Canvas, _: np.random.Generator) -> None:
-    """A red box with a window for an extinguisher, and its sign above."""
+    """Paint a red box with a window for an extinguisher, and its sign above."""
     canvas[:] = (186, 190, 190)
     band(canvas, (0.1, 0.02, 0.9, 0.27), (182, 36, 32))
     band(canvas, (0.4, 0.08, 0.6, 0.2), (236, 232, 228))
@@ -283,7 +274,7 @@ def _cabinet(canvas: Canvas, _: np.random.Generator) -> None:
 
 
 def _board(canvas: Canvas, rng: np.random.Generator) -> None:
-    """A notice board: sheets of lines and charts, no pictures."""
+    """Paint a notice board: sheets with lines and charts, no photographs."""
     canvas[:] = (54, 92, 138)
     for row in range(2):
         for column in range(4):
@@ -307,10 +298,8 @@ def _warning(canvas: Canvas, _: np.random.Generator) -> None:
 
 
 def _duty(canvas: Canvas, _: np.random.Generator) -> None:
-    """A blue roundel with an arrow: keep this way."""
-    angles = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
-    rim = [(float(0.5 + 0.48 * np.cos(a)), float(0.5 + 0.48 * np.sin(a))) for a in angles]
-    polygon(canvas, rim, (34, 82, 158))
+    """Paint a blue mandatory sign with an arrow: keep this way."""
+    disc(canvas, 0.48, (34, 82, 158))
     polygon(canvas, [(0.5, 0.85), (0.24, 0.55), (0.76, 0.55)], (240, 240, 238))
     band(canvas, (0.42, 0.16, 0.58, 0.58), (240, 240, 238))
 
@@ -331,13 +320,8 @@ def _heater(canvas: Canvas, _: np.random.Generator) -> None:
 
 
 def _clock(canvas: Canvas, _: np.random.Generator) -> None:
-    angles = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
-    for radius, rgb in ((0.48, (40, 42, 44)), (0.42, (238, 238, 234))):
-        polygon(
-            canvas,
-            [(float(0.5 + radius * np.cos(a)), float(0.5 + radius * np.sin(a))) for a in angles],
-            rgb,
-        )
+    disc(canvas, 0.48, (40, 42, 44))
+    disc(canvas, 0.42, (238, 238, 234))
     polygon(canvas, [(0.48, 0.5), (0.52, 0.5), (0.52, 0.16), (0.48, 0.16)], (30, 30, 30))
     polygon(canvas, [(0.5, 0.48), (0.5, 0.53), (0.74, 0.58), (0.74, 0.55)], (30, 30, 30))
 
@@ -349,7 +333,7 @@ def _pipe(canvas: Canvas, _: np.random.Generator) -> None:
     canvas[:, 12:] *= 0.6
 
 
-_SMALL: Final = {
+_FIXTURE_PAINTERS: Final = {
     "door": _door,
     "exit": _exit,
     "extinguisher": _extinguisher,

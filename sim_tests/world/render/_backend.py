@@ -1,4 +1,4 @@
-"""What a renderer of the picture world offers, whichever library draws."""
+"""The interface of the renderers, and the drawing that each of them returns."""
 
 from __future__ import annotations
 
@@ -10,18 +10,17 @@ from numpy.typing import NDArray
 
 from perception.arrays import FloatArray
 
-from ..hall import Lighting, Mesh
+from ..hall import Colour, Lighting, Mesh
 from ._view import RenderView
 
 BackendName = Literal["tiny", "gl"]
 RendererName = Literal["tiny", "gl", "auto"]
 RENDERERS: Final[tuple[RendererName, ...]] = ("tiny", "gl", "auto")
-BACKGROUND_RGB: Final = (255, 255, 255)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drawing:
-    """What a backend has drawn: one row and column a sample.
+    """The result of a backend: one row and column per sample of the view.
 
     Attributes:
         rgb: (h, w, 3) uint8; white where there is nothing.
@@ -34,10 +33,10 @@ class Drawing:
     body_ids: NDArray[np.int32]
 
 
-class PictureBackend(Protocol):
-    """A PyBullet client of its own that only draws.
+class RenderBackend(Protocol):
+    """A PyBullet client without physics, and a renderer for its bodies.
 
-    ``shares_textures`` says that shapes with one picture keep one copy of it.
+    ``shares_textures`` says whether shapes with the same texture share one copy of it.
     """
 
     name: BackendName
@@ -49,28 +48,25 @@ class PictureBackend(Protocol):
         ...
 
     def texture(self, rgb: NDArray[np.uint8]) -> int:
-        """Register a picture (H, W, 3); returns its number for :meth:`shape`."""
+        """Register a texture (H, W, 3); return its number for :meth:`shape`."""
         ...
 
-    def shape(self, mesh: Mesh, colour: tuple[float, float, float], texture: int | None) -> int:
-        """Register a visual shape; returns PyBullet's id of it."""
+    def shape(self, mesh: Mesh, colour: Colour, texture: int | None) -> int:
+        """Register a visual shape; return PyBullet's id of it."""
         ...
 
-    def dress(self, body: int, link: int, shape: int, texture: int | None) -> None:
-        """Let a link (−1: base) show its shape, with the texture that was registered with it."""
+    def attach(self, body: int, link: int, shape: int, texture: int | None) -> None:
+        """Draw a shape on a link (−1: base), with the texture that it was registered with."""
         ...
 
     def hide(self, body: int) -> None:
-        """Draw a body no longer, in no buffer."""
+        """Stop drawing a body, in every buffer."""
         ...
 
     def reveal(self, body: int) -> None:
         """Draw a hidden body again."""
         ...
 
-    def draw(self, view: RenderView, light: Lighting, least_depth_m: float) -> Drawing:
-        """Draw the view as if the light were white and cast no shadows.
-
-        Nothing in it is nearer than ``least_depth_m``.
-        """
+    def draw(self, view: RenderView, light: Lighting) -> Drawing:
+        """Draw the view as if the light were white and cast no shadows."""
         ...

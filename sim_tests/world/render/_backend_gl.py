@@ -1,15 +1,19 @@
-"""Drawing with OpenGL without a window: the quickest, on Mesa's software rasteriser as well.
+"""The renderer ``"gl"``: OpenGL 3.3 without a window, through moderngl (extra ``awarenav[sim]``).
 
-Bodies live in a PyBullet client of their own, as with the other renderers, which knows their poses;
-what they look like is kept here. One picture takes one pass: beside the colour it writes the
-distance itself, which no near plane coarsens, and the body's number. moderngl is part of the
-optional dependency ``awarenav[sim]``.
+It is the fastest renderer, on Mesa's software rasteriser as well. PyBullet holds the poses of the
+bodies, this module holds their meshes and textures. One pass draws an image: it writes colour, the
+depth as a distance (so the near plane does not limit its precision) and the number of the body.
+
+The OpenGL context comes from EGL on Linux, and from the system (CGL, WGL) on macOS and Windows. It
+is tested on Linux only; ``gl_works`` tells whether a context starts, and the renderer ``"auto"``
+then falls back to ``"tiny"``.
 """
 
 from __future__ import annotations
 
 import os
 import sys
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final
 
@@ -21,7 +25,7 @@ from perception.arrays import FloatArray
 
 from ..bullet import pybullet
 from ..errors import SimError
-from ..hall import Lighting, Mesh
+from ..hall import Colour, Lighting, Mesh
 from ._backend import BackendName, Drawing
 from ._view import RenderView
 
@@ -32,51 +36,53 @@ uniform mat3 odom_body;
 in vec3 position;
 in vec3 normal;
 in vec2 uv;
-out vec3 facing;
-out vec2 texel;
+out vec3 normal_odom;
+out vec2 texture_uv;
 out float depth;
 void main() {
     gl_Position = clip_body * vec4(position, 1.0);
-    facing = odom_body * normal;
-    texel = uv;
+    normal_odom = odom_body * normal;
+    texture_uv = uv;
     depth = gl_Position.w;
 }
 """
 _FRAGMENT_SHADER: Final = """
 #version 330
-uniform sampler2D picture;
+uniform sampler2D surface;
 uniform vec3 colour;
-uniform vec3 lamp;
-uniform vec2 strength;
-uniform float mark;
-in vec3 facing;
-in vec2 texel;
+uniform vec3 to_light;
+uniform vec2 ambient_diffuse;
+uniform float label;
+in vec3 normal_odom;
+in vec2 texture_uv;
 in float depth;
 layout(location = 0) out vec4 out_colour;
-layout(location = 1) out vec2 out_depth_and_mark;
+layout(location = 1) out vec2 out_depth_and_label;
 void main() {
-    float lit = strength.x + strength.y * max(dot(normalize(facing), lamp), 0.0);
-    out_colour = vec4(texture(picture, texel).rgb * colour * lit, 1.0);
-    out_depth_and_mark = vec2(depth, mark);
+    float cosine = max(dot(normalize(normal_odom), to_light), 0.0);
+    float light = ambient_diffuse.x + ambient_diffuse.y * cosine;
+    out_colour = vec4(texture(surface, texture_uv).rgb * colour * light, 1.0);
+    out_depth_and_label = vec2(depth, label);
 }
 """
-# What PyBullet holds in place of a shape: it never draws it.
-_STAND_IN_M: Final = 0.01
-# Buffers are cleared with ones, so a body's mark is its number and two more.
-_FIRST_MARK: Final = 2
+# Half extent of the placeholder that PyBullet holds for each shape; it is never drawn.
+_PLACEHOLDER_M: Final = 0.01
+# A body's label is its number plus this: buffers are cleared with ones, which label nothing.
+_FIRST_LABEL: Final = 2
 
 
+@dataclass(frozen=True, slots=True, eq=False)
 class _Shape:
-    """A mesh on its way to the rasteriser."""
+    """A mesh in OpenGL's memory: its vertex array and buffers, colour and texture."""
 
-    __slots__ = ("array", "buffers", "colour", "texture")
-
-    def __init__(self, array: Any, buffers: tuple[Any, ...], colour: Any, texture: Any) -> None:
-        self.array, self.buffers, self.colour, self.texture = array, buffers, colour, texture
+    array: Any
+    buffers: tuple[Any, ...]
+    colour: Colour
+    texture: Any
 
 
 class GlBackend:
-    """See :class:`PictureBackend`.
+    """See :class:`RenderBackend`.
 
     Raises:
         SimError: when moderngl is not installed or finds no OpenGL 3.3 here.
@@ -87,20 +93,20 @@ class GlBackend:
 
     def __init__(self) -> None:
         self.client = -1
-        self._context, self._program = _start(os.getpid())
+        self._context, self._program = _context_and_program(os.getpid())
         client: int = pybullet.connect(pybullet.DIRECT)
         if client < 0:
-            raise SimError("PyBullet could not start another picture world")
+            raise SimError("PyBullet could not start another render world")
         self.client = client
         self._textures = [self._upload(np.full((1, 1, 3), 255, dtype=np.uint8))]
         self._shapes: dict[int, _Shape] = {}
-        # What each body shows, by link (−1: base).
+        # Links (−1: base) with their shapes, by body.
         self._bodies: dict[int, list[tuple[int, _Shape]]] = {}
         self._hidden: set[int] = set()
-        self._target: Any = None
+        self._framebuffer: Any = None
 
     def close(self) -> None:
-        """End the client and give back what the pictures were drawn from."""
+        """End the client and free the memory of meshes, textures and buffers."""
         if self.client < 0:
             return
         pybullet.disconnect(physicsClientId=self.client)
@@ -111,19 +117,19 @@ class GlBackend:
                     buffer.release()
             for texture in self._textures:
                 texture.release()
-            if self._target is not None:
-                _release_target(self._target)
+            if self._framebuffer is not None:
+                _release_framebuffer(self._framebuffer)
 
     def texture(self, rgb: NDArray[np.uint8]) -> int:
-        """Register a picture (H, W, 3)."""
+        """Register a texture (H, W, 3)."""
         self._textures.append(self._upload(rgb))
         return len(self._textures) - 1
 
-    def shape(self, mesh: Mesh, colour: tuple[float, float, float], texture: int | None) -> int:
+    def shape(self, mesh: Mesh, colour: Colour, texture: int | None) -> int:
         """Register a visual shape with its texture."""
         number = int(
             pybullet.createVisualShape(
-                pybullet.GEOM_BOX, halfExtents=[_STAND_IN_M] * 3, physicsClientId=self.client
+                pybullet.GEOM_BOX, halfExtents=[_PLACEHOLDER_M] * 3, physicsClientId=self.client
             )
         )
         uv = np.zeros((len(mesh.vertices_m), 2)) if mesh.uv is None else mesh.uv
@@ -141,80 +147,82 @@ class GlBackend:
         self._shapes[number] = _Shape(array, buffers, colour, self._textures[texture or 0])
         return number
 
-    def dress(self, body: int, link: int, shape: int, texture: int | None) -> None:
-        """Remember what a link shows."""
+    def attach(self, body: int, link: int, shape: int, texture: int | None) -> None:
+        """Draw a shape on a link."""
         self._bodies.setdefault(body, []).append((link, self._shapes[shape]))
 
     def hide(self, body: int) -> None:
-        """Draw a body no longer."""
+        """Stop drawing a body."""
         self._hidden.add(body)
 
     def reveal(self, body: int) -> None:
         """Draw a hidden body again."""
         self._hidden.discard(body)
 
-    def draw(self, view: RenderView, light: Lighting, least_depth_m: float) -> Drawing:
+    def draw(self, view: RenderView, light: Lighting) -> Drawing:
         """Draw the view as if the light were white, in one pass."""
         towards = np.asarray(light.direction_odom, dtype=np.float64)
         with self._context:
-            target = self._target_of(view.width, view.height)
-            part = (0, 0, view.width, view.height)
-            target.use()
-            target.viewport = part
+            framebuffer = self._framebuffer_for(view.width, view.height)
+            viewport = (0, 0, view.width, view.height)
+            framebuffer.use()
+            framebuffer.viewport = viewport
             self._context.enable(self._context.DEPTH_TEST)
-            target.clear(1.0, 1.0, 1.0, 1.0, viewport=part)
+            framebuffer.clear(1.0, 1.0, 1.0, 1.0, viewport=viewport)
             program = self._program
-            program["lamp"].value = tuple((towards / float(np.linalg.norm(towards))).tolist())
-            program["strength"].value = (light.ambient, light.diffuse)
+            program["to_light"].value = tuple((towards / float(np.linalg.norm(towards))).tolist())
+            program["ambient_diffuse"].value = (light.ambient, light.diffuse)
             self._draw_bodies(_clip_odom(view))
-            return _read(target, part)
+            return _read(framebuffer, viewport)
 
     def _draw_bodies(self, clip_odom: FloatArray) -> None:
-        """Draw every body that is not hidden where PyBullet has it."""
+        """Draw every body that is not hidden, at PyBullet's poses."""
         parts: list[tuple[int, _Shape]] = []
-        places: list[tuple[float, ...]] = []
-        for body, shown in self._bodies.items():
+        poses: list[tuple[float, ...]] = []
+        for body, links in self._bodies.items():
             if body in self._hidden:
                 continue
-            for link, shape in shown:
+            for link, shape in links:
                 parts.append((body, shape))
-                places.append(self._place(body, link))
+                poses.append(self._pose(body, link))
         if not parts:
             return
-        where = np.array(places)
+        pose = np.array(poses)
         T_odom_body = np.zeros((len(parts), 4, 4))
-        T_odom_body[:, :3, :3] = Rotation.from_quat(where[:, 3:]).as_matrix()
-        T_odom_body[:, :3, 3] = where[:, :3]
+        T_odom_body[:, :3, :3] = Rotation.from_quat(pose[:, 3:]).as_matrix()
+        T_odom_body[:, :3, 3] = pose[:, :3]
         T_odom_body[:, 3, 3] = 1.0
-        # Column by column, as OpenGL takes them.
-        clips = np.swapaxes(clip_odom @ T_odom_body, 1, 2).astype(np.float32)
-        turns = np.swapaxes(T_odom_body[:, :3, :3], 1, 2).astype(np.float32)
-        clip, turn, colour, mark = (
-            self._program[name] for name in ("clip_body", "odom_body", "colour", "mark")
+        # OpenGL takes matrices column by column.
+        clip_bodies = np.swapaxes(clip_odom @ T_odom_body, 1, 2).astype(np.float32)
+        odom_bodies = np.swapaxes(T_odom_body[:, :3, :3], 1, 2).astype(np.float32)
+        clip_uniform, odom_uniform, colour_uniform, label_uniform = (
+            self._program[name] for name in ("clip_body", "odom_body", "colour", "label")
         )
-        for (body, shape), to_clip, to_odom in zip(parts, clips, turns, strict=True):
-            clip.write(to_clip.tobytes())
-            turn.write(to_odom.tobytes())
-            colour.value = shape.colour
-            mark.value = float(body + _FIRST_MARK)
+        for (body, shape), clip_body, odom_body in zip(
+            parts, clip_bodies, odom_bodies, strict=True
+        ):
+            clip_uniform.write(clip_body.tobytes())
+            odom_uniform.write(odom_body.tobytes())
+            colour_uniform.value = shape.colour
+            label_uniform.value = float(body + _FIRST_LABEL)
             shape.texture.use(0)
             shape.array.render()
 
-    def _place(self, body: int, link: int) -> tuple[float, ...]:
-        """Position and quaternion of a link in odom."""
+    def _pose(self, body: int, link: int) -> tuple[float, ...]:
+        """Return position and quaternion (7 numbers) of a link in odom."""
         if link < 0:
-            position, turn = pybullet.getBasePositionAndOrientation(
+            position, quaternion = pybullet.getBasePositionAndOrientation(
                 body, physicsClientId=self.client
             )
         else:
             state = pybullet.getLinkState(
                 body, link, computeForwardKinematics=1, physicsClientId=self.client
             )
-            position, turn = state[4], state[5]
-        return (*position, *turn)
+            position, quaternion = state[4], state[5]
+        return (*position, *quaternion)
 
     def _upload(self, rgb: NDArray[np.uint8]) -> Any:
-        """A texture whose first row is the picture's last, as texture coordinates count."""
+        """Return an OpenGL texture; its rows are reversed, since v counts from the bottom."""
         height, width = rgb.shape[:2]
         with self._context:
             texture = self._context.texture(
@@ -223,37 +231,37 @@ class GlBackend:
             texture.filter = (self._context.NEAREST, self._context.NEAREST)
         return texture
 
-    def _target_of(self, width: int, height: int) -> Any:
-        """What to draw into, at least so large; it grows with the pictures asked for."""
-        target = self._target
-        if target is None or target.width < width or target.height < height:
-            if target is not None:
-                width, height = max(width, target.width), max(height, target.height)
-                _release_target(target)
-            target = self._context.framebuffer(
+    def _framebuffer_for(self, width: int, height: int) -> Any:
+        """Return a framebuffer of at least this size; it grows to the largest image asked for."""
+        framebuffer = self._framebuffer
+        if framebuffer is None or framebuffer.width < width or framebuffer.height < height:
+            if framebuffer is not None:
+                width, height = max(width, framebuffer.width), max(height, framebuffer.height)
+                _release_framebuffer(framebuffer)
+            framebuffer = self._context.framebuffer(
                 [
                     self._context.renderbuffer((width, height), 4),
                     self._context.renderbuffer((width, height), 2, dtype="f4"),
                 ],
                 self._context.depth_renderbuffer((width, height)),
             )
-            self._target = target
-        return target
+            self._framebuffer = framebuffer
+        return framebuffer
 
 
 @lru_cache(maxsize=1)
 def gl_works() -> bool:
-    """Whether there is OpenGL without a window here; found out once a process."""
+    """Return whether OpenGL starts without a window here; it is tried once per process."""
     try:
-        _start(os.getpid())
+        _context_and_program(os.getpid())
     except SimError:
         return False
     return True
 
 
 @lru_cache(maxsize=1)
-def _start(process: int) -> tuple[Any, Any]:
-    """The context and the program of this process: all its picture worlds share them."""
+def _context_and_program(process_id: int) -> tuple[Any, Any]:
+    """Return the context and the shader program that all render worlds of a process share."""
     try:
         import moderngl  # noqa: PLC0415
     except ImportError as cause:
@@ -262,38 +270,40 @@ def _start(process: int) -> tuple[Any, Any]:
             "'sim': pip install 'awarenav[sim]', or use renderer='tiny'"
         ) from cause
     try:
-        # Elsewhere the system offers contexts without a window by itself.
-        where: dict[str, Any] = {"backend": "egl"} if sys.platform == "linux" else {}
-        context = moderngl.create_context(standalone=True, require=330, **where)
+        # macOS and Windows offer contexts without a window by themselves.
+        backend: dict[str, Any] = {"backend": "egl"} if sys.platform == "linux" else {}
+        context = moderngl.create_context(standalone=True, require=330, **backend)
         return context, context.program(_VERTEX_SHADER, _FRAGMENT_SHADER)
-    except Exception as cause:  # of whatever kind the driver's loader raises
+    except Exception as cause:  # drivers raise errors of many kinds
+        need = "libEGL (Mesa's will do)" if sys.platform == "linux" else "a driver for OpenGL 3.3"
         raise SimError(
-            f"OpenGL without a window does not start here ({cause}); it needs libEGL (Mesa's will "
-            "do); use renderer='tiny' or 'auto'"
+            f"OpenGL without a window does not start here ({cause}); it needs {need}; "
+            "use renderer='tiny' or 'auto'"
         ) from cause
 
 
 def _clip_odom(view: RenderView) -> FloatArray:
-    """(4, 4) from odom to clip space, upside down: the first row read is the picture's first."""
+    """Return (4, 4) from odom to clip space, upside down: OpenGL reads its lowest row first."""
     projection = np.array(view.projection_matrix()).reshape(4, 4).T
     projection[1] *= -1.0
     return np.asarray(projection @ np.array(view.view_matrix()).reshape(4, 4).T)
 
 
-def _read(target: Any, part: tuple[int, int, int, int]) -> Drawing:
-    size = (part[3], part[2])
-    rgba = np.frombuffer(target.read(part, components=4, attachment=0), dtype=np.uint8)
+def _read(framebuffer: Any, viewport: tuple[int, int, int, int]) -> Drawing:
+    """Return the drawing in the framebuffer's viewport."""
+    size = (viewport[3], viewport[2])
+    rgba = np.frombuffer(framebuffer.read(viewport, components=4, attachment=0), dtype=np.uint8)
     data = np.frombuffer(
-        target.read(part, components=2, attachment=1, dtype="f4"), dtype=np.float32
-    )
-    depth, mark = data.reshape(*size, 2)[..., 0], data.reshape(*size, 2)[..., 1]
-    body_ids = mark.astype(np.int32) - _FIRST_MARK
+        framebuffer.read(viewport, components=2, attachment=1, dtype="f4"), dtype=np.float32
+    ).reshape(*size, 2)
+    depth, label = data[..., 0], data[..., 1]
+    body_ids = label.astype(np.int32) - _FIRST_LABEL
     depth_m = depth.astype(np.float64)
     depth_m[body_ids < 0] = np.inf
     return Drawing(np.ascontiguousarray(rgba.reshape(*size, 4)[..., :3]), depth_m, body_ids)
 
 
-def _release_target(target: Any) -> None:
-    for attachment in (*target.color_attachments, target.depth_attachment):
+def _release_framebuffer(framebuffer: Any) -> None:
+    for attachment in (*framebuffer.color_attachments, framebuffer.depth_attachment):
         attachment.release()
-    target.release()
+    framebuffer.release()

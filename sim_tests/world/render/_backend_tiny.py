@@ -1,4 +1,4 @@
-"""Drawing with PyBullet's software renderer: it works everywhere."""
+"""The renderer ``"tiny"``: PyBullet's software renderer, on every platform that PyBullet has."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from numpy.typing import NDArray
 
 from ..bullet import pybullet
 from ..errors import SimError
-from ..hall import Lighting, Mesh
+from ..hall import Colour, Lighting, Mesh
 from ._backend import BackendName, Drawing
 from ._view import RenderView
 
-# Half a metre before the far plane counts as nothing: float32 depth is coarse out there.
+# The last half metre before the far plane counts as nothing: float32 depth is coarse there.
 _FAR_MARGIN_M: Final = 0.5
-# Column i is sampled at the fraction i / width of the frustum and, since the picture is flipped,
-# row j at (j + 1) / height from the top; shifted so, the samples are the middles of the cells.
+# The renderer samples column i at i / width of the frustum and, since the image is flipped, row j
+# at (j + 1) / height from the top. This shift moves the samples to the middles of the cells.
 _SHIFT_SAMPLES: Final = (0.5, -0.5)
 # A vertex exactly in the camera's plane has no image; the renderer draws its triangles anywhere.
-# Halls are full of corners at round coordinates: a camera along an odom axis moves aside by a hair.
+# Halls have many corners at round coordinates, so a camera along an odom axis is moved a little.
 _ALONG_AXIS: Final = 1.0 - 1e-9
-_HAIR_M: Final = 1.37e-4
+_NUDGE_M: Final = 1.37e-4
 
 
 class TinyBackend:
-    """See :class:`PictureBackend`. A body hidden by zero opacity costs 0.06 µs a picture."""
+    """See :class:`RenderBackend`. A body hidden by zero opacity costs 0.06 µs per image."""
 
     name: BackendName = "tiny"
     shares_textures = False
@@ -36,11 +36,11 @@ class TinyBackend:
     def __init__(self) -> None:
         self.client: int = pybullet.connect(pybullet.DIRECT)
         if self.client < 0:
-            raise SimError("PyBullet could not start another picture world")
+            raise SimError("PyBullet could not start another render world")
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._textures = 0
-        # Colour (r, g, b) of every link that shows something, by body.
-        self._colours: dict[int, tuple[tuple[int, tuple[float, float, float]], ...]] = {}
+        # Each link that has a shape, with its colour, by body.
+        self._colours: dict[int, tuple[tuple[int, Colour], ...]] = {}
 
     def close(self) -> None:
         """End the client."""
@@ -52,20 +52,22 @@ class TinyBackend:
             self.client = -1
 
     def texture(self, rgb: NDArray[np.uint8]) -> int:
-        """Register a picture (H, W, 3)."""
+        """Register a texture (H, W, 3)."""
         # PyBullet takes textures from files only; this format is the fastest to write and to read.
         if self._folder is None:
             self._folder = tempfile.TemporaryDirectory(prefix="awarenav-")
         self._textures += 1
-        path = write_picture(Path(self._folder.name) / f"{self._textures}.bmp", rgb)
+        path = Path(self._folder.name) / f"{self._textures}.bmp"
+        if not cv2.imwrite(str(path), np.ascontiguousarray(rgb[..., ::-1])):
+            raise SimError(f"cannot write the texture {path.name}")
         number = int(pybullet.loadTexture(str(path), physicsClientId=self.client))
         path.unlink()
         if number < 0:
             raise SimError(f"PyBullet did not take a texture of shape {rgb.shape}")
         return number
 
-    def shape(self, mesh: Mesh, colour: tuple[float, float, float], texture: int | None) -> int:
-        """Register a visual shape; its texture is put on by :meth:`dress`."""
+    def shape(self, mesh: Mesh, colour: Colour, texture: int | None) -> int:
+        """Register a visual shape; :meth:`attach` adds its texture."""
         uv = {} if mesh.uv is None else {"uvs": mesh.uv.tolist()}
         return int(
             pybullet.createVisualShape(
@@ -80,15 +82,15 @@ class TinyBackend:
             )
         )
 
-    def dress(self, body: int, link: int, shape: int, texture: int | None) -> None:
-        """Put a texture on a link."""
+    def attach(self, body: int, link: int, shape: int, texture: int | None) -> None:
+        """Set the texture of a link."""
         if texture is not None:
             pybullet.changeVisualShape(
                 body, link, textureUniqueId=texture, physicsClientId=self.client
             )
 
     def hide(self, body: int) -> None:
-        """Make a body fully transparent: the renderer then skips it."""
+        """Make a body fully transparent, so the renderer skips it."""
         self._set_opacity(body, 0.0)
 
     def reveal(self, body: int) -> None:
@@ -106,13 +108,13 @@ class TinyBackend:
                 body, link, rgbaColor=(*colour, opacity), physicsClientId=self.client
             )
 
-    def draw(self, view: RenderView, light: Lighting, least_depth_m: float) -> Drawing:
+    def draw(self, view: RenderView, light: Lighting) -> Drawing:
         """Draw the view as if the light were white."""
         width, height = view.width, view.height
         _, _, rgba, depth, bodies = pybullet.getCameraImage(
             width,
             height,
-            _off_the_corners(view),
+            _nudged_view_matrix(view),
             view.projection_matrix(_SHIFT_SAMPLES),
             lightDirection=light.direction_odom,
             lightColor=(1.0, 1.0, 1.0),
@@ -136,16 +138,9 @@ class TinyBackend:
         )
 
 
-def _off_the_corners(view: RenderView) -> list[float]:
-    """The view matrix, moved along the optical axis where that lies along an axis of odom."""
+def _nudged_view_matrix(view: RenderView) -> list[float]:
+    """Return the view matrix, moved along the optical axis if that lies along an axis of odom."""
     matrix = view.view_matrix()
     if float(np.abs(view.T_odom_camera[:3, 2]).max()) > _ALONG_AXIS:
-        matrix[14] += _HAIR_M
+        matrix[14] += _NUDGE_M
     return matrix
-
-
-def write_picture(path: Path, rgb: NDArray[np.uint8]) -> Path:
-    """Write (H, W, 3) to a file of the type that its name says; returns the path."""
-    if not cv2.imwrite(str(path), np.ascontiguousarray(rgb[..., ::-1])):
-        raise SimError(f"cannot write the texture {path.name}")
-    return path

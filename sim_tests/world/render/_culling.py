@@ -1,7 +1,6 @@
-"""Which boxes a view does not show, so that nothing is drawn in vain; plain geometry on arrays.
+"""View culling: the boxes that a view cannot show are not drawn.
 
-Every answer errs on the side of drawing: a box is left out only when no sample of the picture can
-fall on anything inside it.
+The tests are conservative: a box is left out only if no sample of the image can fall on it.
 """
 
 from __future__ import annotations
@@ -28,24 +27,24 @@ _UNIT_CORNERS: Final = np.array(
 
 
 def box_corners(boxes_m: FloatArray) -> FloatArray:
-    """(N, 8, 3) corners of axis-aligned boxes (N, 2, 3), low and high corner."""
+    """Return the corners (N, 8, 3) of axis-aligned boxes (N, 2, 3), low and high corner."""
     low, high = boxes_m[:, None, 0], boxes_m[:, None, 1]
     return np.asarray(low + _UNIT_CORNERS * (high - low))
 
 
 def to_camera(view: RenderView, corners_odom_m: FloatArray) -> FloatArray:
-    """Corners (N, 8, 3) in the view's optical frame."""
+    """Return corners (N, 8, 3) in the view's optical frame."""
     rotation, origin = view.T_odom_camera[:3, :3], view.T_odom_camera[:3, 3]
     flat = corners_odom_m.reshape(-1, 3) @ rotation - origin @ rotation
     return np.asarray(flat.reshape(corners_odom_m.shape))
 
 
 def in_view(view: RenderView, corners_camera_m: FloatArray) -> BoolArray:
-    """(N,) False for a box (N, 8, 3) outside the frustum or between the samples.
+    """Return (N,) False for a box (N, 8, 3) outside the frustum or between the samples.
 
-    A box in front of the camera projects into the rectangle around its projected corners; when no
-    sample lies in there, none falls on the box. One that reaches behind the near plane is held
-    against the frustum's side planes only.
+    A box in front of the camera projects into the rectangle around its projected corners: if no
+    sample lies in this rectangle, none falls on the box. A box that reaches behind the near plane
+    is tested against the frustum's side planes only.
     """
     x, y, z = corners_camera_m[..., 0], corners_camera_m[..., 1], corners_camera_m[..., 2]
     low_z, high_z = z.min(axis=1), z.max(axis=1)
@@ -62,14 +61,15 @@ def in_view(view: RenderView, corners_camera_m: FloatArray) -> BoolArray:
         (y[rows], view.top, view.bottom, view.height),
     ):
         scale = samples / (far_edge - edge)
-        at = (along / depth - edge) * scale - 0.5  # sample i lies at i
-        first = np.ceil(at.min(axis=1) - _SLACK_SAMPLES)
-        last = np.floor(at.max(axis=1) + _SLACK_SAMPLES)
+        samples_at = (along / depth - edge) * scale - 0.5  # sample i lies at i
+        first = np.ceil(samples_at.min(axis=1) - _SLACK_SAMPLES)
+        last = np.floor(samples_at.max(axis=1) + _SLACK_SAMPLES)
         shown[rows] &= np.maximum(first, 0.0) <= np.minimum(last, samples - 1.0)
     return shown
 
 
 def _between_planes(view: RenderView, x: FloatArray, y: FloatArray, z: FloatArray) -> BoolArray:
+    """Return (N,) False for boxes with all corners (N, 8) beyond one side plane."""
     slack = _SLACK_TANGENT * np.abs(z) + _SLACK_M
     return np.asarray(
         (x - view.left * z > -slack).any(axis=1)
@@ -79,30 +79,14 @@ def _between_planes(view: RenderView, x: FloatArray, y: FloatArray, z: FloatArra
     )
 
 
-def least_depth_m(view: RenderView, corners_camera_m: FloatArray) -> FloatArray:
-    """(N,) a depth that no visible part of a box (N, 8, 3) goes below; at least the near plane.
-
-    Beside the lowest corner it uses the frustum's sides: what lies 1.4 m below the camera is not
-    seen before the lower edge of the picture has come down to it.
-    """
-    low, high = corners_camera_m.min(axis=1), corners_camera_m.max(axis=1)
-    out = np.maximum(low[:, 2], view.near_m)
-    for axis, edge, far_edge in ((0, view.left, view.right), (1, view.top, view.bottom)):
-        if far_edge > 0.0:
-            np.maximum(out, low[:, axis] / far_edge, out=out)
-        if edge < 0.0:
-            np.maximum(out, high[:, axis] / edge, out=out)
-    return np.asarray(out)
-
-
 def hidden_behind(
     view: RenderView, corners_odom_m: FloatArray, occluders_odom_m: FloatArray
 ) -> BoolArray:
-    """(N,) True for a box (N, 8, 3) that lies wholly behind one of the solid occluders (M, 2, 3).
+    """Return (N,) True for a box (N, 8, 3) wholly behind one of the solid occluders (M, 2, 3).
 
-    The shadow that a convex body casts from a point is convex, so a box whose eight corners lie in
-    it lies in it altogether. A corner is in the shadow when the segment from the camera to it meets
-    the occluder. An occluder that the near plane may cut open hides nothing.
+    The shadow of a convex body from a point is convex, so a box lies in it if its eight corners
+    do. A corner lies in it if the segment from the camera to the corner meets the occluder. An
+    occluder that the near plane may cut open hides nothing.
     """
     hidden = np.zeros(len(corners_odom_m), dtype=bool)
     eye = view.T_odom_camera[:3, 3]
@@ -114,7 +98,7 @@ def hidden_behind(
     solids = occluders_odom_m[whole]
     if not len(solids) or not len(corners_odom_m):
         return hidden
-    # A hidden box has a hidden centre, and few have: the corners are looked at for those only.
+    # A hidden box has a hidden centre: the corners are tested for these few boxes only.
     centres = corners_odom_m.mean(axis=1)
     box, solid = np.nonzero(_meets(eye, centres[:, None, :], solids[None]))
     behind = _meets(eye, corners_odom_m[box], solids[solid][:, None]).all(axis=1)
@@ -123,7 +107,7 @@ def hidden_behind(
 
 
 def _meets(eye: FloatArray, ends: FloatArray, boxes: FloatArray) -> BoolArray:
-    """Whether segments from ``eye`` to ``ends`` (…, 3) meet boxes (…, 2, 3), by slabs."""
+    """Return whether segments from ``eye`` to ``ends`` (…, 3) meet boxes (…, 2, 3), by slabs."""
     along = ends - eye
     along = np.where(np.abs(along) < _TINY, _TINY, along)
     first = (boxes[..., 0, :] - eye) / along

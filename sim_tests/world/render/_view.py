@@ -1,9 +1,9 @@
-"""The part of the world that a picture shows: a pinhole frustum over a grid of samples."""
+"""The view of a drawing: a pinhole frustum over a grid of samples."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,18 +18,18 @@ from ..errors import SimError
 class RenderView:
     """A rectangle of a camera's image plane, divided into equal cells with a sample in each middle.
 
-    Edges are tangents: an edge at ``left`` is the plane x = left · z of the optical frame (x right,
+    Edges are tangents: the edge ``left`` is the plane x = left · z of the optical frame (x right,
     y down, z forward).
 
     Attributes:
         T_odom_camera: (4, 4) optical frame to odom.
         left: tangent of the rectangle's left edge.
-        right: > left.
-        top: tangent of the rectangle's upper edge.
-        bottom: > top.
-        width: samples a row.
-        height: samples a column.
-        near_m: nothing closer is drawn.
+        right: tangent of its right edge, > left.
+        top: tangent of its upper edge.
+        bottom: tangent of its lower edge, > top.
+        width: samples per row.
+        height: samples per column.
+        near_m: nothing nearer is drawn.
         far_m: nothing farther is drawn.
     """
 
@@ -54,15 +54,15 @@ class RenderView:
         near_m: float = 0.05,
         far_m: float = 60.0,
     ) -> RenderView:
-        """The view of a rectangle of an undistorted camera's image.
+        """Return the view of a rectangle of a camera's image.
 
         Args:
             camera: without distortion.
             T_odom_camera: (4, 4), optical frame to odom.
-            roi_xyxy_px: (4,) u_min, v_min, u_max, v_max in pixels counted from the image's corner;
-                None is the whole image.
-            size_px: samples a row and a column; None is one a pixel of the rectangle.
-            near_m: nothing closer is drawn, > 0.
+            roi_xyxy_px: (4,) u_min, v_min, u_max, v_max in pixels from the image's corner; None is
+                the whole image.
+            size_px: samples per row and per column; None is one per pixel of the rectangle.
+            near_m: nothing nearer is drawn, > 0.
             far_m: nothing farther is drawn.
 
         Raises:
@@ -70,7 +70,7 @@ class RenderView:
         """
         if camera.distortion is not None:
             raise SimError(
-                "the renderer makes undistorted pictures; use a camera with distortion=None"
+                "the renderer makes undistorted images; use a camera with distortion=None"
             )
         T = rigid_transform("T_odom_camera", T_odom_camera, SimError)
         if roi_xyxy_px is None:
@@ -104,62 +104,29 @@ class RenderView:
 
     @property
     def samples_per_m(self) -> float:
-        """How many samples a metre spans that lies across the view at 1 m distance."""
+        """The number of samples per metre of a line across the view at 1 m distance."""
         return self.width / (self.right - self.left)
 
     def finer(self, factor: int) -> RenderView:
-        """The same rectangle with ``factor`` times the samples each way."""
-        return self.changed(width=self.width * factor, height=self.height * factor)
-
-    def tiles(self, max_width: int, max_height: int) -> list[tuple[slice, slice, RenderView]]:
-        """Cut the grid into pieces no larger than given: rows, columns and the view of each."""
-        step_u = (self.right - self.left) / self.width
-        step_v = (self.bottom - self.top) / self.height
-        out = []
-        for row in range(0, self.height, max_height):
-            for column in range(0, self.width, max_width):
-                width = min(max_width, self.width - column)
-                height = min(max_height, self.height - row)
-                out.append(
-                    (
-                        slice(row, row + height),
-                        slice(column, column + width),
-                        self.changed(
-                            left=self.left + column * step_u,
-                            right=self.left + (column + width) * step_u,
-                            top=self.top + row * step_v,
-                            bottom=self.top + (row + height) * step_v,
-                            width=width,
-                            height=height,
-                        ),
-                    )
-                )
-        return out
-
-    def changed(self, **fields: Any) -> RenderView:
-        """A copy with other values of some attributes."""
-        values = {name: getattr(self, name) for name in self.__slots__}
-        return RenderView(**{**values, **fields})
+        """Return the same rectangle with ``factor`` times the samples in each direction."""
+        return replace(self, width=self.width * factor, height=self.height * factor)
 
     def view_matrix(self) -> list[float]:
-        """OpenGL's view matrix, column by column: its camera looks along −z with y up."""
+        """Return OpenGL's view matrix, column by column: its camera looks along −z with y up."""
         rotation, origin = self.T_odom_camera[:3, :3], self.T_odom_camera[:3, 3]
         out = np.eye(4)
         out[:3, :3] = rotation.T * np.array([[1.0], [-1.0], [-1.0]])
         out[:3, 3] = out[:3, :3] @ -origin
         return [float(value) for value in out.T.flat]
 
-    def projection_matrix(
-        self, shift_samples: tuple[float, float] = (0.0, 0.0), near_m: float | None = None
-    ) -> list[float]:
-        """OpenGL's projection matrix of the frustum, column by column.
+    def projection_matrix(self, shift_samples: tuple[float, float] = (0.0, 0.0)) -> list[float]:
+        """Return OpenGL's projection matrix of the frustum, column by column.
 
         Args:
-            shift_samples: moves the frustum right and down by so many cells of the grid, for a
+            shift_samples: moves the frustum right and down by this many cells of the grid, for a
                 renderer that does not sample in the middle of a cell.
-            near_m: another near plane.
         """
-        near, far = self.near_m if near_m is None else near_m, self.far_m
+        near, far = self.near_m, self.far_m
         shift_u = shift_samples[0] * (self.right - self.left) / self.width
         shift_v = shift_samples[1] * (self.bottom - self.top) / self.height
         left, right = self.left + shift_u, self.right + shift_u

@@ -1,97 +1,83 @@
-"""The picture world: all that a camera sees, apart from the physics."""
+"""The render world: the scenery and the actors that cameras see, apart from the physics."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Set as AbstractSet
+from contextlib import AbstractContextManager
 from dataclasses import replace
+from types import TracebackType
 from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from awarenav.closing import Closing
 from awarenav.errors import not_one_of
 from perception.arrays import FloatArray
 
 from ..bullet import pybullet
 from ..errors import SimError
 from ..hall import Colour, Lighting, Mesh, WarehouseLayout, scenery, scenery_texture
-from ._backend import RENDERERS, Drawing, PictureBackend, RendererName
+from ._backend import RENDERERS, Drawing, RenderBackend, RendererName
 from ._backend_gl import GlBackend, gl_works
 from ._backend_tiny import TinyBackend
-from ._culling import box_corners, hidden_behind, in_view, least_depth_m, to_camera
+from ._culling import box_corners, hidden_behind, in_view, to_camera
 from ._texture_islands import cut_texture
 from ._view import RenderView
 
-
-def make_backend(renderer: str) -> PictureBackend:
-    """Start the backend called ``renderer``; ``"auto"`` takes the quickest that works here.
-
-    Raises:
-        SimError: for an unknown name, and for ``"gl"`` where that does not work.
-    """
-    if renderer not in RENDERERS:
-        raise SimError(not_one_of("renderer", renderer, RENDERERS))
-    if renderer == "gl" or (renderer == "auto" and gl_works()):
-        return GlBackend()
-    return TinyBackend()
-
-
-WHITE: Final[Colour] = (1.0, 1.0, 1.0)
-
-# A rack is closed at its ends, on top and along its middle: whatever enters its box meets a wall of
-# it. The box that hides is this much smaller on every side.
-_RACK_SKIN_M: Final = 0.05
+_WHITE: Final[Colour] = (1.0, 1.0, 1.0)
+# A rack is closed at its ends, on top and along its middle, so it hides what is behind its box.
+# The box used for hiding is smaller by this on every side.
+_RACK_MARGIN_M: Final = 0.05
 
 
 class VisualActor(Protocol):
-    """Something that moves and is seen."""
+    """Something that moves and that cameras see."""
 
     @property
     def kind(self) -> str:
-        """``"person"``, ``"robot"`` or ``"prop"``."""
+        """The kind of actor: ``"person"``, ``"robot"`` or ``"prop"``."""
         ...
 
     def bounds_odom_m(self) -> FloatArray:
-        """(2, 3) low and high corner of a box that holds all of it now; cheap."""
+        """Return the low and high corner (2, 3) of a box around all of it now; cheap."""
         ...
 
     def build(self, visuals: Visuals) -> None:
-        """Make its bodies in the picture world; called once, before it is first drawn."""
+        """Make its bodies in the render world; called once, before it is first drawn."""
         ...
 
     def show(self, pixels_per_m: float | None, view: RenderView | None = None) -> None:
-        """Pose its bodies for the coming picture at this level of detail; None: hide them.
+        """Pose its bodies for the next image at this level of detail; None: hide them.
 
-        An actor of many bodies may hide those that ``view`` does not show; None shows them all.
+        An actor of many bodies may hide those outside ``view``; None shows them all.
         """
         ...
 
     def bodies(self) -> AbstractSet[int]:
-        """Ids of its bodies in the picture world."""
+        """Return the ids of its bodies in the render world."""
         ...
 
 
-class Visuals(Closing):
-    """Bodies without physics in a PyBullet client of its own; close it, or use it in a ``with``.
+class Visuals(AbstractContextManager["Visuals"]):
+    """The render world, a PyBullet client of its own without physics; use it in a ``with`` block.
 
-    Scenery stands still; actors move. Before a picture, :meth:`prepare` hides what that picture
-    does not show: outside the frustum, between the samples, or behind a rack.
+    Scenery stands still; actors move. Before each image, :meth:`prepare` hides the bodies that the
+    image cannot show: those outside the frustum, between the samples, or behind a rack.
 
     Args:
         layout: the hall whose scenery is built; None leaves the world empty.
-        renderer: ``"tiny"`` is PyBullet's software renderer, ``"gl"`` OpenGL without a window,
-            and ``"auto"`` the quickest that works.
+        renderer: ``"tiny"`` is PyBullet's software renderer, ``"gl"`` is OpenGL without a window,
+            and ``"auto"`` is the fastest of the two that works here.
         variant: number of the scenery's variant (goods, colours, wear).
 
     Attributes:
-        client: PyBullet's id of this world.
         renderer: ``"tiny"`` or ``"gl"``, the one in use.
-        culling: whether :meth:`prepare` hides what is not seen; the pictures are the same.
+        culling: whether :meth:`prepare` hides bodies that the image cannot show; it never changes
+            the image.
 
     Raises:
-        SimError: when a renderer is asked for that does not work here.
+        SimError: for an unknown renderer, and for ``"gl"`` where OpenGL does not start.
     """
 
     def __init__(
@@ -101,12 +87,13 @@ class Visuals(Closing):
         variant: int = 0,
     ) -> None:
         self.culling = True
-        self._backend: PictureBackend = make_backend(renderer)
+        self._backend: RenderBackend = _start_backend(renderer)
         self.renderer = self._backend.name
-        self._pictures: list[NDArray[np.uint8]] = []
-        self._numbers: dict[bytes, int] = {}
-        self._loaded: dict[bytes, int] = {}
-        self._texture_of_shape: dict[int, int] = {}
+        # Textures as registered, with their numbers by content; the backend's numbers by content.
+        self._textures: list[NDArray[np.uint8]] = []
+        self._texture_numbers: dict[bytes, int] = {}
+        self._backend_textures: dict[bytes, int] = {}
+        self._backend_texture_of_shape: dict[int, int] = {}
         self._actors: list[VisualActor] = []
         self._built: set[int] = set()
         self._shown_actors: set[int] = set()
@@ -127,43 +114,51 @@ class Visuals(Closing):
         """PyBullet's id of this world; −1 once it is closed."""
         return self._backend.client
 
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
     def close(self) -> None:
-        """End the picture world; a second call does nothing."""
+        """End the render world; a second call does nothing."""
         self._backend.close()
 
     def texture(self, rgb: NDArray[np.uint8]) -> int:
-        """Register a picture (H, W, 3) uint8; equal pictures get the same number."""
+        """Register a texture (H, W, 3) uint8; equal textures get the same number."""
         image = np.ascontiguousarray(rgb)
         if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3 or not image.size:
             raise SimError(
                 f"a texture must be uint8 of shape (H, W, 3), got {image.dtype} {image.shape}"
             )
         key = _key(image)
-        if key not in self._numbers:
-            self._numbers[key] = len(self._pictures)
-            self._pictures.append(image)
-        return self._numbers[key]
+        if key not in self._texture_numbers:
+            self._texture_numbers[key] = len(self._textures)
+            self._textures.append(image)
+        return self._texture_numbers[key]
 
-    def shape(self, mesh: Mesh, colour: Colour = WHITE, texture: int | None = None) -> int:
-        """Register a visual shape for :meth:`add_body`; returns PyBullet's id of it.
+    def shape(self, mesh: Mesh, colour: Colour = _WHITE, texture: int | None = None) -> int:
+        """Register a visual shape for :meth:`add_body`; return PyBullet's id of it.
 
-        A texture multiplies the colour.
+        The texture is multiplied by the colour.
         """
         if texture is None:
             return self._backend.shape(mesh, colour, None)
         if mesh.uv is None:
             raise SimError("a mesh with a texture needs uv coordinates")
-        uv, picture = mesh.uv, self._pictures[texture]
+        uv, rgb = mesh.uv, self._textures[texture]
         if self._backend.shares_textures:
             key = texture.to_bytes(8, "little")
         else:
-            uv, picture = cut_texture(uv, mesh.indices.ravel(), picture)
-            key = _key(picture)
-        if key not in self._loaded:
-            self._loaded[key] = self._backend.texture(picture)
-        loaded = self._loaded[key]
-        shape = self._backend.shape(replace(mesh, uv=uv), colour, loaded)
-        self._texture_of_shape[shape] = loaded
+            uv, rgb = cut_texture(uv, mesh.indices.ravel(), rgb)
+            key = _key(rgb)
+        if key not in self._backend_textures:
+            self._backend_textures[key] = self._backend.texture(rgb)
+        number = self._backend_textures[key]
+        shape = self._backend.shape(replace(mesh, uv=uv), colour, number)
+        self._backend_texture_of_shape[shape] = number
         return shape
 
     def add_body(
@@ -173,11 +168,11 @@ class Visuals(Closing):
         joints_m: FloatArray | None = None,
         parents: tuple[int, ...] = (),
     ) -> int:
-        """Make a textured body of one shape, or of a tree of shapes held by spherical joints.
+        """Make a body of one shape, or of a tree of shapes connected by spherical joints.
 
         Args:
-            shape: of the base, −1 for none.
-            link_shapes: of the links, −1 for none.
+            shape: shape of the base, −1 for none.
+            link_shapes: shapes of the links, −1 for none.
             joints_m: (L, 3) each link's joint in the frame of its parent.
             parents: row of each link's parent among the links, −1 for the base.
 
@@ -186,7 +181,7 @@ class Visuals(Closing):
         """
         count = len(link_shapes)
         origins = np.zeros((count, 3)) if joints_m is None else np.asarray(joints_m)
-        above = parents or (-1,) * count
+        parent_rows = parents or (-1,) * count
         links = {
             "linkMasses": [0.0] * count,
             "linkCollisionShapeIndices": [-1] * count,
@@ -195,7 +190,7 @@ class Visuals(Closing):
             "linkOrientations": [(0.0, 0.0, 0.0, 1.0)] * count,
             "linkInertialFramePositions": [(0.0, 0.0, 0.0)] * count,
             "linkInertialFrameOrientations": [(0.0, 0.0, 0.0, 1.0)] * count,
-            "linkParentIndices": [parent + 1 for parent in above],
+            "linkParentIndices": [parent + 1 for parent in parent_rows],
             "linkJointTypes": [pybullet.JOINT_SPHERICAL] * count,
             "linkJointAxis": [(0.0, 0.0, 1.0)] * count,
         }
@@ -209,13 +204,14 @@ class Visuals(Closing):
                 **(links if count else {}),
             )
         )
-        for link, own in enumerate((shape, *link_shapes), start=-1):
-            if own >= 0:
-                self._backend.dress(body, link, own, self._texture_of_shape.get(own))
+        for link, link_shape in enumerate((shape, *link_shapes), start=-1):
+            if link_shape >= 0:
+                texture = self._backend_texture_of_shape.get(link_shape)
+                self._backend.attach(body, link, link_shape, texture)
         return body
 
-    def add_static(self, mesh: Mesh, colour: Colour = WHITE, texture: int | None = None) -> int:
-        """Add a piece of scenery in odom; it is drawn when its box is in view."""
+    def add_static(self, mesh: Mesh, colour: Colour = _WHITE, texture: int | None = None) -> int:
+        """Add a piece of scenery in odom; return PyBullet's id of its body."""
         body = self.add_body(self.shape(mesh, colour, texture))
         bounds = np.array([mesh.vertices_m.min(axis=0), mesh.vertices_m.max(axis=0)])
         self._static_bodies.append(body)
@@ -224,45 +220,42 @@ class Visuals(Closing):
         return body
 
     def add_actor(self, actor: VisualActor) -> int:
-        """Add something that moves; returns its number in :attr:`RenderedView.actors`."""
+        """Add something that moves; return its number in :attr:`RenderedView.actors`."""
         self._actors.append(actor)
         return len(self._actors) - 1
 
     @property
     def actors(self) -> tuple[VisualActor, ...]:
-        """Every actor by its number."""
+        """The actors in the order of their numbers."""
         return tuple(self._actors)
 
     @property
     def statics(self) -> int:
-        """How many pieces of scenery there are."""
+        """The number of pieces of scenery."""
         return len(self._static_bodies)
 
     @property
     def shown_statics(self) -> int:
-        """How many of them the last picture drew."""
+        """The number of pieces of scenery that the last :meth:`prepare` did not hide."""
         return int(np.count_nonzero(self._static_shown))
 
     def hide(self, body: int) -> None:
-        """Draw a body no longer, in no buffer; it must be revealed before it is posed again."""
+        """Stop drawing a body, in every buffer."""
         self._backend.hide(body)
 
     def reveal(self, body: int) -> None:
-        """Draw a hidden body again, where it was."""
+        """Draw a hidden body again."""
         self._backend.reveal(body)
 
-    def prepare(self, view: RenderView, only: AbstractSet[int] | None = None) -> float:
-        """Hide what the view does not show and let every actor in it take its pose.
+    def prepare(self, view: RenderView, only: AbstractSet[int] | None = None) -> None:
+        """Hide the bodies that the view cannot show, and pose every actor in view.
 
         Args:
-            view: of the coming picture.
-            only: numbers of actors to draw alone, without scenery.
-
-        Returns:
-            A depth in metres that nothing seen is nearer than.
+            view: the view of the next image.
+            only: numbers of the actors to draw, without scenery; None draws everything.
         """
         if self.client < 0:
-            raise SimError("the picture world is closed: it can no longer draw")
+            raise SimError("the render world is closed: it cannot draw any more")
         corners = self._static_corners if only is None else self._static_corners[:0]
         statics = len(corners)
         if self._actors:
@@ -276,21 +269,19 @@ class Visuals(Closing):
                 shown[rows] &= ~hidden_behind(view, corners[rows], self._occluders)
         else:
             shown = np.ones(len(corners), dtype=bool)
-        least = least_depth_m(view, in_camera[shown]) if shown.any() else np.array([view.near_m])
         self._show_statics(
             shown[:statics] if only is None else np.zeros(len(self._static_bodies), dtype=bool)
         )
         self._show_actors(view, shown[statics:], in_camera[statics:], only)
-        return float(least.min())
 
-    def draw(self, view: RenderView, light: Lighting, least_depth_m: float) -> Drawing:
-        """Draw the view as :meth:`prepare` has left the world."""
-        return self._backend.draw(view, light, least_depth_m)
+    def draw(self, view: RenderView, light: Lighting) -> Drawing:
+        """Draw the bodies that are not hidden; :meth:`prepare` is called with the view before."""
+        return self._backend.draw(view, light)
 
     def actor_numbers(self, body_ids: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Number of the actor that each body id belongs to, −1 for scenery and nothing."""
-        self._grow_numbers(int(body_ids.max(initial=-1)))
-        # Row −1, the last, stands for "nothing".
+        """Return the number of the actor that each body belongs to, −1 for scenery and nothing."""
+        self._grow_actor_numbers(int(body_ids.max(initial=-1)))
+        # Id −1 is the last row, which stands for "nothing".
         return np.asarray(self._actor_numbers[body_ids])
 
     def _show_statics(self, shown: NDArray[np.bool_]) -> None:
@@ -316,18 +307,18 @@ class Visuals(Closing):
                 depth = max(float(corners_camera_m[number, :, 2].mean()), view.near_m)
                 actor.show(view.samples_per_m / depth, view if self.culling else None)
                 self._shown_actors.add(number)
-                self._enter(number, actor.bodies())
+                self._register_bodies(number, actor.bodies())
             elif number in self._shown_actors:
                 actor.show(None)
                 self._shown_actors.discard(number)
 
-    def _enter(self, number: int, bodies: AbstractSet[int]) -> None:
-        """Remember whose bodies these are; an actor may make more as it comes closer."""
-        self._grow_numbers(max(bodies, default=-1))
+    def _register_bodies(self, number: int, bodies: AbstractSet[int]) -> None:
+        """Record an actor's bodies; it may make more of them as it comes closer."""
+        self._grow_actor_numbers(max(bodies, default=-1))
         for body in bodies:
             self._actor_numbers[body] = number
 
-    def _grow_numbers(self, highest_body: int) -> None:
+    def _grow_actor_numbers(self, highest_body: int) -> None:
         size = len(self._actor_numbers)
         if highest_body + 2 > size:
             grown = np.full(max(highest_body + 2, 2 * size), -1, dtype=np.int32)
@@ -345,21 +336,30 @@ class Visuals(Closing):
         self._occluders = _solid_racks(layout)
 
 
-def _key(picture: NDArray[np.uint8]) -> bytes:
-    """Equal for equal pictures."""
+def _start_backend(renderer: str) -> RenderBackend:
+    """Start the backend of this name; ``"auto"`` takes the fastest that works here."""
+    if renderer not in RENDERERS:
+        raise SimError(not_one_of("renderer", renderer, RENDERERS))
+    if renderer == "gl" or (renderer == "auto" and gl_works()):
+        return GlBackend()
+    return TinyBackend()
+
+
+def _key(texture: NDArray[np.uint8]) -> bytes:
+    """Return a hash of a texture's shape and texels."""
     return hashlib.blake2b(
-        np.ascontiguousarray(picture).data, digest_size=16, salt=str(picture.shape).encode()[:16]
+        np.ascontiguousarray(texture).data, digest_size=16, salt=str(texture.shape).encode()[:16]
     ).digest()
 
 
 def _solid_racks(layout: WarehouseLayout) -> FloatArray:
-    """(M, 2, 3) boxes just inside the racks, which nobody sees through."""
+    """Return the boxes (M, 2, 3) just inside the racks, which hide everything behind them."""
     boxes = [
-        ((x_min, y_min, -_RACK_SKIN_M), (x_max, y_max, rack.height_m))
+        ((x_min, y_min, -_RACK_MARGIN_M), (x_max, y_max, rack.height_m))
         for rack in layout.racks
         for x_min, y_min, x_max, y_max in (rack.box_odom_m,)
     ]
     solid = np.array(boxes, dtype=np.float64).reshape(-1, 2, 3)
-    solid[:, 0] += _RACK_SKIN_M
-    solid[:, 1] -= _RACK_SKIN_M
+    solid[:, 0] += _RACK_MARGIN_M
+    solid[:, 1] -= _RACK_MARGIN_M
     return solid

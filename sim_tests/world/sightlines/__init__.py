@@ -1,4 +1,4 @@
-"""Lines of sight tested against the surfaces that pictures show, without a picture."""
+"""Lines of sight tested against the rendered surfaces of hall, people and robot, without images."""
 
 from __future__ import annotations
 

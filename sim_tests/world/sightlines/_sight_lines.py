@@ -1,4 +1,4 @@
-"""What stands between a camera and some points: scenery, people, what they hold, the robot."""
+"""Lines of sight from an eye to points, blocked by scenery, people, held things and the robot."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from ._triangles import (
     meet_triangles,
 )
 
-# What rounding may leave of a line that just touches a sphere.
+# Added to the radii of bounding spheres, against rounding of lines that just touch one.
 _MARGIN_M: Final = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlacedSurface:
-    """A set of triangles where it is now.
+    """A set of triangles at its present pose.
 
     Attributes:
-        triangles: in rigid pieces.
-        T_odom_piece: (P, 4, 4) rigid, from each piece's frame, its metres times ``scale``, to odom.
-        scale: size over that of the triangles.
+        triangles: triangles in rigid pieces.
+        T_odom_piece: (P, 4, 4) rigid, from each piece's frame, scaled by ``scale``, to odom.
+        scale: size of the surface relative to its triangles.
     """
 
     triangles: TriangleSet
@@ -42,9 +42,9 @@ class PlacedSurface:
     scale: float = 1.0
 
     def blocks(self, eye_odom_m: FloatArray, ends_odom_m: FloatArray) -> NDArray[np.bool_]:
-        """(K,) whether it lies between the eye (3,) and each of the points (K, 3)."""
-        asked = np.ones((1, len(ends_odom_m)), dtype=bool)
-        return _blocked_by((self,), eye_odom_m, ends_odom_m, asked)
+        """Return (K,) whether it lies between the eye (3,) and each of the points (K, 3)."""
+        every_line = np.ones((1, len(ends_odom_m)), dtype=bool)
+        return _blocked_by((self,), eye_odom_m, ends_odom_m, every_line)
 
 
 @runtime_checkable
@@ -52,21 +52,21 @@ class Occluder(Protocol):
     """Something that moves and hides what is behind it."""
 
     def reach_odom_m(self) -> FloatArray:
-        """(2, 3) low and high corner of a generous box about it; cheaper than its surface."""
+        """Return the low and high corner (2, 3) of a box around it; cheaper than its surface."""
         ...
 
     def surface(self, detail: int) -> PlacedSurface | None:
-        """Its surface now, at a level of detail (0 is the finest); None when there is nothing."""
+        """Return its surface now at a level of detail (0: the finest); None if it has none."""
         ...
 
 
 class SightLines:
-    """Holds straight lines against the surfaces of one hall and all that moves in it.
+    """Tests straight lines against the surfaces of one hall and of everything that moves in it.
 
     Args:
         layout: the hall.
-        variant: of its scenery.
-        actors: whatever may move in it; those that are no :class:`Occluder` hide nothing.
+        variant: number of the scenery's variant.
+        actors: everything that moves in it; an actor that is no :class:`Occluder` hides nothing.
     """
 
     def __init__(
@@ -78,12 +78,13 @@ class SightLines:
     def blocked(
         self, eye_odom_m: FloatArray, ends_odom_m: FloatArray, detail: NDArray[np.int64]
     ) -> NDArray[np.bool_]:
-        """(K,) whether anything lies between the eye (3,) and each of the points (K, 3).
+        """Return (K,) whether anything lies between the eye and each of the points.
 
         Args:
             eye_odom_m: (3,).
             ends_odom_m: (K, 3).
-            detail: (K,) of the bodies held against each line: 0 the finest, 2 the coarsest.
+            detail: (K,) level of detail of the bodies tested against each line: 0 is the finest,
+                2 the coarsest.
         """
         blocked = self._scenery.blocks(eye_odom_m[None], ends_odom_m[None])
         if not self._occluders:
@@ -94,24 +95,24 @@ class SightLines:
         near = meet_boxes(eyes, along, boxes) & ~blocked
         levels = [(level, detail == level) for level in sorted(set(detail.tolist()))]
         surfaces: list[PlacedSurface] = []
-        asked: list[NDArray[np.bool_]] = []
+        tested: list[NDArray[np.bool_]] = []
         for number in np.flatnonzero(near.any(axis=1)).tolist():
-            last: TriangleSet | None = None
-            for level, lines in levels:
-                held = near[number] & lines
-                if not held.any():
+            previous: TriangleSet | None = None
+            for level, of_level in levels:
+                lines = near[number] & of_level
+                if not lines.any():
                     continue
                 surface = self._occluders[number].surface(level)
                 if surface is None:
                     break
-                if surface.triangles is last:
-                    asked[-1] |= held  # there is one level of detail
+                if surface.triangles is previous:
+                    tested[-1] |= lines  # both levels have the same triangles
                     continue
-                last = surface.triangles
+                previous = surface.triangles
                 surfaces.append(surface)
-                asked.append(held)
+                tested.append(lines)
         if surfaces:
-            blocked |= _blocked_by(surfaces, eye_odom_m, ends_odom_m, np.array(asked))
+            blocked |= _blocked_by(surfaces, eye_odom_m, ends_odom_m, np.array(tested))
         return blocked
 
 
@@ -119,23 +120,24 @@ def _blocked_by(
     surfaces: Sequence[PlacedSurface],
     eye_odom_m: FloatArray,
     ends_odom_m: FloatArray,
-    asked: NDArray[np.bool_],
+    tested: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
-    """Whether any of S surfaces lies between the eye (3,) and each of the points (K, 3).
+    """Return (K,) whether any of S surfaces lies between the eye (3,) and each point (K, 3).
 
-    ``asked`` (S, K) says which lines each surface is held against; several surfaces at once cost
-    little more than one.
+    ``tested`` (S, K) says which lines are tested against each surface. Several surfaces at once
+    cost little more than one.
     """
     blocked = np.zeros(len(ends_odom_m), dtype=bool)
     sets = tuple(surface.triangles for surface in surfaces)
     joined = _joined(sets)
-    places = np.concatenate([surface.T_odom_piece for surface in surfaces])
+    poses = np.concatenate([surface.T_odom_piece for surface in surfaces])
     scales = np.repeat([surface.scale for surface in surfaces], joined.pieces)[:, None]
-    # Most lines pass most pieces by: only pairs of the two that come near each other are looked at.
+    # Most lines pass far from most pieces: only pairs that come near each other are tested.
     middles, radii = joined.middles_m * scales, joined.radii_m * scales[:, 0] + _MARGIN_M
-    rotations, origins = places[:, :3, :3], places[:, :3, 3]
-    away = (rotations @ middles[:, :, None])[..., 0] + (origins - eye_odom_m)
-    near = _near(away, radii, ends_odom_m - eye_odom_m) & np.repeat(asked, joined.pieces, axis=0)
+    rotations, origins = poses[:, :3, :3], poses[:, :3, 3]
+    offsets = (rotations @ middles[:, :, None])[..., 0] + (origins - eye_odom_m)
+    near = _near(offsets, radii, ends_odom_m - eye_odom_m)
+    near &= np.repeat(tested, joined.pieces, axis=0)
     piece, line = near.nonzero()
     if not piece.size:
         return blocked
@@ -144,13 +146,13 @@ def _blocked_by(
     segments = (segments - origins[piece][:, None]) @ (rotations / scales[..., None])[piece]
     eye, along = segments[:, 0], segments[:, 1] - segments[:, 0]
     eyes, inverse = np.ascontiguousarray(eye.T), inverse_of(along.T)
-    held = np.flatnonzero(meet_own_boxes(eyes, inverse, joined.piece_boxes_m[..., piece]))
-    piece = piece[held]
-    # Each pair with every cluster of triangles of its piece.
-    many = joined.counts[piece]
-    pair = np.repeat(held, many)
-    skipped = joined.starts[piece] - np.cumsum(many) + many
-    cluster = np.arange(len(pair)) + np.repeat(skipped, many)
+    pairs = np.flatnonzero(meet_own_boxes(eyes, inverse, joined.piece_boxes_m[..., piece]))
+    piece = piece[pairs]
+    # Each pair is combined with every cluster of triangles of its piece.
+    counts = joined.counts[piece]
+    pair = np.repeat(pairs, counts)
+    skipped = joined.starts[piece] - np.cumsum(counts) + counts
+    cluster = np.arange(len(pair)) + np.repeat(skipped, counts)
     boxes = joined.boxes_m[..., cluster]
     met = np.flatnonzero(meet_own_boxes(eyes[:, pair], inverse[:, pair], boxes))
     pair, cluster = pair[met], cluster[met]
@@ -159,24 +161,29 @@ def _blocked_by(
     edges, planes = np.empty((len(cluster), 6, SIDES)), np.empty((len(cluster), 4, CLUSTER))
     # Pairs are in the order of the pieces, and so of the sets.
     begin, first = 0, 0
-    for one in sets:
-        end = int(np.searchsorted(cluster, first + one.clusters))
+    for triangles in sets:
+        end = int(np.searchsorted(cluster, first + triangles.clusters))
         if end > begin:
             rows = cluster[begin:end] - first
-            one.edges.take(rows, axis=0, out=edges[begin:end], mode="clip")
-            one.planes.take(rows, axis=0, out=planes[begin:end], mode="clip")
-        begin, first = end, first + one.clusters
+            triangles.edges.take(rows, axis=0, out=edges[begin:end], mode="clip")
+            triangles.planes.take(rows, axis=0, out=planes[begin:end], mode="clip")
+        begin, first = end, first + triangles.clusters
     blocked[line[pair[meet_triangles(edges, planes, eye[pair], along[pair])]]] = True
     return blocked
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Joined:
-    """What several sets of triangles have in common tables.
+class _JoinedSets:
+    """The bounds of S sets of triangles, P pieces and C clusters, in common tables.
 
-    ``pieces`` (S,) says how many each has; of every piece of all of them, ``middles_m`` (P, 3),
-    ``radii_m`` (P,) and ``piece_boxes_m`` (2, 3, P) bound it, ``starts`` and ``counts`` (P,) are
-    its clusters; ``boxes_m`` (2, 3, C) is about each cluster.
+    Attributes:
+        pieces: (S,) number of pieces of each set.
+        middles_m: (P, 3) centre of each piece's bounding sphere, in the piece's frame.
+        radii_m: (P,) its radius.
+        piece_boxes_m: (2, 3, P) bounding box of each piece.
+        starts: (P,) first cluster of each piece.
+        counts: (P,) number of its clusters.
+        boxes_m: (2, 3, C) bounding box of each cluster.
     """
 
     pieces: NDArray[np.int64]
@@ -188,32 +195,36 @@ class _Joined:
     boxes_m: FloatArray
 
 
-@lru_cache(maxsize=128)  # the same few bodies hide each other for many frames
-def _joined(sets: tuple[TriangleSet, ...]) -> _Joined:
-    piece_boxes = np.concatenate([one.piece_boxes_m for one in sets], axis=2)
-    counts = np.concatenate([one.counts for one in sets])
+@lru_cache(maxsize=128)  # the same few bodies are near each other for many frames
+def _joined(sets: tuple[TriangleSet, ...]) -> _JoinedSets:
+    piece_boxes = np.concatenate([triangles.piece_boxes_m for triangles in sets], axis=2)
+    counts = np.concatenate([triangles.counts for triangles in sets])
     halves = 0.5 * (piece_boxes[1] - piece_boxes[0])
-    return _Joined(
-        np.array([one.pieces for one in sets]),
+    return _JoinedSets(
+        np.array([triangles.pieces for triangles in sets]),
         (0.5 * (piece_boxes[0] + piece_boxes[1])).T,
         np.sqrt((halves * halves).sum(axis=0)),
         piece_boxes,
         np.cumsum(counts) - counts,
         counts,
-        np.concatenate([one.boxes_m for one in sets], axis=2),
+        np.concatenate([triangles.boxes_m for triangles in sets], axis=2),
     )
 
 
-def _near(away_m: FloatArray, radii_m: FloatArray, along_m: FloatArray) -> NDArray[np.bool_]:
-    """(P, K) whether segments from 0 along (K, 3) come within radii (P,) of points (P, 3)."""
+def _near(points_m: FloatArray, radii_m: FloatArray, along_m: FloatArray) -> NDArray[np.bool_]:
+    """Return (P, K) whether segments from 0 along (K, 3) come within radii (P,) of points (P, 3).
+
+    Squared distances are compared.
+    """
     squares = (along_m * along_m).sum(axis=1)
-    forward = away_m @ along_m.T
+    forward = points_m @ along_m.T
     share = np.minimum(np.maximum(forward / np.maximum(squares, 1e-12), 0.0), 1.0)
-    far = (away_m * away_m).sum(axis=1)[:, None] - share * (2.0 * forward - share * squares)
-    return np.asarray(far <= (radii_m * radii_m)[:, None])
+    distances2 = (points_m * points_m).sum(axis=1)[:, None]
+    distances2 = distances2 - share * (2.0 * forward - share * squares)
+    return np.asarray(distances2 <= (radii_m * radii_m)[:, None])
 
 
-@lru_cache(maxsize=8)  # many episodes play in the same hall
+@lru_cache(maxsize=8)  # many episodes use the same hall
 def _scenery_triangles(layout: WarehouseLayout, variant: int) -> TriangleSet:
     meshes = [chunk.mesh for chunk in scenery(layout, variant)]
     surfaces = [(mesh.vertices_m, mesh.indices.reshape(-1, 3)) for mesh in meshes]

@@ -1,11 +1,11 @@
-"""Which straight lines meet a surface made of triangles, in closed form on whole arrays.
+"""Intersection of line segments with triangles, in closed form on whole arrays.
 
 A line through the eye o along d passes the edge from b to c on the side given by the sign of
 d · ((b − o) × (c − o)) = [d, d × o] · [b × c, b − c], the product of the line's and the edge's
-Plücker coordinates. It meets the triangle when it passes all three edges on the same side. The
-edges' coordinates do not change while a rigid piece moves, so they are computed once; moving is
-left to the lines, of which there are few. Neighbours share an edge with exactly opposite sign, so
-nothing is seen through a seam.
+Plücker coordinates. It meets the triangle if it passes all three edges on the same side. The edges'
+coordinates are computed once, in the frame of their rigid piece; when a piece moves, the few lines
+are transformed into its frame instead. Neighbouring triangles have exactly opposite coordinates of
+their common edge, so no line passes through a seam.
 """
 
 from __future__ import annotations
@@ -21,19 +21,30 @@ from perception.arrays import FloatArray
 #: Vertices (V, 3) in metres and triangles (T, 3) of rows of them.
 Surface = tuple[FloatArray, NDArray[np.int64]]
 
-#: Triangles are held against lines in clusters of so many, each with a box about it, …
+#: Number of triangles in a cluster; lines are tested against clusters, each with a bounding box.
 CLUSTER: Final = 16
-#: … and of so many sides.
+#: Number of edges in a cluster.
 SIDES: Final = 3 * CLUSTER
+# Smallest component of a direction, so that nothing is divided by 0.
 _TINY_M: Final = 1e-12
 
 
 class TriangleSet:
-    """Triangles in rigid pieces, prepared for lines of sight.
+    """Triangles in P rigid pieces, divided into C clusters, prepared for lines of sight.
 
     Args:
-        pieces: surface of each piece in a frame of its own, metres.
-        together: all pieces are in one frame instead, and count as one that does not bend.
+        pieces: surface of each piece, in the piece's own frame.
+        together: all pieces are in one frame instead and count as one rigid piece.
+
+    Attributes:
+        pieces: P.
+        clusters: C.
+        starts: (P,) first cluster of each piece.
+        counts: (P,) number of its clusters.
+        boxes_m: (2, 3, C) low and high corner of a box around each cluster.
+        piece_boxes_m: (2, 3, P) low and high corner of a box around each piece.
+        edges: (C, 6, 48) Plücker coordinates of the first, second and third edges.
+        planes: (C, 4, 16) planes of the triangles: −n and n · first corner.
     """
 
     def __init__(self, pieces: Sequence[Surface], *, together: bool = False) -> None:
@@ -50,18 +61,15 @@ class TriangleSet:
         self._boxes = np.array(
             [(part.min(axis=(0, 1)), part.max(axis=(0, 1))) for _, part in clusters]
         ).reshape(count, 2, 3)
-        #: (P,) first cluster of each piece, and how many it has
         self.starts = np.searchsorted(self._piece, np.arange(self.pieces))
         self.counts = np.bincount(self._piece, minlength=self.pieces)
-        #: (2, 3, C) low and high corners about each cluster, and (2, 3, P) about each piece
         self.boxes_m = np.ascontiguousarray(self._boxes.transpose(1, 2, 0))
-        self.piece_boxes_m = _about(self.boxes_m, self.starts, self.counts)
-        # What fills up a cluster is a triangle without area, which no line meets.
+        self.piece_boxes_m = _boxes_of_pieces(self.boxes_m, self.starts, self.counts)
+        # Unused rows of a cluster hold triangles without area, which no line meets.
         packed = np.zeros((count, CLUSTER, 3, 3))
         for row, (_, part) in enumerate(clusters):
             packed[row, : len(part)] = part
         first, second, third = packed[:, :, 0], packed[:, :, 1], packed[:, :, 2]
-        # (C, 6, 3 · 32): the three edges of every triangle, one kind of edge after another.
         self.edges = np.ascontiguousarray(
             np.concatenate(
                 [
@@ -72,7 +80,6 @@ class TriangleSet:
             ).transpose(0, 2, 1)
         )
         normals = np.cross(second - first, third - first)
-        # (C, 4, 32) of each plane: n · p − n · first is how far p is before it.
         self.planes = np.ascontiguousarray(
             np.concatenate(
                 [-normals, np.einsum("cti,cti->ct", first, normals)[..., None]], axis=2
@@ -81,18 +88,17 @@ class TriangleSet:
 
     @property
     def triangles(self) -> int:
-        """How many triangles there are."""
+        """The number of triangles."""
         return int(np.count_nonzero(self.planes[:, :3].any(axis=1)))
 
     def blocks(self, eye_m: FloatArray, ends_m: FloatArray) -> NDArray[np.bool_]:
-        """Whether a triangle lies between the eye and each of some points.
+        """Return (K,) whether a triangle lies between the eye and each of K points.
+
+        A line that starts or ends on a triangle is not blocked by it.
 
         Args:
             eye_m: (P, 3) the eye in the frame of every piece.
             ends_m: (P, K, 3) the points in the frame of every piece.
-
-        Returns:
-            (K,); a line that only ends on a triangle, or starts on it, is free.
         """
         blocked = np.zeros(ends_m.shape[1], dtype=bool)
         low = np.minimum(ends_m.min(axis=1), eye_m)
@@ -107,7 +113,7 @@ class TriangleSet:
         piece = self._piece[reached]
         along = ends_m - eye_m[:, None]
         eye = eye_m[piece]
-        # Few lines come near any one cluster: each pair of the two is looked at by itself.
+        # Few lines come near any one cluster, so each pair of line and cluster is tested alone.
         near, line = _slabs(eye, _inverse(along)[:, piece], self._boxes[reached]).nonzero()
         if not near.size:
             return blocked
@@ -122,14 +128,14 @@ class TriangleSet:
 def meet_triangles(
     edges: FloatArray, planes: FloatArray, eye_m: FloatArray, along_m: FloatArray
 ) -> NDArray[np.bool_]:
-    """(N,) whether each segment from eyes (N, 3) along (N, 3) meets a cluster of its own.
+    """Return (N,) whether each segment from eyes (N, 3) along (N, 3) meets a cluster of its own.
 
     ``edges`` (N, 6, 48) and ``planes`` (N, 4, 16) are rows of those of a :class:`TriangleSet`.
     """
-    sides = (_lines(eye_m, along_m)[:, None] @ edges)[:, 0]
+    sides = (_plucker(eye_m, along_m)[:, None] @ edges)[:, 0]
     one, two, three = (sides[:, k * CLUSTER : (k + 1) * CLUSTER] for k in range(3))
     rate = one + two + three
-    # The plane is met at the share start / rate of the line.
+    # The line meets the plane at the share start / rate of its length.
     origin = np.ones((len(edges), 1, 4))
     origin[:, 0, :3] = eye_m
     start = (origin @ planes)[:, 0]
@@ -140,8 +146,8 @@ def meet_triangles(
     return np.asarray(np.logical_or.reduce(met, axis=1))
 
 
-def _lines(eye_m: FloatArray, along_m: FloatArray) -> FloatArray:
-    """(N, 6) Plücker coordinates [d, d × o] of lines from eyes (N, 3) along (N, 3)."""
+def _plucker(eye_m: FloatArray, along_m: FloatArray) -> FloatArray:
+    """Return the Plücker coordinates (N, 6) [d, d × o] of lines from eyes (N, 3) along (N, 3)."""
     out = np.empty((len(along_m), 6))
     out[:, :3] = along_m
     (x, y, z), (ox, oy, oz) = along_m.T, eye_m.T
@@ -151,8 +157,10 @@ def _lines(eye_m: FloatArray, along_m: FloatArray) -> FloatArray:
     return out
 
 
-def _about(boxes_m: FloatArray, starts: NDArray[np.int64], counts: NDArray[np.int64]) -> FloatArray:
-    """(2, 3, P) about the boxes (2, 3, C) of each piece; a point at 0 about none."""
+def _boxes_of_pieces(
+    boxes_m: FloatArray, starts: NDArray[np.int64], counts: NDArray[np.int64]
+) -> FloatArray:
+    """Return (2, 3, P) around the clusters' boxes (2, 3, C) of each piece; 0 for an empty piece."""
     out = np.zeros((2, 3, len(starts)))
     for piece, (start, count) in enumerate(zip(starts.tolist(), counts.tolist(), strict=True)):
         if count:
@@ -162,33 +170,33 @@ def _about(boxes_m: FloatArray, starts: NDArray[np.int64], counts: NDArray[np.in
 
 
 def _clusters(centres_m: FloatArray) -> list[NDArray[np.int64]]:
-    """Rows of triangles in groups that lie together: halved along their longest side."""
-    waiting, done = [np.arange(len(centres_m))], []
-    while waiting:
-        rows = waiting.pop()
+    """Return the rows of triangles in compact groups, by halving along the longest extent."""
+    stack, done = [np.arange(len(centres_m))], []
+    while stack:
+        rows = stack.pop()
         if len(rows) <= CLUSTER:
             if len(rows):
                 done.append(rows)
             continue
         axis = int(np.ptp(centres_m[rows], axis=0).argmax())
         order = rows[np.argsort(centres_m[rows, axis], kind="stable")]
-        waiting += [order[: len(order) // 2], order[len(order) // 2 :]]
+        stack += [order[: len(order) // 2], order[len(order) // 2 :]]
     return done
 
 
 def meet_boxes(eye_m: FloatArray, along_m: FloatArray, boxes_m: FloatArray) -> NDArray[np.bool_]:
-    """(C, K) whether segments from eyes (C, 3) along (C, K, 3) meet boxes (C, 2, 3), by slabs."""
+    """Return (C, K) whether segments from eyes (C, 3) along (C, K, 3) meet boxes (C, 2, 3)."""
     return _slabs(eye_m, _inverse(along_m), boxes_m)
 
 
 def meet_own_boxes(
     eye_m: FloatArray, inverse: FloatArray, boxes_m: FloatArray
 ) -> NDArray[np.bool_]:
-    """(N,) whether each segment meets a box of its own.
+    """Return (N,) whether each segment meets a box of its own.
 
     Args:
-        eye_m: (3, N) where the segments begin.
-        inverse: (3, N) of :func:`inverse_of` of them.
+        eye_m: (3, N) starts of the segments.
+        inverse: (3, N) :func:`inverse_of` their directions.
         boxes_m: (2, 3, N) low and high corners.
     """
     first, last = boxes_m - eye_m
@@ -201,17 +209,17 @@ def meet_own_boxes(
 
 
 def inverse_of(along_m: FloatArray) -> FloatArray:
-    """One over each component of directions (…), which may be 0."""
+    """Return one over each component of directions; a component may be 0."""
     return np.asarray(1.0 / np.where(np.abs(along_m) < _TINY_M, _TINY_M, along_m))
 
 
 def _inverse(along_m: FloatArray) -> FloatArray:
-    """(3, C, K) one over each component of directions (C, K, 3), axis by axis."""
+    """Return (3, C, K) one over each component of directions (C, K, 3), axis by axis."""
     return inverse_of(np.ascontiguousarray(along_m.transpose(2, 0, 1)))
 
 
 def _slabs(eye_m: FloatArray, inverse: FloatArray, boxes_m: FloatArray) -> NDArray[np.bool_]:
-    """As :func:`meet_boxes`; a segment is in a box for a share of it between enter and leave."""
+    """Return :func:`meet_boxes` by the slab method, from the inverse (3, C, K) of directions."""
     enter: FloatArray | float = 0.0
     leave: FloatArray | float = 1.0
     for axis in range(3):

@@ -10,7 +10,7 @@ import numpy as np
 def level_pose(
     position_m: tuple[float, float, float], heading_rad: float, pitch_down_rad: float = 0.0
 ) -> np.ndarray:
-    """T_odom_camera of a camera with a level horizon."""
+    """Return T_odom_camera of a camera with a level horizon."""
     ch, sh = math.cos(heading_rad), math.sin(heading_rad)
     cp, sp = math.cos(pitch_down_rad), math.sin(pitch_down_rad)
     forward = np.array([cp * ch, cp * sh, -sp])

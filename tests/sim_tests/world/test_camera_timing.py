@@ -1,4 +1,4 @@
-"""Frames are taken, lost and delivered as the settings say."""
+"""Frames are taken, lost and delivered as the timing is configured."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_a_perfect_camera_delivers_every_frame_at_once() -> None:
     assert _frames(CameraTiming(rate_hz=25.0), 4) == [(t, t) for t in (5.0, 5.04, 5.08, 5.12)]
 
 
-def test_losses_and_delays_have_the_asked_statistics() -> None:
+def test_losses_and_delays_have_the_configured_statistics() -> None:
     timing = CameraTiming(rate_hz=30.0, drop_rate=0.2, latency_s=0.05, latency_jitter_s=0.03)
     count = 20_000
     frames = _frames(timing, count)
@@ -39,8 +39,8 @@ def test_losses_and_delays_have_the_asked_statistics() -> None:
     assert delays.var() == pytest.approx(0.03**2 / 12.0, rel=0.05)
 
 
-def test_one_frames_fate_changes_no_others() -> None:
-    """More losses take frames away; those that are left arrive exactly when they did."""
+def test_losing_one_frame_does_not_change_the_others() -> None:
+    """A higher loss rate removes frames; the remaining frames arrive at the same times."""
     settings_of = {"rate_hz": 30.0, "latency_s": 0.02, "latency_jitter_s": 0.05}
     few = _frames(CameraTiming(drop_rate=0.1, **settings_of), 300)
     many = _frames(CameraTiming(drop_rate=0.5, **settings_of), 300)
@@ -57,7 +57,7 @@ def test_one_frames_fate_changes_no_others() -> None:
     st.floats(0.0, 0.3),
     st.integers(0, 99),
 )
-def test_the_queue_hands_out_each_frame_once_when_it_has_arrived(
+def test_the_queue_returns_each_frame_once_when_it_has_arrived(
     rate_hz: float, drop_rate: float, latency_s: float, jitter_s: float, seed: int
 ) -> None:
     timing = CameraTiming(
@@ -65,7 +65,7 @@ def test_the_queue_hands_out_each_frame_once_when_it_has_arrived(
     )
     frames = _frames(timing, 40, seed)
     queue: FrameQueue[tuple[float, float]] = FrameQueue()
-    kept = [(stamp, end) for stamp, end in frames if end is not None]
+    expected = [(stamp, end) for stamp, end in frames if end is not None]
     received: list[tuple[float, float]] = []
     waiting = list(frames)
     for now in np.arange(5.0, frames[-1][0] + 1.0, 0.017):
@@ -75,7 +75,7 @@ def test_the_queue_hands_out_each_frame_once_when_it_has_arrived(
         arrived = queue.take(float(now))
         assert all(end <= now + 1e-5 for _, end in arrived)
         received += arrived
-    assert sorted(received) == sorted(kept)
+    assert sorted(received) == sorted(expected)
     assert [end for _, end in received] == sorted(end for _, end in received)
     assert len(queue) == 0
 
@@ -103,7 +103,7 @@ def test_a_clock_takes_as_many_frames_as_the_slower_of_rate_and_ticks(
     taken = [k / tick_hz for k in range(round(10 * tick_hz)) if clock.tick(k / tick_hz)[0]]
     assert len(taken) == 10 * per_second
     if rate_hz is not None:
-        # None before its time, none later than a tick after it.
+        # No frame is taken before its time or more than one tick after it.
         late = np.array(taken) * rate_hz % 1.0 / rate_hz
         assert np.minimum(late, 1.0 / rate_hz - late).max() < 1.0 / tick_hz + 1e-9
 
@@ -114,7 +114,7 @@ def test_a_camera_without_a_rate_does_not_run_on_its_own() -> None:
 
 
 class _Counting:
-    """Eyes that see nobody and remember when they looked."""
+    """Eyes that see nobody and record the stamps at which they look."""
 
     def __init__(self) -> None:
         self.looked_s: list[float] = []
@@ -124,25 +124,25 @@ class _Counting:
         return ()
 
 
-def test_timed_eyes_learn_late_of_what_they_saw_then() -> None:
+def test_timed_eyes_deliver_late_what_they_saw_at_the_stamp() -> None:
     eyes = _Counting()
     timing = CameraTiming(rate_hz=10.0, latency_s=0.12, drop_rate=0.25)
     timed = TimedEyes(eyes, timing, np.random.default_rng(2))
-    learned = []
+    delivered = []
     for tick in range(200):
         now = tick / 20.0
         pose = np.eye(4) * (1.0 + tick)
         for sighting in timed.look(now, pose, ()):
             assert now - sighting.stamp_s == pytest.approx(0.15)  # the first tick after 0.12 s
             assert sighting.T_odom_camera[0, 0] == pytest.approx(1.0 + 20.0 * sighting.stamp_s)
-            learned.append(sighting.stamp_s)
-    # A frame that is lost is not looked at; two were still on their way at the end.
-    assert eyes.looked_s[: len(learned)] == learned
-    assert len(eyes.looked_s) - len(learned) <= 2
-    assert len(learned) == pytest.approx(75, abs=15)
+            delivered.append(sighting.stamp_s)
+    # Lost frames are not looked at; at most two are still to be delivered at the end.
+    assert eyes.looked_s[: len(delivered)] == delivered
+    assert len(eyes.looked_s) - len(delivered) <= 2
+    assert len(delivered) == pytest.approx(75, abs=15)
 
 
-def test_perfect_timing_is_looking_now() -> None:
+def test_perfect_timing_delivers_at_once() -> None:
     eyes = _Counting()
     timed = TimedEyes(eyes, CameraTiming(), np.random.default_rng(2))
     for tick in range(50):

@@ -1,4 +1,4 @@
-"""Coarse scenery, fine people: what differs from a picture in full, and what must not."""
+"""Coarse scenery: people are as in the full image, and depths and ids stay true."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ import pytest
 from perception import Camera
 from sim_tests import CameraRenderer, Scenario, SimError
 from sim_tests.crossing import Stage
-from sim_tests.world.camera import CoarseSceneryRenderer
-from sim_tests.world.camera._coarse_scenery import FINE_PX_PER_M
+from sim_tests.world.camera import FINE_PX_PER_M, CoarseSceneryRenderer
 
 CAMERA = Camera.from_fov(768, 480, math.radians(100.0))
 DIVISOR = 3
@@ -25,37 +24,35 @@ def stage() -> Iterator[Stage]:
 
 
 @pytest.mark.parametrize(("x_m", "y_m"), [(2.4, 0.4), (4.0, -1.5), (6.5, 0.0)])
-def test_people_are_those_of_the_full_picture_and_depths_are_true(
-    stage: Stage, x_m: float, y_m: float
-):
+def test_people_are_as_in_the_full_image_and_depths_are_true(stage: Stage, x_m: float, y_m: float):
     worker, T = stage.workers[0], stage.amr.T_odom_camera
     worker.place((x_m, y_m), 2.5)
     full = CameraRenderer(stage.warehouse).render(CAMERA, T)
     view = CoarseSceneryRenderer(stage.warehouse, DIVISOR).render(CAMERA, T)
     assert view.rgb.shape == full.rgb.shape
-    # Nobody here is near enough to need fewer samples than the picture has pixels.
+    # No person is so near that they need fewer samples than the image has pixels.
     assert CAMERA.fx_px / (x_m - T[0, 3] - 0.5) < 2.0 * FINE_PX_PER_M
     shown = full.actors == worker.actor
     assert shown.sum() > 300
     np.testing.assert_array_equal(view.actors == worker.actor, shown)
-    # Rounding moves a sample across a texture's edge now and then.
+    # Rounding sometimes moves a sample across a texel's edge.
     assert (view.rgb[shown] == full.rgb[shown]).mean() > 0.999
     np.testing.assert_allclose(view.depth_m[shown], full.depth_m[shown], rtol=1e-4)
-    # The hall's depths are those of samples at most a block away: the same hall, coarser.
+    # The depths of the hall are true, but come from samples at most a block away.
     same = np.isclose(view.depth_m, full.depth_m, rtol=0.03)
     assert same.mean() > 0.85
     assert not np.array_equal(view.rgb, full.rgb)
 
 
-def test_somebody_near_has_fewer_samples_but_stays_in_place(stage: Stage):
+def test_a_near_person_has_fewer_samples_in_the_same_place(stage: Stage):
     worker, T = stage.workers[0], stage.amr.T_odom_camera
     worker.place((float(T[0, 3]) + 1.0, 0.1), 2.5)
     camera = Camera.from_fov(1536, 960, math.radians(100.0))
     full = CameraRenderer(stage.warehouse).render(camera, T)
     view = CoarseSceneryRenderer(stage.warehouse, DIVISOR).render(camera, T)
-    ours, truth = (picture.actors == worker.actor for picture in (view, full))
-    assert (ours & truth).sum() / (ours | truth).sum() > 0.97
-    assert np.abs(view.rgb[truth].astype(int) - full.rgb[truth]).mean() < 12.0
+    coarse, true = (image.actors == worker.actor for image in (view, full))
+    assert (coarse & true).sum() / (coarse | true).sum() > 0.97
+    assert np.abs(view.rgb[true].astype(int) - full.rgb[true]).mean() < 12.0
 
 
 def test_a_divisor_of_one_changes_nothing(stage: Stage):
@@ -66,8 +63,8 @@ def test_a_divisor_of_one_changes_nothing(stage: Stage):
     np.testing.assert_array_equal(view.depth_m, full.depth_m)
 
 
-def test_blocks_that_do_not_fill_the_picture_are_refused(stage: Stage):
-    with pytest.raises(SimError, match="blocks of 7 pixels must fill the picture, got 768 x 480"):
+def test_blocks_that_do_not_fill_the_image_are_refused(stage: Stage):
+    with pytest.raises(SimError, match="blocks of 7 pixels must fill the image, got 768 x 480"):
         CoarseSceneryRenderer(stage.warehouse, 7).render(CAMERA, stage.amr.T_odom_camera)
     with pytest.raises(SimError, match="divisor"):
         CoarseSceneryRenderer(stage.warehouse, 0)

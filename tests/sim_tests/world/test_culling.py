@@ -1,4 +1,4 @@
-"""What is left out of a picture is never seen in it."""
+"""Culling leaves out only what the image cannot show."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ from perception import Camera
 from sim_tests.world import Warehouse
 from sim_tests.world.camera import CameraRenderer
 from sim_tests.world.hall import WarehouseLayout
-from sim_tests.world.render import RenderView, box_corners, in_view, to_camera
-from sim_tests.world.render._culling import hidden_behind, least_depth_m
+from sim_tests.world.render import RenderView, box_corners, hidden_behind, in_view, to_camera
 
 CAMERA = Camera(40, 30, 33.0, 31.0, 17.3, 16.1)
 _SIDES = st.floats(0.02, 3.0)
@@ -42,7 +41,7 @@ def _boxes(numbers: list[tuple[float, ...]]) -> np.ndarray:
 
 
 def _rays(view: RenderView) -> np.ndarray:
-    """(h · w, 3) in odom, through the samples, one metre deep."""
+    """Return rays (h · w, 3) in odom through the samples, one metre deep."""
     u = view.left + (np.arange(view.width) + 0.5) / view.width * (view.right - view.left)
     v = view.top + (np.arange(view.height) + 0.5) / view.height * (view.bottom - view.top)
     grid = np.stack([*np.meshgrid(u, v), np.ones((view.height, view.width))], axis=-1)
@@ -50,7 +49,7 @@ def _rays(view: RenderView) -> np.ndarray:
 
 
 def _hit_depths(view: RenderView, boxes: np.ndarray) -> np.ndarray:
-    """(rays, N) depths at which each ray enters and (rays, N) leaves each box; NaN for a miss."""
+    """Return the depths (rays, N) at which each ray enters each box; NaN for a miss."""
     eye, rays = view.T_odom_camera[:3, 3], _rays(view)
     with np.errstate(divide="ignore", invalid="ignore"):
         first = (boxes[None, :, 0] - eye) / rays[:, None]
@@ -75,22 +74,8 @@ def test_a_box_that_any_ray_meets_is_in_view(
 
 
 @settings(max_examples=150, deadline=None)
-@given(_BOXES, _POSES)
-def test_nothing_seen_lies_before_the_least_depth(
-    numbers: list[tuple[float, ...]], pose: tuple[float, ...]
-) -> None:
-    view, boxes = _view(pose), _boxes(numbers)
-    depths = _hit_depths(view, boxes)
-    met = ~np.isnan(depths).all(axis=0)
-    bound = least_depth_m(view, to_camera(view, box_corners(boxes)))
-    assert (bound >= view.near_m).all()
-    for box in np.flatnonzero(met):
-        assert np.nanmin(depths[:, box]) >= bound[box] - 1e-9
-
-
-@settings(max_examples=150, deadline=None)
 @given(_BOXES, _BOXES, _POSES)
-def test_what_is_hidden_has_an_occluder_before_it_on_every_ray(
+def test_a_hidden_box_has_an_occluder_in_front_on_every_ray(
     numbers: list[tuple[float, ...]], solids: list[tuple[float, ...]], pose: tuple[float, ...]
 ) -> None:
     view, boxes, occluders = _view(pose), _boxes(numbers), _boxes(solids)
@@ -102,14 +87,14 @@ def test_what_is_hidden_has_an_occluder_before_it_on_every_ray(
         assert (cover[met] <= depths[met, box] + 1e-9).all()
 
 
-def test_a_wall_hides_what_is_right_behind_it_and_nothing_beside_or_before_it() -> None:
+def test_a_wall_hides_boxes_behind_it_and_none_beside_or_in_front() -> None:
     view = _view((0.0, 0.0, 1.0, 0.0, 0.0))
     wall = np.array([[[3.0, -2.0, -1.0], [3.1, 2.0, 4.0]]])
     boxes = np.array(
         [
             [[5.0, -0.5, 0.0], [6.0, 0.5, 2.0]],  # behind
             [[5.0, 3.0, 0.0], [6.0, 4.0, 2.0]],  # behind, sticking out of the shadow
-            [[1.0, -0.5, 0.0], [2.0, 0.5, 2.0]],  # before
+            [[1.0, -0.5, 0.0], [2.0, 0.5, 2.0]],  # in front
             [[2.0, -0.5, 0.0], [5.0, 0.5, 2.0]],  # through the wall
             [[3.2, -1.9, 0.0], [3.4, 1.9, 2.0]],  # behind, nearly as wide
         ]
@@ -123,7 +108,7 @@ def test_a_wall_hides_what_is_right_behind_it_and_nothing_beside_or_before_it() 
     assert not hidden_behind(close, box_corners(boxes), wall).any()
 
 
-def test_what_falls_between_the_samples_is_left_out() -> None:
+def test_a_box_between_the_samples_is_left_out() -> None:
     view = _view((0.0, 0.0, 0.0, 0.0, 0.0))
     # A sample at x = 10 m every 10 / 33 m; columns count to the right, odom y to the left.
     middle = -(20.0 - CAMERA.cx_px) / CAMERA.fx_px * 10.0
@@ -139,8 +124,8 @@ def hall(request: pytest.FixtureRequest) -> Iterator[Warehouse]:
         yield warehouse
 
 
-def test_pictures_with_and_without_culling_are_the_same(hall: Warehouse) -> None:
-    """From every sort of place: aisles, before a rack, above it, in it, outside of the hall."""
+def test_images_with_and_without_culling_are_the_same(hall: Warehouse) -> None:
+    """Cameras stand in aisles, in front of a rack, above it, in it, and outside the hall."""
     rng = np.random.default_rng(5)
     renderer, layout = CameraRenderer(hall), hall.layout
     camera = Camera.from_fov(200, 150, math.radians(75.0))

@@ -1,13 +1,14 @@
-"""A shadow lies on the floor where the lamp's rays put it, as dark as the light that is missing."""
+"""A shadow lies on the floor where the lamp's rays put it, darkened by the missing light."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
 from camera_poses import level_pose
-from picture_actors import Shown, ball
+from visual_actors import ShapeActor, ball
 
 from perception import Camera
 from sim_tests.world import Warehouse
@@ -18,10 +19,20 @@ from sim_tests.world.render import gl_works
 CAMERA = Camera(240, 180, 160.0, 160.0, 119.5, 89.5)
 ABOVE = level_pose((0.5, 0.0, 4.5), 0.0, 0.5 * math.pi - 1e-3)  # looks straight down
 LAMPS = [(0.4, -0.9, 1.5), (-1.0, 0.6, 2.0), (1.5, 1.0, 2.0)]
+RADIUS_M = 0.3
+
+
+@pytest.fixture(scope="module", params=["tiny", "gl"])
+def hall_with_ball(request: pytest.FixtureRequest) -> Iterator[tuple[Warehouse, int]]:
+    """Return a hall with a ball at (0.4, 0.1, 0.8), and the ball's number."""
+    if request.param == "gl" and not gl_works():
+        pytest.skip("no OpenGL here: install moderngl and libEGL (Mesa's will do)")
+    with Warehouse(WarehouseLayout.open_floor(), renderer=request.param) as hall:
+        yield hall, hall.visuals.add_actor(ball(RADIUS_M, position_m=(0.4, 0.1, 0.8)))
 
 
 def _loss(hall: Warehouse, light: Lighting, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Share of the light that each pixel loses, and the actors."""
+    """Return the share of the light that each pixel loses, and the actors."""
     lit = CameraRenderer(hall, lighting=light, shadows=False).render(CAMERA, pose)
     shaded = CameraRenderer(hall, lighting=light, shadows=True).render(CAMERA, pose)
     np.testing.assert_array_equal(lit.depth_m, shaded.depth_m)
@@ -30,21 +41,16 @@ def _loss(hall: Warehouse, light: Lighting, pose: np.ndarray) -> tuple[np.ndarra
 
 
 @pytest.mark.parametrize("direction", LAMPS)
-@pytest.mark.parametrize("renderer", ["tiny", "gl"])
-def test_a_balls_shadow_is_where_the_rays_put_it(
-    renderer: str, direction: tuple[float, float, float]
+def test_the_shadow_of_a_ball_is_where_the_rays_put_it(
+    hall_with_ball: tuple[Warehouse, int], direction: tuple[float, float, float]
 ) -> None:
-    if renderer == "gl" and not gl_works():
-        pytest.skip("no OpenGL here: install moderngl and libEGL (Mesa's will do)")
-    height, radius = 0.8, 0.3
+    hall, number = hall_with_ball
     light = Lighting(ambient=0.3, diffuse=0.6, direction_odom=direction)
-    centre = np.array([0.4, 0.1, height])
-    with Warehouse(WarehouseLayout.open_floor(), renderer=renderer) as hall:  # type: ignore[arg-type]
-        number = hall.visuals.add_actor(ball(radius, position_m=tuple(centre.tolist())))
-        loss, actors = _loss(hall, light, ABOVE)
+    centre = np.array([0.4, 0.1, 0.8])
+    loss, actors = _loss(hall, light, ABOVE)
     towards = np.array(direction) / np.linalg.norm(direction)
-    spot = centre - towards * height / towards[2]
-    # The floor under each pixel, and how far the ray through it to the lamp passes the ball.
+    spot = centre - towards * centre[2] / towards[2]
+    # The floor under each pixel, and the distance of its ray to the lamp from the ball's centre.
     rows, columns = np.mgrid[:180, :240]
     rays = np.stack([(columns - 119.5) / 160.0, (rows - 89.5) / 160.0, np.ones((180, 240))], -1)
     rays = rays @ ABOVE[:3, :3].T
@@ -54,23 +60,23 @@ def test_a_balls_shadow_is_where_the_rays_put_it(
     distance = np.linalg.norm(off, axis=-1)
     seen = actors != number
     full = 0.6 * towards[2] / (0.3 + 0.6 * towards[2])
-    inside, outside = seen & (distance < radius - 0.14), seen & (distance > radius + 0.14)
+    inside, outside = seen & (distance < RADIUS_M - 0.14), seen & (distance > RADIUS_M + 0.14)
     assert outside.sum() > 1000
     assert np.abs(loss[outside]).max() < 1e-9
     assert inside.sum() > 50
     assert np.median(loss[inside]) == pytest.approx(full, abs=0.02)
     assert loss[inside].min() > 0.9 * full
     # Half of the light is missing on the outline itself.
-    outline = seen & (np.abs(distance - radius) < 0.02)
+    outline = seen & (np.abs(distance - RADIUS_M) < 0.02)
     assert outline.sum() > 50
     assert loss[outline].mean() == pytest.approx(0.5 * full, abs=0.12 * full)
     assert (loss[actors == number] == 0.0).all()
 
 
-def test_a_rectangle_shows_the_same_shadow_as_the_whole() -> None:
+def test_a_rectangle_shows_the_same_shadow_as_the_whole_image() -> None:
     light = Lighting(shadows=True, ambient=0.3, diffuse=0.6)
     with Warehouse(WarehouseLayout.open_floor()) as hall:
-        post = Shown(box((0.0, 0.0, 0.9), (0.3, 0.4, 1.8)), (3.0, 0.3, 0.0))
+        post = ShapeActor(box((0.0, 0.0, 0.9), (0.3, 0.4, 1.8)), (3.0, 0.3, 0.0))
         hall.visuals.add_actor(post)
         renderer = CameraRenderer(hall, lighting=light)
         pose = level_pose((0.0, 0.0, 1.5), 0.0, 0.4)
@@ -85,8 +91,6 @@ def test_a_rectangle_shows_the_same_shadow_as_the_whole() -> None:
         assert (alone.rgb[alone.actors < 0] == 255).all()
 
 
-def test_a_lamp_below_the_floor_casts_no_shadow() -> None:
-    with Warehouse(WarehouseLayout.open_floor()) as hall:
-        hall.visuals.add_actor(ball(0.3, position_m=(0.4, 0.1, 0.8)))
-        loss, _ = _loss(hall, Lighting(direction_odom=(0.0, 0.5, -1.0)), ABOVE)
-        assert not loss.any()
+def test_a_lamp_below_the_floor_casts_no_shadow(hall_with_ball: tuple[Warehouse, int]) -> None:
+    loss, _ = _loss(hall_with_ball[0], Lighting(direction_odom=(0.0, 0.5, -1.0)), ABOVE)
+    assert not loss.any()

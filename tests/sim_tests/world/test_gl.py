@@ -1,4 +1,4 @@
-"""OpenGL through moderngl draws the software renderer's pictures, several worlds at a time."""
+"""The renderer "gl" draws the same images as "tiny", with several render worlds at a time."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from camera_poses import level_pose
-from picture_actors import CHECKS, Shown, ball, upright_square
+from visual_actors import CHECKERBOARD, ShapeActor, ball, upright_square
 
 from perception import Camera
 from sim_tests import SimError
@@ -40,8 +40,8 @@ def halls() -> Iterator[tuple[Warehouse, Warehouse]]:
         for hall in (tiny, opengl):
             for actor in (
                 ball(0.35, position_m=(2.3, 0.5, 1.1), colour=(0.9, 0.6, 0.2), kind="person"),
-                Shown(upright_square(0.4), (3.0, -0.6, 1.2), texture_rgb=CHECKS),
-                Shown(box((0.0, 0.0, 0.0), (0.3, 0.5, 1.6)), (4.5, 0.3, 0.8), (0.2, 0.5, 0.9)),
+                ShapeActor(upright_square(0.4), (3.0, -0.6, 1.2), texture_rgb=CHECKERBOARD),
+                ShapeActor(box((0.0, 0.0, 0.0), (0.3, 0.5, 1.6)), (4.5, 0.3, 0.8), (0.2, 0.5, 0.9)),
             ):
                 hall.visuals.add_actor(actor)
             Worker(hall, 1.75, position_odom_m=(3.4, 0.2), heading_odom_rad=2.5)
@@ -61,7 +61,7 @@ def test_bodies_and_depth_agree(halls: tuple[Warehouse, Warehouse], heading: flo
     for number in np.unique(tiny.actors):
         first, second = tiny.actors == number, opengl.actors == number
         assert (first & second).sum() / (first | second).sum() >= 0.98
-        if first.sum() > 1000:  # no shift of even a few hundredths of a pixel between the two
+        if first.sum() > 1000:  # the two are not shifted by even a few hundredths of a pixel
             offset = np.argwhere(first).mean(axis=0) - np.argwhere(second).mean(axis=0)
             assert np.abs(offset).max() < 0.05
     np.testing.assert_array_equal(np.isinf(tiny.depth_m), tiny.body_ids < 0)
@@ -88,7 +88,7 @@ def test_colours_agree(halls: tuple[Warehouse, Warehouse], light: dict[str, obje
     tiny, opengl = _pair(halls, CAMERA, AHEAD, **light)
     difference = np.abs(opengl.rgb.astype(int) - tiny.rgb)
     same = tiny.body_ids == opengl.body_ids
-    # A texel's edge may fall to either side of a sample; elsewhere only rounding differs.
+    # A texel's edge may fall on either side of a sample; elsewhere only rounding differs.
     assert np.quantile(difference[same], 0.9) <= 2.0
     assert difference.mean() < 3.0
 
@@ -104,7 +104,7 @@ def test_a_rectangle_is_that_part_of_the_whole(halls: tuple[Warehouse, Warehouse
         assert (part.body_ids == whole.body_ids[v0:v1, u0:u1]).mean() > 0.99
 
 
-def test_what_is_hidden_is_in_no_buffer(halls: tuple[Warehouse, Warehouse]) -> None:
+def test_hidden_bodies_are_in_no_buffer(halls: tuple[Warehouse, Warehouse]) -> None:
     renderer = CameraRenderer(halls[1])
     alone = renderer.render(CAMERA, AHEAD, only={0})
     assert set(np.unique(alone.actors)) == {-1, 0}
@@ -125,21 +125,24 @@ def test_links_are_drawn_where_their_joints_turn_them() -> None:
             pybullet.resetJointStateMultiDof(
                 body, 0, [0.38, 0.0, 0.0, 0.92], physicsClientId=visuals.client
             )
-            drawings.append(visuals.draw(view, Lighting(), visuals.prepare(view)))
+            visuals.prepare(view)
+            drawings.append(visuals.draw(view, Lighting()))
     tiny, opengl = (drawing.body_ids >= 0 for drawing in drawings)
     assert tiny.sum() > 1000
     assert (tiny & opengl).sum() / (tiny | opengl).sum() > 0.98
 
 
-def test_worlds_do_not_disturb_each_other_and_end_twice() -> None:
+def test_worlds_do_not_disturb_each_other_and_can_be_closed_twice() -> None:
     view = RenderView.of_rectangle(CAMERA, level_pose((-2.0, 0.0, 0.0), 0.0))
     first, second = Visuals(renderer="gl"), Visuals(renderer="auto")
     assert second.renderer == "gl"
     first.add_static(box((0.0, 0.0, 0.0), (0.5, 0.5, 0.5)), (0.9, 0.1, 0.1))
-    assert (second.draw(view, Lighting(), second.prepare(view)).body_ids < 0).all()
+    second.prepare(view)
+    assert (second.draw(view, Lighting()).body_ids < 0).all()
     second.close()
     second.close()
-    drawn = first.draw(view, Lighting(), first.prepare(view))
+    first.prepare(view)
+    drawn = first.draw(view, Lighting())
     assert (drawn.body_ids == 0).sum() > 1000
     red = drawn.rgb[drawn.body_ids == 0].mean(axis=0)
     assert red[0] > 3.0 * red[1]
@@ -150,9 +153,9 @@ def test_worlds_do_not_disturb_each_other_and_end_twice() -> None:
 
 @pytest.mark.parametrize("width", [64, 65, 70])
 def test_textures_of_any_width_lie_straight(width: int) -> None:
-    """Also those of which only a part is used."""
+    """A mesh shows the whole texture or a part of it."""
     right, down = np.meshgrid(np.linspace(0.0, 250.0, width), np.linspace(0.0, 250.0, 50))
-    picture = np.stack([right, down, 250.0 - right], axis=-1).astype(np.uint8)
+    texture = np.stack([right, down, 250.0 - right], axis=-1).astype(np.uint8)
     square = upright_square(0.5)
     part = Mesh(
         square.vertices_m, square.normals, square.indices, 0.2 + 0.5 * np.asarray(square.uv)
@@ -163,21 +166,22 @@ def test_textures_of_any_width_lie_straight(width: int) -> None:
         drawings = []
         for renderer in ("tiny", "gl"):
             with Visuals(renderer=renderer) as visuals:  # type: ignore[arg-type]
-                visuals.add_static(mesh, texture=visuals.texture(picture))
-                drawings.append(visuals.draw(view, even, visuals.prepare(view)).rgb.astype(int))
-        # Half a texel's step apart at most, as one of them blends neighbours; at the rim it blends
-        # the picture's two ends.
+                visuals.add_static(mesh, texture=visuals.texture(texture))
+                visuals.prepare(view)
+                drawings.append(visuals.draw(view, even).rgb.astype(int))
+        # A sample near a texel's edge may show either neighbour: one step of the ramp apart.
         inside = (drawings[0] != 255).all(axis=2) & (drawings[1] != 255).all(axis=2)
         assert inside.sum() > 10_000
         assert np.quantile(np.abs(drawings[0] - drawings[1])[inside], 0.95) <= 6.0
 
 
-def test_large_pictures_agree_everywhere(halls: tuple[Warehouse, Warehouse]) -> None:
+def test_large_images_agree_everywhere(halls: tuple[Warehouse, Warehouse]) -> None:
     camera = Camera(1300, 900, 1100.0, 1100.0, 650.0, 450.0)
     tiny, opengl = _pair(halls, camera, AHEAD)
     assert opengl.rgb.shape == (900, 1300, 3)
     same = tiny.body_ids == opengl.body_ids
     assert same.mean() > 0.99
+    # No band of columns or rows is worse than the rest.
     for band in (same[:, 1014:1034], same[758:778]):
         assert band.mean() > 0.97
 
@@ -205,8 +209,8 @@ def test_opengl_is_silent_starts_again_and_leaves_no_files(tmp_path: Path) -> No
         "    with Visuals(renderer='gl') as visuals:\n"
         "        visuals.add_static(box((0.0, 0.0, 2.0), (0.5, 0.5, 0.5)), (0.9, 0.2, 0.2))\n"
         "        visuals.texture(np.zeros((4, 4, 3), np.uint8))\n"
-        "        least = visuals.prepare(view)\n"
-        "        assert (visuals.draw(view, Lighting(), least).body_ids == 0).sum() > 100\n"
+        "        visuals.prepare(view)\n"
+        "        assert (visuals.draw(view, Lighting()).body_ids == 0).sum() > 100\n"
     )
     done = subprocess.run(
         [sys.executable, "-c", program],

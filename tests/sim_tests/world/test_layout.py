@@ -1,4 +1,4 @@
-"""Halls as data: what stands where, what is refused, and that known halls stay as they are."""
+"""Layouts as data: places of things, refused layouts, and shipped layouts that never change."""
 
 from __future__ import annotations
 
@@ -12,22 +12,20 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from sim_tests import SimError
-from sim_tests.world.hall import LAYOUTS, WarehouseLayout
-from sim_tests.world.hall._layout import RackBox
-from sim_tests.world.hall._props import PROP_PARTS, Prop
+from sim_tests.world.hall import LAYOUTS, PROP_PARTS, Prop, RackBox, WarehouseLayout
 
 _HALL = {"x_min_m": 0.0, "y_min_m": 0.0, "x_max_m": 5.0, "y_max_m": 5.0}
 
 
 def _blocked(layout: WarehouseLayout, start: tuple[float, float], end: tuple[float, float]) -> bool:
-    """Whether an obstacle's footprint lies on the way; sampled every centimetre."""
+    """Return whether an obstacle's footprint lies on the way, sampled every centimetre."""
     steps = math.ceil(100.0 * math.dist(start, end)) + 1
     points = np.linspace(start, end, steps)[:, None]
     boxes = layout.obstacle_boxes_odom
     return bool(((points > boxes[:, :2]) & (points < boxes[:, 2:])).all(axis=2).any())
 
 
-def test_crossing_has_the_boxes_that_its_results_were_measured_with() -> None:
+def test_the_boxes_of_the_crossing_are_those_of_the_published_results() -> None:
     expected = [
         *[(-3.3, 1.6, 4.5, 2.7), (7.5, 1.6, 15.3, 2.7)],
         *[(-3.3, 5.1, 4.5, 6.2), (7.5, 5.1, 15.3, 6.2)],
@@ -43,7 +41,7 @@ def test_crossing_has_the_boxes_that_its_results_were_measured_with() -> None:
     np.testing.assert_array_equal(layout.obstacle_heights_m, [4.0] * 8 + [6.0] * 4)
 
 
-def test_open_floor_has_the_boxes_that_its_results_were_measured_with() -> None:
+def test_the_boxes_of_the_open_floor_are_those_of_the_published_results() -> None:
     expected = [
         (-1.75, 4.65, 11.75, 5.75),
         (-1.75, -5.75, 11.75, -4.65),
@@ -57,7 +55,7 @@ def test_open_floor_has_the_boxes_that_its_results_were_measured_with() -> None:
 
 
 @pytest.mark.parametrize("name", LAYOUTS)
-def test_every_hall_leaves_the_robot_its_aisle_and_keeps_things_apart(name: str) -> None:
+def test_every_hall_has_a_free_robot_aisle_and_no_overlapping_things(name: str) -> None:
     layout = WarehouseLayout.named(name)
     boxes = layout.obstacle_boxes_odom
     assert boxes.shape == (len(layout.obstacle_heights_m), 4)
@@ -87,7 +85,7 @@ def test_the_blind_corner_is_blind() -> None:
     assert not _blocked(layout, (-3.0, 0.0), (6.0, 0.0))
 
 
-def test_aisles_are_crossed_by_one() -> None:
+def test_one_aisle_crosses_all_others() -> None:
     layout = WarehouseLayout.aisles()
     assert not _blocked(layout, (7.8, -10.0), (7.8, 10.0))
     for y in (-9.0, -4.0, 0.0, 4.0, 9.0):
@@ -96,7 +94,7 @@ def test_aisles_are_crossed_by_one() -> None:
 
 
 @pytest.mark.parametrize("name", LAYOUTS)
-def test_halls_survive_yaml(name: str, tmp_path: Path) -> None:
+def test_halls_round_trip_through_yaml(name: str, tmp_path: Path) -> None:
     layout = WarehouseLayout.named(name)
     layout.to_yaml(tmp_path / "hall.yaml")
     assert WarehouseLayout.from_yaml(tmp_path / "hall.yaml") == layout
@@ -135,7 +133,9 @@ def test_unusable_props_are_refused_by_name() -> None:
     st.floats(-9.0, 9.0),
     st.floats(-9.0, 9.0),
 )
-def test_a_props_boxes_bound_its_turned_parts(kind: str, yaw: float, x: float, y: float) -> None:
+def test_the_boxes_of_a_prop_bound_its_rotated_parts(
+    kind: str, yaw: float, x: float, y: float
+) -> None:
     prop = Prop(kind=kind, x_m=x, y_m=y, yaw_deg=yaw)
     c, s = math.cos(math.radians(yaw)), math.sin(math.radians(yaw))
     rotation = np.array([[c, -s], [s, c]])

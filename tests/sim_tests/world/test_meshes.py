@@ -1,4 +1,4 @@
-"""Triangle meshes: closed, facing outwards, pictures upright on their sides."""
+"""Triangle meshes are closed, face outwards and carry textures upright on their sides."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from sim_tests.world.hall import Mesh, box, ellipsoid, merge, quad, tube
-from sim_tests.world.hall._meshes import BOX_FACES
+from sim_tests.world.hall import BOX_FACES, Mesh, box, ellipsoid, merge, quad, tube
 
 
 def _volume_m3(mesh: Mesh) -> float:
-    """By the divergence theorem; positive when the triangles face outwards."""
+    """Return the volume by the divergence theorem; positive if the triangles face outwards."""
     a, b, c = (mesh.vertices_m[mesh.indices.reshape(-1, 3)[:, k]] for k in range(3))
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
 
@@ -27,7 +26,7 @@ def test_volumes_are_those_of_the_solids() -> None:
 
 
 @pytest.mark.parametrize("face", BOX_FACES[:4])
-def test_a_picture_stands_upright_on_each_side_of_a_box(face: str) -> None:
+def test_a_texture_stands_upright_on_each_side_of_a_box(face: str) -> None:
     side = box((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), {face: (0.25, 0.5, 0.75, 1.0)})
     assert side.uv is not None
     assert side.triangles == 2
@@ -36,12 +35,12 @@ def test_a_picture_stands_upright_on_each_side_of_a_box(face: str) -> None:
     outward[axis] = sign
     np.testing.assert_array_equal(side.vertices_m[:, axis], 0.5 * sign)
     np.testing.assert_array_equal(side.normals, np.tile(outward, (4, 1)))
-    right = np.cross([0.0, 0.0, 1.0], outward)  # as seen by who looks at the face
+    right = np.cross([0.0, 0.0, 1.0], outward)  # to the right, seen from outside
     np.testing.assert_allclose(side.uv[:, 0], 0.5 + 0.5 * side.vertices_m @ right, atol=1e-12)
     np.testing.assert_allclose(side.uv[:, 1], 0.75 + 0.5 * side.vertices_m[:, 2], atol=1e-12)
 
 
-def test_some_faces_are_a_part_of_the_whole_box() -> None:
+def test_a_box_of_all_named_faces_is_the_whole_box() -> None:
     whole, part = (
         box((0, 0, 0), (1, 2, 3)),
         box((0, 0, 0), (1, 2, 3), dict.fromkeys(BOX_FACES, (0.0, 0.0, 1.0, 1.0))),
@@ -51,7 +50,7 @@ def test_some_faces_are_a_part_of_the_whole_box() -> None:
     np.testing.assert_array_equal(whole.indices, part.indices)
 
 
-def test_merging_keeps_every_triangle_and_its_picture() -> None:
+def test_merging_keeps_every_triangle_and_its_texture() -> None:
     parts = [box((0, 0, 0), (1, 1, 1)), quad([(0, 0, 2), (1, 0, 2), (1, 1, 2), (0, 1, 2)])]
     both = merge(parts)
     assert both.triangles == 14

@@ -11,8 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from perception import Camera
-from sim_tests.world.camera._motion_blur import motion_blur, motion_field
-from sim_tests.world.camera._sensor import to_linear
+from sim_tests.world.camera import motion_blur, motion_field, to_linear
 
 CAMERA = Camera(120, 80, 110.0, 105.0, 58.7, 41.2)
 STILL = level_pose((0.3, -0.4, 1.2), 0.7, 0.1)
@@ -25,9 +24,9 @@ def _moved(pose: np.ndarray, shift_camera_m: tuple[float, float, float]) -> np.n
 
 
 def _edge() -> np.ndarray:
-    picture = np.full((80, 120, 3), 40, np.uint8)
-    picture[:, 60:] = 220
-    return picture
+    image = np.full((80, 120, 3), 40, np.uint8)
+    image[:, 60:] = 220
+    return image
 
 
 @settings(max_examples=40, deadline=None)
@@ -64,7 +63,7 @@ def test_far_away_only_turning_moves_the_image() -> None:
     assert middle[0] == pytest.approx(CAMERA.fx_px * 0.01, rel=0.02)  # to the left: content right
 
 
-def test_an_actor_moves_by_its_own_velocity_and_alone() -> None:
+def test_only_the_actor_moves_by_its_own_velocity() -> None:
     depth = np.full((80, 120), 4.0)
     actors = np.full((80, 120), -1, np.int32)
     actors[20:60, 30:50] = 2
@@ -78,13 +77,13 @@ def test_an_actor_moves_by_its_own_velocity_and_alone() -> None:
 
 @pytest.mark.parametrize("length_px", [3.0, 8.0, 15.0])
 def test_an_edge_smears_evenly_over_its_path(length_px: float) -> None:
-    """Light rises linearly over fx · d / z pixels around the edge, and not outside of them."""
+    """Light rises linearly over fx · d / z pixels around the edge, and is constant elsewhere."""
     z = 2.0
     shift = length_px * z / CAMERA.fx_px
     field = motion_field(CAMERA, np.full((80, 120), z), STILL, _moved(STILL, (shift, 0.0, 0.0)))
     light = to_linear(motion_blur(_edge(), field))[40, :, 0]
     low, high = to_linear(np.uint8([40, 220]))
-    # Between the last dark pixel's centre and the first bright one's lies the edge, at 59.5.
+    # The edge lies at 59.5, between the centres of the last dark and the first bright pixel.
     ramp = low + (high - low) * np.clip((np.arange(120) - 59.5) / length_px + 0.5, 0.0, 1.0)
     inside = np.abs(np.arange(120) - 59.5) < 0.5 * length_px - 0.5
     outside = np.abs(np.arange(120) - 59.5) > 0.5 * length_px + 1.0
@@ -92,31 +91,31 @@ def test_an_edge_smears_evenly_over_its_path(length_px: float) -> None:
     np.testing.assert_allclose(light[outside], ramp[outside], atol=0.005)
 
 
-def test_what_stands_still_stays_sharp() -> None:
+def test_things_that_stand_still_stay_sharp() -> None:
     rng = np.random.default_rng(2)
-    picture = rng.integers(0, 256, (80, 120, 3)).astype(np.uint8)
+    image = rng.integers(0, 256, (80, 120, 3)).astype(np.uint8)
     field = motion_field(CAMERA, rng.uniform(1.0, 9.0, (80, 120)), STILL, STILL)
-    np.testing.assert_array_equal(motion_blur(picture, field), picture)
-    # An actor that moves leaves the scenery a little away from it alone.
+    np.testing.assert_array_equal(motion_blur(image, field), image)
+    # A moving actor does not change the scenery a few pixels away from it.
     actors = np.full((80, 120), -1, np.int32)
     actors[30:50, 40:60] = 0
     field[actors == 0] = (6.0, 0.0)
-    out = motion_blur(picture, field, actors)
-    assert (out[30:50, 40:60] != picture[30:50, 40:60]).any()
+    out = motion_blur(image, field, actors)
+    assert (out[30:50, 40:60] != image[30:50, 40:60]).any()
     far = np.ones((80, 120), dtype=bool)
     far[25:55, 33:67] = False
-    np.testing.assert_array_equal(out[far], picture[far])
+    np.testing.assert_array_equal(out[far], image[far])
 
 
 def test_a_moving_outline_is_half_see_through() -> None:
-    """A bright actor over a dark scene covers each pixel for as long as it is there."""
-    picture = np.full((80, 120, 3), 30, np.uint8)
+    """A bright actor over a dark scene lights each pixel for the time that it covers it."""
+    image = np.full((80, 120, 3), 30, np.uint8)
     actors = np.full((80, 120), -1, np.int32)
     actors[20:60, 40:80] = 1
-    picture[actors == 1] = 230
+    image[actors == 1] = 230
     field = np.zeros((80, 120, 2))
     field[actors == 1] = (10.0, 0.0)
-    light = to_linear(motion_blur(picture, field, actors))[40, :, 1]
+    light = to_linear(motion_blur(image, field, actors))[40, :, 1]
     low, high = to_linear(np.uint8([30, 230]))
     for edge, sign in ((39.5, 1.0), (79.5, -1.0)):
         columns = np.arange(math.ceil(edge - 4.0), math.floor(edge + 4.0) + 1)

@@ -1,4 +1,4 @@
-"""Rendered pictures and depth fall where the camera model projects the truth."""
+"""Rendered images and depth fall where the camera model projects the truth."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from camera_poses import level_pose
-from picture_actors import Shown, ball
+from visual_actors import AWAY_M, ShapeActor, ball
 
 from perception import Camera
 from sim_tests import SimError
@@ -17,7 +17,6 @@ from sim_tests.world import Warehouse
 from sim_tests.world.camera import CameraRenderer
 from sim_tests.world.hall import Lighting, WarehouseLayout
 
-_AWAY = (0.0, 0.0, -50.0)
 OFF_CENTRE = Camera(320, 240, 270.0, 260.0, 171.3, 110.6)
 
 
@@ -33,20 +32,20 @@ def renderer(hall: Warehouse) -> CameraRenderer:
 
 
 @pytest.fixture(scope="module")
-def red_ball(hall: Warehouse) -> tuple[int, Shown]:
-    actor = ball(position_m=_AWAY, colour=(1.0, 0.0, 0.0))
+def red_ball(hall: Warehouse) -> tuple[int, ShapeActor]:
+    actor = ball(position_m=AWAY_M, colour=(1.0, 0.0, 0.0))
     return hall.visuals.add_actor(actor), actor
 
 
 @pytest.fixture
-def target(red_ball: tuple[int, Shown]) -> Iterator[tuple[int, Shown]]:
-    """A red ball with its number among the actors; it waits underground."""
+def target(red_ball: tuple[int, ShapeActor]) -> Iterator[tuple[int, ShapeActor]]:
+    """Return a red ball with its actor number; it is out of view before and after the test."""
     yield red_ball
-    red_ball[1].position_m = np.array(_AWAY)
+    red_ball[1].position_m = np.array(AWAY_M)
 
 
 def test_a_ball_appears_where_it_is_projected(
-    renderer: CameraRenderer, target: tuple[int, Shown]
+    renderer: CameraRenderer, target: tuple[int, ShapeActor]
 ) -> None:
     number, actor = target
     rng = np.random.default_rng(3)
@@ -81,7 +80,7 @@ def test_depth_of_the_floor_is_exact(renderer: CameraRenderer, pitch_rad: float)
         ],
         axis=-1,
     )
-    falls = rays @ T[2, :3]  # odom z a metre of depth
+    falls = rays @ T[2, :3]  # change of odom z per metre of depth
     expected = np.where(falls < 0.0, -1.4 / falls, np.inf)
     near = expected < 3.5  # farther away the racks and walls begin
     assert near.sum() > 10_000
@@ -90,7 +89,7 @@ def test_depth_of_the_floor_is_exact(renderer: CameraRenderer, pitch_rad: float)
 
 
 def test_a_rectangle_is_that_part_of_the_whole(
-    renderer: CameraRenderer, target: tuple[int, Shown]
+    renderer: CameraRenderer, target: tuple[int, ShapeActor]
 ) -> None:
     target[1].position_m = np.array((2.0, 0.1, 1.5))
     T = level_pose((0.0, 0.0, 1.4), 0.0)
@@ -124,7 +123,7 @@ def test_a_rectangle_may_reach_outside_the_image(renderer: CameraRenderer) -> No
 def test_corners_in_the_cameras_plane_do_no_harm(
     renderer: CameraRenderer, heading_deg: float
 ) -> None:
-    """The floor's tiles meet at y = 0, where this camera stands; 1 cm beside they do no harm."""
+    """The floor's tiles meet at y = 0 under the camera: its image equals one from 1 cm beside."""
     camera = Camera.from_fov(160, 160, math.radians(110.0))
     at, beside = (
         renderer.render(camera, level_pose((0.12, y_m, 1.55), math.radians(heading_deg)))
@@ -135,22 +134,22 @@ def test_corners_in_the_cameras_plane_do_no_harm(
     np.testing.assert_allclose(at.depth_m[120:], beside.depth_m[120:], rtol=0.03)
 
 
-def test_nothing_is_infinitely_far(renderer: CameraRenderer) -> None:
+def test_empty_space_is_infinitely_far(renderer: CameraRenderer) -> None:
     view = renderer.render(OFF_CENTRE, level_pose((-30.0, 0.0, 1.4), math.pi))
     assert np.isinf(view.depth_m).all()
     assert (view.body_ids == -1).all()
 
 
-def test_pictures_are_repeatable_and_not_empty(renderer: CameraRenderer) -> None:
+def test_images_are_repeatable_and_not_empty(renderer: CameraRenderer) -> None:
     T = level_pose((0.0, 0.0, 1.4), 0.0)
-    picture = renderer.rgb(OFF_CENTRE, T)
-    assert picture.shape == (240, 320, 3)
-    assert picture.dtype == np.uint8
-    np.testing.assert_array_equal(picture, renderer.rgb(OFF_CENTRE, T))
-    assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 100
+    image = renderer.rgb(OFF_CENTRE, T)
+    assert image.shape == (240, 320, 3)
+    assert image.dtype == np.uint8
+    np.testing.assert_array_equal(image, renderer.rgb(OFF_CENTRE, T))
+    assert len(np.unique(image.reshape(-1, 3), axis=0)) > 100
 
 
-def test_robots_camera_sees_others_and_not_itself() -> None:
+def test_the_robots_camera_sees_others_but_not_the_robot() -> None:
     with Warehouse(WarehouseLayout.open_floor()) as hall:
         amr = Amr(hall)
         robot = hall.visuals.add_actor(AmrLook.of(hall, amr))
@@ -160,7 +159,7 @@ def test_robots_camera_sees_others_and_not_itself() -> None:
         view = renderer.render(camera, amr.T_odom_camera)
         assert not (view.actors == robot).any()
         assert (view.actors == head).any()
-        # Whoever looks at the robot sees it, about where its body is.
+        # A person who looks at the robot sees it where its body is.
         camera = Camera.from_fov(320, 240, math.radians(60.0))
         T = level_pose((2.5, 0.3, 1.65), math.pi, 0.3)
         view = renderer.render(camera, T)
@@ -171,7 +170,7 @@ def test_robots_camera_sees_others_and_not_itself() -> None:
 
 
 @pytest.mark.parametrize("factor", [2, 3])
-def test_supersampling_averages_the_finer_picture(hall: Warehouse, factor: int) -> None:
+def test_supersampling_averages_the_finer_image(hall: Warehouse, factor: int) -> None:
     T = level_pose((0.0, 0.0, 1.4), 0.4)
     smooth = CameraRenderer(hall, supersampling=factor).render(OFF_CENTRE, T)
     once = CameraRenderer(hall)
@@ -189,7 +188,7 @@ def test_supersampling_averages_the_finer_picture(hall: Warehouse, factor: int) 
 
 
 def test_light_has_colour_and_strength(hall: Warehouse) -> None:
-    """A surface shows its own colour · the light's · (ambient + diffuse · cos)."""
+    """The colour of a surface is its own · the light's · (ambient + diffuse · cos)."""
     T = level_pose((0.0, 0.0, 1.4), 0.3, 1.2)
 
     def floor(**light: object) -> np.ndarray:

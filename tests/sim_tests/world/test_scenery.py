@@ -1,4 +1,4 @@
-"""What is drawn of a hall: fills what it collides with, stays inside, is the same every time."""
+"""Scenery fills its collision boxes, stays inside the hall, and is the same every time."""
 
 from __future__ import annotations
 
@@ -13,25 +13,26 @@ from sim_tests import SimError
 from sim_tests.world import Warehouse
 from sim_tests.world.camera import CameraRenderer
 from sim_tests.world.hall import (
+    AMR_ATLAS,
     LAYOUTS,
     LIGHTINGS,
+    PROP_PARTS,
+    TEXTURE_NAMES,
     Lighting,
     Mesh,
+    Prop,
+    RackBox,
+    SceneryChunk,
     WarehouseLayout,
     merge,
     scenery,
     scenery_texture,
 )
-from sim_tests.world.hall._layout import RackBox
-from sim_tests.world.hall._meshes import SceneryChunk
-from sim_tests.world.hall._props import PROP_PARTS, Prop
-from sim_tests.world.hall._scenery import TEXTURE_NAMES
-from sim_tests.world.hall._scenery_props import prop_chunk
-from sim_tests.world.hall._scenery_racks import rack_chunks
 
 _VARIANTS = (0, 1, 6)
-# So far may a mesh stick out of what it collides with.
-_PROUD_M = 0.03
+_HALL = {"x_min_m": -9.0, "y_min_m": -9.0, "x_max_m": 9.0, "y_max_m": 9.0}
+# A mesh may stick out of its collision box by this much.
+_TOLERANCE_M = 0.03
 
 
 def _bytes(chunks: tuple[SceneryChunk, ...]) -> bytes:
@@ -44,8 +45,17 @@ def _bytes(chunks: tuple[SceneryChunk, ...]) -> bytes:
     )
 
 
+def _mesh_on_the_floor(layout: WarehouseLayout) -> Mesh:
+    """Return the racks and props of a layout, without the ceiling's beams and lamps."""
+    return merge(
+        chunk.mesh
+        for chunk in scenery(layout)
+        if chunk.texture == "goods0" and chunk.mesh.vertices_m[:, 2].min() < 0.5
+    )
+
+
 def _hits(mesh: Mesh, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """(N,) whether segments meet a triangle from either side (Möller and Trumbore, 1997)."""
+    """Return (N,) whether segments meet a triangle from either side (Möller, Trumbore 1997)."""
     a, b, c = (mesh.vertices_m[mesh.indices.reshape(-1, 3)[:, k]] for k in range(3))
     out = np.zeros(len(starts), dtype=bool)
     for row, (start, along) in enumerate(zip(starts, ends - starts, strict=True)):
@@ -64,7 +74,7 @@ def _hits(mesh: Mesh, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
 def _on_face(
     rng: np.random.Generator, low: np.ndarray, high: np.ndarray, face: int, margin_m: float
 ) -> np.ndarray:
-    """A point on face 0–3 (−x, +x, −y, +y) or 4 (+z) of a box, not at its rim."""
+    """Return a point on face 0 to 3 (−x, +x, −y, +y) or 4 (+z) of a box, away from its rim."""
     point = rng.uniform(low + margin_m, high - margin_m)
     axis = face // 2
     point[axis] = high[axis] if face in (1, 3, 4) else low[axis]
@@ -89,7 +99,7 @@ def test_chunks_are_well_formed_and_stay_inside_the_hall(name: str, variant: int
         assert (low >= np.array([layout.x_min_m, layout.y_min_m, 0.0]) - 1e-9).all()
         inner = np.array([layout.x_max_m, layout.y_max_m, layout.wall_height_m])
         assert (high <= inner + 1e-9).all()
-        # Small enough that a view leaves most of a hall out.
+        # Chunks are small enough that a view leaves most of a hall out.
         assert np.linalg.norm(high - low) < 9.0
         corners = mesh.vertices_m[mesh.indices.reshape(-1, 3)]
         facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -97,7 +107,7 @@ def test_chunks_are_well_formed_and_stay_inside_the_hall(name: str, variant: int
         assert area.min() > 1e-8
         shaded = mesh.normals[mesh.indices.reshape(-1, 3)].mean(axis=1)
         outward = np.einsum("ij,ij->i", facing, shaded) > 0.0
-        # The ceiling and its lamps alone take the light from above though they face down.
+        # Only the ceiling and its lamps face down with normals that point up.
         overhead = corners[:, :, 2].min(axis=1) > layout.wall_height_m - 0.5
         assert (outward | (overhead & (facing[:, 2] < 0.0))).all()
 
@@ -110,7 +120,7 @@ def test_the_crossing_is_cheap_to_draw() -> None:
         assert len({chunk.texture for chunk in chunks}) <= 8
 
 
-def test_the_same_hall_is_the_same_picture() -> None:
+def test_the_same_hall_and_variant_give_the_same_bytes() -> None:
     layout = WarehouseLayout.staging_hall()
     first = _bytes(scenery(layout, 3))
     scenery.cache_clear()
@@ -128,12 +138,12 @@ def test_the_same_hall_is_the_same_picture() -> None:
         RackBox(x_m=0.0, y_m=0.0, length_m=2.0, width_m=0.7, height_m=2.2),
     ],
 )
-def test_nothing_is_seen_through_a_rack_and_nothing_sticks_out(rack: RackBox) -> None:
-    mesh = merge(chunk.mesh for chunk in rack_chunks(rack, 2, 0))
+def test_a_rack_blocks_every_ray_and_does_not_stick_out(rack: RackBox) -> None:
+    mesh = _mesh_on_the_floor(WarehouseLayout(**_HALL, racks=(rack,)))
     x_min, y_min, x_max, y_max = rack.box_odom_m
     low, high = np.array([x_min, y_min, 0.0]), np.array([x_max, y_max, rack.height_m])
-    assert (mesh.vertices_m >= low - _PROUD_M).all()
-    assert (mesh.vertices_m <= high + _PROUD_M).all()
+    assert (mesh.vertices_m >= low - _TOLERANCE_M).all()
+    assert (mesh.vertices_m <= high + _TOLERANCE_M).all()
     rng = np.random.default_rng(5)
     pairs = [(a, b) for a in range(5) for b in range(5) if a != b]
     chords = [pairs[k % len(pairs)] for k in range(300)]
@@ -146,25 +156,25 @@ def test_nothing_is_seen_through_a_rack_and_nothing_sticks_out(rack: RackBox) ->
 @pytest.mark.parametrize("yaw_deg", [0.0, 90.0, 217.0])
 def test_a_prop_fills_its_boxes_and_does_not_stick_out(kind: str, yaw_deg: float) -> None:
     prop = Prop(kind=kind, x_m=1.0, y_m=-2.0, yaw_deg=yaw_deg)
-    mesh = prop_chunk(prop, 1, 0).mesh
+    mesh = _mesh_on_the_floor(WarehouseLayout(**_HALL, props=(prop,)))
     boxes, heights = np.array(prop.boxes_odom_m), np.array(prop.heights_m)
     x, y, z = mesh.vertices_m.T[:, :, None]
     inside = (
-        (x >= boxes[:, 0] - _PROUD_M)
-        & (x <= boxes[:, 2] + _PROUD_M)
-        & (y >= boxes[:, 1] - _PROUD_M)
-        & (y <= boxes[:, 3] + _PROUD_M)
+        (x >= boxes[:, 0] - _TOLERANCE_M)
+        & (x <= boxes[:, 2] + _TOLERANCE_M)
+        & (y >= boxes[:, 1] - _TOLERANCE_M)
+        & (y <= boxes[:, 3] + _TOLERANCE_M)
         & (z >= -1e-9)
-        & (z <= heights + _PROUD_M)
+        & (z <= heights + _TOLERANCE_M)
     )
     assert inside.any(axis=1).all()
     assert mesh.vertices_m[:, 2].max() > heights.max() - 0.06
-    if yaw_deg == 217.0:  # the box is then larger than the thing
+    if yaw_deg == 217.0:  # the axis-aligned box is larger than the rotated prop
         return
     rng = np.random.default_rng(6)
     for box, height in zip(boxes, heights, strict=True):
         low, high = np.array([*box[:2], 0.0]), np.array([*box[2:], height])
-        if height < 0.4:  # forks: sight passes far above them
+        if height < 0.4:  # forks, which are lower than any line of sight
             continue
         starts = rng.uniform(low, high, (120, 3))
         ends = starts.copy()
@@ -182,16 +192,35 @@ def test_textures_are_painted_alike_every_time() -> None:
         assert max(first.shape) <= 1024
         assert not first.flags.writeable
         assert first.std() > 5.0
-    kept = {name: scenery_texture(name).tobytes() for name in TEXTURE_NAMES}
-    assert len(set(kept.values())) == len(kept)
+    painted = {name: scenery_texture(name).tobytes() for name in TEXTURE_NAMES}
+    assert len(set(painted.values())) == len(painted)
     scenery_texture.cache_clear()
-    assert {name: scenery_texture(name).tobytes() for name in TEXTURE_NAMES} == kept
+    assert {name: scenery_texture(name).tobytes() for name in TEXTURE_NAMES} == painted
     with pytest.raises(SimError, match="did you mean 'goods0'"):
         scenery_texture("good0")
 
 
+def test_the_cells_of_an_atlas_do_not_overlap_and_their_regions_stay_inside() -> None:
+    size = AMR_ATLAS.size_px
+    used = np.zeros((size, size), dtype=int)
+    for name, cell in AMR_ATLAS.cells.items():
+        bottom, right = cell.top_px + cell.height_px, cell.left_px + cell.width_px
+        assert bottom <= size
+        assert right <= size
+        used[cell.top_px : bottom, cell.left_px : right] += 1
+        u_min, v_min, u_max, v_max = AMR_ATLAS.region(name)
+        # The centres of the outermost texels; v counts from the lower edge of the texture.
+        assert (u_min * size, u_max * size) == (cell.left_px + 0.5, right - 0.5)
+        assert (size - v_max * size, size - v_min * size) == (cell.top_px + 0.5, bottom - 0.5)
+        middle = AMR_ATLAS.region(name, (0.5, 0.5, 0.5, 0.5))
+        assert middle[:2] == pytest.approx((0.5 * (u_min + u_max), 0.5 * (v_min + v_max)))
+    assert used.max() == 1
+    with pytest.raises(ValueError, match="cell 'wide' does not fit into an atlas of 16 px"):
+        type(AMR_ATLAS)(16, {"small": (8, 8), "wide": (17, 4)})
+
+
 def _free_pose(layout: WarehouseLayout, rng: np.random.Generator) -> np.ndarray:
-    """T_odom_camera at the robot's eye level, 0.4 m clear of everything."""
+    """Return T_odom_camera at the height of the robot's camera, 0.4 m clear of everything."""
     boxes = layout.obstacle_boxes_odom
     while True:
         x = rng.uniform(layout.x_min_m + 0.5, layout.x_max_m - 0.5)
@@ -209,7 +238,7 @@ def _free_pose(layout: WarehouseLayout, rng: np.random.Generator) -> np.ndarray:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("detector", REQUIRED)
-def test_nobody_is_seen_in_an_empty_hall(detector: str) -> None:
+def test_genuine_detectors_find_nobody_in_an_empty_hall(detector: str) -> None:
     if not (MODELS / f"{detector}.onnx").exists():
         pytest.skip(f"the genuine detector {detector} is not here")
     network = GenuineDetector(detector)
@@ -222,6 +251,6 @@ def test_nobody_is_seen_in_an_empty_hall(detector: str) -> None:
             for _ in range(4):
                 light = Lighting.preset(lights[rng.integers(len(lights))])
                 renderer = CameraRenderer(warehouse, lighting=light)
-                picture = renderer.rgb(camera, _free_pose(warehouse.layout, rng))
-                highest.append(network.people(picture).scores.max(initial=0.0))
+                image = renderer.rgb(camera, _free_pose(warehouse.layout, rng))
+                highest.append(network.people(image).scores.max(initial=0.0))
     assert max(highest) < 0.5

@@ -11,13 +11,12 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from sim_tests import SimError
-from sim_tests.world.camera import SensorConfig, expose
-from sim_tests.world.camera._sensor import collected_electrons, to_linear, to_srgb
+from sim_tests.world.camera import SensorConfig, collected_electrons, expose, to_linear, to_srgb
 
 RAMP = np.repeat(np.arange(256, dtype=np.uint8)[None, :, None], 3, axis=2).repeat(8, axis=0)
 
 
-def test_the_default_changes_nothing_and_draws_no_chance() -> None:
+def test_the_default_changes_nothing_and_draws_no_random_numbers() -> None:
     rng = np.random.default_rng(0)
     out = expose(RAMP, SensorConfig(), rng)
     np.testing.assert_array_equal(out, RAMP)
@@ -35,10 +34,10 @@ def test_srgb_is_undone_exactly() -> None:
 
 @pytest.mark.parametrize("ev", [-2.0, -1.0, 0.5])
 def test_a_stop_is_a_factor_of_two(ev: float) -> None:
-    picture = RAMP[:, 60:150]
-    out = expose(picture, SensorConfig(exposure_ev=ev), np.random.default_rng(0))
+    image = RAMP[:, 60:150]
+    out = expose(image, SensorConfig(exposure_ev=ev), np.random.default_rng(0))
     # Bytes are rounded by half a code, and light goes with about the 2.4th power of the code.
-    np.testing.assert_allclose(to_linear(out), to_linear(picture) * 2.0**ev, rtol=0.04)
+    np.testing.assert_allclose(to_linear(out), to_linear(image) * 2.0**ev, rtol=0.04)
 
 
 @pytest.mark.parametrize("level", [0.0005, 0.003, 0.02, 0.1, 0.5])
@@ -59,8 +58,8 @@ def test_noise_follows_the_photon_transfer_curve(
     assert electrons.var() == pytest.approx(variance, abs=6.0 * spread)
 
 
-def test_noise_keeps_the_mean_of_a_picture_and_its_curve() -> None:
-    """Through bytes and back, where nothing is cut off at white or black."""
+def test_noise_keeps_the_mean_of_an_image_and_its_curve() -> None:
+    """Light passes through sRGB codes and back, where no noise is clipped at white or black."""
     config = SensorConfig(shot_noise=True, full_well_e=3000.0, read_noise_e=5.0)
     rng = np.random.default_rng(3)
     for code in (90, 140, 200):
@@ -74,7 +73,7 @@ def test_noise_keeps_the_mean_of_a_picture_and_its_curve() -> None:
 
 
 def test_gain_trades_photons_for_brightness() -> None:
-    """The same picture with half the light: noise in the picture rises by √2 for 6.02 dB."""
+    """The same image with half the light: noise rises by √2 for 6.02 dB."""
     flat = np.full((100, 100, 3), 150, np.uint8)
     spreads = [
         to_linear(
@@ -90,9 +89,9 @@ def test_vignetting_loses_its_share_in_the_corner_and_nothing_in_the_middle() ->
     light = to_linear(expose(flat, SensorConfig(vignetting=0.4), np.random.default_rng(0)))[..., 0]
     full = float(to_linear(np.uint8([200]))[0])
     assert light[50, 100] == pytest.approx(full, rel=0.01)
-    # The corner's pixel lies half a pixel inside.
+    # The centre of the corner's pixel lies half a pixel inside the image.
     assert light[0, 0] == pytest.approx(0.6 * full, rel=0.02)
-    assert light[0, 100] > light[50, 0] > light[0, 0]  # it goes by the distance from the middle
+    assert light[0, 100] > light[50, 0] > light[0, 0]  # falls with the distance from the middle
     # cos⁴: at half the corner's distance, tan² is a quarter of the corner's.
     corner_tan2 = 0.6**-0.5 - 1.0
     assert light[25, 50] == pytest.approx(full * (1.0 + corner_tan2 / 4.0) ** -2, rel=0.02)
@@ -100,13 +99,13 @@ def test_vignetting_loses_its_share_in_the_corner_and_nothing_in_the_middle() ->
 
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.floats(0.0, 30.0), st.booleans())
-def test_the_same_seed_is_the_same_picture(seed: int, read_noise_e: float, shot: bool) -> None:
+def test_the_same_seed_gives_the_same_image(seed: int, read_noise_e: float, shot: bool) -> None:
     config = SensorConfig(shot_noise=shot, read_noise_e=read_noise_e, exposure_ev=-0.3)
     first, second = (expose(RAMP, config, np.random.default_rng(seed)) for _ in range(2))
     np.testing.assert_array_equal(first, second)
 
 
-def test_odd_pictures_and_settings_are_refused() -> None:
+def test_unusable_images_and_settings_are_refused() -> None:
     with pytest.raises(SimError, match="uint8"):
         expose(RAMP.astype(float), SensorConfig(), np.random.default_rng(0))
     with pytest.raises(ValidationError, match="did you mean 'gain_db'"):

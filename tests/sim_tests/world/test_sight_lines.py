@@ -1,4 +1,4 @@
-"""Lines of sight agree with brute force, with depth pictures, and with what a head hides."""
+"""Lines of sight agree with brute force and with depth images, and heads hide faces."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def hall() -> Iterator[tuple[Warehouse, list[Worker]]]:
 
 
 def meets(eye: np.ndarray, end: np.ndarray, corners: np.ndarray) -> bool:
-    """Möller and Trumbore's test of one segment against one triangle (3, 3)."""
+    """Return whether a segment meets a triangle (3, 3), by Möller and Trumbore's test."""
     along, first, second = end - eye, corners[1] - corners[0], corners[2] - corners[0]
     across = np.cross(along, second)
     volume = first @ across
@@ -71,7 +71,7 @@ def test_a_closed_surface_has_no_gaps_and_hides_only_what_is_behind() -> None:
         inside = rng.normal(size=(20, 3))
         inside *= 0.3 * rng.random((20, 1)) / np.linalg.norm(inside, axis=1, keepdims=True)
         assert surface.blocks(eye, inside).all()
-        # Before the ball, and past it at more than its radius.
+        # One point in front of the ball, and one past it at more than its radius.
         side = np.cross(eye, rng.normal(size=3))
         beside = 0.45 * side / np.linalg.norm(side)
         assert not surface.blocks(eye, np.array([0.2 * eye, beside - eye + beside])).any()
@@ -106,7 +106,9 @@ def test_a_rack_hides_what_is_behind_it_and_the_aisle_is_free() -> None:
     assert not lines.blocked(np.array([0.0, 0.0, 1.4]), np.array([[6.0, 0.0, 1.0]]), FINE).any()
 
 
-def test_whatever_a_worker_does_stays_within_reach(hall: tuple[Warehouse, list[Worker]]) -> None:
+def test_a_worker_stays_within_its_reach_box_in_every_pose(
+    hall: tuple[Warehouse, list[Worker]],
+) -> None:
     rng = np.random.default_rng(5)
     for worker in hall[1]:
         asset = worker.asset
@@ -119,8 +121,8 @@ def test_whatever_a_worker_does_stays_within_reach(hall: tuple[Warehouse, list[W
             assert (points < high).all()
 
 
-def test_visibility_is_that_of_a_depth_picture(hall: tuple[Warehouse, list[Worker]]) -> None:
-    """The picture is asked at the very pixel of each keypoint, at the same level of detail."""
+def test_visibility_agrees_with_a_depth_image(hall: tuple[Warehouse, list[Worker]]) -> None:
+    """The depth image is sampled at each keypoint's own pixel, at the same level of detail."""
     warehouse, workers = hall
     renderer = CameraRenderer(warehouse)
     camera = KeypointCamera(
@@ -145,10 +147,10 @@ def test_visibility_is_that_of_a_depth_picture(hall: tuple[Warehouse, list[Worke
                 corner = pixels[row] + 0.5
                 rectangle = np.concatenate([corner - half_px, corner + half_px])
                 front = renderer.depth(CAMERA, T, rectangle, (1, 1))[0, 0]
-                shown = points[row, 2] <= front + (FACE_DEPTH_M if face else JOINT_DEPTH_M)
-                same[face].append(shown == (keypoints.scores[row] > 0.0))
+                visible = points[row, 2] <= front + (FACE_DEPTH_M if face else JOINT_DEPTH_M)
+                same[face].append(visible == (keypoints.scores[row] > 0.0))
     assert min(len(same[True]), len(same[False])) > 40
-    # The rest are limbs of somebody nearer, whom the picture draws with a finer outline.
+    # The rest are behind limbs of a nearer person, drawn with a finer outline in the image.
     assert np.mean(same[True]) >= 0.99
     assert np.mean(same[False]) >= 0.985
 
@@ -172,7 +174,9 @@ def test_the_back_of_a_head_never_shows_a_face(hall: tuple[Warehouse, list[Worke
         assert lines.blocked(eye, ends, np.ones(3, dtype=np.int64)).all()
 
 
-def test_a_person_hides_another_and_a_box_the_chest(hall: tuple[Warehouse, list[Worker]]) -> None:
+def test_a_person_hides_another_and_a_carried_box_hides_the_chest(
+    hall: tuple[Warehouse, list[Worker]],
+) -> None:
     warehouse, (near, far) = hall
     lines = SightLines(warehouse.layout, actors=warehouse.actors)
     eye, detail = np.array([0.0, 0.0, 1.2]), np.full(1, 2)
@@ -188,7 +192,7 @@ def test_a_person_hides_another_and_a_box_the_chest(hall: tuple[Warehouse, list[
     assert lines.blocked(eye, navel + np.array([0.1, 0.0, 0.0]), detail).all()
 
 
-def test_the_robot_stands_in_the_way_of_others_and_not_of_its_own_camera() -> None:
+def test_the_robot_hides_others_but_never_blocks_its_own_camera() -> None:
     with Warehouse(WarehouseLayout.crossing()) as warehouse:
         amr = Amr(warehouse)
         lines = SightLines(warehouse.layout, actors=[AmrLook.of(warehouse, amr)])

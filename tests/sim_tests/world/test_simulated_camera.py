@@ -1,14 +1,13 @@
-"""The whole camera: renderer, sensor and timing together."""
+"""The simulated camera: renderer, sensor and timing together."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 import numpy as np
 import pytest
 from camera_poses import level_pose
-from picture_actors import ball
+from visual_actors import ball
 
 from perception import Camera
 from sim_tests import SimError
@@ -35,7 +34,7 @@ def test_a_perfect_camera_shows_what_the_renderer_draws(hall: Warehouse) -> None
     np.testing.assert_array_equal(frame.T_odom_camera, pose)
     np.testing.assert_array_equal(frame.rgb, view.rgb)
     np.testing.assert_array_equal(frame.depth_m, view.depth_m)
-    # Both balls are seen, one of them is a person.
+    # Both balls are visible, and one of them is a person.
     np.testing.assert_array_equal(frame.person_mask, view.actors == 0)
     assert frame.person_mask.any()
     assert (view.actors == 1).any()
@@ -55,10 +54,10 @@ def test_a_late_frame_keeps_the_stamp_and_the_pose_of_its_capture(hall: Warehous
     assert 12 <= len(received) < 29  # of 29 that had time to arrive
 
 
-def test_a_turning_camera_smears_along_its_turn_only(hall: Warehouse) -> None:
+def test_a_turning_camera_smears_along_the_turn_only(hall: Warehouse) -> None:
     sensor = SensorConfig(motion_blur=True, exposure_s=0.03)
     camera = SimulatedCamera(hall, CAMERA, sensor=sensor)
-    sharp = camera.capture(0.0, level_pose((0.0, 0.0, 1.4), 0.0))  # nothing moved before
+    sharp = camera.capture(0.0, level_pose((0.0, 0.0, 1.4), 0.0))  # there is no earlier capture
     still = camera.capture(0.05, level_pose((0.0, 0.0, 1.4), 0.0))
     np.testing.assert_array_equal(sharp.rgb, still.rgb)
     camera.capture(0.10, level_pose((0.0, 0.0, 1.4), -0.06))
@@ -75,7 +74,7 @@ def test_a_turning_camera_smears_along_its_turn_only(hall: Warehouse) -> None:
     np.testing.assert_array_equal(turning.depth_m, sharp.depth_m)
 
 
-def test_an_actors_velocity_is_seen_from_frame_to_frame() -> None:
+def test_the_velocity_of_an_actor_is_estimated_between_frames() -> None:
     with Warehouse(WarehouseLayout.open_floor()) as hall:
         actor = ball(0.25, position_m=(2.0, 0.0, 1.4), colour=(0.9, 0.1, 0.1))
         hall.visuals.add_actor(actor)
@@ -85,15 +84,15 @@ def test_an_actors_velocity_is_seen_from_frame_to_frame() -> None:
         actor.position_m[1] = -0.1
         camera.capture(0.0, pose)
         actor.position_m[1] = 0.0
-        guessed = camera.capture(0.1, pose)
-        told = SimulatedCamera(hall, CAMERA, sensor=sensor).capture(0.1, pose, {0: (0.0, 1.0)})
-        np.testing.assert_array_equal(guessed.rgb, told.rgb)
+        estimated = camera.capture(0.1, pose)
+        given = SimulatedCamera(hall, CAMERA, sensor=sensor).capture(0.1, pose, {0: (0.0, 1.0)})
+        np.testing.assert_array_equal(estimated.rgb, given.rgb)
         sharp = SimulatedCamera(hall, CAMERA).capture(0.1, pose)
-        changed = (guessed.rgb != sharp.rgb).any(axis=2)
+        changed = (estimated.rgb != sharp.rgb).any(axis=2)
         assert changed.any()
         # The ball reaches 11.25 px from the middle and moves by 2.25 px.
         rows, columns = np.nonzero(changed)
-        assert math.hypot(*(np.abs(columns - 47.5).max(), 0.0)) < 11.25 + 4.0
+        assert np.abs(columns - 47.5).max() < 11.25 + 4.0
         assert np.abs(rows - 35.5).max() < 11.25 + 2.0
 
 
@@ -101,7 +100,7 @@ def test_noise_and_delays_are_seeded_and_independent(hall: Warehouse) -> None:
     pose = level_pose((0.0, 0.0, 1.4), 0.0)
     noise = SensorConfig(shot_noise=True, read_noise_e=4.0)
 
-    def stamps_and_pictures(sensor: SensorConfig) -> tuple[list[float], list[bytes]]:
+    def stamps_and_images(sensor: SensorConfig) -> tuple[list[float], list[bytes]]:
         camera = SimulatedCamera(
             hall,
             CAMERA,
@@ -113,9 +112,9 @@ def test_noise_and_delays_are_seeded_and_independent(hall: Warehouse) -> None:
         return [frame.stamp_s for frame in frames], [frame.rgb.tobytes() for frame in frames]
 
     noisy, again, clean = (
-        stamps_and_pictures(noise),
-        stamps_and_pictures(noise),
-        stamps_and_pictures(SensorConfig()),
+        stamps_and_images(noise),
+        stamps_and_images(noise),
+        stamps_and_images(SensorConfig()),
     )
     assert noisy == again
     assert noisy[0] == clean[0]
@@ -123,7 +122,7 @@ def test_noise_and_delays_are_seeded_and_independent(hall: Warehouse) -> None:
     assert len(set(clean[1])) == 1
 
 
-def test_chance_without_a_generator_is_refused(hall: Warehouse) -> None:
+def test_noise_and_delays_without_a_generator_are_refused(hall: Warehouse) -> None:
     with pytest.raises(SimError, match="rng"):
         SimulatedCamera(hall, CAMERA, sensor=SensorConfig(shot_noise=True))
     with pytest.raises(SimError, match="rng"):

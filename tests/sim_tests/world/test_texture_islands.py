@@ -11,26 +11,26 @@ from sim_tests.world.hall import WarehouseLayout, scenery, scenery_texture
 from sim_tests.world.render._texture_islands import cut_texture
 
 
-def _colours(uv: np.ndarray, picture: np.ndarray) -> np.ndarray:
-    """The texel that each coordinate (N, 2) falls on."""
-    height, width = picture.shape[:2]
+def _colours(uv: np.ndarray, texture: np.ndarray) -> np.ndarray:
+    """Return the texel that each coordinate (N, 2) falls on."""
+    height, width = texture.shape[:2]
     column = np.clip((uv[:, 0] * width).astype(int), 0, width - 1)
     row = np.clip(((1.0 - uv[:, 1]) * height).astype(int), 0, height - 1)
-    return picture[row, column]
+    return texture[row, column]
 
 
 def _inside(uv: np.ndarray, indices: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Twenty points in every triangle, as (weights, corners): well off its edges."""
+    """Return twenty points in every triangle, away from its edges."""
     weights = rng.dirichlet((2.0, 2.0, 2.0), (len(indices) // 3, 20))
     return np.einsum("tpk,tkc->tpc", weights, uv[indices.reshape(-1, 3)]).reshape(-1, 2)
 
 
 def _same_look(
-    uv: np.ndarray, indices: np.ndarray, picture: np.ndarray
+    uv: np.ndarray, indices: np.ndarray, texture: np.ndarray
 ) -> tuple[float, np.ndarray]:
-    """Share of points with the same colour before and after, and the new picture."""
-    cut_uv, cut = cut_texture(uv, indices, picture)
-    before = _colours(_inside(uv, indices, np.random.default_rng(0)), picture)
+    """Return the share of points with the same colour before and after, and the cut texture."""
+    cut_uv, cut = cut_texture(uv, indices, texture)
+    before = _colours(_inside(uv, indices, np.random.default_rng(0)), texture)
     after = _colours(_inside(cut_uv, indices, np.random.default_rng(0)), cut)
     return float((before == after).all(axis=1).mean()), cut
 
@@ -43,52 +43,52 @@ def test_scattered_triangles_keep_their_colours(
     triangles: int, extent: float, height: int, width: int, seed: int
 ) -> None:
     rng = np.random.default_rng(seed)
-    picture = rng.integers(0, 256, (height, width, 3)).astype(np.uint8)
+    texture = rng.integers(0, 256, (height, width, 3)).astype(np.uint8)
     centres = rng.uniform(extent, 1.0 - extent, (triangles, 1, 2))
     uv = centres + rng.uniform(-extent, extent, (triangles, 3, 2))
-    share, cut = _same_look(uv.reshape(-1, 2), np.arange(3 * triangles), picture)
+    share, cut = _same_look(uv.reshape(-1, 2), np.arange(3 * triangles), texture)
     # A point on the border of two texels may round to either.
     assert share > 0.999
-    assert cut.size <= picture.size
+    assert cut.size <= texture.size
 
 
 def test_a_strip_of_connected_triangles_is_one_rectangle() -> None:
-    picture = np.random.default_rng(1).integers(0, 256, (200, 100, 3)).astype(np.uint8)
+    texture = np.random.default_rng(1).integers(0, 256, (200, 100, 3)).astype(np.uint8)
     uv = np.array([(0.2, 0.4), (0.3, 0.4), (0.3, 0.5), (0.2, 0.5)])
     indices = np.array((0, 1, 2, 0, 2, 3))
-    share, cut = _same_look(uv, indices, picture)
+    share, cut = _same_look(uv, indices, texture)
     assert share > 0.999
-    # Ten columns and twenty rows and what lies around them, rows of whole words.
+    # Ten columns and twenty rows with a margin; a row has whole words.
     assert cut.shape == (20 + 5, 10 + 5 + 1, 3)
-    # The same rectangle used by another face takes no more room.
+    # Another face with the same rectangle takes no more space.
     twice, again = np.concatenate([uv, uv]), np.concatenate([indices, indices + 4])
-    assert cut_texture(twice, again, picture)[1].shape == cut.shape
+    assert cut_texture(twice, again, texture)[1].shape == cut.shape
 
 
 @pytest.mark.parametrize(
     "uv", [[(0.0, 0.0), (3.0, 0.0), (0.0, 3.0)], [(-0.1, 0.0), (0.2, 0.0), (0.0, 0.2)]]
 )
-def test_a_repeated_picture_is_left_alone(uv: list[tuple[float, float]]) -> None:
-    picture = np.zeros((50, 50, 3), np.uint8)
+def test_a_repeated_texture_is_left_alone(uv: list[tuple[float, float]]) -> None:
+    texture = np.zeros((50, 50, 3), np.uint8)
     coordinates = np.array(uv)
-    kept_uv, kept = cut_texture(coordinates, np.array((0, 1, 2)), picture)
-    assert kept is picture
-    assert kept_uv is coordinates
+    same_uv, same = cut_texture(coordinates, np.array((0, 1, 2)), texture)
+    assert same is texture
+    assert same_uv is coordinates
 
 
-def test_a_picture_that_is_used_altogether_is_left_alone() -> None:
-    picture = np.zeros((50, 50, 3), np.uint8)
+def test_a_texture_that_is_used_completely_is_left_alone() -> None:
+    texture = np.zeros((50, 50, 3), np.uint8)
     uv = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
-    assert cut_texture(uv, np.array((0, 1, 2, 0, 2, 3)), picture)[1] is picture
+    assert cut_texture(uv, np.array((0, 1, 2, 0, 2, 3)), texture)[1] is texture
 
 
-def test_racks_keep_their_look_in_a_part_of_the_room() -> None:
+def test_racks_look_the_same_with_a_part_of_the_texture() -> None:
     sizes = []
     for chunk in scenery(WarehouseLayout.crossing()):
         if chunk.texture is not None and chunk.texture.startswith("goods"):
-            picture = scenery_texture(chunk.texture)
-            share, cut = _same_look(chunk.mesh.uv, chunk.mesh.indices.ravel(), picture)
+            texture = scenery_texture(chunk.texture)
+            share, cut = _same_look(chunk.mesh.uv, chunk.mesh.indices.ravel(), texture)
             assert share > 0.999
-            sizes.append(cut.size / picture.size)
+            sizes.append(cut.size / texture.size)
     assert len(sizes) > 10
     assert np.mean(sizes) < 0.6

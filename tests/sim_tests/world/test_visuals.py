@@ -1,14 +1,15 @@
-"""The picture world: actors, textures, what is hidden, and that the physics never notices."""
+"""The render world: actors, textures, hidden bodies, renderers, and physics that never changes."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+import sys
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
 from camera_poses import level_pose
-from picture_actors import CHECKS, Shown, ball, upright_square
+from visual_actors import AWAY_M, CHECKERBOARD, ShapeActor, ball, upright_square
 
 from perception import Camera
 from sim_tests import SimError
@@ -17,21 +18,47 @@ from sim_tests.world import Warehouse
 from sim_tests.world.bullet import pybullet
 from sim_tests.world.camera import CameraRenderer
 from sim_tests.world.hall import Lighting, Mesh, WarehouseLayout, box
-from sim_tests.world.render import RenderView, Visuals
+from sim_tests.world.render import RenderView, Visuals, gl_works
 
 CAMERA = Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
 AHEAD = level_pose((0.0, 0.0, 1.4), 0.0)
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def hall() -> Iterator[Warehouse]:
     with Warehouse(WarehouseLayout.open_floor()) as warehouse:
         yield warehouse
 
 
-def test_an_actor_is_built_once_and_told_when_it_is_out_of_view(hall: Warehouse) -> None:
+@pytest.fixture
+def add_actor(hall: Warehouse) -> Iterator[Callable[[ShapeActor], int]]:
+    """Return a function that adds an actor to the shared hall until the end of the test."""
+    added: list[ShapeActor] = []
+
+    def add(actor: ShapeActor) -> int:
+        added.append(actor)
+        return hall.visuals.add_actor(actor)
+
+    yield add
+    for actor in added:
+        actor.position_m = np.array(AWAY_M)
+
+
+@pytest.fixture
+def _no_opengl(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Make moderngl impossible to import; a changed process id makes OpenGL start again."""
+    monkeypatch.setitem(sys.modules, "moderngl", None)
+    monkeypatch.setattr("os.getpid", lambda: -1)
+    gl_works.cache_clear()
+    yield
+    gl_works.cache_clear()
+
+
+def test_an_actor_is_built_once_and_told_when_it_is_out_of_view(
+    hall: Warehouse, add_actor: Callable[[ShapeActor], int]
+) -> None:
     actor = ball(position_m=(3.0, 0.0, 1.4))
-    number = hall.visuals.add_actor(actor)
+    number = add_actor(actor)
     renderer = CameraRenderer(hall)
     view = renderer.render(CAMERA, AHEAD)
     assert (view.actors == number).sum() == (view.body_ids == actor.body).sum() > 20
@@ -46,16 +73,20 @@ def test_an_actor_is_built_once_and_told_when_it_is_out_of_view(hall: Warehouse)
     assert actor.builds == 1
 
 
-def test_an_actor_that_is_never_seen_is_never_built(hall: Warehouse) -> None:
+def test_an_actor_that_is_never_seen_is_never_built(
+    hall: Warehouse, add_actor: Callable[[ShapeActor], int]
+) -> None:
     behind_the_rack = ball(position_m=(5.0, 6.3, 1.0))
-    hall.visuals.add_actor(behind_the_rack)
+    add_actor(behind_the_rack)
     CameraRenderer(hall).render(CAMERA, level_pose((5.0, 0.0, 1.4), 0.5 * math.pi))
     assert behind_the_rack.builds == 0
 
 
-def test_level_of_detail_follows_the_grid_and_not_the_rectangle(hall: Warehouse) -> None:
+def test_level_of_detail_follows_the_grid_and_not_the_rectangle(
+    hall: Warehouse, add_actor: Callable[[ShapeActor], int]
+) -> None:
     actor = ball(position_m=(2.0, 0.0, 1.4))
-    hall.visuals.add_actor(actor)
+    add_actor(actor)
     renderer = CameraRenderer(hall)
     renderer.render(CAMERA, AHEAD)
     renderer.render(CAMERA, AHEAD, (70, 50, 90, 70))
@@ -64,12 +95,13 @@ def test_level_of_detail_follows_the_grid_and_not_the_rectangle(hall: Warehouse)
     assert actor.shown == pytest.approx([75.0, 75.0, 150.0, 150.0])
 
 
-def test_only_shows_silhouettes_through_everything(hall: Warehouse) -> None:
-    visuals = hall.visuals
+def test_only_shows_silhouettes_through_everything(
+    hall: Warehouse, add_actor: Callable[[ShapeActor], int]
+) -> None:
     near = ball(0.3, position_m=(2.0, 0.0, 1.4))
     far = ball(0.3, position_m=(4.0, 0.0, 1.4))
     in_the_rack = ball(0.3, position_m=(5.0, 5.9, 1.0))
-    first, second, third = (visuals.add_actor(actor) for actor in (near, far, in_the_rack))
+    first, second, third = (add_actor(actor) for actor in (near, far, in_the_rack))
     renderer = CameraRenderer(hall)
     whole = renderer.render(CAMERA, AHEAD)
     assert not (whole.actors == second).any()  # wholly behind the nearer one
@@ -78,7 +110,7 @@ def test_only_shows_silhouettes_through_everything(hall: Warehouse) -> None:
     assert (alone.actors == second).sum() == pytest.approx(
         math.pi * (0.3 / 4.0 * 150) ** 2, rel=0.05
     )
-    # Nothing but the silhouette: no depth, and white.
+    # Everything outside the silhouette is infinitely far and white.
     assert np.isinf(alone.depth_m[alone.actors < 0]).all()
     assert (alone.rgb[alone.actors < 0] == 255).all()
     sideways = level_pose((5.0, 0.0, 1.4), 0.5 * math.pi)
@@ -86,27 +118,27 @@ def test_only_shows_silhouettes_through_everything(hall: Warehouse) -> None:
     np.testing.assert_array_equal(renderer.render(CAMERA, AHEAD).rgb, whole.rgb)
 
 
-def test_a_texture_lies_as_its_coordinates_say_and_multiplies_the_colour() -> None:
+def test_a_texture_lies_as_its_coordinates_say_and_multiplies_the_colour(
+    hall: Warehouse, add_actor: Callable[[ShapeActor], int]
+) -> None:
     quarters = np.zeros((8, 8, 3), np.uint8)
     quarters[:4, :4], quarters[:4, 4:] = (200, 0, 0), (0, 200, 0)
     quarters[4:, :4], quarters[4:, 4:] = (0, 0, 200), (200, 200, 200)
     even = Lighting(ambient=1.0, diffuse=0.0)
-    with Warehouse(WarehouseLayout.open_floor()) as hall:
-        square = Shown(upright_square(), (2.0, 0.0, 1.4), (1.0, 1.0, 0.5), quarters)
-        hall.visuals.add_actor(square)
-        rgb = CameraRenderer(hall, lighting=even).rgb(CAMERA, AHEAD)
+    add_actor(ShapeActor(upright_square(), (2.0, 0.0, 1.4), (1.0, 1.0, 0.5), quarters))
+    rgb = CameraRenderer(hall, lighting=even).rgb(CAMERA, AHEAD)
     seen = rgb[[45, 45, 75, 75], [65, 95, 65, 95]].astype(int)
     wanted = [[200, 0, 0], [0, 200, 0], [0, 0, 100], [200, 200, 100]]
     np.testing.assert_allclose(seen, wanted, atol=2)
 
 
-def test_equal_textures_are_kept_once_and_odd_ones_refused() -> None:
+def test_equal_textures_are_kept_once_and_unusable_ones_are_refused() -> None:
     with Visuals() as visuals:
-        first = visuals.texture(CHECKS.astype(np.uint8))
-        assert visuals.texture(CHECKS.astype(np.uint8).copy()) == first
+        first = visuals.texture(CHECKERBOARD.astype(np.uint8))
+        assert visuals.texture(CHECKERBOARD.astype(np.uint8).copy()) == first
         assert visuals.texture(np.zeros((32, 32, 3), np.uint8)) != first
         with pytest.raises(SimError, match="uint8"):
-            visuals.texture(CHECKS)
+            visuals.texture(CHECKERBOARD)
         with pytest.raises(SimError, match="uint8"):
             visuals.texture(np.zeros((8, 8), np.uint8))
         square = upright_square()
@@ -116,9 +148,9 @@ def test_equal_textures_are_kept_once_and_odd_ones_refused() -> None:
 
 
 def test_hidden_bodies_of_many_links_leave_no_trace() -> None:
-    """A chain of three boxes on spherical joints: posed, hidden, and shown again."""
+    """A chain of three shapes on spherical joints is posed, hidden, and shown again."""
     with Visuals() as visuals:
-        texture = visuals.texture(CHECKS.astype(np.uint8))
+        texture = visuals.texture(CHECKERBOARD.astype(np.uint8))
         square = upright_square(0.2)
         shapes = tuple(visuals.shape(square, texture=texture) for _ in range(2))
         body = visuals.add_body(
@@ -129,24 +161,24 @@ def test_hidden_bodies_of_many_links_leave_no_trace() -> None:
         )
         view = RenderView.of_rectangle(CAMERA, level_pose((-3.0, 0.5, 0.0), 0.0))
         light = Lighting(ambient=1.0, diffuse=0.0)
-        shown = visuals.draw(view, light, 0.1)
+        shown = visuals.draw(view, light)
         assert (shown.body_ids == body).sum() > 500
         columns = np.flatnonzero((shown.body_ids == body).any(axis=0))
         half_turn = (0.0, 0.0, 1.0, 0.0)
         pybullet.resetJointStatesMultiDof(body, [1], [half_turn], physicsClientId=visuals.client)
-        turned = visuals.draw(view, light, 0.1)
-        # Its face is towards the other side now: a face is drawn from in front only.
+        turned = visuals.draw(view, light)
+        # The first link now faces away from the camera, and faces are visible from in front only.
         assert np.flatnonzero((turned.body_ids == body).any(axis=0)).min() > columns.min()
         visuals.hide(body)
-        gone = visuals.draw(view, light, 0.1)
+        gone = visuals.draw(view, light)
         assert (gone.body_ids == -1).all()
         assert np.isinf(gone.depth_m).all()
         visuals.reveal(body)
-        again = visuals.draw(view, light, 0.1)
+        again = visuals.draw(view, light)
         np.testing.assert_array_equal(again.rgb, turned.rgb)
 
 
-def test_pictures_never_change_the_physics() -> None:
+def test_rendering_never_changes_the_physics() -> None:
     def drive(look: bool) -> bytes:
         with Warehouse() as hall:
             amr = Amr(hall)
@@ -164,8 +196,8 @@ def test_pictures_never_change_the_physics() -> None:
     assert drive(True) == drive(False)
 
 
-def test_a_closed_hall_shows_nothing_more() -> None:
-    warehouse = Warehouse()
+def test_a_closed_warehouse_cannot_be_rendered() -> None:
+    warehouse = Warehouse(WarehouseLayout.open_floor())
     visuals = warehouse.visuals
     client = visuals.client
     warehouse.close()
@@ -183,9 +215,40 @@ def test_an_unknown_renderer_is_refused_before_anything_starts() -> None:
         Warehouse(renderer="tinny")  # type: ignore[arg-type]
 
 
-def test_where_opengl_does_not_start_auto_is_the_software_renderer(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr("sim_tests.world.render._visuals.gl_works", lambda: False)
+@pytest.mark.usefixtures("_no_opengl")
+def test_where_opengl_does_not_start_auto_is_the_software_renderer() -> None:
+    assert not gl_works()
     with Visuals(renderer="auto") as visuals:
         assert visuals.renderer == "tiny"
+
+
+@pytest.mark.usefixtures("_no_opengl")
+def test_opengl_without_moderngl_names_the_extra_and_the_other_renderer() -> None:
+    with pytest.raises(SimError, match=r"awarenav\[sim\].*renderer='tiny'"):
+        Visuals(renderer="gl")
+
+
+@pytest.mark.parametrize(
+    ("platform", "backend", "need"),
+    [
+        ("linux", {"backend": "egl"}, "libEGL"),
+        ("darwin", {}, "a driver for OpenGL 3.3"),
+        ("win32", {}, "a driver for OpenGL 3.3"),
+    ],
+)
+def test_each_platform_is_asked_for_its_own_context(
+    monkeypatch: pytest.MonkeyPatch, platform: str, backend: dict[str, str], need: str
+) -> None:
+    moderngl = pytest.importorskip("moderngl")
+    options: dict[str, object] = {}
+
+    def refuse(**given: object) -> None:
+        options.update(given)
+        raise RuntimeError("no driver")
+
+    monkeypatch.setattr(moderngl, "create_context", refuse)
+    monkeypatch.setattr("sys.platform", platform)
+    monkeypatch.setattr("os.getpid", lambda: -1)
+    with pytest.raises(SimError, match=rf"no driver.*it needs {need}.*renderer='tiny'"):
+        Visuals(renderer="gl")
+    assert options == {"standalone": True, "require": 330, **backend}

@@ -1,4 +1,4 @@
-"""The hall: layouts as data, physics that keeps to closed forms, worlds that do not meet."""
+"""The warehouse: collision boxes, physics in closed form, independent and repeatable worlds."""
 
 from __future__ import annotations
 
@@ -13,9 +13,7 @@ from perception import Camera
 from sim_tests import SimError
 from sim_tests.actors.body import Worker
 from sim_tests.actors.robot import Amr
-from sim_tests.world import ROBOT_GROUP, Warehouse
-from sim_tests.world import bullet as _bullet
-from sim_tests.world._warehouse import GRAVITY_MPS2
+from sim_tests.world import GRAVITY_MPS2, ROBOT_GROUP, Warehouse, bullet
 from sim_tests.world.bullet import pybullet
 from sim_tests.world.camera import CameraRenderer
 from sim_tests.world.errors import MissingSimulatorError
@@ -39,7 +37,7 @@ def _ball(warehouse: Warehouse, position_m: tuple[float, float, float]) -> int:
 
 
 @pytest.mark.parametrize("name", LAYOUTS)
-def test_planners_boxes_are_where_the_physics_has_them(name: str) -> None:
+def test_the_planners_boxes_are_those_of_the_physics(name: str) -> None:
     layout = WarehouseLayout.named(name)
     rng = np.random.default_rng(0)
     low, high = (layout.x_min_m, layout.y_min_m), (layout.x_max_m, layout.y_max_m)
@@ -90,13 +88,13 @@ def test_a_ball_falls_as_newton_says_and_stays_on_the_floor() -> None:
         assert position[2] == pytest.approx(0.1, abs=1e-3)
 
 
-def _run(steps: int = 120) -> bytes:
-    """All that a crossing's physics and pictures give, as bytes."""
+def _run() -> bytes:
+    """Return the poses and one image of a drive past a worker, as bytes."""
     with Warehouse() as warehouse:
         amr, worker = Amr(warehouse), Worker(warehouse, 1.8)
         amr.command(1.2, 0.2)
         trace = []
-        for step in range(steps):
+        for step in range(120):
             if step % 4 == 0:
                 worker.place((3.0, 1.0 - 0.01 * step), -1.5, 0.01 * step, 1.2, 0.3, 0.1)
             amr.advance(warehouse.physics_dt_s)
@@ -107,16 +105,20 @@ def _run(steps: int = 120) -> bytes:
         return np.array(trace).tobytes() + view.rgb.tobytes() + view.depth_m.tobytes()
 
 
-def test_same_inputs_give_the_same_bytes() -> None:
-    assert _run() == _run()
+@pytest.fixture(scope="module")
+def first_run() -> bytes:
+    return _run()
 
 
-def test_worlds_do_not_meet() -> None:
-    alone = _run(60)
+def test_same_inputs_give_the_same_bytes(first_run: bytes) -> None:
+    assert _run() == first_run
+
+
+def test_worlds_do_not_affect_each_other(first_run: bytes) -> None:
     with Warehouse(WarehouseLayout.open_floor()) as other:
         _ball(other, (1.0, 0.0, 0.5))
         other.step()
-        assert _run(60) == alone
+        assert _run() == first_run
         other.step()
         assert other.time_s == pytest.approx(2 * other.physics_dt_s)
 
@@ -129,8 +131,8 @@ def test_unusable_steps_are_refused(dt_s: float) -> None:
 
 def test_a_missing_simulator_is_named_with_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pybullet", None)
-    assert _bullet.__file__ is not None
-    spec = importlib.util.spec_from_file_location("sim_tests.world.bullet_again", _bullet.__file__)
+    assert bullet.__file__ is not None
+    spec = importlib.util.spec_from_file_location("sim_tests.world.bullet_again", bullet.__file__)
     assert spec is not None
     assert spec.loader is not None
     with pytest.raises(MissingSimulatorError, match=r"awarenav\[sim\]"):
@@ -147,7 +149,7 @@ def test_the_simulator_starts_silently() -> None:
     assert (done.stdout, done.stderr) == ("", "")
 
 
-def test_a_closed_hall_says_so() -> None:
+def test_a_closed_warehouse_refuses_to_step() -> None:
     warehouse = Warehouse()
     warehouse.close()
     warehouse.close()

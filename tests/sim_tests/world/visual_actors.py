@@ -1,4 +1,4 @@
-"""Small things that move, for tests of what the camera sees."""
+"""Small actors for tests of rendering."""
 
 from __future__ import annotations
 
@@ -9,13 +9,17 @@ from sim_tests.world.bullet import pybullet
 from sim_tests.world.hall import Mesh, ellipsoid, quad
 from sim_tests.world.render import RenderView, Visuals
 
-CHECKS = np.kron(np.indices((4, 4)).sum(axis=0) % 2, np.ones((8, 8)))[..., None] * np.array(
+CHECKERBOARD = np.kron(np.indices((4, 4)).sum(axis=0) % 2, np.ones((8, 8)))[..., None] * np.array(
     [200, 40, 30]
 ) + np.array([30, 90, 60])
 
 
-class Shown:
-    """An actor of one shape at a place; remembers at which level of detail it was shown."""
+#: A place far below the floor, where no camera sees an actor and no lamp casts its shadow.
+AWAY_M = (0.0, 0.0, -50.0)
+
+
+class ShapeActor:
+    """An actor of one shape; it records the levels of detail at which it was shown."""
 
     kind = "prop"
 
@@ -65,14 +69,14 @@ class Shown:
         return frozenset({self.body})
 
 
-def ball(radius_m: float = 0.06, **others: object) -> Shown:
-    """A round actor."""
+def ball(radius_m: float = 0.06, **others: object) -> ShapeActor:
+    """Return a round actor."""
     mesh = ellipsoid((0.0, 0.0, 0.0), (radius_m,) * 3, sides=24, rings=16)
-    return Shown(mesh, **others)  # type: ignore[arg-type]
+    return ShapeActor(mesh, **others)  # type: ignore[arg-type]
 
 
 def upright_square(half_m: float = 0.5) -> Mesh:
-    """A square across odom x that faces −x, its picture upright."""
+    """Return a square across odom x that faces −x, its texture upright."""
     corners = [
         (0.0, half_m, -half_m),
         (0.0, -half_m, -half_m),

@@ -1,4 +1,4 @@
-"""Painters of the goods' atlas: each fills a canvas with one kind of surface."""
+"""Painters of the goods atlas: each fills a canvas with one kind of surface."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from ._texture_paint import (
+from ._canvas import (
     Canvas,
     band,
     fade,
@@ -21,7 +21,7 @@ from ._texture_paint import (
     text,
 )
 
-_KRAFT: Final = np.array(
+_KRAFT_RGB: Final = np.array(
     [
         (184, 146, 102),
         (168, 128, 84),
@@ -34,7 +34,7 @@ _KRAFT: Final = np.array(
     ],
     dtype=np.float64,
 )
-_PRINT: Final = np.array(
+_PRINT_RGB: Final = np.array(
     [(40, 60, 120), (150, 40, 36), (40, 96, 60), (46, 44, 44), (196, 110, 30), (30, 104, 128)],
     dtype=np.float64,
 )
@@ -42,26 +42,26 @@ _CRATE_RGB: Final = ((46, 84, 150), (112, 116, 120), (158, 48, 40), (52, 116, 74
 
 
 def _carton(canvas: Canvas, rng: np.random.Generator, _: int = 0) -> None:
-    base = _KRAFT[rng.integers(len(_KRAFT))] * rng.uniform(0.88, 1.06)
+    base = _KRAFT_RGB[rng.integers(len(_KRAFT_RGB))] * rng.uniform(0.88, 1.06)
     canvas[:] = base
     grain(canvas, rng, 0.035, 5)
     tape = base * 0.5 + np.array((196, 174, 140)) * 0.5 if rng.random() < 0.7 else base * 0.82
     middle = 0.5
     band(canvas, (middle - 0.05, 0.0, middle + 0.05, rng.uniform(0.14, 0.3)), tape, 0.8)
     band(canvas, (middle - 0.05, 0.86, middle + 0.05, 1.0), tape, 0.8)
-    ink = _PRINT[rng.integers(len(_PRINT))]
+    rgb = _PRINT_RGB[rng.integers(len(_PRINT_RGB))]
     kind = rng.integers(5)
     if kind == 0:  # two arrows: this side up
         for x in (0.68, 0.84):
-            polygon(canvas, [(x - 0.06, 0.5), (x, 0.38), (x + 0.06, 0.5)], ink)
-            band(canvas, (x - 0.02, 0.5, x + 0.02, 0.66), ink)
+            polygon(canvas, [(x - 0.06, 0.5), (x, 0.38), (x + 0.06, 0.5)], rgb)
+            band(canvas, (x - 0.02, 0.5, x + 0.02, 0.66), rgb)
     elif kind == 1:  # a maker's band
-        band(canvas, (0.0, 0.42, 1.0, 0.62), ink, 0.75)
+        band(canvas, (0.0, 0.42, 1.0, 0.62), rgb, 0.75)
         band(canvas, (0.2, 0.48, 0.8, 0.56), (235, 230, 215), 0.8)
     elif kind == 2:  # a maker's block with lines of print
-        band(canvas, (0.08, 0.34, 0.4, 0.56), ink, 0.85)
+        band(canvas, (0.08, 0.34, 0.4, 0.56), rgb, 0.85)
         for row in range(3):
-            band(canvas, (0.08, 0.64 + 0.08 * row, 0.5 - 0.08 * row, 0.67 + 0.08 * row), ink, 0.6)
+            band(canvas, (0.08, 0.64 + 0.08 * row, 0.5 - 0.08 * row, 0.67 + 0.08 * row), rgb, 0.6)
     if rng.random() < 0.6:  # address label with a bar code
         x, y = rng.uniform(0.55, 0.68), rng.uniform(0.68, 0.74)
         if kind in (0, 1):
@@ -75,17 +75,17 @@ def _carton(canvas: Canvas, rng: np.random.Generator, _: int = 0) -> None:
 def _stack(canvas: Canvas, rng: np.random.Generator, _: int = 0) -> None:
     rows, columns = ((2, 2), (3, 3), (3, 2), (2, 3), (4, 3))[rng.integers(5)]
     high, wide = canvas.shape[0] / rows, canvas.shape[1] / columns
-    same = int(rng.integers(1 << 30))
+    seed = int(rng.integers(1 << 30))
     canvas[:] = (70, 54, 38)
     for row in range(rows):
         for column in range(columns):
             x0, x1 = round(column * wide), round((column + 1) * wide) - 1
             y0, y1 = round(row * high), round((row + 1) * high) - 1
-            one = plain(x1 - x0, y1 - y0, (0, 0, 0))
-            # One delivery is one kind of carton; each has aged on its own.
-            _carton(one, np.random.default_rng(same))
-            one *= rng.uniform(0.9, 1.05)
-            canvas[y0:y1, x0:x1] = one[:, : canvas.shape[1] - x0]
+            carton = plain(x1 - x0, y1 - y0, (0, 0, 0))
+            # All cartons of a stack are of one kind; each has its own tone.
+            _carton(carton, np.random.default_rng(seed))
+            carton *= rng.uniform(0.9, 1.05)
+            canvas[y0:y1, x0:x1] = carton[:, : canvas.shape[1] - x0]
     if rng.random() < 0.35:  # strapping
         for x in (0.3, 0.7):
             band(canvas, (x - 0.008, 0.0, x + 0.008, 1.0), (230, 230, 224), 0.7)
@@ -127,7 +127,7 @@ def _crates(canvas: Canvas, rng: np.random.Generator, index: int) -> None:
 
 def _sacks(canvas: Canvas, rng: np.random.Generator, index: int) -> None:
     paper = np.array(((206, 196, 176), (176, 186, 196))[index % 2]) * rng.uniform(0.92, 1.03)
-    ink = _PRINT[rng.integers(len(_PRINT))]
+    print_rgb = _PRINT_RGB[rng.integers(len(_PRINT_RGB))]
     rows = 6
     canvas[:] = paper * 0.45
     for row in range(rows):
@@ -147,7 +147,7 @@ def _sacks(canvas: Canvas, rng: np.random.Generator, index: int) -> None:
                 ],
                 tone,
             )
-            band(canvas, (x0 + 0.1, y0 + 0.05, x0 + 0.3, y1 - 0.04), ink, 0.7)
+            band(canvas, (x0 + 0.1, y0 + 0.05, x0 + 0.3, y1 - 0.04), print_rgb, 0.7)
     grain(canvas, rng, 0.04, 12)
 
 
@@ -164,7 +164,7 @@ def _drums(canvas: Canvas, rng: np.random.Generator, index: int) -> None:
 
 
 def _cage(canvas: Canvas, rng: np.random.Generator, index: int) -> None:
-    """A wire cage with parcels behind the wire."""
+    """Paint a wire cage with parcels behind the wire."""
     _stack(canvas, rng) if index == 0 else _crates(canvas, rng, int(rng.integers(5)))
     canvas *= 0.72
     for k in range(9):
@@ -176,7 +176,7 @@ def _cage(canvas: Canvas, rng: np.random.Generator, index: int) -> None:
 
 
 def _parts(canvas: Canvas, rng: np.random.Generator, _: int) -> None:
-    """A shelf with small bins in rows."""
+    """Paint a shelf with small bins in rows."""
     canvas[:] = (60, 62, 66)
     for row in range(5):
         for column in range(5):
@@ -189,7 +189,7 @@ def _parts(canvas: Canvas, rng: np.random.Generator, _: int) -> None:
 
 
 def _backing(canvas: Canvas, rng: np.random.Generator, _: int) -> None:
-    """What is deep inside a rack: mesh and the dim backs of other goods."""
+    """Paint the wire mesh and the dim goods deep inside a rack."""
     canvas[:] = (66, 66, 66)
     grain(canvas, rng, 0.16, 6)
     for k in range(16):
@@ -199,7 +199,7 @@ def _backing(canvas: Canvas, rng: np.random.Generator, _: int) -> None:
 
 
 def _end(canvas: Canvas, rng: np.random.Generator, _: int) -> None:
-    """The sheet that closes a rack's end, perforated, with a guard at the bottom."""
+    """Paint the perforated sheet that closes a rack's end, with a guard at the bottom."""
     canvas[:] = (122, 130, 138)
     grain(canvas, rng, 0.02)
     canvas[6:-40:8, 5::8] *= 0.55
@@ -219,12 +219,12 @@ def _upright(canvas: Canvas, rng: np.random.Generator, _: int) -> None:
     canvas[4::8, 10:12] *= 0.35
     canvas[:, :2] *= 1.2
     canvas[:, -2:] *= 0.75
-    canvas[-34:-6] = (228, 182, 36)  # the foot's guard
+    canvas[-34:-6] = (228, 182, 36)  # guard at the foot
     fade(canvas, 1.0, 0.9)
 
 
 def _ladder(canvas: Canvas, rng: np.random.Generator, _: int) -> None:
-    """Zigzag bracing on a dark ground."""
+    """Paint zigzag bracing on a dark background."""
     canvas[:] = (58, 60, 62)
     grain(canvas, rng, 0.1, 6)
     for k in range(4):
@@ -250,7 +250,7 @@ def _window(canvas: Canvas, rng: np.random.Generator, _: int) -> None:
 
 
 def _deck(canvas: Canvas, rng: np.random.Generator, _: int) -> None:
-    """Wire deck or chipboard seen from below."""
+    """Paint a wire deck or chipboard, seen from below."""
     canvas[:] = (108, 106, 102)
     grain(canvas, rng, 0.04, 6)
     for k in range(8):
@@ -260,7 +260,7 @@ def _deck(canvas: Canvas, rng: np.random.Generator, _: int) -> None:
 
 
 def _top(canvas: Canvas, rng: np.random.Generator, _: int) -> None:
-    canvas[:] = _KRAFT[rng.integers(len(_KRAFT))]
+    canvas[:] = _KRAFT_RGB[rng.integers(len(_KRAFT_RGB))]
     grain(canvas, rng, 0.04, 4)
     for k in (0.0, 0.5):
         band(canvas, (0.0, k + 0.21, 1.0, k + 0.29), (200, 178, 142), 0.7)
@@ -280,20 +280,17 @@ def _crates_top(canvas: Canvas, rng: np.random.Generator, _: int) -> None:
         band(canvas, (x0 + 0.05, y0 + 0.05, x0 + 0.41, y0 + 0.41), (52, 54, 58))
 
 
-def _planks(canvas: Canvas, rng: np.random.Generator, gaps: int) -> None:
+def _pallet_top(canvas: Canvas, rng: np.random.Generator, _: int) -> None:
+    planks = 6
     canvas[:] = (60, 46, 32)
-    for k in range(gaps):
+    for k in range(planks):
         tone = np.array((178, 142, 98)) * rng.uniform(0.84, 1.08)
-        band(canvas, (0.0, (k + 0.04) / gaps, 1.0, (k + 0.86) / gaps), tone)
+        band(canvas, (0.0, (k + 0.04) / planks, 1.0, (k + 0.86) / planks), tone)
     canvas *= 1.0 + 0.05 * noise(rng, canvas.shape[0], canvas.shape[1], 24, 4)[..., None]
 
 
-def _pallet_top(canvas: Canvas, rng: np.random.Generator, _: int) -> None:
-    _planks(canvas, rng, 6)
-
-
 def _pallet_side(canvas: Canvas, rng: np.random.Generator, _: int) -> None:
-    """Boards above and below three blocks, dark between them: 1.2 m by 0.144 m."""
+    """Paint boards above and below three blocks, dark between them: 1.2 m × 0.144 m."""
     wood = np.array((172, 138, 94)) * rng.uniform(0.92, 1.05)
     canvas[:] = (34, 28, 22)
     band(canvas, (0.0, 0.0, 1.0, 0.26), wood)
@@ -305,7 +302,7 @@ def _pallet_side(canvas: Canvas, rng: np.random.Generator, _: int) -> None:
 
 
 def _mast(canvas: Canvas, rng: np.random.Generator, _: int) -> None:
-    """A lift mast: profiles, chains and a dark guard between them."""
+    """Paint a lift mast: profiles, chains and a dark guard between them."""
     canvas[:] = (74, 78, 82)
     for x in (0.0, 0.14, 0.78, 0.92):
         band(canvas, (x, 0.0, x + 0.08, 1.0), (46, 48, 50))
@@ -316,9 +313,9 @@ def _mast(canvas: Canvas, rng: np.random.Generator, _: int) -> None:
 
 
 def _sign(canvas: Canvas, rng: np.random.Generator, index: int) -> None:
-    ground, ink = (((236, 196, 40), (30, 30, 30)), ((232, 234, 232), (26, 60, 130)))[index % 2]
-    canvas[:] = ground
-    text(canvas, f"{'ABCDEF'[index % 6]}{index + 1:02d}", (0.5, 0.5), 0.5, ink)
+    plate, letters = (((236, 196, 40), (30, 30, 30)), ((232, 234, 232), (26, 60, 130)))[index % 2]
+    canvas[:] = plate
+    text(canvas, f"{'ABCDEF'[index % 6]}{index + 1:02d}", (0.5, 0.5), 0.5, letters)
     shade_edges(canvas, 0.04, 0.4)
 
 
@@ -334,7 +331,7 @@ def _beam(canvas: Canvas, rng: np.random.Generator, _: int) -> None:
 
 
 def _label(canvas: Canvas, _rng: np.random.Generator, _index: int) -> None:
-    """A storage place's label: a bar code and a number."""
+    """Paint the label of a storage place: a bar code and a number."""
     canvas[:] = (236, 236, 230)
     for k in range(6):
         band(canvas, (0.06 + 0.07 * k, 0.2, 0.09 + 0.07 * k, 0.8), (44, 44, 46))
@@ -346,7 +343,7 @@ def _grille(canvas: Canvas, rng: np.random.Generator, _: int) -> None:
     canvas[::4] *= 0.4
 
 
-#: By the name of the picture without its number; called with canvas, generator and number.
+#: Painters by the name of a cell without its number; called with canvas, generator and number.
 GOODS_PAINTERS: Final[dict[str, Callable[[Canvas, np.random.Generator, int], None]]] = {
     "carton": _carton,
     "stack": _stack,

@@ -1,6 +1,8 @@
-"""Brushes for procedural textures: noise, stains, boards, bands and printed text.
+"""Drawing primitives for procedural textures: noise, bands, shades, polygons and text.
 
-A canvas is an (H, W, 3) float32 array of sRGB values, 0 to 255, row 0 on top.
+A canvas is an (H, W, 3) float32 array of sRGB values, 0 to 255, its first row at the top. Boxes,
+corners and centres are given as shares of the canvas: (0, 0) is its upper left corner, (1, 1) its
+lower right one.
 """
 
 from __future__ import annotations
@@ -17,14 +19,21 @@ Rgb = Sequence[float] | NDArray[Any]
 
 
 def plain(width_px: int, height_px: int, rgb: Rgb) -> Canvas:
-    """A canvas of one colour."""
+    """Return a canvas of one colour."""
     return np.full((height_px, width_px, 3), rgb, dtype=np.float32)
+
+
+def finished(canvas: Canvas) -> NDArray[np.uint8]:
+    """Return the texture painted on a canvas: rounded, clipped to 0 to 255, read-only."""
+    texture = np.clip(np.round(canvas), 0, 255).astype(np.uint8)
+    texture.setflags(write=False)
+    return texture
 
 
 def noise(
     rng: np.random.Generator, height_px: int, width_px: int, rows: int, columns: int
 ) -> NDArray[np.float32]:
-    """(H, W) smooth noise of about unit spread whose edges meet when it is tiled."""
+    """Return (H, W) smooth noise with a standard deviation of about 1, seamless when tiled."""
     grid = rng.standard_normal((rows, columns)).astype(np.float32)
     margin = 2
     padded = np.pad(grid, margin, mode="wrap")
@@ -38,7 +47,7 @@ def noise(
 
 
 def grain(canvas: Canvas, rng: np.random.Generator, amount: float, cells: int = 0) -> None:
-    """Vary the brightness by ``amount`` (a share), in ``cells`` patches a side (0: every texel)."""
+    """Vary the brightness by a share ``amount``, in cells × cells patches (0: per texel)."""
     height, width = canvas.shape[:2]
     if cells:
         field = noise(rng, height, width, cells, cells)
@@ -48,7 +57,7 @@ def grain(canvas: Canvas, rng: np.random.Generator, amount: float, cells: int = 
 
 
 def band(canvas: Canvas, box: Any, rgb: Rgb, opacity: float = 1.0) -> None:
-    """Blend a rectangle: ``box`` is x_min, y_min, x_max, y_max as shares of the canvas."""
+    """Blend a rectangle ``box`` (x_min, y_min, x_max, y_max) into the canvas."""
     height, width = canvas.shape[:2]
     x0, x1 = round(box[0] * width), max(round(box[2] * width), round(box[0] * width) + 1)
     y0, y1 = round(box[1] * height), max(round(box[3] * height), round(box[1] * height) + 1)
@@ -57,7 +66,7 @@ def band(canvas: Canvas, box: Any, rgb: Rgb, opacity: float = 1.0) -> None:
 
 
 def shade_edges(canvas: Canvas, share: float, amount: float) -> None:
-    """Darken a rim of ``share`` of the canvas, as worn edges of boxes are."""
+    """Darken a rim as wide as ``share`` of the canvas by up to ``amount``, like worn edges."""
     height, width = canvas.shape[:2]
     x = np.minimum(np.arange(width) + 0.5, width - np.arange(width) - 0.5) / width
     y = np.minimum(np.arange(height) + 0.5, height - np.arange(height) - 0.5) / height
@@ -78,30 +87,47 @@ def round_shade(canvas: Canvas, cycles: int, depth: float) -> None:
 
 
 def text(canvas: Canvas, words: str, centre: tuple[float, float], height: float, rgb: Rgb) -> None:
-    """Write ``words`` about a centre (shares of the canvas), ``height`` a share of its height."""
+    """Write ``words`` about ``centre``, as high as ``height`` of the canvas."""
     rows, columns = canvas.shape[:2]
     font = cv2.FONT_HERSHEY_SIMPLEX
     scale = height * rows / 22.0
     (wide, high), _ = cv2.getTextSize(words, font, scale, 1)
-    ink = np.zeros((rows, columns), np.uint8)
+    coverage = np.zeros((rows, columns), np.uint8)
     at = (round(centre[0] * columns - 0.5 * wide), round(centre[1] * rows + 0.5 * high))
-    cv2.putText(ink, words, at, font, scale, 255, max(1, round(scale * 2.2)), cv2.LINE_AA)
-    share = (ink.astype(np.float32) / 255.0)[..., None]
-    canvas += share * (np.asarray(rgb, dtype=np.float32) - canvas)
+    cv2.putText(coverage, words, at, font, scale, 255, max(1, round(scale * 2.2)), cv2.LINE_AA)
+    _blend(canvas, coverage, rgb)
 
 
 def polygon(canvas: Canvas, corners: Sequence[tuple[float, float]], rgb: Rgb) -> None:
-    """Fill a polygon given by shares of the canvas."""
+    """Fill a polygon."""
     rows, columns = canvas.shape[:2]
     points = np.round(np.asarray(corners) * (columns, rows) * 16).astype(np.int32)
-    ink = np.zeros((rows, columns), np.uint8)
-    cv2.fillPoly(ink, [points.reshape(-1, 1, 2)], 255, cv2.LINE_AA, 4)
-    share = (ink.astype(np.float32) / 255.0)[..., None]
+    coverage = np.zeros((rows, columns), np.uint8)
+    cv2.fillPoly(coverage, [points.reshape(-1, 1, 2)], 255, cv2.LINE_AA, 4)
+    _blend(canvas, coverage, rgb)
+
+
+def disc(
+    canvas: Canvas,
+    radius: float,
+    rgb: Rgb,
+    centre: tuple[float, float] = (0.5, 0.5),
+    corners: int = 24,
+) -> None:
+    """Fill a regular polygon about ``centre``; it is an ellipse on a canvas that is not square."""
+    x, y = centre
+    angles = np.linspace(0.0, 2.0 * np.pi, corners, endpoint=False)
+    polygon(canvas, [(x + radius * np.cos(a), y + radius * np.sin(a)) for a in angles], rgb)
+
+
+def _blend(canvas: Canvas, coverage: NDArray[np.uint8], rgb: Rgb) -> None:
+    """Blend a colour into the canvas by its coverage (H, W), 0 to 255."""
+    share = (coverage.astype(np.float32) / 255.0)[..., None]
     canvas += share * (np.asarray(rgb, dtype=np.float32) - canvas)
 
 
 def stripes(canvas: Canvas, count: int, first: Rgb, second: Rgb, slant: float = 1.0) -> None:
-    """Slanted stripes of two colours, ``count`` pairs across the width, tileable."""
+    """Fill with slanted stripes of two colours, ``count`` pairs across the width, seamless."""
     rows, columns = canvas.shape[:2]
     x = np.linspace(0.0, count, columns, endpoint=False)[None, :]
     y = np.linspace(0.0, slant * count * rows / columns, rows, endpoint=False)[:, None]
@@ -109,10 +135,3 @@ def stripes(canvas: Canvas, count: int, first: Rgb, second: Rgb, slant: float = 
     canvas[:] = np.where(
         on[..., None], np.asarray(first, np.float32), np.asarray(second, np.float32)
     )
-
-
-def sealed(canvas: Canvas) -> NDArray[np.uint8]:
-    """The finished picture: clipped, whole numbers, read-only."""
-    picture = np.clip(np.round(canvas), 0, 255).astype(np.uint8)
-    picture.setflags(write=False)
-    return picture

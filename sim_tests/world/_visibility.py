@@ -1,0 +1,105 @@
+"""Visibility of points: on the floor plan, by a ray through the physics world, in a depth image.
+
+:mod:`sim_tests.world.sightlines` tests lines of sight against the rendered surfaces instead.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perception.arrays import FloatArray
+
+from .bullet import pybullet
+
+#: A keypoint counts as visible if no surface lies in front of it by more than this: joint centres
+#: lie inside the body, the points of the face on its skin.
+JOINT_DEPTH_M: Final = 0.16
+FACE_DEPTH_M: Final = 0.04
+#: The first keypoints are those of the face.
+FACE_KEYPOINTS: Final = 5
+
+# Smallest component of a direction, so that nothing is divided by 0.
+_TINY_M: Final = 1e-9
+# A line of sight starts at this distance from the eyes, outside the head.
+_HEAD_M: Final = 0.16
+# A keypoint nearer to the camera plane than this is never visible.
+_NEAR_M: Final = 0.1
+
+
+class Viewer(Protocol):
+    """A person with eyes and a body in a physics world."""
+
+    body: int
+    client: int
+
+    @property
+    def eyes_odom_m(self) -> FloatArray:
+        """The midpoint of the eyes, (3,)."""
+        ...
+
+
+def crosses_boxes(boxes_odom_m: FloatArray, start_m: Any, ends_m: Any) -> NDArray[np.bool_]:
+    """Return (K,) whether the lines from ``start_m`` to ``ends_m`` cross any box on the floor plan.
+
+    Args:
+        boxes_odom_m: (N, 4) x_min, y_min, x_max, y_max.
+        start_m: (2,).
+        ends_m: (K, 2).
+    """
+    origin = np.asarray(start_m, dtype=np.float64)
+    along = np.asarray(ends_m, dtype=np.float64).reshape(-1, 2) - origin
+    safe = np.where(np.abs(along) < _TINY_M, _TINY_M, along)[:, None]
+    first = (boxes_odom_m[:, :2] - origin) / safe
+    second = (boxes_odom_m[:, 2:] - origin) / safe
+    enter = np.minimum(first, second).max(axis=2)
+    leave = np.maximum(first, second).min(axis=2)
+    return np.asarray(((enter < leave) & (leave > 0.0) & (enter < 1.0)).any(axis=1))
+
+
+def sees(viewer: Viewer, target_odom_m: FloatArray, through: frozenset[int] = frozenset()) -> bool:
+    """Return whether nothing stands between a person's eyes and a point in the physics world.
+
+    Args:
+        viewer: the person; their own body never blocks.
+        target_odom_m: (3,).
+        through: ids of other bodies that do not block, such as the robot that carries the target.
+    """
+    eyes = viewer.eyes_odom_m
+    ray = target_odom_m - eyes
+    distance = float(np.linalg.norm(ray))
+    if distance <= _HEAD_M:
+        return True
+    start = eyes + ray * (_HEAD_M / distance)
+    (hit,) = pybullet.rayTestBatch(
+        [start.tolist()], [target_odom_m.tolist()], physicsClientId=viewer.client
+    )
+    return hit[0] == -1 or hit[0] == viewer.body or hit[0] in through
+
+
+def keypoints_in_front(
+    points_camera_m: FloatArray, pixels_px: FloatArray, depth_m: FloatArray
+) -> NDArray[np.bool_]:
+    """Return (K,) whether each keypoint is visible in a depth image.
+
+    Args:
+        points_camera_m: (K, 3) in the optical frame.
+        pixels_px: (K, 2) their projections; NaN behind the camera.
+        depth_m: (H, W) along the optical axis.
+    """
+    height, width = depth_m.shape
+    column, row = (np.floor(np.nan_to_num(pixels_px, nan=-9.0) + 0.5).astype(int)).T
+    inside = (
+        (points_camera_m[:, 2] > _NEAR_M)
+        & (column >= 0)
+        & (column < width)
+        & (row >= 0)
+        & (row < height)
+    )
+    front = depth_m[np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)]
+    tolerance = np.full(len(points_camera_m), JOINT_DEPTH_M)
+    tolerance[:FACE_KEYPOINTS] = FACE_DEPTH_M
+    visible: Any = inside & (points_camera_m[:, 2] <= front + tolerance)
+    return np.asarray(visible)
