@@ -181,7 +181,8 @@ def write_manifest(folder: Path, entries: Sequence[Mapping[str, str]]) -> Path:
 def _with_facts(card: Path, text: str, model: ShippedModel) -> str:
     """Return the text of a card with the facts of the manifest's entry."""
     for fact in ("sha256", "size_bytes", "licence", "input"):
-        line = f"- {fact}: {getattr(model, fact)}".replace("\\", r"\\")  # no group references
+        # A backslash in the replacement must not start a group reference.
+        line = f"- {fact}: {getattr(model, fact)}".replace("\\", r"\\")
         text, count = re.subn(rf"^- {fact}: .*$", line, text, flags=re.MULTILINE)
         if count != 1:
             raise PerceptionError(f"{card} must have one line '- {fact}: …', got {count}")

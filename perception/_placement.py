@@ -88,8 +88,8 @@ def place_people(
         feet = _feet_on_floor(floor, camera, detections, people, keypoint_std_px, min_score)
     placed: list[Placement | None] = [None] * len(people)
     to_correct: list[tuple[int, Placement, list[DepthCue]]] = []
-    for row, (any_body, by_box) in enumerate(zip(bodies, box_placements, strict=True)):
-        body, start = _first_placement(any_body, by_box)
+    for row, (body_placement, by_box) in enumerate(zip(bodies, box_placements, strict=True)):
+        body, start = _first_placement(body_placement, by_box)
         if start is None:
             continue
         placed[row] = start

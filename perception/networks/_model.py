@@ -170,9 +170,8 @@ class OnnxModel:
         try:
             return cls(path, settings=settings, sha256=shipped_model(name, folder).sha256)
         except PerceptionError:
-            verify_shipped_model(
-                name, folder
-            )  # if the file is the cause, its error says the remedy
+            # If the file is the cause, this raises an error that says the remedy.
+            verify_shipped_model(name, folder)
             raise
 
     def __repr__(self) -> str:

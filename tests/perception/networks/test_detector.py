@@ -122,12 +122,12 @@ def test_boxes_and_scores_that_are_not_finite_are_dropped(name: str) -> None:
         (colour_rtmdet(320, 320), None),
     ],
 )
-@pytest.mark.parametrize("picture", [(512, 640), (300, 500)])
+@pytest.mark.parametrize("image_size", [(512, 640), (300, 500)])
 def test_networks_get_the_channels_in_their_own_order(
-    make: bytes, size: tuple[int, int] | None, picture: tuple[int, int]
+    make: bytes, size: tuple[int, int] | None, image_size: tuple[int, int]
 ) -> None:
     """Only the red patch is found: not the green one, the blue one or the padding."""
-    image = np.zeros((*picture, 3), np.uint8)
+    image = np.zeros((*image_size, 3), np.uint8)
     image[:, :, 1] = 40
     image[50:150, 100:200] = (0, 255, 0)
     image[50:150, 300:400] = (0, 0, 255)

@@ -44,7 +44,7 @@ def model(name: str) -> Path:
 @pytest.fixture(scope="module")
 def photographs() -> list[Photograph]:
     if not TRUTH.is_file():
-        pytest.skip(f"needs {TRUTH.name} and its pictures in the folder of genuine images")
+        pytest.skip(f"needs {TRUTH.name} and its images in the folder of genuine images")
     truth = json.loads(TRUTH.read_text(encoding="utf-8"))
     found = []
     for entry in truth["images"]:

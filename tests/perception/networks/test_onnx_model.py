@@ -149,7 +149,7 @@ def test_a_provider_is_used_when_present_and_refused_when_not(name: str) -> None
 def test_a_run_with_wrong_inputs_is_refused_with_what_the_network_takes() -> None:
     model = OnnxModel(content())
     for feeds in (
-        {"picture": np.zeros((1, 3, 32, 64), np.float32)},
+        {"image": np.zeros((1, 3, 32, 64), np.float32)},
         {"images": np.zeros((1, 3, 32, 32), np.float32)},
         {"images": np.zeros((1, 3, 32, 64), np.float64)},
     ):
