@@ -106,16 +106,18 @@ def test_contradicting_poses_give_no_confident_awareness(turn, one, two, swap):
 
 def test_fused_poses_are_consistent_over_a_population():
     rng = np.random.default_rng(0)
-    nees = []
-    for _ in range(2000):
-        poses = []
-        for std in (0.08, 0.15):
-            turn, shift = rng.normal(0.0, std, 3), rng.normal(0.0, 0.05, 3)
-            poses.append(head(turn, std, shift=shift))
-        fused = fuse_heads(*poses)
-        turn = Rotation.from_matrix(FACING @ fused.rotation_camera_head.T).as_rotvec()
-        error = np.concatenate([turn, POSITION - fused.position_camera_m])
-        nees.append(error @ np.linalg.solve(fused.covariance, error))
+    count, stds = 2000, (0.08, 0.15)
+    poses = [
+        [head(rng.normal(0.0, std, 3), std, shift=rng.normal(0.0, 0.05, 3)) for std in stds]
+        for _ in range(count)
+    ]
+    fusion = FusedHeadPoseEstimator(*(FixedEstimator(*each) for each in zip(*poses, strict=True)))
+    fused = fusion.estimate(None, None, (PERSON,) * count)
+    rotations = np.array([pose.rotation_camera_head for pose in fused])
+    turns = Rotation.from_matrix(FACING @ rotations.swapaxes(1, 2)).as_rotvec()
+    errors = np.hstack([turns, [POSITION - pose.position_camera_m for pose in fused]])
+    covariances = np.array([pose.covariance for pose in fused])
+    nees = np.einsum("ni,ni->n", errors, np.linalg.solve(covariances, errors[..., None])[..., 0])
     # The covariance grows with the difference, so it is slightly too large on average.
     assert 4.0 <= np.mean(nees) <= 6.2
 
