@@ -1,8 +1,8 @@
-"""Who is where, and have they noticed the robot: from an RGB frame to person observations."""
+"""Perception: from an RGB image to people, their positions and their awareness of the robot."""
 
 from __future__ import annotations
 
-from . import _clash  # noqa: F401 - first: refuses a foreign package of one of our names
+from . import _clash  # noqa: F401 - first: reports another distribution with these package names
 from ._attention import AttentionCone
 from ._camera import Camera
 from ._detection import PersonDetection

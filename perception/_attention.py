@@ -1,4 +1,4 @@
-"""The attention cone: how central the robot lies in a person's field of view."""
+"""The attention cone: a score of how centrally the robot lies in a person's field of view."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from numpy.typing import ArrayLike
 from .arrays import FloatArray, finite_number, set_fields
 from .errors import PerceptionError
 
-#: Half of θ_FOV = 120°, the horizontal field that head orientation alone can vouch for.
+#: Half of θ_FOV = 120°, the horizontal field of view that head orientation alone supports.
 DEFAULT_HALF_ANGLE_RAD: Final = math.radians(60.0)
 
 
 @dataclass(frozen=True, slots=True)
 class AttentionCone:
-    """Awareness score of a target in a cone about the gaze (eqs. (1)–(3) of the paper).
+    """Awareness score of a target in a cone around the gaze (eqs. (1)–(3) of the paper).
 
     α = 1 − d⊥ / (d · tan half-angle) for a target ahead of the apex and inside the cone, else 0;
-    d is the distance along the gaze and d⊥ the offset from it. The paper gives the cone's radius as
-    d · tan θ_FOV but calls θ_FOV/2 its half-angle; one unambiguous half-angle stands for both.
+    d is the distance along the gaze and d⊥ the distance from its axis. The paper gives the cone's
+    radius as d · tan θ_FOV but calls θ_FOV/2 its half-angle; here one half-angle replaces both.
 
     Attributes:
-        half_angle_rad: in (0, π/2).
+        half_angle_rad: half-angle of the cone, in (0, π/2).
     """
 
     half_angle_rad: float = DEFAULT_HALF_ANGLE_RAD
@@ -42,16 +42,17 @@ class AttentionCone:
         """Return α in [0, 1].
 
         Args:
-            apex_m: (3,) apex of the cone, or (N, 3).
-            gaze: (3,) or (N, 3) vectors along the gaze; they need not be unit vectors.
-            target_m: (3,); or (M, 3) points of one target, of which the best counts since seeing
-                any part of a robot is seeing the robot; or, with N gazes, (N, 3) one target each.
+            apex_m: (3,) or (N, 3) apex of the cone.
+            gaze: (3,) or (N, 3) vectors along the gaze, of any length > 0.
+            target_m: for one gaze (3,), or (M, 3) points of one target, of which the highest score
+                counts: a person who sees any part of the robot sees the robot. For N gazes (3,), or
+                (N, 3) with one target per gaze. All vectors are in the same frame.
 
         Returns:
-            A float for one gaze, (N,) for N. All vectors in one frame.
+            A float for one gaze, (N,) for N gazes.
 
         Raises:
-            PerceptionError: for a shape other than these, a non-finite number or a zero gaze.
+            PerceptionError: for another shape, a non-finite number or a gaze of length 0.
         """
         apex, direction, target = (
             np.asarray(value, dtype=np.float64) for value in (apex_m, gaze, target_m)
@@ -74,7 +75,7 @@ class AttentionCone:
         return float(np.max(scores, initial=0.0)) if one_gaze else scores
 
     def scores(self, apex_m: FloatArray, gaze: FloatArray, target_m: FloatArray) -> FloatArray:
-        """Evaluate eqs. (1)–(3) under NumPy broadcasting of (…, 3) arrays, unchecked, to (…,)."""
+        """Return α (…,) of (…, 3) arrays under NumPy broadcasting, without checks of the input."""
         length = np.sqrt(_dot(gaze, gaze))
         if not np.all(length > 0.0):
             raise PerceptionError("gaze must have a direction, got a vector of length 0")
@@ -91,5 +92,5 @@ class AttentionCone:
 
 
 def _dot(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Dot products of (…, 3) arrays under broadcasting."""
+    """Return dot products of (…, 3) arrays under broadcasting."""
     return np.asarray(np.einsum("...i,...i->...", first, second))

@@ -1,4 +1,4 @@
-"""The pinhole camera with lens distortion, as ROS and OpenCV describe it."""
+"""The pinhole camera with lens distortion, in the conventions of ROS and OpenCV."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ._camera_info import read_camera_info
 from .arrays import FloatArray, finite_array, finite_number, pixel_count, set_fields
 from .errors import PerceptionError
 
-# OpenCV accepts these numbers of coefficients: plumb_bob has 5, rational_polynomial 8.
+# Numbers of coefficients that OpenCV accepts: plumb_bob has 5, rational_polynomial 8.
 _DISTORTION_SIZES: Final = (4, 5, 8, 12, 14)
 _DISTORTION_MODELS: Final = ("plumb_bob", "rational_polynomial")
 
@@ -72,9 +72,15 @@ class Camera:
 
     @classmethod
     def from_fov(cls, width_px: int, height_px: int, horizontal_fov_rad: float) -> Camera:
-        """Make a camera with square pixels and its principal point at (width/2, height/2).
+        """Return a camera with square pixels and the principal point at (width/2, height/2).
 
-        ``horizontal_fov_rad`` lies in (0, π).
+        Args:
+            width_px: image width.
+            height_px: image height.
+            horizontal_fov_rad: horizontal field of view, in (0, π).
+
+        Raises:
+            PerceptionError: for an invalid value.
         """
         fov = finite_number(
             "horizontal_fov_rad", horizontal_fov_rad, minimum=0.0, exclusive_minimum=True
@@ -88,17 +94,20 @@ class Camera:
     def from_yaml(cls, path: str | Path) -> Camera:
         """Read a ROS camera_info YAML file.
 
-        Either the file that ``camera_calibration`` writes (``camera_matrix`` and so on) or a
+        The file may be written by ``camera_calibration`` (``camera_matrix`` and so on), or be a
         ``sensor_msgs/CameraInfo`` message as ``ros2 topic echo`` prints it (``k``, ``d``). The
-        distortion models plumb_bob and rational_polynomial are accepted; raises
-        :class:`PerceptionError` naming the file and what is missing otherwise.
+        distortion models plumb_bob and rational_polynomial are accepted.
+
+        Raises:
+            PerceptionError: for a file that cannot be read, is not complete, or has another
+                distortion model; the message names the file.
         """
         info = read_camera_info(path)
         if np.any(info.coefficients) and info.model not in _DISTORTION_MODELS:
             raise PerceptionError(
                 f"{path}: distortion_model must be one of {', '.join(_DISTORTION_MODELS)}, "
-                f"got {info.model!r}; rectify the images first, or cut flat views from a fisheye's "
-                "(perception.surround)"
+                f"got {info.model!r}; rectify the images first, or use perception.surround for a "
+                "fisheye camera"
             )
         try:
             return cls(
@@ -127,7 +136,7 @@ class Camera:
 
     @cached_property
     def matrix(self) -> FloatArray:
-        """(3, 3) intrinsic matrix."""
+        """Intrinsic matrix (3, 3)."""
         matrix = np.array(
             [[self.fx_px, 0.0, self.cx_px], [0.0, self.fy_px, self.cy_px], [0.0, 0.0, 1.0]]
         )
@@ -137,7 +146,7 @@ class Camera:
     def project(self, points_camera_m: Any) -> FloatArray:
         """Project points (N, 3) in the camera frame to pixels (N, 2), lens distortion included.
 
-        A point at or behind the image plane (z ≤ 0) has no image: its row is NaN.
+        The row of a point at z ≤ 0, which has no image, is NaN.
         """
         points = finite_array("points_camera_m", points_camera_m, ("N", 3))
         ahead = points[:, 2] > 0.0
@@ -158,7 +167,7 @@ class Camera:
         return pixels
 
     def normalise(self, pixels_px: Any) -> FloatArray:
-        """Undo intrinsics and distortion: pixels (N, 2) to x/z, y/z (N, 2)."""
+        """Return rays x/z, y/z (N, 2) of pixels (N, 2), with intrinsics and distortion removed."""
         pixels = finite_array("pixels_px", pixels_px, ("N", 2))
         if self.distortion is None or not len(pixels):
             return np.asarray(

@@ -1,4 +1,4 @@
-"""ROS camera_info files, of whatever distortion model."""
+"""ROS camera_info files, for any distortion model."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ import yaml
 from .arrays import FloatArray
 from .errors import PerceptionError
 
-# Fields of sensor_msgs/Calibration (ROS 2 in lower case, ROS 1 in upper) by the calibrator's names.
+# Fields of sensor_msgs/CameraInfo (ROS 2 in lower case, ROS 1 in upper case) and the names that
+# camera_calibration gives them.
 _MESSAGE_KEYS: Final = {
     "width": "image_width",
     "height": "image_height",
@@ -25,14 +26,14 @@ _MESSAGE_KEYS: Final = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
-    """What a file says; only its shapes are checked.
+    """Content of a camera_info file; only the shapes are checked.
 
     Attributes:
-        width_px: as written.
-        height_px: as written.
-        matrix: (3, 3) intrinsics.
-        coefficients: (N,) of the distortion model.
-        model: its name, ``"plumb_bob"`` where the file names none.
+        width_px: image width.
+        height_px: image height.
+        matrix: (3, 3) intrinsic matrix.
+        coefficients: (N,) coefficients of the distortion model.
+        model: name of the distortion model; ``"plumb_bob"`` if the file names none.
     """
 
     width_px: int
@@ -43,20 +44,20 @@ class Calibration:
 
     @property
     def intrinsics(self) -> tuple[int, int, float, float, float, float]:
-        """Width, height, fx, fy, cx, cy, in the order of the camera models' arguments."""
+        """Width, height, fx, fy, cx, cy: the first arguments of the camera models."""
         (fx, _, cx), (_, fy, cy), _ = self.matrix.tolist()
         return self.width_px, self.height_px, fx, fy, cx, cy
 
 
 def read_camera_info(path: str | Path) -> Calibration:
-    """Read the file that ``camera_calibration`` writes, or a message as ``ros2 topic echo`` does.
+    """Read a file that ``camera_calibration`` writes, or a message that ``ros2 topic echo`` prints.
 
     Raises:
-        PerceptionError: naming the file and what is missing.
+        PerceptionError: for a file that cannot be read or is not complete; the message names it.
     """
     path = Path(path)
     try:
-        # Echoed messages end in "---"; the first one counts.
+        # Each echoed message ends with "---"; the first message counts.
         data = next(yaml.safe_load_all(path.read_text(encoding="utf-8")), None)
     except OSError as cause:
         raise PerceptionError(f"cannot read {path}: {cause.strerror or cause}") from cause
@@ -83,5 +84,5 @@ def read_camera_info(path: str | Path) -> Calibration:
 
 
 def _entries(value: Any) -> Any:
-    """The numbers of a ROS matrix, written as a mapping with ``data`` or as a plain list."""
+    """Return the numbers of a ROS matrix: a mapping with ``data``, or a plain list."""
     return np.asarray(value["data"] if isinstance(value, dict) else value, dtype=np.float64)

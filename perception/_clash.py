@@ -1,8 +1,8 @@
-"""Reports a clash of import names, naming the distribution that causes it.
+"""Check for another distribution that installs a package of the same name.
 
-Other distributions install a package called ``perception`` too, and installers let one overwrite
-another's files without a word. Each of our packages runs this file first; the line that does
-so also tells our own ``__init__.py`` from a foreign one, without running either.
+Other distributions also install a package called ``perception``, and installers overwrite files of
+one with files of the other without a warning. Each of our packages imports this module first. The
+import line also marks an ``__init__.py`` as ours, so that it can be recognised without running it.
 """
 
 from __future__ import annotations
@@ -11,21 +11,22 @@ from importlib.machinery import all_suffixes
 from importlib.util import find_spec
 from pathlib import Path
 
-# Each needs those before it.
+# Each package needs those before it.
 _PACKAGES = ("perception", "tracking", "nav_adapter", "awarenav", "sim_tests")
 _MARKER = b"_clash"
 _SITE = Path(__file__).parents[1]
 
 
 def require_sole_owner(package: str) -> None:
-    """Check that ``package``, and each of our packages that it needs, is ours alone.
+    """Check that ``package``, and each of our packages that it needs, has no foreign files.
 
-    The good case reads no metadata but our own. A checkout or an editable install has no record of
-    its files: there, only a foreign ``__init__.py`` is noticed. A foreign package that was nothing
-    but the ``__init__.py`` that ours overwrote left no trace, and goes unnoticed.
+    Without a clash only our own metadata are read. A checkout or an editable install has no list of
+    its files; there, only a foreign ``__init__.py`` is found. A foreign package that consisted of
+    nothing but an ``__init__.py`` which ours overwrote cannot be found.
 
     Raises:
-        ImportError: naming the other distribution, or the path when none claims it, and the remedy.
+        ImportError: for a clash; the message names the other distribution, or the path if no
+            distribution lists it, and the remedy.
     """
     for name in _PACKAGES[: _PACKAGES.index(package) + 1]:
         spec = find_spec(name)
@@ -39,30 +40,30 @@ def require_sole_owner(package: str) -> None:
         init = Path(spec.origin)
         try:
             ours = _MARKER in init.read_bytes()
-        except OSError:  # inside a zip file or a frozen program: no installer mixes those
+        except OSError:  # in a zip file or a frozen program, which no installer changes
             continue
-        place = init.parent if init.stem == "__init__" else init  # or a lone perception.py
+        place = init.parent if init.stem == "__init__" else init  # or a module perception.py
         owners = _other_owners(place) if not ours or _has_strange_modules(place) else []
         if not ours or owners:
             raise ImportError(_message(name, place, owners), name=name, path=spec.origin)
 
 
 def _has_strange_modules(folder: Path) -> bool:
-    """Whether ``folder`` holds modules that our own installation record does not list."""
+    """Return True if ``folder`` has modules that our own installation record does not list."""
     records = list(_SITE.glob("awarenav-*.dist-info/RECORD"))
     if folder.parent != _SITE or not records:
         return False
     lines = [line for path in records for line in path.read_text(encoding="utf-8").splitlines()]
     ours = [line.split(",")[0].split("/") for line in lines if line.startswith(f"{folder.name}/")]
     known = {"__pycache__", *(parts[1] for parts in ours)}
-    importable = ("", *all_suffixes())  # a folder, or a module; data files are nobody's harm
+    importable = ("", *all_suffixes())  # folders and modules; data files do no harm
     strange = (entry for entry in folder.iterdir() if entry.name not in known)
     return any("".join(entry.suffixes) in importable for entry in strange)
 
 
 def _other_owners(folder: Path) -> list[str]:
-    """Distributions other than ours that list files under ``folder``, as "name version"."""
-    from importlib import metadata  # noqa: PLC0415 - takes 20 ms, and only when all is not well
+    """Return other distributions that list files under ``folder``, as "name version"."""
+    from importlib import metadata  # noqa: PLC0415 - takes 20 ms and is only needed for a clash
 
     return sorted(
         {

@@ -1,4 +1,4 @@
-"""How far away a person is: cues that may each be wrong, combined by their uncertainties."""
+"""Range of a person from several cues, each of which may be an outlier."""
 
 from __future__ import annotations
 
@@ -8,60 +8,64 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Final
 
-# Density of a cue that is wrong, and of ranges before anything is known, over the logarithm of the
-# range: flat within a factor of e up or down.
-_FLAT_DENSITY: Final = 0.5
-# What is left when every cue is wrong.
-_ALL_WRONG_LOG_STD: Final = 0.5
+# Density of an outlier, and prior density of the range, over the logarithm of the range: uniform
+# within a factor of e up or down.
+_UNIFORM_DENSITY: Final = 0.5
+# Standard deviation if every cue is an outlier.
+_ALL_OUTLIERS_LOG_STD: Final = 0.5
 _MAX_CUES: Final = 5
+# By the number of cues: all subsets with at least one inlier.
+_SUBSETS: Final = {
+    count: tuple(inliers for inliers in product((False, True), repeat=count) if any(inliers))
+    for count in range(2, _MAX_CUES + 1)
+}
 
 
 @dataclass(frozen=True, slots=True)
 class DepthCue:
-    """One opinion about the range of a person.
+    """A measurement of a person's range that may be an outlier.
 
     Attributes:
         log_range: natural logarithm of the range, relative to any common reference.
-        log_std: its standard deviation when the cue is right, > 0.
-        stature_std: the part of ``log_std`` that comes from not knowing the person's stature. Cues
-            that have such a part err together, in proportion to it.
-        wrong: probability that the cue has nothing to do with the range, in (0, 1): feet that
-            stand on something, a head that is somebody else's, a skeleton that is none.
+        log_std: its standard deviation if the cue is no outlier, > 0.
+        stature_std: the part of ``log_std`` from the unknown stature of the person. Errors of
+            cues with such a part are correlated, in proportion to it.
+        outlier_probability: probability in (0, 1) that the cue is unrelated to the range: feet
+            that stand on something, the head of another person, a false skeleton.
     """
 
     log_range: float
     log_std: float
     stature_std: float
-    wrong: float
+    outlier_probability: float
 
 
 def combine_cues(cues: Sequence[DepthCue]) -> tuple[float, float]:
     """Return the logarithm of the range and its standard deviation.
 
-    Any subset of the cues may be the right ones. Within a subset they are combined by generalised
-    least squares, with the covariance that their common stature gives; the subsets weigh by their
-    probability given what all cues say. Their weighted median is returned, which no unlikely subset
-    can drag along, and the root mean square distance of all of them from it. Cues that agree
-    sharpen each other; one that disagrees by more than its errors allow is outvoted, and where two
-    contradict each other the standard deviation spans both. A single cue is returned as it is:
-    there is nothing to check it against.
+    Any subset of the cues may be the inliers. Within a subset the cues are combined by generalised
+    least squares, with the covariance from their common stature. Each subset is weighted by its
+    probability given all cues. The result is the weighted median of the subsets, which an unlikely
+    subset cannot shift, and their root mean square distance from it. So cues that agree lower the
+    standard deviation, a cue that disagrees with the others is outvoted, and if two cues contradict
+    each other the standard deviation spans both. A single cue is returned unchanged.
 
     Args:
-        cues: one to five.
+        cues: one to five cues.
     """
     if len(cues) == 1:
         return cues[0].log_range, cues[0].log_std
     terms = [_terms(cue) for cue in cues]
-    # Nothing is right: the range itself is all that is left to integrate over.
+    # If every cue is an outlier, only the prior density of the range is left to integrate.
     middle = _median([cue.log_range for cue in cues])
-    nothing = sum(wrong for *_, wrong in terms) - math.log(_FLAT_DENSITY)
-    found = [(middle, _ALL_WRONG_LOG_STD**2, nothing)]
-    found += [_least_squares(terms, right) for right in _SUBSETS[len(cues)]]
+    all_outliers = sum(as_outlier for *_, as_outlier in terms) - math.log(_UNIFORM_DENSITY)
+    found = [(middle, _ALL_OUTLIERS_LOG_STD**2, all_outliers)]
+    found += [_least_squares(terms, inliers) for inliers in _SUBSETS[len(cues)]]
     found.sort()
     highest = max(fit for *_, fit in found)
     weights = [math.exp(fit - highest) for *_, fit in found]
     total = sum(weights)
-    # Rounding must not carry the sum past a half that it reaches exactly.
+    # 1e-9: rounding must not carry the sum past a half that it reaches exactly.
     half, centre = (0.5 - 1e-9) * total, found[-1][0]
     for (mean, _, _), weight in zip(found, weights, strict=True):
         half -= weight
@@ -76,10 +80,10 @@ def combine_cues(cues: Sequence[DepthCue]) -> tuple[float, float]:
 
 
 def _terms(cue: DepthCue) -> tuple[float, ...]:
-    """The sums of least squares that one cue adds, and the logarithms of its densities.
+    """Return the terms that one cue adds to the sums of least squares, and its log densities.
 
-    Information alone, with stature once and twice, with value, with both, with value twice; density
-    when right, but for the exponent, and when wrong.
+    With the information w, stature s and value z: w, w s, w s², w z, w s z, w z², the log density
+    as inlier without the exponent, and the log density as outlier.
     """
     value, stature = cue.log_range, cue.stature_std
     own = max(cue.log_std**2 - stature**2, 1e-8)
@@ -91,28 +95,28 @@ def _terms(cue: DepthCue) -> tuple[float, ...]:
         one * value,
         one * stature * value,
         one * value * value,
-        math.log1p(-cue.wrong) - 0.5 * math.log(2.0 * math.pi * own),
-        math.log(_FLAT_DENSITY * cue.wrong),
+        math.log1p(-cue.outlier_probability) - 0.5 * math.log(2.0 * math.pi * own),
+        math.log(_UNIFORM_DENSITY * cue.outlier_probability),
     )
 
 
 def _least_squares(
-    terms: Sequence[tuple[float, ...]], right: Sequence[bool]
+    terms: Sequence[tuple[float, ...]], inliers: Sequence[bool]
 ) -> tuple[float, float, float]:
-    """Mean, variance and logarithm of the probability where some of the cues are the right ones."""
+    """Return mean, variance and log probability if exactly these cues are inliers."""
     one = s = ss = z = sz = zz = fit = 0.0
-    for (a, b, c, d, e, f, as_right, as_wrong), believed in zip(terms, right, strict=True):
-        if not believed:
-            fit += as_wrong
+    for (a, b, c, d, e, f, as_inlier, as_outlier), is_inlier in zip(terms, inliers, strict=True):
+        if not is_inlier:
+            fit += as_outlier
             continue
         one, s, ss, z, sz, zz = one + a, s + b, ss + c, z + d, sz + e, zz + f
-        fit += as_right
-    # Covariance diag(own) + stature·statureᵀ, inverted after Sherman and Morrison.
+        fit += as_inlier
+    # The covariance diag(own) + stature·statureᵀ is inverted by the Sherman–Morrison formula.
     shared = 1.0 / (1.0 + ss)
     information = max(one - s * s * shared, 1e-12)
     mean = (z - s * sz * shared) / information
     chi2 = max(zz - sz * sz * shared - information * mean * mean, 0.0)
-    # Logarithm of ∫ N(values; x, Σ) dx for the right ones.
+    # Logarithm of ∫ N(values; x, Σ) dx over the inliers.
     fit -= 0.5 * (chi2 + math.log(information / (shared * 2.0 * math.pi)))
     return mean, 1.0 / information, fit
 
@@ -121,10 +125,3 @@ def _median(values: list[float]) -> float:
     values.sort()
     last = len(values) - 1
     return 0.5 * (values[last // 2] + values[(last + 1) // 2])
-
-
-#: By the number of cues: every way in which at least one of them is right.
-_SUBSETS: Final = {
-    count: tuple(right for right in product((False, True), repeat=count) if any(right))
-    for count in range(2, _MAX_CUES + 1)
-}

@@ -10,11 +10,11 @@ from .errors import PerceptionError
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PersonDetection:
-    """One person's box in pixels.
+    """The box of one person in pixels.
 
     Attributes:
         box_xyxy_px: (4,) left, top, right, bottom; right ≥ left and bottom ≥ top.
-        score: confidence in [0, 1].
+        score: confidence of the detection in [0, 1].
     """
 
     box_xyxy_px: FloatArray

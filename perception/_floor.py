@@ -1,18 +1,18 @@
-"""The floor that people stand on, as the camera sees it."""
+"""The floor in the camera frame, and the depth at which rays meet it."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 from .arrays import FloatArray, finite_number, rigid_transform, set_fields, unit_vector
 from .errors import PerceptionError
 
-# A ray flatter than this meets the floor too far away to say where.
-_HORIZON_SINE = 0.02
+# Sine of the angle between ray and floor. A flatter ray meets the floor too far away to be useful.
+_HORIZON_SINE: Final = 0.02
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -21,10 +21,10 @@ class FloorPlane:
 
     Attributes:
         normal_camera: (3,) unit vector up from the floor, in the camera frame.
-        height_m: how high the camera's centre is above the floor, > 0.
-        height_std_m: standard deviation of that, ≥ 0.
-        tilt_std_rad: standard deviation of the normal's direction an axis, ≥ 0: how well the
-            camera's mount is known, and how much the robot pitches.
+        height_m: height of the camera's centre above the floor, > 0.
+        height_std_m: standard deviation of the height, ≥ 0.
+        tilt_std_rad: standard deviation of the normal's direction per axis, ≥ 0; it includes the
+            error of the camera's mount and the pitching of the robot.
     """
 
     normal_camera: FloatArray
@@ -48,7 +48,7 @@ class FloorPlane:
         """Return the floor z = 0 of odom for a camera at ``T_odom_camera`` (4, 4).
 
         Raises:
-            PerceptionError: for a transform that is none, or a camera that is not above z = 0.
+            PerceptionError: for an invalid transform, or a camera that is not above z = 0.
         """
         pose = rigid_transform("T_odom_camera", T_odom_camera)
         if pose[2, 3] <= 0.0:
@@ -61,17 +61,18 @@ class FloorPlane:
     def depth_of(
         self, rays: FloatArray, above_m: float, above_std_m: float, ray_std: float | FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return where rays meet the plane that lies ``above_m`` above the floor.
+        """Return the depths at which rays meet the plane ``above_m`` above the floor.
 
         Args:
             rays: (N, 2) x/z and y/z of points known to be at that height.
-            above_m: ≥ 0.
+            above_m: height above the floor, ≥ 0.
             above_std_m: standard deviation of that height.
-            ray_std: standard deviation of either coordinate of a ray, or (N,) of each.
+            ray_std: standard deviation of each of the two coordinates of a ray; one for all rays,
+                or (N,).
 
         Returns:
             (N,) depths z in metres and (N,) standard deviations of their logarithms, first order.
-            Both are NaN for a ray that goes at or above the horizon.
+            Both are NaN for a ray at or above the horizon.
         """
         points = np.ones((len(rays), 3))
         points[:, :2] = rays
@@ -81,7 +82,8 @@ class FloorPlane:
         meets = (sine > _HORIZON_SINE * length) & (clearance > 0.0)
         down = np.where(meets, sine, np.nan)
         height = math.hypot(self.height_std_m, above_std_m) / max(clearance, 1e-9)
-        # sine = −n·ray: tilting n by δ changes it by |ray| δ, moving the ray by its components.
+        # sine = −n·ray: a tilt of n by δ changes it by |ray| δ, an error of the ray by n's
+        # components.
         across = math.hypot(*self.normal_camera[:2].tolist())
         tilted, moved = self.tilt_std_rad * length / down, ray_std * across / down
         return clearance / down, np.sqrt(height * height + tilted * tilted + moved * moved)

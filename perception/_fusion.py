@@ -9,34 +9,39 @@ import numpy as np
 from ._camera import Camera
 from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
-from ._pose_refinement import rotation_exp, rotation_log
 from ._protocols import HeadPoseEstimator
+from ._rotations import rotation_exp, rotation_log
 from .arrays import FloatArray, ImageRgb
 from .errors import PerceptionError
 
-# What chance exceeds once in a hundred times: χ² of three degrees of freedom for the rotation, of
+# Limits that chance exceeds in 1 % of cases: χ² of three degrees of freedom for the rotation, of
 # six for the whole pose.
-_TURN_LIMIT_CHI2, _POSE_LIMIT_CHI2 = 11.3, 16.8
-# Spread of head sizes between adults, which a pose from the average head's template leaves out.
+_ROTATION_LIMIT_CHI2, _POSE_LIMIT_CHI2 = 11.3, 16.8
+# Relative standard deviation of head sizes between adults. The covariance of a pose that assumes
+# the average head does not include it.
 _HEAD_SIZE_STD: Final = 0.04
 
 
 class FusedHeadPoseEstimator:
-    """Several head pose estimators, one answer: each counts by its covariance.
+    """Several head pose estimators combined, each weighted by its covariance.
 
-    Poses that agree are combined in information form (their rotations as small turns about the
-    first's). From the point where they differ by more than their covariances explain on average,
-    the covariance grows with the disagreement; beyond what chance produces once in a hundred times
-    they are not averaged at all: the surer one is returned with a covariance that reaches the
-    other. A person of whom only one estimator makes a pose gets that one.
+    Poses that agree are combined in information form (rotations as small rotations relative to the
+    first). Where they differ by more than their covariances explain on average, the covariance
+    grows with the difference. Poses with a difference that chance produces in less than 1 % of
+    cases are not averaged: the one with the smaller rotation covariance is returned, with a
+    covariance that includes the other pose. A person for whom only one estimator gives a pose gets
+    that pose.
 
     Args:
-        estimators: two or more, of which the errors are taken to be independent.
+        estimators: two or more estimators; their errors are assumed to be independent.
+
+    Raises:
+        PerceptionError: for fewer than two estimators, or an object that is not one.
     """
 
     def __init__(self, *estimators: HeadPoseEstimator) -> None:
         if len(estimators) < 2:
-            raise PerceptionError(f"fusing takes two or more estimators, got {len(estimators)}")
+            raise PerceptionError(f"fusion takes two or more estimators, got {len(estimators)}")
         for estimator in estimators:
             if not isinstance(estimator, HeadPoseEstimator):
                 raise PerceptionError(
@@ -48,13 +53,17 @@ class FusedHeadPoseEstimator:
     def estimate(
         self, image_rgb: ImageRgb, camera: Camera, people: tuple[PersonKeypoints, ...]
     ) -> tuple[HeadPose | None, ...]:
-        """Return one head pose a person, or None where no estimator makes one."""
+        """Return one head pose per person, or None where no estimator gives one.
+
+        Raises:
+            PerceptionError: if an estimator returns a different number of results.
+        """
         fused: list[HeadPose | None] = [None] * len(people)
         for estimator in self.estimators:
             heads = tuple(estimator.estimate(image_rgb, camera, people))
             if len(heads) != len(people):
                 raise PerceptionError(
-                    f"{type(estimator).__name__} must return one result a person "
+                    f"{type(estimator).__name__} must return one result per person "
                     f"({len(people)}), got {len(heads)}"
                 )
             for row, head in enumerate(heads):
@@ -66,37 +75,37 @@ class FusedHeadPoseEstimator:
 
 
 def fuse_heads(first: HeadPose, second: HeadPose) -> HeadPose:
-    """Combine two poses of one head; see :class:`FusedHeadPoseEstimator`.
+    """Combine two poses of one head as :class:`FusedHeadPoseEstimator` does.
 
-    ``face_seen`` is the lower of the two: a face has to be seen by all who can tell.
+    ``face_seen`` is the lower of the values that are not None.
     """
-    away = np.concatenate(
+    difference = np.concatenate(
         [
             rotation_log(second.rotation_camera_head @ first.rotation_camera_head.T),
             second.position_camera_m - first.position_camera_m,
         ]
     )
-    one, two = _sized(first), _sized(second)
+    one, two = _with_head_size_spread(first), _with_head_size_spread(second)
     both = one + two + 1e-12 * np.eye(6)
-    pose_chi2 = float(away @ np.linalg.solve(both, away))
-    turn_chi2 = float(away[:3] @ np.linalg.solve(both[:3, :3], away[:3]))
+    pose_chi2 = float(difference @ np.linalg.solve(both, difference))
+    rotation_chi2 = float(difference[:3] @ np.linalg.solve(both[:3, :3], difference[:3]))
     seen = [pose.face_seen for pose in (first, second) if pose.face_seen is not None]
     ranges = [p.range_relative_std for p in (first, second) if p.range_relative_std is not None]
-    if turn_chi2 > _TURN_LIMIT_CHI2 or pose_chi2 > _POSE_LIMIT_CHI2:
+    if rotation_chi2 > _ROTATION_LIMIT_CHI2 or pose_chi2 > _POSE_LIMIT_CHI2:
         surer = first if np.trace(one[:3, :3]) <= np.trace(two[:3, :3]) else second
         position, rotation = surer.position_camera_m, surer.rotation_camera_head
-        covariance = (one if surer is first else two) + np.outer(away, away)
+        covariance = (one if surer is first else two) + np.outer(difference, difference)
         if surer.range_relative_std is None:
             ranges = []
     else:
         gain = one @ np.linalg.inv(both)
-        step = gain @ away
+        step = gain @ difference
         rotation = rotation_exp(step[:3]) @ first.rotation_camera_head
         position = first.position_camera_m + step[3:]
-        # Joseph's form keeps the difference of two covariances positive.
+        # Joseph's form keeps the covariance positive definite.
         keep = np.eye(6) - gain
         covariance = keep @ one @ keep.T + gain @ two @ gain.T
-        covariance = covariance * max(1.0, turn_chi2 / 3.0, pose_chi2 / 6.0)
+        covariance = covariance * max(1.0, rotation_chi2 / 3.0, pose_chi2 / 6.0)
     return HeadPose(
         position,
         rotation,
@@ -107,8 +116,8 @@ def fuse_heads(first: HeadPose, second: HeadPose) -> HeadPose:
     )
 
 
-def _sized(head: HeadPose) -> FloatArray:
-    """The covariance, with the spread of head sizes along the ray where it is left out."""
+def _with_head_size_spread(head: HeadPose) -> FloatArray:
+    """Return the covariance; without a measured range, with the spread of head sizes added."""
     covariance = np.array(head.covariance)
     if head.range_relative_std is None:
         covariance[3:, 3:] += _HEAD_SIZE_STD**2 * np.outer(

@@ -16,7 +16,7 @@ from .arrays import (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HeadPose:
-    """Where a head is and where it points.
+    """Position and direction of a head.
 
     The head frame is the paper's: origin at the nose, y forward (the gaze), z towards the person's
     right ear, x = y × z (downwards for an upright head). ``p_camera = rotation_camera_head @ p_head
@@ -24,15 +24,15 @@ class HeadPose:
 
     Attributes:
         position_camera_m: (3,) the nose, in the camera frame.
-        rotation_camera_head: (3, 3).
+        rotation_camera_head: (3, 3) from the head frame to the camera frame.
         covariance: (6, 6), order rotation vector (rad), position (m). The rotation error δ is a
             small rotation in camera axes: ``R_true = exp(δ) @ rotation_camera_head``.
-        reprojection_error_px: root mean square over the points used.
-        face_seen: probability that the camera sees the face of this head (two of nose and eyes),
-            where the estimator can tell; None leaves it to the scores of the keypoints.
-        range_relative_std: how well the range |position| is known from the head itself, relative;
-            None when the range is not of its own measuring (taken from the body, or the template's
-            size without its spread), and then it says nothing new about where the body is.
+        reprojection_error_px: root mean square error of the points used.
+        face_seen: probability that the camera sees the face (two of nose and eyes), if the
+            estimator gives one; None leaves it to the scores of the keypoints.
+        range_relative_std: relative standard deviation of the range |position|, if it is measured
+            from the head itself. None if the range comes from the body, or from an assumed head
+            size whose spread is not included; then it is no cue for the body's position.
     """
 
     position_camera_m: FloatArray
@@ -64,5 +64,5 @@ class HeadPose:
 
     @property
     def gaze_camera(self) -> FloatArray:
-        """(3,) unit vector along the head's forward axis, in the camera frame."""
+        """Unit vector (3,) along the head's forward axis, in the camera frame."""
         return self.rotation_camera_head[:, 1]

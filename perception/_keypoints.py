@@ -11,22 +11,22 @@ from .layouts import KeypointLayout, keypoint_layout
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PersonKeypoints:
-    """Keypoints of one person in the image and, relative to the body's root, in space.
+    """Keypoints of one person in the image, and in 3-D relative to the body's root.
 
     Attributes:
         keypoints_px: (K, 2) pixel coordinates u, v.
         keypoints_root_m: (K, 3) positions in metres in camera axes (x right, y down, z forward),
-            relative to the body's root (mid-hip). Networks whose 3-D output has no unit may be
-            passed as they are: the pipeline rescales limb by limb.
-        scores: (K,) confidence of each keypoint in [0, 1]; 0 for one that was not seen.
+            relative to the body's root (mid-hip). A 3-D output without a unit is accepted too: the
+            pipeline computes the scale from the limb lengths.
+        scores: (K,) confidence of each keypoint in [0, 1]; 0 for a keypoint that is not seen.
         layout: ``"coco"`` (K = 17) or ``"coco_wholebody"`` (K = 133).
         lifted: False for a 2-D network, whose ``keypoints_root_m`` is flat: x and y follow the
-            pixels, z is 0. Limbs that point at the camera then look short, and the scale of the
-            body is taken from those that do not.
-        face_evidence: False when high scores of nose and eyes do not mean that the face is seen.
-            MediaPipe Pose, for one, scores them near 1 on backs of heads.
-        scale_relative_std: what the estimator's own noise leaves open of the size of the whole
-            skeleton, relative to it, beyond the spread of adults' statures and limbs.
+            pixels, z is 0. Limbs that point at the camera then look short; the scale comes from
+            the others.
+        face_evidence: False if high scores of nose and eyes do not mean that the face is seen.
+            MediaPipe Pose, for example, gives scores near 1 on backs of heads.
+        scale_relative_std: relative standard deviation of the size of the whole skeleton from the
+            estimator's noise, beyond the spread of statures and limbs of adults.
     """
 
     keypoints_px: FloatArray
@@ -58,5 +58,5 @@ class PersonKeypoints:
 
     @property
     def indices(self) -> KeypointLayout:
-        """Where each named keypoint stands in this person's arrays."""
+        """Layout with the row of each named keypoint."""
         return keypoint_layout(self.layout)

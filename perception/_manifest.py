@@ -1,7 +1,7 @@
-"""The manifest of the shipped networks: names, sizes and sha256, read, verified and written.
+"""The manifest of the shipped networks: reading it, checking files against it, writing it.
 
-``models/manifest.json`` names every shipped file with its size and sha256. :func:`write_manifest`
-writes it when ``training/`` exports the networks, together with the facts in each network's card.
+``models/manifest.json`` lists each shipped file with its size and SHA-256. When ``training/``
+exports the networks, :func:`write_manifest` writes it and the facts in each network's card.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ _REMEDY: Final = "put it back: pip install --force-reinstall --no-deps awarenav"
 
 @dataclass(frozen=True, slots=True)
 class ShippedModel:
-    """One network of the box.
+    """A shipped network.
 
     Attributes:
-        name: what it is asked for by, as ``"person_detector"``; its file is ``name + ".onnx"`` and
-            its card ``name + ".md"``.
-        sha256: of the file, 64 lower-case hexadecimal digits.
-        size_bytes: of the file.
+        name: name, for example ``"person_detector"``. The file is ``name + ".onnx"``, the card
+            ``name + ".md"``.
+        sha256: SHA-256 of the file, 64 lower-case hexadecimal digits.
+        size_bytes: size of the file.
         licence: SPDX identifier.
         input: shape and colour order, in words.
-        summary: what it is for, in a sentence.
+        summary: purpose, in a sentence.
     """
 
     name: str
@@ -51,7 +51,7 @@ class ShippedModel:
     def __post_init__(self) -> None:
         texts = (self.name, self.sha256, self.licence, self.input, self.summary)
         if not all(isinstance(text, str) and text for text in texts):
-            raise PerceptionError(f"a shipped model needs every text, got {texts}")
+            raise PerceptionError(f"a shipped model needs all of its texts, got {texts}")
         if not _NAME.fullmatch(self.name):
             raise PerceptionError(f"name must match {_NAME.pattern}, got {self.name!r}")
         if not _SHA256.fullmatch(self.sha256):
@@ -63,18 +63,18 @@ class ShippedModel:
 
     @property
     def file(self) -> str:
-        """Name of the file beside the manifest."""
+        """Name of the file in the folder of the manifest."""
         return f"{self.name}.onnx"
 
 
 def shipped_models(folder: Path | None = None) -> tuple[ShippedModel, ...]:
-    """Return the networks that the manifest lists; the files are not looked at.
+    """Return the networks that the manifest lists; the files themselves are not checked.
 
     Args:
-        folder: of the manifest; default the package's own.
+        folder: folder of the manifest; default that of this package.
 
     Raises:
-        PerceptionError: for a manifest that is missing or is none.
+        PerceptionError: for a missing or invalid manifest.
     """
     path = (_FOLDER if folder is None else folder) / _MANIFEST
     try:
@@ -96,7 +96,7 @@ def shipped_model(name: str, folder: Path | None = None) -> ShippedModel:
     """Return the manifest's entry of a shipped network.
 
     Raises:
-        PerceptionError: for a name that the manifest does not list, saying which it does.
+        PerceptionError: for an unknown name; the message says which names there are.
     """
     known = shipped_models(folder)
     for model in known:
@@ -107,10 +107,10 @@ def shipped_model(name: str, folder: Path | None = None) -> ShippedModel:
 
 
 def shipped_model_path(name: str, folder: Path | None = None) -> Path:
-    """Return the path of a shipped network's file, which is there but has not been verified.
+    """Return the path of a shipped network's file, which exists; its content is not checked.
 
     Raises:
-        PerceptionError: for an unknown name, or a file that is missing.
+        PerceptionError: for an unknown name or a missing file.
     """
     model = shipped_model(name, folder)
     path = (_FOLDER if folder is None else folder) / model.file
@@ -123,10 +123,11 @@ def shipped_model_path(name: str, folder: Path | None = None) -> Path:
 
 
 def verify_shipped_model(name: str, folder: Path | None = None) -> Path:
-    """Return the path of a shipped network whose file has the sha256 of the manifest.
+    """Check the SHA-256 of a shipped network's file against the manifest and return its path.
 
     Raises:
-        PerceptionError: for an unknown name, a missing file, or another content, with both hashes.
+        PerceptionError: for an unknown name, a missing file, or another SHA-256; the message says
+            both.
     """
     model = shipped_model(name, folder)
     path = shipped_model_path(name, folder)
@@ -143,17 +144,17 @@ def write_manifest(folder: Path, entries: Sequence[Mapping[str, str]]) -> Path:
     """Write the manifest of the networks in ``folder``, and its facts into their cards.
 
     Args:
-        folder: holds ``name.onnx`` of every entry. Where ``name.md`` lies beside it, its lines
-            that begin with ``- sha256:``, ``- size_bytes:``, ``- licence:`` and ``- input:`` are
-            written anew; each must be there once.
-        entries: of each network ``name``, ``licence``, ``input`` and ``summary``; size and sha256
-            are taken from the file.
+        folder: folder with ``name.onnx`` of each entry. In a card ``name.md``, if there is one, the
+            lines that begin with ``- sha256:``, ``- size_bytes:``, ``- licence:`` and ``- input:``
+            are replaced; each must occur once.
+        entries: ``name``, ``licence``, ``input`` and ``summary`` of each network; size and SHA-256
+            are computed from the file.
 
     Returns:
-        The manifest's path; it and the cards appear whole or not at all, the manifest last.
+        The path of the manifest. Each file is replaced as a whole, the manifest last.
 
     Raises:
-        PerceptionError: for a file that is missing, or a card without one of the lines.
+        PerceptionError: for a missing file, or a card without one of the lines.
     """
     models = []
     cards: dict[Path, str] = {}
@@ -170,16 +171,18 @@ def write_manifest(folder: Path, entries: Sequence[Mapping[str, str]]) -> Path:
         if text is not None:
             cards[card] = _with_facts(card, text, model)
     for card, text in cards.items():
-        _write_whole(card, text)
+        _replace_file(card, text)
     manifest = folder / _MANIFEST
     content = {"models": [asdict(model) for model in models]}
-    _write_whole(manifest, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
+    _replace_file(manifest, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
     return manifest
 
 
 def _with_facts(card: Path, text: str, model: ShippedModel) -> str:
+    """Return the text of a card with the facts of the manifest's entry."""
     for fact in ("sha256", "size_bytes", "licence", "input"):
-        line = f"- {fact}: {getattr(model, fact)}".replace("\\", r"\\")  # no group references
+        # A backslash in the replacement must not start a group reference.
+        line = f"- {fact}: {getattr(model, fact)}".replace("\\", r"\\")
         text, count = re.subn(rf"^- {fact}: .*$", line, text, flags=re.MULTILINE)
         if count != 1:
             raise PerceptionError(f"{card} must have one line '- {fact}: …', got {count}")
@@ -191,7 +194,7 @@ def _digest(path: Path) -> tuple[str, int]:
     return hashlib.sha256(content).hexdigest(), len(content)
 
 
-def _write_whole(path: Path, text: str) -> None:
+def _replace_file(path: Path, text: str) -> None:
     partial = path.with_name(path.name + ".part")
     partial.write_text(text, encoding="utf-8")
     partial.replace(path)

@@ -1,4 +1,4 @@
-"""What one frame says about one person: the seam between perception and tracking."""
+"""One person in one frame: the type that perception hands over to tracking."""
 
 from __future__ import annotations
 
@@ -21,11 +21,12 @@ class PersonObservation:
 
     Attributes:
         stamp_s: time of the frame.
-        position_camera_m: (3,) the body's centre line at chest height, in the camera frame.
-        position_covariance_m2: (3, 3).
-        gaze_camera: (3,) unit vector of the head's forward axis, or None when no face was seen.
-        awareness: α in [0, 1] after eqs. (1)–(3) of the paper, or None for "no evidence".
-        awareness_std: standard deviation of α, ≥ 0; None exactly when ``awareness`` is None.
+        position_camera_m: (3,) centre line of the body at chest height, in the camera frame.
+        position_covariance_m2: (3, 3) covariance of the position.
+        gaze_camera: (3,) unit vector of the head's forward axis in the camera frame, or None
+            without evidence.
+        awareness: α in [0, 1], eqs. (1)–(3) of the paper, or None without evidence.
+        awareness_std: standard deviation of α, ≥ 0; None if and only if ``awareness`` is None.
         score: confidence of the detection in [0, 1].
         box_xyxy_px: (4,) left, top, right, bottom in the image, or None without an image.
     """

@@ -1,4 +1,4 @@
-"""The awareness pipeline: one RGB frame in, one observation a person out."""
+"""The awareness pipeline: from an RGB image to one observation per person."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import numpy as np
 
 from ._attention import AttentionCone
 from ._camera import Camera
-from ._evidence import judge_face
 from ._floor import FloorPlane
 from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
@@ -23,6 +22,7 @@ from ._protocols import HeadPoseEstimator, PersonDetector, PoseEstimator
 from .arrays import ImageRgb, finite_array, finite_number
 from .awareness import AwarenessEstimate, estimate_awareness
 from .errors import PerceptionError
+from .evidence import judge_face
 from .networks import NETWORK_TIME, OnnxSettings
 from .shipped import (
     shipped_detector,
@@ -31,19 +31,24 @@ from .shipped import (
 )
 
 _CAMERA_CENTRE: Final = np.zeros((1, 3))
-#: Spread of the eyes in the head, sideways and up and down: what the workers of the simulator have.
-#: People differ a good deal in how far they turn their eyes before they turn their head (Thumser
-#: and Stahl 2009, doi:10.1007/s00221-009-1803-8); give your own where you know it.
+#: Standard deviations of the eyes in the head, sideways and up and down: those of the simulated
+#: workers. Real people differ widely in how far they turn their eyes before they turn their head
+#: (Thumser and Stahl 2009, doi:10.1007/s00221-009-1803-8); replace them if you know better values.
 DEFAULT_EYE_IN_HEAD_STD_RAD: Final = (math.radians(7.0), math.radians(3.4))
 
 
 @dataclass(frozen=True, slots=True)
 class StageTimings:
-    """Wall-clock time of the stages of one frame in seconds.
+    """Wall-clock times of the stages of one frame.
 
-    The stages of the networks hold their own preparation and reading of results; ``rest_s`` is
-    everything else: placing, judging, awareness, checks. ``networks_s`` is what the runs of ONNX
-    networks alone took of all that; networks that run elsewhere count as work outside of them.
+    Attributes:
+        detector_s: time of the detector, including the preparation of its input and the reading of
+            its output.
+        pose_s: the same for the pose estimator.
+        head_pose_s: the same for the head pose estimator.
+        rest_s: time of everything else: checks, positions, face evidence, awareness.
+        networks_s: the part of all this in runs of ONNX networks. Networks that do not run in ONNX
+            Runtime are not included.
     """
 
     detector_s: float = 0.0
@@ -54,39 +59,39 @@ class StageTimings:
 
     @property
     def total_s(self) -> float:
-        """The whole frame."""
+        """Time of the whole frame."""
         return self.detector_s + self.pose_s + self.head_pose_s + self.rest_s
 
     @property
     def outside_s(self) -> float:
-        """The whole frame less the runs of ONNX networks."""
+        """Time of the whole frame without the runs of ONNX networks."""
         return self.total_s - self.networks_s
 
 
 class AwarenessPipeline:
-    """Detection, keypoints, head pose and awareness for every person in a frame.
+    """Detection, keypoints, head pose and awareness of every person in a frame.
 
     Args:
         camera: the robot's camera.
         detector: finds people; default the shipped network.
         pose_estimator: finds their keypoints; default the shipped network.
-        head_pose_estimator: finds their head poses; default the shipped network beside the shipped
-            pose network, and :class:`PnpHeadPoseEstimator` on the keypoints of any other: the
-            shipped networks are made for the simulator, so none of them looks at real heads
-            unasked.
+        head_pose_estimator: finds their head poses; default the shipped network if the pose
+            estimator is the shipped one too, else :class:`PnpHeadPoseEstimator`. The shipped
+            networks are made for the simulator and are only used on real images on request.
         cone: the attention cone; default half-angle 60°.
-        robot_points_camera_m: (M, 3) points of the robot in the camera frame, of which seeing any
-            one counts as seeing the robot; default the camera's centre, as in the paper.
-        keypoint_std_px: noise of the keypoints assumed for the body's position.
-        min_score: keypoints scored below this count as not seen.
-        floor: the floor in the camera frame, where it is known and does not move in it; the feet
-            then help to say how far away people are.
-        eye_in_head_std_rad: how far eyes stray from where the head points, sideways and up and
-            down (or one number for both); it is part of α's standard deviation.
-        onnx_settings: providers and threads for the shipped networks.
+        robot_points_camera_m: (M, 3) points of the robot in the camera frame. A person who sees
+            any of them sees the robot. Default the camera's centre, as in the paper.
+        keypoint_std_px: standard deviation of the keypoint noise, for the body's position.
+        min_score: keypoints with a lower score count as not seen.
+        floor: the floor in the camera frame, if it is known and constant; the feet then improve
+            the range of people.
+        eye_in_head_std_rad: standard deviations of the eyes relative to the head's direction,
+            sideways and up and down, or one number for both. They are part of α's standard
+            deviation.
+        onnx_settings: providers and threads of the shipped networks.
 
     Raises:
-        PerceptionError: when a value is not valid or a shipped network cannot be loaded.
+        PerceptionError: for an invalid value, or a shipped network that cannot be loaded.
     """
 
     def __init__(
@@ -116,8 +121,8 @@ class AwarenessPipeline:
             "keypoint_std_px", keypoint_std_px, minimum=0.0, exclusive_minimum=True
         )
         self._min_score = finite_number("min_score", min_score, minimum=0.0, maximum=1.0)
-        self._floor = _floor("floor", floor)
-        self._eye_std_rad = _eye_std(eye_in_head_std_rad)
+        self._floor = _checked_floor(floor)
+        self._eye_std_rad = _checked_eye_std(eye_in_head_std_rad)
         shipped_pose = pose_estimator is None
         if detector is None or pose_estimator is None:
             if detector is None:
@@ -135,30 +140,30 @@ class AwarenessPipeline:
 
     @property
     def last_timings(self) -> StageTimings:
-        """How long the stages of the last processed frame took; zeros before the first."""
+        """Times of the stages of the last processed frame; zeros before the first."""
         return self._timings
 
     def process(
         self, image_rgb: ImageRgb, stamp_s: float, floor: FloorPlane | None = None
     ) -> tuple[PersonObservation, ...]:
-        """Return one observation a detected person.
+        """Return one observation per detected person.
 
-        A person whose keypoints cannot place the body is placed by the box, with a covariance to
-        match; a person without a usable head has awareness None.
+        If the keypoints do not determine the position, it comes from the box, with a larger
+        covariance. A person without a usable head pose has awareness None.
 
         Args:
             image_rgb: (H, W, 3) uint8 of the camera's size.
             stamp_s: time of the frame.
-            floor: the floor in this frame's camera, for a camera that moves against it; default the
-                one given to the constructor.
+            floor: the floor in the camera frame of this image, for a camera that moves relative to
+                the floor; default the constructor's.
 
         Raises:
-            PerceptionError: for an image of another size or type, a non-finite stamp, or an
-                estimator that returns a different number of people than it was given.
+            PerceptionError: for an image of another size or type, a non-finite stamp, and an
+                estimator that does not return one result per person.
         """
         began, run_before_s = perf_counter(), NETWORK_TIME.elapsed_s
         stamp_s = finite_number("stamp_s", stamp_s)
-        floor = self._floor if floor is None else _floor("floor", floor)
+        floor = self._floor if floor is None else _checked_floor(floor)
         self._check_image(image_rgb)
         ready = perf_counter()
         detections = tuple(self._detector.detect(image_rgb))
@@ -171,27 +176,29 @@ class AwarenessPipeline:
             )
             return ()
         people = tuple(self._pose_estimator.estimate(image_rgb, detections))
-        _same_count("pose_estimator", len(people), len(detections))
+        _check_count("pose_estimator", len(people), len(detections))
         posed = perf_counter()
         heads = tuple(self._head_pose_estimator.estimate(image_rgb, self.camera, people))
-        _same_count("head_pose_estimator", len(heads), len(people))
+        _check_count("head_pose_estimator", len(heads), len(people))
         headed = perf_counter()
         places = place_people(
             self.camera, detections, people, heads, floor, self._std_px, self._min_score
         )
-        known = self._awareness(people, heads)
+        estimates = self._awareness(people, heads)
         observations = tuple(
             PersonObservation(
                 stamp_s=stamp_s,
                 position_camera_m=place[0],
                 position_covariance_m2=place[1],
-                gaze_camera=None if head is None or seen is None else head.gaze_camera,
-                awareness=None if seen is None else seen.awareness,
-                awareness_std=None if seen is None else seen.awareness_std,
+                gaze_camera=None if head is None or estimate is None else head.gaze_camera,
+                awareness=None if estimate is None else estimate.awareness,
+                awareness_std=None if estimate is None else estimate.awareness_std,
                 score=detection.score,
                 box_xyxy_px=detection.box_xyxy_px,
             )
-            for detection, place, head, seen in zip(detections, places, heads, known, strict=True)
+            for detection, place, head, estimate in zip(
+                detections, places, heads, estimates, strict=True
+            )
             if place is not None
         )
         rest = ready - began + perf_counter() - headed
@@ -207,23 +214,23 @@ class AwarenessPipeline:
     def _awareness(
         self, people: tuple[PersonKeypoints, ...], heads: tuple[HeadPose | None, ...]
     ) -> list[AwarenessEstimate | None]:
-        """α of each person, or None where there is no evidence."""
+        """Return the awareness of each person, or None where there is no evidence."""
         estimates: list[AwarenessEstimate | None] = [None] * len(people)
-        judged = [
+        faces = [
             (row, head, evidence)
             for row, (person, head) in enumerate(zip(people, heads, strict=True))
             if head is not None
             and (evidence := judge_face(self.camera, person, head, self._min_score)) is not None
         ]
-        made = estimate_awareness(
+        face_estimates = estimate_awareness(
             self.cone,
-            [head for _, head, _ in judged],
+            [head for _, head, _ in faces],
             self._robot_points,
-            extra_std_rad=np.array([evidence.extra_std_rad for *_, evidence in judged]),
+            extra_std_rad=np.array([evidence.extra_std_rad for *_, evidence in faces]),
             eye_in_head_std_rad=self._eye_std_rad,
-            face_seen=np.array([evidence.seen for *_, evidence in judged]),
+            face_seen=np.array([evidence.seen for *_, evidence in faces]),
         )
-        for (row, *_), estimate in zip(judged, made, strict=True):
+        for (row, *_), estimate in zip(faces, face_estimates, strict=True):
             estimates[row] = estimate
         return estimates
 
@@ -240,18 +247,18 @@ class AwarenessPipeline:
             )
 
 
-def _same_count(name: str, got: int, wanted: int) -> None:
+def _check_count(name: str, got: int, wanted: int) -> None:
     if got != wanted:
-        raise PerceptionError(f"{name} must return one result a person ({wanted}), got {got}")
+        raise PerceptionError(f"{name} must return one result per person ({wanted}), got {got}")
 
 
-def _floor(name: str, floor: Any) -> FloorPlane | None:
+def _checked_floor(floor: Any) -> FloorPlane | None:
     if floor is not None and not isinstance(floor, FloorPlane):
-        raise PerceptionError(f"{name} must be a FloorPlane or None, got {type(floor).__name__}")
+        raise PerceptionError(f"floor must be a FloorPlane or None, got {type(floor).__name__}")
     return floor
 
 
-def _eye_std(value: Any) -> tuple[float, float]:
+def _checked_eye_std(value: Any) -> tuple[float, float]:
     pair = np.broadcast_to(value, 2) if np.ndim(value) == 0 else value
     sideways, upwards = finite_array("eye_in_head_std_rad", pair, (2,)).tolist()
     for std in (sideways, upwards):

@@ -1,4 +1,4 @@
-"""Where a person is: the body's own placement, corrected in range by head and floor."""
+"""Position of people: direction and range of the body, and range cues of head and floor."""
 
 from __future__ import annotations
 
@@ -20,28 +20,30 @@ from .anthropometry import HEAD_CENTRE_HEAD_M, STATURE_RELATIVE_STD
 from .arrays import FloatArray
 from .body import BOX_LEAST_TRACE_M2, BodyPlacement, place_bodies, place_boxes
 
+#: Position (3,) and covariance (3, 3) in the camera frame.
 Placement = tuple[FloatArray, FloatArray]
 
-_ANKLES: Final = slice(kp.LEFT_ANKLE, kp.RIGHT_ANKLE + 1)
-
-# How often each cue is simply wrong.
-_BODY_WRONG, _BOX_WRONG, _HEAD_WRONG, _FEET_WRONG, _BOTTOM_WRONG = 0.03, 0.05, 0.05, 0.10, 0.30
-# Heads vary by about 4 % between adults and follow the stature loosely (correlation about 0.4).
+# Probability that each cue is an outlier. "Bottom" is the lower edge of the box.
+_BODY_OUTLIER, _BOX_OUTLIER, _HEAD_OUTLIER = 0.03, 0.05, 0.05
+_FEET_OUTLIER, _BOTTOM_OUTLIER = 0.10, 0.30
+# Head sizes vary by about 4 % between adults; their correlation with the stature is about 0.4.
 _HEAD_STATURE_STD: Final = 0.4 * 0.04
-# Depth of head or foot against the chest: as lifted, and where nothing says how the body leans.
+# Standard deviations of the depth of head or foot relative to the chest: from a lifted skeleton,
+# and from a flat one, which does not show how the body leans.
 _HEAD_OFFSET_STD_M, _HEAD_OFFSET_FLAT_STD_M = 0.05, 0.09
 _FOOT_OFFSET_STD_M, _FOOT_OFFSET_FLAT_STD_M = 0.06, 0.20
-# From chest to head centre along the upright body (0.93 and 0.73 of an average stature).
+# From the chest to the centre of the head along the upright body (0.73 and 0.93 of an average
+# stature).
 _CHEST_TO_HEAD_M: Final = 0.35
-# An ankle stands 0.039 of the stature above the sole of the foot (Drillis and Contini), a work
-# shoe's sole adds three centimetres, and a step lifts it.
+# Height of an ankle above the floor: 0.039 of the stature above the sole of the foot (Drillis and
+# Contini), plus three centimetres for the sole of a work shoe. A step lifts it.
 _ANKLE_M, _ANKLE_STD_M = 0.10, 0.03
 _BOTTOM_STD_M: Final = 0.02
-# The lowest pixel of a person is the nearer toe, not the middle of the body.
+# Distance of the nearer toe, the lowest pixel of a person, ahead of the body's centre line.
 _TOE_AHEAD_M, _TOE_AHEAD_STD_M = 0.10, 0.15
-# Noise of ankle labels and of the lower edge of a box, in parts of the box's height.
+# Noise of ankle labels and of the lower edge of a box, as a fraction of the box's height.
 _ANKLE_LABEL_STD, _BOTTOM_LABEL_STD = 0.012, 0.02
-# Boxes of detectors end a little short of the border that cuts them off, in parts of the height.
+# A box counts as cut off by the lower border if it ends within this fraction of the image's height.
 _BORDER: Final = 0.03
 _SAME_FLOOR_STDS: Final = 1.5
 _UP_LEVEL_CAMERA: Final = np.array([0.0, -1.0, 0.0])
@@ -50,7 +52,12 @@ _IDENTITY: Final = np.eye(3)
 
 @dataclass(frozen=True, slots=True)
 class _Feet:
-    """Of both ankles, the depth at which each would stand on the floor (NaN if unseen)."""
+    """Depths at which both ankles of a person would stand on the floor.
+
+    Attributes:
+        depth_m: depth of the left and right ankle; NaN for an ankle that is not seen.
+        log_std: standard deviations of the logarithms of the depths.
+    """
 
     depth_m: list[float]
     log_std: list[float]
@@ -65,65 +72,65 @@ def place_people(
     keypoint_std_px: float,
     min_score: float,
 ) -> tuple[Placement | None, ...]:
-    """Return position (3,) and covariance (3, 3) of the body's centre line at chest height.
+    """Return the placement of each person's centre line at chest height; None if unknown.
 
-    The skeleton's translation (limb lengths and all seen keypoints, or the box where that says
-    more) gives the direction and a first range. The head's own range, where its estimator measured
-    one, and the feet on a known floor are further opinions about the range;
-    :func:`combine_cues` weighs them and lets any of them be wrong.
+    The skeleton (limb lengths and all seen keypoints), or the box if that is more accurate, gives
+    the direction and a first range. Further cues for the range are the head's range, if its
+    estimator measures one, and the feet on a known floor. :func:`combine_cues` combines all cues;
+    any of them may be an outlier.
     """
     if not people:
         return ()
     bodies = place_bodies(camera, people, keypoint_std_px, min_score)
-    boxes = _boxes(camera, detections, bodies)
+    box_placements = _place_by_boxes(camera, detections, bodies)
     feet: Sequence[_Feet | None] = [None] * len(people)
     if floor is not None:
-        feet = _feet_on(floor, camera, detections, people, keypoint_std_px, min_score)
+        feet = _feet_on_floor(floor, camera, detections, people, keypoint_std_px, min_score)
     placed: list[Placement | None] = [None] * len(people)
-    moves: list[tuple[int, Placement, list[DepthCue]]] = []
-    for row, (body, boxed) in enumerate(zip(bodies, boxes, strict=True)):
-        body, start = _first(body, boxed)  # noqa: PLW2901 - a body that says too little goes
+    to_correct: list[tuple[int, Placement, list[DepthCue]]] = []
+    for row, (body_placement, by_box) in enumerate(zip(bodies, box_placements, strict=True)):
+        body, start = _first_placement(body_placement, by_box)
         if start is None:
             continue
         placed[row] = start
-        opinions = _opinions(
+        range_cues = _range_cues(
             camera, detections[row], people[row], body, start, heads[row], floor, feet[row]
         )
-        if len(opinions) > 1:
-            moves.append((row, start, opinions))
-    if moves:
-        rows, starts, cues = zip(*moves, strict=True)
-        for row, moved in zip(rows, _moved(starts, cues), strict=True):
-            placed[row] = moved
+        if len(range_cues) > 1:
+            to_correct.append((row, start, range_cues))
+    if to_correct:
+        rows, starts, cues = zip(*to_correct, strict=True)
+        for row, corrected in zip(rows, _with_corrected_range(starts, cues), strict=True):
+            placed[row] = corrected
     return tuple(placed)
 
 
-def _boxes(
+def _place_by_boxes(
     camera: Camera, detections: Sequence[PersonDetection], bodies: Sequence[BodyPlacement | None]
 ) -> list[Placement | None]:
-    """What the boxes say, of those people alone for whom it can matter."""
+    """Return placements by boxes, only of people whose body placement may be less accurate."""
     asked = [
         row
         for row, body in enumerate(bodies)
         if body is None or _trace(body.position_covariance_m2) > BOX_LEAST_TRACE_M2
     ]
-    boxes: list[Placement | None] = [None] * len(bodies)
+    placements: list[Placement | None] = [None] * len(bodies)
     if asked:
         found = place_boxes(camera, [detections[row].box_xyxy_px for row in asked])
         for row, place in zip(asked, found, strict=True):
-            boxes[row] = place
-    return boxes
+            placements[row] = place
+    return placements
 
 
-def _first(
-    body: BodyPlacement | None, boxed: Placement | None
+def _first_placement(
+    body: BodyPlacement | None, by_box: Placement | None
 ) -> tuple[BodyPlacement | None, Placement | None]:
-    """Where a person is by body or box, and the body if it is the one that counts."""
+    """Return the more accurate placement, and the body if it comes from the body."""
     if body is None:
-        return None, boxed
-    # An arm at the image border says less about the range than the height of its box.
-    if boxed is not None and _trace(body.position_covariance_m2) > _trace(boxed[1]):
-        return None, boxed
+        return None, by_box
+    # An arm at the image's border gives a less accurate range than the height of its box.
+    if by_box is not None and _trace(body.position_covariance_m2) > _trace(by_box[1]):
+        return None, by_box
     return body, (body.position_camera_m, body.position_covariance_m2)
 
 
@@ -131,7 +138,7 @@ def _trace(matrix: FloatArray) -> float:
     return float(matrix[0, 0] + matrix[1, 1] + matrix[2, 2])
 
 
-def _opinions(
+def _range_cues(
     camera: Camera,
     detection: PersonDetection,
     person: PersonKeypoints,
@@ -141,19 +148,19 @@ def _opinions(
     floor: FloorPlane | None,
     feet: _Feet | None,
 ) -> list[DepthCue]:
-    """What body or box, head and feet say about a person's range, against that of the start."""
+    """Return the cues of body or box, head and feet for the range, relative to the start's."""
     position, covariance = start
     x, y, z = position.tolist()
     squared = x * x + y * y + z * z
     along = math.sqrt(max(float(position @ covariance @ position), 1e-9)) / squared
     stature = STATURE_RELATIVE_STD if body is None else body.scale_relative_std
-    wrong = _BOX_WRONG if body is None else _BODY_WRONG
-    cues = [DepthCue(0.0, along, min(stature, STATURE_RELATIVE_STD, 0.99 * along), wrong)]
+    outlier = _BOX_OUTLIER if body is None else _BODY_OUTLIER
+    cues = [DepthCue(0.0, along, min(stature, STATURE_RELATIVE_STD, 0.99 * along), outlier)]
     if (cue := _head_cue(position, person, body, head, floor)) is not None:
         cues.append(cue)
     if floor is not None:
-        # A body whose ankles do not show stands behind something or beyond the picture's border;
-        # the lower edge of its box is not its feet.
+        # If a body's ankles are not seen, they are behind something or outside the image. Then the
+        # lower edge of its box does not show its feet.
         if body is None or feet is None:
             cue = _bottom_cue(camera, detection, position, floor)
         else:
@@ -163,11 +170,13 @@ def _opinions(
     return cues
 
 
-def _moved(starts: Sequence[Placement], cues: Sequence[Sequence[DepthCue]]) -> list[Placement]:
-    """Placements with their ranges replaced by what all cues say together."""
+def _with_corrected_range(
+    starts: Sequence[Placement], cues: Sequence[Sequence[DepthCue]]
+) -> list[Placement]:
+    """Return the placements with the range of all cues together."""
     position = np.array([start[0] for start in starts])
     covariance = np.array([start[1] for start in starts])
-    log_range, log_std = np.array([combine_cues(opinions) for opinions in cues]).T
+    log_range, log_std = np.array([combine_cues(range_cues) for range_cues in cues]).T
     ratio = np.exp(log_range)[:, None]
     squared = (position * position).sum(axis=1)[:, None, None]
     across = ratio[..., None] * (_IDENTITY - position[:, :, None] * position[:, None] / squared)
@@ -185,7 +194,7 @@ def _head_cue(
     head: HeadPose | None,
     floor: FloorPlane | None,
 ) -> DepthCue | None:
-    """What the measured range of the head says about the range of the body under it."""
+    """Return the cue of the head's measured range for the range of its body."""
     if head is None or head.range_relative_std is None:
         return None
     centre = head.position_camera_m + head.rotation_camera_head @ HEAD_CENTRE_HEAD_M
@@ -201,11 +210,11 @@ def _head_cue(
         return None
     std = math.hypot(head.range_relative_std, offset / expected)
     return DepthCue(
-        math.log(measured / expected), std, min(_HEAD_STATURE_STD, 0.5 * std), _HEAD_WRONG
+        math.log(measured / expected), std, min(_HEAD_STATURE_STD, 0.5 * std), _HEAD_OUTLIER
     )
 
 
-def _feet_on(
+def _feet_on_floor(
     floor: FloorPlane,
     camera: Camera,
     detections: Sequence[PersonDetection],
@@ -213,9 +222,9 @@ def _feet_on(
     keypoint_std_px: float,
     min_score: float,
 ) -> list[_Feet]:
-    """Depths at which the seen ankles of each person would stand on the floor, and their errors."""
-    pixels = np.array([person.keypoints_px[_ANKLES] for person in people])
-    scores = np.array([person.scores[_ANKLES] for person in people])
+    """Return the depths at which the seen ankles of each person would stand on the floor."""
+    pixels = np.array([person.keypoints_px[kp.ANKLES] for person in people])
+    scores = np.array([person.scores[kp.ANKLES] for person in people])
     edge = np.array([camera.width_px - 1.0, camera.height_px - 1.0])
     shown = (scores >= min_score) & ((pixels >= 0.0) & (pixels <= edge)).all(axis=2)
     label_px = [
@@ -233,29 +242,29 @@ def _feet_on(
 
 
 def _feet_cue(person: PersonKeypoints, body: BodyPlacement, feet: _Feet) -> DepthCue | None:
-    """The ankles on a floor: the planted foot, or both where they agree."""
+    """Return the cue of the ankles on the floor: the planted foot, or both where they agree."""
     offset = _FOOT_OFFSET_STD_M if person.lifted else _FOOT_OFFSET_FLAT_STD_M
-    opinions = [
+    ankles = [
         (math.log(found / expected), math.hypot(error, offset / expected))
         for found, error, expected in zip(
-            feet.depth_m, feet.log_std, body.keypoints_camera_m[_ANKLES, 2].tolist(), strict=True
+            feet.depth_m, feet.log_std, body.keypoints_camera_m[kp.ANKLES, 2].tolist(), strict=True
         )
         if found > 0.0 and expected > 0.0
     ]
-    if not opinions:
+    if not ankles:
         return None
-    opinions.sort()
-    value, error = opinions[0]
-    # A raised foot looks farther away than it is, so the nearer one is the planted one.
-    if len(opinions) > 1 and opinions[1][0] - value < _SAME_FLOOR_STDS * error:
-        value = 0.5 * (value + opinions[1][0])
-    return DepthCue(value, error, 0.0, _FEET_WRONG)
+    ankles.sort()
+    value, error = ankles[0]
+    # A raised foot seems farther away than it is, so the nearer one is the planted foot.
+    if len(ankles) > 1 and ankles[1][0] - value < _SAME_FLOOR_STDS * error:
+        value = 0.5 * (value + ankles[1][0])
+    return DepthCue(value, error, 0.0, _FEET_OUTLIER)
 
 
 def _bottom_cue(
     camera: Camera, detection: PersonDetection, position: FloatArray, floor: FloorPlane
 ) -> DepthCue | None:
-    """The lower edge of a box that the image does not cut off, taken for shoes on the floor."""
+    """Return the cue of the box's lower edge, as shoes on the floor; None if it is cut off."""
     left, top, right, bottom = detection.box_xyxy_px.tolist()
     if bottom > (1.0 - _BORDER) * camera.height_px or position[2] <= _TOE_AHEAD_M:
         return None
@@ -266,4 +275,4 @@ def _bottom_cue(
     if not (found > 0.0 and expected > 0.0):
         return None
     error = math.hypot(float(std[0]), _TOE_AHEAD_STD_M / expected)
-    return DepthCue(math.log(found / expected), error, 0.0, _BOTTOM_WRONG)
+    return DepthCue(math.log(found / expected), error, 0.0, _BOTTOM_OUTLIER)

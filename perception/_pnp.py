@@ -1,4 +1,4 @@
-"""Head pose from head keypoints: Perspective-n-Point, as in the paper."""
+"""Head pose from head keypoints by Perspective-n-Point (PnP), as in the paper."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from ._camera import Camera
 from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
 from ._metric_scale import DEFAULT_MIN_SCORE, metric_scale
-from ._pose_refinement import HeadPrior, RefinedPose, refine, rotation_exp, rotation_log, skew
+from ._pose_refinement import HeadPrior, RefinedPose, refine
+from ._rotations import rotation_exp, rotation_log, skew
 from .anthropometry import HEAD_KEYPOINTS, HEAD_TEMPLATE_M
 from .arrays import FloatArray, finite_number
 from .body import BodyPlacement, place_body
@@ -24,45 +25,54 @@ from .head_frame import lifted_head_model
 
 HeadModel = Literal["template", "lifted"]
 
-# The head turns about a joint below and between the ears.
+_HEAD_ROWS: Final = np.array(HEAD_KEYPOINTS)
+
+# The joint of head and neck lies below and between the ears.
 _PIVOT_HEAD_M: Final = np.array([0.035, -0.100, 0.0])
-# From the shoulder midpoint to that joint, in the torso frame (forward, left, up), so that a head
-# looking straight ahead has its nose where anthropometry puts it.
+# From the shoulder midpoint to that joint, in the torso frame (forward, left, up). With it, the
+# nose of a head that looks straight ahead lies where anthropometry says.
 _NECK_TO_PIVOT_M: Final = np.array([0.046, 0.0, 0.168])
-# How far a head strays from straight ahead, within the limits of its joints.
+# Standard deviations of the head's rotation relative to the torso.
 _YAW_STD_RAD, _ROLL_STD_RAD, _PITCH_STD_RAD = map(math.radians, (60.0, 15.0, 25.0))
 _PIVOT_STD_M: Final = 0.04
 _YAW_STARTS_RAD: Final = np.radians([0.0, 50.0, -50.0, 100.0, -100.0, 180.0])
 
-# A seen keypoint is expected to face the camera, an unseen one to face away; being wrong about one
-# costs as much as an error of two standard deviations, since either can happen.
+# A seen keypoint should face the camera, an unseen one should face away. Each exception costs as
+# much as an error of two standard deviations, since exceptions do occur.
 _VISIBILITY_COST: Final = 4.0
-# Cosine between the direction that a keypoint faces and the direction to the camera at which it
-# goes out of sight.
-_FACE_LIMIT: Final = math.cos(math.radians(95.0))
-_EAR_LIMIT: Final = math.cos(math.radians(105.0))
+# Directions that the five keypoints face in the head frame, and the cosines between them and the
+# direction to the camera below which the keypoints are out of sight.
 _FACING: Final = np.array(
     [[0.0, 1.0, 0.0], [0.0, 0.87, -0.5], [0.0, 0.87, 0.5], [0.0, 0.0, -1.0], [0.0, 0.0, 1.0]]
 )
+_FACE_LIMIT: Final = math.cos(math.radians(95.0))
+_EAR_LIMIT: Final = math.cos(math.radians(105.0))
 _SIGHT_LIMIT: Final = np.array([_FACE_LIMIT, _FACE_LIMIT, _FACE_LIMIT, _EAR_LIMIT, _EAR_LIMIT])
 
-# Heads whose keypoints span less than this many standard deviations carry no direction.
+# A head whose keypoints span less than this many standard deviations carries no direction.
 _MIN_SPREAD_STD: Final = 3.0
-# Residuals that pixel noise of the stated size produces once in a hundred poses.
+# χ² that pixel noise of the stated size exceeds in 1 % of poses, by degrees of freedom.
 _FIT_QUANTILE: Final = {1: 6.6, 2: 9.2, 3: 11.3, 4: 13.3, 5: 15.1, 6: 16.8}
-# Poses that fit worse than the best by more than this are not answers any more.
+# A local optimum is ignored if its χ² is larger than the best by more than this.
 _MODE_CUTOFF_CHI2: Final = 16.0
-# Local optima closer than this to each other are one.
+# Local optima closer than 8° to each other count as one.
 _SAME_MODE_COSINE: Final = math.cos(math.radians(8.0))
 _MAX_ROTATION_STD_RAD: Final = math.radians(100.0)
 
 
-_HEAD_ROWS: Final = np.array(HEAD_KEYPOINTS)
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class _Head:
-    """The five points of one head: model (5, 3), rays (5, 2), which were seen (5,), and starts."""
+    """The five points of one head and the starting poses.
+
+    Attributes:
+        row: row of the person.
+        model: (5, 3) points in the head frame.
+        rays: (5, 2) measured x/z and y/z.
+        seen: (5,) True for seen points.
+        rotations: (B, 3, 3) starts.
+        translations_m: (B, 3) starts.
+        prior: prior from the body, or None.
+    """
 
     row: int
     model: FloatArray
@@ -74,20 +84,23 @@ class _Head:
 
 
 class PnpHeadPoseEstimator:
-    """The paper's head pose: PnP on the head keypoints of each person.
+    """Head pose estimator of the paper: PnP on the head keypoints of each person.
 
-    Four or more head keypoints: SQPnP gives the start (OpenCV ``SOLVEPNP_SQPNP``) and
-    Levenberg–Marquardt refines it; solutions behind the camera are rejected, and where two fit
-    alike, the one whose visible side matches the keypoints that were seen wins. With fewer (a
-    profile, a back of a head) the torso, where it is seen, adds what it knows of its head.
+    With four or more seen head keypoints, SQPnP gives the starts (OpenCV ``SOLVEPNP_SQPNP``) and
+    Levenberg–Marquardt refines them. Solutions behind the camera are rejected. If two solutions fit
+    equally well, the one wins whose visible side agrees with the keypoints that are seen. With
+    fewer keypoints (a profile, the back of a head), a prior from the torso is added, if it is seen.
 
     Args:
-        keypoint_std_px: standard deviation of the keypoint noise that the covariance assumes; where
-            residuals speak of more, the covariance grows with them.
-        min_score: keypoints scored below this count as not seen.
-        head_model: ``"template"``, the anatomical template whose forward axis is the Frankfurt
-            horizontal; or ``"lifted"``, the person's own lifted keypoints in the frame of the
-            paper's printed formula (about 36° of downward bias on an upright head).
+        keypoint_std_px: standard deviation of the keypoint noise that the covariance assumes;
+            larger residuals enlarge the covariance.
+        min_score: keypoints with a lower score count as not seen.
+        head_model: ``"template"`` for the anatomical template, whose forward axis is the Frankfurt
+            horizontal; ``"lifted"`` for the person's own lifted keypoints in the frame of the
+            paper's printed formula (on an upright head a bias of about 36° downwards).
+
+    Raises:
+        PerceptionError: for an invalid value.
     """
 
     def __init__(
@@ -107,11 +120,11 @@ class PnpHeadPoseEstimator:
     def estimate(
         self, image_rgb: Any, camera: Camera, people: tuple[PersonKeypoints, ...]
     ) -> tuple[HeadPose | None, ...]:
-        """Return one head pose a person, or None where the head carries no evidence.
+        """Return one head pose per person; None if the keypoints do not determine one.
 
         Args:
-            image_rgb: not used; keypoints say it all. May be None.
-            camera: the camera that saw the keypoints.
+            image_rgb: not used; may be None.
+            camera: camera of the image.
             people: keypoints of each person.
         """
         poses: list[HeadPose | None] = [None] * len(people)
@@ -123,7 +136,7 @@ class PnpHeadPoseEstimator:
         return tuple(poses)
 
     def _head(self, camera: Camera, person: PersonKeypoints, row: int) -> _Head | None:
-        """What is seen of a head and where to start, or None where it carries no evidence."""
+        """Return the points and starting poses of a head; None without enough keypoints."""
         scores = person.scores[_HEAD_ROWS]
         seen = scores >= self._min_score
         rows = np.flatnonzero(seen)
@@ -146,7 +159,7 @@ class PnpHeadPoseEstimator:
         return None if starts is None else _Head(row, model, rays, seen, *starts, prior)
 
     def _refined(self, camera: Camera, heads: list[_Head]) -> list[HeadPose | None]:
-        """Refine the starts of several heads in one go."""
+        """Refine the starting poses of several heads at once and return their head poses."""
         counts = [len(head.rotations) for head in heads]
         owner = np.repeat(np.arange(len(heads)), counts)
         poses = refine(
@@ -171,13 +184,14 @@ class PnpHeadPoseEstimator:
         return results
 
     def _model(self, person: PersonKeypoints, seen: Any) -> FloatArray | None:
+        """Return the object points (5, 3) in the head frame; None if they cannot be computed."""
         if self._head_model == "template":
             return HEAD_TEMPLATE_M
         neck_seen = person.scores[[kp.LEFT_SHOULDER, kp.RIGHT_SHOULDER]] >= self._min_score
         scale = metric_scale(person, self._min_score)
         if scale is None or not (neck_seen.all() and seen[[0, 3, 4]].all()):
             return None
-        points = scale.factor * person.keypoints_root_m[:17]
+        points = scale.factor * person.keypoints_root_m[kp.BODY]
         neck = 0.5 * (points[kp.LEFT_SHOULDER] + points[kp.RIGHT_SHOULDER])
         try:
             return lifted_head_model(points[list(HEAD_KEYPOINTS)], neck)
@@ -187,6 +201,7 @@ class PnpHeadPoseEstimator:
     def _finish(
         self, costs: list[tuple[float, RefinedPose]], points: int, with_prior: bool
     ) -> HeadPose | None:
+        """Return the best pose with its covariance; None if its rotation is too uncertain."""
         pose = costs[0][1]
         try:
             covariance = np.linalg.inv(pose.information)
@@ -209,7 +224,7 @@ class PnpHeadPoseEstimator:
 
 
 def _sqpnp(points: FloatArray, rays: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-    """Every SQPnP solution in front of the camera and its mirror in depth, as starts."""
+    """Return starting poses: each SQPnP solution in front of the camera, and its mirror image."""
     if len(points) < 3:
         return None
     try:
@@ -230,8 +245,8 @@ def _sqpnp(points: FloatArray, rays: FloatArray) -> tuple[FloatArray, FloatArray
         rotation = rotation_exp(np.ravel(vector))
         rotations.append(rotation)
         origins.append(origin)
-        # A small head far away is nearly a weak-perspective image, whose second solution is the
-        # first reflected in the image plane: start from it too.
+        # The image of a small, distant head is nearly a weak-perspective one. Its second solution
+        # is the first, reflected in the image plane.
         mirrored = _mirrored(rotation, origin, centre)
         rotations.append(mirrored)
         origins.append(origin + (rotation - mirrored) @ centre)
@@ -241,11 +256,11 @@ def _sqpnp(points: FloatArray, rays: FloatArray) -> tuple[FloatArray, FloatArray
 
 
 def _mirrored(rotation: FloatArray, origin: FloatArray, centre: FloatArray) -> FloatArray:
-    """The rotation that a planar figure seen along this ray could equally have (Oberkampf 1996)."""
+    """Return the second rotation that fits the image of a planar object (Oberkampf et al. 1996)."""
     ray = rotation @ centre + origin
     ray = ray / np.linalg.norm(ray)
     forward = rotation[:, 1]
-    # Turn the gaze to its reflection in the plane across the ray, about their common normal.
+    # Rotate the gaze to its reflection in the plane across the ray, about their common normal.
     reflected = forward - 2.0 * (forward @ ray) * ray
     axis = skew(forward) @ reflected
     sine = float(np.linalg.norm(axis))
@@ -258,7 +273,7 @@ def _mirrored(rotation: FloatArray, origin: FloatArray, centre: FloatArray) -> F
 def _body_prior(
     camera: Camera, person: PersonKeypoints, keypoint_std_px: float, min_score: float
 ) -> HeadPrior | None:
-    """What the torso says about its head, or None where too little of it is seen."""
+    """Return the prior of the head's pose from the torso; None if too little of it is seen."""
     body = place_body(camera, person, keypoint_std_px, min_score)
     if body is None:
         return None
@@ -282,7 +297,7 @@ def _body_prior(
 
 
 def _torso_axes(body: BodyPlacement) -> tuple[FloatArray, FloatArray] | None:
-    """(3, 3) forward, left, up as columns in the camera frame, and the neck (3,)."""
+    """Return forward, left, up as columns (3, 3) and the neck (3,), in the camera frame."""
     shoulders = body.shoulders_camera_m
     if shoulders is None:
         return None
@@ -298,7 +313,7 @@ def _torso_axes(body: BodyPlacement) -> tuple[FloatArray, FloatArray] | None:
 
 
 def _prior_starts(prior: HeadPrior) -> tuple[FloatArray, FloatArray]:
-    """Heads turned by several yaws about the neck that the body gives."""
+    """Return starting poses with several yaw angles about the joint of the prior."""
     down = prior.rotation_camera_head[:, 0]
     rotations = rotation_exp(_YAW_STARTS_RAD[:, None] * down) @ prior.rotation_camera_head
     return rotations, prior.pivot_camera_m - rotations @ prior.pivot_head_m
@@ -307,10 +322,10 @@ def _prior_starts(prior: HeadPrior) -> tuple[FloatArray, FloatArray]:
 def _costs(
     poses: list[RefinedPose], points: FloatArray, seen: Any, *, without_body: bool
 ) -> list[tuple[float, RefinedPose]]:
-    """The poses in front of the camera with what each costs, cheapest first.
+    """Return the poses in front of the camera with their costs, the lowest cost first.
 
-    The cost is χ² of the fit and of the prior, and a charge for every keypoint that the camera
-    should have seen and did not, or the reverse.
+    The cost is χ² of fit and prior, plus a fixed cost for each keypoint that should be visible and
+    was not seen, or the reverse.
     """
     costs = []
     for pose in poses:
@@ -323,17 +338,17 @@ def _costs(
         expected = facing > _SIGHT_LIMIT
         cost = pose.cost + _VISIBILITY_COST * float(np.count_nonzero(expected != seen))
         if without_body and pose.rotation[1, 0] < 0.0:
-            # Upside down to the camera: possible, but not for somebody on their feet.
+            # Upside down in the camera: unlikely for a person who stands or sits.
             cost += _VISIBILITY_COST
         costs.append((cost, pose))
     return sorted(costs, key=lambda pair: pair[0])
 
 
 def _spread_of_modes(costs: list[tuple[float, RefinedPose]]) -> FloatArray:
-    """(6, 6) second moment about the best pose of the other poses that fit almost as well.
+    """Return the second moment (6, 6) about the best pose of other poses that fit nearly as well.
 
-    Each mode weighs exp(−Δχ²/2). Where the image allows two answers the covariance says so, and an
-    α that could be 0 or 0.8 is not reported as a sure 0.8.
+    The weight of a pose is exp(−Δχ²/2). If the image allows two solutions, the covariance includes
+    both: an α that may be 0 or 0.8 then has a large standard deviation.
     """
     lowest, best = costs[0]
     modes: list[RefinedPose] = [best]
@@ -347,8 +362,8 @@ def _spread_of_modes(costs: list[tuple[float, RefinedPose]]) -> FloatArray:
             continue
         modes.append(pose)
         turn = rotation_log(pose.rotation @ best.rotation.T)
-        away = np.concatenate([turn, pose.translation_m - best.translation_m])
+        difference = np.concatenate([turn, pose.translation_m - best.translation_m])
         weight = math.exp(-0.5 * (cost - lowest))
-        spread += weight * np.outer(away, away)
+        spread += weight * np.outer(difference, difference)
         total += weight
     return spread / total

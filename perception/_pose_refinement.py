@@ -1,4 +1,4 @@
-"""Least-squares refinement of head poses with priors, batched over starting points."""
+"""Least-squares refinement of head poses with priors, from many starting poses at once."""
 
 from __future__ import annotations
 
@@ -9,33 +9,29 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ._rotations import rotation_exp, rotation_log, skew
 from .arrays import FloatArray
 
 _ITERATIONS: Final = 8
-# Far below one, the scale of the noise.
+# A head is converged when no step promises to lower χ² by more; noise changes χ² by about 1.
 _CONVERGED_CHI2: Final = 1e-2
 _MIN_DEPTH_M: Final = 0.05
 _EYE: Final = np.eye(3)
 _EYE_2: Final = np.eye(2)
 _EYE_6: Final = np.eye(6)
-# (3, 9): a vector times it is the rows of its cross product's matrix, one after the other.
-_SKEW: Final = np.array(
-    [[0, 0, 0, 0, 0, -1, 0, 1, 0], [0, 0, 1, 0, 0, 0, -1, 0, 0], [0, -1, 0, 1, 0, 0, 0, 0, 0]],
-    dtype=np.float64,
-)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HeadPrior:
-    """What the body says about its head: weak, but enough where few head points are seen.
+    """Prior of a head's pose from the body: weak, but enough where few head points are seen.
 
     Attributes:
-        rotation_camera_head: (3, 3) head looking straight ahead of the torso.
-        rotation_information: (3, 3) inverse covariance of the head's rotation against that, as a
-            rotation vector in head axes (x yaw, y roll, z pitch).
-        pivot_head_m: (3,) the joint of head and neck in the head frame.
-        pivot_camera_m: (3,) where the body puts that joint.
-        position_information: (3, 3) inverse covariance of it, camera frame.
+        rotation_camera_head: (3, 3) rotation of a head that looks straight ahead of the torso.
+        rotation_information: (3, 3) inverse covariance of the head's rotation relative to that, as
+            a rotation vector in head axes (x yaw, y roll, z pitch).
+        pivot_head_m: (3,) joint of head and neck in the head frame.
+        pivot_camera_m: (3,) position of that joint according to the body.
+        position_information: (3, 3) inverse covariance of that position, camera frame.
     """
 
     rotation_camera_head: FloatArray
@@ -47,13 +43,13 @@ class HeadPrior:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Priors:
-    """The prior of each of B starts; arrays as in :class:`HeadPrior` with B in front.
+    """Priors of B starts; arrays as in :class:`HeadPrior` with B in front.
 
-    ``rotation_information`` is in camera axes here; ``rows`` are those of the starts among all.
+    ``rotation_information`` is in camera axes here. ``rows`` are the rows of these starts among
+    all starts.
     """
 
     rows: slice | NDArray[np.int64]
-
     rotation_camera_head: FloatArray
     rotation_information: FloatArray
     pivot_head_m: FloatArray
@@ -64,7 +60,7 @@ class _Priors:
     def of(
         cls, priors: Sequence[HeadPrior | None] | None, owner: NDArray[np.int64]
     ) -> _Priors | None:
-        """Of starts whose heads are ``owner``; None where no head has one."""
+        """Return the priors of starts that belong to the heads ``owner``; None without priors."""
         known = [prior for prior in priors or () if prior is not None]
         if priors is None or not known:
             return None
@@ -87,9 +83,14 @@ class _Priors:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RefinedPose:
-    """A local optimum: rotation (3, 3), translation (3,), 6×6 information, cost and pixel error.
+    """A local optimum of a head's pose.
 
-    ``cost`` is the sum of squared normalised residuals, priors included; ``reprojection_px`` (N,).
+    Attributes:
+        rotation: (3, 3) from the head frame to the camera frame.
+        translation_m: (3,) head origin in the camera frame.
+        information: (6, 6) inverse covariance, order rotation vector, translation.
+        cost: sum of squared normalised residuals, priors included.
+        reprojection_px: (N,) pixel error of each point.
     """
 
     rotation: FloatArray
@@ -97,44 +98,6 @@ class RefinedPose:
     information: FloatArray
     cost: float
     reprojection_px: FloatArray
-
-
-def skew(vectors: FloatArray) -> FloatArray:
-    """(…, 3) to (…, 3, 3) with ``skew(a) @ b == cross(a, b)``."""
-    return np.asarray((vectors @ _SKEW).reshape(*vectors.shape, 3))
-
-
-def rotation_exp(vectors: FloatArray) -> FloatArray:
-    """Rodrigues' formula: rotation vectors (…, 3) to rotations (…, 3, 3)."""
-    angle = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))[..., None, None]
-    cross = skew(vectors)
-    if np.minimum.reduce(angle, axis=None, initial=1.0) >= 1e-8:
-        first, second = np.sin(angle) / angle, (1.0 - np.cos(angle)) / (angle * angle)
-    else:
-        small = angle < 1e-8
-        safe = np.where(small, 1.0, angle)
-        first = np.where(small, 1.0, np.sin(angle) / safe)
-        second = np.where(small, 0.5, (1.0 - np.cos(angle)) / safe**2)
-    return np.asarray(_EYE + first * cross + second * (cross @ cross))
-
-
-def rotation_log(rotations: FloatArray) -> FloatArray:
-    """Rotations (…, 3, 3) to rotation vectors (…, 3) of length at most π."""
-    trace = rotations[..., 0, 0] + rotations[..., 1, 1] + rotations[..., 2, 2]
-    angle = np.arccos(np.minimum(np.maximum(0.5 * (trace - 1.0), -1.0), 1.0))
-    axis = np.empty(rotations.shape[:-1])
-    axis[..., 0] = rotations[..., 2, 1] - rotations[..., 1, 2]
-    axis[..., 1] = rotations[..., 0, 2] - rotations[..., 2, 0]
-    axis[..., 2] = rotations[..., 1, 0] - rotations[..., 0, 1]
-    length = np.sqrt(np.einsum("...i,...i->...", axis, axis))
-    if length.min(initial=1.0) > 1e-6:
-        return np.asarray((angle / length)[..., None] * axis)
-    # Near a half turn the antisymmetric part vanishes; the diagonal still gives the axis.
-    diagonal = np.sqrt(np.maximum(0.5 * (1.0 + np.diagonal(rotations, axis1=-2, axis2=-1)), 0.0))
-    turned = np.where(axis < 0.0, -diagonal, diagonal)
-    usable = length > 1e-6
-    unit = np.where(usable[..., None], axis / np.where(usable, length, 1.0)[..., None], turned)
-    return np.asarray(np.where((angle < 1e-8)[..., None], 0.5 * axis, angle[..., None] * unit))
 
 
 def _linearise(
@@ -145,9 +108,9 @@ def _linearise(
     translation: FloatArray,
     prior: _Priors | None,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Cost (B,), gradient (B, 6), information (B, 6, 6) and pixel residuals (B, N, 2).
+    """Return cost (B,), gradient (B, 6), information (B, 6, 6) and pixel residuals (B, N, 2).
 
-    The state is a rotation in camera axes applied from the left, then the translation.
+    The state is a rotation in camera axes, applied from the left, then the translation.
     """
     turned = model @ rotation.swapaxes(1, 2)
     points = turned + translation[:, None]
@@ -167,7 +130,7 @@ def _linearise(
     information = flat.swapaxes(1, 2) @ flat
     gradient = np.einsum("bki,bk->bi", flat, flat_residual)
     cost = np.add.reduce(flat_residual * flat_residual, axis=1)
-    # A point behind the camera must never look like a good fit.
+    # The penalty keeps a point behind the camera from being a good fit.
     if np.minimum.reduce(nearest, axis=None) < _MIN_DEPTH_M:
         behind = np.maximum(_MIN_DEPTH_M - nearest, 0.0)
         cost += 1e6 * np.add.reduce(behind * (weight_px[..., 0] > 0.0), axis=1)
@@ -175,7 +138,7 @@ def _linearise(
         rows = prior.rows
         rotation, translation = rotation[rows], translation[rows]
         away = rotation_log(rotation.swapaxes(1, 2) @ prior.rotation_camera_head)
-        # In camera axes: R log(Rᵀ R0) is the turn that brings the head back to the prior.
+        # In camera axes, R log(Rᵀ R0) is the rotation that takes the head to the prior.
         away = -np.einsum("bij,bj->bi", rotation, away)
         rotation_information = prior.rotation_information
         pivot = np.einsum("bij,bj->bi", rotation, prior.pivot_head_m)
@@ -208,24 +171,25 @@ def refine(
     seen: FloatArray | None = None,
     owner: NDArray[np.int64] | None = None,
 ) -> list[RefinedPose]:
-    """Levenberg–Marquardt from B starts at once, of one head or of several.
+    """Refine B starting poses at once, of one or several heads, by Levenberg–Marquardt.
 
-    Each head stops by itself when none of its starts promises more: what others are refined with
-    it does not matter.
+    A head stops when none of its starts promises a better fit, so its result does not depend on the
+    other heads.
 
     Args:
-        model_m: (N, 3) points in the head frame, or (B, N, 3) each start's own.
-        rays: (N, 2) or (B, N, 2) x/z and y/z where they were seen.
+        model_m: (N, 3) points in the head frame, or (B, N, 3) points per start.
+        rays: (N, 2) or (B, N, 2) measured x/z and y/z of the points.
         focal_px: (2,) fx and fy.
         keypoint_std_px: standard deviation of the pixel noise.
         rotations: (B, 3, 3) starts.
         translations_m: (B, 3) starts.
-        priors: what the body of each head says, None where it says nothing, or None for all.
-        seen: (B, N) of ones, and zeros for points that do not count; default all count.
-        owner: (B,) the head that each start is of, starts of one head in a row; default one head.
+        priors: prior of each head, or None for a head without one; None for no priors at all.
+        seen: (B, N) 1 for points that count, 0 for others; default all count.
+        owner: (B,) head of each start, with the starts of a head in consecutive rows; default one
+            head.
 
     Returns:
-        One local optimum a start, in the same order.
+        One local optimum per start, in the same order.
     """
     weight = focal_px / keypoint_std_px
     weight = weight[None, None] if seen is None else seen[..., None] * weight
@@ -242,7 +206,7 @@ def refine(
         scale = information.reshape(count, 36)[:, ::7]  # the diagonals
         damped = information + (damping[:, None] * scale + 1e-9)[..., None] * _EYE_6
         step = -np.linalg.solve(damped, gradient[..., None])[..., 0]
-        # The decrease of the cost that the local model still promises, in units of χ².
+        # The decrease of χ² that the local model still promises.
         promise = np.maximum.reduceat(-np.add.reduce(gradient * step, axis=1), first)
         active &= (promise >= _CONVERGED_CHI2)[owner]
         if not np.logical_or.reduce(active):

@@ -1,4 +1,4 @@
-"""What the pipeline asks of its networks: protocols that any detector or estimator can meet."""
+"""Interfaces of the pipeline's stages; any object with these methods can be used."""
 
 from __future__ import annotations
 
@@ -13,30 +13,30 @@ from .arrays import ImageRgb
 
 @runtime_checkable
 class PersonDetector(Protocol):
-    """Finds people in an image."""
+    """Interface: finds people in an image."""
 
     def detect(self, image_rgb: ImageRgb) -> tuple[PersonDetection, ...]:
-        """Return the people in an (H, W, 3) RGB image; an empty tuple when there are none."""
+        """Return the people in an (H, W, 3) RGB image; an empty tuple if there are none."""
         ...
 
 
 @runtime_checkable
 class PoseEstimator(Protocol):
-    """Finds the keypoints of detected people."""
+    """Interface: finds the keypoints of detected people."""
 
     def estimate(
         self, image_rgb: ImageRgb, detections: tuple[PersonDetection, ...]
     ) -> tuple[PersonKeypoints, ...]:
-        """Return one set of keypoints a detection, in the same order."""
+        """Return one set of keypoints per detection, in the same order."""
         ...
 
 
 @runtime_checkable
 class HeadPoseEstimator(Protocol):
-    """Finds the head pose of people whose keypoints are known."""
+    """Interface: finds the head poses of people whose keypoints are known."""
 
     def estimate(
         self, image_rgb: ImageRgb, camera: Camera, people: tuple[PersonKeypoints, ...]
     ) -> tuple[HeadPose | None, ...]:
-        """Return one head pose a person, in the same order; None where there is no evidence."""
+        """Return one head pose per person, in the same order; None where there is no evidence."""
         ...

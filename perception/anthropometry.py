@@ -1,9 +1,9 @@
-"""How large people are: limb lengths for metric scale and an anatomical template of the head.
+"""Body sizes: limb lengths for the metric scale, and an anatomical template of the head.
 
 Limb lengths are distances between COCO keypoints of an adult of stature :data:`MEAN_STATURE_M`.
-Two sources are averaged where both define the limb alike: the body-segment fractions of Drillis and
+Where two sources define a limb alike, they are averaged: the body-segment fractions of Drillis and
 Contini (1966; reprinted in D. A. Winter, *Biomechanics and Motor Control of Human Movement*,
-table/figure 4.1) and 27 adult bodies of the parametric model ``anny`` 0.6.2 (its COCO keypoint
+table/figure 4.1), and 27 adult bodies of the parametric model ``anny`` 0.6.2 (its COCO keypoint
 definitions; body data of MakeHuman, CC0), measured by ``training/anthropometry.py``.
 
 =============== ===================== ================ =========
@@ -19,7 +19,8 @@ hip span        0.191                 0.109            0.150
 =============== ===================== ================ =========
 
 The spans depend most on where a labeller puts the joint (over the deltoid or at the joint's
-centre), so their relative standard deviation is large and they weigh little beside the long bones.
+centre). Their relative standard deviation is therefore large, and they count little compared to the
+long bones.
 """
 
 from __future__ import annotations
@@ -44,8 +45,13 @@ STATURE_RELATIVE_STD: Final = 0.05
 class Limb:
     """A limb between two keypoints, or between the midpoints of two pairs of keypoints.
 
-    ``relative_std`` is the spread of its length over adults of the same stature together with the
-    spread of where labels put its ends.
+    Attributes:
+        name: name of the limb.
+        start: one keypoint, or two whose midpoint is the start.
+        end: one keypoint, or two whose midpoint is the end.
+        length_m: average length.
+        relative_std: relative standard deviation of the length over adults of the same stature,
+            including the spread of where labels put its ends.
     """
 
     name: str
@@ -95,8 +101,8 @@ def _locked(rows: list[list[float]]) -> FloatArray:
 
 
 #: (5, 3) nose, left eye, right eye, left ear, right ear in the paper's head frame: origin nose,
-#: x down, y forward along the Frankfurt horizontal, z to the right ear. Mean of the same 27 bodies:
-#: the ear midpoint lies 110 mm behind and 12 mm above the nose, the ears 156 mm and the eyes 63 mm
+#: x down, y forward along the Frankfurt horizontal, z to the right ear. Mean of the 27 bodies: the
+#: ear midpoint lies 110 mm behind and 12 mm above the nose, the ears 156 mm and the eyes 63 mm
 #: apart, the eyes 23 mm behind and 33 mm above the nose.
 HEAD_TEMPLATE_M: Final[FloatArray] = _locked(
     [
@@ -108,18 +114,18 @@ HEAD_TEMPLATE_M: Final[FloatArray] = _locked(
     ]
 )
 
-#: (3,) the middle of the head in the paper's head frame: between the ears and a little above them.
+#: (3,) centre of the head in the paper's head frame: between the ears and a little above them.
 HEAD_CENTRE_HEAD_M: Final[FloatArray] = np.array([-0.045, -0.090, 0.0])
 HEAD_CENTRE_HEAD_M.setflags(write=False)
 
-#: Midpoint of the eyes in the head frame: the apex of the attention cone.
+#: (3,) midpoint of the eyes in the head frame: the apex of the attention cone.
 EYES_HEAD_M: Final[FloatArray] = HEAD_TEMPLATE_M[1:3].mean(axis=0)
 
-#: From the shoulder midpoint (neck) to the nose of an upright adult looking straight ahead: forward
-#: and up, the mean of the same bodies.
+#: From the shoulder midpoint (neck) to the nose of an upright adult who looks straight ahead:
+#: forward and up, mean of the same bodies.
 NECK_TO_NOSE_FORWARD_M: Final = 0.144
 NECK_TO_NOSE_UP_M: Final = 0.198
 
-#: Radius of a circle about the body's vertical centre line that holds an adult with arms down:
+#: Radius of a circle around the body's vertical centre line that contains an adult with arms down:
 #: half the 95th-percentile bideltoid breadth of men in the ANSUR II survey (0.56 m), rounded up.
 BODY_RADIUS_M: Final = 0.30

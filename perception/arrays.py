@@ -1,7 +1,7 @@
-"""Checks at the door: arrays and numbers that enter a seam type are copied, verified and locked.
+"""Checks of numbers and arrays: each value is verified, and arrays are copied and made read-only.
 
-The four packages share these helpers so that every refusal reads the same: what was given, what is
-valid, and the unit. Each caller passes the error class of its own package.
+All packages share these helpers, so that all error messages have the same form: what was given,
+what is valid, and the unit. A caller passes the error class of its own package.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from .errors import PerceptionError
 
 FloatArray = NDArray[np.float64]
-#: (H, W, 3) uint8, red first.
+#: (H, W, 3) uint8 in the order red, green, blue.
 ImageRgb = NDArray[np.uint8]
 
-# A rotation read from a file or sent over a wire carries rounding of about this size.
+# Rounding of a rotation that was read from a file or sent in a message.
 _ROTATION_TOLERANCE = 1e-4
 _FEW_NUMBERS = 64
 _LAST_ROW = (0.0, 0.0, 0.0, 1.0)
@@ -32,7 +32,7 @@ def _shape_text(shape: tuple[int | str, ...]) -> str:
 
 
 def _fits(given: tuple[int, ...], wanted: tuple[int | str, ...]) -> bool:
-    """True when the extents agree, letters standing for any extent but equal ones for equal."""
+    """Return True if the extents agree; a letter is any extent, equal letters are equal extents."""
     free: dict[str, int] = {}
     return len(given) == len(wanted) and all(
         extent == (want if isinstance(want, int) else free.setdefault(want, extent))
@@ -41,8 +41,8 @@ def _fits(given: tuple[int, ...], wanted: tuple[int | str, ...]) -> bool:
 
 
 def _all_finite(array: FloatArray) -> bool:
-    # Plain Python is faster on few numbers; their sum is finite unless one of them is not, or all
-    # are enormous.
+    # Plain Python is faster for few numbers. If their sum is finite, so are all numbers; if it is
+    # not (non-finite or very large numbers), NumPy decides.
     if array.size <= _FEW_NUMBERS and math.isfinite(sum(array.ravel().tolist())):
         return True
     return bool(np.isfinite(array).all())
@@ -56,8 +56,12 @@ def finite_array(
 ) -> FloatArray:
     """Return a read-only float64 copy of ``value`` after checking its shape and finiteness.
 
-    ``shape`` holds an int where the extent is fixed and a letter where it is free; equal letters
-    must have equal extents. Raises ``error`` naming the field, what was given and what is valid.
+    Args:
+        name: name of the value in messages.
+        value: anything that NumPy converts to an array of numbers.
+        shape: an int for a fixed extent, a letter for a free one; equal letters must have equal
+            extents.
+        error: class of the error to raise.
     """
     try:
         array = np.array(value, dtype=np.float64, copy=True)
@@ -84,7 +88,7 @@ def finite_number(
     maximum: float = math.inf,
     exclusive_minimum: bool = False,
 ) -> float:
-    """Return ``value`` as a float after checking that it is finite and within its bounds."""
+    """Return ``value`` as a float after checking that it is finite and within the bounds."""
     try:
         number = float(value)
     except (TypeError, ValueError) as cause:
@@ -106,7 +110,7 @@ def covariance_matrix(
 ) -> FloatArray:
     """Return a read-only (size, size) symmetric, positive semi-definite covariance."""
     array = finite_array(name, value, (size, size), error)
-    if _is_plainly_a_covariance(array.tolist()):
+    if _has_cholesky_factor(array.tolist()):
         return array
     scale = max(float(np.abs(array).max()), 1e-12)
     if float(np.abs(array - array.T).max()) > 1e-6 * scale:
@@ -119,10 +123,11 @@ def covariance_matrix(
     return array
 
 
-def _is_plainly_a_covariance(rows: list[list[float]]) -> bool:
-    """True for an exactly symmetric, positive definite matrix; by Cholesky's decomposition.
+def _has_cholesky_factor(rows: list[list[float]]) -> bool:
+    """Return True for an exactly symmetric, positive definite matrix.
 
-    False says nothing yet. A few numbers are done before LAPACK has begun.
+    A matrix with False may still be valid within the tolerances. In plain Python this is faster
+    than LAPACK for small matrices.
     """
     factor: list[list[float]] = []
     for size, row in enumerate(rows):
@@ -141,7 +146,7 @@ def _is_plainly_a_covariance(rows: list[list[float]]) -> bool:
 
 
 def rotation_matrix(name: str, value: Any, error: type[ValueError] = PerceptionError) -> FloatArray:
-    """Return a read-only (3, 3) rotation; it must be orthonormal with determinant +1."""
+    """Return a read-only (3, 3) rotation matrix: orthonormal, determinant +1."""
     array = finite_array(name, value, (3, 3), error)
     a, b, c = array.tolist()
     deviation = max(
@@ -167,7 +172,7 @@ def _dot(first: Sequence[float], second: Sequence[float]) -> float:
 
 
 def rigid_transform(name: str, value: Any, error: type[ValueError] = PerceptionError) -> FloatArray:
-    """Return a read-only (4, 4) rigid transform; translation in metres."""
+    """Return a read-only (4, 4) rigid transform, translation in metres."""
     array = finite_array(name, value, (4, 4), error)
     if any(
         abs(given - wanted) > 1e-9
@@ -179,7 +184,7 @@ def rigid_transform(name: str, value: Any, error: type[ValueError] = PerceptionE
 
 
 def unit_vector(name: str, value: Any, error: type[ValueError] = PerceptionError) -> FloatArray:
-    """Return a read-only (3,) unit vector; a length within 1e-3 of one is normalised."""
+    """Return a read-only (3,) unit vector; a length within 1e-3 of 1 is normalised."""
     array = finite_array(name, value, (3,), error)
     length = math.hypot(*array.tolist())
     if abs(length - 1.0) > 1e-3:
@@ -190,7 +195,7 @@ def unit_vector(name: str, value: Any, error: type[ValueError] = PerceptionError
 
 
 def pixel_count(name: str, value: Any) -> int:
-    """Return a width or height: a whole number of at least 1."""
+    """Return a width or height: a whole number ≥ 1."""
     number = finite_number(name, value, minimum=1.0)
     if number != int(number):
         raise PerceptionError(f"{name} must be a whole number of pixels, got {number:g}")
@@ -198,6 +203,6 @@ def pixel_count(name: str, value: Any) -> int:
 
 
 def set_fields(instance: object, **values: Any) -> None:
-    """Assign checked values to the fields of a frozen dataclass from its ``__post_init__``."""
+    """Assign checked values to the fields of a frozen dataclass, in its ``__post_init__``."""
     for field, value in values.items():
         object.__setattr__(instance, field, value)

@@ -1,4 +1,4 @@
-"""Where a body is: metric keypoints in the camera frame, and the point a planner cares about."""
+"""Position of bodies in the camera frame: metric keypoints, and the chest for the planner."""
 
 from __future__ import annotations
 
@@ -19,31 +19,30 @@ from .anthropometry import LIMBS, MEAN_STATURE_M, STATURE_RELATIVE_STD
 from .arrays import FloatArray
 
 _TORSO_M: Final = LIMBS[0].length_m
-#: The chest lies this fraction of the torso below the shoulders.
+#: Distance of the chest below the shoulders, as a fraction of the torso.
 CHEST_FRACTION: Final = 0.3
-# A box says little about depth: people stoop, sit and are cut off.
+# A box gives only a rough range: people stoop, sit and are cut off by the border.
 _BOX_DEPTH_RELATIVE_STD: Final = 0.25
 _MIN_POINTS: Final = 3
-# Face and hands of a whole-body layout are many points on two small spots; the body is enough.
+# Rows of a whole-body layout that count: not the many points of face and hands.
 _BODY_AND_FEET: Final = 23
-# How far shoulders lie from the mid-hip of people who stand, stoop or sit.
+# Smallest and largest distance of a shoulder from the mid-hip, for people who stand, stoop or sit.
 _SHOULDER_REACH_M: Final = (0.25, 0.80)
-# What lifting leaves uncertain of the chest within the body: 45 mm a keypoint, averaged over four.
+# Standard deviation of the chest relative to the body from lifting: 45 mm per keypoint, averaged
+# over four keypoints.
 _LIFT_STD_M: Final = 0.025
-_SHOULDERS: Final = slice(kp.LEFT_SHOULDER, kp.RIGHT_SHOULDER + 1)
-_HIPS: Final = slice(kp.LEFT_HIP, kp.RIGHT_HIP + 1)
 _UP_CAMERA: Final = np.array([0.0, -1.0, 0.0])
 _ITERATIONS: Final = 4
-# Far below what scale leaves uncertain.
+# Relative change of the depth, far below the error of the scale.
 _CONVERGED: Final = 1e-3
 _IDENTITY: Final = np.eye(3)
 _ACROSS: Final = np.diag([1.0, 1.0, 0.0])
-# Where the chest is in the box of somebody who stands: shoulders stand at 0.82 of the stature, and
-# it a little below (Drillis and Contini).
+# The chest of a standing person in units of the box, from its top left corner: a little below the
+# shoulders, which lie at 0.82 of the stature (Drillis and Contini).
 _CHEST_IN_BOX: Final = np.array([0.5, 0.27])
 _BOX_VARIANCE: Final = _BOX_DEPTH_RELATIVE_STD**2 + STATURE_RELATIVE_STD**2
 _BOX_LATERAL_M2: Final = (0.15 * MEAN_STATURE_M) ** 2 * _IDENTITY
-#: No placement by a box has a covariance of a smaller trace.
+#: Lower bound on the trace of the covariance of a placement by a box.
 BOX_LEAST_TRACE_M2: Final = 3.0 * (0.15 * MEAN_STATURE_M) ** 2
 
 
@@ -52,12 +51,12 @@ class BodyPlacement:
     """A person's metric keypoints in the camera frame.
 
     Attributes:
-        shoulders_camera_m: (2, 3) left and right, or None when the skeleton does not tell.
-        hips_camera_m: (3,) their midpoint.
-        position_camera_m: (3,) the body's centre line at chest height.
-        position_covariance_m2: (3, 3).
-        scale_relative_std: the part of the range that scale leaves uncertain.
-        keypoints_camera_m: (17, 3) the whole skeleton, guessed parts included.
+        shoulders_camera_m: (2, 3) left and right shoulder, or None if they are not known.
+        hips_camera_m: (3,) midpoint of the hips.
+        position_camera_m: (3,) centre line of the body at chest height.
+        position_covariance_m2: (3, 3) covariance of that position.
+        scale_relative_std: relative standard deviation of the range from the body's scale.
+        keypoints_camera_m: (17, 3) all keypoints of the skeleton, seen or not.
     """
 
     shoulders_camera_m: FloatArray | None
@@ -74,14 +73,21 @@ def place_body(
     keypoint_std_px: float,
     min_score: float = DEFAULT_MIN_SCORE,
 ) -> BodyPlacement | None:
-    """Find the translation that projects the rescaled skeleton onto its pixels.
+    """Place a body: find the translation that projects its metric skeleton onto the pixels.
 
     Linear least squares in the three unknowns of the translation, iterated with Huber's weights on
-    the reprojection error. The covariance holds pixel noise (no smaller than the residuals say) and
-    the uncertainty of scale, which acts along the ray.
+    the reprojection error. The covariance includes the pixel noise (at least as large as the
+    residuals) and the uncertainty of the scale, which acts along the ray.
 
-    Returns None when fewer than three keypoints were seen, the skeleton has no limb, or the body
-    would lie behind the camera.
+    Args:
+        camera: camera of the image.
+        person: the keypoints.
+        keypoint_std_px: standard deviation of the pixel noise.
+        min_score: keypoints with a lower score count as not seen.
+
+    Returns:
+        The placement; None if fewer than three keypoints are seen, the skeleton has no limb, or
+        the body would lie behind the camera.
     """
     return place_bodies(camera, (person,), keypoint_std_px, min_score)[0]
 
@@ -92,11 +98,11 @@ def place_bodies(
     keypoint_std_px: float,
     min_score: float = DEFAULT_MIN_SCORE,
 ) -> tuple[BodyPlacement | None, ...]:
-    """Return :func:`place_body` of several people at once."""
+    """Place the bodies of several people at once, each as :func:`place_body` does."""
     return _place_bodies(camera, tuple(people), keypoint_std_px, min_score)
 
 
-# Finding a head and placing its body ask for the same person alone in a frame, who never changes.
+# Head pose and position of a frame's only person need the same placement, so it is cached.
 @lru_cache(maxsize=1)
 def _place_bodies(
     camera: Camera, people: tuple[PersonKeypoints, ...], keypoint_std_px: float, min_score: float
@@ -108,7 +114,7 @@ def _place_bodies(
     scores = np.array([person.scores[:width] for person in people])
     points = np.array([person.keypoints_root_m[:width] for person in people])
     pixels = np.array([person.keypoints_px[:width] for person in people])
-    # Nobody without a scale is placed.
+    # A person without a scale is not placed.
     factor, relative_std = np.array(
         [(np.nan, 0.0) if scale is None else (scale.factor, scale.relative_std) for scale in scales]
     ).T
@@ -124,7 +130,7 @@ def _place_bodies(
     far = relative_std[:, None] * chest
     covariance += far[:, :, None] * far[:, None] + _LIFT_STD_M**2 * _IDENTITY
     shoulders, hips = shoulders + translation[:, None], hips + translation
-    points = points[:, :17] + translation[:, None]
+    points = points[:, kp.BODY] + translation[:, None]
     return tuple(
         None
         if scale is None or not valid[row]
@@ -147,27 +153,28 @@ def _translations(
     focal_px: float,
     keypoint_std_px: float,
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-    """Weighted solutions of (X + tx) − x (Z + tz) = 0 and (Y + ty) − y (Z + tz) = 0.
+    """Solve (X + tx) − x (Z + tz) = 0 and (Y + ty) − y (Z + tz) = 0 by weighted least squares.
 
     Args:
         points: (P, N, 3) skeletons in metres.
-        rays: (P, N, 2) x/z and y/z where their points were seen.
-        seen: (P, N); the others do not count.
-        focal_px: turns rays into pixels.
-        keypoint_std_px: of the pixels, at least.
+        rays: (P, N, 2) measured x/z and y/z of their points.
+        seen: (P, N) True for points that count.
+        focal_px: focal length, to convert rays to pixels.
+        keypoint_std_px: smallest standard deviation of the pixel noise.
 
     Returns:
-        Translations (P, 3), their covariances (P, 3, 3) and whether each is one (P,).
+        Translations (P, 3), their covariances (P, 3, 3), and (P,) True for valid solutions.
     """
     count = seen.sum(axis=1)
-    # With p = t_xy − ray · tz + start, tz is the slope of start over ray.
+    # With start = (X, Y) − ray · Z, the equations are start + t_xy − ray · tz = 0: tz is the slope
+    # of start over ray.
     start = points[..., :2] - rays * points[..., 2:]
-    # Weights times this are all the sums that the slope needs.
+    # The weighted sums of these columns give the slope.
     table = np.empty((*seen.shape, 6))
     table[..., :2], table[..., 2:4] = rays, start
     table[..., 4], table[..., 5] = (rays * rays).sum(axis=2), (rays * start).sum(axis=2)
     weight = seen.astype(np.float64)
-    allowed_px = 3.0 * max(keypoint_std_px, 1e-9)
+    huber_limit_px = 3.0 * max(keypoint_std_px, 1e-9)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         depth_of_root = np.zeros(len(count))
         for iteration in range(_ITERATIONS):
@@ -181,14 +188,14 @@ def _translations(
             depth = points[..., 2] + depth_of_root[:, None]
             off = start - rays * depth_of_root[:, None, None] + across[:, None]
             error_px = np.sqrt((off * off).sum(axis=2)) * np.abs(focal_px / depth)
-            if iteration and not _moved(depth_of_root, previous):
+            if iteration and not _has_changed(depth_of_root, previous):
                 break
             if iteration + 1 < _ITERATIONS:
-                robust = np.maximum(allowed_px, 3.0 * _masked_median(error_px, seen))
+                robust = np.maximum(huber_limit_px, 3.0 * _masked_median(error_px, seen))
                 huber = np.minimum(1.0, robust[:, None] / np.maximum(error_px, 1e-9))
                 weight = np.where(seen, huber / (depth * depth), 0.0)
         translation = np.concatenate([across, depth_of_root[:, None]], axis=1)
-        # Huber's weights without the 1/depth² that turns metres into pixels.
+        # Huber's weights without the factor 1/depth², which converts metres to pixels.
         relative = np.where(seen, weight * depth * depth, 0.0)
         spread = (relative * np.where(seen, error_px * error_px, 0.0)).sum(axis=1)
         variance = np.maximum(keypoint_std_px**2, spread / np.maximum(2 * count - 3, 1))
@@ -208,7 +215,7 @@ def _translations(
     return translation, variance[:, None, None] * covariance, valid
 
 
-def _moved(values: FloatArray, previous: FloatArray) -> bool:
+def _has_changed(values: FloatArray, previous: FloatArray) -> bool:
     return any(
         abs(new - old) > _CONVERGED * abs(new)
         for new, old in zip(values.tolist(), previous.tolist(), strict=True)
@@ -216,7 +223,7 @@ def _moved(values: FloatArray, previous: FloatArray) -> bool:
 
 
 def _masked_median(values: FloatArray, seen: NDArray[np.bool_]) -> FloatArray:
-    """(P,) medians of the seen values of each row; of none, 0."""
+    """Return (P,) medians of the seen values of each row; 0 for a row without seen values."""
     medians = []
     for row, counts in zip(values.tolist(), seen.tolist(), strict=True):
         ordered = sorted(compress(row, counts))
@@ -228,20 +235,21 @@ def _masked_median(values: FloatArray, seen: NDArray[np.bool_]) -> FloatArray:
 def _trunks(
     skeletons: FloatArray, seen: NDArray[np.bool_]
 ) -> tuple[FloatArray, NDArray[np.bool_], FloatArray, FloatArray]:
-    """Shoulders (P, 2, 3), whether usable (P,), hips and chest (P, 3), relative to the root.
+    """Return shoulders (P, 2, 3), their usability (P,), hips (P, 3) and chest (P, 3).
 
-    The midpoint of the hips is the root by definition where they are not seen. In a profile one
-    shoulder hides the other, yet a lifting network says where it is; that is believed when it lies
-    where a shoulder can be. Without shoulders the chest stands above the hips.
+    All are relative to the root. Where the hips are not seen, their midpoint is the root by
+    definition. A shoulder that is not seen (in a profile one hides the other) is usable if the
+    lifting network places it at a possible distance from the root. Without usable shoulders, the
+    chest is placed above the hips.
     """
-    both = skeletons[:, _HIPS]
-    shown = np.asarray(seen[:, _HIPS].all(axis=1))[:, None]
+    both = skeletons[:, kp.HIPS]
+    shown = np.asarray(seen[:, kp.HIPS].all(axis=1))[:, None]
     hips = np.where(shown, 0.5 * (both[:, 0] + both[:, 1]), 0.0)
-    shoulders = skeletons[:, _SHOULDERS]
+    shoulders = skeletons[:, kp.SHOULDERS]
     reach = np.sqrt((shoulders * shoulders).sum(axis=2))
     low, high = _SHOULDER_REACH_M
-    there = seen[:, _SHOULDERS] | ((reach > low) & (reach < high))
-    usable = there[:, 0] & there[:, 1]
+    known = seen[:, kp.SHOULDERS] | ((reach > low) & (reach < high))
+    usable = known[:, 0] & known[:, 1]
     neck = np.where(
         usable[:, None],
         0.5 * (shoulders[:, 0] + shoulders[:, 1]),
@@ -251,11 +259,14 @@ def _trunks(
 
 
 def place_box(camera: Camera, box_xyxy_px: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-    """Guess a position from the box of a standing adult when keypoints cannot place the body.
+    """Estimate a position from a box, as that of a standing adult.
 
-    Returns position (3,) and covariance (3, 3) in the camera frame, or None for a box of no height.
-    A box that is cut off by the image border looks farther away than it is; that error is bounded
-    by taking the larger of height and 2.5 × width as the height.
+    It is for people whose keypoints cannot place the body. A person who is cut off by the image's
+    border seems farther away than they are; the error is limited by taking the larger of height
+    and 2.5 × width as the height.
+
+    Returns:
+        Position (3,) and covariance (3, 3) in the camera frame; None for a box without extent.
     """
     return place_boxes(camera, [box_xyxy_px])[0]
 
@@ -263,7 +274,7 @@ def place_box(camera: Camera, box_xyxy_px: FloatArray) -> tuple[FloatArray, Floa
 def place_boxes(
     camera: Camera, boxes_xyxy_px: Sequence[FloatArray]
 ) -> list[tuple[FloatArray, FloatArray] | None]:
-    """Return :func:`place_box` of several boxes at once."""
+    """Estimate positions from several boxes at once, each as :func:`place_box` does."""
     corners = camera.normalise(np.reshape(boxes_xyxy_px, (-1, 2)))
     edges = corners.reshape(-1, 4)
     low, extent = edges[:, :2], edges[:, 2:] - edges[:, :2]

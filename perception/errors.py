@@ -1,15 +1,15 @@
-"""The error bases: of the whole library, and of the perception package."""
+"""Base errors of the whole library and of the perception package."""
 
 from __future__ import annotations
 
 
 class AwarenavError(ValueError):
-    """Base of every error that this library raises on purpose.
+    """Base of all errors that this library raises deliberately.
 
-    The message says what was given and what is valid. Each package derives its own:
+    The message says what was given and what is valid. Each package derives its own error:
     :class:`PerceptionError`, ``TrackingError``, ``NavError`` and ``SimError``.
     """
 
 
 class PerceptionError(AwarenavError):
-    """Input that perception cannot use; the message says what was given and what is valid."""
+    """Error for input that perception cannot use."""

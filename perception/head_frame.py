@@ -1,6 +1,7 @@
-"""The head frame: from head keypoints in space to axes, by the printed formula or by anatomy.
+"""The head frame from 3-D head keypoints: by the paper's printed formula, or by anatomy.
 
-Frame of the paper: origin nose, y forward (gaze), z to the right ear, x = y × z (downwards).
+The frame is the paper's: origin at the nose, y forward (gaze), z to the right ear, x = y × z
+(downwards).
 """
 
 from __future__ import annotations
@@ -19,11 +20,11 @@ _PARALLEL_SINE: Final = 1e-3
 
 
 def printed_head_rotation(head_points_m: ArrayLike, neck_m: ArrayLike) -> FloatArray:
-    """Return the head frame by the paper's printed cross product.
+    """Return the head frame according to the paper's printed cross product.
 
     The gaze is (left ear − right ear) × (nose − neck), normalised. It is perpendicular to the line
-    from neck to nose, so on an average adult looking straight ahead it points about 36° below the
-    horizontal; :func:`anatomical_head_rotation` has no such bias.
+    from neck to nose, so for an average adult who looks straight ahead it points about 36° below
+    the horizontal. :func:`anatomical_head_rotation` does not have this bias.
 
     Args:
         head_points_m: (5, 3) nose, left eye, right eye, left ear, right ear in any frame F.
@@ -33,7 +34,7 @@ def printed_head_rotation(head_points_m: ArrayLike, neck_m: ArrayLike) -> FloatA
         (3, 3) rotation from the head frame to F.
 
     Raises:
-        PerceptionError: when ears, nose and neck span no frame.
+        PerceptionError: if ears, nose and neck do not span a frame.
     """
     points = finite_array("head_points_m", head_points_m, (5, 3))
     neck = finite_array("neck_m", neck_m, (3,))
@@ -54,20 +55,20 @@ def printed_head_rotation(head_points_m: ArrayLike, neck_m: ArrayLike) -> FloatA
 def anatomical_head_rotation(
     head_points_m: ArrayLike, weights: ArrayLike | None = None
 ) -> FloatArray:
-    """Register the anatomical template to head keypoints and return the head frame.
+    """Return the head frame by fitting the anatomical template to the head keypoints.
 
-    The template's forward axis is the Frankfurt horizontal. Least squares over rotation,
+    The template's forward axis is the Frankfurt horizontal. The fit is least squares over rotation,
     translation and scale (Kabsch 1976, Umeyama 1991).
 
     Args:
         head_points_m: (5, 3) nose, left eye, right eye, left ear, right ear in any frame F.
-        weights: (5,) ≥ 0, zero for a point that was not seen; default all one.
+        weights: (5,) ≥ 0, 0 for a point that was not seen; default 1 for all.
 
     Returns:
         (3, 3) rotation from the head frame to F.
 
     Raises:
-        PerceptionError: when fewer than three points count or they lie on one line.
+        PerceptionError: if fewer than three points count, or they lie on one line.
     """
     points = finite_array("head_points_m", head_points_m, (5, 3))
     weight = np.ones(5) if weights is None else finite_array("weights", weights, (5,))
@@ -81,15 +82,22 @@ def anatomical_head_rotation(
     left, singular, right = np.linalg.svd((share * centred).T @ template)
     if singular[1] <= _PARALLEL_SINE * singular[0]:
         raise PerceptionError("head points must not lie on one line")
-    handed = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
-    return np.asarray(left @ handed @ right, dtype=np.float64)
+    reflection = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
+    return np.asarray(left @ reflection @ right, dtype=np.float64)
 
 
 def lifted_head_model(head_points_m: ArrayLike, neck_m: ArrayLike) -> FloatArray:
-    """Return a person's own head points in the paper's head frame, (5, 3), nose at the origin.
+    """Return a person's own head points (5, 3) in the paper's head frame, nose at the origin.
 
-    These are the object points of the paper's PnP: lifted keypoints expressed in the frame of the
-    printed formula.
+    These are the object points of the paper's PnP: lifted keypoints in the frame of
+    :func:`printed_head_rotation`.
+
+    Args:
+        head_points_m: (5, 3) nose, left eye, right eye, left ear, right ear in any frame F.
+        neck_m: (3,) midpoint of the shoulders in F.
+
+    Raises:
+        PerceptionError: if ears, nose and neck do not span a frame.
     """
     points = finite_array("head_points_m", head_points_m, (5, 3))
     return np.asarray((points - points[0]) @ printed_head_rotation(points, neck_m))

@@ -1,7 +1,7 @@
-"""Keypoint layouts: which row of an array is which part of the body.
+"""Keypoint layouts: names and order of the keypoints in arrays.
 
-The first 17 keypoints of COCO-WholeBody are those of COCO, so the body and head indices hold for
-both. The neck is no keypoint of either: it is the midpoint of the shoulders.
+The first 17 keypoints of COCO-WholeBody are those of COCO, so the indices below hold for both. The
+neck is not a keypoint of either; it is the midpoint of the shoulders.
 """
 
 from __future__ import annotations
@@ -50,10 +50,23 @@ NOSE, LEFT_EYE, RIGHT_EYE, LEFT_EAR, RIGHT_EAR = range(5)
 LEFT_SHOULDER, RIGHT_SHOULDER, LEFT_ELBOW, RIGHT_ELBOW, LEFT_WRIST, RIGHT_WRIST = range(5, 11)
 LEFT_HIP, RIGHT_HIP, LEFT_KNEE, RIGHT_KNEE, LEFT_ANKLE, RIGHT_ANKLE = range(11, 17)
 
+#: Rows of the head (nose, eyes, ears) and of COCO's 17 keypoints.
+HEAD: Final = slice(NOSE, RIGHT_EAR + 1)
+BODY: Final = slice(NOSE, RIGHT_ANKLE + 1)
+#: Rows of pairs, the left one first.
+SHOULDERS: Final = slice(LEFT_SHOULDER, RIGHT_SHOULDER + 1)
+HIPS: Final = slice(LEFT_HIP, RIGHT_HIP + 1)
+ANKLES: Final = slice(LEFT_ANKLE, RIGHT_ANKLE + 1)
+
 
 @dataclass(frozen=True, slots=True)
 class KeypointLayout:
-    """A named order of keypoints."""
+    """A named order of keypoints.
+
+    Attributes:
+        name: name of the layout.
+        names: names of the keypoints, in the order of the rows.
+    """
 
     name: str
     names: tuple[str, ...]
@@ -68,7 +81,11 @@ class KeypointLayout:
         return len(self.names)
 
     def index(self, name: str) -> int:
-        """Row of the keypoint called ``name``."""
+        """Return the row of the keypoint called ``name``.
+
+        Raises:
+            PerceptionError: for a name that the layout does not have.
+        """
         try:
             return self._index[name]
         except KeyError:
@@ -85,7 +102,11 @@ _LAYOUTS: Final[dict[str, KeypointLayout]] = {
 
 
 def keypoint_layout(name: str) -> KeypointLayout:
-    """Return the layout called ``name``: ``"coco"`` (17) or ``"coco_wholebody"`` (133)."""
+    """Return the layout called ``name``: ``"coco"`` (17) or ``"coco_wholebody"`` (133).
+
+    Raises:
+        PerceptionError: for another name.
+    """
     try:
         return _LAYOUTS[name]
     except (KeyError, TypeError):

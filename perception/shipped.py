@@ -1,4 +1,4 @@
-"""The networks that come with the package, loaded and verified."""
+"""The shipped networks: loading them, with a check of their SHA-256, and their manifest."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ __all__ = [
     "write_manifest",
 ]
 
-# The picture that the detector was trained on, and the focal length of a 60° camera in it.
+# Size of the detector's training images, and the focal length of a 60° camera at that size.
 _DETECTOR_WIDTH_PX, _DETECTOR_HEIGHT_PX, _DETECTOR_STRIDE = 320, 256, 32
 _DETECTOR_FOCAL_PX: Final = 160.0 / math.tan(math.radians(30.0))
 _DETECTOR_MAX_ENLARGEMENT: Final = 2.0
@@ -47,7 +47,7 @@ _DETECTOR_MAX_ENLARGEMENT: Final = 2.0
 def load_shipped(
     name: str, settings: OnnxSettings | None = None, folder: Path | None = None
 ) -> OnnxModel:
-    """Load a shipped network; see :meth:`OnnxModel.shipped`."""
+    """Load a shipped network, as :meth:`OnnxModel.shipped` does."""
     return OnnxModel.shipped(name, settings, folder)
 
 
@@ -57,12 +57,12 @@ def shipped_detector(
     *,
     score_threshold: float = 0.25,
 ) -> OnnxPersonDetector:
-    """Return the shipped person detector; errors as :func:`load_shipped`.
+    """Return the shipped person detector; errors as in :func:`load_shipped`.
 
     Args:
         settings: providers and threads.
-        camera: whose pictures it will see; a wide field gets a larger input.
-        score_threshold: people with less confidence are dropped.
+        camera: camera of its images; a wide field of view gets a larger input.
+        score_threshold: detections with a lower score are dropped.
     """
     return OnnxPersonDetector(
         load_shipped(DETECTOR, settings),
@@ -72,10 +72,11 @@ def shipped_detector(
 
 
 def detector_input_size(camera: Camera) -> tuple[int, int]:
-    """Height and width of the detector's input that suit a camera.
+    """Return height and width of the detector's input for a camera.
 
-    As many pixels a radian as a camera of 60° has at 320 × 256, on which it was trained, if need be
-    at twice the length and four times the cost; wider fields than that show people smaller.
+    The input has at least as many pixels per radian as a 60° camera at 320 × 256, the detector's
+    training size. Its sides grow by a factor of at most 2 (four times the cost); with still wider
+    fields of view people appear smaller.
     """
     width, height = camera.width_px, camera.height_px
     fitting = min(_DETECTOR_WIDTH_PX / width, _DETECTOR_HEIGHT_PX / height)
@@ -89,10 +90,10 @@ def detector_input_size(camera: Camera) -> tuple[int, int]:
 
 
 def shipped_pose_estimator(settings: OnnxSettings | None = None) -> OnnxPoseEstimator:
-    """Return the shipped body pose network; errors as :func:`load_shipped`."""
+    """Return the shipped body pose network; errors as in :func:`load_shipped`."""
     return OnnxPoseEstimator(load_shipped(POSE, settings))
 
 
 def shipped_head_pose_estimator(settings: OnnxSettings | None = None) -> OnnxHeadPoseEstimator:
-    """Return the shipped head pose network; errors as :func:`load_shipped`."""
+    """Return the shipped head pose network; errors as in :func:`load_shipped`."""
     return OnnxHeadPoseEstimator(load_shipped(HEAD, settings))

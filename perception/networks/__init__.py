@@ -1,11 +1,12 @@
-"""Everything that runs a network: sessions, person detectors and body poses; heads in ``heads``."""
+"""Networks: ONNX models, person detectors and pose estimators; head poses are in ``heads``."""
 
 from __future__ import annotations
 
-from ._detector import OnnxPersonDetector
-from ._mediapipe import MediaPipePoseEstimator
-from ._pose import OnnxPoseEstimator
-from ._session import NETWORK_TIME, OnnxModel, OnnxSettings
+from ._image import rgb_image
+from ._model import NETWORK_TIME, OnnxModel, OnnxSettings
+from ._pixels import PixelFormat
+from .detectors import OnnxPersonDetector
+from .poses import MediaPipePoseEstimator, OnnxPoseEstimator
 
 __all__ = [
     "NETWORK_TIME",
@@ -14,4 +15,6 @@ __all__ = [
     "OnnxPersonDetector",
     "OnnxPoseEstimator",
     "OnnxSettings",
+    "PixelFormat",
+    "rgb_image",
 ]

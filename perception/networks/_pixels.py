@@ -1,4 +1,4 @@
-"""How a network wants its pixels: order of channels, mean and standard deviation."""
+"""The pixel format of a network: order of the channels, mean and standard deviation."""
 
 from __future__ import annotations
 
@@ -9,25 +9,24 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import PerceptionError
-from ._session import OnnxTensor
-
-_INPUT_DTYPES: Final = ("float32", "float16", "uint8")
+#: Mean and standard deviation of ImageNet's pixels (0–255), which many networks are trained with.
+IMAGENET_MEAN_RGB: Final = (123.675, 116.28, 103.53)
+IMAGENET_STD_RGB: Final = (58.395, 57.12, 57.375)
 
 
 @dataclass(frozen=True, slots=True)
 class PixelFormat:
-    """Pixels become (value − mean) / std, channel by channel.
+    """Conversion of pixels to the numbers of a network: (value − mean) / std in each channel.
 
-    One table a channel holds the 256 results, computed in float64 and rounded once; looking them up
-    is exact and several times faster than ``cv2.dnn.blobFromImage``.
+    A table per channel holds the 256 results, computed in float64 and rounded once. The look-up is
+    exact and several times faster than ``cv2.dnn.blobFromImage``.
 
     Attributes:
-        mean_rgb: of the channels red, green, blue, in 0–255.
-        std_rgb: likewise.
-        bgr: whether the network takes the channels in the order blue, green, red. Mean and standard
-            deviation are given in the order red, green, blue all the same.
-        dtype: the network's input; ``"uint8"`` takes the pixels as they are.
+        mean_rgb: mean of the channels red, green, blue, in 0–255.
+        std_rgb: standard deviation of the same channels.
+        bgr: True if the network takes the channels in the order blue, green, red. Mean and
+            standard deviation are still given in the order red, green, blue.
+        dtype: number type of the network's input; ``"uint8"`` takes the pixels unchanged.
     """
 
     mean_rgb: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -44,14 +43,14 @@ class PixelFormat:
         ]
         object.__setattr__(self, "_tables", tuple(lookup))
 
-    def blob(self, count: int, height: int, width: int) -> NDArray[Any]:
-        """An empty input of the network for ``count`` pictures: (count, 3, height, width)."""
-        # Tables are looked up in float32; half precision is rounded from it when fed.
+    def empty_blob(self, count: int, height: int, width: int) -> NDArray[Any]:
+        """Return zeros (count, 3, height, width) to be filled by :meth:`write`."""
+        # The tables are float32; :meth:`as_input` rounds them to half precision.
         dtype = np.uint8 if self.dtype == "uint8" else np.float32
         return np.zeros((count, 3, height, width), dtype)
 
     def write(self, image_rgb: NDArray[np.uint8], out: NDArray[Any]) -> None:
-        """Write an (h, w, 3) RGB picture into ``out`` (3, h, w), a blob or a part of one."""
+        """Write an RGB image (h, w, 3) into ``out`` (3, h, w), a blob or a part of one."""
         for channel, plane in enumerate(cv2.split(image_rgb)):
             row = 2 - channel if self.bgr else channel
             if self.dtype == "uint8":
@@ -59,15 +58,6 @@ class PixelFormat:
             else:
                 cv2.LUT(plane, self._tables[channel], dst=out[row])
 
-    def fed(self, blob: NDArray[Any]) -> NDArray[Any]:
-        """The blob as the network takes it."""
+    def as_input(self, blob: NDArray[Any]) -> NDArray[Any]:
+        """Return the blob in the number type of the network's input."""
         return blob.astype(np.float16) if self.dtype == "float16" else blob
-
-
-def input_dtype(tensor: OnnxTensor, model_name: str) -> str:
-    """The type of a network's pixels, or a refusal."""
-    if tensor.dtype not in _INPUT_DTYPES:
-        raise PerceptionError(
-            f"{model_name}: input {tensor} is not one of the known types {', '.join(_INPUT_DTYPES)}"
-        )
-    return tensor.dtype

@@ -1,9 +1,9 @@
-"""Cameras that see to the side and behind: fisheye lenses and panoramas, cut into flat views.
+"""Cameras that see to the side and behind: fisheye and panorama images, cut into flat views.
 
-A pinhole picture ends before 180°, and a person who has left it is no longer known to be aware. One
-picture of a wider lens is cut into flat (pinhole) views about the same optical centre. Each goes
-through an :class:`~perception.AwarenessPipeline`, and whoever shows in two neighbours is reported
-once, in the frame of the camera::
+A pinhole image covers less than 180°, and a person outside it no longer counts as aware. Here an
+image of a wider lens is cut into flat (pinhole) views from the same optical centre. An
+:class:`~perception.AwarenessPipeline` processes each view. A person who appears in two views is
+reported once, in the camera frame::
 
     lens = PanoramaLens(3840, 1920)
     flat = Camera.from_fov(1584, 1200, math.radians(110))
@@ -11,8 +11,10 @@ once, in the frame of the camera::
     pipeline = SurroundPipeline(lens, views)
     observations = pipeline.process(image_rgb, stamp_s)
 
-:class:`tracking.SurroundView` tells a tracker where such a camera can see.
+:class:`tracking.SurroundView` describes the field of view of such a camera to a tracker.
 """
+
+from __future__ import annotations
 
 from ._lenses import FisheyeLens, PanoramaLens, WideLens
 from ._merging import SeenInView, merge_views

@@ -1,4 +1,4 @@
-"""Lenses that see more than a pinhole can: directions to pixels."""
+"""Lenses with a wider view than a pinhole: from directions to pixels."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ _KANNALA_BRANDT: Final = ("equidistant", "fisheye")
 
 
 class WideLens(Protocol):
-    """What maps directions to pixels, beyond what a pinhole can."""
+    """Interface of a lens: maps directions to pixels, also beyond 90° from the axis."""
 
     @property
     def width_px(self) -> int:
-        """Width of the picture."""
+        """Width of the image."""
         ...
 
     @property
     def height_px(self) -> int:
-        """Height of the picture."""
+        """Height of the image."""
         ...
 
     def project(self, points_camera_m: Any) -> FloatArray:
-        """Points (N, 3) in the camera frame to pixels (N, 2); NaN where the lens does not see."""
+        """Project points (N, 3) in the camera frame to pixels (N, 2); NaN where it does not see."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class FisheyeLens:
-    """A fisheye after Kannala and Brandt, as OpenCV's ``fisheye`` and ROS's ``equidistant``.
+    """A fisheye lens: the Kannala–Brandt model of OpenCV's ``fisheye`` and ROS's ``equidistant``.
 
     A ray at the angle θ from the axis falls θ (1 + k₁θ² + k₂θ⁴ + k₃θ⁶ + k₄θ⁸) focal lengths from
     the principal point (Kannala and Brandt 2006, doi:10.1109/TPAMI.2006.153).
@@ -49,9 +49,9 @@ class FisheyeLens:
         fy_px: pixels per radian along v, > 0.
         cx_px: principal point, u.
         cy_px: principal point, v.
-        coefficients: (4,) k₁ to k₄.
-        max_angle_rad: in (0, π], where the image circle ends; beyond it nothing is seen. The
-            polynomial must grow up to there.
+        coefficients: (4,) k₁ to k₄; default 0.
+        max_angle_rad: angle at which the image circle ends, in (0, π]. The polynomial must grow up
+            to this angle.
     """
 
     width_px: int
@@ -71,7 +71,7 @@ class FisheyeLens:
         )
         if angle > math.pi:
             raise PerceptionError(f"max_angle_rad must lie in (0, pi], got {angle:g} rad")
-        radii = _bent(np.linspace(0.0, angle, 256), coefficients)
+        radii = _fisheye_radius(np.linspace(0.0, angle, 256), coefficients)
         if not (np.diff(radii) > 0.0).all():
             raise PerceptionError(
                 f"the fisheye polynomial of {coefficients.tolist()} must grow up to max_angle_rad "
@@ -98,8 +98,9 @@ class FisheyeLens:
         """Read a ROS camera_info YAML file whose ``distortion_model`` is ``equidistant``.
 
         Raises:
-            PerceptionError: naming the file and what is wrong; pinhole models belong to
-                :meth:`perception.Camera.from_yaml`.
+            PerceptionError: for a file that cannot be read, is not complete, or has another
+                distortion model (:meth:`perception.Camera.from_yaml` reads pinhole models); the
+                message names the file.
         """
         info = read_camera_info(path)
         if info.model not in _KANNALA_BRANDT:
@@ -117,12 +118,12 @@ class FisheyeLens:
             raise PerceptionError(f"{path}: {cause}") from cause
 
     def project(self, points_camera_m: Any) -> FloatArray:
-        """Points (N, 3) in the camera frame to pixels (N, 2); NaN beyond ``max_angle_rad``."""
+        """Project points (N, 3) in the camera frame to pixels (N, 2); NaN past the image circle."""
         x, y, z = finite_array("points_camera_m", points_camera_m, ("N", 3)).T
         across = np.hypot(x, y)
         angle = np.arctan2(across, z)
         assert self.coefficients is not None  # set by the constructor
-        radius = _bent(angle, self.coefficients)
+        radius = _fisheye_radius(angle, self.coefficients)
         share = np.divide(radius, across, out=np.zeros_like(radius), where=across > 0.0)
         pixels = np.column_stack(
             (self.fx_px * share * x + self.cx_px, self.fy_px * share * y + self.cy_px)
@@ -133,14 +134,14 @@ class FisheyeLens:
 
 @dataclass(frozen=True, slots=True)
 class PanoramaLens:
-    """An equirectangular panorama of the whole sphere, as 360° cameras give it.
+    """An equirectangular panorama of the whole sphere, the format of 360° cameras.
 
-    The camera's z axis is in the middle of the picture, its left a quarter of the width further
-    left; the picture's left and right edges meet behind.
+    The camera's z axis is in the middle of the image, the direction to its left a quarter of the
+    width further left. The left and right borders of the image meet behind the camera.
 
     Attributes:
-        width_px: 360°, > 0.
-        height_px: 180°, > 0.
+        width_px: image width, which covers 360°, > 0.
+        height_px: image height, which covers 180°, > 0.
     """
 
     width_px: int
@@ -151,7 +152,7 @@ class PanoramaLens:
             set_fields(self, **{name: pixel_count(name, getattr(self, name))})
 
     def project(self, points_camera_m: Any) -> FloatArray:
-        """Points (N, 3) in the camera frame to pixels (N, 2), u from −0.5 to width − 0.5."""
+        """Project points (N, 3) in the camera frame to pixels (N, 2), u in −0.5 … width − 0.5."""
         x, y, z = finite_array("points_camera_m", points_camera_m, ("N", 3)).T
         aside = np.arctan2(x, z) / (2.0 * math.pi)
         down = np.arctan2(y, np.hypot(x, z)) / math.pi
@@ -160,8 +161,8 @@ class PanoramaLens:
         )
 
 
-def _bent(angle_rad: FloatArray, coefficients: FloatArray) -> FloatArray:
-    """Focal lengths from the principal point at which a ray at this angle falls."""
+def _fisheye_radius(angle_rad: FloatArray, coefficients: FloatArray) -> FloatArray:
+    """Return the distance from the principal point, in focal lengths, of rays at these angles."""
     square = angle_rad * angle_rad
     k1, k2, k3, k4 = coefficients.tolist()
     factor = 1.0 + square * (k1 + square * (k2 + square * (k3 + square * k4)))

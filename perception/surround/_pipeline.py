@@ -1,4 +1,4 @@
-"""One wide RGB frame in, one observation a person out."""
+"""The surround pipeline: from an RGB image of a wide lens to one observation per person."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from ._views import FlatView
 
 
 class SurroundPipeline:
-    """An :class:`~perception.AwarenessPipeline` for a lens that sees more than a pinhole can.
+    """An :class:`~perception.AwarenessPipeline` for a lens with a wider view than a pinhole.
 
     Args:
-        lens: of the pictures.
-        views: what is cut from them, e.g. by :func:`ring_of_views`.
-        make_pipeline: makes the pipeline of a view's camera; default one with the shipped networks.
-            Views of one camera share a pipeline.
+        lens: lens of the camera.
+        views: flat views to cut from an image, for example from :func:`ring_of_views`.
+        make_pipeline: makes the pipeline for the camera of a view; default one with the shipped
+            networks. Views with the same camera object share a pipeline.
 
     Raises:
         PerceptionError: without views, or from ``make_pipeline``.
@@ -48,13 +48,14 @@ class SurroundPipeline:
                 made[id(view.camera)] = make_pipeline(view.camera)
         self._pipelines = [made[id(view.camera)] for view in self.views]
         self._maps = [
-            cv2.convertMaps(*view.cut(lens), cv2.CV_16SC2)  # fixed point: several times faster
+            # Fixed-point maps make cv2.remap several times faster.
+            cv2.convertMaps(*view.sampling_maps(lens), cv2.CV_16SC2)
             for view in self.views
         ]
         self._wraps = isinstance(lens, PanoramaLens)
 
     def flat_pictures(self, image_rgb: ImageRgb) -> tuple[ImageRgb, ...]:
-        """The views of one picture (H, W, 3); black where the lens does not see.
+        """Return the flat views of an image (H, W, 3); black where the lens does not see.
 
         Raises:
             PerceptionError: for an image of another size or type.
@@ -76,33 +77,35 @@ class SurroundPipeline:
     def process(
         self, image_rgb: ImageRgb, stamp_s: float, floor: FloorPlane | None = None
     ) -> tuple[PersonObservation, ...]:
-        """Return one observation a person, in the camera's frame.
+        """Return one observation per person, in the camera frame.
 
-        Boxes are in the lens's picture, None for a person across the seam of a panorama.
+        Boxes are in pixels of the lens's image. The box is None for a person across the seam of a
+        panorama.
 
         Args:
             image_rgb: (H, W, 3) uint8 of the lens's size.
             stamp_s: time of the frame.
-            floor: the floor in the camera's frame, where it is known.
+            floor: the floor in the camera frame, if it is known.
 
         Raises:
             PerceptionError: as :meth:`AwarenessPipeline.process`.
         """
         seen = [
-            pipeline.process(picture, stamp_s, None if floor is None else _turned(floor, view))
-            for picture, pipeline, view in zip(
+            pipeline.process(flat, stamp_s, None if floor is None else _floor_in_view(floor, view))
+            for flat, pipeline, view in zip(
                 self.flat_pictures(image_rgb), self._pipelines, self.views, strict=True
             )
         ]
-        return tuple(self._boxed(each) for each in merge_views(self.views, seen))
+        return tuple(self._with_lens_box(each) for each in merge_views(self.views, seen))
 
-    def _boxed(self, seen: SeenInView) -> PersonObservation:
+    def _with_lens_box(self, seen: SeenInView) -> PersonObservation:
+        """Return the observation with its box in pixels of the lens's image."""
         box = seen.observation.box_xyxy_px
         if box is None:
             return seen.observation
         return replace(seen.observation, box_xyxy_px=self.views[seen.view].box_in(self.lens, box))
 
 
-def _turned(floor: FloorPlane, view: FlatView) -> FloorPlane:
-    """The floor in the view's frame."""
+def _floor_in_view(floor: FloorPlane, view: FlatView) -> FloorPlane:
+    """Return the floor in the view's frame."""
     return replace(floor, normal_camera=view.rotation_camera_view.T @ floor.normal_camera)

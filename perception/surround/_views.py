@@ -1,4 +1,4 @@
-"""Flat views about one optical centre, cut from a wide picture."""
+"""Flat views cut from an image of a wide lens, with the same optical centre."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from ..arrays import FloatArray, finite_array, rotation_matrix, set_fields
 from ..errors import PerceptionError
 from ._lenses import WideLens
 
-# Points a side of a box that is carried from a view to the picture.
+# Points per side with which the outline of a box is mapped from a view to the lens's image.
 _BOX_POINTS: Final = 9
 
 
 @dataclass(frozen=True, eq=False)
 class FlatView:
-    """A flat picture cut from a wide one, about the same optical centre.
+    """A flat (pinhole) view cut from an image of a wide lens, with the same optical centre.
 
     Attributes:
-        camera: of the flat picture.
-        rotation_camera_view: (3, 3), directions in the view's optical frame to the camera's.
+        camera: pinhole camera of the flat view.
+        rotation_camera_view: (3, 3) from the view's optical frame to the camera frame.
     """
 
     camera: Camera
@@ -39,14 +39,14 @@ class FlatView:
 
     @cached_property
     def T_camera_view(self) -> FloatArray:  # noqa: N802
-        """(4, 4) the rotation as a transform: ``T_odom_view = T_odom_camera @ T_camera_view``."""
+        """The rotation as a transform (4, 4): ``T_odom_view = T_odom_camera @ T_camera_view``."""
         transform = np.eye(4)
         transform[:3, :3] = self.rotation_camera_view
         transform.setflags(write=False)
         return transform
 
     def in_camera(self, observation: PersonObservation) -> PersonObservation:
-        """The same observation in the camera's frame; the box stays in the view's pixels."""
+        """Return the observation in the camera frame; its box stays in pixels of the view."""
         R = self.rotation_camera_view
         gaze = observation.gaze_camera
         covariance = R @ observation.position_covariance_m2 @ R.T
@@ -57,22 +57,22 @@ class FlatView:
             gaze_camera=None if gaze is None else R @ gaze,
         )
 
-    def cut(self, lens: WideLens) -> tuple[FloatArray, FloatArray]:
-        """Where each pixel of the view lies in the lens's picture: two (H, W) float32 maps."""
+    def sampling_maps(self, lens: WideLens) -> tuple[FloatArray, FloatArray]:
+        """Return the maps u, v (H, W), float32, of the view's pixels in the lens's image."""
         columns, rows = np.meshgrid(
             np.arange(self.camera.width_px, dtype=float), np.arange(self.camera.height_px)
         )
         pixels = lens.project(self._rays(np.column_stack((columns.ravel(), rows.ravel()))))
-        # Where the lens does not see, the view is black.
+        # Far outside the image, cv2.remap samples black.
         pixels = np.where(np.isnan(pixels), -10.0, pixels).astype(np.float32)
         shape = (self.camera.height_px, self.camera.width_px)
         return pixels[:, 0].reshape(shape), pixels[:, 1].reshape(shape)
 
     def box_in(self, lens: WideLens, box_xyxy_px: FloatArray) -> FloatArray | None:
-        """The box about a box of the view in the lens's picture.
+        """Return the bounding box, in the lens's image, of a box of the view.
 
-        None where the lens does not see all of its outline, or it lies across the seam of a
-        panorama.
+        It is None if the lens does not see the whole outline of the box, or the box lies across the
+        seam of a panorama.
         """
         left, top, right, bottom = box_xyxy_px.tolist()
         u, v = np.linspace(left, right, _BOX_POINTS), np.linspace(top, bottom, _BOX_POINTS)
@@ -88,17 +88,21 @@ class FlatView:
         return np.concatenate([low, high]) if (high > low).all() else None
 
     def _rays(self, pixels_px: FloatArray) -> FloatArray:
-        """(N, 3) directions in the camera's frame of pixels (N, 2) of the view."""
+        """Return directions (N, 3) in the camera frame of pixels (N, 2) of the view."""
         flat = np.column_stack((self.camera.normalise(pixels_px), np.ones(len(pixels_px))))
         return np.asarray(flat @ self.rotation_camera_view.T)
 
 
 def ring_of_views(camera: Camera, headings_rad: Any) -> tuple[FlatView, ...]:
-    """Views of one flat camera turned about the camera's vertical (its y axis).
+    """Return flat views of one pinhole camera, turned about the vertical (the camera's y axis).
 
     Args:
-        camera: of every view. Neighbours should overlap by the width of a body near by, some 20°.
-        headings_rad: (V,) of the views' axes from the camera's, left positive.
+        camera: pinhole camera of all views. Neighbouring views should overlap by the width of a
+            nearby body, about 20°.
+        headings_rad: (V,) angles from the camera's axis to the axes of the views, left positive.
+
+    Raises:
+        PerceptionError: without headings, or for a non-finite one.
     """
     headings = finite_array("headings_rad", headings_rad, ("V",))
     if not headings.size:

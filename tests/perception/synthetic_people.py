@@ -1,8 +1,8 @@
-"""People with known keypoints, in front of a camera at a known place.
+"""Synthetic people with known keypoints, position and head pose in the camera frame.
 
-The body is the average adult of the parametric model anny 0.6.2 (stature 1.83 m, arms a little
-away from the body), scaled to any stature. Its proportions are not those of the library's
-constants, which average over more than one source.
+The body is the average adult of the parametric model anny 0.6.2 (stature 1.83 m, arms slightly away
+from the body), scaled to a given stature. Its proportions differ from the library's constants,
+which are averages of more than one source.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from perception import Camera, PersonKeypoints
 from perception.anthropometry import EYES_HEAD_M, HEAD_TEMPLATE_M
 
 BODY_STATURE_M = 1.83
-# forward, left, up from the mid-hip
+# Forward, left, up from the mid-hip.
 _SHOULDER, _ELBOW, _WRIST = (0.007, 0.175, 0.537), (0.025, 0.363, 0.313), (0.193, 0.501, 0.168)
 _HIP, _KNEE, _ANKLE = (0.013, 0.099, 0.0), (0.022, 0.156, -0.424), (-0.003, 0.197, -0.849)
 _NOSE = (0.151, 0.0, 0.734)
 _FLOOR_UP = -0.93
 # Upright, facing the camera: forward = −z, left = +x, up = −y of the camera.
 _CAMERA_FROM_BODY = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]])
-# Forward, left, up of the body from the head frame's x down, y forward, z right.
+# From the head frame (x down, y forward, z right) to forward, left, up of the body.
 _BODY_FROM_HEAD = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]])
 
 
@@ -61,7 +61,10 @@ def person_at(
     head_roll_rad: float = 0.0,
     stature_m: float = BODY_STATURE_M,
 ) -> SyntheticPerson:
-    """Yaw 0 faces the camera; the position is the mid-hip; head angles are relative to the body."""
+    """Return a person with the mid-hip at a position.
+
+    Body yaw 0 faces the camera; head angles are relative to the body.
+    """
     scale = stature_m / BODY_STATURE_M
     mirrored = np.array([1.0, -1.0, 1.0])
     pairs = [np.array(p) * m for p in (_SHOULDER, _ELBOW, _WRIST, _HIP, _KNEE, _ANKLE)

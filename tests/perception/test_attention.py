@@ -1,3 +1,5 @@
+"""The attention cone: the paper's equations, invariances and refusals."""
+
 import math
 
 import numpy as np
@@ -35,12 +37,12 @@ def test_score_is_invariant_to_motion_scale_and_gaze_length(
     cone = AttentionCone(angle)
     alpha = cone.score(apex, gaze, target)
     assert 0.0 <= alpha <= 1.0
-    # At the apex itself the direction of the target is rounding.
+    # For a target at the apex, its direction is determined by rounding.
     assume(np.linalg.norm(target - apex) > 1e-2)
     turn = Rotation.random(random_state=seed).as_matrix()
     moved = cone.score(turn @ apex + 3.0, turn @ gaze, turn @ target + 3.0)
     assert moved == pytest.approx(alpha, abs=1e-6)
-    # α depends on angles alone.
+    # α depends on angles only.
     assert cone.score(factor * apex, factor * gaze, factor * target) == pytest.approx(
         alpha, abs=1e-6
     )
@@ -70,25 +72,25 @@ def test_default_cone_at_the_papers_values(off_axis_deg, alpha):
     assert score == pytest.approx(alpha, abs=0.001)
 
 
-def test_many_people_at_once_equal_one_by_one():
+def test_scores_of_many_people_at_once_equal_those_one_by_one():
     rng = np.random.default_rng(0)
     apexes, gazes, targets = rng.normal(size=(3, 50, 3))
     cone = AttentionCone()
     each = [cone.score(a, g, t) for a, g, t in zip(apexes, gazes, targets, strict=True)]
     np.testing.assert_allclose(cone.score(apexes, gazes, targets), each)
-    towards_one = cone.score(apexes, gazes, targets[0])
-    assert towards_one.shape == (50,)
-    assert towards_one[7] == cone.score(apexes[7], gazes[7], targets[0])
+    one_target = cone.score(apexes, gazes, targets[0])
+    assert one_target.shape == (50,)
+    assert one_target[7] == cone.score(apexes[7], gazes[7], targets[0])
 
 
-def test_seeing_any_part_of_the_robot_counts():
+def test_the_highest_score_of_several_points_of_the_robot_counts():
     cone = AttentionCone()
     parts = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
     assert cone.score([0, 0, 0], [0, 1, 0], parts) == 1.0
     assert cone.score([0, 0, 0], [0, 0, 1], parts) == 0.0
 
 
-def test_target_at_the_apex_is_not_seen():
+def test_a_target_at_the_apex_has_score_0():
     assert AttentionCone().score([1, 2, 3], [1, 0, 0], [1, 2, 3]) == 0.0
 
 
@@ -101,12 +103,12 @@ def test_target_at_the_apex_is_not_seen():
         ((np.zeros((3, 3)), np.ones((3, 3)), np.ones((4, 3))), "equal lengths"),
     ],
 )
-def test_unusable_input_is_refused_by_name(arguments, message):
+def test_invalid_input_is_refused_by_name(arguments, message):
     with pytest.raises(PerceptionError, match=message):
         AttentionCone().score(*arguments)
 
 
 @pytest.mark.parametrize("angle", [0.0, -1.0, math.pi / 2, math.nan])
-def test_impossible_cones_are_refused(angle):
+def test_invalid_half_angles_are_refused(angle):
     with pytest.raises(PerceptionError, match="half_angle_rad"):
         AttentionCone(angle)

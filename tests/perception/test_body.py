@@ -1,3 +1,5 @@
+"""Placement of bodies and boxes in the camera frame, and the scale of skeletons."""
+
 import math
 
 import numpy as np
@@ -5,11 +7,16 @@ import pytest
 from synthetic_people import person_at
 
 from perception import Camera, PersonKeypoints
-from perception._metric_scale import metric_scale
 from perception.anthropometry import LIMBS, MEAN_STATURE_M
 from perception.body import place_body, place_box
 
 CAMERA = Camera.from_fov(1280, 960, math.radians(60.0))
+
+
+def scale_of(person):
+    """Return the factor from the skeleton's unit to metres."""
+    placed = place_body(CAMERA, person, 1.0).keypoints_camera_m
+    return np.ptp(placed[:, 1]) / np.ptp(person.keypoints_root_m[:, 1])
 
 
 def inside(person):
@@ -21,7 +28,7 @@ def inside(person):
 
 
 def relative_errors(*, lift_std_m, unit, stature_m=1.74, count=200, seed=0):
-    """Range 2–8 m, every heading, whatever part of the body the image holds."""
+    """Return errors at 2–8 m and every heading, with only a part of the body in some images."""
     rng = np.random.default_rng(seed)
     errors = []
     for _ in range(count):
@@ -47,13 +54,13 @@ def test_position_of_an_average_adult_within_four_percent(lift_std_m, unit):
 
 
 @pytest.mark.parametrize("stature_m", [1.55, 1.92])
-def test_stature_is_the_error_that_remains(stature_m):
-    """A skeleton without a unit is scaled to the average; the range errs as the stature does."""
+def test_without_a_unit_the_range_error_is_that_of_the_stature(stature_m):
+    """A skeleton without a unit is scaled to the average adult."""
     errors = relative_errors(lift_std_m=0.0, unit=1.0 / stature_m, stature_m=stature_m)
     assert np.median(errors) == pytest.approx(abs(MEAN_STATURE_M / stature_m - 1.0), abs=0.045)
 
 
-def test_covariance_holds_the_errors_over_a_population():
+def test_the_covariance_agrees_with_the_errors_over_a_population():
     rng = np.random.default_rng(1)
     inside_95 = []
     for _ in range(300):
@@ -72,37 +79,37 @@ def test_covariance_holds_the_errors_over_a_population():
 
 
 @pytest.mark.parametrize("unit", [0.01, 1.0, 37.0])
-def test_scale_is_found_in_any_unit_and_despite_a_wild_limb(unit):
+def test_the_scale_is_found_in_any_unit_and_despite_an_outlier(unit):
     person = person_at((0.0, 0.4, 3.0), stature_m=MEAN_STATURE_M)
     keypoints = person.keypoints(CAMERA, 0.0, np.random.default_rng(0), unit=unit)
-    clean = metric_scale(keypoints)
-    assert clean.factor * unit == pytest.approx(1.0, abs=0.05)
-    wild = np.array(keypoints.keypoints_root_m)
-    wild[9] += 2.0 * unit  # the left wrist two metres off
-    spoilt = metric_scale(
-        PersonKeypoints(keypoints.keypoints_px, wild, keypoints.scores, keypoints.layout)
+    clean = scale_of(keypoints)
+    assert clean * unit == pytest.approx(1.0, abs=0.05)
+    wrong = np.array(keypoints.keypoints_root_m)
+    wrong[9] += 2.0 * unit  # the left wrist two metres off
+    outlier = scale_of(
+        PersonKeypoints(keypoints.keypoints_px, wrong, keypoints.scores, keypoints.layout)
     )
-    assert spoilt.factor * unit == pytest.approx(clean.factor * unit, rel=0.03)
+    assert outlier * unit == pytest.approx(clean * unit, rel=0.03)
 
 
-def test_constants_are_the_papers_shoulder_span():
+def test_the_shoulder_span_is_the_papers():
     span = next(limb for limb in LIMBS if limb.name == "shoulder span")
     assert span.length_m == pytest.approx(0.45, abs=0.005)
 
 
-def test_one_wild_keypoint_hardly_moves_the_body():
+def test_one_outlier_hardly_moves_the_body():
     rng = np.random.default_rng(2)
     person = person_at((0.3, 0.4, 3.0))
     keypoints = person.keypoints(CAMERA, 1.0, rng)
     pixels = np.array(keypoints.keypoints_px)
     pixels[10] += (250.0, -180.0)
-    wild = PersonKeypoints(pixels, keypoints.keypoints_root_m, keypoints.scores, "coco")
-    moved = place_body(CAMERA, wild, 1.0).position_camera_m
+    outlier = PersonKeypoints(pixels, keypoints.keypoints_root_m, keypoints.scores, "coco")
+    moved = place_body(CAMERA, outlier, 1.0).position_camera_m
     still = place_body(CAMERA, keypoints, 1.0).position_camera_m
     assert np.linalg.norm(moved - still) < 0.06
 
 
-def test_too_little_of_a_body_is_no_position():
+def test_a_body_with_two_keypoints_has_no_position():
     person = person_at((0.0, 0.4, 3.0)).keypoints(CAMERA, 0.0, np.random.default_rng(0))
     scores = np.zeros(17)
     scores[[5, 6]] = 1.0
@@ -110,7 +117,7 @@ def test_too_little_of_a_body_is_no_position():
     assert place_body(CAMERA, two, 1.0) is None
 
 
-def test_a_head_above_a_shelf_is_placed_with_the_doubt_that_it_deserves():
+def test_a_body_of_which_only_the_head_is_seen_has_a_larger_covariance():
     truth = person_at((0.0, 0.4, 3.0))
     person = truth.keypoints(CAMERA, 1.0, np.random.default_rng(0))
     head_only = PersonKeypoints(
@@ -122,7 +129,7 @@ def test_a_head_above_a_shelf_is_placed_with_the_doubt_that_it_deserves():
     assert head.position_covariance_m2[2, 2] > 2.0 * whole.position_covariance_m2[2, 2]
 
 
-def test_the_box_of_a_standing_adult_is_a_rough_position():
+def test_the_box_of_a_standing_adult_gives_a_rough_position():
     person = person_at((0.8, 0.45, 5.0), stature_m=1.74)
     pixels = CAMERA.project(person.points_camera_m)
     left, top = pixels.min(axis=0)

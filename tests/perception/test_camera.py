@@ -1,3 +1,5 @@
+"""The camera: projection against OpenCV, ROS files and refusals."""
+
 import math
 
 import cv2
@@ -30,7 +32,7 @@ def test_normalise_undoes_project(distortion):
 
 
 @given(st.floats(0.2, 2.6), st.integers(16, 4000))
-def test_field_of_view_spans_the_image(fov, width):
+def test_the_field_of_view_spans_the_image(fov, width):
     camera = Camera.from_fov(width, 100, fov)
     ray = np.array([math.sin(0.5 * fov), 0.0, math.cos(0.5 * fov)])
     assert camera.project([ray])[0, 0] == pytest.approx(width)
@@ -43,7 +45,7 @@ def test_points_behind_the_camera_have_no_image():
     assert np.isnan(pixels[1:]).all()
 
 
-def test_no_points_project_to_no_pixels():
+def test_an_empty_array_of_points_projects_to_an_empty_array():
     assert Camera.from_fov(640, 480, 1.0).project(np.empty((0, 3))).shape == (0, 2)
 
 
@@ -60,7 +62,7 @@ def test_yaml_round_trip(tmp_path, distortion):
         np.testing.assert_array_equal(read.distortion, camera.distortion)
 
 
-def test_reads_a_file_of_the_ros_calibrator(tmp_path):
+def test_a_file_of_the_ros_calibrator_is_read(tmp_path):
     path = tmp_path / "ost.yaml"
     path.write_text(
         "image_width: 640\nimage_height: 480\ncamera_name: head\n"
@@ -75,7 +77,7 @@ def test_reads_a_file_of_the_ros_calibrator(tmp_path):
     assert camera.distortion == pytest.approx([-0.36, 0.112, 0.0011, 0.0005, 0.0])
 
 
-def test_reads_an_echoed_camera_info_message(tmp_path):
+def test_an_echoed_camera_info_message_is_read(tmp_path):
     path = tmp_path / "echo.yaml"
     path.write_text(
         "header: {frame_id: camera}\nheight: 480\nwidth: 640\ndistortion_model: plumb_bob\n"
@@ -104,7 +106,7 @@ def test_reads_an_echoed_camera_info_message(tmp_path):
         ("image_width: 640\nimage_height: 480\ncamera_matrix: [1, 2]\n", "reshape"),
     ],
 )
-def test_unusable_files_are_refused_by_name(tmp_path, text, message):
+def test_invalid_files_are_refused_by_name(tmp_path, text, message):
     path = tmp_path / "bad.yaml"
     path.write_text(text)
     with pytest.raises(PerceptionError, match=message) as refusal:
@@ -112,7 +114,7 @@ def test_unusable_files_are_refused_by_name(tmp_path, text, message):
     assert "bad.yaml" in str(refusal.value)
 
 
-def test_missing_file_is_refused_by_name(tmp_path):
+def test_a_missing_file_is_refused_by_name(tmp_path):
     with pytest.raises(PerceptionError, match=r"absent\.yaml"):
         Camera.from_yaml(tmp_path / "absent.yaml")
 
@@ -128,7 +130,7 @@ def test_missing_file_is_refused_by_name(tmp_path):
         ({"distortion": [math.inf] * 5}, "finite"),
     ],
 )
-def test_impossible_cameras_are_refused_by_name(change, message):
+def test_invalid_fields_are_refused_by_name(change, message):
     fields = {
         "width_px": 640,
         "height_px": 480,

@@ -1,4 +1,4 @@
-"""Range from several cues: least squares where they agree, outvoting where they do not."""
+"""Range from several cues: least squares where they agree, outliers outvoted where not."""
 
 from __future__ import annotations
 
@@ -10,15 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from synthetic_people import person_at
 
-from perception import Camera, HeadPose, PersonDetection, PersonKeypoints
+from perception import Camera, FloorPlane, HeadPose, PersonDetection, PersonKeypoints
 from perception._depth_cues import DepthCue, combine_cues
-from perception._floor import FloorPlane
 from perception._placement import place_people
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
 CAMERA_HEIGHT_M = 1.2
 FLOOR = FloorPlane(np.array([0.0, -1.0, 0.0]), CAMERA_HEIGHT_M)
-SURE = 1e-9
+NO_OUTLIER = 1e-9
 
 cue = st.builds(
     DepthCue,
@@ -29,14 +28,14 @@ cue = st.builds(
 )
 
 
-# --- the combination ----------------------------------------------------------------------------
+# --- combination --------------------------------------------------------------------------------
 
 
-def test_cues_that_cannot_be_wrong_are_generalised_least_squares():
+def test_without_outliers_the_result_is_generalised_least_squares():
     cues = [
-        DepthCue(0.02, 0.06, 0.05, SURE),
-        DepthCue(-0.01, 0.05, 0.016, SURE),
-        DepthCue(0.0, 0.04, 0.0, SURE),
+        DepthCue(0.02, 0.06, 0.05, NO_OUTLIER),
+        DepthCue(-0.01, 0.05, 0.016, NO_OUTLIER),
+        DepthCue(0.0, 0.04, 0.0, NO_OUTLIER),
     ]
     stature = np.array([0.05, 0.016, 0.0])
     covariance = np.outer(stature, stature) + np.diag(
@@ -48,21 +47,22 @@ def test_cues_that_cannot_be_wrong_are_generalised_least_squares():
     assert std == pytest.approx(1.0 / math.sqrt(weight.sum()), rel=1e-4)
 
 
-def test_what_shares_the_stature_is_not_counted_twice():
-    same = [DepthCue(0.0, 0.05, 0.0499, SURE)] * 2
-    assert combine_cues(same)[1] == pytest.approx(0.05, rel=0.01)
-    apart = [DepthCue(0.0, 0.05, 0.0, SURE)] * 2
-    assert combine_cues(apart)[1] == pytest.approx(0.05 / math.sqrt(2.0), rel=0.01)
+def test_a_common_error_of_the_stature_is_not_averaged_out():
+    correlated = [DepthCue(0.0, 0.05, 0.0499, NO_OUTLIER)] * 2
+    assert combine_cues(correlated)[1] == pytest.approx(0.05, rel=0.01)
+    independent = [DepthCue(0.0, 0.05, 0.0, NO_OUTLIER)] * 2
+    assert combine_cues(independent)[1] == pytest.approx(0.05 / math.sqrt(2.0), rel=0.01)
 
 
-def test_a_single_cue_stays_as_it_is():
+def test_a_single_cue_is_returned_unchanged():
     assert combine_cues([DepthCue(0.3, 0.07, 0.05, 0.2)]) == (0.3, 0.07)
 
 
 @given(st.lists(cue, min_size=1, max_size=4), st.floats(-2.0, 2.0))
-def test_a_common_shift_shifts_the_answer(cues, shift):
+def test_a_common_shift_of_all_cues_shifts_the_result(cues, shift):
     moved = [
-        DepthCue(one.log_range + shift, one.log_std, one.stature_std, one.wrong) for one in cues
+        DepthCue(one.log_range + shift, one.log_std, one.stature_std, one.outlier_probability)
+        for one in cues
     ]
     mean, std = combine_cues(cues)
     other_mean, other_std = combine_cues(moved)
@@ -76,7 +76,7 @@ def test_the_order_of_cues_does_not_matter(order, cues):
 
 
 @given(st.floats(0.4, 1.5))
-def test_a_cue_far_off_is_outvoted_by_two(off):
+def test_two_cues_that_agree_outvote_an_outlier(off):
     agreeing = [DepthCue(0.0, 0.06, 0.05, 0.03), DepthCue(0.01, 0.05, 0.016, 0.05)]
     mean, std = combine_cues([*agreeing, DepthCue(off, 0.03, 0.0, 0.1)])
     assert abs(mean) < 0.03
@@ -84,25 +84,25 @@ def test_a_cue_far_off_is_outvoted_by_two(off):
 
 
 @given(st.floats(0.3, 1.0))
-def test_two_cues_that_contradict_each_other_leave_both_possible(off):
+def test_the_standard_deviation_spans_two_contradicting_cues(off):
     mean, std = combine_cues([DepthCue(0.0, 0.05, 0.0, 0.1), DepthCue(off, 0.05, 0.0, 0.1)])
     assert mean == pytest.approx(0.5 * off, abs=1e-6)
     assert std > 0.45 * off
 
 
-def test_the_mixture_is_consistent_over_a_population():
-    """Errors drawn as the model says, wrong cues included: 68 and 95 % intervals hold."""
+def test_the_standard_deviation_is_calibrated_over_a_population():
+    """With random errors and outliers as in the model, 68 and 95 % intervals hold."""
     rng = np.random.default_rng(0)
     normalised = []
     for _ in range(3000):
         stature = rng.normal()
         cues = []
-        for std, part, wrong in ((0.06, 0.05, 0.03), (0.05, 0.016, 0.05), (0.05, 0.0, 0.1)):
+        for std, part, outlier in ((0.06, 0.05, 0.03), (0.05, 0.016, 0.05), (0.05, 0.0, 0.1)):
             own = math.sqrt(std**2 - part**2)
             value = part * stature + own * rng.normal()
-            if rng.random() < wrong:
+            if rng.random() < outlier:
                 value = rng.uniform(-1.0, 1.0)
-            cues.append(DepthCue(value, std, part, wrong))
+            cues.append(DepthCue(value, std, part, outlier))
         mean, std = combine_cues(cues)
         normalised.append(abs(mean) / std)
     assert 0.66 <= np.mean(np.array(normalised) < 1.0) <= 0.80
@@ -113,7 +113,7 @@ def test_the_mixture_is_consistent_over_a_population():
 
 
 def seen_person(rng, *, stature_m=1.74, depth=4.0, across=0.0, lift_m=0.0, noise_px=1.0, yaw=0.0):
-    """Standing on the floor (or ``lift_m`` above it) with keypoints and the tight box of them."""
+    """Return a person who stands ``lift_m`` above the floor, with keypoints and tight box."""
     scale = stature_m / 1.83
     hips_down = CAMERA_HEIGHT_M - lift_m - 0.93 * scale
     person = person_at((across, hips_down, depth), body_yaw_rad=yaw, stature_m=stature_m)
@@ -121,7 +121,7 @@ def seen_person(rng, *, stature_m=1.74, depth=4.0, across=0.0, lift_m=0.0, noise
     soles = person.points_camera_m[15:17] + np.array([0.0, 0.081 * scale, 0.0])
     crown = person.points_camera_m[0] - np.array([0.0, 0.16 * scale, 0.0])
     extent = np.vstack([keypoints.keypoints_px, CAMERA.project([*soles, crown])])
-    # What lies outside the picture is not seen, and boxes end at its border.
+    # Keypoints outside the image are not seen, and boxes end at its border.
     limits = (CAMERA.width_px - 1.0, CAMERA.height_px - 1.0)
     box = np.clip(np.r_[extent.min(axis=0), extent.max(axis=0)], 0.0, [*limits, *limits])
     inside = ((keypoints.keypoints_px >= 0.0) & (keypoints.keypoints_px <= limits)).all(axis=1)
@@ -132,7 +132,7 @@ def seen_person(rng, *, stature_m=1.74, depth=4.0, across=0.0, lift_m=0.0, noise
 
 
 def head_of(person, rng=None, *, range_std=0.05, stature_m=1.74, factor=None):
-    """A head pose whose range errs as a head of unknown size does."""
+    """Return a head pose with a range error as from an unknown head size."""
     if factor is None:
         factor = 1.0 + (rng.normal(0.0, range_std) if rng is not None else 0.0)
     nose = person.points_camera_m[0] * factor
@@ -145,11 +145,11 @@ def place(shown, detection, head=None, floor=None):
     return placed
 
 
-def test_more_cues_make_the_range_sharper_and_stay_consistent():
-    """Statures of a population; median error falls with every cue and the covariance holds it."""
+def test_more_cues_lower_the_error_and_agree_with_the_covariance():
+    """The people have the statures of a population."""
     rng = np.random.default_rng(1)
     errors = {name: [] for name in ("body", "head", "floor", "all")}
-    held = {name: [] for name in errors}
+    within_95 = {name: [] for name in errors}
     for _ in range(250):
         stature = rng.normal(1.74, 0.05 * 1.74)
         person, shown, detection = seen_person(
@@ -167,19 +167,19 @@ def test_more_cues_make_the_range_sharper_and_stay_consistent():
             position, covariance = place(shown, detection, with_head, with_floor)
             error = position - person.chest_camera_m
             errors[name].append(np.linalg.norm(error) / np.linalg.norm(person.chest_camera_m))
-            held[name].append(error @ np.linalg.solve(covariance, error) < 7.81)
+            within_95[name].append(error @ np.linalg.solve(covariance, error) < 7.81)
     median = {name: np.median(values) for name, values in errors.items()}
     assert median["head"] < median["body"]
     assert median["floor"] < 0.7 * median["body"]
     assert median["all"] <= 1.1 * median["floor"]
     assert median["all"] < 0.02
-    for name, values in held.items():
+    for name, values in within_95.items():
         assert 0.88 <= np.mean(values) <= 1.0, name
 
 
 @pytest.mark.parametrize("lift_m", [0.0, 0.3, 0.6, 0.9])
 @pytest.mark.parametrize("with_head", [True, False])
-def test_on_a_ladder_nobody_is_placed_surely_where_the_ladder_is_not(lift_m, with_head):
+def test_the_covariance_includes_the_error_for_a_person_on_a_ladder(lift_m, with_head):
     rng = np.random.default_rng(2)
     inside = []
     for _ in range(25):
@@ -191,8 +191,8 @@ def test_on_a_ladder_nobody_is_placed_surely_where_the_ladder_is_not(lift_m, wit
     assert np.mean(inside) >= 0.9
 
 
-def test_hidden_feet_do_not_pull_people_away():
-    """Behind a bench: neither ankles nor the lower edge of the box are at the floor."""
+def test_a_person_behind_a_bench_is_not_placed_farther_away():
+    """Neither the ankles nor the lower edge of the box show the floor."""
     rng = np.random.default_rng(3)
     for _ in range(20):
         person, shown, detection = seen_person(rng, depth=4.0)
@@ -219,7 +219,7 @@ def test_the_planted_foot_counts_in_a_step():
     assert np.linalg.norm(position - standing) < 0.12
 
 
-def test_a_box_alone_is_placed_by_its_feet_when_the_floor_is_known():
+def test_a_floor_improves_the_placement_by_a_box():
     rng = np.random.default_rng(5)
     person, shown, detection = seen_person(rng, depth=5.0, stature_m=1.5)
     unseen = PersonKeypoints(shown.keypoints_px, shown.keypoints_root_m, np.zeros(17), "coco")
@@ -227,7 +227,7 @@ def test_a_box_alone_is_placed_by_its_feet_when_the_floor_is_known():
     truth = person.chest_camera_m
     assert np.linalg.norm(fine - truth) < 0.5 * np.linalg.norm(rough - truth)
     assert tight[2, 2] < 0.7 * wide[2, 2]
-    # The same box cut off by the image's lower border says nothing about feet.
+    # A box that is cut off by the lower border does not show the feet.
     lower = CAMERA.height_px - 1.0
     cut = PersonDetection([300.0, 200.0, 360.0, lower], 0.9)
     with_floor, without = place(unseen, cut, None, FLOOR), place(unseen, cut)
@@ -235,7 +235,7 @@ def test_a_box_alone_is_placed_by_its_feet_when_the_floor_is_known():
 
 
 @given(st.floats(0.3, 3.0))
-def test_a_head_range_alone_never_overrules_the_body_surely(factor):
+def test_the_covariance_includes_the_error_for_a_false_head_range(factor):
     rng = np.random.default_rng(6)
     person, shown, detection = seen_person(rng, depth=4.0, stature_m=1.74, noise_px=0.3)
     position, covariance = place(shown, detection, head_of(person, factor=factor))

@@ -1,4 +1,4 @@
-"""The floor as a range cue: exact on exact rays, and honest about what it does not know."""
+"""The floor as a range cue: exact depths for exact rays, and correct standard deviations."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from perception import PerceptionError
-from perception._floor import FloorPlane
+from perception import FloorPlane, PerceptionError
 
 LEVEL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])  # camera to odom
 
@@ -41,7 +40,7 @@ def test_points_on_the_floor_are_found_at_their_depth(pitch, roll, yaw, ahead, l
     assert floor.normal_camera @ point[:3] + floor.height_m == pytest.approx(above, abs=1e-9)
 
 
-def test_the_horizon_and_what_lies_above_the_camera_have_no_depth():
+def test_rays_at_the_horizon_and_points_above_the_camera_have_no_depth():
     floor = FloorPlane(np.array([0.0, -1.0, 0.0]), 1.0)
     depth, std = floor.depth_of(np.array([[0.0, 0.0], [0.0, -0.2], [0.1, 0.005]]), 0.0, 0.0, 0.0)
     assert np.isnan(depth).all()
@@ -49,7 +48,7 @@ def test_the_horizon_and_what_lies_above_the_camera_have_no_depth():
     assert np.isnan(floor.depth_of(np.array([[0.0, 0.3]]), 1.4, 0.0, 0.0)[0]).all()
 
 
-def test_standard_deviation_is_that_of_drawn_errors():
+def test_the_standard_deviation_agrees_with_random_errors():
     floor = FloorPlane.from_pose(pose(1.1, 0.2), height_std_m=0.02, tilt_std_rad=0.01)
     ray, count = np.array([0.15, 0.12]), 40000
     rng = np.random.default_rng(0)
@@ -66,7 +65,7 @@ def test_standard_deviation_is_that_of_drawn_errors():
 
 
 @given(nearer=st.floats(0.1, 0.6), farther=st.floats(0.03, 0.09))
-def test_farther_feet_say_less(nearer, farther):
+def test_the_depth_of_farther_feet_is_less_certain(nearer, farther):
     floor = FloorPlane(np.array([0.0, -1.0, 0.0]), 1.2)
     _, std = floor.depth_of(np.array([[0.0, nearer], [0.0, farther]]), 0.0, 0.02, 0.003)
     assert std[0] < std[1]
@@ -83,6 +82,6 @@ def test_farther_feet_say_less(nearer, farther):
         (lambda: FloorPlane.from_pose(np.eye(3)), "T_odom_camera"),
     ],
 )
-def test_a_floor_that_is_none_is_refused(make, message):
+def test_invalid_floors_are_refused(make, message):
     with pytest.raises(PerceptionError, match=message):
         make()

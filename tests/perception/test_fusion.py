@@ -1,4 +1,4 @@
-"""Head poses from several sources: sharper where they agree, doubtful where they do not."""
+"""Fusion of head poses: more accurate where they agree, more uncertain where they do not."""
 
 from __future__ import annotations
 
@@ -10,8 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from perception import AttentionCone, HeadPose, PerceptionError, PersonKeypoints
-from perception._fusion import FusedHeadPoseEstimator, fuse_heads
+from perception import (
+    AttentionCone,
+    FusedHeadPoseEstimator,
+    HeadPose,
+    PerceptionError,
+    PersonKeypoints,
+)
 from perception.awareness import estimate_awareness
 
 FACING = np.stack([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]], axis=1)
@@ -24,8 +29,8 @@ def head(turn=(0.0, 0.0, 0.0), std_rad=0.1, *, shift=(0.0, 0.0, 0.0), seen=None,
     return HeadPose(POSITION + shift, rotation, covariance, 1.0, seen, range_std)
 
 
-class Always:
-    """A source that has made up its mind."""
+class FixedEstimator:
+    """A head pose estimator that always returns the given poses."""
 
     def __init__(self, *heads):
         self.heads = heads
@@ -34,7 +39,13 @@ class Always:
         return self.heads[: len(people)]
 
 
-NOBODY = PersonKeypoints(np.zeros((17, 2)), np.zeros((17, 3)), np.zeros(17), "coco")
+PERSON = PersonKeypoints(np.zeros((17, 2)), np.zeros((17, 3)), np.zeros(17), "coco")
+
+
+def fuse_heads(first, second):
+    fusion = FusedHeadPoseEstimator(FixedEstimator(first), FixedEstimator(second))
+    (fused,) = fusion.estimate(None, None, (PERSON,))
+    return fused
 
 
 def alpha_of(pose):
@@ -63,18 +74,18 @@ def test_agreeing_poses_are_combined_in_information_form():
     st.floats(0.06, 0.3),
     st.floats(0.06, 0.3),
 )
-def test_the_order_of_agreeing_sources_hardly_matters(turn, one, two):
+def test_the_order_of_agreeing_poses_hardly_matters(turn, one, two):
     first, second = head(std_rad=one), head(turn, two)
-    forth, back = fuse_heads(first, second), fuse_heads(second, first)
+    forward, reverse = fuse_heads(first, second), fuse_heads(second, first)
     angle = Rotation.from_matrix(
-        forth.rotation_camera_head @ back.rotation_camera_head.T
+        forward.rotation_camera_head @ reverse.rotation_camera_head.T
     ).magnitude()
     assert angle < 0.01
-    np.testing.assert_allclose(forth.covariance, back.covariance, atol=2e-3)
+    np.testing.assert_allclose(forward.covariance, reverse.covariance, atol=2e-3)
 
 
 @given(st.floats(0.0, math.pi - 0.05), st.floats(0.0, math.pi - 0.05))
-def test_the_covariance_never_shrinks_with_disagreement(first_turn, second_turn):
+def test_the_covariance_never_shrinks_with_the_difference(first_turn, second_turn):
     less, more = sorted([first_turn, second_turn])
     base = head(std_rad=0.15)
     near, far = (fuse_heads(base, head((turn, 0.0, 0.0), 0.15)) for turn in (less, more))
@@ -82,8 +93,8 @@ def test_the_covariance_never_shrinks_with_disagreement(first_turn, second_turn)
 
 
 @given(st.floats(0.8, 3.0), st.floats(0.02, 0.2), st.floats(0.02, 0.2), st.booleans())
-def test_sources_that_contradict_each_other_are_not_surely_aware(turn, one, two, swap):
-    """One says that the person looks at the robot, the other that they look away."""
+def test_contradicting_poses_give_no_confident_awareness(turn, one, two, swap):
+    """In one pose the person looks at the robot, in the other they look away."""
     towards = head(np.zeros(3), one)
     away = head((0.0, max(turn, math.radians(65.0)), 0.0), two)
     fused = fuse_heads(away, towards) if swap else fuse_heads(towards, away)
@@ -95,49 +106,53 @@ def test_sources_that_contradict_each_other_are_not_surely_aware(turn, one, two,
 
 def test_fused_poses_are_consistent_over_a_population():
     rng = np.random.default_rng(0)
-    nees = []
-    for _ in range(2000):
-        poses = []
-        for std in (0.08, 0.15):
-            turn, shift = rng.normal(0.0, std, 3), rng.normal(0.0, 0.05, 3)
-            poses.append(head(turn, std, shift=shift))
-        fused = fuse_heads(*poses)
-        turn = Rotation.from_matrix(FACING @ fused.rotation_camera_head.T).as_rotvec()
-        error = np.concatenate([turn, POSITION - fused.position_camera_m])
-        nees.append(error @ np.linalg.solve(fused.covariance, error))
-    # Growing with disagreement makes it a little cautious.
+    count, stds = 2000, (0.08, 0.15)
+    poses = [
+        [head(rng.normal(0.0, std, 3), std, shift=rng.normal(0.0, 0.05, 3)) for std in stds]
+        for _ in range(count)
+    ]
+    fusion = FusedHeadPoseEstimator(*(FixedEstimator(*each) for each in zip(*poses, strict=True)))
+    fused = fusion.estimate(None, None, (PERSON,) * count)
+    rotations = np.array([pose.rotation_camera_head for pose in fused])
+    turns = Rotation.from_matrix(FACING @ rotations.swapaxes(1, 2)).as_rotvec()
+    errors = np.hstack([turns, [POSITION - pose.position_camera_m for pose in fused]])
+    covariances = np.array([pose.covariance for pose in fused])
+    nees = np.einsum("ni,ni->n", errors, np.linalg.solve(covariances, errors[..., None])[..., 0])
+    # The covariance grows with the difference, so it is slightly too large on average.
     assert 4.0 <= np.mean(nees) <= 6.2
 
 
-def test_a_face_has_to_be_seen_by_all_who_can_tell():
+def test_the_lowest_given_probability_of_a_face_counts():
     assert fuse_heads(head(seen=0.9), head(seen=0.1)).face_seen == pytest.approx(0.1)
     assert fuse_heads(head(seen=0.9), head()).face_seen == pytest.approx(0.9)
     assert fuse_heads(head(), head()).face_seen is None
 
 
-def test_only_a_measured_range_stays_one():
-    measured, borrowed = head(range_std=0.04), head(range_std=None)
-    assert fuse_heads(measured, borrowed).range_relative_std == pytest.approx(0.04)
-    assert fuse_heads(borrowed, borrowed).range_relative_std is None
-    # Head sizes vary by 4 %: the borrowed range weighs accordingly less along the ray.
+def test_only_a_measured_range_counts_as_measured():
+    measured, assumed = head(range_std=0.04), head(range_std=None)
+    assert fuse_heads(measured, assumed).range_relative_std == pytest.approx(0.04)
+    assert fuse_heads(assumed, assumed).range_relative_std is None
+    # Head sizes vary by 4 %, so the assumed range has a lower weight along the ray.
     shifted = head(shift=(0.0, 0.0, 0.2), range_std=None)
     moved = fuse_heads(measured, shifted).position_camera_m[2] - POSITION[2]
     assert 0.0 < moved < 0.2 * 0.05**2 / (2 * 0.05**2 + 0.9 * 0.12**2) * 1.2
 
 
-def test_who_makes_no_pose_leaves_it_to_the_other():
+def test_a_pose_of_only_one_estimator_is_kept():
     first, second = head((0.05, 0.0, 0.0)), head((0.0, 0.05, 0.0))
-    fused = FusedHeadPoseEstimator(Always(first, None, None), Always(None, second, None))
-    assert fused.estimate(None, None, (NOBODY,) * 3) == (first, second, None)
-    three = FusedHeadPoseEstimator(Always(first), Always(first), Always(first))
-    (sharper,) = three.estimate(None, None, (NOBODY,))
-    np.testing.assert_allclose(sharper.covariance, first.covariance / 3.0, rtol=1e-6)
+    fused = FusedHeadPoseEstimator(
+        FixedEstimator(first, None, None), FixedEstimator(None, second, None)
+    )
+    assert fused.estimate(None, None, (PERSON,) * 3) == (first, second, None)
+    three = FusedHeadPoseEstimator(*(FixedEstimator(first) for _ in range(3)))
+    (combined,) = three.estimate(None, None, (PERSON,))
+    np.testing.assert_allclose(combined.covariance, first.covariance / 3.0, rtol=1e-6)
 
 
-def test_what_cannot_be_fused_is_refused():
+def test_invalid_estimators_are_refused():
     with pytest.raises(PerceptionError, match="two or more"):
-        FusedHeadPoseEstimator(Always())
+        FusedHeadPoseEstimator(FixedEstimator())
     with pytest.raises(PerceptionError, match="estimate"):
-        FusedHeadPoseEstimator(Always(), 5)
-    with pytest.raises(PerceptionError, match="one result a person"):
-        FusedHeadPoseEstimator(Always(), Always()).estimate(None, None, (NOBODY,))
+        FusedHeadPoseEstimator(FixedEstimator(), 5)
+    with pytest.raises(PerceptionError, match="one result per person"):
+        FusedHeadPoseEstimator(FixedEstimator(), FixedEstimator()).estimate(None, None, (PERSON,))

@@ -1,3 +1,5 @@
+"""The head frame by the paper's printed formula and by the anatomical template."""
+
 import math
 
 import numpy as np
@@ -29,7 +31,7 @@ def test_both_frames_turn_with_the_head_and_are_right_handed(seed, scale):
         )
 
 
-def test_printed_formula_points_36_degrees_below_straight_ahead():
+def test_the_printed_formula_points_36_degrees_below_straight_ahead():
     gaze = printed_head_rotation(HEAD_TEMPLATE_M, NECK_HEAD_M)[:, 1]
     below = math.degrees(math.atan2(gaze[0], gaze[1]))
     assert below == pytest.approx(36.0, abs=0.5)
@@ -42,14 +44,14 @@ def test_z_points_from_the_left_ear_to_the_right_ear():
     np.testing.assert_allclose(rotation[:, 2], ears / np.linalg.norm(ears), atol=1e-12)
 
 
-def test_unseen_points_do_not_matter_to_the_registration():
+def test_points_with_weight_0_do_not_affect_the_anatomical_frame():
     points = np.array(HEAD_TEMPLATE_M)
     points[4] += 5.0
     rotation = anatomical_head_rotation(points, [1, 1, 1, 1, 0])
     np.testing.assert_allclose(rotation, np.eye(3), atol=1e-9)
 
 
-def test_pnp_on_lifted_points_is_the_printed_formula():
+def test_pnp_on_lifted_points_agrees_with_the_printed_formula():
     camera = Camera(1280, 960, 1100.0, 1100.0, 640.0, 480.0)
     person = person_at((0.0, 0.4, 2.5), body_yaw_rad=0.4, head_yaw_rad=-0.2)
     keypoints = person.keypoints(camera, 0.0, np.random.default_rng(0))
@@ -74,7 +76,7 @@ def test_points_that_span_no_frame_are_refused(points, neck):
         printed_head_rotation(points, neck)
 
 
-def test_registration_refuses_points_on_a_line():
+def test_points_on_a_line_are_refused():
     with pytest.raises(PerceptionError, match="line"):
         anatomical_head_rotation(np.arange(5.0)[:, None] * np.ones(3))
     with pytest.raises(PerceptionError, match="weights"):

@@ -1,4 +1,4 @@
-"""The figures that PnP head pose must reach, on heads all around the circle."""
+"""Accuracy and covariance of PnP head poses, for heads in all directions."""
 
 import math
 
@@ -17,7 +17,7 @@ EAR_TO_NOSE_M = 0.1107
 
 
 def turned_head(rng, yaw_rad, ear_to_nose_px=55.0):
-    """A true rotation and position of a head whose ear-midpoint and nose are that far apart."""
+    """Return rotation and position of a head with this distance from ear midpoint to nose."""
     facing = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
     angles = [yaw_rad, rng.uniform(-0.4, 0.4), rng.normal(0.0, 0.1)]
     rotation = facing @ Rotation.from_euler("xzy", angles).as_matrix()
@@ -55,7 +55,7 @@ def test_without_noise_the_pose_is_exact():
 
 
 @pytest.mark.parametrize(("noise_px", "median_deg"), [(1.0, 2.0), (2.0, 3.5)])
-def test_gaze_all_around_the_circle(noise_px, median_deg):
+def test_the_gaze_error_in_all_directions(noise_px, median_deg):
     errors, _ = gaze_errors_deg(noise_px, 500, 1)
     assert np.median(errors) <= median_deg
     if noise_px == 1.0:
@@ -81,8 +81,8 @@ def test_covariance_grows_when_the_noise_is_larger_than_stated():
 
 
 @pytest.mark.parametrize("yaw_deg", [0, 5, 12, 34, 49, -34, 55])
-def test_awareness_std_equals_monte_carlo(yaw_deg):
-    """Within 25 %: at the centre, on the flank and at the edge of the cone."""
+def test_the_standard_deviation_of_awareness_agrees_with_monte_carlo(yaw_deg):
+    """It agrees within 25 % in the middle, on the flank and at the edge of the cone."""
     rng = np.random.default_rng(4)
     person = person_at((0.2, 0.3, 2.5), body_yaw_rad=0.3, head_yaw_rad=math.radians(yaw_deg) - 0.3)
     robot, cone, estimator = np.zeros((1, 3)), AttentionCone(), PnpHeadPoseEstimator()
@@ -106,11 +106,11 @@ def test_awareness_std_equals_monte_carlo(yaw_deg):
         (150, (0, 0, 0, 1, 1), 60),
     ],
 )
-def test_turned_heads_with_what_a_camera_sees_of_them(head_yaw_deg, seen, tolerance_deg):
-    """Yaw is relative to facing the camera; the body is turned halfway with the head."""
+def test_turned_heads_with_some_keypoints_hidden(head_yaw_deg, seen, tolerance_deg):
+    """Yaw 0 faces the camera; the body is turned half as far as the head."""
     rng = np.random.default_rng(5)
     yaw = math.radians(head_yaw_deg)
-    # Turning left shows the camera the right side of the face, so mirror the mask's names.
+    # A head that turns left shows the camera its right side; the minus turns it to the right.
     person = person_at((0.1, 0.4, 3.0), body_yaw_rad=-0.5 * yaw, head_yaw_rad=-0.5 * yaw)
     visible = np.concatenate([np.array(seen), np.ones(12)]).astype(bool)
     people = tuple(
@@ -132,25 +132,25 @@ def test_turned_heads_with_what_a_camera_sees_of_them(head_yaw_deg, seen, tolera
             assert alpha - 1.28 * std < 0.2, "a face turned away was called aware"
 
 
-def test_heads_without_evidence_have_no_pose():
+def test_heads_without_enough_keypoints_have_no_pose():
     rng = np.random.default_rng(6)
     rotation, position = turned_head(rng, 0.3)
     far = position * 60.0
-    nobody = head_only(rotation, position, 0.0, rng, seen=(0, 0, 0, 0, 0))
+    unseen = head_only(rotation, position, 0.0, rng, seen=(0, 0, 0, 0, 0))
     nose_alone = head_only(rotation, position, 0.0, rng, seen=(1, 0, 0, 0, 0))
-    speck = head_only(rotation, far, 0.3, rng)
+    too_small = head_only(rotation, far, 0.3, rng)
     one_point = PersonKeypoints(np.full((17, 2), 300.0), np.zeros((17, 3)), np.ones(17), "coco")
-    people = (nobody, nose_alone, speck, one_point)
+    people = (unseen, nose_alone, too_small, one_point)
     assert PnpHeadPoseEstimator().estimate(None, CAMERA, people) == (None,) * 4
 
 
 def test_distorted_images_give_the_same_pose():
     rng = np.random.default_rng(7)
-    bent = Camera(1280, 960, 1100.0, 1100.0, 640.0, 480.0, [-0.2, 0.05, 0.001, 0.001, 0.0])
+    distorted = Camera(1280, 960, 1100.0, 1100.0, 640.0, 480.0, [-0.2, 0.05, 0.001, 0.001, 0.0])
     rotation, position = turned_head(rng, 0.5)
     pixels, scores = np.zeros((17, 2)), np.zeros(17)
-    pixels[:5] = bent.project(HEAD_TEMPLATE_M @ rotation.T + position)
+    pixels[:5] = distorted.project(HEAD_TEMPLATE_M @ rotation.T + position)
     scores[:5] = 1.0
     person = PersonKeypoints(pixels, np.zeros((17, 3)), scores, "coco")
-    (head,) = PnpHeadPoseEstimator().estimate(None, bent, (person,))
+    (head,) = PnpHeadPoseEstimator().estimate(None, distorted, (person,))
     np.testing.assert_allclose(head.rotation_camera_head, rotation, atol=1e-3)

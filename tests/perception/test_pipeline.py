@@ -1,3 +1,5 @@
+"""The awareness pipeline with estimators whose errors are known, and the types it returns."""
+
 import math
 
 import numpy as np
@@ -9,21 +11,21 @@ from perception import (
     AttentionCone,
     AwarenessPipeline,
     Camera,
+    FloorPlane,
     HeadPose,
     PerceptionError,
     PersonDetection,
     PersonKeypoints,
     PersonObservation,
 )
-from perception._floor import FloorPlane
 from perception.networks import NETWORK_TIME
 
 CAMERA = Camera.from_fov(1280, 960, math.radians(60.0))
 FRAME = np.zeros((960, 1280, 3), np.uint8)
 
 
-class Eyes:
-    """A detector and pose estimator that know the people in front of the camera."""
+class KnownPeople:
+    """A detector and pose estimator for given people."""
 
     def __init__(self, people, noise_px=1.0, seed=0, seen=None):
         self.people = people
@@ -45,17 +47,17 @@ class Eyes:
         )
 
 
-def pipeline(eyes, **options):
-    return AwarenessPipeline(CAMERA, eyes, eyes, **options)
+def pipeline(known, **options):
+    return AwarenessPipeline(CAMERA, known, known, **options)
 
 
-def test_many_people_each_with_position_gaze_and_awareness():
+def test_several_people_have_position_gaze_and_awareness_each():
     people = [
         person_at((-1.0, 0.4, 3.5), head_yaw_rad=0.2),
         person_at((0.4, 0.4, 2.5), body_yaw_rad=0.8, head_yaw_rad=0.3),
         person_at((1.5, 0.4, 6.0), body_yaw_rad=-0.6),
     ]
-    seen = pipeline(Eyes(people)).process(FRAME, 12.5)
+    seen = pipeline(KnownPeople(people)).process(FRAME, 12.5)
     assert len(seen) == 3
     for person, observation in zip(people, seen, strict=True):
         assert observation.stamp_s == 12.5
@@ -70,44 +72,46 @@ def test_many_people_each_with_position_gaze_and_awareness():
         assert observation.box_xyxy_px is not None
 
 
-def test_position_is_the_body_and_not_the_nose():
+def test_the_position_is_that_of_the_body_and_not_of_the_nose():
     person = person_at((0.0, 0.4, 3.0), body_yaw_rad=math.pi / 2)
-    (seen,) = pipeline(Eyes([person], noise_px=0.0)).process(FRAME, 0.0)
+    (seen,) = pipeline(KnownPeople([person], noise_px=0.0)).process(FRAME, 0.0)
     nose = person.points_camera_m[0]
     assert np.linalg.norm(seen.position_camera_m - person.chest_camera_m) < 0.1
     assert np.linalg.norm(seen.position_camera_m - nose) > 0.25
 
 
-def test_no_face_is_no_evidence_and_never_aware():
+def test_a_head_that_is_not_seen_gives_no_evidence():
     person = person_at((0.0, 0.4, 3.0))
     hidden = np.r_[np.zeros(5), np.ones(12)]
-    (seen,) = pipeline(Eyes([person], seen=hidden)).process(FRAME, 0.0)
+    (seen,) = pipeline(KnownPeople([person], seen=hidden)).process(FRAME, 0.0)
     assert seen.awareness is None
     assert seen.awareness_std is None
     assert seen.gaze_camera is None
 
 
-def test_a_person_without_usable_keypoints_is_still_an_obstacle():
+def test_a_person_without_usable_keypoints_still_has_a_position():
     person = person_at((0.5, 0.4, 4.0))
-    (seen,) = pipeline(Eyes([person], seen=np.zeros(17))).process(FRAME, 0.0)
+    (seen,) = pipeline(KnownPeople([person], seen=np.zeros(17))).process(FRAME, 0.0)
     assert seen.awareness is None
     assert np.linalg.norm(seen.position_camera_m - person.chest_camera_m) < 1.5
     assert np.sqrt(seen.position_covariance_m2[2, 2]) > 0.5
 
 
-def test_any_point_of_the_robot_counts():
+def test_a_person_who_looks_at_any_point_of_the_robot_is_aware():
     person = person_at((0.0, 0.4, 3.0), head_yaw_rad=math.radians(50.0))
-    eyes = Eyes([person], noise_px=0.0)
-    (camera_only,) = pipeline(eyes).process(FRAME, 0.0)
+    known = KnownPeople([person], noise_px=0.0)
+    (camera_only,) = pipeline(known).process(FRAME, 0.0)
     gaze = person.rotation_camera_head[:, 1]
     looked_at = person.eyes_camera_m + 2.0 * gaze
-    (anywhere,) = pipeline(eyes, robot_points_camera_m=[[0, 0, 0], looked_at]).process(FRAME, 0.0)
+    (two_points,) = pipeline(known, robot_points_camera_m=[[0, 0, 0], looked_at]).process(
+        FRAME, 0.0
+    )
     assert camera_only.awareness < 0.4
-    assert anywhere.awareness > 0.95
+    assert two_points.awareness > 0.95
 
 
-def test_nobody_is_an_empty_result():
-    assert pipeline(Eyes([])).process(FRAME, 0.0) == ()
+def test_no_people_give_an_empty_result():
+    assert pipeline(KnownPeople([])).process(FRAME, 0.0) == ()
 
 
 @pytest.mark.parametrize(
@@ -122,15 +126,15 @@ def test_nobody_is_an_empty_result():
 )
 def test_unusable_images_are_refused(image, message):
     with pytest.raises(PerceptionError, match=message):
-        pipeline(Eyes([])).process(image, 0.0)
+        pipeline(KnownPeople([])).process(image, 0.0)
 
 
-def test_a_clock_without_a_time_is_refused():
+def test_a_stamp_that_is_not_finite_is_refused():
     with pytest.raises(PerceptionError, match="stamp_s"):
-        pipeline(Eyes([])).process(FRAME, math.nan)
+        pipeline(KnownPeople([])).process(FRAME, math.nan)
 
 
-def test_parts_that_are_none_are_named():
+def test_invalid_arguments_are_refused_by_name():
     for change, name in [
         ({"robot_points_camera_m": np.empty((0, 3))}, "robot_points_camera_m"),
         ({"floor": 1.2}, "floor must be a FloorPlane"),
@@ -140,97 +144,98 @@ def test_parts_that_are_none_are_named():
         ({"min_score": 1.5}, "min_score"),
     ]:
         with pytest.raises(PerceptionError, match=name):
-            pipeline(Eyes([]), **change)
+            pipeline(KnownPeople([]), **change)
     with pytest.raises(PerceptionError, match="floor must be a FloorPlane"):
-        pipeline(Eyes([])).process(FRAME, 0.0, floor="z = 0")
+        pipeline(KnownPeople([])).process(FRAME, 0.0, floor="z = 0")
 
 
-def test_without_networks_of_its_own_it_runs_the_shipped_ones():
+def test_the_shipped_networks_are_the_default():
     seen = AwarenessPipeline(CAMERA).process(FRAME, 0.0)
     assert all(person.awareness is None or person.awareness_std is not None for person in seen)
 
 
-def test_the_backs_of_heads_are_surely_unaware():
+def test_the_back_of_a_head_is_unaware_with_certainty():
     person = person_at((0.0, 0.4, 3.0), body_yaw_rad=math.pi)
     ears_only = np.r_[np.zeros(3), np.ones(14)]
-    (seen,) = pipeline(Eyes([person], seen=ears_only)).process(FRAME, 0.0)
+    (seen,) = pipeline(KnownPeople([person], seen=ears_only)).process(FRAME, 0.0)
     assert seen.awareness == 0.0
     assert seen.awareness_std < 0.05
 
 
-def test_wandering_eyes_widen_alpha_and_leave_it_where_it_is():
+def test_eye_movements_increase_the_standard_deviation_and_do_not_change_alpha():
     person = person_at((0.0, 0.4, 2.5), head_yaw_rad=math.radians(25.0))
     steady, wandering = (
-        pipeline(Eyes([person]), eye_in_head_std_rad=std).process(FRAME, 0.0)[0]
+        pipeline(KnownPeople([person]), eye_in_head_std_rad=std).process(FRAME, 0.0)[0]
         for std in (0.0, (math.radians(15.0), math.radians(10.0)))
     )
     assert steady.awareness == wandering.awareness
     assert wandering.awareness_std > 1.5 * steady.awareness_std
 
 
-def test_a_floor_helps_with_range_and_each_frame_may_bring_its_own():
-    rng_error = []
+def test_a_floor_improves_the_range_and_may_be_given_per_frame():
+    errors = []
     camera_height_m = 1.25
     floor = FloorPlane([0.0, -1.0, 0.0], camera_height_m)
     for stature in (1.55, 1.95):
         scale = stature / 1.83
         person = person_at((0.0, camera_height_m - 0.93 * scale, 4.5), stature_m=stature)
-        eyes = Eyes([person])
-        eyes.estimate = lambda image, found, person=person, stature=stature: (
+        known = KnownPeople([person])
+        known.estimate = lambda image, found, person=person, stature=stature: (
             person.keypoints(CAMERA, 1.0, np.random.default_rng(0), unit=1.0 / stature),
         )
-        (without,) = pipeline(eyes).process(FRAME, 0.0)
-        (always,) = pipeline(eyes, floor=floor).process(FRAME, 0.0)
-        (now,) = pipeline(eyes).process(FRAME, 0.0, floor=floor)
-        np.testing.assert_array_equal(always.position_camera_m, now.position_camera_m)
-        blind, floored = (
-            np.linalg.norm(seen.position_camera_m - person.chest_camera_m)
-            for seen in (without, now)
+        (without,) = pipeline(known).process(FRAME, 0.0)
+        (constant,) = pipeline(known, floor=floor).process(FRAME, 0.0)
+        (per_frame,) = pipeline(known).process(FRAME, 0.0, floor=floor)
+        np.testing.assert_array_equal(constant.position_camera_m, per_frame.position_camera_m)
+        errors.append(
+            [
+                np.linalg.norm(seen.position_camera_m - person.chest_camera_m)
+                for seen in (without, per_frame)
+            ]
         )
-        rng_error.append((blind, floored))
-    assert all(floored < 0.6 * blind for blind, floored in rng_error)
+    assert all(with_floor < 0.6 * without_floor for without_floor, with_floor in errors)
 
 
-def test_timings_add_up_and_are_of_the_last_frame():
+def test_timings_are_those_of_the_last_frame_and_add_up():
     person = person_at((0.0, 0.4, 3.0))
-    eyes = Eyes([person])
-    line = pipeline(eyes)
-    assert line.last_timings.total_s == 0.0
-    line.process(FRAME, 0.0)
-    timings = line.last_timings
+    known = KnownPeople([person])
+    tested = pipeline(known)
+    assert tested.last_timings.total_s == 0.0
+    tested.process(FRAME, 0.0)
+    timings = tested.last_timings
     parts = (timings.detector_s, timings.pose_s, timings.head_pose_s, timings.rest_s)
     assert min(parts) > 0.0
     assert timings.total_s == pytest.approx(sum(parts))
-    eyes.people = []
-    line.process(FRAME, 0.1)
-    assert line.last_timings.head_pose_s == 0.0
+    known.people = []
+    tested.process(FRAME, 0.1)
+    assert tested.last_timings.head_pose_s == 0.0
 
 
-def test_the_runs_of_networks_are_told_from_the_rest():
-    class Slow(Eyes):
+def test_timings_separate_the_runs_of_networks_from_the_rest():
+    class SlowDetector(KnownPeople):
         def detect(self, image_rgb):
-            NETWORK_TIME.elapsed_s += 0.015  # as a network would that took that long
+            NETWORK_TIME.elapsed_s += 0.015  # as after a run of a network that took that long
             return super().detect(image_rgb)
 
     person = person_at((0.0, 0.4, 3.0))
-    eyes = Slow([person])
-    line = pipeline(eyes)
-    assert line.last_timings.networks_s == 0.0
-    for people in ([person], [person], []):  # of each frame, not of all so far
-        eyes.people = people
-        line.process(FRAME, 0.0)
-        timings = line.last_timings
+    known = SlowDetector([person])
+    tested = pipeline(known)
+    assert tested.last_timings.networks_s == 0.0
+    for people in ([person], [person], []):  # the time of each frame, not the sum
+        known.people = people
+        tested.process(FRAME, 0.0)
+        timings = tested.last_timings
         assert timings.networks_s == pytest.approx(0.015)
         assert timings.outside_s == pytest.approx(timings.total_s - 0.015)
 
 
-def test_an_estimator_that_loses_people_is_named():
-    class Forgetful(Eyes):
+def test_an_estimator_with_too_few_results_is_named():
+    class LosesOne(KnownPeople):
         def estimate(self, image_rgb, detections):
             return super().estimate(image_rgb, detections)[1:]
 
     with pytest.raises(PerceptionError, match="pose_estimator"):
-        pipeline(Forgetful([person_at((0.0, 0.4, 3.0))])).process(FRAME, 0.0)
+        pipeline(LosesOne([person_at((0.0, 0.4, 3.0))])).process(FRAME, 0.0)
 
 
 def observation(**change):
@@ -262,12 +267,12 @@ def observation(**change):
         ({"score": "high"}, "score"),
     ],
 )
-def test_observations_refuse_bad_fields_by_name(change, message):
+def test_observations_refuse_invalid_fields_by_name(change, message):
     with pytest.raises(PerceptionError, match=message):
         observation(**change)
 
 
-def test_seam_types_keep_their_own_locked_copy():
+def test_observations_keep_a_read_only_copy_of_arrays():
     position = np.array([0.0, 0.0, 1.0])
     seen = observation(position_camera_m=position)
     position[2] = 9.0
@@ -276,7 +281,7 @@ def test_seam_types_keep_their_own_locked_copy():
         seen.position_camera_m[2] = 5.0
 
 
-def test_head_pose_and_keypoints_refuse_what_is_not_one():
+def test_head_poses_keypoints_and_detections_refuse_invalid_fields():
     flipped = np.diag([1.0, 1.0, -1.0])
     with pytest.raises(PerceptionError, match="rotation_camera_head"):
         HeadPose([0, 0, 1], flipped, np.eye(6), 0.0)

@@ -1,3 +1,5 @@
+"""The shipped networks and their manifest: content, refusals and writing."""
+
 from __future__ import annotations
 
 import hashlib
@@ -11,6 +13,7 @@ import pytest
 from paths import ROOT
 
 from perception import PerceptionError
+from perception.networks import OnnxSettings
 from perception.shipped import (
     DETECTOR,
     HEAD,
@@ -43,19 +46,19 @@ Does one thing. More about it.
 
 @pytest.fixture
 def folder(tmp_path):
-    """A folder with one network, which is none, and its card."""
+    """Return a folder with one file in place of a network, and its card."""
     (tmp_path / "thing.onnx").write_bytes(b"weights")
     (tmp_path / "thing.md").write_text(CARD, encoding="utf-8")
     return tmp_path
 
 
 @pytest.fixture
-def box(tmp_path):
-    """A copy of what is shipped."""
-    return Path(shutil.copytree(FOLDER, tmp_path / "box"))
+def copy(tmp_path):
+    """Return a copy of the folder of the shipped networks."""
+    return Path(shutil.copytree(FOLDER, tmp_path / "copy"))
 
 
-# What is in the box
+# --- content ------------------------------------------------------------------------------------
 
 
 def test_three_networks_are_shipped_and_small():
@@ -66,7 +69,7 @@ def test_three_networks_are_shipped_and_small():
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_file_manifest_and_card_agree(name):
+def test_the_file_the_manifest_and_the_card_agree(name):
     (model,) = (each for each in shipped_models() if each.name == name)
     content = verify_shipped_model(name).read_bytes()
     assert (hashlib.sha256(content).hexdigest(), len(content)) == (model.sha256, model.size_bytes)
@@ -79,20 +82,20 @@ def test_file_manifest_and_card_agree(name):
     assert "Made for the simulator" in card
 
 
-def test_nothing_else_is_in_the_box():
+def test_no_other_file_is_shipped():
     expected = {"manifest.json"}
     expected |= {f"{name}.{suffix}" for name in NAMES for suffix in ("onnx", "md")}
     assert {path.name for path in FOLDER.iterdir() if path.suffix != ".part"} == expected
 
 
-def test_each_loads_as_what_it_is():
+def test_each_network_loads_in_its_estimator():
     for make in (shipped_detector, shipped_pose_estimator, shipped_head_pose_estimator):
         assert make() is not None
 
 
 @pytest.mark.parametrize("name", [POSE, HEAD])
 @pytest.mark.parametrize("people", [1, 2, 3, 7])
-def test_any_number_of_people_fits_in_a_batch(name, people):
+def test_a_batch_may_have_any_number_of_people(name, people):
     model = load_shipped(name)
     (tensor,) = model.inputs
     assert tensor.shape[0] is None
@@ -102,18 +105,18 @@ def test_any_number_of_people_fits_in_a_batch(name, people):
         assert np.isfinite(output).all()
 
 
-# What is not as it should be
+# --- refusals -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_altered_file_is_refused_with_both_hashes_and_the_remedy(box, name):
-    path = box / f"{name}.onnx"
+def test_an_altered_file_is_refused_with_both_hashes_and_the_remedy(copy, name):
+    path = copy / f"{name}.onnx"
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 1
     path.write_bytes(content)
     expected = verify_shipped_model(name, FOLDER).read_bytes()
     with pytest.raises(PerceptionError) as refused:
-        load_shipped(name, folder=box)
+        load_shipped(name, folder=copy)
     for part in (
         str(path),
         hashlib.sha256(content).hexdigest(),
@@ -123,31 +126,28 @@ def test_altered_file_is_refused_with_both_hashes_and_the_remedy(box, name):
         assert part in str(refused.value)
 
 
-def test_truncated_file_is_refused(box):
-    path = box / f"{DETECTOR}.onnx"
+def test_a_truncated_file_is_refused(copy):
+    path = copy / f"{DETECTOR}.onnx"
     path.write_bytes(path.read_bytes()[:1000])
     with pytest.raises(PerceptionError, match=r"altered.*\(1000 bytes\)"):
-        load_shipped(DETECTOR, folder=box)
+        load_shipped(DETECTOR, folder=copy)
 
 
-def test_missing_file_is_refused(box):
-    (box / f"{HEAD}.onnx").unlink()
+def test_a_missing_file_is_refused(copy):
+    (copy / f"{HEAD}.onnx").unlink()
     with pytest.raises(PerceptionError, match=r"head_pose\.onnx is missing.*pip install"):
-        load_shipped(HEAD, folder=box)
+        load_shipped(HEAD, folder=copy)
     with pytest.raises(PerceptionError, match="is missing"):
-        shipped_model_path(HEAD, box)
+        shipped_model_path(HEAD, copy)
 
 
-def test_trouble_of_another_kind_is_not_blamed_on_the_file():
-    # Whoever asks for a GPU that is not there has an unaltered file.
-    from perception.networks import OnnxSettings  # noqa: PLC0415
-
+def test_a_missing_provider_does_not_blame_the_file():
     with pytest.raises(PerceptionError, match="provider") as refused:
         load_shipped(DETECTOR, OnnxSettings(providers=("tensorrt",)))
     assert "altered" not in str(refused.value)
 
 
-def test_unknown_name_says_which_there_are():
+def test_an_unknown_name_is_refused_with_the_known_names():
     with pytest.raises(PerceptionError, match=r"'face'.*'person_detector'"):
         load_shipped("face")
 
@@ -164,13 +164,13 @@ def test_unknown_name_says_which_there_are():
         json.dumps({"models": [{"name": "../up", "sha256": "0" * 64, "size_bytes": 1}]}),
     ],
 )
-def test_manifest_that_is_none(tmp_path, text):
+def test_an_invalid_manifest_is_refused(tmp_path, text):
     (tmp_path / "manifest.json").write_text(text)
     with pytest.raises(PerceptionError, match=r"manifest\.json"):
         shipped_models(tmp_path)
 
 
-def test_manifest_that_is_missing(tmp_path):
+def test_a_missing_manifest_is_refused(tmp_path):
     with pytest.raises(PerceptionError, match=r"cannot be read.*pip install"):
         shipped_models(tmp_path)
 
@@ -179,15 +179,15 @@ def test_manifest_that_is_missing(tmp_path):
     ("change", "message"),
     [
         ({"name": "../up"}, "name must match"),
-        ({"name": ""}, "needs every text"),
-        ({"licence": None}, "needs every text"),
+        ({"name": ""}, "needs all of its texts"),
+        ({"licence": None}, "needs all of its texts"),
         ({"sha256": "abc"}, "64 lower-case hexadecimal"),
         ({"sha256": "G" * 64}, "64 lower-case hexadecimal"),
         ({"size_bytes": 0}, "size_bytes must be"),
         ({"size_bytes": "7"}, "size_bytes must be"),
     ],
 )
-def test_entries_are_checked(change, message):
+def test_entries_with_invalid_fields_are_refused(change, message):
     good = {
         "name": "thing",
         "sha256": "0" * 64,
@@ -201,8 +201,7 @@ def test_entries_are_checked(change, message):
         ShippedModel(**(good | change))
 
 
-# Writing it
-
+# --- writing ------------------------------------------------------------------------------------
 
 ENTRY = {
     "name": "thing",
@@ -212,7 +211,7 @@ ENTRY = {
 }
 
 
-def test_manifest_and_card_are_written_from_the_file(folder):
+def test_the_manifest_and_the_card_are_written_from_the_file(folder):
     digest = hashlib.sha256(b"weights").hexdigest()
     write_manifest(folder, [ENTRY])
     assert shipped_models(folder) == (
@@ -231,7 +230,7 @@ def test_manifest_and_card_are_written_from_the_file(folder):
     assert verify_shipped_model("thing", folder) == folder / "thing.onnx"
 
 
-def test_manifest_is_written_where_there_are_no_cards(folder):
+def test_the_manifest_is_written_without_a_card(folder):
     (folder / "thing.md").unlink()
     write_manifest(folder, [ENTRY])
     assert verify_shipped_model("thing", folder) == folder / "thing.onnx"
@@ -244,14 +243,14 @@ def test_manifest_is_written_where_there_are_no_cards(folder):
         ("- licence: Apache-2.0", "- licence: MIT\n- licence: Apache-2.0", "got 2"),
     ],
 )
-def test_card_that_does_not_say_what_it_must_changes_nothing(folder, old, new, message):
+def test_nothing_is_written_for_a_card_without_the_lines(folder, old, new, message):
     (folder / "thing.md").write_text(CARD.replace(old, new), encoding="utf-8")
     with pytest.raises(PerceptionError, match=message):
         write_manifest(folder, [ENTRY])
     assert not (folder / "manifest.json").exists()
 
 
-def test_file_that_is_missing_changes_nothing(folder):
+def test_nothing_is_written_for_a_missing_file(folder):
     before = (folder / "thing.md").read_bytes()
     with pytest.raises(PerceptionError, match=r"cannot read .*other\.onnx"):
         write_manifest(folder, [ENTRY, ENTRY | {"name": "other"}])

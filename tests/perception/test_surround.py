@@ -1,4 +1,4 @@
-"""Wide lenses, the flat views cut from them, and everybody once."""
+"""Wide lenses, flat views cut from their images, and the merging of their observations."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from perception.surround import (
     ring_of_views,
 )
 
-BENT = (-0.02, 0.004, -0.001, 0.0002)
+FISHEYE = (-0.02, 0.004, -0.001, 0.0002)
 FLAT = Camera.from_fov(220, 160, math.radians(110.0))
 RING = ring_of_views(FLAT, np.radians([0.0, 90.0, 180.0, -90.0]))
 
 
 def person(position: np.ndarray, **changes: object) -> PersonObservation:
-    """Seen there, by a camera whose depth is less sure than its angles."""
-    known = PersonObservation(
+    """Return an observation at a position, with a depth less certain than the direction."""
+    observation = PersonObservation(
         stamp_s=1.0,
         position_camera_m=position,
         position_covariance_m2=np.diag([0.05, 0.05, 0.15]) ** 2,
@@ -39,16 +39,16 @@ def person(position: np.ndarray, **changes: object) -> PersonObservation:
         score=0.9,
         box_xyxy_px=None,
     )
-    return replace(known, **changes)
+    return replace(observation, **changes)
 
 
 def at(bearing_rad: float, range_m: float) -> np.ndarray:
-    """A place in the camera's frame, bearings left positive."""
+    """Return a position in the camera frame; left bearings are positive."""
     return np.array([-range_m * math.sin(bearing_rad), 0.2, range_m * math.cos(bearing_rad)])
 
 
 def views_of(place: np.ndarray, rng: np.random.Generator) -> list[tuple[int, np.ndarray]]:
-    """The views whose picture holds a place, and the place in each, with noise of 3 cm."""
+    """Return the views that show a position, and the position in each with 3 cm of noise."""
     shown = []
     for number, view in enumerate(RING):
         inside = view.rotation_camera_view.T @ place
@@ -59,14 +59,14 @@ def views_of(place: np.ndarray, rng: np.random.Generator) -> list[tuple[int, np.
 
 
 def test_fisheye_agrees_with_opencv() -> None:
-    lens = FisheyeLens(1280, 960, 300.0, 310.0, 640.0, 470.0, np.array(BENT))
+    lens = FisheyeLens(1280, 960, 300.0, 310.0, 640.0, 470.0, np.array(FISHEYE))
     points = np.random.default_rng(0).uniform([-8, -8, 0.7], [8, 8, 8], (500, 3))
     expected, _ = cv2.fisheye.projectPoints(
         points[:, None],
         np.zeros(3),
         np.zeros(3),
         np.array([[300.0, 0, 640.0], [0, 310.0, 470.0], [0, 0, 1]]),
-        np.array(BENT),
+        np.array(FISHEYE),
     )
     np.testing.assert_allclose(lens.project(points), expected[:, 0], atol=1e-6)
 
@@ -90,7 +90,7 @@ def test_a_fisheye_sees_nothing_beyond_its_circle() -> None:
     assert np.isnan(pixels[1:]).all()
 
 
-def test_a_fisheye_that_folds_is_refused() -> None:
+def test_a_fisheye_polynomial_that_decreases_is_refused() -> None:
     with pytest.raises(PerceptionError, match=r"must grow up to max_angle_rad = 1\.7"):
         FisheyeLens(1000, 1000, 250.0, 250.0, 500.0, 500.0, np.array([-0.5, 0, 0, 0]))
     with pytest.raises(PerceptionError, match=r"max_angle_rad must lie in \(0, pi\], got 4 rad"):
@@ -108,12 +108,12 @@ def test_a_ros_calibration_of_a_fisheye_is_read(tmp_path) -> None:
             "data": [300.0, 0, 640.0, 0, 310.0, 470.0, 0, 0, 1],
         },
         "distortion_model": "equidistant",
-        "distortion_coefficients": {"rows": 1, "cols": 4, "data": list(BENT)},
+        "distortion_coefficients": {"rows": 1, "cols": 4, "data": list(FISHEYE)},
     }
     path.write_text(yaml.safe_dump(info))
     lens = FisheyeLens.from_yaml(path)
     assert (lens.width_px, lens.fy_px, lens.cy_px) == (1280, 310.0, 470.0)
-    np.testing.assert_array_equal(lens.coefficients, BENT)
+    np.testing.assert_array_equal(lens.coefficients, FISHEYE)
     with pytest.raises(PerceptionError, match=r"perception\.surround"):
         Camera.from_yaml(path)
     path.write_text(yaml.safe_dump({**info, "distortion_model": "plumb_bob"}))
@@ -131,7 +131,7 @@ def test_a_panorama_maps_angles_evenly(heading, down):
 
 
 def directions_of(lens, height: int, width: int) -> np.ndarray:
-    """A picture (H, W, 3) that shows in every direction the direction itself, as a colour."""
+    """Return an image (H, W, 3) whose colours are the directions of the pixels."""
     if isinstance(lens, PanoramaLens):
         heading = ((np.arange(width) + 0.5) / width - 0.5) * 2.0 * math.pi
         down = ((np.arange(height) + 0.5) / height - 0.5) * math.pi
@@ -156,11 +156,11 @@ def directions_of(lens, height: int, width: int) -> np.ndarray:
     ],
     ids=["panorama", "fisheye"],
 )
-def test_each_view_shows_what_lies_in_its_directions(lens) -> None:
+def test_each_view_shows_its_directions(lens) -> None:
     views = (*RING, *ring_of_views(Camera.from_fov(120, 90, 1.0), [0.6]))
     pipeline = SurroundPipeline(lens, views, AwarenessPipeline)
-    picture = directions_of(lens, lens.height_px, lens.width_px)
-    for view, flat in zip(views, pipeline.flat_pictures(picture), strict=True):
+    image = directions_of(lens, lens.height_px, lens.width_px)
+    for view, flat in zip(views, pipeline.flat_pictures(image), strict=True):
         camera = view.camera
         u, v = np.meshgrid(np.arange(camera.width_px, dtype=float), np.arange(camera.height_px))
         rays = np.column_stack(
@@ -179,7 +179,7 @@ def test_each_view_shows_what_lies_in_its_directions(lens) -> None:
             assert not flat[beyond].any()
 
 
-def test_an_observation_turns_as_a_whole() -> None:
+def test_in_camera_rotates_position_covariance_and_gaze() -> None:
     seen = person(np.array([0.3, 0.2, 2.0]), gaze_camera=np.array([0.6, 0.0, -0.8]))
     for view, place, gaze in zip(
         RING,
@@ -201,7 +201,7 @@ def test_an_observation_turns_as_a_whole() -> None:
     st.lists(st.tuples(st.floats(-math.pi, math.pi), st.floats(0.8, 9.0)), min_size=1, max_size=6),
     st.integers(0, 2**32 - 1),
 )
-def test_people_apart_are_reported_once_each(people, seed):
+def test_people_more_than_1_2_m_apart_are_reported_once_each(people, seed):
     rng = np.random.default_rng(seed)
     places = [at(*each) for each in people]
     apart = [places[0]]
@@ -220,8 +220,8 @@ def test_people_apart_are_reported_once_each(people, seed):
 
 
 @given(st.floats(0.6, 1.0), st.floats(1.0, 5.0), st.integers(0, 2**32 - 1))
-def test_shoulder_to_shoulder_in_the_overlap_stay_two(bearing, range_m, seed):
-    """Both show in both views, or one in one only: nobody disappears."""
+def test_two_people_shoulder_to_shoulder_in_the_overlap_stay_two(bearing, range_m, seed):
+    """Each of them appears in one view or in both."""
     rng = np.random.default_rng(seed)
     half = 0.3 / range_m
     seen: list[list[PersonObservation]] = [[] for _ in RING]
@@ -235,20 +235,20 @@ def test_shoulder_to_shoulder_in_the_overlap_stay_two(bearing, range_m, seed):
     assert max(both) <= len(merged) <= 2
 
 
-def test_of_a_pair_the_more_central_one_stays_and_surer_people_stay_apart() -> None:
+def test_the_more_central_observation_is_kept_and_the_covariance_decides_about_pairs() -> None:
     place = at(math.radians(40.0), 3.0)
     ahead, left = (RING[n].rotation_camera_view.T @ place for n in (0, 1))
     merged = merge_views(RING, [[person(ahead, score=0.7)], [person(left, score=0.8)], [], []])
     assert [(each.view, each.row) for each in merged] == [(0, 0)]
-    # 0.6 m apart: one person where either place is hardly known, two where both are.
+    # 0.6 m apart: one person with large covariances, two people with small ones.
     aside = RING[1].rotation_camera_view.T @ np.add(place, [0.0, 0.0, 0.6])
     for std_m, people in ((0.3, 1), (0.02, 2)):
-        sure = np.eye(3) * std_m**2
+        covariance = np.eye(3) * std_m**2
         both = merge_views(
             RING,
             [
-                [person(ahead, position_covariance_m2=sure)],
-                [person(aside, position_covariance_m2=sure)],
+                [person(ahead, position_covariance_m2=covariance)],
+                [person(aside, position_covariance_m2=covariance)],
                 [],
                 [],
             ],
@@ -256,13 +256,13 @@ def test_of_a_pair_the_more_central_one_stays_and_surer_people_stay_apart() -> N
         assert len(both) == people
 
 
-def test_two_in_one_view_are_never_one() -> None:
+def test_two_observations_of_one_view_are_never_merged() -> None:
     place = at(0.0, 2.0)
     merged = merge_views(RING[:1], [[person(place), person(np.add(place, [0.1, 0.0, 0.0]))]])
     assert [each.row for each in merged] == [0, 1]
 
 
-def test_a_box_is_carried_to_the_picture_it_was_cut_from() -> None:
+def test_a_box_of_a_view_is_mapped_to_the_image_of_the_lens() -> None:
     lens = PanoramaLens(1440, 720)
     corners = np.array([80.0, 30.0, 140.0, 130.0])
     for view in RING:
@@ -280,7 +280,7 @@ def test_a_box_is_carried_to_the_picture_it_was_cut_from() -> None:
     assert RING[1].box_in(narrow, corners) is None
 
 
-def test_what_does_not_fit_is_refused() -> None:
+def test_invalid_arguments_are_refused() -> None:
     lens = PanoramaLens(360, 180)
     with pytest.raises(PerceptionError, match="at least one view"):
         SurroundPipeline(lens, ())
@@ -289,7 +289,7 @@ def test_what_does_not_fit_is_refused() -> None:
         pipeline.process(np.zeros((90, 360, 3), np.uint8), 0.0)
     with pytest.raises(PerceptionError, match="uint8"):
         pipeline.process(np.zeros((180, 360, 3)), 0.0)
-    with pytest.raises(PerceptionError, match=r"one list of observations a view \(4\), got 1"):
+    with pytest.raises(PerceptionError, match=r"one list of observations per view \(4\), got 1"):
         merge_views(RING, [[]])
     with pytest.raises(PerceptionError, match="at least one heading"):
         ring_of_views(FLAT, [])
@@ -299,7 +299,7 @@ def test_what_does_not_fit_is_refused() -> None:
         PanoramaLens(3.5, 2)  # type: ignore[arg-type]
 
 
-def test_an_empty_panorama_shows_nobody_also_with_a_floor() -> None:
+def test_a_black_panorama_has_no_people() -> None:
     pipeline = SurroundPipeline(PanoramaLens(360, 180), RING)
     floor = FloorPlane(np.array([0.0, -1.0, 0.0]), 1.5)
     assert pipeline.process(np.zeros((180, 360, 3), np.uint8), 0.0, floor) == ()

@@ -1,8 +1,7 @@
-"""Head poses from a network on a crop about each head."""
+"""A head pose estimator that runs a network on a crop around each head."""
 
 from __future__ import annotations
 
-import os
 from typing import Final
 
 import numpy as np
@@ -12,56 +11,65 @@ from ..._head_pose import HeadPose
 from ..._keypoints import PersonKeypoints
 from ..._manifest import HEAD
 from ..._metric_scale import DEFAULT_MIN_SCORE
-from ..._pose_refinement import skew
+from ..._rotations import skew
 from ...anthropometry import HEAD_CENTRE_HEAD_M, HEAD_TEMPLATE_M
 from ...arrays import FloatArray, ImageRgb, finite_number
 from ...errors import PerceptionError
 from .._image import rgb_image
-from .._session import OnnxModel, OnnxSettings, as_onnx_model
+from .._image_input import run_on_images
+from .._model import ModelSource, OnnxModel, OnnxSettings, as_onnx_model
 from ._crops import HeadCrops
-from ._layouts import HeadOutputs, read_outputs, read_rows, recognise, where_it_is
-from ._place import locate_heads
+from ._layouts import recognise
+from ._locate import locate_heads
+from ._outputs import HeadOutputs, read_outputs, read_placement, read_rows
 
-# A crop of fewer pixels shows nothing of a head.
+# A smaller crop shows nothing of a head.
 _MIN_SIDE_PX: Final = 8.0
-# A crop as near as this to where the network would have it is not cut again.
-_CENTRED: Final = 0.03
-_SIZED: Final = 0.08
-# No network knows a direction or a distance better than this.
+# A crop is cut again if the network places the head's centre farther than this from the crop's
+# centre (in sides of the crop), or if its size is off by more than this factor (logarithm).
+_MAX_OFFSET: Final = 0.03
+_MAX_LOG_FACTOR: Final = 0.08
+# Smallest standard deviations of the direction and of the logarithm of the distance.
 _MIN_ROTATION_STD_RAD: Final = float(np.radians(0.5))
 _MIN_LOG_STD: Final = 0.01
+# A head whose direction is less certain than this gets no pose.
 _MAX_ROTATION_STD_RAD: Final = float(np.radians(100.0))
 _IDENTITY: Final = np.eye(3)
-_MOST_TURN: Final = _MAX_ROTATION_STD_RAD**2 * _IDENTITY
-# What a network without keypoints leaves open of the head's centre, and of its distance when the
-# body's scale alone says it.
+_MAX_ROTATION_COVARIANCE: Final = _MAX_ROTATION_STD_RAD**2 * _IDENTITY
+# For a network that gives a rotation only: standard deviation of the head's centre, and of the
+# logarithm of its distance, which then comes from the body's scale.
 _CENTRE_STD_M: Final = 0.04
 _BODY_LOG_STD: Final = 0.12
 _MAX_PASSES: Final = 5
 
 
 class OnnxHeadPoseEstimator:
-    """A network that sees a crop about each head: where it points and how far away it is.
+    """A network that gives direction and distance of each head, from a crop around it.
 
-    The head is found from the keypoints of whichever pose model runs (head, else shoulders); the
-    crops of all people of a frame form one batch where the graph allows. Own networks say where the
-    head's centre lies in the crop and how large the crop is, so a second pass cuts it better.
-    Networks of the 6DRepNet kind (224 × 224, a rotation matrix or six numbers) give a rotation
-    only; their pose carries a fixed covariance of 10° an axis, and the body's scale for distance.
+    The keypoints of the pose estimator (head, else shoulders) tell where the head is. The crops of
+    all people of a frame form one batch if the network's batch axis is free. A network of
+    awarenav's layout gives the head's centre in the crop and the size of the crop, so a second pass
+    cuts the crop better. A network of the 6DRepNet kind (224 × 224, a rotation matrix or six
+    numbers) gives a rotation only: its pose has a fixed standard deviation of 10° per axis, and the
+    distance comes from the body's scale.
 
     Args:
-        path: the ONNX file, its bytes or a loaded :class:`OnnxModel`; None for the shipped
-            network. A layout that is not known is refused.
-        settings: providers and threads for a model that is not loaded yet.
-        sha256: what its content must hash to.
-        passes: how often a crop is cut, 1 to 5; a crop that is centred already is not cut again.
-        min_score: keypoints scored below this are not used to find the head.
-        min_head: crops that hold a head with a probability below this give no pose.
+        path: the ONNX file, its bytes, or a loaded :class:`~perception.networks.OnnxModel`; None
+            for the shipped network.
+        settings: providers and threads, for a model that is not loaded yet.
+        sha256: expected SHA-256 of the file, for a model that is not loaded yet.
+        passes: largest number of times that a crop is cut, 1 to 5. A centred crop is not cut again.
+        min_score: keypoints with a lower score are not used to find the head.
+        min_head: crops with a lower probability of a head give no pose, in [0, 1].
+
+    Raises:
+        PerceptionError: for a file that cannot be loaded, an unknown layout (the message says what
+            was found and what is known), and an invalid value.
     """
 
     def __init__(
         self,
-        path: OnnxModel | str | os.PathLike[str] | bytes | None = None,
+        path: ModelSource | None = None,
         *,
         settings: OnnxSettings | None = None,
         sha256: str | None = None,
@@ -85,94 +93,97 @@ class OnnxHeadPoseEstimator:
     def estimate(
         self, image_rgb: ImageRgb, camera: Camera, people: tuple[PersonKeypoints, ...]
     ) -> tuple[HeadPose | None, ...]:
-        """Return one head pose a person, or None where no head is found or none is in the crop.
+        """Return one head pose per person; None where no head is found.
 
         Args:
             image_rgb: (H, W, 3) uint8.
-            camera: that took it.
+            camera: camera of the image.
             people: keypoints of each person.
 
         Raises:
-            PerceptionError: for a bad image, and when the network fails or returns no numbers.
+            PerceptionError: for an image of another type or shape, and when the network fails or
+                returns non-finite numbers.
         """
         image = rgb_image(image_rgb)
         found = locate_heads(people, self._min_score)
         rows = [
             row
             for row, place in enumerate(found)
-            if place is not None and self._worth_a_look(place, image.shape)
+            if place is not None and self._is_visible(place, image.shape)
         ]
         poses: list[HeadPose | None] = [None] * len(people)
         if not rows:
             return tuple(poses)
         places = [place for place in (found[row] for row in rows) if place is not None]
         size_px = self.layout.crop_side_m * np.array([place[1] for place in places])
-        answers, crops = self._look(
+        output_rows, crops = self._run_passes(
             image, HeadCrops.of_sizes(camera, np.array([place[0] for place in places]), size_px)
         )
-        outputs = read_outputs(self.layout, self.model, answers)
-        made = _poses(outputs, crops, self.layout.crop_side_m)
+        outputs = read_outputs(self.layout, self.model, output_rows)
+        found_poses = _poses(outputs, crops, self.layout.crop_side_m)
         for index, row in enumerate(rows):
             if outputs.head is None or outputs.head[index] >= self._min_head:
-                poses[row] = made[index]
+                poses[row] = found_poses[index]
         return tuple(poses)
 
-    def _worth_a_look(self, place: tuple[FloatArray, float], shape: tuple[int, ...]) -> bool:
+    def _is_visible(self, place: tuple[FloatArray, float], shape: tuple[int, ...]) -> bool:
+        """Return True for a head whose crop overlaps the image and is large enough."""
         side = self.layout.crop_side_m * place[1]
         reach = 0.5 * side
         u, v = place[0].tolist()
         inside = -reach < u < shape[1] + reach and -reach < v < shape[0] + reach
         return bool(inside and side >= _MIN_SIDE_PX)
 
-    def _look(self, image: ImageRgb, crops: HeadCrops) -> tuple[FloatArray, HeadCrops]:
-        """What the network said in the last pass, with the crops that it belongs to."""
-        answers = self._run(image, crops)
-        for _ in range(self._passes - 1 if self.layout.own else 0):
-            centre, side_m, head = where_it_is(answers)
+    def _run_passes(self, image: ImageRgb, crops: HeadCrops) -> tuple[FloatArray, HeadCrops]:
+        """Return the network's rows for the last crop of each head, and these crops."""
+        rows = self._run(image, crops)
+        for _ in range(self._passes - 1 if self.layout.is_awarenav else 0):
+            centre, side_m, head = read_placement(rows)
             larger = side_m / self.layout.crop_side_m
-            off = np.abs(centre - 0.5).max(axis=1) > _CENTRED
-            off |= np.abs(np.log(larger)) > _SIZED
+            off = np.abs(centre - 0.5).max(axis=1) > _MAX_OFFSET
+            off |= np.abs(np.log(larger)) > _MAX_LOG_FACTOR
             again = (off & (head >= 0.5 * self._min_head)).nonzero()[0]
             if not len(again):
                 break
-            # A wild answer must not end in a crop of the whole picture or of one pixel.
+            # The limits keep a wrong output from leading to a crop of the whole image or one pixel.
             factor = 1.0 / np.minimum(np.maximum(larger[again], 0.5), 2.0)
-            crops = crops.moved(again, centre[again], factor)
-            answers[again] = self._run(image, crops.only(again))
-        return answers, crops
+            crops = crops.recentred(again, centre[again], factor)
+            rows[again] = self._run(image, crops.subset(again))
+        return rows, crops
 
     def _run(self, image: ImageRgb, crops: HeadCrops) -> FloatArray:
+        """Return the network's row of outputs for each crop."""
         layout, size, count = self.layout, self.layout.size_px, len(crops.side_px)
-        blob = layout.pixels.blob(count, size, size)
+        blob = layout.pixels.empty_blob(count, size, size)
         for row in range(count):
             layout.pixels.write(crops.cut(image, row, size), blob[row])
-        blob = layout.pixels.fed(blob)
-        name, step = self.model.inputs[0].name, layout.batch or count
+        blob = layout.pixels.as_input(blob)
+        step = layout.batch or count
         parts = []
         for start in range(0, count, step):
             part = blob[start : start + step]
-            short = step - len(part)
-            if short:
-                part = np.concatenate([part, np.zeros((short, *part.shape[1:]), part.dtype)])
-            results = self.model.run({name: part})
-            parts.append([result[: step - short] for result in results])
+            missing = step - len(part)
+            if missing:
+                part = np.concatenate([part, np.zeros((missing, *part.shape[1:]), part.dtype)])
+            results = run_on_images(self.model, part)
+            parts.append([result[: step - missing] for result in results])
         arrays = [
             np.concatenate(rows) if len(rows) > 1 else rows[0] for rows in zip(*parts, strict=True)
         ]
         if any(len(array) != count for array in arrays):
             raise PerceptionError(
-                f"{self.model.name} must return one result a crop ({count}), got "
+                f"{self.model.name} must return one result per crop ({count}), got "
                 f"{[len(array) for array in arrays]}"
             )
         return read_rows(layout, self.model, arrays)
 
 
 def _poses(outputs: HeadOutputs, crops: HeadCrops, crop_side_m: float) -> list[HeadPose | None]:
-    """Head poses in the camera frame from what the network said of each crop.
+    """Return head poses in the camera frame from the network's outputs for each crop.
 
-    The crop's side in metres and in radians, as seen along its ray, gives the distance of the
-    head's centre C; the nose is C less the rotated arm from nose to C, whose turning couples the
-    two halves of the covariance.
+    The crop's side in metres and as an angle along its ray gives the distance of the head's centre
+    C. The nose lies at C minus the rotated arm from nose to C, so an error of the rotation also
+    moves the nose: the covariance couples both.
     """
     axes, side_px = crops.axes, crops.side_px
     count = len(side_px)
@@ -196,7 +207,7 @@ def _poses(outputs: HeadOutputs, crops: HeadCrops, crop_side_m: float) -> list[H
     centre = (axes @ along_ray[:, :, None])[:, :, 0]
     arm = rotation @ HEAD_CENTRE_HEAD_M
     nose = centre - arm
-    # Turning moves rotation and nose together; distance and place in the crop move the nose alone.
+    # A rotation error changes rotation and nose; errors of distance and centre change the nose.
     moves = np.empty((count, 6, 3))
     moves[:, :3] = axes
     moves[:, 3:] = skew(arm) @ axes
@@ -222,20 +233,22 @@ def _poses(outputs: HeadOutputs, crops: HeadCrops, crop_side_m: float) -> list[H
     ]
 
 
-def _is_usable(turn: FloatArray) -> bool:
-    """Whether a covariance (3, 3) is one and no standard deviation exceeds what makes sense."""
-    return _is_positive(turn.tolist()) and _is_positive((_MOST_TURN - turn).tolist())
+def _is_usable(covariance: FloatArray) -> bool:
+    """Return True for a positive definite (3, 3) covariance of at most 100° in any direction."""
+    return _is_positive_definite(covariance.tolist()) and _is_positive_definite(
+        (_MAX_ROTATION_COVARIANCE - covariance).tolist()
+    )
 
 
-def _is_positive(matrix: list[list[float]]) -> bool:
-    """Whether a symmetric (3, 3) matrix is positive definite, by Sylvester's criterion."""
+def _is_positive_definite(matrix: list[list[float]]) -> bool:
+    """Return True for a positive definite symmetric (3, 3) matrix, by Sylvester's criterion."""
     (a, b, c), (_, e, f), (_, _, i) = matrix
     minor = a * e - b * b
     return a > 0.0 and minor > 0.0 and i * minor - a * f * f + c * (2.0 * b * f - c * e) > 0.0
 
 
 def _face_seen(outputs: HeadOutputs, row: int) -> float | None:
-    """Probability that there is a head and at least two of nose and eyes are visible."""
+    """Return the probability of a head of which at least two of nose and eyes are visible."""
     if outputs.visible is None or outputs.head is None:
         return None
     a, b, c = outputs.visible[row, :3].tolist()
@@ -246,9 +259,9 @@ def _face_seen(outputs: HeadOutputs, row: int) -> float | None:
 def _reprojection(
     outputs: HeadOutputs, crops: HeadCrops, rotation: FloatArray, nose: FloatArray
 ) -> FloatArray:
-    """(N,) root mean square distance of the visible keypoints from the template's.
+    """Return (N,) root mean square distances between visible and template keypoints.
 
-    In pixels of the camera turned to each head, as which the crop shows it.
+    They are in pixels of the camera turned towards each head, as in the crop.
     """
     count = len(nose)
     if outputs.keypoints is None or outputs.visible is None:
@@ -257,7 +270,7 @@ def _reprojection(
     turned = points @ crops.axes
     depth = turned[:, :, 2:]
     seen = outputs.visible >= 0.5
-    # A template point behind the camera has no image, and no error.
+    # A template point behind the camera has no image, so it does not count.
     seen &= depth[:, :, 0] > 0.0
     expected = crops.focal_px * turned[:, :, :2] / np.where(depth > 0.0, depth, 1.0)
     found = (outputs.keypoints - 0.5) * crops.side_px[:, None, None]

@@ -1,7 +1,8 @@
-"""Looking along a ray: the camera turned towards a head, so that no wide lens stretches it.
+"""Views along a ray: a virtual camera turned towards a head, which undoes a wide lens's stretch.
 
-A wide lens draws whatever stands at its side long: by 1 / cos² of the angle off the axis outwards
-and 1 / cos across. A crop that undoes this looks as if the camera had been turned to the head.
+A wide lens stretches what lies off its axis: by 1 / cos² of the angle to the axis in the radial
+direction, and by 1 / cos across it. A crop that undoes this looks as if the camera had been turned
+towards the head.
 """
 
 from __future__ import annotations
@@ -15,19 +16,20 @@ from ...arrays import FloatArray
 
 _HALF_TURN: Final = np.array([-1.0, -1.0, 1.0])
 _TURNED: Final = np.diag(_HALF_TURN)
-# Half the distance over which a distorted lens is differentiated, as a tangent: about a head's.
+# Step of the central difference for lenses with distortion, as a tangent: about half a head.
 _STEP: Final = 0.03
 
 
 def ray_axes(rays: FloatArray) -> FloatArray:
-    """Rotations (N, 3, 3) from ray axes to the camera for rays (N, 2) given as x/z and y/z.
+    """Return rotations (N, 3, 3) from ray axes to camera axes, for rays (N, 2) as x/z and y/z.
 
-    The smallest rotation that takes the camera's z axis onto the ray: its third column is the ray.
+    Each is the smallest rotation that turns the camera's z axis onto the ray; its third column is
+    the unit vector along the ray.
     """
     unit = np.ones((len(rays), 3))
     unit[:, :2] = rays
     unit /= np.sqrt((unit * unit).sum(axis=1))[:, None]
-    # A half turn about z, which leaves z where it is, then one about the bisector of z and ray.
+    # A half turn about z, which does not move z, then a half turn about the bisector of z and ray.
     unit[:, 2] += 1.0
     bisector = unit[:, :, None]
     return np.asarray(
@@ -36,41 +38,41 @@ def ray_axes(rays: FloatArray) -> FloatArray:
 
 
 def ray_stretch(axes: FloatArray) -> FloatArray:
-    """How the image plane z = 1 stretches the plane across each ray: (N, 2, 2).
+    """Return how a pinhole image stretches the plane across each ray.
 
     Args:
         axes: (N, 3, 3) from :func:`ray_axes`.
 
     Returns:
-        The derivative of x/z and y/z by the tangents along the first two ray axes, at the ray; the
-        unit matrix on the optical axis.
+        (N, 2, 2) derivatives of x/z and y/z with respect to the tangents along the first two ray
+        axes, at the ray; the identity on the optical axis.
     """
     ray = axes[:, :, 2]
     across = axes[:, :2, :2] - (ray[:, :2] / ray[:, 2:])[:, :, None] * axes[:, 2:, :2]
     return np.asarray(across / ray[:, 2:, None])
 
 
-def focal_px(camera: Camera) -> float:
-    """The focal length of the cameras that look along rays: the geometric mean of the lens's."""
+def ray_focal_px(camera: Camera) -> float:
+    """Return the focal length of views along a ray: the geometric mean of fx and fy."""
     return float(np.sqrt(camera.fx_px * camera.fy_px))
 
 
 def looking_at(camera: Camera, centre_px: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Turn the camera towards some pixels.
+    """Turn a virtual camera towards each of N pixels.
 
     Args:
         camera: with or without distortion.
         centre_px: (N, 2).
 
     Returns:
-        Ray axes (N, 3, 3), and the matrices (N, 2, 2) that take pixels of the turned camera, whose
-        focal length is :func:`focal_px`, to pixels of the image: exact at the centre, to first
-        order around it.
+        Ray axes (N, 3, 3), and matrices (N, 2, 2) from pixels of the turned camera to pixels of
+        the image, relative to the centre: exact at the centre, first order around it. The focal
+        length of the turned camera is :func:`ray_focal_px`.
     """
     rays = camera.normalise(centre_px)
     axes = ray_axes(rays)
     stretch = ray_stretch(axes)
-    f = focal_px(camera)
+    f = ray_focal_px(camera)
     if camera.distortion is None:
         return axes, stretch * (np.array([[camera.fx_px], [camera.fy_px]]) / f)
     steps = _STEP * stretch.swapaxes(1, 2)

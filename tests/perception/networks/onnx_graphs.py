@@ -1,7 +1,7 @@
-"""Small ONNX graphs in the layouts of detectors and pose networks, with answers known beforehand.
+"""Small ONNX graphs in the layouts of detectors and pose networks, with known results.
 
-Some give fixed rows. Others look at the picture: a detector that scores each cell by how much of
-one colour lies in it, and a pose network whose keypoints all sit on the reddest point.
+Some return fixed rows. Others depend on the image: the score of a detector's cell is the mean of
+one colour in it, and all keypoints of a pose network lie at the reddest point.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Graph:
         return output
 
     def zero(self) -> str:
-        """A number that is 0 for every finite picture and yet depends on it."""
+        """Return a number that depends on the image, and is 0 for every finite image."""
         mean = self.node("ReduceMean", self.pixels, axes=[1, 2, 3], keepdims=0)
         bounded = self.node("Clip", mean, self.constant(-1.0), self.constant(1.0))
         return self.node("Mul", bounded, self.constant([0.0]))
@@ -88,7 +88,7 @@ def fixed(
     dtype: str = "float32",
     declared: dict[str, Sequence[int | str | None]] | None = None,
 ) -> bytes:
-    """A network that gives these outputs whatever it sees; NaN in a picture reaches them too."""
+    """Return a network with fixed outputs; a NaN in the image makes them NaN."""
     graph = Graph("images", (batch, 3, *size), dtype=dtype)
     zero = graph.zero()
     for name, value in outputs.items():
@@ -107,7 +107,7 @@ def cell_count(height: int, width: int) -> int:
 
 
 def cell_centres(height: int, width: int) -> tuple[np.ndarray, np.ndarray]:
-    """(N, 2) centres in pixels of the input and (N,) strides."""
+    """Return centres (N, 2) in pixels of the input, and strides (N,)."""
     centres, strides = [], []
     for stride in STRIDES:
         for row in range(height // stride):
@@ -118,7 +118,7 @@ def cell_centres(height: int, width: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def colour_scores(graph: Graph, channel: int, gain: float, offset: float) -> str:
-    """(1, 1, N): the mean of one channel over each cell, times gain, plus offset."""
+    """Return (1, 1, N) means of one channel over each cell, times gain, plus offset."""
     parts = []
     for stride in STRIDES:
         weight = np.zeros((1, 3, stride, stride))
@@ -136,7 +136,7 @@ def colour_scores(graph: Graph, channel: int, gain: float, offset: float) -> str
 
 
 def colour_yolov8(height: int, width: int, *, dtype: str = "float32") -> bytes:
-    """YOLOv8 of one class that sees red: every cell's box is the cell, its score the redness."""
+    """Return a YOLOv8 of one class; the boxes are the cells, the scores their mean red."""
     graph = Graph("images", (1, 3, height, width), dtype=dtype)
     centres, strides = cell_centres(height, width)
     boxes = np.concatenate([centres, np.repeat(strides[:, None], 2, axis=1)], axis=1).T
@@ -148,10 +148,13 @@ def colour_yolov8(height: int, width: int, *, dtype: str = "float32") -> bytes:
 
 
 def colour_yolox(height: int, width: int) -> bytes:
-    """YOLOX of one class that sees red, in the blue-green-red order of 0–255."""
+    """Return a YOLOX of one class; the boxes are the cells, the scores their mean red.
+
+    Its input is in the order blue, green, red, in 0–255.
+    """
     graph = Graph("images", (1, 3, height, width))
     count = cell_count(height, width)
-    # Offsets of half a cell and log sizes of 0: the cell itself.
+    # With offsets of half a cell and log sizes of 0, the box is the cell.
     boxes = np.tile([[0.5], [0.5], [0.0], [0.0]], (1, count))
     scores = colour_scores(graph, 2, 1 / 255.0, 0.0)
     ones = graph.constant(np.ones((1, 1, count)))
@@ -161,12 +164,15 @@ def colour_yolox(height: int, width: int) -> bytes:
 
 
 def colour_rtmdet(height: int, width: int) -> bytes:
-    """RTMDet of any input size that sees red; ``dets`` belong to an input of height × width."""
+    """Return an RTMDet of free input size; the scores are the mean red of each cell.
+
+    ``dets`` are the cells of an input of height × width.
+    """
     graph = Graph("input", ("batch", 3, "height", "width"))
     centres, strides = cell_centres(height, width)
     half = 0.5 * strides[:, None]
     boxes = np.concatenate([centres - half, centres + half], axis=1).T
-    # Standardised red back to 0–1.
+    # From standardised red back to 0–1.
     scores = colour_scores(graph, 2, STD_RGB[0] / 255.0, MEAN_RGB[0] / 255.0)
     columns = graph.node("Concat", graph.constant(boxes[None]), scores, axis=1)
     rows = graph.node("Transpose", columns, perm=[0, 2, 1])
@@ -192,7 +198,7 @@ def simcc(
     dtype: str = "float32",
     metadata: dict[str, str] | None = None,
 ) -> bytes:
-    """A pose network that gives Gaussians at ``places`` (K,) in bins with ``heights`` (K,)."""
+    """Return a pose network with Gaussians at ``places`` (K,) in bins with ``heights`` (K,)."""
     graph = Graph("input", (batch, 3, *size), dtype=dtype)
     mean = graph.node("ReduceMean", graph.pixels, axes=[1, 2, 3], keepdims=1)
     zero = graph.node("Mul", mean, graph.constant([0.0]))
@@ -208,9 +214,9 @@ def simcc(
 def red_point_pose(
     height: int, width: int, *, batch: int | str = "batch", order: str = "xy", named: bool = True
 ) -> bytes:
-    """A pose network of 17 keypoints that all sit on the reddest column and row of the picture.
+    """Return a pose network whose 17 keypoints lie at the reddest column and row of the image.
 
-    Bins are two to a pixel; the odd ones hold the mean of their neighbours.
+    It has two bins per pixel; the odd bins are the mean of their neighbours.
     """
     graph = Graph("input", (batch, 3, height, width))
     red = graph.node("Slice", graph.pixels, *(graph.constant([v], np.int64) for v in (0, 1, 1)))

@@ -1,4 +1,4 @@
-"""Every detector layout against graphs whose answers are known in closed form."""
+"""Person detectors: each layout with graphs whose results are known in closed form."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from onnx_graphs import cell_centres, cell_count, colour_rtmdet, colour_yolov8, 
 
 from perception import PerceptionError, PersonDetector
 from perception.networks import OnnxModel, OnnxPersonDetector
-from perception.networks._letterbox import LetterboxGeometry
+from perception.networks.detectors import LetterboxGeometry
 
 HEIGHT, WIDTH = 256, 320
 CELLS = cell_count(HEIGHT, WIDTH)
 ONE_CLASS = {"names": "{0: 'person'}", "task": "detect"}
 SIZES = [(480, 640), (333, 500), (1080, 1920), (601, 77), (1, 1)]
-# Boxes in a picture, as fractions of its sides, and their scores; the last reaches over its edge.
+# Boxes as fractions of the image's sides, and their scores; the last box crosses the border.
 PEOPLE = np.array([[0.1, 0.2, 0.3, 0.9], [0.5, 0.1, 0.8, 0.6], [0.85, 0.5, 1.2, 1.1]])
 SCORES = np.array([0.9, 0.6, 0.3])
 
@@ -73,7 +73,7 @@ LAYOUTS: dict[str, tuple[Layout, bool]] = {
 
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("name", LAYOUTS)
-def test_boxes_return_to_a_picture_of_any_size(name: str, size: tuple[int, int]) -> None:
+def test_boxes_are_mapped_to_images_of_any_size(name: str, size: tuple[int, int]) -> None:
     make, centred = LAYOUTS[name]
     height, width = size
     geometry = LetterboxGeometry.of((width, height), (WIDTH, HEIGHT), centred=centred)
@@ -91,13 +91,13 @@ def test_boxes_return_to_a_picture_of_any_size(name: str, size: tuple[int, int])
 
 
 @pytest.mark.parametrize("name", LAYOUTS)
-def test_nobody_is_an_empty_result(name: str) -> None:
-    nobody = OnnxPersonDetector(LAYOUTS[name][0](np.zeros((0, 4)), np.zeros(0)))
-    assert nobody.detect(np.zeros((480, 640, 3), np.uint8)) == ()
+def test_no_boxes_give_an_empty_result(name: str) -> None:
+    detector = OnnxPersonDetector(LAYOUTS[name][0](np.zeros((0, 4)), np.zeros(0)))
+    assert detector.detect(np.zeros((480, 640, 3), np.uint8)) == ()
 
 
 @pytest.mark.parametrize("name", LAYOUTS)
-def test_what_is_not_finite_or_has_no_extent_is_dropped(name: str) -> None:
+def test_boxes_and_scores_that_are_not_finite_are_dropped(name: str) -> None:
     make, centred = LAYOUTS[name]
     geometry = LetterboxGeometry.of((640, 480), (WIDTH, HEIGHT), centred=centred)
     good = geometry.to_input(np.array([[10.0, 20.0, 110.0, 220.0]]))[0]
@@ -122,12 +122,12 @@ def test_what_is_not_finite_or_has_no_extent_is_dropped(name: str) -> None:
         (colour_rtmdet(320, 320), None),
     ],
 )
-@pytest.mark.parametrize("picture", [(512, 640), (300, 500)])
-def test_networks_see_the_picture_in_their_own_colours(
-    make: bytes, size: tuple[int, int] | None, picture: tuple[int, int]
+@pytest.mark.parametrize("image_size", [(512, 640), (300, 500)])
+def test_networks_get_the_channels_in_their_own_order(
+    make: bytes, size: tuple[int, int] | None, image_size: tuple[int, int]
 ) -> None:
-    """Only the red patch counts: not the green one, not the blue one, not the padding."""
-    image = np.zeros((*picture, 3), np.uint8)
+    """Only the red patch is found: not the green one, the blue one or the padding."""
+    image = np.zeros((*image_size, 3), np.uint8)
     image[:, :, 1] = 40
     image[50:150, 100:200] = (0, 255, 0)
     image[50:150, 300:400] = (0, 0, 255)
@@ -142,11 +142,11 @@ def test_networks_see_the_picture_in_their_own_colours(
     assert (high - low > 70.0).all()
 
 
-def test_only_people_are_kept() -> None:
+def test_only_the_person_class_is_returned() -> None:
     boxes = np.array([[10.0, 20.0, 60.0, 200.0]])
     image = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
     assert len(OnnxPersonDetector(yolov8(boxes, np.array([0.9]), 5, 3)).detect(image)) == 1
-    # Another class at the same place neither hides the person nor counts.
+    # Another class at the same place neither suppresses the person nor counts.
     rows = np.zeros((1, 6, CELLS))
     rows[0, :4, 0] = (35, 110, 50, 180)
     rows[0, 4:, 0] = (0.9, 0.4)
@@ -167,8 +167,8 @@ def test_only_people_are_kept() -> None:
     np.testing.assert_allclose(person.box_xyxy_px, [100, 20, 160, 200])
 
 
-def test_the_better_of_two_overlapping_boxes_stays_and_the_surest_comes_first() -> None:
-    # A box 60 wide shifted by 6 and by 30: IoU 0.82, 0.43 between the shifted, and 0.33.
+def test_overlapping_boxes_are_suppressed_and_the_highest_score_comes_first() -> None:
+    # A box 60 px wide, shifted by 6 and by 30 px: IoU 0.82, 0.33, and 0.43 between the shifted.
     boxes = np.array([[100.0, 20.0, 160.0, 200.0]]) + np.array([[0], [6], [30]]) * (1, 0, 1, 0)
     graph = yolov8(boxes, np.array([0.7, 0.9, 0.5]))
     image = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
@@ -181,7 +181,7 @@ def test_the_better_of_two_overlapping_boxes_stays_and_the_surest_comes_first() 
     assert [round(p.score, 3) for p in picky.detect(image)] == [0.9, 0.7]
 
 
-def test_a_network_gone_wild_is_bounded_and_breaks_nothing() -> None:
+def test_random_outputs_give_a_bounded_number_of_valid_boxes() -> None:
     rng = np.random.default_rng(0)
     rows = rng.normal(0.0, 1e3, (1, 5, CELLS))
     people = OnnxPersonDetector(fixed({"output0": rows}, (HEIGHT, WIDTH)), score_threshold=0.0)
@@ -190,12 +190,12 @@ def test_a_network_gone_wild_is_bounded_and_breaks_nothing() -> None:
     boxes = np.array([person.box_xyxy_px for person in found])
     assert (boxes >= 0.0).all()
     assert (boxes <= (640, 480, 640, 480)).all()
-    nothing = np.full((1, 5, CELLS), np.nan)
-    blind = OnnxPersonDetector(fixed({"output0": nothing}, (HEIGHT, WIDTH)))
-    assert blind.detect(np.zeros((480, 640, 3), np.uint8)) == ()
+    only_nan = np.full((1, 5, CELLS), np.nan)
+    detector = OnnxPersonDetector(fixed({"output0": only_nan}, (HEIGHT, WIDTH)))
+    assert detector.detect(np.zeros((480, 640, 3), np.uint8)) == ()
 
 
-def test_threads_may_share_a_detector() -> None:
+def test_several_threads_may_share_a_detector() -> None:
     detector = OnnxPersonDetector(colour_yolov8(HEIGHT, WIDTH), score_threshold=0.999)
     images = []
     for left in (0, 300):
@@ -235,7 +235,7 @@ def test_threads_may_share_a_detector() -> None:
         ({"input_size_hw_px": (0, 320)}, "two whole numbers"),
     ],
 )
-def test_settings_are_checked(options: dict[str, object], words: str) -> None:
+def test_invalid_arguments_are_refused(options: dict[str, object], words: str) -> None:
     model = OnnxModel(colour_yolov8(HEIGHT, WIDTH))
     with pytest.raises(PerceptionError, match=words):
         OnnxPersonDetector(model, **options)  # type: ignore[arg-type]
@@ -245,7 +245,7 @@ def test_settings_are_checked(options: dict[str, object], words: str) -> None:
     "image",
     [np.zeros((9, 9), np.uint8), np.zeros((9, 9, 3)), np.zeros((0, 0, 3), np.uint8), None],
 )
-def test_what_is_no_picture_is_refused(image: np.ndarray) -> None:
+def test_anything_but_an_rgb_image_is_refused(image: np.ndarray) -> None:
     detector = OnnxPersonDetector(colour_yolov8(HEIGHT, WIDTH))
     with pytest.raises(PerceptionError, match="image_rgb must"):
         detector.detect(image)

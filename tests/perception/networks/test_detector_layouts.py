@@ -1,4 +1,4 @@
-"""Layouts are told apart, and what is unknown or could be two things is refused."""
+"""Layouts of detectors: known ones are recognised, unknown and ambiguous ones are refused."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from onnx_graphs import cell_centres, cell_count, fixed, red_point_pose
 
 from perception import PerceptionError
 from perception.networks import OnnxPersonDetector
-from perception.networks._box_format import BoxFormatVote
+from perception.networks.detectors import BoxFormatVote
 
 SIZE = (256, 320)
 CELLS = cell_count(*SIZE)
-PICTURE = np.zeros((*SIZE, 3), np.uint8)
+IMAGE = np.zeros((*SIZE, 3), np.uint8)
 
 
 def layout(shape: tuple[int, ...], names: str | None = None, **metadata: str) -> str:
@@ -37,12 +37,14 @@ def layout(shape: tuple[int, ...], names: str | None = None, **metadata: str) ->
         ((1, CELLS, 6), "['person']", "YOLOX raw"),
     ],
 )
-def test_shapes_tell_the_layout(shape: tuple[int, ...], names: str | None, wanted: str) -> None:
+def test_the_layout_is_recognised_from_shapes(
+    shape: tuple[int, ...], names: str | None, wanted: str
+) -> None:
     assert layout(shape, names) == wanted
 
 
 @pytest.mark.parametrize("end2end", ["True", "False"])
-def test_what_metadata_say_of_end2end_does_not_matter(end2end: str) -> None:
+def test_the_metadata_end2end_do_not_affect_the_layout(end2end: str) -> None:
     assert layout((1, 300, 6), end2end=end2end) == "rows (NMS inside)"
     assert layout((1, 84, CELLS), end2end=end2end) == "YOLOv8"
 
@@ -54,12 +56,12 @@ def test_what_metadata_say_of_end2end_does_not_matter(end2end: str) -> None:
         ((1, CELLS, 5), None, "looks like YOLOv8 with its axes swapped"),
         ((1, CELLS, 6), "['person', 'dog']", "looks like YOLOv8 with its axes swapped"),
         ((1, 84, CELLS), "['person', 'dog']", "do not agree with the classes"),
-        ((1, 3 * CELLS, 85), None, "three places a cell, as YOLOv5"),
+        ((1, 3 * CELLS, 85), None, "three outputs per cell, as YOLOv5"),
         ((1, 84, 8400), None, rf"an input of this size has {CELLS} cells"),
         ((1, 300, 84), None, "cells"),
         ((1, 17, 64, 48), None, "no known detector has such outputs"),
-        ((2, 84, CELLS), None, "one batch for one picture"),
-        ((300, 6), None, "one batch for one picture"),
+        ((2, 84, CELLS), None, "batch size 1 for one image"),
+        ((300, 6), None, "batch size 1 for one image"),
     ],
 )
 def test_other_shapes_are_refused_with_what_was_found_and_what_is_known(
@@ -71,11 +73,11 @@ def test_other_shapes_are_refused_with_what_was_found_and_what_is_known(
     assert "Known: YOLOv8/11" in str(refused.value)
 
 
-def test_other_tasks_and_more_outputs_are_refused() -> None:
+def test_other_tasks_and_other_numbers_of_outputs_are_refused() -> None:
     with pytest.raises(PerceptionError, match="its task is 'pose'"):
         layout((1, 56, CELLS), task="pose")
     two = {"a": np.zeros((1, 84, CELLS)), "b": np.zeros((1, 32, 64, 80))}
-    with pytest.raises(PerceptionError, match="two outputs are known of RTMDet only"):
+    with pytest.raises(PerceptionError, match="only RTMDet has two outputs"):
         OnnxPersonDetector(fixed(two, SIZE))
     three = {name: np.zeros((1, 4, 4)) for name in "abc"}
     with pytest.raises(PerceptionError, match="no known detector"):
@@ -100,9 +102,7 @@ def test_yolox_with_boxes_decoded_in_the_network_is_refused() -> None:
         ("{}", 0),
     ],
 )
-def test_the_person_is_the_class_of_that_name_or_else_the_first(
-    names: str, found: int | None
-) -> None:
+def test_the_person_class_is_found_by_name_or_is_the_first(names: str, found: int | None) -> None:
     rows = np.zeros((1, 6, CELLS))
     rows[0, :4, :2] = np.array([(50, 50, 40, 80), (200, 50, 40, 80)]).T
     rows[0, 4, 0] = rows[0, 5, 1] = 0.9
@@ -114,7 +114,7 @@ def test_the_person_is_the_class_of_that_name_or_else_the_first(
         detector = OnnxPersonDetector(graph, person_class=1)
     else:
         detector = OnnxPersonDetector(graph)
-    (person,) = detector.detect(PICTURE)
+    (person,) = detector.detect(IMAGE)
     assert person.box_xyxy_px[0] == pytest.approx((30, 180)[found])
 
 
@@ -123,20 +123,20 @@ def test_a_free_input_size_comes_from_metadata_or_the_caller() -> None:
     free = {"out": (1, 84, "cells")}
     described = fixed({"out": rows}, ("h", "w"), metadata={"imgsz": "[256, 320]"}, declared=free)
     assert OnnxPersonDetector(described).input_size_hw_px == SIZE
-    silent = fixed({"out": rows}, ("h", "w"), declared=free)
+    undescribed = fixed({"out": rows}, ("h", "w"), declared=free)
     with pytest.raises(PerceptionError, match=r"give it with input_size_hw_px=\(height, width\)"):
-        OnnxPersonDetector(silent)
-    assert OnnxPersonDetector(silent, input_size_hw_px=SIZE).layout == "YOLOv8"
+        OnnxPersonDetector(undescribed)
+    assert OnnxPersonDetector(undescribed, input_size_hw_px=SIZE).layout == "YOLOv8"
     square = fixed({"out": np.zeros((1, 84, 8400))}, ("h", "w"), metadata={"imgsz": "640"})
     assert OnnxPersonDetector(square).input_size_hw_px == (640, 640)
 
 
-def test_inputs_that_are_no_single_picture_are_refused() -> None:
-    with pytest.raises(PerceptionError, match="takes 4 pictures at a time"):
+def test_networks_with_a_fixed_batch_of_several_images_are_refused() -> None:
+    with pytest.raises(PerceptionError, match="takes 4 images at a time"):
         OnnxPersonDetector(red_point_pose(32, 32, batch=4))
 
 
-# --- corners or centre and size ---
+# --- box format: corners, or centre and size ----------------------------------------------------
 
 BOXES = np.array([[150.0, 40.0, 190.0, 160.0], [20.0, 60.0, 70.0, 250.0]])
 
@@ -148,29 +148,29 @@ def as_centres(boxes: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("corners", [True, False])
-def test_the_boxes_tell_their_own_format(corners: bool) -> None:
+def test_the_box_format_is_recognised_from_the_boxes(corners: bool) -> None:
     rows = np.zeros((1, 300, 6))
     rows[0, :2, :4] = BOXES if corners else as_centres(BOXES)
     rows[0, :2, 4] = (0.9, 0.8)
     detector = OnnxPersonDetector(fixed({"out": rows}, SIZE, metadata={"end2end": "True"}))
-    people = detector.detect(PICTURE)
+    people = detector.detect(IMAGE)
     np.testing.assert_allclose([p.box_xyxy_px for p in people], BOXES)
 
 
-def test_an_undecided_picture_is_read_as_those_before_it() -> None:
-    # Left and large: read either way it is a box within the input.
-    undecided = np.array([[80.0, 100.0, 120.0, 180.0]])
+def test_an_ambiguous_image_is_read_like_the_images_before_it() -> None:
+    # In both formats this is a box within the input.
+    ambiguous = np.array([[80.0, 100.0, 120.0, 180.0]])
     vote = BoxFormatVote()
-    vote.listen(undecided, np.array([0.9]), (320, 256))
-    assert vote.format == "xyxy"  # as exporters have it
-    vote.listen(as_centres(BOXES), np.array([0.9, 0.9]), (320, 256))
-    vote.listen(undecided, np.array([0.9]), (320, 256))
+    vote.update(ambiguous, np.array([0.9]), (320, 256))
+    assert vote.format == "xyxy"  # the default
+    vote.update(as_centres(BOXES), np.array([0.9, 0.9]), (320, 256))
+    vote.update(ambiguous, np.array([0.9]), (320, 256))
     assert vote.format == "cxcywh"
 
 
-def test_the_caller_may_know_the_format() -> None:
+def test_a_format_given_by_the_caller_is_kept() -> None:
     vote = BoxFormatVote("cxcywh")
-    vote.listen(BOXES, np.array([0.9, 0.9]), (320, 256))
+    vote.update(BOXES, np.array([0.9, 0.9]), (320, 256))
     assert vote.format == "cxcywh"
     with pytest.raises(PerceptionError, match="one of 'xyxy', 'cxcywh' or None, got 'xywh'"):
         BoxFormatVote("xywh")
@@ -178,10 +178,10 @@ def test_the_caller_may_know_the_format() -> None:
 
 @given(st.data())
 def test_four_people_anywhere_decide_the_format(data: st.DataObject) -> None:
-    """Property: people spread over a picture never look like the other format."""
+    """People spread over an image never fit the other format better."""
     width, height = 320, 256
     boxes = []
-    for column in range(4):  # one in each quarter
+    for column in range(4):  # one person per quarter of the width
         left = column * 80 + data.draw(st.floats(0, 20))
         top = data.draw(st.floats(0, 120))
         boxes.append(
@@ -195,6 +195,6 @@ def test_four_people_anywhere_decide_the_format(data: st.DataObject) -> None:
     corners = np.array(boxes)
     for given_boxes, wanted in ((corners, "xyxy"), (as_centres(corners), "cxcywh")):
         vote = BoxFormatVote()
-        vote.listen(given_boxes, np.full(4, 0.7), (width, height))
+        vote.update(given_boxes, np.full(4, 0.7), (width, height))
         assert vote.format == wanted
         np.testing.assert_allclose(vote.corners(given_boxes), corners, atol=1e-9)

@@ -1,4 +1,4 @@
-"""Third-party networks on photographs; skipped where their files are not beside the project."""
+"""Third-party networks on photographs; skipped if the files are not beside the checkout."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ LAYOUTS = {
 @dataclass(frozen=True)
 class Photograph:
     image_rgb: np.ndarray
-    boxes: np.ndarray  # (N, 4) everyone
-    clear: np.ndarray  # (N,) taller than 80 px and less than half hidden
+    boxes: np.ndarray  # (N, 4) boxes of all people
+    clear: np.ndarray  # (N,) True for people taller than 80 px and less than half hidden
 
 
 def model(name: str) -> Path:
@@ -44,7 +44,7 @@ def model(name: str) -> Path:
 @pytest.fixture(scope="module")
 def photographs() -> list[Photograph]:
     if not TRUTH.is_file():
-        pytest.skip(f"needs {TRUTH.name} and its pictures in the folder of genuine images")
+        pytest.skip(f"needs {TRUTH.name} and its images in the folder of genuine images")
     truth = json.loads(TRUTH.read_text(encoding="utf-8"))
     found = []
     for entry in truth["images"]:
@@ -54,7 +54,7 @@ def photographs() -> list[Photograph]:
         people = [p for p in truth["annotations"] if p["image_id"] == entry["id"]]
         boxes = np.array([p["bbox"] for p in people], float)
         boxes[:, 2:] += boxes[:, :2]
-        # COCO marks a keypoint 2 where it shows; half of those of a body must.
+        # COCO marks a visible keypoint with 2; half of the keypoints must be visible.
         shown = [np.mean(np.array(p["keypoints"])[2::3] == 2) for p in people]
         clear = (boxes[:, 3] - boxes[:, 1] > 80.0) & (np.array(shown) > 0.5)
         clear &= np.array([not p["iscrowd"] for p in people])
@@ -65,7 +65,7 @@ def photographs() -> list[Photograph]:
 
 
 def ious(people: tuple[PersonDetection, ...], boxes: np.ndarray) -> np.ndarray:
-    """(people, boxes) intersection over union."""
+    """Return the intersection over union (people, boxes)."""
     mine = np.array([p.box_xyxy_px for p in people]).reshape(-1, 1, 4)
     low, high = np.maximum(mine[..., :2], boxes[:, :2]), np.minimum(mine[..., 2:], boxes[:, 2:])
     shared = np.prod(np.clip(high - low, 0.0, None), axis=2)
@@ -74,20 +74,20 @@ def ious(people: tuple[PersonDetection, ...], boxes: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", LAYOUTS)
-def test_every_file_loads_and_its_layout_is_told(name: str) -> None:
+def test_each_file_loads_and_its_layout_is_recognised(name: str) -> None:
     detector = OnnxPersonDetector(model(name))
     assert (detector.layout, detector.input_size_hw_px) == LAYOUTS[name]
     grey = np.full((480, 640, 3), 128, np.uint8)
     assert all(p.score < 0.5 for p in detector.detect(grey))
 
 
-def test_no_file_is_left_out() -> None:
+def test_all_files_in_the_folder_are_tested() -> None:
     if not MODELS.is_dir():
         pytest.skip("needs the folder of genuine models")
     assert {path.stem for path in MODELS.glob("*.onnx")} == set(LAYOUTS)
 
 
-def test_rtmdet_and_yolov8_together_find_everyone_who_is_clear(
+def test_rtmdet_and_yolov8_together_find_all_clear_people(
     photographs: list[Photograph],
 ) -> None:
     detectors = [
@@ -109,8 +109,8 @@ def test_rtmdet_and_yolov8_together_find_everyone_who_is_clear(
 
 
 @pytest.mark.parametrize("name", list(LAYOUTS)[:3])
-def test_nobody_is_seen_twice(name: str, photographs: list[Photograph]) -> None:
-    """No two boxes have the same person as their best match at IoU 0.5."""
+def test_no_person_is_found_twice(name: str, photographs: list[Photograph]) -> None:
+    """No two boxes have the same person as best match at IoU 0.5."""
     detector = OnnxPersonDetector(model(name))
     for photograph in photographs:
         overlap = ious(detector.detect(photograph.image_rgb), photograph.boxes)
@@ -119,7 +119,7 @@ def test_nobody_is_seen_twice(name: str, photographs: list[Photograph]) -> None:
 
 
 @pytest.mark.parametrize("name", list(LAYOUTS)[:3])
-def test_a_picture_padded_differently_shows_the_same_person(
+def test_an_image_with_other_padding_shows_the_same_person(
     name: str, photographs: list[Photograph]
 ) -> None:
     detector = OnnxPersonDetector(model(name), score_threshold=0.6)
@@ -130,10 +130,10 @@ def test_a_picture_padded_differently_shows_the_same_person(
 
 
 @pytest.mark.parametrize("name", list(LAYOUTS)[:3])
-def test_an_independent_decoder_sees_the_same_people(
+def test_an_independent_decoder_finds_the_same_people(
     name: str, photographs: list[Photograph]
 ) -> None:
-    """Against the reference that the rendered workers are judged with, written on its own."""
+    """The reference is an independent program, which also judges the rendered workers."""
     path = model(name)
     spec = importlib.util.spec_from_file_location("reference_detectors", REFERENCE)
     assert spec is not None
@@ -153,14 +153,15 @@ def test_an_independent_decoder_sees_the_same_people(
         boxes = np.clip(wanted.boxes_xyxy_px, 0, (width, height, width, height))
         assert len(people) == len(boxes)
         for person, box, score in zip(people, boxes, wanted.scores, strict=True):
-            # The reference scales both axes alike; sides rounded to whole pixels differ by 0.3 %.
+            # The reference has one scale for both axes; here the sides are rounded to whole pixels,
+            # which differs by 0.3 %.
             np.testing.assert_allclose(person.box_xyxy_px, box, atol=1.5)
             assert person.score == pytest.approx(score, abs=0.01)
             compared += 1
     assert compared >= 10
 
 
-def test_loading_once_serves_two_detectors() -> None:
+def test_two_detectors_may_share_a_loaded_model() -> None:
     loaded = OnnxModel(model("rtmdet_nano_person_320_mmpose"))
     small, large = (OnnxPersonDetector(loaded, input_size_hw_px=(s, s)) for s in (320, 640))
     assert small.model is large.model

@@ -1,4 +1,4 @@
-"""Pictures of any size in a network's input, and boxes back, exactly."""
+"""Letterboxing: images of any size in a network's input, and boxes mapped back exactly."""
 
 from __future__ import annotations
 
@@ -8,26 +8,25 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from perception import PerceptionError
-from perception.networks._image import rgb_image
-from perception.networks._letterbox import Letterbox, LetterboxGeometry
-from perception.networks._pixels import PixelFormat
+from perception.networks import PixelFormat, rgb_image
+from perception.networks.detectors import Letterbox, LetterboxGeometry
 
 sides = st.integers(1, 3000)
-STANDARD = {"mean_rgb": (123.675, 116.28, 103.53), "std_rgb": (58.395, 57.12, 57.375)}
+IMAGENET = {"mean_rgb": (123.675, 116.28, 103.53), "std_rgb": (58.395, 57.12, 57.375)}
 
 
 @given(sides, sides, st.integers(8, 700), st.integers(8, 700), st.booleans())
-def test_the_picture_fits_and_boxes_return(
+def test_the_image_fits_into_the_input_and_boxes_map_back(
     width: int, height: int, input_width: int, input_height: int, centred: bool
 ) -> None:
     geometry = LetterboxGeometry.of((width, height), (input_width, input_height), centred=centred)
     scaled, corner = np.array(geometry.scaled_px), np.array(geometry.corner_px)
-    room = np.array([input_width, input_height])
+    available = np.array([input_width, input_height])
     assert (scaled >= 1).all()
-    assert (corner + scaled <= room).all()
-    assert (scaled == room).any()  # as large as it goes
+    assert (corner + scaled <= available).all()
+    assert (scaled == available).any()  # as large as possible
     if centred:
-        assert (abs(room - scaled - 2 * corner) <= 1).all()
+        assert (abs(available - scaled - 2 * corner) <= 1).all()
     whole = np.array([[0.0, 0.0, width, height]])
     np.testing.assert_allclose(geometry.to_input(whole), [[*corner, *(corner + scaled)]])
     inner = whole * 0.75 + 0.1
@@ -44,7 +43,7 @@ def test_the_picture_fits_and_boxes_return(
 def test_scaling_is_bilinear_between_pixel_centres(
     size: tuple[int, int], input_size: tuple[int, int]
 ) -> None:
-    """Noise tells a shift of a tenth of a pixel from none."""
+    """An image of noise shows a shift of a tenth of a pixel."""
     width, height = size
     image = np.random.default_rng(0).integers(0, 256, (height, width, 3), np.uint8)
     letterbox = Letterbox(input_size[1], input_size[0], PixelFormat(), centred=True)
@@ -52,7 +51,7 @@ def test_scaling_is_bilinear_between_pixel_centres(
     (columns, rows), (left, top) = geometry.scaled_px, geometry.corner_px
 
     def interpolated(values: np.ndarray, count: int) -> np.ndarray:
-        """Along the first axis, at the centres of ``count`` pixels that share its extent."""
+        """Interpolate along the first axis at the centres of ``count`` pixels of equal size."""
         places = (np.arange(count) + 0.5) * len(values) / count - 0.5
         flat = values.reshape(len(values), -1).T
         lines = [np.interp(places, np.arange(len(values)), line) for line in flat]
@@ -63,16 +62,16 @@ def test_scaling_is_bilinear_between_pixel_centres(
     np.testing.assert_allclose(found, wanted.transpose(2, 1, 0), atol=1.5)
 
 
-def test_a_picture_of_the_inputs_size_goes_in_as_it_is() -> None:
+def test_an_image_of_the_inputs_size_is_not_scaled() -> None:
     image = np.random.default_rng(0).integers(0, 256, (48, 64, 3), np.uint8)
-    pixels = PixelFormat(**STANDARD)
+    pixels = PixelFormat(**IMAGENET)
     blob, _ = Letterbox(48, 64, pixels, centred=True).fill(image)
     wanted = (image - np.array(pixels.mean_rgb)) / np.array(pixels.std_rgb)
     np.testing.assert_array_equal(blob[0], wanted.transpose(2, 0, 1).astype(np.float32))
 
 
 @pytest.mark.parametrize("centred", [True, False])
-def test_padding_is_grey_also_after_a_picture_of_another_shape(centred: bool) -> None:
+def test_padding_is_grey_also_after_an_image_of_another_shape(centred: bool) -> None:
     letterbox = Letterbox(64, 64, PixelFormat(), centred=centred)
     white = np.full((64, 20, 3), 255, np.uint8)
     letterbox.fill(white)
@@ -86,15 +85,15 @@ def test_padding_is_grey_also_after_a_picture_of_another_shape(centred: bool) ->
     assert (blob[0][:, ~outside] == 255.0).all()
 
 
-def test_channels_stand_in_the_order_of_the_network() -> None:
+def test_channels_are_in_the_order_of_the_network() -> None:
     image = np.zeros((8, 8, 3), np.uint8)
     image[...] = (10, 20, 30)
     for bgr, order in ((False, (0, 1, 2)), (True, (2, 1, 0))):
         for dtype in ("float32", "float16", "uint8"):
-            pixels = PixelFormat(**STANDARD, bgr=bgr, dtype=dtype)
+            pixels = PixelFormat(**IMAGENET, bgr=bgr, dtype=dtype)
             blob, _ = Letterbox(8, 8, pixels, centred=True).fill(image)
             assert blob.dtype == dtype
-            values = (np.array([10, 20, 30]) - STANDARD["mean_rgb"]) / STANDARD["std_rgb"]
+            values = (np.array([10, 20, 30]) - IMAGENET["mean_rgb"]) / IMAGENET["std_rgb"]
             wanted = np.array([10, 20, 30]) if dtype == "uint8" else values
             np.testing.assert_allclose(blob[0, :, 0, 0], wanted[list(order)], rtol=1e-3)
 
@@ -112,12 +111,12 @@ def test_channels_stand_in_the_order_of_the_network() -> None:
         (None, "got NoneType"),
     ],
 )
-def test_what_is_no_rgb_picture_is_refused(image: object, words: str) -> None:
+def test_anything_but_an_rgb_image_is_refused(image: object, words: str) -> None:
     with pytest.raises(PerceptionError, match=words):
         rgb_image(image)
 
 
-def test_views_are_read_as_they_are_seen() -> None:
+def test_views_of_an_image_are_read_correctly() -> None:
     image = np.random.default_rng(0).integers(0, 256, (40, 60, 3), np.uint8)
     letterbox = Letterbox(64, 64, PixelFormat(), centred=True)
     for view in (image[..., ::-1], image[::-1], image[:, ::2], image.transpose(1, 0, 2)):

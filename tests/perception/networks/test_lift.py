@@ -1,4 +1,4 @@
-"""Skeletons in metres from pixels and depths."""
+"""Lifting: skeletons in metres from pixels and depths."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from perception import Camera, PersonKeypoints
 from perception.anthropometry import LIMBS
 from perception.body import place_body
-from perception.networks._lift import lift, metres_per_pixel
+from perception.networks.poses import lift_keypoints, metres_per_pixel
 
 FOCAL_PX = 500.0
 FAR_M = 200.0  # weak perspective holds
@@ -19,7 +19,7 @@ DOWN, AHEAD = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, -1.0])
 
 
 def body(yaw_rad: float = 0.0) -> np.ndarray:
-    """(17, 3) a body relative to its mid-hip whose limbs are all as long as the average."""
+    """Return a body (17, 3) relative to the mid-hip; every limb has the average length."""
     points = np.zeros((17, 3))
     length = {limb.name: limb.length_m for limb in LIMBS}
     for side, sign in ((0, 1.0), (1, -1.0)):
@@ -39,31 +39,31 @@ def body(yaw_rad: float = 0.0) -> np.ndarray:
 def test_a_distant_body_is_recovered_at_any_heading(yaw_deg: float) -> None:
     points = body(math.radians(yaw_deg))
     pixels = points[:, :2] * FOCAL_PX / FAR_M + (320.0, 240.0)
-    skeleton = lift(pixels[None], points[None, :, 2], np.ones((1, 17)))[0]
+    skeleton = lift_keypoints(pixels[None], points[None, :, 2], np.ones((1, 17)))[0]
     np.testing.assert_allclose(skeleton, points, atol=1e-9)
 
 
-def test_without_depths_the_skeleton_is_flat_and_no_limb_is_too_long() -> None:
+def test_without_depths_the_skeleton_is_flat_and_has_the_right_scale() -> None:
     points = body(math.radians(40))
     pixels = points[:, :2] * FOCAL_PX / FAR_M
-    skeleton = lift(pixels[None], None, np.ones((1, 17)))[0]
+    skeleton = lift_keypoints(pixels[None], None, np.ones((1, 17)))[0]
     assert (skeleton[:, 2] == 0.0).all()
     np.testing.assert_allclose(skeleton[:, :2], points[:, :2], atol=1e-9)
 
 
-def test_limbs_at_the_camera_and_a_bad_limb_do_not_matter() -> None:
+def test_limbs_that_point_at_the_camera_and_an_outlier_do_not_affect_the_scale() -> None:
     points = body()
-    points[9, :2] += (0.5, 0.5)  # a wrist that is elsewhere
+    points[9, :2] += (0.5, 0.5)  # a wrist at a wrong place
     pixels = points[None, :, :2] * FOCAL_PX / FAR_M
     scale = metres_per_pixel(pixels, points[None, :, 2], np.ones((1, 17)))
     assert scale[0] == pytest.approx(FAR_M / FOCAL_PX)
 
 
-def test_limbs_that_are_not_seen_vote_only_where_none_is() -> None:
+def test_unseen_limbs_vote_only_if_no_limb_is_seen() -> None:
     points = body()
     pixels = points[None, :, :2] * FOCAL_PX / FAR_M
     wrong = pixels.copy()
-    wrong[:, 11:] *= 3.0  # legs that are guessed three times too large
+    wrong[:, 11:] *= 3.0  # unseen legs, three times too large
     scores = np.ones((1, 17))
     scores[:, 11:] = 0.1
     shown = metres_per_pixel(wrong, points[None, :, 2], scores)
@@ -72,14 +72,14 @@ def test_limbs_that_are_not_seen_vote_only_where_none_is() -> None:
     assert guessed[0] == pytest.approx(FAR_M / FOCAL_PX)
 
 
-def test_a_body_without_any_extent_has_no_scale() -> None:
+def test_the_scale_of_a_body_without_extent_is_0() -> None:
     same = np.full((2, 17, 2), 7.0)
     for depths in (None, np.zeros((2, 17))):
         np.testing.assert_array_equal(metres_per_pixel(same, depths, np.ones((2, 17))), 0.0)
-        np.testing.assert_array_equal(lift(same, depths, np.ones((2, 17))), 0.0)
+        np.testing.assert_array_equal(lift_keypoints(same, depths, np.ones((2, 17))), 0.0)
 
 
-def test_people_do_not_mix() -> None:
+def test_the_scale_of_a_person_does_not_depend_on_others() -> None:
     points = np.stack([body(0.3), body(1.2)])
     pixels = points[..., :2] * np.array([2.0, 5.0])[:, None, None]
     scale = metres_per_pixel(pixels, points[..., 2], np.ones((2, 17)))
@@ -89,14 +89,14 @@ def test_people_do_not_mix() -> None:
 @pytest.mark.parametrize("yaw_deg", [0, 45, 110])
 @pytest.mark.parametrize("distance_m", [2.0, 4.0])
 def test_the_pipeline_places_a_lifted_body(distance_m: float, yaw_deg: float) -> None:
-    """Weak perspective costs some percent near by; with or without the network's depths."""
+    """At short distances weak perspective causes an error of some percent."""
     camera = Camera.from_fov(640, 480, math.radians(60.0))
     points = body(math.radians(yaw_deg))
     root = np.array([0.2, 0.1, distance_m])
     pixels = camera.project(points + root)
     true = root + 0.7 * points[5:7].mean(axis=0)
     for depths, limit in ((points[None, :, 2], 0.06), (None, 0.12)):
-        skeleton = lift(pixels[None], depths, np.ones((1, 17)))[0]
+        skeleton = lift_keypoints(pixels[None], depths, np.ones((1, 17)))[0]
         found = place_body(camera, PersonKeypoints(pixels, skeleton, np.ones(17), "coco"), 1.0)
         assert found is not None
         assert np.linalg.norm(found.position_camera_m - true) < limit * distance_m

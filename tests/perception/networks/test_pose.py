@@ -1,4 +1,4 @@
-"""Pose networks against graphs whose keypoints are known in closed form."""
+"""Pose networks: graphs whose keypoints are known in closed form."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from hypothesis import strategies as st
 from onnx_graphs import Graph, fixed, red_point_pose, simcc
 
 from perception import PerceptionError, PersonDetection, PersonKeypoints, PoseEstimator
-from perception.networks import OnnxModel, OnnxPoseEstimator, _pose
-from perception.networks._crops import PersonCrops
+from perception.networks import OnnxModel, OnnxPoseEstimator
+from perception.networks.poses import PersonCrops
 
-PICTURE = np.zeros((480, 640, 3), np.uint8)
+IMAGE = np.zeros((480, 640, 3), np.uint8)
 MIDDLE = PersonDetection(np.array([220.0, 60.0, 380.0, 440.0]), 0.9)
 
 
 def red_dot(u: float, v: float, size: tuple[int, int] = (480, 640)) -> np.ndarray:
-    """A picture with a smooth red dot of 4 px at u, v, and green and blue ones elsewhere."""
+    """Return an image with a smooth red dot of 4 px at u, v, and green and blue dots elsewhere."""
     rows, columns = np.mgrid[: size[0], : size[1]]
     image = np.zeros((*size, 3), np.uint8)
     for channel, (at_u, at_v) in enumerate(((u, v), (u + 40, v - 30), (u - 40, v + 30))):
@@ -35,7 +35,7 @@ def network(
     dtype: str = "float32",
     seed: int = 0,
 ) -> tuple[bytes, np.ndarray, np.ndarray]:
-    """A graph with random keypoints: its bytes, places (axes, K) in bins, heights (axes, K)."""
+    """Return a graph with random keypoints, their places (axes, K) in bins and their heights."""
     rng = np.random.default_rng(seed)
     height, width = size
     bins = np.array([2 * width, 2 * height, 2 * width])[: 3 if depth else 2]
@@ -52,10 +52,10 @@ def network(
         (133, (256, 192), False),  # RTMW
         (133, (384, 288), False),
         (133, (384, 288), True),  # RTMW3D
-        (17, (192, 144), True),  # ours
+        (17, (192, 144), True),  # the shipped network
     ],
 )
-def test_known_networks_are_decoded_as_their_makers_say(
+def test_networks_of_known_layouts_are_decoded(
     keypoints: int, size: tuple[int, int], depth: bool
 ) -> None:
     graph, places, heights = network(keypoints, size, depth=depth)
@@ -63,7 +63,7 @@ def test_known_networks_are_decoded_as_their_makers_say(
     assert isinstance(estimator, PoseEstimator)
     assert estimator.layout == {17: "coco", 133: "coco_wholebody"}[keypoints]
     assert estimator.has_depth == depth
-    (person,) = estimator.estimate(PICTURE, (MIDDLE,))
+    (person,) = estimator.estimate(IMAGE, (MIDDLE,))
     assert person.lifted == depth
     crops = PersonCrops(MIDDLE.box_xyxy_px[None], *size)
     wanted = crops.to_image(places[None, :2].transpose(0, 2, 1) / 2.0, np.array([0]))[0]
@@ -79,16 +79,16 @@ def test_known_networks_are_decoded_as_their_makers_say(
     np.testing.assert_allclose(hips[:2], 0.0, atol=1e-9)
 
 
-def test_metadata_may_say_how_much_is_padded_and_how_deep_z_reaches() -> None:
+def test_metadata_may_give_padding_and_depth_range() -> None:
     places, heights = np.full((3, 17), 20.0), np.full((3, 17), 0.9)
     metadata = {"box_padding": "1.5", "z_range_m": "1.0"}
     graph = simcc(places, heights, [96, 128, 96], (64, 48), metadata=metadata)
-    (person,) = OnnxPoseEstimator(graph).estimate(PICTURE, (MIDDLE,))
+    (person,) = OnnxPoseEstimator(graph).estimate(IMAGE, (MIDDLE,))
     crops = PersonCrops(MIDDLE.box_xyxy_px[None], 64, 48, padding=1.5)
     wanted = crops.to_image(np.array([[[10.0, 10.0]]]), np.array([0]))[0, 0]
     np.testing.assert_allclose(person.keypoints_px[0], wanted, atol=0.01)
     np.testing.assert_allclose(person.keypoints_root_m[:, 2], 20 / 48 - 1, atol=1e-4)
-    (tighter,) = OnnxPoseEstimator(graph, box_padding=1.0).estimate(PICTURE, (MIDDLE,))
+    (tighter,) = OnnxPoseEstimator(graph, box_padding=1.0).estimate(IMAGE, (MIDDLE,))
     assert tighter.keypoints_px[0, 0] > person.keypoints_px[0, 0]
     wrong = simcc(places, heights, [96, 128, 96], (64, 48), metadata={"z_range_m": "-1"})
     with pytest.raises(PerceptionError, match="metadata z_range_m of model given as bytes must"):
@@ -96,9 +96,9 @@ def test_metadata_may_say_how_much_is_padded_and_how_deep_z_reaches() -> None:
 
 
 @pytest.mark.parametrize("dtype", ["float16", "uint8"])
-def test_other_types_of_input_are_fed(dtype: str) -> None:
+def test_inputs_of_other_number_types_are_supported(dtype: str) -> None:
     graph, places, _ = network(17, (64, 48), depth=False, dtype=dtype)
-    (person,) = OnnxPoseEstimator(graph).estimate(PICTURE, (MIDDLE,))
+    (person,) = OnnxPoseEstimator(graph).estimate(IMAGE, (MIDDLE,))
     crops = PersonCrops(MIDDLE.box_xyxy_px[None], 64, 48)
     wanted = crops.to_image(places[None].transpose(0, 2, 1) / 2.0, np.array([0]))[0]
     np.testing.assert_allclose(person.keypoints_px, wanted, atol=0.05)
@@ -109,13 +109,13 @@ def test_other_types_of_input_are_fed(dtype: str) -> None:
     [
         (220.0, 60.0, 380.0, 440.0),
         (300.0, 200.0, 340.0, 280.0),
-        (280.0, 190.0, 700.0, 600.0),  # over the edge
+        (280.0, 190.0, 700.0, 600.0),  # over the border
         (-200.0, -300.0, 800.0, 900.0),
     ],
 )
 @pytest.mark.parametrize("batch", [1, "batch"])
-def test_a_red_dot_is_found_where_it_is(box: tuple[float, ...], batch: int | str) -> None:
-    """From pixels to pixels: crop, colours, mean and deviation, peaks, and back."""
+def test_a_red_dot_is_found_at_its_pixel(box: tuple[float, ...], batch: int | str) -> None:
+    """The test covers all steps: crop, channels, mean and standard deviation, peaks, way back."""
     estimator = OnnxPoseEstimator(red_point_pose(192, 144, batch=batch))
     step = float(PersonCrops(np.array([box]), 192, 144).step_px.max())
     (person,) = estimator.estimate(red_dot(318.4, 231.7), (PersonDetection(np.array(box), 0.9),))
@@ -125,7 +125,7 @@ def test_a_red_dot_is_found_where_it_is(box: tuple[float, ...], batch: int | str
     assert person.scores.min() > 0.8
 
 
-def test_outputs_are_taken_by_name_and_else_in_order() -> None:
+def test_outputs_are_found_by_name_and_otherwise_by_order() -> None:
     image, people = red_dot(318.4, 231.7), (MIDDLE,)
     (wanted,) = OnnxPoseEstimator(red_point_pose(192, 144)).estimate(image, people)
     for graph in (
@@ -137,16 +137,14 @@ def test_outputs_are_taken_by_name_and_else_in_order() -> None:
 
 
 @pytest.mark.parametrize("batch", [1, 2, 4, "batch"])
-def test_people_come_in_the_order_of_their_boxes(
-    batch: int | str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(_pose, "_MAX_BATCH", 3)  # so that a crowd of five takes two portions
+def test_people_are_in_the_order_of_their_boxes(batch: int | str) -> None:
+    """With a free batch axis, 18 people need two batches."""
     estimator = OnnxPoseEstimator(red_point_pose(96, 72, batch=batch))
-    image = np.zeros((480, 640, 3), np.uint8)
+    image = np.zeros((600, 820, 3), np.uint8)
     detections, wanted = [], []
-    for number in range(5):
-        u, v = 60.0 + 125.0 * number, 200.0 + 20.0 * number
-        image = np.maximum(image, red_dot(u, v) * np.array([1, 0, 0], np.uint8))
+    for number in range(18):
+        u, v = 90.0 + 125.0 * (number % 6) + number, 110.0 + 170.0 * (number // 6) + number
+        image = np.maximum(image, red_dot(u, v, (600, 820)) * np.array([1, 0, 0], np.uint8))
         detections.append(PersonDetection(np.array([u - 30, v - 60, u + 20, v + 70]), 0.9))
         wanted.append((u, v))
     people = estimator.estimate(image, tuple(detections))
@@ -154,8 +152,8 @@ def test_people_come_in_the_order_of_their_boxes(
     np.testing.assert_allclose(nose, wanted, atol=0.7)
 
 
-def test_an_export_with_one_crop_written_into_its_insides_is_fed_one_by_one() -> None:
-    """The batch is called free, yet the outputs are those of one picture."""
+def test_an_export_that_works_with_one_crop_only_is_run_for_each_crop() -> None:
+    """The batch axis is declared as free, but the outputs are always those of one crop."""
     rows = np.exp(-0.5 * ((np.arange(128) - 50.0) / 6.0) ** 2) * np.ones((1, 17, 1))
     graph = fixed(
         {"simcc_x": rows[..., :96], "simcc_y": rows},
@@ -163,13 +161,13 @@ def test_an_export_with_one_crop_written_into_its_insides_is_fed_one_by_one() ->
         batch="batch",
         declared=dict.fromkeys(("simcc_x", "simcc_y"), ("batch", 17, "bins")),
     )
-    people = OnnxPoseEstimator(graph).estimate(PICTURE, (MIDDLE, MIDDLE))
+    people = OnnxPoseEstimator(graph).estimate(IMAGE, (MIDDLE, MIDDLE))
     assert len(people) == 2
     np.testing.assert_array_equal(people[0].keypoints_px, people[1].keypoints_px)
 
 
-def test_an_export_with_two_crops_written_into_its_insides_serves_any_number() -> None:
-    """The batch is called free, yet the network fails on any number but two."""
+def test_an_export_that_works_with_two_crops_only_is_run_on_pairs() -> None:
+    """The batch axis is declared as free, but the network fails for any number but two."""
     rows = np.exp(-0.5 * ((np.arange(128) - 50.0) / 6.0) ** 2) * np.ones((2, 17, 1))
     graph = Graph("input", ("batch", 3, 64, 48))
     mean = graph.node("ReduceMean", graph.pixels, axes=[2, 3], keepdims=0)
@@ -183,72 +181,72 @@ def test_an_export_with_two_crops_written_into_its_insides_serves_any_number() -
         graph.output(total, name, ("batch", 17, bins))
     estimator = OnnxPoseEstimator(graph.bytes())
     for count in (1, 2, 3):
-        people = estimator.estimate(PICTURE, (MIDDLE,) * count)
+        people = estimator.estimate(IMAGE, (MIDDLE,) * count)
         assert len(people) == count
         for person in people:
             np.testing.assert_array_equal(person.keypoints_px, people[0].keypoints_px)
             assert person.scores.min() > 0.9
 
 
-def test_nobody_detected_is_nobody_and_the_network_does_not_run() -> None:
+def test_without_detections_the_network_does_not_run() -> None:
     estimator = OnnxPoseEstimator(red_point_pose(192, 144))
-    estimator.model = OnnxModel(red_point_pose(32, 32))  # would refuse the crops
+    estimator.model = OnnxModel(red_point_pose(32, 32))  # fails for these crops
     assert estimator.estimate(red_dot(300, 200), ()) == ()
     with pytest.raises(PerceptionError, match="could not be run"):
         estimator.estimate(red_dot(300, 200), (MIDDLE,))
 
 
-def test_crops_outside_the_picture_are_people_without_evidence() -> None:
+def test_people_whose_crops_lie_outside_the_image_have_scores_of_0() -> None:
     estimator = OnnxPoseEstimator(network(17, (192, 144), depth=True)[0])
     beside = PersonDetection(np.array([900.0, 10.0, 990.0, 200.0]), 0.9)
     point = PersonDetection(np.array([50.0, 50.0, 50.0, 50.0]), 0.9)
-    people = estimator.estimate(PICTURE, (beside, MIDDLE, point))
+    people = estimator.estimate(IMAGE, (beside, MIDDLE, point))
     assert [float(person.scores.max()) > 0.0 for person in people] == [False, True, False]
     np.testing.assert_allclose(people[0].keypoints_px, np.tile((944.5, 104.5), (17, 1)))
-    (only,) = estimator.estimate(PICTURE, (beside,))
+    (only,) = estimator.estimate(IMAGE, (beside,))
     assert (only.scores == 0.0).all()
 
 
-def test_keypoints_outside_the_picture_were_not_seen() -> None:
+def test_keypoints_outside_the_image_have_scores_of_0() -> None:
     graph, _, _ = network(17, (192, 144), depth=False)
     box = PersonDetection(np.array([-100.0, 60.0, 60.0, 440.0]), 0.9)
-    (person,) = OnnxPoseEstimator(graph).estimate(PICTURE, (box,))
+    (person,) = OnnxPoseEstimator(graph).estimate(IMAGE, (box,))
     beyond = person.keypoints_px[:, 0] < -4.0
     assert 3 < beyond.sum() < 17
     assert (person.scores[beyond] == 0.0).all()
     assert (person.scores[person.keypoints_px[:, 0] > 0.0] > 0.0).all()
 
 
-@pytest.mark.parametrize("poison", [np.nan, np.inf])
+@pytest.mark.parametrize("invalid", [np.nan, np.inf])
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_numbers_that_are_not_finite_are_no_evidence(poison: float, axis: int) -> None:
+def test_a_keypoint_with_a_non_finite_axis_has_a_score_of_0(invalid: float, axis: int) -> None:
     rows = [
         np.exp(-0.5 * ((np.arange(n) - n / 2) / 6.0) ** 2) * np.ones((1, 17, 1))
         for n in (288, 384, 288)
     ]
-    rows[axis][0, 3, 10] = poison
+    rows[axis][0, 3, 10] = invalid
     graph = fixed({f"simcc_{name}": row for name, row in zip("xyz", rows, strict=True)}, (192, 144))
-    (person,) = OnnxPoseEstimator(graph).estimate(PICTURE, (MIDDLE,))
+    (person,) = OnnxPoseEstimator(graph).estimate(IMAGE, (MIDDLE,))
     assert person.scores[3] == 0.0
     assert np.delete(person.scores, 3) == pytest.approx(1.0)
 
 
-def test_a_network_of_nothing_but_nan_sees_nobody() -> None:
+def test_a_network_that_returns_only_nan_gives_scores_of_0() -> None:
     nothing = {"simcc_x": np.full((1, 17, 96), np.nan), "simcc_y": np.full((1, 17, 128), np.nan)}
-    (person,) = OnnxPoseEstimator(fixed(nothing, (64, 48))).estimate(PICTURE, (MIDDLE,))
+    (person,) = OnnxPoseEstimator(fixed(nothing, (64, 48))).estimate(IMAGE, (MIDDLE,))
     assert isinstance(person, PersonKeypoints)
     assert (person.scores == 0.0).all()
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 900), (37, 53)])
-def test_pictures_of_any_size(size: tuple[int, int]) -> None:
+def test_images_may_have_any_size(size: tuple[int, int]) -> None:
     estimator = OnnxPoseEstimator(red_point_pose(192, 144))
     whole = PersonDetection(np.array([0.0, 0.0, size[1], size[0]]), 0.9)
     (person,) = estimator.estimate(np.zeros((*size, 3), np.uint8), (whole,))
     assert person.layout == "coco"
 
 
-_ANYWHERE = OnnxPoseEstimator(red_point_pose(48, 36))
+_SMALL_ESTIMATOR = OnnxPoseEstimator(red_point_pose(48, 36))
 
 
 @given(
@@ -256,13 +254,13 @@ _ANYWHERE = OnnxPoseEstimator(red_point_pose(48, 36))
     st.integers(1, 700),
     st.integers(1, 700),
 )
-def test_any_box_on_any_picture_is_a_person(
+def test_any_box_on_any_image_gives_one_person(
     box: tuple[float, ...], height: int, width: int
 ) -> None:
     left, top, across, down = box
     detection = PersonDetection(np.array([left, top, left + across, top + down]), 0.5)
     image = np.full((height, width, 3), 200, np.uint8)
-    (person,) = _ANYWHERE.estimate(image, (detection,))
+    (person,) = _SMALL_ESTIMATOR.estimate(image, (detection,))
     seen = person.keypoints_px[person.scores > 0.0]
     crop = PersonCrops(detection.box_xyxy_px[None], 48, 36)
     slack = 0.5 + crop.step_px[0]
@@ -275,7 +273,7 @@ def test_any_box_on_any_picture_is_a_person(
     "image",
     [np.zeros((9, 9), np.uint8), np.zeros((9, 9, 3)), np.zeros((0, 0, 3), np.uint8), None],
 )
-def test_what_is_no_picture_is_refused_even_without_people(image: np.ndarray) -> None:
+def test_anything_but_an_rgb_image_is_refused_even_without_people(image: np.ndarray) -> None:
     with pytest.raises(PerceptionError, match="image_rgb must"):
         OnnxPoseEstimator(red_point_pose(64, 48)).estimate(image, ())
 
@@ -283,8 +281,8 @@ def test_what_is_no_picture_is_refused_even_without_people(image: np.ndarray) ->
 @pytest.mark.parametrize(
     ("outputs", "reason"),
     [
-        ({"heatmaps": (1, 17, 64, 48)}, "no two or three outputs"),
-        ({"simcc_x": (1, 17, 96)}, "no two or three outputs"),
+        ({"heatmaps": (1, 17, 64, 48)}, "does not have two or three outputs"),
+        ({"simcc_x": (1, 17, 96)}, "does not have two or three outputs"),
         ({"simcc_x": (1, 26, 96), "simcc_y": (1, 26, 128)}, "26 keypoints are not known"),
         ({"simcc_x": (1, 17, 96), "simcc_y": (1, 133, 128)}, "17 and 133 keypoints"),
         ({"simcc_x": (1, 17, 96), "simcc_y": (1, 17, 96)}, "96 bins along x and 96 along y"),
@@ -301,7 +299,7 @@ def test_unknown_layouts_are_refused_with_what_was_found_and_what_is_known(
     assert "Known: RTMPose" in str(refused.value)
 
 
-def test_inputs_that_are_no_pictures_are_refused() -> None:
+def test_a_free_input_size_and_an_invalid_padding_are_refused() -> None:
     free = fixed({"simcc_x": np.zeros((1, 17, 96))}, ("h", "w"))
     with pytest.raises(PerceptionError, match="input_size_hw_px"):
         OnnxPoseEstimator(free)

@@ -1,4 +1,4 @@
-"""The runtime of the networks reports nothing to anybody, unless its owner wants it to."""
+"""ONNX Runtime sends no telemetry unless the environment variable allows it."""
 
 import os
 import subprocess
@@ -10,7 +10,7 @@ PROGRAM = "import os, perception.networks; print(os.environ['ORT_DISABLE_TELEMET
 
 
 def run(tmp_path, **environment):
-    # The runtime is silent in what it takes for a build server, so these must not be set.
+    # ONNX Runtime sends nothing on a build server, so the variables that mark one are removed.
     kept = {key: value for key, value in os.environ.items() if key not in ("CI", "GITHUB_ACTIONS")}
     kept.pop("ORT_DISABLE_TELEMETRY", None)
     return subprocess.run(
@@ -28,11 +28,11 @@ def run(tmp_path, **environment):
     )
 
 
-def test_importing_the_networks_leaves_no_identifier_behind(tmp_path):
+def test_importing_the_networks_stores_no_identifier(tmp_path):
     assert run(tmp_path).stdout == "1\n"
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("chosen", ["0", "1"])
-def test_what_the_owner_chose_stays(tmp_path, chosen):
-    assert run(tmp_path, ORT_DISABLE_TELEMETRY=chosen).stdout == f"{chosen}\n"
+@pytest.mark.parametrize("value", ["0", "1"])
+def test_a_set_environment_variable_is_kept(tmp_path, value):
+    assert run(tmp_path, ORT_DISABLE_TELEMETRY=value).stdout == f"{value}\n"

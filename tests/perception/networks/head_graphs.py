@@ -1,4 +1,4 @@
-"""Head pose networks whose answers are known: they look for one bright disc on black."""
+"""Head pose networks with known results: they find one bright disc on black."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ def disc_network(
     batch="N",
     nan=False,
 ):
-    """The shipped layout: the disc's middle is the head's centre, its diameter 0.20 m."""
+    """Return a network of awarenav's layout: the head is the disc, with a diameter of 0.20 m."""
     rotation = np.eye(3) if rotation is None else rotation
     grid = (np.arange(size) + 0.5) / size
     constants = {
         "grid_x": grid.reshape(1, 1, 1, size),
         "grid_y": grid.reshape(1, 1, size, 1),
-        "offset": np.array(2.0),  # black is −2
+        "offset": np.array(2.0),  # black is −2 in the input
         "white": np.array(4.25 * size * size),
         "ratio": np.array(4.0 / np.pi),
         "disc_m": np.array(DISC_M),
@@ -91,7 +91,7 @@ def disc_network(
 
 
 def full_range_network(output, size=224):
-    """A network of the 6DRepNet kind that always answers ``output``: (3, 3) or (6,)."""
+    """Return a network of the 6DRepNet kind that always returns ``output``: (3, 3) or (6,)."""
     output = np.asarray(output, dtype=np.float32)
     tail = [1] * output.ndim
     nodes = [

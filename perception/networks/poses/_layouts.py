@@ -1,4 +1,4 @@
-"""Which pose network a file holds, told from the shapes of its outputs."""
+"""Layouts of pose networks, recognised from the shapes of the outputs."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Any, Final
 
 from numpy.typing import NDArray
 
-from ..arrays import finite_number
-from ..errors import PerceptionError
-from ._session import OnnxModel
+from ...arrays import finite_number
+from ...errors import PerceptionError
+from .._model import OnnxModel, output_shapes
 from ._simcc import Z_RANGE_M
 
-KNOWN: Final = (
+_KNOWN: Final = (
     "RTMPose and RTMW: simcc_x (N, K, s * width), simcc_y (N, K, s * height); "
     "RTMW3D: simcc_z (N, K, depth bins) beside them; K = 17 (COCO) or 133 (COCO-WholeBody)"
 )
@@ -23,12 +23,12 @@ _AXES: Final = ("simcc_x", "simcc_y", "simcc_z")
 
 @dataclass(frozen=True, slots=True)
 class PoseLayout:
-    """How to read a pose network.
+    """Layout of a pose network's outputs.
 
     Attributes:
-        keypoints: the layout's name: ``"coco"`` or ``"coco_wholebody"``.
-        axes: which outputs are x, y and, where it has one, z.
-        split_ratio: bins a pixel of the input along x and y.
+        keypoints: name of the keypoint layout: ``"coco"`` or ``"coco_wholebody"``.
+        axes: indices of the outputs x, y and, if there is one, z.
+        split_ratio: bins per pixel of the input along x and y.
         z_range_m: half the depth that the z axis spans.
     """
 
@@ -39,33 +39,30 @@ class PoseLayout:
 
     @property
     def has_depth(self) -> bool:
-        """Whether the network says how deep keypoints lie."""
+        """True if the network gives the depths of the keypoints."""
         return len(self.axes) == 3
 
 
-def recognise_pose(
+def recognise(
     model: OnnxModel, outputs: Sequence[NDArray[Any]], height_px: int, width_px: int
 ) -> PoseLayout:
-    """Tell the layout of a pose network from the outputs of a trial run.
+    """Recognise the layout of a pose network from the outputs of a trial run.
 
-    Outputs called simcc_x, simcc_y and simcc_z are found by name, others are taken in this order.
+    Outputs called simcc_x, simcc_y and simcc_z are found by their names; outputs with other names
+    are taken in this order.
 
     Raises:
-        PerceptionError: for a layout that is not known, saying what was found and what is known.
+        PerceptionError: for an unknown layout; the message says what was found and what is known.
     """
 
     def refusal(reason: str) -> PerceptionError:
-        shapes = (
-            f"{tensor.name} {output.shape}"
-            for tensor, output in zip(model.outputs, outputs, strict=True)
-        )
         return PerceptionError(
-            f"{model.name} is no pose network of a known layout: {reason}. Found input "
-            f"(N, 3, {height_px}, {width_px}) -> {', '.join(shapes)}. Known: {KNOWN}"
+            f"{model.name} is not a pose network of a known layout: {reason}. Found input "
+            f"(N, 3, {height_px}, {width_px}) -> {output_shapes(model, outputs)}. Known: {_KNOWN}"
         )
 
     if len(outputs) not in (2, 3) or any(output.ndim != 3 for output in outputs):
-        raise refusal("it has no two or three outputs (N, K, bins)")
+        raise refusal("it does not have two or three outputs (N, K, bins)")
     names = [tensor.name for tensor in model.outputs]
     axes = tuple(range(len(outputs)))
     if set(names) == set(_AXES[: len(names)]):
@@ -77,7 +74,7 @@ def recognise_pose(
     split = bins_x / width_px
     if split < 1.0 or bins_y != split * height_px:
         raise refusal(
-            f"{bins_x} bins along x and {bins_y} along y are not the same number to a pixel"
+            f"{bins_x} bins along x and {bins_y} along y are not the same number per pixel"
         )
     if min(output.shape[2] for output in outputs) < 3:
         raise refusal("an axis has fewer than three bins")
@@ -86,7 +83,7 @@ def recognise_pose(
 
 
 def metadata_number(model: OnnxModel, key: str, default: float) -> float:
-    """A number > 0 that the metadata hold, as our own exports do, or the default of the makers."""
+    """Return a number > 0 from the metadata, which awarenav's exports have, or the default."""
     if key not in model.metadata:
         return default
     return finite_number(

@@ -1,4 +1,4 @@
-"""Crops of people: what they show, and where their points lie in the picture."""
+"""Crops of people: their content, and the way back to the image."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from perception.networks._crops import PersonCrops
+from perception.networks.poses import PersonCrops
 
 HEIGHT, WIDTH = 192, 144
 boxes = st.tuples(
@@ -17,14 +17,14 @@ boxes = st.tuples(
 
 
 @given(boxes)
-def test_the_crop_is_the_padded_box_with_the_crops_aspect(box: np.ndarray) -> None:
+def test_a_crop_is_the_padded_box_in_the_crops_aspect_ratio(box: np.ndarray) -> None:
     crops = PersonCrops(box, HEIGHT, WIDTH)
     size = np.array([WIDTH, HEIGHT])
     extent = crops.step_px[0] * size
     wanted = 1.25 * (box[0, 2:] - box[0, :2])
     assert (extent >= wanted - 0.51).all()
-    assert (np.abs(extent - wanted) <= 0.51).any()  # no larger than it must be
-    # One scale for both axes, but for the rounding to whole pixels.
+    assert (np.abs(extent - wanted) <= 0.51).any()  # no larger than needed
+    # Both axes have the same scale, apart from the rounding to whole pixels.
     np.testing.assert_allclose(*crops.step_px[0], rtol=0.51 / WIDTH + 0.51 / HEIGHT + 1e-9)
     middle = crops.to_image(0.5 * size[None, None], np.array([0]))[0, 0]
     np.testing.assert_allclose(middle, 0.5 * (box[0, :2] + box[0, 2:]) - 0.5, atol=0.8)
@@ -35,14 +35,14 @@ def test_the_crop_is_the_padded_box_with_the_crops_aspect(box: np.ndarray) -> No
     [
         (60.0, 40.0, 300.0, 440.0),  # resized
         (150.3, 90.7, 180.1, 150.9),  # enlarged
-        (-60.0, -80.0, 330.0, 500.0),  # over the left and upper edges
-        (300.0, 200.0, 700.0, 600.0),  # over the right and lower edges
+        (-60.0, -80.0, 330.0, 500.0),  # over the left and upper borders
+        (300.0, 200.0, 700.0, 600.0),  # over the right and lower borders
         (0.0, 0.0, 640.0, 480.0),
-        (-4000.0, -3000.0, 4000.0, 3000.0),  # far beyond: too large to resize
+        (-4000.0, -3000.0, 4000.0, 3000.0),  # too large to resize
     ],
 )
-def test_every_pixel_shows_the_place_that_the_geometry_says(box: tuple[float, ...]) -> None:
-    """Two ramps tell the place of each pixel; beyond the edge it is black."""
+def test_each_pixel_of_a_crop_shows_its_place_in_the_image(box: tuple[float, ...]) -> None:
+    """Two brightness ramps show the place of each pixel; outside the image crops are black."""
     height, width = 480, 640
     v, u = np.mgrid[:height, :width]
     image = np.zeros((height, width, 3), np.uint8)
@@ -67,8 +67,8 @@ def test_every_pixel_shows_the_place_that_the_geometry_says(box: tuple[float, ..
         assert abs(float(np.mean(seen - place[within]))) < 1.0
 
 
-def test_a_small_crop_equals_the_affine_warp_of_the_pose_networks_makers() -> None:
-    """The formulas of TopdownAffine without rotation: three points to three points."""
+def test_a_small_crop_equals_the_affine_warp_of_openmmlab() -> None:
+    """The formulas are those of TopdownAffine without rotation: three points to three points."""
     image = np.random.default_rng(0).integers(0, 256, (200, 300, 3), np.uint8)
     box = np.array([101.5, 60.5, 151.5, 160.5])  # counted from the corner
     centre = 0.5 * (box[:2] + box[2:]) - 0.5
@@ -84,11 +84,11 @@ def test_a_small_crop_equals_the_affine_warp_of_the_pose_networks_makers() -> No
     assert np.abs(out.astype(int) - wanted).max() <= 2
 
 
-def test_crops_beside_the_picture_and_boxes_without_extent_are_told() -> None:
+def test_crops_outside_the_image_and_boxes_without_extent_are_found() -> None:
     image = np.zeros((480, 640, 3), np.uint8)
     cases = {
         (10, 10, 100, 200): True,
-        (-90, 10, -1, 200): True,  # the padding reaches into the picture
+        (-90, 10, -1, 200): True,  # the padding reaches into the image
         (-400, 10, -300, 200): False,
         (900, 10, 1000, 200): False,
         (10, 700, 100, 900): False,

@@ -1,4 +1,4 @@
-"""Pictures of any size in a network's input, aspect kept, and boxes back."""
+"""Letterboxing: an image of any size scaled into a network's input, and boxes mapped back."""
 
 from __future__ import annotations
 
@@ -9,24 +9,25 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import FloatArray, ImageRgb
-from ._pixels import PixelFormat
+from ...arrays import FloatArray, ImageRgb
+from .._pixels import PixelFormat
 
-_GREY: Final = 114
+_PADDING_GREY: Final = 114
 
 
 @dataclass(frozen=True, slots=True)
 class LetterboxGeometry:
-    """Where a picture of one size lies in the input.
+    """Position and scale of an image of one size in the network's input.
 
-    Both count pixels from their corner, as boxes do: ``cv2.resize`` maps the picture's corners onto
-    the corners of the scaled picture, so x_image = (x_input − left) · width_image / width_scaled
-    holds exactly, with a factor of its own for y since sides are rounded to whole pixels.
+    Coordinates of image and input both count from the corner, as boxes do. ``cv2.resize`` maps the
+    image's corners onto the corners of the scaled image, so
+    x_image = (x_input − left) · width_image / width_scaled holds exactly. The factor for y differs
+    slightly, because both sides are rounded to whole pixels.
 
     Attributes:
-        image_px: width and height of the picture.
-        scaled_px: width and height that it has in the input.
-        corner_px: left and top of it there.
+        image_px: width and height of the image.
+        scaled_px: width and height of the scaled image in the input.
+        corner_px: left and top of the scaled image in the input.
     """
 
     image_px: tuple[int, int]
@@ -37,38 +38,38 @@ class LetterboxGeometry:
     def of(
         cls, image_px: tuple[int, int], input_px: tuple[int, int], *, centred: bool
     ) -> LetterboxGeometry:
-        """Fit a picture into the input, as large as it goes; both sizes are width, height."""
-        scale = min(room / side for room, side in zip(input_px, image_px, strict=True))
+        """Return the geometry of the largest scaled image that fits; sizes are (width, height)."""
+        scale = min(available / side for available, side in zip(input_px, image_px, strict=True))
         width, height = (
-            min(max(round(side * scale), 1), room)
-            for side, room in zip(image_px, input_px, strict=True)
+            min(max(round(side * scale), 1), available)
+            for side, available in zip(image_px, input_px, strict=True)
         )
-        # An odd pixel of padding goes to the right and below, as Ultralytics' LetterBox has it.
+        # An odd pixel of padding goes to the right or bottom, as in Ultralytics' LetterBox.
         left, top = (input_px[0] - width) // 2, (input_px[1] - height) // 2
         return cls(image_px, (width, height), (left, top) if centred else (0, 0))
 
     def to_image(self, boxes_xyxy: NDArray[Any]) -> FloatArray:
-        """Boxes (N, 4) in pixels of the input to pixels of the picture, clipped to it."""
+        """Map boxes (N, 4) from the input to the image and clip them to the image."""
         factor = np.divide(self.image_px, self.scaled_px)
         boxes = (boxes_xyxy.astype(np.float64) - self.corner_px * 2) * np.tile(factor, 2)
         return np.asarray(np.clip(boxes, 0.0, self.image_px * 2))
 
     def to_input(self, boxes_xyxy_px: NDArray[Any]) -> FloatArray:
-        """Boxes (N, 4) in pixels of the picture to pixels of the input."""
+        """Map boxes (N, 4) from the image to the input."""
         factor = np.divide(self.scaled_px, self.image_px)
         return np.asarray(boxes_xyxy_px * np.tile(factor, 2) + self.corner_px * 2)
 
 
 class Letterbox:
-    """Fills a network's input with pictures, padded with grey (114).
+    """Network input that is filled with one image at a time, padded with grey (114).
 
-    The input is reused from picture to picture: feed it before the next one is filled.
+    Every image is written into the same array: run the network before the next :meth:`fill`.
 
     Args:
-        height_px: of the input.
-        width_px: of the input.
-        pixels: order and scale of its channels.
-        centred: whether the picture lies in the middle or at the top left.
+        height_px: height of the input.
+        width_px: width of the input.
+        pixels: pixel format of the network.
+        centred: True puts the image into the middle, False at the top left.
     """
 
     def __init__(
@@ -77,12 +78,15 @@ class Letterbox:
         self._input_px = (width_px, height_px)
         self._pixels = pixels
         self._centred = centred
-        self._blob = pixels.blob(1, height_px, width_px)
+        self._blob = pixels.empty_blob(1, height_px, width_px)
         self._geometry: LetterboxGeometry | None = None
         self._scaled = np.empty((1, 1, 3), np.uint8)
 
     def fill(self, image_rgb: ImageRgb) -> tuple[NDArray[Any], LetterboxGeometry]:
-        """Scale ``image_rgb`` (H, W, 3) bilinearly into the input (1, 3, height, width)."""
+        """Scale ``image_rgb`` (H, W, 3) bilinearly into the input; return input and geometry.
+
+        The input has the shape (1, 3, height, width).
+        """
         size = (image_rgb.shape[1], image_rgb.shape[0])
         geometry = self._geometry
         if geometry is None or geometry.image_px != size:
@@ -93,13 +97,13 @@ class Letterbox:
             cv2.resize(image_rgb, geometry.scaled_px, dst=scaled, interpolation=cv2.INTER_LINEAR)
         (width, height), (left, top) = geometry.scaled_px, geometry.corner_px
         self._pixels.write(scaled, self._blob[0, :, top : top + height, left : left + width])
-        return self._pixels.fed(self._blob), geometry
+        return self._pixels.as_input(self._blob), geometry
 
     def _prepare(self, size: tuple[int, int]) -> LetterboxGeometry:
-        """Paint the padding for pictures of another size; it stays while the size does."""
+        """Write the padding for images of a new size; it is kept until the size changes again."""
         geometry = LetterboxGeometry.of(size, self._input_px, centred=self._centred)
         width, height = self._input_px
-        self._pixels.write(np.full((height, width, 3), _GREY, np.uint8), self._blob[0])
+        self._pixels.write(np.full((height, width, 3), _PADDING_GREY, np.uint8), self._blob[0])
         self._scaled = np.empty((geometry.scaled_px[1], geometry.scaled_px[0], 3), np.uint8)
         self._geometry = geometry
         return geometry

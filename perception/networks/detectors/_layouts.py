@@ -1,4 +1,4 @@
-"""Which detector a file holds, told from the shapes of its outputs and from its metadata."""
+"""Layouts of detectors, recognised from the shapes of the outputs and from the metadata."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import PerceptionError
+from ...errors import PerceptionError
+from .._model import OnnxModel, output_shapes
+from .._pixels import IMAGENET_MEAN_RGB, IMAGENET_STD_RGB, PixelFormat
 from ._box_format import BoxFormatVote
-from ._detector_decoders import (
+from ._decoders import (
     STRIDES,
     Decoder,
     RowsDecoder,
@@ -22,39 +24,33 @@ from ._detector_decoders import (
     cell_count,
     cells,
 )
-from ._pixels import PixelFormat
-from ._session import OnnxModel
 
-KNOWN: Final = (
+_KNOWN: Final = (
     "YOLOv8/11 and relatives (1, 4 + classes, N), N cells of strides 8, 16 and 32; "
     "rows of a network without or with its own NMS (1, M, 6); "
     "YOLOX raw (1, N, 5 + classes); "
     "RTMDet dets (1, N, 5) and labels (1, N)"
 )
-# Other pyramids of the same family: with a coarser and with a finer level.
+# Feature pyramids of the YOLOv8 family: the usual one, with a coarser and with a finer level.
 _PYRAMIDS: Final = (STRIDES, (*STRIDES, 64), (4, *STRIDES))
 _COCO_CLASSES: Final = 80
 _ROW_LENGTH: Final = 6
 
 _ULTRALYTICS: Final = {"std_rgb": (255.0, 255.0, 255.0)}
 _YOLOX: Final = {"bgr": True}
-# OpenMMLab's configs of RTMDet list these for blue, green, red.
-_RTMDET: Final = {
-    "mean_rgb": (123.675, 116.28, 103.53),
-    "std_rgb": (58.395, 57.12, 57.375),
-    "bgr": True,
-}
+# OpenMMLab's configs of RTMDet list mean and standard deviation in the order blue, green, red.
+_RTMDET: Final = {"mean_rgb": IMAGENET_MEAN_RGB, "std_rgb": IMAGENET_STD_RGB, "bgr": True}
 
 
 @dataclass(frozen=True, slots=True)
 class DetectorLayout:
-    """How to feed a detector and how to read it.
+    """Layout of a detector: the form of its input and of its outputs.
 
     Attributes:
-        name: for messages.
-        pixels: what its pixels look like.
-        centred: whether the picture lies in the middle of the input or at its top left.
-        decoder: reads its outputs.
+        name: name for messages.
+        pixels: pixel format of the input.
+        centred: True if the image lies in the middle of the input, False if at its top left.
+        decoder: reads the outputs.
     """
 
     name: str
@@ -64,17 +60,17 @@ class DetectorLayout:
 
 
 @dataclass(frozen=True, slots=True)
-class Trial:
-    """A detector that has been run once on an empty input, so that all its extents are known.
+class TrialRun:
+    """A run of a detector on an empty input, which shows the extents of all outputs.
 
     Attributes:
         model: the network.
-        outputs: what it put out.
-        height_px: of the input.
-        width_px: of the input.
-        dtype: of the input.
-        person_class: the caller's, or None.
-        box_format: the caller's, or None.
+        outputs: its outputs.
+        height_px: height of the input.
+        width_px: width of the input.
+        dtype: number type of the input.
+        person_class: class number given by the caller, or None.
+        box_format: box format given by the caller, or None.
     """
 
     model: OnnxModel
@@ -86,32 +82,28 @@ class Trial:
     box_format: str | None = None
 
     def refusal(self, reason: str) -> PerceptionError:
-        """An error that says what was found and what is known."""
-        shapes = (
-            f"{tensor.name} {output.shape}"
-            for tensor, output in zip(self.model.outputs, self.outputs, strict=True)
-        )
+        """Return an error that says what was found and which layouts are known."""
         names = class_names(self.model)
-        described = "" if names is None else f", metadata naming {len(names)} class(es)"
+        classes = "" if names is None else f", metadata naming {len(names)} class(es)"
         return PerceptionError(
-            f"{self.model.name} is no person detector of a known layout: {reason}. Found input "
-            f"(1, 3, {self.height_px}, {self.width_px}) -> {', '.join(shapes)}{described}. "
-            f"Known: {KNOWN}"
+            f"{self.model.name} is not a person detector of a known layout: {reason}. Found input "
+            f"(1, 3, {self.height_px}, {self.width_px}) -> "
+            f"{output_shapes(self.model, self.outputs)}{classes}. Known: {_KNOWN}"
         )
 
 
-def recognise(trial: Trial) -> DetectorLayout:
-    """Tell the layout of a detector.
+def recognise(trial: TrialRun) -> DetectorLayout:
+    """Recognise the layout of a detector.
 
     Raises:
-        PerceptionError: for a layout that is not known, or that could be two of those known.
+        PerceptionError: for an unknown layout, and for one that fits two known layouts.
     """
     task = trial.model.metadata.get("task", "detect")
     if task != "detect":
         raise trial.refusal(f"its metadata says that its task is {task!r}, not 'detect'")
     shapes = [output.shape for output in trial.outputs]
     if any(0 in shape[:1] or shape[0] != 1 for shape in shapes if shape):
-        raise trial.refusal("it does not put out one batch for one picture")
+        raise trial.refusal("its outputs do not have batch size 1 for one image")
     if len(shapes) == 2:
         return _rtmdet(trial)
     if len(shapes) != 1 or len(shapes[0]) != 3:
@@ -119,7 +111,8 @@ def recognise(trial: Trial) -> DetectorLayout:
     return _single_output(trial, shapes[0][1], shapes[0][2])
 
 
-def _single_output(trial: Trial, first: int, second: int) -> DetectorLayout:
+def _single_output(trial: TrialRun, first: int, second: int) -> DetectorLayout:
+    """Recognise a detector with one output (1, first, second)."""
     size = trial.height_px, trial.width_px
     counts = {cell_count(*size, strides) for strides in _PYRAMIDS}
     names = class_names(trial.model)
@@ -129,7 +122,7 @@ def _single_output(trial: Trial, first: int, second: int) -> DetectorLayout:
     if first == cell_count(*size):
         if second >= 6 and (names is None or second == 5 + len(names)):
             candidates["YOLOX raw"] = lambda: _yolox(trial, second - 5)
-        # Without names only COCO's 80 classes or a lone one give a transposed YOLOv8 away.
+        # Without class names, a transposed YOLOv8 is recognised only with 1 or COCO's 80 classes.
         classes = second - 4
         if classes in ((1, _COCO_CLASSES) if names is None else (len(names),)):
             candidates["YOLOv8 with its axes swapped"] = None
@@ -139,38 +132,38 @@ def _single_output(trial: Trial, first: int, second: int) -> DetectorLayout:
         raise trial.refusal(f"it could be {' or '.join(candidates)}")
     make = next(iter(candidates.values()), None)
     if make is None:
-        raise trial.refusal(_reason(trial, first, second, candidates))
+        raise trial.refusal(_refusal_reason(trial, first, second, candidates))
     layout: DetectorLayout = make()
     return layout
 
 
-def _reason(trial: Trial, first: int, second: int, candidates: dict[str, Any]) -> str:
+def _refusal_reason(trial: TrialRun, first: int, second: int, candidates: dict[str, Any]) -> str:
     wanted = cell_count(trial.height_px, trial.width_px)
     if candidates:
         return f"it looks like {next(iter(candidates))}; export it as (1, {second}, {first})"
     if 3 * wanted in (first, second):
-        return "it has three places a cell, as YOLOv5 and YOLOv7 with their anchors have"
+        return "it has three outputs per cell, as YOLOv5 and YOLOv7 have with their anchors"
     if wanted in (first, second):
         extent = second if first == wanted else first
-        return f"{extent} numbers a place do not agree with the classes that its metadata names"
+        return f"{extent} numbers per cell do not agree with the classes that its metadata names"
     return f"an input of this size has {wanted} cells of strides 8, 16 and 32"
 
 
-def _yolov8(trial: Trial, classes: int) -> DetectorLayout:
+def _yolov8(trial: TrialRun, classes: int) -> DetectorLayout:
     person = _person_class(trial, classes)
     return DetectorLayout("YOLOv8", _pixels(trial, _ULTRALYTICS), True, YoloV8Decoder(person))
 
 
-def _rows(trial: Trial) -> DetectorLayout:
+def _rows(trial: TrialRun) -> DetectorLayout:
     input_px = (trial.width_px, trial.height_px)
     vote = BoxFormatVote(trial.box_format)
     rows = trial.outputs[0][0].astype(np.float32)
-    vote.listen(rows[:, :4], rows[:, 4], input_px)
+    vote.update(rows[:, :4], rows[:, 4], input_px)
     decoder = RowsDecoder(_person_class(trial, None), vote, input_px)
     return DetectorLayout("rows (NMS inside)", _pixels(trial, _ULTRALYTICS), True, decoder)
 
 
-def _yolox(trial: Trial, classes: int) -> DetectorLayout:
+def _yolox(trial: TrialRun, classes: int) -> DetectorLayout:
     size = trial.height_px, trial.width_px
     if _is_decoded(trial.outputs[0][0], *size):
         raise trial.refusal(
@@ -182,7 +175,7 @@ def _yolox(trial: Trial, classes: int) -> DetectorLayout:
 
 
 def _is_decoded(rows: NDArray[Any], height_px: int, width_px: int) -> bool:
-    """Whether centres lie near their own cells in pixels rather than near zero."""
+    """Return True if the centres lie near their cells, in pixels, and not near zero."""
     places, strides = cells(height_px, width_px)
     centres = rows[:, :2].astype(np.float32)
     near_cell = np.abs(centres - (places + 0.5) * strides) < 2.0 * strides
@@ -190,23 +183,24 @@ def _is_decoded(rows: NDArray[Any], height_px: int, width_px: int) -> bool:
     return float(near_cell.mean()) > max(0.5, float(near_zero.mean()))
 
 
-def _rtmdet(trial: Trial) -> DetectorLayout:
+def _rtmdet(trial: TrialRun) -> DetectorLayout:
     shapes = [output.shape for output in trial.outputs]
     for dets, labels in ((0, 1), (1, 0)):
-        whole = np.issubdtype(trial.outputs[labels].dtype, np.integer)
+        integers = np.issubdtype(trial.outputs[labels].dtype, np.integer)
         if len(shapes[dets]) == 3 and shapes[dets][2] == 5 and shapes[labels] == shapes[dets][:2]:
-            if not whole:
+            if not integers:
                 break
             decoder = RtmdetDecoder(_person_class(trial, None), dets, labels)
             return DetectorLayout("RTMDet", _pixels(trial, _RTMDET), False, decoder)
-    raise trial.refusal("two outputs are known of RTMDet only")
+    raise trial.refusal("of the known detectors only RTMDet has two outputs")
 
 
-def _pixels(trial: Trial, values: dict[str, Any]) -> PixelFormat:
+def _pixels(trial: TrialRun, values: dict[str, Any]) -> PixelFormat:
     return PixelFormat(**values, dtype=trial.dtype)
 
 
-def _person_class(trial: Trial, classes: int | None) -> int:
+def _person_class(trial: TrialRun, classes: int | None) -> int:
+    """Return the number of the class that counts, for a network of ``classes`` if that is known."""
     names = class_names(trial.model)
     given = trial.person_class
     if given is not None:
@@ -216,7 +210,7 @@ def _person_class(trial: Trial, classes: int | None) -> int:
                 f"person_class must lie in [0, {count - 1}] for {trial.model.name}, got {given}"
             )
         return given
-    # Exports without names number their classes; COCO's first is the person.
+    # Exports without names give the classes numbers as names. COCO's first class is the person.
     if names is None or all(name.isdigit() for name in names.values()):
         return 0
     for number, name in names.items():
@@ -225,16 +219,13 @@ def _person_class(trial: Trial, classes: int | None) -> int:
     listed = ", ".join(repr(name) for name in list(names.values())[:8])
     raise PerceptionError(
         f"{trial.model.name} names no class 'person' but {listed}"
-        f"{', …' if len(names) > 8 else ''}; say which one counts with person_class"
+        f"{', …' if len(names) > 8 else ''}; give the number of the class with person_class"
     )
 
 
 def class_names(model: OnnxModel) -> dict[int, str] | None:
-    """The classes that the metadata ``names`` lists, by number; None where it lists none."""
-    try:
-        names = ast.literal_eval(model.metadata.get("names", "None"))
-    except (ValueError, SyntaxError, MemoryError, RecursionError):
-        return None
+    """Return the class names in the metadata ``names``, by number; None without class names."""
+    names = _metadata_literal(model, "names")
     if isinstance(names, (list, tuple)):
         names = dict(enumerate(names))
     if not isinstance(names, dict) or not names:
@@ -245,11 +236,8 @@ def class_names(model: OnnxModel) -> dict[int, str] | None:
 
 
 def metadata_size(model: OnnxModel) -> tuple[int, int] | None:
-    """Height and width that the metadata ``imgsz`` gives, or None."""
-    try:
-        size = ast.literal_eval(model.metadata.get("imgsz", "None"))
-    except (ValueError, SyntaxError, MemoryError, RecursionError):
-        return None
+    """Return height and width from the metadata ``imgsz``, or None without them."""
+    size = _metadata_literal(model, "imgsz")
     if isinstance(size, int):
         size = (size, size)
     if (
@@ -259,3 +247,11 @@ def metadata_size(model: OnnxModel) -> tuple[int, int] | None:
     ):
         return size[0], size[1]
     return None
+
+
+def _metadata_literal(model: OnnxModel, key: str) -> Any:
+    """Return a Python literal from the metadata; None where it is missing or no literal."""
+    try:
+        return ast.literal_eval(model.metadata.get(key, "None"))
+    except (ValueError, SyntaxError, MemoryError, RecursionError):
+        return None

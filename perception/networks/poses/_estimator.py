@@ -1,61 +1,58 @@
-"""Finds the keypoints of people with any SimCC pose network, in the image and in space."""
+"""A pose estimator that runs any SimCC network: keypoints in the image and in metres."""
 
 from __future__ import annotations
 
-import os
 import threading
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .._detection import PersonDetection
-from .._keypoints import PersonKeypoints
-from ..arrays import FloatArray, ImageRgb, finite_number
-from ..errors import PerceptionError
-from ..layouts import keypoint_layout
+from ..._detection import PersonDetection
+from ..._keypoints import PersonKeypoints
+from ...arrays import FloatArray, ImageRgb, finite_number
+from ...errors import PerceptionError
+from ...layouts import keypoint_layout
+from .._image import rgb_image
+from .._image_input import input_batch, input_dtype, input_size, run_on_images
+from .._model import ModelSource, OnnxSettings, as_onnx_model
+from .._pixels import IMAGENET_MEAN_RGB, IMAGENET_STD_RGB, PixelFormat
 from ._crops import BOX_PADDING, PersonCrops
-from ._image import rgb_image
-from ._input_size import batch_of, input_size
-from ._lift import lift
-from ._pixels import PixelFormat, input_dtype
-from ._pose_layouts import PoseLayout, metadata_number, recognise_pose
-from ._session import OnnxModel, OnnxSettings, as_onnx_model
-from ._simcc import confidence, depth_m, peaks
+from ._layouts import PoseLayout, metadata_number, recognise
+from ._lift import lift_keypoints
+from ._simcc import simcc_confidence, simcc_depth_m, simcc_peaks
 
-# The data preprocessor of RTMPose, RTMW and RTMW3D, and ours.
-_MEAN_RGB: Final = (123.675, 116.28, 103.53)
-_STD_RGB: Final = (58.395, 57.12, 57.375)
-# A crowd is run in portions: memory grows with the batch, and speed no longer does.
+# Larger batches need more memory and are not faster per person.
 _MAX_BATCH: Final = 16
 
 
 class OnnxPoseEstimator:
-    """A top-down pose network from an ONNX file: RTMPose, RTMW, RTMW3D or our own.
+    """A top-down pose network from an ONNX file: RTMPose, RTMW, RTMW3D or the shipped one.
 
-    Keypoints are refined between the bins and scored by the weakest of their axes. With a third
-    axis they come with the network's depth; see :func:`._lift.lift` for how they become metres.
-    Without one the skeleton is flat, every z is 0, and ``lifted`` is False.
+    Keypoint positions are refined between the bins; the score of a keypoint is that of its weakest
+    axis. A network with a third axis gives depths;
+    :func:`~perception.networks.poses.lift_keypoints` describes how the skeleton becomes metric.
+    Without a third axis the skeleton is flat: every z is 0, and ``lifted`` is False.
 
-    All people of a picture go through the network together where its batch axis is free, else in
-    portions of its size. Calls from several threads take turns.
+    The people of an image form one batch if the network's batch axis is free, else batches of the
+    network's size. Several threads may share an estimator; their calls run one after another.
 
     Args:
-        path: the ONNX file, its bytes, or an :class:`OnnxModel` that is loaded already.
-        box_padding: how much larger than the box the network's picture is, > 0; default the
-            metadata's ``box_padding``, else 1.25.
-        input_size_hw_px: (height, width) for a network that leaves its input's size free.
-        settings: providers and threads, for loading.
-        sha256: what the file must hash to, for loading.
+        path: the ONNX file, its bytes, or a loaded :class:`~perception.networks.OnnxModel`.
+        box_padding: size of the crop relative to the box, > 0; default the metadata's
+            ``box_padding``, else 1.25.
+        input_size_hw_px: (height, width) for a network that leaves its input size free.
+        settings: providers and threads, for a model that is not loaded yet.
+        sha256: expected SHA-256 of the file, for a model that is not loaded yet.
 
     Raises:
-        PerceptionError: for a file that cannot be loaded, a layout that is not known (saying what
-            was found and what is known), and a value that is not valid.
+        PerceptionError: for a file that cannot be loaded, an unknown layout (the message says what
+            was found and what is known), and an invalid value.
     """
 
     def __init__(
         self,
-        path: OnnxModel | str | os.PathLike[str] | bytes,
+        path: ModelSource,
         *,
         box_padding: float | None = None,
         input_size_hw_px: tuple[int, int] | None = None,
@@ -72,16 +69,17 @@ class OnnxPoseEstimator:
             if box_padding is None
             else box_padding
         )
-        # Where a network's keypoints lie in the body is a habit of whoever labelled its data.
+        # Data sets place keypoints differently on the body, so limbs differ in length.
         self._limb_scale = metadata_number(self.model, "limb_scale", 1.0)
         self._scale_std = metadata_number(self.model, "scale_relative_std", 0.0)
-        batch = batch_of(self.model)
+        batch = input_batch(self.model)
         self.input_size_hw_px = input_size(self.model, input_size_hw_px, None)
-        dtype = input_dtype(self.model.inputs[0], self.model.name)
-        self._pixels = PixelFormat(_MEAN_RGB, _STD_RGB, dtype=dtype)
+        self._pixels = PixelFormat(
+            IMAGENET_MEAN_RGB, IMAGENET_STD_RGB, dtype=input_dtype(self.model)
+        )
         self._batch, self._always_full, self._layout = self._recognise(batch)
         self._crop = np.empty((*self.input_size_hw_px, 3), np.uint8)
-        self._blob = self._pixels.blob(1, *self.input_size_hw_px)
+        self._blob = self._pixels.empty_blob(1, *self.input_size_hw_px)
         self._lock = threading.Lock()
 
     def __repr__(self) -> str:
@@ -94,7 +92,7 @@ class OnnxPoseEstimator:
 
     @property
     def has_depth(self) -> bool:
-        """Whether the network gives depths; skeletons are flat where it does not."""
+        """True if the network gives depths; without them skeletons are flat."""
         return self._layout.has_depth
 
     def estimate(
@@ -102,16 +100,16 @@ class OnnxPoseEstimator:
     ) -> tuple[PersonKeypoints, ...]:
         """Return the keypoints of each detected person, in the same order.
 
-        Without detections there are no people, and the network is not run. A person whose crop lies
-        outside the picture, or whose box has no extent, has every score 0. So has a keypoint that
-        the network places outside the picture, or at no finite place.
+        All scores are 0 for a person whose crop lies outside the image or whose box has no extent.
+        The score of a keypoint is 0 if the network places it outside the image or at a non-finite
+        position. Without detections the network does not run.
 
         Args:
             image_rgb: (H, W, 3) uint8 of any size.
-            detections: boxes that count pixels from the picture's corner.
+            detections: people; box coordinates count from the image's corner.
 
         Raises:
-            PerceptionError: for a picture of another type or shape, and when the network fails.
+            PerceptionError: for an image of another type or shape, and when the network fails.
         """
         image = rgb_image(image_rgb)
         if not detections:
@@ -120,7 +118,7 @@ class OnnxPoseEstimator:
         crops = PersonCrops(boxes, *self.input_size_hw_px, self._padding)
         visible = crops.inside(image).nonzero()[0]
         size = keypoint_layout(self.layout).size
-        # Those who are not seen stand in the middle of their box, with scores of 0.
+        # The keypoints of people outside the image lie in the middle of the box, with scores of 0.
         middle = 0.5 * (boxes[:, :2] + boxes[:, 2:]) - 0.5
         pixels = np.empty((len(boxes), size, 2))
         pixels[:] = middle[:, None]
@@ -147,24 +145,21 @@ class OnnxPoseEstimator:
     def _run(
         self, image: ImageRgb, crops: PersonCrops, rows: NDArray[np.intp]
     ) -> list[NDArray[Any]]:
-        """The outputs for the crops ``rows``, x, y and z along the first axis of each."""
-        portions = []
+        """Return the network's outputs x, y and, if it has one, z for the crops ``rows``."""
+        batches = []
         for start in range(0, len(rows), self._batch):
-            portion = rows[start : start + self._batch]
-            count = self._batch if self._always_full else len(portion)
+            batch = rows[start : start + self._batch]
+            count = self._batch if self._always_full else len(batch)
             if len(self._blob) < count:
-                self._blob = self._pixels.blob(count, *self.input_size_hw_px)
-            for place, row in enumerate(portion):
+                self._blob = self._pixels.empty_blob(count, *self.input_size_hw_px)
+            for place, row in enumerate(batch):
                 crops.cut(image, int(row), self._crop)
                 self._pixels.write(self._crop, self._blob[place])
-            outputs = self._feed(self._pixels.fed(self._blob[:count]))
-            portions.append([outputs[axis][: len(portion)] for axis in self._layout.axes])
-        if len(portions) == 1:
-            return portions[0]
-        return [np.concatenate(parts) for parts in zip(*portions, strict=True)]
-
-    def _feed(self, blob: NDArray[Any]) -> list[NDArray[Any]]:
-        return self.model.run({self.model.inputs[0].name: blob})
+            outputs = run_on_images(self.model, self._pixels.as_input(self._blob[:count]))
+            batches.append([outputs[axis][: len(batch)] for axis in self._layout.axes])
+        if len(batches) == 1:
+            return batches[0]
+        return [np.concatenate(parts) for parts in zip(*batches, strict=True)]
 
     def _decode(
         self,
@@ -173,32 +168,33 @@ class OnnxPoseEstimator:
         crops: PersonCrops,
         rows: NDArray[np.intp],
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Pixels (n, K, 2), skeletons (n, K, 3) and scores (n, K) of the crops ``rows``."""
-        places, heights = peaks(outputs)
+        """Return pixels (n, K, 2), skeletons (n, K, 3) and scores (n, K) of the crops ``rows``."""
+        places, heights = simcc_peaks(outputs)
         in_crop = places[:2].transpose(1, 2, 0) / self._layout.split_ratio
         pixels = crops.to_image(in_crop, rows)
-        # What lies outside the picture was guessed. One pixel of the crop is rounding.
+        # Keypoints outside the image were guessed. The slack of one crop pixel allows for rounding.
         extent = np.array([image.shape[1], image.shape[0]])
         slack = 0.5 + crops.step_px[rows, None]
         shown = (pixels > -slack) & (pixels < extent - 1.0 + slack)
-        scores = confidence(heights, np.asarray(shown.all(axis=2)))
+        scores = simcc_confidence(heights, np.asarray(shown.all(axis=2)))
         depths = None
         if self.has_depth:
-            depths = depth_m(places[2], outputs[2].shape[2], self._layout.z_range_m)
-        return pixels, lift(pixels, depths, scores, self._limb_scale), scores
+            depths = simcc_depth_m(places[2], outputs[2].shape[2], self._layout.z_range_m)
+        return pixels, lift_keypoints(pixels, depths, scores, self._limb_scale), scores
 
     def _recognise(self, batch: int | None) -> tuple[int, bool, PoseLayout]:
-        """How many crops the network takes at most, whether always so many, and its layout.
+        """Return the largest batch, whether every batch must have that size, and the layout.
 
-        Some exports call the batch free and have a number written into their insides: runs on
-        nothing tell.
+        Some exports declare a free batch axis but work with one fixed number only. Runs on empty
+        inputs show this.
         """
         height, width = self.input_size_hw_px
         works: dict[int, list[NDArray[Any]]] = {}
         failure: PerceptionError | None = None
         for count in (1, 2) if batch is None else (batch,):
             try:
-                outputs = self._feed(self._pixels.fed(self._pixels.blob(count, height, width)))
+                blob = self._pixels.as_input(self._pixels.empty_blob(count, height, width))
+                outputs = run_on_images(self.model, blob)
             except PerceptionError as error:
                 failure = failure or error
                 continue
@@ -206,8 +202,8 @@ class OnnxPoseEstimator:
                 works[count] = outputs
         if not works:
             raise failure or PerceptionError(
-                f"{self.model.name} does not put out one result a picture: {self.model.layout}"
+                f"{self.model.name} does not return one result per image: {self.model.layout}"
             )
         count, outputs = next(iter(works.items()))
-        layout = recognise_pose(self.model, outputs, height, width)
+        layout = recognise(self.model, outputs, height, width)
         return (_MAX_BATCH, False, layout) if len(works) == 2 else (count, True, layout)

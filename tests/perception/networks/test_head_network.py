@@ -1,4 +1,4 @@
-"""A head pose network between pixels and the camera frame, on graphs whose answers are known."""
+"""Head pose networks: graphs whose results in the camera frame are known."""
 
 from __future__ import annotations
 
@@ -16,16 +16,15 @@ from perception import Camera, PerceptionError, PersonKeypoints
 from perception.anthropometry import HEAD_CENTRE_HEAD_M
 from perception.networks import OnnxModel
 from perception.networks.heads import OnnxHeadPoseEstimator, ray_axes
-from perception.networks.heads._crops import crop_to_image, head_crop
-from perception.networks.heads._layouts import _orthonormal
-from perception.networks.heads._ray_view import focal_px, looking_at
+from perception.networks.heads._outputs import nearest_rotations
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
+WIDE = Camera.from_fov(960, 600, math.radians(120.0))
 FACING_HEAD = np.stack([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]], axis=1)
 
 
 def disc_image(camera, centre_camera_m):
-    """A white disc, square to its ray, with pixels at its rim as grey as they are full."""
+    """Return an image of a white disc perpendicular to its ray, with an anti-aliased rim."""
     v, u = np.mgrid[: camera.height_px, : camera.width_px]
     rays = camera.normalise(np.column_stack([u.ravel(), v.ravel()]))
     (axes,) = ray_axes(centre_camera_m[None, :2] / centre_camera_m[2])
@@ -44,7 +43,7 @@ def disc_at(centre_camera_m):
 
 
 def person_about(pixel, px_per_m, offset_px=(0.0, 0.0), scores=(1, 1, 1, 1, 1)):
-    """A person whose keypoints put the head's centre near ``pixel``: ears beside, body below."""
+    """Return a person whose keypoints place the head's centre near ``pixel``."""
     pixels = np.zeros((17, 2))
     down = np.array([0.0, 1.0])
     u = np.asarray(pixel) + offset_px
@@ -65,128 +64,9 @@ def person_about(pixel, px_per_m, offset_px=(0.0, 0.0), scores=(1, 1, 1, 1, 1)):
     return PersonKeypoints(pixels, root, score, "coco")
 
 
-# --- the crop -----------------------------------------------------------------------------------
-
-
-@given(
-    u=st.floats(100.0, 540.0),
-    v=st.floats(100.0, 380.0),
-    side=st.floats(10.0, 180.0),
-    size=st.sampled_from([32, 64, 224]),
-)
-@settings(max_examples=40, deadline=None)
-def test_a_ramp_stays_the_same_ramp_in_any_crop(u, v, side, size):
-    """Bilinear sampling and area averages are both exact on a linear ramp of brightness."""
-    ramp = np.zeros((480, 640, 3), np.uint8)
-    ramp[..., 0] = np.round(np.arange(640) * 0.375)[None, :]
-    ramp[..., 1] = np.round(np.arange(480) * 0.5)[:, None]
-    crop = head_crop(ramp, (u, v), side, size).astype(float)
-    steps = ((np.arange(size) + 0.5) / size - 0.5) * side
-    np.testing.assert_allclose(crop[:, :, 0], np.tile((u + steps) * 0.375, (size, 1)), atol=1.3)
-    np.testing.assert_allclose(crop[:, :, 1].T, np.tile((v + steps) * 0.5, (size, 1)), atol=1.3)
-    assert abs(np.mean(crop[..., 0]) - 0.375 * u) < 0.35
-
-
-def test_shrinking_averages_over_areas():
-    """A chequerboard of single pixels becomes grey: nothing of it survives as a pattern."""
-    board = np.zeros((480, 640, 3), np.uint8)
-    board[(np.add.outer(np.arange(480), np.arange(640)) % 2).astype(bool)] = 255
-    crop = head_crop(board, (320.2, 240.4), 400.0)
-    assert abs(float(crop.mean()) - 127.5) < 2.0
-    assert float(crop.std()) < 12.0
-
-
-@pytest.mark.parametrize("centre", [(-500.0, 100.0), (1e9, -1e9), (320.0, 900.0)])
-def test_outside_the_image_is_grey(centre):
-    image = np.zeros((480, 640, 3), np.uint8)
-    assert (head_crop(image, centre, 80.0) == 114).all()
-
-
-def test_the_border_of_the_image_runs_through_the_crop():
-    image = np.full((480, 640, 3), 255, np.uint8)
-    crop = head_crop(image, (-0.5, 239.5), 64.0)
-    assert (crop[:, :31] == 114).all()
-    assert (crop[:, 33:] == 255).all()
-
-
-@pytest.mark.parametrize("side", [0.0, -3.0, math.nan])
-def test_a_crop_without_extent_is_refused(side):
-    with pytest.raises(PerceptionError, match="side_px"):
-        head_crop(np.zeros((9, 9, 3), np.uint8), (4.0, 4.0), side)
-
-
-def test_one_pixel_is_an_image():
-    crop = head_crop(np.full((1, 1, 3), 7, np.uint8), (0.0, 0.0), 1.0, 8)
-    assert crop.shape == (8, 8, 3)
-    assert (crop[4, 4] < 114).all()
-
-
-def test_crop_units_become_pixels():
-    corner = crop_to_image(np.zeros(2), np.array([10.0, 20.0]), 8.0)
-    np.testing.assert_allclose(corner, [6.0, 16.0])
-    stretched = crop_to_image(np.zeros(2), np.array([10.0, 20.0]), 8.0, np.diag([2.0, 0.5]))
-    np.testing.assert_allclose(stretched, [2.0, 18.0])
-
-
-BENT = Camera(960, 600, 340.0, 345.0, 470.0, 310.0, [-0.15, 0.02, 0.001, -0.001, 0.0])
-WIDE = Camera.from_fov(960, 600, math.radians(120.0))
-
-
-@pytest.mark.parametrize("camera", [WIDE, BENT], ids=["pinhole", "distorted"])
-@given(u=st.floats(20.0, 940.0), v=st.floats(20.0, 580.0), angle=st.floats(0.0, 6.28))
-@settings(max_examples=40, deadline=None)
-def test_the_stretch_is_how_the_lens_draws_what_lies_around_a_ray(camera, u, v, angle):
-    axes, stretch = looking_at(camera, np.array([[u, v]]))
-    step = 0.02 * np.array([math.cos(angle), math.sin(angle)])
-    both = np.array([[*step, 1.0], [*-step, 1.0]]) @ axes[0].T
-    ahead, behind = camera.project(both)
-    drawn = stretch[0] @ (2.0 * step) * focal_px(camera)
-    np.testing.assert_allclose(ahead - behind, drawn, atol=0.02 * np.linalg.norm(drawn))
-
-
-@pytest.mark.parametrize("pixel", [(480.0, 300.0), (860.0, 180.0), (60.0, 420.0)])
-def test_a_crop_looks_as_if_the_camera_had_been_turned_to_the_head(pixel):
-    """A pattern on the directions around a ray: the same crop wherever the ray hits the picture."""
-    (axes,), (stretch,) = looking_at(WIDE, np.array([pixel]))
-    v, u = np.mgrid[0:600, 0:960]
-    rays = WIDE.normalise(np.stack([u.ravel(), v.ravel()], axis=1))
-    turned = np.column_stack([rays, np.ones(len(rays))]) @ axes
-    a, b = (turned[:, :2] / turned[:, 2:]).T * focal_px(WIDE)
-
-    def pattern(across, down):
-        return 127.0 + 60.0 * np.sin(across / 7.0) + 50.0 * np.cos(down / 5.0)
-
-    shown = np.where(turned[:, 2] > 0.0, pattern(a, b), 0.0).reshape(600, 960)
-    image = np.repeat(np.clip(np.rint(shown), 0, 255).astype(np.uint8)[..., None], 3, axis=2)
-    side = 24.0
-    crop = head_crop(image, pixel, side, 64, stretch)[..., 0].astype(float)
-    steps = ((np.arange(64) + 0.5) / 64 - 0.5) * side
-    expected = pattern(steps[None, :], steps[:, None])
-    # What bends within the crop is left of the lens: some tenths of a pixel at its corners.
-    assert np.abs(crop - expected).mean() < 4.0
-    plain = head_crop(image, pixel, side, 64)[..., 0].astype(float)
-    off_axis = math.hypot(pixel[0] - 480.0, pixel[1] - 300.0) > 100.0
-    assert (np.abs(plain - expected).mean() > 15.0) == off_axis
-
-
-# --- geometry -----------------------------------------------------------------------------------
-
-
-@given(x=st.floats(-1.5, 1.5), y=st.floats(-1.5, 1.5))
-def test_ray_axes_are_the_smallest_rotation_onto_the_ray(x, y):
-    (axes,) = ray_axes(np.array([[x, y]]))
-    ray = np.array([x, y, 1.0]) / math.sqrt(x * x + y * y + 1.0)
-    expected, _ = Rotation.align_vectors([ray], [[0.0, 0.0, 1.0]])
-    np.testing.assert_allclose(axes[:, 2], ray, atol=1e-12)
-    np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
-    angle = np.linalg.norm(Rotation.from_matrix(axes).as_rotvec())
-    assert angle == pytest.approx(math.acos(min(ray[2], 1.0)), abs=1e-7)
-    assert expected.magnitude() == pytest.approx(angle, abs=1e-6)
-
-
 @pytest.mark.parametrize("centre_m", [(0.0, -0.2, 2.0), (1.2, -0.5, 3.0), (-1.5, 0.6, 4.0)])
 @pytest.mark.parametrize("misplaced", [(0.0, 0.0), (0.25, -0.2)])
-def test_position_and_rotation_come_back_to_the_camera(centre_m, misplaced):
+def test_position_and_rotation_are_those_in_the_camera_frame(centre_m, misplaced):
     rotation = FACING_HEAD @ Rotation.from_euler("x", 0.4).as_matrix()
     estimator = OnnxHeadPoseEstimator(disc_network(rotation), passes=3)
     image, pixel = disc_at(np.array(centre_m))
@@ -196,7 +76,7 @@ def test_position_and_rotation_come_back_to_the_camera(centre_m, misplaced):
     centre = head.position_camera_m + head.rotation_camera_head @ HEAD_CENTRE_HEAD_M
     np.testing.assert_allclose(centre, centre_m, rtol=0.012, atol=0.004)
     ray = CAMERA.normalise([pixel])
-    # A crop is not cut again once it is centred to 3 % of its side, 0.4 m: under half a degree.
+    # A crop is not cut again if it is centred to 3 % of its side (0.4 m): less than 0.5°.
     expected = ray_axes(ray)[0] @ rotation
     turn = Rotation.from_matrix(head.rotation_camera_head @ expected.T).magnitude()
     assert turn < math.radians(0.5)
@@ -206,7 +86,7 @@ def test_position_and_rotation_come_back_to_the_camera(centre_m, misplaced):
 
 
 @pytest.mark.parametrize("azimuth_deg", [-48.0, 35.0, 50.0])
-def test_at_the_side_of_a_wide_lens_a_head_is_as_large_as_in_its_middle(azimuth_deg):
+def test_a_head_at_the_side_of_a_wide_lens_is_placed_correctly(azimuth_deg):
     azimuth = math.radians(azimuth_deg)
     truth = 2.0 * np.array([math.sin(azimuth), -0.12, math.cos(azimuth)])
     rotation = FACING_HEAD @ Rotation.from_euler("x", 0.4).as_matrix()
@@ -215,26 +95,26 @@ def test_at_the_side_of_a_wide_lens_a_head_is_as_large_as_in_its_middle(azimuth_
     person = person_about(pixel, WIDE.fx_px / truth[2])
     (head,) = estimator.estimate(disc_image(WIDE, truth), WIDE, (person,))
     centre = head.position_camera_m + head.rotation_camera_head @ HEAD_CENTRE_HEAD_M
-    # What a wide lens bends within the crop itself is left.
+    # The distortion of a wide lens within the crop remains.
     assert np.linalg.norm(centre - truth) < 0.03 * np.linalg.norm(truth)
     expected = ray_axes(WIDE.normalise([pixel]))[0] @ rotation
     turn = Rotation.from_matrix(head.rotation_camera_head @ expected.T).magnitude()
     assert turn < math.radians(0.7)
 
 
-def test_distorted_lenses_give_the_same_place():
-    bent = Camera(640, 480, 554.0, 554.0, 320.0, 240.0, [-0.25, 0.06, 0.0, 0.0, 0.0])
+def test_a_distorted_image_gives_the_same_position():
+    distorted = Camera(640, 480, 554.0, 554.0, 320.0, 240.0, [-0.25, 0.06, 0.0, 0.0, 0.0])
     truth = np.array([1.0, -0.4, 2.5])
-    pixel = bent.project([truth])[0]
-    image = disc_image(bent, truth)
+    pixel = distorted.project([truth])[0]
+    image = disc_image(distorted, truth)
     estimator = OnnxHeadPoseEstimator(disc_network(FACING_HEAD), passes=3)
-    (head,) = estimator.estimate(image, bent, (person_about(pixel, 554.0 / 2.5),))
+    (head,) = estimator.estimate(image, distorted, (person_about(pixel, 554.0 / 2.5),))
     centre = head.position_camera_m + head.rotation_camera_head @ HEAD_CENTRE_HEAD_M
     np.testing.assert_allclose(centre, truth, rtol=0.015)
 
 
-def test_the_covariance_is_that_of_drawn_errors():
-    """First order: rotation and crop scale drawn, nose placed, against the 6×6 covariance."""
+def test_the_covariance_agrees_with_random_errors():
+    """Random errors of rotation, distance and centre move the nose."""
     rotation = FACING_HEAD
     estimator = OnnxHeadPoseEstimator(disc_network(rotation, rotation_std=0.05, side_log_std=0.03))
     truth = np.array([0.8, -0.3, 2.5])
@@ -255,7 +135,7 @@ def test_the_covariance_is_that_of_drawn_errors():
     np.testing.assert_allclose(head.covariance / scale, drawn / scale, atol=0.05)
 
 
-def test_people_of_a_frame_are_one_batch_and_order_is_kept():
+def test_head_poses_are_in_the_order_of_the_people_for_any_batch_size():
     truths = [np.array([-0.9, -0.2, 2.5]), np.array([0.9, -0.1, 3.5])]
     images, pixels = zip(*(disc_at(truth) for truth in truths), strict=True)
     image = np.maximum(*images)
@@ -263,10 +143,10 @@ def test_people_of_a_frame_are_one_batch_and_order_is_kept():
         person_about(pixel, CAMERA.fx_px / truth[2])
         for pixel, truth in zip(pixels, truths, strict=True)
     )
-    nobody = PersonKeypoints(np.zeros((17, 2)), np.zeros((17, 3)), np.zeros(17), "coco")
+    unseen = PersonKeypoints(np.zeros((17, 2)), np.zeros((17, 3)), np.zeros(17), "coco")
     for batch in ("N", 1, 3):
         estimator = OnnxHeadPoseEstimator(disc_network(FACING_HEAD, batch=batch))
-        left, none, right = estimator.estimate(image, CAMERA, (people[0], nobody, people[1]))
+        left, none, right = estimator.estimate(image, CAMERA, (people[0], unseen, people[1]))
         assert none is None
         assert left.position_camera_m[2] == pytest.approx(2.5 - 0.09, rel=0.03)
         assert right.position_camera_m[2] == pytest.approx(3.5 - 0.09, rel=0.03)
@@ -275,7 +155,7 @@ def test_people_of_a_frame_are_one_batch_and_order_is_kept():
 @pytest.mark.parametrize(
     "scores", [(1, 1, 1, 1, 1), (0, 0, 0, 1, 1), (1, 1, 0, 1, 0), (0, 0, 0, 0, 0), (0, 0, 0, 0, 1)]
 )
-def test_a_head_is_found_from_whichever_keypoints_there_are(scores):
+def test_a_head_is_found_from_any_seen_keypoints(scores):
     truth = np.array([0.3, -0.4, 3.0])
     image, pixel = disc_at(truth)
     person = person_about(pixel, CAMERA.fx_px / 3.0, scores=scores)
@@ -286,7 +166,7 @@ def test_a_head_is_found_from_whichever_keypoints_there_are(scores):
     np.testing.assert_allclose(centre, truth, rtol=0.02, atol=0.01)
 
 
-def test_flat_skeletons_of_2d_networks_serve_as_well():
+def test_a_head_is_found_with_a_flat_skeleton_of_a_2d_network():
     truth = np.array([0.3, -0.4, 3.0])
     image, pixel = disc_at(truth)
     person = person_about(pixel, CAMERA.fx_px / 3.0)
@@ -299,10 +179,10 @@ def test_flat_skeletons_of_2d_networks_serve_as_well():
     assert head.position_camera_m[2] == pytest.approx(2.91, rel=0.03)
 
 
-# --- what is no head ----------------------------------------------------------------------------
+# --- no head, and refusals ----------------------------------------------------------------------
 
 
-def test_a_crop_without_a_head_gives_none():
+def test_a_crop_without_a_head_gives_no_pose():
     image, pixel = disc_at(np.array([0.0, 0.0, 2.0]))
     people = (person_about(pixel, CAMERA.fx_px / 2.0),)
     assert OnnxHeadPoseEstimator(disc_network(head=0.3)).estimate(image, CAMERA, people) == (None,)
@@ -310,7 +190,7 @@ def test_a_crop_without_a_head_gives_none():
     assert lenient.estimate(image, CAMERA, people)[0].face_seen < 0.3
 
 
-def test_nobody_is_an_empty_result_and_an_unlocated_head_is_none():
+def test_heads_outside_the_image_and_tiny_heads_have_no_pose():
     estimator = OnnxHeadPoseEstimator(disc_network())
     image = np.zeros((480, 640, 3), np.uint8)
     assert estimator.estimate(image, CAMERA, ()) == ()
@@ -328,34 +208,34 @@ def test_nobody_is_an_empty_result_and_an_unlocated_head_is_none():
         None,
     ],
 )
-def test_bad_images_are_refused(image):
+def test_anything_but_an_rgb_image_is_refused(image):
     with pytest.raises(PerceptionError, match="image_rgb"):
         OnnxHeadPoseEstimator(disc_network()).estimate(
             image, CAMERA, (person_about((320.0, 240.0), 200.0),)
         )
 
 
-def test_one_pixel_of_image_is_no_crash():
+def test_an_image_of_one_pixel_gives_one_result():
     person = person_about((0.0, 0.0), 100.0)
     assert len(OnnxHeadPoseEstimator(disc_network()).estimate(
         np.zeros((1, 1, 3), np.uint8), CAMERA, (person,)
     )) == 1  # fmt: skip
 
 
-def test_numbers_that_are_none_are_named():
+def test_non_finite_outputs_and_matrices_that_are_not_rotations_are_refused():
     image, pixel = disc_at(np.array([0.0, 0.0, 2.0]))
     estimator = OnnxHeadPoseEstimator(disc_network(nan=True))
     with pytest.raises(PerceptionError, match="side_log_std"):
         estimator.estimate(image, CAMERA, (person_about(pixel, 277.0),))
     squashed = OnnxHeadPoseEstimator(disc_network(0.3 * np.eye(3)))
-    with pytest.raises(PerceptionError, match="no rotations"):
+    with pytest.raises(PerceptionError, match="not rotations"):
         squashed.estimate(image, CAMERA, (person_about(pixel, 277.0),))
 
 
 def test_unknown_layouts_are_refused_with_what_is_known():
-    stranger = full_range_network(np.zeros(5))
+    unknown = full_range_network(np.zeros(5))
     with pytest.raises(PerceptionError, match=r"found image .* known are awarenav"):
-        OnnxHeadPoseEstimator(stranger)
+        OnnxHeadPoseEstimator(unknown)
     with pytest.raises(PerceptionError, match="6DRepNet"):
         OnnxHeadPoseEstimator(full_range_network(np.eye(3), size=96))
     with pytest.raises(PerceptionError, match="layout 2"):
@@ -364,25 +244,24 @@ def test_unknown_layouts_are_refused_with_what_is_known():
         OnnxHeadPoseEstimator(disc_network(metadata={"mean": "grey"}))
     with pytest.raises(PerceptionError, match="passes"):
         OnnxHeadPoseEstimator(disc_network(), passes=0)
-    assert OnnxHeadPoseEstimator(OnnxModel(disc_network())).layout.own
+    assert OnnxHeadPoseEstimator(OnnxModel(disc_network())).layout.is_awarenav
 
 
 # --- networks of the 6DRepNet kind ---------------------------------------------------------------
 
 
 def angles_300w_lp(yaw, pitch, roll):
-    """Their matrix: Rz(roll) Ry(yaw) Rx(pitch)."""
+    """Return the matrix of these networks: Rz(roll) Ry(yaw) Rx(pitch)."""
     return Rotation.from_euler("xyz", [pitch, yaw, roll]).as_matrix()
 
 
 @given(yaw=st.floats(-3.1, 3.1), pitch=st.floats(-1.0, 1.0), roll=st.floats(-1.0, 1.0))
 @settings(max_examples=20, deadline=None)
-def test_full_range_networks_turn_as_they_draw_their_axes(yaw, pitch, roll):
-    """Against the repository's drawing of the axes in the picture, in the middle of the image.
+def test_rotations_of_full_range_networks_agree_with_the_axes_that_6drepnet_draws(yaw, pitch, roll):
+    """In the middle of the image, 6DRepNet's code draws these axes, x right and y down.
 
-    It draws the face's forward axis to (sin(−yaw), −cos(yaw) sin(pitch)) and the axis to the
-    person's left to (cos(yaw) cos(roll), cos(pitch) sin(roll) + cos(roll) sin(pitch) sin(−yaw)),
-    x to the right and y down.
+    The face's forward axis points to (sin(−yaw), −cos(yaw) sin(pitch)), the axis to the person's
+    left to (cos(yaw) cos(roll), cos(pitch) sin(roll) + cos(roll) sin(pitch) sin(−yaw)).
     """
     matrix = angles_300w_lp(yaw, pitch, roll)
     (rotation,) = rotations_of(matrix)
@@ -392,7 +271,7 @@ def test_full_range_networks_turn_as_they_draw_their_axes(yaw, pitch, roll):
     )
     drawn = math.cos(pitch) * math.sin(roll) - math.cos(roll) * math.sin(pitch) * math.sin(yaw)
     np.testing.assert_allclose(left[:2], [math.cos(yaw) * math.cos(roll), drawn], atol=1e-4)
-    # A face with no angles looks at the camera.
+    # A face with angles of 0 looks at the camera.
     assert forward[2] == pytest.approx(-math.cos(yaw) * math.cos(pitch), abs=1e-4)
     assert np.linalg.det(rotation) == pytest.approx(1.0)
 
@@ -405,7 +284,7 @@ def rotations_of(*outputs):
     return (head.rotation_camera_head,)
 
 
-def test_six_numbers_mean_the_same_rotation():
+def test_six_numbers_give_the_same_rotation_as_the_matrix():
     matrix = angles_300w_lp(0.7, -0.2, 0.1)
     six = np.concatenate([2.5 * matrix[:, 0], matrix[:, 1] + 0.3 * matrix[:, 0]])
     np.testing.assert_allclose(rotations_of(six)[0], rotations_of(matrix)[0], atol=1e-5)
@@ -413,7 +292,7 @@ def test_six_numbers_mean_the_same_rotation():
         rotations_of(np.ones(6))
 
 
-def test_a_full_range_network_says_nothing_of_range_or_visibility():
+def test_a_full_range_network_gives_no_range_and_no_visibility():
     estimator = OnnxHeadPoseEstimator(full_range_network(np.eye(3)))
     person = person_about((320.0, 240.0), 200.0)
     (head,) = estimator.estimate(np.zeros((480, 640, 3), np.uint8), CAMERA, (person,))
@@ -426,13 +305,13 @@ def test_a_full_range_network_says_nothing_of_range_or_visibility():
 
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 1e-7, 1e-3, 0.01]))
-def test_rotations_are_brought_to_the_nearest_ones(seed, error):
+def test_inaccurate_rotations_are_replaced_by_the_nearest_ones(seed, error):
     model = OnnxModel(full_range_network(np.eye(3)))
     rng = np.random.default_rng(seed)
     noise = error * rng.uniform(-1.0, 1.0, (3, 3, 3))
     output = np.float64(np.float32(Rotation.random(3, rng).as_matrix() + noise))
-    for found, put_out in zip(_orthonormal(model, output), output, strict=True):
-        assert found == pytest.approx(scipy.linalg.polar(put_out)[0], abs=1e-9)
+    for found, matrix in zip(nearest_rotations(model, output), output, strict=True):
+        assert found == pytest.approx(scipy.linalg.polar(matrix)[0], abs=1e-9)
     output[1] *= -1.0
-    with pytest.raises(PerceptionError, match="no rotations"):
-        _orthonormal(model, output)
+    with pytest.raises(PerceptionError, match="not rotations"):
+        nearest_rotations(model, output)

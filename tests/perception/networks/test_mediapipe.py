@@ -1,3 +1,5 @@
+"""MediaPipe as a pose estimator; most tests need the extra and photographs."""
+
 from __future__ import annotations
 
 import importlib.util
@@ -11,8 +13,8 @@ from paths import SHARED
 
 from perception import PerceptionError, PersonDetection, PersonKeypoints, PoseEstimator
 from perception.layouts import LEFT_ANKLE, LEFT_SHOULDER, NOSE, RIGHT_ANKLE, RIGHT_SHOULDER
-from perception.networks import _mediapipe
-from perception.networks._mediapipe import MediaPipePoseEstimator
+from perception.networks import MediaPipePoseEstimator
+from perception.networks.poses._mediapipe import _cropped, _face_scores, _in_image
 
 IMAGES = SHARED / "images"
 TRUTH = IMAGES / "truth_coco_wholebody_mmpose.json"
@@ -22,26 +24,26 @@ needs_mediapipe = pytest.mark.skipif(
     not HAS_MEDIAPIPE, reason="mediapipe is not installed (the extra 'mediapipe')"
 )
 needs_images = pytest.mark.skipif(not TRUTH.is_file(), reason="no photographs beside the checkout")
-# A head is about 1.75 times as high as the face from brows to chin that the labels box.
+# Height of a head relative to the face from brows to chin, which the labels box.
 HEAD_OVER_FACE = 1.75
 
 
 @pytest.fixture(scope="module")
 def estimator():
-    with MediaPipePoseEstimator() as made:
-        yield made
+    with MediaPipePoseEstimator() as opened:
+        yield opened
 
 
 @pytest.fixture(scope="module")
 def photographs():
-    """Every labelled person with the picture that shows them."""
+    """Return each labelled person with the image that shows them."""
     truth = json.loads(TRUTH.read_text())
     files = {image["id"]: f"coco_{image['file_name']}" for image in truth["images"]}
-    pictures = {
+    images = {
         key: cv2.cvtColor(cv2.imread(str(IMAGES / name)), cv2.COLOR_BGR2RGB)
         for key, name in files.items()
     }
-    return [(pictures[person["image_id"]], person) for person in truth["annotations"]]
+    return [(images[person["image_id"]], person) for person in truth["annotations"]]
 
 
 def detection(person):
@@ -54,12 +56,12 @@ def labelled(person):
 
 
 @pytest.mark.skipif(HAS_MEDIAPIPE, reason="mediapipe is installed")
-def test_missing_package_names_the_extra():
+def test_a_missing_package_is_refused_with_the_name_of_the_extra():
     with pytest.raises(PerceptionError, match=r"pip install 'awarenav\[mediapipe\]'"):
         MediaPipePoseEstimator()
 
 
-def test_package_that_is_broken_names_the_extra(monkeypatch):
+def test_a_broken_package_is_refused_with_the_name_of_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "mediapipe", None)
     monkeypatch.setitem(sys.modules, "mediapipe.python.solutions", None)
     with pytest.raises(PerceptionError, match=r"pip install 'awarenav\[mediapipe\]'"):
@@ -67,13 +69,13 @@ def test_package_that_is_broken_names_the_extra(monkeypatch):
 
 
 @pytest.mark.parametrize("confidence", [-0.1, 1.1, float("nan"), "high"])
-def test_confidence_is_a_share(confidence):
+def test_an_invalid_confidence_is_refused(confidence):
     with pytest.raises(PerceptionError, match="min_detection_confidence"):
         MediaPipePoseEstimator(confidence)
 
 
 def turned_head(yaw_rad):
-    """Points of a face (5, 3) in x right, y down, z away; positive yaw turns it to the right."""
+    """Return points of a face (5, 3), x right, y down, z away; positive yaw turns it right."""
     face = np.array(
         [[0, 0, -1.0], [0.3, -0.3, -0.8], [-0.3, -0.3, -0.8], [0.7, 0, 0], [-0.7, 0, 0]]
     )
@@ -82,32 +84,32 @@ def turned_head(yaw_rad):
 
 
 @pytest.mark.parametrize("yaw_deg", [0.0, 25.0, 40.0, 65.0, 90.0])
-def test_far_side_of_a_turned_face_fades(yaw_deg):
+def test_the_far_side_of_a_turned_face_has_lower_scores(yaw_deg):
     to_the_right = turned_head(np.deg2rad(yaw_deg))
     if yaw_deg:
         assert to_the_right[0, 0] > 0.0  # the nose
-    nose, left_eye, right_eye, left_ear, right_ear = _mediapipe._face_scores(to_the_right)
+    nose, left_eye, right_eye, left_ear, right_ear = _face_scores(to_the_right)
     assert (nose, right_eye, right_ear) == (1.0, 1.0, 1.0)
     assert left_ear == pytest.approx(np.clip((40.0 - yaw_deg) / 25.0, 0.0, 1.0))
     assert left_eye == pytest.approx(np.clip((80.0 - yaw_deg) / 30.0, 0.0, 1.0))
-    mirrored = _mediapipe._face_scores(turned_head(-np.deg2rad(yaw_deg)))
+    mirrored = _face_scores(turned_head(-np.deg2rad(yaw_deg)))
     assert mirrored == pytest.approx([nose, right_eye, left_eye, right_ear, left_ear])
 
 
-def test_parts_of_a_picture_map_back_to_pixel_centres():
+def test_points_of_a_crop_are_mapped_to_pixel_centres_of_the_image():
     image = np.zeros((40, 60, 3), np.uint8)
-    picture, corner = _mediapipe._part(image, np.array([-5.0, 10.0, 30.2, 90.0]))
-    assert picture.shape == (30, 30, 3)
-    # The corner of the first pixel is half a pixel before its centre.
-    assert _mediapipe._in_image(np.array([[0.0, 0.0], [1.0, 1.0]]), picture, corner).tolist() == [
+    crop, corner = _cropped(image, np.array([-5.0, 10.0, 30.2, 90.0]))
+    assert crop.shape == (30, 30, 3)
+    # The corner of the first pixel lies half a pixel before its centre.
+    assert _in_image(np.array([[0.0, 0.0], [1.0, 1.0]]), crop, corner).tolist() == [
         [-0.5, 9.5],
         [29.5, 39.5],
     ]
-    assert _mediapipe._part(image, np.array([100.0, 0.0, 200.0, 40.0]))[0] is None
-    assert _mediapipe._part(image, np.array([5.0, 5.0, 5.0, 5.0]))[0] is None
+    assert _cropped(image, np.array([100.0, 0.0, 200.0, 40.0]))[0] is None
+    assert _cropped(image, np.array([5.0, 5.0, 5.0, 5.0]))[0] is None
 
 
-# With MediaPipe
+# --- with MediaPipe -----------------------------------------------------------------------------
 
 
 @needs_mediapipe
@@ -121,7 +123,7 @@ def test_it_is_a_pose_estimator(estimator):
     "box",
     [[0, 0, 640, 480], [10, 10, 10, 10], [-50, -50, -10, -10], [600, 400, 700, 500], [3, 3, 7, 9]],
 )
-def test_nobody_there_is_scores_of_zero(estimator, box):
+def test_a_box_without_a_person_gives_scores_of_0(estimator, box):
     image = np.random.default_rng(0).integers(0, 255, (480, 640, 3), dtype=np.uint8)
     (person,) = estimator.estimate(image, (PersonDetection(box, 0.5),))
     assert isinstance(person, PersonKeypoints)
@@ -140,13 +142,13 @@ def test_nobody_there_is_scores_of_zero(estimator, box):
         None,
     ],
 )
-def test_pictures_of_another_kind_are_refused(estimator, image):
+def test_anything_but_an_rgb_image_is_refused(estimator, image):
     with pytest.raises(PerceptionError, match="image_rgb"):
         estimator.estimate(image, (PersonDetection([0, 0, 10, 10], 0.5),))
 
 
 @needs_mediapipe
-def test_picture_of_a_single_pixel_holds_nobody(estimator):
+def test_an_image_of_one_pixel_gives_scores_of_0(estimator):
     (person,) = estimator.estimate(
         np.zeros((1, 1, 3), np.uint8), (PersonDetection([0, 0, 1, 1], 0.5),)
     )
@@ -154,17 +156,17 @@ def test_picture_of_a_single_pixel_holds_nobody(estimator):
 
 
 @needs_mediapipe
-def test_closed_estimator_says_so():
-    made = MediaPipePoseEstimator()
-    made.close()
-    made.close()
+def test_a_closed_estimator_is_refused():
+    closed = MediaPipePoseEstimator()
+    closed.close()
+    closed.close()
     with pytest.raises(PerceptionError, match="closed"):
-        made.estimate(np.zeros((8, 8, 3), np.uint8), ())
+        closed.estimate(np.zeros((8, 8, 3), np.uint8), ())
 
 
 @needs_mediapipe
 @needs_images
-def test_faces_lie_where_the_labels_say(estimator, photographs):
+def test_faces_agree_with_the_labels(estimator, photographs):
     errors = []
     for image, person in photographs:
         labels = labelled(person)
@@ -176,7 +178,7 @@ def test_faces_lie_where_the_labels_say(estimator, photographs):
         error = np.linalg.norm(found.keypoints_px[:5] - labels[:5, :2], axis=1) / head_px
         visible = labels[:5, 2] == 2
         errors.extend(error[visible])
-        # An ear that nobody could label must not be claimed.
+        # An ear without a label must have a low score.
         assert (found.scores[:5][labels[:5, 2] == 0] < 0.5).all()
     assert len(errors) >= 15
     assert max(errors) <= 0.12
@@ -184,25 +186,25 @@ def test_faces_lie_where_the_labels_say(estimator, photographs):
 
 @needs_mediapipe
 @needs_images
-def test_face_is_claimed_only_where_one_is_seen(estimator, photographs):
-    """Where a face is claimed, the labels have nose and both eyes, and they are near."""
-    claimed = 0
+def test_face_evidence_is_given_only_where_a_face_is_labelled(estimator, photographs):
+    """The labels have nose and both eyes, near the estimated ones."""
+    faces = 0
     for image, person in photographs:
         (found,) = estimator.estimate(image, (detection(person),))
         if not found.face_evidence:
             continue
-        claimed += 1
+        faces += 1
         labels = labelled(person)
         assert (labels[:3, 2] == 2).all()
         shoulders = np.linalg.norm(labels[LEFT_SHOULDER, :2] - labels[RIGHT_SHOULDER, :2])
         error = np.linalg.norm(found.keypoints_px[:3] - labels[:3, :2], axis=1)
         assert error.max() <= 0.25 * shoulders
-    assert claimed >= 5
+    assert faces >= 5
 
 
 @needs_mediapipe
 @needs_images
-def test_skeleton_in_metres_has_camera_axes(estimator, photographs):
+def test_the_skeleton_has_camera_axes(estimator, photographs):
     image, person = max(photographs, key=lambda pair: labelled(pair[1])[:17, 2].min())
     (found,) = estimator.estimate(image, (detection(person),))
     root = found.keypoints_root_m
@@ -212,14 +214,14 @@ def test_skeleton_in_metres_has_camera_axes(estimator, photographs):
     pixels = found.keypoints_px - found.keypoints_px[11:13].mean(axis=0)
     body = slice(5, 17)
     assert np.corrcoef(root[body, 0], pixels[body, 0])[0, 1] > 0.8  # x right
-    assert root[NOSE, 2] < root[[3, 4], 2].mean()  # z away: the nose of somebody who looks at us
+    assert root[NOSE, 2] < root[[3, 4], 2].mean()  # z away: the person faces the camera
 
 
 @needs_mediapipe
 @needs_images
-def test_people_do_not_depend_on_one_another(estimator, photographs):
+def test_the_result_of_a_person_does_not_depend_on_others(estimator, photographs):
     image = photographs[-1][0]
-    boxes = tuple(detection(person) for picture, person in photographs if picture is image)
+    boxes = tuple(detection(person) for other, person in photographs if other is image)
     together = estimator.estimate(image, boxes)
     for box, person in zip(boxes[::-1], together[::-1], strict=True):
         (alone,) = estimator.estimate(image, (box,))

@@ -1,8 +1,8 @@
-"""From what detectors put out to boxes of people, one class for each of the known layouts.
+"""Decoders: from the outputs of a detector to boxes of people, one class per known layout.
 
-Boxes are x1, y1, x2, y2 in pixels of the network's input, overlapping ones still among them.
-Candidates are picked by their scores before anything is computed of their boxes: of some thousand
-places a few dozen are left, and comparing drops what is not a number.
+Boxes are x1, y1, x2, y2 in pixels of the network's input, before the removal of overlaps. Rows are
+selected by their scores before their boxes are computed: of some thousand cells a few dozen remain,
+and the comparison drops scores that are NaN.
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ Floats = NDArray[np.float32]
 
 
 class Decoder(Protocol):
-    """Finds the people in a detector's outputs for one picture."""
+    """Interface of the decoders: finds the people in a detector's outputs for one image."""
 
     def decode(
         self, outputs: Sequence[NDArray[Any]], score_threshold: float
     ) -> tuple[Floats, Floats]:
-        """Return boxes (N, 4) and scores (N,) of the rows at or above the threshold."""
+        """Return boxes (N, 4) and scores (N,) of the people with scores ≥ the threshold."""
         ...
 
 
 def cell_count(height_px: int, width_px: int, strides: tuple[int, ...] = STRIDES) -> int:
-    """How many places a head without anchors has, one a cell at each stride."""
+    """Return the number of outputs of an anchor-free head: one per cell at each stride."""
     return sum((height_px // stride) * (width_px // stride) for stride in strides)
 
 
 class YoloV8Decoder:
-    """Output (1, 4 + C, N): centre x, y, width, height and one score a class, already decoded."""
+    """YOLOv8: output (1, 4 + C, N) of centre x, y, width, height and one score per class."""
 
     def __init__(self, person_class: int) -> None:
         self._score_row = 4 + person_class
@@ -47,17 +47,17 @@ class YoloV8Decoder:
         """See :class:`Decoder`."""
         columns = outputs[0][0]
         scores = columns[self._score_row]
-        picked = (scores >= score_threshold).nonzero()[0]
-        boxes = _float32(columns[:4, picked]).T
-        return centre_to_corners(boxes[:, :2], boxes[:, 2:]), _float32(scores[picked])
+        selected = (scores >= score_threshold).nonzero()[0]
+        boxes = _float32(columns[:4, selected]).T
+        return centre_to_corners(boxes[:, :2], boxes[:, 2:]), _float32(scores[selected])
 
 
 class RowsDecoder:
-    """Output (1, M, 6): four numbers of a box, score, class; overlaps removed in the network.
+    """Output (1, M, 6) of a box (4 numbers), score and class; the network removes overlaps.
 
     Args:
-        person_class: which class counts.
-        vote: tells corners from centres.
+        person_class: number of the class that counts.
+        vote: finds out whether the boxes are corners or centre and size.
         input_px: width and height of the network's input.
     """
 
@@ -72,16 +72,16 @@ class RowsDecoder:
         """See :class:`Decoder`."""
         rows = _float32(outputs[0][0])
         rows = rows[rows[:, 4] >= score_threshold]
-        self._vote.listen(rows[:, :4], rows[:, 4], self._input_px)
+        self._vote.update(rows[:, :4], rows[:, 4], self._input_px)
         rows = rows[np.rint(rows[:, 5]) == self._person_class]
         return self._vote.corners(rows[:, :4]), rows[:, 4]
 
 
 class YoloxDecoder:
-    """Output (1, N, 5 + C) of YOLOX's raw head: offset, log size, objectness, classes.
+    """YOLOX's raw head: output (1, N, 5 + C) of offset, log size, objectness and class scores.
 
     Offsets and sizes are in cells: the centre is (offset + cell) · stride, the size
-    exp(log size) · stride. The score is objectness times class.
+    exp(log size) · stride. The score is objectness times class score.
     """
 
     def __init__(self, person_class: int, height_px: int, width_px: int) -> None:
@@ -94,15 +94,21 @@ class YoloxDecoder:
         """See :class:`Decoder`."""
         rows = outputs[0][0]
         scores = _float32(rows[:, 4]) * _float32(rows[:, self._class_column])
-        picked = (scores >= score_threshold).nonzero()[0]
-        found, stride = _float32(rows[picked, :4]), self._strides[picked]
-        centre = (found[:, :2] + self._cells[picked]) * stride
+        selected = (scores >= score_threshold).nonzero()[0]
+        found, stride = _float32(rows[selected, :4]), self._strides[selected]
+        centre = (found[:, :2] + self._cells[selected]) * stride
         size = np.exp(found[:, 2:]) * stride
-        return centre_to_corners(centre, size), scores[picked]
+        return centre_to_corners(centre, size), scores[selected]
 
 
 class RtmdetDecoder:
-    """Outputs ``dets`` (1, N, 5): x1, y1, x2, y2, score, and ``labels`` (1, N)."""
+    """RTMDet: outputs ``dets`` (1, N, 5) of x1, y1, x2, y2, score, and ``labels`` (1, N).
+
+    Args:
+        person_class: number of the class that counts.
+        dets: index of the output ``dets``.
+        labels: index of the output ``labels``.
+    """
 
     def __init__(self, person_class: int, dets: int, labels: int) -> None:
         self._person_class = person_class
@@ -119,7 +125,10 @@ class RtmdetDecoder:
 
 
 def cells(height_px: int, width_px: int) -> tuple[Floats, Floats]:
-    """Column and row (N, 2) of each cell and its stride (N, 1), row by row, finest stride first."""
+    """Return column and row (N, 2) and stride (N, 1) of each cell.
+
+    Cells are in row-major order, the finest stride first.
+    """
     places, strides = [], []
     for stride in STRIDES:
         rows, columns = np.mgrid[: height_px // stride, : width_px // stride]

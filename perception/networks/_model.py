@@ -1,39 +1,28 @@
-"""An ONNX file in memory: checked when loaded, described by its shapes, run by onnxruntime."""
+"""ONNX networks: load a file, describe its inputs and outputs, run it with ONNX Runtime."""
 
 from __future__ import annotations
 
 import hashlib
 import os
 import threading
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter, thread_time
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .._manifest import shipped_model, shipped_model_path, verify_shipped_model
 from ..errors import PerceptionError
-from ._onnxruntime import ort
 
+# The newer Linux wheels of ONNX Runtime report processes, sessions and models to their maker from
+# the import on (microsoft/onnxruntime#27379) and store an identifier on disk. This turns both off,
+# unless the environment variable is already set.
+os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
 
-class NetworkTime(threading.local):
-    """Time that the calling thread has spent in networks since it began, each thread its own.
-
-    Attributes:
-        elapsed_s: by the clock.
-        processor_s: of the processor, in that thread; a network's other threads do not count.
-    """
-
-    elapsed_s: float = 0.0
-    processor_s: float = 0.0
-
-
-#: Every :class:`~perception.networks.OnnxModel` adds to it.
-NETWORK_TIME = NetworkTime()
-
+import onnxruntime as ort  # type: ignore[import-untyped]
 
 _PROVIDERS: Final[dict[str, str]] = {
     "cpu": "CPUExecutionProvider",
@@ -54,20 +43,38 @@ _DTYPES: Final[dict[str, str]] = {
     "uint64": "uint64",
     "bool": "bool",
 }
-_ERRORS_ONLY: Final = 3
+_LOG_ERRORS_ONLY: Final = 3
+
+
+class NetworkTime(threading.local):
+    """Time that the calling thread has spent in networks since the thread began.
+
+    Attributes:
+        elapsed_s: wall-clock time.
+        processor_s: processor time of the calling thread; the worker threads of ONNX Runtime are
+            not included.
+    """
+
+    elapsed_s: float = 0.0
+    processor_s: float = 0.0
+
+
+#: Every run of an :class:`~perception.networks.OnnxModel` adds to it.
+NETWORK_TIME = NetworkTime()
 
 
 @dataclass(frozen=True, slots=True)
 class OnnxSettings:
-    """How onnxruntime runs a network.
+    """Settings with which ONNX Runtime runs a network.
 
     Attributes:
-        providers: in order of preference, of ``"cpu"``, ``"cuda"`` and ``"tensorrt"``. One that is
-            asked for and not present is refused; the CPU takes what the others leave over.
-        intra_op_threads: threads of one operator, ≥ 1; None leaves it to onnxruntime, which takes
-            one a physical core.
-        allow_spinning: whether idle threads wait in a busy loop. That is faster by some
-            microseconds and takes whole cores from the robot's other programs.
+        providers: one or more of ``"cpu"``, ``"cuda"`` and ``"tensorrt"``, in order of preference.
+            A provider that is not present is refused. The CPU runs the operators that the other
+            providers do not support.
+        intra_op_threads: threads per operator, ≥ 1; None for ONNX Runtime's default, one per
+            physical core.
+        allow_spinning: True lets idle threads wait in a busy loop. This saves some microseconds
+            per run but takes whole cores from the robot's other programs.
     """
 
     providers: tuple[str, ...] = ("cpu",)
@@ -75,7 +82,7 @@ class OnnxSettings:
     allow_spinning: bool = False
 
     def __post_init__(self) -> None:
-        # A lone string is a sequence of letters, which would be refused one letter at a time.
+        # tuple("cpu") would be three letters.
         given: Any = self.providers
         names = (given,) if isinstance(given, str) else tuple(given)
         if not names or any(name not in _PROVIDERS for name in names):
@@ -98,9 +105,9 @@ class OnnxTensor:
     """An input or output of a network.
 
     Attributes:
-        name: as the graph has it.
-        shape: extents; None where the graph leaves one free.
-        dtype: NumPy's name of its numbers, or onnxruntime's where NumPy has none.
+        name: name in the graph.
+        shape: extents; None where the graph leaves an extent free.
+        dtype: NumPy's name of the number type, or ONNX Runtime's where NumPy has none.
     """
 
     name: str
@@ -118,12 +125,13 @@ class OnnxModel:
     Args:
         path_or_bytes: the file, or its content.
         settings: providers and threads.
-        sha256: 64 hexadecimal digits that the content must hash to; checked on the very bytes that
-            are loaded. Weights in files of their own are not covered by it and are then refused.
+        sha256: expected SHA-256 of the content, 64 hexadecimal digits. It is checked on the same
+            bytes that are loaded. It does not cover weights in separate files, so networks with
+            such files are then refused.
 
     Raises:
-        PerceptionError: for a file that is absent, cannot be read, has another sha256 or is no
-            network that onnxruntime can load, and for a provider that is not present.
+        PerceptionError: for a file that is missing, cannot be read, has another SHA-256 or is not
+            a network that ONNX Runtime can load, and for a provider that is not present.
     """
 
     def __init__(
@@ -147,22 +155,23 @@ class OnnxModel:
     def shipped(
         cls, name: str, settings: OnnxSettings | None = None, folder: Path | None = None
     ) -> OnnxModel:
-        """Load a shipped network, its sha256 checked on the very bytes that are loaded.
+        """Load a shipped network; its SHA-256 is checked on the same bytes that are loaded.
 
         Args:
-            name: of the manifest, as ``"person_detector"``.
+            name: name in the manifest, for example ``"person_detector"``.
             settings: providers and threads.
-            folder: of the manifest; default the package's own.
+            folder: folder of the manifest; default that of this package.
 
         Raises:
-            PerceptionError: for an unknown name, a missing or altered file, and when onnxruntime
-                cannot run it as the settings ask.
+            PerceptionError: for an unknown name, a missing or altered file, and when ONNX Runtime
+                cannot run the network with these settings.
         """
         path = shipped_model_path(name, folder)
         try:
             return cls(path, settings=settings, sha256=shipped_model(name, folder).sha256)
         except PerceptionError:
-            verify_shipped_model(name, folder)  # says what to do where the file is to blame
+            # If the file is the cause, this raises an error that says the remedy.
+            verify_shipped_model(name, folder)
             raise
 
     def __repr__(self) -> str:
@@ -170,27 +179,27 @@ class OnnxModel:
 
     @property
     def name(self) -> str:
-        """What messages call it: the file, or that it came as bytes."""
+        """Name for messages: the path, or a note that the model was given as bytes."""
         return "model given as bytes" if self.path is None else str(self.path)
 
     @property
     def layout(self) -> str:
         """Inputs and outputs with shapes and types, for messages."""
-        ends = (", ".join(map(str, tensors)) for tensors in (self.inputs, self.outputs))
-        return " -> ".join(ends)
+        sides = (", ".join(map(str, tensors)) for tensors in (self.inputs, self.outputs))
+        return " -> ".join(sides)
 
     @property
     def providers(self) -> tuple[str, ...]:
-        """The providers in use, in order of preference, by the names of :class:`OnnxSettings`."""
+        """Providers in use, in order of preference, with the names of :class:`OnnxSettings`."""
         short = {long: name for name, long in _PROVIDERS.items()}
         return tuple(short.get(name, name) for name in self._session.get_providers())
 
     def run(self, feeds: Mapping[str, NDArray[Any]]) -> list[NDArray[Any]]:
-        """Run the network on its named inputs; the outputs come in the order of ``outputs``.
+        """Run the network on its named inputs and return the outputs in the order of ``outputs``.
 
         Raises:
             PerceptionError: for inputs of the wrong name, shape or type, and when the network
-                fails, with onnxruntime's words.
+                fails, with ONNX Runtime's message.
         """
         began, processor_began = perf_counter(), thread_time()
         try:
@@ -226,25 +235,26 @@ class OnnxModel:
                 f"which has {', '.join(map(repr, here))}; onnxruntime-gpu has the others"
             )
         options = ort.SessionOptions()
-        options.log_severity_level = _ERRORS_ONLY
+        options.log_severity_level = _LOG_ERRORS_ONLY
         if self.settings.intra_op_threads is not None:
             options.intra_op_num_threads = self.settings.intra_op_threads
         spinning = "1" if self.settings.allow_spinning else "0"
         options.add_session_config_entry("session.intra_op.allow_spinning", spinning)
         if _PROVIDERS["cpu"] not in wanted:
             wanted.append(_PROVIDERS["cpu"])
-        # By its path, a file finds the weights that some exporters write beside it.
+        # Some exporters write the weights into files next to the graph. ONNX Runtime finds them
+        # only when it loads the graph by its path.
         source = content if self.path is None or sealed else str(self.path)
         try:
-            # Without enable_fallback=0 a failing GPU is replaced by the CPU, with a print.
+            # Without enable_fallback=0, ONNX Runtime prints a failure of the GPU and uses the CPU.
             session = ort.InferenceSession(source, options, providers=wanted, enable_fallback=0)
         except Exception as cause:  # onnxruntime's errors share no base of their own
             raise PerceptionError(
-                f"{self.name} is no ONNX network that onnxruntime {ort.__version__} can load "
+                f"{self.name} is not an ONNX network that onnxruntime {ort.__version__} can load "
                 f"({len(content)} bytes): {_first_line(cause)}"
             ) from cause
-        idle = [name for name in self.settings.providers if _PROVIDERS[name] not in _used(session)]
-        if idle:
+        used = session.get_providers()
+        if idle := [name for name in self.settings.providers if _PROVIDERS[name] not in used]:
             raise PerceptionError(
                 f"provider {idle[0]!r} is built into this onnxruntime {ort.__version__} but could "
                 "not start: its driver or libraries are missing or of another version"
@@ -252,20 +262,35 @@ class OnnxModel:
         return session
 
 
+#: An ONNX file, its content, or a model that is already loaded.
+ModelSource: TypeAlias = OnnxModel | str | os.PathLike[str] | bytes
+
+
 def as_onnx_model(
-    model: OnnxModel | str | os.PathLike[str] | bytes,
-    settings: OnnxSettings | None,
-    sha256: str | None,
+    model: ModelSource, settings: OnnxSettings | None, sha256: str | None
 ) -> OnnxModel:
-    """Load what is not loaded yet; a loaded model takes no settings and no sha256 any more."""
+    """Return the model, after loading it if needed.
+
+    Raises:
+        PerceptionError: as :class:`OnnxModel`, and for settings or a SHA-256 given with a model
+            that is already loaded.
+    """
     if not isinstance(model, OnnxModel):
         return OnnxModel(model, settings=settings, sha256=sha256)
     if settings is not None or sha256 is not None:
         raise PerceptionError(
             "settings and sha256 are for loading a model: give them to OnnxModel, "
-            f"not beside {model.name}, which is loaded already"
+            f"not together with {model.name}, which is loaded already"
         )
     return model
+
+
+def output_shapes(model: OnnxModel, outputs: Sequence[NDArray[Any]]) -> str:
+    """Return the names and shapes of the outputs of a run, for messages."""
+    return ", ".join(
+        f"{tensor.name} {output.shape}"
+        for tensor, output in zip(model.outputs, outputs, strict=True)
+    )
 
 
 def _read(path_or_bytes: Any) -> tuple[Path | None, bytes]:
@@ -285,14 +310,10 @@ def _read(path_or_bytes: Any) -> tuple[Path | None, bytes]:
         raise PerceptionError(f"cannot read the model {path}: {reason}") from cause
 
 
-def _used(session: Any) -> list[str]:
-    return list(session.get_providers())
-
-
 def _tensor(entry: Any) -> OnnxTensor:
     shape = tuple(extent if isinstance(extent, int) else None for extent in entry.shape)
-    inner = entry.type.removeprefix("tensor(").removesuffix(")")
-    return OnnxTensor(entry.name, shape, _DTYPES.get(inner, entry.type))
+    number_type = entry.type.removeprefix("tensor(").removesuffix(")")
+    return OnnxTensor(entry.name, shape, _DTYPES.get(number_type, entry.type))
 
 
 def _first_line(cause: Exception) -> str:

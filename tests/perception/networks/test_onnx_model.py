@@ -1,4 +1,4 @@
-"""Loading a network: what is checked, what is refused, and in which words."""
+"""Loading and running ONNX models: checks, refusals and their messages."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ import pytest
 from onnx_graphs import fixed, red_point_pose
 
 from perception import PerceptionError
-from perception.networks import NETWORK_TIME, OnnxModel, OnnxSettings
-from perception.networks._session import as_onnx_model
+from perception.networks import NETWORK_TIME, OnnxModel, OnnxPoseEstimator, OnnxSettings
 
 ROWS = np.arange(12.0).reshape(1, 2, 6)
 
@@ -23,7 +22,7 @@ def content() -> bytes:
     return fixed({"out": ROWS}, (32, 64), metadata={"names": "{0: 'person'}"}, batch="N")
 
 
-def test_a_model_tells_its_inputs_outputs_metadata_and_provider() -> None:
+def test_a_model_describes_inputs_outputs_metadata_and_provider() -> None:
     model = OnnxModel(content())
     assert [(t.name, t.shape, t.dtype) for t in model.inputs] == [
         ("images", (None, 3, 32, 64), "float32")
@@ -45,7 +44,7 @@ def test_outputs_come_in_the_order_of_the_graph(tmp_path: Path) -> None:
     np.testing.assert_array_equal(second, [[3]])
 
 
-def test_the_sha256_is_that_of_the_bytes_loaded(tmp_path: Path) -> None:
+def test_the_sha256_of_the_file_is_checked(tmp_path: Path) -> None:
     path = tmp_path / "model.onnx"
     path.write_bytes(content())
     digest = hashlib.sha256(content()).hexdigest()
@@ -56,22 +55,22 @@ def test_the_sha256_is_that_of_the_bytes_loaded(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("sha256", ["", "ab", "g" * 64, 7])
-def test_a_sha256_is_64_hexadecimal_digits(sha256: str) -> None:
+def test_a_sha256_that_is_not_64_hexadecimal_digits_is_refused(sha256: str) -> None:
     with pytest.raises(PerceptionError, match="64 hexadecimal digits"):
         OnnxModel(content(), sha256=sha256)
 
 
 @pytest.mark.parametrize("keep", [0, 1, 50, -1])
-def test_a_truncated_file_is_named(tmp_path: Path, keep: int) -> None:
+def test_a_truncated_file_is_refused_by_name(tmp_path: Path, keep: int) -> None:
     path = tmp_path / "half.onnx"
     path.write_bytes(content()[:keep])
-    with pytest.raises(PerceptionError, match=r"half\.onnx is no ONNX network"):
+    with pytest.raises(PerceptionError, match=r"half\.onnx is not an ONNX network"):
         OnnxModel(path)
 
 
 @pytest.mark.parametrize("noise", [b"PK\x03\x04 not a model", b"<html>404</html>"])
 def test_other_content_is_refused(noise: bytes) -> None:
-    with pytest.raises(PerceptionError, match=f"no ONNX network .*{len(noise)} bytes"):
+    with pytest.raises(PerceptionError, match=f"not an ONNX network .*{len(noise)} bytes"):
         OnnxModel(noise)
 
 
@@ -85,13 +84,15 @@ def test_other_content_is_refused(noise: bytes) -> None:
         (None, "got NoneType"),
     ],
 )
-def test_what_is_no_file_is_refused(tmp_path: Path, given: object, words: str) -> None:
+def test_an_argument_that_is_not_a_file_is_refused(
+    tmp_path: Path, given: object, words: str
+) -> None:
     path = tmp_path / given if isinstance(given, str) else given
     with pytest.raises(PerceptionError, match=words):
         OnnxModel(path)  # type: ignore[arg-type]
 
 
-def test_weights_beside_the_file_are_found_unless_the_file_is_sealed(tmp_path: Path) -> None:
+def test_weights_in_a_separate_file_are_loaded_only_without_a_sha256(tmp_path: Path) -> None:
     path = tmp_path / "model.onnx"
     values = np.full((1, 2000, 6), 0.5, np.float32)
     onnx.save_model(
@@ -103,7 +104,7 @@ def test_weights_beside_the_file_are_found_unless_the_file_is_sealed(tmp_path: P
     )
     (out,) = OnnxModel(path).run({"images": np.zeros((1, 3, 32, 64), np.float32)})
     np.testing.assert_array_equal(out, values)
-    with pytest.raises(PerceptionError, match="no ONNX network"):
+    with pytest.raises(PerceptionError, match="not an ONNX network"):
         OnnxModel(path, sha256=hashlib.sha256(path.read_bytes()).hexdigest())
 
 
@@ -118,12 +119,12 @@ def test_weights_beside_the_file_are_found_unless_the_file_is_sealed(tmp_path: P
         ({"intra_op_threads": True}, "got True"),
     ],
 )
-def test_settings_are_checked(settings: dict[str, object], words: str) -> None:
+def test_invalid_settings_are_refused(settings: dict[str, object], words: str) -> None:
     with pytest.raises(PerceptionError, match=words):
         OnnxSettings(**settings)  # type: ignore[arg-type]
 
 
-def test_settings_reach_the_session() -> None:
+def test_settings_are_passed_to_onnxruntime() -> None:
     model = OnnxModel(content(), settings=OnnxSettings(intra_op_threads=1, allow_spinning=False))
     options = model._session.get_session_options()
     assert options.intra_op_num_threads == 1
@@ -145,10 +146,10 @@ def test_a_provider_is_used_when_present_and_refused_when_not(name: str) -> None
         OnnxModel(content(), settings=settings)
 
 
-def test_what_a_run_refuses_says_what_the_network_takes() -> None:
+def test_a_run_with_wrong_inputs_is_refused_with_what_the_network_takes() -> None:
     model = OnnxModel(content())
     for feeds in (
-        {"picture": np.zeros((1, 3, 32, 64), np.float32)},
+        {"image": np.zeros((1, 3, 32, 64), np.float32)},
         {"images": np.zeros((1, 3, 32, 32), np.float32)},
         {"images": np.zeros((1, 3, 32, 64), np.float64)},
     ):
@@ -156,7 +157,7 @@ def test_what_a_run_refuses_says_what_the_network_takes() -> None:
             model.run(feeds)
 
 
-def test_runs_add_up_to_the_time_of_the_calling_thread() -> None:
+def test_the_times_of_runs_are_summed_per_thread() -> None:
     model = OnnxModel(red_point_pose(64, 48))
     feeds = {"input": np.zeros((1, 3, 64, 48), np.float32)}
 
@@ -175,10 +176,10 @@ def test_runs_add_up_to_the_time_of_the_calling_thread() -> None:
     assert here[-1].tolist() == [NETWORK_TIME.elapsed_s, NETWORK_TIME.processor_s]
 
 
-def test_a_loaded_model_takes_no_settings_any_more() -> None:
+def test_settings_with_a_loaded_model_are_refused() -> None:
     model = OnnxModel(red_point_pose(32, 32))
-    assert as_onnx_model(model, None, None) is model
+    assert OnnxPoseEstimator(model).model is model
     with pytest.raises(PerceptionError, match="loaded already"):
-        as_onnx_model(model, OnnxSettings(), None)
+        OnnxPoseEstimator(model, settings=OnnxSettings())
     with pytest.raises(PerceptionError, match="loaded already"):
-        as_onnx_model(model, None, "0" * 64)
+        OnnxPoseEstimator(model, sha256="0" * 64)

@@ -1,0 +1,111 @@
+"""Evidence of a face: the probability that it is seen, and the accuracy that its size allows."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from . import layouts as kp
+from ._camera import Camera
+from ._head_pose import HeadPose
+from ._keypoints import PersonKeypoints
+from .anthropometry import HEAD_TEMPLATE_M
+
+# Ear to ear.
+_FACE_WIDTH_M: Final = 0.156
+# A face with a width of less than 5 pixels carries no direction. At 12 pixels the gaze is uncertain
+# by 20°, whatever the estimator says: no estimator is trained or tested on such small faces.
+_MIN_FACE_PX: Final = 5.0
+_WEAK_FACE_PX: Final = 12.0
+_WEAK_FACE_STD_RAD: Final = math.radians(20.0)
+_SIZE_POWER: Final = 4.0
+# Keypoint errors, in widths of the face: up to the first they agree with the pose; beyond it, the
+# second is the standard deviation of a Gaussian that lowers the probability.
+_CONSISTENT_ERROR: Final = 0.15
+_ERROR_SCALE: Final = 0.15
+# Probability of a face without evidence for or against it.
+_UNKNOWN: Final = 0.5
+_MIN_SCORE_SCALE: Final = 0.05
+# Generous bound on the shift of a point near the image's border by lens distortion.
+_MAX_DISTORTION_PX: Final = 200.0
+
+
+@dataclass(frozen=True, slots=True)
+class FaceEvidence:
+    """Evidence of one person's face in the image.
+
+    Attributes:
+        seen: probability that the camera sees the face.
+        width_px: width of the face, ear to ear.
+        extra_std_rad: standard deviation that the small size of the face adds to each of the two
+            angles of the gaze.
+    """
+
+    seen: float
+    width_px: float
+    extra_std_rad: float
+
+
+def judge_face(
+    camera: Camera, person: PersonKeypoints, head: HeadPose, min_score: float
+) -> FaceEvidence | None:
+    """Return the evidence of a face for a head pose, or None if there is too little of it.
+
+    Three things count:
+
+    * Two of nose and eyes are seen, according to ``head.face_seen``, or else to the scores of the
+      keypoints (probability 0 at half of ``min_score``, 1 at one and a half). If these scores are
+      no evidence of a face (``face_evidence`` False), the probability is 0.5. A nose or an eye
+      outside the image counts as seen with a probability of at least 0.5: it is cut off, not turned
+      away. If two of them are outside, a lower ``head.face_seen`` also counts as 0.5.
+    * Nose, eyes and ears lie where a head in this pose has them. A root mean square error of more
+      than 15 % of the face's width lowers the probability.
+    * The face is large enough. Below 12 pixels of width the gaze is very uncertain; below 5 pixels
+      there is no evidence.
+
+    There is also no evidence if no keypoint of the head is seen and ``head.face_seen`` is None.
+
+    Args:
+        camera: camera that saw the person.
+        person: keypoints from which the pose was computed, or with which the head was found.
+        head: the pose.
+        min_score: keypoints with a lower score count as not seen.
+    """
+    depth = max(float(head.position_camera_m[2]), 0.05)
+    width_px = _FACE_WIDTH_M * math.sqrt(camera.fx_px * camera.fy_px) / depth
+    if width_px < _MIN_FACE_PX or head.position_camera_m[2] <= 0.0:
+        return None
+    outside = _outside_image(camera, head, width_px)
+    if head.face_seen is not None:
+        seen = max(head.face_seen, _UNKNOWN) if sum(outside) > 1 else head.face_seen
+    elif not (person.scores[kp.HEAD] >= min_score).any():
+        return None
+    elif person.face_evidence:
+        scale = max(min_score, _MIN_SCORE_SCALE)
+        shown = np.clip((person.scores[:3] - 0.5 * scale) / scale, 0.0, 1.0)
+        possible = np.where(outside, np.maximum(shown, _UNKNOWN), shown)
+        seen = float(np.sort(possible)[1])
+    else:
+        seen = _UNKNOWN
+    excess = head.reprojection_error_px / width_px - _CONSISTENT_ERROR
+    if excess > 0.0:
+        seen *= math.exp(-0.5 * (excess / _ERROR_SCALE) ** 2)
+    extra = _WEAK_FACE_STD_RAD * (_WEAK_FACE_PX / width_px) ** _SIZE_POWER
+    return FaceEvidence(seen, width_px, extra)
+
+
+def _outside_image(camera: Camera, head: HeadPose, width_px: float) -> tuple[bool, bool, bool]:
+    """Return True for each of nose, left eye and right eye that lies outside the image."""
+    x, y, z = head.position_camera_m.tolist()
+    u, v = camera.fx_px * x / z + camera.cx_px, camera.fy_px * y / z + camera.cy_px
+    margin = width_px + _MAX_DISTORTION_PX * (camera.distortion is not None)
+    within_u = margin < u < camera.width_px - margin
+    if within_u and margin < v < camera.height_px - margin:
+        return False, False, False
+    points = head.position_camera_m + HEAD_TEMPLATE_M[:3] @ head.rotation_camera_head.T
+    pixels = camera.project(points)
+    inside = (pixels > -0.5) & (pixels < (camera.width_px - 0.5, camera.height_px - 0.5))
+    return not inside[0].all(), not inside[1].all(), not inside[2].all()
