@@ -1,4 +1,4 @@
-"""True keypoints, projected, fall on the rendered body: found again by marker colours."""
+"""Projected true keypoints fall on the rendered body, where coloured markers are found."""
 
 from __future__ import annotations
 
@@ -9,10 +9,15 @@ import numpy as np
 import pytest
 
 from perception import Camera
-from sim_tests.actors.body import Worker, load_worker, worker_names
-from sim_tests.actors.body._asset import JOINTS, SkinMesh
-from sim_tests.actors.body._pose import skin_points
-from sim_tests.actors.body._skin import WorkerSkin
+from sim_tests.actors.body import (
+    JOINTS,
+    SkinMesh,
+    Worker,
+    WorkerSkin,
+    load_worker,
+    skin_points,
+    worker_names,
+)
 from sim_tests.world import Warehouse
 from sim_tests.world.camera import CameraRenderer
 from sim_tests.world.hall import Lighting, WarehouseLayout
@@ -22,7 +27,7 @@ MARKERS = ((255, 0, 255), (0, 255, 255), (255, 255, 0), (0, 0, 255), (0, 255, 0)
 MARKER_M = 0.009
 DISTANCE_M = 3.0
 LEAST_PIXELS = 4
-# Every pixel takes its texel as it is: nothing shades the markers.
+# Every pixel has the colour of its texel, without shading.
 FLAT = Lighting(ambient=1.0, diffuse=0.0, specular=0.0, shadows=False)
 POSES = (
     {},
@@ -34,7 +39,7 @@ POSES = (
 
 
 def texel_points(skin: SkinMesh) -> tuple[np.ndarray, np.ndarray]:
-    """(H, W) triangle of each texel or −1, and (H, W, 3) where on the body at rest it lies."""
+    """Return (H, W) the triangle of each texel or −1, and (H, W, 3) its place at rest."""
     height, width = skin.texture_rgb.shape[:2]
     corners = skin.uv[skin.triangles] * (width, height)
     corners[..., 1] = height - corners[..., 1]
@@ -58,12 +63,12 @@ def texel_points(skin: SkinMesh) -> tuple[np.ndarray, np.ndarray]:
 
 
 def cross(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Of (N, 2) vectors."""
+    """Return (N,) the cross products of (N, 2) vectors."""
     return first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
 
 
 def marked(look: str) -> tuple[np.ndarray, np.ndarray]:
-    """The finest texture with a marker at each keypoint of the face; the markers (5, 3) at rest."""
+    """Return the finest texture with a marker at each face keypoint, and their places at rest."""
     asset = load_worker(look)
     skin = asset.levels[0]
     owner, points = texel_points(skin)
@@ -73,7 +78,7 @@ def marked(look: str) -> tuple[np.ndarray, np.ndarray]:
     usable = (owner >= 0) & head[np.maximum(owner, 0)]
     for row, (keypoint, colour) in enumerate(zip(asset.keypoints_m[:5], MARKERS, strict=True)):
         distance = np.where(usable, np.linalg.norm(points - keypoint, axis=-1), np.inf)
-        # A keypoint under the skin is compared with the nearest skin.
+        # A keypoint below the skin is replaced by the nearest point of the skin.
         places[row] = points.reshape(-1, 3)[np.argmin(distance)]
         near = usable & (np.linalg.norm(points - places[row], axis=-1) < MARKER_M)
         texture[near] = colour
@@ -81,7 +86,7 @@ def marked(look: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def pixel_errors(look: str, headings: int = 8) -> list[float]:
-    """Distances between markers found and keypoints projected, over headings and poses."""
+    """Return distances (px) between found markers and projected keypoints, over many poses."""
     texture, places = marked(look)
     head = np.zeros((5, len(JOINTS)))
     head[:, [JOINTS.index("spine"), JOINTS.index("neck")]] = 1.0
