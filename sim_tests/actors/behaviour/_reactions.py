@@ -27,8 +27,8 @@ _FAR_M: Final = 6.0
 # A slower robot counts as standing, and up to the second speed as one that waits itself.
 _ROBOT_STANDING_MPS: Final = 0.08
 _ROBOT_WAITING_MPS: Final = 0.25
-# A person who lets the robot pass stays this far from its line, the course of its centre. Patience
-# with a robot that waits itself ends after the first time, any wait after the second.
+# A person who lets the robot pass stays this far from its line, the course of its centre. The wait
+# for a robot that waits itself ends after the first time, any other wait after the second.
 _ASIDE_M: Final = 1.1
 _PATIENCE_S: Final = 3.0
 _MAX_WAIT_S: Final = 15.0
@@ -38,9 +38,9 @@ _SIDE_STEP_MPS: Final = 0.7
 _MIN_ONWARD_SHARE: Final = 0.3
 # An encounter is head on if the sine of the angle between course and line is smaller.
 _HEAD_ON_SINE: Final = 0.35
-# The robot has passed once its tail is this far ahead along its line.
+# The robot has passed once the person is this far behind its tail.
 _PASSED_M: Final = 0.35
-# Speed of a person who goes first, relative to the free speed; running ends at 2 m/s.
+# Speed of a person who goes first, relative to the free speed, and its upper limit.
 _HURRY_FACTOR: Final = 1.5
 _CLAIM_FACTOR: Final = 1.1
 _MAX_HURRY_MPS: Final = 2.0
@@ -80,7 +80,7 @@ class ReactionModel:
 
     @property
     def expects_robot_to_yield(self) -> bool:
-        """Whether the person goes first in the present encounter."""
+        """True while the person goes first in an encounter."""
         return self.reaction in ("walk_on", "hurry", "claim") and not self._passed
 
     def react(

@@ -40,7 +40,7 @@ class DesiredVelocity:
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """A stop after a length of route, and its duration; the end of the route is infinite."""
+    """A stop after a length of route, and its duration; the last stop has no end."""
 
     at_m: float
     for_s: float

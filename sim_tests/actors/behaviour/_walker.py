@@ -36,10 +36,11 @@ _TOO_NEAR_M: Final = 0.5
 _TURN_RATE_HZ: Final = 4.0
 _MAX_TURN_RADPS: Final = 2.6
 _MAX_TURN_RADPS2: Final = 15.0
-# Farther off the desired direction, a person walks slower until turned, down to this share.
+# A person whose heading is farther off walks slower until it is turned, down to this speed share.
 _TURN_FIRST_RAD: Final = math.radians(60.0)
 _MIN_TURNING_SHARE: Final = 0.1
-# Below this cosine to the route a waiting person steps aside or back without turning.
+# A waiting person steps aside or back without turning if the cosine of the angle between step and
+# route is smaller.
 _SIDE_STEP_COSINE: Final = 0.2
 # After a contact the person steps back, and never towards the robot while they touch.
 _RECOIL_S: Final = 0.7
@@ -147,7 +148,7 @@ class Walker:
 
     @property
     def arrived(self) -> bool:
-        """Whether the end of the route was reached."""
+        """True once the end of the route was reached."""
         return self._follower.arrived_s is not None
 
     def outcome(self) -> PersonOutcome:

@@ -26,7 +26,7 @@ from ._gait_parameters import (
     MIDSTANCE_PHASE,
     MIDSTANCE_SHIFT,
     PELVIS_LIST_RAD,
-    PELVIS_TWIST,
+    PELVIS_TWIST_SHARE,
     PELVIS_YAW_RAD,
     ROLL_OFF_S,
     ROLL_OFF_SHARE,
@@ -243,7 +243,7 @@ class Gait:
             [sway, -PELVIS_YAW_RAD * stride_ratio * turn, PELVIS_LIST_RAD * size * weight]
         )
         if twist_rad is not None:
-            pelvis[:, 1] += PELVIS_TWIST * twist_rad
+            pelvis[:, 1] += PELVIS_TWIST_SHARE * twist_rad
         limit = np.minimum(
             self._hip_limits(feet, position_m, heading_rad, pelvis), self.standing_height_m
         )

@@ -31,7 +31,7 @@ TURN_PER_CYCLE_RAD: Final = math.radians(60.0)
 SIDE_STRIDE_SHARE: Final = 0.12
 #: A backward stride as a share of a forward one.
 BACKWARD_STRIDE_SHARE: Final = 0.75
-#: No feet go faster, whatever the body does.
+#: Largest cadence of any motion.
 MAX_CADENCE_HZ: Final = 1.8
 #: A body that walks askew turns its feet towards the walk: at most by this angle, and less below
 #: this speed.
@@ -45,7 +45,7 @@ THORAX_YAW_RAD: Final = 0.06
 SWAY_M: Final = 0.016
 ARM_SWING_RAD: Final = 0.36
 #: Share of the angle between feet and heading that the pelvis follows.
-PELVIS_TWIST: Final = 0.75
+PELVIS_TWIST_SHARE: Final = 0.75
 
 _LANDING_PITCH_RAD: Final = math.radians(-20.0)
 _LIFT_OFF_PITCH_RAD: Final = math.radians(40.0)

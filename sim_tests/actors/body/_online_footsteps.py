@@ -22,7 +22,7 @@ from ._gait_parameters import (
     MIDSTANCE_PHASE,
     MIDSTANCE_SHIFT,
     PELVIS_LIST_RAD,
-    PELVIS_TWIST,
+    PELVIS_TWIST_SHARE,
     PELVIS_YAW_RAD,
     ROLL_OFF_S,
     ROLL_OFF_SHARE,
@@ -350,7 +350,7 @@ class OnlineFootsteps:
         turn = math.cos(math.tau * self._phase)
         weight = math.cos(math.tau * (self._phase - MIDSTANCE_PHASE))
         sway = SWAY_M * min(2.0 * size, 1.0) * weight
-        yaw = -PELVIS_YAW_RAD * stride_ratio * turn + PELVIS_TWIST * self._twist
+        yaw = -PELVIS_YAW_RAD * stride_ratio * turn + PELVIS_TWIST_SHARE * self._twist
         tilt = PELVIS_LIST_RAD * size * weight
         highest = min(
             self._tables.hip_limit_m(feet, place, sway, yaw, tilt), self._tables.standing_height_m

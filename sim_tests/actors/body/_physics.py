@@ -14,7 +14,7 @@ from ._quaternions import IDENTITY, Quaternion, Vector, subtract
 from ._skeleton import Skeleton
 
 _SPINE: Final = JOINTS.index("spine")
-# Row of the box. A prismatic joint on the thorax takes it away while nobody carries it.
+# Row of the box. A prismatic joint on the thorax takes it away while the hands are empty.
 _BOX: Final = len(JOINTS)
 # Rows of JOINTS and of the box in PyBullet's order of links, depth first. Eyes do not collide.
 _LINKS: Final = (

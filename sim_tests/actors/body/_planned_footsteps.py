@@ -31,7 +31,7 @@ _STANDING_BELOW_RADPS: Final = math.radians(0.6)
 _MIN_PAUSE_S: Final = 0.8
 _STAY_WITHIN_M: Final = 0.03
 _STAY_WITHIN_RAD: Final = math.radians(8.0)
-# Cadence of a body that stands in a walk, and of one that hardly moves.
+# Least cadence in a pause that is walked through, and in motion.
 _PAUSE_HZ: Final = 0.6
 _CREEPING_HZ: Final = 0.05
 # Range of the cadence before the first and after the last step.
@@ -40,12 +40,12 @@ _MAX_START_HZ: Final = 1.2
 _MIN_STEP_S: Final = 0.2
 # The first foot lands this part of a cycle after the body starts, the last after it stops.
 _FIRST_LANDING_CYCLES: Final = 0.25
-# Feet neither wait for the last nor step for the first part of a motion, in cycles.
+# The first and the last part of a motion take no steps: this much of a cycle each.
 _TRIMMED_CYCLES: Final = 0.04
 _DOUBLE_SUPPORT_S: Final = 0.04
 _MAX_STANCE_SHARE: Final = 0.75
-# As shares of stature: the longest step of a dash, how far a stance foot may be left behind, and
-# how far ahead it may land. A foot left behind lifts off while the other is in flight this long.
+# As shares of stature: the longest step, how far a stance foot may be left behind, and how far
+# ahead it may land. A foot that is left behind lifts off this long before the other one lands.
 _MAX_STEP_SHARE: Final = 0.5
 _MAX_BEHIND_SHARE: Final = 0.335
 _MAX_AHEAD_SHARE: Final = 0.29
@@ -56,7 +56,7 @@ _MIN_HIP_HEIGHT_SHARE: Final = 0.76
 _MAX_FOOT_SPEED_MPS: Final = 9.9
 _REACH_SCALES: Final = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5)
 _SMOOTHING_S: Final = 0.30
-# The stance share of a start and of a stop is that of the walk within this time.
+# A start and a stop have the stance share of the walk within this time.
 _START_STOP_S: Final = 0.35
 
 
@@ -237,7 +237,7 @@ def _add_steps(
     path_m = float(np.hypot(*np.diff(motion.position_m[first : last + 1], axis=0).T).sum())
     steps = max(steps, math.ceil(path_m / (reach_scale * _MAX_STEP_SHARE * stature_m)))
     stretch = 0.5 * steps / float(cycles[-1])
-    # Before and after the walk the cycle goes on at the cadence of the first and the last step.
+    # Before and after the walk the cycle continues at the cadence of the first and the last step.
     before, after = (
         float(np.clip(hz * stretch, _MIN_START_HZ, _MAX_START_HZ))
         for hz in (cadence[: len(cadence) // 4 + 1].max(), cadence[-len(cadence) // 4 :].max())

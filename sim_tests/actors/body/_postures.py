@@ -58,6 +58,7 @@ _FINGERS_OUT_RAD: Final = math.radians(22.0)
 _GRIP_DEPTH_M: Final = 0.012
 # The forearm takes this share of the hand's twist, the wrist the rest.
 _FOREARM_TWIST_SHARE: Final = 0.65
+# Bend of the elbow in a walk at 1.2 m/s, and per radian of forward swing.
 _ELBOW_BEND_RAD: Final = 0.16
 _ELBOW_SWING: Final = 0.55
 # Arms hang this far outwards from rest, and this much farther in a walk at 1.2 m/s.
@@ -102,7 +103,7 @@ class Activity:
 
     @property
     def upright(self) -> float:
-        """How upright a carried box keeps the trunk, in [0, 1]."""
+        """Uprightness of the trunk that a carried box demands, in [0, 1]."""
         return self.share * (self.name == "carry_box") + (1.0 - self.share) * (
             self.before == "carry_box"
         )

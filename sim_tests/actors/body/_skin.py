@@ -213,7 +213,7 @@ class WorkerSkin:
         return np.array([points.min(axis=0) - reach, points.max(axis=0) + reach])
 
     def build(self, visuals: Visuals) -> None:
-        """Keep the visual world; each level of detail is made when it is first needed."""
+        """Store the visual world; each level of detail is made when it is first needed."""
         self._visuals = visuals
 
     def bodies(self) -> AbstractSet[int]:
