@@ -1,8 +1,10 @@
-"""What people do: scripts, recorded paths, and walkers that look, decide and react."""
+"""The behaviour of people: scripts, recorded paths, and walkers that look, decide and react."""
 
 from __future__ import annotations
 
+from ._obstacles import WALKER_RADIUS_M
 from ._person import (
+    ALONE,
     MovingBody,
     PersonBehaviour,
     PersonMotion,
@@ -10,22 +12,28 @@ from ._person import (
     RobotBody,
     Surroundings,
 )
-from ._replayed import replayed_people
-from ._script import WorkerScript
-from ._scripted import Scripted
-from ._spec import PersonSpec
-from ._walker import Walker
+from ._replayed import Replayed, read_recordings, replayed_people
+from ._script import Scripted, WorkerScript
+from ._spec import Glances, PersonSpec, Reactions
+from ._walker import DECISION_PERIOD_S, Walker
 
 __all__ = [
+    "ALONE",
+    "DECISION_PERIOD_S",
+    "WALKER_RADIUS_M",
+    "Glances",
     "MovingBody",
     "PersonBehaviour",
     "PersonMotion",
     "PersonOutcome",
     "PersonSpec",
+    "Reactions",
+    "Replayed",
     "RobotBody",
     "Scripted",
     "Surroundings",
     "Walker",
     "WorkerScript",
+    "read_recordings",
     "replayed_people",
 ]

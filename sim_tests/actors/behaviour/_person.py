@@ -1,25 +1,23 @@
-"""What goes on around a person at one instant.
-
-A person of a crossing at one instant, whoever decides what the person does.
-
-What became of one person in one episode.
-"""
+"""Interface of a person in a crossing: surroundings in, motion out, and the outcome at the end."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Final, Protocol
 
 from perception.arrays import FloatArray
 
-from ..body import Activity, Footing
+from ..body import Activity, GaitPose
+
+#: Height of the eyes as a share of stature.
+EYE_HEIGHT_SHARE: Final = 0.94
 
 
 @dataclass(frozen=True, slots=True)
 class MovingBody:
-    """Somebody else's place and velocity, in odom."""
+    """Position and velocity of another person in odom."""
 
     x_m: float
     y_m: float
@@ -29,16 +27,16 @@ class MovingBody:
 
 @dataclass(frozen=True, slots=True)
 class RobotBody:
-    """The robot as one can see it: a rectangle that moves, and a camera on top; in odom.
+    """The robot as a person can see it, in odom: a moving rectangle with a camera.
 
     Attributes:
-        x_m: of the base.
-        y_m: of the base.
-        heading_rad: of the base.
+        x_m: position of the base.
+        y_m: position of the base.
+        heading_rad: heading of the base.
         vx_mps: velocity.
         vy_mps: velocity.
-        half_length_m: of the rectangle, along the heading.
-        half_width_m: across.
+        half_length_m: half the rectangle's length along the heading.
+        half_width_m: half its width.
         camera_m: (x, y, z) of the camera.
     """
 
@@ -51,17 +49,17 @@ class RobotBody:
     half_width_m: float
     camera_m: tuple[float, float, float]
 
-    def nearest_m(self, x_m: float, y_m: float) -> tuple[float, float]:
-        """The point of the rectangle that is nearest to (x, y)."""
+    def nearest_point_m(self, x_m: float, y_m: float) -> tuple[float, float]:
+        """Return the point of the rectangle nearest to (x, y)."""
         cos, sin = math.cos(self.heading_rad), math.sin(self.heading_rad)
         dx, dy = x_m - self.x_m, y_m - self.y_m
         ahead = min(max(cos * dx + sin * dy, -self.half_length_m), self.half_length_m)
         aside = min(max(cos * dy - sin * dx, -self.half_width_m), self.half_width_m)
         return self.x_m + cos * ahead - sin * aside, self.y_m + sin * ahead + cos * aside
 
-    def later(self, after_s: float) -> RobotBody:
-        """The same, gone on as it went for a while."""
-        dx, dy = self.vx_mps * after_s, self.vy_mps * after_s
+    def extrapolated(self, dt_s: float) -> RobotBody:
+        """Return the robot after ``dt_s`` of constant velocity."""
+        dx, dy = self.vx_mps * dt_s, self.vy_mps * dt_s
         x, y, z = self.camera_m
         return RobotBody(
             self.x_m + dx,
@@ -77,13 +75,13 @@ class RobotBody:
 
 @dataclass(frozen=True, slots=True)
 class Surroundings:
-    """What is around one person.
+    """The surroundings of one person at one instant.
 
     Attributes:
-        robot: None in a hall without.
-        others: everybody else.
-        sees_robot: whether nothing stands between the person's eyes and the robot's camera; asked
-            only when the robot is where the person could see it.
+        robot: the robot; None without one.
+        others: all other people.
+        sees_robot: whether the line from the person's eyes to the robot's camera is free. It is
+            called only while the robot is in the person's field of view.
     """
 
     robot: RobotBody | None
@@ -95,32 +93,32 @@ def _never() -> bool:
     return False
 
 
-#: Nobody there.
-ALONE = Surroundings(None, (), _never)
+#: Surroundings without a robot and without other people.
+ALONE: Final = Surroundings(None, (), _never)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PersonMotion:
-    """A person at one instant; angles in radians.
+    """A person at one instant.
 
     Attributes:
-        position_odom_m: (2,) of the body's centre line.
+        position_odom_m: (2,) position of the body's centre line.
         velocity_odom_mps: (2,).
-        heading_odom_rad: the way the body faces.
-        walked_m: length of the way so far.
-        feet: where feet and hips are, in odom.
+        heading_odom_rad: heading of the body.
+        walked_m: length of the path so far.
+        feet: gait pose in odom.
         head_yaw_rad: of the head from the body, left positive.
-        head_pitch_rad: up positive.
-        eye_yaw_rad: of the eyes in the head.
-        eye_pitch_rad: of the eyes in the head.
-        activity: what the hands do.
+        head_pitch_rad: of the head, up positive.
+        eye_yaw_rad: of the eyes from the head, left positive.
+        eye_pitch_rad: of the eyes from the head, up positive.
+        activity: of the hands.
     """
 
     position_odom_m: FloatArray
     velocity_odom_mps: FloatArray
     heading_odom_rad: float
     walked_m: float
-    feet: Footing
+    feet: GaitPose
     head_yaw_rad: float
     head_pitch_rad: float
     eye_yaw_rad: float
@@ -129,7 +127,7 @@ class PersonMotion:
 
 
 class PersonBehaviour(Protocol):
-    """Decides what one person of a crossing does: a script, a recording or a mind of its own."""
+    """The behaviour of one person: a script, a recording or a walker that reacts."""
 
     @property
     def stature_m(self) -> float:
@@ -138,7 +136,7 @@ class PersonBehaviour(Protocol):
 
     @property
     def look(self) -> str | None:
-        """Name of a shipped worker; None is the one of the nearest stature."""
+        """Name of a shipped worker; None is the one of nearest stature."""
         ...
 
     @property
@@ -147,32 +145,32 @@ class PersonBehaviour(Protocol):
         ...
 
     def motion(self, t_s: float, around: Surroundings) -> PersonMotion:
-        """What the person does at ``t_s``; time never goes back."""
+        """Return the person's motion at ``t_s``, which never decreases."""
         ...
 
     def hold(self) -> None:
-        """The last motion would have led into the robot: the body stays where it was before."""
+        """Take the last motion back: it would have led into the robot, and the body stayed."""
         ...
 
     def touch(self, towards_x: float, towards_y: float) -> None:
-        """Body and robot touch; the robot lies in this direction (a unit vector in odom)."""
+        """Note a contact with the robot, which lies in this direction (a unit vector in odom)."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class PersonOutcome:
-    """What became of one person in one episode.
+    """The outcome of one episode for one person.
 
     Attributes:
         name: of the person in the scenario.
-        noticed_s: when the person first looked at the robot; None if never.
-        reaction: what a person who had seen the robot did: ``"walk_on"``, ``"wait"``, ``"hurry"``,
-            ``"pass_behind"`` or ``"claim"``; empty for one who never had to choose.
-        time_s: from setting out to the end of the route; None if it was not reached.
-        free_time_s: the same without robot and other people, pauses included; None for a person
-            without a route to an end.
-        length_m: walked.
-        free_length_m: of the route; None as ``free_time_s``.
+        noticed_s: time of the first look at the robot; None without one.
+        reaction: first reaction to the robot: ``"walk_on"``, ``"wait"``, ``"hurry"``,
+            ``"pass_behind"`` or ``"claim"``; empty without an encounter.
+        time_s: from the start to the end of the route; None if the end was not reached.
+        free_time_s: the same without robot and other people, pauses included; None without a route
+            or without an end of it.
+        length_m: length of the path walked.
+        free_length_m: the same without robot and other people; None as ``free_time_s``.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""People whose ways were recorded: replayed from a CSV table."""
+"""People whose paths were recorded, replayed from a CSV table."""
 
 from __future__ import annotations
 
@@ -17,26 +17,26 @@ from perception.arrays import FloatArray
 from ...world.errors import SimError
 from ..body import MAX_HEAD_YAW_RAD, Activity, Gait, skeleton, worker_names
 from ._person import PersonMotion, Surroundings
-from ._script import HeadingKey, Waypoint, WorkerWalk
+from ._planned_walk import HeadingKey, PlannedWalk, Waypoint
 
-_NEEDED: Final = ("t_s", "id", "x_m", "y_m")
+_REQUIRED: Final = ("t_s", "id", "x_m", "y_m")
 _OPTIONAL: Final = ("heading_rad", "head_yaw_rad")
 _IDLE: Final = Activity()
 _STATURE_M: Final = 1.75
-# Nobody moves faster than this: who seems to was mixed up with another, or the units are wrong.
-_FASTEST_MPS: Final = 12.0
+# A faster person was mixed up with another one, or the units are wrong.
+_MAX_SPEED_MPS: Final = 12.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordedPath:
-    """What was recorded of one person.
+    """The recorded path of one person.
 
     Attributes:
-        name: the ``id`` of the table.
+        name: ``id`` in the table.
         times_s: (N,) increasing.
         positions_odom_m: (N, 2).
-        headings_odom_rad: (N,) of the body, unwrapped; None faces the way it walks.
-        head_yaws_rad: (N,) of the head from the body, left positive; None looks ahead.
+        headings_odom_rad: (N,) heading of the body, unwrapped; None faces along the path.
+        head_yaws_rad: (N,) yaw of the head from the body, left positive; None looks ahead.
     """
 
     name: str
@@ -47,15 +47,18 @@ class RecordedPath:
 
 
 class Replayed:
-    """Does what was recorded, whatever happens; before the first row and after the last it stands.
+    """A person who follows a recorded path regardless of the surroundings.
 
-    At the times of the rows place, heading and head are those of the rows; in between they are
-    monotone cubics (place, heading) and straight lines (head).
+    The rows are met exactly. Between them position and heading are monotone cubics and the head's
+    yaw is linear. The person stands before the first and after the last row.
 
     Args:
-        recording: of one person.
-        look: name of a shipped worker; None is the one of the nearest stature.
-        stature_m: of the body.
+        recording: the path of one person.
+        look: name of a shipped worker; None is the one of nearest stature.
+        stature_m: height of the body.
+
+    Attributes:
+        recording: as given.
     """
 
     def __init__(
@@ -75,13 +78,14 @@ class Replayed:
                 HeadingKey(t_s=t, heading_deg=angle)
                 for t, angle in zip(times.tolist(), degrees, strict=True)
             )
-        self._walk = WorkerWalk(path, headings, Gait(skeleton(look, stature_m)))
-        self._place = self._velocity = self._facing = None
+        self._walk = PlannedWalk(path, headings, Gait(skeleton(look, stature_m)))
+        # Exact splines: the planned walk's table interpolates between its rows.
+        self._position = self._velocity = self._heading = None
         if len(times) > 1:
-            self._place = PchipInterpolator(times, recording.positions_odom_m)
-            self._velocity = self._place.derivative()
+            self._position = PchipInterpolator(times, recording.positions_odom_m)
+            self._velocity = self._position.derivative()
             if recording.headings_odom_rad is not None:
-                self._facing = PchipInterpolator(times, recording.headings_odom_rad)
+                self._heading = PchipInterpolator(times, recording.headings_odom_rad)
 
     @property
     def stature_m(self) -> float:
@@ -95,23 +99,23 @@ class Replayed:
 
     @property
     def stride_m(self) -> float | None:
-        """The stride follows the speed."""
+        """None: the stride follows the speed."""
         return None
 
     def motion(self, t_s: float, around: Surroundings) -> PersonMotion:
-        """What was recorded for ``t_s``."""
+        """Return the recorded motion at ``t_s``."""
         recording = self.recording
         first, last = float(recording.times_s[0]), float(recording.times_s[-1])
         at_s = min(max(t_s, first), last)
         walk = self._walk.motion(t_s)
         position, velocity = recording.positions_odom_m[0], np.zeros(2)
         heading = walk.heading_odom_rad
-        if self._place is not None and self._velocity is not None:
-            position = np.asarray(self._place(at_s))
+        if self._position is not None and self._velocity is not None:
+            position = np.asarray(self._position(at_s))
             if first <= t_s <= last:
                 velocity = np.asarray(self._velocity(at_s))
-        if self._facing is not None:
-            heading = float(self._facing(at_s))
+        if self._heading is not None:
+            heading = float(self._heading(at_s))
         yaw = 0.0
         if recording.head_yaws_rad is not None:
             yaw = float(np.interp(at_s, recording.times_s, recording.head_yaws_rad))
@@ -129,14 +133,14 @@ class Replayed:
         )
 
     def hold(self) -> None:
-        """A recording goes on regardless."""
+        """Do nothing: the recording continues."""
 
     def touch(self, towards_x: float, towards_y: float) -> None:
-        """A recording takes no notice."""
+        """Do nothing: the recording continues."""
 
 
 def replayed_people(path: str | Path) -> tuple[Replayed, ...]:
-    """The people of a table, in order of their first rows, dressed differently.
+    """Return the people of a table in order of their first rows, with different looks.
 
     Raises:
         SimError: see :func:`read_recordings`.
@@ -149,15 +153,16 @@ def replayed_people(path: str | Path) -> tuple[Replayed, ...]:
 
 
 def read_recordings(path: str | Path) -> tuple[RecordedPath, ...]:
-    """Read ``t_s, id, x_m, y_m`` and maybe ``heading_rad, head_yaw_rad`` of one or more people.
+    """Read the recorded paths of one or more people from a CSV file.
 
-    Seconds, metres and radians in odom, a header in the first line, columns and rows in any order;
-    ``heading_rad`` is the way the body faces, ``head_yaw_rad`` the head's turn from it to the left.
-    An optional column is filled for every row of a person or for none.
+    The first line is the header; columns and rows may be in any order. ``t_s, id, x_m, y_m`` are
+    required. ``heading_rad`` (of the body) and ``head_yaw_rad`` (of the head from the body, left
+    positive) are optional; each is filled in every row of a person or in none. Positions and
+    headings are in odom.
 
     Raises:
-        SimError: a file that cannot be read, a column that is missing or unknown, a value that is
-            no finite number, two rows of a person for one time, a jump; the message says where.
+        SimError: for a file that cannot be read, a missing or unknown column, a value that is not a
+            finite number, two rows of a person with one time, or a jump; the message says where.
     """
     path = Path(path)
     try:
@@ -178,12 +183,12 @@ def read_recordings(path: str | Path) -> tuple[RecordedPath, ...]:
         if not name:
             raise SimError(f"{path}, line {line}: id is empty")
         people.setdefault(name, []).append((line, row))
-    return tuple(_recording(path, name, own) for name, own in people.items())
+    return tuple(_recorded_path(path, name, own) for name, own in people.items())
 
 
 def _check_columns(path: Path, names: list[str]) -> None:
-    missing = [name for name in _NEEDED if name not in names]
-    unknown = [name for name in names if name not in (*_NEEDED, *_OPTIONAL)]
+    missing = [name for name in _REQUIRED if name not in names]
+    unknown = [name for name in names if name not in (*_REQUIRED, *_OPTIONAL)]
     twice = sorted({name for name in names if names.count(name) > 1})
     if missing or unknown or twice:
         what = (
@@ -194,15 +199,15 @@ def _check_columns(path: Path, names: list[str]) -> None:
             else f"names {', '.join(twice)} twice"
         )
         raise SimError(
-            f"{path}: the header {what}; it must name {', '.join(_NEEDED)} and may name "
+            f"{path}: the header {what}; it must name {', '.join(_REQUIRED)} and may name "
             f"{', '.join(_OPTIONAL)}"
         )
 
 
-def _recording(
+def _recorded_path(
     path: Path, name: str, rows: list[tuple[int, dict[str, str | None]]]
 ) -> RecordedPath:
-    """One person's rows in order of time."""
+    """Return one person's rows in order of time."""
     columns = ["t_s", "x_m", "y_m"]
     for column in _OPTIONAL:
         filled = [bool((row.get(column) or "").strip()) for _, row in rows]
@@ -215,31 +220,31 @@ def _recording(
                 "give it in all of a person's rows or in none"
             )
     values = sorted(
-        ([_number(path, line, column, row.get(column)) for column in columns], line)
+        ([_finite_number(path, line, column, row.get(column)) for column in columns], line)
         for line, row in rows
     )
     for (before, _), (after, line) in itertools.pairwise(values):
-        elapsed, way = after[0] - before[0], math.dist(before[1:3], after[1:3])
-        if elapsed <= 0.0:
+        elapsed_s, moved_m = after[0] - before[0], math.dist(before[1:3], after[1:3])
+        if elapsed_s <= 0.0:
             raise SimError(f"{path}, line {line}: {name!r} has two rows for t_s = {after[0]:g} s")
-        if way > _FASTEST_MPS * elapsed:
+        if moved_m > _MAX_SPEED_MPS * elapsed_s:
             raise SimError(
-                f"{path}, line {line}: {name!r} moves {way:.3g} m in {elapsed:.3g} s, faster than "
-                f"{_FASTEST_MPS:g} m/s; t_s is in seconds, x_m and y_m are in metres"
+                f"{path}, line {line}: {name!r} moves {moved_m:.3g} m in {elapsed_s:.3g} s, faster "
+                f"than {_MAX_SPEED_MPS:g} m/s; t_s is in seconds, x_m and y_m are in metres"
             )
     table = np.array([row for row, _ in values])
     optional = {column: table[:, 3 + at] for at, column in enumerate(columns[3:])}
-    headings, yaws = (optional.get(column) for column in _OPTIONAL)
+    headings, head_yaws = (optional.get(column) for column in _OPTIONAL)
     return RecordedPath(
         name,
         table[:, 0],
         table[:, 1:3],
         None if headings is None else np.unwrap(headings),
-        yaws,
+        head_yaws,
     )
 
 
-def _number(path: Path, line: int, column: str, text: str | None) -> float:
+def _finite_number(path: Path, line: int, column: str, text: str | None) -> float:
     try:
         value = float(text or "")
     except ValueError:

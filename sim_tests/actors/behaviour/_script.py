@@ -1,70 +1,39 @@
-"""What a scripted worker does: walk, face, look, carry; by keys in time."""
+"""Scripted workers: walk, heading, gaze and activities by keys in time."""
 
 from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
-from functools import lru_cache
-from typing import ClassVar, Literal
+from typing import ClassVar, Final, Literal
 
-import numpy as np
 from pydantic import Field, model_validator
-from scipy.interpolate import PchipInterpolator
-from scipy.ndimage import uniform_filter1d
 
-from perception.arrays import FloatArray
 from tracking.config import StrictConfig
 
 from ...world.errors import SimError
 from ..body import (
+    MAX_HEAD_PITCH_RAD,
+    MAX_HEAD_YAW_RAD,
     MAX_STATURE_M,
     MIN_STATURE_M,
     Activity,
     ActivityName,
-    Footing,
-    Gait,
-    footstep_table,
-    skeleton,
     worker_names,
 )
+from ._person import EYE_HEIGHT_SHARE, PersonMotion, Surroundings
+from ._planned_walk import HeadingKey, PlannedMotion, PlannedWalk, Waypoint, planned_walk
 
-# Below this speed the direction of walking is noise and the body keeps its heading.
-_TURNING_SPEED_MPS = 0.05
-_TABLE_STEP_S = 0.01
-# Bodies turn no more abruptly than this, and hands go from one activity to the next in this time.
-_TURN_SMOOTHING_S = 0.4
-_CHANGE_S = 0.6
-# Feet begin before the body moves and end after it.
-_MARGIN_S = 1.5
-_IDLE = Activity()
-
-
-class Waypoint(StrictConfig):
-    """Where the worker's body is at a time; metres in odom."""
-
-    error: ClassVar[type[ValueError]] = SimError
-
-    t_s: float
-    x_m: float
-    y_m: float
-
-
-class HeadingKey(StrictConfig):
-    """Which way the body faces at a time, degrees counter-clockwise from odom x."""
-
-    error: ClassVar[type[ValueError]] = SimError
-
-    t_s: float
-    heading_deg: float
+# Hands change from one activity to the next in this time.
+_CHANGE_S: Final = 0.6
+_IDLE: Final = Activity()
 
 
 class GazeKey(StrictConfig):
-    """Where the head points at a time.
+    """Direction of head and eyes at a time.
 
-    ``look: ahead`` is the way the body faces, ``look: robot`` the robot's camera; ``yaw_deg`` turns
-    away from that to the left, ``pitch_deg`` up. The eyes turn in the head by ``eye_yaw_deg`` and
-    ``eye_pitch_deg``. From one key to the next head and eyes turn smoothly.
+    ``look: ahead`` is the heading of the body, ``look: robot`` the direction to the robot's camera.
+    The head points ``yaw_deg`` to the left of it and ``pitch_deg`` above it. The eyes turn in the
+    head by ``eye_yaw_deg`` and ``eye_pitch_deg``. Head and eyes turn smoothly between two keys.
     """
 
     error: ClassVar[type[ValueError]] = SimError
@@ -78,7 +47,7 @@ class GazeKey(StrictConfig):
 
 
 class ActivityKey(StrictConfig):
-    """What the hands do from a time on; they take 0.6 s to get there."""
+    """Activity of the hands from a time on; the change takes 0.6 s."""
 
     error: ClassVar[type[ValueError]] = SimError
 
@@ -86,38 +55,20 @@ class ActivityKey(StrictConfig):
     activity: ActivityName
 
 
-@dataclass(frozen=True, slots=True)
-class WorkerMotion:
-    """The scripted body at one instant.
-
-    Attributes:
-        position_odom_m: (2,).
-        velocity_odom_mps: (2,).
-        heading_odom_rad: the way the body faces.
-        walked_m: length of the path so far.
-        feet: where feet and hips are, in odom.
-    """
-
-    position_odom_m: FloatArray
-    velocity_odom_mps: FloatArray
-    heading_odom_rad: float
-    walked_m: float
-    feet: Footing
-
-
 class WorkerScript(StrictConfig):
-    """A worker's looks, walk, gaze and activities.
+    """The script of a worker.
 
     Attributes:
         stature_m: body height.
         look: name of a shipped worker, scaled to the stature; default the one of nearest stature.
         stride_m: distance of a full gait cycle (two steps); default follows the speed.
-        path: at least one waypoint in order of time; between them the walk is a monotone cubic
-            (PCHIP), before the first and after the last the worker stands.
-        heading: the way the body faces, a monotone cubic between keys; empty means along the walk.
-        gaze: where the head points; empty means ahead.
-        activities: what the hands do, in order of time and 0.6 s apart at least; the first one
-            holds before its time as well. Empty means nothing.
+        path: at least one waypoint in order of time. The walk is a monotone cubic (PCHIP) between
+            them; the worker stands before the first and after the last one.
+        heading: keys of the body's heading, with a monotone cubic between them; empty faces along
+            the walk.
+        gaze: keys of head and eyes; empty looks ahead.
+        activities: keys of the hands in order of time, at least 0.6 s apart. The first one holds
+            before its time as well. Empty is none.
     """
 
     error: ClassVar[type[ValueError]] = SimError
@@ -153,32 +104,32 @@ class WorkerScript(StrictConfig):
             raise ValueError(f"look must be one of {', '.join(worker_names())}, got {self.look!r}")
         return self
 
-    def walk(self) -> WorkerWalk:
-        """The walk worked out; scripts that walk alike share it."""
-        return _walk(self.path, self.heading, self.look, self.stature_m, self.stride_m)
+    def walk(self) -> PlannedWalk:
+        """Return the planned walk."""
+        return planned_walk(self.path, self.heading, self.look, self.stature_m, self.stride_m)
 
-    def motion(self, t_s: float) -> WorkerMotion:
-        """Where the body is at ``t_s``, how it moves and where its feet are."""
+    def motion(self, t_s: float) -> PlannedMotion:
+        """Return the body's motion at ``t_s``."""
         return self.walk().motion(t_s)
 
     def activity(self, t_s: float) -> Activity:
-        """What the hands do at ``t_s``."""
+        """Return the activity of the hands at ``t_s``."""
         keys = self.activities
         if not keys:
             return _IDLE
-        at = max(sum(key.t_s <= t_s for key in keys) - 1, 0)
-        share = min(max((t_s - keys[at].t_s) / _CHANGE_S, 0.0), 1.0)
-        before = keys[max(at - 1, 0)].activity
-        return Activity(keys[at].activity, before, share * share * (3.0 - 2.0 * share))
+        row = max(sum(key.t_s <= t_s for key in keys) - 1, 0)
+        share = min(max((t_s - keys[row].t_s) / _CHANGE_S, 0.0), 1.0)
+        before = keys[max(row - 1, 0)].activity
+        return Activity(keys[row].activity, before, _smoothstep(share))
 
     def gaze_angles(
         self, t_s: float, heading_odom_rad: float, to_robot: tuple[float, float]
     ) -> tuple[float, float]:
-        """Azimuth in odom and elevation of the gaze at ``t_s``, radians.
+        """Return azimuth in odom and elevation of the head at ``t_s``, radians.
 
         Args:
             t_s: time.
-            heading_odom_rad: the way the body faces now.
+            heading_odom_rad: heading of the body now.
             to_robot: azimuth and elevation from the eyes to the robot's camera, radians.
         """
         if not self.gaze:
@@ -188,15 +139,17 @@ class WorkerScript(StrictConfig):
         if first is second:
             return azimuth, elevation
         next_azimuth, next_elevation = _key_angles(second, heading_odom_rad, to_robot)
-        # Heads turn through the front: blend relative to the body, not the short way round.
-        here, there = (_wrapped(angle - heading_odom_rad) for angle in (azimuth, next_azimuth))
+        # A head turns through the front: interpolate relative to the body, not the short way.
+        here, there = (
+            math.remainder(angle - heading_odom_rad, math.tau) for angle in (azimuth, next_azimuth)
+        )
         return (
             heading_odom_rad + here + share * (there - here),
             elevation + share * (next_elevation - elevation),
         )
 
     def eye_angles(self, t_s: float) -> tuple[float, float]:
-        """Yaw to the left and pitch up of the eyes in the head at ``t_s``, radians."""
+        """Return yaw to the left and pitch up of the eyes in the head at ``t_s``, radians."""
         if not self.gaze:
             return 0.0, 0.0
         first, second, share = self._gaze_keys(t_s)
@@ -210,112 +163,89 @@ class WorkerScript(StrictConfig):
         return yaw, pitch
 
     def _gaze_keys(self, t_s: float) -> tuple[GazeKey, GazeKey, float]:
-        """The keys before and after a time, and how far it is from one to the other, eased."""
+        """Return the keys before and after a time, and the smooth progress between them."""
         after = sum(key.t_s <= t_s for key in self.gaze)
         first = self.gaze[max(after - 1, 0)]
         second = self.gaze[min(after, len(self.gaze) - 1)]
         if first is second:
             return first, second, 0.0
         share = min(max((t_s - first.t_s) / (second.t_s - first.t_s), 0.0), 1.0)
-        return first, second, share * share * (3.0 - 2.0 * share)
+        return first, second, _smoothstep(share)
 
 
-class WorkerWalk:
-    """A scripted walk worked out: rows of a table over time.
+class Scripted:
+    """A person who follows a script regardless of the surroundings.
 
     Args:
-        path: at least one waypoint.
-        heading: keys of the way the body faces, maybe none.
-        gait: of the body.
+        script: the script.
+        offset_s: delay of the whole script.
     """
 
-    def __init__(
-        self, path: tuple[Waypoint, ...], heading: tuple[HeadingKey, ...], gait: Gait
-    ) -> None:
-        first, last = path[0].t_s, path[-1].t_s
-        steps = max(math.ceil((last - first) / _TABLE_STEP_S), 1)
-        # Rows fall on the first and the last waypoint.
-        step = (last - first) / steps if last > first else _TABLE_STEP_S
-        before = math.ceil((max(first - heading[0].t_s, 0.0) if heading else 0.0) / step)
-        after = math.ceil((max(heading[-1].t_s - last, 0.0) if heading else 0.0) / step)
-        margin = math.ceil(_MARGIN_S / step)
-        numbers = np.arange(-before - margin, steps + after + margin + 1)
-        times: FloatArray = first + step * numbers.astype(np.float64)
-        corners = np.array([[point.x_m, point.y_m] for point in path])
-        if len(path) == 1:
-            points, velocity = np.repeat(corners, len(times), axis=0), np.zeros((len(times), 2))
-        else:
-            spline = PchipInterpolator([point.t_s for point in path], corners)
-            clipped = np.clip(times, first, last)
-            points, velocity = spline(clipped), spline.derivative()(clipped)
-            velocity[(numbers < 0) | (numbers > steps)] = 0.0
-        facing = _facing(heading, times, velocity, step)
-        lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
-        walked = np.concatenate([[0.0], np.cumsum(lengths)])
-        feet = footstep_table(gait, times, points, facing, velocity)
-        self._rows = np.column_stack([points, velocity, facing, walked, feet])
-        self._start_s, self._step_s = float(times[0]), step
-        self._walking_s = (first, last) if len(path) > 1 else (math.inf, -math.inf)
+    def __init__(self, script: WorkerScript, offset_s: float) -> None:
+        self.script = script
+        self._walk = script.walk()
+        self._offset_s = offset_s
 
-    def motion(self, t_s: float) -> WorkerMotion:
-        """Where the body is at ``t_s``, how it moves and where its feet are."""
-        rows = self._rows
-        place = min(max((t_s - self._start_s) / self._step_s, 0.0), len(rows) - 1.0)
-        row = min(int(place), len(rows) - 2)
-        here: FloatArray = rows[row] + (place - row) * (rows[row + 1] - rows[row])
-        heading, walked, *feet = here[4:].tolist()
-        walking = self._walking_s[0] <= t_s <= self._walking_s[1]
-        return WorkerMotion(
-            position_odom_m=here[:2],
-            velocity_odom_mps=here[2:4] if walking else np.zeros(2),
+    @property
+    def stature_m(self) -> float:
+        """Height of the body."""
+        return self.script.stature_m
+
+    @property
+    def look(self) -> str | None:
+        """Name of a shipped worker."""
+        return self.script.look
+
+    @property
+    def stride_m(self) -> float | None:
+        """Distance of a full gait cycle."""
+        return self.script.stride_m
+
+    def motion(self, t_s: float, around: Surroundings) -> PersonMotion:
+        """Return the scripted motion; of the surroundings only the robot's camera matters."""
+        t_s -= self._offset_s
+        motion = self._walk.motion(t_s)
+        heading = motion.heading_odom_rad
+        x, y = motion.position_odom_m.tolist()
+        to_robot = heading, 0.0
+        if around.robot is not None:
+            camera_x, camera_y, camera_z = around.robot.camera_m
+            up = camera_z - EYE_HEIGHT_SHARE * self.stature_m
+            to_robot = (
+                math.atan2(camera_y - y, camera_x - x),
+                math.atan2(up, math.hypot(camera_x - x, camera_y - y)),
+            )
+        azimuth, elevation = self.script.gaze_angles(t_s, heading, to_robot)
+        eye_yaw, eye_pitch = self.script.eye_angles(t_s)
+        yaw = math.remainder(azimuth - heading, math.tau)
+        return PersonMotion(
+            position_odom_m=motion.position_odom_m,
+            velocity_odom_mps=motion.velocity_odom_mps,
             heading_odom_rad=heading,
-            walked_m=walked,
-            feet=Footing.of_row(feet),
+            walked_m=motion.walked_m,
+            feet=motion.feet,
+            head_yaw_rad=min(max(yaw, -MAX_HEAD_YAW_RAD), MAX_HEAD_YAW_RAD),
+            head_pitch_rad=min(max(elevation, -MAX_HEAD_PITCH_RAD), MAX_HEAD_PITCH_RAD),
+            eye_yaw_rad=eye_yaw,
+            eye_pitch_rad=eye_pitch,
+            activity=self.script.activity(t_s),
         )
 
+    def hold(self) -> None:
+        """Do nothing: the script continues."""
 
-@lru_cache(maxsize=64)
-def _walk(
-    path: tuple[Waypoint, ...],
-    heading: tuple[HeadingKey, ...],
-    look: str | None,
-    stature_m: float,
-    stride_m: float | None,
-) -> WorkerWalk:
-    return WorkerWalk(path, heading, Gait(skeleton(look, stature_m), stride_m))
-
-
-def _facing(
-    heading: tuple[HeadingKey, ...], times: FloatArray, velocity: FloatArray, step_s: float
-) -> FloatArray:
-    """Unwrapped heading at every time: by its keys, else along the walk."""
-    if not heading:
-        size = 2 * round(0.5 * _TURN_SMOOTHING_S / step_s) + 1
-        return np.asarray(uniform_filter1d(_heading_along(velocity), size, mode="nearest"))
-    angles = [math.radians(key.heading_deg) for key in heading]
-    if len(heading) == 1:
-        return np.full(len(times), angles[0])
-    keys = [key.t_s for key in heading]
-    turn = PchipInterpolator(keys, angles)
-    return np.asarray(turn(np.clip(times, keys[0], keys[-1])))
-
-
-def _heading_along(velocity: FloatArray) -> FloatArray:
-    """Unwrapped direction of walking, held where the worker hardly moves."""
-    moving = np.flatnonzero(np.linalg.norm(velocity, axis=1) > _TURNING_SPEED_MPS)
-    if not len(moving):
-        return np.zeros(len(velocity))
-    place = np.searchsorted(moving, np.arange(len(velocity)))
-    nearest = moving[np.clip(place, 0, len(moving) - 1)]
-    return np.unwrap(np.arctan2(velocity[:, 1], velocity[:, 0])[nearest])
-
-
-def _wrapped(angle_rad: float) -> float:
-    return math.remainder(angle_rad, 2.0 * math.pi)
+    def touch(self, towards_x: float, towards_y: float) -> None:
+        """Do nothing: the script continues."""
 
 
 def _key_angles(
     key: GazeKey, heading_odom_rad: float, to_robot: tuple[float, float]
 ) -> tuple[float, float]:
+    """Return azimuth in odom and elevation of the head at a key, radians."""
     azimuth, elevation = to_robot if key.look == "robot" else (heading_odom_rad, 0.0)
     return azimuth + math.radians(key.yaw_deg), elevation + math.radians(key.pitch_deg)
+
+
+def _smoothstep(share: float) -> float:
+    """Rise from 0 at 0 to 1 at 1 with zero slope at both ends."""
+    return share * share * (3.0 - 2.0 * share)

@@ -1,4 +1,4 @@
-"""A person who reacts: what a scenario says about one."""
+"""Specification of a person who walks a route and reacts, as a scenario gives it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..body import MAX_STATURE_M, MIN_STATURE_M, ActivityName
 
 
 class RoutePoint(StrictConfig):
-    """A corner of a route; metres in odom."""
+    """A corner of a route in odom."""
 
     error: ClassVar[type[ValueError]] = SimError
 
@@ -22,7 +22,7 @@ class RoutePoint(StrictConfig):
 
 
 class Pause(StrictConfig):
-    """A stop on the way: where, as length walked, and how long."""
+    """A stop after a length of route, and its duration."""
 
     error: ClassVar[type[ValueError]] = SimError
 
@@ -31,25 +31,24 @@ class Pause(StrictConfig):
 
 
 class Glances(StrictConfig):
-    """When a person looks at the robot: an alternating renewal process with lognormal lengths.
+    """Glances at the robot: an alternating renewal process with lognormal durations.
 
     The defaults were fitted to 686 annotated pedestrians in front of approaching vehicles.
 
     Attributes:
-        notices_within_m: the first glance comes only when the robot is nearer than this and can be
-            seen; 0 for a person who never looks.
-        first_glance_delay_s: from then on.
-        glance_median_s: length of a glance.
-        glance_quartiles_s: of the same.
-        away_median_s: length of looking away.
-        away_quartiles_s: of the same.
-        watches: once the robot has been noticed, keeps looking as long as it can be seen.
-        gives_up_after_s: looks away for good so long after the first glance; None never.
-        looker_share: probability that the person ever looks at the robot at all. 1 for somebody
-            who does; about 0.81 brings the process nearest to the pedestrians that it was fitted
-            to, see :class:`GlanceProcess`.
-        away_yaw_deg: where the head points between glances, left of the way the body faces.
-        away_pitch_deg: up; a phone is read at about −40.
+        notices_within_m: largest distance for the first glance; 0 for a person who never looks.
+        first_glance_delay_s: delay of the first glance after the robot becomes visible within that
+            distance.
+        glance_median_s: median duration of a glance.
+        glance_quartiles_s: lower and upper quartile of it.
+        away_median_s: median duration of looking away.
+        away_quartiles_s: lower and upper quartile of it.
+        watches: after the first glance, look at the robot as long as it is visible.
+        gives_up_after_s: stop looking for good this long after the first glance; None never.
+        looker_share: probability that the person ever looks at the robot. About 0.81 brings the
+            process nearest to the pedestrians that it was fitted to, see :class:`GlanceProcess`.
+        away_yaw_deg: yaw of the head between glances, left of the body's heading.
+        away_pitch_deg: pitch of the head between glances, up; about −40 reads a phone.
     """
 
     error: ClassVar[type[ValueError]] = SimError
@@ -80,17 +79,17 @@ class Glances(StrictConfig):
 
 
 class Reactions(StrictConfig):
-    """What a person on a conflicting course does who has seen the robot: shares of the whole.
+    """Shares of the reactions of a person who has seen the robot on a conflicting course.
 
-    What a mapping does not name gets none: ``{wait: 1}`` always waits. Shares are taken relative to
-    their sum.
+    A reaction that a mapping does not name has share 0: ``{wait: 1}`` always waits. The shares are
+    divided by their sum.
 
     Attributes:
-        walk_on: changes nothing.
-        wait: lets the robot pass.
-        hurry: passes in front, faster.
-        pass_behind: passes behind the robot.
-        claim: steps up to go first, without haste, and expects the robot to yield.
+        walk_on: change nothing.
+        wait: let the robot pass.
+        hurry: pass in front of the robot, faster.
+        pass_behind: pass behind the robot.
+        claim: go first a little faster, and expect the robot to yield.
     """
 
     error: ClassVar[type[ValueError]] = SimError
@@ -103,13 +102,13 @@ class Reactions(StrictConfig):
 
     @model_validator(mode="before")
     @classmethod
-    def _unnamed_get_none(cls, data: Any) -> Any:
+    def _unnamed_shares_are_zero(cls, data: Any) -> Any:
         if isinstance(data, dict) and data:
             return {**dict.fromkeys(cls.model_fields, 0.0), **data}
         return data
 
     @model_validator(mode="after")
-    def _some(self) -> Reactions:
+    def _sum_is_positive(self) -> Reactions:
         shares = [getattr(self, name) for name in type(self).model_fields]
         if not sum(shares) > 0.0:
             raise ValueError("at least one share of reactions must be above 0, got all 0")
@@ -117,23 +116,23 @@ class Reactions(StrictConfig):
 
 
 class PersonSpec(StrictConfig):
-    """A person who walks a route, glances about and reacts.
+    """A person who walks a route, glances at the robot and reacts to it.
 
     Attributes:
         name: unique in the scenario.
         stature_m: body height.
         look: name of a shipped worker; default the one of nearest stature.
-        route: at least one point; one alone stands there.
+        route: at least one point. With one point the person stands there.
         speed_mps: free walking speed.
-        start_s: when the person sets out.
-        heading_deg: the way the body faces while standing; default along the route.
-        backwards: walks with the back ahead.
+        start_s: time of the start.
+        heading_deg: heading while standing; default along the route.
+        backwards: walk backwards.
         pauses: stops on the way.
-        turns_back_at_m: after so many metres walks back to the start; None never.
-        activity: what the hands do.
-        glances: when the person looks at the robot.
-        reactions: what the person does about it.
-        social: keeps away from racks, people and, once it has been noticed, the robot.
+        turns_back_at_m: length of route after which the person walks back to the start; None never.
+        activity: activity of the hands.
+        glances: glances at the robot.
+        reactions: shares of the reactions to it.
+        social: social forces of racks, people and, once it has been noticed, the robot.
     """
 
     error: ClassVar[type[ValueError]] = SimError

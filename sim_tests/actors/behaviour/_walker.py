@@ -1,4 +1,4 @@
-"""A person with a mind of their own: looks, decides and walks, step by step."""
+"""A person who looks, decides and walks, step by step."""
 
 from __future__ import annotations
 
@@ -7,56 +7,63 @@ from typing import Any, Final
 
 import numpy as np
 
-from perception.arrays import FloatArray
-
 from ...world.errors import SimError
 from ..body import Activity, Gait, OnlineFootsteps, skeleton
-from ._course import Course, Detour, kept_off
-from ._forces import RELAXATION_S, Obstacles, push_of_people, push_of_robot
+from ._avoidance import SlowRobotDetour, limit_approach
 from ._gaze import Gaze
-from ._meeting import Intent, Meeting
+from ._obstacles import Obstacles
 from ._person import ALONE, PersonMotion, PersonOutcome, RobotBody, Surroundings
-from ._route import STILL_MPS, Errand, Route
+from ._reactions import ReactionModel
+from ._route import STANDING_BELOW_MPS, DesiredVelocity, Route, RouteFollower
+from ._social_force import RELAXATION_S, people_force, robot_force
 from ._spec import PersonSpec
+from ._trajectory import Trajectory
 
-#: People decide so often; in between they go on as they began.
-TICK_S: Final = 1.0 / 20.0
+#: Time between two decisions of a walker; in between its motion follows closed forms.
+DECISION_PERIOD_S: Final = 1.0 / 20.0
 
-# What a person knows of a robot that is out of sight is worth something for so long.
-_REMEMBERS_S: Final = 3.0
+# A robot out of sight is extrapolated for this time, then forgotten.
+_REMEMBERED_S: Final = 3.0
 _BRAKING_S: Final = 0.1
-# Nobody speeds up or swerves harder than this, nor gets pushed to more than this times the pace.
-_MOST_MPS2: Final = 3.0
-_MOST_PACE: Final = 1.3
-_LEAST_PACE_MPS: Final = 0.5
-# Whoever stands lets pushes weaker than this be; whoever goes first keeps off a robot this near.
-_UNMOVED_MPS2: Final = 1.0
+# Limits of acceleration and speed; the speed relative to the larger of free and desired speed.
+_MAX_ACCELERATION_MPS2: Final = 3.0
+_MAX_SPEED_FACTOR: Final = 1.3
+_MIN_REFERENCE_MPS: Final = 0.5
+# Weaker social forces do not move a standing person.
+_UNMOVED_BELOW_MPS2: Final = 1.0
+# A person who goes first avoids the robot only within this distance.
 _TOO_NEAR_M: Final = 0.5
-# Turning the body.
 _TURN_RATE_HZ: Final = 4.0
-_TURN_RADPS: Final = 2.6
-_TURN_RADPS2: Final = 15.0
-_TURNED_RAD: Final = math.radians(60.0)
-_LEAST_TURNED: Final = 0.1
-# After running into the robot: a step back, and no step towards it while they touch.
+_MAX_TURN_RADPS: Final = 2.6
+_MAX_TURN_RADPS2: Final = 15.0
+# A person whose heading is farther off walks slower until it is turned, down to this speed share.
+_TURN_FIRST_RAD: Final = math.radians(60.0)
+_MIN_TURNING_SHARE: Final = 0.1
+# A waiting person steps aside or back without turning if the cosine of the angle between step and
+# route is smaller.
+_SIDE_STEP_COSINE: Final = 0.2
+# After a contact the person steps back, and never towards the robot while they touch.
 _RECOIL_S: Final = 0.7
 _RECOIL_MPS: Final = 0.4
 _TOUCHING_S: Final = 0.1
-# An undisturbed walk that takes longer than this times its plan never ends.
-_LONGEST: Final = 4.0
+# The free walk has no end if it takes longer than this factor times its plan.
+_MAX_FREE_TIME_FACTOR: Final = 4.0
 
 
 class Walker:
-    """A person who walks a route, glances about and reacts to the robot.
+    """A person who walks a route, glances at the robot and reacts to it.
 
-    Decisions are taken every :data:`TICK_S`; in between, place and angles follow closed forms, so
-    that how often somebody asks changes nothing but the steps of the feet.
+    Decisions are taken every :data:`DECISION_PERIOD_S`. Position and angles follow closed forms in
+    between, so they do not depend on how often :meth:`motion` is called; only the footsteps do.
 
     Args:
-        spec: what the scenario says.
-        rng: for glances and reactions; the person's own.
+        spec: the person.
+        rng: the person's own generator, for glances and reactions.
         boxes_odom_m: (N, 4) racks and walls, x_min, y_min, x_max, y_max.
-        offset_s: sets out so much later; never before 0.
+        offset_s: delay of the start; the person never starts before 0.
+
+    Attributes:
+        spec: as given.
 
     Raises:
         SimError: for a route with a corner inside a rack or a wall.
@@ -71,36 +78,43 @@ class Walker:
         offset_s: float = 0.0,
     ) -> None:
         self.spec = spec
+        self._boxes_odom_m = boxes_odom_m
         self._obstacles = Obstacles(boxes_odom_m)
-        route = Route.of(spec)
-        self._errand = Errand(route, spec.speed_mps, max(spec.start_s + offset_s, 0.0))
+        route = Route.from_spec(spec)
+        self._follower = RouteFollower(route, spec.speed_mps, max(spec.start_s + offset_s, 0.0))
         for number, point in enumerate(spec.route):
-            self._obstacles.refuse(f"route point {number} of {spec.name!r}", point.x_m, point.y_m)
-        gaze_rng, meeting_rng = rng.spawn(2)
+            self._obstacles.check_free(
+                f"route point {number} of {spec.name!r}", point.x_m, point.y_m
+            )
+        gaze_rng, reaction_rng = rng.spawn(2)
         self._gaze = Gaze(spec.glances, spec.stature_m, gaze_rng)
-        self._meeting = Meeting(spec.reactions, meeting_rng)
-        self._detour = Detour()
+        self._reactions = ReactionModel(spec.reactions, reaction_rng)
+        self._detour = SlowRobotDetour()
         self._activity = Activity(spec.activity, spec.activity)
-        self._boxes = boxes_odom_m
-        self._reverse = math.pi if spec.backwards else 0.0
-        self._stands_facing = None if spec.heading_deg is None else math.radians(spec.heading_deg)
-        self._course = Course(*route.start, self._obstacles)
+        self._trajectory = Trajectory(*route.start, self._obstacles)
         self._tick = -1
-        ux, uy = route.direction(0.0)
-        along = math.atan2(uy, ux) + (self._reverse if route.length_m > 0.0 else 0.0)
-        self._heading = along if self._stands_facing is None else self._stands_facing
-        self._turning = 0.0
-        self._walked_m = 0.0
-        self._way_m: float | None = None  # walked until the end was reached
-        # About the robot.
-        self._known: tuple[RobotBody, float] | None = None
-        self._touch: tuple[float, float, float] | None = None  # direction and when
-        self._bumped_s = -math.inf
         self._now_s = 0.0
-        self._shown = self._showing = route.start
+        # Heading at the last tick, and its rate since.
+        self._reverse_rad = math.pi if spec.backwards else 0.0
+        self._standing_heading = (
+            None if spec.heading_deg is None else math.radians(spec.heading_deg)
+        )
+        ux, uy = route.direction(0.0)
+        along = math.atan2(uy, ux) + (self._reverse_rad if route.length_m > 0.0 else 0.0)
+        self._heading = along if self._standing_heading is None else self._standing_heading
+        self._turning = 0.0
+        # Length walked so far, when the end was reached, and of the free walk with its time.
+        self._walked_m = 0.0
+        self._walked_to_end_m: float | None = None
+        self._free_walk: tuple[float | None, float] | None = None
+        # The robot: last known state and its time, contact direction and time, first contact.
+        self._known_robot: tuple[RobotBody, float] | None = None
+        self._touch: tuple[float, float, float] | None = None
+        self._bumped_s = -math.inf
+        # The feet, and the positions of the last two motions.
         self._feet: OnlineFootsteps | None = None
-        self._stepped_s = 0.0
-        self._free: tuple[float | None, float] | None = None
+        self._feet_s = 0.0
+        self._previous_position = self._last_position = route.start
 
     @property
     def stature_m(self) -> float:
@@ -114,68 +128,73 @@ class Walker:
 
     @property
     def stride_m(self) -> float | None:
-        """The stride follows the speed."""
+        """None: the stride follows the speed."""
         return None
 
     @property
     def noticed_s(self) -> float | None:
-        """When the person first looked at the robot."""
+        """Time of the first look at the robot; None before."""
         return self._gaze.noticed_s
 
     @property
     def place_odom_m(self) -> tuple[float, float]:
-        """Where the person was when last asked, x and y."""
-        return self._course.at(self._now_s)[:2]
+        """Position at the last requested time, x and y."""
+        return self._trajectory.state(self._now_s)[:2]
 
     @property
     def reaction(self) -> str:
-        """What the person does about the robot now; empty for nothing."""
-        return self._meeting.reaction
+        """Reaction in the present encounter with the robot; empty without one."""
+        return self._reactions.reaction
 
     @property
     def arrived(self) -> bool:
-        """Whether the end of the route was reached."""
-        return self._errand.arrived_s is not None
+        """True once the end of the route was reached."""
+        return self._follower.arrived_s is not None
 
     def outcome(self) -> PersonOutcome:
-        """What has become of the person up to now."""
+        """Return the outcome for the person up to now."""
         time_s = None
-        errand = self._errand
-        if errand.arrived_s is not None and errand.set_out_s is not None:
-            time_s = errand.arrived_s - errand.set_out_s
-        free_time_s, free_length_m = self._undisturbed()
+        follower = self._follower
+        if follower.arrived_s is not None and follower.started_s is not None:
+            time_s = follower.arrived_s - follower.started_s
+        free_time_s, free_length_m = self._free_time_and_length()
         return PersonOutcome(
             name=self.spec.name,
             noticed_s=self._gaze.noticed_s,
-            reaction=self._meeting.first_reaction,
+            reaction=self._reactions.first_reaction,
             time_s=time_s if free_time_s is not None else None,
             free_time_s=free_time_s,
-            length_m=self._walked_m if self._way_m is None else self._way_m,
+            length_m=self._walked_m if self._walked_to_end_m is None else self._walked_to_end_m,
             free_length_m=None if free_time_s is None else free_length_m,
         )
 
     def motion(self, t_s: float, around: Surroundings) -> PersonMotion:
-        """What the person does at ``t_s``, which never goes back."""
+        """Return the person's motion at ``t_s``, which never decreases."""
         self.advance(t_s, around)
-        x, y, vx, vy = self._course.at(t_s)
-        self._shown, self._showing = self._showing, (x, y)
-        after_s = t_s - self._tick * TICK_S
+        x, y, vx, vy = self._trajectory.state(t_s)
+        self._previous_position, self._last_position = self._last_position, (x, y)
+        after_s = t_s - self._tick * DECISION_PERIOD_S
         heading = self._heading + self._turning * after_s
         if self._feet is None:
             gait = Gait(skeleton(self.spec.look, self.spec.stature_m))
             self._feet = OnlineFootsteps(gait, x, y, heading)
         feet = None
         if t_s - self._bumped_s < _RECOIL_S:
-            feet = self._feet.carried(x - self._shown[0], y - self._shown[1])
+            feet = self._feet.translate(
+                x - self._previous_position[0], y - self._previous_position[1]
+            )
         if feet is None:
             feet = self._feet.step(
-                t_s - self._stepped_s, (x, y, heading), (vx, vy, self._turning), self._course.push
+                t_s - self._feet_s,
+                (x, y, heading),
+                (vx, vy, self._turning),
+                self._trajectory.acceleration,
             )
-        self._stepped_s = t_s
-        head_yaw, head_pitch, eye_yaw, eye_pitch = self._gaze.at(after_s)
+        self._feet_s = t_s
+        head_yaw, head_pitch, eye_yaw, eye_pitch = self._gaze.angles(after_s)
         return PersonMotion(
-            position_odom_m=_pair(x, y),
-            velocity_odom_mps=_pair(vx, vy),
+            position_odom_m=np.array([x, y]),
+            velocity_odom_mps=np.array([vx, vy]),
             heading_odom_rad=heading,
             walked_m=self._walked_m,
             feet=feet,
@@ -187,182 +206,187 @@ class Walker:
         )
 
     def advance(self, t_s: float, around: Surroundings) -> None:
-        """Take all decisions due up to ``t_s``."""
-        while (self._tick + 1) * TICK_S <= t_s + 1e-9:
+        """Take all decisions up to ``t_s``."""
+        while (self._tick + 1) * DECISION_PERIOD_S <= t_s + 1e-9:
             self._decide(around)
         self._now_s = t_s
 
     def hold(self) -> None:
-        """The last motion would have led into the robot: the body stays where it was before."""
-        left_s = (self._tick + 1) * TICK_S - self._now_s
-        self._course.set_off(self._now_s, (*self._shown, 0.0, 0.0), (0.0, 0.0), left_s)
-        self._showing = self._shown
+        """Take the last motion back: it would have led into the robot, and the body stayed."""
+        left_s = (self._tick + 1) * DECISION_PERIOD_S - self._now_s
+        state = (*self._previous_position, 0.0, 0.0)
+        self._trajectory.start_segment(self._now_s, state, (0.0, 0.0), left_s)
+        self._last_position = self._previous_position
         if self._feet is not None:
             self._feet.undo()
 
     def touch(self, towards_x: float, towards_y: float) -> None:
-        """Body and robot touch: the person gets no farther that way, and has noticed.
+        """Note a contact with the robot in this direction: the person steps back and looks at it.
 
         Raises:
             SimError: for a direction that is not a unit vector.
         """
         if not math.isclose(math.hypot(towards_x, towards_y), 1.0, abs_tol=1e-6):
             raise SimError(
-                f"the robot must lie in a direction of length 1, got ({towards_x}, {towards_y})"
+                f"the direction to the robot must have length 1, got ({towards_x}, {towards_y})"
             )
         if self._touch is None or self._now_s - self._touch[2] > _RECOIL_S:
             self._bumped_s = self._now_s
-            self._heading += self._turning * (self._now_s - self._tick * TICK_S)
+            self._heading += self._turning * (self._now_s - self._tick * DECISION_PERIOD_S)
             self._turning = 0.0
             self._gaze.startle(self._now_s)
         self._touch = (towards_x, towards_y, self._now_s)
-        x, y, vx, vy = self._course.at(self._now_s)
+        x, y, vx, vy = self._trajectory.state(self._now_s)
         back = max(vx * towards_x + vy * towards_y + _RECOIL_MPS, 0.0)
         vx, vy = vx - back * towards_x, vy - back * towards_y
-        left_s = (self._tick + 1) * TICK_S - self._now_s
-        self._course.set_off(self._now_s, (x, y, vx, vy), (0.0, 0.0), left_s)
+        left_s = (self._tick + 1) * DECISION_PERIOD_S - self._now_s
+        self._trajectory.start_segment(self._now_s, (x, y, vx, vy), (0.0, 0.0), left_s)
 
     def _decide(self, around: Surroundings) -> None:
-        """One tick: where am I, what do I see, what do I want, what pushes me."""
+        """Take one decision: look, follow the route, react, avoid, and set the next segment."""
         first = self._tick < 0
         self._tick += 1
-        t_s = self._tick * TICK_S
-        x, y, vx, vy = self._course.end
+        t_s = self._tick * DECISION_PERIOD_S
+        x, y, vx, vy = self._trajectory.end
         if not first:
-            self._walked_m += math.dist((x, y), self._course.start)
-            self._heading += self._turning * TICK_S
-        place = (x, y, self._heading)
-        robot = self._look(t_s, place, around)
-        intent = self._errand.intent(t_s, x, y, math.hypot(vx, vy))
-        if self._way_m is None and self.arrived:
-            self._way_m = self._walked_m
-        going = self._errand.going
-        wanted = self._meeting.react(t_s, TICK_S, (x, y), intent, robot, standing=not going)
-        if going and robot is not None:
-            wanted = self._detour.around(wanted, x, y, robot)
+            self._walked_m += math.dist((x, y), self._trajectory.start)
+            self._heading += self._turning * DECISION_PERIOD_S
+        robot = self._look_at_robot(t_s, (x, y, self._heading), around)
+        on_route = self._follower.desired_velocity(t_s, x, y, math.hypot(vx, vy))
+        if self._walked_to_end_m is None and self.arrived:
+            self._walked_to_end_m = self._walked_m
+        walking = self._follower.walking
+        desired = self._reactions.react(
+            t_s, DECISION_PERIOD_S, (x, y), on_route, robot, standing=not walking
+        )
+        if walking and robot is not None:
+            desired = self._detour.steer(desired, x, y, robot)
         if robot is not None:
-            wanted = kept_off(wanted, x, y, robot)
-        wanted, facing = self._recoiling(t_s, intent, wanted, going)
-        ax, ay = self._acceleration((x, y, vx, vy), wanted, robot, around)
+            desired = limit_approach(desired, x, y, robot)
+        desired, facing = self._recoil_or_face(t_s, on_route, desired)
+        acceleration = self._acceleration((x, y, vx, vy), desired, robot, around)
         self._turn(facing)
-        self._course.set_off(t_s, (x, y, vx, vy), (ax, ay), TICK_S)
+        self._trajectory.start_segment(t_s, (x, y, vx, vy), acceleration, DECISION_PERIOD_S)
 
-    def _look(
+    def _look_at_robot(
         self, t_s: float, place: tuple[float, float, float], around: Surroundings
     ) -> RobotBody | None:
-        """Set head and eyes; returns the robot as far as the person knows of it."""
+        """Update head and eyes; return the robot as the person knows it, None without knowledge."""
         robot = around.robot
         if robot is None:
             return None
-        sees = self._gaze.could_see(TICK_S, place, robot) and around.sees_robot()
-        self._gaze.tick(t_s, TICK_S, place, robot, sees)
+        visible = (
+            self._gaze.in_field_of_view(DECISION_PERIOD_S, place, robot) and around.sees_robot()
+        )
+        self._gaze.update(t_s, DECISION_PERIOD_S, place, robot, visible)
         felt = self._touch is not None and t_s - self._touch[2] <= _TOUCHING_S
-        if (sees and self._gaze.noticed_s is not None) or felt:
-            self._known = (robot, t_s)
-        if self._known is None or t_s - self._known[1] > _REMEMBERS_S:
+        if (visible and self._gaze.noticed_s is not None) or felt:
+            self._known_robot = (robot, t_s)
+        if self._known_robot is None or t_s - self._known_robot[1] > _REMEMBERED_S:
             return None
-        return self._known[0].later(t_s - self._known[1])
+        return self._known_robot[0].extrapolated(t_s - self._known_robot[1])
 
-    def _recoiling(
-        self, t_s: float, intent: Intent, wanted: Intent, going: bool
-    ) -> tuple[Intent, float]:
-        """What is wanted after a bump and a turn of the body, and which way to face for it."""
+    def _recoil_or_face(
+        self, t_s: float, on_route: DesiredVelocity, desired: DesiredVelocity
+    ) -> tuple[DesiredVelocity, float]:
+        """Return the velocity after contact and turning, and the heading to turn to."""
         if self._touch is not None and t_s - self._bumped_s < _RECOIL_S:
-            return Intent(-self._touch[0], -self._touch[1], _RECOIL_MPS), self._heading
-        # Steps aside and back are taken without turning.
-        along = wanted.x * intent.x + wanted.y * intent.y
-        if not going:
-            facing = self._heading if self._stands_facing is None else self._stands_facing
-            return wanted, facing
-        if along < 0.2 and self._meeting.reaction == "wait":
-            return wanted, self._heading
-        facing = math.atan2(wanted.y, wanted.x) + self._reverse
+            return DesiredVelocity(-self._touch[0], -self._touch[1], _RECOIL_MPS), self._heading
+        if not self._follower.walking:
+            facing = self._heading if self._standing_heading is None else self._standing_heading
+            return desired, facing
+        along = desired.ux * on_route.ux + desired.uy * on_route.uy
+        if along < _SIDE_STEP_COSINE and self._reactions.reaction == "wait":
+            return desired, self._heading
+        facing = math.atan2(desired.uy, desired.ux) + self._reverse_rad
         off = abs(math.remainder(facing - self._heading, math.tau))
-        if off > _TURNED_RAD:
-            share = (math.pi - off) / (math.pi - _TURNED_RAD)
-            wanted = Intent(wanted.x, wanted.y, wanted.speed_mps * max(share, _LEAST_TURNED))
-        return wanted, facing
+        if off > _TURN_FIRST_RAD:
+            share = (math.pi - off) / (math.pi - _TURN_FIRST_RAD)
+            speed_mps = desired.speed_mps * max(share, _MIN_TURNING_SHARE)
+            desired = DesiredVelocity(desired.ux, desired.uy, speed_mps)
+        return desired, facing
 
     def _turn(self, facing: float) -> None:
-        """Set the body turning."""
+        """Set the turn rate of the body towards a heading."""
         off = math.remainder(facing - self._heading, math.tau)
-        rate = min(max(_TURN_RATE_HZ * off, -_TURN_RADPS), _TURN_RADPS)
-        most = _TURN_RADPS2 * TICK_S
+        rate = min(max(_TURN_RATE_HZ * off, -_MAX_TURN_RADPS), _MAX_TURN_RADPS)
+        most = _MAX_TURN_RADPS2 * DECISION_PERIOD_S
         self._turning += min(max(rate - self._turning, -most), most)
 
     def _acceleration(
         self,
         state: tuple[float, float, float, float],
-        wanted: Intent,
+        desired: DesiredVelocity,
         robot: RobotBody | None,
         around: Surroundings,
     ) -> tuple[float, float]:
-        """Of the wish and of all that pushes, within human limits."""
+        """Return the acceleration by desired velocity and social forces, within human limits."""
         _, _, vx, vy = state
-        want_x, want_y = wanted.speed_mps * wanted.x, wanted.speed_mps * wanted.y
-        slower = wanted.speed_mps < math.hypot(vx, vy)
+        desired_vx, desired_vy = desired.speed_mps * desired.ux, desired.speed_mps * desired.uy
+        slower = desired.speed_mps < math.hypot(vx, vy)
         within_s = _BRAKING_S if slower else RELAXATION_S
-        ax, ay = (want_x - vx) / within_s, (want_y - vy) / within_s
+        ax, ay = (desired_vx - vx) / within_s, (desired_vy - vy) / within_s
         if self.spec.social:
-            px, py = self._pushes(state, robot, around)
-            if wanted.speed_mps > STILL_MPS or math.hypot(px, py) > _UNMOVED_MPS2:
-                ax, ay = ax + px, ay + py
+            fx, fy = self._social_force(state, robot, around)
+            moves = desired.speed_mps > STANDING_BELOW_MPS
+            if moves or math.hypot(fx, fy) > _UNMOVED_BELOW_MPS2:
+                ax, ay = ax + fx, ay + fy
         size = math.hypot(ax, ay)
-        if size > _MOST_MPS2:
-            ax, ay = ax * _MOST_MPS2 / size, ay * _MOST_MPS2 / size
-        next_x, next_y = vx + ax * TICK_S, vy + ay * TICK_S
-        fastest = _MOST_PACE * max(self.spec.speed_mps, wanted.speed_mps, _LEAST_PACE_MPS)
-        speed = math.hypot(next_x, next_y)
+        if size > _MAX_ACCELERATION_MPS2:
+            ax, ay = ax * _MAX_ACCELERATION_MPS2 / size, ay * _MAX_ACCELERATION_MPS2 / size
+        next_vx, next_vy = vx + ax * DECISION_PERIOD_S, vy + ay * DECISION_PERIOD_S
+        fastest = _MAX_SPEED_FACTOR * max(
+            self.spec.speed_mps, desired.speed_mps, _MIN_REFERENCE_MPS
+        )
+        speed = math.hypot(next_vx, next_vy)
         if speed > fastest:
-            next_x, next_y = next_x * fastest / speed, next_y * fastest / speed
-        if self._touch is not None and self._tick * TICK_S - self._touch[2] <= _TOUCHING_S:
-            next_x, next_y = _without(next_x, next_y, self._touch[0], self._touch[1])
-        return (next_x - vx) / TICK_S, (next_y - vy) / TICK_S
+            next_vx, next_vy = next_vx * fastest / speed, next_vy * fastest / speed
+        t_s = self._tick * DECISION_PERIOD_S
+        if self._touch is not None and t_s - self._touch[2] <= _TOUCHING_S:
+            next_vx, next_vy = _without_part(next_vx, next_vy, self._touch[0], self._touch[1])
+        return (next_vx - vx) / DECISION_PERIOD_S, (next_vy - vy) / DECISION_PERIOD_S
 
-    def _pushes(
+    def _social_force(
         self,
         state: tuple[float, float, float, float],
         robot: RobotBody | None,
         around: Surroundings,
     ) -> tuple[float, float]:
-        """Of racks, people, and the robot as far as it is known."""
+        """Return the force of racks, people, and the robot as far as it is known."""
         x, y, vx, vy = state
-        ax, ay = self._obstacles.push(x, y)
-        px, py = push_of_people(x, y, vx, vy, around.others)
-        ax, ay = ax + px, ay + py
+        ax, ay = self._obstacles.force(x, y)
+        fx, fy = people_force(x, y, vx, vy, around.others)
+        ax, ay = ax + fx, ay + fy
         if robot is not None:
-            near_x, near_y = robot.nearest_m(x, y)
-            # Whoever goes first expects the robot to make way.
-            if not self._meeting.goes_first or math.hypot(near_x - x, near_y - y) < _TOO_NEAR_M:
-                px, py = push_of_robot(x, y, vx, vy, robot)
-                ax, ay = ax + px, ay + py
+            near_x, near_y = robot.nearest_point_m(x, y)
+            too_near = math.hypot(near_x - x, near_y - y) < _TOO_NEAR_M
+            if too_near or not self._reactions.expects_robot_to_yield:
+                fx, fy = robot_force(x, y, vx, vy, robot)
+                ax, ay = ax + fx, ay + fy
         return ax, ay
 
-    def _undisturbed(self) -> tuple[float | None, float]:
-        """Time and length of the same walk without robot and people; None without an end."""
-        if self._free is None:
-            self._free = (None, 0.0)
-            if self._errand.route.length_m > 0.0:
-                self._free = self._walk_alone()
-        return self._free
+    def _free_time_and_length(self) -> tuple[float | None, float]:
+        """Return time and length of the walk without robot and people; time None without an end."""
+        if self._free_walk is None:
+            self._free_walk = (None, 0.0)
+            if self._follower.route.length_m > 0.0:
+                self._free_walk = self._walk_alone()
+        return self._free_walk
 
     def _walk_alone(self) -> tuple[float | None, float]:
         spec = self.spec.model_copy(update={"start_s": 0.0})
-        alone = Walker(spec, np.random.default_rng(0), self._boxes)
-        pauses = sum(stop.for_s for stop in self._errand.route.stops[:-1])
-        longest_s = _LONGEST * (self._errand.route.length_m / spec.speed_mps + 5.0) + pauses
+        alone = Walker(spec, np.random.default_rng(0), self._boxes_odom_m)
+        route = self._follower.route
+        pauses = sum(stop.for_s for stop in route.stops[:-1])
+        longest_s = _MAX_FREE_TIME_FACTOR * (route.length_m / spec.speed_mps + 5.0) + pauses
         while not alone.arrived:
-            alone.advance((alone._tick + 1) * TICK_S, ALONE)
-            if alone._tick * TICK_S > longest_s:
+            alone.advance((alone._tick + 1) * DECISION_PERIOD_S, ALONE)
+            if alone._tick * DECISION_PERIOD_S > longest_s:
                 return None, 0.0
-        return alone._errand.arrived_s, alone._walked_m
+        return alone._follower.arrived_s, alone._walked_m
 
 
-def _pair(x: float, y: float) -> FloatArray:
-    return np.array([x, y])
-
-
-def _without(vx: float, vy: float, nx: float, ny: float) -> tuple[float, float]:
-    """A velocity less its part along a direction, if it goes that way."""
+def _without_part(vx: float, vy: float, nx: float, ny: float) -> tuple[float, float]:
+    """Return a velocity without its part along a direction; the opposite part stays."""
     along = max(vx * nx + vy * ny, 0.0)
     return vx - along * nx, vy - along * ny

@@ -1,14 +1,20 @@
-"""Workers' bodies: meshes, skeleton, gait, postures, and the truth about their keypoints."""
+"""The bodies of workers.
+
+The shipped assets (meshes, joints, keypoints), their skeletons, the gait and its footsteps, the
+postures of the arms, and :class:`Worker`, which places a body in the physics and the visual world.
+"""
 
 from __future__ import annotations
 
-from ._asset import load_worker, worker_names
-from ._footing import Footing
-from ._footsteps import footstep_table
+from ._asset import DETAIL_LEVELS, JOINTS, PARENTS, SkinMesh, WorkerAsset, load_worker, worker_names
 from ._gait import Gait
-from ._online_feet import OnlineFootsteps
-from ._postures import Activity, ActivityName
+from ._gait_pose import GaitPose
+from ._online_footsteps import OnlineFootsteps
+from ._planned_footsteps import plan_footsteps
+from ._pose import skin_points
+from ._postures import ACTIVITIES, BOX_SIZE_M, PHONE_SIZE_M, Activity, ActivityName
 from ._skeleton import MAX_STATURE_M, MIN_STATURE_M, skeleton
+from ._skin import WorkerSkin
 from ._worker import (
     MAX_EYE_PITCH_RAD,
     MAX_EYE_YAW_RAD,
@@ -18,20 +24,30 @@ from ._worker import (
 )
 
 __all__ = [
+    "ACTIVITIES",
+    "BOX_SIZE_M",
+    "DETAIL_LEVELS",
+    "JOINTS",
     "MAX_EYE_PITCH_RAD",
     "MAX_EYE_YAW_RAD",
     "MAX_HEAD_PITCH_RAD",
     "MAX_HEAD_YAW_RAD",
     "MAX_STATURE_M",
     "MIN_STATURE_M",
+    "PARENTS",
+    "PHONE_SIZE_M",
     "Activity",
     "ActivityName",
-    "Footing",
     "Gait",
+    "GaitPose",
     "OnlineFootsteps",
+    "SkinMesh",
     "Worker",
-    "footstep_table",
+    "WorkerAsset",
+    "WorkerSkin",
     "load_worker",
+    "plan_footsteps",
     "skeleton",
+    "skin_points",
     "worker_names",
 ]

@@ -1,8 +1,8 @@
 """The shipped workers: skinned meshes, joints and keypoints of a parametric body model.
 
-``training/workers`` makes the files; this module reads them. A body stands at rest: upright, arms
-hanging, knees and head straight, in its own frame (x forward, y left, z up, origin on the floor
-below the hip midpoint). Every joint's rotation is written in axes parallel to that frame at rest.
+``training/workers`` makes the files and this module reads them. At rest a body stands upright with
+hanging arms, straight knees and a level head. Its frame has x forward, y left, z up and its origin
+on the floor below the midpoint of the hips. Joint rotations are written in axes parallel to it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from perception.arrays import FloatArray
 
 from ...world.errors import SimError
 
-#: Joints in the order of every array; a parent precedes its children.
+#: Joints in the order of every array; parents come before their children.
 JOINTS: Final = (
     "spine",
     "neck",
@@ -42,8 +42,8 @@ JOINTS: Final = (
 )
 #: Parent of each joint in :data:`JOINTS`, −1 for the pelvis.
 PARENTS: Final = (-1, 0, 1, 1, 0, 4, 5, 0, 7, 8, -1, 10, 11, -1, 13, 14)
-#: Levels of detail, finest first.
-LEVELS: Final = 3
+#: Number of levels of detail; the finest comes first.
+DETAIL_LEVELS: Final = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,8 +55,8 @@ class SkinMesh:
         normals: (V, 3) unit.
         uv: (V, 2), (0, 0) at the lower left of the texture.
         triangles: (T, 3) rows of vertices, counter-clockwise as seen from outside.
-        weights: (V, 16) in [0, 1]: how much of each joint's rotation a vertex follows; 1 for
-            everything beyond the joint, between 0 and 1 where skin bends.
+        weights: (V, 16) in [0, 1]: the share of each joint's rotation that a vertex follows. It is
+            1 beyond the joint and between 0 and 1 where the skin bends.
         texture_rgb: (H, W, 3) uint8.
     """
 
@@ -70,7 +70,7 @@ class SkinMesh:
 
 @dataclass(frozen=True, eq=False)
 class Capsule:
-    """A collision shape: the part of the body beyond ``joint`` (−1: the pelvis), at rest."""
+    """A collision shape at rest that moves with the body beyond ``joint`` (−1: the pelvis)."""
 
     joint: int
     start_m: tuple[float, float, float]
@@ -83,15 +83,15 @@ class WorkerAsset:
     """A worker as shipped.
 
     Attributes:
-        name: by which it was loaded.
-        description: who this is, in a line.
-        stature_m: height with shoes and without hat or helmet.
+        name: name or file that it was loaded by.
+        description: one line on the person's looks.
+        stature_m: height with shoes, without hat or helmet.
         joints_m: (16, 3) at rest, in the order of :data:`JOINTS`.
-        keypoints_m: (23, 3) at rest: COCO's 17, then big toe, small toe and heel, left and right;
-            where the body model's own definitions put them.
-        keypoint_weights: (23, 16) as :attr:`SkinMesh.weights`.
+        keypoints_m: (23, 3) at rest by the body model's own definitions: COCO's 17, then big toe,
+            small toe and heel of the left and of the right foot.
+        keypoint_weights: (23, 16), as :attr:`SkinMesh.weights`.
         capsules: collision shapes.
-        levels: surfaces, finest first.
+        levels: surfaces by level of detail, finest first.
     """
 
     name: str
@@ -105,7 +105,7 @@ class WorkerAsset:
 
 
 def worker_names() -> tuple[str, ...]:
-    """Names of the shipped workers, sorted."""
+    """Return the names of the shipped workers, sorted."""
     folder = resources.files("sim_tests.actors.body") / "workers"
     return tuple(
         sorted(
@@ -118,10 +118,10 @@ def worker_names() -> tuple[str, ...]:
 
 @lru_cache(maxsize=64)
 def load_worker(name: str) -> WorkerAsset:
-    """Read a shipped worker, or one from the ``.npz`` file that ``training/workers`` has made.
+    """Read a shipped worker by name, or one from an ``.npz`` file of ``training/workers``.
 
     Raises:
-        SimError: for a name that is not shipped or a file that is not there.
+        SimError: for a name that is not shipped or a file that does not exist.
     """
     if name.endswith(".npz"):
         folder, stem = Path(name).parent, Path(name).stem
@@ -136,7 +136,8 @@ def load_worker(name: str) -> WorkerAsset:
     with (folder / f"{stem}.npz").open("rb") as file, np.load(file, allow_pickle=False) as data:
         arrays = {key: data[key] for key in data.files}
     levels = tuple(
-        _skin(arrays, level, _picture(folder / f"{stem}_lod{level}.jpg")) for level in range(LEVELS)
+        _skin_mesh(arrays, level, _texture_rgb(folder / f"{stem}_lod{level}.jpg"))
+        for level in range(DETAIL_LEVELS)
     )
     capsules = tuple(
         Capsule(int(joint), tuple(row[:3]), tuple(row[3:6]), row[6])
@@ -148,38 +149,40 @@ def load_worker(name: str) -> WorkerAsset:
         name=name,
         description=str(arrays["description"]),
         stature_m=float(arrays["stature_m"]),
-        joints_m=_locked(arrays["joints_m"]),
-        keypoints_m=_locked(arrays["keypoints_m"]),
-        keypoint_weights=_locked(arrays["keypoint_weights"]),
+        joints_m=_read_only_copy(arrays["joints_m"]),
+        keypoints_m=_read_only_copy(arrays["keypoints_m"]),
+        keypoint_weights=_read_only_copy(arrays["keypoint_weights"]),
         capsules=capsules,
         levels=levels,
     )
 
 
-def _skin(arrays: dict[str, NDArray[np.generic]], level: int, rgb: NDArray[np.uint8]) -> SkinMesh:
-    """Undo the quantisation: 0.1 mm, 1/127, 1/65535 and 1/255."""
+def _skin_mesh(
+    arrays: dict[str, NDArray[np.generic]], level: int, rgb: NDArray[np.uint8]
+) -> SkinMesh:
+    """Undo the quantisation of one level of detail."""
 
-    def get(key: str, scale: float) -> FloatArray:
-        return _locked(arrays[f"lod{level}_{key}"].astype(np.float64) * scale)
+    def dequantised(key: str, scale: float) -> FloatArray:
+        return _read_only_copy(arrays[f"lod{level}_{key}"].astype(np.float64) * scale)
 
-    normals = get("normals", 1.0 / 127.0)
+    normals = dequantised("normals", 1.0 / 127.0)
     lengths = np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
     return SkinMesh(
-        vertices_m=get("vertices", 1e-4),
-        normals=_locked(normals / lengths),
-        uv=get("uv", 1.0 / 65535.0),
+        vertices_m=dequantised("vertices", 1e-4),
+        normals=_read_only_copy(normals / lengths),
+        uv=dequantised("uv", 1.0 / 65535.0),
         triangles=arrays[f"lod{level}_triangles"].astype(np.int64),
-        weights=get("weights", 1.0 / 255.0),
+        weights=dequantised("weights", 1.0 / 255.0),
         texture_rgb=rgb,
     )
 
 
-def _picture(file: Path) -> NDArray[np.uint8]:
+def _texture_rgb(file: Path) -> NDArray[np.uint8]:
     bgr = cv2.imdecode(np.frombuffer(file.read_bytes(), np.uint8), cv2.IMREAD_COLOR)
     return np.ascontiguousarray(np.asarray(bgr, dtype=np.uint8)[..., ::-1])
 
 
-def _locked(array: NDArray[np.generic]) -> FloatArray:
+def _read_only_copy(array: NDArray[np.generic]) -> FloatArray:
     out = np.array(array, dtype=np.float64)
     out.setflags(write=False)
     return out

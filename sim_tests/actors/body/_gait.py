@@ -1,8 +1,8 @@
-"""How a worker walks: steps that keep up with the speed, feet that roll and never slide.
+"""The gait of a worker: strides that follow the speed, feet that roll and never slide.
 
 The gait is periodic in the distance walked, not in time. A stance foot lands on the heel, lies flat
-and rolls off over the toes, always turning about the point on which it rests; the legs follow by
-inverse kinematics. Everything here is vectorised over instants.
+and rolls off over the toes; it always turns about the point on which it rests. Inverse kinematics
+gives the legs. All functions are vectorised over instants.
 """
 
 from __future__ import annotations
@@ -17,57 +17,52 @@ from scipy.ndimage import minimum_filter1d, uniform_filter1d
 from perception.arrays import FloatArray, finite_number
 
 from ...world.errors import SimError
-from ._footing import Footing, unhurried
-from ._skeleton import SIGNS, Skeleton
+from ._gait_parameters import (
+    ARM_SWING_RAD,
+    FOOT_LIFT_M,
+    LOADING_S,
+    LOADING_SHARE,
+    LONGEST_SWING_S,
+    MIDSTANCE_PHASE,
+    MIDSTANCE_SHIFT,
+    PELVIS_LIST_RAD,
+    PELVIS_TWIST_SHARE,
+    PELVIS_YAW_RAD,
+    ROLL_OFF_S,
+    ROLL_OFF_SHARE,
+    SWAY_M,
+    SWING_CLEARANCE_M,
+    THORAX_YAW_RAD,
+    USED_REACH,
+    landing_pitch_rad,
+    lift_off_pitch_rad,
+)
+from ._gait_pose import GaitPose
+from ._skeleton import LEFT, RIGHT, SIDES, SIGNS, Skeleton
 
-#: The foot that a step belongs to, in the order of every pair.
-LEFT, RIGHT = 0, 1
-
-# Stride of a walk at the speed of comfort, as a fraction of stature; step length grows with speed
-# to about this power (Bertram and Ruina 2001, Journal of Theoretical Biology 209, 445-453).
-_COMFORT_MPS: Final = 1.2
-_STRIDE_FRACTION: Final = 0.75
+# Stride at the comfortable speed as a share of stature. Step length grows with speed to about this
+# power (Bertram and Ruina 2001, Journal of Theoretical Biology 209, 445-453).
+_COMFORTABLE_MPS: Final = 1.2
+_STRIDE_SHARE: Final = 0.75
 _STRIDE_POWER: Final = 0.42
-# Stance shortens with speed; a swing lasts this long at most, the rest is waiting on both feet.
+_MAX_STRIDE_RATIO: Final = 1.3
+# A fixed stride shortens below this speed.
+_FIXED_STRIDE_FROM_MPS: Final = 0.3
+# The stance takes this share of a cycle, and less at speed. Where the longest swing leaves time
+# over, the rest is double support.
 _STANCE_SHARE: Final = 0.665
 _STANCE_SHARE_PER_MPS: Final = -0.04
-LONGEST_SWING_S: Final = 0.65
-# Toes come down after the heel has landed; the heel lifts before the toes: parts of a stance, and
-# the longest that either takes.
-LOADING_SHARE: Final = 0.15
-LOADING_S: Final = 0.18
-ROLLING_SHARE: Final = 0.43
-ROLLING_S: Final = 0.45
-_LANDING_RAD: Final = math.radians(-20.0)
-_TOE_OFF_RAD: Final = math.radians(40.0)
-# Walking backwards lands on the toes and leaves on the heel.
-_BACK_LANDING_RAD: Final = math.radians(16.0)
-_BACK_OFF_RAD: Final = math.radians(-12.0)
-# Feet land a little less far ahead of the hips than they leave behind them.
-_OVER_SHARE: Final = 0.12
-LIFT_M: Final = 0.035
 _TOE_OUT_RAD: Final = math.radians(6.0)
-# Walking brings the feet nearer to the line; the swinging foot makes way for the standing one.
-_NARROWER: Final = 0.40
-WAY_ROUND_M: Final = 0.010
-
-PELVIS_YAW_RAD: Final = 0.07
-PELVIS_LIST_RAD: Final = 0.035
-THORAX_YAW_RAD: Final = 0.06
-PELVIS_TWIST: Final = 0.75
-SWAY_M: Final = 0.016
-ARM_SWING_RAD: Final = 0.36
-# The body is highest over the middle of a stance.
-MID_STANCE: Final = 0.30
-# Knees are never locked: this much of a leg's reach is used, which leaves a bend of 7 degrees.
-USED_REACH: Final = 0.998
-# The hips follow what the legs allow over this time, so that they neither jerk nor overstretch.
+# A walk brings the feet this share nearer to the body's centre line than standing.
+_NARROWING: Final = 0.40
+_MAX_FOOT_SPEED_MPS: Final = 9.0
+# The hip height follows the reach of the legs over this time, so that it does not jerk.
 _SMOOTHING_S: Final = 0.14
-_SAMPLES: Final = 96
+_SAMPLES_PER_CYCLE: Final = 96
 
 
 class Gait:
-    """Walking of one body.
+    """The gait of one body.
 
     Args:
         skeleton: the body.
@@ -76,6 +71,7 @@ class Gait:
 
     Attributes:
         skeleton: as given.
+        standing_height_m: height of the hips' midpoint when standing.
 
     Raises:
         SimError: for a stride that is out of range.
@@ -84,56 +80,55 @@ class Gait:
     def __init__(self, skeleton: Skeleton, stride_m: float | None = None) -> None:
         self.skeleton = skeleton
         stature = skeleton.stature_m
-        self._usual_m = _STRIDE_FRACTION * stature
-        self._stride_m = (
-            None
-            if stride_m is None
-            else finite_number(
+        self._comfortable_stride_m = _STRIDE_SHARE * stature
+        if stride_m is not None:
+            stride_m = finite_number(
                 "stride_m", stride_m, SimError, minimum=0.2 * stature, maximum=stature
             )
-        )
-        self._ankles = [np.array(skeleton.joint_m(f"{side}_ankle")) for side in ("left", "right")]
-        self._hips = [
-            np.array(skeleton.joint_m(f"{side}_hip")) - np.array(skeleton.hips_m)
-            for side in ("left", "right")
+        self._stride_m = stride_m
+        self._ankles_m = [np.array(skeleton.joint_m(f"{side}_ankle")) for side in SIDES]
+        self._hips_m = [
+            np.array(skeleton.joint_m(f"{side}_hip")) - np.array(skeleton.hips_m) for side in SIDES
         ]
-        self._cycle = lru_cache(maxsize=32)(self._one_cycle)
-        still = np.zeros(1)
-        highest = self._hip_limits(self._standing_feet(), np.zeros((1, 2)), still, np.zeros((1, 3)))
+        self._cycle = lru_cache(maxsize=32)(self._cycle_table)
+        zero = np.zeros(1)
+        highest = self._hip_limits(self._standing_feet(), np.zeros((1, 2)), zero, np.zeros((1, 3)))
         self.standing_height_m = min(float(highest[0]), skeleton.hips_m[2])
 
     def stride_m(self, speed_mps: Any) -> FloatArray:
-        """Distance of a full cycle at a speed ≥ 0."""
+        """Return the distance of a full cycle at a speed ≥ 0."""
         speed = np.asarray(speed_mps, dtype=np.float64)
         if self._stride_m is not None:
             return np.full_like(speed, self._stride_m)
-        return np.asarray(self._usual_m * (speed / _COMFORT_MPS) ** _STRIDE_POWER)
+        return np.asarray(self._comfortable_stride_m * (speed / _COMFORTABLE_MPS) ** _STRIDE_POWER)
 
     def stance_share(self, speed_mps: Any) -> FloatArray:
-        """Part of the cycle for which a foot is on the floor."""
+        """Return the share of the cycle for which a foot is on the floor."""
         speed = np.asarray(speed_mps, dtype=np.float64)
         stride = np.maximum(self.stride_m(speed), 1e-9)
-        waiting = 1.0 - LONGEST_SWING_S * speed / stride
-        return np.asarray(np.maximum(_STANCE_SHARE + _STANCE_SHARE_PER_MPS * speed, waiting))
+        share = _STANCE_SHARE + _STANCE_SHARE_PER_MPS * speed
+        return np.asarray(np.maximum(share, 1.0 - LONGEST_SWING_S * speed / stride))
 
-    def vigour(self, forward_mps: FloatArray) -> FloatArray:
-        """Stride at a speed over that of comfort, with the sign of the speed."""
-        stride = self.stride_m(np.abs(forward_mps))
-        if self._stride_m is not None:  # a fixed stride fades out as well
-            stride = stride * np.minimum(np.abs(forward_mps) / 0.3, 1.0)
-        return np.asarray(np.sign(forward_mps) * np.minimum(stride / self._usual_m, 1.3))
+    def stride_ratio(self, forward_mps: FloatArray) -> FloatArray:
+        """Return the stride divided by the comfortable one, with the sign of the speed."""
+        speed = np.abs(forward_mps)
+        stride = self.stride_m(speed)
+        if self._stride_m is not None:
+            stride = stride * np.minimum(speed / _FIXED_STRIDE_FROM_MPS, 1.0)
+        ratio = np.minimum(stride / self._comfortable_stride_m, _MAX_STRIDE_RATIO)
+        return np.asarray(np.sign(forward_mps) * ratio)
 
     @staticmethod
-    def over_share(vigour: FloatArray) -> FloatArray:
-        """Part of a stance after which the body is over the foot."""
-        return np.asarray(0.5 - _OVER_SHARE * np.clip(2.0 * vigour, -1.0, 1.0))
+    def midstance_share(stride_ratio: FloatArray) -> FloatArray:
+        """Return the share of a stance after which the body is over the foot."""
+        return np.asarray(0.5 - MIDSTANCE_SHIFT * np.clip(2.0 * stride_ratio, -1.0, 1.0))
 
     def neutral(
-        self, side: int, position_m: FloatArray, heading_rad: FloatArray, vigour: FloatArray
+        self, side: int, position_m: FloatArray, heading_rad: FloatArray, stride_ratio: FloatArray
     ) -> FloatArray:
-        """(N, 3) x, y, yaw of a flat foot under the body: where a stance belongs."""
-        ankle = self._ankles[side]
-        across = SIGNS[side] * self._half_width_m(side, vigour)
+        """Return (N, 3) x, y, yaw of a flat foot at midstance, when the body is over it."""
+        ankle = self._ankles_m[side]
+        across = SIGNS[side] * self._half_width_m(side, stride_ratio)
         cos, sin = np.cos(heading_rad), np.sin(heading_rad)
         return np.column_stack(
             [
@@ -143,35 +138,32 @@ class Gait:
             ]
         )
 
-    def _half_width_m(self, side: int, vigour: FloatArray) -> FloatArray:
-        """Of an ankle from the body's centre line."""
-        narrow = 1.0 - _NARROWER * np.minimum(np.abs(vigour), 1.0)
-        return np.asarray(abs(float(self._ankles[side][1])) * narrow)
-
     def stance(
         self,
         side: int,
         place: FloatArray,
-        since_s: FloatArray,
-        until_s: FloatArray,
-        vigour: tuple[float, float],
+        since_landing_s: FloatArray,
+        until_lift_off_s: FloatArray,
+        ratios: tuple[float, float],
     ) -> FloatArray:
-        """(N, 5) x, y, z, yaw, pitch of the ankle of a foot that stands and rolls.
+        """Return (N, 5) x, y, z, yaw, pitch of the ankle of a stance foot.
 
         Args:
             side: left or right.
-            place: (3,) x, y, yaw of the foot lying flat.
-            since_s: (N,) ≥ 0 since it landed.
-            until_s: (N,) ≥ 0 until it lifts off.
-            vigour: of the steps with which it lands and leaves.
+            place: (3,) x, y, yaw of the flat foot.
+            since_landing_s: (N,) ≥ 0.
+            until_lift_off_s: (N,) ≥ 0.
+            ratios: stride ratios of the steps with which it lands and lifts off.
         """
-        duration = since_s + until_s
+        duration = since_landing_s + until_lift_off_s
         loading = np.minimum(LOADING_SHARE * duration, LOADING_S)
-        rolling = np.minimum(ROLLING_SHARE * duration, ROLLING_S)
-        landed = _smooth(np.clip(since_s / loading, 0.0, 1.0))
-        rolled = np.clip(1.0 - until_s / rolling, 0.0, 1.0)
-        pitch = landing_rad(vigour[0]) * (1.0 - landed) + off_rad(vigour[1]) * rolled**2
-        return self._ankle(side, np.broadcast_to(place, (len(since_s), 3)), pitch, np.zeros(1))
+        roll_off = np.minimum(ROLL_OFF_SHARE * duration, ROLL_OFF_S)
+        landed = _smoothstep(np.clip(since_landing_s / loading, 0.0, 1.0))
+        rolled = np.clip(1.0 - until_lift_off_s / roll_off, 0.0, 1.0)
+        landing, lift_off = landing_pitch_rad(ratios[0]), lift_off_pitch_rad(ratios[1])
+        pitch = landing * (1.0 - landed) + lift_off * rolled**2
+        places = np.broadcast_to(place, (len(since_landing_s), 3))
+        return self._ankle(side, places, pitch, np.zeros(1))
 
     def swing(
         self,
@@ -181,39 +173,40 @@ class Gait:
         progress: FloatArray,
         swing_s: float,
         stance_s: float,
-        vigour: tuple[float, float],
+        ratios: tuple[float, float],
         body: FloatArray,
     ) -> FloatArray:
-        """(N, 5) of the ankle of a foot on its way from one stance to the next.
+        """Return (N, 5) x, y, z, yaw, pitch of the ankle of a swing foot.
 
         Args:
             side: left or right.
-            start: (3,) x, y, yaw of the flat foot before.
-            end: (3,) and after; yaws must differ by less than half a turn.
-            progress: (N,) in [0, 1].
-            swing_s: how long the swing lasts.
-            stance_s: how long the stance before lasted.
-            vigour: of the steps with which it lifts off and lands.
-            body: (N, 3) x, y, heading of the body meanwhile: the foot keeps to its side of it.
+            start: (3,) x, y, yaw of the flat foot before the swing.
+            end: (3,) the same after it; the yaws must differ by less than half a turn.
+            progress: (N,) share of the swing, in [0, 1].
+            swing_s: duration of the swing.
+            stance_s: duration of the stance before.
+            ratios: stride ratios of the steps with which it lifts off and lands.
+            body: (N, 3) x, y, heading of the body meanwhile. The foot stays on its side of it.
         """
         u = progress
-        off, land = off_rad(vigour[0]), landing_rad(vigour[1])
-        # The foot leaves with the rate at which it rolled, and lands with none.
-        rate = 2.0 * off * swing_s / min(ROLLING_SHARE * stance_s, ROLLING_S)
-        smooth = _smooth(u)
-        pitch = off + (land - off) * smooth + rate * u * (1.0 - u) ** 2
+        lift_off, landing = lift_off_pitch_rad(ratios[0]), landing_pitch_rad(ratios[1])
+        # The foot lifts off with the pitch rate of its roll-off, and lands with none.
+        rate = 2.0 * lift_off * swing_s / min(ROLL_OFF_SHARE * stance_s, ROLL_OFF_S)
+        smooth = _smoothstep(u)
+        pitch = lift_off + (landing - lift_off) * smooth + rate * u * (1.0 - u) ** 2
         place = start + smooth[:, None] * (end - start)
         bump = np.minimum(1.6 * np.sin(math.pi * u) ** 2, 1.0)
         sin, cos = np.sin(body[:, 2]), np.cos(body[:, 2])
         beside = cos * (place[:, 1] - body[:, 1]) - sin * (place[:, 0] - body[:, 0])
-        clear = self._half_width_m(side, np.array(max(vigour, key=abs))) + WAY_ROUND_M
+        clear = self._half_width_m(side, np.array(max(ratios, key=abs))) + SWING_CLEARANCE_M
         aside = np.maximum(clear - SIGNS[side] * beside, 0.0) * bump
-        aside *= unhurried(
+        aside *= _circumduction_share(
             place[:, :2], aside, (-SIGNS[side] * sin, SIGNS[side] * cos), u * swing_s
         )
         reach = math.hypot(*(end - start)[:2]) + 0.25 * abs(float(end[2] - start[2]))
         reach += 4.0 * float(aside.max(initial=0.0))
-        lift = LIFT_M * math.sqrt(min(reach / self._usual_m, 1.5)) * np.sin(math.pi * u)
+        strides = min(reach / self._comfortable_stride_m, 1.5)
+        lift = FOOT_LIFT_M * math.sqrt(strides) * np.sin(math.pi * u)
         place[:, 0] -= SIGNS[side] * aside * sin
         place[:, 1] += SIGNS[side] * aside * cos
         return self._ankle(side, place, pitch, lift)
@@ -224,33 +217,33 @@ class Gait:
         position_m: FloatArray,
         heading_rad: FloatArray,
         phase: FloatArray,
-        vigour: FloatArray,
+        stride_ratio: FloatArray,
         dt_s: float,
         *,
         twist_rad: FloatArray | None = None,
         periodic: bool = False,
     ) -> FloatArray:
-        """(N, 17) rows of :class:`Footing` from where the feet are.
+        """Return (N, 17) rows of :class:`GaitPose` for given feet.
 
         Args:
-            feet: (2, N, 5) as :meth:`stance` and :meth:`swing` give them.
-            position_m: (N, 2) of the body's centre line.
+            feet: (2, N, 5) ankles, as :meth:`stance` and :meth:`swing` return them.
+            position_m: (N, 2) the body's centre line.
             heading_rad: (N,) of the body.
             phase: (N,) cycles since the left foot landed.
-            vigour: (N,) of the step.
+            stride_ratio: (N,) of the step.
             dt_s: time between rows.
-            twist_rad: (N,) of the feet's direction to the left of the heading; None is none.
-            periodic: the last row is followed by the first.
+            twist_rad: (N,) yaw of the feet to the left of the heading; None is 0.
+            periodic: the first row follows the last one.
         """
         turn = np.cos(math.tau * phase)
-        weight = np.cos(math.tau * (phase - MID_STANCE))
-        size = np.abs(vigour)
+        weight = np.cos(math.tau * (phase - MIDSTANCE_PHASE))
+        size = np.abs(stride_ratio)
         sway = SWAY_M * np.minimum(2.0 * size, 1.0) * weight
         pelvis = np.column_stack(
-            [sway, -PELVIS_YAW_RAD * vigour * turn, PELVIS_LIST_RAD * size * weight]
+            [sway, -PELVIS_YAW_RAD * stride_ratio * turn, PELVIS_LIST_RAD * size * weight]
         )
         if twist_rad is not None:
-            pelvis[:, 1] += PELVIS_TWIST * twist_rad
+            pelvis[:, 1] += PELVIS_TWIST_SHARE * twist_rad
         limit = np.minimum(
             self._hip_limits(feet, position_m, heading_rad, pelvis), self.standing_height_m
         )
@@ -263,70 +256,64 @@ class Gait:
                 feet[RIGHT],
                 height,
                 pelvis,
-                THORAX_YAW_RAD * vigour * turn,
-                vigour,
-                -ARM_SWING_RAD * vigour * turn,
+                THORAX_YAW_RAD * stride_ratio * turn,
+                stride_ratio,
+                -ARM_SWING_RAD * stride_ratio * turn,
             ]
         )
 
-    def footing(self, walked_m: float, speed_mps: float) -> Footing:
-        """A straight walk at constant speed, after ``walked_m``: in the body's frame.
+    def pose(self, walked_m: float, speed_mps: float) -> GaitPose:
+        """Return the pose after ``walked_m`` of a straight walk at one speed, in the body's frame.
 
-        At standstill the feet stand side by side; towards it strides become ever shorter.
+        At standstill the feet stand side by side; strides become shorter towards it.
         """
         if speed_mps <= 0.0:
-            return Footing.of_row(self._cycle(0.0)[0].tolist())
+            return GaitPose.from_row(self._cycle(0.0)[0].tolist())
         rows = self._cycle(speed_mps)
-        # Positions ahead are relative to the body: the walk goes on where the cycle ends.
-        place = (walked_m / float(self.stride_m(speed_mps)) % 1.0) * _SAMPLES
-        row = int(place) % _SAMPLES
+        place = (walked_m / float(self.stride_m(speed_mps)) % 1.0) * _SAMPLES_PER_CYCLE
+        row = int(place) % _SAMPLES_PER_CYCLE
         share = place - int(place)
-        after = (row + 1) % _SAMPLES
+        after = (row + 1) % _SAMPLES_PER_CYCLE
         mixed = rows[row] + share * (rows[after] - rows[row])
-        phase = np.array([place / _SAMPLES])
-        mixed[:10] = self._feet(phase, speed_mps).reshape(10)
-        return Footing.of_row(mixed.tolist())
+        phase = np.array([place / _SAMPLES_PER_CYCLE])
+        mixed[:10] = self._cycle_feet(phase, speed_mps).reshape(10)
+        return GaitPose.from_row(mixed.tolist())
 
-    def _one_cycle(self, speed_mps: float) -> FloatArray:
-        """(_SAMPLES, 17) rows of a cycle in the body's frame; one row when standing."""
-        still = np.zeros(1)
+    def _cycle_table(self, speed_mps: float) -> FloatArray:
+        """Return (96, 17) rows of one cycle in the body's frame; one row when standing."""
+        zero = np.zeros(1)
         if speed_mps <= 0.0:
-            return self.table(
-                self._standing_feet(), np.zeros((1, 2)), still, still, still, dt_s=1.0
-            )
-        phase = np.arange(_SAMPLES) / _SAMPLES
-        feet = self._feet(phase, speed_mps)
-        vigour = np.full(_SAMPLES, self.vigour(np.array(speed_mps)))
-        dt_s = float(self.stride_m(speed_mps)) / speed_mps / _SAMPLES
+            return self.table(self._standing_feet(), np.zeros((1, 2)), zero, zero, zero, dt_s=1.0)
+        count = _SAMPLES_PER_CYCLE
+        phase = np.arange(count) / count
+        feet = self._cycle_feet(phase, speed_mps)
+        ratio = np.full(count, self.stride_ratio(np.array(speed_mps)))
+        dt_s = float(self.stride_m(speed_mps)) / speed_mps / count
         return self.table(
-            feet, np.zeros((_SAMPLES, 2)), np.zeros(_SAMPLES), phase, vigour, dt_s, periodic=True
+            feet, np.zeros((count, 2)), np.zeros(count), phase, ratio, dt_s, periodic=True
         )
 
     def _standing_feet(self) -> FloatArray:
-        """(2, 1, 5) in the body's frame."""
-        still = np.zeros(1)
-        return np.stack(
-            [
-                self._ankle(side, self.neutral(side, np.zeros((1, 2)), still, still), still, 0.0)
-                for side in (LEFT, RIGHT)
-            ]
-        )
+        """Return (2, 1, 5) ankles in the body's frame."""
+        zero = np.zeros(1)
+        places = [self.neutral(side, np.zeros((1, 2)), zero, zero) for side in (LEFT, RIGHT)]
+        return np.stack([self._ankle(side, place, zero, 0.0) for side, place in enumerate(places)])
 
-    def _feet(self, phase: FloatArray, speed_mps: float) -> FloatArray:
-        """(2, N, 5) in the body's frame at phases since the left foot landed."""
+    def _cycle_feet(self, phase: FloatArray, speed_mps: float) -> FloatArray:
+        """Return (2, N, 5) ankles in the body's frame at phases since the left foot landed."""
         stride = float(self.stride_m(speed_mps))
         share = float(self.stance_share(speed_mps))
-        vigour = self.vigour(np.array([speed_mps]))
-        both = (float(vigour[0]), float(vigour[0]))
-        ahead = float(self.over_share(vigour)[0]) * share * stride
+        ratio = self.stride_ratio(np.array([speed_mps]))
+        ratios = (float(ratio[0]), float(ratio[0]))
+        ahead = float(self.midstance_share(ratio)[0]) * share * stride
         cycle_s = stride / speed_mps
         feet = np.empty((2, len(phase), 5))
         for side in (LEFT, RIGHT):
-            (place,) = self.neutral(side, np.array([[ahead, 0.0]]), np.zeros(1), vigour)
+            (place,) = self.neutral(side, np.array([[ahead, 0.0]]), np.zeros(1), ratio)
             own = (phase + 0.5 * side) % 1.0
             down = own < share
             since = own[down] * cycle_s
-            feet[side, down] = self.stance(side, place, since, share * cycle_s - since, both)
+            feet[side, down] = self.stance(side, place, since, share * cycle_s - since, ratios)
             feet[side, ~down] = self.swing(
                 side,
                 place,
@@ -334,13 +321,19 @@ class Gait:
                 (own[~down] - share) / (1.0 - share),
                 (1.0 - share) * cycle_s,
                 share * cycle_s,
-                both,
+                ratios,
                 np.column_stack([stride * own[~down], np.zeros((np.count_nonzero(~down), 2))]),
             )
             feet[side, :, 0] -= stride * own
         return feet
 
+    def _half_width_m(self, side: int, stride_ratio: FloatArray) -> FloatArray:
+        """Return the distance of an ankle from the body's centre line."""
+        narrow = 1.0 - _NARROWING * np.minimum(np.abs(stride_ratio), 1.0)
+        return np.asarray(abs(float(self._ankles_m[side][1])) * narrow)
+
     def _ankle(self, side: int, place: FloatArray, pitch: FloatArray, lift: Any) -> FloatArray:
+        """Return (N, 5) x, y, z, yaw, pitch of an ankle for flat feet that roll and lift."""
         ahead, height = self.skeleton.soles[side].ankle(pitch)
         yaw = place[:, 2]
         return np.column_stack(
@@ -360,11 +353,11 @@ class Gait:
         heading_rad: FloatArray,
         pelvis: FloatArray,
     ) -> FloatArray:
-        """(N,) the highest that the hips' midpoint may be for both ankles to be in reach."""
+        """Return (N,) the greatest hip height at which both ankles are in reach."""
         sway, yaw, tilt = pelvis.T
         limits = []
         for side in (LEFT, RIGHT):
-            x, y, z = self._hips[side]
+            x, y, z = self._hips_m[side]
             across = y * np.cos(tilt) - z * np.sin(tilt)
             cos, sin = np.cos(heading_rad + yaw), np.sin(heading_rad + yaw)
             hip_x = position_m[:, 0] - np.sin(heading_rad) * sway + cos * x - sin * across
@@ -377,16 +370,31 @@ class Gait:
         return np.asarray(np.minimum(limits[0], limits[1]))
 
 
-def landing_rad(vigour: float) -> float:
-    size = min(abs(vigour), 1.15)
-    return size * (_LANDING_RAD if vigour >= 0.0 else _BACK_LANDING_RAD)
+def _circumduction_share(
+    place_m: FloatArray,
+    aside_m: FloatArray,
+    direction: tuple[FloatArray, FloatArray],
+    times_s: FloatArray,
+) -> float:
+    """Return the share, in [0, 1], of a swing's sideways arc that the foot has time for.
+
+    Args:
+        place_m: (N, 2) foot without the arc.
+        aside_m: (N,) width of the arc.
+        direction: (N,) x and (N,) y of the unit vectors to the side.
+        times_s: (N,) increasing.
+    """
+    dt_s = np.diff(times_s)[:, None]
+    straight = np.diff(place_m, axis=0) / dt_s
+    arc = np.diff(aside_m[:, None] * np.column_stack(direction), axis=0) / dt_s
+    # The largest share s with |straight + s arc| ≤ the greatest foot speed in every interval.
+    square, mixed = (arc**2).sum(axis=1), (arc * straight).sum(axis=1)
+    spare = _MAX_FOOT_SPEED_MPS**2 - (straight**2).sum(axis=1)
+    moves = square > 1e-12
+    root = np.sqrt(np.maximum(mixed[moves] ** 2 + square[moves] * spare[moves], 0.0))
+    return float(np.clip(((root - mixed[moves]) / square[moves]).min(initial=1.0), 0.0, 1.0))
 
 
-def off_rad(vigour: float) -> float:
-    size = min(abs(vigour), 1.15)
-    return size * (_TOE_OFF_RAD if vigour >= 0.0 else _BACK_OFF_RAD)
-
-
-def _smooth(u: FloatArray) -> FloatArray:
-    """From 0 at 0 to 1 at 1 with level ends."""
+def _smoothstep(u: FloatArray) -> FloatArray:
+    """Rise from 0 at 0 to 1 at 1 with zero slope at both ends."""
     return np.asarray(u * u * (3.0 - 2.0 * u))

@@ -1,4 +1,4 @@
-"""The worker's body in the physics world: capsules on spherical joints, and the box carried."""
+"""The collision body of a worker: capsules on spherical joints, and the carried box."""
 
 from __future__ import annotations
 
@@ -9,31 +9,30 @@ from typing import Final
 from ...world import PERSON_GROUP, RAY_GROUP, ROBOT_GROUP, Warehouse
 from ...world.bullet import pybullet
 from ._asset import JOINTS, PARENTS, Capsule
-from ._pose import IDENTITY, Quaternion, Vector
 from ._postures import BOX_SIZE_M, arm_postures
+from ._quaternions import IDENTITY, Quaternion, Vector, subtract
 from ._skeleton import Skeleton
 
 _SPINE: Final = JOINTS.index("spine")
-# The box hangs from the thorax by a slide that takes it away.
+# Row of the box. A prismatic joint on the thorax takes it away while the hands are empty.
 _BOX: Final = len(JOINTS)
-# Rows of JOINTS, and the box, in the order in which PyBullet numbers links: depth first. Eyes do
-# not collide.
+# Rows of JOINTS and of the box in PyBullet's order of links, depth first. Eyes do not collide.
 _LINKS: Final = (
     *(row for row in range(JOINTS.index("left_hip")) if not JOINTS[row].endswith("_eye")),
     _BOX,
     *range(JOINTS.index("left_hip"), len(JOINTS)),
 )
 _LINK_PARENTS: Final = (*PARENTS, _SPINE)
-# Spherical joints need masses. These are so large, and their motors so unwilling to move, that a
-# robot that pushes for seconds moves a limb by less than a millimetre.
+# Spherical joints need masses and motors. With these, a robot that pushes for seconds moves a limb
+# by less than a millimetre.
 _LINK_MASS_KG: Final = 1000.0
 _HOLDING_NM: Final = 1e5
-# A box that nobody carries waits where nothing comes.
+# Place of a box that is not carried: far below the floor.
 _PARKED_M: Final = -100.0
 
 
 class WorkerBody:
-    """One kinematic multibody: it goes where it is put and stays there, whoever pushes.
+    """A kinematic multibody that stays where it is placed, even if a robot pushes it.
 
     Its base is the pelvis with the hips' midpoint as origin (x forward, y left, z up at rest).
 
@@ -42,7 +41,7 @@ class WorkerBody:
         skeleton: bones and capsules.
 
     Attributes:
-        body: PyBullet's id of it.
+        body: PyBullet's id of the multibody.
     """
 
     def __init__(self, warehouse: Warehouse, skeleton: Skeleton) -> None:
@@ -71,7 +70,9 @@ class WorkerBody:
                 linkMasses=[_LINK_MASS_KG] * count,
                 linkCollisionShapeIndices=shapes[1:],
                 linkVisualShapeIndices=[-1] * count,
-                linkPositions=[_minus(centres[row], centres[_LINK_PARENTS[row]]) for row in _LINKS],
+                linkPositions=[
+                    subtract(centres[row], centres[_LINK_PARENTS[row]]) for row in _LINKS
+                ],
                 linkOrientations=[IDENTITY] * count,
                 linkInertialFramePositions=[(0.0, 0.0, 0.0)] * count,
                 linkInertialFrameOrientations=[IDENTITY] * count,
@@ -113,7 +114,7 @@ class WorkerBody:
                 self.body, link, PERSON_GROUP, ROBOT_GROUP | RAY_GROUP, physicsClientId=self._client
             )
 
-    def put(
+    def place(
         self,
         hips_odom_m: Vector,
         pelvis_odom: Quaternion,
@@ -124,8 +125,9 @@ class WorkerBody:
 
         Args:
             hips_odom_m: midpoint of the hips.
-            pelvis_odom: turn of the pelvis.
-            joints: turn of every joint in :data:`JOINTS`, in axes parallel to the body's at rest.
+            pelvis_odom: rotation of the pelvis.
+            joints: rotation of every joint in :data:`JOINTS`, in axes parallel to the body's at
+                rest.
             with_box: whether the box is in the hands.
         """
         slide = (0.0 if with_box else _PARKED_M,)
@@ -138,7 +140,7 @@ class WorkerBody:
             [slide if row == _BOX else joints[row] for row in _LINKS],
             physicsClientId=self._client,
         )
-        # A sleeping body costs nothing in a step; a robot that touches it wakes it.
+        # A sleeping body costs no time in a physics step. A robot that touches it wakes it.
         pybullet.changeDynamics(
             self.body,
             -1,
@@ -147,11 +149,11 @@ class WorkerBody:
         )
 
     def _capsules(self, capsules: list[Capsule], scale: float, centre_m: Vector) -> int:
-        """One collision shape of all capsules of a link; −1 without any."""
+        """Make one collision shape of a link's capsules; return −1 without any."""
         if not capsules:
             return -1
         ends = [
-            [_minus(_scaled(end, scale), centre_m) for end in (capsule.start_m, capsule.end_m)]
+            [_relative(end, scale, centre_m) for end in (capsule.start_m, capsule.end_m)]
             for capsule in capsules
         ]
         return int(
@@ -162,7 +164,9 @@ class WorkerBody:
                 collisionFramePositions=[
                     [0.5 * (a + b) for a, b in zip(start, end, strict=True)] for start, end in ends
                 ],
-                collisionFrameOrientations=[_from_z(_minus(end, start)) for start, end in ends],
+                collisionFrameOrientations=[
+                    _rotation_from_z(subtract(end, start)) for start, end in ends
+                ],
                 physicsClientId=self._client,
             )
         )
@@ -177,20 +181,18 @@ class WorkerBody:
         )
 
 
-def _scaled(vector: Vector, scale: float) -> Vector:
-    return (vector[0] * scale, vector[1] * scale, vector[2] * scale)
+def _relative(point_m: Vector, scale: float, centre_m: Vector) -> Vector:
+    """Return a scaled point relative to a centre."""
+    scaled = (point_m[0] * scale, point_m[1] * scale, point_m[2] * scale)
+    return subtract(scaled, centre_m)
 
 
-def _minus(first: Vector, second: Vector) -> Vector:
-    return (first[0] - second[0], first[1] - second[1], first[2] - second[2])
-
-
-def _from_z(direction: Vector) -> Quaternion:
-    """The shortest turn from z to a direction; capsules lie along z."""
+def _rotation_from_z(direction: Vector) -> Quaternion:
+    """Return the shortest rotation from z, the axis of PyBullet's capsules, to a direction."""
     x, y, z = direction
     length = math.sqrt(x * x + y * y + z * z)
     if length < 1e-9 or z < -length * (1.0 - 1e-9):
-        return IDENTITY  # a capsule is the same upside down
+        return IDENTITY  # a capsule upside down is the same
     w = 1.0 + z / length
     norm = math.sqrt((x * x + y * y) / (length * length) + w * w)
     return (-y / length / norm, x / length / norm, 0.0, w / norm)

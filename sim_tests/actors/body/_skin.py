@@ -1,13 +1,11 @@
-"""Cuts a worker's skin into rigid pieces, since the simulator draws nothing that bends.
+"""Visual actor of a worker: skin, hair and clothes, cut into rigid pieces.
 
-At a joint whose rotation is R, skin of weight w ought to turn by R to the power w. The weight is
-quantised into ``bands`` equal steps between 0 and 1, and every step is a piece of its own. Each
-triangle joins every piece whose weight is not much more than one step away from its own, so that
-the nearest two or three draw it and no gap opens where the body bends. Where a piece overlaps the
-part that its neighbour fits better, it dips under the skin: its rim would stick out of a bent knee.
-
-
-What the camera sees of a worker: skin, hair and clothes, in the picture world.
+The simulator draws only rigid bodies. At a joint whose rotation is R, skin of weight w should turn
+by R to the power w. The weights between 0 and 1 are divided into ``bands`` equal steps, and each
+step is a piece of its own. A triangle belongs to every piece whose weight differs from its own by
+little more than one step. Two or three pieces therefore draw it, and no gap opens where the body
+bends. Where a piece overlaps skin that its neighbour fits better, it lies below the surface;
+otherwise its rim would stick out of a bent knee.
 """
 
 from __future__ import annotations
@@ -28,17 +26,25 @@ from ...world.bullet import pybullet
 from ...world.hall import Mesh
 from ...world.render import RenderView, Visuals, box_corners, in_view, to_camera
 from ...world.sightlines import PlacedSurface, TriangleSet
-from ._asset import JOINTS, LEVELS, PARENTS, SkinMesh, WorkerAsset, load_worker
-from ._pose import BodyPose, link_transform
+from ._asset import DETAIL_LEVELS, JOINTS, PARENTS, SkinMesh, WorkerAsset, load_worker
+from ._pose import BodyPose, piece_transforms
 
-# How many steps off a triangle's weight may be from that of a piece.
+#: Row of the pelvis among the joints.
+PELVIS: Final = -1
+
+# Largest difference between the weights of a triangle and of its piece, in steps.
 _OVERLAP: Final = 1.6
+# Weights this near to 0 or 1 do not bend.
 _RIGID: Final = 1.0e-3
-# A rim lies so deep where its weight is a whole step off, and at most so many times as deep.
+# Depth of a piece's rim per step of difference in weight, and the largest multiple of it.
 _SINK_M: Final = 0.012
-_MOST_SUNK: Final = 3.0
-#: Number of the pelvis among joints.
-PELVIS = -1
+_MAX_SINK: Final = 3.0
+# Bands between the two sides of a joint, by level of detail.
+_BANDS: Final = (5, 2, 1)
+# Fewest samples per metre of image for each level but the coarsest.
+_MIN_SAMPLES_PER_M: Final = (120.0, 60.0)
+# Skin, clothes, hair and hats reach at most this far beyond the keypoints.
+_REACH_M: Final = 0.30
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,9 +52,9 @@ class SkinPiece:
     """A rigid part of the body's surface at rest.
 
     Attributes:
-        joint: row in :data:`JOINTS`, or −1 for what moves with the pelvis.
-        share: how much of that joint's rotation the piece follows, in (0, 1].
-        mesh: the surface at rest in the body's frame.
+        joint: row in :data:`JOINTS`, −1 for the pelvis.
+        share: share of the joint's rotation that the piece follows, in (0, 1].
+        mesh: surface at rest in the body's frame.
     """
 
     joint: int
@@ -57,34 +63,36 @@ class SkinPiece:
 
 
 def skin_pieces(skin: SkinMesh, bands: int) -> tuple[SkinPiece, ...]:
-    """Cut ``skin`` into rigid pieces, ``bands`` ≥ 0 between the two sides of every joint."""
+    """Cut ``skin`` into rigid pieces with ``bands`` ≥ 0 between the two sides of every joint."""
     step = 1.0 / (bands + 1)
     weights = skin.weights[skin.triangles].mean(axis=1)
     pieces = []
     for joint in (PELVIS, *range(len(JOINTS))):
-        # What hangs below takes over one step after it has begun.
-        unbent = np.ones(len(skin.triangles), dtype=bool)
+        # Beyond a child joint's first step its own pieces take over.
+        above_children = np.ones(len(skin.triangles), dtype=bool)
         for child, parent in enumerate(PARENTS):
             if parent == joint:
-                unbent &= weights[:, child] < _OVERLAP * step
+                above_children &= weights[:, child] < _OVERLAP * step
         for level in range(1, bands + 2) if joint != PELVIS else (bands + 1,):
             share = level * step
-            chosen = unbent.copy() if level == bands + 1 else np.ones_like(unbent)
+            chosen = above_children.copy() if level == bands + 1 else np.ones_like(above_children)
             if joint != PELVIS:
                 chosen &= np.abs(weights[:, joint] - share) < _OVERLAP * step
-                # What does not bend at all is drawn once.
+                # Skin that does not bend is drawn once.
                 chosen &= weights[:, joint] > _RIGID
                 if level <= bands:
                     chosen &= weights[:, joint] < 1.0 - _RIGID
             if chosen.any():
-                beyond = _beyond(skin, joint, share, level == bands + 1)
-                sink_m = _SINK_M * np.clip(beyond / step - 0.5, 0.0, _MOST_SUNK)
-                pieces.append(SkinPiece(joint, share, _part(skin, skin.triangles[chosen], sink_m)))
+                off = _weight_difference(skin, joint, share, level == bands + 1)
+                sink_m = _SINK_M * np.clip(off / step - 0.5, 0.0, _MAX_SINK)
+                pieces.append(
+                    SkinPiece(joint, share, _submesh(skin, skin.triangles[chosen], sink_m))
+                )
     return tuple(pieces)
 
 
-def _beyond(skin: SkinMesh, joint: int, share: float, whole: bool) -> FloatArray:
-    """(V,) how far each vertex's weight is from that of a piece."""
+def _weight_difference(skin: SkinMesh, joint: int, share: float, whole: bool) -> FloatArray:
+    """Return (V,) the difference between each vertex's weight and that of a piece."""
     off = [np.zeros(len(skin.vertices_m))]
     if joint != PELVIS:
         off.append(np.abs(skin.weights[:, joint] - share))
@@ -93,19 +101,11 @@ def _beyond(skin: SkinMesh, joint: int, share: float, whole: bool) -> FloatArray
     return np.asarray(np.max(off, axis=0))
 
 
-def _part(skin: SkinMesh, triangles: NDArray[np.int64], sink_m: FloatArray) -> Mesh:
-    """Only the vertices that the triangles use, each moved inwards by so much."""
+def _submesh(skin: SkinMesh, triangles: NDArray[np.int64], sink_m: FloatArray) -> Mesh:
+    """Return these triangles with their vertices moved inwards by ``sink_m``."""
     used, rows = np.unique(triangles.ravel(), return_inverse=True)
     vertices = skin.vertices_m[used] - sink_m[used, None] * skin.normals[used]
     return Mesh(vertices, skin.normals[used], rows.astype(np.int64), skin.uv[used])
-
-
-# Bands between the two sides of a joint, a level of detail; far away nobody sees a knee bend.
-_BANDS: Final = (5, 2, 1)
-# A level serves down to so many samples a metre of the picture; the coarsest all the rest.
-_COARSEST_SAMPLES_PER_M: Final = (120.0, 60.0)
-# How far skin, clothes, hair and hats reach beyond the keypoints.
-_REACH_M: Final = 0.30
 
 
 @lru_cache(maxsize=64)
@@ -115,7 +115,7 @@ def _pieces(look: str, level: int) -> tuple[SkinPiece, ...]:
 
 @lru_cache(maxsize=64)
 def _surface(look: str, level: int) -> tuple[TriangleSet, NDArray[np.int64], FloatArray]:
-    """Triangles of all pieces, and the joint and share of each piece."""
+    """Return the triangles of all pieces, and the joint and share of each piece."""
     pieces = _pieces(look, level)
     return (
         TriangleSet([(p.mesh.vertices_m, p.mesh.indices.reshape(-1, 3)) for p in pieces]),
@@ -126,30 +126,30 @@ def _surface(look: str, level: int) -> tuple[TriangleSet, NDArray[np.int64], Flo
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Level:
-    """One level of detail in the picture world: a body a piece."""
+    """One level of detail in the visual world, with one body per piece."""
 
     bodies: tuple[int, ...]
     joints: NDArray[np.int64]
     shares: FloatArray
-    boxes_m: FloatArray  # (P, 8, 3) corners about each piece at rest, scaled
+    boxes_m: FloatArray  # (P, 8, 3) corners of a box around each scaled piece at rest
 
 
 class PosedBody(Protocol):
-    """A body whose posture a skin shows, as :class:`Worker` is."""
+    """A body whose pose a skin shows; :class:`Worker` is one."""
 
     @property
     def asset(self) -> WorkerAsset:
-        """Meshes, joints and keypoints."""
+        """The shipped worker: meshes, joints and keypoints."""
         ...
 
     @property
     def pose(self) -> BodyPose:
-        """The posture."""
+        """The pose."""
         ...
 
     @property
     def links_odom(self) -> FloatArray:
-        """(J, 4, 4) where the links are."""
+        """(J, 4, 4) link transforms to odom."""
         ...
 
     @property
@@ -158,17 +158,16 @@ class PosedBody(Protocol):
         ...
 
     def reach_odom_m(self) -> FloatArray:
-        """(2, 3) low and high corner of a box about the body."""
+        """Return (2, 3) the low and high corner of a box that holds the body."""
         ...
 
 
 class WorkerSkin:
-    """The actor of one :class:`Worker`; see :class:`Actor`.
+    """The visual actor of one :class:`Worker`.
 
     Args:
-        worker: whose posture is shown.
-        textures: (H, W, 3) uint8 a level of detail to wear instead of the shipped ones, finest
-            first.
+        worker: the body to show.
+        textures: (H, W, 3) uint8 per level of detail, finest first; None takes the shipped ones.
 
     Attributes:
         worker: as given.
@@ -186,16 +185,16 @@ class WorkerSkin:
         self._visuals: Visuals | None = None
         self._levels: dict[int, _Level] = {}
         self._shown: set[int] = set()
-        # The last pose asked for, and its surface by level of detail.
+        # Surfaces of the last requested pose by level of detail.
         self._surface_pose: BodyPose | None = None
         self._surfaces: dict[int, PlacedSurface] = {}
 
     def reach_odom_m(self) -> FloatArray:
-        """As :meth:`Worker.reach_odom_m`."""
+        """Return the reach of the body; see :meth:`Worker.reach_odom_m`."""
         return self.worker.reach_odom_m()
 
     def surface(self, detail: int) -> PlacedSurface:
-        """The skin as it is bent now, at a level of detail."""
+        """Return the skin in its present pose at a level of detail."""
         worker, pose = self.worker, self.worker.pose
         if self._surface_pose is not pose:
             self._surface_pose = pose
@@ -203,26 +202,26 @@ class WorkerSkin:
         if detail not in self._surfaces:
             asset = worker.asset
             triangles, joints, shares = _surface(asset.name, detail)
-            places = link_transform(asset.joints_m, pose, joints, shares, worker.links_odom)
+            places = piece_transforms(asset.joints_m, pose, joints, shares, worker.links_odom)
             self._surfaces[detail] = PlacedSurface(triangles, places, pose.scale)
         return self._surfaces[detail]
 
     def bounds_odom_m(self) -> FloatArray:
-        """(2, 3) low and high corner of a box about all of the worker."""
+        """Return (2, 3) the low and high corner of a box that holds the worker now."""
         points = self.worker.keypoints_odom_m
         reach = _REACH_M * max(self.worker.pose.scale, 1.0)
         return np.array([points.min(axis=0) - reach, points.max(axis=0) + reach])
 
     def build(self, visuals: Visuals) -> None:
-        """Note where to draw; each level of detail is made when it is first needed."""
+        """Store the visual world; each level of detail is made when it is first needed."""
         self._visuals = visuals
 
     def bodies(self) -> AbstractSet[int]:
-        """Ids of all pieces made so far."""
+        """Return the ids of all pieces made so far."""
         return {body for level in self._levels.values() for body in level.bodies}
 
     def show(self, pixels_per_m: float | None, view: RenderView | None = None) -> None:
-        """Take the worker's posture at the level of detail that so many samples a metre need."""
+        """Show the worker's pose at the level of detail for these samples per metre; None hides."""
         visuals = self._visuals
         if visuals is None:
             return
@@ -233,7 +232,7 @@ class WorkerSkin:
                 self._levels[number] = self._make(visuals, number)
                 self._shown |= set(self._levels[number].bodies)
             level = self._levels[number]
-            places = self._places(level)
+            places = self._transforms(level)
             rows = _rows_in_view(level, places, view)
             shown = {level.bodies[row] for row in rows}
         for body in self._shown - shown:
@@ -242,7 +241,7 @@ class WorkerSkin:
             visuals.reveal(body)
         self._shown = shown
         if shown:
-            _pose(visuals.client, level, places, rows)
+            _place_pieces(visuals.client, level, places, rows)
 
     def _make(self, visuals: Visuals, level: int) -> _Level:
         asset, scale = self.worker.asset, self.worker.pose.scale
@@ -267,14 +266,14 @@ class WorkerSkin:
             ),
         )
 
-    def _places(self, level: _Level) -> FloatArray:
-        """(P, 4, 4) from each piece at rest to odom."""
+    def _transforms(self, level: _Level) -> FloatArray:
+        """Return (P, 4, 4) transforms of the pieces from rest to odom."""
         joints_m, pose = self.worker.asset.joints_m, self.worker.pose
-        return link_transform(joints_m, pose, level.joints, level.shares)
+        return piece_transforms(joints_m, pose, level.joints, level.shares)
 
 
 def _rows_in_view(level: _Level, places: FloatArray, view: RenderView | None) -> list[int]:
-    """Pieces that the view may show."""
+    """Return the rows of the pieces that the view may show."""
     if view is None:
         return list(range(len(level.bodies)))
     corners = np.einsum("pij,pkj->pki", places[:, :3, :3], level.boxes_m) + places[:, None, :3, 3]
@@ -282,7 +281,7 @@ def _rows_in_view(level: _Level, places: FloatArray, view: RenderView | None) ->
     return rows
 
 
-def _pose(client: int, level: _Level, places: FloatArray, rows: list[int]) -> None:
+def _place_pieces(client: int, level: _Level, places: FloatArray, rows: list[int]) -> None:
     turns = Rotation.from_matrix(places[rows, :3, :3]).as_quat().tolist()
     for row, position, turn in zip(rows, places[rows, :3, 3].tolist(), turns, strict=True):
         pybullet.resetBasePositionAndOrientation(
@@ -291,10 +290,10 @@ def _pose(client: int, level: _Level, places: FloatArray, rows: list[int]) -> No
 
 
 def _level_for(samples_per_m: float) -> int:
-    for level, least in enumerate(_COARSEST_SAMPLES_PER_M):
+    for level, least in enumerate(_MIN_SAMPLES_PER_M):
         if samples_per_m >= least:
             return level
-    return LEVELS - 1
+    return DETAIL_LEVELS - 1
 
 
 def _scaled(mesh: Mesh, scale: float) -> Mesh:

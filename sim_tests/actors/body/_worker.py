@@ -1,4 +1,4 @@
-"""A person in the hall: placed, not simulated, with the truth about every keypoint."""
+"""A person in the warehouse: placed, not simulated, with the true position of every keypoint."""
 
 from __future__ import annotations
 
@@ -14,45 +14,48 @@ from perception.layouts import LEFT_SHOULDER, RIGHT_SHOULDER
 from ...world import Warehouse
 from ...world.errors import SimError
 from ._asset import JOINTS, WorkerAsset, load_worker
-from ._footing import Footing
 from ._gait import Gait
-from ._held_thing import HeldThing
+from ._gait_pose import GaitPose
+from ._held_object import HeldObject
 from ._physics import WorkerBody
-from ._pose import (
-    BentPoints,
-    BodyPose,
+from ._pose import BodyPose, SkinnedPoints, link_transforms
+from ._postures import ACTIVITIES, Activity, arm_postures
+from ._quaternions import (
     Quaternion,
     Vector,
-    about,
-    about_x,
-    about_y,
-    about_z,
+    add,
+    axis_angle,
     inverse,
-    link_transforms,
-    matrix,
-    product,
+    multiply,
+    rotate,
+    rotation_matrix,
     rotation_vector,
-    turned,
+    rotation_x,
+    rotation_y,
+    rotation_z,
+    subtract,
 )
-from ._postures import ACTIVITIES, Activity, arm_postures
-from ._skeleton import Skeleton, skeleton
+from ._skeleton import LEFT, RIGHT, SIDES, Skeleton, skeleton
 from ._skin import WorkerSkin
 
-#: How far the head turns from the torso, and how far it nods.
+#: Largest yaw and pitch of the head from the body.
 MAX_HEAD_YAW_RAD: Final = math.radians(80.0)
 MAX_HEAD_PITCH_RAD: Final = math.radians(40.0)
-#: How far the eyes turn in the head.
+#: Largest yaw and pitch of the eyes from the head.
 MAX_EYE_YAW_RAD: Final = math.radians(35.0)
 MAX_EYE_PITCH_RAD: Final = math.radians(25.0)
 
-_STATURE_M: Final = 1.75
-_REACH_M: Final = 1.0  # nothing of a body is farther from its centre line
+_DEFAULT_STATURE_M: Final = 1.75
+# No part of an unscaled body is farther from its centre line.
+_REACH_M: Final = 1.0
 # The optical frame (x right, y down, z forward) in the head frame (x down, y forward, z right).
 _ROTATION_HEAD_OPTICAL: Final = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
-_CHEST_SHOULDERS: Final = 0.7
-# The trunk leans into a brisk walk.
+# The chest lies at this share of the way from the hips to the shoulders.
+_CHEST_SHARE: Final = 0.7
+# The trunk leans forward in a walk at 1.2 m/s.
 _LEAN_RAD: Final = math.radians(3.5)
-_KNEE_SHARE: Final = 0.2
+# The knee follows this share of the foot's yaw from the pelvis, the ankle the rest.
+_KNEE_YAW_SHARE: Final = 0.2
 _NECK: Final = "neck"
 _SPINE: Final = "spine"
 _RIGHT_WRIST: Final = JOINTS.index("right_wrist")
@@ -61,26 +64,25 @@ _RIGHT_WRIST: Final = JOINTS.index("right_wrist")
 class Worker:
     """An articulated person in a warehouse.
 
-    The body is one kinematic multibody: :meth:`place` sets where it is, a robot that runs into it
-    finds it immovable. The body's own frame stands on the floor below its centre line, x forward,
-    y left, z up.
+    The body is one kinematic multibody. Only :meth:`place` moves it; a robot that runs into it does
+    not. The body's frame stands on the floor below its centre line, x forward, y left, z up.
 
     Args:
         warehouse: the world to stand in.
-        stature_m: height standing, with shoes, in [1.4, 2.1]; None is that of ``look``, or 1.75 m.
+        stature_m: standing height with shoes, in [1.4, 2.1]; None is that of ``look``, or 1.75 m.
         look: name of a shipped worker (:func:`worker_names`), scaled to the stature; None is the
-            one of the nearest stature.
+            one of nearest stature.
         stride_m: distance of a full gait cycle, see :class:`Gait`; None follows the speed.
-        position_odom_m: (2,) where to stand first; None waits outside the hall, in nobody's way.
-        heading_odom_rad: where to face first.
+        position_odom_m: (2,) first position; None waits outside the warehouse.
+        heading_odom_rad: first heading.
 
     Attributes:
         body: PyBullet's id of the person.
-        client: PyBullet's id of the world it is in.
-        skin: what pictures show of the person.
-        actor: number of the skin among the actors of pictures.
+        client: PyBullet's id of the world.
+        skin: visual actor of the person.
+        actor: number of the skin among the visual actors.
         skeleton: the bones.
-        gait: how the person walks.
+        gait: the gait.
 
     Raises:
         SimError: for arguments that are not finite, out of range or not shipped.
@@ -97,7 +99,7 @@ class Worker:
         heading_odom_rad: float = 0.0,
     ) -> None:
         if stature_m is None:
-            stature_m = _STATURE_M if look is None else load_worker(look).stature_m
+            stature_m = _DEFAULT_STATURE_M if look is None else load_worker(look).stature_m
         self.skeleton: Skeleton = skeleton(look, stature_m)
         self.gait = Gait(self.skeleton, stride_m)
         if position_odom_m is None:
@@ -106,17 +108,15 @@ class Worker:
         finite_number("heading_odom_rad", heading_odom_rad, SimError)
         bones = self.skeleton
         self._arms = arm_postures(bones)
-        self._hips = tuple(
-            _difference(bones.joint_m(f"{side}_hip"), bones.hips_m) for side in ("left", "right")
-        )
-        self._waist = _difference(bones.joint_m(_SPINE), bones.hips_m)
-        self._neck = _difference(bones.joint_m(_NECK), bones.joint_m(_SPINE))
+        self._hips = tuple(subtract(bones.joint_m(f"{side}_hip"), bones.hips_m) for side in SIDES)
+        self._waist = subtract(bones.joint_m(_SPINE), bones.hips_m)
+        self._neck = subtract(bones.joint_m(_NECK), bones.joint_m(_SPINE))
         self._chest = (
-            _difference(bones.shoulders_m, bones.joint_m(_SPINE)),
-            _difference(bones.hip_keypoints_m, bones.hips_m),
+            subtract(bones.shoulders_m, bones.joint_m(_SPINE)),
+            subtract(bones.hip_keypoints_m, bones.hips_m),
         )
         self._face = tuple(
-            _difference(point, bones.joint_m(_NECK)) for point in (bones.nose_m, bones.eyes_m)
+            subtract(point, bones.joint_m(_NECK)) for point in (bones.nose_m, bones.eyes_m)
         )
         self._body = WorkerBody(warehouse, bones)
         self.client: int = warehouse.client
@@ -124,7 +124,7 @@ class Worker:
         self.place(position_odom_m, heading_odom_rad)
         self.skin = WorkerSkin(self)
         self.actor: int = warehouse.add_actor(self.skin)
-        warehouse.add_actor(HeldThing(self))
+        warehouse.add_actor(HeldObject(self))
 
     def place(
         self,
@@ -138,43 +138,40 @@ class Worker:
         eye_yaw_rad: float = 0.0,
         eye_pitch_rad: float = 0.0,
         activity: str | Activity = "none",
-        feet: Footing | None = None,
+        feet: GaitPose | None = None,
     ) -> None:
-        """Put the person somewhere in some posture; the same arguments give the same posture.
+        """Place the person in a posture. The same arguments always give the same posture.
 
         Args:
-            position_odom_m: (2,) of the body's centre line.
+            position_odom_m: (2,) the body's centre line.
             heading_odom_rad: of the body, counter-clockwise from odom x.
             walked_m: distance walked so far; it sets the phase of the gait.
-            speed_mps: ≥ 0; of a straight walk, 0 stands.
+            speed_mps: speed of a straight walk, in [0, 3]; 0 stands.
             head_yaw_rad: of the head from the body, left positive, within ±80°.
-            head_pitch_rad: up positive, within ±40°.
+            head_pitch_rad: of the head, up positive, within ±40°.
             eye_yaw_rad: of the eyes from the head, left positive, within ±35°.
-            eye_pitch_rad: up positive, within ±25°.
-            activity: what the hands do: ``"none"``, ``"carry_box"``, ``"phone"``, or on the way.
-            feet: where feet and hips of this body are, in odom, from :func:`footstep_table`; None
-                walks straight on by ``walked_m`` and ``speed_mps``.
+            eye_pitch_rad: of the eyes from the head, up positive, within ±25°.
+            activity: ``"none"``, ``"carry_box"``, ``"phone"``, or a change between two of them.
+            feet: gait pose in odom, as :func:`plan_footsteps` and :class:`OnlineFootsteps` give it;
+                None takes the straight walk of ``walked_m`` and ``speed_mps``.
 
         Raises:
-            SimError: for a value that is not finite or out of range; nothing is moved then.
+            SimError: for a value that is not finite or out of range; the person is not moved then.
         """
         x, y = finite_array("position_odom_m", position_odom_m, (2,), SimError).tolist()
         heading = finite_number("heading_odom_rad", heading_odom_rad, SimError)
         walked = finite_number("walked_m", walked_m, SimError)
         speed = finite_number("speed_mps", speed_mps, SimError, minimum=0.0, maximum=3.0)
         head = (
-            _angle("head_yaw_rad", head_yaw_rad, MAX_HEAD_YAW_RAD),
-            _angle("head_pitch_rad", head_pitch_rad, MAX_HEAD_PITCH_RAD),
+            _checked_angle("head_yaw_rad", head_yaw_rad, MAX_HEAD_YAW_RAD),
+            _checked_angle("head_pitch_rad", head_pitch_rad, MAX_HEAD_PITCH_RAD),
         )
         eyes = (
-            _angle("eye_yaw_rad", eye_yaw_rad, MAX_EYE_YAW_RAD),
-            _angle("eye_pitch_rad", eye_pitch_rad, MAX_EYE_PITCH_RAD),
+            _checked_angle("eye_yaw_rad", eye_yaw_rad, MAX_EYE_YAW_RAD),
+            _checked_angle("eye_pitch_rad", eye_pitch_rad, MAX_EYE_PITCH_RAD),
         )
-        doing = activity if isinstance(activity, Activity) else _activity(activity)
-        if feet is None:
-            footing, local = self.gait.footing(walked, speed), True
-        else:
-            footing, local = feet, False
+        doing = activity if isinstance(activity, Activity) else _checked_activity(activity)
+        gait_pose = self.gait.pose(walked, speed) if feet is None else feet
         self._x_m, self._y_m, self._heading_rad = x, y, heading
         self._activity, self._eyes = doing, eyes
         self._keypoints: FloatArray | None = None
@@ -182,22 +179,22 @@ class Worker:
         self._pose: BodyPose | None = None
         self._links: FloatArray | None = None
         self._head_rotation: FloatArray | None = None
-        self._bend(footing, local, head)
-        self._body.put(self._hips_odom_m, self._pelvis, self._joints, doing.held == "box")
+        self._solve_joints(gait_pose, head, local=feet is None)
+        self._body.place(self._hips_odom_m, self._pelvis, self._joints, doing.held == "box")
 
     @property
     def asset(self) -> WorkerAsset:
-        """Whose body it is."""
+        """The shipped worker whose body it is."""
         return self.skeleton.asset
 
     @property
     def stature_m(self) -> float:
-        """Height of the body standing, with shoes."""
+        """Standing height with shoes."""
         return self.skeleton.stature_m
 
     @property
     def position_odom_m(self) -> FloatArray:
-        """(2,) the body's centre line."""
+        """(2,) position of the body's centre line."""
         return np.array([self._x_m, self._y_m])
 
     @property
@@ -207,14 +204,14 @@ class Worker:
 
     @property
     def held(self) -> Literal["box", "phone"] | None:
-        """What is in the hands."""
+        """The object in the hands; None for empty ones."""
         return self._activity.held
 
     @property
     def T_odom_held(self) -> FloatArray | None:  # noqa: N802
-        """(4, 4) of what is held, its middle as origin; None with empty hands.
+        """(4, 4) pose of the held object, with its middle as origin; None with empty hands.
 
-        A box of :data:`BOX_SIZE_M` has x forward and z up, a phone of :data:`PHONE_SIZE_M` its
+        A box (:data:`BOX_SIZE_M`) has x forward and z up. A phone (:data:`PHONE_SIZE_M`) has its
         screen towards −x and its long side along z.
         """
         if self.held is None:
@@ -228,10 +225,10 @@ class Worker:
 
     @property
     def pose(self) -> BodyPose:
-        """The whole posture: what draws the body needs no more."""
+        """The pose from which the body is drawn."""
         if self._pose is None:
             T_odom_body = np.eye(4)
-            rotation = matrix(self._pelvis)
+            rotation = rotation_matrix(self._pelvis)
             T_odom_body[:3, :3] = rotation
             T_odom_body[:3, 3] = self._hips_odom_m - rotation @ self.skeleton.hips_m
             rotvecs = np.array([rotation_vector(joint) for joint in self._joints])
@@ -242,26 +239,24 @@ class Worker:
 
     @property
     def links_odom(self) -> FloatArray:
-        """(17, 4, 4) of :func:`link_transforms` now."""
+        """(17, 4, 4) link transforms to odom; see :func:`link_transforms`."""
         if self._links is None:
             self._links = link_transforms(self.asset.joints_m, self.pose)
         return self._links
 
     @property
     def chest_odom_m(self) -> FloatArray:
-        """(3,) the body's centre line at chest height: 0.7 shoulders + 0.3 hips (keypoints)."""
-        shoulders = _sum(self._waist_odom_m, turned(self._thorax, self._chest[0]))
-        hips = _sum(self._hips_odom_m, turned(self._pelvis, self._chest[1]))
-        rest = 1.0 - _CHEST_SHOULDERS
-        return np.array(
-            [_CHEST_SHOULDERS * a + rest * b for a, b in zip(shoulders, hips, strict=True)]
-        )
+        """(3,) centre line at chest height: 0.7 of the shoulder and 0.3 of the hip keypoints."""
+        shoulders = add(self._waist_odom_m, rotate(self._thorax, self._chest[0]))
+        hips = add(self._hips_odom_m, rotate(self._pelvis, self._chest[1]))
+        rest = 1.0 - _CHEST_SHARE
+        return np.array([_CHEST_SHARE * a + rest * b for a, b in zip(shoulders, hips, strict=True)])
 
     @property
     def rotation_odom_head(self) -> FloatArray:
-        """(3, 3) the paper's head frame (x down, y forward, z right) in odom."""
+        """(3, 3) rotation of the paper's head frame (x down, y forward, z right) in odom."""
         if self._head_rotation is None:
-            forward, left, up = matrix(self._head).T.tolist()
+            forward, left, up = rotation_matrix(self._head).T.tolist()
             rotation = np.array([[-u, f, -s] for u, f, s in zip(up, forward, left, strict=True)])
             rotation.setflags(write=False)
             self._head_rotation = rotation
@@ -269,33 +264,33 @@ class Worker:
 
     @property
     def gaze_odom(self) -> FloatArray:
-        """(3,) unit vector of the gaze: the head's forward axis turned by the eyes."""
+        """(3,) unit vector of the gaze: the head's forward axis rotated by the eyes."""
         yaw, pitch = self._eyes
         cos = math.cos(pitch)
         return np.array(
-            turned(self._head, (cos * math.cos(yaw), cos * math.sin(yaw), math.sin(pitch)))
+            rotate(self._head, (cos * math.cos(yaw), cos * math.sin(yaw), math.sin(pitch)))
         )
 
     @property
     def position_nose_odom_m(self) -> FloatArray:
         """(3,) tip of the nose, the origin of the head frame."""
-        return np.array(_sum(self._neck_odom_m, turned(self._head, self._face[0])))
+        return np.array(add(self._neck_odom_m, rotate(self._head, self._face[0])))
 
     @property
     def eyes_odom_m(self) -> FloatArray:
         """(3,) midpoint of the eyes."""
-        return np.array(_sum(self._neck_odom_m, turned(self._head, self._face[1])))
+        return np.array(add(self._neck_odom_m, rotate(self._head, self._face[1])))
 
     @property
     def T_odom_eyes(self) -> FloatArray:  # noqa: N802
-        """(4, 4) optical frame of a camera between the eyes, looking where the head points."""
+        """(4, 4) optical frame of a camera between the eyes that looks along the head's axis."""
         pose = np.eye(4)
         pose[:3, :3] = self.rotation_odom_head @ _ROTATION_HEAD_OPTICAL
         pose[:3, 3] = self.eyes_odom_m
         return pose
 
     def reach_odom_m(self) -> FloatArray:
-        """(2, 3) low and high corner of a generous box about all of the body in any posture."""
+        """Return (2, 3) the low and high corner of a box that holds the body in any posture."""
         if self._reach is None:
             side, top = _REACH_M * self.skeleton.scale, 1.15 * self.skeleton.stature_m
             low, high = self.position_odom_m - side, self.position_odom_m + side
@@ -304,9 +299,9 @@ class Worker:
 
     @property
     def keypoints_odom_m(self) -> FloatArray:
-        """(23, 3) COCO's 17 keypoints, then big toe, small toe and heel, left and right."""
+        """(23, 3) COCO's 17 keypoints, then big toe, small toe and heel, left before right."""
         if self._keypoints is None:
-            self._keypoints = _keypoints(self.asset).odom_m(self.pose)
+            self._keypoints = _skinned_keypoints(self.asset).odom_m(self.pose)
             self._keypoints.setflags(write=False)
         return self._keypoints
 
@@ -315,54 +310,58 @@ class Worker:
         """(3,) midpoint of the shoulder keypoints."""
         return np.asarray(self.keypoints_odom_m[[LEFT_SHOULDER, RIGHT_SHOULDER]].mean(axis=0))
 
-    def _bend(self, footing: Footing, local: bool, head: tuple[float, float]) -> None:
-        """Joint angles from feet, hips, head and hands, in the frame of the heading, then odom."""
+    def _solve_joints(self, gait_pose: GaitPose, head: tuple[float, float], *, local: bool) -> None:
+        """Set all joints from feet, hips, head and hands.
+
+        The joints are solved in the heading frame: the body's position with x along its heading.
+        Feet that are ``local`` are given in it, others in odom.
+        """
         activity = self._activity
-        pelvis = product(about_z(footing.pelvis_yaw_rad), about_x(footing.pelvis_list_rad))
-        lean = _LEAN_RAD * footing.vigour * (1.0 - activity.upright)
-        thorax = product(about_z(footing.thorax_yaw_rad), about_y(lean))
-        facing = product(about_z(head[0]), about_y(-head[1]))
-        hips = (0.0, footing.sway_m, footing.hip_height_m)
+        pelvis = multiply(
+            rotation_z(gait_pose.pelvis_yaw_rad), rotation_x(gait_pose.pelvis_list_rad)
+        )
+        lean = _LEAN_RAD * gait_pose.stride_ratio * (1.0 - activity.upright)
+        thorax = multiply(rotation_z(gait_pose.thorax_yaw_rad), rotation_y(lean))
+        facing = multiply(rotation_z(head[0]), rotation_y(-head[1]))
+        hips = (0.0, gait_pose.sway_m, gait_pose.hip_height_m)
         back = inverse(pelvis)
         legs: list[Quaternion] = []
-        for side in (0, 1):
-            ankle, yaw, pitch = self._ankle(footing.feet[side], local)
-            hip = _sum(hips, turned(pelvis, self._hips[side]))
-            # The knee points part of the way to the toes, the ankle turns the rest.
-            knee_yaw = footing.pelvis_yaw_rad + _KNEE_SHARE * (yaw - footing.pelvis_yaw_rad)
-            across = turned(back, (-math.sin(knee_yaw), math.cos(knee_yaw), 0.0))
+        for side in (LEFT, RIGHT):
+            foot = gait_pose.feet[side]
+            ankle, yaw, pitch = (foot[:3], *foot[3:]) if local else self._local_ankle(foot)
+            hip = add(hips, rotate(pelvis, self._hips[side]))
+            knee_yaw = gait_pose.pelvis_yaw_rad + _KNEE_YAW_SHARE * (yaw - gait_pose.pelvis_yaw_rad)
+            across = rotate(back, (-math.sin(knee_yaw), math.cos(knee_yaw), 0.0))
             leg = self.skeleton.legs[side]
-            thigh, bend = leg.solve(turned(back, _difference(ankle, hip)), across)
-            knee = about(leg.axis, bend)
-            foot = product(back, product(about_z(yaw), about_y(pitch)))
-            legs += (thigh, knee, product(inverse(product(thigh, knee)), foot))
-        eye = product(about_z(self._eyes[0]), about_y(-self._eyes[1]))
-        left, right = self._arms.arms(footing, activity)
+            thigh, bend = leg.solve(rotate(back, subtract(ankle, hip)), across)
+            knee = axis_angle(leg.axis, bend)
+            turned_foot = multiply(back, multiply(rotation_z(yaw), rotation_y(pitch)))
+            legs += (thigh, knee, multiply(inverse(multiply(thigh, knee)), turned_foot))
+        eye = multiply(rotation_z(self._eyes[0]), rotation_y(-self._eyes[1]))
+        left, right = self._arms.arms(gait_pose, activity)
         self._joints: tuple[Quaternion, ...] = (
-            product(back, thorax),
-            product(inverse(thorax), facing),
+            multiply(back, thorax),
+            multiply(inverse(thorax), facing),
             eye,
             eye,
             *left,
             *right,
             *legs,
         )
-        heading = about_z(self._heading_rad)
-        x, y, z = turned(heading, hips)
+        heading = rotation_z(self._heading_rad)
+        x, y, z = rotate(heading, hips)
         self._hips_odom_m: Vector = (self._x_m + x, self._y_m + y, z)
-        self._pelvis: Quaternion = product(heading, pelvis)
-        self._thorax: Quaternion = product(heading, thorax)
-        self._head: Quaternion = product(heading, facing)
-        self._waist_odom_m = _sum(self._hips_odom_m, turned(self._pelvis, self._waist))
-        self._neck_odom_m = _sum(self._waist_odom_m, turned(self._thorax, self._neck))
+        self._pelvis: Quaternion = multiply(heading, pelvis)
+        self._thorax: Quaternion = multiply(heading, thorax)
+        self._head: Quaternion = multiply(heading, facing)
+        self._waist_odom_m = add(self._hips_odom_m, rotate(self._pelvis, self._waist))
+        self._neck_odom_m = add(self._waist_odom_m, rotate(self._thorax, self._neck))
 
-    def _ankle(
-        self, foot: tuple[float, float, float, float, float], local: bool
+    def _local_ankle(
+        self, foot: tuple[float, float, float, float, float]
     ) -> tuple[Vector, float, float]:
-        """Ankle, yaw and pitch of a foot in the frame of the heading."""
+        """Return ankle, yaw and pitch of a foot, from odom to the heading frame."""
         x, y, z, yaw, pitch = foot
-        if local:
-            return (x, y, z), yaw, pitch
         cos, sin = math.cos(self._heading_rad), math.sin(self._heading_rad)
         dx, dy = x - self._x_m, y - self._y_m
         ankle = (cos * dx + sin * dy, cos * dy - sin * dx, z)
@@ -370,19 +369,19 @@ class Worker:
 
 
 @lru_cache(maxsize=64)
-def _keypoints(asset: WorkerAsset) -> BentPoints:
-    return BentPoints(asset.joints_m, asset.keypoints_m, asset.keypoint_weights)
+def _skinned_keypoints(asset: WorkerAsset) -> SkinnedPoints:
+    return SkinnedPoints(asset.joints_m, asset.keypoints_m, asset.keypoint_weights)
 
 
-def _activity(name: str) -> Activity:
+def _checked_activity(name: str) -> Activity:
     if name not in ACTIVITIES:
         valid = ", ".join(map(repr, ACTIVITIES))
         raise SimError(f"activity must be one of {valid}, got {name!r}")
     return Activity(name, name)
 
 
-def _angle(name: str, value: float, limit_rad: float) -> float:
-    """A finite angle within ±limit; rounding at the limit is forgiven."""
+def _checked_angle(name: str, value: float, limit_rad: float) -> float:
+    """Return a finite angle within ±limit, with a tolerance for rounding errors."""
     angle = finite_number(name, value, SimError)
     if abs(angle) > limit_rad + 1e-9:
         raise SimError(
@@ -390,11 +389,3 @@ def _angle(name: str, value: float, limit_rad: float) -> float:
             f"got {angle:g} rad"
         )
     return angle
-
-
-def _sum(first: Vector, second: Vector) -> Vector:
-    return (first[0] + second[0], first[1] + second[1], first[2] + second[2])
-
-
-def _difference(first: Vector, second: Vector) -> Vector:
-    return (first[0] - second[0], first[1] - second[1], first[2] - second[2])

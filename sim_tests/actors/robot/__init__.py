@@ -1,8 +1,27 @@
-"""The robot: its physics and its looks."""
+"""The robot: its physics, its dimensions and limits, and its visual meshes."""
 
 from __future__ import annotations
 
-from ._amr import NOVA_CARTER, Amr
+from ._amr import (
+    CAMERA_FORWARD_M,
+    CAMERA_HEIGHT_M,
+    MAX_YAW_RATE_RADPS,
+    NOVA_CARTER,
+    TRACK_M,
+    WHEEL_RADIUS_M,
+    Amr,
+)
 from ._look import AmrLook
+from ._meshes import amr_meshes
 
-__all__ = ["NOVA_CARTER", "Amr", "AmrLook"]
+__all__ = [
+    "CAMERA_FORWARD_M",
+    "CAMERA_HEIGHT_M",
+    "MAX_YAW_RATE_RADPS",
+    "NOVA_CARTER",
+    "TRACK_M",
+    "WHEEL_RADIUS_M",
+    "Amr",
+    "AmrLook",
+    "amr_meshes",
+]

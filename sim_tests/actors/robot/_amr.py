@@ -1,4 +1,4 @@
-"""A mobile robot that drives through its wheels, with a camera on a post."""
+"""A differential-drive robot with a camera on a post."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ...world import ROBOT_GROUP, Warehouse
 from ...world.bullet import pybullet
 from ...world.errors import SimError
 
-#: Nova Carter's published outline, its centre midway between the drive wheels.
+#: Nova Carter's published outline; its centre is midway between the drive wheels.
 NOVA_CARTER: Final = RobotProfile(
     footprint_m=np.array([[0.3625, 0.25], [-0.3625, 0.25], [-0.3625, -0.25], [0.3625, -0.25]]),
     max_speed_mps=1.5,
@@ -32,12 +32,12 @@ CAMERA_HEIGHT_M: Final = 1.4
 # Just ahead of the camera's housing, so that the robot does not see itself.
 CAMERA_FORWARD_M: Final = 0.165
 
-# Where a camera that looks all around sits: above the head and the beacon on the post.
+# Position of a camera that looks all around: above everything on the post.
 _ABOVE_POST_M: Final = (0.12, 0.0, 1.55)
 
-# Ample for 98 kg at 1 m/s² on two wheels (7 N·m each), too little to spin the tyres on the floor.
+# More than 98 kg at 1 m/s² need on two wheels (7 N·m each), and too little to spin the tyres.
 _MAX_WHEEL_TORQUE_NM: Final = 25.0
-_ON_FLOOR_TYRE_FRICTION: Final = 1.0
+_TYRE_FRICTION: Final = 1.0
 # The axes of the optical frame (x right, y down, z forward) in the base frame, as columns.
 _ROTATION_BASE_OPTICAL: Final = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 
@@ -46,16 +46,16 @@ class Amr:
     """A differential-drive robot in a warehouse.
 
     The base frame lies on the floor midway between the drive wheels (REP-105's base_footprint):
-    x forward, y left, z up. Speeds follow the command through acceleration limits and velocity
-    motors with a torque limit on the two wheel joints; nothing but these motors moves it.
+    x forward, y left, z up. Only the motors of the two wheel joints move the robot. Their speeds
+    follow the command within acceleration limits and a torque limit.
 
     Args:
-        warehouse: the world that it drives in.
-        position_odom_m: (2,) start, metres.
-        heading_odom_rad: start, counter-clockwise from odom x.
-        profile: its limits; the body is that of :data:`NOVA_CARTER` whatever they are.
-        camera_pitch_rad: how far the camera looks down, in (−π/2, π/2).
-        camera_mount: ``"front"`` of the head on the post, or on its ``"top"``.
+        warehouse: the world to drive in.
+        position_odom_m: (2,) start.
+        heading_odom_rad: heading at the start, counter-clockwise from odom x.
+        profile: limits of the motion; the body is always that of :data:`NOVA_CARTER`.
+        camera_pitch_rad: pitch of the camera, down positive, in (−π/2, π/2).
+        camera_mount: ``"front"`` or ``"top"`` of the post.
 
     Attributes:
         body: PyBullet's id of the robot.
@@ -107,9 +107,9 @@ class Amr:
         self._drive()
 
     def command(self, speed_mps: float, yaw_rate_radps: float) -> None:
-        """Set what the robot shall do from now on: m/s forwards and rad/s counter-clockwise.
+        """Set the target speed (m/s forwards) and yaw rate (rad/s counter-clockwise).
 
-        Beyond the robot's limits the command is cut to them, as its motor controller would.
+        A command beyond the robot's limits is clipped, as by its motor controller.
         """
         speed = finite_number("speed_mps", speed_mps, SimError)
         yaw_rate = finite_number("yaw_rate_radps", yaw_rate_radps, SimError)
@@ -118,7 +118,7 @@ class Amr:
         self._target_yaw_rate_radps = min(max(yaw_rate, -MAX_YAW_RATE_RADPS), MAX_YAW_RATE_RADPS)
 
     def advance(self, dt_s: float) -> None:
-        """Ramp the wheels towards the command by ``dt_s`` > 0; call it before each physics step."""
+        """Ramp the wheels towards the command for ``dt_s`` > 0; call it before a physics step."""
         dt = finite_number("dt_s", dt_s, SimError, minimum=0.0, exclusive_minimum=True)
         if (
             self._speed_mps == self._target_speed_mps
@@ -139,11 +139,11 @@ class Amr:
 
     @property
     def driven_speed_mps(self) -> float:
-        """Speed that the motors ask for now; whoever pushes the robot does not change it."""
+        """Present target speed of the motors; a push from outside does not change it."""
         return self._speed_mps
 
     def state(self, stamp_s: float) -> RobotState:
-        """Where the robot is and how it moves, from the physics."""
+        """Return the robot's state in the physics."""
         T, speed, yaw_rate, _ = self._motion()
         return RobotState(
             stamp_s=stamp_s,
@@ -155,14 +155,14 @@ class Amr:
 
     @property
     def velocity_odom_mps(self) -> FloatArray:
-        """(2,) velocity of the base origin, along the heading."""
+        """(2,) velocity of the base origin, which points along the heading."""
         T, speed, _, _ = self._motion()
         heading = math.atan2(T[1, 0], T[0, 0])
         return speed * np.array([math.cos(heading), math.sin(heading)])
 
     @property
     def T_odom_base(self) -> FloatArray:  # noqa: N802
-        """(4, 4) pose of the base frame in odom, with the slight pitch of the real motion."""
+        """(4, 4) pose of the base frame in odom, with the slight pitch of its motion."""
         return self._motion()[0]
 
     @property
@@ -171,7 +171,7 @@ class Amr:
         return self._motion()[3]
 
     def _motion(self) -> tuple[FloatArray, float, float, FloatArray]:
-        """T_odom_base, speed (m/s), yaw rate (rad/s) and T_odom_camera; read once a step."""
+        """Return T_odom_base, speed, yaw rate and T_odom_camera; they are read once per step."""
         if self._read_at_step == self._warehouse.steps:
             return self._last_motion
         self._read_at_step = self._warehouse.steps
@@ -207,8 +207,8 @@ class Amr:
             pybullet.changeDynamics(
                 self.body,
                 link,
-                # Casters and body slide freely; only the tyres hold.
-                lateralFriction=_ON_FLOOR_TYRE_FRICTION if rolls else 0.0,
+                # Casters and body slide without friction.
+                lateralFriction=_TYRE_FRICTION if rolls else 0.0,
                 rollingFriction=0.0,
                 spinningFriction=0.0,
                 restitution=0.0,
@@ -237,7 +237,7 @@ class Amr:
 
 
 def _camera_pose(pitch_rad: float, on_top: bool) -> FloatArray:
-    """T_base_camera of a camera on the post that looks down by ``pitch_rad``."""
+    """Return T_base_camera of a camera on the post that looks down by ``pitch_rad``."""
     cos, sin = math.cos(pitch_rad), math.sin(pitch_rad)
     down = np.array([[cos, 0.0, sin], [0.0, 1.0, 0.0], [-sin, 0.0, cos]])  # about base y
     pose = np.eye(4)
@@ -248,9 +248,9 @@ def _camera_pose(pitch_rad: float, on_top: bool) -> FloatArray:
 
 
 def _ramped(now: float, target: float, rise: float, fall: float) -> float:
-    """One step from ``now`` towards ``target``: away from zero by ``rise``, towards it by ``fall``.
+    """Return a step from ``now`` to ``target``: by ``rise`` away from zero, by ``fall`` towards it.
 
-    A change of sign passes through zero first.
+    A change of sign stops at zero first.
     """
     if now * target < 0.0 or abs(target) < abs(now):
         end = target if now * target >= 0.0 else 0.0

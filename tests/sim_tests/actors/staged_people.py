@@ -1,4 +1,4 @@
-"""A robot that drives straight on among people, without perception or planner: quick to run."""
+"""A fast stage: a robot that drives straight ahead among people, without perception or planner."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ DT_S = 0.05
 
 
 @dataclass(frozen=True)
-class Film:
-    """What happened: rows of all people over time, and the robot."""
+class StageRun:
+    """The recorded run of a stage with P people at T times."""
 
     times_s: np.ndarray
     people: np.ndarray  # (T, P, 4) x, y, vx, vy
@@ -30,17 +30,17 @@ class Film:
 
     @property
     def speeds(self) -> np.ndarray:
-        """(T, P) of the people."""
+        """(T, P) speeds of the people."""
         return np.hypot(self.people[:, :, 2], self.people[:, :, 3])
 
     def crossing(self, person: int = 0) -> tuple[float, float]:
-        """When the person crosses y = 0 upwards, and how far ahead of the robot's middle."""
+        """Return the time of crossing y = 0 upwards, and x ahead of the robot's centre then."""
         y = self.people[:, person, 1]
         at = int(np.flatnonzero((y[:-1] < 0.0) & (y[1:] >= 0.0))[0])
         return float(self.times_s[at]), float(self.people[at, person, 0] - self.robot[at, 0])
 
 
-def film(
+def run_stage(
     people: list[dict[str, Any]],
     *,
     robot_mps: float = 0.8,
@@ -49,8 +49,8 @@ def film(
     layout: str = "open",
     robot: dict[str, float] | None = None,
     **scenario: Any,
-) -> Film:
-    """Run a stage with a robot that drives straight on."""
+) -> StageRun:
+    """Run a stage with a robot that drives straight ahead."""
     task = {"goal_x_m": 12.0, **(robot or {})}
     case = Scenario.model_validate(
         {
@@ -77,7 +77,7 @@ def film(
             places.append(stage.amr.T_odom_base[:2, 3].copy())
             stage.advance((tick + 1) * DT_S, meter)
         outcomes = stage.outcomes
-    return Film(
+    return StageRun(
         np.array(times),
         np.array(rows),
         np.array(headings),
@@ -89,7 +89,7 @@ def film(
 
 
 def crosser(reaction: str | None, **fields: Any) -> dict[str, Any]:
-    """Somebody who crosses the robot's way at x = 5 m upwards, seen or unseen by them."""
+    """Return a person who crosses the robot's line at x = 5 m; without a reaction unaware."""
     person: dict[str, Any] = {
         "name": "crosser",
         "route": [{"x_m": 5.0, "y_m": -4.0}, {"x_m": 5.0, "y_m": 4.0}],

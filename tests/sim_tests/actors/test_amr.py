@@ -1,4 +1,4 @@
-"""The robot: it follows its commands through its wheels, within its limits, without slipping."""
+"""The robot follows its commands within its limits, driven by wheels that do not slip."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ import pytest
 from nav_adapter import RobotState
 from sim_tests import SimError
 from sim_tests.actors.body import Worker
-from sim_tests.actors.robot import NOVA_CARTER, Amr
-from sim_tests.actors.robot._amr import (
+from sim_tests.actors.robot import (
     CAMERA_FORWARD_M,
     CAMERA_HEIGHT_M,
     MAX_YAW_RATE_RADPS,
+    NOVA_CARTER,
     TRACK_M,
     WHEEL_RADIUS_M,
+    Amr,
 )
 from sim_tests.world import Warehouse
 from sim_tests.world.bullet import pybullet
@@ -45,7 +46,7 @@ def _drive(
 
 
 def _trapezoid(t_s: np.ndarray, speed_mps: float) -> np.ndarray:
-    """Distance at constant acceleration up to ``speed_mps``."""
+    """Return the distance at constant acceleration up to ``speed_mps``."""
     ramp_s = speed_mps / A_MPS2
     return np.where(t_s < ramp_s, 0.5 * A_MPS2 * t_s**2, speed_mps * t_s - 0.5 * speed_mps * ramp_s)
 
@@ -59,7 +60,7 @@ def test_stands_still_without_a_command(hall: Warehouse) -> None:
 
 
 @pytest.mark.parametrize(("speed_mps", "duration_s"), [(0.15, 12.0), (1.5, 4.1)])
-def test_follows_the_ideal_trapezoid_straight_on(
+def test_follows_the_ideal_trapezoid_straight_ahead(
     hall: Warehouse, speed_mps: float, duration_s: float
 ) -> None:
     amr = Amr(hall, (-2.0, 0.0))
@@ -83,7 +84,7 @@ def test_stops_within_its_braking_distance(hall: Warehouse, speed_mps: float) ->
     assert abs(states[-1].speed_mps) < 1e-3
 
 
-def test_acceleration_keeps_to_its_limits(hall: Warehouse) -> None:
+def test_acceleration_stays_within_its_limits(hall: Warehouse) -> None:
     amr = Amr(hall, (-2.0, 0.0))
     states = []
     for speed in (1.5, 0.2, -0.5, 1.0):
@@ -99,7 +100,7 @@ def test_acceleration_keeps_to_its_limits(hall: Warehouse) -> None:
 def test_turns_on_the_spot(hall: Warehouse) -> None:
     amr = Amr(hall, (0.5, 0.2), -0.3)
     end = _drive(hall, amr, 3.0, 0.0, 0.5)[-1]
-    ideal = 0.5 * 3.0 - 0.5 * 0.5**2 / 3.0  # less the ramp at 3 rad/s²
+    ideal = 0.5 * 3.0 - 0.5 * 0.5**2 / 3.0  # minus the ramp at 3 rad/s²
     assert end.heading_odom_rad + 0.3 == pytest.approx(ideal, abs=0.01)
     assert end.yaw_rate_radps == pytest.approx(0.5, rel=0.02)
     np.testing.assert_allclose(end.position_odom_m, (0.5, 0.2), atol=0.005)
@@ -196,7 +197,7 @@ def test_camera_looks_along_the_heading_from_its_post(hall: Warehouse) -> None:
     assert np.linalg.det(tilted.T_base_camera) == pytest.approx(1.0)
 
 
-def test_commands_beyond_the_limits_are_cut(hall: Warehouse) -> None:
+def test_commands_beyond_the_limits_are_clipped(hall: Warehouse) -> None:
     amr = Amr(hall, (-2.0, 0.0))
     assert _drive(hall, amr, 2.0, 99.0)[-1].speed_mps == pytest.approx(1.5, rel=0.02)
     _drive(hall, amr, 2.0, 0.0)
@@ -206,7 +207,7 @@ def test_commands_beyond_the_limits_are_cut(hall: Warehouse) -> None:
 
 
 @pytest.mark.parametrize("bad", [float("nan"), float("inf"), "fast", None])
-def test_unusable_commands_are_refused_and_change_nothing(hall: Warehouse, bad: object) -> None:
+def test_invalid_commands_are_refused_and_change_nothing(hall: Warehouse, bad: object) -> None:
     amr, twin = Amr(hall, (0.0, -1.5)), Amr(hall, (0.0, 1.5))
     for robot in (amr, twin):
         robot.command(0.5, 0.1)

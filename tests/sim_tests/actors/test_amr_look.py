@@ -1,4 +1,4 @@
-"""The robot's look: where the robot is, wheels turned, never before its own camera."""
+"""The robot's visual actor: pose, turned wheels, and a free view for its own camera."""
 
 from __future__ import annotations
 
@@ -9,9 +9,15 @@ import pytest
 
 from perception import Camera
 from sim_tests import SimError
-from sim_tests.actors.robot import NOVA_CARTER, Amr, AmrLook
-from sim_tests.actors.robot._amr import CAMERA_FORWARD_M, CAMERA_HEIGHT_M, WHEEL_RADIUS_M
-from sim_tests.actors.robot._look import amr_meshes
+from sim_tests.actors.robot import (
+    CAMERA_FORWARD_M,
+    CAMERA_HEIGHT_M,
+    NOVA_CARTER,
+    WHEEL_RADIUS_M,
+    Amr,
+    AmrLook,
+    amr_meshes,
+)
 from sim_tests.world import Warehouse
 from sim_tests.world.bullet import pybullet
 from sim_tests.world.camera import CameraRenderer
@@ -33,11 +39,11 @@ def test_it_fills_its_footprint_and_stands_on_the_floor() -> None:
     assert sum(piece[0].triangles for pieces in amr_meshes().values() for piece in pieces) < 1500
 
 
-def test_nothing_of_it_is_before_its_camera() -> None:
+def test_no_part_of_it_is_in_view_of_its_camera() -> None:
     ((base, _, _),) = amr_meshes()["base_link"]
     ahead = base.vertices_m[:, 0] - CAMERA_FORWARD_M
     off_axis = np.abs(base.vertices_m[:, 2] - CAMERA_HEIGHT_M)
-    # Whatever lies ahead of the lens lies more than 45° below its axis.
+    # Parts ahead of the lens lie more than 45° below its axis.
     assert (off_axis[ahead > 0.0] > ahead[ahead > 0.0]).all()
     assert (ahead[off_axis < 0.3] < 0.0).all()
 
@@ -70,7 +76,7 @@ def test_it_is_drawn_where_the_robot_is_and_its_camera_does_not_see_it(heading_r
         outline = NOVA_CARTER.footprint_m
         assert (in_base[:, :2] > outline.min(axis=0) - 0.02).all()
         assert (in_base[:, :2] < outline.max(axis=0) + 0.02).all()
-        # Seen from above its cover shows, 12 mm smaller all round, to the pixel of 9 mm.
+        # From above the cover is visible, which is 12 mm smaller all round; a pixel is 9 mm.
         np.testing.assert_allclose(np.ptp(in_base[:, :2], axis=0), (0.70, 0.476), atol=0.025)
         low, high = look.bounds_odom_m()
         world = seen + np.array([*amr.T_odom_base[:2, 3], 0.0])
@@ -99,7 +105,7 @@ def test_its_wheels_turn_as_far_as_it_has_rolled() -> None:
             assert math.remainder(turned - rolled, math.tau) == pytest.approx(0.0, abs=0.02)
 
 
-def test_a_look_without_bodies_says_so() -> None:
+def test_a_look_cannot_be_shown_before_it_is_built() -> None:
     look = AmrLook(lambda: (np.eye(4), 0.0, 0.0))
     assert look.bodies() == frozenset()
     with pytest.raises(SimError, match="build"):

@@ -1,4 +1,4 @@
-"""Glances: their statistics against closed forms, and what head and eyes make of them."""
+"""Glances: their statistics against closed forms, and the motion of head and eyes."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ from scipy.integrate import quad
 from scipy.stats import norm
 
 from sim_tests import SimError
-from sim_tests.actors.behaviour import RobotBody
+from sim_tests.actors.behaviour import Glances, RobotBody
 from sim_tests.actors.behaviour._gaze import Gaze, GlanceProcess, LogNormalDuration
-from sim_tests.actors.behaviour._spec import Glances
 
 GLANCE = LogNormalDuration.fitted(0.83, (0.47, 1.50))
 AWAY = LogNormalDuration.fitted(1.03, (0.63, 1.98))
@@ -25,13 +24,16 @@ def survival(length: LogNormalDuration, t_s: float) -> float:
 
 
 def looked_within(tau_s: float) -> float:
-    """Of a stationary alternating process: looks now, or has looked away for less than tau."""
+    """Return the probability of a look within the last ``tau_s`` of a stationary process.
+
+    The person looks now, or has looked away for less than ``tau_s``.
+    """
     recent, _ = quad(lambda age: survival(AWAY, age), 0.0, tau_s)
     return (GLANCE.mean_s + recent) / (GLANCE.mean_s + AWAY.mean_s)
 
 
 @pytest.mark.parametrize("length", [GLANCE, AWAY])
-def test_lengths_have_the_median_mean_and_quartile_ratio_that_they_were_fitted_to(length):
+def test_drawn_durations_have_the_fitted_median_mean_and_quartile_ratio(length):
     rng = np.random.default_rng(1)
     drawn = np.array([length.draw_s(rng) for _ in range(20_000)])
     lower, median, upper = np.quantile(drawn, (0.25, 0.5, 0.75))
@@ -44,13 +46,13 @@ def test_the_fit_gives_the_quartiles_of_the_data():
     for length, (lower, upper) in ((GLANCE, (0.47, 1.50)), (AWAY, (0.63, 1.98))):
         spread = math.exp(norm.ppf(0.75) * length.sigma)
         assert spread**2 == pytest.approx(upper / lower)
-        # The medians lie a little beside the middle of the quartiles: a lognormal cannot follow.
+        # The medians are not exactly the geometric means of the quartiles, as a lognormal's are.
         assert length.median_s / spread == pytest.approx(lower, rel=0.10)
         assert length.median_s * spread == pytest.approx(upper, rel=0.10)
 
 
-def test_residual_lengths_are_those_of_renewal_theory():
-    """The mean of what is left is E[X²] / 2 E[X]."""
+def test_residual_durations_agree_with_renewal_theory():
+    """The mean residual is E[X²] / 2 E[X]."""
     rng = np.random.default_rng(2)
     left = np.array([AWAY.residual_s(rng) for _ in range(40_000)])
     expected = 0.5 * AWAY.mean_s * math.exp(AWAY.sigma**2)
@@ -60,12 +62,12 @@ def test_residual_lengths_are_those_of_renewal_theory():
     np.testing.assert_allclose(shares, exact, atol=0.012)
 
 
-def test_a_stationary_start_stays_stationary_and_gives_the_figures_that_are_stated():
+def test_a_stationary_start_stays_stationary_and_gives_the_stated_figures():
     count, grid_s = 3000, 0.1
     looking = np.zeros((count, 51), dtype=bool)
     for row, rng in zip(looking, np.random.default_rng(3).spawn(count), strict=True):
         process = GlanceProcess(GLANCE, AWAY, rng)
-        process.begin_anywhere(0.0)
+        process.begin_stationary(0.0)
         row[:] = [process.looking(grid_s * n) for n in range(51)]
     share = GLANCE.mean_s / (GLANCE.mean_s + AWAY.mean_s)
     error = 4.0 * math.sqrt(share * (1.0 - share) / count)
@@ -75,12 +77,12 @@ def test_a_stationary_start_stays_stationary_and_gives_the_figures_that_are_stat
     for tau_s, figure in stated.items():
         assert looked_within(tau_s) == pytest.approx(figure, abs=0.006)
         back = round(tau_s / grid_s)
-        # A grid of 0.1 s misses glances shorter than that: the truth lies a little above.
+        # A grid of 0.1 s misses shorter glances, so the true figure is a little larger.
         simulated = looking[:, 50 - back :].any(axis=1).mean()
         assert simulated == pytest.approx(figure, abs=0.035)
 
 
-def test_the_share_of_lookers_that_is_nearest_to_the_data():
+def test_the_stated_share_of_lookers_fits_the_data_best():
     process = np.array([looked_within(tau_s) for tau_s in OBSERVED])
     data = np.array(list(OBSERVED.values()))
     share = float(data @ process / (process @ process))
@@ -95,19 +97,19 @@ def robot_at(x: float, y: float, height_m: float = 1.4) -> RobotBody:
 
 
 def watch(gaze: Gaze, path, seconds: float, sees=lambda t: True, dt_s: float = 0.05):
-    """Rows t, head yaw, head pitch, eye yaw, eye pitch, looking of a person at the origin."""
+    """Return rows t, head yaw and pitch, eye yaw and pitch, looking of a person at the origin."""
     rows = []
     for n in range(round(seconds / dt_s)):
         t = n * dt_s
         robot = path(t)
-        seen = gaze.could_see(dt_s, (0.0, 0.0, 0.0), robot) and sees(t)
-        gaze.tick(t, dt_s, (0.0, 0.0, 0.0), robot, seen)
-        rows.append((t, *gaze.at(dt_s), gaze.looking))
+        seen = gaze.in_field_of_view(dt_s, (0.0, 0.0, 0.0), robot) and sees(t)
+        gaze.update(t, dt_s, (0.0, 0.0, 0.0), robot, seen)
+        rows.append((t, *gaze.angles(dt_s), gaze.looking))
     return np.array(rows)
 
 
-def test_heads_turn_smoothly_at_human_speed_through_the_front_and_eyes_lead():
-    """A robot that passes behind somebody's back is lost on one side and found on the other."""
+def test_the_head_turns_smoothly_through_the_front_and_the_eyes_lead():
+    """A robot that passes behind a person is lost on one side and found on the other."""
     gaze = Gaze(Glances(watches=True, notices_within_m=20.0), 1.75, np.random.default_rng(0))
 
     def around(t: float) -> RobotBody:
@@ -121,7 +123,7 @@ def test_heads_turn_smoothly_at_human_speed_through_the_front_and_eyes_lead():
     assert np.abs(np.diff(rate)).max() <= 25.0 * 0.05 + 1e-6
     assert np.abs(yaw).max() <= math.radians(80.0) + 1e-9
     assert np.abs(eyes).max() <= math.radians(35.0) + 1e-9
-    # First to the left as far as it goes, in the end to the right; never through the back.
+    # First to the left limit, at the end to the right; never through the back.
     assert yaw.max() > 1.35
     assert yaw[-1] == pytest.approx(-1.2, abs=0.05)
     assert np.abs(np.diff(yaw)).max() < 0.2
@@ -129,7 +131,7 @@ def test_heads_turn_smoothly_at_human_speed_through_the_front_and_eyes_lead():
     assert np.abs(eyes[-5:]).max() < 0.02
 
 
-def test_nobody_notices_what_is_behind_hidden_or_far():
+def test_a_robot_behind_hidden_or_far_away_is_not_noticed():
     def noticed(where, sees=lambda t: True, **glances):
         gaze = Gaze(Glances(watches=True, **glances), 1.75, np.random.default_rng(0))
         watch(gaze, lambda t: robot_at(*where), 6.0, sees)
@@ -140,14 +142,14 @@ def test_nobody_notices_what_is_behind_hidden_or_far():
     assert noticed((13.0, 0.0)) is None
     assert noticed((3.0, 0.0), notices_within_m=0.0) is None
     assert noticed((3.0, 0.0), looker_share=0.0) is None
-    # Nor one who looks the other way: the head, not the body, has the eyes.
+    # The field of view turns with the head, not with the body.
     assert noticed((0.0, -3.0), away_yaw_deg=80.0) is None
     assert noticed((0.0, -3.0)) is not None
     assert noticed((3.0, 0.0), lambda t: t > 2.0) == pytest.approx(2.3, abs=0.2)
     assert noticed((3.0, 0.0), first_glance_delay_s=1.5) == pytest.approx(1.5, abs=0.2)
 
 
-def test_glances_alternate_and_end_for_good_when_given_up():
+def test_glances_alternate_and_stop_for_good_after_giving_up():
     def looks(**glances) -> np.ndarray:
         gaze = Gaze(Glances(**glances), 1.75, np.random.default_rng(4))
         return watch(gaze, lambda t: robot_at(5.0, 1.0), 40.0)[:, 5]
@@ -161,7 +163,7 @@ def test_glances_alternate_and_end_for_good_when_given_up():
     assert not ended[70:].any()
 
 
-def test_a_phone_is_looked_at_between_glances():
+def test_between_glances_the_head_points_at_the_phone():
     gaze = Gaze(
         Glances(notices_within_m=0.0, away_yaw_deg=10.0, away_pitch_deg=-40.0),
         1.75,
@@ -172,7 +174,7 @@ def test_a_phone_is_looked_at_between_glances():
     np.testing.assert_allclose(np.degrees(rows[:, 2]), -40.0, atol=1e-9)
 
 
-def test_quartiles_must_lie_about_the_median():
+def test_quartiles_must_lie_on_either_side_of_the_median():
     with pytest.raises(SimError, match="either side of the median"):
         LogNormalDuration.fitted(1.0, (1.2, 2.0))
     with pytest.raises(ValueError, match="glance_quartiles_s"):

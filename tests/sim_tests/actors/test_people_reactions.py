@@ -1,10 +1,10 @@
-"""What people do about a robot, on a real stage."""
+"""Reactions of people to a robot on a stage with physics."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from staged_people import crosser, film
+from staged_people import crosser, run_stage
 
 from sim_tests import Scenario, SimError, run_crossing
 from sim_tests.crossing import Stage
@@ -12,10 +12,10 @@ from sim_tests.crossing import Stage
 
 @pytest.fixture(scope="module")
 def unaware():
-    return film([crosser(None)])
+    return run_stage([crosser(None)])
 
 
-def test_one_who_has_not_seen_the_robot_walks_on_as_if_alone(unaware):
+def test_a_person_who_has_not_seen_the_robot_walks_as_if_alone(unaware):
     (outcome,) = unaware.outcomes
     assert outcome.noticed_s is None
     assert outcome.reaction == ""
@@ -24,17 +24,17 @@ def test_one_who_has_not_seen_the_robot_walks_on_as_if_alone(unaware):
 
 
 def test_walk_on_changes_nothing():
-    unaware, aware = (film([crosser(reaction, start_s=1.5)]) for reaction in (None, "walk_on"))
+    unaware, aware = (run_stage([crosser(reaction, start_s=1.5)]) for reaction in (None, "walk_on"))
     assert aware.outcomes[0].noticed_s is not None
     assert aware.outcomes[0].reaction == "walk_on"
-    assert aware.meter.min_separation_m > 0.3  # else one keeps off what one nearly touches
-    # Until there is something to decide, what is seen is kept away from a little.
+    assert aware.meter.min_separation_m > 0.3  # a nearer robot would be avoided
+    # Before the encounter a visible robot pushes the walker a little.
     np.testing.assert_allclose(aware.people[:, 0, :2], unaware.people[:, 0, :2], atol=0.1)
     assert aware.outcomes[0].time_s == pytest.approx(unaware.outcomes[0].time_s, abs=0.1)
 
 
-def test_wait_stops_before_the_robots_way_until_it_has_passed():
-    waiting = film([crosser("wait")], seconds=14.0)
+def test_wait_stops_short_of_the_robots_line_until_it_has_passed():
+    waiting = run_stage([crosser("wait")], seconds=14.0)
     assert waiting.outcomes[0].reaction == "wait"
     _, ahead_m = waiting.crossing()
     assert ahead_m < -0.36  # the robot is past
@@ -45,7 +45,7 @@ def test_wait_stops_before_the_robots_way_until_it_has_passed():
     assert waiting.outcomes[0].time_s > waiting.outcomes[0].free_time_s + 1.0
 
 
-def test_who_waits_for_a_robot_that_stands_waits_no_longer_than_some_seconds():
+def test_waiting_for_a_robot_that_stands_ends_after_some_seconds():
     """The robot drives, then stops for good short of the crossing."""
     result = run_crossing(
         Scenario.model_validate(
@@ -53,7 +53,7 @@ def test_who_waits_for_a_robot_that_stands_waits_no_longer_than_some_seconds():
                 "name": "stands",
                 "duration_s": 16.0,
                 "layout": "open",
-                # It stops where its goal is, before the person's way.
+                # It stops at its goal, short of the person's route.
                 "robot": {"goal_x_m": 3.4, "goal_tolerance_m": 0.01},
                 "people": [crosser("wait")],
             }
@@ -70,7 +70,7 @@ def test_who_waits_for_a_robot_that_stands_waits_no_longer_than_some_seconds():
 
 
 class _StopsAt:
-    """Drives straight on at 0.8 m/s and stops at x."""
+    """A planner that drives straight ahead at 0.8 m/s and stops at x."""
 
     def __init__(self, x_m: float) -> None:
         self._x_m = x_m
@@ -80,7 +80,7 @@ class _StopsAt:
 
 
 def test_hurry_goes_first_and_faster_within_human_limits():
-    hurrying = film([crosser("hurry", start_s=2.0)])
+    hurrying = run_stage([crosser("hurry", start_s=2.0)])
     assert hurrying.outcomes[0].reaction == "hurry"
     assert 1.3 * 1.34 < hurrying.speeds.max() <= 2.0 + 1e-6
     _, ahead_m = hurrying.crossing()
@@ -88,16 +88,16 @@ def test_hurry_goes_first_and_faster_within_human_limits():
     assert hurrying.outcomes[0].time_s < hurrying.outcomes[0].free_time_s - 0.5
 
 
-def test_claim_goes_first_without_haste():
-    claiming = film([crosser("claim", start_s=2.0)])
+def test_claim_goes_first_a_little_faster():
+    claiming = run_stage([crosser("claim", start_s=2.0)])
     assert claiming.outcomes[0].reaction == "claim"
     assert 1.36 < claiming.speeds.max() <= 1.1 * 1.34 + 1e-6
     _, ahead_m = claiming.crossing()
     assert ahead_m > 0.0
 
 
-def test_pass_behind_bends_the_way_behind_the_robot_without_stopping():
-    passing = film([crosser("pass_behind")])
+def test_pass_behind_walks_behind_the_robot_without_stopping():
+    passing = run_stage([crosser("pass_behind")])
     assert passing.outcomes[0].reaction == "pass_behind"
     _, ahead_m = passing.crossing()
     assert ahead_m < -0.36
@@ -109,8 +109,8 @@ def test_pass_behind_bends_the_way_behind_the_robot_without_stopping():
 
 
 @pytest.mark.parametrize("reaction", ["wait", "pass_behind"])
-def test_head_on_one_who_makes_way_steps_out_of_it(reaction):
-    head_on = film(
+def test_a_person_head_on_steps_aside_to_let_the_robot_pass(reaction):
+    head_on = run_stage(
         [crosser(reaction, route=[{"x_m": 9.0, "y_m": 0.0}, {"x_m": -2.0, "y_m": 0.0}])],
         seconds=9.0,
     )
@@ -122,15 +122,15 @@ def test_head_on_one_who_makes_way_steps_out_of_it(reaction):
 def test_reactions_are_drawn_by_their_shares():
     shares = {"wait": 0.5, "claim": 0.5}
     drawn = [
-        film([crosser(None) | {"reactions": shares, "glances": {"watches": True}}],
+        run_stage([crosser(None) | {"reactions": shares, "glances": {"watches": True}}],
              seconds=4.0, seed=seed).outcomes[0].reaction
         for seed in range(12)
     ]  # fmt: skip
     assert set(drawn) == {"wait", "claim"}
 
 
-def test_a_blind_person_runs_into_a_standing_robot_stops_there_and_finds_the_way_round():
-    bump = film(
+def test_a_blind_person_who_hits_a_standing_robot_stops_and_walks_around_it():
+    bump = run_stage(
         [crosser(None, start_s=0.0, glances={"notices_within_m": 0.0})],
         robot_mps=0.0,
         seconds=14.0,
@@ -141,7 +141,7 @@ def test_a_blind_person_runs_into_a_standing_robot_stops_there_and_finds_the_way
     touch_s = bump.meter.contacts[0].t_s
     after = np.searchsorted(bump.times_s, touch_s)
     assert bump.speeds[after + 1 : after + 4, 0].min() < 0.5
-    # Nobody walks through a robot, nor moves it.
+    # The person does not walk through the robot, and does not move it.
     inside = (np.abs(bump.people[:, 0, 0] - bump.robot[:, 0]) < 0.36) & (
         np.abs(bump.people[:, 0, 1] - bump.robot[:, 1]) < 0.25
     )
@@ -151,13 +151,13 @@ def test_a_blind_person_runs_into_a_standing_robot_stops_there_and_finds_the_way
 
 
 def test_a_blind_person_who_walks_into_the_side_of_a_moving_robot_is_the_cause():
-    side = film([crosser(None, start_s=3.6)], seconds=9.0)
+    side = run_stage([crosser(None, start_s=3.6)], seconds=9.0)
     assert side.meter.contacts
     assert side.meter.contacts[0].by == "person"
 
 
-def test_who_stands_behind_racks_never_notices():
-    hidden = film(
+def test_a_person_behind_racks_never_notices_the_robot():
+    hidden = run_stage(
         [
             {
                 "name": "hidden",
@@ -172,8 +172,8 @@ def test_who_stands_behind_racks_never_notices():
     assert hidden.outcomes[0].reaction == ""
 
 
-def test_at_a_blind_corner_one_notices_only_when_the_rack_lets_one():
-    corner = film(
+def test_at_a_blind_corner_the_robot_is_noticed_only_past_the_rack():
+    corner = run_stage(
         [crosser("wait", route=[{"x_m": 6.0, "y_m": -5.0}, {"x_m": 6.0, "y_m": 5.0}])],
         layout="crossing",
         seconds=8.0,
@@ -189,15 +189,15 @@ def test_at_a_blind_corner_one_notices_only_when_the_rack_lets_one():
     assert noticed_s > 2.4 + 1.0
 
 
-def test_people_react_alike_in_the_same_episode_and_apart_in_others():
+def test_the_same_seed_gives_the_same_reactions_and_another_seed_others():
     case = [crosser(None) | {"glances": {}, "reactions": {}}]
-    first, again, other = (film(case, seed=seed, seconds=7.0) for seed in (5, 5, 6))
+    first, again, other = (run_stage(case, seed=seed, seconds=7.0) for seed in (5, 5, 6))
     assert first.people.tobytes() == again.people.tobytes()
     assert first.heads.tobytes() == again.heads.tobytes()
     assert first.heads.tobytes() != other.heads.tobytes()
 
 
-def test_scripted_reacting_and_replayed_people_stand_in_that_order(tmp_path):
+def test_people_are_ordered_scripted_then_reacting_then_replayed(tmp_path):
     table = tmp_path / "one.csv"
     table.write_text("t_s,id,x_m,y_m\n0,a,9,3\n2,a,10,3\n")
     case = Scenario.model_validate(
@@ -218,7 +218,7 @@ def test_scripted_reacting_and_replayed_people_stand_in_that_order(tmp_path):
     assert not run_crossing(case.without_people(), policy="balanced").frames[0].truth
 
 
-def test_reactions_that_are_not_named_get_no_share():
+def test_unnamed_reactions_have_share_0():
     person = crosser("wait")
     case = {"name": "x", "duration_s": 1.0, "robot": {"goal_x_m": 1.0}, "people": [person, person]}
     with pytest.raises(ValueError, match="names of people must be unique"):
@@ -232,7 +232,7 @@ def test_reactions_that_are_not_named_get_no_share():
     assert reactions.walk_on == reactions.claim == reactions.hurry == 0.0
 
 
-def test_a_route_into_a_rack_ends_the_stage_cleanly():
+def test_a_route_into_a_rack_is_refused_by_the_stage():
     case = Scenario.model_validate(
         {
             "name": "x",

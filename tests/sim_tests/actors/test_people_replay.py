@@ -1,4 +1,4 @@
-"""Recorded people: exact at their rows, smooth between them, and what a table must hold."""
+"""Recorded people: exact at their rows, smooth between them; checks of the table."""
 
 from __future__ import annotations
 
@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 
 from sim_tests import SimError
-from sim_tests.actors.behaviour import replayed_people
-from sim_tests.actors.behaviour._person import ALONE
-from sim_tests.actors.behaviour._replayed import Replayed, read_recordings
+from sim_tests.actors.behaviour import ALONE, Replayed, read_recordings, replayed_people
 
 TABLE = """t_s, id, x_m, y_m, heading_rad, head_yaw_rad
 0.0, anna, 0.0, 0.0, 3.0, 0.0
@@ -43,14 +41,14 @@ def test_rows_are_met_exactly(table):
         assert motion.head_yaw_rad == pytest.approx(yaw, abs=1e-12)
 
 
-def test_between_rows_velocity_is_the_slope_and_headings_go_the_short_way(table):
+def test_between_rows_velocity_is_the_slope_and_headings_turn_the_short_way(table):
     anna, seven = replayed_people(table)
     for t in np.linspace(0.02, 0.78, 20):
         before, now, after = (anna.motion(t + dt, ALONE) for dt in (-1e-5, 0.0, 1e-5))
         slope = (after.position_odom_m - before.position_odom_m) / 2e-5
         np.testing.assert_allclose(now.velocity_odom_mps, slope, atol=1e-3)
         assert 3.0 <= now.heading_odom_rad <= math.tau - 3.1 + 1e-9
-    # Without headings the body faces the way it walks; outside of the rows it stands.
+    # Without headings the body faces along its path; before and after the rows it stands.
     assert seven.motion(0.5, ALONE).heading_odom_rad == pytest.approx(math.pi / 2)
     for t, y in ((-1.0, 5.0), (4.0, 6.0)):
         motion = seven.motion(t, ALONE)
@@ -72,7 +70,7 @@ def test_order_of_rows_and_columns_does_not_matter(table, tmp_path):
         np.testing.assert_array_equal(recording.times_s, here[recording.name].times_s)
 
 
-def test_one_row_is_somebody_who_stands(tmp_path):
+def test_a_person_with_one_row_stands(tmp_path):
     path = tmp_path / "one.csv"
     path.write_text("t_s,id,x_m,y_m,heading_rad\n2.0,a,1.0,-1.0,0.5\n")
     (recording,) = read_recordings(path)
@@ -101,13 +99,13 @@ def test_one_row_is_somebody_who_stands(tmp_path):
         ),
     ],
 )
-def test_what_a_table_must_hold(tmp_path, text, message):
+def test_invalid_tables_are_refused(tmp_path, text, message):
     path = tmp_path / "bad.csv"
     path.write_text(text)
     with pytest.raises(SimError, match=message):
         read_recordings(path)
 
 
-def test_a_file_that_is_not_there(tmp_path):
+def test_a_missing_file_is_refused(tmp_path):
     with pytest.raises(SimError, match="cannot read recorded people from"):
         read_recordings(tmp_path / "none.csv")

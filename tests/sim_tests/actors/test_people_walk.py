@@ -1,4 +1,4 @@
-"""Walking: routes, stops, racks, feet; without a robot."""
+"""Walkers without a reaction to a robot: routes, stops, racks, other people, feet."""
 
 from __future__ import annotations
 
@@ -10,10 +10,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sim_tests import SimError
-from sim_tests.actors.behaviour import MovingBody, PersonSpec, RobotBody, Surroundings, Walker
-from sim_tests.actors.behaviour._forces import BODY_M
-from sim_tests.actors.behaviour._person import ALONE
-from sim_tests.actors.behaviour._walker import TICK_S
+from sim_tests.actors.behaviour import (
+    ALONE,
+    DECISION_PERIOD_S,
+    WALKER_RADIUS_M,
+    MovingBody,
+    PersonSpec,
+    RobotBody,
+    Surroundings,
+    Walker,
+)
 from sim_tests.world.hall import WarehouseLayout
 
 NO_BOXES = np.empty((0, 4))
@@ -27,7 +33,7 @@ def walker(route, boxes=NO_BOXES, seed: int = 0, **fields) -> Walker:
 
 
 def walk(person: Walker, seconds: float, around=ALONE, hz: float = 20.0) -> np.ndarray:
-    """Rows t, x, y, vx, vy, heading."""
+    """Return rows t, x, y, vx, vy, heading."""
     rows = []
     for n in range(round(seconds * hz) + 1):
         m = person.motion(n / hz, around)
@@ -54,15 +60,17 @@ def test_an_undisturbed_walk_takes_the_free_time_exactly():
 
 def test_free_time_is_length_over_speed_plus_starting_stopping_and_pauses():
     long, longer = (walker([(0, 0), (length, 0)]).outcome() for length in (6.0, 9.0))
-    # Free walking in the middle: three metres more take so much longer, to a tick.
-    assert longer.free_time_s - long.free_time_s == pytest.approx(3.0 / 1.34, abs=1.5 * TICK_S)
+    # 3 m more take 3 m at the free speed, to one decision.
+    assert longer.free_time_s - long.free_time_s == pytest.approx(
+        3.0 / 1.34, abs=1.5 * DECISION_PERIOD_S
+    )
     assert 6.0 / 1.34 < long.free_time_s < 6.0 / 1.34 + 2.5
     assert long.free_length_m == pytest.approx(5.9, abs=0.1)
     paused = walker([(0, 0), (6, 0)], pauses=[{"at_m": 3.0, "for_s": 2.0}]).outcome()
     assert 2.0 < paused.free_time_s - long.free_time_s < 5.0
 
 
-def test_stops_are_where_and_as_long_as_asked():
+def test_pauses_have_the_given_place_and_duration():
     rows = walk(walker([(0, 0), (8, 0)], pauses=[{"at_m": 3.0, "for_s": 2.0}]), 14.0)
     standing = rows[(np.hypot(rows[:, 3], rows[:, 4]) < 0.05) & (rows[:, 1] > 1) & (rows[:, 1] < 7)]
     np.testing.assert_allclose(standing[:, 1], 3.0, atol=0.1)
@@ -70,20 +78,20 @@ def test_stops_are_where_and_as_long_as_asked():
     assert rows[-1, 1] == pytest.approx(8.0, abs=0.1)
 
 
-def test_turning_back_ends_where_it_began_and_faces_the_way_back():
+def test_a_person_who_turns_back_ends_at_the_start_and_faces_back():
     rows = walk(walker([(0, 0), (8, 0)], turns_back_at_m=3.0), 12.0)
     assert rows[:, 1].max() == pytest.approx(3.0, abs=0.15)
     assert rows[-1, 1] == pytest.approx(0.0, abs=0.1)
     assert math.cos(rows[-1, 5]) == pytest.approx(-1.0, abs=0.01)
 
 
-def test_walking_backwards_the_back_is_ahead():
+def test_a_person_who_walks_backwards_faces_back():
     rows = walk(walker([(0, 0), (6, 0)], backwards=True), 3.0)
     assert rows[-1, 3] > 1.2
     np.testing.assert_allclose(np.cos(rows[:, 5]), -1.0, atol=1e-9)
 
 
-def test_standing_somewhere_faces_as_asked_and_has_no_free_time():
+def test_a_standing_person_has_the_given_heading_and_no_free_time():
     person = walker([(2, 1)], heading_deg=-90.0)
     rows = walk(person, 3.0)
     np.testing.assert_allclose(rows[:, 1:5], [[2, 1, 0, 0]] * len(rows), atol=1e-9)
@@ -93,16 +101,16 @@ def test_standing_somewhere_faces_as_asked_and_has_no_free_time():
 
 
 @pytest.mark.parametrize("speed", [0.5, 1.34, 2.0, 3.0])
-def test_starts_and_stops_are_smooth_and_nobody_is_faster_than_told(speed):
+def test_starts_and_stops_are_smooth_and_within_the_free_speed(speed):
     rows = walk(walker([(0, 0), (10, 0)], speed_mps=speed), 10.0 / speed + 4.0)
     v = np.hypot(rows[:, 3], rows[:, 4])
     assert v.max() <= speed + 1e-9
     assert v.max() > 0.97 * speed
-    assert np.abs(np.diff(v)).max() <= 3.0 * TICK_S + 1e-9
+    assert np.abs(np.diff(v)).max() <= 3.0 * DECISION_PERIOD_S + 1e-9
     assert rows[-1, 1] == pytest.approx(10.0, abs=0.1)
 
 
-def test_how_often_one_asks_changes_nothing():
+def test_the_walk_does_not_depend_on_how_often_it_is_sampled():
     route = [(4.5, -4.0), (6.0, 0.0), (7.0, 5.0)]
     other = Surroundings(None, (MovingBody(5.5, -1.0, 0.0, -0.5),), lambda: False)
     rare = walk(walker(route, HALL), 6.0, other, hz=20.0)
@@ -110,7 +118,7 @@ def test_how_often_one_asks_changes_nothing():
     np.testing.assert_allclose(often, rare, atol=1e-9)
 
 
-def test_the_same_seed_walks_the_same_way_to_the_bit():
+def test_the_same_seed_gives_the_same_walk_to_the_bit():
     def rows():
         around = Surroundings(
             RobotBody(2.0, 0.0, 0.0, 0.8, 0.0, 0.36, 0.25, (2.2, 0.0, 1.4)),
@@ -123,7 +131,7 @@ def test_the_same_seed_walks_the_same_way_to_the_bit():
 
 
 @pytest.mark.parametrize(("angle", "shift"), [(0.7, (3.0, -2.0)), (math.pi / 2, (0.0, 0.0))])
-def test_turning_the_world_turns_the_walk(angle, shift):
+def test_rotating_the_world_rotates_the_walk(angle, shift):
     cos, sin = math.cos(angle), math.sin(angle)
     R = np.array([[cos, -sin], [sin, cos]])
 
@@ -136,7 +144,7 @@ def test_turning_the_world_turns_the_walk(angle, shift):
         person = walker([place(0, -3), place(0, 3), place(2, 4)], reactions={"pass_behind": 1.0})
         out = []
         for n in range(121):
-            t = n * TICK_S
+            t = n * DECISION_PERIOD_S
             robot = RobotBody(
                 *place(-2.6 + 0.8 * t, 0.2),
                 angle if turn else 0.0,
@@ -172,16 +180,16 @@ coordinate = st.floats(-4.0, 4.0)
     speed=st.floats(0.5, 3.0),
     seed=st.integers(0, 5),
 )
-def test_nobody_gets_into_a_rack_whatever_pushes(corners, movers, speed, seed):
+def test_no_force_pushes_a_walker_into_a_rack(corners, movers, speed, seed):
     try:
         person = walker(corners, HALL, seed=seed, speed_mps=speed)
     except SimError:
-        return  # the route itself leads into a rack, and is refused
+        return  # a route into a rack is refused
     x, y = corners[0]
-    least = min(BODY_M, float(_distances(np.array([[x, y]])).min()))
+    least = min(WALKER_RADIUS_M, float(_distances(np.array([[x, y]])).min()))
     for n in range(140):
         t = 0.1 * n
-        # People who come at the walker from all sides, wherever that is.
+        # People who stay near the walker and come from all sides.
         crowd = tuple(
             MovingBody(x + dx * math.cos(t), y + dy * math.cos(t), vx, vy)
             for dx, dy, vx, vy in movers
@@ -208,7 +216,9 @@ def test_two_people_who_meet_head_on_pass_each_other():
     states = [(0.0, 0.0, 0.0, 0.0), (8.0, 0.0, 0.0, 0.0)]
     for n in range(240):
         around = [Surroundings(None, (MovingBody(*states[1 - i]),), lambda: False) for i in (0, 1)]
-        motions = [p.motion(n * TICK_S, a) for p, a in zip((left, right), around, strict=True)]
+        motions = [
+            p.motion(n * DECISION_PERIOD_S, a) for p, a in zip((left, right), around, strict=True)
+        ]
         states = [(*m.position_odom_m, *m.velocity_odom_mps) for m in motions]
         nearest = min(nearest, math.dist(states[0][:2], states[1][:2]))
     assert nearest > 0.4
@@ -227,7 +237,7 @@ def test_two_people_who_meet_head_on_pass_each_other():
         {"turns_back_at_m": 2.0},
     ],
 )
-def test_a_foot_that_stands_stays_and_legs_reach_it(fields):
+def test_stance_feet_stay_and_legs_reach_them(fields):
     person = walker([(0, 0), (4, 0), (5, 2)], **fields)
     before = None
     steps = [0, 0]
@@ -248,6 +258,6 @@ def test_a_foot_that_stands_stays_and_legs_reach_it(fields):
         before = m.feet
         assert 0.4 < m.feet.hip_height_m < 1.1
     assert min(steps) >= 3
-    # In the end the feet stand side by side.
+    # At the end the feet stand side by side.
     (ax, ay, *_), (bx, by, *_) = m.feet.feet
     assert math.hypot(ax - bx, ay - by) < 0.4

@@ -1,4 +1,4 @@
-"""What hands do: boxes level and in the hands, phones before the eyes, no limb through another."""
+"""Postures of the arms: a level box in the hands, a phone before the eyes, no limbs that cross."""
 
 from __future__ import annotations
 
@@ -13,10 +13,18 @@ from hypothesis import strategies as st
 
 from perception import layouts as kp
 from sim_tests import SimError
-from sim_tests.actors.body import Activity, Worker, load_worker, worker_names
-from sim_tests.actors.body._asset import JOINTS, PARENTS
-from sim_tests.actors.body._pose import link_transforms, skin_points
-from sim_tests.actors.body._postures import ACTIVITIES, BOX_SIZE_M, PHONE_SIZE_M
+from sim_tests.actors.body import (
+    ACTIVITIES,
+    BOX_SIZE_M,
+    JOINTS,
+    PARENTS,
+    PHONE_SIZE_M,
+    Activity,
+    Worker,
+    load_worker,
+    skin_points,
+    worker_names,
+)
 from sim_tests.world import Warehouse
 from sim_tests.world.bullet import pybullet
 from sim_tests.world.hall import WarehouseLayout
@@ -33,7 +41,7 @@ def hall() -> Iterator[Warehouse]:
 
 
 @pytest.fixture(scope="module")
-def cast(hall: Warehouse) -> dict[str, Worker]:
+def workers(hall: Warehouse) -> dict[str, Worker]:
     return {name: Worker(hall, load_worker(name).stature_m, look=name) for name in worker_names()}
 
 
@@ -48,7 +56,7 @@ def _limb(joint: int) -> str:
 
 
 def _joined(one: int, other: int) -> bool:
-    """The same limb, or links that meet in a joint."""
+    """Return whether two links belong to one limb or share a joint."""
     return (
         _limb(one) == _limb(other)
         or (one != PELVIS and PARENTS[one] == other)
@@ -57,8 +65,8 @@ def _joined(one: int, other: int) -> bool:
 
 
 def _capsules(worker: Worker) -> tuple[np.ndarray, np.ndarray]:
-    """Ends (C, 2, 3) in odom and radii (C,) of the capsules."""
-    links, scale = link_transforms(worker.asset.joints_m, worker.pose), worker.skeleton.scale
+    """Return the ends (C, 2, 3) in odom and the radii (C,) of the capsules."""
+    links, scale = worker.links_odom, worker.skeleton.scale
     capsules = worker.asset.capsules
     ends = np.array([[capsule.start_m, capsule.end_m] for capsule in capsules]) * scale
     mine = links[[1 + capsule.joint for capsule in capsules]]
@@ -67,13 +75,13 @@ def _capsules(worker: Worker) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("look", worker_names())
-def test_no_limb_passes_through_another(cast: dict[str, Worker], look: str) -> None:
-    """By capsules, and by the skin of one limb in the capsules of another."""
-    worker = cast[look]
+def test_no_limb_passes_through_another(workers: dict[str, Worker], look: str) -> None:
+    """Neither capsules of two limbs nor the skin of one and a capsule of the other overlap."""
+    worker = workers[look]
     asset, skin = worker.asset, worker.asset.levels[1]
     joints = [capsule.joint for capsule in asset.capsules]
     apart = np.array([[not _joined(one, other) for other in joints] for one in joints])
-    # Of the skin, arms and legs: what moves wholly with one joint.
+    # Skin of arms and legs that follows one joint fully.
     owner = np.full(len(skin.vertices_m), PELVIS)
     for joint in range(len(JOINTS)):
         owner[skin.weights[:, joint] > 0.99] = joint
@@ -105,9 +113,9 @@ def test_no_limb_passes_through_another(cast: dict[str, Worker], look: str) -> N
 @pytest.mark.parametrize("look", worker_names())
 @pytest.mark.parametrize("speed_mps", [0.0, 1.2, 2.0])
 def test_a_box_is_level_before_the_belly_and_between_the_hands(
-    cast: dict[str, Worker], look: str, speed_mps: float
+    workers: dict[str, Worker], look: str, speed_mps: float
 ) -> None:
-    worker = cast[look]
+    worker = workers[look]
     for part in np.arange(4) / 4:
         walked = part * float(worker.gait.stride_m(max(speed_mps, 0.1)))
         worker.place((1.0, -2.0), 0.9, walked, speed_mps, activity="carry_box")
@@ -117,13 +125,13 @@ def test_a_box_is_level_before_the_belly_and_between_the_hands(
         np.testing.assert_allclose(T[:3, 2], (0.0, 0.0, 1.0), atol=1e-9)  # level
         assert T[:3, 0] @ [math.cos(0.9), math.sin(0.9), 0.0] > 0.99
         wrists = (worker.keypoints_odom_m[WRISTS] - T[:3, 3]) @ T[:3, :3]
-        # A wrist on either side, a hand's thickness off the box and behind its middle.
+        # One wrist on each side, a hand's thickness off the box and behind its middle.
         for (x, y, z), sign in zip(wrists, (1.0, -1.0), strict=True):
             assert 0.0 < sign * y - 0.5 * BOX_SIZE_M[1] < 0.08
             assert -0.5 * BOX_SIZE_M[0] - 0.03 < x < 0.0
             assert abs(z) < 0.5 * BOX_SIZE_M[2]
         assert 0.45 < T[2, 3] / worker.stature_m < 0.68
-        # It touches neither belly nor thighs.
+        # The box does not touch belly or thighs.
         points = skin_points(
             worker.asset.joints_m,
             worker.pose,
@@ -136,20 +144,20 @@ def test_a_box_is_level_before_the_belly_and_between_the_hands(
 
 
 @pytest.mark.parametrize("look", worker_names())
-def test_a_phone_is_in_the_hand_before_the_eyes(cast: dict[str, Worker], look: str) -> None:
-    worker = cast[look]
+def test_a_phone_is_in_the_hand_before_the_eyes(workers: dict[str, Worker], look: str) -> None:
+    worker = workers[look]
     worker.place((0.0, 0.0), 0.0, head_pitch_rad=math.radians(-35.0), activity="phone")
     assert worker.held == "phone"
     T = worker.T_odom_held
     assert T is not None
     to_phone = T[:3, 3] - worker.eyes_odom_m
     assert 0.22 < np.linalg.norm(to_phone) < 0.42
-    # The screen looks at the eyes, and the eyes at the phone.
+    # The screen faces the eyes, and the gaze points at the phone.
     assert -T[:3, 0] @ -to_phone / np.linalg.norm(to_phone) > 0.9
     assert worker.gaze_odom @ to_phone / np.linalg.norm(to_phone) > 0.93
     wrist = worker.keypoints_odom_m[kp.RIGHT_WRIST]
     assert 0.05 < np.linalg.norm(T[:3, 3] - wrist) < 0.5 * PHONE_SIZE_M[2] + 0.08
-    # The other arm hangs as it does without.
+    # The left arm hangs as it does without the phone.
     left = worker.keypoints_odom_m[kp.LEFT_WRIST].copy()
     worker.place((0.0, 0.0), 0.0, head_pitch_rad=math.radians(-35.0))
     np.testing.assert_allclose(worker.keypoints_odom_m[kp.LEFT_WRIST], left, atol=1e-9)
@@ -163,10 +171,10 @@ def test_a_phone_is_in_the_hand_before_the_eyes(cast: dict[str, Worker], look: s
     st.floats(0.0, 1.8),
 )
 @settings(max_examples=40, deadline=None)
-def test_hands_go_smoothly_from_one_activity_to_the_next(
-    cast: dict[str, Worker], change: tuple[str, str], share: float, speed_mps: float
+def test_hands_change_smoothly_from_one_activity_to_the_next(
+    workers: dict[str, Worker], change: tuple[str, str], share: float, speed_mps: float
 ) -> None:
-    worker = cast["amina"]
+    worker = workers["amina"]
     before, name = change
 
     def hands(share: float) -> np.ndarray:
@@ -174,7 +182,7 @@ def test_hands_go_smoothly_from_one_activity_to_the_next(
         worker.place((0.0, 0.0), 0.0, 0.3, speed_mps, activity=doing)
         return np.array(worker.keypoints_odom_m[WRISTS])
 
-    # A hundredth of the way moves a hand by centimetres at most; the ends are the activities.
+    # One per cent of the change moves a hand by at most 3 cm; the ends are the activities.
     assert np.abs(hands(share + 0.005) - hands(share - 0.005)).max() < 0.03
     for end, activity in ((0.0, before), (1.0, name)):
         blended = hands(end)
@@ -182,8 +190,8 @@ def test_hands_go_smoothly_from_one_activity_to_the_next(
         np.testing.assert_allclose(blended, worker.keypoints_odom_m[WRISTS], atol=1e-9)
 
 
-def test_unknown_activities_are_refused(cast: dict[str, Worker]) -> None:
-    worker = cast["amina"]
+def test_unknown_activities_are_refused(workers: dict[str, Worker]) -> None:
+    worker = workers["amina"]
     worker.place((0.5, 0.5), 0.5, activity="phone")
     with pytest.raises(SimError, match="'none', 'carry_box', 'phone'"):
         worker.place((1.0, 1.0), 0.0, activity="juggle")
@@ -194,7 +202,7 @@ def test_unknown_activities_are_refused(cast: dict[str, Worker]) -> None:
 
 
 def test_a_carried_box_is_solid_and_an_absent_one_is_not() -> None:
-    """What comes near from ahead meets the box first, if there is one."""
+    """A probe ahead of the person is nearest to the box, if there is one."""
     gaps = {}
     with Warehouse(WarehouseLayout.open_floor()) as hall:
         worker = Worker(hall, look="kofi", stature_m=1.84)

@@ -1,3 +1,5 @@
+"""Scripts of workers: walk, heading, gaze and activities."""
+
 import math
 
 import numpy as np
@@ -6,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sim_tests.actors.behaviour import WorkerScript
-from sim_tests.actors.behaviour._script import GazeKey
 from sim_tests.actors.body import Activity, worker_names
 
 
@@ -23,7 +24,7 @@ def test_the_walk_passes_its_waypoints_at_their_times():
 
 
 @given(st.floats(0.05, 5.9))
-def test_velocity_is_the_derivative_of_position_and_walked_the_length(t_s):
+def test_velocity_is_the_derivative_of_position_and_walked_is_the_path_length(t_s):
     step = 0.02
     before, after = WALK.motion(t_s - step), WALK.motion(t_s + step)
     moved = after.position_odom_m - before.position_odom_m
@@ -39,14 +40,14 @@ def test_before_and_after_the_walk_the_worker_stands(t_s):
         assert not motion.velocity_odom_mps.any()
 
 
-def test_the_body_faces_the_way_it_walks_unless_told():
+def test_the_body_faces_along_the_walk_without_heading_keys():
     assert WALK.motion(0.5).heading_odom_rad == pytest.approx(0.0, abs=0.05)
     assert WALK.motion(4.0).heading_odom_rad == pytest.approx(math.pi / 2, abs=0.05)
     backwards = script([(0, 0, 0), (4, 4, 0)], heading=[{"t_s": 0.0, "heading_deg": 180.0}])
     assert backwards.motion(2.0).heading_odom_rad == pytest.approx(math.pi)
 
 
-def test_gaze_at_the_robot_follows_the_robot():
+def test_a_gaze_key_at_the_robot_follows_the_robot():
     watching = script([(0, 0, 0)], gaze=[{"t_s": 0.0, "look": "robot", "yaw_deg": 10.0}])
     for azimuth in (-2.0, 0.4, 2.5):
         angle, elevation = watching.gaze_angles(1.0, 0.3, (azimuth, -0.1))
@@ -54,8 +55,8 @@ def test_gaze_at_the_robot_follows_the_robot():
         assert elevation == pytest.approx(-0.1)
 
 
-def test_the_head_turns_smoothly_between_keys_and_holds_outside():
-    keys = [GazeKey(t_s=1.0, yaw_deg=0.0), GazeKey(t_s=2.0, yaw_deg=60.0)]
+def test_the_head_turns_smoothly_between_keys_and_holds_outside_them():
+    keys = [{"t_s": 1.0, "yaw_deg": 0.0}, {"t_s": 2.0, "yaw_deg": 60.0}]
     turning = script([(0, 0, 0)], gaze=keys)
     angles = [turning.gaze_angles(t, 0.0, (0.0, 0.0))[0] for t in np.linspace(0.0, 3.0, 301)]
     assert angles[0] == 0.0
@@ -65,10 +66,10 @@ def test_the_head_turns_smoothly_between_keys_and_holds_outside():
 
 
 def test_the_head_turns_through_the_front_not_through_the_back():
-    """From a robot on the right behind to one on the left behind, relative to the body."""
+    """From a robot behind on the right to one behind on the left."""
     keys = [
-        GazeKey(t_s=0.0, look="ahead", yaw_deg=-120.0),
-        GazeKey(t_s=1.0, look="ahead", yaw_deg=120.0),
+        {"t_s": 0.0, "look": "ahead", "yaw_deg": -120.0},
+        {"t_s": 1.0, "look": "ahead", "yaw_deg": 120.0},
     ]
     angle, _ = script([(0, 0, 0)], gaze=keys).gaze_angles(0.5, 0.0, (0.0, 0.0))
     assert angle == pytest.approx(0.0, abs=1e-9)
@@ -90,7 +91,7 @@ def test_impossible_walks_are_refused(change):
 
 def test_unknown_keys_are_refused_with_the_nearest_name():
     with pytest.raises(ValueError, match="did you mean 'yaw_deg'"):
-        GazeKey.model_validate({"t_s": 0.0, "yaw": 3.0})
+        script([(0, 0, 0)], gaze=[{"t_s": 0.0, "yaw": 3.0}])
 
 
 def test_a_copied_script_walks_its_own_path():
@@ -99,7 +100,7 @@ def test_a_copied_script_walks_its_own_path():
     assert moved.motion(1.0).position_odom_m[0] == 9.0
 
 
-def test_the_eyes_turn_smoothly_between_keys_and_not_without():
+def test_the_eyes_turn_smoothly_between_keys_and_rest_without_keys():
     looking = script(
         [(0, 0, 0)],
         gaze=[
@@ -113,7 +114,7 @@ def test_the_eyes_turn_smoothly_between_keys_and_not_without():
     assert looking.gaze_angles(1.5, 0.2, (0.0, 0.0)) == (0.2, 0.0)  # the head does not follow
     assert WALK.eye_angles(1.0) == (0.0, 0.0)
     with pytest.raises(ValueError, match="eye_yaw_deg"):
-        GazeKey(t_s=0.0, eye_yaw_deg=50.0)
+        script([(0, 0, 0)], gaze=[{"t_s": 0.0, "eye_yaw_deg": 50.0}])
 
 
 def test_activities_change_in_six_tenths_of_a_second():
@@ -141,14 +142,14 @@ def test_activities_change_in_six_tenths_of_a_second():
         )
 
 
-def test_looks_are_those_that_ship():
+def test_unknown_looks_are_refused():
     assert script([(0, 0, 0)], look=worker_names()[0]).look == worker_names()[0]
     with pytest.raises(ValueError, match="look must be one of"):
         script([(0, 0, 0)], look="nobody")
 
 
 def test_headings_turn_without_jerks():
-    """Between keys the body starts and stops turning gently, and never overshoots."""
+    """Between keys the body starts and stops turning smoothly, without overshoot."""
     turning = script(
         [(0, 0, 0)],
         heading=[
@@ -166,7 +167,7 @@ def test_headings_turn_without_jerks():
     assert np.abs(np.diff(rate)).max() / 0.02 < 12.0
 
 
-def test_feet_are_ready_before_the_first_key_and_at_rest_after_the_last():
+def test_feet_stand_before_the_first_and_after_the_last_waypoint():
     for t_s in (-1e6, -3.0, 8.0, 1e6):
         feet = np.array(WALK.motion(t_s).feet.feet)
         assert np.ptp(feet[:, 2]) < 1e-9

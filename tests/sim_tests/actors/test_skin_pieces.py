@@ -1,4 +1,4 @@
-"""Rigid pieces of a skin bend like skin: nothing is lost, and no gap opens."""
+"""Rigid pieces of a skin bend like skin: no part is missing, and no gap opens."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim_tests.actors.body import load_worker, worker_names
-from sim_tests.actors.body._asset import JOINTS, SkinMesh
+from sim_tests.actors.body import JOINTS, SkinMesh, load_worker, worker_names
 from sim_tests.actors.body._skin import PELVIS, skin_pieces
 
 KNEE = JOINTS.index("left_knee")
@@ -19,7 +18,7 @@ RADIUS_M, HALF_M, BLEND_M = 0.06, 0.30, 0.05
 
 
 def leg(rings: int = 61, sides: int = 16) -> SkinMesh:
-    """A straight tube along z whose lower half follows the knee, which lies at the origin."""
+    """Return a tube along z whose lower half follows the knee, which lies at the origin."""
     z = np.linspace(HALF_M, -HALF_M, rings)
     around = np.linspace(0.0, 2.0 * math.pi, sides, endpoint=False)
     ring = np.stack([np.cos(around), np.sin(around)], axis=-1)
@@ -38,7 +37,7 @@ def leg(rings: int = 61, sides: int = 16) -> SkinMesh:
     return SkinMesh(
         vertices,
         normals,
-        # Every vertex has a coordinate of its own: pieces are told apart by it.
+        # Every vertex has its own texture coordinate, by which triangles are identified.
         np.random.default_rng(0).random((len(vertices), 2)),
         np.array(triangles),
         weights,
@@ -47,7 +46,7 @@ def leg(rings: int = 61, sides: int = 16) -> SkinMesh:
 
 
 def keys(corners_uv: np.ndarray) -> list[tuple[float, ...]]:
-    """A name for each triangle: its middle in the texture."""
+    """Return an identifier for each triangle: its centre in the texture."""
     return [tuple(row) for row in corners_uv.mean(axis=1).round(9).tolist()]
 
 
@@ -56,14 +55,14 @@ def rows_by_texture(corners_uv: np.ndarray) -> dict[tuple[float, ...], int]:
 
 
 def turned(points: np.ndarray, angle: np.ndarray | float) -> np.ndarray:
-    """Rotate points about y through the knee by an angle each."""
+    """Return points rotated about y through the knee, each by its own angle."""
     cos, sin = np.cos(angle), np.sin(angle)
     x, y, z = points.T
     return np.stack([cos * x + sin * z, y, cos * z - sin * x], axis=-1)
 
 
 @given(bands=st.integers(0, 4), angle=st.floats(0.0, math.radians(70.0)))
-def test_every_bit_of_skin_lies_near_a_piece_and_pieces_overlap_where_it_bends(
+def test_all_skin_lies_near_a_piece_and_pieces_overlap_where_it_bends(
     bands: int, angle: float
 ) -> None:
     skin = leg()
@@ -80,14 +79,14 @@ def test_every_bit_of_skin_lies_near_a_piece_and_pieces_overlap_where_it_bends(
         rest = piece.mesh.vertices_m[corners].mean(axis=1)
         assert piece.mesh.uv is not None
         rows = np.array([row_of[key] for key in keys(piece.mesh.uv[corners])])
-        # A rim dips inwards, never outwards.
+        # A rim sinks inwards, never outwards.
         assert (
             np.linalg.norm(rest[:, :2], axis=1) < np.linalg.norm(centres[rows, :2], axis=1) + 1e-9
         ).all()
         gaps = np.linalg.norm(turned(rest, angle * share) - truth[rows], axis=1)
         nearest[rows] = np.minimum(nearest[rows], gaps)
         cover[rows] += 1
-    # A step of rotation at the farthest bending skin, and the dip of a triangle's far corner.
+    # One step of rotation at the farthest bending skin, plus the depth of a sunk corner.
     reach = math.hypot(RADIUS_M, BLEND_M)
     assert nearest.max() <= angle * step * reach + 0.007
     assert cover.min() >= 1
@@ -95,7 +94,7 @@ def test_every_bit_of_skin_lies_near_a_piece_and_pieces_overlap_where_it_bends(
     assert (cover[bending] >= 2).all()
 
 
-def test_what_lies_beyond_a_joint_is_one_piece() -> None:
+def test_skin_beyond_a_joint_is_one_piece() -> None:
     pieces = skin_pieces(leg(), 3)
     assert {(piece.joint, piece.share) for piece in pieces} == {
         (HIP, 1.0),
@@ -110,7 +109,7 @@ def test_what_lies_beyond_a_joint_is_one_piece() -> None:
 
 
 @pytest.mark.parametrize("name", worker_names()[:4])
-def test_pieces_of_a_worker_show_all_of_its_skin(name: str) -> None:
+def test_the_pieces_of_a_worker_show_all_its_skin(name: str) -> None:
     for level, skin in enumerate(load_worker(name).levels):
         pieces = skin_pieces(skin, 2)
         shown = {

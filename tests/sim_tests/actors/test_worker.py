@@ -1,4 +1,4 @@
-"""The worker: kinematics, head and gaze, and that PyBullet's links are where the truth says."""
+"""The worker: posture, head and gaze, and the links of its body in PyBullet."""
 
 from __future__ import annotations
 
@@ -9,41 +9,28 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.spatial.transform import Rotation
 
 from perception import layouts as kp
 from perception.anthropometry import HEAD_TEMPLATE_M
 from sim_tests import SimError
 from sim_tests.actors.body import (
+    JOINTS,
     MAX_EYE_PITCH_RAD,
     MAX_EYE_YAW_RAD,
     MAX_HEAD_PITCH_RAD,
     MAX_HEAD_YAW_RAD,
+    PARENTS,
     Gait,
     Worker,
-    load_worker,
-    worker_names,
-)
-from sim_tests.actors.body._asset import JOINTS, PARENTS
-from sim_tests.actors.body._pose import (
-    BodyPose,
-    about,
-    link_transform,
-    link_transforms,
-    matrix,
-    product,
-    quaternion,
-    rotation_matrices,
-    rotation_vector,
     skin_points,
-    slerp,
+    worker_names,
 )
 from sim_tests.actors.robot import Amr
 from sim_tests.world import Warehouse
 from sim_tests.world.bullet import pybullet
 from sim_tests.world.hall import WarehouseLayout
 
-# PyBullet numbers links depth first, without the eyes; the slide of the carried box is one too.
+# PyBullet's order of links, depth first: no eyes, and the prismatic joint of the carried box.
 LINKS = [
     *(name for name in JOINTS[: JOINTS.index("left_hip")] if not name.endswith("_eye")),
     "box",
@@ -66,8 +53,6 @@ postures = st.fixed_dictionaries(
         **heads,
     }
 )
-angles = st.floats(-1.5, 1.5)
-rotvecs = st.tuples(angles, angles, angles)
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +67,7 @@ def worker(hall: Warehouse) -> Worker:
 
 
 def _links(hall: Warehouse, worker: Worker) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Rotation and origin of every link in PyBullet."""
+    """Return rotation and origin of every link in PyBullet."""
     out = {}
     for row, name in enumerate(LINKS):
         state = pybullet.getLinkState(
@@ -95,11 +80,9 @@ def _links(hall: Warehouse, worker: Worker) -> dict[str, tuple[np.ndarray, np.nd
 
 @given(postures)
 @settings(max_examples=60, deadline=None)
-def test_truth_is_where_pybullet_has_the_links(
-    hall: Warehouse, worker: Worker, posture: dict
-) -> None:
+def test_links_agree_with_pybullets(hall: Warehouse, worker: Worker, posture: dict) -> None:
     worker.place(**posture)
-    transforms = link_transforms(worker.asset.joints_m, worker.pose)
+    transforms = worker.links_odom
     links = _links(hall, worker)
     for row, name in enumerate(JOINTS):
         if name.endswith("_eye"):
@@ -124,22 +107,22 @@ def test_truth_is_where_pybullet_has_the_links(
 
 @given(postures)
 @settings(max_examples=60, deadline=None)
-def test_shortcuts_agree_with_the_whole_body(worker: Worker, posture: dict) -> None:
-    """Head, eyes and chest are computed alone; the keypoints come from the whole pose."""
+def test_head_eyes_and_chest_agree_with_the_whole_body(worker: Worker, posture: dict) -> None:
+    """They are computed directly; the keypoints come from the whole pose."""
     worker.place(**posture)
     points = worker.keypoints_odom_m
     assert points.shape == (23, 3)
     np.testing.assert_allclose(worker.position_nose_odom_m, points[kp.NOSE], atol=1e-9)
-    # Shoulders give a little with the arms, hips with the legs.
+    # The shoulder keypoints move a little with the arms, the hip keypoints with the legs.
     np.testing.assert_allclose(
         worker.chest_odom_m,
         0.7 * points[5:7].mean(axis=0) + 0.3 * points[11:13].mean(axis=0),
         atol=0.025,
     )
     np.testing.assert_array_equal(worker.position_odom_m, posture["position_odom_m"])
-    # The chest is over the body's centre line but for the sway and lean of a walk.
+    # The chest is over the body's centre line except for the sway and lean of a walk.
     assert np.linalg.norm(worker.chest_odom_m[:2] - posture["position_odom_m"]) < 0.09
-    # The face is rigid, and near the template that perception fits to it.
+    # The face is rigid, and near perception's head template.
     face = (points[[0, 3, 4]] - points[0]) @ worker.rotation_odom_head
     rest = worker.asset.keypoints_m[[0, 3, 4]] * worker.skeleton.scale
     expected = (rest - rest[0]) @ np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]])
@@ -149,7 +132,7 @@ def test_shortcuts_agree_with_the_whole_body(worker: Worker, posture: dict) -> N
 
 @given(postures, st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))
 @settings(max_examples=40, deadline=None)
-def test_a_body_looks_the_same_anywhere(
+def test_a_posture_does_not_depend_on_place_and_heading(
     worker: Worker, posture: dict, turn_rad: float, x_m: float, y_m: float
 ) -> None:
     worker.place(**posture)
@@ -179,7 +162,7 @@ def test_stands_upright_on_the_floor_as_tall_as_asked(hall: Warehouse, look: str
         rest = asset.keypoints_m * worker.pose.scale + [2.0, 1.0, 0.0]
         np.testing.assert_allclose(worker.keypoints_odom_m, rest, atol=0.04)
         assert worker.eyes_odom_m[2] / stature_m == pytest.approx(0.935, abs=0.02)
-        # What a ray from above meets first is the head.
+        # A ray from above hits the head first.
         x, y, _ = worker.eyes_odom_m - 0.06 * worker.gaze_odom
         hit = pybullet.rayTest((x, y, 3.0), (x, y, 0.0), physicsClientId=hall.client)[0]
         assert hit[0] == worker.body
@@ -189,7 +172,7 @@ def test_stands_upright_on_the_floor_as_tall_as_asked(hall: Warehouse, look: str
 
 @given(st.floats(-3.0, 3.0), st.fixed_dictionaries(heads), st.floats(0.0, 2.0))
 @settings(max_examples=60, deadline=None)
-def test_head_and_eyes_turn_by_the_angles_given_and_nothing_else_does(
+def test_head_and_eyes_turn_by_the_given_angles_and_nothing_else_moves(
     worker: Worker, heading_rad: float, head: dict, speed_mps: float
 ) -> None:
     worker.place((1.0, -1.0), heading_rad, 0.3, speed_mps)
@@ -210,20 +193,20 @@ def test_head_and_eyes_turn_by_the_angles_given_and_nothing_else_does(
     np.testing.assert_allclose(eyes[:3, 2], forward, atol=1e-12)
     np.testing.assert_allclose(eyes[:3, 1], down, atol=1e-12)
     np.testing.assert_allclose(eyes[:3, 3], worker.eyes_odom_m, atol=1e-12)
-    # The gaze leaves the head's axis by the eyes' yaw and pitch.
+    # The gaze differs from the head's axis by the eyes' yaw and pitch.
     yaw, up = head["eye_yaw_rad"], head["eye_pitch_rad"]
     gaze = np.array([-down, forward, -right]) @ worker.gaze_odom  # up, ahead, left
     np.testing.assert_allclose(
         gaze, (math.sin(up), math.cos(up) * math.cos(yaw), math.cos(up) * math.sin(yaw)), atol=1e-9
     )
-    # Eyeballs turn with it: their pupils look along the gaze.
-    transforms = link_transforms(worker.asset.joints_m, worker.pose)
+    # The eyeballs point along the gaze.
+    transforms = worker.links_odom
     for eye in ("left_eye", "right_eye"):
         axis = transforms[1 + JOINTS.index(eye), :3, 0]
         np.testing.assert_allclose(axis, worker.gaze_odom, atol=1e-9)
 
 
-def test_an_offset_of_the_eyes_leaves_head_and_apex_where_they_are(worker: Worker) -> None:
+def test_turning_the_eyes_does_not_move_the_head(worker: Worker) -> None:
     worker.place((0.0, 0.0), 0.4, head_yaw_rad=0.5, head_pitch_rad=-0.2)
     head, apex, gaze = worker.rotation_odom_head, worker.eyes_odom_m, worker.gaze_odom
     np.testing.assert_allclose(gaze, head[:, 1], atol=1e-12)
@@ -237,74 +220,12 @@ def test_an_offset_of_the_eyes_leaves_head_and_apex_where_they_are(worker: Worke
     )
 
 
-@given(st.lists(rotvecs, min_size=16, max_size=16), st.floats(0.8, 1.2), rotvecs)
-@settings(max_examples=40, deadline=None)
-def test_kinematics_against_scipy_joint_by_joint(
-    bends: list, scale: float, turn: tuple[float, float, float]
-) -> None:
-    """Links, pieces and skin against a plain product of turns about joints."""
-    asset = load_worker("giulia")
-    T_odom_body = np.eye(4)
-    T_odom_body[:3, :3] = Rotation.from_rotvec(turn).as_matrix()
-    T_odom_body[:3, 3] = (1.0, 2.0, 0.1)
-    pose = BodyPose(T_odom_body, scale, np.array(bends))
-
-    def about_joint(joint: int, share: float) -> np.ndarray:
-        step = np.eye(4)
-        step[:3, :3] = Rotation.from_rotvec(share * np.array(bends[joint])).as_matrix()
-        centre = asset.joints_m[joint] * scale
-        step[:3, 3] = centre - step[:3, :3] @ centre
-        return step
-
-    def link(joint: int) -> np.ndarray:
-        return T_odom_body if joint < 0 else link(PARENTS[joint]) @ about_joint(joint, 1.0)
-
-    links = link_transforms(asset.joints_m, pose)
-    for joint in range(-1, 16):
-        np.testing.assert_allclose(links[1 + joint], link(joint), atol=1e-9)
-    joints = np.repeat(np.arange(-1, 16), 3)
-    shares = np.tile([0.0, 0.4, 1.0], 17)
-    pieces = link_transform(asset.joints_m, pose, joints, shares)
-    for joint, share, piece in zip(joints.tolist(), shares.tolist(), pieces, strict=True):
-        expected = T_odom_body if joint < 0 else link(PARENTS[joint]) @ about_joint(joint, share)
-        np.testing.assert_allclose(piece, expected, atol=1e-9)
-    # A point whose weights are whole moves with its link; a share of a joint moves it part of it.
-    weights = np.zeros((2, 16))
-    elbow, shoulder = JOINTS.index("left_elbow"), JOINTS.index("left_shoulder")
-    weights[:, [0, shoulder]] = 1.0
-    weights[:, elbow] = [1.0, 0.3]
-    points = np.array([[0.1, 0.3, 0.9], [0.0, 0.25, 1.1]])
-    whole = np.column_stack([points * scale, np.ones(2)])
-    moved = skin_points(asset.joints_m, pose, points, weights)
-    np.testing.assert_allclose(moved[0], (link(elbow) @ whole[0])[:3], atol=1e-9)
-    part = link(shoulder) @ about_joint(elbow, 0.3)
-    np.testing.assert_allclose(moved[1], (part @ whole[1])[:3], atol=1e-9)
-
-
-@given(rotvecs, rotvecs, st.floats(0.0, 1.0))
-@settings(deadline=None)
-def test_quaternions_against_scipy(first: tuple, second: tuple, share: float) -> None:
-    one, other = (Rotation.from_rotvec(v) for v in (first, second))
-    p, q = (tuple(r.as_quat().tolist()) for r in (one, other))
-    np.testing.assert_allclose(matrix(product(p, q)), (one * other).as_matrix(), atol=1e-12)
-    np.testing.assert_allclose(rotation_matrices(np.array([first]))[0], one.as_matrix(), atol=1e-9)
-    np.testing.assert_allclose(rotation_vector(p), one.as_rotvec(), atol=1e-9)
-    columns = tuple(tuple(column) for column in one.as_matrix().T.tolist())
-    np.testing.assert_allclose(matrix(quaternion(*columns)), one.as_matrix(), atol=1e-9)
-    middle = one * Rotation.from_rotvec(share * (one.inv() * other).as_rotvec())
-    np.testing.assert_allclose(matrix(slerp(p, q, share)), middle.as_matrix(), atol=1e-9)
-    length = float(np.linalg.norm(first))
-    if length > 1e-6:
-        axis = tuple((np.array(first) / length).tolist())
-        np.testing.assert_allclose(matrix(about(axis, length)), one.as_matrix(), atol=1e-9)
-
-
 def test_limbs_keep_their_lengths(worker: Worker) -> None:
-    """Between joints; keypoints sit on skin that bends, so theirs change by a little."""
+    """Measured between joints: keypoints lie on skin that bends."""
     rest = worker.skeleton.joints_m
     for walked in np.linspace(0.0, 1.5, 13):
         worker.place((0.3, 0.1), 1.0, walked, 1.4, activity="phone")
-        links = link_transforms(worker.asset.joints_m, worker.pose)
+        links = worker.links_odom
         at = np.einsum("jab,jb->ja", links[1:], np.column_stack([rest, np.ones(16)]))[:, :3]
         for joint, parent in enumerate(PARENTS):
             if parent >= 0:
@@ -313,7 +234,7 @@ def test_limbs_keep_their_lengths(worker: Worker) -> None:
                 )
 
 
-def test_posture_depends_on_the_arguments_alone(worker: Worker) -> None:
+def test_a_posture_depends_only_on_its_arguments(worker: Worker) -> None:
     arguments = ((0.7, 0.2), 1.0, 3.3, 1.1, 0.4, -0.2)
     worker.place(*arguments)
     first = worker.keypoints_odom_m.tobytes()
@@ -322,12 +243,11 @@ def test_posture_depends_on_the_arguments_alone(worker: Worker) -> None:
     assert worker.keypoints_odom_m.tobytes() == first
 
 
-def test_explicit_feet_are_those_of_the_gait(worker: Worker) -> None:
-    """Feet given in odom and the stateless gait meet in the same body."""
+def test_given_feet_and_the_stateless_gait_give_the_same_body(worker: Worker) -> None:
     gait = Gait(worker.skeleton)
     worker.place((0.0, 0.0), 0.0, 0.4, 1.2)
     stateless = np.array(worker.keypoints_odom_m)
-    worker.place((0.0, 0.0), 0.0, feet=gait.footing(0.4, 1.2))
+    worker.place((0.0, 0.0), 0.0, feet=gait.pose(0.4, 1.2))
     np.testing.assert_allclose(worker.keypoints_odom_m, stateless, atol=1e-12)
 
 
@@ -347,7 +267,7 @@ def test_explicit_feet_are_those_of_the_gait(worker: Worker) -> None:
         ("activity", "dance"),
     ],
 )
-def test_unusable_placements_are_refused_and_move_nothing(
+def test_invalid_placements_are_refused_and_move_nothing(
     hall: Warehouse, worker: Worker, name: str, value: object
 ) -> None:
     worker.place((0.5, 0.5), 0.5, 0.5, 0.5, 0.5, 0.5, activity="phone")
@@ -361,7 +281,7 @@ def test_unusable_placements_are_refused_and_move_nothing(
     assert base == pybullet.getBasePositionAndOrientation(worker.body, physicsClientId=hall.client)
 
 
-def test_unusable_bodies_are_refused(hall: Warehouse) -> None:
+def test_invalid_bodies_are_refused(hall: Warehouse) -> None:
     bodies = pybullet.getNumBodies(physicsClientId=hall.client)
     with pytest.raises(SimError, match="stature_m"):
         Worker(hall, 0.9)
@@ -374,7 +294,7 @@ def test_unusable_bodies_are_refused(hall: Warehouse) -> None:
     assert pybullet.getNumBodies(physicsClientId=hall.client) == bodies
 
 
-def test_physics_leaves_a_worker_where_it_was_put(hall: Warehouse, worker: Worker) -> None:
+def test_physics_does_not_move_a_placed_worker(hall: Warehouse, worker: Worker) -> None:
     worker.place((2.0, 2.0), 0.5, 0.3, 1.0, activity="carry_box")
     before = _links(hall, worker)
     for _ in range(240):
@@ -384,8 +304,8 @@ def test_physics_leaves_a_worker_where_it_was_put(hall: Warehouse, worker: Worke
         np.testing.assert_allclose(after[name][1], before[name][1], atol=2e-4)
 
 
-def test_capsules_are_where_the_body_is_and_stop_what_runs_into_them() -> None:
-    """A robot meets shins and feet, is stopped, and moves no limb."""
+def test_a_worker_stops_a_robot_that_drives_into_it() -> None:
+    """The robot touches shins and feet, is stopped, and moves no limb."""
     with Warehouse(WarehouseLayout.open_floor()) as hall:
         amr = Amr(hall)
         worker = Worker(hall, 1.8, look="ivan", position_odom_m=(1.3, 0.05), heading_odom_rad=2.8)

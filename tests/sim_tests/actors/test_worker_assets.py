@@ -1,4 +1,4 @@
-"""The shipped workers: what the files promise about shape, joints, weights and keypoints."""
+"""The shipped workers: shape, joints, weights and keypoints of the files."""
 
 from __future__ import annotations
 
@@ -11,16 +11,23 @@ from perception import layouts as kp
 from perception.anthropometry import HEAD_KEYPOINTS, HEAD_TEMPLATE_M, LIMBS, MEAN_STATURE_M
 from perception.arrays import FloatArray
 from sim_tests import SimError
-from sim_tests.actors.body import load_worker, worker_names
-from sim_tests.actors.body._asset import JOINTS, LEVELS, PARENTS, SkinMesh, WorkerAsset
+from sim_tests.actors.body import (
+    DETAIL_LEVELS,
+    JOINTS,
+    PARENTS,
+    SkinMesh,
+    WorkerAsset,
+    load_worker,
+    worker_names,
+)
 
 NAMES = worker_names()
 SPINE, NECK = JOINTS.index("spine"), JOINTS.index("neck")
 ARMS = [JOINTS.index(f"{side}_shoulder") for side in ("left", "right")]
 LEGS = [JOINTS.index(f"{side}_hip") for side in ("left", "right")]
-#: One step of the weights as they are stored.
+#: Quantisation step of the stored weights.
 STEP = 1.0 / 255.0
-#: Budgets of triangles; a level may miss its own by a tenth.
+#: Largest number of triangles of each level of detail.
 MOST_TRIANGLES = (9_500, 3_200, 1_000)
 
 
@@ -29,13 +36,16 @@ def worker(request: pytest.FixtureRequest) -> WorkerAsset:
     return load_worker(request.param)
 
 
-def folded(mesh: SkinMesh) -> FloatArray:
-    """(T, 3, 3) corners of the triangles."""
+def triangle_corners(mesh: SkinMesh) -> FloatArray:
+    """Return (T, 3, 3) corners of the triangles."""
     return mesh.vertices_m[mesh.triangles]
 
 
 def winding_number(points_m: FloatArray, corners_m: FloatArray) -> FloatArray:
-    """How often a surface goes round a point (van Oosterom and Strackee 1983): 1 inside."""
+    """Return the winding number of a surface about points: 1 inside.
+
+    By the solid angles of van Oosterom and Strackee 1983.
+    """
     a, b, c = (corners_m[None, :, k] - points_m[:, None] for k in range(3))
     la, lb, lc = (np.linalg.norm(v, axis=-1) for v in (a, b, c))
     over = np.einsum("nti,nti->nt", a, np.cross(b, c))
@@ -56,7 +66,7 @@ def distance_to_segment(points_m: FloatArray, start_m: FloatArray, end_m: FloatA
     return distance
 
 
-def test_enough_distinct_workers_ship_in_little_space() -> None:
+def test_at_least_twelve_distinct_workers_ship_in_10_mb() -> None:
     folder = resources.files("sim_tests.actors.body") / "workers"
     size = sum(len(entry.read_bytes()) for entry in folder.iterdir())
     assert len(NAMES) >= 12
@@ -81,8 +91,8 @@ def test_an_unknown_worker_is_refused_with_the_known_ones() -> None:
         load_worker("nobody")
 
 
-def test_levels_are_valid_meshes_of_fewer_and_fewer_triangles(worker: WorkerAsset) -> None:
-    assert len(worker.levels) == LEVELS
+def test_levels_are_valid_meshes_with_decreasing_numbers_of_triangles(worker: WorkerAsset) -> None:
+    assert len(worker.levels) == DETAIL_LEVELS
     for mesh, most in zip(worker.levels, MOST_TRIANGLES, strict=True):
         count = len(mesh.vertices_m)
         assert 0.5 * most < len(mesh.triangles) <= most
@@ -97,7 +107,7 @@ def test_levels_are_valid_meshes_of_fewer_and_fewer_triangles(worker: WorkerAsse
         assert mesh.weights.max() <= 1.0
 
 
-def test_textures_are_sharp_pictures(worker: WorkerAsset) -> None:
+def test_textures_are_square_and_have_contrast(worker: WorkerAsset) -> None:
     sides = [mesh.texture_rgb.shape[0] for mesh in worker.levels]
     assert sides == sorted(sides, reverse=True)
     for mesh in worker.levels:
@@ -107,7 +117,7 @@ def test_textures_are_sharp_pictures(worker: WorkerAsset) -> None:
 
 
 def test_levels_have_the_same_outline(worker: WorkerAsset) -> None:
-    """Boxes of the levels differ by no more than what is seen at the distances they serve."""
+    """Bounding boxes of the levels differ by no more than is visible at their distances."""
     fine = worker.levels[0].vertices_m
     for mesh, allowed_m in zip(worker.levels[1:], (0.012, 0.030), strict=True):
         assert np.abs(mesh.vertices_m.min(axis=0) - fine.min(axis=0)).max() < allowed_m
@@ -115,9 +125,9 @@ def test_levels_have_the_same_outline(worker: WorkerAsset) -> None:
 
 
 def test_surface_faces_outwards(worker: WorkerAsset) -> None:
-    """The signed volume is that of a person, and normals agree with the triangles' winding."""
+    """The signed volume is that of a person, and normals agree with the winding of triangles."""
     for mesh in worker.levels:
-        corners = folded(mesh)
+        corners = triangle_corners(mesh)
         area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         volume_m3 = np.einsum("ti,ti->", corners.mean(axis=1), area) / 6.0
         assert 0.04 < volume_m3 < 0.20
@@ -139,7 +149,7 @@ def test_worker_stands_on_the_floor_at_the_origin(worker: WorkerAsset) -> None:
 
 
 def test_stature_is_the_height_of_the_bare_head_in_shoes(worker: WorkerAsset) -> None:
-    """Hair adds up to 3 cm, a hat or helmet up to 8; eyes are at 93.5 % of an adult's stature."""
+    """Hair adds up to 3 cm, a hat or helmet up to 8 cm; eyes are at 93.5 % of stature."""
     top = worker.levels[0].vertices_m[:, 2].max()
     covered = any(word in worker.description for word in ("cap", "helmet"))
     assert -0.005 < top - worker.stature_m < (0.08 if covered else 0.03)
@@ -165,7 +175,7 @@ def test_joints_and_keypoints_are_symmetric(worker: WorkerAsset) -> None:
             )
 
 
-def test_a_child_never_follows_more_than_its_parent(worker: WorkerAsset) -> None:
+def test_a_joints_weights_never_exceed_its_parents(worker: WorkerAsset) -> None:
     rows = [mesh.weights for mesh in worker.levels] + [worker.keypoint_weights]
     for weights in rows:
         for joint, parent in enumerate(PARENTS):
@@ -174,10 +184,10 @@ def test_a_child_never_follows_more_than_its_parent(worker: WorkerAsset) -> None
 
 
 @pytest.mark.parametrize("joint", ["elbow", "knee"])
-def test_limbs_follow_their_joint_wholly_beyond_it_and_not_before(
+def test_limbs_follow_their_joint_fully_beyond_it_and_not_before_it(
     worker: WorkerAsset, joint: str
 ) -> None:
-    """Twelve centimetres either side of the joint, and smoothly in between."""
+    """From 12 cm on either side of the joint, and smoothly in between."""
     for side in ("left", "right"):
         at = JOINTS.index(f"{side}_{joint}")
         before, after = worker.joints_m[PARENTS[at]], worker.joints_m[at + 1]
@@ -204,7 +214,7 @@ def test_head_is_rigid_and_the_trunk_does_not_turn_with_it(worker: WorkerAsset) 
 
 
 def test_skin_bends_over_several_centimetres(worker: WorkerAsset) -> None:
-    """No weight jumps along an edge of the finer levels: rigid pieces would gape there."""
+    """No weight jumps along an edge of the finer levels, where rigid pieces would leave gaps."""
     for mesh, step in zip(worker.levels[:2], (0.40, 0.50), strict=True):
         ends = mesh.weights[mesh.triangles]
         jumps = np.abs(ends - np.roll(ends, 1, axis=1)).max(axis=(1, 2))
@@ -212,8 +222,8 @@ def test_skin_bends_over_several_centimetres(worker: WorkerAsset) -> None:
         assert jumps.max() <= step + 0.15
 
 
-def test_eyeballs_sit_about_their_joints(worker: WorkerAsset) -> None:
-    """Eyes turn alone: whole pieces that lie round the joint, as large as an eye."""
+def test_eyeballs_are_centred_on_their_joints(worker: WorkerAsset) -> None:
+    """Eyes are whole pieces of the size of an eye around their joint, and turn alone."""
     mesh = worker.levels[0]
     for joint in (JOINTS.index("left_eye"), JOINTS.index("right_eye")):
         ball = mesh.vertices_m[mesh.weights[:, joint] == 1.0]
@@ -225,7 +235,7 @@ def test_eyeballs_sit_about_their_joints(worker: WorkerAsset) -> None:
 
 
 def test_keypoints_lie_in_or_on_the_body(worker: WorkerAsset) -> None:
-    corners = folded(worker.levels[0])
+    corners = triangle_corners(worker.levels[0])
     inside = winding_number(worker.keypoints_m, corners) > 0.5
     nearest = np.array(
         [
@@ -247,7 +257,7 @@ def test_keypoints_follow_the_joints_that_move_them(worker: WorkerAsset) -> None
 
 
 def test_heads_match_the_template_of_perception(worker: WorkerAsset) -> None:
-    """Nose, eyes and ears within 15 mm of the template after the best rigid alignment."""
+    """Nose, eyes and ears lie within 15 mm of the template after the best rigid alignment."""
     head = worker.keypoints_m[list(HEAD_KEYPOINTS)]
     template = HEAD_TEMPLATE_M - HEAD_TEMPLATE_M.mean(axis=0)
     centred = head - head.mean(axis=0)
@@ -257,7 +267,7 @@ def test_heads_match_the_template_of_perception(worker: WorkerAsset) -> None:
 
 
 def test_heads_are_level(worker: WorkerAsset) -> None:
-    """At rest the head looks straight ahead: the nose as far below the ears as on the template."""
+    """At rest the head points straight ahead, with the template's angle from ears to nose."""
     nose, ears = worker.keypoints_m[kp.NOSE], worker.keypoints_m[[kp.LEFT_EAR, kp.RIGHT_EAR]]
     ahead = nose - ears.mean(axis=0)
     pitch_deg = np.degrees(np.arctan2(-ahead[2], ahead[0]))
@@ -267,7 +277,7 @@ def test_heads_are_level(worker: WorkerAsset) -> None:
 
 @pytest.mark.parametrize("limb", LIMBS, ids=lambda limb: limb.name)
 def test_limbs_match_the_lengths_of_perception(worker: WorkerAsset, limb: object) -> None:
-    """Two standard deviations of the stated spread, three for the spans (see the table there)."""
+    """Within two standard deviations of perception's table, three for the spans."""
     assert isinstance(limb, type(LIMBS[0]))
     start, end = (worker.keypoints_m[list(rows)].mean(axis=0) for rows in (limb.start, limb.end))
     ratio = np.linalg.norm(start - end) / (limb.length_m * worker.stature_m / MEAN_STATURE_M)
@@ -275,7 +285,7 @@ def test_limbs_match_the_lengths_of_perception(worker: WorkerAsset, limb: object
 
 
 def test_capsules_hold_the_surface(worker: WorkerAsset) -> None:
-    """95 % of the surface within 3 cm of a capsule, and no capsule larger than what it is for."""
+    """95 % of the surface lies within 3 cm of a capsule, and no capsule is too large."""
     vertices = worker.levels[0].vertices_m
     gap = np.full(len(vertices), np.inf)
     for capsule in worker.capsules:
@@ -291,7 +301,7 @@ def test_capsules_hold_the_surface(worker: WorkerAsset) -> None:
 
 
 def test_hands_hang_clear_of_the_thighs(worker: WorkerAsset) -> None:
-    """A centimetre at least between what moves with the wrist and what moves with the hip."""
+    """At least 1 cm lies between skin that follows the wrist and skin that follows the hip."""
     mesh = worker.levels[0]
     hands = mesh.vertices_m[mesh.weights[:, [a + 2 for a in ARMS]].max(axis=1) > 0.5]
     trunk = mesh.vertices_m[mesh.weights[:, ARMS].max(axis=1) < 0.05]

@@ -1,4 +1,4 @@
-"""Feet of scripted walks: straight, in curves, turning, starting, stopping, backwards."""
+"""Footsteps of planned walks: straight, in curves, turning, starting, stopping, backwards."""
 
 from __future__ import annotations
 
@@ -13,9 +13,14 @@ from hypothesis import strategies as st
 
 from perception import layouts as kp
 from sim_tests.actors.behaviour import WorkerScript
-from sim_tests.actors.body import Gait, Worker, load_worker, skeleton, worker_names
-from sim_tests.actors.body._asset import JOINTS
-from sim_tests.actors.body._pose import link_transforms
+from sim_tests.actors.body import (
+    JOINTS,
+    Gait,
+    Worker,
+    load_worker,
+    skeleton,
+    worker_names,
+)
 from sim_tests.scenario import Scenario, shipped_scenarios
 from sim_tests.world import Warehouse
 from sim_tests.world.hall import WarehouseLayout
@@ -72,7 +77,7 @@ def hall() -> Iterator[Warehouse]:
 
 
 @pytest.fixture(scope="module")
-def cast(hall: Warehouse) -> dict[str, Worker]:
+def workers(hall: Warehouse) -> dict[str, Worker]:
     return {name: Worker(hall, load_worker(name).stature_m, look=name) for name in worker_names()}
 
 
@@ -81,8 +86,8 @@ def _times(walk: WorkerScript) -> np.ndarray:
     return np.arange(min(keys) - 1.0, max(keys) + 1.5, 1.0 / HZ)
 
 
-def _film(worker: Worker, walk: WorkerScript) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Soles (2, N, V, 3), ankles by the legs minus where they were asked (N, 2, 3), keypoints."""
+def _simulate(worker: Worker, walk: WorkerScript) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return soles (2, N, V, 3), errors of the ankles, and keypoints at all times."""
     walk = walk.model_copy(update={"look": worker.asset.name, "stature_m": worker.stature_m})
     asset, scale = worker.asset, worker.skeleton.scale
     skin = asset.levels[1]
@@ -95,7 +100,7 @@ def _film(worker: Worker, walk: WorkerScript) -> tuple[np.ndarray, np.ndarray, n
     for t_s in _times(walk):
         motion = walk.motion(float(t_s))
         worker.place(motion.position_odom_m, motion.heading_odom_rad, feet=motion.feet)
-        links = link_transforms(asset.joints_m, worker.pose)
+        links = worker.links_odom
         for side, ankle in enumerate(ANKLES):
             frames[side].append((soles[side] @ links[1 + ankle].T)[:, :3])
             place = links[1 + ankle] @ [*(asset.joints_m[ankle] * scale), 1.0]
@@ -105,7 +110,7 @@ def _film(worker: Worker, walk: WorkerScript) -> tuple[np.ndarray, np.ndarray, n
 
 
 def _slip_m(shoe: np.ndarray) -> float:
-    """How far any point of a sole moves over the floor between landing and leaving."""
+    """Return the longest slide of any point of a sole while it touches the floor."""
     worst, touched, start = 0.0, np.zeros(len(shoe[0]), dtype=bool), shoe[0][:, :2].copy()
     for frame in shoe:
         touches = frame[:, 2] < TOUCHING_M
@@ -117,9 +122,9 @@ def _slip_m(shoe: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("name", WALKS)
-def test_feet_stand_where_they_landed(cast: dict[str, Worker], name: str) -> None:
-    """No sole slides, sinks or floats, legs reach their feet, and nothing jumps."""
-    soles, errors, keypoints = _film(cast["daniel"], WALKS[name])
+def test_stance_feet_stay_where_they_landed(workers: dict[str, Worker], name: str) -> None:
+    """No sole slides, sinks or floats, the legs reach the feet, and no keypoint jumps."""
+    soles, errors, keypoints = _simulate(workers["daniel"], WALKS[name])
     lowest = []
     for side in (0, 1):
         shoe = np.array(soles[side].tolist(), dtype=np.float64)
@@ -139,8 +144,8 @@ def test_feet_stand_where_they_landed(cast: dict[str, Worker], name: str) -> Non
 
 
 @pytest.mark.parametrize("look", worker_names())
-def test_all_workers_keep_their_feet(cast: dict[str, Worker], look: str) -> None:
-    soles, errors, _ = _film(cast[look], WALKS["round a corner"])
+def test_no_workers_feet_slide(workers: dict[str, Worker], look: str) -> None:
+    soles, errors, _ = _simulate(workers[look], WALKS["round a corner"])
     for side in (0, 1):
         shoe = np.array(soles[side].tolist(), dtype=np.float64)
         assert _slip_m(shoe) < 0.03
@@ -152,20 +157,20 @@ corners = st.lists(st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0)), min_si
 
 
 @given(corners, st.floats(0.4, 1.5), st.floats(-180.0, 180.0), st.booleans())
-@example([(0.25, 0.0), (0.25, 0.0), (1.375, 0.0)], 1.5, 0.0, True)  # a dash from standing
-@example([(1.2, 0.2), (-1.8, -0.5), (-0.9, -1.2)], 1.5, -70.0, False)  # and one sideways
+@example([(0.25, 0.0), (0.25, 0.0), (1.375, 0.0)], 1.5, 0.0, True)  # a short run from standing
+@example([(1.2, 0.2), (-1.8, -0.5), (-0.9, -1.2)], 1.5, -70.0, False)  # a short run sideways
 @example([(1.2, -1.8), (-1.1, 1.7), (0.4, -1.0), (-0.9, 0.1)], 1.5, 0.0, False)  # sharp turns
-@example([(0.2, 1.9), (0.2, 1.9), (1.0, 1.6)], 1.5, 17.0, False)  # a short one askew
+@example([(0.2, 1.9), (0.2, 1.9), (1.0, 1.6)], 1.5, 17.0, False)  # a short run askew
 @settings(max_examples=15, deadline=None)
-def test_stances_stay_put_whatever_the_walk(
+def test_stance_feet_stay_in_any_walk(
     places: list, speed_mps: float, heading_deg: float, ahead: bool
 ) -> None:
-    """Of any script: a flat foot does not move, hips stay up, no foot is faster than 10 m/s."""
+    """In any script a flat foot does not move, hips stay up, no foot is faster than 10 m/s."""
     times = np.cumsum(
         [0.0, *(max(math.dist(*pair) / speed_mps, 0.5) for pair in itertools.pairwise(places))]
     )
     path = [(t, x, y) for t, (x, y) in zip(times.tolist(), places, strict=True)]
-    # Nobody turns faster than half a turn a second.
+    # No turn is faster than 180 degrees per second.
     end = max(times[-1], abs(heading_deg) / 180.0)
     walk = script(path, () if ahead else ((0.0, heading_deg), (end, 0.0)))
     rows = [walk.motion(float(t)).feet for t in _times(walk)]
@@ -182,24 +187,24 @@ def test_stances_stay_put_whatever_the_walk(
     assert hips.max() <= hips[0] + 1e-9
 
 
-def test_a_straight_walk_is_that_of_the_stateless_gait() -> None:
-    """In the middle of a long walk the plan and the formula agree, but for the phase."""
+def test_a_straight_walk_agrees_with_the_stateless_gait() -> None:
+    """In the middle of a long walk both agree except for the phase."""
     walk = script([(0, 0, 0), (10, 12.0, 0)])
     times = np.arange(3.0, 7.0, 1.0 / HZ)
     motions = [walk.motion(float(t)) for t in times]
     planned = np.array([np.array(m.feet.feet)[:, 0] - m.position_odom_m[0] for m in motions])
-    # Each foot comes as far ahead and falls as far behind as the gait says.
+    # Each foot gets as far ahead of the body and as far behind it as in the gait.
     stateless = Gait(skeleton(None, 1.75))
     stride = float(stateless.stride_m(1.2))
     formula = np.array(
-        [np.array(stateless.footing(s, 1.2).feet)[:, 0] for s in np.linspace(0.0, stride, 200)]
+        [np.array(stateless.pose(s, 1.2).feet)[:, 0] for s in np.linspace(0.0, stride, 200)]
     )
     np.testing.assert_allclose(planned.max(axis=0), formula.max(axis=0), atol=0.03)
     np.testing.assert_allclose(planned.min(axis=0), formula.min(axis=0), atol=0.03)
 
 
-def test_place_and_time_do_not_matter() -> None:
-    """The same walk elsewhere, a quarter turn on, and later: the same feet, moved with it."""
+def test_footsteps_do_not_depend_on_place_heading_or_time() -> None:
+    """The same walk at another place, rotated by 90 degrees and later has the same feet."""
     path, turn = [(0, 0, 0), (2, 2, 0.3), (4, 2.5, 2)], 0.5 * math.pi
     cos, sin = math.cos(turn), math.sin(turn)
     moved = [(t + 7, 3 + cos * x - sin * y, -1 + sin * x + cos * y) for t, x, y in path]

@@ -1,28 +1,37 @@
-"""True keypoints, projected, fall on the rendered body: found again by marker colours."""
+"""Projected true keypoints fall on the rendered body, where coloured markers are found."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from functools import cache
 
 import cv2
 import numpy as np
 import pytest
 
 from perception import Camera
-from sim_tests.actors.body import Worker, load_worker, worker_names
-from sim_tests.actors.body._asset import JOINTS, SkinMesh
-from sim_tests.actors.body._pose import skin_points
-from sim_tests.actors.body._skin import WorkerSkin
+from sim_tests.actors.body import (
+    JOINTS,
+    SkinMesh,
+    Worker,
+    WorkerSkin,
+    load_worker,
+    skin_points,
+    worker_names,
+)
 from sim_tests.world import Warehouse
 from sim_tests.world.camera import CameraRenderer
 from sim_tests.world.hall import Lighting, WarehouseLayout
 
-CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
+# The part of an image of 640 × 480 px and 60° that holds the head.
+WHOLE = Camera.from_fov(640, 480, math.radians(60.0))
+CAMERA = Camera(160, 200, WHOLE.fx_px, WHOLE.fy_px, WHOLE.cx_px - 240.0, WHOLE.cy_px - 90.0)
 MARKERS = ((255, 0, 255), (0, 255, 255), (255, 255, 0), (0, 0, 255), (0, 255, 0))
 MARKER_M = 0.009
 DISTANCE_M = 3.0
 LEAST_PIXELS = 4
-# Every pixel takes its texel as it is: nothing shades the markers.
+# Every pixel has the colour of its texel, without shading.
 FLAT = Lighting(ambient=1.0, diffuse=0.0, specular=0.0, shadows=False)
 POSES = (
     {},
@@ -33,8 +42,14 @@ POSES = (
 )
 
 
+@pytest.fixture(scope="module")
+def hall() -> Iterator[Warehouse]:
+    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
+        yield warehouse
+
+
 def texel_points(skin: SkinMesh) -> tuple[np.ndarray, np.ndarray]:
-    """(H, W) triangle of each texel or −1, and (H, W, 3) where on the body at rest it lies."""
+    """Return (H, W) the triangle of each texel or −1, and (H, W, 3) its place at rest."""
     height, width = skin.texture_rgb.shape[:2]
     corners = skin.uv[skin.triangles] * (width, height)
     corners[..., 1] = height - corners[..., 1]
@@ -58,68 +73,66 @@ def texel_points(skin: SkinMesh) -> tuple[np.ndarray, np.ndarray]:
 
 
 def cross(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Of (N, 2) vectors."""
+    """Return (N,) the cross products of (N, 2) vectors."""
     return first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
 
 
+@cache
 def marked(look: str) -> tuple[np.ndarray, np.ndarray]:
-    """The finest texture with a marker at each keypoint of the face; the markers (5, 3) at rest."""
+    """Return the finest texture with a marker at each face keypoint, and their places at rest."""
     asset = load_worker(look)
     skin = asset.levels[0]
     owner, points = texel_points(skin)
     head = skin.weights[skin.triangles][..., JOINTS.index("neck")].min(axis=1) > 0.99
     texture = np.full_like(skin.texture_rgb, 90)
     places = np.empty((5, 3))
-    usable = (owner >= 0) & head[np.maximum(owner, 0)]
+    rows, columns = np.nonzero((owner >= 0) & head[np.maximum(owner, 0)])
+    texels = points[rows, columns]
     for row, (keypoint, colour) in enumerate(zip(asset.keypoints_m[:5], MARKERS, strict=True)):
-        distance = np.where(usable, np.linalg.norm(points - keypoint, axis=-1), np.inf)
-        # A keypoint under the skin is compared with the nearest skin.
-        places[row] = points.reshape(-1, 3)[np.argmin(distance)]
-        near = usable & (np.linalg.norm(points - places[row], axis=-1) < MARKER_M)
-        texture[near] = colour
+        # A keypoint below the skin is replaced by the nearest point of the skin.
+        places[row] = texels[np.argmin(np.linalg.norm(texels - keypoint, axis=-1))]
+        near = np.linalg.norm(texels - places[row], axis=-1) < MARKER_M
+        texture[rows[near], columns[near]] = colour
     return texture, places
 
 
-def pixel_errors(look: str, headings: int = 8) -> list[float]:
-    """Distances between markers found and keypoints projected, over headings and poses."""
+def pixel_errors(hall: Warehouse, look: str, headings: int = 8) -> list[float]:
+    """Return distances (px) between found markers and projected keypoints, over many poses."""
     texture, places = marked(look)
     head = np.zeros((5, len(JOINTS)))
     head[:, [JOINTS.index("spine"), JOINTS.index("neck")]] = 1.0
     errors = []
-    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
-        stature = load_worker(look).stature_m
-        worker = Worker(warehouse, stature, look=look)
-        skin = WorkerSkin(worker, [texture] * 3)
-        actor = warehouse.visuals.add_actor(skin)
-        renderer = CameraRenderer(warehouse, lighting=FLAT)
-        T_odom_camera = np.eye(4)
-        T_odom_camera[:3, :3] = [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]
-        T_odom_camera[2, 3] = 1.4
-        for pose in POSES:
-            for heading in np.linspace(0.0, 2.0 * math.pi, headings, endpoint=False):
-                worker.place((DISTANCE_M, 0.0), heading, **pose)
-                view = renderer.render(CAMERA, T_odom_camera, only={actor})
-                where = skin_points(worker.asset.joints_m, worker.pose, places, head)
-                pixels = CAMERA.project((where - T_odom_camera[:3, 3]) @ T_odom_camera[:3, :3])
-                for colour, pixel in zip(MARKERS, pixels, strict=True):
-                    rows, columns = np.nonzero((view.rgb == colour).all(axis=-1))
-                    if len(rows) >= LEAST_PIXELS:
-                        found = np.array([columns.mean(), rows.mean()])
-                        errors.append(float(np.linalg.norm(found - pixel)))
+    worker = Worker(hall, load_worker(look).stature_m, look=look)
+    actor = hall.visuals.add_actor(WorkerSkin(worker, [texture] * 3))
+    renderer = CameraRenderer(hall, lighting=FLAT)
+    T_odom_camera = np.eye(4)
+    T_odom_camera[:3, :3] = [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]
+    T_odom_camera[2, 3] = 1.4
+    for pose in POSES:
+        for heading in np.linspace(0.0, 2.0 * math.pi, headings, endpoint=False):
+            worker.place((DISTANCE_M, 0.0), heading, **pose)
+            view = renderer.render(CAMERA, T_odom_camera, only={actor})
+            where = skin_points(worker.asset.joints_m, worker.pose, places, head)
+            pixels = CAMERA.project((where - T_odom_camera[:3, 3]) @ T_odom_camera[:3, :3])
+            for colour, pixel in zip(MARKERS, pixels, strict=True):
+                rows, columns = np.nonzero((view.rgb == colour).all(axis=-1))
+                if len(rows) >= LEAST_PIXELS:
+                    found = np.array([columns.mean(), rows.mean()])
+                    errors.append(float(np.linalg.norm(found - pixel)))
     return errors
 
 
 @pytest.mark.parametrize("look", worker_names()[::4])
-def test_markers_are_found_where_keypoints_are_projected(look: str) -> None:
-    errors = pixel_errors(look)
+def test_markers_are_found_where_keypoints_are_projected(hall: Warehouse, look: str) -> None:
+    errors = pixel_errors(hall, look)
     assert len(errors) >= 30  # long hair hides ears
     assert np.median(errors) <= 1.0
     assert np.percentile(errors, 95) <= 2.5
 
 
 @pytest.mark.slow
-def test_over_all_workers_the_median_is_within_two_pixels() -> None:
-    errors = [error for look in worker_names() for error in pixel_errors(look, headings=3)]
+def test_over_all_workers_the_median_is_within_two_pixels(hall: Warehouse) -> None:
+    errors = [error for look in worker_names() for error in pixel_errors(hall, look, headings=3)]
     assert np.median(errors) <= 2.0
 
 

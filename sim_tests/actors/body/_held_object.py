@@ -1,4 +1,4 @@
-"""What the camera sees of the things in a worker's hands: a carton, a telephone."""
+"""Visual actor of the object in a worker's hands: a cardboard box or a phone."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ from ...world.render import RenderView, Visuals
 from ...world.sightlines import PlacedSurface, TriangleSet
 from ._postures import BOX_SIZE_M, PHONE_SIZE_M
 
-# Colours, a texel each: carton, tape, telephone, its screen.
+# One texel per colour: cardboard, tape, phone, its screen.
 _PALETTE: Final = np.array(
     [[[176, 136, 92], [206, 184, 142], [28, 28, 32], [150, 190, 220]]], dtype=np.uint8
 ).repeat(4, axis=0)
-_CARTON_UV, _TAPE_UV, _SLAB_UV, _SCREEN_UV = ((0.125 + 0.25 * k, 0.5) for k in range(4))
-_TAPE_M: Final = 0.05
-# A box about either thing, however it is turned.
+_CARDBOARD_UV, _TAPE_UV, _PHONE_UV, _SCREEN_UV = ((0.125 + 0.25 * k, 0.5) for k in range(4))
+_TAPE_WIDTH_M: Final = 0.05
+# Radius of a sphere that holds either object.
 _REACH_M: Final = 0.5 * float(np.linalg.norm(BOX_SIZE_M))
 
 
 class Holder(Protocol):
-    """A body that may hold something, as :class:`Worker` is."""
+    """A body that may hold an object; :class:`Worker` is one."""
 
     @property
     def held(self) -> str | None:
-        """What is in the hands; None for empty ones."""
+        """The object in the hands; None for empty ones."""
         ...
 
     @property
     def T_odom_held(self) -> FloatArray | None:  # noqa: N802
-        """(4, 4) where it is."""
+        """(4, 4) pose of the object; None with empty hands."""
         ...
 
     @property
@@ -46,18 +46,17 @@ class Holder(Protocol):
         ...
 
     def reach_odom_m(self) -> FloatArray:
-        """(2, 3) low and high corner of a box about the body."""
+        """Return (2, 3) the low and high corner of a box that holds the body."""
         ...
 
 
-class HeldThing:
-    """The actor of whatever a :class:`Worker` holds; see :class:`Actor`.
+class HeldObject:
+    """The visual actor of the object that a :class:`Worker` holds.
 
-    It is an actor of its own, so that a carton before somebody's chest hides it instead of being
-    part of the person.
+    It is separate from the person's actor, so that a box hides the chest behind it.
 
     Args:
-        worker: whose hands.
+        worker: the person who holds it.
 
     Attributes:
         kind: ``"prop"``.
@@ -68,62 +67,59 @@ class HeldThing:
     def __init__(self, worker: Holder) -> None:
         self._worker = worker
         self._visuals: Visuals | None = None
-        self._things: dict[str, int] = {}
+        self._bodies: dict[str, int] = {}
         self._shown: str | None = None
 
     def bounds_odom_m(self) -> FloatArray:
-        """(2, 3) low and high corner of a box about the thing; a point with empty hands."""
+        """Return (2, 3) the corners of a box that holds the object; a point with empty hands."""
         place = self._worker.T_odom_held
         if place is None:
             return np.array([self._worker.chest_odom_m] * 2)
         return np.array([place[:3, 3] - _REACH_M, place[:3, 3] + _REACH_M])
 
     def reach_odom_m(self) -> FloatArray:
-        """The worker's reach; a point with empty hands."""
+        """Return the worker's reach; a point with empty hands."""
         reach = self._worker.reach_odom_m()
         return reach if self._worker.held is not None else np.array([reach[0], reach[0]])
 
     def surface(self, detail: int) -> PlacedSurface | None:
-        """The thing where it is now; None with empty hands. There is one level of detail."""
+        """Return the object's surface; None with empty hands. All levels of detail are the same."""
         held, place = self._worker.held, self._worker.T_odom_held
         if held is None or place is None:
             return None
         return PlacedSurface(_triangles(held), place[None])
 
     def build(self, visuals: Visuals) -> None:
-        """Note where to draw; each thing is made when it is first held."""
+        """Store the visual world; each object is made when it is first held."""
         self._visuals = visuals
 
     def bodies(self) -> AbstractSet[int]:
-        """Ids of all things made so far."""
-        return set(self._things.values())
+        """Return the ids of all objects made so far."""
+        return set(self._bodies.values())
 
     def show(self, pixels_per_m: float | None, view: RenderView | None = None) -> None:
-        """Put the thing into the hands; there is one level of detail."""
+        """Place the object in the hands, or hide it. All levels of detail are the same."""
         visuals = self._visuals
         if visuals is None:
             return
         held = None if pixels_per_m is None else self._worker.held
-        if held is not None and held not in self._things:
-            self._things[held] = visuals.add_body(_shape(visuals, held))
+        if held is not None and held not in self._bodies:
+            self._bodies[held] = visuals.add_body(
+                visuals.shape(_mesh(held), texture=visuals.texture(_PALETTE))
+            )
         elif held is not None and held != self._shown:
-            visuals.reveal(self._things[held])
+            visuals.reveal(self._bodies[held])
         if self._shown is not None and held != self._shown:
-            visuals.hide(self._things[self._shown])
+            visuals.hide(self._bodies[self._shown])
         self._shown = held
         place = self._worker.T_odom_held
         if held is not None and place is not None:
             pybullet.resetBasePositionAndOrientation(
-                self._things[held],
+                self._bodies[held],
                 place[:3, 3].tolist(),
                 Rotation.from_matrix(place[:3, :3]).as_quat().tolist(),
                 physicsClientId=visuals.client,
             )
-
-
-def _shape(visuals: Visuals, held: str) -> int:
-    """The shape of a thing about its middle."""
-    return visuals.shape(_mesh(held), texture=visuals.texture(_PALETTE))
 
 
 @lru_cache(maxsize=2)
@@ -133,20 +129,21 @@ def _triangles(held: str) -> TriangleSet:
 
 
 def _mesh(held: str) -> Mesh:
+    """Return the mesh of an object about its middle."""
     middle = (0.0, 0.0, 0.0)
     if held == "box":
         length, _, height = BOX_SIZE_M
-        tape = (length + 0.004, _TAPE_M, height + 0.004)
-        parts = [(box(middle, BOX_SIZE_M), _CARTON_UV), (box(middle, tape), _TAPE_UV)]
+        tape = (length + 0.004, _TAPE_WIDTH_M, height + 0.004)
+        parts = [(box(middle, BOX_SIZE_M), _CARDBOARD_UV), (box(middle, tape), _TAPE_UV)]
     else:
         thick, width, height = PHONE_SIZE_M
         screen = box((-0.5 * thick, 0.0, 0.0), (0.002, 0.9 * width, 0.92 * height))
-        parts = [(box(middle, PHONE_SIZE_M), _SLAB_UV), (screen, _SCREEN_UV)]
+        parts = [(box(middle, PHONE_SIZE_M), _PHONE_UV), (screen, _SCREEN_UV)]
     return _coloured(parts)
 
 
 def _coloured(parts: list[tuple[Mesh, tuple[float, float]]]) -> Mesh:
-    """One mesh whose parts each take one texel of the palette."""
+    """Return one mesh of all parts, each with one texel of the palette."""
     return merge(
         Mesh(mesh.vertices_m, mesh.normals, mesh.indices, np.tile(uv, (len(mesh.vertices_m), 1)))
         for mesh, uv in parts
