@@ -1,7 +1,7 @@
 """The bodies of workers.
 
 The shipped assets (meshes, joints, keypoints), their skeletons, the gait and its footsteps, the
-postures of the arms, and :class:`Worker`, which places a body in the physics and the visual world.
+postures of the arms, and :class:`Worker`, which places a body in the physics and the render world.
 """
 
 from __future__ import annotations

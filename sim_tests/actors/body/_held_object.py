@@ -90,7 +90,7 @@ class HeldObject:
         return PlacedSurface(_triangles(held), place[None])
 
     def build(self, visuals: Visuals) -> None:
-        """Store the visual world; each object is made when it is first held."""
+        """Store the render world; each object is made when it is first held."""
         self._visuals = visuals
 
     def bodies(self) -> AbstractSet[int]:

@@ -126,7 +126,7 @@ def _surface(look: str, level: int) -> tuple[TriangleSet, NDArray[np.int64], Flo
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Level:
-    """One level of detail in the visual world, with one body per piece."""
+    """One level of detail in the render world, with one body per piece."""
 
     bodies: tuple[int, ...]
     joints: NDArray[np.int64]
@@ -213,7 +213,7 @@ class WorkerSkin:
         return np.array([points.min(axis=0) - reach, points.max(axis=0) + reach])
 
     def build(self, visuals: Visuals) -> None:
-        """Store the visual world; each level of detail is made when it is first needed."""
+        """Store the render world; each level of detail is made when it is first needed."""
         self._visuals = visuals
 
     def bodies(self) -> AbstractSet[int]:

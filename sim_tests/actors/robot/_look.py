@@ -89,7 +89,7 @@ class AmrLook:
         return PlacedSurface(triangles, places)
 
     def build(self, visuals: Visuals) -> None:
-        """Make the robot's bodies in the visual world."""
+        """Make the robot's bodies in the render world."""
         self._visuals = visuals
         half = 0.5 * TRACK_M
         hubs = {"left_wheel": (half, 1), "right_wheel": (-half, 2)}
@@ -131,5 +131,5 @@ class AmrLook:
             )
 
     def bodies(self) -> frozenset[int]:
-        """Return the ids of the robot's bodies in the visual world."""
+        """Return the ids of the robot's bodies in the render world."""
         return frozenset(body for body, _, _ in self._parts)
