@@ -59,8 +59,8 @@ MUTANTS: Final = (
     Mutant("head_stature", "perception/_placement.py", "_HEAD_STATURE_STD: Final = 0.4 * 0.04", "_HEAD_STATURE_STD: Final = 0.0", "tests/perception/test_head_range.py"),
     Mutant("head_template", "perception/anthropometry.py", "[-0.012, -0.110, -0.078]", "[-0.012, -0.090, -0.078]", "tests/perception/test_head_frame.py tests/perception/test_head_pose.py"),
     Mutant("cone", "perception/_attention.py", "DEFAULT_HALF_ANGLE_RAD: Final = math.radians(60.0)", "DEFAULT_HALF_ANGLE_RAD: Final = math.radians(75.0)", "tests/perception/test_attention.py"),
-    Mutant("z_range", "perception/networks/_simcc.py", "Z_RANGE_M: Final = 2.1744869", "Z_RANGE_M: Final = 2.1", "tests/perception/networks"),
-    Mutant("crop_padding", "perception/networks/_crops.py", "BOX_PADDING: Final = 1.25", "BOX_PADDING: Final = 1.15", "tests/perception/networks"),
+    Mutant("z_range", "perception/networks/poses/_simcc.py", "Z_RANGE_M: Final = 2.1744869", "Z_RANGE_M: Final = 2.1", "tests/perception/networks"),
+    Mutant("crop_padding", "perception/networks/poses/_crops.py", "BOX_PADDING: Final = 1.25", "BOX_PADDING: Final = 1.15", "tests/perception/networks"),
     # Tracks.
     Mutant("acceleration_density", "tracking/_config.py", "acceleration_density_m2ps3: float = Field(default=0.05", "acceleration_density_m2ps3: float = Field(default=0.005", "tests/tracking"),
     Mutant("gate_distance", "tracking/_config.py", "gate_distance_m: float = Field(default=1.0", "gate_distance_m: float = Field(default=3.0", "tests/tracking"),
