@@ -1,4 +1,4 @@
-"""All messages of one instant."""
+"""All messages for one update, by topic."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ class Frames:
     """Names of the frames that messages are in.
 
     Attributes:
-        odom: fixed, drifting, never jumping (REP-105).
-        base: of the robot, on the floor.
-        camera: optical frame; empty for the one that the images name.
+        odom: the fixed frame, which may drift but never jumps (REP-105).
+        base: frame of the robot, on the floor.
+        camera: optical frame of the camera; empty for the frame named in the images.
     """
 
     odom: str = "odom"
@@ -44,10 +44,10 @@ def outgoing(
     grid_m: float = 10.0,
     wanted: Callable[[str], bool] = lambda key: True,
 ) -> Iterator[tuple[str, Message]]:
-    """Key of the topic (:data:`~nav_adapter.ros2.PUBLISHED`) and message, the urgent ones first.
+    """Yield topic key (:data:`~nav_adapter.ros2.PUBLISHED`) and message, urgent ones first.
 
-    Without ``robot_state`` there is no grid, which is about the robot. Messages that are not
-    ``wanted``, asked by key, are not made.
+    Without ``robot_state`` there is no grid, since it is centred on the robot. A message is made
+    only if ``wanted`` returns True for its key.
     """
     odom, base = frames.odom, frames.base
     if wanted("speed_limit"):
