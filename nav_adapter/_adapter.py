@@ -40,7 +40,7 @@ class NavAdapter:
 
     Tentative people, people unseen for longer than ``fresh_within_s`` and, with stale data, all
     people count as unaware. After stale data, or after a pause in the updates of that length, the
-    limit rises no faster than the robot accelerates.
+    limit rises from its last value no faster than the robot accelerates.
 
     Args:
         policy: radii, human speeds, margins and time behaviour.
@@ -178,7 +178,7 @@ class NavAdapter:
         if self._latest is not None:
             elapsed_s = now - self._latest.stamp_s
             if elapsed_s > timing.stale_after_s:
-                # After a pause in the updates the limit before it no longer counts by itself.
+                # After a pause in the updates the robot may be slower than the limit before it.
                 ceiling_mps = min(self._latest.speed_limit_mps, abs(robot_state.speed_mps))
             if ceiling_mps is not None and not stale:
                 counted_s = min(elapsed_s, timing.fresh_within_s)

@@ -25,8 +25,6 @@ _STANDING_MPS: Final = 0.05
 # brisk walker, who may turn to the robot. A person faster than that speed by the second share runs.
 _BRISK_SHARE: Final = 0.75
 _RUNNING_SHARE: Final = 0.25
-# In the order of the limits; they appear in ``limited_by``.
-_RULES: Final = ("speed and separation", "distance zone", "cap near people")
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,25 +81,52 @@ class SpeedGovernor:
         maximum_mps = self._robot.max_speed_mps
         if not people:
             return GovernedSpeed(maximum_mps, "robot maximum", True)
+        gaps_m, shares = self._gaps(people, robot_state, now, robot_age_s)
+        robot_x, robot_y = robot_state.position_odom_m.tolist()
+        rows = [
+            (max(0.0, now - m.track.stamp_s), self._human_speed_mps(m, robot_x, robot_y))
+            for m in people.values()
+        ]
+        age_s, human_mps = np.array(rows).T.copy()
+        separation_mps = self._separation_limit_mps(gaps_m, shares, human_mps, age_s)
+        limits = {
+            "speed and separation": separation_mps,
+            **self._rule_limits_mps(gaps_m, shares[1]),
+        }
+        lowest = []
+        for rule, limit in limits.items():
+            row = int(limit.argmin())
+            lowest.append((float(limit[row]), row, rule))
+        limit_mps, row, rule = min(lowest, key=lambda entry: entry[0])
+        speed_mps = abs(robot_state.speed_mps)
+        # A robot within speed and separation has the whole reaction time left.
+        suffices = speed_mps <= lowest[0][0] or self._braking_suffices(
+            gaps_m, shares, human_mps, age_s, speed_mps
+        )
+        if limit_mps >= maximum_mps:
+            return GovernedSpeed(maximum_mps, "robot maximum", suffices)
+        return GovernedSpeed(limit_mps, f"track {list(people)[row]}: {rule}", suffices)
+
+    def _gaps(
+        self,
+        people: Mapping[int, PersonMemory],
+        robot_state: RobotState,
+        now: float,
+        robot_age_s: float,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the separations and the shares of the stopping distance that lead to the people.
+
+        Both are (2, N): by the bound from the footprint, and by that from the circumscribed circle.
+        """
         count = len(people)
         base_margin_m = BODY_RADIUS_M + abs(robot_state.speed_mps) * robot_age_s
+        margin_m = np.array([base_margin_m + self._uncertainty_m(m, now) for m in people.values()])
         # The nearer of predicted and tracked position counts: the person may have turned round.
         positions = np.array(
             [m.position_odom_m for m in people.values()]
             + [m.track_position_odom_m for m in people.values()]
         )
-        robot_x, robot_y = robot_state.position_odom_m.tolist()
-        rows = [
-            (
-                base_margin_m + self._uncertainty_m(m, now),
-                max(0.0, now - m.track.stamp_s),
-                self._human_speed_mps(m, robot_x, robot_y),
-            )
-            for m in people.values()
-        ]
-        margin_m, age_s, human_mps = np.array(rows).T.copy()
         offset = positions - robot_state.position_odom_m
-        # Both separations: from the footprint, and from the circumscribed circle.
         gaps_m = np.empty((2, count))
         footprint_m = self._footprint.distance_m(positions, robot_state)
         np.minimum(footprint_m[:count], footprint_m[count:], out=gaps_m[0])
@@ -112,24 +137,7 @@ class SpeedGovernor:
         approach = self._approach(offset, robot_state, robot_age_s)
         shares = np.ones((2, count))
         np.maximum(approach[:count], approach[count:], out=shares[1])
-
-        separation_mps = self._separation_limit_mps(gaps_m, shares, human_mps, age_s)
-        limits = [separation_mps, *self._rule_limits_mps(gaps_m, shares[1])]
-        lowest = []
-        for limit in limits:
-            row = int(limit.argmin())
-            lowest.append((float(limit[row]), row))
-        limit_mps, person = min(lowest, key=lambda entry: entry[0])
-        speed_mps = abs(robot_state.speed_mps)
-        # A robot within speed and separation has the whole reaction time left.
-        suffices = speed_mps <= lowest[0][0] or self._braking_suffices(
-            gaps_m, shares, human_mps, age_s, speed_mps
-        )
-        if limit_mps >= maximum_mps:
-            return GovernedSpeed(maximum_mps, "robot maximum", suffices)
-        names = [name for name, used in zip(_RULES, self._rules_used(), strict=True) if used]
-        rule = lowest.index((limit_mps, person))
-        return GovernedSpeed(limit_mps, f"track {list(people)[person]}: {names[rule]}", suffices)
+        return gaps_m, shares
 
     def _uncertainty_m(self, memory: PersonMemory, now: float) -> float:
         """Return by how much a person may be nearer than estimated."""
@@ -138,11 +146,6 @@ class SpeedGovernor:
         if now - memory.seen_stamp_s > self._policy.timing.fresh_within_s:
             sigmas = max(sigmas, margins.unseen_sigmas)
         return sigmas * memory.sigma_m
-
-    def _rules_used(self) -> tuple[bool, bool, bool]:
-        """Return for each rule of :data:`_RULES` whether the policy has it."""
-        rules = self._policy.rules
-        return True, rules.zones is not None, rules.near_cap is not None
 
     def _approach(
         self, offset_odom_m: FloatArray, robot_state: RobotState, robot_age_s: float
@@ -173,9 +176,10 @@ class SpeedGovernor:
         )
         return np.asarray(np.maximum(limits_mps[0], limits_mps[1]))
 
-    def _rule_limits_mps(self, gaps_m: FloatArray, approach: FloatArray) -> list[FloatArray]:
-        """Return the limits (N,) of the other rules that the policy has."""
-        rules, limits, (footprint_gap_m, circle_gap_m) = self._policy.rules, [], gaps_m
+    def _rule_limits_mps(self, gaps_m: FloatArray, approach: FloatArray) -> dict[str, FloatArray]:
+        """Return the limits (N,) of the policy's other rules, by the name of the rule."""
+        rules, (footprint_gap_m, circle_gap_m) = self._policy.rules, gaps_m
+        limits = {}
         if rules.zones is not None:
             # The distance that the robot drives until it has come nearer by the gap.
             drive_m = np.divide(
@@ -183,10 +187,10 @@ class SpeedGovernor:
             )
             drive_m = np.where(circle_gap_m > 0.0, drive_m, circle_gap_m)
             distance_m = np.maximum(footprint_gap_m, drive_m)
-            limits.append(rules.zones.limit_mps(distance_m, self._robot.max_speed_mps))
+            limits["distance zone"] = rules.zones.limit_mps(distance_m, self._robot.max_speed_mps)
         if rules.near_cap is not None:
             deceleration_mps2 = self._robot.max_deceleration_mps2
-            limits.append(rules.near_cap.limit_mps(footprint_gap_m, deceleration_mps2))
+            limits["cap near people"] = rules.near_cap.limit_mps(footprint_gap_m, deceleration_mps2)
         return limits
 
     def _braking_suffices(

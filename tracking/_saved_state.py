@@ -53,7 +53,7 @@ class _TracksRecord(StrictConfig):
 
 
 class _StateRecord(StrictConfig):
-    """A :class:`TrackerState`."""
+    """A :class:`TrackerState` as plain values."""
 
     stamp_s: float | None
     interval_s: float | None
@@ -79,7 +79,7 @@ class _StateRecord(StrictConfig):
 
 
 class _FrameRecord(StrictConfig):
-    """A :class:`Frame`."""
+    """A :class:`Frame` as plain values."""
 
     stamp_s: float
     T_odom_camera: tuple[_Four, _Four, _Four, _Four]

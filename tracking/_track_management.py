@@ -108,8 +108,8 @@ def damped_time_s(tracks: TrackTable, from_s: float, to_s: float) -> FloatArray 
 
     Only standing people have one. With constant velocity, an unseen standing person would drift off
     with the remaining estimated velocity, and its uncertainty, which grows with the cube of time,
-    would fill the hall. The time counts from the last sighting, so that the number of frames since
-    then does not matter.
+    would cover the whole map. The time counts from the last sighting, so that the number of frames
+    since then does not matter.
     """
     if not tracks.standing.any():
         return None

@@ -31,10 +31,10 @@ class PersonTracker:
     is never used again. Tentative tracks are returned too, with ``awareness_lower`` 0: the person
     may not exist, but navigation must treat them as one who has not seen the robot.
 
-    Whether an unseen person should have been seen decides how long the track is kept. With a
-    ``view``, a person whom nothing hides is deleted after ``max_missed_s``. A person out of view or
-    behind another person is deleted after ``max_coast_s``, or after ``max_standing_coast_s`` if
-    they stood still. Without a view every person is kept for ``max_coast_s``.
+    A track is deleted sooner if frames should have shown the person. With a ``view``, a person whom
+    nothing hides is deleted after ``max_missed_s``. A person out of view or behind another person
+    is deleted after ``max_coast_s``, or after ``max_standing_coast_s`` if they stood still. Without
+    a view every person is kept for ``max_coast_s``.
 
     Frames may come late by up to ``max_lag_s``. The tracks and their ids are then the same as if
     the frames had come in order. This may revise earlier results from after the late frame's stamp:

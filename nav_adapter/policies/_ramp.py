@@ -13,7 +13,7 @@ from .._errors import NavError
 
 
 def smoothstep(position: float) -> float:
-    """Return 0 at 0 and 1 at 1, with slope 0 at both ends; ``position`` lies in [0, 1]."""
+    """Return 3p² − 2p³ for ``position`` p in [0, 1], which has slope 0 at both ends."""
     return min(position * position * (3.0 - 2.0 * position), 1.0)
 
 

@@ -63,8 +63,8 @@ def outgoing(
         speed_mps = 0.0 if robot_state is None else robot_state.speed_mps
         yield "stop_zone", stop_zone(robot, speed_mps, constraints.stamp_s, base_frame=base)
     if robot_state is not None and wanted("grid"):
-        place = robot_state.position_odom_m
-        yield "grid", occupancy_grid(constraints, place, size_m=grid_m, frame_id=odom)
+        center = robot_state.position_odom_m
+        yield "grid", occupancy_grid(constraints, center, size_m=grid_m, frame_id=odom)
     if wanted("circles"):
         for circle in circle_objects(constraints, frame_id=odom):
             yield "circles", circle

@@ -98,7 +98,7 @@ def people(
     and 0 for a person without a track, whom the adapter still keeps.
     """
     by_id = {track.id: track for track in tracks}
-    everybody = []
+    persons = []
     for each in constraints.obstacles:
         tags = {
             "awareness_lower": f"{each.awareness_lower:.3f}",
@@ -112,7 +112,7 @@ def people(
                 "status": track.status,
                 "time_since_seen_s": f"{track.time_since_seen_s:.3f}",
             }
-        everybody.append(
+        persons.append(
             Person(
                 str(each.track_id),
                 Point(*each.center_odom_m.tolist()),
@@ -122,7 +122,7 @@ def people(
                 tuple(tags.values()),
             )
         )
-    return People(header(constraints.stamp_s, frame_id), tuple(everybody))
+    return People(header(constraints.stamp_s, frame_id), tuple(persons))
 
 
 def detections(constraints: NavConstraints, *, frame_id: str = "odom") -> Detection3DArray:

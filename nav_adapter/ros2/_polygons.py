@@ -54,9 +54,9 @@ def collision_polygons(
     """
     obstacles = list(constraints.obstacles)
     if robot_state is not None:
-        place = robot_state.position_odom_m
+        robot_m = robot_state.position_odom_m
         obstacles.sort(
-            key=lambda each: each.radius_m - float(np.linalg.norm(each.center_odom_m - place))
+            key=lambda each: each.radius_m - float(np.linalg.norm(each.center_odom_m - robot_m))
         )
     people = [
         _instance(each.polygon, each.track_id, constraints.stamp_s, odom_frame)
