@@ -1,4 +1,4 @@
-"""How large, how fast, and why: tracks become obstacles and a speed limit for any planner.
+"""Navigation: turns person tracks into obstacles and a speed limit for any planner.
 
 The parts of a policy are in :mod:`nav_adapter.policies`.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from runpy import run_path
 
-# By path: importing it by name would first run whatever now calls itself perception.
+# Run by path: an import by name could load another package that is called perception.
 _CLASH = Path(__file__).parents[1] / "perception" / "_clash.py"
 run_path(str(_CLASH))["require_sole_owner"](__name__)
 

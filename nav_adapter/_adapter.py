@@ -1,4 +1,4 @@
-"""Tracks in, constraints for a local planner out."""
+"""The adapter: turns person tracks into constraints for a local planner."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from perception.arrays import finite_number
 from tracking import PersonTrack
 
 from ._alert import Alert
-from ._alerting import AlertBook, alerts_due
+from ._alerting import AlertHistory, alerts_due
 from ._constraints import NavConstraints
 from ._errors import NavError
 from ._governor import GovernedSpeed, SpeedGovernor
@@ -19,36 +19,36 @@ from ._obstacles import obstacles_of
 from ._policy import AwarenessPolicy
 from ._robot import RobotProfile, RobotState
 
-# Clocks of two machines, or of a camera and a control loop, differ by this much without harm.
+# Tolerated difference between the clocks of two computers, or of a camera and a control loop.
 _CLOCK_TOLERANCE_S = 0.05
 
 
 class NavAdapter:
     """Turns tracked people into obstacles and a speed limit.
 
-    A person's radius is the policy's, for the lower bound of their α, plus ``uncertainty_sigmas``
-    standard deviations of their position, and never below the floor (body radius plus minimum
-    clearance). It grows at once. It shrinks at a bounded rate, to what has been allowed for
-    ``shrink_after_s``, and only by what a *new sighting* of a confirmed person pays for: as long as
-    no frame shows the person, however the tracks are repeated or predicted, neither the radius
-    shrinks nor the awareness rises.
+    A person's radius is that of the policy for the lower bound of α, plus ``uncertainty_sigmas``
+    standard deviations of the position, and never below the floor (body radius plus minimum
+    clearance). It grows at once. It shrinks at a bounded rate, to the largest radius that was
+    called for in the last ``shrink_after_s``, and only with *new sightings* of a confirmed person:
+    while no frame shows the person, neither repeated nor predicted tracks shrink the radius or
+    raise the awareness.
 
-    The speed limit is the smallest v_max of speed-and-separation monitoring over all people, with
-    the human speed that the policy assumes, and of the policy's other rules. The separation runs
-    from the robot to the person's body circle (radius 0.30 m), not to the inflated obstacle. People
-    whom the robot cannot meet while it stops limit it less (:class:`SpeedGovernor`).
+    The speed limit is the smallest of all people and all rules: v_max of speed-and-separation
+    monitoring with the human speed that the policy assumes, and the policy's other rules. The
+    separation runs from the robot to the person's body circle (radius 0.30 m), not to the inflated
+    obstacle. People whom the robot cannot reach while it stops limit it less (``docs/safety.md``).
 
-    Tentative people, people unseen for longer than ``fresh_within_s`` and, when the data are stale,
-    all people count as unaware. After stale data, or a pause in the updates as long as that, the
-    limit rises from where it was no faster than the robot accelerates.
+    Tentative people, people unseen for longer than ``fresh_within_s`` and, with stale data, all
+    people count as unaware. After stale data, or after a pause in the updates of that length, the
+    limit rises from its last value no faster than the robot accelerates.
 
     Args:
         policy: radii, human speeds, margins and time behaviour.
         robot: footprint, braking and reaction time.
 
     Raises:
-        NavError: an argument of the wrong type, or an own policy object that gives numbers that are
-            not finite or that grow with awareness.
+        NavError: for an argument of the wrong type, or a custom policy object whose values are not
+            finite or grow with awareness.
     """
 
     def __init__(self, policy: AwarenessPolicy, robot: RobotProfile) -> None:
@@ -61,10 +61,10 @@ class NavAdapter:
         self._rules = ObstacleRules(policy)
         self._governor = SpeedGovernor(policy, robot, self._rules)
         self._people: dict[int, PersonMemory] = {}
-        self._book = AlertBook()
+        self._alert_history = AlertHistory()
         self._latest: NavConstraints | None = None
         self._latest_input: tuple[tuple[PersonTrack, ...], RobotState, float] | None = None
-        # While the limit climbs back after stale data.
+        # The ceiling of the limit during the recovery after stale data.
         self._ceiling_mps: float | None = None
 
     def update(
@@ -75,23 +75,24 @@ class NavAdapter:
         *,
         perception_stamp_s: float | None = None,
     ) -> NavConstraints:
-        """Constraints for the instant ``stamp_s``.
+        """Return the constraints at ``stamp_s``.
 
         Args:
-            tracks: the tracker's latest; they are carried on to ``stamp_s`` at constant velocity.
-            robot_state: the latest; its age counts, too.
-            stamp_s: now, never earlier than in the update before.
-            perception_stamp_s: the latest frame that perception has worked through, people or none.
-                Without it the newest track stands in, and an empty ``tracks`` reads as "nobody
-                there": only with it does a dead camera stop a robot that saw nobody.
+            tracks: the tracker's latest; they are predicted to ``stamp_s`` with constant velocity.
+            robot_state: the latest; its age counts too.
+            stamp_s: the present time, not before that of the previous update.
+            perception_stamp_s: stamp of the latest frame that perception has processed, with or
+                without people. If it is None, the newest track's stamp is used, and empty
+                ``tracks`` mean that nobody is there. So only with this stamp does a dead camera
+                stop a robot that sees nobody.
 
         Returns:
-            Obstacles ordered by track id, the speed limit with the rule that set it, and alerts,
-            the most urgent first.
+            Obstacles in the order of track ids, the speed limit with the rule that set it, and
+            alerts, the most urgent first.
 
         Raises:
-            NavError: input of the wrong type, not finite, twice the same id, a stamp before the
-                last one or data from the future. The adapter is then as it was before the call.
+            NavError: for input of the wrong type or not finite, an id that occurs twice, a stamp
+                before the last one, or data from the future. The adapter does not change then.
         """
         now = self._checked_stamp(stamp_s)
         current = _checked_tracks(tracks, now)
@@ -99,16 +100,16 @@ class NavAdapter:
             raise NavError(f"robot_state must be a RobotState, got {type(robot_state).__name__}")
         robot_age_s = _age_s("robot_state.stamp_s", robot_state.stamp_s, now)
         if perception_stamp_s is not None:
-            seen = finite_number("perception_stamp_s", perception_stamp_s, NavError)
+            perceived_s = finite_number("perception_stamp_s", perception_stamp_s, NavError)
         else:
-            seen = min(now, max((track.stamp_s for track in current), default=now))
-        perception_age_s = _age_s("perception_stamp_s", seen, now)
+            perceived_s = min(now, max((track.stamp_s for track in current), default=now))
+        perception_age_s = _age_s("perception_stamp_s", perceived_s, now)
 
         timing = self._policy.timing
         stale = max(robot_age_s, perception_age_s) > timing.stale_after_s
         people = self._people
         if self._latest is not None and now - self._latest.stamp_s > timing.stale_after_s:
-            # Nobody has asked meanwhile, and nobody is known to be aware any more.
+            # After a pause in the updates nobody counts as aware any more.
             people = self._rules.after_silence(people)
         people = self._rules.updated(people, current, now, stale)
         limit = self._governor.limit(people, robot_state, now, robot_age_s)
@@ -116,18 +117,18 @@ class NavAdapter:
             if age_s > timing.stop_after_s:
                 reason = f"stale data: {name} is {age_s:.2f} s old"
                 limit = replace(limit, limit_mps=0.0, limited_by=reason)
-        limit, ceiling_mps = self._recovering(limit, robot_state, now, stale)
+        limit, ceiling_mps = self._limit_recovery(limit, robot_state, now, stale)
         alerts: tuple[Alert, ...] = ()
-        book = self._book
+        alert_history = self._alert_history
         if self._policy.alerts is not None and not stale:
-            alerts, book = alerts_due(
+            alerts, alert_history = alerts_due(
                 self._policy.alerts,
                 self._robot,
                 people,
                 robot_state,
                 now,
                 self._policy.margins.uncertainty_sigmas,
-                book,
+                alert_history,
             )
         last_s = now if self._latest is None else self._latest.stamp_s
         braked_mps = abs(robot_state.speed_mps) - self._robot.max_deceleration_mps2 * (now - last_s)
@@ -141,47 +142,47 @@ class NavAdapter:
             alerts=alerts,
             braking_suffices=limit.braking_suffices,
         )
-        # Nothing can fail from here on: whatever was refused above has left no trace.
+        # Nothing can fail from here on. A refusal above leaves the adapter unchanged.
         self._people = people
-        self._book = book
+        self._alert_history = alert_history
         self._latest = constraints
-        self._latest_input = current, robot_state, seen
+        self._latest_input = current, robot_state, perceived_s
         self._ceiling_mps = ceiling_mps
         return constraints
 
     def watchdog(self, stamp_s: float) -> NavConstraints:
-        """Constraints at ``stamp_s`` when nothing new has come: the latest input, grown older.
+        """Return the constraints at ``stamp_s`` without new input: :meth:`update` with the latest.
 
-        For a timer beside the callbacks that call :meth:`update`: first everyone counts as unaware
-        (``stale_after_s``), then the limit is 0 (``stop_after_s``). Before the first update it is
-        0 as well.
+        For a timer beside the callbacks that call :meth:`update`. After ``stale_after_s`` everyone
+        counts as unaware, and after ``stop_after_s`` the limit is 0. Before the first update it is
+        0 too.
 
         Raises:
-            NavError: a stamp that is not finite or lies before the last one.
+            NavError: for a stamp that is not finite or lies before the last one.
         """
         now = self._checked_stamp(stamp_s)
         if self._latest_input is None:
             return NavConstraints(now, (), 0.0, "stale data: none yet", True)
-        tracks, robot_state, seen = self._latest_input
-        return self.update(tracks, robot_state, now, perception_stamp_s=seen)
+        tracks, robot_state, perceived_s = self._latest_input
+        return self.update(tracks, robot_state, now, perception_stamp_s=perceived_s)
 
-    def _recovering(
+    def _limit_recovery(
         self, limit: GovernedSpeed, robot_state: RobotState, now: float, stale: bool
     ) -> tuple[GovernedSpeed, float | None]:
-        """The limit under a ceiling that rises from stale data on, and that ceiling if any.
+        """Return the limit under the recovery ceiling, and the ceiling, or None without one.
 
-        The ceiling rises to the robot's maximum whatever the limit is meanwhile, so that more
-        awareness never means less speed.
+        There is a ceiling from stale data on. It rises to the robot's maximum whatever the limit is
+        meanwhile, so that more awareness never means less speed.
         """
         ceiling_mps, timing = self._ceiling_mps, self._policy.timing
         if self._latest is not None:
             elapsed_s = now - self._latest.stamp_s
             if elapsed_s > timing.stale_after_s:
-                # Nobody has asked meanwhile: what was allowed before that counts no longer.
+                # After a pause in the updates the robot may be slower than the limit before it.
                 ceiling_mps = min(self._latest.speed_limit_mps, abs(robot_state.speed_mps))
             if ceiling_mps is not None and not stale:
-                credit_s = min(elapsed_s, timing.fresh_within_s)
-                ceiling_mps += self._robot.max_acceleration_mps2 * credit_s
+                counted_s = min(elapsed_s, timing.fresh_within_s)
+                ceiling_mps += self._robot.max_acceleration_mps2 * counted_s
         if ceiling_mps is not None and limit.limit_mps > ceiling_mps:
             limit = replace(limit, limit_mps=ceiling_mps, limited_by="recovery after stale data")
         if stale:
@@ -190,6 +191,7 @@ class NavAdapter:
         return limit, (None if done else ceiling_mps)
 
     def _checked_stamp(self, stamp_s: float) -> float:
+        """Return the stamp after checking that it is finite and does not go back."""
         now = finite_number("stamp_s", stamp_s, NavError)
         if self._latest is not None and now < self._latest.stamp_s:
             raise NavError(
@@ -199,6 +201,7 @@ class NavAdapter:
 
 
 def _age_s(name: str, stamp_s: float, now: float) -> float:
+    """Return the age of data, at least 0; refuse data from the future."""
     if stamp_s > now + _CLOCK_TOLERANCE_S:
         raise NavError(
             f"{name} must not lie after stamp_s, got {stamp_s:.6f} s and {now:.6f} s "
@@ -208,6 +211,7 @@ def _age_s(name: str, stamp_s: float, now: float) -> float:
 
 
 def _checked_tracks(tracks: Iterable[PersonTrack], now: float) -> tuple[PersonTrack, ...]:
+    """Return the tracks after checking their types, ids and stamps."""
     try:
         checked = tuple(tracks)
     except TypeError:

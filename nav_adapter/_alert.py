@@ -1,4 +1,4 @@
-"""A request to warn somebody."""
+"""A request to warn a person."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ AlertKind = Literal["light", "voice", "horn"]
 
 @dataclass(frozen=True, slots=True)
 class Alert:
-    """Who should be warned, how, and why.
+    """A request to warn a person: the kind of alert and the reason.
 
     Attributes:
         track_id: the person.
         kind: ``"light"``, ``"voice"`` or ``"horn"``.
-        time_to_closest_s: ≥ 0, until the closest approach at constant velocities.
-        closest_gap_m: ≥ 0, between robot and body then.
-        reason: the same in words.
+        time_to_closest_s: ≥ 0, time to the closest approach at constant velocities.
+        closest_gap_m: ≥ 0, gap between robot and body at the closest approach.
+        reason: the reason as text.
     """
 
     track_id: int

@@ -1,4 +1,4 @@
-"""What a planner gets: the seam between the adapter and any local planner."""
+"""Obstacles and a speed limit, as the adapter hands them to a local planner."""
 
 from __future__ import annotations
 
@@ -18,15 +18,16 @@ class PersonObstacle:
     """One person as an obstacle in the odom frame.
 
     Attributes:
-        track_id: the track it comes from.
+        track_id: id of the person's track.
         center_odom_m: (2,).
         velocity_odom_mps: (2,).
-        radius_m: > 0; body, clearance and awareness-dependent inflation.
+        radius_m: > 0, including body, clearance and the inflation that depends on awareness.
         height_m: > 0.
-        awareness_lower: the lower bound of α that was acted on, in [0, 1]: 0 for people whose α is
-            not trusted. The radius follows it at once upward and at a bounded rate downward.
-        polygon: the same obstacle as a shapely polygon in odom; it contains the circle, and reaches
-            farther where the policy's outline says so.
+        awareness_lower: the lower bound of α that was used, in [0, 1]; 0 for people whose α is not
+            trusted. When it falls the radius grows at once; when it rises the radius shrinks at a
+            bounded rate.
+        polygon: the obstacle as a shapely polygon in odom. It contains the circle, and reaches
+            farther if the policy's outline asks for it.
     """
 
     track_id: int
@@ -71,10 +72,10 @@ def trusted_obstacle(
     awareness_lower: float,
     polygon: Polygon,
 ) -> PersonObstacle:
-    """Make an obstacle of values known to be sound, without checking them.
+    """Make an obstacle without checks.
 
-    The adapter's own numbers are; arrays must be read-only. A fifth of the time of the constructor,
-    which is for everybody else.
+    For the adapter's own numbers only, with read-only arrays. It takes a fifth of the time of the
+    constructor.
     """
     obstacle = object.__new__(PersonObstacle)
     _SET_ID(obstacle, track_id)
@@ -92,21 +93,21 @@ class NavConstraints:
     """Obstacles and a speed limit for one planning cycle.
 
     Attributes:
-        stamp_s: the instant they are for.
-        obstacles: one a person.
-        speed_limit_mps: ≥ 0; never above what speed-and-separation monitoring allows. 0 means stop.
-        limited_by: who and which rule set the limit, e.g. ``"track 3: speed and separation"``, or
-            ``"robot maximum"``.
-        stale: True when the data are too old to trust: everyone then counts as unaware.
-        reachable_speed_limit_mps: the limit that a robot braking as hard as it may can follow from
-            its present speed; equal to ``speed_limit_mps`` (and never below it) unless the limit
-            fell faster than the robot can brake. For planners whose window of reachable speeds must
-            not be empty. It starts from the measured speed, so a drive that ramps by itself should
-            be given ``speed_limit_mps``: following a late measurement brakes too softly.
-        alerts: who should be warned now; an alert is asked for once, not in every update.
-        braking_suffices: False when a robot that brakes from this instant at its full deceleration
-            comes, by the assumptions of speed and separation, nearer to somebody than the clearance
-            before it stands. Then a limit is not enough: warn, evade, stop harder.
+        stamp_s: the time that they hold for.
+        obstacles: one per person.
+        speed_limit_mps: ≥ 0, at most the limit of speed-and-separation monitoring; 0 means stop.
+        limited_by: the person and the rule that set the limit, e.g. ``"track 3: speed and
+            separation"``, or ``"robot maximum"``.
+        stale: True if the data are too old to trust; everyone then counts as unaware.
+        reachable_speed_limit_mps: the limit that the robot can follow from its present speed with
+            its full deceleration. It equals ``speed_limit_mps`` (and is never below it) unless the
+            limit fell faster than the robot can brake. For planners whose window of reachable
+            speeds must not be empty. It starts from the measured speed, so a drive with its own
+            ramp should get ``speed_limit_mps``: following a late measurement brakes too softly.
+        alerts: people to warn now. An alert is given once, not in every update.
+        braking_suffices: False if a robot that brakes from now on at full deceleration still comes
+            nearer to a person than the clearance before it stands, by the assumptions of speed and
+            separation. A limit is then not enough: warn, evade or stop harder.
     """
 
     stamp_s: float

@@ -1,4 +1,4 @@
-"""Distance between a robot's footprint and points in the odom frame."""
+"""Distances from a robot's footprint to points in the odom frame."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ _SHORTEST_EDGE_M = 1e-9
 
 
 class Footprint:
-    """The convex hull of a footprint, ready for fast distances.
+    """The convex hull of a footprint, prepared for fast distances.
 
-    Plain numpy: for a handful of people it is several times faster than building a shapely polygon
-    at the robot's pose. The points are taken into the base frame, so the hull is prepared once.
+    In plain numpy, which is several times faster for a few people than a shapely polygon at the
+    robot's pose. Points are transformed to the base frame, so the hull is prepared only once.
 
     Args:
         footprint_m: (M, 2) corners in the base frame, not all on one line.
@@ -30,18 +30,18 @@ class Footprint:
         ring = np.asarray(hull.exterior.coords)
         edges = np.diff(ring, axis=0)
         length2 = (edges**2).sum(axis=1)
-        # Corners given twice, but for rounding, make an edge without a direction.
-        kept = length2 > _SHORTEST_EDGE_M**2
-        # (M, 1): the edges run down, the points along, so that minima are taken row by row.
-        self._start_x, self._start_y = ring[:-1][kept].T[:, :, None].copy()
-        self._edge_x, self._edge_y = edges[kept].T[:, :, None].copy()
-        self._edge_length2 = length2[kept][:, None].copy()
+        # A corner given twice, up to rounding, makes an edge without a direction.
+        has_length = length2 > _SHORTEST_EDGE_M**2
+        # (M, 1): one row per edge and one column per point, so that minima are taken over rows.
+        self._start_x, self._start_y = ring[:-1][has_length].T[:, :, None].copy()
+        self._edge_x, self._edge_y = edges[has_length].T[:, :, None].copy()
+        self._edge_length2 = length2[has_length][:, None].copy()
 
     def distance_m(self, points_odom_m: FloatArray, robot_state: RobotState) -> FloatArray:
-        """(N,) distance of (N, 2) points from the footprint at the robot's pose; 0 inside."""
+        """Return the distances (N,) of points (N, 2) from the footprint, 0 inside."""
         offset_x, offset_y = (points_odom_m - robot_state.position_odom_m).T
         cos, sin = math.cos(robot_state.heading_odom_rad), math.sin(robot_state.heading_odom_rad)
-        # (M, N): from every corner to every point, in the base frame.
+        # (M, N): from each corner to each point, in the base frame.
         to_x = (cos * offset_x + sin * offset_y) - self._start_x
         to_y = (cos * offset_y - sin * offset_x) - self._start_y
         along = (to_x * self._edge_x + to_y * self._edge_y) / self._edge_length2
@@ -50,6 +50,6 @@ class Footprint:
         gap2 = np.square(to_x - along * self._edge_x)
         gap2 += np.square(to_y - along * self._edge_y)
         distance: FloatArray = np.sqrt(gap2.min(axis=0))
-        # The hull runs counter-clockwise: inside is to the left of every edge.
+        # The hull is counter-clockwise, so a point inside is to the left of every edge.
         distance[(self._edge_x * to_y >= self._edge_y * to_x).all(axis=0)] = 0.0
         return distance

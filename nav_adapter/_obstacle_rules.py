@@ -1,4 +1,4 @@
-"""The size of each person's obstacle from one update to the next."""
+"""Rules for the size of each person's obstacle from one update to the next."""
 
 from __future__ import annotations
 
@@ -12,31 +12,29 @@ from perception.arrays import finite_number
 from tracking import PersonTrack
 
 from ._errors import NavError
-from ._memory import Pair, PersonMemory, motion_at, position_sigma_m
+from ._memory import PersonMemory, Vector2, motion_at, position_sigma_m
 from ._policy import AwarenessPolicy
 
-# Slower than this, the direction of a velocity is noise.
+# Below this speed the direction of a velocity is noise.
 _WALKING_MPS: Final = 0.1
-# Sums of frame periods are compared with a setting.
+# Tolerance for rounding where sums of frame periods are compared with a setting.
 _ROUNDING_S: Final = 1e-9
 
 _History = tuple[tuple[float, float, float], ...]
 
 
 class ObstacleRules:
-    """The rules by which obstacles grow and shrink. The people are the caller's.
+    """Rules by which obstacles grow and shrink. The caller keeps the people.
 
-    Obstacles grow at once. They shrink to the largest size of the last ``shrink_after_s`` and at a
-    bounded rate, both counted in time in which frames showed a confirmed person: as long as no
-    frame does, however the tracks are repeated or predicted, neither does an obstacle shrink nor
-    awareness rise.
+    Obstacles grow at once. They shrink at a bounded rate, to the largest size called for in the
+    last ``shrink_after_s``. Both count only time in which frames showed a confirmed person. While
+    no frame does, neither repeated nor predicted tracks shrink an obstacle or raise awareness.
 
     Args:
         policy: radii, human speeds, margins and time behaviour.
 
     Raises:
-        NavError: an own policy object that gives numbers that are not finite or that grow with
-            awareness.
+        NavError: for a custom policy object whose values are not finite or grow with awareness.
     """
 
     def __init__(self, policy: AwarenessPolicy) -> None:
@@ -51,8 +49,8 @@ class ObstacleRules:
         _require_non_increasing(self._policy_radius_m, type(inflation).__name__, "m")
         _require_non_increasing(self._policy_human_speed_mps, type(speed).__name__, "m/s")
         self.unaware_human_speed_mps = self._policy_human_speed_mps(0.0)
-        self._inflation_holds = _hysteresis(inflation)
-        self._speed_holds = _hysteresis(speed)
+        self._inflation_holds = _hysteresis_of(inflation)
+        self._speed_holds = _hysteresis_of(speed)
 
     def updated(
         self,
@@ -61,18 +59,28 @@ class ObstacleRules:
         now: float,
         stale: bool,
     ) -> dict[int, PersonMemory]:
-        """Everybody as of ``now``, in the order of their ids, from who was known and the input."""
-        known = {
-            track.id: self._remember(track, people.get(track.id), now, stale) for track in tracks
+        """Return all people as of ``now``, in the order of their ids.
+
+        Args:
+            people: of the update before.
+            tracks: the input.
+            now: stamp of the update.
+            stale: whether the data are too old to trust.
+        """
+        current = {
+            track.id: self._tracked_person(track, people.get(track.id), now, stale)
+            for track in tracks
         }
         for track_id, memory in people.items():
-            if track_id not in known and memory.is_held(now, self._timing.hold_s):
-                # Vanished from the input: walking on and unaware.
-                known[track_id] = self._updated(memory.track, memory, 0.0, now, visible_s=0.0)
-        return dict(sorted(known.items()))
+            if track_id not in current and memory.is_kept(now, self._timing.hold_s):
+                # Missing from the input: unaware, and walking on.
+                current[track_id] = self._known_person(
+                    memory.track, memory, 0.0, now, visible_s=0.0
+                )
+        return dict(sorted(current.items()))
 
     def after_silence(self, people: Mapping[int, PersonMemory]) -> dict[int, PersonMemory]:
-        """The same people after a silence: unaware, and no smaller than at first sight."""
+        """Return the people after a pause in the updates: unaware, and no smaller than that."""
         unaware = {}
         for track_id, memory in people.items():
             radius_m, ahead_m = self._target_m(memory.velocity_odom_mps, 0.0, memory.sigma_m)
@@ -87,13 +95,13 @@ class ObstacleRules:
         return unaware
 
     def human_speed_mps(self, memory: PersonMemory) -> float:
-        """The policy's assumption for a person."""
+        """Return the speed that the policy assumes for a person."""
         return self._policy_human_speed_mps(1.0 if memory.speed_held else memory.awareness_lower)
 
-    def _remember(
+    def _tracked_person(
         self, track: PersonTrack, before: PersonMemory | None, now: float, stale: bool
     ) -> PersonMemory:
-        """The person of a track that is in the input."""
+        """Return the person of a track in the input."""
         timing = self._timing
         seen_stamp_s = track.stamp_s - track.time_since_seen_s
         trusted = (
@@ -103,30 +111,30 @@ class ObstacleRules:
         )
         lower = track.awareness_lower if trusted else 0.0
         if before is None:
-            return self._first(track, seen_stamp_s, lower, now)
+            return self._new_person(track, seen_stamp_s, lower, now)
         newly_seen_s = before.newly_seen_s(seen_stamp_s)
         if newly_seen_s == 0.0:
-            # No new frame, no new evidence: also not from a tracker that claims otherwise.
+            # Without a new frame there is no new evidence, whatever the track says.
             lower = min(lower, before.awareness_lower)
-        # A frame that comes late proves no awareness, but it shows where somebody is:
-        # else a slow camera would leave the doubt of first sight for ever.
-        pays = not stale and track.status == "confirmed"
-        visible_s = min(newly_seen_s, timing.fresh_within_s) if pays else 0.0
-        return self._updated(
+        # A late frame is no evidence of awareness, but it does show the position. Without it, the
+        # uncertainty of the first sighting would never shrink with a slow camera.
+        counts = not stale and track.status == "confirmed"
+        visible_s = min(newly_seen_s, timing.fresh_within_s) if counts else 0.0
+        return self._known_person(
             track, before, lower, now, visible_s=visible_s, seen_stamp_s=seen_stamp_s
         )
 
-    def _first(
+    def _new_person(
         self, track: PersonTrack, seen_stamp_s: float, lower: float, now: float
     ) -> PersonMemory:
-        """Nobody is known to be aware at first sight: the first obstacle is the unaware one."""
+        """Return a person at first sight, whose obstacle has the unaware size."""
         sigma_m = self._sigma_m(track, now)
-        place, here, velocity = motion_at(track, now)
+        track_position, position, velocity = motion_at(track, now)
         radius_m, ahead_m = self._target_m(velocity, 0.0, sigma_m)
         return PersonMemory(
             track=track,
-            place_odom_m=place,
-            here_odom_m=here,
+            track_position_odom_m=track_position,
+            position_odom_m=position,
             velocity_odom_mps=velocity,
             seen_stamp_s=seen_stamp_s,
             awareness_lower=lower,
@@ -134,13 +142,13 @@ class ObstacleRules:
             sigma_m=sigma_m,
             visible_s=0.0,
             ahead_m=ahead_m,
-            facing_odom=_facing(velocity, (1.0, 0.0)),
+            direction_odom=_walking_direction(velocity, (1.0, 0.0)),
             history=((0.0, radius_m, ahead_m),),
             inflation_held=self._inflation_holds(lower, False),
             speed_held=self._speed_holds(lower, False),
         )
 
-    def _updated(
+    def _known_person(
         self,
         track: PersonTrack,
         before: PersonMemory,
@@ -150,14 +158,16 @@ class ObstacleRules:
         visible_s: float,
         seen_stamp_s: float = -math.inf,
     ) -> PersonMemory:
-        """A person known before, now with this bound of α."""
+        """Return a person known from before, now with the bound ``lower`` of α."""
         timing = self._timing
         sigma_m = self._sigma_m(track, now)
         held = self._inflation_holds(lower, before.inflation_held)
-        place, here, velocity = motion_at(track, now)
+        track_position, position, velocity = motion_at(track, now)
         target = self._target_m(velocity, 1.0 if held else lower, sigma_m)
-        clock_s = before.visible_s + visible_s
-        history = _with_history(before.history, (clock_s, *target), timing.shrink_after_s)
+        total_visible_s = before.visible_s + visible_s
+        history = _extended_history(
+            before.history, (total_visible_s, *target), timing.shrink_after_s
+        )
         shrink_m = timing.shrink_rate_mps * visible_s
         radius_m, ahead_m = target
         if len(history) > 1:
@@ -165,23 +175,23 @@ class ObstacleRules:
             ahead_m = max(entry[2] for entry in history)
         return PersonMemory(
             track=track,
-            place_odom_m=place,
-            here_odom_m=here,
+            track_position_odom_m=track_position,
+            position_odom_m=position,
             velocity_odom_mps=velocity,
             seen_stamp_s=max(before.seen_stamp_s, seen_stamp_s),
             awareness_lower=lower,
             radius_m=max(radius_m, before.radius_m - shrink_m),
             sigma_m=sigma_m,
-            visible_s=clock_s,
+            visible_s=total_visible_s,
             ahead_m=max(ahead_m, before.ahead_m - shrink_m),
-            facing_odom=_facing(velocity, before.facing_odom),
+            direction_odom=_walking_direction(velocity, before.direction_odom),
             history=history,
             inflation_held=held,
             speed_held=self._speed_holds(lower, before.speed_held),
         )
 
-    def _target_m(self, velocity: Pair, awareness: float, sigma_m: float) -> Pair:
-        """Radius and elongation that this awareness allows."""
+    def _target_m(self, velocity: Vector2, awareness: float, sigma_m: float) -> Vector2:
+        """Return the radius and the length ahead that this awareness allows."""
         radius_m = self._bounded_m(self._policy_radius_m(awareness) + self._sigmas * sigma_m)
         if not self._elongates:
             return radius_m, 0.0
@@ -190,7 +200,7 @@ class ObstacleRules:
         return radius_m, min(outline.ahead_s(awareness) * walking_mps, outline.longest_ahead_m)
 
     def _sigma_m(self, track: PersonTrack, now: float) -> float:
-        # Once the robot stands for want of data, doubt that grew on would only block its restart.
+        # Growth ends where the robot stops for lack of data: more would only block its restart.
         return position_sigma_m(track, min(now, track.stamp_s + self._timing.stop_after_s))
 
     def _bounded_m(self, radius_m: float) -> float:
@@ -200,63 +210,65 @@ class ObstacleRules:
 
     def _policy_radius_m(self, awareness_lower: float) -> float:
         radius_m = self._radius_of(awareness_lower)
-        if not _is_plain(radius_m):
+        if not _is_finite_float(radius_m):
             name = f"{type(self._policy.inflation).__name__}.radius_m({awareness_lower:g})"
             radius_m = finite_number(name, radius_m, NavError)
         return self._bounded_m(radius_m)
 
     def _policy_human_speed_mps(self, awareness_lower: float) -> float:
         speed_mps = self._human_speed_of(awareness_lower)
-        if _is_plain(speed_mps) and speed_mps >= 0.0:
+        if _is_finite_float(speed_mps) and speed_mps >= 0.0:
             return speed_mps
         name = f"{type(self._policy.speed).__name__}.human_speed_mps({awareness_lower:g})"
         return finite_number(name, speed_mps, NavError, minimum=0.0)
 
 
-def _is_plain(value: float) -> bool:
-    """A finite float, which needs no closer look; an own policy may give anything."""
+def _is_finite_float(value: float) -> bool:
+    """Return whether a value needs no further check; a custom policy may return anything."""
     return type(value) is float and math.isfinite(value)
 
 
-def _with_history(
+def _extended_history(
     before: _History, newest: tuple[float, float, float], within_s: float
 ) -> _History:
     """Return the sizes of the last ``within_s`` that exceed the newest, and the newest.
 
-    The size at one sighting holds until the next, so that the first sighting after an
-    absence proves nothing about the time between.
+    The size at one sighting holds until the next, so that the first sighting after an absence is no
+    evidence for the time in between.
     """
-    clock_s, radius_m, ahead_m = newest
+    visible_s, radius_m, ahead_m = newest
     if len(before) == 1 and radius_m >= before[0][1] and ahead_m >= before[0][2]:
         return (newest,)
-    held = (*before[:-1], (clock_s, *before[-1][1:]))
-    kept = (
+    extended = (*before[:-1], (visible_s, *before[-1][1:]))
+    larger = (
         entry
-        for entry in held
-        if clock_s - entry[0] < within_s - _ROUNDING_S
+        for entry in extended
+        if visible_s - entry[0] < within_s - _ROUNDING_S
         and (entry[1] > radius_m or entry[2] > ahead_m)
     )
-    return (*kept, newest)
+    return (*larger, newest)
 
 
-def _facing(velocity: Pair, before: Pair) -> Pair:
+def _walking_direction(velocity: Vector2, before: Vector2) -> Vector2:
+    """Return the unit vector of the velocity, or the direction before for a standing person."""
     vx, vy = velocity
     speed_mps = math.hypot(vx, vy)
     return (vx / speed_mps, vy / speed_mps) if speed_mps > _WALKING_MPS else before
 
 
-def _hysteresis(policy: object) -> Callable[[float, bool], bool]:
+def _hysteresis_of(policy: object) -> Callable[[float, bool], bool]:
+    """Return the ``holds`` method of a policy, or a function that never holds."""
     holds = getattr(policy, "holds", None)
     if not callable(holds):
         return lambda awareness_lower, held: False
-    # No evidence is never "aware", whatever an own policy says.
+    # No evidence is never "aware", whatever a custom policy returns.
     return lambda awareness_lower, held: (
         awareness_lower > 0.0 and bool(holds(awareness_lower, held))
     )
 
 
 def _require_non_increasing(function: Callable[[float], float], name: str, unit: str) -> None:
-    """Refuse an own policy that gives less room or more haste to people who are less aware."""
+    """Refuse a custom policy whose value grows with awareness."""
     before = function(0.0)
     for alpha in np.linspace(0.0, 1.0, 101).tolist():
         after = function(alpha)

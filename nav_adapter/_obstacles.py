@@ -1,4 +1,4 @@
-"""The obstacles of the people known: circles, and polygons that may be longer."""
+"""The obstacles of all people: circles, and polygons that may be longer."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from ._policy import AwarenessPolicy
 
 _SIDES: Final = 24
 _ANGLES = np.arange(_SIDES) * (2.0 * math.pi / _SIDES)
-# Stretched so that the sides, not the corners, touch the circle: the polygon contains it.
+# Scaled so that the sides, not the corners, touch the circle: the polygon contains it.
 _UNIT_POLYGON = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1) / math.cos(math.pi / _SIDES)
-# Between these instants of the sweep the hull runs straight.
+# Time between the discs of the sweep; the convex hull joins them with straight lines.
 _SWEEP_STEP_S: Final = 0.25
 
 
 def obstacles_of(
     people: Mapping[int, PersonMemory], now: float, policy: AwarenessPolicy
 ) -> tuple[PersonObstacle, ...]:
-    """One obstacle a person, in their order."""
+    """Return one obstacle per person, in the order of ``people``."""
     if not people:
         return ()
-    centers = np.array([m.here_odom_m for m in people.values()])
-    # The obstacles get read-only rows.
+    centers = np.array([m.position_odom_m for m in people.values()])
+    # The rows become the obstacles' read-only centres.
     centers.setflags(write=False)
     radii = np.array([m.radius_m for m in people.values()])
     rings = centers[:, None] + radii[:, None, None] * _UNIT_POLYGON
@@ -41,9 +41,9 @@ def obstacles_of(
             for memory, center, ring in zip(people.values(), centers, rings, strict=True)
         ]
         polygons = [shapely.convex_hull(shapely.multipoints(points)) for points in discs]
-    # Enormous numbers may have become infinite on the way: those are looked at, and refused.
-    sound = math.isfinite(float(centers.sum()) + float(radii.sum()))
-    make = trusted_obstacle if sound else PersonObstacle
+    # Huge numbers may have overflowed to infinity: the checking constructor refuses those.
+    all_finite = math.isfinite(float(centers.sum()) + float(radii.sum()))
+    make = trusted_obstacle if all_finite else PersonObstacle
     return tuple(
         make(
             track_id,
@@ -63,9 +63,9 @@ def obstacles_of(
 def _discs_ahead(
     memory: PersonMemory, center: FloatArray, now: float, policy: AwarenessPolicy
 ) -> list[FloatArray]:
-    """Polygons about the disc at the end of the elongation, and about those of the sweep."""
+    """Return polygons around the disc at the end of the elongation and the discs of the sweep."""
     outline, margins = policy.outline, policy.margins
-    tip = center + memory.ahead_m * np.array(memory.facing_odom)
+    tip = center + memory.ahead_m * np.array(memory.direction_odom)
     discs = [tip + memory.radius_m * _UNIT_POLYGON]
     steps = math.ceil(outline.sweep_s / _SWEEP_STEP_S)
     for step in range(1, steps + 1):
@@ -74,20 +74,20 @@ def _discs_ahead(
             0.0, _sigma_ahead_m(memory, now, ahead_s, policy) - memory.sigma_m
         )
         radius_m = margins.bounded_m(memory.radius_m + wider_m)
-        there = center + ahead_s * memory.track.velocity_odom_mps
-        discs.append(there + radius_m * _UNIT_POLYGON)
+        predicted = center + ahead_s * memory.track.velocity_odom_mps
+        discs.append(predicted + radius_m * _UNIT_POLYGON)
     return discs
 
 
 def _sigma_ahead_m(
     memory: PersonMemory, now: float, ahead_s: float, policy: AwarenessPolicy
 ) -> float:
-    """Standard deviation of the position predicted ``ahead_s`` from now, most uncertain direction.
+    """Return the standard deviation of the position predicted ``ahead_s`` from now.
 
-    White acceleration of density q adds q t³/3, and the whole is widened by how much too sure
-    constant velocity was found to be.
+    It is that of the most uncertain direction. White acceleration of density q adds q t³/3 to the
+    variance, and the sum is multiplied to make up for the overconfidence of constant velocity.
     """
     outline = policy.outline
-    carried_m = position_sigma_m(memory.track, now + ahead_s)
+    predicted_m = position_sigma_m(memory.track, now + ahead_s)
     noise_m2 = outline.acceleration_density_m2ps3 * ahead_s**3 / 3.0
-    return math.sqrt((carried_m**2 + noise_m2) * (1.0 + outline.overconfidence_per_s * ahead_s))
+    return math.sqrt((predicted_m**2 + noise_m2) * (1.0 + outline.overconfidence_per_s * ahead_s))

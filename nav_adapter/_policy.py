@@ -1,4 +1,4 @@
-"""One file that says how a robot moves around people who have, and have not, noticed it."""
+"""Awareness policies: all settings between awareness and the constraints, in one YAML file."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from .policies import (
     TimeBehaviour,
 )
 
-# Read once a process: presets are frozen, and an episode takes less time than its YAML.
+# Presets are read once per process: they are frozen, and reading takes longer than an episode.
 _PRESETS: dict[str, AwarenessPolicy] = {}
 _SHIPPED: dict[str, tuple[type[StrictConfig], ...]] = {
     "inflation": (InterpolatedInflation, TableInflation),
@@ -38,8 +38,8 @@ _SHIPPED: dict[str, tuple[type[StrictConfig], ...]] = {
 }
 
 
-class _ShippedOrOwn:
-    """Pydantic marker of a field: a shipped model (or its YAML keys), or a user's own object."""
+class _ShippedOrCustom:
+    """Pydantic marker of a field that takes a shipped model, its YAML keys, or a custom object."""
 
     def __init__(self, field: str, method: str) -> None:
         self._ramp, self._table = _SHIPPED[field]
@@ -76,28 +76,28 @@ class _ShippedOrOwn:
 
 
 class AwarenessPolicy(StrictConfig):
-    """Everything between a person's awareness and the planner's constraints, in one YAML file.
+    """All settings between a person's awareness and the planner's constraints.
 
     Attributes:
-        inflation: radius of a person over ``awareness_lower``: a ramp, a table or an own object.
-        speed: assumed human speed over ``awareness_lower``: a ramp, a table or an own object. The
-            default has a level for people who watch the robot; a ``speed`` of one's own has none
-            unless it says so.
-        outline: what the obstacles' polygons add to their circles; by default nothing.
-        rules: speed limits beside speed and separation, and whom limits are about.
-        alerts: who is warned and when, or none.
-        margins: distances that hold whatever α says.
+        inflation: radius of a person over ``awareness_lower``: a ramp, a table or a custom object.
+        speed: assumed human speed over ``awareness_lower``: a ramp, a table or a custom object. The
+            default has a level for people who watch the robot; another ``speed`` has none unless it
+            sets one.
+        outline: the part of the obstacles' polygons beyond their circles; by default nothing.
+        rules: assumed turns, and speed limits besides speed and separation.
+        alerts: rules for alerts, or None.
+        margins: distances that hold for every α.
         timing: how fast obstacles may shrink and how long data may be trusted.
-        filter: settings of the tracker's awareness filter, kept here because they decide with the
-            rest how soon a glance counts and how long it lasts.
+        filter: settings of the tracker's awareness filter. They belong to the policy because they
+            decide how soon a look at the robot counts and for how long.
     """
 
     error: ClassVar[type[ValueError]] = NavError
 
-    inflation: Annotated[InflationPolicy, _ShippedOrOwn("inflation", "radius_m")] = (
+    inflation: Annotated[InflationPolicy, _ShippedOrCustom("inflation", "radius_m")] = (
         InterpolatedInflation()
     )
-    speed: Annotated[SpeedPolicy, _ShippedOrOwn("speed", "human_speed_mps")] = (
+    speed: Annotated[SpeedPolicy, _ShippedOrCustom("speed", "human_speed_mps")] = (
         InterpolatedHumanSpeed(watching_above=0.8, watching_human_speed_mps=0.05)
     )
     outline: ObstacleOutline = ObstacleOutline()
@@ -108,7 +108,7 @@ class AwarenessPolicy(StrictConfig):
     filter: AwarenessFilterConfig = AwarenessFilterConfig()
 
     @model_validator(mode="after")
-    def _ceiling_above_unaware(self) -> AwarenessPolicy:
+    def _check_ceiling(self) -> AwarenessPolicy:
         ceiling_m = self.margins.maximum_radius_m
         if ceiling_m is not None and isinstance(self.inflation, _SHIPPED["inflation"]):
             unaware_m = self.inflation.radius_m(0.0)
@@ -123,15 +123,15 @@ class AwarenessPolicy(StrictConfig):
     def preset(cls, name: str) -> AwarenessPolicy:
         """Load a shipped policy.
 
-        ``"balanced"`` is the default, ``"blind"`` ignores α, ``"conservative"`` and
-        ``"assertive"`` lie on either side of the default.
+        ``"balanced"`` is the default and ``"blind"`` ignores α. ``"conservative"`` is more careful
+        than the default, ``"assertive"`` less.
 
         Raises:
-            NavError: there is no preset of that name.
+            NavError: for a name that is not a preset.
         """
-        kept = _PRESETS.get(name) if cls is AwarenessPolicy else None
-        if kept is not None:
-            return kept
+        cached = _PRESETS.get(name) if cls is AwarenessPolicy else None
+        if cached is not None:
+            return cached
         folder = resources.files("nav_adapter.policies")
         files = {
             entry.name.removesuffix(".yaml"): entry
@@ -150,7 +150,7 @@ class AwarenessPolicy(StrictConfig):
         return policy
 
     def to_yaml(self, path: str | Path) -> None:
-        """Write the policy for :meth:`from_yaml`; own policy objects cannot be written."""
+        """Write the policy for :meth:`from_yaml`; custom policy objects cannot be written."""
         for field, shipped in _SHIPPED.items():
             value = getattr(self, field)
             if not isinstance(value, shipped):

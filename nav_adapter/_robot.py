@@ -1,4 +1,4 @@
-"""The robot as navigation knows it: what it is, and where it is now."""
+"""The robot: its profile and its state."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from perception.arrays import FloatArray, finite_array, finite_number, set_field
 
 from ._errors import NavError
 
-# Below one square millimetre an outline is a line or a point, and a mistake.
+# An outline below one square millimetre is a line or a point.
 _SMALLEST_FOOTPRINT_M2 = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class RobotProfile:
-    """What the robot can do.
+    """The robot's footprint and its limits of motion.
 
     Attributes:
-        footprint_m: (M, 2), M ≥ 3, outline in the base frame (x forward, y left); its convex hull
-            counts, in either direction of travel round it.
+        footprint_m: (M, 2), M ≥ 3, corners in the base frame (x forward, y left), clockwise or
+            counter-clockwise. The convex hull counts.
         max_speed_mps: > 0.
         max_acceleration_mps2: > 0.
-        max_deceleration_mps2: > 0, the braking that can be relied on.
+        max_deceleration_mps2: > 0, a deceleration that the brakes always reach.
         reaction_time_s: ≥ 0, from a change in the scene to the start of braking: exposure,
-            perception, the period of the control loop and the drive's own delay.
+            perception, the period of the control loop and the delay of the drive.
     """
 
     footprint_m: FloatArray
@@ -70,12 +70,12 @@ class RobotProfile:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RobotState:
-    """Where the robot is and how it moves.
+    """The robot's pose and velocity.
 
     Attributes:
-        stamp_s: the instant of the state.
+        stamp_s: time of the state.
         position_odom_m: (2,).
-        heading_odom_rad: counter-clockwise from odom x.
+        heading_odom_rad: counter-clockwise from the x axis of odom.
         speed_mps: signed, forward positive.
         yaw_rate_radps: counter-clockwise positive.
     """

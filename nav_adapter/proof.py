@@ -1,11 +1,11 @@
-"""A checker of speed and separation that does not use its formula: motion, integrated exactly.
+"""A check of speed and separation by exact integration of the motion, without its formula.
 
-For anyone who wants to see the safety argument hold for their own robot::
+To check the safety argument for a robot of your own::
 
     proof = check_robot(robot, human_speed_mps=1.6, clearance_m=0.1)
     assert proof.contacts == 0
 
-``docs/safety.md`` says what that proves and what not.
+``docs/safety.md`` says what this proves and what it does not.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ Limit = Callable[..., FloatArray]
 
 @dataclass(frozen=True, slots=True)
 class SeparationProof:
-    """What the checker found.
+    """Result of a check.
 
     Attributes:
-        states: how many were checked.
-        moving: in how many of them the limit lets the robot move.
-        contacts: in how many the person reaches the robot while it moves; 0 proves the limit.
-        smallest_gap_m: smallest gap at standstill of a robot that moved; negative in a contact.
+        states: number of states checked.
+        moving: number of them in which the limit lets the robot move.
+        contacts: number in which the person reaches the moving robot; 0 proves the limit.
+        smallest_gap_m: smallest gap at standstill of a robot that moved; negative after a contact.
     """
 
     states: int
@@ -55,24 +55,25 @@ def gap_at_standstill_m(
     deceleration_mps2: ArrayLike,
     reaction_time_s: ArrayLike,
 ) -> FloatArray:
-    """Gap left when the robot stands, for the worst robot that obeys and a person walking at it.
+    """Return the gap when the robot has stopped, for the worst robot that obeys the limit.
 
-    From its present speed the robot accelerates up to the limit, during the whole reaction time,
-    and brakes after it. The person walks straight at it until it stands. The gap only falls until
-    then, so it is also the smallest while the robot moves.
+    The robot accelerates from its present speed up to the limit during the whole reaction time, and
+    then brakes. The person walks straight at it until it stands. The gap only falls until then, so
+    it is also the smallest gap while the robot moves.
 
     Args:
-        separation_m: true distance between the surfaces at the start; broadcastable as all others.
+        separation_m: true distance between the surfaces at the start; like every argument a scalar
+            or any broadcastable shape.
         speed_mps: of the robot at the start, in [0, limit].
-        limit_mps: the speed limit at the start; a robot with a limit of 0 stands.
+        limit_mps: the speed limit at the start; with a limit of 0 the robot stands.
         human_speed_mps: ≥ 0.
         acceleration_mps2: > 0.
         deceleration_mps2: > 0.
         reaction_time_s: ≥ 0.
 
     Returns:
-        Metres in the broadcast shape, negative where the person has reached the robot; the
-        separation itself where the robot never moves.
+        Metres in the broadcast shape; negative if the person has reached the robot, and the
+        separation itself if the robot never moves.
     """
     d, v, top, v_h, up, down, T = (
         np.asarray(value, dtype=np.float64)
@@ -106,18 +107,18 @@ def check_states(
     maximum_mps: float = np.inf,
     limit: Limit = max_speed_mps,
 ) -> SeparationProof:
-    """Check every state of a grid; arguments broadcast against each other.
+    """Check every state of a grid. The arguments broadcast against each other.
 
     Args:
-        separation_m: as measured. What C + Z stands for is used up: the true separation is smaller
-            by the whole ``clearance_m``.
+        separation_m: as measured. The true separation is assumed to be smaller by the whole
+            ``clearance_m`` (C + Z).
         speed_share: speed of the robot at the start as a share of the limit, in [0, 1].
-        human_speed_mps: assumed by the limit and walked by the person.
+        human_speed_mps: speed that the limit assumes and at which the person walks.
         acceleration_mps2: of the robot up to the limit.
         deceleration_mps2: of the robot.
-        reaction_time_s: until it brakes.
+        reaction_time_s: time until the robot brakes.
         clearance_m: C + Z.
-        maximum_mps: the robot goes no faster whatever the limit.
+        maximum_mps: top speed of the robot, whatever the limit.
         limit: the formula under test, called like :func:`max_speed_mps`.
     """
     limit_mps = np.minimum(
@@ -152,10 +153,10 @@ def check_states(
 def check_robot(
     robot: RobotProfile, *, human_speed_mps: float = 1.6, clearance_m: float = 0.1
 ) -> SeparationProof:
-    """Check the limit for one robot over 0–20 m, all starting speeds and slower people as well.
+    """Check the limit for one robot: separations of 0–20 m, all starting speeds, slower people too.
 
     Raises:
-        NavError: a human speed or a clearance that is negative or not finite.
+        NavError: for a human speed or a clearance that is negative or not finite.
     """
     human = finite_number("human_speed_mps", human_speed_mps, NavError, minimum=0.0)
     clearance = finite_number("clearance_m", clearance_m, NavError, minimum=0.0)

@@ -1,4 +1,4 @@
-"""What a policy comes to once all has settled: one person, standing, known exactly."""
+"""Steady-state values of a policy, for one standing person at an exactly known position."""
 
 from __future__ import annotations
 
@@ -13,14 +13,17 @@ from ._separation import max_speed_mps
 
 
 def settled_radius_m(policy: AwarenessPolicy, awareness_lower: ArrayLike) -> FloatArray:
-    """Obstacle radius at each lower bound of α, between floor and ceiling; from "unaware" up."""
+    """Return the obstacle radius at each lower bound of α, limited to floor and ceiling.
+
+    With hysteresis the values are those of a rising α.
+    """
     flat = np.asarray(awareness_lower, dtype=np.float64)
     radii = [policy.margins.bounded_m(policy.inflation.radius_m(a)) for a in flat.ravel().tolist()]
     return np.array(radii).reshape(flat.shape)
 
 
 def settled_human_speed_mps(policy: AwarenessPolicy, awareness_lower: ArrayLike) -> FloatArray:
-    """Assumed human speed at each lower bound of α."""
+    """Return the assumed human speed at each lower bound of α."""
     flat = np.asarray(awareness_lower, dtype=np.float64)
     speeds = [policy.speed.human_speed_mps(a) for a in flat.ravel().tolist()]
     return np.array(speeds).reshape(flat.shape)
@@ -32,16 +35,17 @@ def settled_speed_limit_mps(
     separation_m: ArrayLike,
     awareness_lower: ArrayLike,
 ) -> FloatArray:
-    """Speed limit for a person straight ahead.
+    """Return the speed limit for a person straight ahead.
 
     Args:
         policy: the policy.
         robot: the robot.
-        separation_m: from the footprint to the body's surface; broadcasts with the next.
+        separation_m: from the footprint to the body's surface; broadcasts with ``awareness_lower``.
         awareness_lower: lower bound of α.
 
     Returns:
-        m/s in the broadcast shape: the smallest of all rules, as :class:`NavAdapter` gives it.
+        The smallest limit of all rules in m/s, as :class:`~nav_adapter.NavAdapter` gives it, in the
+        broadcast shape.
     """
     separation = np.asarray(separation_m, dtype=np.float64)
     limit = max_speed_mps(

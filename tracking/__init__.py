@@ -1,11 +1,11 @@
-"""Who over time: Kalman tracks in the odom frame with a smoothed awareness α(t)."""
+"""Person tracking: Kalman tracks in the odom frame, each with a filtered awareness α(t)."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from runpy import run_path
 
-# By path: importing it by name would first run whatever now calls itself perception.
+# Run by path: an import by name could load another package that is called perception.
 _CLASH = Path(__file__).parents[1] / "perception" / "_clash.py"
 run_path(str(_CLASH))["require_sole_owner"](__name__)
 

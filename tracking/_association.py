@@ -1,4 +1,4 @@
-"""Which measurement belongs to which track, and which of these matches are in doubt."""
+"""Data association: one-to-one matches of measurements to tracks, and which are ambiguous."""
 
 from __future__ import annotations
 
@@ -14,15 +14,14 @@ from ._table import BoolArray, IndexArray
 
 @dataclass(frozen=True, slots=True)
 class Gates:
-    """When a match is possible, and when it is in doubt.
+    """Limits within which a match is possible, and within which it is ambiguous.
 
     Attributes:
         mahalanobis2: largest squared Mahalanobis distance (χ² with two degrees of freedom).
         distance_m: largest distance.
-        miss_cost: what a track and a measurement that both stay alone cost together; see
-            :func:`associate`.
-        ambiguity_margin: rivals within this cost of the chosen match put it in doubt, …
-        ambiguity_distance_m: … if they are no further away than this.
+        miss_cost: cost of leaving a track and a measurement unmatched; see :func:`associate`.
+        ambiguity_margin: a rival that costs at most this much more makes a match ambiguous, …
+        ambiguity_distance_m: … if it is no further away than this.
     """
 
     mahalanobis2: float
@@ -39,7 +38,7 @@ class Matches:
     Attributes:
         tracks: (K,) rows of tracks.
         measurements: (K,) rows of measurements.
-        ambiguous: (K,) True where it could as well be another's.
+        ambiguous: (K,) True where a rival match is about as likely.
     """
 
     tracks: IndexArray
@@ -49,7 +48,7 @@ class Matches:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Edges:
-    """The matches that both gates let pass: rows of tracks and measurements, and their costs."""
+    """The matches that pass both gates: rows of tracks and measurements, and their costs."""
 
     tracks: IndexArray
     measurements: IndexArray
@@ -60,7 +59,7 @@ class _Edges:
 
 
 _NO_ROWS: IndexArray = np.empty(0, dtype=np.intp)
-_NOBODY = Matches(_NO_ROWS, _NO_ROWS, np.empty(0, dtype=np.bool_))
+_NO_MATCHES = Matches(_NO_ROWS, _NO_ROWS, np.empty(0, dtype=np.bool_))
 
 
 def associate(
@@ -71,27 +70,27 @@ def associate(
     noises_m2: FloatArray,
     gates: Gates,
 ) -> Matches:
-    """Match tracks to measurements one to one: confirmed tracks first, the others to what is left.
+    """Match tracks to measurements one to one: confirmed tracks first, then the others.
 
     The cost d² + ln det S is twice the negative log-likelihood of the measurement. Without its
     second term a track that has coasted, and so has a wide S, would take its neighbour's
-    measurements. Each of the two rounds takes the set of matches with the least sum of costs, a
-    track that stays alone counting ``miss_cost``: without that, a person whom the frame missed
-    would take their neighbour's measurement, and the neighbour any clutter in reach.
+    measurements. Each of the two rounds chooses the matches with the least sum of costs, where an
+    unmatched track costs ``miss_cost``. Without that, a person whom the frame missed would take the
+    measurement of a neighbour, and the neighbour any clutter in reach.
 
     Args:
         positions_m: (N, 2) predicted positions.
-        covariances_m2: (N, 2, 2) of them.
+        covariances_m2: (N, 2, 2) of the predicted positions.
         confirmed: (N,) True for the tracks of the first round.
-        measured_m: (M, 2), same frame.
-        noises_m2: (M, 2, 2) of them, positive definite.
-        gates: both must let a match pass.
+        measured_m: (M, 2) measured positions, in the same frame.
+        noises_m2: (M, 2, 2) of the measured positions, positive definite.
+        gates: a match must pass both gates.
     """
     if not len(positions_m) or not len(measured_m):
-        return _NOBODY
+        return _NO_MATCHES
     edges = _edges(positions_m, covariances_m2, measured_m, noises_m2, gates)
     if not edges.tracks.size:
-        return _NOBODY
+        return _NO_MATCHES
     partner = np.full(len(positions_m), -1, dtype=np.intp)
     if confirmed.all():
         _solve(edges, gates.miss_cost, partner)
@@ -103,8 +102,8 @@ def associate(
         _solve(edges.where(~first & ~taken[edges.measurements]), gates.miss_cost, partner)
     tracks = np.flatnonzero(partner >= 0)
     measurements = partner[tracks]
-    doubt = _doubts(edges, partner, positions_m, measured_m, gates)
-    return Matches(tracks, measurements, doubt[tracks])
+    ambiguous = _ambiguities(edges, partner, positions_m, measured_m, gates)
+    return Matches(tracks, measurements, ambiguous[tracks])
 
 
 def _edges(
@@ -114,7 +113,7 @@ def _edges(
     noises_m2: FloatArray,
     gates: Gates,
 ) -> _Edges:
-    """Return the matches that both gates let pass, with their costs d² + ln det S."""
+    """Return the matches that pass both gates, with their costs d² + ln det S."""
     offset_x = measured_m[None, :, 0] - positions_m[:, None, 0]
     offset_y = measured_m[None, :, 1] - positions_m[:, None, 1]
     near = offset_x * offset_x + offset_y * offset_y <= gates.distance_m**2
@@ -133,8 +132,8 @@ def _edges(
 def _solve(edges: _Edges, miss_cost: float, partner: IndexArray) -> None:
     """Write the best set of matches into ``partner``: the measurement of each track.
 
-    A match whose track and measurement have no other is part of every best set when it costs no
-    more than a miss. What is left has rivals, and ``scipy.optimize.linear_sum_assignment`` decides.
+    A match whose track and measurement have no other match is part of every best set if it costs
+    less than a miss. ``scipy.optimize.linear_sum_assignment`` decides among the others.
     """
     worth = edges.costs < miss_cost
     if not worth.all():
@@ -159,35 +158,35 @@ def _solve(edges: _Edges, miss_cost: float, partner: IndexArray) -> None:
     partner[rows[chosen_rows[real]]] = columns[chosen_columns[real]]
 
 
-def _doubts(
+def _ambiguities(
     edges: _Edges,
     partner: IndexArray,
     positions_m: FloatArray,
     measured_m: FloatArray,
     gates: Gates,
 ) -> BoolArray:
-    """Return (N,) True where a rival track, or measurement, fits about as well as the match."""
-    doubt = np.zeros(len(positions_m), dtype=np.bool_)
+    """Return (N,) True where a rival track or measurement fits about as well as the match."""
+    ambiguous = np.zeros(len(positions_m), dtype=np.bool_)
     chosen = partner[edges.tracks] == edges.measurements
     if chosen.all():
-        return doubt
+        return ambiguous
     holder = np.full(len(measured_m), -1, dtype=np.intp)
     holder[edges.measurements[chosen]] = edges.tracks[chosen]
-    limit = np.full(len(positions_m) + 1, -np.inf)  # the last row stands for "nobody"
+    limit = np.full(len(positions_m) + 1, -np.inf)  # the last row is that of no track
     limit[edges.tracks[chosen]] = edges.costs[chosen] + gates.ambiguity_margin
     rival = edges.where(~chosen)
     reach2 = gates.ambiguity_distance_m**2
 
-    # The track's own match against another measurement that it could have taken.
+    # Rival measurements: the track could have matched another measurement.
     offset = measured_m[rival.measurements] - measured_m[partner[rival.tracks]]
     fits = (rival.costs <= limit[rival.tracks]) & (_squares(offset) <= reach2)
-    doubt[rival.tracks[fits]] = True
-    # The measurement's own match against another track that could have taken it.
+    ambiguous[rival.tracks[fits]] = True
+    # Rival tracks: the measurement could have matched another track.
     owner = holder[rival.measurements]
     offset = positions_m[rival.tracks] - positions_m[owner]
     fits = (rival.costs <= limit[owner]) & (_squares(offset) <= reach2)
-    doubt[owner[fits]] = True
-    return doubt
+    ambiguous[owner[fits]] = True
+    return ambiguous
 
 
 def _squares(offsets: FloatArray) -> FloatArray:

@@ -10,49 +10,48 @@ from .config import StrictConfig
 class AwarenessFilterConfig(StrictConfig):
     """Settings of the awareness filter, which lives in logit(α) = ln(α / (1 − α)).
 
-    The three time constants must not decrease in the order no face, unseen, evidence: seeing
-    somebody without a face is never a reason to believe in awareness for longer.
+    The three time constants must not decrease in the order no face, unseen, evidence: a person who
+    is seen without a face must not count as aware for longer than one who is not seen.
     """
 
     prior_awareness: float = Field(default=0.05, gt=0.0, le=0.5)
-    """α that is believed of a person about whom nothing is known."""
+    """α of a person of whom nothing is known: the mean of the prior is its logit."""
 
     prior_std_logit: float = Field(default=2.0, gt=0.0, le=5.0)
-    """Standard deviation of that belief in logit(α); uncertainty never grows beyond it. Wide enough
-    that one turn of the head, some six units of logit(α), is no surprise."""
+    """Standard deviation of the prior in logit(α); uncertainty never grows beyond it. It is wide
+    enough for one turn of the head, about six units of logit(α)."""
 
     evidence_time_constant_s: float = Field(default=1.0, gt=0.0)
-    """How fast attention itself wanders towards the prior between two frames that show a face."""
+    """Time constant of the drift to the prior between two frames that show a face."""
 
     unseen_time_constant_s: float = Field(default=0.3, gt=0.0)
-    """How fast belief falls back to the prior while the person is not seen at all."""
+    """Time constant of the drift to the prior while no frame shows the person."""
 
     no_face_time_constant_s: float = Field(default=0.2, gt=0.0)
-    """How fast belief falls back to the prior while the person is seen without a usable face."""
+    """Time constant of the drift to the prior while the person is seen without a usable face."""
 
     max_evidence_gap_s: float = Field(default=0.25, gt=0.0)
-    """Two frames with a face further apart than this do not vouch for the time between them."""
+    """Two frames with a face further apart than this are no evidence for the time between them."""
 
     evidence_correlation_s: float = Field(default=0.1, ge=0.0)
-    """Errors of α this close in time count as one. It caps the information per second: a frame dt
-    after the last one has its variance multiplied by ``evidence_correlation_s / dt`` where that is
-    above one, so a faster camera, or one that repeats itself, does not make the filter surer."""
+    """Errors of α this close in time count as one error. This caps the information per second: the
+    variance of a frame dt after the last one is multiplied by ``evidence_correlation_s / dt`` where
+    that is above one, so a faster camera, or one that repeats frames, adds no certainty."""
 
     clip_awareness: float = Field(default=0.02, gt=0.0, lt=0.5)
-    """ε: α is taken as at least ε and at most 1 − ε before the logit."""
+    """ε: α is clipped to [ε, 1 − ε] before the logit."""
 
     min_evidence_std_logit: float = Field(default=0.3, gt=0.0)
-    """Floor of a measurement's standard deviation in logit(α)."""
+    """Smallest standard deviation of a measurement in logit(α)."""
 
     max_evidence_std: float = Field(default=0.29, gt=0.0, le=0.5)
-    """An α with a larger standard deviation is no evidence; 1/√12 ≈ 0.29 is that of a uniform
-    distribution on [0, 1], which says nothing."""
+    """An α with a larger standard deviation is no evidence. 1/√12 ≈ 0.29 is the standard deviation
+    of the uniform distribution on [0, 1], which carries no information."""
 
     memory_s: float = Field(default=0.0, ge=0.0, le=10.0)
-    """Longest that a glance may go on counting while nothing contradicts it: the time constants of
-    unseen and of no face are at least this. A face that is seen to look away is evidence and ends
-    it, and so does an ambiguous match. 0, the default, for no memory: whoever remembers relies on a
-    person who has not been seen to look for as long."""
+    """Memory of a look at the robot: the time constants of unseen and of no face are at least this.
+    A face that looks away is evidence and ends the memory, and so does an ambiguous match. The
+    default 0 is no memory; with a memory the robot relies on a look that is that old."""
 
     lower_bound_confidence: float = Field(default=0.9, ge=0.5, lt=1.0)
     """One-sided confidence of ``awareness_lower``."""
@@ -76,75 +75,75 @@ class TrackerConfig(StrictConfig):
     """Settings of :class:`~tracking.PersonTracker`."""
 
     acceleration_density_m2ps3: float = Field(default=0.05, gt=0.0)
-    """Spectral density q of the white acceleration that a walking person is modelled by."""
+    """Spectral density q of the white acceleration in the motion model of a person."""
 
     initial_velocity_std_mps: float = Field(default=1.0, gt=0.0, le=3.0)
-    """Cap on a new track's velocity uncertainty, per axis: how fast an unknown person may walk."""
+    """Standard deviation of a new track's velocity, per axis: how fast people may walk."""
 
     position_noise_floor_m: float = Field(default=0.05, gt=0.0)
-    """Least standard deviation of a measured position along any direction of the floor plane."""
+    """Smallest standard deviation of a measured position in any direction of the floor plane."""
 
     gate_probability: float = Field(default=0.9999, gt=0.0, lt=1.0)
-    """Share of a person's true measurements that the Mahalanobis gate lets through."""
+    """Share of a person's true measurements that pass the Mahalanobis gate."""
 
     gate_distance_m: float = Field(default=1.0, gt=0.0)
-    """Furthest a measurement may lie from where its track was expected."""
+    """Largest distance of a measurement from the predicted position of its track."""
 
     miss_cost: float = Field(default=10.0)
-    """What it costs to leave a track and a measurement alone instead of matching them, in units of
-    d² + ln det S (S in m²): 2 ln(P_D / (2π β (1 − P_D))), here for a person detected in nine frames
-    of ten and β = 0.01 false or first detections per m² and frame."""
+    """Cost of leaving a track and a measurement unmatched, in units of d² + ln det S (S in m²):
+    2 ln(P_D / (2π β (1 − P_D))), here for a detection probability P_D of 0.9 and a density β of
+    0.01 false or first detections per m² and frame."""
 
     ambiguity_margin: float = Field(default=4.0, ge=0.0)
-    """A rival match whose cost (d² + ln det S) is no more than this above the chosen one makes the
-    match ambiguous; 4 is a likelihood ratio of e²."""
+    """A match is ambiguous if a rival match costs (d² + ln det S) at most this much more. 4 is a
+    likelihood ratio of e²."""
 
     ambiguity_distance_m: float = Field(default=0.8, ge=0.0)
-    """Rivals further away than this are not confused with each other."""
+    """Rivals further away than this do not make a match ambiguous."""
 
     ambiguous_noise_factor: float = Field(default=2.0, ge=1.0)
-    """The variance of a position is taken this many times when its match is ambiguous: between two
-    people who pass, a wrong match would turn both velocities round."""
+    """Factor on the variance of a measured position whose match is ambiguous. When two people pass
+    each other, a wrong match would otherwise reverse both velocities."""
 
     confirm_hits: int = Field(default=4, ge=1, le=20)
-    """Frames (distinct stamps) that must show a person before the track is confirmed, …"""
+    """Number of frames (distinct stamps) that must show a person to confirm the track, …"""
 
     confirm_window_s: float = Field(default=0.5, gt=0.0)
-    """… all within this time, or within ``confirm_hits`` + 1 frame intervals of a slow camera."""
+    """… within this time, or within ``confirm_hits`` + 1 frame intervals of a slow camera."""
 
     max_tentative_gap_s: float = Field(default=0.12, ge=0.0)
-    """A tentative track unseen for longer than this is dropped; each gets one more frame, however
-    slow the camera."""
+    """A tentative track unseen for longer than this is deleted. Each gets at least one more frame,
+    however slow the camera is."""
 
     max_missed_s: float = Field(default=1.2, gt=0.0)
-    """A confirmed track that frames should have shown, and did not, for longer than this is
-    dropped. It needs a view; without one nobody knows who should be visible."""
+    """A confirmed track is deleted after this time in which frames should have shown it and did
+    not. Needs a view: without one it is unknown which people should be visible."""
 
     max_coast_s: float = Field(default=3.0, ge=0.0, le=60.0)
-    """A confirmed track unseen for longer than this is dropped, whatever the reason, …"""
+    """A confirmed track unseen for longer than this is deleted, whatever the reason, …"""
 
     max_standing_coast_s: float = Field(default=5.0, ge=0.0, le=120.0)
-    """… save that a person who stood still, and is out of view or hidden behind somebody, is
-    remembered for this long. It needs a view and counts where it exceeds ``max_coast_s``."""
+    """… except that a person who stood still, and is out of view or hidden by another person, is
+    kept for this long. Needs a view, and counts where it exceeds ``max_coast_s``."""
 
     standing_speed_mps: float = Field(default=0.3, ge=0.0)
-    """Somebody no faster than this, and whose velocity is consistent with 0, stands."""
+    """A person no faster than this, with a velocity consistent with 0, counts as standing."""
 
     standing_time_constant_s: float = Field(default=1.0, gt=0.0)
-    """How fast the velocity of a standing person decays while they are not seen."""
+    """Time constant with which the velocity of an unseen standing person decays."""
 
     body_radius_m: float = Field(default=0.25, gt=0.0)
-    """How much of the view a person takes up: what lies behind it is hidden."""
+    """Radius of a person as an occluder: a body hides the people behind it."""
 
     max_lag_s: float = Field(default=0.5, ge=0.0, le=10.0)
-    """A frame this much older than the latest is still taken, as if it had come in time; one that
-    is older is refused."""
+    """A frame up to this much older than the latest is processed as if it had come in order. An
+    older one is refused."""
 
     stamp_tolerance_s: float = Field(default=1e-3, ge=0.0)
-    """How far an observation's own stamp may lie from the stamp of its frame."""
+    """Largest difference between the stamps of an observation and of its frame."""
 
     stature_m: float = Field(default=1.75, gt=0.0)
-    """Stature assumed of every person."""
+    """Stature assumed for every person."""
 
     awareness: AwarenessFilterConfig = Field(default_factory=AwarenessFilterConfig)
     """Settings of the awareness filter."""

@@ -6,4 +6,4 @@ from perception.errors import AwarenavError
 
 
 class TrackingError(AwarenavError):
-    """Input that the tracker cannot use; the message says what was given and what is valid."""
+    """Input that tracking cannot use; the message says what was given and what is valid."""

@@ -1,4 +1,4 @@
-"""The latest frames and the states between them, so that a late frame can take its place."""
+"""The latest frames and the states after each of them, so that late frames can be inserted."""
 
 from __future__ import annotations
 
@@ -10,22 +10,23 @@ from ._errors import TrackingError
 from ._measurement import Frame
 from ._step import TrackerState
 
-# Memory has a bound at any frame rate, and so has the work that one late frame can cause.
+# Bounds memory, and the work for one late frame, at any frame rate.
 MAX_FRAMES: Final = 256
 
 
 class History:
     """A state, the frames that came after it, and the state after each of them.
 
-    The frames span the lag, so a frame from within it finds the state that it belongs after. States
-    are values and share what they have in common: keeping them costs no copying.
+    The frames cover ``max_lag_s``. A late frame within that lag is inserted in its place, and the
+    states after it are computed again. States are immutable and share their arrays, so keeping them
+    costs no copying.
 
     Args:
-        advance: the state after one more frame.
-        max_lag_s: ≥ 0, how far before the latest frame the kept ones reach back.
+        advance: returns the state after one more frame.
+        max_lag_s: ≥ 0, how far the kept frames reach back from the latest one.
         base: the state before the first of ``frames``.
         frames: in the order of their stamps.
-        latest: the state after the last frame, where it is known already.
+        latest: the state after the last frame, if it is known already.
     """
 
     def __init__(
@@ -40,7 +41,7 @@ class History:
         self._max_lag_s = max_lag_s
         self._base = base
         self._frames: list[Frame] = list(frames)
-        self._states = self._after(base, frames)
+        self._states = self._replay(base, frames)
         if latest is not None and self._states:
             self._states[-1] = latest
 
@@ -59,8 +60,8 @@ class History:
         """The state after all frames."""
         return self._states[-1] if self._states else self._base
 
-    def refusal(self, stamp_s: float) -> str | None:
-        """Return why a frame at ``stamp_s`` would come too late, or None when it would not."""
+    def lateness_error(self, stamp_s: float) -> str | None:
+        """Return the message for a frame at ``stamp_s`` that is too late, or None if it is not."""
         last_s = self.latest.stamp_s
         if last_s is None or stamp_s >= last_s:
             return None
@@ -70,38 +71,39 @@ class History:
         if self._base.stamp_s is not None and stamp_s < self._base.stamp_s:
             return (
                 f"{late}, and more than the {MAX_FRAMES} frames that are kept for replay have "
-                "come since"
+                "come since then"
             )
         return None
 
     def insert(self, frame: Frame) -> None:
-        """Put a frame in its place and work out the states from there on again.
+        """Insert a frame in the order of stamps and compute the states from there on again.
 
-        Among frames of one stamp it comes last. When a step fails nothing has changed.
+        Among frames with the same stamp it comes last. If a step fails, nothing changes.
 
         Raises:
             TrackingError: for a frame that comes too late.
         """
-        refused = self.refusal(frame.stamp_s)
-        if refused is not None:
-            raise TrackingError(refused)
+        late = self.lateness_error(frame.stamp_s)
+        if late is not None:
+            raise TrackingError(late)
         place = bisect_right(self._frames, frame.stamp_s, key=_stamp_of)
         before = self._states[place - 1] if place else self._base
         later = [frame, *self._frames[place:]]
-        states = self._after(before, later)
+        states = self._replay(before, later)
         self._frames[place:] = later
         self._states[place:] = states
-        self._forget()
+        self._drop_old_frames()
 
-    def _after(self, state: TrackerState, frames: Sequence[Frame]) -> list[TrackerState]:
+    def _replay(self, state: TrackerState, frames: Sequence[Frame]) -> list[TrackerState]:
+        """Return the state after each of the frames."""
         states: list[TrackerState] = []
         for frame in frames:
             state = self._advance(state, frame)
             states.append(state)
         return states
 
-    def _forget(self) -> None:
-        """Let go of the frames that no frame within the lag can come before."""
+    def _drop_old_frames(self) -> None:
+        """Drop the frames that are older than the lag, or more than :data:`MAX_FRAMES`."""
         oldest_s = self._frames[-1].stamp_s - self._max_lag_s
         surplus = max(
             bisect_left(self._frames, oldest_s, key=_stamp_of), len(self._frames) - MAX_FRAMES

@@ -1,7 +1,7 @@
-"""The measurement update of many Kalman filters at once: position measured, constant velocity.
+"""The measurement update of many Kalman filters at once: measured position, constant velocity.
 
 The equations of ``filterpy.kalman.KalmanFilter.update`` with H = [I 0], in Joseph form, which keeps
-P positive definite. The tests hold it to filterpy's result within 1e-9.
+P positive definite. Tests compare the result with filterpy's to 1e-9.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ def correct(
     Args:
         states: (N, 4) x, y, vx, vy.
         covariances: (N, 4, 4), positive definite.
-        measured_m: (N, 2).
-        noises_m2: (N, 2, 2), positive definite.
+        measured_m: (N, 2) measured positions.
+        noises_m2: (N, 2, 2) of the measured positions, positive definite.
     """
     inverse = inverse_2x2(covariances[:, :2, :2] + noises_m2)
     gain = covariances[:, :, :2] @ inverse
@@ -32,7 +32,7 @@ def correct(
     remainder[:, :, :2] -= gain
     joseph = remainder @ covariances @ remainder.transpose(0, 2, 1)
     joseph += gain @ noises_m2 @ gain.transpose(0, 2, 1)
-    # Rounding leaves it asymmetric in the last digit.
+    # Rounding leaves the covariance asymmetric in the last digit.
     return corrected, 0.5 * (joseph + joseph.transpose(0, 2, 1))
 
 

@@ -1,7 +1,4 @@
-"""What a frame says in the odom frame: places on the floor plane, their noise, evidence.
-
-One frame as the tracker remembers it: checked, and in the odom frame.
-"""
+"""Frames as the tracker keeps them: checked, with measurements in the odom frame."""
 
 from __future__ import annotations
 
@@ -18,18 +15,18 @@ from ._config import TrackerConfig
 from ._errors import TrackingError
 from .awareness_filter import evidence
 
-# Beyond these a number may be finite but is no place a robot drives, and its square may overflow.
+# Limits far beyond any place a robot drives; the squares of larger numbers may overflow.
 _MAX_POSITION_M: Final = 1e7
 _MAX_VARIANCE_M2: Final = 1e6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Measurements:
-    """The M observations of one frame, checked and carried to the odom frame.
+    """The M observations of one frame, checked and transformed to the odom frame.
 
     Attributes:
-        positions_odom_m: (M, 2).
-        noises_m2: (M, 2, 2) positive definite covariances of them.
+        positions_odom_m: (M, 2) on the floor plane.
+        noises_m2: (M, 2, 2) of the positions, positive definite.
         evidence_means: (M,) of logit(α); NaN for "no evidence".
         evidence_variances: (M,) of logit(α); NaN for "no evidence".
     """
@@ -43,8 +40,23 @@ class Measurements:
         return len(self.positions_odom_m)
 
 
-_NO_ONE = np.empty(0)
-_NOTHING = Measurements(np.empty((0, 2)), np.empty((0, 2, 2)), _NO_ONE, _NO_ONE)
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """One frame: the camera's pose and the people it shows.
+
+    Attributes:
+        stamp_s: time of the frame.
+        T_odom_camera: (4, 4) pose of the camera.
+        measurements: of the people in the frame.
+    """
+
+    stamp_s: float
+    T_odom_camera: FloatArray
+    measurements: Measurements
+
+
+_NO_EVIDENCE = np.empty(0)
+_NO_MEASUREMENTS = Measurements(np.empty((0, 2)), np.empty((0, 2, 2)), _NO_EVIDENCE, _NO_EVIDENCE)
 
 
 def measurements_of(
@@ -56,68 +68,68 @@ def measurements_of(
 ) -> Measurements:
     """Return the observations of the frame at ``stamp_s`` as measurements.
 
-    A position covariance turns with the camera, R Σ Rᵀ, and its x–y block remains. A pose
+    A position covariance is rotated with the camera, R Σ Rᵀ, and its x–y block is kept. A pose
     covariance (3, 3) of the camera's x, y and yaw adds J Σ Jᵀ with J = [I, (t_y − p_y, p_x − t_x)]:
     an error in yaw moves a person in proportion to their range.
 
     Raises:
-        TrackingError: naming the observation, when it is no ``PersonObservation``, carries
-            another frame's stamp or lies out of this world.
+        TrackingError: naming an observation that is not a ``PersonObservation``, has another stamp
+            than the frame, or lies out of bounds.
     """
-    given = _checked(observations, stamp_s, config.stamp_tolerance_s)
-    if not given:
-        return _NOTHING
+    checked = _checked_observations(observations, stamp_s, config.stamp_tolerance_s)
+    if not checked:
+        return _NO_MEASUREMENTS
     to_floor, origin = T_odom_camera[:2, :3], T_odom_camera[:2, 3]
-    places = np.concatenate([one.position_camera_m for one in given]).reshape(-1, 3)
-    spreads = np.concatenate([one.position_covariance_m2 for one in given]).reshape(-1, 3, 3)
+    places = np.concatenate([one.position_camera_m for one in checked]).reshape(-1, 3)
+    spreads = np.concatenate([one.position_covariance_m2 for one in checked]).reshape(-1, 3, 3)
     with np.errstate(over="ignore", invalid="ignore"):
         offsets = places @ to_floor.T
         positions = offsets + origin
         noises = to_floor @ spreads @ to_floor.T
         if pose_covariance_odom is not None:
-            noises = noises + _pose_noises(offsets, pose_covariance_odom)
+            noises = noises + _pose_noise(offsets, pose_covariance_odom)
         variances = noises[:, 0, 0] + noises[:, 1, 1]
-        # Written so that NaN, from overflow, is refused as well.
+        # Written so that NaN from an overflow is refused as well.
         inside = (np.abs(positions) <= _MAX_POSITION_M).all(axis=1)
-        sure = variances <= _MAX_VARIANCE_M2
+        bounded = variances <= _MAX_VARIANCE_M2
     if not inside.all():
         index = int(np.argmin(inside))
         raise TrackingError(
             f"observations[{index}] must lie within {_MAX_POSITION_M:g} m of the origin of odom, "
             f"got {positions[index].tolist()} m"
         )
-    if not sure.all():
-        index = int(np.argmin(sure))
+    if not bounded.all():
+        index = int(np.argmin(bounded))
         raise TrackingError(
             f"observations[{index}].position_covariance_m2 must sum to at most "
             f"{_MAX_VARIANCE_M2:g} m² on the floor plane, the pose's share included, "
             f"got {variances[index]:g} m²"
         )
     means, evidence_variances = evidence(
-        np.array([np.nan if one.awareness is None else one.awareness for one in given]),
-        np.array([np.nan if one.awareness_std is None else one.awareness_std for one in given]),
+        np.array([np.nan if one.awareness is None else one.awareness for one in checked]),
+        np.array([np.nan if one.awareness_std is None else one.awareness_std for one in checked]),
         config.awareness,
     )
     return Measurements(
         positions,
-        floor_covariances(noises, config.position_noise_floor_m),
+        with_noise_floor(noises, config.position_noise_floor_m),
         means,
         evidence_variances,
     )
 
 
-def _checked(
+def _checked_observations(
     observations: Any, stamp_s: float, tolerance_s: float
 ) -> tuple[PersonObservation, ...]:
-    """Return the observations of a frame after checking that they are its own."""
+    """Return the observations after checking their types and stamps."""
     try:
-        given = tuple(observations)
+        checked = tuple(observations)
     except TypeError as cause:
         raise TrackingError(
             "observations must be an iterable of PersonObservation, got "
             f"{type(observations).__name__}"
         ) from cause
-    for index, one in enumerate(given):
+    for index, one in enumerate(checked):
         if not isinstance(one, PersonObservation):
             raise TrackingError(
                 f"observations[{index}] must be a PersonObservation, got {type(one).__name__}"
@@ -127,22 +139,22 @@ def _checked(
                 f"observations[{index}].stamp_s = {one.stamp_s!r} s must be that of its frame, "
                 f"{stamp_s!r} s, within {tolerance_s:g} s"
             )
-    return given
+    return checked
 
 
-def _pose_noises(offsets_m: FloatArray, pose_covariance: FloatArray) -> FloatArray:
-    """Return (M, 2, 2) what an uncertain pose adds to places at ``offsets_m`` (M, 2) from it."""
+def _pose_noise(offsets_m: FloatArray, pose_covariance: FloatArray) -> FloatArray:
+    """Return (M, 2, 2), the covariance that an uncertain pose adds at ``offsets_m`` (M, 2)."""
     J = np.zeros((len(offsets_m), 2, 3))
     J[:, 0, 0] = J[:, 1, 1] = 1.0
     J[:, 0, 2], J[:, 1, 2] = -offsets_m[:, 1], offsets_m[:, 0]
     return np.asarray(J @ pose_covariance @ J.transpose(0, 2, 1))
 
 
-def floor_covariances(covariances_m2: FloatArray, floor_m: float) -> FloatArray:
+def with_noise_floor(covariances_m2: FloatArray, floor_m: float) -> FloatArray:
     """Return (M, 2, 2) covariances with no standard deviation below ``floor_m`` in any direction.
 
-    Eigenvalues below the floor are raised to it and the eigenvectors kept, in closed form: turning
-    the world turns the result.
+    Eigenvalues below the floor are raised to it and the eigenvectors are kept, in closed form: the
+    result of a rotated covariance is the rotated result.
     """
     xx, yy = covariances_m2[:, 0, 0], covariances_m2[:, 1, 1]
     xy = 0.5 * (covariances_m2[:, 0, 1] + covariances_m2[:, 1, 0])
@@ -153,7 +165,7 @@ def floor_covariances(covariances_m2: FloatArray, floor_m: float) -> FloatArray:
     floored[:, 0, 1] = floored[:, 1, 0] = xy
     below = low < floor
     if below.any():
-        # Those below the floor in every direction have none to keep: scale 0 leaves it round.
+        # A covariance below the floor in every direction becomes isotropic: its scale is 0.
         split = high > floor
         scale = np.where(split, high - floor, 0.0) / np.where(split & below, high - low, 1.0)
         scale = scale[below]
@@ -161,18 +173,3 @@ def floor_covariances(covariances_m2: FloatArray, floor_m: float) -> FloatArray:
         floored[below, 1, 1] = floor + scale * (yy - low)[below]
         floored[below, 0, 1] = floored[below, 1, 0] = scale * xy[below]
     return floored
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Frame:
-    """What the camera saw at one instant, and from where.
-
-    Attributes:
-        stamp_s: time of the frame.
-        T_odom_camera: (4, 4) where the camera was.
-        measurements: of the people it shows.
-    """
-
-    stamp_s: float
-    T_odom_camera: FloatArray
-    measurements: Measurements

@@ -1,9 +1,9 @@
-"""Motion on the floor plane, driven by white acceleration in continuous time.
+"""Motion model on the floor plane, driven by white acceleration in continuous time.
 
-State order x, y, vx, vy. Because the noise is continuous, the matrices compose exactly: two steps
-of dt/2 are one step of dt, so the frame rate does not matter. Source: Bar-Shalom, Li, Kirubarajan,
-*Estimation with Applications to Tracking and Navigation* (2001), section 6.2 (constant velocity)
-and 8.2 (the damped form, there for acceleration).
+The state order is x, y, vx, vy. Because the noise is continuous, the matrices compose exactly: two
+steps of dt/2 equal one step of dt, so the frame rate does not matter. Source: Bar-Shalom, Li,
+Kirubarajan, *Estimation with Applications to Tracking and Navigation* (2001), sections 6.2
+(constant velocity) and 8.2 (the damped form, there for acceleration).
 """
 
 from __future__ import annotations
@@ -16,60 +16,60 @@ from perception.arrays import FloatArray
 
 from ._table import BoolArray
 
-# The 2 × 2 patterns of one axis, spread over x and y.
+# The 2 × 2 patterns of one axis, for both x and y.
 _POSITION = np.kron(np.diag([1.0, 0.0]), np.eye(2))
 _VELOCITY = np.kron(np.diag([0.0, 1.0]), np.eye(2))
 _POSITION_FROM_VELOCITY = np.kron([[0.0, 1.0], [0.0, 0.0]], np.eye(2))
 _CROSS = _POSITION_FROM_VELOCITY + _POSITION_FROM_VELOCITY.T
 _IDENTITY = np.eye(4)
 
-# Below this share of the time constant the closed form loses digits and its series is exact.
+# For steps below this share of the time constant, the closed form loses digits; use its series.
 _SHORT_SHARE: Final = 1e-3
 
 
 def transition(dt_s: float) -> FloatArray:
-    """Return F (4, 4): where constant velocity carries the state in ``dt_s`` ≥ 0."""
+    """Return F (4, 4) of a constant velocity over ``dt_s`` ≥ 0."""
     return _IDENTITY + dt_s * _POSITION_FROM_VELOCITY
 
 
 def process_noise(dt_s: float, acceleration_density_m2ps3: float) -> FloatArray:
-    """Return Q (4, 4): the covariance that white acceleration adds over ``dt_s`` ≥ 0."""
+    """Return Q (4, 4), the covariance that white acceleration adds over ``dt_s`` ≥ 0."""
     pattern = dt_s**3 / 3.0 * _POSITION + dt_s**2 / 2.0 * _CROSS + dt_s * _VELOCITY
     return np.asarray(acceleration_density_m2ps3 * pattern)
 
 
 def damped_transition(dt_s: FloatArray, time_constant_s: float) -> FloatArray:
     """Return F (N, 4, 4) of a velocity that decays with ``time_constant_s``; ``dt_s`` (N,) ≥ 0."""
-    gone = -np.expm1(-dt_s / time_constant_s)[:, None, None]
+    decayed = -np.expm1(-dt_s / time_constant_s)[:, None, None]
     pattern = time_constant_s * _POSITION_FROM_VELOCITY - _VELOCITY
-    return np.asarray(_IDENTITY + gone * pattern)
+    return np.asarray(_IDENTITY + decayed * pattern)
 
 
 def damped_process_noise(
     dt_s: FloatArray, time_constant_s: float, acceleration_density_m2ps3: float
 ) -> FloatArray:
-    """Return Q (N, 4, 4) that white acceleration adds to a velocity that decays.
+    """Return Q (N, 4, 4), the covariance that white acceleration adds to a velocity that decays.
 
-    The velocity is an Ornstein–Uhlenbeck process, so its variance never exceeds q τ / 2 and the
-    position's grows in proportion to time, not to its cube.
+    The velocity is an Ornstein–Uhlenbeck process. Its variance never exceeds q τ / 2, and the
+    variance of the position grows in proportion to time, not to its cube.
     """
     tau = time_constant_s
     share = dt_s / tau
-    gone, gone2 = -np.expm1(-share), -np.expm1(-2.0 * share)
+    decayed, decayed2 = -np.expm1(-share), -np.expm1(-2.0 * share)
     position = np.where(
         share < _SHORT_SHARE,
         dt_s**3 * (1.0 / 3.0 - 0.25 * share),
-        tau * tau * (dt_s - 2.0 * tau * gone + 0.5 * tau * gone2),
+        tau * tau * (dt_s - 2.0 * tau * decayed + 0.5 * tau * decayed2),
     )
     pattern = (
         position[:, None, None] * _POSITION
-        + (0.5 * (tau * gone) ** 2)[:, None, None] * _CROSS
-        + (0.5 * tau * gone2)[:, None, None] * _VELOCITY
+        + (0.5 * (tau * decayed) ** 2)[:, None, None] * _CROSS
+        + (0.5 * tau * decayed2)[:, None, None] * _VELOCITY
     )
     return np.asarray(acceleration_density_m2ps3 * pattern)
 
 
-def carry(
+def predict(
     states: FloatArray,
     covariances: FloatArray,
     dt_s: float,
@@ -77,15 +77,15 @@ def carry(
     time_constant_s: float,
     acceleration_density_m2ps3: float,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return N states (N, 4) and covariances (N, 4, 4) after ``dt_s`` > 0.
+    """Return the states (N, 4) and covariances (N, 4, 4) predicted ``dt_s`` > 0 ahead.
 
     Args:
         states: (N, 4).
         covariances: (N, 4, 4).
         dt_s: the whole step.
-        damped_s: (N,) how much of it, at its end, the velocity decays; None for nothing at all.
+        damped_s: (N,) the last part of the step, in which the velocity decays; None for no decay.
         time_constant_s: of that decay.
-        acceleration_density_m2ps3: q.
+        acceleration_density_m2ps3: q of the white acceleration.
     """
     if damped_s is None:
         F, Q = transition(dt_s), process_noise(dt_s, acceleration_density_m2ps3)
@@ -95,13 +95,13 @@ def carry(
     states, covariances = states.copy(), covariances.copy()
     plain: BoolArray = damped_s <= 0.0
     if plain.any():
-        states[plain], covariances[plain] = carry(
+        states[plain], covariances[plain] = predict(
             states[plain], covariances[plain], dt_s, None, time_constant_s, q
         )
     rows = np.flatnonzero(~plain)
     for row, free_s in zip(rows.tolist(), (dt_s - damped_s[rows]).tolist(), strict=True):
         if free_s > 0.0:
-            states[row : row + 1], covariances[row : row + 1] = carry(
+            states[row : row + 1], covariances[row : row + 1] = predict(
                 states[row : row + 1], covariances[row : row + 1], free_s, None, time_constant_s, q
             )
     damped = damped_s[rows]

@@ -1,4 +1,4 @@
-"""A tracker's state as plain JSON values, and back to the last bit."""
+"""Conversion of a tracker's state to plain JSON values and back, without loss of a bit."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _Four: TypeAlias = tuple[float, float, float, float]
 
 
 class _TracksRecord(StrictConfig):
-    """A :class:`TrackTable`, column by column; null where a number is not finite."""
+    """A :class:`TrackTable`, column by column; null for numbers that are not finite."""
 
     ids: list[int]
     states: list[_Four]
@@ -41,10 +41,10 @@ class _TracksRecord(StrictConfig):
     missed_s: list[float]
 
     @model_validator(mode="after")
-    def _agree(self) -> _TracksRecord:
+    def _check_consistency(self) -> _TracksRecord:
         lengths = {name: len(getattr(self, name)) for name in type(self).model_fields}
         if len(set(lengths.values())) > 1:
-            raise ValueError(f"every column must have one entry a track, got {lengths}")
+            raise ValueError(f"every column must have one entry per track, got {lengths}")
         if any(a >= b for a, b in zip([0, *self.ids], self.ids, strict=False)):
             raise ValueError(f"ids must be above 0 and increase, got {self.ids}")
         if any(not variance > 0.0 for variance in self.awareness_variances):
@@ -53,7 +53,7 @@ class _TracksRecord(StrictConfig):
 
 
 class _StateRecord(StrictConfig):
-    """A :class:`TrackerState`."""
+    """A :class:`TrackerState` as plain values."""
 
     stamp_s: float | None
     interval_s: float | None
@@ -61,14 +61,14 @@ class _StateRecord(StrictConfig):
     tracks: _TracksRecord
 
     @model_validator(mode="after")
-    def _agree(self) -> _StateRecord:
+    def _check_consistency(self) -> _StateRecord:
         if self.tracks.ids and self.tracks.ids[-1] >= self.next_id:
             raise ValueError(
                 f"next_id must be above every id in use, got {self.next_id} with a track "
                 f"{self.tracks.ids[-1]}"
             )
         if self.tracks.ids and self.stamp_s is None:
-            raise ValueError("stamp_s must be a number where there are tracks")
+            raise ValueError("stamp_s must be a number if there are tracks")
         for row in self.tracks.hit_stamps_s:
             seen_s = row[-1] if row else None
             if seen_s is None or self.stamp_s is None or seen_s > self.stamp_s:
@@ -79,7 +79,7 @@ class _StateRecord(StrictConfig):
 
 
 class _FrameRecord(StrictConfig):
-    """A :class:`Frame`."""
+    """A :class:`Frame` as plain values."""
 
     stamp_s: float
     T_odom_camera: tuple[_Four, _Four, _Four, _Four]
@@ -89,7 +89,7 @@ class _FrameRecord(StrictConfig):
     evidence_variances: list[float | None]
 
     @model_validator(mode="after")
-    def _agree(self) -> _FrameRecord:
+    def _check_consistency(self) -> _FrameRecord:
         lengths = {
             len(self.positions_odom_m),
             len(self.noises_m2),
@@ -97,12 +97,12 @@ class _FrameRecord(StrictConfig):
             len(self.evidence_variances),
         }
         if len(lengths) > 1:
-            raise ValueError("every column of a frame must have one entry an observation")
+            raise ValueError("every column of a frame must have one entry per observation")
         return self
 
 
 class TrackerRecord(StrictConfig):
-    """All of a tracker but its view: the frames that may still be replayed are in it."""
+    """A tracker without its view, but with the frames that may still be replayed."""
 
     format: Literal["awarenav-tracker"]
     version: Literal[1]
@@ -113,7 +113,7 @@ class TrackerRecord(StrictConfig):
     latest: _StateRecord
 
     @model_validator(mode="after")
-    def _agree(self) -> TrackerRecord:
+    def _check_consistency(self) -> TrackerRecord:
         stamps = [frame.stamp_s for frame in self.frames]
         if self.base.stamp_s is not None:
             stamps.insert(0, self.base.stamp_s)
@@ -126,7 +126,7 @@ class TrackerRecord(StrictConfig):
         for state in (self.base, self.latest):
             if any(len(row) != self.config.confirm_hits for row in state.tracks.hit_stamps_s):
                 raise ValueError(
-                    f"hit_stamps_s must hold confirm_hits = {self.config.confirm_hits} stamps a "
+                    f"hit_stamps_s must hold confirm_hits = {self.config.confirm_hits} stamps per "
                     "track"
                 )
         return self
@@ -152,10 +152,10 @@ def to_plain(
 
 
 def record_of(state: Any) -> TrackerRecord:
-    """Return a checked record of plain values.
+    """Return plain values as a checked record.
 
     Raises:
-        TrackingError: for anything that :func:`to_plain` has not written.
+        TrackingError: for values that :func:`to_plain` has not written.
     """
     if not isinstance(state, dict):
         raise TrackingError(f"state must be a mapping, got {type(state).__name__}")
@@ -172,7 +172,7 @@ def record_of(state: Any) -> TrackerRecord:
     try:
         return TrackerRecord.model_validate(state)
     except ValidationError as cause:
-        raise TrackingError(f"state is not one that a tracker has written: {cause}") from cause
+        raise TrackingError(f"state is not the state of a tracker: {cause}") from cause
 
 
 def state_of(record: _StateRecord, confirm_hits: int, name: str) -> TrackerState:
@@ -183,18 +183,18 @@ def state_of(record: _StateRecord, confirm_hits: int, name: str) -> TrackerState
     count = len(tracks.ids)
     table = TrackTable(
         ids=np.array(tracks.ids, dtype=np.int64),
-        states=_numbers(tracks.states).reshape(count, 4),
-        covariances=_numbers(tracks.covariances).reshape(count, 4, 4),
-        awareness_means=_numbers(tracks.awareness_means),
-        awareness_variances=_numbers(tracks.awareness_variances),
-        awareness_bounds=_numbers(tracks.awareness_bounds, -math.inf),
-        evidence_stamps_s=_numbers(tracks.evidence_stamps_s, math.nan),
-        hit_stamps_s=_numbers(
+        states=_array(tracks.states).reshape(count, 4),
+        covariances=_array(tracks.covariances).reshape(count, 4, 4),
+        awareness_means=_array(tracks.awareness_means),
+        awareness_variances=_array(tracks.awareness_variances),
+        awareness_bounds=_array(tracks.awareness_bounds, -math.inf),
+        evidence_stamps_s=_array(tracks.evidence_stamps_s, math.nan),
+        hit_stamps_s=_array(
             [stamp for row in tracks.hit_stamps_s for stamp in row], -math.inf
         ).reshape(count, confirm_hits),
         confirmed=np.array(tracks.confirmed, dtype=np.bool_),
         standing=np.array(tracks.standing, dtype=np.bool_),
-        missed_s=_numbers(tracks.missed_s),
+        missed_s=_array(tracks.missed_s),
     )
     interval_s = math.inf if record.interval_s is None else record.interval_s
     return TrackerState(table, record.next_id, record.stamp_s, interval_s)
@@ -209,10 +209,10 @@ def frame_of(record: _FrameRecord, name: str) -> Frame:
         record.stamp_s,
         rigid_transform(f"{name}.T_odom_camera", record.T_odom_camera, TrackingError),
         Measurements(
-            _numbers(record.positions_odom_m).reshape(count, 2),
-            _numbers(record.noises_m2).reshape(count, 2, 2),
-            _numbers(record.evidence_means, math.nan),
-            _numbers(record.evidence_variances, math.nan),
+            _array(record.positions_odom_m).reshape(count, 2),
+            _array(record.noises_m2).reshape(count, 2, 2),
+            _array(record.evidence_means, math.nan),
+            _array(record.evidence_variances, math.nan),
         ),
     )
 
@@ -252,10 +252,10 @@ def _plain_frame(frame: Frame) -> dict[str, Any]:
 
 
 def _finite_or_none(values: FloatArray) -> list[float | None]:
-    """Return numbers as a list; JSON has no word for those that are not finite."""
+    """Return numbers as a list, with None for those that are not finite, which JSON cannot hold."""
     return [value if math.isfinite(value) else None for value in values.tolist()]
 
 
-def _numbers(values: Sequence[Any], missing: float = math.nan) -> FloatArray:
-    """Return numbers as an array, with ``missing`` for None."""
+def _array(values: Sequence[Any], missing: float = math.nan) -> FloatArray:
+    """Return numbers as a float64 array, with ``missing`` for None."""
     return np.array([missing if value is None else value for value in values], dtype=np.float64)

@@ -1,25 +1,25 @@
-"""The tracks at an instant as the world sees them."""
+"""The tracks at an instant as :class:`~tracking.PersonTrack` objects."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ._attention import belief_of
+from ._awareness_update import belief_of
 from ._config import TrackerConfig
-from ._step import TrackerState, moved
+from ._step import TrackerState, predicted
 from ._table import BoolArray, TrackTable
 from ._track import PersonTrack, TrackStatus, trusted_track
-from ._track_management import lost
+from ._track_management import coasted_too_long
 from .awareness_filter import drift, estimate
 
 
 def snapshots(
     state: TrackerState, stamp_s: float, config: TrackerConfig, has_view: bool
 ) -> tuple[PersonTrack, ...]:
-    """Return every track at ``stamp_s``, not before the state's own stamp.
+    """Return every track at ``stamp_s``, which is not before the state's own stamp.
 
-    The time in between counts as unseen. No frame looked, so nobody was missed: what would end a
-    tentative track in a frame does not end it here before ``confirm_window_s``.
+    The time in between counts as unseen. It holds no frame that could have missed a person, so a
+    tentative track is kept for ``confirm_window_s`` here, not only for ``max_tentative_gap_s``.
     """
     tracks = state.tracks
     if state.stamp_s is None or not len(tracks):
@@ -27,16 +27,16 @@ def snapshots(
     dt_s = stamp_s - state.stamp_s
     belief = belief_of(tracks)
     if dt_s > 0.0:
-        tracks = tracks.take(~_absent(tracks, stamp_s, config, has_view))
+        tracks = tracks.take(~_expired(tracks, stamp_s, config, has_view))
         if not len(tracks):
             return ()
-        tracks = moved(tracks, state.stamp_s, stamp_s, config)
+        tracks = predicted(tracks, state.stamp_s, stamp_s, config)
         awareness = config.awareness
         unseen_s = max(awareness.unseen_time_constant_s, awareness.memory_s)
         belief = drift(belief_of(tracks), dt_s, unseen_s, awareness)
-    told = estimate(belief, config.awareness)
+    estimated = estimate(belief, config.awareness)
     last_seen_s = tracks.last_seen_s
-    # The snapshots share these arrays, which nothing writes to again.
+    # The snapshots share these arrays.
     tracks.states.setflags(write=False)
     tracks.covariances.setflags(write=False)
     return tuple(
@@ -48,25 +48,27 @@ def snapshots(
             tracks.states[:, :2],
             tracks.states[:, 2:],
             tracks.covariances,
-            np.asarray(told.awareness).tolist(),
-            np.asarray(told.awareness_std).tolist(),
-            np.asarray(told.awareness_lower).tolist(),
+            np.asarray(estimated.awareness).tolist(),
+            np.asarray(estimated.awareness_std).tolist(),
+            np.asarray(estimated.awareness_lower).tolist(),
             [config.stature_m] * len(tracks),
             (stamp_s - last_seen_s).tolist(),
         )
     )
 
 
-def _absent(tracks: TrackTable, stamp_s: float, config: TrackerConfig, has_view: bool) -> BoolArray:
-    """Return (N,) True for whoever is not told of at ``stamp_s`` any more."""
-    patience_s = max(config.max_tentative_gap_s, config.confirm_window_s)
-    given_up = ~tracks.confirmed & (stamp_s - tracks.last_seen_s > patience_s)
-    return given_up | lost(tracks, stamp_s, config, has_view)
+def _expired(
+    tracks: TrackTable, stamp_s: float, config: TrackerConfig, has_view: bool
+) -> BoolArray:
+    """Return (N,) True for tracks that are not reported at ``stamp_s`` any more."""
+    kept_s = max(config.max_tentative_gap_s, config.confirm_window_s)
+    unconfirmed = ~tracks.confirmed & (stamp_s - tracks.last_seen_s > kept_s)
+    return unconfirmed | coasted_too_long(tracks, stamp_s, config, has_view)
 
 
-def _statuses(confirmed: list[bool], shown: list[bool]) -> list[TrackStatus]:
-    """Return the statuses of tracks: whether confirmed, whether in the latest frame."""
+def _statuses(confirmed: list[bool], in_latest_frame: list[bool]) -> list[TrackStatus]:
+    """Return the status of each track."""
     return [
-        "tentative" if not sure else "confirmed" if now else "coasting"
-        for sure, now in zip(confirmed, shown, strict=True)
+        "tentative" if not is_confirmed else "confirmed" if is_seen else "coasting"
+        for is_confirmed, is_seen in zip(confirmed, in_latest_frame, strict=True)
     ]

@@ -1,4 +1,4 @@
-"""All tracks at one instant as arrays, one row a track: the state that the tracker computes on."""
+"""All tracks at one instant as arrays, one row per track."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ BoolArray = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackTable:
-    """The tracks in the order of their ids; arrays are never written to once they are in here.
+    """The tracks in the order of their ids. The arrays are never written to once they are in here.
 
     Attributes:
         ids: (N,) increasing.
         states: (N, 4) x, y, vx, vy in odom, metres and metres per second.
-        covariances: (N, 4, 4) of them.
+        covariances: (N, 4, 4) of the states.
         awareness_means: (N,) of logit(α).
         awareness_variances: (N,) of logit(α).
-        awareness_bounds: (N,) remembered lower bound of logit(α); −∞ until evidence has lifted it.
-        evidence_stamps_s: (N,) of the latest evidence of awareness that counted; NaN for none.
-        hit_stamps_s: (N, confirm_hits) of the latest frames that showed the person, oldest first;
-            −∞ where there were fewer.
+        awareness_bounds: (N,) remembered lower bound of logit(α); −∞ before the first evidence.
+        evidence_stamps_s: (N,) of the latest evidence of awareness that was used; NaN for none.
+        hit_stamps_s: (N, confirm_hits) stamps of the latest frames that showed the person, oldest
+            first; −∞ where there were fewer.
         confirmed: (N,) whether enough frames have shown the person.
         standing: (N,) whether the person stood still when last seen.
-        missed_s: (N,) how long frames should have shown the person, and did not, since last seen.
+        missed_s: (N,) time since last seen in which frames should have shown the person.
     """
 
     ids: IntArray
@@ -49,20 +49,20 @@ class TrackTable:
     @staticmethod
     def empty(confirm_hits: int) -> TrackTable:
         """Return a table without tracks."""
-        none = np.empty(0)
-        no = np.empty(0, dtype=np.bool_)
+        no_numbers = np.empty(0)
+        no_flags = np.empty(0, dtype=np.bool_)
         return TrackTable(
             ids=np.empty(0, dtype=np.int64),
             states=np.empty((0, 4)),
             covariances=np.empty((0, 4, 4)),
-            awareness_means=none,
-            awareness_variances=none,
-            awareness_bounds=none,
-            evidence_stamps_s=none,
+            awareness_means=no_numbers,
+            awareness_variances=no_numbers,
+            awareness_bounds=no_numbers,
+            evidence_stamps_s=no_numbers,
             hit_stamps_s=np.empty((0, confirm_hits)),
-            confirmed=no,
-            standing=no,
-            missed_s=none,
+            confirmed=no_flags,
+            standing=no_flags,
+            missed_s=no_numbers,
         )
 
     @property
@@ -80,7 +80,7 @@ class TrackTable:
         return TrackTable(*(getattr(self, name)[keep] for name in TRACK_COLUMNS))
 
     def replaced(self, **columns: NDArray[Any]) -> TrackTable:
-        """Return the table with other columns; half the time of ``dataclasses.replace``."""
+        """Return the table with other columns; takes half the time of ``dataclasses.replace``."""
         return TrackTable(
             *(columns[name] if name in columns else getattr(self, name) for name in TRACK_COLUMNS)
         )

@@ -1,4 +1,4 @@
-"""One person followed over time: the seam between tracking and navigation."""
+"""A tracked person, as the tracker hands it to navigation."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ TrackStatus = Literal["tentative", "confirmed", "coasting"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PersonTrack:
-    """A frozen snapshot of one tracked person, in the odom frame.
+    """An immutable snapshot of one tracked person, in the odom frame.
 
     Attributes:
         id: unique for the life of a tracker, never used again.
-        stamp_s: the instant that the state is for.
-        status: ``"tentative"`` (too new to trust), ``"confirmed"`` or ``"coasting"`` (not seen in
-            the latest frame).
+        stamp_s: time of the state.
+        status: ``"tentative"`` (not confirmed yet), ``"confirmed"`` or ``"coasting"`` (not in the
+            latest frame).
         position_odom_m: (2,).
         velocity_odom_mps: (2,).
         covariance_odom: (4, 4), order x, y, vx, vy.
-        awareness: smoothed α in [0, 1].
+        awareness: filtered α in [0, 1].
         awareness_std: its standard deviation, ≥ 0.
-        awareness_lower: lower bound of α in [0, 1]; the only part that may shrink an obstacle.
+        awareness_lower: lower bound of α in [0, 1]; only this value may shrink an obstacle.
         height_m: the person's assumed stature, > 0.
         time_since_seen_s: ≥ 0, time since a frame last showed this person.
     """
@@ -85,10 +85,10 @@ _SETTERS: Final = tuple(
 
 
 def trusted_track(*values: Any) -> PersonTrack:
-    """Make a track of values known to be sound, in the order of its fields, without checking them.
+    """Make a track from values in the order of its fields, without checks.
 
-    The tracker's own numbers are; arrays must be read-only. A fifth of the time of the constructor,
-    which is for everybody else.
+    For the tracker's own numbers only, with read-only arrays. It takes a fifth of the time of the
+    constructor.
     """
     track = object.__new__(PersonTrack)
     for assign, value in zip(_SETTERS, values, strict=True):

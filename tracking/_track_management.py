@@ -1,6 +1,7 @@
-"""How much of each person the people nearer to the camera hide.
+"""Track management: initiation, confirmation, coasting and deletion of tracks.
 
-Births and deaths: who counts as confirmed, who stands, and how long the unseen are kept.
+A confirmed track is deleted soon if frames should have shown the person and did not. How surely a
+frame should have shown a person depends on the view and on the people who stand in front.
 """
 
 from __future__ import annotations
@@ -14,170 +15,49 @@ from perception.arrays import FloatArray
 from ._config import TrackerConfig
 from ._errors import TrackingError
 from ._kalman import inverse_2x2
+from ._measurement import Frame
 from ._table import BoolArray, IndexArray, TrackTable
 from ._views import View
+from .awareness_filter import prior
 
-
-def open_share(
-    places_m: FloatArray,
-    people_m: FloatArray,
-    eye_m: FloatArray,
-    radius_m: float,
-) -> FloatArray:
-    """Return (N,) in [0, 1]: the share of a body at each place that nobody nearer covers.
-
-    Bodies are upright cylinders, so on the floor plane each takes up an interval of bearings. The
-    shares that several people cover are summed: two who stand side by side hide somebody whole.
-
-    Args:
-        places_m: (N, 2) where somebody may be.
-        people_m: (M, 2) the others, who may stand in front.
-        eye_m: (2,) the camera, in the same frame.
-        radius_m: > 0, of every body.
-    """
-    if not len(places_m) or not len(people_m):
-        return np.ones(len(places_m))
-    bearing, distance, half = _seen_from(places_m, eye_m, radius_m)
-    front_bearing, front_distance, front_half = _seen_from(people_m, eye_m, radius_m)
-    apart = bearing[:, None] - front_bearing
-    apart = np.abs(np.mod(apart + np.pi, 2.0 * np.pi) - np.pi)
-    overlap = np.minimum(half[:, None], apart + front_half) - np.maximum(
-        -half[:, None], apart - front_half
-    )
-    before: BoolArray = front_distance + radius_m <= distance[:, None]
-    hidden = np.where(before, np.clip(overlap / (2.0 * half[:, None]), 0.0, 1.0), 0.0)
-    return np.asarray(np.maximum(1.0 - hidden.sum(axis=1), 0.0))
-
-
-def _seen_from(
-    places_m: FloatArray, eye_m: FloatArray, radius_m: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return bearing, distance and half the angle of bodies at (N, 2), seen from (2,)."""
-    offset = places_m - eye_m
-    distance = np.hypot(offset[:, 0], offset[:, 1])
-    half = np.arcsin(np.minimum(radius_m / np.maximum(distance, radius_m), 1.0))
-    return np.arctan2(offset[:, 1], offset[:, 0]), distance, half
-
-
-# χ² with two degrees of freedom: nine velocities in ten of somebody who stands pass.
+# χ² with two degrees of freedom: 90 % of the estimated velocities of a standing person pass.
 _STANDING_CHI2: Final = 4.605
-# A constant velocity holds for this long after the last sight of somebody who stood.
+# A standing person is predicted with constant velocity for this long after the last sighting.
 _STANDING_HOLD_S: Final = 0.5
-# However long the pause before it, one frame is no more than this share of max_missed_s.
+# One frame counts for at most this share of max_missed_s, however long the pause before it.
 _MAX_SHARE_OF_ONE_FRAME: Final = 0.5
 
 
-def lost(tracks: TrackTable, stamp_s: float, config: TrackerConfig, has_view: bool) -> BoolArray:
-    """Return (N,) True for confirmed tracks unseen for too long at ``stamp_s``, for any reason."""
-    gap_s = stamp_s - tracks.last_seen_s
-    if not has_view:
-        return tracks.confirmed & (gap_s > config.max_coast_s)
-    standing_s = max(config.max_standing_coast_s, config.max_coast_s)
-    limit_s = np.where(tracks.standing, standing_s, config.max_coast_s)
-    return tracks.confirmed & (gap_s > limit_s)
-
-
-def gone(tracks: TrackTable, stamp_s: float, config: TrackerConfig, has_view: bool) -> BoolArray:
-    """Return (N,) True for whoever is to be dropped at ``stamp_s`` if not seen then."""
-    given_up = ~tracks.confirmed & (stamp_s - tracks.last_seen_s > config.max_tentative_gap_s)
-    missed = tracks.confirmed & (tracks.missed_s > config.max_missed_s)
-    return lost(tracks, stamp_s, config, has_view) | given_up | missed
-
-
-def missed_time_s(
-    tracks: TrackTable,
-    unseen: BoolArray,
-    dt_s: float,
-    T_odom_camera: FloatArray,
-    config: TrackerConfig,
-    view: View | None,
-) -> FloatArray:
-    """Return (N,) how long frames should have shown the tracks and did not, after one more frame.
-
-    The time since the frame before counts in proportion to how surely this one should have shown
-    the person. Only people whom this very frame shows can hide others. Without a view it is 0.
-
-    Args:
-        tracks: at the frame's stamp.
-        unseen: (N,) whom the frame does not show.
-        dt_s: since the frame before.
-        T_odom_camera: (4, 4) of the frame.
-        config: settings.
-        view: where people can be seen.
-    """
-    missed_s = np.where(unseen, tracks.missed_s, 0.0)
-    asked = unseen & tracks.confirmed
-    if view is None or dt_s <= 0.0 or not asked.any():
-        return missed_s
-    rows = np.flatnonzero(asked)
-    visibility = _visibility(tracks, rows, ~unseen, T_odom_camera, config, view)
-    missed_s[rows] += visibility * min(dt_s, _MAX_SHARE_OF_ONE_FRAME * config.max_missed_s)
-    return missed_s
-
-
-def _visibility(
-    tracks: TrackTable,
-    rows: IndexArray,
-    shown: BoolArray,
-    T_odom_camera: FloatArray,
-    config: TrackerConfig,
-    view: View,
-) -> FloatArray:
-    """Return (K,) in [0, 1]: how surely the frame should have shown the tracks of ``rows`` (K,).
-
-    Judged where the track is, not all over its uncertainty: that nobody is seen in the open part
-    of it does not speak against a person in the hidden part.
-    """
-    places = tracks.states[rows, :2]
-    said = np.asarray(view.visibility(places, T_odom_camera), dtype=np.float64)
-    if said.shape != (len(places),) or not ((said >= 0.0) & (said <= 1.0)).all():
-        raise TrackingError(
-            f"view.visibility must return one number in [0, 1] a position, {len(places)} in all, "
-            f"got shape {said.shape}: {said!r:.80}"
-        )
-    share = open_share(
-        places,
-        tracks.states[shown, :2],
-        T_odom_camera[:2, 3],
-        config.body_radius_m,
+def initiate(
+    frame: Frame, unmatched: BoolArray, first_id: int, config: TrackerConfig
+) -> TrackTable:
+    """Return new tracks at the unmatched measurements (M,), with the prior awareness."""
+    count = int(np.count_nonzero(unmatched))
+    measured = frame.measurements
+    states = np.zeros((count, 4))
+    states[:, :2] = measured.positions_odom_m[unmatched]
+    covariances = np.zeros((count, 4, 4))
+    covariances[:, :2, :2] = measured.noises_m2[unmatched]
+    covariances[:, 2, 2] = covariances[:, 3, 3] = config.initial_velocity_std_mps**2
+    hits = np.full((count, config.confirm_hits), -np.inf)
+    hits[:, -1] = frame.stamp_s
+    belief = prior(config.awareness)
+    return TrackTable(
+        ids=np.arange(first_id, first_id + count, dtype=np.int64),
+        states=states,
+        covariances=covariances,
+        awareness_means=np.full(count, belief.mean),
+        awareness_variances=np.full(count, belief.variance),
+        awareness_bounds=np.full(count, belief.bound),
+        evidence_stamps_s=np.full(count, np.nan),
+        hit_stamps_s=hits,
+        confirmed=np.full(count, config.confirm_hits <= 1),
+        standing=np.zeros(count, dtype=np.bool_),
+        missed_s=np.zeros(count),
     )
-    return np.asarray(said * share)
 
 
-def damped_time_s(tracks: TrackTable, from_s: float, to_s: float) -> FloatArray | None:
-    """Return (N,) how much of a step the standing are modelled as staying where they are.
-
-    Constant velocity would carry somebody who stands away on the rest of their estimated velocity,
-    and its uncertainty, which grows with the cube of time, would fill the hall. Counted from the
-    last sight of them, so that it does not matter how many frames came since. None for no one.
-    """
-    if not tracks.standing.any():
-        return None
-    since_s = np.maximum(tracks.last_seen_s + _STANDING_HOLD_S, from_s)
-    damped_s = np.where(tracks.standing, np.maximum(to_s - since_s, 0.0), 0.0)
-    return damped_s if damped_s.any() else None
-
-
-def stand(states: FloatArray, covariances: FloatArray, config: TrackerConfig) -> BoolArray:
-    """Return (N,) True for velocities that are small, well known and consistent with 0."""
-    velocity, spread = states[:, 2:], covariances[:, 2:, 2:]
-    v_x, v_y = velocity[:, 0], velocity[:, 1]
-    limit2 = config.standing_speed_mps**2
-    slow = v_x * v_x + v_y * v_y <= limit2
-    sure = spread[:, 0, 0] + spread[:, 1, 1] <= 2.0 * limit2
-    likely = slow & sure
-    if likely.any():
-        inverse = inverse_2x2(spread)
-        chi2 = (
-            v_x * v_x * inverse[:, 0, 0]
-            + 2.0 * v_x * v_y * inverse[:, 0, 1]
-            + v_y * v_y * inverse[:, 1, 1]
-        )
-        likely &= chi2 <= _STANDING_CHI2
-    return likely
-
-
-def after_hits(
+def record_hits(
     tracks: TrackTable,
     rows: IndexArray,
     stamp_s: float,
@@ -186,7 +66,8 @@ def after_hits(
 ) -> TrackTable:
     """Return the tracks after a frame at ``stamp_s`` that shows those of ``rows``.
 
-    A second set of measurements of one instant is no second sighting.
+    Confirms tracks with enough hits and finds out who stands. A second set of measurements with the
+    same stamp is not another hit.
     """
     hits = tracks.hit_stamps_s.copy()
     fresh = rows[hits[rows, -1] < stamp_s]
@@ -199,5 +80,173 @@ def after_hits(
             window_s = max(window_s, (config.confirm_hits + 1) * interval_s)
         confirmed = confirmed | (stamp_s - hits[:, 0] <= window_s)
     standing = tracks.standing.copy()
-    standing[rows] = stand(tracks.states[rows], tracks.covariances[rows], config)
+    standing[rows] = is_standing(tracks.states[rows], tracks.covariances[rows], config)
     return tracks.replaced(hit_stamps_s=hits, confirmed=confirmed, standing=standing)
+
+
+def is_standing(states: FloatArray, covariances: FloatArray, config: TrackerConfig) -> BoolArray:
+    """Return (N,) True for velocities that are small, well known and consistent with 0."""
+    velocity, spread = states[:, 2:], covariances[:, 2:, 2:]
+    v_x, v_y = velocity[:, 0], velocity[:, 1]
+    limit2 = config.standing_speed_mps**2
+    slow = v_x * v_x + v_y * v_y <= limit2
+    well_known = spread[:, 0, 0] + spread[:, 1, 1] <= 2.0 * limit2
+    standing = slow & well_known
+    if standing.any():
+        inverse = inverse_2x2(spread)
+        chi2 = (
+            v_x * v_x * inverse[:, 0, 0]
+            + 2.0 * v_x * v_y * inverse[:, 0, 1]
+            + v_y * v_y * inverse[:, 1, 1]
+        )
+        standing &= chi2 <= _STANDING_CHI2
+    return standing
+
+
+def damped_time_s(tracks: TrackTable, from_s: float, to_s: float) -> FloatArray | None:
+    """Return (N,), the part of a step in which the velocity decays, or None if it is 0 for all.
+
+    Only standing people have one. With constant velocity, an unseen standing person would drift off
+    with the remaining estimated velocity, and its uncertainty, which grows with the cube of time,
+    would cover the whole map. The time counts from the last sighting, so that the number of frames
+    since then does not matter.
+    """
+    if not tracks.standing.any():
+        return None
+    since_s = np.maximum(tracks.last_seen_s + _STANDING_HOLD_S, from_s)
+    damped_s = np.where(tracks.standing, np.maximum(to_s - since_s, 0.0), 0.0)
+    return damped_s if damped_s.any() else None
+
+
+def coasted_too_long(
+    tracks: TrackTable, stamp_s: float, config: TrackerConfig, has_view: bool
+) -> BoolArray:
+    """Return (N,) True for confirmed tracks that are unseen for too long, for whatever reason."""
+    gap_s = stamp_s - tracks.last_seen_s
+    if not has_view:
+        return tracks.confirmed & (gap_s > config.max_coast_s)
+    standing_s = max(config.max_standing_coast_s, config.max_coast_s)
+    limit_s = np.where(tracks.standing, standing_s, config.max_coast_s)
+    return tracks.confirmed & (gap_s > limit_s)
+
+
+def expired_before(
+    tracks: TrackTable, stamp_s: float, config: TrackerConfig, has_view: bool
+) -> BoolArray:
+    """Return (N,) True for tracks that a frame at ``stamp_s`` can no longer match.
+
+    A tentative track gets a chance in this frame, however long the frame interval.
+    """
+    gap_s = stamp_s - tracks.last_seen_s
+    unconfirmed = ~tracks.confirmed & (gap_s > max(config.max_coast_s, config.max_tentative_gap_s))
+    return coasted_too_long(tracks, stamp_s, config, has_view) | unconfirmed
+
+
+def due_for_deletion(
+    tracks: TrackTable, stamp_s: float, config: TrackerConfig, has_view: bool
+) -> BoolArray:
+    """Return (N,) True for tracks to delete if the frame at ``stamp_s`` does not show them."""
+    unconfirmed = ~tracks.confirmed & (stamp_s - tracks.last_seen_s > config.max_tentative_gap_s)
+    missed = tracks.confirmed & (tracks.missed_s > config.max_missed_s)
+    return coasted_too_long(tracks, stamp_s, config, has_view) | unconfirmed | missed
+
+
+def missed_time_s(
+    tracks: TrackTable,
+    unseen: BoolArray,
+    dt_s: float,
+    T_odom_camera: FloatArray,
+    config: TrackerConfig,
+    view: View | None,
+) -> FloatArray:
+    """Return (N,), the updated time in which frames should have shown the tracks and did not.
+
+    The time since the previous frame counts in proportion to how surely this frame should have
+    shown the person. Only people in this frame can hide others. Without a view the time is 0.
+
+    Args:
+        tracks: at the frame's stamp.
+        unseen: (N,) True for people who are not in the frame.
+        dt_s: since the previous frame.
+        T_odom_camera: (4, 4) of the frame.
+        config: settings.
+        view: where people can be seen.
+    """
+    missed_s = np.where(unseen, tracks.missed_s, 0.0)
+    candidates = unseen & tracks.confirmed
+    if view is None or dt_s <= 0.0 or not candidates.any():
+        return missed_s
+    rows = np.flatnonzero(candidates)
+    visibility = _visibility(tracks, rows, ~unseen, T_odom_camera, config, view)
+    missed_s[rows] += visibility * min(dt_s, _MAX_SHARE_OF_ONE_FRAME * config.max_missed_s)
+    return missed_s
+
+
+def _visibility(
+    tracks: TrackTable,
+    rows: IndexArray,
+    seen: BoolArray,
+    T_odom_camera: FloatArray,
+    config: TrackerConfig,
+    view: View,
+) -> FloatArray:
+    """Return (K,) in [0, 1]: how surely the frame should have shown the tracks of ``rows`` (K,).
+
+    Evaluated at the track's position only, not over its uncertainty: an empty visible part of the
+    uncertain area does not rule out a person in the hidden part.
+    """
+    positions = tracks.states[rows, :2]
+    in_view = np.asarray(view.visibility(positions, T_odom_camera), dtype=np.float64)
+    if in_view.shape != (len(positions),) or not ((in_view >= 0.0) & (in_view <= 1.0)).all():
+        raise TrackingError(
+            f"view.visibility must return one number in [0, 1] per position, {len(positions)} in "
+            f"all, got shape {in_view.shape}: {in_view!r:.80}"
+        )
+    share = unoccluded_share(
+        positions,
+        tracks.states[seen, :2],
+        T_odom_camera[:2, 3],
+        config.body_radius_m,
+    )
+    return np.asarray(in_view * share)
+
+
+def unoccluded_share(
+    positions_m: FloatArray,
+    occluders_m: FloatArray,
+    camera_m: FloatArray,
+    radius_m: float,
+) -> FloatArray:
+    """Return (N,) in [0, 1]: the share of a body at each position that no nearer body hides.
+
+    Bodies are upright cylinders, so each covers an interval of bearings on the floor plane. The
+    shares that several people hide are summed: two people side by side can hide a third completely.
+
+    Args:
+        positions_m: (N, 2) positions of the bodies.
+        occluders_m: (M, 2) positions of the other people.
+        camera_m: (2,) position of the camera, in the same frame.
+        radius_m: > 0, of every body.
+    """
+    if not len(positions_m) or not len(occluders_m):
+        return np.ones(len(positions_m))
+    bearing, distance, half = _bearing_intervals(positions_m, camera_m, radius_m)
+    front_bearing, front_distance, front_half = _bearing_intervals(occluders_m, camera_m, radius_m)
+    apart = bearing[:, None] - front_bearing
+    apart = np.abs(np.mod(apart + np.pi, 2.0 * np.pi) - np.pi)
+    overlap = np.minimum(half[:, None], apart + front_half) - np.maximum(
+        -half[:, None], apart - front_half
+    )
+    in_front: BoolArray = front_distance + radius_m <= distance[:, None]
+    hidden = np.where(in_front, np.clip(overlap / (2.0 * half[:, None]), 0.0, 1.0), 0.0)
+    return np.asarray(np.maximum(1.0 - hidden.sum(axis=1), 0.0))
+
+
+def _bearing_intervals(
+    positions_m: FloatArray, camera_m: FloatArray, radius_m: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return bearing, distance and angular half-width of bodies at (N, 2), seen from (2,)."""
+    offset = positions_m - camera_m
+    distance = np.hypot(offset[:, 0], offset[:, 1])
+    half = np.arcsin(np.minimum(radius_m / np.maximum(distance, radius_m), 1.0))
+    return np.arctan2(offset[:, 1], offset[:, 0]), distance, half

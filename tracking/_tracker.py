@@ -1,4 +1,4 @@
-"""The tracker: person observations of one frame after another become tracks in the odom frame."""
+"""The tracker: turns the person observations of each frame into tracks in the odom frame."""
 
 from __future__ import annotations
 
@@ -23,29 +23,29 @@ from ._views import View
 
 
 class PersonTracker:
-    """Follow people through frames that come at any rate from a camera that moves.
+    """Track people with a moving camera, at any frame rate.
 
-    Each person is a constant-velocity Kalman filter on the floor plane (odom x and y) and a filter
-    of awareness in logit(α). A person is tentative until ``confirm_hits`` frames within
-    ``confirm_window_s`` have shown them and coasting while the latest frame does not. Ids are never
-    used again. Tentative tracks are returned too, with ``awareness_lower`` 0: navigation must
-    reckon with a person who may not be there, as with one who has not seen the robot.
+    Each track has a constant-velocity Kalman filter on the floor plane (odom x and y) and a filter
+    of awareness in logit(α). A track is tentative until ``confirm_hits`` frames within
+    ``confirm_window_s`` have shown the person, and coasting while the latest frame does not. An id
+    is never used again. Tentative tracks are returned too, with ``awareness_lower`` 0: the person
+    may not exist, but navigation must treat them as one who has not seen the robot.
 
-    How long an unseen person is kept depends on whether they should have been seen. With a
-    ``view``, those whom nothing hides are dropped after ``max_missed_s``, those out of view or
-    behind somebody after ``max_coast_s``, or ``max_standing_coast_s`` if they stood still; without
-    one nobody knows, and all are kept for ``max_coast_s``.
+    A track is deleted sooner if frames should have shown the person. With a ``view``, a person whom
+    nothing hides is deleted after ``max_missed_s``. A person out of view or behind another person
+    is deleted after ``max_coast_s``, or after ``max_standing_coast_s`` if they stood still. Without
+    a view every person is kept for ``max_coast_s``.
 
-    Frames may come late by up to ``max_lag_s``. The tracks, their ids included, are then those of
-    frames that came in order. That may take back what was said since the late frame's stamp: a
-    person who was first seen after it can get another id, or turn out to be somebody known.
+    Frames may come late by up to ``max_lag_s``. The tracks and their ids are then the same as if
+    the frames had come in order. This may revise earlier results from after the late frame's stamp:
+    a person first seen after it can get another id, or turn out to be a known person.
 
     The tracker is deterministic. A refused input raises :class:`~tracking.TrackingError` and leaves
-    it as it was, save that :attr:`refused_late_frames` counts.
+    the tracker as it was, except that :attr:`refused_late_frames` may count it.
 
     Args:
         config: settings; None for the defaults.
-        view: where the camera can see people; None when nobody knows.
+        view: where the camera can see people; None if unknown.
     """
 
     def __init__(self, config: TrackerConfig | None = None, *, view: View | None = None) -> None:
@@ -74,13 +74,13 @@ class PersonTracker:
     def last_stamp_s(self) -> float | None:
         """Stamp of the latest frame, or None before the first.
 
-        No tracks may mean that nobody is there or that the camera has stopped; this tells which.
+        Without tracks, it tells whether nobody is there or the camera has stopped.
         """
         return self._history.latest.stamp_s
 
     @property
     def refused_late_frames(self) -> int:
-        """How many frames have been refused because they came too late."""
+        """Number of frames that were refused because they came too late."""
         return self._refused_late_frames
 
     def update(
@@ -91,26 +91,26 @@ class PersonTracker:
         *,
         pose_covariance_odom: Any = None,
     ) -> tuple[PersonTrack, ...]:
-        """Take one frame and return every track at the latest stamp, in the order of their ids.
+        """Process one frame and return every track at the latest stamp, in the order of their ids.
 
         Args:
-            observations: of this frame; none when it shows nobody.
-            stamp_s: time of the frame, at most ``max_lag_s`` before the latest one's. The same
-                stamp again is a second set of measurements of that instant.
-            T_odom_camera: (4, 4) where the camera was at ``stamp_s``.
+            observations: of this frame; empty if it shows nobody.
+            stamp_s: time of the frame, at most ``max_lag_s`` before the latest one's. A second
+                frame with the same stamp is a second set of measurements at that time.
+            T_odom_camera: (4, 4) pose of the camera at ``stamp_s``.
             pose_covariance_odom: (3, 3) of the camera's x, y (m) and yaw (rad) in odom at
-                ``stamp_s``, or None when its pose is as good as known. People of one frame share
-                the pose's error; it counts for each of them on their own.
+                ``stamp_s``, or None if the pose is known well enough. All people in a frame share
+                the pose error; the tracker adds it to each of them as if it were independent.
 
         Raises:
             TrackingError: for a stamp that is not finite, lies too far back or differs from that of
                 an observation by more than ``stamp_tolerance_s``, for a ``T_odom_camera`` that is
-                no rigid transform, a ``pose_covariance_odom`` that is no covariance, and for
-                anything in ``observations`` that is no :class:`~perception.PersonObservation` or
-                lies out of this world.
+                not a rigid transform, for a ``pose_covariance_odom`` that is not a covariance, and
+                for anything in ``observations`` that is not a
+                :class:`~perception.PersonObservation` or lies out of bounds.
         """
         stamp = finite_number("stamp_s", stamp_s, TrackingError)
-        late = self._history.refusal(stamp)
+        late = self._history.lateness_error(stamp)
         if late is not None:
             self._refused_late_frames += 1
             raise TrackingError(late)
@@ -124,12 +124,12 @@ class PersonTracker:
         return self._snapshots(stamp if latest.stamp_s is None else latest.stamp_s)
 
     def predict(self, stamp_s: float) -> tuple[PersonTrack, ...]:
-        """Return the tracks at a later (or the same) instant; the tracker stays as it was.
+        """Return the tracks at the latest stamp or later; the tracker does not change.
 
-        They are what :meth:`update` would return for a frame at ``stamp_s`` that shows nobody and
-        looks nowhere: position uncertainty grows, awareness falls, and a track whose time is up is
-        absent. A person whom the latest frame showed is still called confirmed, and a tentative
-        track is kept for ``confirm_window_s``.
+        They are what :meth:`update` would return for a frame at ``stamp_s`` that covers nothing:
+        position uncertainty grows, awareness falls, and expired tracks are left out. A person in
+        the latest frame keeps the status confirmed, and a tentative track is kept for
+        ``confirm_window_s``.
 
         Raises:
             TrackingError: for a stamp that is not finite or lies before the latest frame's.
@@ -139,14 +139,14 @@ class PersonTracker:
         if last_s is not None and stamp < last_s:
             raise TrackingError(
                 f"cannot predict at stamp_s = {stamp!r} s: the last frame was at {last_s!r} s, "
-                "and what was before is not kept"
+                "and earlier tracks are not kept"
             )
         return self._snapshots(stamp)
 
     def state(self) -> dict[str, Any]:
-        """Return everything that the tracker knows, its config included, as plain JSON values.
+        """Return the whole state of the tracker, config included, as plain JSON values.
 
-        :meth:`from_state` continues from it to the last bit. The view is not part of it.
+        A tracker made by :meth:`from_state` continues bit for bit. The view is not included.
         """
         history = self._history
         return to_plain(
@@ -159,14 +159,14 @@ class PersonTracker:
 
     @classmethod
     def from_state(cls, state: dict[str, Any], *, view: View | None = None) -> PersonTracker:
-        """Make a tracker that continues where :meth:`state` was taken.
+        """Make a tracker that continues from a state that :meth:`state` returned.
 
         Args:
             state: from :meth:`state`, or from its JSON.
-            view: the same as the first tracker's; it is not part of the state.
+            view: the view of the first tracker; it is not part of the state.
 
         Raises:
-            TrackingError: for a state that no tracker has written, or another version has.
+            TrackingError: for a state that no tracker has written, or that has another version.
         """
         record = record_of(state)
         tracker = cls(record.config, view=view)
@@ -182,10 +182,10 @@ class PersonTracker:
         return tracker
 
     def save(self, path: str | Path) -> None:
-        """Write :meth:`state` as JSON for :meth:`load`; the file appears whole or not at all.
+        """Write :meth:`state` as JSON for :meth:`load`; the file is replaced in one step.
 
         Raises:
-            TrackingError: naming the file, when it cannot be written.
+            TrackingError: naming the file, if it cannot be written.
         """
         path = Path(path)
         text = json.dumps(self.state(), allow_nan=False)
@@ -198,10 +198,10 @@ class PersonTracker:
 
     @classmethod
     def load(cls, path: str | Path, *, view: View | None = None) -> PersonTracker:
-        """Make a tracker that continues where :meth:`save` wrote ``path``.
+        """Make a tracker that continues from a file that :meth:`save` wrote.
 
         Raises:
-            TrackingError: naming the file, when it cannot be read or holds no tracker's state.
+            TrackingError: naming the file, if it cannot be read or holds no state of a tracker.
         """
         path = Path(path)
         try:

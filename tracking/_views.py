@@ -1,9 +1,4 @@
-"""What the tracker asks of whoever knows where the camera can see.
-
-The view of a pinhole camera: inside the image, and neither too far away nor too near.
-
-The view of a camera whose picture is cut into several flat ones.
-"""
+"""Views: where a camera would have detected a person, if one had been there."""
 
 from __future__ import annotations
 
@@ -27,11 +22,11 @@ from ._errors import TrackingError
 
 @runtime_checkable
 class View(Protocol):
-    """Where a frame would have shown a person, had one been there.
+    """The chance that a frame shows a person, for each position.
 
-    People who hide others are not a view's business: the tracker knows where they are. Racks and
-    walls may be. A view must not remember anything from call to call: frames that come late are
-    asked about again.
+    A view may take racks and walls into account. It does not need to consider people who hide each
+    other: the tracker does that itself. A view must not keep state between calls, since late frames
+    are processed again.
     """
 
     def visibility(self, positions_odom_m: FloatArray, T_odom_camera: FloatArray) -> FloatArray:
@@ -39,29 +34,24 @@ class View(Protocol):
 
         Args:
             positions_odom_m: (N, 2) on the floor plane.
-            T_odom_camera: (4, 4) where the camera was.
+            T_odom_camera: (4, 4) pose of the camera.
         """
         ...
 
 
-# Image borders of a lens with much distortion are curved; a rectangle in x/z and y/z through the
-# middles of the four sides stands for them. Projecting people instead would fold those far outside
-# the image back into it.
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraView:
-    """People whose body's centre is in the image and within range should be seen.
+    """The view of a camera: people whose chest is in the image and within range are visible.
 
-    The answer falls linearly from 1 to 0 over a margin at the left and right of the image, where
+    Visibility falls linearly from 1 to 0 over a margin at the left and right of the image, where
     bodies are cut off, and over the last fifth of the range. The floor is at z = 0 in odom.
 
     Attributes:
         camera: its intrinsics.
-        max_range_m: > 0, horizontal distance beyond which nobody is expected to be detected.
-        min_range_m: ≥ 0, nearer than this too little of a body is in the image.
+        max_range_m: > 0, horizontal distance from which visibility is 0.
+        min_range_m: ≥ 0; nearer than this, visibility is 0: too little of a body is in the image.
         side_margin: in [0, 0.5), width of the margin at each side as a share of the image's width.
-        chest_height_m: ≥ 0, height of the point that stands for a body.
+        chest_height_m: ≥ 0, height of the point that represents a body.
     """
 
     camera: Camera
@@ -97,6 +87,9 @@ class CameraView:
                 maximum=self.max_range_m,
             ),
         )
+        # Image borders are curved if the lens distorts. Use a rectangle in x/z and y/z through the
+        # middles of the four borders: projecting people with the lens model instead would fold
+        # those far outside the image back into it.
         right, bottom = camera.width_px - 0.5, camera.height_px - 0.5
         sides = camera.normalise(
             [
@@ -120,14 +113,14 @@ class CameraView:
         """Return (N,) in [0, 1] for people at ``positions_odom_m`` (N, 2).
 
         Raises:
-            TrackingError: for positions that are no finite (N, 2) and for a ``T_odom_camera``
-                that is no rigid transform.
+            TrackingError: for positions that are not finite or not (N, 2), and for a
+                ``T_odom_camera`` that is not a rigid transform.
         """
-        places = finite_array("positions_odom_m", positions_odom_m, ("N", 2), TrackingError)
+        positions = finite_array("positions_odom_m", positions_odom_m, ("N", 2), TrackingError)
         T = rigid_transform("T_odom_camera", T_odom_camera, TrackingError)
-        chests = np.column_stack((places, np.full(len(places), self.chest_height_m)))
+        chests = np.column_stack((positions, np.full(len(positions), self.chest_height_m)))
         x, y, z = ((chests - T[:3, 3]) @ T[:3, :3]).T
-        ranges = np.hypot(*(places - T[:2, 3]).T)
+        ranges = np.hypot(*(positions - T[:2, 3]).T)
         ahead = z > 1e-6
         depth = np.where(ahead, z, 1.0)
         left, right, top, bottom = self._limits
@@ -141,12 +134,12 @@ class CameraView:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SurroundView:
-    """People who should be seen in any of several views about one optical centre.
+    """The union of several views with one optical centre, for example of a fisheye camera.
 
     Attributes:
-        views: V, each of its own optical frame; a :class:`CameraView` for each flat camera.
+        views: V views, each in its own optical frame; a :class:`CameraView` for each flat camera.
         rotations_camera_view: V rotations (3, 3) from each view's optical frame to the camera's, as
-            :class:`perception.surround.FlatView` has them.
+            in :class:`perception.surround.FlatView`.
     """
 
     views: tuple[View, ...]
@@ -172,15 +165,16 @@ class SurroundView:
         set_fields(self, views=views, rotations_camera_view=rotations)
 
     def visibility(self, positions_odom_m: Any, T_odom_camera: Any) -> FloatArray:
-        """Return (N,) in [0, 1]: of each person in the view that shows them best.
+        """Return (N,) in [0, 1]: for each person, the visibility in the best view.
 
         Raises:
-            TrackingError: as the views do, and for a ``T_odom_camera`` that is no rigid transform.
+            TrackingError: as raised by the views, and for a ``T_odom_camera`` that is not a rigid
+                transform.
         """
         T_odom_camera = rigid_transform("T_odom_camera", T_odom_camera, TrackingError)
-        shown = []
+        visibilities = []
         for view, rotation in zip(self.views, self.rotations_camera_view, strict=True):
             T_odom_view = np.array(T_odom_camera)
             T_odom_view[:3, :3] = T_odom_camera[:3, :3] @ rotation
-            shown.append(view.visibility(positions_odom_m, T_odom_view))
-        return np.asarray(np.max(shown, axis=0))
+            visibilities.append(view.visibility(positions_odom_m, T_odom_view))
+        return np.asarray(np.max(visibilities, axis=0))

@@ -1,11 +1,11 @@
-"""Awareness over time: a Gaussian filter in logit(α) with a lower bound that keeps its word.
+"""The awareness filter: a Gaussian filter in logit(α) with a lower bound.
 
-Between measurements the belief follows an Ornstein–Uhlenbeck process towards a low prior. It is
-stationary at the prior, so uncertainty grows while nothing is known but never beyond the prior's,
-and its solution is exact for any time step. The lower bound is remembered: without evidence it may
-fall, never rise, however the belief moves.
+Between measurements the belief follows an Ornstein–Uhlenbeck process towards a low prior. The
+process is stationary at the prior, so uncertainty grows without evidence, but never beyond that of
+the prior. Its solution is exact for any time step. The lower bound is remembered: without evidence
+it may fall but never rise, however the belief moves.
 
-Every function works on one person (numbers) as on many at once (arrays of equal shape).
+Every function works on one person (numbers) or on many at once (arrays of equal shape).
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ _GAUSS_HERMITE_WEIGHTS: Final = _WEIGHTS / _WEIGHTS.sum()
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AwarenessBelief:
-    """What is believed of α, in logit units.
+    """The estimate of α for one person or many, in logit units.
 
     Attributes:
         mean: of logit(α).
         variance: of logit(α), > 0.
-        bound: the remembered lower bound of logit(α); −∞ until evidence has lifted it.
+        bound: the remembered lower bound of logit(α); −∞ before the first evidence.
     """
 
     mean: Value
@@ -48,7 +48,13 @@ class AwarenessBelief:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FilteredAwareness:
-    """A belief in units of α: median, standard deviation (≤ 0.5) and one-sided lower bound."""
+    """A belief in units of α.
+
+    Attributes:
+        awareness: median of α.
+        awareness_std: standard deviation of α, ≤ 0.5.
+        awareness_lower: one-sided lower bound of α.
+    """
 
     awareness: Value
     awareness_std: Value
@@ -69,7 +75,7 @@ def sigmoid(value: Value) -> Value:
 
 
 def prior(config: AwarenessFilterConfig) -> AwarenessBelief:
-    """Return the belief about a person of whom nothing is known; its lower bound is α = 0."""
+    """Return the belief for a person of whom nothing is known; its lower bound is α = 0."""
     return AwarenessBelief(logit(config.prior_awareness), config.prior_std_logit**2)
 
 
@@ -79,7 +85,8 @@ def drift(
     """Return the belief after ``dt_s`` ≥ 0 without evidence.
 
     Exact for any step: φ = exp(−dt/τ), mean → m₀ + φ (mean − m₀), variance → P₀ + φ² (variance −
-    P₀). The remembered bound becomes the lowest value that mean − z √variance takes on the way.
+    P₀). The remembered bound falls to the lowest value of mean − z √variance during the step, and
+    never rises.
     """
     if dt_s <= 0.0:
         return belief
@@ -92,8 +99,8 @@ def drift(
     before = belief.mean - z * np.sqrt(belief.variance)
     after = mean - z * np.sqrt(np.maximum(variance, 0.0))
     lowest = np.minimum(np.minimum(belief.bound, before), after)
-    # A belief surer and lower than the prior dips while its variance grows and then climbs
-    # towards the prior: setting the derivative by φ to zero gives the turning point.
+    # If mean and variance are both below the prior's, the bound falls while the variance grows and
+    # then rises towards the prior. The turning point is where its derivative by φ is zero.
     dips = (offset < 0.0) & (excess < 0.0)
     if np.any(dips):
         squared = offset * offset
@@ -111,13 +118,13 @@ def drift(
 def evidence(
     awareness: Value, awareness_std: Value, config: AwarenessFilterConfig
 ) -> tuple[FloatArray, FloatArray]:
-    """Return a measured α as mean and variance of logit(α), NaN where it says too little.
+    """Return a measured α as mean and variance of logit(α).
 
-    The Gaussian in logit(α) whose two one-σ points are those of α, α ± σ clipped to [ε, 1 − ε]. In
-    mid-range that is the logit's derivative, σ / (α (1 − α)); near 0 and 1 the derivative has no
-    bound and would turn a confident "unaware" (α = 0, σ = 0.05) into next to nothing.
+    This is the Gaussian in logit(α) with the same one-σ points as α: α ± σ, clipped to [ε, 1 − ε].
+    In mid-range its σ agrees with the logit's derivative, σ / (α (1 − α)). Near 0 and 1 the
+    derivative has no bound and would give a confident "unaware" (α = 0, σ = 0.05) almost no weight.
 
-    NaN in, for no measured α, gives NaN.
+    Mean and variance are NaN if σ exceeds ``max_evidence_std``, or if the input is NaN.
     """
     awareness, awareness_std = np.asarray(awareness), np.asarray(awareness_std)
     low, high = config.clip_awareness, 1.0 - config.clip_awareness
@@ -135,14 +142,14 @@ def measure(
     interval_s: float,
     config: AwarenessFilterConfig,
 ) -> AwarenessBelief:
-    """Return the belief after one measurement of logit(α) and reset the remembered bound by it.
+    """Return the belief after one measurement of logit(α), which also sets the remembered bound.
 
     Args:
-        belief: at the instant of the measurement.
+        belief: at the time of the measurement.
         mean: of the measurement, from :func:`evidence`.
         variance: of the measurement, from :func:`evidence`.
-        interval_s: > 0, time that this measurement stands for; below ``evidence_correlation_s``
-            the variance grows in proportion, so that information per second has a limit.
+        interval_s: > 0, time that this measurement stands for. Below ``evidence_correlation_s`` the
+            variance is increased in proportion, so that the information per second has a limit.
         config: settings.
     """
     effective = variance * max(1.0, config.evidence_correlation_s / interval_s)
@@ -154,25 +161,25 @@ def measure(
 
 
 def forget(belief: AwarenessBelief, config: AwarenessFilterConfig) -> AwarenessBelief:
-    """Return the prior, with a lower bound no higher than the belief's or the prior's own."""
+    """Return the prior, with the lower of the belief's bound and the prior's bound."""
     fresh = prior(config)
-    own = fresh.mean - _quantile(config.lower_bound_confidence) * config.prior_std_logit
-    bound = np.minimum(belief.bound, own)
+    prior_bound = fresh.mean - _quantile(config.lower_bound_confidence) * config.prior_std_logit
+    bound = np.minimum(belief.bound, prior_bound)
     return AwarenessBelief(fresh.mean, fresh.variance, bound)
 
 
 def estimate(belief: AwarenessBelief, config: AwarenessFilterConfig) -> FilteredAwareness:
     """Return a belief in units of α.
 
-    The awareness is sigmoid(mean), the median of the logit-normal distribution; the standard
-    deviation is that of the distribution by Gauss–Hermite quadrature, so it never exceeds 0.5.
-    The lower bound is (sigmoid(bound) − ε) / (1 − ε), not below 0: no measurement tells an α below
-    ε from 0, which a logit cannot reach, so what is no more than ε must not count for anything.
+    The awareness is sigmoid(mean), the median of the logit-normal distribution. The standard
+    deviation is that of the distribution by Gauss–Hermite quadrature, so it never exceeds 0.5. The
+    lower bound is (sigmoid(bound) − ε) / (1 − ε), at least 0: measurements are clipped at ε, so a
+    bound of ε or less is the same as 0.
     """
     mean, std = np.asarray(belief.mean), np.sqrt(belief.variance)
-    # The sigmoid is (1 + tanh(x / 2)) / 2, and tanh the faster function of an array.
+    # The sigmoid is (1 + tanh(x / 2)) / 2, and tanh is faster on arrays.
     values = np.tanh((0.5 * mean)[..., None] + (0.5 * std)[..., None] * _GAUSS_HERMITE_NODES)
-    # Sums along the last axis, which do not depend on how many people there are.
+    # Sums along the last axis do not depend on the number of people.
     deviation = values - (values * _GAUSS_HERMITE_WEIGHTS).sum(axis=-1)[..., None]
     second = (deviation * deviation * _GAUSS_HERMITE_WEIGHTS).sum(axis=-1)
     clip = config.clip_awareness

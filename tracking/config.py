@@ -1,7 +1,7 @@
-"""Validated configuration: strict pydantic models that read and write YAML.
+"""Strict pydantic models that read and write YAML.
 
-Every config of the project derives from :class:`StrictConfig`: unknown keys are refused with the
-nearest valid name, values are checked, and ``from_yaml(to_yaml(config)) == config``.
+Every config of the project derives from :class:`StrictConfig`. Unknown keys are refused with the
+nearest valid name, values are checked, and a config that is written and read again is equal.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ _ConfigT = TypeVar("_ConfigT", bound="StrictConfig")
 
 
 class StrictConfig(BaseModel):
-    """Base of every config: frozen, finite numbers only, unknown keys refused by name."""
+    """Base of every config: frozen, with finite numbers only; unknown keys are refused by name."""
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", allow_inf_nan=False, validate_default=True
     )
 
-    #: The error raised when a file cannot be used; packages override it with their own.
+    #: The error for a file that cannot be used; each package sets its own.
     error: ClassVar[type[ValueError]] = TrackingError
 
     @model_validator(mode="before")
@@ -43,7 +43,11 @@ class StrictConfig(BaseModel):
 
     @classmethod
     def from_yaml(cls: type[_ConfigT], path: str | Path) -> _ConfigT:
-        """Read and validate a YAML file; raises the package's error naming the file and key."""
+        """Read and validate a YAML file.
+
+        Raises:
+            ValueError: the package's own error, naming the file and the key.
+        """
         path = Path(path)
         try:
             data = yaml.safe_load(path.read_text(encoding="utf-8"))
@@ -59,7 +63,7 @@ class StrictConfig(BaseModel):
             raise cls.error(f"{path}: {cause}") from cause
 
     def to_yaml(self, path: str | Path) -> None:
-        """Write the config as YAML for :meth:`from_yaml`; the file appears whole or not at all."""
+        """Write the config as YAML for :meth:`from_yaml`; the file is replaced in one step."""
         path = Path(path)
         text = yaml.safe_dump(self.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
         partial = path.with_name(path.name + ".part")

@@ -1,7 +1,7 @@
-"""Constraints in the form that a planner reads: one function a form, all in the odom frame.
+"""Exporters: constraints in the forms that planners read, in the odom frame.
 
-Functions of :class:`nav_adapter.NavConstraints` without memory; only :class:`CostmapPainter`
-remembers what it painted. ``docs/planners.md`` says which planner reads which.
+Each form has one pure function of :class:`nav_adapter.NavConstraints`; only :class:`CostmapPainter`
+keeps state. ``docs/planners.md`` says which planner reads which form.
 """
 
 from __future__ import annotations

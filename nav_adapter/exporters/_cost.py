@@ -1,4 +1,4 @@
-"""What being somewhere costs, for planners that sample (MPPI, CEM, lattices)."""
+"""Costs of sampled trajectories, for planners that sample (MPPI, CEM, lattices)."""
 
 from __future__ import annotations
 
@@ -23,30 +23,30 @@ def people_cost(
     near_cost: float = 1.0,
     decay_m: float = 0.4,
 ) -> FloatArray:
-    """(K, T) cost of K sampled trajectories at T instants, dimensionless.
+    """Return (K, T), the cost of K sampled trajectories at T times, dimensionless.
 
-    At the gap g between the robot's disc and a person's circle, where that person will be then at
-    their present velocity:
+    The cost of a person depends on the gap g between the robot's disc and the person's circle,
+    predicted with the present velocity:
 
-    * g > 0: ``near_cost``·exp(−g / ``decay_m``), smooth;
-    * g ≤ 0: ``inside_cost``·(1 + depth in metres): hard, and deeper is worse, so that samples that
-      are all inside still tell the way out.
+    * g > 0: ``near_cost``·exp(−g / ``decay_m``), which is smooth.
+    * g ≤ 0: ``inside_cost``·(1 + depth in metres), which rises with depth, so that samples that
+      are all inside still show the way out.
 
-    People add up.
+    The costs of all people are summed.
 
     Args:
         constraints: the people.
-        positions_odom_m: (K, T, 2) the robot's centre; entry t is at ``first_s + t·dt_s`` after
-            ``constraints.stamp_s``.
-        dt_s: > 0.
-        robot_radius_m: ≥ 0, of the disc round the robot.
-        first_s: ≥ 0, time of the first entry: ``dt_s`` where it is the state after one step.
-        inside_cost: > ``near_cost``.
-        near_cost: ≥ 0, of touching a circle from outside.
+        positions_odom_m: (K, T, 2) positions of the robot's centre; entry t is at
+            ``first_s + t·dt_s`` after ``constraints.stamp_s``.
+        dt_s: > 0, time step.
+        robot_radius_m: ≥ 0, of the disc around the robot.
+        first_s: ≥ 0, time of the first entry: ``dt_s`` if that is the state after one step.
+        inside_cost: > ``near_cost``, cost at the edge of a circle, from inside.
+        near_cost: ≥ 0, cost at the edge of a circle, from outside.
         decay_m: > 0, the gap over which the cost falls to 1/e.
 
     Raises:
-        NavError: an argument that is not finite or out of bounds.
+        NavError: for an argument that is not finite or out of bounds.
     """
     positions = finite_array("positions_odom_m", positions_odom_m, ("K", "T", 2), NavError)
     dt = finite_number("dt_s", dt_s, NavError, minimum=0.0, exclusive_minimum=True)
@@ -60,7 +60,7 @@ def people_cost(
     x, y = positions[:, :, 0], positions[:, :, 1]
     times = first + dt * np.arange(positions.shape[1])
     cost = np.zeros(positions.shape[:2])
-    # One person at a time keeps the memory at a few arrays of the samples' size.
+    # One person at a time, so that memory holds only a few arrays of the samples' size.
     for obstacle in constraints.obstacles:
         (cx, cy), (vx, vy) = obstacle.center_odom_m, obstacle.velocity_odom_mps
         gap = np.hypot(x - (cx + vx * times), y - (cy + vy * times))

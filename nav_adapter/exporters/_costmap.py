@@ -1,4 +1,4 @@
-"""Obstacles painted into an occupancy grid with the cost values of Nav2."""
+"""Obstacles painted into a costmap with the cost values of Nav2."""
 
 from __future__ import annotations
 
@@ -8,7 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._constraints import NavConstraints
-from ._stamps import checked_brush, checked_costmap, checked_grid, paint, stamps
+from ._person_costs import (
+    checked_costmap,
+    checked_grid,
+    checked_profile,
+    cost_windows,
+    paint,
+)
 
 
 def paint_costmap(
@@ -23,26 +29,25 @@ def paint_costmap(
 ) -> NDArray[np.uint8]:
     """Paint the obstacles into a costmap, in place.
 
-    A cell whose centre lies within an obstacle's radius r becomes lethal (254), as does the cell
-    that holds the obstacle's centre, so that no obstacle slips through a coarse grid. Outside, with
-    g the distance from the obstacle's edge, costs follow Nav2's inflation layer
+    A cell whose centre lies within an obstacle's radius r becomes lethal (254). So does the cell
+    with the obstacle's centre, so that no obstacle is missed on a coarse grid. Outside, with g the
+    distance from the obstacle's edge, costs follow Nav2's inflation layer
     (``InflationLayer::computeCost``): 253 up to the robot's inscribed radius r_i, then
-    ⌊252·exp(−k(g − r_i))⌋ as far as ``ring_m``, or what was there when that is more. Unknown cells
-    (255) become lethal within the radius and stay unknown in the ring. Cells farther away are not
-    touched.
+    ⌊252·exp(−k(g − r_i))⌋ up to ``ring_m``. A higher cost in the map is kept. Unknown cells (255)
+    become lethal within the radius and stay unknown in the ring. Cells farther away do not change.
 
-    An obstacle that its policy stretches along the person's way is painted as its polygon. Off the
-    polygon's corners distances err to the near side.
+    An obstacle that the policy stretches along the person's motion is painted as its polygon. Near
+    the polygon's corners distances are too small rather than too large.
 
     The default r_i = 0 is for a planner that checks the robot's footprint, or a map that is
-    inflated afterwards. To take people away again, see :class:`CostmapPainter`.
+    inflated afterwards. To remove people again, see :class:`CostmapPainter`.
 
     Args:
         costmap: (H, W) uint8, writable; row = y, column = x.
         origin_odom_m: (2,) lower-left corner of cell (0, 0), as in ``nav_msgs/OccupancyGrid``.
         resolution_m: side of a cell, > 0.
         constraints: the obstacles to paint.
-        ring_m: ≥ 0, from the obstacle's edge (Nav2's ``inflation_radius``); at least r_i counts.
+        ring_m: ≥ 0, from the obstacle's edge (Nav2's ``inflation_radius``); at least r_i.
         decay_per_m: k > 0 (Nav2's ``cost_scaling_factor``).
         inscribed_radius_m: r_i ≥ 0, of the robot's footprint.
 
@@ -50,12 +55,12 @@ def paint_costmap(
         The same array.
 
     Raises:
-        NavError: an array of another type, shape or dtype, or a number out of bounds; the costmap
-            is then untouched.
+        NavError: for an array of another type, shape or dtype, or a number out of bounds; the
+            costmap does not change then.
     """
     checked_costmap(costmap)
     origin, resolution = checked_grid(origin_odom_m, resolution_m)
-    brush = checked_brush(ring_m, inscribed_radius_m, decay_per_m)
-    for window, cost in stamps(costmap.shape, origin, resolution, constraints, brush):
+    profile = checked_profile(ring_m, inscribed_radius_m, decay_per_m)
+    for window, cost in cost_windows(costmap.shape, origin, resolution, constraints, profile):
         paint(costmap[window], cost)
     return costmap

@@ -1,4 +1,4 @@
-"""People in a costmap that lives on: painted, and taken away again."""
+"""People in a persistent costmap: painted, and removed again."""
 
 from __future__ import annotations
 
@@ -9,16 +9,23 @@ from numpy.typing import NDArray
 
 from .._constraints import NavConstraints
 from .._errors import NavError
-from ._stamps import Cells, checked_brush, checked_costmap, checked_grid, paint, stamps
+from ._person_costs import (
+    Cells,
+    checked_costmap,
+    checked_grid,
+    checked_profile,
+    cost_windows,
+    paint,
+)
 
 
 class CostmapPainter:
-    """Keeps people painted in one costmap, and everything else in it as it was.
+    """Paints people into one costmap and restores the cells when they move on.
 
-    Each update takes away what the last one painted and paints anew, as :func:`paint_costmap` does.
-    A cell that somebody else has written since keeps what they wrote. That is seen by its value:
-    writing just the cost that is there already goes unnoticed, and the cell then gets back what it
-    was before the person came. So a static layer that changes is best written between
+    Each update removes the people of the last one and paints the new ones, as
+    :func:`paint_costmap` does. A cell that other code has written since keeps its new value. Only a
+    changed value is noticed: if other code writes the cost that is there already, the cell later
+    gets back its value from before the person came. So write a static layer that changes between
     :meth:`clear` and :meth:`update`.
 
     Args:
@@ -30,7 +37,7 @@ class CostmapPainter:
         inscribed_radius_m: ≥ 0, of the robot's footprint.
 
     Raises:
-        NavError: an array of another type, shape or dtype, or a number out of bounds.
+        NavError: for an array of another type, shape or dtype, or a number out of bounds.
     """
 
     def __init__(
@@ -45,25 +52,25 @@ class CostmapPainter:
     ) -> None:
         self._costmap = checked_costmap(costmap)
         self._origin, self._resolution = checked_grid(origin_odom_m, resolution_m)
-        self._brush = checked_brush(ring_m, inscribed_radius_m, decay_per_m)
-        # Windows in the order of painting, with their cells before and after.
+        self._profile = checked_profile(ring_m, inscribed_radius_m, decay_per_m)
+        # Windows in the order of painting, with their cells before and after it.
         self._painted: list[tuple[tuple[slice, slice], Cells, Cells]] = []
 
     @property
     def costmap(self) -> NDArray[np.uint8]:
-        """(H, W) the array that is painted into."""
+        """(H, W) array that is painted into."""
         return self._costmap
 
     def update(self, constraints: NavConstraints) -> tuple[tuple[slice, slice], ...]:
-        """Replace the people of the last update by these.
+        """Replace the people of the last update with these.
 
         Returns:
-            Windows (rows, columns) that hold every changed cell: the last people's, then these.
+            Windows (rows, columns) with every changed cell: of the last people, then of these.
         """
         cleared = self.clear()
         shape = self._costmap.shape
-        for window, cost in stamps(
-            (shape[0], shape[1]), self._origin, self._resolution, constraints, self._brush
+        for window, cost in cost_windows(
+            (shape[0], shape[1]), self._origin, self._resolution, constraints, self._profile
         ):
             cells = self._costmap[window]
             before = cells.copy()
@@ -72,9 +79,9 @@ class CostmapPainter:
         return (*cleared, *(window for window, _, _ in self._painted))
 
     def clear(self) -> tuple[tuple[slice, slice], ...]:
-        """Take all people away and return the windows (rows, columns) where they were."""
+        """Remove all people and return the windows (rows, columns) in which they were."""
         windows = []
-        # Backwards: where windows overlap, the first one remembers the map without people.
+        # In reverse order: if windows overlap, the first one has the cells without people.
         while self._painted:
             window, before, after = self._painted.pop()
             cells = self._costmap[window]
@@ -83,10 +90,10 @@ class CostmapPainter:
         return tuple(windows)
 
     def move(self, origin_odom_m: Any) -> None:
-        """Tell where a rolling map now is. Call :meth:`clear` before its cells are shifted.
+        """Set the new origin of a rolling map. Call :meth:`clear` before its cells are shifted.
 
         Raises:
-            NavError: an origin that is not finite, or people are still painted.
+            NavError: for an origin that is not finite, or while people are painted.
         """
         origin, _ = checked_grid(origin_odom_m, self._resolution)
         if self._painted:

@@ -1,4 +1,4 @@
-"""Where the obstacles will be over the horizon of a model-predictive controller."""
+"""Predicted obstacles over the horizon of a model-predictive controller."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .._constraints import NavConstraints
 from .._errors import NavError
 from ._shapes import circles
 
-# Of an empty slot, beside the robot: out of reach, and small enough for a solver's scaling.
+# Distance of an empty slot from the robot: out of reach, but small enough for a solver's scaling.
 _FAR_M = 100.0
 
 
@@ -24,25 +24,25 @@ def predicted_circles(
     slots: int | None = None,
     robot_position_odom_m: Any = None,
 ) -> FloatArray:
-    """(N, T, 5) x, y (m), vx, vy (m/s), radius (m) of every person at every time.
+    """Return (N, T, 5): x, y (m), vx, vy (m/s) and radius (m) of every person at every time.
 
-    People go on at their velocity; their radius grows with time by ``growth_mps``, for what they
-    might do instead.
+    People are predicted with their present velocity. Their radius grows by ``growth_mps``, since
+    they may move otherwise.
 
-    A controller that is built once has a fixed number of obstacles. With ``slots`` the first axis
-    has that length: the people whose circle comes nearest to the robot within the times, nearest
-    first, and then circles of radius 0, 100 m away. ``speed_limit_mps`` counts everybody, also
-    those left out.
+    Some controllers need a fixed number of obstacles. With ``slots`` the first axis has that
+    length: first the people whose circles come nearest to the robot within the times, nearest
+    first, then circles of radius 0 at a distance of 100 m. ``speed_limit_mps`` takes all people
+    into account, also those left out here.
 
     Args:
         constraints: the people.
         times_s: (T,) seconds after ``constraints.stamp_s``, ≥ 0.
-        growth_mps: ≥ 0.
-        slots: ≥ 1, or None for one a person in the order of ``constraints.obstacles``.
-        robot_position_odom_m: (2,), needed with ``slots``.
+        growth_mps: ≥ 0, growth of the radius.
+        slots: ≥ 1, or None for one entry per person in the order of ``constraints.obstacles``.
+        robot_position_odom_m: (2,) position of the robot; needed with ``slots``.
 
     Raises:
-        NavError: an argument that is not finite or out of bounds.
+        NavError: for an argument that is not finite or out of bounds.
     """
     times = finite_array("times_s", times_s, ("T",), NavError)
     if bool((times < 0.0).any()):
@@ -57,7 +57,7 @@ def predicted_circles(
     if isinstance(slots, bool) or not isinstance(slots, int) or slots < 1:
         raise NavError(f"slots must be a whole number of at least 1, got {slots!r}")
     if robot_position_odom_m is None:
-        raise NavError("slots needs robot_position_odom_m, (2,) in metres, to tell who is nearest")
+        raise NavError("slots needs robot_position_odom_m, (2,) in metres, to find the nearest")
     robot = finite_array("robot_position_odom_m", robot_position_odom_m, (2,), NavError)
     filled = np.zeros((slots, len(times), 5))
     filled[:, :, :2] = robot + np.array([_FAR_M, 0.0])

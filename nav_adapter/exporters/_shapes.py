@@ -1,15 +1,16 @@
 """Obstacles in the shapes that planners read: circles, points, polygons, boxes.
 
-Pure functions of the constraints; everything is in the odom frame, one entry a person, in the order
-of ``constraints.obstacles``, and an empty array or tuple when there is nobody.
+Pure functions of the constraints, in the odom frame. They have one entry per person, in the order
+of ``constraints.obstacles``, and return an empty array or tuple if there is nobody.
 
-A policy may stretch an obstacle along the person's way. Shapes without a velocity are stretched
-with it. Circles are not: who reads them moves them along the velocity.
+A policy may stretch an obstacle along the person's motion. Shapes without a velocity are stretched
+with it. Circles are not: planners that use them move them along the velocity.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Final
 
 import numpy as np
 import shapely
@@ -19,15 +20,17 @@ from perception.arrays import FloatArray, finite_number
 
 from .._constraints import NavConstraints
 from .._errors import NavError
-from ._outlines import long_outlines
 
-# A finer perimeter than this only costs memory.
-_MINIMUM_SPACING_M = 1e-3
-_MINIMUM_POINTS = 8
+# A smaller spacing only costs memory.
+_MINIMUM_SPACING_M: Final = 1e-3
+_MINIMUM_POINTS: Final = 8
+# The 24-sided polygon of a circle is 0.6 % larger than the circle. A polygon larger by 2 % or more
+# is longer than the circle by a fiftieth of the radius or more.
+_STRETCHED_AREA_RATIO: Final = 1.02
 
 
 def circles(constraints: NavConstraints) -> FloatArray:
-    """(N, 5) x, y (m), vx, vy (m/s) and radius (m): for velocity obstacles, MPC, TEB."""
+    """Return (N, 5): x, y (m), vx, vy (m/s) and radius (m), for velocity obstacles, MPC and TEB."""
     rows = [
         [*o.center_odom_m.tolist(), *o.velocity_odom_mps.tolist(), o.radius_m]
         for o in constraints.obstacles
@@ -36,24 +39,24 @@ def circles(constraints: NavConstraints) -> FloatArray:
 
 
 def points(constraints: NavConstraints, spacing_m: float) -> FloatArray:
-    """(M, 2) points on the obstacles' outlines, for planners that read a laser scan or a cloud.
+    """Return (M, 2) points on the outlines, for planners that read a laser scan or a point cloud.
 
-    Neighbours along an outline, the last and the first included, lie at most ``spacing_m`` apart;
-    every outline has at least 8 points.
+    Neighbours along an outline, the last and the first included, are at most ``spacing_m`` apart.
+    Every outline has at least 8 points.
 
     Raises:
-        NavError: ``spacing_m`` is not finite or below 1 mm.
+        NavError: for a ``spacing_m`` that is not finite or below 1 mm.
     """
     spacing = finite_number("spacing_m", spacing_m, NavError, minimum=_MINIMUM_SPACING_M)
     rings: list[FloatArray] = [np.empty((0, 2))]
-    outlines = long_outlines(constraints)
+    outlines = stretched_outlines(constraints)
     for index, obstacle in enumerate(constraints.obstacles):
         if index in outlines:
             ring = shapely.linearrings(outlines[index])
             step = min(spacing, shapely.length(ring) / _MINIMUM_POINTS)
             rings.append(shapely.get_coordinates(shapely.segmentize(ring, step))[:-1])
             continue
-        # The arc is longer than the chord between neighbours, so this errs to the dense side.
+        # The arc is longer than the chord between neighbours, so the spacing is kept.
         count = max(_MINIMUM_POINTS, math.ceil(2.0 * math.pi * obstacle.radius_m / spacing))
         angle = np.arange(count) * (2.0 * math.pi / count)
         directions = np.stack([np.cos(angle), np.sin(angle)], axis=1)
@@ -62,17 +65,17 @@ def points(constraints: NavConstraints, spacing_m: float) -> FloatArray:
 
 
 def polygons(constraints: NavConstraints) -> tuple[Polygon, ...]:
-    """Shapely polygons, each containing its obstacle's circle."""
+    """Return shapely polygons, each of which contains its obstacle's circle."""
     return tuple(obstacle.polygon for obstacle in constraints.obstacles)
 
 
 def boxes(constraints: NavConstraints) -> FloatArray:
-    """(N, 7) upright 3-D boxes: centre x, y, z, size x, y, z (m) and yaw (rad).
+    """Return (N, 7) upright 3-D boxes: centre x, y, z, size x, y, z (m) and yaw (rad).
 
-    Each is the box about the obstacle's outline, standing on the floor (z = 0) and turned with the
-    person's velocity (yaw 0 for one who stands). Size x runs along the yaw direction.
+    Each is the box around the obstacle's outline, on the floor (z = 0) and turned to the direction
+    of the person's velocity (yaw 0 for a standing person). Size x is along the yaw direction.
     """
-    outlines = long_outlines(constraints)
+    outlines = stretched_outlines(constraints)
     rows = []
     for index, obstacle in enumerate(constraints.obstacles):
         (x, y), (vx, vy) = obstacle.center_odom_m, obstacle.velocity_odom_mps
@@ -86,3 +89,22 @@ def boxes(constraints: NavConstraints) -> FloatArray:
             x, y = np.array([[c, -s], [s, c]]) @ (0.5 * (low + high))
         rows.append([x, y, 0.5 * height, length, width, height, yaw])
     return np.array(rows, dtype=np.float64).reshape(-1, 7)
+
+
+def stretched_outlines(constraints: NavConstraints) -> dict[int, FloatArray]:
+    """Return the corners (M, 2), in metres, of obstacles that are longer than their circle.
+
+    They are those of the polygons' convex hulls. The keys are indices into
+    ``constraints.obstacles``.
+    """
+    obstacles = constraints.obstacles
+    if not obstacles:
+        return {}
+    polygons = [obstacle.polygon for obstacle in obstacles]
+    # Each polygon contains its circle, so a longer one has a larger area.
+    circles_m2 = math.pi * np.array([obstacle.radius_m for obstacle in obstacles]) ** 2
+    stretched = np.flatnonzero(shapely.area(polygons) > _STRETCHED_AREA_RATIO * circles_m2)
+    return {
+        index: shapely.get_coordinates(shapely.convex_hull(polygons[index]))[:-1]
+        for index in stretched.tolist()
+    }

@@ -1,4 +1,4 @@
-"""Which velocities would lead into a person: half-planes and cones in velocity space."""
+"""Velocities that lead into a person: half-planes and cones in velocity space."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .._constraints import NavConstraints
 from .._errors import NavError
 from ._shapes import circles
 
-# Shorter vectors have no direction to speak of.
+# Shorter vectors count as having no direction.
 _NO_DIRECTION = 1e-9
 
 
@@ -26,28 +26,29 @@ def half_planes(
     resolve_s: float = 0.5,
     share: float = 1.0,
 ) -> FloatArray:
-    """(N, 3) rows nx, ny, b: a velocity v (m/s, odom) is allowed while nx·vx + ny·vy ≥ b.
+    """Return (N, 3) rows nx, ny, b: a velocity v (m/s, odom) is allowed if nx·vx + ny·vy ≥ b.
 
-    The half-planes of ORCA (van den Berg, Guy, Lin and Manocha 2011, "Reciprocal n-body collision
-    avoidance"), n of length 1. With the whole share, a disc-shaped robot that holds an allowed
-    velocity touches no obstacle within the horizon, as long as people keep theirs. Where it is
-    inside an obstacle already, allowed velocities bring it out within ``resolve_s``.
+    These are the half-planes of ORCA (van den Berg, Guy, Lin and Manocha 2011, "Reciprocal n-body
+    collision avoidance"), with n of length 1. With a ``share`` of 1, a disc-shaped robot that keeps
+    an allowed velocity touches no obstacle within the horizon, as long as people keep their
+    velocity. If the robot is inside an obstacle already, allowed velocities bring it out within
+    ``resolve_s``.
 
-    ORCA knows no acceleration limit: a drive that cannot follow at once is not covered. The rows
-    may contradict each other in a crowd; then stop.
+    ORCA has no acceleration limit, so a drive that cannot follow at once is not covered. The rows
+    may contradict each other in a crowd; the robot should stop then.
 
     Args:
         constraints: the people.
         position_odom_m: (2,) the robot's centre.
-        velocity_odom_mps: (2,) the robot's velocity, about which the half-planes are laid.
-        robot_radius_m: ≥ 0, of the disc round the robot.
-        horizon_s: > 0.
-        resolve_s: > 0; for a robot that is inside an obstacle.
-        share: of the avoiding that the robot does, in [0.5, 1]. ORCA's half expects the other half
-            from the person, which nobody may who has not seen the robot.
+        velocity_odom_mps: (2,) the robot's velocity, at which the half-planes are computed.
+        robot_radius_m: ≥ 0, of the disc around the robot.
+        horizon_s: > 0, time within which no obstacle may be touched.
+        resolve_s: > 0, time for a robot inside an obstacle to get out.
+        share: the robot's share of the avoidance, in [0.5, 1]. ORCA's 0.5 leaves the other half to
+            the person, which cannot be expected of one who has not seen the robot.
 
     Raises:
-        NavError: an argument that is not finite or out of bounds.
+        NavError: for an argument that is not finite or out of bounds.
     """
     position = finite_array("position_odom_m", position_odom_m, (2,), NavError)
     velocity = finite_array("velocity_odom_mps", velocity_odom_mps, (2,), NavError)
@@ -64,7 +65,7 @@ def half_planes(
     distance = np.hypot(apart[:, 0], apart[:, 1])
     inside = distance <= radius
 
-    # The velocity obstacle is a cone, cut off by the disc of what is reached at the horizon.
+    # The velocity obstacle is a cone that is cut off by a disc, the cap at the horizon.
     time = np.where(inside, resolve, horizon)
     from_cap = relative - apart / time[:, None]
     cap_length = np.hypot(from_cap[:, 0], from_cap[:, 1])
@@ -74,7 +75,8 @@ def half_planes(
     cap_normal = _unit(from_cap, away)
     cap_change = radius / time - cap_length
 
-    # Legs: the tangents from the apex to the disc; ±1 for the one on the robot's side of its way.
+    # The legs are the tangents from the apex to the disc; the sign selects the leg on the side of
+    # the relative velocity.
     side = np.where(apart[:, 0] * from_cap[:, 1] - apart[:, 1] * from_cap[:, 0] > 0.0, 1.0, -1.0)
     square = np.maximum(distance * distance, radius * radius)
     leg = np.sqrt(square - radius * radius)
@@ -98,19 +100,19 @@ def half_planes(
 def velocity_obstacles(
     constraints: NavConstraints, position_odom_m: Any, robot_radius_m: float
 ) -> FloatArray:
-    """(N, 6) cones of colliding velocities: apex vx, vy and the unit vectors of both legs.
+    """Return (N, 6) cones of colliding velocities: apex vx, vy and the unit vectors of both legs.
 
-    Columns: apex (the person's velocity, m/s, odom), left leg x, y, right leg x, y. A velocity
-    leads into the person at some time exactly if it lies between the legs. For a robot that is
-    inside an obstacle, the legs are at right angles to the way to its centre.
+    The columns are apex (the person's velocity, m/s, odom), left leg x, y and right leg x, y. A
+    velocity leads into the person at some time if and only if it lies between the legs. For a robot
+    inside an obstacle, the legs are at right angles to the direction of its centre.
 
     Args:
         constraints: the people.
         position_odom_m: (2,) the robot's centre.
-        robot_radius_m: ≥ 0, of the disc round the robot.
+        robot_radius_m: ≥ 0, of the disc around the robot.
 
     Raises:
-        NavError: an argument that is not finite or a negative radius.
+        NavError: for an argument that is not finite or a negative radius.
     """
     position = finite_array("position_odom_m", position_odom_m, (2,), NavError)
     robot_radius = finite_number("robot_radius_m", robot_radius_m, NavError, minimum=0.0)
@@ -127,6 +129,6 @@ def velocity_obstacles(
 
 
 def _unit(vectors: FloatArray, otherwise: FloatArray) -> FloatArray:
-    """(N, 2) scaled to length 1; what has no direction gets that of ``otherwise``."""
+    """Return vectors (N, 2) scaled to length 1, or ``otherwise`` for those without direction."""
     length = np.hypot(vectors[:, 0], vectors[:, 1])[:, None]
     return np.where(length > _NO_DIRECTION, vectors / np.maximum(length, _NO_DIRECTION), otherwise)

@@ -1,4 +1,4 @@
-"""The parts of an awareness policy, and the presets (YAML files in this folder)."""
+"""The parts of an awareness policy. The presets are YAML files in this folder."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How fast a person may come at the robot, given what they have noticed."""
+"""Assumed speed of a person towards the robot, as a function of awareness."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from ._ramp import AwarenessRamp, smoothstep
 
 
 class SpeedPolicy(Protocol):
-    """Assumed speed of a person towards the robot; write your own with this one method.
+    """Assumed speed of a person towards the robot. A custom policy needs this one method.
 
-    A policy with hysteresis has a second one, ``holds(awareness_lower, held) -> bool``: whether a
-    person who was, or was not, held at the aware level at the last sighting is so now. While it
-    says so, α counts as 1 for this policy. It must say False for α = 0.
+    A policy with hysteresis has a second method, ``holds(awareness_lower, held) -> bool``: whether
+    a person is held at the aware level now, given whether they were held at the last sighting.
+    While it returns True, α counts as 1 for this policy. It must return False for α = 0.
 
-    A policy names the assumption, not the limit: the adapter turns it into a speed limit through
-    speed-and-separation monitoring, so that no policy can hand out more than that allows.
+    A policy gives the assumption, not the limit. The adapter turns it into a speed limit by
+    speed-and-separation monitoring, so no policy can allow more than that.
     """
 
     def human_speed_mps(self, awareness_lower: float) -> float:
-        """Speed assumed straight at the robot for a lower bound of α in [0, 1].
+        """Return the speed assumed straight at the robot for a lower bound of α in [0, 1].
 
-        Must be finite, at least 0 and must not increase with α.
+        It must be finite and at least 0, and must not increase with α.
         """
         ...
 
@@ -34,14 +34,15 @@ class InterpolatedHumanSpeed(AwarenessRamp):
     Attributes:
         unaware_human_speed_mps: for a person who has not noticed the robot; 1.6 m/s is the walking
             speed of ISO 13855.
-        aware_human_speed_mps: for a person who has, at most the unaware value. Not zero: somebody
-            who sees the robot may still drift into its way, but will not walk into it.
+        aware_human_speed_mps: for a person who has, at most the unaware value. It is not zero by
+            default: a person who sees the robot may still drift into its path.
         watching_above: α from which a person counts as looking straight at the robot, in
-            (``aware_above``, 1]; the robot stands 19° off the gaze at α = 0.8 with the default
-            attention cone. None, the default, for no difference between them and the aware.
-        watching_human_speed_mps: for such a person, at most the aware value; it is reached from
-            there along a smoothstep. Who has the robot in the corner of the eye may not have
-            noticed it, who looks straight at it has.
+            (``aware_above``, 1]. With the default attention cone, the robot is 19° off the gaze at
+            α = 0.8. None, the default, makes no difference between watching and aware people.
+        watching_human_speed_mps: for such a person, at most the aware value. Between
+            ``aware_above`` and ``watching_above`` the speed follows a smoothstep. A person with the
+            robot in the corner of the eye may not have noticed it; one who looks straight at it
+            has.
     """
 
     unaware_human_speed_mps: float = Field(default=1.6, ge=0.0, le=10.0)
@@ -50,7 +51,7 @@ class InterpolatedHumanSpeed(AwarenessRamp):
     watching_human_speed_mps: float | None = Field(default=None, ge=0.0, le=10.0)
 
     @model_validator(mode="after")
-    def _watching_is_more_than_aware(self) -> InterpolatedHumanSpeed:
+    def _check_watching(self) -> InterpolatedHumanSpeed:
         above, speed_mps = self.watching_above, self.watching_human_speed_mps
         if (above is None) != (speed_mps is None):
             raise ValueError(
@@ -69,11 +70,11 @@ class InterpolatedHumanSpeed(AwarenessRamp):
                 f"{speed_mps:g} m/s and {self.aware_human_speed_mps:g} m/s"
             )
         if self.shape == "two_level":
-            raise ValueError("two levels have no third: leave out watching_above")
+            raise ValueError("shape two_level has no watching level: leave out watching_above")
         return self
 
     @model_validator(mode="after")
-    def _awareness_never_hastens(self) -> InterpolatedHumanSpeed:
+    def _check_speeds(self) -> InterpolatedHumanSpeed:
         if self.aware_human_speed_mps > self.unaware_human_speed_mps:
             raise ValueError(
                 "aware_human_speed_mps must be at most unaware_human_speed_mps, got "
@@ -82,7 +83,7 @@ class InterpolatedHumanSpeed(AwarenessRamp):
         return self
 
     def human_speed_mps(self, awareness_lower: float) -> float:
-        """Assumed speed for a lower bound of α; non-increasing in it."""
+        """Return the assumed speed for a lower bound of α; it does not increase with α."""
         share = self.blend(awareness_lower)
         above, watching_mps = self.watching_above, self.watching_human_speed_mps
         if share < 1.0 or above is None or watching_mps is None:

@@ -1,7 +1,4 @@
-"""How large a person counts for a planner, given what they have noticed.
-
-Obstacles that are longer than a circle: ahead of who walks, and over where they may be soon.
-"""
+"""Size and outline of a person as an obstacle, as functions of awareness."""
 
 from __future__ import annotations
 
@@ -13,18 +10,18 @@ from ._ramp import AwarenessRamp
 
 
 class InflationPolicy(Protocol):
-    """Radius of a person as an obstacle; write your own with this one method.
+    """Radius of a person as an obstacle. A custom policy needs this one method.
 
-    A policy with hysteresis has a second one, ``holds(awareness_lower, held) -> bool``: whether a
-    person who was, or was not, held at the aware level at the last sighting is so now. While it
-    says so, α counts as 1 for this policy. It must say False for α = 0.
+    A policy with hysteresis has a second method, ``holds(awareness_lower, held) -> bool``: whether
+    a person is held at the aware level now, given whether they were held at the last sighting.
+    While it returns True, α counts as 1 for this policy. It must return False for α = 0.
     """
 
     def radius_m(self, awareness_lower: float) -> float:
-        """Radius about the body's centre line for a lower bound of α in [0, 1].
+        """Return the radius about the body's centre line for a lower bound of α in [0, 1].
 
-        Must be finite and must not increase with α. The adapter raises what is smaller than the
-        floor (body radius plus minimum clearance) to the floor.
+        It must be finite and must not increase with α. The adapter raises a radius below the floor
+        (body radius plus minimum clearance) to the floor.
         """
         ...
 
@@ -42,7 +39,7 @@ class InterpolatedInflation(AwarenessRamp):
     aware_radius_m: float = Field(default=0.45, gt=0.0, le=10.0)
 
     @model_validator(mode="after")
-    def _awareness_never_enlarges(self) -> InterpolatedInflation:
+    def _check_radii(self) -> InterpolatedInflation:
         if self.aware_radius_m > self.unaware_radius_m:
             raise ValueError(
                 "aware_radius_m must be at most unaware_radius_m, got "
@@ -51,28 +48,29 @@ class InterpolatedInflation(AwarenessRamp):
         return self
 
     def radius_m(self, awareness_lower: float) -> float:
-        """Radius for a lower bound of α; non-increasing in it."""
+        """Return the radius for a lower bound of α; it does not increase with α."""
         share = self.blend(awareness_lower)
         return (1.0 - share) * self.unaware_radius_m + share * self.aware_radius_m
 
 
 class ObstacleOutline(AwarenessRamp):
-    """What the polygon of an obstacle adds to its circle; by default nothing.
+    """The part of an obstacle's polygon beyond its circle; by default nothing.
 
-    The circle (``center_odom_m``, ``radius_m``) stays what it is: planners that take velocities
-    move it themselves. Only ``polygon`` grows, for planners that know no velocities.
+    The circle (``center_odom_m``, ``radius_m``) does not change: planners that use velocities move
+    it themselves. Only ``polygon`` grows, for planners without velocities.
 
     Attributes:
-        unaware_ahead_s: the polygon of somebody who walks reaches as far ahead as an unaware person
-            gets in this time.
+        unaware_ahead_s: the polygon of an unaware person reaches ahead as far as the person walks
+            in this time.
         aware_ahead_s: the same for an aware person, at most ``unaware_ahead_s``.
-        longest_ahead_m: the elongation is never longer.
-        sweep_s: horizon of the predicted motion that the polygon covers; 0 is none.
-        acceleration_density_m2ps3: q of the tracker's white acceleration, for the covariance ahead.
-        overconfidence_per_s: the predicted covariance is multiplied by 1 + this × time ahead.
-            Constant velocity is too sure ahead: on simulated walkers the position NEES one second
-            ahead is 3.4 to 3.6 where 2 is consistent (docs/tracking.md), hence 0.75; farther ahead
-            that is an extrapolation.
+        longest_ahead_m: upper limit of this elongation.
+        sweep_s: horizon of the predicted motion that the polygon covers; 0 for none.
+        acceleration_density_m2ps3: q of the tracker's white acceleration, for the predicted
+            covariance.
+        overconfidence_per_s: the predicted covariance is multiplied by 1 + this × prediction time.
+            Prediction with constant velocity is overconfident: for simulated walkers the position
+            NEES one second ahead is 3.4 to 3.6 where 2 is consistent (docs/tracking.md), hence
+            0.75. Farther ahead this is an extrapolation.
     """
 
     unaware_ahead_s: float = Field(default=0.0, ge=0.0, le=5.0)
@@ -83,7 +81,7 @@ class ObstacleOutline(AwarenessRamp):
     overconfidence_per_s: float = Field(default=0.75, ge=0.0, le=10.0)
 
     @model_validator(mode="after")
-    def _awareness_never_lengthens(self) -> ObstacleOutline:
+    def _check_times(self) -> ObstacleOutline:
         if self.aware_ahead_s > self.unaware_ahead_s:
             raise ValueError(
                 "aware_ahead_s must be at most unaware_ahead_s, got "
@@ -92,6 +90,6 @@ class ObstacleOutline(AwarenessRamp):
         return self
 
     def ahead_s(self, awareness_lower: float) -> float:
-        """Time of walking that the elongation covers; non-increasing in α."""
+        """Return the time of walking that the elongation covers; it does not increase with α."""
         share = self.blend(awareness_lower)
         return (1.0 - share) * self.unaware_ahead_s + share * self.aware_ahead_s

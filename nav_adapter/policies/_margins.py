@@ -1,9 +1,4 @@
-"""The distances that no awareness can take away.
-
-How fast confidence may be won, and how long data may be trusted.
-
-When to warn somebody.
-"""
+"""Settings besides radius and speed: safety margins, time behaviour and alerts."""
 
 from __future__ import annotations
 
@@ -18,21 +13,21 @@ from .._errors import NavError
 
 
 class SafetyMargins(StrictConfig):
-    """Margins that hold whatever α says.
+    """Margins that hold for every α.
 
     Attributes:
-        minimum_clearance_m: added to the body radius (0.30 m) it is the floor of every obstacle
-            radius; at least 0.10 m.
+        minimum_clearance_m: body radius (0.30 m) plus this is the floor of every obstacle radius;
+            at least 0.10 m.
         separation_clearance_m: C + Z of the protective separation distance: reach of a body part
             into the field and position uncertainty of the robot.
-        uncertainty_sigmas: how many standard deviations of a person's position (along its most
-            uncertain direction) enlarge the obstacle and shorten the separation. 2 holds 98 % of a
-            normal error towards the robot.
-        unseen_sigmas: how many shorten the separation of somebody unseen for ``fresh_within_s``; at
-            least ``uncertainty_sigmas`` count. Nothing corrects a prediction out of sight, and who
-            has left the view may have begun to run.
-        maximum_radius_m: ceiling of every obstacle radius, uncertainty included, or none. It keeps
-            an uncertain track from filling an aisle; the speed limit is not affected by it.
+        uncertainty_sigmas: number of standard deviations of a person's position (along its most
+            uncertain direction) that enlarge the obstacle and shorten the separation. 2 covers 98 %
+            of a normal error towards the robot.
+        unseen_sigmas: the number that shortens the separation of a person unseen for longer than
+            ``fresh_within_s``; at least ``uncertainty_sigmas`` count. No measurement corrects the
+            prediction of an unseen person, who may have begun to run.
+        maximum_radius_m: ceiling of every obstacle radius, uncertainty included, or None. It keeps
+            an uncertain track from filling an aisle; it does not affect the speed limit.
     """
 
     error: ClassVar[type[ValueError]] = NavError
@@ -49,7 +44,7 @@ class SafetyMargins(StrictConfig):
         return BODY_RADIUS_M + self.minimum_clearance_m
 
     @model_validator(mode="after")
-    def _ceiling_above_floor(self) -> SafetyMargins:
+    def _check_ceiling(self) -> SafetyMargins:
         if self.maximum_radius_m is not None and self.maximum_radius_m < self.floor_m:
             raise ValueError(
                 f"maximum_radius_m must be at least the floor of {self.floor_m:g} m (body radius "
@@ -58,24 +53,24 @@ class SafetyMargins(StrictConfig):
         return self
 
     def bounded_m(self, radius_m: float) -> float:
-        """The radius between floor and ceiling."""
+        """Return the radius, limited to the range from floor to ceiling."""
         bounded = max(radius_m, self.floor_m)
         return bounded if self.maximum_radius_m is None else min(bounded, self.maximum_radius_m)
 
 
 class TimeBehaviour(StrictConfig):
-    """Time behaviour of the adapter. Growth needs no setting: it is instant.
+    """Time behaviour of the adapter. Growth needs no setting: obstacles grow at once.
 
     Attributes:
-        shrink_rate_mps: how fast an obstacle may shrink while its person is being seen.
-        shrink_after_s: an obstacle shrinks only to what awareness has allowed for this long; time
-            in which frames show the person counts, other time does not.
+        shrink_rate_mps: largest rate at which an obstacle shrinks while the person is seen.
+        shrink_after_s: an obstacle shrinks only to the largest size that awareness called for
+            during this time. Only time in which frames show the person counts.
         fresh_within_s: a person unseen for longer counts as unaware. Must exceed the camera's
             period plus the delay of perception.
-        hold_s: a confirmed person who disappears from the input is kept, unaware and moving on,
-            until this long after they were last seen.
-        stale_after_s: when perception or the robot's state is older, everyone counts as unaware.
-        stop_after_s: when it is older than this, the speed limit is 0.
+        hold_s: a confirmed person who disappears from the input is kept, as unaware and with
+            constant velocity, until this time after the last sighting.
+        stale_after_s: if perception or the robot's state is older, everyone counts as unaware.
+        stop_after_s: if either is older than this, the speed limit is 0.
     """
 
     error: ClassVar[type[ValueError]] = NavError
@@ -88,7 +83,7 @@ class TimeBehaviour(StrictConfig):
     stop_after_s: float = Field(default=1.5, gt=0.0, le=10.0)
 
     @model_validator(mode="after")
-    def _ordered(self) -> TimeBehaviour:
+    def _check_order(self) -> TimeBehaviour:
         if not self.fresh_within_s <= self.stale_after_s <= self.stop_after_s:
             raise ValueError(
                 "fresh_within_s <= stale_after_s <= stop_after_s must hold, got "
@@ -98,21 +93,21 @@ class TimeBehaviour(StrictConfig):
 
 
 class AlertRules(StrictConfig):
-    """Who is warned, how, and how often at most.
+    """Rules for alerts: whom to warn, how, and how often at most.
 
-    Warned are people whose lower bound of α is under ``unaware_below``, on a course that passes the
-    moving robot within ``miss_within_m``. Of the alerts whose time is reached the loudest is asked
-    for: horn before voice before light.
+    A person is warned if the lower bound of α is below ``unaware_below`` and the moving robot
+    passes within ``miss_within_m``. Of the alerts whose time is reached, the loudest is given: horn
+    before voice before light.
 
     Attributes:
-        unaware_below: α under which a person is worth a warning.
-        miss_within_m: gap between robot and body at the closest approach, at constant velocities,
-            that makes a course conflicting.
-        light_within_s: time to the closest approach from which light is asked for; 0 is never.
+        unaware_below: α below which a person is warned.
+        miss_within_m: a person is warned if the gap between robot and body at the closest approach,
+            at constant velocities, is at most this.
+        light_within_s: time to the closest approach below which light is given; 0 for never.
         voice_within_s: the same for a spoken warning.
         horn_within_s: the same for the horn.
-        repeat_after_s: the same person gets the same alert again no sooner.
-        quiet_s: two sounds, to whomever, lie at least so far apart.
+        repeat_after_s: shortest time until the same person gets the same alert again.
+        quiet_s: shortest time between two sounds, for any people.
     """
 
     error: ClassVar[type[ValueError]] = NavError

@@ -1,4 +1,4 @@
-"""The way from "unaware" to "aware" that the shipped policies share."""
+"""The blend from "unaware" to "aware" that the shipped policies share."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .._errors import NavError
 
 
 def smoothstep(position: float) -> float:
-    """From 0 at 0 to 1 at 1 without a kink at either end; ``position`` lies in [0, 1]."""
+    """Return 3p² − 2p³ for ``position`` p in [0, 1], which has slope 0 at both ends."""
     return min(position * position * (3.0 - 2.0 * position), 1.0)
 
 
@@ -22,14 +22,14 @@ class AwarenessRamp(StrictConfig):
 
     Attributes:
         unaware_below: α up to which a person counts as fully unaware, in [0, 1).
-        aware_above: α from which a person counts as fully aware, in (0, 1]. The robot stands 35°
-            off the gaze at α = 0.6 with the default attention cone of 60°.
-        shape: ``"smoothstep"`` (no kink at either end), ``"linear"``, ``"logistic"`` (most of the
-            change about the middle) or ``"two_level"``: aware from ``aware_above`` on, and until α
-            has fallen to ``unaware_below``; between the two the level stays what it was.
-        steepness: of the logistic shape, dimensionless: its slope in the middle is about a quarter
-            of this, over the span from ``unaware_below`` to ``aware_above``. It is scaled so that
-            both ends are reached exactly.
+        aware_above: α from which a person counts as fully aware, in (0, 1]. With the default
+            attention cone of 60°, the robot is 35° off the gaze at α = 0.6.
+        shape: ``"smoothstep"`` (slope 0 at both ends), ``"linear"``, ``"logistic"`` (most of the
+            change about the middle) or ``"two_level"``: aware from ``aware_above`` on, until α has
+            fallen to ``unaware_below``; between the two the level does not change.
+        steepness: of the logistic shape, dimensionless. Its slope in the middle is about a quarter
+            of this, over the span from ``unaware_below`` to ``aware_above``. The curve is scaled to
+            reach both ends exactly.
     """
 
     error: ClassVar[type[ValueError]] = NavError
@@ -40,7 +40,7 @@ class AwarenessRamp(StrictConfig):
     steepness: float = Field(default=10.0, ge=1.0, le=50.0)
 
     @model_validator(mode="after")
-    def _ordered(self) -> AwarenessRamp:
+    def _check_thresholds(self) -> AwarenessRamp:
         if self.aware_above <= self.unaware_below:
             raise ValueError(
                 f"aware_above must exceed unaware_below, got {self.aware_above:g} and "
@@ -49,12 +49,12 @@ class AwarenessRamp(StrictConfig):
         return self
 
     def blend(self, awareness_lower: float) -> float:
-        """Share of "aware" in [0, 1], non-decreasing in ``awareness_lower``; NaN gives 0.
+        """Return the share of "aware" in [0, 1], which does not decrease with α; NaN gives 0.
 
-        Without memory: two levels start from "unaware".
+        The two levels have no hysteresis here: the share is 1 from ``aware_above`` on.
         """
         below, above = self.unaware_below, self.aware_above
-        # Written this way round so that NaN counts as unaware.
+        # Written so that NaN counts as unaware.
         if not awareness_lower > below:
             return 0.0
         if awareness_lower >= above:
@@ -65,7 +65,7 @@ class AwarenessRamp(StrictConfig):
         if self.shape == "linear":
             return min(position, 1.0)
         if self.shape == "logistic":
-            # A logistic curve is a tanh, which cannot overflow.
+            # The logistic curve as a tanh, which cannot overflow.
             half = 0.25 * self.steepness
             return min(
                 max(0.5 + 0.5 * math.tanh(half * (2.0 * position - 1.0)) / math.tanh(half), 0.0),
@@ -74,9 +74,14 @@ class AwarenessRamp(StrictConfig):
         return smoothstep(position)
 
     def holds(self, awareness_lower: float, held: bool) -> bool:
-        """Whether a person stays at the aware level who was ``held`` there at the last sighting.
+        """Return whether a person is held at the aware level, with hysteresis.
 
-        True only for two levels. NaN and whatever has fallen to ``unaware_below`` let go at once.
+        Always False unless the shape is two levels. An α of NaN or at most ``unaware_below`` ends
+        the hold at once.
+
+        Args:
+            awareness_lower: lower bound of α.
+            held: whether the person was held at the last sighting.
         """
         if self.shape != "two_level":
             return False

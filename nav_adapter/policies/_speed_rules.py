@@ -1,9 +1,4 @@
-"""A top speed near people, whoever they are.
-
-A speed limit that depends on distance alone.
-
-Speed limits beside speed-and-separation monitoring, and who they are about.
-"""
+"""Speed rules that only lower the limit of speed-and-separation monitoring."""
 
 from __future__ import annotations
 
@@ -20,12 +15,12 @@ from .._errors import NavError
 
 
 class NearCap(StrictConfig):
-    """At most this speed near anyone, in any direction and however aware.
+    """A top speed near people, in any direction and for every α.
 
     Attributes:
-        within_m: where the cap holds: from the footprint to the body, less uncertainty.
-        speed_mps: the cap. Beyond ``within_m`` the limit is what a braking robot may still have, so
-            that it arrives at the cap's edge with the cap and not with a jump.
+        within_m: the cap holds up to this distance from footprint to body, less uncertainty.
+        speed_mps: the cap. Beyond ``within_m`` the limit rises with distance so that a braking
+            robot has slowed down to the cap when it gets there.
     """
 
     error: ClassVar[type[ValueError]] = NavError
@@ -34,20 +29,20 @@ class NearCap(StrictConfig):
     speed_mps: float = Field(default=0.8, gt=0.0, le=10.0)
 
     def limit_mps(self, separation_m: ArrayLike, deceleration_mps2: float) -> FloatArray:
-        """Limit at each separation (m) of a robot that brakes so hard; NaN gives the cap."""
+        """Return the limit at each separation (m) for this deceleration; NaN gives the cap."""
         beyond_m = np.asarray(separation_m, dtype=np.float64) - self.within_m
         beyond_m = np.where(beyond_m > 0.0, beyond_m, 0.0)
         return np.asarray(np.sqrt(self.speed_mps**2 + 2.0 * deceleration_mps2 * beyond_m))
 
 
 class DistanceZones(StrictConfig):
-    """Full speed beyond one distance, linearly down to a stop at another.
+    """A speed limit that falls linearly with distance, from full speed to a stop.
 
-    Distances are those of speed and separation: from the footprint to the body, less uncertainty.
+    Distances run from the footprint to the body, less uncertainty, as in speed and separation.
 
     Attributes:
-        stop_within_m: the limit is 0 up to here.
-        full_speed_beyond_m: the limit is the robot's maximum from here on.
+        stop_within_m: the limit is 0 up to this distance.
+        full_speed_beyond_m: the limit is the robot's maximum from this distance on.
     """
 
     error: ClassVar[type[ValueError]] = NavError
@@ -56,7 +51,7 @@ class DistanceZones(StrictConfig):
     full_speed_beyond_m: float = Field(default=3.0, gt=0.0, le=50.0)
 
     @model_validator(mode="after")
-    def _ordered(self) -> DistanceZones:
+    def _check_order(self) -> DistanceZones:
         if self.full_speed_beyond_m <= self.stop_within_m:
             raise ValueError(
                 "full_speed_beyond_m must exceed stop_within_m, got "
@@ -65,7 +60,7 @@ class DistanceZones(StrictConfig):
         return self
 
     def limit_mps(self, separation_m: ArrayLike, maximum_mps: float) -> FloatArray:
-        """Limit at each separation (m), of a robot with this maximum; NaN gives 0."""
+        """Return the limit at each separation (m) for this maximum speed; NaN gives 0."""
         span_m = self.full_speed_beyond_m - self.stop_within_m
         share = (np.asarray(separation_m, dtype=np.float64) - self.stop_within_m) / span_m
         share = np.where(share > 0.0, np.minimum(share, 1.0), 0.0)
@@ -73,19 +68,20 @@ class DistanceZones(StrictConfig):
 
 
 class SpeedRules(StrictConfig):
-    """Rules that can only lower the limit of speed and separation, and whom the limit is about.
+    """Assumed turns of robot and people, and rules that only lower the speed limit.
 
     Attributes:
-        turn_within_stop_deg: how far the robot may turn off its direction of travel while it stops.
-            Towards a person who lies farther off, it gets less far than its stopping distance, and
-            towards one straight behind not at all: such people limit the speed less. 180 makes
-            everybody count as if straight ahead; needed by robots that can drive sideways.
-        people_turn_deg: how far a brisk walker may turn towards the robot while it stops: what
-            they walk counts as if they did, however aware they are. Holds in full for whoever is
-            as fast as an unaware person is assumed to be, not at all below three quarters of that,
-            and in between in proportion; at 0 only the speed at which they come nearer now counts.
-        zones: a limit over distance, or none.
-        near_cap: a limit near anyone, or none.
+        turn_within_stop_deg: largest turn of the robot off its direction of travel while it stops.
+            Towards a person farther off than this, the robot advances by less than its stopping
+            distance, and towards a person straight behind not at all: such people limit the speed
+            less. At 180 every person counts as straight ahead; robots that can drive sideways need
+            that.
+        people_turn_deg: largest turn of a brisk walker towards the robot while it stops. The speed
+            after that turn counts, for every α. It holds in full for people as fast as an unaware
+            person is assumed to be, not at all below three quarters of that, and in proportion in
+            between. At 0 only the present closing speed counts.
+        zones: a limit over distance, or None.
+        near_cap: a limit near people, or None.
     """
 
     error: ClassVar[type[ValueError]] = NavError

@@ -1,16 +1,11 @@
-"""Values over awareness that somebody has written down point by point.
-
-Radius of a person from a table.
-
-Assumed speed of a person from a table.
-"""
+"""Radius and assumed speed of a person, interpolated in tables over awareness."""
 
 from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import ClassVar
+from typing import ClassVar, Final
 
 from pydantic import model_validator
 
@@ -18,14 +13,18 @@ from tracking.config import StrictConfig
 
 from .._errors import NavError
 
+_SMALLEST_M: Final = 0.01
+_LARGEST_M: Final = 10.0
+_FASTEST_MPS: Final = 10.0
+
 Points = tuple[tuple[float, float], ...]
 
 
-def check_points(points: Points, name: str, low: float, high: float, unit: str) -> None:
-    """Refuse points that are not in order of α, or that grow with it.
+def _check_points(points: Points, name: str, low: float, high: float, unit: str) -> None:
+    """Check that α rises from point to point and the value does not.
 
     Raises:
-        ValueError: naming the field, the value and what is valid.
+        ValueError: naming the field, what was given and what is valid.
     """
     if not points:
         raise ValueError(f"{name} must hold at least one [awareness, {unit}] pair")
@@ -46,9 +45,9 @@ def check_points(points: Points, name: str, low: float, high: float, unit: str) 
             )
 
 
-def interpolated(points: Sequence[tuple[float, float]], awareness_lower: float) -> float:
-    """Straight lines between the points, level beyond them; NaN gives the first value."""
-    # Written this way round so that NaN counts as unaware.
+def _interpolate(points: Sequence[tuple[float, float]], awareness_lower: float) -> float:
+    """Return the value, linear between the points and constant beyond; NaN gives the first."""
+    # Written so that NaN counts as unaware.
     if not awareness_lower > points[0][0]:
         return points[0][1]
     index = bisect_right(points, awareness_lower, key=lambda point: point[0])
@@ -59,16 +58,13 @@ def interpolated(points: Sequence[tuple[float, float]], awareness_lower: float) 
     return (1.0 - share) * value + share * next_value
 
 
-_SMALLEST_M = 0.01
-_LARGEST_M = 10.0
-
-
 class TableInflation(StrictConfig):
     """Radius interpolated in a table.
 
     Attributes:
-        table_m: pairs of α and radius in metres, α rising, radius never: straight lines between
-            them, level beyond them. Values below the floor act as the floor.
+        table_m: pairs of α and radius in metres. α must rise, the radius must not. Between the
+            points the radius is linear, beyond them constant. Values below the floor act as the
+            floor.
     """
 
     error: ClassVar[type[ValueError]] = NavError
@@ -76,24 +72,21 @@ class TableInflation(StrictConfig):
     table_m: Points
 
     @model_validator(mode="after")
-    def _sound(self) -> TableInflation:
-        check_points(self.table_m, "table_m", _SMALLEST_M, _LARGEST_M, "m")
+    def _check_table(self) -> TableInflation:
+        _check_points(self.table_m, "table_m", _SMALLEST_M, _LARGEST_M, "m")
         return self
 
     def radius_m(self, awareness_lower: float) -> float:
-        """Radius for a lower bound of α; non-increasing in it."""
-        return interpolated(self.table_m, awareness_lower)
-
-
-_FASTEST_MPS = 10.0
+        """Return the radius for a lower bound of α; it does not increase with α."""
+        return _interpolate(self.table_m, awareness_lower)
 
 
 class TableHumanSpeed(StrictConfig):
     """Assumed human speed interpolated in a table.
 
     Attributes:
-        table_mps: pairs of α and speed in m/s, α rising, speed never: straight lines between them,
-            level beyond them.
+        table_mps: pairs of α and speed in m/s. α must rise, the speed must not. Between the points
+            the speed is linear, beyond them constant.
     """
 
     error: ClassVar[type[ValueError]] = NavError
@@ -101,10 +94,10 @@ class TableHumanSpeed(StrictConfig):
     table_mps: Points
 
     @model_validator(mode="after")
-    def _sound(self) -> TableHumanSpeed:
-        check_points(self.table_mps, "table_mps", 0.0, _FASTEST_MPS, "m/s")
+    def _check_table(self) -> TableHumanSpeed:
+        _check_points(self.table_mps, "table_mps", 0.0, _FASTEST_MPS, "m/s")
         return self
 
     def human_speed_mps(self, awareness_lower: float) -> float:
-        """Assumed speed for a lower bound of α; non-increasing in it."""
-        return interpolated(self.table_mps, awareness_lower)
+        """Return the assumed speed for a lower bound of α; it does not increase with α."""
+        return _interpolate(self.table_mps, awareness_lower)

@@ -1,9 +1,10 @@
-"""People, speed limit and stop as messages that ROS 2, Nav2 and its neighbours read.
+"""ROS 2: people, speed limit and stop as messages for Nav2 and related packages, without ROS.
 
-No ROS is needed. The conversions are pure functions of :class:`~nav_adapter.NavConstraints`, the
-messages plain dataclasses (:mod:`nav_adapter.ros2.messages`). Publishing and recording need the
-extra ``ros2``: :func:`encode`, :class:`DdsNode` and :class:`McapRecorder` load it when they are
-asked for. Under ROS, :mod:`nav_adapter.ros2.node` is the same bridge as an rclpy node.
+The messages are plain dataclasses (:mod:`nav_adapter.ros2.messages`), made by pure functions of
+:class:`~nav_adapter.NavConstraints`. Publishing and recording need the extra ``ros2``, which
+:func:`encode`, :func:`decode`, :class:`DdsNode` and :class:`McapRecorder` load at first use. With
+ROS installed, :mod:`nav_adapter.ros2.node` runs the same bridge as an rclpy node. Times, poses and
+rclpy's messages are converted in :mod:`nav_adapter.ros2.conversions`.
 """
 
 from __future__ import annotations
@@ -13,10 +14,10 @@ from typing import TYPE_CHECKING, Any
 from ._alerts import alerts
 from ._bridge import AwarenessBridge
 from ._grid import occupancy_grid
+from ._images import camera_of, picture_of
 from ._markers import markers
 from ._outgoing import Frames, outgoing
 from ._people import circle_objects, detections, people, teb_obstacles
-from ._pictures import camera_of, picture_of
 from ._polygons import STOP_POLYGON_ID, collision_polygons, stop_zone
 from ._robot_file import CameraMount, RobotFile
 from ._speed_limit import SLOWEST_MPS, speed_limit
@@ -61,7 +62,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Load what needs the extra ``ros2`` when it is asked for."""
+    """Load the names that need the extra ``ros2`` at first use."""
     if name in ("decode", "encode"):
         from . import _cdr  # noqa: PLC0415
 

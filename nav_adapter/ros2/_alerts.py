@@ -1,28 +1,27 @@
-"""Alerts, and whether the robot can still obey, as diagnostics."""
+"""Alerts and the state of the speed limit as diagnostics."""
 
 from __future__ import annotations
 
 from .._alert import Alert
 from .._constraints import NavConstraints
-from ._stamps import header
+from .conversions import header
 from .messages.diagnostic_msgs import DiagnosticArray, DiagnosticStatus, KeyValue
 
-_FROM = "awarenav"
+_NAME = "awarenav"
 
 
 def alerts(constraints: NavConstraints, *, frame_id: str = "") -> DiagnosticArray:
-    """``diagnostic_msgs/DiagnosticArray``: the state of the limit, and one status an alert.
+    """Return ``diagnostic_msgs/DiagnosticArray``: the state of the limit and one status per alert.
 
     The first status is always there: ``"awarenav: speed limit"``, with ``limited_by`` as its
-    message; ERROR when full braking from now on comes too late (``braking_suffices`` is False),
-    WARN when the data are stale, else OK. Each alert asked for in this instant follows as a WARN
-    named after what is asked for, ``"awarenav: horn"``, ``"awarenav: voice"`` or
-    ``"awarenav: light"``, the most urgent first. An alert is in one message only: whoever drives
-    the horn sounds it once a status.
+    message. Its level is ERROR if full braking from now on comes too late (``braking_suffices`` is
+    False), WARN if the data are stale, else OK. The alerts given now follow as WARN, the most
+    urgent first, named ``"awarenav: horn"``, ``"awarenav: voice"`` or ``"awarenav: light"``. Each
+    alert is in one message only: sound the horn once per status.
 
     Args:
-        constraints: the alerts, and the limit.
-        frame_id: of the header; diagnostics have no place.
+        constraints: the alerts and the limit.
+        frame_id: of the header; diagnostics do not use it.
     """
     return DiagnosticArray(
         header(constraints.stamp_s, frame_id),
@@ -60,4 +59,4 @@ def _alert(alert: Alert) -> DiagnosticStatus:
 
 def _status(level: int, name: str, text: str, **values: str) -> DiagnosticStatus:
     pairs = tuple(KeyValue(key, value) for key, value in values.items())
-    return DiagnosticStatus(level, f"{_FROM}: {name}", text, _FROM, pairs)
+    return DiagnosticStatus(level, f"{_NAME}: {name}", text, _NAME, pairs)

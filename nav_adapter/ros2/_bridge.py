@@ -1,4 +1,4 @@
-"""The bridge without a transport: messages in, messages out."""
+"""The bridge from camera and odometry messages to constraints, without a transport."""
 
 from __future__ import annotations
 
@@ -17,44 +17,45 @@ from .._constraints import NavConstraints
 from .._errors import NavError
 from .._policy import AwarenessPolicy
 from .._robot import RobotProfile, RobotState
+from ._images import camera_of, picture_of
 from ._outgoing import Frames, outgoing
-from ._pictures import camera_of, picture_of
-from ._stamps import pose_matrix, to_seconds
 from ._transforms import TransformBuffer
+from .conversions import pose_matrix, to_seconds
 from .messages import Message
 from .messages.geometry_msgs import TransformStamped
 from .messages.nav_msgs import Odometry
 from .messages.sensor_msgs import CameraInfo, CompressedImage, Image
 from .messages.tf2_msgs import TFMessage
 
+# Tolerated difference between the clocks of the camera and of this computer.
 _CLOCK_TOLERANCE_S = 0.05
-# How well the height and the tilt of a camera on a driving robot are known.
+# Uncertainty of the height and the tilt of a camera on a driving robot.
 _HEIGHT_STD_M = 0.05
 _TILT_STD_RAD = math.radians(2.0)
-# No robot of this library drives so fast: such a number is a fault of the sender.
+# No robot drives so fast: a higher speed is an error of the sender.
 _FASTEST_MPS = 100.0
 
 
 class AwarenessBridge:
-    """Camera and odometry of a ROS graph to constraints for its planners.
+    """Turns camera and odometry messages of a ROS graph into constraints for its planners.
 
-    Feed it messages as they come (``on_…``) and call :meth:`tick` at a fixed rate, images or none:
-    each tick publishes every topic. Whatever is missing, late or refused makes it publish a stop
-    and the reason; it never falls silent by itself and never counts anybody as aware for want of
-    data.
+    Pass on messages as they come (``on_…``) and call :meth:`tick` at a fixed rate, with or without
+    new images: each tick publishes every topic. If input is missing, late or refused, the bridge
+    publishes a stop with the reason. It never stops publishing by itself, and missing data never
+    make a person count as aware.
 
     Args:
         policy: of the adapter and of the awareness filter.
-        robot: its profile.
+        robot: the robot's profile.
         publish: called with the key of a topic and a message.
         frames: names of the frames.
-        T_base_camera: where a fixed camera sits; None asks tf.
-        make_pipeline: makes perception for a camera, once it is known; default the shipped
+        T_base_camera: pose of a fixed camera; None to look it up in tf.
+        make_pipeline: makes perception for a camera, once it is known; by default with the shipped
             networks.
-        camera: calibration, if it is not to come from camera_info.
-        percentage: of :func:`speed_limit`.
-        warn: called with what went wrong, each text once in a row.
-        wanted: asked with the key of a topic in every tick; what nobody wants is not made.
+        camera: calibration; None to read it from camera_info.
+        percentage: as in :func:`speed_limit`.
+        warn: called with each problem; a repeated text is passed on only once.
+        wanted: called with the key of a topic in every tick; unwanted messages are not made.
     """
 
     def __init__(
@@ -83,31 +84,31 @@ class AwarenessBridge:
         self._transforms = TransformBuffer()
         self._state: RobotState | None = None
         self._tracks: tuple[PersonTrack, ...] = ()
-        self._seen_s: float | None = None
-        self._ticked_s: float | None = None
-        self._forget()
-        #: The latest frame for whoever draws: picture, observations, T_odom_camera.
+        self._perceived_s: float | None = None
+        self._last_tick_s: float | None = None
+        self._start_afresh()
+        #: The latest frame, for drawing: image, observations and T_odom_camera.
         self.last_picture: NDArray[np.uint8] | None = None
         self.last_observations: tuple[PersonObservation, ...] = ()
         self.last_T_odom_camera: FloatArray | None = None
 
     @property
     def tracks(self) -> tuple[PersonTrack, ...]:
-        """Of the latest frame."""
+        """Tracks of the latest frame."""
         return self._tracks
 
     @property
     def robot_state(self) -> RobotState | None:
-        """The latest."""
+        """The latest state of the robot, or None."""
         return self._state
 
     @property
     def camera(self) -> Camera | None:
-        """As far as it is known."""
+        """The camera, or None while it is unknown."""
         return self._camera
 
     def on_camera_info(self, message: CameraInfo) -> None:
-        """Make the pipeline from the first calibration; a later, other one is refused."""
+        """Make the pipeline from the first calibration; later ones are ignored."""
         if self._camera is not None:
             return
         try:
@@ -117,25 +118,25 @@ class AwarenessBridge:
             self._camera = None
             self._warn(str(problem))
             return
-        self._forget()
+        self._start_afresh()
 
     def on_transforms(self, message: TFMessage, *, static: bool = False) -> None:
-        """Remember transforms of /tf or /tf_static."""
+        """Store the transforms of /tf or /tf_static."""
         for each in message.transforms:
-            self._remember(each, static)
+            self._store_transform(each, static)
 
     def on_odometry(self, message: Odometry) -> None:
-        """Take the robot's state, and its pose as a transform."""
+        """Store the robot's state, and its pose as a transform."""
         if message.header.frame_id.lstrip("/") != self.frames.odom:
             self._warn(
                 f"odometry must be in frame {self.frames.odom!r}, got "
                 f"{message.header.frame_id!r}: ignored"
             )
             return
-        place, turn = message.pose.pose.position, message.pose.pose.orientation
+        position, rotation = message.pose.pose.position, message.pose.pose.orientation
         stamp_s = to_seconds(message.header.stamp)
         try:
-            T = pose_matrix((place.x, place.y, place.z), turn)
+            T = pose_matrix((position.x, position.y, position.z), rotation)
             speed_mps = message.twist.twist.linear.x
             if abs(speed_mps) > _FASTEST_MPS:
                 raise NavError(f"speed must be within {_FASTEST_MPS:g} m/s, got {speed_mps:g} m/s")
@@ -155,14 +156,14 @@ class AwarenessBridge:
             self._state = state
 
     def on_image(self, message: Image | CompressedImage, now_s: float) -> bool:
-        """Work one frame through; True when it was good."""
+        """Process one image; return True if it was used."""
         stamp_s = to_seconds(message.header.stamp)
         try:
             if self._pipeline is None:
                 raise NavError("no camera_info yet: the image cannot be used")
             if stamp_s > now_s + _CLOCK_TOLERANCE_S:
                 raise NavError(
-                    f"the image's stamp is {stamp_s - now_s:.3f} s ahead of this machine's clock"
+                    f"the image's stamp is {stamp_s - now_s:.3f} s ahead of this computer's clock"
                 )
             frame = self.frames.camera or message.header.frame_id
             T_odom_camera = self._camera_pose(frame, stamp_s)
@@ -172,20 +173,20 @@ class AwarenessBridge:
         except (NavError, PerceptionError, TrackingError) as problem:
             self._warn(f"image: {problem}")
             return False
-        self._tracks, self._seen_s = tracks, stamp_s
+        self._tracks, self._perceived_s = tracks, stamp_s
         self.last_picture, self.last_observations = image, observations
         self.last_T_odom_camera = T_odom_camera
         self._warned = ""
         return True
 
     def tick(self, now_s: float) -> NavConstraints:
-        """Publish every topic for the instant ``now_s`` and return what was published."""
-        if self._ticked_s is not None and now_s < self._ticked_s:
-            self._warn("the clock went backward: everybody is forgotten")
-            self._forget()
+        """Publish every topic at ``now_s`` and return the constraints."""
+        if self._last_tick_s is not None and now_s < self._last_tick_s:
+            self._warn("the clock went backward: all tracks are deleted")
+            self._start_afresh()
             self._state = None
             self._transforms = TransformBuffer()
-        self._ticked_s = now_s
+        self._last_tick_s = now_s
         constraints = self._constraints(now_s)
         for key, message in outgoing(
             constraints,
@@ -200,11 +201,11 @@ class AwarenessBridge:
         return constraints
 
     def refuse(self, problem: str) -> None:
-        """Say what was wrong with a message that never got here."""
+        """Warn of a message that could not be decoded."""
         self._warn(problem)
 
     def stop(self, now_s: float, reason: str) -> NavConstraints:
-        """Publish a stop, for a caller that is about to leave."""
+        """Publish a stop, before the caller ends."""
         constraints = NavConstraints(now_s, (), 0.0, reason, True)
         for key, message in outgoing(
             constraints, (), self._robot, None, self.frames, percentage=self._percentage
@@ -213,17 +214,17 @@ class AwarenessBridge:
         return constraints
 
     def _constraints(self, now_s: float) -> NavConstraints:
-        for missing, what in (
+        for needed, reason in (
             (self._state, "no odometry yet"),
             (self._pipeline, "no camera_info yet"),
-            (self._seen_s, "no camera frame yet"),
+            (self._perceived_s, "no camera frame yet"),
         ):
-            if missing is None:
-                return NavConstraints(now_s, (), 0.0, what, True)
+            if needed is None:
+                return NavConstraints(now_s, (), 0.0, reason, True)
         assert self._state is not None
         try:
             return self._adapter.update(
-                self._tracks, self._state, now_s, perception_stamp_s=self._seen_s
+                self._tracks, self._state, now_s, perception_stamp_s=self._perceived_s
             )
         except NavError as problem:
             self._warn(str(problem))
@@ -235,26 +236,27 @@ class AwarenessBridge:
         T_odom_base = self._transforms.lookup(self.frames.odom, self.frames.base, stamp_s)
         return np.asarray(T_odom_base @ self._T_base_camera, dtype=np.float64)
 
-    def _remember(self, message: TransformStamped, static: bool) -> None:
-        move, turn = message.transform.translation, message.transform.rotation
+    def _store_transform(self, message: TransformStamped, static: bool) -> None:
+        translation, rotation = message.transform.translation, message.transform.rotation
         try:
             self._transforms.add(
                 message.header.frame_id,
                 message.child_frame_id,
                 to_seconds(message.header.stamp),
-                pose_matrix((move.x, move.y, move.z), turn),
+                pose_matrix((translation.x, translation.y, translation.z), rotation),
                 static=static,
             )
         except NavError as problem:
             self._warn(f"tf: {problem}")
 
-    def _forget(self) -> None:
+    def _start_afresh(self) -> None:
+        """Begin with a new tracker and a new adapter, without tracks."""
         view = None if self._camera is None else CameraView(self._camera)
         self._tracker = PersonTracker(TrackerConfig(awareness=self._policy.filter), view=view)
         self._adapter = NavAdapter(self._policy, self._robot)
         self._tracks = ()
-        self._seen_s = None
-        self._ticked_s = None
+        self._perceived_s = None
+        self._last_tick_s = None
 
     def _warn(self, text: str) -> None:
         if text != self._warned:
@@ -263,7 +265,7 @@ class AwarenessBridge:
 
 
 def _floor(T_odom_camera: FloatArray) -> FloorPlane | None:
-    """The floor z = 0 of odom, which the feet of people stand on."""
+    """Return the floor, z = 0 in odom, or None for a camera that is not above it."""
     if T_odom_camera[2, 3] <= 0.0:
         return None
     return FloorPlane.from_pose(

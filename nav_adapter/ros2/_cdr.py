@@ -1,11 +1,11 @@
-"""Messages as CDR bytes and as DDS types; with ``_dds.py`` all that imports ``cyclonedds``."""
+"""Messages as CDR bytes and as DDS types; only this module and ``_dds`` import ``cyclonedds``."""
 
 from __future__ import annotations
 
 from typing import Any, Final, TypeVar, cast
 
 from .._errors import NavError
-from ._encoder import REFUSALS, encoded
+from ._encoder import ENCODING_ERRORS, encoded
 from ._message import FieldType, Message, field_types, ros_type
 
 try:
@@ -32,7 +32,7 @@ except ImportError as cause:  # pragma: no cover - depends on the installation
 _AnyMessage = TypeVar("_AnyMessage", bound=Message)
 
 _HEADER_BYTES: Final = 4
-# By ROS name, and whether sequences of bytes are bytes.
+# By ROS name, and by whether sequences of bytes are read as ``bytes``.
 _IDL_TYPES: Final[dict[tuple[str, bool], Any]] = {}
 _PRIMITIVES: Final[dict[str, Any]] = {
     "bool": bool,
@@ -49,37 +49,41 @@ _PRIMITIVES: Final[dict[str, Any]] = {
 
 
 def encode(message: Message) -> bytes:
-    """A message in CDR (XCDR1, little-endian, with its four-byte header), as ROS 2 sends it."""
+    """Return a message as CDR bytes (XCDR1, little-endian, with four-byte header), as in ROS 2.
+
+    Raises:
+        NavError: for a value that does not fit its field.
+    """
     try:
         return encoded(message)
-    except REFUSALS as cause:
+    except ENCODING_ERRORS as cause:
         raise NavError(f"{ros_type(type(message))} cannot be encoded: {cause}") from cause
 
 
 def decode(kind: type[_AnyMessage], data: bytes) -> _AnyMessage:
-    """A message from CDR bytes, header included, of either byte order.
+    """Return a message from CDR bytes, header included, in either byte order.
 
     Raises:
-        NavError: the bytes are cut off or are those of something else.
+        NavError: for bytes that are cut off or of another type.
     """
     buffer = Buffer(data, align_offset=_HEADER_BYTES)
     try:
         message = _idl_type(kind, True).__idl__.deserialize(buffer)
-        if buffer.tell() > len(data):  # slices of bytes end early without a word
+        if buffer.tell() > len(data):  # reading past the end raises no error
             raise ValueError(f"{buffer.tell()} bytes are needed, got {len(data)}")
         return cast(_AnyMessage, message)
-    except Exception as cause:  # the library raises what struct, str and it itself raise
-        raise NavError(f"received bytes are no {ros_type(kind)}: {cause}") from cause
+    except Exception as cause:  # the library raises its own errors and those of struct and str
+        raise NavError(f"received bytes are not a {ros_type(kind)}: {cause}") from cause
 
 
 def topic_type(kind: type[Message]) -> Any:
-    """The DDS type of a message: an IDL structure with the name that ROS 2 gives it.
+    """Return the DDS type of a message: an IDL structure with the name that ROS 2 gives it.
 
-    Samples of it carry CDR bytes (attribute ``cdr``) and are not decoded on the way.
+    Its samples hold CDR bytes (attribute ``cdr``), which DDS does not decode.
     """
-    exact = _idl_type(kind, False)
-    if hasattr(exact, "cdr"):
-        return exact
+    idl_type = _idl_type(kind, False)
+    if hasattr(idl_type, "cdr"):
+        return idl_type
 
     def serialize(self: Any, *_: Any, **__: Any) -> bytes:
         return cast(bytes, self.cdr)
@@ -89,32 +93,32 @@ def topic_type(kind: type[Message]) -> Any:
         sample.cdr = bytes(data)
         return sample
 
-    exact.cdr = b""
-    exact.serialize = serialize
-    exact.deserialize = classmethod(deserialize)
-    return exact
+    idl_type.cdr = b""
+    idl_type.serialize = serialize
+    idl_type.deserialize = classmethod(deserialize)
+    return idl_type
 
 
 def sample(message_type: type[Message], cdr: bytes) -> Any:
-    """A sample of :func:`topic_type` with these bytes."""
+    """Return a sample of :func:`topic_type` with these bytes."""
     return topic_type(message_type).deserialize(cdr)
 
 
 def _idl_type(kind: type[Message], fast: bool) -> Any:
-    """The IDL structure of a message, read and written as the message itself.
+    """Return the IDL structure of a message, which reads and writes the message itself.
 
-    ``fast`` takes sequences of bytes as bytes: the same wire format a hundred times faster, but
-    another type by name, so that topics do not use it.
+    With ``fast``, sequences of bytes are ``bytes``: the same wire format, a hundred times faster.
+    The type differs, though, so topics do not use it.
     """
     known = _IDL_TYPES.get((ros_type(kind), fast))
     if known is not None:
         return known
-    # rosidl_generator_dds_idl mangles package/msg/Name so.
+    # rosidl_generator_dds_idl mangles package/msg/Name in this way.
     name = ros_type(kind).replace("/", "::").replace("::msg::", "::msg::dds_::") + "_"
     namespace: Any = IdlMeta.__prepare__(kind.__name__, (IdlStruct,), typename=name)
     for field, field_type in field_types(kind).items():
         namespace["__annotations__"][field] = _idl_field(field_type, fast)
-    # The library makes what it has read by calling the type.
+    # The library calls the type to make a message from the fields that it has read.
     namespace["__new__"] = lambda cls, **values: kind(
         **{key: tuple(value) if isinstance(value, list) else value for key, value in values.items()}
     )

@@ -1,4 +1,4 @@
-"""Topics over DDS, as ROS 2 names and encodes them; imports ``cyclonedds``."""
+"""Topics over DDS, with the names and the encoding of ROS 2; imports ``cyclonedds``."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ _ANY: Final = SampleState.Any | ViewState.Any | InstanceState.Any
 class DdsNode:
     """Publishes and reads ROS 2 topics of one domain, without ROS.
 
-    Other nodes see the topics under ``rt/`` with types such as
-    ``nav2_msgs::msg::dds_::SpeedLimit_``; the network interface is chosen by the environment
-    variable ``CYCLONEDDS_URI``, as with ``rmw_cyclonedds_cpp``.
+    In DDS the topics are named ``rt/…`` and have types such as
+    ``nav2_msgs::msg::dds_::SpeedLimit_``. The environment variable ``CYCLONEDDS_URI`` selects the
+    network interface, as with ``rmw_cyclonedds_cpp``.
 
     Args:
         domain_id: ``ROS_DOMAIN_ID`` of the other nodes, 0 to 232.
 
     Raises:
-        NavError: a domain that cannot be joined.
+        NavError: for a domain that cannot be joined.
     """
 
     def __init__(self, domain_id: int = 0) -> None:
@@ -55,13 +55,13 @@ class DdsNode:
         self._waitset = WaitSet(self._participant)
 
     def advertise(self, topic: Topic) -> None:
-        """Make a publisher."""
+        """Create a publisher."""
         if topic.name not in self._writers:
             writer = DataWriter(self._participant, self._topic(topic), qos=_qos(topic))
             self._writers[topic.name] = topic, writer
 
     def subscribe(self, topic: Topic) -> None:
-        """Make a subscriber, whose messages :meth:`take` returns and :meth:`wait` waits for."""
+        """Create a subscriber, for :meth:`take` and :meth:`wait`."""
         if topic.name not in self._readers:
             reader = DataReader(self._participant, self._topic(topic), qos=_qos(topic))
             self._waitset.attach(ReadCondition(reader, _ANY))
@@ -71,14 +71,14 @@ class DdsNode:
         """Send a message on an advertised topic and return its CDR bytes.
 
         Raises:
-            NavError: a message of another type, or one that DDS refuses.
+            NavError: for a message of another type, or one that DDS refuses.
         """
         cdr = encode(message)
         self.publish_cdr(topic, cdr)
         return cdr
 
     def publish_cdr(self, topic: Topic, cdr: bytes) -> None:
-        """Send a message that is encoded already."""
+        """Send a message that is already encoded."""
         declared, writer = self._writers[topic.name]
         try:
             writer.write(sample(declared.message, cdr))
@@ -86,21 +86,25 @@ class DdsNode:
             raise NavError(f"{topic.name}: cannot publish: {cause}") from cause
 
     def take(self, topic: Topic) -> list[Message]:
-        """Take the messages that have come since; what cannot be decoded raises NavError."""
+        """Return the messages since the last call.
+
+        Raises:
+            NavError: for a message that cannot be decoded.
+        """
         return [decode(topic.message, cdr) for cdr in self.take_cdr(topic)]
 
     def take_cdr(self, topic: Topic) -> list[bytes]:
-        """Take the messages as they were on the wire."""
+        """Return the messages since the last call as CDR bytes."""
         declared, reader = self._readers[topic.name]
         kind = topic_type(declared.message)
         return [each.cdr for each in reader.take(N=topic.depth) if isinstance(each, kind)]
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait until a message has come; False when none did in time."""
+        """Wait for a message; return False if none came in time."""
         return bool(self._waitset.wait(timeout=max(0, round(timeout_s * 1e9))))
 
     def readers_of(self, topic: Topic) -> int:
-        """How many subscribers are matched."""
+        """Return the number of matched subscribers."""
         return len(self._writers[topic.name][1].get_matched_subscriptions())
 
     def close(self) -> None:
@@ -112,6 +116,7 @@ class DdsNode:
         del self._participant
 
     def _topic(self, topic: Topic) -> Any:
+        """Return the DDS topic, created at first use."""
         known = self._topics.get(topic.name)
         if known is None:
             kind = topic_type(topic.message)

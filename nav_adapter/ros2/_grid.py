@@ -11,7 +11,7 @@ from perception.arrays import finite_array, finite_number
 from .._constraints import NavConstraints
 from .._errors import NavError
 from ..exporters import paint_costmap
-from ._stamps import header, to_time
+from .conversions import header, to_time
 from .messages.geometry_msgs import Point, Pose
 from .messages.nav_msgs import MapMetaData, OccupancyGrid
 
@@ -27,10 +27,10 @@ def occupancy_grid(
     resolution_m: float = 0.05,
     frame_id: str = "odom",
 ) -> OccupancyGrid:
-    """``nav_msgs/OccupancyGrid``: 100 where a person's obstacle is, 0 elsewhere.
+    """Return ``nav_msgs/OccupancyGrid``: 100 inside the obstacles, 0 elsewhere.
 
-    The square about ``center_odom_m``, its corner rounded to whole cells so that a moving window
-    does not smear people. No slope round them: Nav2's inflation layer adds its own.
+    The grid is a square around ``center_odom_m``. Its corner is rounded to whole cells so that
+    people do not smear when the grid moves. Costs around them are left to Nav2's inflation layer.
 
     Args:
         constraints: the people.
@@ -40,7 +40,7 @@ def occupancy_grid(
         frame_id: of the constraints.
 
     Raises:
-        NavError: numbers not finite or not positive, or more than four million cells.
+        NavError: for numbers that are not finite or not positive, or over four million cells.
     """
     center = finite_array("center_odom_m", center_odom_m, (2,), NavError)
     size = finite_number("size_m", size_m, NavError, minimum=0.0, exclusive_minimum=True)

@@ -1,4 +1,4 @@
-"""Shapes for RViz."""
+"""Markers for RViz."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from perception.anthropometry import BODY_RADIUS_M
 
 from .._constraints import NavConstraints
 from .._robot import RobotState
-from ._stamps import header
+from .conversions import header
 from .messages.builtin_interfaces import Duration
 from .messages.geometry_msgs import Point, Pose, Vector3
 from .messages.std_msgs import ColorRGBA
 from .messages.visualization_msgs import Marker, MarkerArray
 
-# A display that hears nothing for longer shows nothing.
+# A marker disappears from the display after this time without an update.
 _LIFETIME: Final = Duration(1, 0)
 _STANDING_MPS: Final = 0.1
 _LINE_M: Final = 0.04
@@ -29,10 +29,10 @@ def markers(
     *,
     frame_id: str = "odom",
 ) -> MarkerArray:
-    """``visualization_msgs/MarkerArray``: bodies, outlines, velocities, α, and the limit.
+    """Return ``visualization_msgs/MarkerArray``: bodies, outlines, velocities, α and the limit.
 
-    Bodies and outlines run from red (unaware) to green (aware). The first marker clears what was
-    there, so that people who left do not stay. The limit and its reason stand over the robot.
+    Bodies and outlines run from red (unaware) to green (aware). The first marker deletes the old
+    ones. The limit and its reason are shown above the robot.
     """
     top = header(constraints.stamp_s, frame_id)
     shapes = [Marker(top, action=Marker.DELETEALL)]
@@ -109,7 +109,7 @@ def markers(
 
 
 def awareness_color(awareness_lower: float) -> ColorRGBA:
-    """Red for 0, green for 1, through yellow."""
+    """Return a colour from red for 0 through yellow to green for 1."""
     return ColorRGBA(
         min(1.0, 2.0 - 2.0 * awareness_lower), min(1.0, 2.0 * awareness_lower), 0.1, 1.0
     )

@@ -1,4 +1,4 @@
-"""Recordings for Foxglove and ROS 2 tools; the one module that imports ``mcap``."""
+"""MCAP recordings for Foxglove and ROS 2 tools; only this module imports ``mcap``."""
 
 from __future__ import annotations
 
@@ -23,14 +23,15 @@ except ImportError as cause:  # pragma: no cover - depends on the installation
 class McapRecorder(AbstractContextManager["McapRecorder"]):
     """Writes CDR messages with their ROS 2 schemas to an MCAP file.
 
-    Profile "ros2", schemas "ros2msg", messages "cdr": Foxglove, ``ros2 bag play``, ``mcap`` and
-    ``rosbags`` read it. Use it as a context manager: the file has its index once it is closed.
+    The profile is "ros2", schemas are "ros2msg" and messages "cdr", which Foxglove,
+    ``ros2 bag play``, ``mcap`` and ``rosbags`` read. Use it as a context manager: the index is
+    written when the file is closed.
 
     Args:
-        path: of the file; one that is there is replaced.
+        path: of the file; an existing file is replaced.
 
     Raises:
-        NavError: the file cannot be written.
+        NavError: if the file cannot be written.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -71,20 +72,20 @@ class McapRecorder(AbstractContextManager["McapRecorder"]):
 
 
 def _metadata(topic: Topic) -> dict[str, str]:
-    """The publisher's quality of service, in the form that rosbag2 writes and replays.
+    """Return the publisher's quality of service, in the form that rosbag2 writes and replays.
 
-    Numbers are those of rmw (``rmw/types.h``); times are its "for ever".
+    The numbers are those of rmw (``rmw/types.h``); the times are its infinite duration.
     """
-    ever = {"sec": 9223372036, "nsec": 854775807}
+    infinite = {"sec": 9223372036, "nsec": 854775807}
     qos = {
         "history": 1,  # keep last
         "depth": topic.depth,
         "reliability": 1 if topic.reliable else 2,
         "durability": 1 if topic.transient_local else 2,
-        "deadline": ever,
-        "lifespan": dict(ever),
+        "deadline": infinite,
+        "lifespan": dict(infinite),
         "liveliness": 1,
-        "liveliness_lease_duration": dict(ever),
+        "liveliness_lease_duration": dict(infinite),
         "avoid_ros_namespace_conventions": False,
     }
     return {"offered_qos_profiles": yaml.safe_dump([qos], sort_keys=False)}

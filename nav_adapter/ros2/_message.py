@@ -1,4 +1,4 @@
-"""What a ROS 2 message is: a frozen dataclass whose annotations are the fields of a .msg file."""
+"""ROS 2 messages as frozen dataclasses whose annotations are the fields of a .msg file."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _RULE: Final = "=" * 80
 
 @dataclasses.dataclass(frozen=True)
 class Message:
-    """Base of the messages; the module that a message is in names its ROS package."""
+    """Base of the messages. The name of a message's module is its ROS package."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -38,8 +38,9 @@ class FieldType:
     """The type of one field.
 
     Attributes:
-        name: of a value: a ROS primitive such as ``"float64"``, or ``"geometry_msgs/msg/Point"``.
-        message: the class, when a value is a message.
+        name: type of a value: a ROS primitive such as ``"float64"``, or a message such as
+            ``"geometry_msgs/msg/Point"``.
+        message: the class, if a value is a message.
         count: None for one value, 0 for a sequence of any length, n for an array of n.
     """
 
@@ -49,27 +50,27 @@ class FieldType:
 
     @property
     def text(self) -> str:
-        """As a .msg file writes it, the package of a message included."""
+        """The type as in a .msg file, with the package of a message."""
         name = self.name.replace("/msg/", "/")
         return name if self.count is None else f"{name}[{self.count or ''}]"
 
 
 def ros_type(message: type[Message]) -> str:
-    """The ROS name of a message class, such as ``"nav2_msgs/msg/SpeedLimit"``."""
+    """Return the ROS name of a message class, such as ``"nav2_msgs/msg/SpeedLimit"``."""
     return f"{message.__module__.rsplit('.', 1)[1]}/msg/{message.__name__}"
 
 
 def field_types(message: type[Message]) -> dict[str, FieldType]:
-    """Name and type of the fields in the order of the wire."""
+    """Return name and type of each field, in the order of the wire."""
     hints = get_type_hints(message, include_extras=True)
     return {field.name: _field_type(hints[field.name]) for field in dataclasses.fields(message)}
 
 
 def definition(message: type[Message]) -> str:
-    """The message definition with those of all messages in it, as recordings carry it.
+    """Return the message definition with those of all nested messages, as in recordings.
 
-    Encoding "ros2msg" of the MCAP specification: definitions separated by a line of 80 equals signs
-    and ``MSG: package/Name``.
+    This is the encoding "ros2msg" of the MCAP specification: definitions separated by a line of 80
+    equals signs and ``MSG: package/Name``.
     """
     text = _own_definition(message)
     for each in _dependencies(message):
@@ -91,7 +92,7 @@ def _own_definition(message: type[Message]) -> str:
 
 
 def _dependencies(message: type[Message]) -> list[type[Message]]:
-    """Every message inside this one, each once, before what is inside of it."""
+    """Return every nested message once, each before those nested in it."""
     found: list[type[Message]] = []
     for kind in field_types(message).values():
         if kind.message is not None:

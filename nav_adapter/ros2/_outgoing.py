@@ -1,4 +1,4 @@
-"""All messages of one instant."""
+"""All messages for one update, by topic."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ class Frames:
     """Names of the frames that messages are in.
 
     Attributes:
-        odom: fixed, drifting, never jumping (REP-105).
-        base: of the robot, on the floor.
-        camera: optical frame; empty for the one that the images name.
+        odom: the fixed frame, which may drift but never jumps (REP-105).
+        base: frame of the robot, on the floor.
+        camera: optical frame of the camera; empty for the frame named in the images.
     """
 
     odom: str = "odom"
@@ -44,10 +44,10 @@ def outgoing(
     grid_m: float = 10.0,
     wanted: Callable[[str], bool] = lambda key: True,
 ) -> Iterator[tuple[str, Message]]:
-    """Key of the topic (:data:`~nav_adapter.ros2.PUBLISHED`) and message, the urgent ones first.
+    """Yield topic key (:data:`~nav_adapter.ros2.PUBLISHED`) and message, urgent ones first.
 
-    Without ``robot_state`` there is no grid, which is about the robot. Messages that are not
-    ``wanted``, asked by key, are not made.
+    Without ``robot_state`` there is no grid, since it is centred on the robot. A message is made
+    only if ``wanted`` returns True for its key.
     """
     odom, base = frames.odom, frames.base
     if wanted("speed_limit"):
@@ -63,8 +63,8 @@ def outgoing(
         speed_mps = 0.0 if robot_state is None else robot_state.speed_mps
         yield "stop_zone", stop_zone(robot, speed_mps, constraints.stamp_s, base_frame=base)
     if robot_state is not None and wanted("grid"):
-        place = robot_state.position_odom_m
-        yield "grid", occupancy_grid(constraints, place, size_m=grid_m, frame_id=odom)
+        center = robot_state.position_odom_m
+        yield "grid", occupancy_grid(constraints, center, size_m=grid_m, frame_id=odom)
     if wanted("circles"):
         for circle in circle_objects(constraints, frame_id=odom):
             yield "circles", circle

@@ -1,4 +1,4 @@
-"""People as obstacles, people and boxes of neighbouring packages."""
+"""People as obstacles, people and boxes of other ROS packages."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tracking import PersonTrack
 
 from .._constraints import NavConstraints, PersonObstacle
 from ..exporters import boxes
-from ._stamps import header, yaw_quaternion
+from .conversions import header, yaw_quaternion
 from .messages.costmap_converter_msgs import ObstacleArrayMsg, ObstacleMsg
 from .messages.geometry_msgs import (
     Point,
@@ -36,20 +36,20 @@ from .messages.vision_msgs import (
 )
 
 _OCCUPIED: Final = 100
-# Any fixed one: the same track has the same UUID in every run and in every process.
+# Any fixed namespace, so that a track has the same UUID in every process.
 _NAMESPACE: Final = uuid.UUID("6f1b3f0a-6f53-4d5e-9c0e-5b2f3f8a7c11")
 _RELIABILITY: Final = {"confirmed": 1.0, "coasting": 0.5, "tentative": 0.25}
-# A regular 24-gon about a circle reaches 0.9 % beyond it.
-_ROUND: Final = 1.02
+# The 24-sided polygon of a circle reaches 0.9 % beyond it; a longer one is stretched.
+_ROUND_REACH_RATIO: Final = 1.02
 
 
 def circle_objects(
     constraints: NavConstraints, *, frame_id: str = "odom"
 ) -> tuple[CircleObject, ...]:
-    """``nav2_msgs/CircleObject``, filled and occupied, one a person.
+    """Return one ``nav2_msgs/CircleObject`` per person, filled and occupied.
 
-    A track keeps its UUID, so that a shape in the vector-object server is replaced and not added.
-    The circle contains the obstacle's polygon.
+    A track keeps its UUID, so that the vector-object server replaces its shape instead of adding
+    another. The circle contains the obstacle's polygon.
     """
     return tuple(
         CircleObject(
@@ -65,10 +65,10 @@ def circle_objects(
 
 
 def teb_obstacles(constraints: NavConstraints, *, frame_id: str = "odom") -> ObstacleArrayMsg:
-    """``costmap_converter_msgs/ObstacleArrayMsg`` for TEB: moving circles, or moving polygons.
+    """Return ``costmap_converter_msgs/ObstacleArrayMsg`` for TEB: moving circles or polygons.
 
-    One corner and a radius is a circle there; an obstacle drawn out along the motion is sent with
-    its corners instead. The velocity is in the frame of the header.
+    One corner and a radius is a circle. An obstacle that is stretched along the motion has its
+    corners instead. The velocity is in the frame of the header.
     """
     top = header(constraints.stamp_s, frame_id)
     obstacles = []
@@ -90,15 +90,15 @@ def teb_obstacles(constraints: NavConstraints, *, frame_id: str = "odom") -> Obs
 def people(
     constraints: NavConstraints, tracks: Iterable[PersonTrack] = (), *, frame_id: str = "odom"
 ) -> People:
-    """``people_msgs/People`` with awareness and radius in the tags.
+    """Return ``people_msgs/People`` with awareness and radius in the tags.
 
-    Tags of everybody: ``awareness_lower`` (acted on), ``radius_m``; of people with a track also
-    ``awareness``, ``awareness_std``, ``status`` and ``time_since_seen_s``. ``reliability`` is 1 for
-    a confirmed track, 0.5 for a coasting one, 0.25 for a tentative one, 0 for a person who is only
-    remembered.
+    Every person has the tags ``awareness_lower`` (the bound that was used) and ``radius_m``, and
+    with a track also ``awareness``, ``awareness_std``, ``status`` and ``time_since_seen_s``. The
+    ``reliability`` is 1 for a confirmed track, 0.5 for a coasting one, 0.25 for a tentative one,
+    and 0 for a person without a track, whom the adapter still keeps.
     """
     by_id = {track.id: track for track in tracks}
-    everybody = []
+    persons = []
     for each in constraints.obstacles:
         tags = {
             "awareness_lower": f"{each.awareness_lower:.3f}",
@@ -112,7 +112,7 @@ def people(
                 "status": track.status,
                 "time_since_seen_s": f"{track.time_since_seen_s:.3f}",
             }
-        everybody.append(
+        persons.append(
             Person(
                 str(each.track_id),
                 Point(*each.center_odom_m.tolist()),
@@ -122,14 +122,14 @@ def people(
                 tuple(tags.values()),
             )
         )
-    return People(header(constraints.stamp_s, frame_id), tuple(everybody))
+    return People(header(constraints.stamp_s, frame_id), tuple(persons))
 
 
 def detections(constraints: NavConstraints, *, frame_id: str = "odom") -> Detection3DArray:
-    """``vision_msgs/Detection3DArray``: the paper's 3-D boxes, sized by awareness.
+    """Return ``vision_msgs/Detection3DArray``: the paper's 3-D boxes, sized by awareness.
 
-    Hypotheses of each: ``"person"`` with score 1, and ``"aware_person"`` with the lower bound of α
-    that was acted on.
+    Each has two hypotheses: ``"person"`` with score 1, and ``"aware_person"`` with the lower bound
+    of α that was used.
     """
     top = header(constraints.stamp_s, frame_id)
     found = []
@@ -153,10 +153,10 @@ def detections(constraints: NavConstraints, *, frame_id: str = "odom") -> Detect
 
 
 def _reach_m(obstacle: PersonObstacle) -> float:
-    """Farthest corner of the polygon from the centre."""
+    """Return the largest distance of a corner of the polygon from the centre."""
     corners = np.asarray(obstacle.polygon.exterior.coords)[:, :2]
     return float(np.linalg.norm(corners - obstacle.center_odom_m, axis=1).max())
 
 
 def _is_round(obstacle: PersonObstacle) -> bool:
-    return _reach_m(obstacle) <= _ROUND * obstacle.radius_m
+    return _reach_m(obstacle) <= _ROUND_REACH_RATIO * obstacle.radius_m

@@ -13,15 +13,16 @@ from perception.arrays import FloatArray
 from .._constraints import NavConstraints
 from .._robot import RobotProfile, RobotState
 from ._speed_limit import SLOWEST_MPS
-from ._stamps import header
+from .conversions import header
 from .messages.geometry_msgs import Point32, PolygonInstance, PolygonInstanceStamped, PolygonStamped
 from .messages.geometry_msgs import Polygon as PolygonMessage
 
 #: Id of the polygon that stops the robot; tracks have ids from 0.
 STOP_POLYGON_ID: Final = -1
-# A point on the border of a zone may count as outside of it.
-_WITHIN: Final = 0.8
-# Where that polygon waits: behind every zone around a robot, near enough for single precision.
+# The stop polygon is smaller than the footprint, since points on a zone's border may be outside.
+_STOP_POLYGON_SCALE: Final = 0.8
+# Distance of that polygon while the robot may move: outside every zone around the robot, but near
+# enough for single precision.
 _PARKED_M: Final = 1000.0
 
 
@@ -33,29 +34,29 @@ def collision_polygons(
     odom_frame: str = "odom",
     base_frame: str = "base_link",
 ) -> tuple[PolygonInstanceStamped, ...]:
-    """``geometry_msgs/PolygonInstanceStamped`` for a polygon source of the collision monitor.
+    """Return ``geometry_msgs/PolygonInstanceStamped``, a polygon source for the collision monitor.
 
-    One a person, and last the stop polygon, always and under the same id: a little less than the
-    robot's own footprint when the limit is below what :func:`speed_limit` can send, so that it lies
-    within every stop zone, and a copy a kilometre behind the robot otherwise. That keeps the source
-    alive while nobody is there (the monitor stops for a source that is silent), and silent is what
-    it is when this process dies.
+    There is one per person, and last the stop polygon, which is always sent and keeps its id. If
+    the limit is below what :func:`speed_limit` can send, it is a little smaller than the robot's
+    footprint, so that it lies within every stop zone. Otherwise it is a kilometre behind the robot.
+    It keeps the source alive while nobody is there: the monitor stops for a silent source, and the
+    source is silent if this process ends.
 
-    People come farthest first: the monitor's reader queues no more than a few messages and drops
-    the oldest, so that what is lost in a crowd is far away.
+    The farthest people come first: the monitor queues only a few messages and drops the oldest, so
+    in a crowd it loses the farthest people.
 
     Args:
         constraints: people and limit.
-        robot: its footprint.
-        robot_state: to order people by distance; None leaves their order.
+        robot: the robot, for its footprint.
+        robot_state: to order people by distance; None keeps their order.
         odom_frame: frame of the people.
         base_frame: frame of the footprint.
     """
     obstacles = list(constraints.obstacles)
     if robot_state is not None:
-        place = robot_state.position_odom_m
+        robot_m = robot_state.position_odom_m
         obstacles.sort(
-            key=lambda each: each.radius_m - float(np.linalg.norm(each.center_odom_m - place))
+            key=lambda each: each.radius_m - float(np.linalg.norm(each.center_odom_m - robot_m))
         )
     people = [
         _instance(each.polygon, each.track_id, constraints.stamp_s, odom_frame)
@@ -75,11 +76,11 @@ def stop_zone(
     *,
     base_frame: str = "base_link",
 ) -> PolygonStamped:
-    """``geometry_msgs/PolygonStamped``: where a robot that brakes now will still come.
+    """Return ``geometry_msgs/PolygonStamped``: the area that a robot passes when it brakes now.
 
-    The footprint, drawn out along the direction of travel by reaction and braking distance
-    v·T + v²/2a (decision 8 without the person): a stop zone for the collision monitor's
-    ``polygon_sub_topic`` that grows with speed.
+    It is the footprint, stretched along the direction of travel by the stopping distance
+    v·T + v²/2a (decision 8 without the person): a stop zone that grows with speed, for the
+    collision monitor's ``polygon_sub_topic``.
     """
     reach = abs(speed_mps) * robot.reaction_time_s + speed_mps**2 / (
         2.0 * robot.max_deceleration_mps2
@@ -91,10 +92,11 @@ def stop_zone(
 
 
 def _within_footprint(robot: RobotProfile) -> FloatArray:
+    """Return the corners (M, 2) of the footprint's hull, scaled about its centroid."""
     hull = MultiPoint(robot.footprint_m).convex_hull
     middle = np.array(hull.centroid.coords[0])
     corners = np.asarray(hull.exterior.coords)[:-1]
-    return np.asarray(middle + _WITHIN * (corners - middle), dtype=np.float64)
+    return np.asarray(middle + _STOP_POLYGON_SCALE * (corners - middle), dtype=np.float64)
 
 
 def _instance(
@@ -106,6 +108,6 @@ def _instance(
 
 
 def _polygon(shape: Any) -> PolygonMessage:
-    """Without the repeated last corner of shapely."""
+    """Return a shapely polygon as a message, without the repeated last corner."""
     ring = np.asarray(shape.exterior.coords)[:-1, :2]
     return PolygonMessage(tuple(Point32(x, y, 0.0) for x, y in ring.tolist()))

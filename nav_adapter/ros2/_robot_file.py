@@ -1,4 +1,4 @@
-"""The robot of a bridge, in one YAML file."""
+"""The robot file of the bridge: profile and camera mount in one YAML file."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ _Corner = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
 class CameraMount(StrictConfig):
-    """Where a fixed camera sits.
+    """Position and direction of a fixed camera.
 
     Attributes:
         position_base_m: x, y, z of its optical centre in the base frame, metres; the base frame
             lies on the floor.
-        yaw_deg: how far it looks to the left of straight ahead.
-        pitch_down_deg: how far it looks down.
+        yaw_deg: angle to the left of straight ahead.
+        pitch_down_deg: angle below the horizontal.
     """
 
     error: ClassVar[type[ValueError]] = NavError
@@ -58,15 +58,15 @@ class CameraMount(StrictConfig):
 
 
 class RobotFile(StrictConfig):
-    """What ``awarenav bridge --robot`` reads.
+    """The file that ``awarenav bridge --robot`` reads.
 
     Attributes:
         footprint_m: corners x, y in the base frame, metres.
-        max_speed_mps: > 0.01, the fastest that the controller is configured for.
+        max_speed_mps: > 0.01, the maximum that the controller is configured with.
         max_acceleration_mps2: > 0.
-        max_deceleration_mps2: > 0, the braking that can be relied on.
-        reaction_time_s: ≥ 0, exposure to start of braking.
-        camera: where the camera sits; without it tf has to say.
+        max_deceleration_mps2: > 0, a deceleration that the brakes always reach.
+        reaction_time_s: ≥ 0, from exposure to the start of braking.
+        camera: mount of the camera; without it the pose is read from tf.
     """
 
     error: ClassVar[type[ValueError]] = NavError
@@ -79,7 +79,11 @@ class RobotFile(StrictConfig):
     camera: CameraMount | None = None
 
     def profile(self) -> RobotProfile:
-        """As the adapter takes it; raises :class:`NavError` for a footprint without area."""
+        """Return the robot's profile.
+
+        Raises:
+            NavError: for a footprint without area.
+        """
         return RobotProfile(
             footprint_m=np.array(self.footprint_m),
             max_speed_mps=self.max_speed_mps,

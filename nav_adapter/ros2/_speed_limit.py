@@ -1,4 +1,4 @@
-"""The speed limit in a form that Nav2's controllers read as what it is."""
+"""The speed limit as a message that Nav2's controllers do not misread."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from perception.arrays import finite_number
 
 from .._constraints import NavConstraints
 from .._errors import NavError
-from ._stamps import header
+from .conversions import header
 from .messages.nav2_msgs import SpeedLimit
 
-#: The slowest limit that is sent: 0.0 would lift every limit (nav2_costmap_2d NO_SPEED_LIMIT).
+#: The lowest limit that is sent: 0.0 would remove every limit (nav2_costmap_2d NO_SPEED_LIMIT).
 SLOWEST_MPS: Final = 0.01
-# DWB keeps its previous limit when it gets an absolute one at or above its maximum.
+# DWB keeps its previous limit if it gets an absolute one at or above its maximum.
 _BELOW_MAXIMUM: Final = 0.999
 
 
@@ -24,22 +24,22 @@ def speed_limit(
     percentage: bool = False,
     frame_id: str = "",
 ) -> SpeedLimit:
-    """``nav2_msgs/SpeedLimit``, in m/s or in per cent.
+    """Return ``nav2_msgs/SpeedLimit``, in m/s or in per cent.
 
-    What is sent is never 0.0, which Nav2 reads as "no limit": a stop becomes 0.01 m/s here, and the
-    stop polygon (:func:`collision_polygons`) makes the collision monitor stand still. It is never
-    above 99.9 % of the maximum: MPPI and RPP would raise their maximum to it, and DWB would ignore
-    it and keep an old one. A limit is rounded toward neither side otherwise.
+    The value is never 0.0, which Nav2 reads as "no limit". A stop becomes 0.01 m/s, and the stop
+    polygon (:func:`collision_polygons`) makes the collision monitor stop the robot. The value is
+    never above 99.9 % of the maximum: MPPI and RPP would raise their maximum to it, and DWB would
+    ignore it and keep an old limit. Other limits are not rounded.
 
     Args:
-        constraints: the limit, and when.
+        constraints: the limit and its stamp.
         max_speed_mps: of the robot, > 0.01; with ``percentage`` it must be the maximum that the
             controller is configured with (``vx_max``, ``desired_linear_vel``, ``max_speed_xy``).
-        percentage: send per cent of that instead of m/s.
-        frame_id: of the header; Nav2 does not look at it.
+        percentage: send per cent of the maximum instead of m/s.
+        frame_id: of the header; Nav2 does not use it.
 
     Raises:
-        NavError: a maximum that is not finite or no more than 0.01 m/s.
+        NavError: for a maximum that is not finite or at most 0.01 m/s.
     """
     maximum = finite_number(
         "max_speed_mps", max_speed_mps, NavError, minimum=SLOWEST_MPS, exclusive_minimum=True

@@ -1,4 +1,4 @@
-"""The topics of the bridge: names, types and qualities of service, in one table."""
+"""The topics of the bridge: names, types and quality of service."""
 
 from __future__ import annotations
 
@@ -26,10 +26,11 @@ class Topic:
 
     Attributes:
         name: ROS name without a leading slash.
-        message: its type.
-        reliable: reliable, else best effort. A reliable publisher matches every subscriber.
-        transient_local: late subscribers get the last message, else volatile.
-        depth: messages kept.
+        message: type of the messages.
+        reliable: True for reliable, False for best effort. A reliable publisher matches every
+            subscriber.
+        transient_local: True if late subscribers get the last message, False for volatile.
+        depth: number of messages kept.
     """
 
     name: str
@@ -39,7 +40,7 @@ class Topic:
     depth: int = 10
 
 
-#: What the bridge publishes, by key.
+#: The topics that the bridge publishes, by key.
 PUBLISHED: Final = MappingProxyType(
     {
         "speed_limit": Topic("speed_limit", SpeedLimit),
@@ -53,12 +54,12 @@ PUBLISHED: Final = MappingProxyType(
         "people": Topic("people", People, depth=1),
         "detections": Topic("awarenav/detections", Detection3DArray, depth=1),
         "markers": Topic("awarenav/markers", MarkerArray, depth=1),
-        # Each alert is in one message only: room for two seconds of them.
+        # Each alert is in one message only, so the depth covers two seconds and more.
         "alerts": Topic("awarenav/alerts", DiagnosticArray, depth=64),
     }
 )
 
-#: What the bridge reads, by key. Best effort matches every publisher; old frames are worth nothing.
+#: The topics that the bridge reads, by key. Best effort matches every publisher.
 READ: Final = MappingProxyType(
     {
         "image": Topic("camera/image_raw", Image, reliable=False, depth=1),
@@ -74,10 +75,10 @@ READ: Final = MappingProxyType(
 
 
 def renamed(topic: Topic, name: str) -> Topic:
-    """The same topic under another name, as ROS writes it (``/robot1/odom``).
+    """Return the topic with another name, as written in ROS (``/robot1/odom``).
 
     Raises:
-        NavError: a name that ROS would not take.
+        NavError: for a name that ROS does not allow.
     """
     bare = name.strip("/")
     parts = bare.split("/")
@@ -86,7 +87,7 @@ def renamed(topic: Topic, name: str) -> Topic:
         for part in parts
     ):
         raise NavError(
-            f"a topic must consist of letters, digits, _ and /, no part starting with a digit, "
+            "a topic must consist of letters, digits, _ and /, with no part starting with a digit, "
             f"got {name!r}"
         )
     return replace(topic, name=bare)

@@ -1,4 +1,4 @@
-"""Frames over time, from tf and odometry."""
+"""Transforms between frames over time, from tf and odometry."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from perception.arrays import FloatArray, finite_number, rigid_transform
 from .._errors import NavError
 
 _KEPT_S: Final = 5.0
-#: A transform stands for instants at most so much later than itself.
+#: The newest transform is used for at most this long after its stamp.
 HOLD_S: Final = 0.1
 
 
 class TransformBuffer:
-    """Remembers transforms of the last 5 s and gives those between any two frames of a tree.
+    """Stores the transforms of the last 5 s and looks up those between any two frames of a tree.
 
-    Between two stamps it interpolates; the newest transform stands for up to 0.1 s after it, the
-    oldest for nothing before it. Static transforms hold for all time.
+    It interpolates between two stamps. The newest transform is used for up to 0.1 s after its
+    stamp; there is no extrapolation before the oldest. Static transforms hold at all times.
     """
 
     def __init__(self) -> None:
@@ -38,12 +38,13 @@ class TransformBuffer:
         *,
         static: bool = False,
     ) -> None:
-        """Remember where ``child`` was in ``parent``.
+        """Store the pose of ``child`` in ``parent``.
 
-        A frame has one parent; a transform with another one replaces what was known of the frame.
+        A frame has one parent. A transform with another parent replaces the frame's history.
 
         Raises:
-            NavError: no rigid transform, a stamp that is not finite, or a loop of frames.
+            NavError: for a matrix that is not a rigid transform, a stamp that is not finite, or a
+                loop of frames.
         """
         parent, child = parent.lstrip("/"), child.lstrip("/")
         T = rigid_transform("T_parent_child", T_parent_child, NavError)
@@ -60,37 +61,40 @@ class TransformBuffer:
             del history[0]
 
     def lookup(self, target: str, source: str, stamp_s: float) -> FloatArray:
-        """T_target_source (4, 4) at an instant.
+        """Return T_target_source (4, 4) at ``stamp_s``.
 
         Raises:
-            NavError: the frames are not connected, or not known at that instant.
+            NavError: for frames that are not connected, or not known at that time.
         """
         stamp = finite_number("stamp_s", stamp_s, NavError)
         target, source = target.lstrip("/"), source.lstrip("/")
-        up, down = self._path(source), self._path(target)
-        common = next((frame for frame in up if frame in down), None)
+        source_path, target_path = self._path(source), self._path(target)
+        common = next((frame for frame in source_path if frame in target_path), None)
         if common is None:
             raise NavError(
                 f"no transform between {source!r} and {target!r}: known are "
                 f"{', '.join(f'{p} -> {c}' for c, p in self._parents.items()) or 'none'}"
             )
-        T_common_source = self._down_to(up[: up.index(common)], stamp)
-        T_common_target = self._down_to(down[: down.index(common)], stamp)
+        T_common_source = self._chain(source_path[: source_path.index(common)], stamp)
+        T_common_target = self._chain(target_path[: target_path.index(common)], stamp)
         return np.asarray(np.linalg.inv(T_common_target) @ T_common_source, dtype=np.float64)
 
     def _path(self, frame: str) -> list[str]:
+        """Return the frame and all its ancestors, up to the root."""
         path = [frame]
         while path[-1] in self._parents:
             path.append(self._parents[path[-1]])
         return path
 
-    def _down_to(self, children: list[str], stamp: float) -> FloatArray:
+    def _chain(self, children: list[str], stamp: float) -> FloatArray:
+        """Return the pose of the first child in the parent of the last."""
         T = np.eye(4)
         for child in children:
             T = self._at(child, stamp) @ T
         return T
 
     def _at(self, child: str, stamp: float) -> FloatArray:
+        """Return the pose of a frame in its parent."""
         history = self._histories[child]
         after = bisect_right(history, stamp, key=lambda entry: entry[0])
         if child in self._static or (after > 0 and history[after - 1][0] == stamp):

@@ -1,10 +1,11 @@
-"""The bridge as an rclpy node, for machines with ROS 2: the same topics, ROS's own clock.
+"""The bridge as an rclpy node, for computers with ROS 2: the same topics, with ROS's clock.
 
 Run it with ``python -m nav_adapter.ros2.node --ros-args -p robot_file:=robot.yaml``. Parameters:
-``robot_file`` (needed), ``policy`` (``balanced``), ``rate_hz`` (20.0), ``compressed`` (false),
-``percentage`` (false), ``detector_file`` and ``pose_file`` (ONNX; else the networks in the box,
-which are made for the simulator), ``odom_frame``, ``base_frame``, ``camera_frame``. ROS's remapping
-renames topics. Imports without ROS; making the node then says what is missing.
+``robot_file`` (required), ``policy`` (``balanced``), ``rate_hz`` (20.0), ``compressed`` (false),
+``percentage`` (false), ``detector_file`` and ``pose_file`` (ONNX; by default the shipped networks,
+which are trained for the simulator), ``odom_frame``, ``base_frame``, ``camera_frame``. Topics are
+renamed by ROS's remapping. The module can be imported without ROS; the node then raises an error
+that says what is missing.
 """
 
 from __future__ import annotations
@@ -27,8 +28,8 @@ from .._policy import AwarenessPolicy
 from ._bridge import AwarenessBridge
 from ._outgoing import Frames
 from ._robot_file import RobotFile
-from ._ros_values import from_ros, ros_class, to_ros
 from ._topics import PUBLISHED, READ, Topic
+from .conversions import from_ros, ros_class, to_ros
 from .messages import Message, ros_type
 from .messages.nav_msgs import Odometry
 from .messages.sensor_msgs import CameraInfo, CompressedImage, Image
@@ -39,19 +40,19 @@ try:
     from rclpy.node import Node
     from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
     from rclpy.signals import SignalHandlerOptions
-except ImportError:  # importable all the same: __init__ says what is missing
+except ImportError:  # AwarenessNode says what is missing
     rclpy = None
     Node = object
 
 
 class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
-    """Camera and odometry in, everything of :data:`~nav_adapter.ros2.PUBLISHED` out.
+    """Reads camera and odometry, publishes the topics of :data:`~nav_adapter.ros2.PUBLISHED`.
 
     A topic whose message package is not installed (``people_msgs``, ``costmap_converter_msgs``,
-    ``vision_msgs``) is left out with a warning; ``nav2_msgs`` is needed.
+    ``vision_msgs``) is left out with a warning; ``nav2_msgs`` is required.
 
     Raises:
-        NavError: no rclpy, no ``nav2_msgs``, or a parameter that is wrong.
+        NavError: without rclpy or ``nav2_msgs``, or for a wrong parameter.
     """
 
     def __init__(self) -> None:
@@ -99,7 +100,7 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
         self.create_timer(1.0 / self._parameter("rate_hz", 20.0), self._tick)
 
     def stop(self) -> None:
-        """Publish a stop, before leaving."""
+        """Publish a stop, before the node ends."""
         self._bridge.stop(self._now_s(), "the awarenav node has ended")
 
     def _tick(self) -> None:
@@ -144,9 +145,9 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
 
 
 def main() -> int:
-    """Run the node until Ctrl-C; 0 well, 2 bad input."""
+    """Run the node until Ctrl-C; return 0, or 2 for bad input."""
     if rclpy is not None:
-        # Its own handlers would shut ROS down before the last stop is out.
+        # rclpy's own signal handlers would shut ROS down before the last stop is published.
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = AwarenessNode()
@@ -166,7 +167,7 @@ def main() -> int:
 
 
 def _pipelines(detector_file: str, pose_file: str) -> Callable[[Camera], AwarenessPipeline]:
-    """Makes the pipeline of these networks; files are read at once, to fail at once."""
+    """Return a function that makes a pipeline with these networks, which are loaded here."""
     detector = OnnxPersonDetector(detector_file) if detector_file else None
     pose = OnnxPoseEstimator(pose_file) if pose_file else None
     return lambda camera: AwarenessPipeline(camera, detector, pose)

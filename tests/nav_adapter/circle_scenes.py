@@ -1,4 +1,4 @@
-"""Constraints made of circles alone, for tests of what planners read."""
+"""Constraints made of circles, for the tests of the exporters."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def some_circles(
 
 
 def stretched(circle: Circle, ahead_m: float) -> PersonObstacle:
-    """A person whose obstacle reaches ahead along the velocity."""
+    """Return a person whose obstacle reaches ahead along the velocity."""
     x, y, vx, vy, radius = circle
     speed_mps = math.hypot(vx, vy)
     tip = Point(x + ahead_m * vx / speed_mps, y + ahead_m * vy / speed_mps)

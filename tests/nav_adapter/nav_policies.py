@@ -1,4 +1,4 @@
-"""Random policies of every family, and random robots."""
+"""Random policies of every kind, and random robots."""
 
 from __future__ import annotations
 

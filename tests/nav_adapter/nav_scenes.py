@@ -1,4 +1,4 @@
-"""Robots, people and walks that the tests of the adapter share."""
+"""Robots and people for the tests of the adapter."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def moved_robot(state: RobotState, angle_rad: float, shift_m: FloatArray) -> Rob
 
 
 def numbers(constraints: NavConstraints) -> tuple[object, ...]:
-    """All that a planner can read from constraints, in comparable form."""
+    """Return all values of the constraints, in comparable form."""
     return (
         constraints.stamp_s,
         constraints.speed_limit_mps,
@@ -114,13 +114,15 @@ def finite(low: float, high: float) -> st.SearchStrategy[float]:
 
 @st.composite
 def covariances(draw: st.DrawFn) -> FloatArray:
-    root = np.array(draw(st.lists(finite(-0.4, 0.4), min_size=16, max_size=16))).reshape(4, 4)
+    """Any covariance (4, 4), from its lower triangular root."""
+    root = np.zeros((4, 4))
+    root[np.tril_indices(4)] = draw(st.lists(finite(-0.6, 0.6), min_size=10, max_size=10))
     return root @ root.T
 
 
 @st.composite
 def crowds(draw: st.DrawFn, stamp_s: float = 0.0, max_size: int = 4) -> tuple[PersonTrack, ...]:
-    """People of every status, some seen and some not, each with an id of their own."""
+    """People of every status, some seen and some not, with distinct ids."""
     ids = draw(st.lists(st.integers(0, 30), max_size=max_size, unique=True))
     return tuple(
         PersonTrack(

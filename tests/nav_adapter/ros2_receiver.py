@@ -1,7 +1,8 @@
-"""A process that knows nothing of this library: receives topics by types made from .msg files.
+"""A receiver without this library: reads topics with types made from .msg files.
 
-``python ros2_receiver.py SECONDS name=type …`` prints one JSON object a message, and "ready" first.
-Types come from rosbags' registry and the definitions in ros2_scenes.
+``python ros2_receiver.py SECONDS TOPICS DEFINITIONS`` prints "ready", then one JSON object per
+message. TOPICS (name to type) and DEFINITIONS (type to text) are JSON objects; types come from
+rosbags' registry and from DEFINITIONS.
 """
 
 from __future__ import annotations
@@ -60,7 +61,7 @@ def main(seconds: float, wanted: dict[str, str], definitions: dict[str, str]) ->
     waitset = WaitSet(participant)
     readers = {}
     for name, kind in wanted.items():
-        # As Nav2 subscribes: see the table in docs/nav2.md.
+        # Nav2's quality of service: see the table in docs/nav2.md.
         latched = kind.endswith("OccupancyGrid")
         best_effort = kind.endswith("PolygonInstanceStamped")
         qos = Qos(

@@ -1,4 +1,4 @@
-"""Messages, people and independent definitions that the tests of nav_adapter.ros2 share."""
+"""Messages, people and independent definitions for the tests of nav_adapter.ros2."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tracking import PersonTrack
 
 STAMP_S = 1_700_000_000.25
 
-# Packages that rosbags does not bring along, from their own .msg files.
+# Messages that rosbags does not ship, from their .msg files.
 DEFINITIONS = {
     "nav2_msgs/msg/SpeedLimit": "std_msgs/Header header\nbool percentage\nfloat64 speed_limit\n",
     "nav2_msgs/msg/CircleObject": "std_msgs/Header header\nunique_identifier_msgs/UUID uuid\n"
@@ -43,7 +43,7 @@ DEFINITIONS = {
 
 
 def typestore() -> Any:
-    """rosbags' types of ROS 2 Jazzy and the packages above: nothing of ours."""
+    """Return rosbags' types of ROS 2 Jazzy and those above, independent of this library."""
     store = get_typestore(Stores.ROS2_JAZZY)
     for name, text in DEFINITIONS.items():
         store.register(get_types_from_msg(text, name))
@@ -59,21 +59,21 @@ def crowd(stamp_s: float = STAMP_S) -> tuple[PersonTrack, ...]:
 
 
 def constraints(stamp_s: float = STAMP_S) -> NavConstraints:
-    """What the adapter makes of that crowd."""
+    """Return the adapter's constraints for that crowd."""
     adapter = NavAdapter(AwarenessPolicy.preset("balanced"), ROBOT)
     return adapter.update(crowd(stamp_s), robot_at(stamp_s, speed_mps=0.5), stamp_s)
 
 
 def everything(stamp_s: float = STAMP_S) -> list[tuple[str, Message]]:
-    """One instant on every topic."""
+    """Return the messages of one update on every topic."""
     state = robot_at(stamp_s, position=(0.3, -0.2), speed_mps=0.5)
     return list(outgoing(constraints(stamp_s), crowd(stamp_s), ROBOT, state, Frames()))
 
 
 def plain(value: Any) -> Any:
-    """A message of any library as nested dicts and lists of Python's own types."""
+    """Return a message of any library as nested dicts and lists of Python's own types."""
     if dataclasses.is_dataclass(value):
-        # rosbags counts a type's constants and its name among the fields.
+        # In rosbags a type's constants and its name are fields too.
         names = [field.name for field in dataclasses.fields(value)]
         return {name: plain(getattr(value, name)) for name in names if name[0].islower()}
     if isinstance(value, bytes):
@@ -87,7 +87,7 @@ def plain(value: Any) -> Any:
 
 
 def loopback_environment(domain: int | None = None) -> dict[str, str]:
-    """Processes that see each other on loopback only, in a domain of their own."""
+    """Return an environment for processes on loopback only, in a domain of their own."""
     interface = '<NetworkInterface name="lo" multicast="false"/>'
     uri = (
         f"<CycloneDDS><Domain><General><Interfaces>{interface}</Interfaces>"

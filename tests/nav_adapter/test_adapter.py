@@ -1,3 +1,5 @@
+"""The adapter at one time: radii, limits, refusals and invariances."""
+
 from __future__ import annotations
 
 import math
@@ -29,12 +31,12 @@ WALK = st.lists(crowds(), min_size=1, max_size=4)
 
 
 def at(tracks: tuple[PersonTrack, ...], stamp_s: float) -> tuple[PersonTrack, ...]:
-    """The same people, ``stamp_s`` later."""
+    """Return the same people, ``stamp_s`` later."""
     return tuple(replace(track, stamp_s=track.stamp_s + stamp_s) for track in tracks)
 
 
 def settled(alpha: float, *, position: tuple[float, float], seconds: float = 2.0) -> NavConstraints:
-    """Constraints after a person with this α has stood in view for a while."""
+    """Return the constraints after a person with this α has stood in view for a while."""
     adapter = NavAdapter(AwarenessPolicy(), ROBOT)
     for step in range(round(seconds / 0.05) + 1):
         now = 0.05 * step
@@ -66,7 +68,7 @@ def test_one_person_in_closed_form() -> None:
     assert result.speed_limit_mps < 0.5 * float(limit)
 
 
-def test_nobody_means_the_robots_own_maximum() -> None:
+def test_without_people_the_limit_is_the_robots_maximum() -> None:
     result = NavAdapter(AwarenessPolicy(), ROBOT).update((), robot_at(), 0.0)
     assert result.obstacles == ()
     assert (result.speed_limit_mps, result.limited_by) == (1.5, "robot maximum")
@@ -88,7 +90,7 @@ def test_awareness_never_enlarges_an_obstacle_and_never_slows_the_robot(
 
 
 @given(walk=WALK, angle=finite(-7.0, 7.0), shift=st.tuples(finite(-50, 50), finite(-50, 50)))
-def test_the_world_may_be_turned_and_shifted(
+def test_rotating_and_shifting_the_world_changes_no_constraint(
     walk: list[tuple[PersonTrack, ...]], angle: float, shift: tuple[float, float]
 ) -> None:
     here = NavAdapter(AwarenessPolicy(), ROBOT)
@@ -141,7 +143,7 @@ def test_floor_and_ceiling_hold_for_anyone(
 
 
 class Own:
-    """A user's policy that gives whatever it was told to."""
+    """A custom policy with given values."""
 
     def __init__(
         self, radius: Callable[[float], float] = lambda _: 0.7, speed: float | None = 1.0
@@ -173,9 +175,7 @@ def test_the_floor_holds_for_any_policy_object(radius: float) -> None:
         ({"speed": Own(speed=None)}, "must be a number, got NoneType"),
     ],
 )
-def test_own_policies_without_meaning_are_refused_by_name(
-    policy: dict[str, Own], message: str
-) -> None:
+def test_invalid_custom_policies_are_refused_by_name(policy: dict[str, Own], message: str) -> None:
     with pytest.raises(NavError, match=message):
         NavAdapter(AwarenessPolicy(**policy), ROBOT)
 
@@ -194,7 +194,7 @@ def test_a_policy_that_fails_later_leaves_the_adapter_as_it_was() -> None:
     assert numbers(adapter.update(*later)) == numbers(twin.update(*later))
 
 
-def test_a_runner_is_faster_than_the_policy_assumes() -> None:
+def test_a_runner_counts_with_the_speed_of_the_track() -> None:
     def limit(velocity: tuple[float, float], alpha: float) -> float:
         track = person(position=(5.0, 0.0), velocity=velocity, awareness_lower=alpha)
         return (
@@ -214,13 +214,13 @@ def test_a_runner_is_faster_than_the_policy_assumes() -> None:
 
 
 @given(sigma=finite(0.0, 1.0), x=finite(0.5, 6.0))
-def test_uncertainty_costs_room_and_speed(sigma: float, x: float) -> None:
+def test_uncertainty_enlarges_the_obstacle_and_lowers_the_limit(sigma: float, x: float) -> None:
     def constraints(sigma_m: float) -> NavConstraints:
         track = person(position=(x, 0.0), sigma_m=sigma_m)
         return NavAdapter(AwarenessPolicy(), ROBOT).update((track,), robot_at(), 0.0)
 
-    sure, unsure = constraints(0.0), constraints(sigma)
-    assert unsure.obstacles[0].radius_m == pytest.approx(sure.obstacles[0].radius_m + 2 * sigma)
+    exact, uncertain = constraints(0.0), constraints(sigma)
+    assert uncertain.obstacles[0].radius_m == pytest.approx(exact.obstacles[0].radius_m + 2 * sigma)
     limit = max_speed_mps(
         max(x - 0.3625, 0.0) - BODY_RADIUS_M - 2.0 * sigma,
         1.6,
@@ -228,7 +228,7 @@ def test_uncertainty_costs_room_and_speed(sigma: float, x: float) -> None:
         reaction_time_s=0.3,
         clearance_m=0.1,
     )
-    assert unsure.speed_limit_mps == pytest.approx(min(1.5, float(limit)), abs=1e-9)
+    assert uncertain.speed_limit_mps == pytest.approx(min(1.5, float(limit)), abs=1e-9)
 
 
 def test_the_most_uncertain_direction_counts() -> None:
@@ -243,8 +243,8 @@ def test_the_most_uncertain_direction_counts() -> None:
     assert result.obstacles[0].radius_m == pytest.approx(1.0 + 2.0 * sigma)
 
 
-def test_people_are_carried_on_but_never_out_of_the_way() -> None:
-    """A person last seen walking away may have turned round: the robot gains no speed by it."""
+def test_people_are_predicted_but_never_farther_away() -> None:
+    """A person last seen walking away may have turned round, so the limit does not rise."""
 
     def constraints(vx: float, now: float) -> NavConstraints:
         adapter = NavAdapter(AwarenessPolicy(), ROBOT)
@@ -259,7 +259,7 @@ def test_people_are_carried_on_but_never_out_of_the_way() -> None:
     assert standing.speed_limit_mps < constraints(0.0, 0.0).speed_limit_mps
 
 
-def test_an_older_robot_state_counts_the_way_driven_since() -> None:
+def test_the_distance_driven_since_the_robot_state_counts() -> None:
     def limit(speed: float, age: float) -> float:
         adapter = NavAdapter(AwarenessPolicy(), ROBOT)
         return adapter.update(
@@ -315,10 +315,10 @@ def test_wrong_constructor_arguments_are_refused() -> None:
 
 @pytest.mark.parametrize("alpha", [0.0, 1.0])
 def test_a_robot_that_obeys_stands_before_an_approaching_person_arrives(alpha: float) -> None:
-    """The loop closed: the person walks at the assumed speed, the drive follows the limit.
+    """Closed loop: the person walks at the assumed speed, and the drive follows the limit.
 
-    The drive acts on constraints that are one period old, up to a whole period later, and brakes no
-    harder than the profile says. Both delays together lie within the reaction time.
+    The drive uses constraints that are one period old for one more period, and brakes no harder
+    than the profile says. Both delays together are within the reaction time.
     """
     period, policy = 0.05, AwarenessPolicy()
     human = policy.speed.human_speed_mps(alpha)

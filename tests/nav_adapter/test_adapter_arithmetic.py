@@ -1,4 +1,4 @@
-"""The adapter's short cuts change no bit: what is unchecked would pass, what is shared is equal."""
+"""The adapter's optimisations change no bit of its results."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FEW = settings(max_examples=30)
 
 @FEW
 @given(policy=policies(), robot=robots(), people=crowds(max_size=6), speed=finite(-1.5, 1.5))
-def test_obstacles_are_those_that_the_constructor_would_take(
+def test_unchecked_obstacles_pass_the_checks_of_the_constructor(
     policy: AwarenessPolicy, robot: RobotProfile, people: tuple[PersonTrack, ...], speed: float
 ) -> None:
     constraints = NavAdapter(policy, robot).update(people, robot_at(0.0, speed_mps=speed), 0.0)
@@ -37,14 +37,14 @@ def test_obstacles_are_those_that_the_constructor_would_take(
 
 @FEW
 @given(policy=policies(), robot=robots(), people=crowds(max_size=6), speed=finite(-1.5, 1.5))
-def test_the_limit_of_a_crowd_is_the_least_of_its_people_to_the_bit(
+def test_the_limit_of_a_crowd_is_the_lowest_of_its_people_to_the_bit(
     policy: AwarenessPolicy, robot: RobotProfile, people: tuple[PersonTrack, ...], speed: float
 ) -> None:
     state = robot_at(0.0, heading_rad=0.7, speed_mps=speed)
 
     def limit(some: tuple[PersonTrack, ...]) -> tuple[float, str, bool]:
-        given = NavAdapter(policy, robot).update(some, state, 0.0, perception_stamp_s=0.0)
-        return given.speed_limit_mps, given.limited_by, given.braking_suffices
+        result = NavAdapter(policy, robot).update(some, state, 0.0, perception_stamp_s=0.0)
+        return result.speed_limit_mps, result.limited_by, result.braking_suffices
 
     alone = [limit((each,)) for each in sorted(people, key=lambda each: each.id)]
     together = limit(people)
@@ -55,20 +55,20 @@ def test_the_limit_of_a_crowd_is_the_least_of_its_people_to_the_bit(
 
 
 @pytest.mark.parametrize(
-    "wild",
+    "huge",
     [
         person(0.0, velocity=(1e308, 0.0)),
         person(0.0, position=(-1e308, 0.0), velocity=(-1e308, 0.0)),
     ],
 )
-def test_numbers_that_overflow_on_the_way_are_refused_without_a_trace(wild: PersonTrack) -> None:
-    """A float may hold a track's numbers and yet not where it is half a minute on."""
+def test_numbers_that_overflow_are_refused_and_change_nothing(huge: PersonTrack) -> None:
+    """A track's numbers may be finite while its prediction for 30 s is not."""
     adapter, other = (NavAdapter(AwarenessPolicy.preset("balanced"), ROBOT) for _ in range(2))
-    sound, state = person(0.0, position=(2.0, 0.5)), robot_at(0.0, speed_mps=0.5)
+    valid, state = person(0.0, position=(2.0, 0.5)), robot_at(0.0, speed_mps=0.5)
     for each in (adapter, other):
-        each.update([sound], state, 0.0)
+        each.update([valid], state, 0.0)
     with np.errstate(all="ignore"), pytest.raises(NavError, match="must be finite"):
-        adapter.update([sound, replace(wild, id=7)], robot_at(30.0), 30.0)
+        adapter.update([valid, replace(huge, id=7)], robot_at(30.0), 30.0)
     later = person(30.1, position=(2.0, 0.5)), robot_at(30.1)
     assert numbers(adapter.update(later[:1], later[1], 30.1)) == numbers(
         other.update(later[:1], later[1], 30.1)

@@ -1,4 +1,4 @@
-"""What the adapter does as time passes: shrinking, losing the camera, holding, staleness."""
+"""The adapter over time: shrinking, losing the camera, holding, staleness."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ HELD_S = AwarenessPolicy().timing.shrink_after_s
 
 
 def watch(adapter: NavAdapter, seconds: float, *, start_s: float = 0.0) -> list[NavConstraints]:
-    """An attentive person in full view at 20 Hz."""
+    """Show an attentive person at 20 Hz."""
     results = []
     for step in range(round(seconds / PERIOD_S)):
         now = start_s + step * PERIOD_S
@@ -42,14 +42,14 @@ def test_a_person_starts_large_and_shrinks_at_the_bounded_rate() -> None:
     assert radii[0] == 1.0
     steps = [before - after for before, after in pairwise(radii)]
     assert max(steps) <= RATE_MPS * PERIOD_S + 1e-9
-    # Not before awareness has held: four frames from the second on, the first being unaware.
+    # Not before awareness has held for four frames, from the second on: the first is unaware.
     assert radii[4] == 1.0
     assert radii[5] == pytest.approx(1.0 - RATE_MPS * PERIOD_S)
     assert radii[10] == pytest.approx(1.0 - RATE_MPS * (0.5 - HELD_S))
     assert radii[-1] == pytest.approx(0.45)
 
 
-def test_a_glance_shorter_than_the_hold_shrinks_nothing() -> None:
+def test_a_look_shorter_than_shrink_after_s_shrinks_nothing() -> None:
     adapter = NavAdapter(AwarenessPolicy(), ROBOT)
     for step in range(60):
         now = step * PERIOD_S
@@ -59,8 +59,8 @@ def test_a_glance_shorter_than_the_hold_shrinks_nothing() -> None:
 
 
 @pytest.mark.parametrize("late_s", [0.0, 0.2, 0.3, 0.45])
-def test_frames_that_come_late_take_back_the_doubt_of_first_sight(late_s: float) -> None:
-    """A slow camera still says where somebody is; only its word on awareness is too old."""
+def test_late_frames_reduce_the_uncertainty_of_the_first_sighting(late_s: float) -> None:
+    """A slow camera still shows the position; only its evidence of awareness is too old."""
     adapter = NavAdapter(AwarenessPolicy(), ROBOT)
     radii = []
     for step in range(60):
@@ -73,7 +73,7 @@ def test_frames_that_come_late_take_back_the_doubt_of_first_sight(late_s: float)
     assert max(before - after for before, after in pairwise(radii)) <= RATE_MPS * PERIOD_S + 1e-9
 
 
-def test_what_comes_late_proves_no_awareness() -> None:
+def test_late_frames_are_no_evidence_of_awareness() -> None:
     adapter = NavAdapter(AwarenessPolicy(), ROBOT)
     for step in range(60):
         now = step * PERIOD_S
@@ -83,7 +83,7 @@ def test_what_comes_late_proves_no_awareness() -> None:
         assert result.obstacles[0].awareness_lower == 0.0
 
 
-def test_growth_is_instant() -> None:
+def test_obstacles_grow_at_once() -> None:
     adapter = NavAdapter(AwarenessPolicy(), ROBOT)
     watch(adapter, 2.0)
     result = adapter.update((person(2.0, awareness_lower=0.0),), robot_at(2.0), 2.0)
@@ -91,14 +91,16 @@ def test_growth_is_instant() -> None:
 
 
 @pytest.mark.parametrize("control_period_s", [0.01, 0.03, 0.1, 0.2])
-def test_shrinking_follows_the_clock_not_the_number_of_updates(control_period_s: float) -> None:
-    """A 20 Hz camera and a control loop of another rate: the same radius after the same time."""
+def test_shrinking_depends_on_time_and_not_on_the_number_of_updates(
+    control_period_s: float,
+) -> None:
+    """With a 20 Hz camera, any rate of the control loop gives the same radius at the same time."""
     adapter = NavAdapter(AwarenessPolicy(), ROBOT)
     for step in range(round(0.6 / control_period_s) + 1):
         now = step * control_period_s
         frame = PERIOD_S * int(now / PERIOD_S + 1e-9)
         result = adapter.update((person(frame, awareness_lower=1.0),), robot_at(now), now)
-    # Whether the first frame counts as aware depends on whether it is looked at twice.
+    # The first frame counts as aware only if there are two updates with it.
     late_s = max(control_period_s, PERIOD_S)
     expected = 1.0 - RATE_MPS * (0.6 - HELD_S)
     assert radius(result) == pytest.approx(expected, abs=RATE_MPS * late_s + 1e-9)
@@ -107,7 +109,7 @@ def test_shrinking_follows_the_clock_not_the_number_of_updates(control_period_s:
 Loss = Callable[[float, float], PersonTrack]
 
 LOSSES: dict[str, Loss] = {
-    # The tracker is asked to predict, or is updated with empty frames, or nobody asks it.
+    # The tracker predicts, or gets empty frames, or is not called.
     "predicted": lambda lost, now: person(
         now, status="confirmed", awareness_lower=1.0, unseen_s=now - lost
     ),
@@ -124,7 +126,7 @@ LOSSES: dict[str, Loss] = {
 def test_losing_the_camera_never_shrinks_a_radius(
     loss: Loss, seen_s: float, period_s: float
 ) -> None:
-    """Also not in the middle of a shrink, and not in the first moments after the loss."""
+    """Not even while it is shrinking, or right after the loss."""
     adapter = NavAdapter(AwarenessPolicy(), ROBOT)
     before = watch(adapter, seen_s)[-1]
     lost = before.stamp_s
@@ -150,7 +152,7 @@ def test_losing_the_camera_never_shrinks_a_radius(
         max_size=20,
     )
 )
-def test_a_radius_shrinks_only_by_what_new_frames_pay_for(
+def test_a_radius_shrinks_only_by_the_time_in_new_frames(
     walk: list[tuple[float, str | None, float, float, str]],
 ) -> None:
     """Any sequence of frames, repeats, predictions and disappearances."""
@@ -172,9 +174,9 @@ def test_a_radius_shrinks_only_by_what_new_frames_pay_for(
         (after,) = result.obstacles
         assert after.radius_m >= FLOOR_M
         if before is not None:
-            paid = RATE_MPS * (frame - previous) if latest.status == "confirmed" else 0.0
+            shrink_m = RATE_MPS * (frame - previous) if latest.status == "confirmed" else 0.0
             # Frames that came while the track was absent count once, when it is back.
-            assert after.radius_m >= before.radius_m - paid - 1e-9
+            assert after.radius_m >= before.radius_m - shrink_m - 1e-9
             if frame == previous:
                 assert after.radius_m >= before.radius_m
                 assert after.awareness_lower <= before.awareness_lower
@@ -191,7 +193,9 @@ def test_a_radius_shrinks_only_by_what_new_frames_pay_for(
         ({"status": "tentative"}, False),
     ],
 )
-def test_whose_awareness_counts(changes: dict[str, object], trusted: bool) -> None:
+def test_awareness_counts_only_for_tracks_seen_recently(
+    changes: dict[str, object], trusted: bool
+) -> None:
     track = replace(person(awareness_lower=1.0), **changes)
     result = NavAdapter(AwarenessPolicy(), ROBOT).update((track,), robot_at(), 0.0)
     unaware = NavAdapter(AwarenessPolicy(), ROBOT).update((person(),), robot_at(), 0.0)
@@ -199,7 +203,7 @@ def test_whose_awareness_counts(changes: dict[str, object], trusted: bool) -> No
     assert (result.speed_limit_mps > unaware.speed_limit_mps) is trusted
 
 
-def test_a_confirmed_person_who_vanishes_is_held_unaware_and_moving() -> None:
+def test_a_confirmed_person_who_disappears_is_held_as_unaware_and_moving() -> None:
     adapter = NavAdapter(AwarenessPolicy(), ROBOT)
     for step in range(41):
         now = step * PERIOD_S
@@ -218,12 +222,12 @@ def test_a_confirmed_person_who_vanishes_is_held_unaware_and_moving() -> None:
     assert adapter.update((), robot_at(3.01), 3.01).obstacles == ()
 
 
-def test_a_person_who_is_back_goes_on_from_the_radius_held() -> None:
+def test_a_person_who_returns_continues_with_the_held_radius() -> None:
     adapter = NavAdapter(AwarenessPolicy(), ROBOT)
     watch(adapter, 2.0)
     adapter.update((), robot_at(2.3), 2.3)
     back = adapter.update((person(2.6, awareness_lower=1.0),), robot_at(2.6), 2.6)
-    # One sighting proves nothing about the absence.
+    # One sighting is no evidence for the time of the absence.
     assert radius(back) == 1.0
     for step in range(1, 6):
         now = 2.6 + step * PERIOD_S
@@ -231,8 +235,8 @@ def test_a_person_who_is_back_goes_on_from_the_radius_held() -> None:
     assert radius(back) == pytest.approx(1.0 - RATE_MPS * 2 * PERIOD_S)
 
 
-def test_two_levels_in_a_loop() -> None:
-    """Between the levels the person stays what they were; without evidence they are unaware."""
+def test_two_levels_over_time() -> None:
+    """Between the thresholds the level stays the same; without evidence it is unaware."""
     levels = {"shape": "two_level", "unaware_below": 0.2, "aware_above": 0.6}
     policy = AwarenessPolicy(inflation=levels, speed=levels)
     adapter, limits, radii = NavAdapter(policy, ROBOT), [], []
@@ -255,7 +259,7 @@ def test_two_levels_in_a_loop() -> None:
 
 
 @given(seen_sigmas=finite(0.0, 3.0), unseen_sigmas=finite(0.0, 4.0), sigma_m=finite(0.0, 0.4))
-def test_a_place_out_of_sight_is_doubted_more(
+def test_unseen_people_count_with_more_standard_deviations(
     seen_sigmas: float, unseen_sigmas: float, sigma_m: float
 ) -> None:
     margins = SafetyMargins(uncertainty_sigmas=seen_sigmas, unseen_sigmas=unseen_sigmas)
@@ -279,24 +283,24 @@ def test_a_place_out_of_sight_is_doubted_more(
         assert limit_mps(unseen_s) == pytest.approx(expected_mps, abs=1e-9)
 
 
-def test_a_long_silence_does_not_blow_people_up() -> None:
-    """A walker tracked with some doubt of their velocity, then nothing for half a minute."""
+def test_obstacles_stop_growing_during_a_long_silence() -> None:
+    """A walker with an uncertain velocity, then no input for half a minute."""
     walker = person(position=(6.0, 0.0), velocity=(0.0, 1.0), sigma_m=0.1)
-    doubt = np.diag([0.01, 0.01, 0.09, 0.09])
+    covariance = np.diag([0.01, 0.01, 0.09, 0.09])
     adapter = NavAdapter(AwarenessPolicy(), ROBOT)
-    adapter.update((replace(walker, covariance_odom=doubt),), robot_at(), 0.0)
+    adapter.update((replace(walker, covariance_odom=covariance),), robot_at(), 0.0)
     for step in range(1, 31):
         result = adapter.watchdog(float(step))
     assert result.speed_limit_mps == 0.0
     sigma_m = math.sqrt(0.01 + 1.5**2 * 0.09)
     assert radius(result) == pytest.approx(1.0 + 2.0 * sigma_m)
     silent = NavAdapter(AwarenessPolicy(), ROBOT)
-    silent.update((replace(walker, covariance_odom=doubt),), robot_at(), 0.0)
+    silent.update((replace(walker, covariance_odom=covariance),), robot_at(), 0.0)
     back = silent.update((person(30.0, awareness_lower=1.0),), robot_at(30.0), 30.0)
     assert radius(back) == pytest.approx(1.2)
 
 
-def test_a_tentative_or_long_unseen_person_is_let_go_at_once() -> None:
+def test_a_tentative_or_long_unseen_person_is_not_held() -> None:
     adapter = NavAdapter(AwarenessPolicy(), ROBOT)
     tracks = (
         person(status="tentative"),
@@ -331,7 +335,7 @@ def test_old_data_are_never_looser_than_fresh_ones(
         assert f"{age:.2f} s old" in old.limited_by or min(perception_age, robot_age) > 1.5
 
 
-def test_the_newest_track_stands_in_for_the_stamp_of_perception() -> None:
+def test_without_a_stamp_of_perception_the_newest_track_counts() -> None:
     adapter = NavAdapter(AwarenessPolicy(), ROBOT)
     tracks = (person(0.0, awareness_lower=1.0), person(0.3, track_id=2, awareness_lower=1.0))
     assert not adapter.update(tracks, robot_at(0.7), 0.7).stale
@@ -357,7 +361,7 @@ def test_the_limit_for_a_braking_robot_falls_no_faster_than_it_can_brake() -> No
     assert result.reachable_speed_limit_mps == pytest.approx(1.2 - 0.1)
 
 
-def test_memory_is_bounded_by_the_people_about() -> None:
+def test_memory_is_bounded_by_the_people_present() -> None:
     adapter = NavAdapter(AwarenessPolicy(), ROBOT)
     for step in range(400):
         now = step * 0.1

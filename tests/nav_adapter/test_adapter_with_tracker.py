@@ -1,4 +1,4 @@
-"""The adapter behind the real tracker: one attentive person, a camera, and its loss."""
+"""The adapter with the real tracker: one attentive person, and the loss of the camera."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tracking import PersonTrack, PersonTracker, TrackerConfig
 PERIOD_S = 0.05
 POLICY = AwarenessPolicy()
 
-# On the robot's post, looking along odom x: optical z forward, x right, y down.
+# On the robot's mast, looking along odom x: optical z forward, x right, y down.
 T_ODOM_CAMERA = np.array(
     [[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 1.4], [0.0, 0.0, 0.0, 1.0]]
 )
@@ -60,7 +60,7 @@ def test_losing_the_camera_for_a_second_never_shrinks_a_radius(loss: str, seen_s
         tracks = LOSSES[loss](tracker, now) if loss in LOSSES else last_tracks
         after = adapter.update(tracks, robot_at(now), now)
         for a in before.obstacles:
-            # A person seen for a moment only may be let go, but not shrink.
+            # A person seen only for a moment may be dropped, but must not shrink.
             for b in (o for o in after.obstacles if o.track_id == a.track_id):
                 assert b.radius_m >= a.radius_m
                 assert b.awareness_lower <= a.awareness_lower

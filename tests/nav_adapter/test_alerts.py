@@ -1,4 +1,4 @@
-"""Who is warned, when, and not too often."""
+"""Alerts: the people, the kinds and the limit on how often."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def warned(
 @pytest.mark.parametrize(
     ("x_m", "kind"), [(1.5, "horn"), (3.0, "voice"), (4.5, "light"), (5.5, None)]
 )
-def test_the_nearer_the_louder(x_m: float, kind: str | None) -> None:
+def test_a_nearer_person_gets_a_louder_alert(x_m: float, kind: str | None) -> None:
     alerts = warned(person(position=(x_m, 0.0)))
     assert [alert.kind for alert in alerts] == ([] if kind is None else [kind])
     for alert in alerts:
@@ -38,7 +38,7 @@ def test_the_nearer_the_louder(x_m: float, kind: str | None) -> None:
 
 
 def test_a_crossing_course_in_closed_form() -> None:
-    """Robot along x at 1 m/s, person along −y at 1 m/s: nearest at t = 2.5 s, 0.71 m apart."""
+    """Robot along x at 1 m/s, person along −y at 1 m/s: nearest at 2.5 s, 0.71 m apart."""
     (alert,) = warned(person(position=(2.0, 3.0), velocity=(0.0, -1.0)))
     assert alert.time_to_closest_s == pytest.approx(2.5)
     gap = 0.5 * 2.0**0.5 - ROBOT.circumscribed_radius_m - BODY_RADIUS_M
@@ -57,18 +57,18 @@ def test_a_crossing_course_in_closed_form() -> None:
     ],
     ids=["aware", "tentative", "behind", "beside", "faster away", "same velocity"],
 )
-def test_who_is_not_warned(track: PersonTrack) -> None:
+def test_people_without_a_conflict_are_not_warned(track: PersonTrack) -> None:
     assert warned(track) == ()
 
 
-def test_a_standing_robot_and_a_policy_without_alerts_are_silent() -> None:
+def test_a_standing_robot_or_a_policy_without_alerts_warns_nobody() -> None:
     coming = person(position=(2.0, 0.0), velocity=(-1.0, 0.0))
     assert len(warned(coming)) == 1
     assert warned(coming, speed_mps=0.0) == ()
     assert warned(coming, policy=AwarenessPolicy(alerts=None)) == ()
 
 
-def test_stale_data_warn_nobody() -> None:
+def test_with_stale_data_nobody_is_warned() -> None:
     adapter = NavAdapter(AwarenessPolicy(), ROBOT)
     result = adapter.update(
         (person(position=(2.0, 0.0)),), robot_at(1.0, speed_mps=1.0), 1.0, perception_stamp_s=0.0
@@ -80,12 +80,12 @@ def test_stale_data_warn_nobody() -> None:
 def test_the_most_urgent_person_gets_the_horn_first() -> None:
     near, nearer = person(position=(1.8, 0.0)), person(position=(1.2, 0.1), track_id=2)
     alerts = warned(near, nearer)
-    # The second sound has to wait its turn.
+    # The second sound has to wait for ``quiet_s``.
     assert [(alert.track_id, alert.kind) for alert in alerts] == [(2, "horn")]
 
 
 @given(people=crowds(max_size=3), rates=st.lists(finite(0.05, 0.4), min_size=1, max_size=20))
-def test_alerts_are_rate_limited(people: tuple[PersonTrack, ...], rates: list[float]) -> None:
+def test_alerts_are_limited_in_rate(people: tuple[PersonTrack, ...], rates: list[float]) -> None:
     adapter, now = NavAdapter(AwarenessPolicy(), ROBOT), 0.0
     given_s: dict[tuple[int, str], float] = {}
     sounded_s = -100.0

@@ -1,3 +1,5 @@
+"""People painted into a costmap, against every cell computed with shapely."""
+
 from __future__ import annotations
 
 import math
@@ -21,7 +23,7 @@ def constraints_for(*tracks: PersonTrack) -> NavConstraints:
 def brute_force(
     costmap: np.ndarray, origin: np.ndarray, resolution: float, constraints: NavConstraints
 ) -> np.ndarray:
-    """Every cell against every obstacle, with shapely's distances."""
+    """Return the costs of every cell and every obstacle, with shapely's distances."""
     out = costmap.copy()
     height, width = costmap.shape
     column, row = np.meshgrid(np.arange(width), np.arange(height))
@@ -49,7 +51,7 @@ def brute_force(
     width=st.integers(1, 70),
     seed=st.integers(0, 2**32 - 1),
 )
-def test_costs_are_those_of_brute_force(
+def test_costs_agree_with_brute_force(
     tracks: tuple[PersonTrack, ...],
     origin: tuple[float, float],
     resolution: float,
@@ -61,19 +63,19 @@ def test_costs_are_those_of_brute_force(
     costmap = rng.choice(np.array([0, 1, 100, 253, 254, 255], dtype=np.uint8), (height, width))
     constraints = constraints_for(*tracks)
     expected = brute_force(costmap, np.asarray(origin), resolution, constraints)
-    # On a slice of a larger map: neither strides nor neighbours may matter.
+    # On a slice of a larger map: strides and neighbours must not matter.
     frame = np.full((height + 2, 2 * width + 2), 7, dtype=np.uint8)
     view = frame[1:-1, 1:-1:2]
     view[:] = costmap
     assert paint_costmap(view, origin, resolution, constraints) is view
-    # Two ways to the same distance may end on either side of a whole cost.
+    # Two ways to compute a distance may round to either side of a whole cost.
     assert np.abs(view.astype(int) - expected.astype(int)).max(initial=0) <= 1
     assert np.array_equal(view >= 254, expected >= 254)
     view[:] = 7
     assert (frame == 7).all()
 
 
-def test_axes() -> None:
+def test_rows_are_y_and_columns_are_x() -> None:
     costmap = np.zeros((40, 100), dtype=np.uint8)
     # The radius is 1.04 m.
     paint_costmap(
@@ -86,7 +88,7 @@ def test_axes() -> None:
     assert costmap[25, 70 + 16] == 0
 
 
-def test_a_coarse_grid_misses_nobody() -> None:
+def test_a_coarse_grid_shows_every_person() -> None:
     costmap = np.zeros((4, 4), dtype=np.uint8)
     paint_costmap(costmap, (0.0, 0.0), 5.0, constraints_for(person(position=(12.4, 2.6))))
     costmap_far = np.zeros((4, 4), dtype=np.uint8)
@@ -99,7 +101,7 @@ def test_a_coarse_grid_misses_nobody() -> None:
     ("position", "origin"),
     [((1e12, -1e12), (0.0, 0.0)), ((3.0, 0.0), (1e15, 1e15)), ((-2.0, -2.0), (0.0, 0.0))],
 )
-def test_people_off_the_map_leave_it_as_it_is(
+def test_people_off_the_map_change_nothing(
     position: tuple[float, float], origin: tuple[float, float]
 ) -> None:
     costmap = np.full((20, 20), 3, dtype=np.uint8)
@@ -107,7 +109,7 @@ def test_people_off_the_map_leave_it_as_it_is(
     assert (costmap == 3).all()
 
 
-def test_people_at_no_place_and_maps_without_cells() -> None:
+def test_a_map_without_cells_and_a_map_without_people() -> None:
     empty = np.zeros((0, 5), dtype=np.uint8)
     assert paint_costmap(empty, (0, 0), 0.1, constraints_for(person())).shape == (0, 5)
     costmap = np.full((5, 5), 9, dtype=np.uint8)
@@ -128,7 +130,7 @@ def test_people_at_no_place_and_maps_without_cells() -> None:
         ({"decay_per_m": 0.0}, "decay_per_m must lie in"),
     ],
 )
-def test_input_without_meaning_is_refused(changes: dict[str, object], message: str) -> None:
+def test_invalid_input_is_refused(changes: dict[str, object], message: str) -> None:
     costmap = np.zeros((50, 50), dtype=np.uint8)
     arguments = {"costmap": costmap, "origin_odom_m": (0.0, 0.0), "resolution_m": 0.1}
     constraints = constraints_for(person(position=(2.0, 2.0)))

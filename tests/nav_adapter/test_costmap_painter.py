@@ -1,3 +1,5 @@
+"""People painted into a persistent costmap and removed again."""
+
 from __future__ import annotations
 
 import math
@@ -21,7 +23,7 @@ COSTS = np.array([0, 1, 100, 253, 254, 255], dtype=np.uint8)
     inscribed_radius_m=finite(0, 0.7),
     seed=st.integers(0, 2**32 - 1),
 )
-def test_only_the_last_people_are_in_the_map(
+def test_only_the_people_of_the_last_update_are_in_the_map(
     crowds: list[list[Circle]], inscribed_radius_m: float, seed: int
 ) -> None:
     static = np.random.default_rng(seed).choice(COSTS, (90, 70))
@@ -47,12 +49,12 @@ def test_only_the_last_people_are_in_the_map(
     assert painter.clear() == ()
 
 
-def test_what_others_write_meanwhile_stays() -> None:
+def test_values_written_by_other_code_stay() -> None:
     costmap = np.zeros((60, 60), dtype=np.uint8)
     painter = CostmapPainter(costmap, (0.0, 0.0), 0.1)
     painter.update(constraints_of((3.0, 3.0, 0.0, 0.0, 1.0)))
     assert costmap[30, 30] == 254
-    costmap[28:33, 30] = 77  # a laser saw something there, and in a free corner
+    costmap[28:33, 30] = 77  # another layer writes here, and in a free corner
     costmap[0, 0] = 200
     painter.clear()
     expected = np.zeros_like(costmap)
@@ -60,7 +62,7 @@ def test_what_others_write_meanwhile_stays() -> None:
     assert np.array_equal(costmap, expected)
 
 
-def test_a_rolling_map_is_cleared_before_it_moves() -> None:
+def test_a_rolling_map_must_be_cleared_before_it_moves() -> None:
     costmap = np.zeros((60, 60), dtype=np.uint8)
     painter = CostmapPainter(costmap, (0.0, 0.0), 0.1)
     people = constraints_of((3.0, 3.0, 0.0, 0.0, 0.6))
@@ -80,7 +82,7 @@ def test_a_rolling_map_is_cleared_before_it_moves() -> None:
     ring_m=finite(0.0, 1.0),
     decay_per_m=st.sampled_from([1.0, 3.0, 10.0]),
 )
-def test_the_profile_is_that_of_the_inflation_layer(
+def test_the_cost_profile_is_that_of_the_inflation_layer(
     inscribed_m: float, ring_m: float, decay_per_m: float
 ) -> None:
     """nav2_costmap_2d/inflation_layer.hpp, computeCost, with distances from the circle's edge."""
@@ -112,20 +114,20 @@ def test_the_profile_is_that_of_the_inflation_layer(
 
 @settings(max_examples=30)
 @given(circles=some_circles(2, 6, reach_m=40.0))
-def test_sharing_a_window_changes_nothing(circles: list[Circle]) -> None:
+def test_a_shared_window_has_the_same_costs(circles: list[Circle]) -> None:
     """People far apart are painted one by one, people close by together."""
     together = np.zeros((400, 400), dtype=np.uint8)
     paint_costmap(together, (-40.0, -40.0), 0.2, constraints_of(*circles))
     one_by_one = np.zeros_like(together)
     for circle in circles:
         paint_costmap(one_by_one, (-40.0, -40.0), 0.2, constraints_of(circle))
-    # The same cell seen from another corner is rounded otherwise.
+    # Coordinates relative to another corner round differently.
     assert np.abs(together.astype(int) - one_by_one).max() <= 1
     assert np.array_equal(together == 254, one_by_one == 254)
 
 
 @pytest.mark.parametrize("decay_per_m", [1e-300, 1e-9, 1e9, 1e300])
-def test_extreme_decays_are_no_trouble(decay_per_m: float) -> None:
+def test_extreme_decays_work(decay_per_m: float) -> None:
     costmap = np.zeros((60, 60), dtype=np.uint8)
     paint_costmap(
         costmap, (0, 0), 0.1, constraints_of((3.0, 3.0, 0, 0, 1.0)), decay_per_m=decay_per_m
@@ -142,7 +144,9 @@ def test_extreme_decays_are_no_trouble(decay_per_m: float) -> None:
         ({"resolution_m": 0.0}, "resolution_m must lie in"),
     ],
 )
-def test_a_painter_without_a_map_is_refused(changes: dict[str, object], message: str) -> None:
+def test_a_painter_with_invalid_arguments_is_refused(
+    changes: dict[str, object], message: str
+) -> None:
     arguments = {
         "costmap": np.zeros((5, 5), dtype=np.uint8),
         "origin_odom_m": (0, 0),

@@ -1,3 +1,5 @@
+"""The shapes of the obstacles: circles, points, polygons and boxes."""
+
 from __future__ import annotations
 
 import math
@@ -30,7 +32,7 @@ def constraints_for(tracks: tuple[PersonTrack, ...]) -> NavConstraints:
 
 
 @given(tracks=crowds(), spacing_m=finite(0.01, 2.0))
-def test_every_shape_says_the_same(tracks: tuple[PersonTrack, ...], spacing_m: float) -> None:
+def test_all_shapes_agree(tracks: tuple[PersonTrack, ...], spacing_m: float) -> None:
     constraints = constraints_for(tracks)
     rows = circles(constraints)
     assert rows.shape == (len(tracks), 5)
@@ -44,7 +46,7 @@ def test_every_shape_says_the_same(tracks: tuple[PersonTrack, ...], spacing_m: f
         assert [vx, vy] == obstacle.velocity_odom_mps.tolist()
         assert radius == obstacle.radius_m
 
-        # The polygon holds the circle and is hardly larger.
+        # The polygon contains the circle and is hardly larger.
         inner = polygon.exterior.distance(Point(x, y))
         outer = shapely.hausdorff_distance(polygon, Point(x, y))
         assert inner == pytest.approx(radius, rel=1e-9)
@@ -64,7 +66,7 @@ def test_every_shape_says_the_same(tracks: tuple[PersonTrack, ...], spacing_m: f
     assert len(perimeter) == 0
 
 
-def test_nobody() -> None:
+def test_without_people_every_shape_is_empty() -> None:
     assert circles(NOBODY).shape == (0, 5)
     assert points(NOBODY, 0.1).shape == (0, 2)
     assert boxes(NOBODY).shape == (0, 7)
@@ -72,6 +74,6 @@ def test_nobody() -> None:
 
 
 @given(spacing_m=st.sampled_from([0.0, -1.0, 1e-9, math.nan, math.inf]))
-def test_a_spacing_without_meaning_is_refused(spacing_m: float) -> None:
+def test_an_invalid_spacing_is_refused(spacing_m: float) -> None:
     with pytest.raises(NavError, match="spacing_m must"):
         points(constraints_for((person(),)), spacing_m)

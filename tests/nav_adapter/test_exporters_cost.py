@@ -1,3 +1,5 @@
+"""Costs of sampled trajectories, and predicted circles."""
+
 from __future__ import annotations
 
 import math
@@ -56,18 +58,20 @@ def test_the_cost_is_the_formula_summed_over_people(
 
 
 @given(circles=some_circles(1, 3), direction_rad=finite(-math.pi, math.pi))
-def test_nearer_is_dearer_and_inside_dearest(circles: list[Circle], direction_rad: float) -> None:
+def test_cost_rises_towards_a_person_and_most_inside(
+    circles: list[Circle], direction_rad: float
+) -> None:
     constraints = constraints_of(circles[0])
     x, y, _, _, radius = circles[0]
-    way_m = np.linspace(0.0, radius + 3.0, 50)
+    distance_m = np.linspace(0.0, radius + 3.0, 50)
     ray = np.array([math.cos(direction_rad), math.sin(direction_rad)])
-    cost = people_cost(constraints, ([x, y] + way_m[:, None] * ray)[:, None], 0.1)[:, 0]
+    cost = people_cost(constraints, ([x, y] + distance_m[:, None] * ray)[:, None], 0.1)[:, 0]
     assert (np.diff(cost) < 0.0).all()
-    assert cost[way_m < radius - 1e-9].min() >= 1000.0
-    assert cost[way_m > radius + 1e-9].max() < 1.0
+    assert cost[distance_m < radius - 1e-9].min() >= 1000.0
+    assert cost[distance_m > radius + 1e-9].max() < 1.0
 
 
-def test_people_are_met_where_they_will_be() -> None:
+def test_people_count_at_their_predicted_positions() -> None:
     constraints = constraints_of((0.0, 5.0, 0.0, -1.0, 0.5))
     waiting = np.zeros((1, 101, 2))
     cost = people_cost(constraints, waiting, 0.1)[0]
@@ -76,7 +80,9 @@ def test_people_are_met_where_they_will_be() -> None:
 
 
 @given(circles=some_circles(), seed=st.integers(0, 2**32 - 1))
-def test_the_cost_turns_with_the_world_and_knows_no_order(circles: list[Circle], seed: int) -> None:
+def test_the_cost_depends_neither_on_the_frame_nor_on_the_order(
+    circles: list[Circle], seed: int
+) -> None:
     positions = np.random.default_rng(seed).uniform(-6, 6, (4, 5, 2))
     R, shift = rotation(-1.1), np.array([2.0, 7.0])
     turned = [(*(R @ c[:2] + shift), *(R @ c[2:4]), c[4]) for c in map(np.array, circles)]
@@ -98,14 +104,18 @@ def test_the_cost_turns_with_the_world_and_knows_no_order(circles: list[Circle],
         ({"robot_radius_m": -1.0}, "robot_radius_m must lie in"),
     ],
 )
-def test_a_cost_without_meaning_is_refused(changes: dict[str, object], message: str) -> None:
+def test_invalid_arguments_of_the_cost_are_refused(
+    changes: dict[str, object], message: str
+) -> None:
     arguments = {"positions_odom_m": np.zeros((1, 1, 2)), "dt_s": 0.1} | changes
     with pytest.raises(NavError, match=message):
         people_cost(constraints_of((2, 0, 0, 0, 0.5)), **arguments)  # type: ignore[arg-type]
 
 
 @given(circles=some_circles(), growth_mps=finite(0, 1), steps=st.integers(0, 5))
-def test_circles_go_on_and_grow(circles: list[Circle], growth_mps: float, steps: int) -> None:
+def test_predicted_circles_move_and_grow(
+    circles: list[Circle], growth_mps: float, steps: int
+) -> None:
     times_s = 0.3 * np.arange(steps)
     rows = predicted_circles(constraints_of(*circles), times_s, growth_mps=growth_mps)
     assert rows.shape == (len(circles), steps, 5)
@@ -118,7 +128,9 @@ def test_circles_go_on_and_grow(circles: list[Circle], growth_mps: float, steps:
 
 
 @given(circles=some_circles(0, 6), slots=st.integers(1, 5))
-def test_slots_hold_the_nearest_and_then_nobody(circles: list[Circle], slots: int) -> None:
+def test_slots_hold_the_nearest_people_and_then_empty_circles(
+    circles: list[Circle], slots: int
+) -> None:
     times_s = np.array([0.0, 0.5, 1.0])
     robot = np.array([1.0, -2.0])
     constraints = constraints_of(*circles)
@@ -149,7 +161,9 @@ def test_slots_hold_the_nearest_and_then_nobody(circles: list[Circle], slots: in
         ({"slots": 2}, "slots needs robot_position_odom_m"),
     ],
 )
-def test_a_horizon_without_meaning_is_refused(changes: dict[str, object], message: str) -> None:
+def test_invalid_arguments_of_the_horizon_are_refused(
+    changes: dict[str, object], message: str
+) -> None:
     arguments = {"times_s": [0.0]} | changes
     with pytest.raises(NavError, match=message):
         predicted_circles(constraints_of((2, 0, 0, 0, 0.5)), **arguments)  # type: ignore[arg-type]

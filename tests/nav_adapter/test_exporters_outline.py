@@ -1,4 +1,4 @@
-"""Obstacles stretched along a person's way: whatever has no velocity is stretched with them."""
+"""Obstacles stretched along the motion: every shape without a velocity is stretched too."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def constraints_with(circle: Circle, ahead_m: float) -> NavConstraints:
 
 
 @given(circle=WALKERS, ahead_m=finite(0.2, 2.0), spacing_m=finite(0.02, 1.0))
-def test_points_lie_close_together_on_the_outline(
+def test_points_are_close_together_on_the_outline(
     circle: Circle, ahead_m: float, spacing_m: float
 ) -> None:
     constraints = constraints_with(circle, ahead_m)
@@ -35,7 +35,7 @@ def test_points_lie_close_together_on_the_outline(
 
 
 @given(circle=WALKERS, ahead_m=finite(0.2, 2.0))
-def test_the_box_is_the_least_one_turned_with_the_velocity(circle: Circle, ahead_m: float) -> None:
+def test_the_box_is_the_smallest_one_along_the_velocity(circle: Circle, ahead_m: float) -> None:
     constraints = constraints_with(circle, ahead_m)
     ((x, y, z, length, width, height, yaw),) = boxes(constraints)
     assert yaw == math.atan2(circle[3], circle[2])
@@ -50,7 +50,7 @@ def test_the_box_is_the_least_one_turned_with_the_velocity(circle: Circle, ahead
 
 @settings(max_examples=25)
 @given(circle=WALKERS, ahead_m=finite(0.2, 2.0), others=st.booleans())
-def test_a_costmap_holds_the_outline_and_little_more(
+def test_the_costs_of_an_outline_follow_the_polygon(
     circle: Circle, ahead_m: float, others: bool
 ) -> None:
     long = constraints_with(circle, ahead_m)
@@ -61,7 +61,7 @@ def test_a_costmap_holds_the_outline_and_little_more(
     cells = shapely.points(0.1 * (columns + 0.5) - 5.0, 0.1 * (rows + 0.5) - 5.0)
     everything = shapely.union_all([obstacle.polygon for obstacle in both.obstacles])
     gap_m = shapely.distance(cells, everything)
-    # The circle, not the polygon about it, is what is round: 1 % less.
+    # A round obstacle is painted as its circle, 1 % smaller than the polygon around it.
     round_part = shapely.distance(cells, shapely.points(4.0, 4.0)) < 0.82 if others else False
     assert (costmap[(gap_m == 0.0) & ~np.asarray(round_part)] == 254).all()
     assert (costmap[gap_m > 0.001] < 254).all()

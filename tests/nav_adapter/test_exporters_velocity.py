@@ -1,3 +1,5 @@
+"""Half-planes and cones in velocity space."""
+
 from __future__ import annotations
 
 import math
@@ -17,7 +19,7 @@ VELOCITIES = st.tuples(finite(-2, 2), finite(-2, 2))
 
 
 def least_gap_m(circle: Circle, velocity: np.ndarray, horizon_s: float) -> float:
-    """Between a robot that starts at the origin and a person, both at constant velocity."""
+    """Return the smallest gap to a robot that starts at the origin, at constant velocities."""
     x, y, vx, vy, radius = circle
     dvx, dvy = vx - velocity[0], vy - velocity[1]
     square = dvx * dvx + dvy * dvy
@@ -27,7 +29,7 @@ def least_gap_m(circle: Circle, velocity: np.ndarray, horizon_s: float) -> float
 
 
 @given(circles=some_circles(1, 1), velocity=VELOCITIES, tried=VELOCITIES, horizon_s=finite(0.5, 8))
-def test_an_allowed_velocity_meets_nobody_within_the_horizon(
+def test_an_allowed_velocity_touches_nobody_within_the_horizon(
     circles: list[Circle],
     velocity: tuple[float, float],
     tried: tuple[float, float],
@@ -39,7 +41,7 @@ def test_an_allowed_velocity_meets_nobody_within_the_horizon(
     )
     normal = np.array([nx, ny])
     assert np.hypot(nx, ny) == pytest.approx(1.0)
-    # The tried velocity itself where it is allowed, else the nearest one that is.
+    # The tried velocity itself if it is allowed, else the nearest allowed one.
     allowed = np.array(tried) + max(bound - normal @ tried, 0.0) * normal
     assert least_gap_m(circles[0], allowed, horizon_s) >= -1e-6
 
@@ -48,7 +50,7 @@ def test_an_allowed_velocity_meets_nobody_within_the_horizon(
 def test_the_half_plane_touches_the_velocity_obstacle(
     circles: list[Circle], velocity: tuple[float, float], horizon_s: float
 ) -> None:
-    """No wider than needed: the boundary point nearest to the velocity grazes the person."""
+    """The boundary point nearest to the velocity just touches the person."""
     gap_m = least_gap_m(circles[0], np.array(velocity), horizon_s)
     assume(least_gap_m(circles[0], np.zeros(2), 0.0) > 0.01)
     ((nx, ny, bound),) = half_planes(
@@ -67,7 +69,7 @@ def test_the_half_plane_touches_the_velocity_obstacle(
     walking=VELOCITIES,
     resolve_s=finite(0.1, 2.0),
 )
-def test_a_robot_inside_is_brought_out_in_time(
+def test_a_robot_inside_an_obstacle_gets_out_in_time(
     angle_rad: float,
     depth_m: float,
     velocity: tuple[float, float],
@@ -88,11 +90,11 @@ def test_a_robot_inside_is_brought_out_in_time(
 @given(
     circles=some_circles(0, 4), velocity=VELOCITIES, horizon_s=finite(0.5, 8), share=finite(0.5, 1)
 )
-def test_half_planes_and_cones_turn_with_the_world(
+def test_half_planes_and_cones_rotate_with_the_world(
     circles: list[Circle], velocity: tuple[float, float], horizon_s: float, share: float
 ) -> None:
     for circle in circles:
-        # At a corner of the velocity obstacle the rounding may choose either side.
+        # At a corner of the velocity obstacle, rounding decides for either side.
         assume(abs(least_gap_m(circle, np.zeros(2), 0.0)) > 0.01)
         assume(abs(circle[0] * velocity[1] - circle[1] * velocity[0]) > 1e-3)
     R, shift = rotation(0.7), np.array([3.0, -8.0])
@@ -113,7 +115,7 @@ def test_half_planes_and_cones_turn_with_the_world(
 
 
 @given(circles=some_circles(1, 1), velocity=VELOCITIES)
-def test_who_shares_the_avoiding_does_that_much_less(
+def test_the_share_scales_the_change_of_velocity(
     circles: list[Circle], velocity: tuple[float, float]
 ) -> None:
     constraints = constraints_of(*circles)
@@ -126,9 +128,9 @@ def test_who_shares_the_avoiding_does_that_much_less(
     assert half[2] - now == pytest.approx(0.5 * (whole[2] - now), abs=1e-9)
 
 
-def test_half_planes_are_those_of_the_authors_library() -> None:
-    """RVO2 itself, through its Python binding; it knows no share but one half."""
-    pyrvo = pytest.importorskip("pyrvo", reason="the peer of this test is in the extra dev")
+def test_half_planes_agree_with_the_authors_library() -> None:
+    """RVO2, through its Python binding; its share is always one half."""
+    pyrvo = pytest.importorskip("pyrvo", reason="pyrvo comes with the extra dev")
     rng = np.random.default_rng(5)
     for _ in range(300):
         x, y = rng.uniform(-5, 5, 2)
@@ -156,7 +158,7 @@ def test_half_planes_are_those_of_the_authors_library() -> None:
 
 
 @given(circles=some_circles(1, 1), velocity=VELOCITIES)
-def test_a_velocity_between_the_legs_meets_the_person_some_time(
+def test_a_velocity_between_the_legs_leads_into_the_person(
     circles: list[Circle], velocity: tuple[float, float]
 ) -> None:
     assume(least_gap_m(circles[0], np.zeros(2), 0.0) > 0.01)
@@ -170,7 +172,7 @@ def test_a_velocity_between_the_legs_meets_the_person_some_time(
     assert between == (gap_m < 0.0)
 
 
-def test_nobody_and_somebody_at_the_same_place() -> None:
+def test_no_people_and_a_person_at_the_robots_position() -> None:
     assert half_planes(constraints_of(), (0, 0), (1, 0), 0.4).shape == (0, 3)
     assert velocity_obstacles(constraints_of(), (0, 0), 0.4).shape == (0, 6)
     same = constraints_of((0.0, 0.0, 0.0, 0.0, 0.5))
@@ -191,7 +193,7 @@ def test_nobody_and_somebody_at_the_same_place() -> None:
         ({"share": 0.4}, "share must lie in"),
     ],
 )
-def test_input_without_meaning_is_refused(changes: dict[str, object], message: str) -> None:
+def test_invalid_input_is_refused(changes: dict[str, object], message: str) -> None:
     arguments = {
         "position_odom_m": (0, 0),
         "velocity_odom_mps": (0, 0),

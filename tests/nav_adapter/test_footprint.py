@@ -1,3 +1,5 @@
+"""Distances from the footprint, against shapely's."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -21,7 +23,7 @@ CORNER = st.tuples(*[st.integers(-1000, 1000).map(lambda millimetres: millimetre
     heading_rad=finite(-7.0, 7.0),
     position=st.tuples(finite(-20, 20), finite(-20, 20)),
 )
-def test_distance_is_shapelys(
+def test_distances_agree_with_shapely(
     corners: list[tuple[float, float]],
     points: list[tuple[float, float]],
     heading_rad: float,
@@ -38,7 +40,7 @@ def test_distance_is_shapelys(
     np.testing.assert_allclose(ours, shapely.distance(placed, shapely.points(odom)), atol=1e-9)
 
 
-def test_a_clockwise_outline_is_the_same_robot() -> None:
+def test_a_clockwise_outline_has_the_same_distances() -> None:
     square = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
     points = np.array([[0.0, 0.0], [3.0, 0.0], [2.0, 2.0]])
     expected = [0.0, 2.0, np.sqrt(2.0)]
@@ -46,7 +48,7 @@ def test_a_clockwise_outline_is_the_same_robot() -> None:
         np.testing.assert_allclose(Footprint(outline).distance_m(points, robot_at()), expected)
 
 
-def test_a_corner_given_twice_is_one_corner() -> None:
+def test_a_corner_given_twice_changes_nothing() -> None:
     outline = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1e-200], [0.0, 1.0]])
     distance = Footprint(outline).distance_m(np.array([[3.0, 0.0], [0.2, 0.2]]), robot_at())
     np.testing.assert_allclose(distance, [2.0, 0.0])

@@ -1,4 +1,4 @@
-"""Polygons longer than their circles: ahead of who walks, and over where they may be soon."""
+"""Polygons longer than their circles: elongated ahead, or swept over the predicted motion."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ def test_elongation_is_a_capsule_along_the_motion(
     length = min(speed * ahead_s, 1.2)
     capsule = LineString([walker.position_odom_m, walker.position_odom_m + length * along])
     assert shape.buffer(1e-9).contains(capsule.buffer(1.0, quad_segs=32))
-    # Stretched by the 24 sides of its discs, and no farther.
+    # The 24 sides of the discs reach a little farther.
     assert capsule.buffer(1.02).contains(shape)
     assert reach_m(shape, across, walker) == pytest.approx(1.0, rel=0.02)
 
 
-def test_who_stands_has_no_ahead_and_who_is_aware_a_shorter_one() -> None:
+def test_a_standing_person_has_no_elongation_and_an_aware_one_a_shorter_one() -> None:
     outline = ObstacleOutline(unaware_ahead_s=1.0, aware_ahead_s=0.2)
     standing, circle = polygon(outline, person()), polygon(ObstacleOutline(), person())
     assert shapely.hausdorff_distance(standing, circle) < 1e-12
@@ -53,7 +53,7 @@ def test_who_stands_has_no_ahead_and_who_is_aware_a_shorter_one() -> None:
 
 
 def test_elongation_shrinks_at_the_bounded_rate_and_keeps_its_direction() -> None:
-    """A walker who stops dead: the polygon still points where they went, less each time."""
+    """A walker stops at once: the polygon keeps its direction and shrinks step by step."""
     policy = AwarenessPolicy(outline=ObstacleOutline(unaware_ahead_s=1.0))
     adapter, before = NavAdapter(policy, ROBOT), None
     for step in range(60):
@@ -71,25 +71,25 @@ def test_elongation_shrinks_at_the_bounded_rate_and_keeps_its_direction() -> Non
 
 
 @given(sigma=finite(0.0, 0.3), horizon=finite(0.3, 2.0), speed=finite(0.0, 1.5))
-def test_the_sweep_covers_the_predicted_motion_and_its_doubt(
+def test_the_sweep_covers_the_predicted_motion_and_its_uncertainty(
     sigma: float, horizon: float, speed: float
 ) -> None:
-    """NEES one second ahead is 3.5 of 2: the covariance there is widened by 1.75."""
+    """The NEES one second ahead is 3.5 instead of 2, so the covariance is multiplied by 1.75."""
     track = person(velocity=(0.0, speed), sigma_m=sigma)
     outline = ObstacleOutline(sweep_s=horizon)
     shape = polygon(outline, track)
     for share in (0.25, 0.5, 1.0):
         t = share * horizon
-        doubt = math.sqrt((sigma**2 + 0.05 * t**3 / 3.0) * (1.0 + 0.75 * t))
-        disc = Point(3.0, speed * t).buffer(1.0 + 2.0 * sigma + 2.0 * (doubt - sigma))
-        # The hull runs straight between its steps, where the true rim bulges by millimetres.
+        predicted_m = math.sqrt((sigma**2 + 0.05 * t**3 / 3.0) * (1.0 + 0.75 * t))
+        disc = Point(3.0, speed * t).buffer(1.0 + 2.0 * sigma + 2.0 * (predicted_m - sigma))
+        # The hull is straight between its steps, the exact outline larger by millimetres.
         assert shape.buffer(0.01).contains(disc)
     exact = reach_m(shape, np.array([0.0, 1.0]), track)
-    assert exact == pytest.approx(speed * horizon + 1.0 + 2.0 * doubt, rel=0.02)
+    assert exact == pytest.approx(speed * horizon + 1.0 + 2.0 * predicted_m, rel=0.02)
 
 
 @given(low=finite(0.0, 1.0), high=finite(0.0, 1.0))
-def test_awareness_never_lengthens(low: float, high: float) -> None:
+def test_awareness_never_lengthens_the_elongation(low: float, high: float) -> None:
     low, high = sorted((low, high))
     for shape in ("linear", "smoothstep", "logistic", "two_level"):
         outline = ObstacleOutline(unaware_ahead_s=1.0, aware_ahead_s=0.1, shape=shape)

@@ -1,3 +1,5 @@
+"""Policies: shapes, tables, rules, YAML and refusals."""
+
 from __future__ import annotations
 
 import math
@@ -24,7 +26,7 @@ ALPHA = finite(0.0, 1.0)
 
 
 class Constant:
-    """An own policy: neither a model nor a subclass of anything."""
+    """A custom policy: neither a pydantic model nor a subclass."""
 
     def radius_m(self, awareness_lower: float) -> float:
         return 0.8
@@ -34,7 +36,7 @@ class Constant:
 
 
 @given(policy=policies(), low=ALPHA, high=ALPHA)
-def test_awareness_never_enlarges_and_never_hastens(
+def test_radius_and_human_speed_never_grow_with_awareness(
     policy: AwarenessPolicy, low: float, high: float
 ) -> None:
     low, high = sorted((low, high))
@@ -61,7 +63,7 @@ def test_both_ends_are_reached_exactly(
         assert speed.human_speed_mps(1.0) == wanted
 
 
-def test_who_watches_is_told_from_who_is_merely_aware() -> None:
+def test_watching_people_have_a_lower_speed_than_aware_ones() -> None:
     speed = AwarenessPolicy().speed
     assert [speed.human_speed_mps(alpha) for alpha in (0.0, 0.6, 0.8, 1.0)] == [
         1.6,
@@ -71,12 +73,12 @@ def test_who_watches_is_told_from_who_is_merely_aware() -> None:
     ]
     assert speed.human_speed_mps(0.7) == pytest.approx(0.2)
     assert speed.human_speed_mps(float("nan")) == 1.6
-    # Without them, and up to the aware, nothing is different.
+    # Up to ``aware_above`` there is no difference.
     plain = InterpolatedHumanSpeed()
     for alpha in np.linspace(0.0, 0.6, 31):
         assert speed.human_speed_mps(alpha) == plain.human_speed_mps(alpha)
     assert plain.human_speed_mps(1.0) == 0.35
-    # A file that says something about speed says all of it.
+    # A file with the key ``speed`` replaces the whole default, watching level included.
     assert (
         AwarenessPolicy.model_validate(
             {"speed": {"aware_human_speed_mps": 0.5}}
@@ -85,7 +87,7 @@ def test_who_watches_is_told_from_who_is_merely_aware() -> None:
     )
 
 
-def test_shapes() -> None:
+def test_the_shapes_in_closed_form() -> None:
     linear = InterpolatedInflation(shape="linear", unaware_below=0.2, aware_above=0.6)
     smooth = linear.model_copy(update={"shape": "smoothstep"})
     assert linear.radius_m(0.3) == pytest.approx(1.0 - 0.25 * 0.55)
@@ -94,7 +96,7 @@ def test_shapes() -> None:
     assert linear.radius_m(float("nan")) == 1.0
     logistic = linear.model_copy(update={"shape": "logistic", "steepness": 12.0})
     assert logistic.radius_m(0.4) == pytest.approx(linear.radius_m(0.4))
-    # Steeper than a straight line in the middle, flatter at the ends, and the same from both.
+    # Steeper than a line in the middle, flatter at the ends, and symmetric.
     assert logistic.radius_m(0.25) > linear.radius_m(0.25)
     assert logistic.radius_m(0.45) < linear.radius_m(0.45)
     middle = logistic.radius_m(0.4)
@@ -103,7 +105,7 @@ def test_shapes() -> None:
     assert gentle.radius_m(0.3) == pytest.approx(linear.radius_m(0.3), abs=0.01)
 
 
-def test_two_levels_have_a_memory() -> None:
+def test_two_levels_have_hysteresis() -> None:
     levels = InterpolatedInflation(shape="two_level", unaware_below=0.2, aware_above=0.6)
     assert [levels.radius_m(alpha) for alpha in (0.0, 0.59, 0.6, 1.0)] == [1.0, 1.0, 0.45, 0.45]
     held, seen = False, []
@@ -114,7 +116,7 @@ def test_two_levels_have_a_memory() -> None:
     assert not InterpolatedInflation().holds(1.0, True)
 
 
-def test_tables() -> None:
+def test_tables_are_interpolated() -> None:
     table = TableInflation(table_m=[[0.2, 1.0], [0.4, 0.6], [0.8, 0.5]])
     given = (0.0, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0, float("nan"))
     expected = [1.0, 1.0, 0.8, 0.6, 0.55, 0.5, 0.5, 1.0]
@@ -134,13 +136,15 @@ def test_zones_and_caps_in_closed_form() -> None:
 
 
 @given(policy=policies())
-def test_yaml_round_trip(policy: AwarenessPolicy, tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_a_policy_is_the_same_after_yaml(
+    policy: AwarenessPolicy, tmp_path_factory: pytest.TempPathFactory
+) -> None:
     path = tmp_path_factory.mktemp("policy") / "policy.yaml"
     policy.to_yaml(path)
     assert AwarenessPolicy.from_yaml(path) == policy
 
 
-def test_presets() -> None:
+def test_presets_are_loaded_by_name() -> None:
     assert AwarenessPolicy.preset("balanced") == AwarenessPolicy()
     blind = AwarenessPolicy.preset("blind")
     for alpha in (0.0, 0.3, 0.7, 1.0):
@@ -169,7 +173,7 @@ def test_presets() -> None:
         ),
         (
             "speed: {shape: two_level, watching_above: 0.8, watching_human_speed_mps: 0.1}",
-            "two levels have no third",
+            "shape two_level has no watching level",
         ),
         ("speed: {unaware_below: 0.7}", "aware_above must exceed unaware_below"),
         ("inflation: {unaware_radius_m: .nan}", "inflation.unaware_radius_m"),
@@ -202,7 +206,7 @@ def test_a_bad_file_is_refused_by_name(tmp_path: Path, text: str, message: str) 
     assert "policy.yaml" in str(refusal.value)
 
 
-def test_own_policy_objects_are_taken_but_not_written(tmp_path: Path) -> None:
+def test_custom_policy_objects_are_accepted_but_not_written(tmp_path: Path) -> None:
     own = Constant()
     policy = AwarenessPolicy(inflation=own, speed=own)
     assert policy.inflation is own

@@ -1,4 +1,4 @@
-"""The figures of docs/policies.md are those of the presets, and its file is a policy."""
+"""docs/policies.md shows the figures of the presets and a valid policy file."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ DISTANCE_M = np.linspace(0.0, 6.0, 6001)
 
 
 def row(name: str) -> list[list[float]]:
-    """The numbers of a table row: for each preset its value, or the unaware and the aware one."""
+    """Return the numbers of a table row: per preset one value, or an unaware and an aware one."""
     (line,) = [line for line in TEXT.splitlines() if line.startswith(f"| {name}")]
     cells = line.strip("|").split("|")[1:]
     return [[float(number) for number in re.findall(r"\d+\.\d+", cell)] for cell in cells]
@@ -33,7 +33,7 @@ def limits(policy: AwarenessPolicy, distance_m: FloatArray) -> FloatArray:
 @pytest.mark.parametrize(
     ("column", "name"), list(enumerate(["blind", "conservative", "balanced", "assertive"]))
 )
-def test_the_table_of_presets(column: int, name: str) -> None:
+def test_the_table_of_presets_shows_their_figures(column: int, name: str) -> None:
     policy = AwarenessPolicy.preset(name)
     over_distance = limits(policy, DISTANCE_M)
     expected = {
@@ -53,7 +53,7 @@ def test_the_table_of_presets(column: int, name: str) -> None:
     assert shrinking == [policy.timing.shrink_rate_mps, policy.timing.shrink_after_s]
 
 
-def test_the_file_shown_is_a_policy() -> None:
+def test_the_file_shown_is_a_valid_policy() -> None:
     (block,) = re.findall(r"```yaml\n(.*?)```", TEXT, flags=re.DOTALL)
     policy = AwarenessPolicy.model_validate(yaml.safe_load(block))
     assert policy.rules.zones is not None

@@ -1,3 +1,5 @@
+"""The bridge: input that is missing, late, refused or damaged, and its published messages."""
+
 from __future__ import annotations
 
 import math
@@ -20,7 +22,7 @@ from nav_adapter.ros2 import (
     decode,
     encode,
 )
-from nav_adapter.ros2._stamps import to_time, yaw_quaternion
+from nav_adapter.ros2.conversions import to_time, yaw_quaternion
 from nav_adapter.ros2.messages.geometry_msgs import (
     Point,
     Pose,
@@ -45,8 +47,8 @@ INFO = CameraInfo(
 )
 
 
-class EmptyHall:
-    """A detector and a pose estimator where there is nobody."""
+class NobodyThere:
+    """A detector and a pose estimator that find nobody."""
 
     def detect(self, image_rgb):
         return ()
@@ -56,8 +58,8 @@ class EmptyHall:
 
 
 def nobody(camera: Camera) -> AwarenessPipeline:
-    hall = EmptyHall()
-    return AwarenessPipeline(camera, detector=hall, pose_estimator=hall, head_pose_estimator=hall)
+    none = NobodyThere()
+    return AwarenessPipeline(camera, detector=none, pose_estimator=none, head_pose_estimator=none)
 
 
 def odometry(stamp_s: float, x: float = 0.0, yaw: float = 0.0, speed: float = 0.5) -> Odometry:
@@ -75,7 +77,7 @@ def image(stamp_s: float) -> Image:
 
 
 class Listener:
-    """What Nav2 would have heard."""
+    """A bridge whose published messages are kept."""
 
     def __init__(self, **settings) -> None:
         self.heard = defaultdict(list)
@@ -89,7 +91,7 @@ class Listener:
         )
 
     def standing(self) -> bool:
-        """Whether the last tick stops a robot: limit, polygon and both together or neither."""
+        """Return whether the last tick stops the robot, by limit and polygon alike."""
         polygon = self.heard["collision_polygons"][-1]
         assert polygon.polygon.id == STOP_POLYGON_ID
         near = all(abs(corner.x) < 1.0 for corner in polygon.polygon.polygon.points)
@@ -97,14 +99,14 @@ class Listener:
         return near
 
 
-def test_nothing_moves_before_everything_is_there() -> None:
+def test_the_robot_stands_until_all_input_has_come() -> None:
     nav = Listener()
-    for give, reason in (
+    for send, reason in (
         (lambda: None, "no odometry yet"),
         (lambda: nav.bridge.on_odometry(odometry(START_S)), "no camera_info yet"),
         (lambda: nav.bridge.on_camera_info(INFO), "no camera frame yet"),
     ):
-        give()
+        send()
         assert nav.bridge.tick(START_S).limited_by == reason
         assert nav.standing()
     assert nav.bridge.on_image(image(START_S), START_S)
@@ -113,7 +115,7 @@ def test_nothing_moves_before_everything_is_there() -> None:
 
 
 @pytest.mark.parametrize("silent", ["camera", "odometry"])
-def test_a_source_that_falls_silent_stops_the_robot_and_its_return_frees_it(silent: str) -> None:
+def test_a_silent_source_stops_the_robot_until_it_returns(silent: str) -> None:
     nav = Listener()
     nav.bridge.on_camera_info(INFO)
     stop_after_s = AwarenessPolicy.preset("balanced").timing.stop_after_s
@@ -134,7 +136,7 @@ def test_a_source_that_falls_silent_stops_the_robot_and_its_return_frees_it(sile
     assert not nav.standing()
 
 
-def test_every_tick_says_everything_once() -> None:
+def test_every_tick_publishes_every_topic_once() -> None:
     nav = Listener(camera=Camera(64, 48, 50.0, 50.0, 32.0, 24.0))
     nav.bridge.on_odometry(odometry(START_S))
     nav.bridge.on_image(image(START_S), START_S)
@@ -144,7 +146,7 @@ def test_every_tick_says_everything_once() -> None:
     assert counts == dict.fromkeys([*once, "people", "detections", "markers"], 1)
 
 
-def test_what_nobody_wants_is_not_made() -> None:
+def test_unwanted_messages_are_not_made() -> None:
     wanted = {"speed_limit", "alerts"}
     nav = Listener(camera=Camera(64, 48, 50.0, 50.0, 32.0, 24.0), wanted=wanted.__contains__)
     nav.bridge.on_odometry(odometry(START_S))
@@ -154,14 +156,14 @@ def test_what_nobody_wants_is_not_made() -> None:
     wanted.add("markers")
     nav.bridge.tick(START_S + 0.02)
     assert set(nav.heard) == wanted
-    assert constraints.limited_by == "robot maximum"  # whoever listens, it is worked out
-    # The last word goes to everybody: whoever is about to listen must hear it.
+    assert constraints.limited_by == "robot maximum"  # computed all the same
+    # The stop is published on every topic, for late subscribers too.
     nav.bridge.stop(START_S + 0.03, "the end")
     assert {"collision_polygons", "stop_zone", "people"} <= set(nav.heard)
 
 
-class OneWhoComes:
-    """Sees one person who walks at the robot and never looks up."""
+class OneApproaching:
+    """Perception of one person who walks at the robot and never looks at it."""
 
     def process(self, image_rgb, stamp_s, *, floor=None):
         ahead_m = 6.0 - 1.1 * (stamp_s - START_S)
@@ -179,8 +181,8 @@ class OneWhoComes:
         )
 
 
-def test_every_alert_is_in_one_message_of_a_hundred() -> None:
-    nav = Listener(make_pipeline=lambda camera: OneWhoComes())
+def test_every_alert_is_in_one_message() -> None:
+    nav = Listener(make_pipeline=lambda camera: OneApproaching())
     nav.bridge.on_camera_info(INFO)
     asked = []
     for tick in range(100):
@@ -197,13 +199,13 @@ def test_every_alert_is_in_one_message_of_a_hundred() -> None:
         (stamp, status.name) for stamp, status in sent
     ]
     kinds = [status.name.removeprefix("awarenav: ") for _, status in sent]
-    # Nearer and nearer: light, then voice, then the horn.
+    # As the person comes nearer: light, then voice, then the horn.
     assert kinds == ["light", "voice", "horn"]
     assert all(message.status[0].name == "awarenav: speed limit" for message in nav.heard["alerts"])
     assert len(nav.heard["alerts"]) == 100
 
 
-def test_the_camera_is_where_mount_and_odometry_put_it() -> None:
+def test_the_pose_of_the_camera_follows_from_mount_and_odometry() -> None:
     nav = Listener()
     nav.bridge.on_camera_info(INFO)
     nav.bridge.on_odometry(odometry(START_S, x=2.0, yaw=math.pi / 2.0))
@@ -214,7 +216,7 @@ def test_the_camera_is_where_mount_and_odometry_put_it() -> None:
     assert np.allclose(T[:3, 2], [0.0, 1.0, 0.0], atol=1e-9)
 
 
-def test_tf_can_say_where_the_camera_is() -> None:
+def test_the_pose_of_the_camera_can_come_from_tf() -> None:
     nav = Listener(T_base_camera=None)
     nav.bridge.on_camera_info(INFO)
     nav.bridge.on_odometry(odometry(START_S, x=2.0))
@@ -232,7 +234,7 @@ def test_tf_can_say_where_the_camera_is() -> None:
     assert np.allclose(T[:3, :3], MOUNT[:3, :3])
 
 
-def test_refused_messages_are_said_once_and_stop_by_going_stale() -> None:
+def test_refused_images_warn_once_and_stop_the_robot_when_stale() -> None:
     nav = Listener()
     nav.bridge.on_camera_info(INFO)
     for tick in range(80):
@@ -244,7 +246,7 @@ def test_refused_messages_are_said_once_and_stop_by_going_stale() -> None:
             assert not nav.bridge.on_image(image(now + 1.0), now)
         nav.bridge.tick(now)
     assert nav.standing()
-    assert nav.warnings == ["image: the image's stamp is 1.000 s ahead of this machine's clock"]
+    assert nav.warnings == ["image: the image's stamp is 1.000 s ahead of this computer's clock"]
 
 
 @pytest.mark.parametrize(
@@ -264,7 +266,7 @@ def test_refused_messages_are_said_once_and_stop_by_going_stale() -> None:
         (odometry(START_S, speed=1e300), "100 m/s"),
     ],
 )
-def test_odometry_that_cannot_be_is_refused(message: Odometry, text: str) -> None:
+def test_impossible_odometry_is_refused(message: Odometry, text: str) -> None:
     nav = Listener()
     nav.bridge.on_odometry(message)
     assert text in nav.warnings[-1]
@@ -273,7 +275,7 @@ def test_odometry_that_cannot_be_is_refused(message: Odometry, text: str) -> Non
     assert nav.standing()
 
 
-def test_a_calibration_that_is_none_keeps_the_robot_standing() -> None:
+def test_an_empty_calibration_keeps_the_robot_standing() -> None:
     nav = Listener()
     nav.bridge.on_camera_info(CameraInfo())
     assert "calibrate" in nav.warnings[-1]
@@ -285,7 +287,7 @@ def test_a_calibration_that_is_none_keeps_the_robot_standing() -> None:
     assert nav.bridge.on_image(image(START_S), START_S)
 
 
-def test_a_picture_of_another_size_than_the_calibration_is_refused() -> None:
+def test_an_image_of_another_size_than_the_calibration_is_refused() -> None:
     nav = Listener()
     nav.bridge.on_camera_info(INFO)
     nav.bridge.on_odometry(odometry(START_S))
@@ -294,7 +296,7 @@ def test_a_picture_of_another_size_than_the_calibration_is_refused() -> None:
     assert "shape" in nav.warnings[-1]
 
 
-def test_a_clock_that_goes_backward_starts_afresh_with_a_stop() -> None:
+def test_a_clock_that_goes_backward_restarts_with_a_stop() -> None:
     nav = Listener()
     nav.bridge.on_camera_info(INFO)
     nav.bridge.on_odometry(odometry(START_S))
@@ -309,7 +311,7 @@ def test_a_clock_that_goes_backward_starts_afresh_with_a_stop() -> None:
     assert not nav.standing()
 
 
-def test_the_last_word_is_a_stop() -> None:
+def test_stop_publishes_a_stop() -> None:
     nav = Listener()
     nav.bridge.on_camera_info(INFO)
     nav.bridge.on_odometry(odometry(START_S))
@@ -339,7 +341,7 @@ def _mount() -> TFMessage:
     st.sampled_from(["odometry", "camera_info", "transforms", "image"]),
     st.lists(st.tuples(st.integers(4, 4000), st.integers(0, 255)), min_size=1, max_size=6),
 )
-def test_damaged_messages_never_crash_it_and_everything_stays_publishable(
+def test_damaged_messages_never_crash_the_bridge_and_its_messages_are_valid(
     which: str, damage: list[tuple[int, int]]
 ) -> None:
     nav = Listener(T_base_camera=None)

@@ -1,3 +1,5 @@
+"""The messages for constraints, and the conversion of stamps."""
+
 from __future__ import annotations
 
 from dataclasses import replace
@@ -26,7 +28,7 @@ from nav_adapter.ros2 import (
     stop_zone,
     teb_obstacles,
 )
-from nav_adapter.ros2._stamps import to_seconds, to_time
+from nav_adapter.ros2.conversions import to_seconds, to_time
 from nav_adapter.ros2.messages.diagnostic_msgs import DiagnosticStatus
 from nav_adapter.ros2.messages.visualization_msgs import Marker
 
@@ -47,11 +49,11 @@ def shape(polygon) -> Polygon:
 
 
 @given(finite(0.0, 1e6), finite(0.02, 10.0), st.booleans())
-def test_a_speed_limit_is_never_no_limit_nor_above_the_maximum(
+def test_a_speed_limit_is_never_read_as_no_limit_or_above_the_maximum(
     limit: float, maximum: float, percentage: bool
 ) -> None:
     message = speed_limit(limited(limit), maximum, percentage=percentage)
-    # What a controller with that maximum makes of it.
+    # The limit that a controller with this maximum reads.
     meant = message.speed_limit * (maximum / 100.0 if percentage else 1.0)
     assert message.percentage is percentage
     assert message.speed_limit > 0.0
@@ -62,7 +64,7 @@ def test_a_speed_limit_is_never_no_limit_nor_above_the_maximum(
 
 
 @pytest.mark.parametrize("maximum", [0.0, -1.0, SLOWEST_MPS, float("nan"), float("inf"), "fast"])
-def test_a_maximum_that_leaves_no_room_is_refused(maximum) -> None:
+def test_a_maximum_that_is_too_small_or_not_finite_is_refused(maximum) -> None:
     with pytest.raises(NavError, match="max_speed_mps"):
         speed_limit(limited(0.5), maximum)
 
@@ -92,7 +94,7 @@ def test_every_person_has_a_polygon_and_the_stop_polygon_comes_last(tracks) -> N
     gaps = []
     for obstacle in constraints.obstacles:
         circle = ShapelyPoint(obstacle.center_odom_m).buffer(obstacle.radius_m)
-        # Single precision on the wire, doubles here.
+        # Single precision on the wire, double precision here.
         assert by_id[obstacle.track_id].buffer(1e-6).contains(circle)
     for each in persons:
         obstacle = next(o for o in constraints.obstacles if o.track_id == each.polygon.id)
@@ -115,9 +117,9 @@ def test_the_stop_polygon_is_in_the_footprint_exactly_when_the_limit_cannot_be_s
 
 
 @given(finite(-1.5, 1.5))
-def test_the_stop_zone_is_the_footprint_swept_by_the_stopping_distance(speed: float) -> None:
+def test_the_stop_zone_is_the_footprint_stretched_by_the_stopping_distance(speed: float) -> None:
     zone = shape(stop_zone(ROBOT, speed, 5.0).polygon)
-    # Constant acceleration: v T + v²/2a, by stepping through time.
+    # The stopping distance v·T + v²/2a.
     reach = abs(speed) * ROBOT.reaction_time_s + speed**2 / (2.0 * ROBOT.max_deceleration_mps2)
     ahead = affinity.translate(FOOTPRINT, np.sign(speed) * reach)
     wanted = FOOTPRINT.union(ahead).convex_hull
@@ -133,13 +135,13 @@ def test_the_grid_is_occupied_where_the_costmap_is_lethal(tracks, x: float, y: f
     costs = paint_costmap(np.zeros((60, 60), np.uint8), corner, 0.1, constraints)
     assert np.array_equal(cells == 100, costs == 254)
     assert set(np.unique(cells)) <= {0, 100}
-    # The window moves by whole cells, so that a cell of the world stays a cell.
+    # The grid moves by whole cells, so that its cells stay at the same places.
     assert np.allclose(corner / 0.1, np.round(corner / 0.1), atol=1e-6)
     assert (np.abs(corner + 3.0 - [x, y]) <= 0.1 + 1e-9).all()
 
 
 @pytest.mark.parametrize("change", [{"size_m": 0.0}, {"size_m": 500.0}, {"resolution_m": 0.0}])
-def test_a_grid_of_no_or_too_many_cells_is_refused(change) -> None:
+def test_a_grid_without_cells_or_with_too_many_is_refused(change) -> None:
     with pytest.raises(NavError):
         occupancy_grid(limited(1.0), (0.0, 0.0), **change)
 
@@ -165,7 +167,7 @@ def stretched(constraints: NavConstraints) -> NavConstraints:
     return replace(constraints, obstacles=longer)
 
 
-def test_an_obstacle_drawn_out_is_not_cut_back_to_its_circle() -> None:
+def test_a_stretched_obstacle_is_not_reduced_to_its_circle() -> None:
     constraints = stretched(around([person(position=(2.0, 1.0), velocity=(1.0, 0.0))]))
     (obstacle,) = constraints.obstacles
     (circle,) = circle_objects(constraints)
@@ -203,7 +205,7 @@ def test_people_carry_awareness_in_their_tags() -> None:
     assert message.reliability == 1.0
 
 
-def test_a_person_who_is_only_remembered_has_no_reliability() -> None:
+def test_a_person_without_a_track_has_no_reliability() -> None:
     constraints = around([person(track_id=4)])
     (message,) = people(constraints, []).people
     assert message.reliability == 0.0
@@ -220,7 +222,7 @@ def test_detections_are_the_papers_boxes(tracks) -> None:
         assert (size.x, size.y) == (2.0 * obstacle.radius_m,) * 2
         assert size.z == obstacle.height_m
         assert center.position.z == 0.5 * obstacle.height_m
-        # The turn about z brings x to the person's direction.
+        # The rotation about z turns x to the person's direction.
         turn = center.orientation
         heading = np.array([1.0 - 2.0 * turn.z**2, 2.0 * turn.w * turn.z])
         speed = np.linalg.norm(obstacle.velocity_odom_mps)
@@ -230,7 +232,7 @@ def test_detections_are_the_papers_boxes(tracks) -> None:
 
 
 @given(crowds())
-def test_markers_clear_what_was_there_and_have_ids_of_their_own(tracks) -> None:
+def test_markers_delete_the_old_ones_and_have_distinct_ids(tracks) -> None:
     constraints = around(tracks)
     first, *rest = markers(constraints, robot_at()).markers
     assert first.action == Marker.DELETEALL
@@ -251,11 +253,11 @@ ALERTS = st.builds(
 
 
 @given(st.lists(ALERTS, max_size=4), st.booleans(), st.booleans())
-def test_alerts_are_warnings_after_the_state_of_the_limit(
-    asked: list[Alert], stale: bool, suffices: bool
+def test_alerts_follow_the_state_of_the_limit_as_warnings(
+    given_alerts: list[Alert], stale: bool, suffices: bool
 ) -> None:
     constraints = replace(
-        limited(0.25), alerts=tuple(asked), stale=stale, braking_suffices=suffices
+        limited(0.25), alerts=tuple(given_alerts), stale=stale, braking_suffices=suffices
     )
     state, *warnings = alerts(constraints).status
     wanted = DiagnosticStatus.WARN if stale else DiagnosticStatus.OK
@@ -266,7 +268,7 @@ def test_alerts_are_warnings_after_the_state_of_the_limit(
     assert values["speed_limit_mps"] == "0.250"
     assert values["braking_suffices"] == ("true" if suffices else "false")
     assert values["stale"] == ("true" if stale else "false")
-    for alert, status in zip(asked, warnings, strict=True):
+    for alert, status in zip(given_alerts, warnings, strict=True):
         assert (status.level, status.message) == (DiagnosticStatus.WARN, alert.reason)
         assert status.name == f"awarenav: {alert.kind}"
         values = {each.key: each.value for each in status.values}

@@ -1,3 +1,5 @@
+"""Topics over DDS: other processes, other libraries, quality of service."""
+
 from __future__ import annotations
 
 import json
@@ -52,7 +54,7 @@ def until(condition, node: DdsNode | None = None) -> bool:
     return bool(condition())
 
 
-def test_another_process_with_types_of_its_own_receives_every_topic(node: DdsNode) -> None:
+def test_another_process_with_its_own_types_receives_every_topic(node: DdsNode) -> None:
     wanted = {topic.name: ros_type(topic.message) for topic in PUBLISHED.values()}
     for topic in PUBLISHED.values():
         node.advertise(topic)
@@ -66,7 +68,7 @@ def test_another_process_with_types_of_its_own_receives_every_topic(node: DdsNod
             sent: dict[str, list] = defaultdict(list)
             for key, message in everything():
                 cdr = node.publish(PUBLISHED[key], message)
-                # As it is after the wire: single precision rounded.
+                # As decoded: some fields are rounded to single precision.
                 sent[PUBLISHED[key].name].append(plain(decode(type(message), cdr)))
             received: dict[str, list] = defaultdict(list)
             for _ in range(sum(map(len, sent.values()))):
@@ -84,7 +86,7 @@ def _unsigned(message: dict, topic: str) -> dict:
     return message
 
 
-def test_captured_payloads_are_what_rosbags_reads(node: DdsNode, domain: int) -> None:
+def test_rosbags_reads_the_captured_payloads(node: DdsNode, domain: int) -> None:
     store = typestore()
     listener = DdsNode(domain)
     try:
@@ -122,7 +124,7 @@ def test_a_late_subscriber_gets_the_grid_and_nothing_else(node: DdsNode, domain:
         late.close()
 
 
-def test_an_image_of_full_size_arrives_whole(node: DdsNode, domain: int) -> None:
+def test_an_image_of_full_size_arrives_complete(node: DdsNode, domain: int) -> None:
     pixels = np.random.default_rng(0).integers(0, 256, (480, 640, 3), dtype=np.uint8).tobytes()
     sent = Image(height=480, width=640, encoding="rgb8", step=1920, data=pixels)
     reader = DdsNode(domain)
@@ -133,7 +135,7 @@ def test_an_image_of_full_size_arrives_whole(node: DdsNode, domain: int) -> None
         got: list = []
 
         def arrived() -> bool:
-            # Best effort: a frame may be lost, as on a robot.
+            # Best effort: a frame may be lost.
             node.publish(READ["image"], sent)
             reader.wait(0.2)
             got.extend(reader.take(READ["image"]))
@@ -145,7 +147,7 @@ def test_an_image_of_full_size_arrives_whole(node: DdsNode, domain: int) -> None
         reader.close()
 
 
-def test_waiting_ends_with_a_message_or_in_time(node: DdsNode, domain: int) -> None:
+def test_waiting_ends_with_a_message_or_after_the_timeout(node: DdsNode, domain: int) -> None:
     topic = PUBLISHED["speed_limit"]
     node.subscribe(topic)
     assert node.wait(0.0) is False
@@ -158,22 +160,22 @@ def test_waiting_ends_with_a_message_or_in_time(node: DdsNode, domain: int) -> N
 
 
 @pytest.mark.parametrize("number", [-1, 233])
-def test_a_domain_that_dds_does_not_have_is_refused(number: int) -> None:
+def test_an_invalid_domain_is_refused(number: int) -> None:
     with pytest.raises(NavError, match="0 to 232"):
         DdsNode(number)
 
 
-def test_one_name_has_one_type(node: DdsNode) -> None:
+def test_a_topic_has_only_one_type(node: DdsNode) -> None:
     node.advertise(Topic("x", SpeedLimit))
     with pytest.raises(NavError, match="SpeedLimit here, not Image"):
         node.subscribe(Topic("x", Image))
 
 
 @pytest.mark.parametrize("name", ["", "/", "a//b", "1odom", "a/2b", "odom!", "ødom", "a b"])
-def test_names_that_ros_refuses_are_refused(name: str) -> None:
+def test_names_that_ros_does_not_allow_are_refused(name: str) -> None:
     with pytest.raises(NavError, match="topic"):
         renamed(READ["odom"], name)
 
 
-def test_a_leading_slash_is_no_part_of_a_name() -> None:
+def test_a_leading_slash_is_removed_from_a_name() -> None:
     assert renamed(READ["odom"], "/robot_1/odom").name == "robot_1/odom"

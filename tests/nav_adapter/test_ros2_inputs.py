@@ -1,3 +1,5 @@
+"""Input of the bridge: images, calibration, transforms and the robot file."""
+
 from __future__ import annotations
 
 import math
@@ -15,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from nav_adapter import NavError
 from nav_adapter.ros2 import CameraMount, RobotFile, TransformBuffer, camera_of, picture_of
-from nav_adapter.ros2._stamps import pose_matrix, yaw_quaternion
+from nav_adapter.ros2.conversions import pose_matrix, yaw_quaternion
 from nav_adapter.ros2.messages.geometry_msgs import Quaternion
 from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, CompressedImage, Image
 from perception import Camera
@@ -47,7 +49,7 @@ def raw(pixels: np.ndarray, encoding: str, padding: int = 0) -> Image:
         ("bgra8", cv2.COLOR_RGB2BGRA),
     ],
 )
-def test_colours_come_back_exactly(encoding: str, code: int | None, padding: int) -> None:
+def test_colours_are_converted_exactly(encoding: str, code: int | None, padding: int) -> None:
     pixels = RGB if code is None else cv2.cvtColor(RGB, code)
     read = picture_of(raw(pixels, encoding, padding))
     assert np.array_equal(read, RGB)
@@ -56,7 +58,7 @@ def test_colours_come_back_exactly(encoding: str, code: int | None, padding: int
 
 @pytest.mark.parametrize("big", [False, True], ids=["little", "big"])
 @pytest.mark.parametrize("encoding", ["rgb16", "bgr16", "mono16"])
-def test_sixteen_bits_become_eight_by_their_full_range(encoding: str, big: bool) -> None:
+def test_16_bit_values_are_scaled_over_their_full_range(encoding: str, big: bool) -> None:
     pixels = {"rgb16": RGB, "bgr16": RGB[:, :, ::-1], "mono16": RGB[:, :, :1]}[encoding]
     samples = (pixels.astype(np.uint16) * 257).astype(">u2" if big else "<u2")
     message = replace(
@@ -66,8 +68,8 @@ def test_sixteen_bits_become_eight_by_their_full_range(encoding: str, big: bool)
     assert np.array_equal(picture_of(message), expected)
 
 
-def test_a_picture_file_is_not_turned_by_what_it_claims() -> None:
-    """The calibration is of the sensor's pixels, not of how somebody would like to see them."""
+def test_the_orientation_in_an_image_file_is_ignored() -> None:
+    """The calibration is for the pixels as stored."""
     tall = np.zeros((64, 32, 3), np.uint8)
     tall[:16] = 250
     plain = cv2.imencode(".jpg", tall)[1].tobytes()
@@ -76,7 +78,7 @@ def test_a_picture_file_is_not_turned_by_what_it_claims() -> None:
     exif = b"Exif\0\0" + tiff
     claimed = plain[:2] + b"\xff\xe1" + (len(exif) + 2).to_bytes(2, "big") + exif + plain[2:]
     turned = cv2.imdecode(np.frombuffer(claimed, np.uint8), cv2.IMREAD_COLOR)
-    assert turned.shape == (32, 64, 3)  # the claim is understood where it is asked
+    assert turned.shape == (32, 64, 3)  # OpenCV applies it by default
     read = picture_of(CompressedImage(format="jpeg", data=claimed))
     assert np.array_equal(read, picture_of(CompressedImage(format="jpeg", data=plain)))
     assert read.shape == (64, 32, 3)
@@ -96,7 +98,7 @@ def test_grey_becomes_three_equal_channels() -> None:
         ("bayer_grbg8", "GR", "BG"),
     ],
 )
-def test_bayer_patterns_give_the_colour_that_the_sensor_saw(
+def test_bayer_patterns_give_the_colour_of_the_sensor(
     encoding: str, first: str, second: str
 ) -> None:
     mosaic = np.zeros((16, 16, 1), np.uint8)
@@ -107,7 +109,7 @@ def test_bayer_patterns_give_the_colour_that_the_sensor_saw(
 
 
 @pytest.mark.parametrize(("suffix", "tolerance"), [(".png", 0), (".jpg", 6)])
-def test_compressed_pictures_are_decoded(suffix: str, tolerance: int) -> None:
+def test_compressed_images_are_decoded(suffix: str, tolerance: int) -> None:
     data = cv2.imencode(suffix, SMOOTH[:, :, ::-1])[1].tobytes()
     read = picture_of(CompressedImage(format=suffix, data=data))
     assert np.abs(read.astype(int) - SMOOTH).max() <= tolerance
@@ -132,7 +134,7 @@ def test_images_that_cannot_be_read_are_refused(message) -> None:
         picture_of(message)
 
 
-def test_camera_info_is_a_camera() -> None:
+def test_camera_info_becomes_a_camera() -> None:
     info = CameraInfo(
         height=480,
         width=640,
@@ -159,7 +161,7 @@ def test_camera_info_is_a_camera() -> None:
         (CameraInfo(height=4, width=4, k=(math.nan,) * 9), "calibrat"),
     ],
 )
-def test_a_calibration_that_is_none_is_refused(info: CameraInfo, text: str) -> None:
+def test_an_invalid_calibration_is_refused(info: CameraInfo, text: str) -> None:
     with pytest.raises(NavError, match=text):
         camera_of(info)
 
@@ -187,7 +189,7 @@ def test_lookups_compose_and_invert(first, second, third) -> None:
 
 
 @given(finite(0.0, 1.0), finite(-3.0, 3.0), finite(-1.0, 1.0))
-def test_between_two_stamps_a_robot_on_an_even_turn_is_found(
+def test_poses_are_interpolated_between_two_stamps(
     share: float, start_rad: float, turn_rad: float
 ) -> None:
     buffer = TransformBuffer()
@@ -200,7 +202,7 @@ def test_between_two_stamps_a_robot_on_an_even_turn_is_found(
     assert np.allclose(T[:3, :3], wanted, atol=1e-6)
 
 
-def test_what_is_too_old_or_too_new_is_refused_with_the_times() -> None:
+def test_a_lookup_outside_the_known_times_is_refused_with_the_times() -> None:
     buffer = TransformBuffer()
     buffer.add("odom", "base", 10.0, np.eye(4))
     assert np.array_equal(buffer.lookup("odom", "base", 10.1), np.eye(4))
@@ -214,14 +216,14 @@ def test_what_is_too_old_or_too_new_is_refused_with_the_times() -> None:
         buffer.lookup("odom", "base", 11.0)
 
 
-def test_late_transforms_are_sorted_in() -> None:
+def test_late_transforms_are_inserted_in_order() -> None:
     buffer = TransformBuffer()
     for stamp_s in (1.0, 1.2, 1.1):
         buffer.add("odom", "base", stamp_s, pose_matrix((stamp_s, 0.0, 0.0), Quaternion()))
     assert buffer.lookup("odom", "base", 1.15)[0, 3] == pytest.approx(1.15)
 
 
-def test_frames_without_a_way_between_them_are_refused_by_name() -> None:
+def test_frames_that_are_not_connected_are_refused_by_name() -> None:
     buffer = TransformBuffer()
     buffer.add("odom", "base", 0.0, np.eye(4), static=True)
     with pytest.raises(NavError, match="between 'camera' and 'odom': known are odom -> base"):
@@ -233,12 +235,12 @@ def test_frames_without_a_way_between_them_are_refused_by_name() -> None:
 
 
 @pytest.mark.parametrize("turn", [Quaternion(w=0.0), Quaternion(w=math.nan)])
-def test_a_turn_of_no_length_is_refused(turn: Quaternion) -> None:
+def test_a_quaternion_without_length_is_refused(turn: Quaternion) -> None:
     with pytest.raises(NavError, match="quaternion"):
         pose_matrix((0.0, 0.0, 0.0), turn)
 
 
-def test_a_camera_mount_looks_where_it_says() -> None:
+def test_a_camera_mount_looks_in_its_direction() -> None:
     mount = CameraMount(position_base_m=[0.2, 0.1, 1.4], yaw_deg=90.0, pitch_down_deg=30.0)
     T = mount.T_base_camera()
     ahead, down = T[:3, 2], T[:3, 1]
@@ -268,7 +270,7 @@ def test_the_robot_file_of_the_docs_is_valid(tmp_path: Path) -> None:
         ("camera: {position_base_m: [1, 2]}", "position_base_m"),
     ],
 )
-def test_a_robot_file_that_is_wrong_says_where(tmp_path: Path, change: str, text: str) -> None:
+def test_a_wrong_robot_file_is_refused_by_key(tmp_path: Path, change: str, text: str) -> None:
     lines = {
         "footprint_m": "footprint_m: [[0.3, 0.2], [-0.3, 0.2], [-0.3, -0.2], [0.3, -0.2]]",
         "max_speed_mps": "max_speed_mps: 1.0",

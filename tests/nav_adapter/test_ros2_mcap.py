@@ -1,3 +1,5 @@
+"""MCAP recordings, read by other libraries."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -27,7 +29,7 @@ def recording(tmp_path: Path) -> Path:
     return path
 
 
-def sent() -> list[tuple[str, object]]:
+def sent_messages() -> list[tuple[str, object]]:
     return [
         (f"/{PUBLISHED[key].name}", plain(decode(type(message), encode(message))))
         for tick in range(3)
@@ -43,7 +45,7 @@ def test_rosbags_reads_every_message_with_the_schemas_in_the_file(recording: Pat
         ]
         offered = {c.topic: c.ext.offered_qos_profiles[0] for c in reader.connections}
         kinds = {each.topic: each.msgtype for each in reader.connections}
-    assert sorted(read, key=str) == sorted(sent(), key=str)
+    assert sorted(read, key=str) == sorted(sent_messages(), key=str)
     assert offered["/awarenav/people_grid"].durability.name == "TRANSIENT_LOCAL"
     assert offered["/speed_limit"].durability.name == "VOLATILE"
     assert all(each.reliability.name == "RELIABLE" for each in offered.values())
@@ -57,7 +59,7 @@ def test_the_mcap_library_reads_profile_schemas_and_index(recording: Path) -> No
         assert reader.get_header().profile == "ros2"
         messages = list(reader.iter_messages())
     assert summary is not None
-    assert summary.statistics.message_count == len(sent()) == len(messages)
+    assert summary.statistics.message_count == len(sent_messages()) == len(messages)
     for schema in summary.schemas.values():
         topic = next(t for t in PUBLISHED.values() if ros_type(t.message) == schema.name)
         assert schema.encoding == "ros2msg"
@@ -74,12 +76,12 @@ def test_foxgloves_decoder_reads_it_too(recording: Path) -> None:
     ).DecoderFactory()
     with recording.open("rb") as stream:
         decoded = list(make_reader(stream, decoder_factories=[factory]).iter_decoded_messages())
-    assert len(decoded) == len(sent())
+    assert len(decoded) == len(sent_messages())
     limits = [m.speed_limit for _, channel, _, m in decoded if channel.topic == "/speed_limit"]
-    assert limits == [dict(sent())["/speed_limit"]["speed_limit"]] * 3
+    assert limits == [dict(sent_messages())["/speed_limit"]["speed_limit"]] * 3
 
 
-def test_closing_twice_is_closing_once(tmp_path: Path) -> None:
+def test_closing_twice_changes_nothing(tmp_path: Path) -> None:
     path = tmp_path / "once.mcap"
     recorder = McapRecorder(path)
     key, message = everything()[0]
@@ -90,6 +92,6 @@ def test_closing_twice_is_closing_once(tmp_path: Path) -> None:
     assert path.read_bytes() == whole
 
 
-def test_a_folder_that_is_not_there_is_refused(tmp_path: Path) -> None:
+def test_a_missing_folder_is_refused(tmp_path: Path) -> None:
     with pytest.raises(NavError, match="cannot write"):
         McapRecorder(tmp_path / "nowhere" / "run.mcap")

@@ -1,3 +1,5 @@
+"""Messages: fields, schemas and CDR bytes, against other libraries."""
+
 from __future__ import annotations
 
 import importlib
@@ -43,7 +45,7 @@ KINDS = sorted(
 
 
 def _as_rosbags_writes(kind: type[Message]) -> list[tuple[str, str]]:
-    """Fields of a type in rosbags' registry, in our notation."""
+    """Return the fields of a type in rosbags' registry, in the notation of this library."""
 
     def text(node: tuple) -> str:
         tag, content = int(node[0]), node[1]
@@ -58,13 +60,13 @@ def _as_rosbags_writes(kind: type[Message]) -> list[tuple[str, str]]:
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=ros_type)
-def test_fields_are_those_of_the_msg_files(kind: type[Message]) -> None:
+def test_fields_agree_with_the_msg_files(kind: type[Message]) -> None:
     ours = [(name, field.text) for name, field in field_types(kind).items()]
     assert ours == _as_rosbags_writes(kind)
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=ros_type)
-def test_a_schema_carries_every_message_in_it_once(kind: type[Message]) -> None:
+def test_a_schema_holds_every_nested_message_once(kind: type[Message]) -> None:
     text = definition(kind)
     registered = get_types_from_msg(text, ros_type(kind))
     for name, content in registered.items():
@@ -74,11 +76,11 @@ def test_a_schema_carries_every_message_in_it_once(kind: type[Message]) -> None:
 
 
 @pytest.mark.parametrize(("key", "message"), everything(), ids=lambda value: str(value)[:20])
-def test_an_independent_decoder_reads_what_was_sent(key: str, message: Message) -> None:
+def test_an_independent_decoder_reads_every_message(key: str, message: Message) -> None:
     cdr = encode(message)
     assert PUBLISHED[key].message is type(message)
     read = STORE.deserialize_cdr(cdr, ros_type(type(message)))
-    # Single precision on the wire: our values rounded so must be theirs exactly.
+    # Both sides are rounded to single precision on the wire, so they must be equal.
     assert plain(read) == plain(decode(type(message), cdr))
     again = decode(type(message), cdr)
     assert encode(again) == cdr
@@ -92,7 +94,7 @@ def test_an_independent_decoder_reads_what_was_sent(key: str, message: Message) 
     st.integers(0, 2**31 - 1),
     st.integers(0, 999_999_999),
 )
-def test_any_speed_limit_survives_both_ways(
+def test_any_speed_limit_is_encoded_and_decoded(
     limit: float, percentage: bool, frame: str, sec: int, nanosec: int
 ) -> None:
     message = SpeedLimit(Header(Time(sec, nanosec), frame), percentage, limit)
@@ -103,7 +105,7 @@ def test_any_speed_limit_survives_both_ways(
 
 
 @given(st.binary(max_size=40))
-def test_foreign_bytes_are_refused_or_read_and_never_crash(data: bytes) -> None:
+def test_any_bytes_are_decoded_or_refused(data: bytes) -> None:
     try:
         read = decode(SpeedLimit, data)
     except NavError:
@@ -111,14 +113,14 @@ def test_foreign_bytes_are_refused_or_read_and_never_crash(data: bytes) -> None:
     assert isinstance(read, SpeedLimit)
 
 
-def test_every_shortened_message_is_refused() -> None:
+def test_every_truncated_message_is_refused() -> None:
     whole = encode(Image(Header(Time(1, 2), "camera"), 2, 3, "rgb8", 0, 9, bytes(18)))
     for length in range(len(whole)):
         with pytest.raises(NavError, match="sensor_msgs/msg/Image"):
             decode(Image, whole[:length])
 
 
-def test_what_rosbags_encodes_is_read() -> None:
+def test_messages_encoded_by_rosbags_are_decoded() -> None:
     kind = STORE.types["sensor_msgs/msg/CameraInfo"]
     blank = decode(CameraInfo, encode(CameraInfo()))
     theirs = STORE.deserialize_cdr(encode(CameraInfo()), "sensor_msgs/msg/CameraInfo")
@@ -138,7 +140,7 @@ def test_type_names_are_mangled_as_ros_2_does(topic) -> None:
     assert topic_type(topic.message).__idl_typename__ == f"{package}::msg::dds_::{name}_"
 
 
-def test_messages_are_values() -> None:
+def test_messages_are_immutable_values() -> None:
     first, second = OccupancyGrid(data=b"\x01"), OccupancyGrid(data=b"\x01")
     assert first == second
     assert hash(first) == hash(second)
@@ -153,7 +155,7 @@ def test_a_value_of_the_wrong_type_is_refused() -> None:
 
 
 def value_of(kind: FieldType) -> st.SearchStrategy:
-    """Any value that a field may have."""
+    """Return a strategy for any value of a field."""
     integers = {"byte": (0, 255), "int32": (-(2**31), 2**31 - 1), "uint32": (0, 2**32 - 1)}
     integers |= {"int8": (-128, 127), "uint8": (0, 255), "int64": (-(2**63), 2**63 - 1)}
     if kind.message is not None:
@@ -181,8 +183,8 @@ def filled(kind: type[Message]) -> st.SearchStrategy[Message]:
 @pytest.mark.parametrize("kind", KINDS, ids=ros_type)
 @settings(max_examples=15)
 @given(data=st.data())
-def test_the_bytes_are_those_of_the_library(kind: type[Message], data: st.DataObject) -> None:
-    """Whatever the values, and with them the alignments: cyclonedds writes the same."""
+def test_the_encoder_agrees_with_cyclonedds(kind: type[Message], data: st.DataObject) -> None:
+    """For any values, and so any alignments, the bytes are equal."""
     message = data.draw(filled(kind))
     theirs = _idl_type(kind, True).__idl__.serialize(
         message, use_version_2=False, endianness=Endianness.Little

@@ -1,3 +1,5 @@
+"""The rclpy node without ROS, and the conversion of its messages."""
+
 from __future__ import annotations
 
 import importlib.util
@@ -13,7 +15,7 @@ from ros2_scenes import ROOT, everything, plain, typestore
 
 from nav_adapter import NavError
 from nav_adapter.ros2 import decode, encode
-from nav_adapter.ros2._ros_values import from_ros, ros_class, to_ros
+from nav_adapter.ros2.conversions import from_ros, ros_class, to_ros
 from nav_adapter.ros2.messages import ros_type
 from nav_adapter.ros2.messages.nav2_msgs import CircleObject
 from nav_adapter.ros2.messages.nav_msgs import Odometry
@@ -27,7 +29,7 @@ no_ros = pytest.mark.skipif(
 
 
 @pytest.mark.parametrize(("key", "message"), MESSAGES, ids=lambda value: str(value)[:12])
-def test_a_message_of_another_library_becomes_ours(key: str, message) -> None:
+def test_a_message_of_another_library_is_converted(key: str, message) -> None:
     # rosbags' messages have attributes and arrays like those of rclpy.
     cdr = encode(message)
     theirs = STORE.deserialize_cdr(cdr, ros_type(type(message)))
@@ -35,12 +37,12 @@ def test_a_message_of_another_library_becomes_ours(key: str, message) -> None:
 
 
 @pytest.mark.parametrize(("key", "message"), MESSAGES, ids=lambda value: str(value)[:12])
-def test_ours_and_back_is_the_same(key: str, message) -> None:
-    made = to_ros(message, lambda kind: SimpleNamespace)
-    assert from_ros(type(message), made) == message
+def test_a_message_is_the_same_after_both_conversions(key: str, message) -> None:
+    ros_message = to_ros(message, lambda kind: SimpleNamespace)
+    assert from_ros(type(message), ros_message) == message
 
 
-def test_ros_gets_the_kinds_of_sequences_that_it_takes() -> None:
+def test_ros_messages_have_the_sequence_types_of_rclpy() -> None:
     messages = dict(everything())
     grid = to_ros(messages["grid"], lambda kind: SimpleNamespace)
     assert grid.data.typecode == "b"
@@ -56,7 +58,7 @@ def test_ros_gets_the_kinds_of_sequences_that_it_takes() -> None:
 
 
 @no_ros
-def test_without_ros_it_imports_and_says_what_is_missing() -> None:
+def test_without_ros_the_node_says_what_is_missing() -> None:
     with pytest.raises(NavError, match="needs rclpy"):
         AwarenessNode()
     with pytest.raises(ImportError):
@@ -64,7 +66,7 @@ def test_without_ros_it_imports_and_says_what_is_missing() -> None:
 
 
 @no_ros
-def test_as_a_program_it_says_so_in_a_line() -> None:
+def test_without_ros_the_program_prints_one_line() -> None:
     done = subprocess.run(
         [sys.executable, "-m", "nav_adapter.ros2.node"],
         cwd=ROOT,

@@ -1,4 +1,4 @@
-"""How much awareness is worth of people who walk fast: less, and of those who run nothing."""
+"""Fast people: awareness counts less for brisk walkers, and not at all for runners."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from perception.anthropometry import BODY_RADIUS_M
 POLICY = AwarenessPolicy()
 UNAWARE_MPS = POLICY.speed.human_speed_mps(0.0)
 AWARE_MPS = POLICY.speed.human_speed_mps(1.0)
-# Straight ahead of the robot, whose footprint ends here.
+# The person's distance straight ahead, and the front end of the footprint.
 AHEAD_M, FRONT_M = 3.0, float(ROBOT.footprint_m[:, 0].max())
 
 
 def limit_mps(
     walking_mps: float, course_rad: float, alpha: float = 1.0, policy: AwarenessPolicy = POLICY
 ) -> float:
-    """The limit for somebody 3 m ahead; a course of 0 leads straight away from the robot."""
+    """Return the limit for a person 3 m ahead; a course of 0 is straight away from the robot."""
     velocity = walking_mps * math.cos(course_rad), walking_mps * math.sin(course_rad)
     track = person(position=(AHEAD_M, 0.0), velocity=velocity, awareness_lower=alpha)
     return NavAdapter(policy, ROBOT).update((track,), robot_at(), 0.0).speed_limit_mps
 
 
 def limit_for(human_mps: float) -> float:
-    """Speed and separation with this human speed."""
+    """Return the limit of speed and separation with this human speed."""
     limit = max_speed_mps(
         AHEAD_M - FRONT_M - BODY_RADIUS_M,
         human_mps,
@@ -42,7 +42,7 @@ def limit_for(human_mps: float) -> float:
 
 @pytest.mark.parametrize("course_deg", [90.0, 110.0, 134.0])
 def test_a_brisk_walker_counts_as_turning_to_the_robot(course_deg: float) -> None:
-    """As fast as an unaware person is assumed to be: the whole 45°, whatever α says."""
+    """At the speed assumed for unaware people the whole 45° counts, for every α."""
     off_rad = math.radians(180.0 - course_deg - 45.0)
     expected = limit_for(UNAWARE_MPS * math.cos(off_rad))
     assert limit_mps(UNAWARE_MPS, math.radians(course_deg)) == pytest.approx(expected, abs=1e-12)
@@ -67,7 +67,7 @@ def test_at_normal_pace_only_the_closing_speed_counts(walking: float, course: fl
 
 
 @given(course=finite(-math.pi, math.pi), faster=finite(1.25, 2.5))
-def test_of_somebody_who_runs_awareness_promises_nothing(course: float, faster: float) -> None:
+def test_for_a_runner_awareness_does_not_count(course: float, faster: float) -> None:
     running_mps = faster * UNAWARE_MPS
     assert limit_mps(running_mps, course) == pytest.approx(limit_for(running_mps), abs=1e-12)
 
@@ -78,7 +78,7 @@ def test_of_somebody_who_runs_awareness_promises_nothing(course: float, faster: 
     more=finite(0.0, 1.0),
     alpha=finite(0.0, 1.0),
 )
-def test_who_walks_faster_never_buys_the_robot_speed(
+def test_a_faster_person_never_raises_the_limit(
     course: float, slow: float, more: float, alpha: float
 ) -> None:
     assert limit_mps(slow + more, course, alpha) <= limit_mps(slow, course, alpha) + 1e-12
@@ -91,7 +91,7 @@ def test_who_walks_faster_never_buys_the_robot_speed(
     turns=finite(0.0, 180.0),
     more=finite(0.0, 180.0),
 )
-def test_more_turn_never_means_more_speed_and_never_less_than_for_the_unaware(
+def test_a_larger_turn_never_raises_the_limit_or_lowers_it_below_the_unaware_one(
     course: float, walking: float, alpha: float, turns: float, more: float
 ) -> None:
     def policy(turn_deg: float) -> AwarenessPolicy:
@@ -101,5 +101,5 @@ def test_more_turn_never_means_more_speed_and_never_less_than_for_the_unaware(
     narrow = limit_mps(walking, course, alpha, policy(turns))
     wide = limit_mps(walking, course, alpha, policy(turns + more))
     assert wide <= narrow + 1e-12
-    # The rule is about awareness: the unaware are assumed to come at the robot anyway.
+    # The rule limits awareness only: unaware people are assumed to walk at the robot anyway.
     assert wide >= limit_mps(walking, course, 0.0, policy(0.0)) - 1e-12

@@ -1,4 +1,4 @@
-"""What holds for any crowd, any robot and any policy: docs/safety.md counts on it."""
+"""Invariants for any crowd, any robot and any policy, on which docs/safety.md relies."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tracking import PersonTrack
 
 PRESETS = ("blind", "conservative", "balanced", "assertive")
 ROUNDING = 1e-9
-# Whole histories of random crowds, robots and policies take their time to make.
+# Random histories of crowds, robots and policies take long to generate.
 FEW = settings(max_examples=20)
 
 Walk = list[tuple[float, float, tuple[PersonTrack, ...]]]
@@ -27,14 +27,14 @@ Walk = list[tuple[float, float, tuple[PersonTrack, ...]]]
 
 @st.composite
 def walks(draw: st.DrawFn) -> Walk:
-    """Updates: their time steps, the robot's speed, and people relative to the stamp."""
+    """Updates: time step, speed of the robot, and people relative to the stamp."""
     steps = draw(st.lists(st.sampled_from([0.05, 0.1, 0.25, 0.7]), min_size=1, max_size=6))
     return [(dt, draw(finite(-1.5, 1.5)), draw(crowds())) for dt in steps]
 
 
 @st.composite
 def followed(draw: st.DrawFn) -> Walk:
-    """The same few people in every update, mostly seen, so that awareness gets to work."""
+    """The same few people in every update, mostly seen, so that awareness has an effect."""
     people = draw(crowds(max_size=2))
     steps = draw(st.lists(st.sampled_from([0.05, 0.1, 0.25, 0.7]), min_size=2, max_size=10))
     return [
@@ -90,7 +90,7 @@ def test_floor_and_ceiling(policy: AwarenessPolicy, robot: RobotProfile, walk: W
 def test_never_faster_than_speed_and_separation_straight_ahead(
     policy: AwarenessPolicy, robot: RobotProfile, walk: Walk
 ) -> None:
-    """For who stands in the driving direction there is no relief, whatever the rules say."""
+    """People in the driving direction count in full, whatever the rules."""
     last = walk[-1]
     ahead = [
         track
@@ -100,7 +100,7 @@ def test_never_faster_than_speed_and_separation_straight_ahead(
     result = run(policy, robot, walk)[-1]
     shown = {obstacle.track_id: obstacle for obstacle in result.obstacles}
     for track in ahead:
-        # Looser than the adapter: from the robot's centre less its narrowest reach.
+        # A looser bound than the adapter's: from the robot's centre.
         distance = float(np.linalg.norm(track.position_odom_m))
         bound = max_speed_mps(
             distance - BODY_RADIUS_M,
@@ -122,7 +122,7 @@ def _ahead(track: PersonTrack) -> float:
 def test_more_awareness_never_means_more_room_or_less_speed(
     policy: AwarenessPolicy, robot: RobotProfile, walk: Walk, data: st.DataObject
 ) -> None:
-    """Over whole histories: bounds that are lower at every instant."""
+    """Over whole histories, with lower bounds that are smaller in every update."""
     share = data.draw(st.lists(finite(0.0, 1.0), min_size=len(walk), max_size=len(walk)))
     lower = [
         (dt, v, tuple(replace(t, awareness_lower=s * t.awareness_lower) for t in people))
@@ -153,9 +153,9 @@ def test_every_rate_is_bounded(policy: AwarenessPolicy, robot: RobotProfile, wal
     results, rate = run(policy, robot, walk), policy.timing.shrink_rate_mps
     for (dt, speed, _), before, after in zip(walk[1:], results, results[1:], strict=False):
         for was, now in zip(before.obstacles, after.obstacles, strict=True):
-            # A sighting pays for the time since the last one, up to what counts as fresh.
-            paid_s = max(dt, policy.timing.fresh_within_s)
-            assert now.radius_m >= was.radius_m - rate * paid_s - ROUNDING
+            # A sighting counts for the time since the last one, up to ``fresh_within_s``.
+            counted_s = max(dt, policy.timing.fresh_within_s)
+            assert now.radius_m >= was.radius_m - rate * counted_s - ROUNDING
         fall = abs(speed) - robot.max_deceleration_mps2 * dt
         assert after.reachable_speed_limit_mps >= fall - ROUNDING
         if before.stale and not after.stale:
@@ -172,7 +172,7 @@ def test_every_rate_is_bounded(policy: AwarenessPolicy, robot: RobotProfile, wal
     angle=finite(-7.0, 7.0),
     shift=st.tuples(finite(-50, 50), finite(-50, 50)),
 )
-def test_the_world_may_be_turned_and_shifted(
+def test_rotating_and_shifting_the_world_changes_no_constraint(
     policy: AwarenessPolicy,
     robot: RobotProfile,
     walk: Walk,
@@ -226,7 +226,7 @@ def test_stale_is_never_looser_than_fresh(
             tracks = tuple(replace(track, stamp_s=now) for track in people)
             state = robot_at(now, speed_mps=speed)
             adapter.update(tracks, state, now, perception_stamp_s=now)
-        # Both adapters are asked at the same instant; one is told that nothing came since.
+        # Both adapters are updated at the same time; one gets no new stamp of perception.
         later = now + age
         after.append(adapter.update(tracks, state, later, perception_stamp_s=later - late))
     fresh, old = after

@@ -1,4 +1,4 @@
-"""Who limits the speed: people the robot can meet, and nobody whom it can meet is left out."""
+"""The people who limit the speed: all whom the robot can reach while it stops."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def limit(
 def test_a_person_behind_a_moving_robot_limits_it_less_than_one_ahead() -> None:
     ahead, behind = limit(0.0, 2.5, 1.0), limit(math.pi, 2.5, 1.0)
     assert behind.speed_limit_mps > ahead.speed_limit_mps
-    # Not at all: they could still walk into it while it stops.
+    # There still is a limit: the person could walk into the robot while it stops.
     assert behind.limited_by == "track 1: speed and separation"
     reach_m = ROBOT.circumscribed_radius_m
     spare_m = 2.5 - BODY_RADIUS_M - reach_m - POLICY.margins.separation_clearance_m
@@ -36,10 +36,10 @@ def test_a_person_behind_a_moving_robot_limits_it_less_than_one_ahead() -> None:
 
 
 @given(bearing=finite(-math.pi, math.pi), distance=finite(0.5, 6.0))
-def test_relief_only_outside_the_turn_and_only_while_moving(
+def test_people_limit_less_only_outside_the_turn_and_only_while_moving(
     bearing: float, distance: float
 ) -> None:
-    """A standing robot may start off either way; a reversing one looks the other way."""
+    """A standing robot may start in any direction; a reversing one drives backward."""
     here = np.array([math.cos(bearing), math.sin(bearing)]) * distance
     everyone = POLICY.model_copy(update={"rules": SpeedRules(turn_within_stop_deg=180.0)})
     for speed in (1.0, -1.0, 0.0):
@@ -55,16 +55,16 @@ def test_relief_only_outside_the_turn_and_only_while_moving(
 def test_nobody_is_reached_by_a_robot_that_turns_while_it_stops(
     bearing: float, turn: float
 ) -> None:
-    """The relief for people beside and behind is never more than motion allows."""
+    """The limit for people beside and behind is never above what the motion allows."""
     for distance in (1.5, 2.0, 2.5, 3.0, 3.5, 4.5):
         for when in (0.0, 0.6):
             _walk_at_a_turning_robot(bearing, distance, turn, when)
 
 
 def _walk_at_a_turning_robot(bearing: float, distance: float, turn: float, when: float) -> None:
-    """Motion in small steps: the robot turns as far as allowed, the person walks straight at it."""
+    """Simulate small steps: the robot turns as far as allowed, the person walks straight at it."""
     speed = 1.0
-    for _ in range(6):  # towards a speed at which the robot obeys its own limit
+    for _ in range(6):  # find a speed at which the robot obeys its own limit
         speed = min(speed, limit(bearing, distance, speed).speed_limit_mps)
     if speed <= 0.05:
         return
@@ -80,7 +80,7 @@ def _walk_at_a_turning_robot(bearing: float, distance: float, turn: float, when:
             heading += yaw_rate * dt
         if t >= ROBOT.reaction_time_s:
             speed = max(speed - ROBOT.max_deceleration_mps2 * dt, 0.0)
-        # The limit is for the fastest point: corners that swing leave less for the base.
+        # The limit holds for the fastest point, so swinging corners slow the base down.
         forward = speed - abs(yaw_rate) * ROBOT.circumscribed_radius_m
         base = base + max(forward, 0.0) * dt * np.array([math.cos(heading), math.sin(heading)])
         towards = base - worker
@@ -111,7 +111,7 @@ def test_zones_and_caps_only_ever_lower_the_limit_and_are_named() -> None:
     assert ruled.speed_limit_mps == pytest.approx(1.5 * 4.0 / 7.0)
 
 
-def test_the_rule_and_the_person_that_bind_are_named() -> None:
+def test_the_limiting_rule_and_person_are_named() -> None:
     rules = SpeedRules(near_cap=NearCap(within_m=2.0, speed_mps=0.3))
     adapter = NavAdapter(POLICY.model_copy(update={"rules": rules}), ROBOT)
     tracks = (
@@ -125,7 +125,7 @@ def test_the_rule_and_the_person_that_bind_are_named() -> None:
 
 
 @pytest.mark.parametrize(("speed", "suffices"), [(0.5, True), (0.85, True), (1.2, False)])
-def test_it_says_when_braking_cannot_suffice(speed: float, suffices: bool) -> None:
+def test_braking_suffices_is_false_when_the_robot_is_too_fast(speed: float, suffices: bool) -> None:
     """1.2 m of way and walking to spare; at 1.2 m/s full braking takes 0.72 + 1.92 m."""
     result = limit(0.0, 2.6625, speed)
     assert result.braking_suffices is suffices

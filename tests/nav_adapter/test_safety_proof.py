@@ -1,4 +1,4 @@
-"""The grid proof of docs/safety.md, and that every term of the formula is needed for it."""
+"""The grid proof of docs/safety.md; every term of the formula is needed for it."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ TERMS: dict[str, Callable[..., FloatArray]] = {
 
 
 def limit_of(terms: dict[str, Callable[..., FloatArray]]) -> Callable[..., FloatArray]:
-    """Highest speed whose terms fit into the separation, by bisection: no formula is inverted."""
+    """Return a limit: the highest speed whose terms fit into the separation, by bisection."""
 
     def limit(
         separation_m: FloatArray,
@@ -59,7 +59,7 @@ def limit_of(terms: dict[str, Callable[..., FloatArray]]) -> Callable[..., Float
             middle = 0.5 * (low + high)
             fits = needed(middle) <= separation_m
             low, high = np.where(fits, middle, low), np.where(fits, high, middle)
-        # What does not fit even at a standstill has converged to (nearly) 0.
+        # The bisection has converged to (nearly) 0 where not even a standing robot fits.
         return np.where(needed(0.0 * low) < separation_m, low, 0.0)
 
     return limit
@@ -70,17 +70,17 @@ def test_no_state_of_a_dense_grid_ends_in_contact_with_a_moving_robot() -> None:
     assert proof.states >= 1_000_000
     assert proof.moving > 0.7 * proof.states
     assert proof.contacts == 0
-    # No slack is wasted either: the worst state comes exactly as near as allowed.
+    # The limit is not too strict either: the worst state just comes as near as allowed.
     assert proof.smallest_gap_m == pytest.approx(0.0, abs=1e-9)
 
 
-def test_the_formula_with_all_its_terms_passes_the_way_the_crippled_ones_are_tested() -> None:
+def test_the_formula_with_all_its_terms_passes_the_test_for_missing_terms() -> None:
     proof = check_states(**axes(every=8), limit=limit_of(TERMS))
     assert (proof.contacts, proof.moving > 0) == (0, True)
 
 
 @pytest.mark.parametrize("dropped", TERMS)
-def test_without_any_one_term_somebody_is_hit(dropped: str) -> None:
+def test_without_any_one_term_there_are_contacts(dropped: str) -> None:
     kept = {name: term for name, term in TERMS.items() if name != dropped}
     proof = check_states(**axes(every=8), limit=limit_of(kept))
     assert proof.contacts > 0.3 * proof.moving
@@ -107,9 +107,10 @@ def test_gap_at_standstill_agrees_with_motion_in_small_steps() -> None:
 
 
 def worst_gap_m(delay_share: float) -> FloatArray:
-    """Loop closed: the robot follows the limit of ``delay_share`` × T ago, all the way down.
+    """Return the gap at standstill less C + Z, for every state of a grid, in a closed loop.
 
-    A person walks straight at it; the gap at standstill less C + Z, for every state of a grid.
+    The robot follows the limit of ``delay_share`` × T ago until it stands. A person walks straight
+    at it.
     """
     dt = 2e-3
     human, down, T = (
@@ -127,24 +128,24 @@ def worst_gap_m(delay_share: float) -> FloatArray:
         after = np.maximum(np.minimum(delayed, speed + 0.5 * dt), speed - down * dt)
         gap = gap - np.where(speed > 1e-3, (0.5 * (speed + after) + human) * dt, 0.0)
         speed = np.where(speed > 1e-3, after, 0.0)
-    # With nobody walking the robot creeps up to the clearance for ever.
+    # If the person stands, the robot approaches the clearance without end.
     return gap - 0.1
 
 
 def test_a_limit_followed_all_the_way_down_leaves_the_clearance_if_the_loop_is_fast() -> None:
-    """Delay at most 0.4 of the reaction time that is set: docs/safety.md, assumption 3."""
+    """With a delay of at most 0.4 of the set reaction time: docs/safety.md, assumption 3."""
     assert worst_gap_m(0.4).min() > -1e-3
 
 
 def test_a_loop_as_slow_as_its_reaction_time_uses_some_of_the_clearance() -> None:
-    """Speeds met on the way down were above the limit of now: up to 0.75 a T² of way more."""
+    """The robot is faster than its present limit, and needs up to 0.75 a T² more distance."""
     short_m = worst_gap_m(1.0).reshape(3, 3, 3)
     allowed_m = 0.75 * np.array([0.5, 1.0, 2.0])[:, None, None] * np.array([0.2, 0.4, 0.8]) ** 2
     assert short_m.min() < -0.02
     assert (short_m >= -allowed_m).all()
 
 
-def test_a_robot_can_be_checked_by_itself() -> None:
+def test_a_single_robot_can_be_checked() -> None:
     proof = check_robot(ROBOT)
     assert proof.contacts == 0
     assert proof.states > 300_000

@@ -1,4 +1,4 @@
-"""Silence: first everyone is unaware, then the robot stops, and then it starts without a jump."""
+"""Missing input: everyone is unaware, then the robot stops, and later it starts with a ramp."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ PERIOD_S = 0.05
 
 
 def driving(seconds: float = 2.0) -> NavAdapter:
-    """An adapter that has watched an attentive person beside a robot at 1 m/s."""
+    """Return an adapter after updates with an attentive person and a robot at 1 m/s."""
     adapter = NavAdapter(AwarenessPolicy(), ROBOT)
     for step in range(round(seconds / PERIOD_S) + 1):
         now = step * PERIOD_S
@@ -22,13 +22,13 @@ def driving(seconds: float = 2.0) -> NavAdapter:
     return adapter
 
 
-def test_before_any_input_the_watchdog_says_stop() -> None:
+def test_before_any_input_the_watchdog_returns_a_stop() -> None:
     result = NavAdapter(AwarenessPolicy(), ROBOT).watchdog(3.0)
     assert (result.speed_limit_mps, result.stale, result.obstacles) == (0.0, True, ())
     assert result.limited_by == "stale data: none yet"
 
 
-def test_silence_makes_everyone_unaware_and_then_stops_the_robot() -> None:
+def test_without_input_everyone_becomes_unaware_and_then_the_robot_stops() -> None:
     adapter = driving()
     before = adapter.watchdog(2.0)
     assert not before.stale
@@ -49,19 +49,19 @@ def test_silence_makes_everyone_unaware_and_then_stops_the_robot() -> None:
     assert result.limited_by.startswith("stale data: ")
 
 
-def test_the_watchdog_is_an_update_without_news() -> None:
-    watched, told = driving(), driving()
+def test_the_watchdog_is_an_update_with_the_latest_input() -> None:
+    watched, updated = driving(), driving()
     for now in (2.1, 2.4, 2.7):
         track = person(2.0, position=(4.0, 0.0), awareness_lower=1.0)
         state = robot_at(2.0, speed_mps=1.0)
-        expected = told.update((track,), state, now, perception_stamp_s=2.0)
+        expected = updated.update((track,), state, now, perception_stamp_s=2.0)
         assert numbers(watched.watchdog(now)) == numbers(expected)
     with pytest.raises(NavError, match="must not go backward"):
         watched.watchdog(2.6)
 
 
-@pytest.mark.parametrize("silent", [True, False], ids=["nobody asked", "watchdog asked"])
-def test_recovery_is_a_ramp_and_not_a_jump(silent: bool) -> None:
+@pytest.mark.parametrize("silent", [True, False], ids=["no update", "watchdog"])
+def test_the_limit_recovers_with_a_ramp(silent: bool) -> None:
     adapter = driving()
     if not silent:
         for step in range(1, 40):
@@ -75,7 +75,7 @@ def test_recovery_is_a_ramp_and_not_a_jump(silent: bool) -> None:
         limits.append(result.speed_limit_mps)
         reasons.append(result.limited_by)
         radii.append(result.obstacles[0].radius_m)
-    # From a standing robot: one period of acceleration, or what counts as fresh of the silence.
+    # The robot stands: the limit starts with at most ``fresh_within_s`` of acceleration.
     assert limits[0] <= ROBOT.max_acceleration_mps2 * 0.25
     steps = [after - before for before, after in pairwise(limits)]
     assert max(steps) <= ROBOT.max_acceleration_mps2 * PERIOD_S + 1e-9

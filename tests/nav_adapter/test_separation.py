@@ -1,3 +1,5 @@
+"""Speed and separation: published figures, the inverse, and motion in small steps."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -22,7 +24,7 @@ def test_published_figures() -> None:
     np.testing.assert_allclose(limits, [0.21, 0.64, 1.01, 1.63], atol=0.005)
 
 
-def test_a_separation_too_small_to_reckon_with_gives_no_speed() -> None:
+def test_a_separation_too_small_for_a_float_gives_a_limit_of_0() -> None:
     limit = max_speed_mps(5e-324, 0.0, deceleration_mps2=0.25, reaction_time_s=0.0, clearance_m=0.0)
     assert limit == 0.0
 
@@ -52,7 +54,7 @@ def test_speed_is_the_root_of_the_protective_separation(
 
 
 @given(low=finite(-1.0, 20.0), more=finite(0.0, 5.0), human=finite(0.0, 3.0), **SETTINGS)
-def test_farther_is_never_slower_and_a_faster_person_never_lets_the_robot_go_faster(
+def test_the_limit_never_falls_with_separation_or_rises_with_human_speed(
     low: float, more: float, human: float, **settings: float
 ) -> None:
     assert max_speed_mps(low + more, human, **settings) >= max_speed_mps(low, human, **settings)
@@ -63,7 +65,7 @@ def test_farther_is_never_slower_and_a_faster_person_never_lets_the_robot_go_fas
     )
 
 
-def test_broadcasts_and_stops_where_it_must() -> None:
+def test_the_limit_broadcasts_and_is_0_where_it_must_be() -> None:
     limits = max_speed_mps(
         np.array([[-1.0], [0.58], [np.nan], [4.0]]),
         np.array([1.6, 0.3]),
@@ -115,8 +117,8 @@ def test_a_robot_at_the_limit_stands_before_contact() -> None:
     while (speed[moving] > 0.0).any():
         braking = t >= reaction - 1e-9
         after = np.where(braking, np.maximum(speed - deceleration * dt, 0.0), speed)
-        # A standing robot is no longer the one who makes contact.
+        # Once the robot stands, the gap no longer counts.
         gap -= np.where(speed > 0.0, (0.5 * (speed + after) + human) * dt, 0.0)
         speed, t = after, t + dt
-    # Never nearer than the clearance, and no farther either: the limit wastes nothing.
+    # Never nearer than the clearance, and not farther either: the limit is not too strict.
     np.testing.assert_allclose(gap[moving], clearance, atol=5.0 * dt)

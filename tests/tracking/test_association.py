@@ -1,3 +1,5 @@
+"""Matching: gates, the best sum of costs, and ambiguous matches."""
+
 from __future__ import annotations
 
 import itertools
@@ -44,8 +46,8 @@ def match(
     )
     columns = (found.tracks, found.measurements, found.ambiguous)
     return tuple(
-        Match(i, j, doubt)
-        for i, j, doubt in zip(*(column.tolist() for column in columns), strict=True)
+        Match(i, j, ambiguous)
+        for i, j, ambiguous in zip(*(column.tolist() for column in columns), strict=True)
     )
 
 
@@ -82,8 +84,8 @@ def test_tentative_tracks_take_what_is_left() -> None:
     assert pairs(found) == {(0, 1), (1, 0)}
 
 
-def test_a_wide_track_does_not_steal_by_being_wide() -> None:
-    # The wide track is nearer in Mahalanobis distance; its log-determinant gives it away.
+def test_an_uncertain_track_does_not_take_its_neighbours_measurement() -> None:
+    # The uncertain track is nearer in Mahalanobis distance, but its log-determinant costs more.
     found = match([(0.0, 0), (0.45, 0)], [(0.16, 0)], track_std_m=[0.05, 0.8])
     assert pairs(found) == {(0, 0)}
 
@@ -99,7 +101,7 @@ def test_matching_is_the_best_over_all_permutations(
     assert len({m.track for m in found}) == len({m.measurement for m in found}) == len(found)
 
     def cost(i: int, j: int) -> float:
-        """What a match costs more than leaving both alone; 0 where a gate is shut."""
+        """Return the cost of a match less that of a miss; 0 outside a gate."""
         offset = np.hypot(*np.subtract(tracks[i], measured[j]))
         distance2 = offset**2 / 0.02
         if offset > GATES.distance_m or distance2 > GATES.mahalanobis2:
@@ -116,29 +118,29 @@ def test_matching_is_the_best_over_all_permutations(
     assert sum(chosen) <= best + 1e-6
 
 
-def test_a_person_who_was_missed_does_not_set_off_a_chain() -> None:
-    # B's measurement lies on B and within A's gate, clutter within B's. The most matches would be
-    # A with B's measurement and B with the clutter.
+def test_a_missed_person_does_not_cause_a_chain_of_wrong_matches() -> None:
+    # B's measurement is at B and in A's gate, clutter is in B's gate. The largest set of matches
+    # would be A with B's measurement and B with the clutter.
     tracks: list[tuple[float, float]] = [(0.0, 0), (0.45, 0)]
     measured: list[tuple[float, float]] = [(0.45, 0), (0.9, 0)]
     assert pairs(match(tracks, measured)) == {(1, 0)}
 
 
-def test_a_lone_match_is_never_in_doubt() -> None:
+def test_a_match_without_rivals_is_never_ambiguous() -> None:
     assert not match([(0, 0)], [(0.4, 0)])[0].ambiguous
 
 
-def test_a_measurement_between_two_near_tracks_is_in_doubt() -> None:
+def test_a_measurement_between_two_near_tracks_is_ambiguous() -> None:
     assert match([(-0.2, 0), (0.2, 0)], [(0.01, 0)])[0].ambiguous
-    # The same measurement on top of one of them, two metres from the other, is not.
+    # The same measurement is not ambiguous when the other track is two metres away.
     assert not match([(0.0, 0), (2.0, 0)], [(0.01, 0)])[0].ambiguous
 
 
-def test_a_track_between_two_near_measurements_is_in_doubt() -> None:
+def test_a_track_between_two_near_measurements_is_ambiguous() -> None:
     assert match([(0, 0)], [(-0.2, 0), (0.21, 0)])[0].ambiguous
 
 
-def test_rivals_that_fit_much_worse_or_lie_far_off_raise_no_doubt() -> None:
+def test_rivals_that_fit_much_worse_or_are_far_away_make_no_match_ambiguous() -> None:
     tracks: list[tuple[float, float]] = [(0.0, 0), (0.42, 0)]
     measured: list[tuple[float, float]] = [(0.0, 0), (0.42, 0)]
     assert not any(found.ambiguous for found in match(tracks, measured))

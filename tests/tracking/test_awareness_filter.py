@@ -1,4 +1,4 @@
-"""The scalar filter on its own: exactness, bounds, and what a measurement means."""
+"""The awareness filter alone: exactness, bounds, and the meaning of a measurement."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ PRIOR_VARIANCE = CONFIG.prior_std_logit**2
 alphas = st.floats(0.0, 1.0)
 stds = st.floats(0.0, CONFIG.max_evidence_std)
 intervals = st.floats(1e-3, 10.0)
-# Any mean; any variance that a filter which starts at the prior can hold; a bound below the mean.
+# Any mean, any variance that a filter started at the prior can have, a bound below the mean.
 beliefs = st.builds(
     lambda mean, variance, slack: AwarenessBelief(
         mean, variance, mean - Z * math.sqrt(variance) - slack
@@ -62,24 +62,24 @@ def test_the_bound_never_rises_without_evidence(belief: AwarenessBelief, dt_s: f
 
 
 @given(belief=beliefs, dt_s=st.floats(1e-3, 5.0))
-def test_the_bound_is_the_lowest_that_the_belief_passes(
+def test_the_bound_falls_to_the_lowest_value_during_the_step(
     belief: AwarenessBelief, dt_s: float
 ) -> None:
     phi = np.exp(-np.linspace(0.0, dt_s, 4001) / TAU_S)
     m0 = logit(CONFIG.prior_awareness)
-    on_the_way = (
+    path = (
         m0
         + phi * (belief.mean - m0)
         - Z * np.sqrt(PRIOR_VARIANCE + phi**2 * (belief.variance - PRIOR_VARIANCE))
     )
-    lowest = min(belief.bound, on_the_way.min())
+    lowest = min(belief.bound, path.min())
     after = drift(belief, dt_s, TAU_S, CONFIG).bound
     assert after <= lowest + 1e-9
     assert after == pytest.approx(lowest, abs=1e-3)
 
 
 @given(belief=beliefs, dt_s=intervals)
-def test_a_hidden_face_lowers_the_bound_at_least_as_fast_as_an_absence(
+def test_a_hidden_face_lowers_the_bound_at_least_as_fast_as_being_unseen(
     belief: AwarenessBelief, dt_s: float
 ) -> None:
     no_face = drift(belief, dt_s, CONFIG.no_face_time_constant_s, CONFIG)
@@ -88,7 +88,7 @@ def test_a_hidden_face_lowers_the_bound_at_least_as_fast_as_an_absence(
 
 
 @given(belief=beliefs)
-def test_without_evidence_belief_ends_at_the_prior(belief: AwarenessBelief) -> None:
+def test_without_evidence_the_belief_ends_at_the_prior(belief: AwarenessBelief) -> None:
     after = drift(belief, 100.0 * TAU_S, TAU_S, CONFIG)
     assert sigmoid(after.mean) == pytest.approx(CONFIG.prior_awareness)
     assert after.variance == pytest.approx(PRIOR_VARIANCE)
@@ -107,11 +107,11 @@ def test_uncertainty_grows_without_evidence_and_shrinks_with_it(
 def test_a_measurement_is_a_scalar_bayes_update(
     belief: AwarenessBelief, alpha: float, std: float, dt_s: float
 ) -> None:
-    said = evidence(alpha, std, CONFIG)
-    mean, variance = said
+    measured = evidence(alpha, std, CONFIG)
+    mean, variance = measured
     variance = variance * max(1.0, CONFIG.evidence_correlation_s / dt_s)
     information = 1.0 / belief.variance + 1.0 / variance
-    after = measure(belief, *said, dt_s, CONFIG)
+    after = measure(belief, *measured, dt_s, CONFIG)
     assert after.variance == pytest.approx(1.0 / information)
     assert after.mean == pytest.approx(
         (belief.mean / belief.variance + mean / variance) / information, abs=1e-9
@@ -122,15 +122,15 @@ def test_a_measurement_is_a_scalar_bayes_update(
 @given(alpha=st.floats(0.3, 0.7))
 def test_in_mid_range_a_standard_deviation_maps_by_the_derivative(alpha: float) -> None:
     std = 0.08
-    said = evidence(alpha, std, CONFIG)
-    assert said[0] == pytest.approx(logit(alpha), abs=0.06)
-    assert math.sqrt(said[1]) == pytest.approx(std / (alpha * (1.0 - alpha)), rel=0.06)
+    mean, variance = evidence(alpha, std, CONFIG)
+    assert mean == pytest.approx(logit(alpha), abs=0.06)
+    assert math.sqrt(variance) == pytest.approx(std / (alpha * (1.0 - alpha)), rel=0.06)
 
 
 @given(alpha=alphas, std=stds)
 def test_the_one_sigma_points_of_a_measurement_are_those_of_alpha(alpha: float, std: float) -> None:
-    said = evidence(alpha, std, CONFIG)
-    mean, sigma = said[0], math.sqrt(said[1])
+    mean, variance = evidence(alpha, std, CONFIG)
+    sigma = math.sqrt(variance)
     epsilon = CONFIG.clip_awareness
     assert sigma >= CONFIG.min_evidence_std_logit
     if sigma > CONFIG.min_evidence_std_logit + 1e-9:
@@ -147,15 +147,15 @@ def test_a_higher_alpha_is_higher_evidence(low: float, high: float, std: float) 
 
 
 def test_a_confident_zero_is_confident_unawareness() -> None:
-    said = evidence(0.0, 0.05, CONFIG)
-    # By the derivative at ε it would weigh next to nothing: σ = 0.05 / (0.02 · 0.98) = 2.6.
-    assert sigmoid(said[0] + 2.0 * math.sqrt(said[1])) < 0.1
-    after = estimate(measure(prior(CONFIG), *said, 1.0, CONFIG), CONFIG)
+    mean, variance = evidence(0.0, 0.05, CONFIG)
+    # By the derivative at ε it would have almost no weight: σ = 0.05 / (0.02 · 0.98) = 2.6.
+    assert sigmoid(mean + 2.0 * math.sqrt(variance)) < 0.1
+    after = estimate(measure(prior(CONFIG), mean, variance, 1.0, CONFIG), CONFIG)
     assert after.awareness < CONFIG.prior_awareness
     assert after.awareness_std < 0.02
 
 
-def test_an_alpha_that_could_be_anything_is_no_evidence() -> None:
+def test_an_alpha_with_a_large_standard_deviation_is_no_evidence() -> None:
     mean, variance = evidence(
         np.array([1.0, 1.0, 1.0, np.nan]),
         np.array([0.3, 1e9, CONFIG.max_evidence_std, np.nan]),
@@ -166,7 +166,7 @@ def test_an_alpha_that_could_be_anything_is_no_evidence() -> None:
 
 
 @pytest.mark.parametrize("frames", [2, 5, 40])
-def test_information_in_a_span_of_time_does_not_depend_on_the_frame_rate(frames: int) -> None:
+def test_information_per_second_does_not_depend_on_the_frame_rate(frames: int) -> None:
     span_s = CONFIG.evidence_correlation_s
     once = measure(prior(CONFIG), 1.0, 0.5, span_s, CONFIG)
     many = prior(CONFIG)
@@ -207,7 +207,7 @@ def test_the_deviation_is_that_of_the_logit_normal_distribution(
 
 
 @given(value=st.floats(-12.0, 12.0))
-def test_a_lower_bound_that_no_measurement_could_tell_from_zero_is_zero(value: float) -> None:
+def test_a_lower_bound_below_the_clip_is_zero(value: float) -> None:
     epsilon = CONFIG.clip_awareness
     lower = estimate(AwarenessBelief(value, 1.0, value), CONFIG).awareness_lower
     assert lower == pytest.approx(max(0.0, (sigmoid(value) - epsilon) / (1.0 - epsilon)))
@@ -215,7 +215,7 @@ def test_a_lower_bound_that_no_measurement_could_tell_from_zero_is_zero(value: f
     assert lower == 0.0 or sigmoid(value) > epsilon
 
 
-def test_nothing_known_has_a_lower_bound_of_zero() -> None:
+def test_the_prior_has_a_lower_bound_of_zero() -> None:
     assert estimate(prior(CONFIG), CONFIG).awareness_lower == 0.0
     assert estimate(prior(CONFIG), CONFIG).awareness == pytest.approx(CONFIG.prior_awareness)
 

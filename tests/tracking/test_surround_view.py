@@ -1,4 +1,4 @@
-"""Where a camera of several flat views expects to see people."""
+"""The view of a camera whose image is cut into several flat views."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ def surround(*headings_deg: float) -> SurroundView:
 
 
 @given(st.floats(-math.pi, math.pi), st.floats(0.6, 7.9))
-def test_four_views_see_all_around(bearing, range_m):
+def test_four_views_cover_all_directions(bearing, range_m):
     place = [[range_m * math.cos(bearing), range_m * math.sin(bearing)]]
     assert surround(0, 90, 180, -90).visibility(place, T_ODOM_CAMERA)[0] == 1.0
 
 
 @given(st.floats(-math.pi, math.pi), st.floats(0.6, 12.0))
-def test_a_view_more_never_hides_anybody(bearing, range_m):
+def test_another_view_never_lowers_the_visibility(bearing, range_m):
     place = [[range_m * math.cos(bearing), range_m * math.sin(bearing)]]
     ahead, more = surround(0), surround(0, 90)
     alone = CameraView(CAMERA, max_range_m=10.0).visibility(place, T_ODOM_CAMERA)
@@ -39,7 +39,7 @@ def test_a_view_more_never_hides_anybody(bearing, range_m):
     assert more.visibility(place, T_ODOM_CAMERA) >= alone
 
 
-def test_headings_are_left_positive() -> None:
+def test_positive_headings_are_to_the_left() -> None:
     left, right, behind = [[0.0, 2.0]], [[0.0, -2.0]], [[-2.0, 0.0]]
     view = surround(0, 90)
     assert isinstance(view, View)
@@ -49,8 +49,8 @@ def test_headings_are_left_positive() -> None:
     assert view.visibility(np.empty((0, 2)), T_ODOM_CAMERA).shape == (0,)
 
 
-def test_who_is_missed_behind_the_robot_is_dropped_sooner_with_eyes_there() -> None:
-    """A frame that should have shown somebody and did not says more than one that could not."""
+def test_a_person_missed_behind_the_robot_is_deleted_sooner_with_a_view_there() -> None:
+    """Only frames that could have shown the person count against the track."""
     kept = {}
     for name, view in (("ahead", surround(0)), ("around", surround(0, 90, 180, -90))):
         tracker = PersonTracker(view=view)
@@ -65,7 +65,7 @@ def test_who_is_missed_behind_the_robot_is_dropped_sooner_with_eyes_there() -> N
     assert kept["ahead"] > 2.9
 
 
-def test_what_does_not_fit_is_refused() -> None:
+def test_views_and_rotations_that_do_not_fit_are_refused() -> None:
     flat = CameraView(CAMERA)
     with pytest.raises(TrackingError, match="of one length, at least 1, got 0 and 0"):
         SurroundView((), ())

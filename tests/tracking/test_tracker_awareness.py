@@ -1,4 +1,4 @@
-"""Awareness through the whole tracker: how fast it comes and goes, and what it never does."""
+"""Awareness in the whole tracker: how fast it rises and falls, and its limits."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from tracking import PersonTrack, PersonTracker, TrackerConfig
 PRIOR = TrackerConfig().awareness.prior_awareness
 AWARE_ABOVE = 0.5
 
-# What a frame shows: an α, None for a person without a face, "unseen" for nobody.
+# Content of a frame: an α, None for a person without a face, "unseen" for no person.
 Shown = float | str | None
 
 
 def lower_bounds(
     shown: list[Shown], *, alpha_std: float = 0.07, seed: int = 0, period_s: float = PERIOD_S
 ) -> np.ndarray:
-    """awareness_lower after each frame, for one standing person; α is measured with noise."""
+    """Return awareness_lower after each frame of one standing person; α has noise."""
     rng = np.random.default_rng(seed)
     tracker, bounds = PersonTracker(), []
     for step, alpha in enumerate(shown):
@@ -41,9 +41,7 @@ def lower_bounds(
 @pytest.mark.parametrize("alpha_std", [0.05, 0.1])
 @pytest.mark.parametrize("period_s", [0.033, 0.05, 0.1])
 @pytest.mark.parametrize("lost", ["unseen", None, 0.0])
-def test_awareness_goes_within_a_third_of_a_second(
-    lost: Shown, period_s: float, alpha_std: float
-) -> None:
+def test_awareness_falls_within_0_35_s(lost: Shown, period_s: float, alpha_std: float) -> None:
     before, after = round(1.0 / period_s), round(0.35 / period_s)
     released = []
     for seed in range(25):
@@ -56,7 +54,7 @@ def test_awareness_goes_within_a_third_of_a_second(
     assert np.percentile(released, 95) <= 0.35
 
 
-def test_nobody_unseen_for_0_3_s_is_aware() -> None:
+def test_a_person_unseen_for_0_3_s_is_not_aware() -> None:
     for seed in range(20):
         bounds = lower_bounds([1.0] * 40 + ["unseen"] * 6, alpha_std=0.02, seed=seed)
         assert bounds[39] > 0.9
@@ -65,7 +63,7 @@ def test_nobody_unseen_for_0_3_s_is_aware() -> None:
 
 @pytest.mark.parametrize("alpha_std", [0.05, 0.1])
 @pytest.mark.parametrize("period_s", [0.033, 0.05, 0.1])
-def test_awareness_comes_within_half_a_second(period_s: float, alpha_std: float) -> None:
+def test_awareness_rises_within_0_5_s(period_s: float, alpha_std: float) -> None:
     before, after = round(1.0 / period_s), round(0.5 / period_s)
     for seed in range(25):
         bounds = lower_bounds(
@@ -76,27 +74,27 @@ def test_awareness_comes_within_half_a_second(period_s: float, alpha_std: float)
 
 
 @pytest.mark.parametrize(("alpha", "least"), [(0.7, 0.5), (0.9, 0.65), (1.0, 0.8)])
-def test_steady_attention_is_recognised_and_not_overrated(alpha: float, least: float) -> None:
+def test_steady_attention_is_recognised_and_not_overestimated(alpha: float, least: float) -> None:
     bounds = np.concatenate([lower_bounds([alpha] * 60, seed=seed)[30:] for seed in range(20)])
     assert bounds.mean() > least
     assert (bounds > alpha).mean() < 0.1
 
 
-def test_one_missed_frame_does_not_cost_an_attentive_person_everything() -> None:
+def test_awareness_survives_one_missed_frame() -> None:
     bounds = lower_bounds([0.95] * 40 + ["unseen", 0.95, 0.95], alpha_std=0.05)
     assert bounds[40] < bounds[39]
     assert bounds[40] > AWARE_ABOVE
     assert bounds[42] > 0.9 * bounds[39]
 
 
-def test_one_false_glance_does_not_make_a_person_aware() -> None:
+def test_one_frame_with_a_high_alpha_does_not_make_a_person_aware() -> None:
     bounds = lower_bounds([None] * 20 + [0.95] + [None] * 5)
     assert bounds.max() < AWARE_ABOVE
     assert lower_bounds([0.0] * 20 + [0.95] + [0.0] * 5).max() < AWARE_ABOVE
 
 
 @pytest.mark.parametrize("blind", [None, "unseen"])
-def test_without_a_face_nobody_was_ever_aware(blind: Shown) -> None:
+def test_without_a_face_nobody_becomes_aware(blind: Shown) -> None:
     assert (lower_bounds([blind] * 60) == 0.0).all()
     bounds = lower_bounds([0.0] * 10 + [blind] * 40)
     assert (np.diff(bounds[9:]) <= 0.0).all()
@@ -113,7 +111,7 @@ def test_evidence_from_before_confirmation_does_not_count() -> None:
     assert (track.status, track.awareness_lower) == ("confirmed", 0.0)
 
 
-def test_a_stuck_camera_makes_nobody_more_aware() -> None:
+def test_repeated_frames_make_nobody_more_aware() -> None:
     tracker = PersonTracker()
     for step in range(10):
         now = step * PERIOD_S
@@ -122,25 +120,25 @@ def test_a_stuck_camera_makes_nobody_more_aware() -> None:
     for _ in range(30):
         (again,) = tracker.update([observe((3, 0), now, awareness=1.0)], now, CAMERA)
     assert again.awareness_lower == once.awareness_lower
-    (warned,) = tracker.update([observe((3, 0), now, awareness=0.0)], now, CAMERA)
-    assert warned.awareness_lower < once.awareness_lower
+    (lower,) = tracker.update([observe((3, 0), now, awareness=0.0)], now, CAMERA)
+    assert lower.awareness_lower < once.awareness_lower
 
 
-def test_two_glances_do_not_vouch_for_a_second_without_frames() -> None:
+def test_looks_far_apart_are_no_evidence_for_the_time_between_them() -> None:
     def after_gap(gap_s: float) -> PersonTrack:
         tracker = PersonTracker()
         for step in range(40):
             now = step * PERIOD_S
             tracker.update([observe((3, 0), now, awareness=0.95)], now, CAMERA)
-        glance = [observe((3, 0), now + gap_s, awareness=0.6, awareness_std=0.25)]
-        return tracker.update(glance, now + gap_s, CAMERA)[0]
+        look = [observe((3, 0), now + gap_s, awareness=0.6, awareness_std=0.25)]
+        return tracker.update(look, now + gap_s, CAMERA)[0]
 
     gap_s = TrackerConfig().awareness.max_evidence_gap_s
     assert after_gap(gap_s - 1e-6).awareness > after_gap(gap_s + 1e-6).awareness + 0.05
 
 
 @pytest.mark.parametrize("alpha_std", [0.3, 0.5, 1e6])
-def test_an_alpha_that_could_be_anything_counts_as_no_face(alpha_std: float) -> None:
+def test_an_alpha_with_a_large_standard_deviation_counts_as_no_face(alpha_std: float) -> None:
     tracker, twin = PersonTracker(), PersonTracker()
     for step in range(30):
         now = step * PERIOD_S
@@ -174,7 +172,7 @@ def two_people(
 
 
 def meeting(now: float) -> np.ndarray:
-    """Two people walk towards each other and pass, 5 cm apart at most, after two seconds."""
+    """Return the places of two people who pass each other after 2 s, 5 cm apart."""
     along = 1.2 * (now - 2.0)
     return np.array([[5.0 + along, 0.0], [5.0 - along, 0.05]])
 
@@ -184,12 +182,12 @@ def test_awareness_is_not_inherited_when_two_people_pass(unaware: Shown) -> None
     for seed in range(15):
         for _, places, tracks in two_people(meeting, (0.95, unaware), seed)[5:]:
             assert nearest(tracks, places[1]).awareness_lower < AWARE_ABOVE or (
-                # In the moment of passing no camera could say who is who.
+                # While they pass, no camera can tell them apart.
                 np.linalg.norm(places[0] - places[1]) < 0.2
             )
 
 
-def test_an_ambiguous_match_forgets_both() -> None:
+def test_an_ambiguous_match_resets_the_awareness_of_both() -> None:
     reset = 0
     for seed in range(5):
         history = two_people(meeting, (0.95, 0.95), seed)

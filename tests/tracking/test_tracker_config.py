@@ -1,3 +1,5 @@
+"""The settings: YAML, ranges and unknown keys."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -9,7 +11,7 @@ from pydantic import ValidationError
 from tracking import AwarenessFilterConfig, PersonTracker, TrackerConfig, TrackingError
 
 
-def test_a_config_survives_yaml(tmp_path: Path) -> None:
+def test_a_config_is_the_same_after_yaml(tmp_path: Path) -> None:
     config = TrackerConfig(
         max_coast_s=2.5, awareness=AwarenessFilterConfig(unseen_time_constant_s=0.25)
     )
@@ -41,12 +43,12 @@ def test_values_out_of_range_are_refused(wrong: dict[str, Any]) -> None:
         TrackerConfig.model_validate(wrong)
 
 
-def test_a_back_turned_may_not_keep_awareness_longer_than_an_absence() -> None:
+def test_a_hidden_face_must_not_keep_awareness_longer_than_being_unseen() -> None:
     with pytest.raises(ValidationError, match="no_face_time_constant_s <= unseen"):
         AwarenessFilterConfig(no_face_time_constant_s=0.5, unseen_time_constant_s=0.3)
 
 
-def test_the_tracker_takes_a_tracker_config_only() -> None:
+def test_the_tracker_accepts_only_a_tracker_config() -> None:
     assert PersonTracker(TrackerConfig(confirm_hits=2)).config.confirm_hits == 2
     with pytest.raises(TrackingError, match="config must be a TrackerConfig, got dict"):
         PersonTracker({"confirm_hits": 2})  # type: ignore[arg-type]

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.stats import chi2
 from tracking_scenes import camera_at, observe, white_acceleration
 
 from tracking import PersonTracker, TrackerConfig
 
-# Gates wide open: consistency is a property of the filter, and gates cut its tails off. The truth
-# here is white acceleration, which knows no standing people.
+# Consistency is a property of the filter, and gates would cut its tails off, so they are wide open.
+# The simulated truth is white acceleration, without standing people.
 CONFIG = TrackerConfig(
     gate_probability=1.0 - 1e-12,
     gate_distance_m=50.0,
@@ -26,7 +28,7 @@ STEPS_S = np.linspace(0.03, 0.4, 12)
 
 @pytest.fixture(scope="module")
 def errors() -> tuple[np.ndarray, np.ndarray]:
-    """NEES (WALKERS, FRAMES) and NIS (WALKERS, FRAMES - 1) at steps of 0.03 to 0.4 s."""
+    """Return NEES (WALKERS, FRAMES) and NIS (WALKERS, FRAMES - 1) at steps of 0.03 to 0.4 s."""
     rng = np.random.default_rng(7)
     noise_root = np.linalg.cholesky(NOISE_M2)
     nees, nis = np.empty((WALKERS, FRAMES)), np.empty((WALKERS, FRAMES - 1))
@@ -55,19 +57,19 @@ def errors() -> tuple[np.ndarray, np.ndarray]:
     return nees, nis
 
 
-def test_estimation_errors_are_as_large_as_the_covariance_says(
+def test_estimation_errors_match_the_covariance(
     errors: tuple[np.ndarray, np.ndarray],
 ) -> None:
     nees, _ = errors
-    # Walkers are independent, frames of one walker are not: one two-sided test a frame, at a level
-    # that the whole family passes with 99 %.
+    # Walkers are independent but frames of one walker are not: one two-sided test per frame, at a
+    # level that all of them pass together with 99 %.
     level = 0.01 / FRAMES
     low, high = chi2.ppf([level / 2, 1.0 - level / 2], df=4 * WALKERS)
     assert (nees.sum(axis=0) > low).all()
     assert (nees.sum(axis=0) < high).all()
 
 
-def test_innovations_are_as_large_as_the_covariance_says_and_white(
+def test_innovations_match_the_covariance_and_are_white(
     errors: tuple[np.ndarray, np.ndarray],
 ) -> None:
     _, nis = errors
@@ -78,7 +80,7 @@ def test_innovations_are_as_large_as_the_covariance_says_and_white(
     assert abs(lag_one) < 3.0 / np.sqrt(nis[:, 1:].size)
 
 
-def test_coasting_errors_are_as_large_as_the_covariance_says() -> None:
+def test_coasting_errors_match_the_covariance() -> None:
     rng = np.random.default_rng(11)
     q = CONFIG.acceleration_density_m2ps3
     total, walkers = 0.0, 150
@@ -100,7 +102,26 @@ def test_coasting_errors_are_as_large_as_the_covariance_says() -> None:
     assert low < total < high
 
 
-def test_it_is_the_textbook_kalman_filter() -> None:
+@given(
+    low=st.floats(0.0, 1.0),
+    extra=st.floats(0.0, 1.0),
+    angle=st.floats(-np.pi, np.pi),
+    floor_m=st.floats(0.01, 1.0),
+)
+def test_the_noise_floor_raises_eigenvalues_and_keeps_directions(
+    low: float, extra: float, angle: float, floor_m: float
+) -> None:
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    eigenvalues = np.array([low, low + extra])
+    measured_m2 = turn @ np.diag(eigenvalues) @ turn.T
+    tracker = PersonTracker(TrackerConfig(position_noise_floor_m=floor_m))
+    seen = observe((3.0, 0.0), 0.0, covariance_odom_m2=measured_m2)
+    (track,) = tracker.update([seen], 0.0, camera_at())
+    expected = turn @ np.diag(np.maximum(eigenvalues, floor_m**2)) @ turn.T
+    np.testing.assert_allclose(track.covariance_odom[:2, :2], expected, atol=1e-9)
+
+
+def test_the_tracker_is_the_textbook_kalman_filter() -> None:
     rng = np.random.default_rng(3)
     tracker = PersonTracker(CONFIG)
     H = np.eye(2, 4)

@@ -1,4 +1,4 @@
-"""The camera moves, and where it is may itself be uncertain."""
+"""A moving camera with an uncertain pose."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def first_sight(
 
 
 @pytest.mark.parametrize("yaw_rad", [0.0, 0.7, -2.0])
-def test_an_uncertain_pose_spreads_people_as_monte_carlo_does(yaw_rad: float) -> None:
+def test_an_uncertain_pose_adds_the_covariance_of_a_monte_carlo_run(yaw_rad: float) -> None:
     rng = np.random.default_rng(0)
     camera_m = np.array([1.0, -2.0])
     ahead = np.array([math.cos(yaw_rad), math.sin(yaw_rad)])
@@ -32,7 +32,7 @@ def test_an_uncertain_pose_spreads_people_as_monte_carlo_does(yaw_rad: float) ->
     covariance = first_sight(tuple(place), camera_at(*camera_m, yaw_rad), POSE).covariance_odom
     errors = rng.multivariate_normal(np.zeros(3), POSE, 40_000)
     turned = np.array([[0.0, -1.0], [1.0, 0.0]]) @ (place - camera_m)
-    # The camera reports the same place in its own frame, wherever it really is.
+    # The camera reports the same position in its own frame, whatever its true pose.
     c, s = np.cos(errors[:, 2:]), np.sin(errors[:, 2:])
     sampled = camera_m + errors[:, :2] + c * (place - camera_m) + s * turned
     expected = np.cov(sampled.T) + 1e-4 * np.eye(2)
@@ -40,14 +40,14 @@ def test_an_uncertain_pose_spreads_people_as_monte_carlo_does(yaw_rad: float) ->
 
 
 @pytest.mark.parametrize("range_m", [1.0, 2.0, 4.0, 8.0])
-def test_an_error_in_yaw_moves_people_across_in_proportion_to_range(range_m: float) -> None:
+def test_an_error_in_yaw_moves_people_sideways_in_proportion_to_range(range_m: float) -> None:
     pose = np.diag([0.0, 0.0, 0.02**2])
     covariance = first_sight((range_m, 0.0), CAMERA, pose).covariance_odom
     assert covariance[0, 0] == pytest.approx(1e-4)
     assert covariance[1, 1] == pytest.approx(1e-4 + (0.02 * range_m) ** 2)
 
 
-def test_a_pose_without_error_is_no_pose_error() -> None:
+def test_a_pose_covariance_of_zero_adds_nothing() -> None:
     with_zero = first_sight((3.0, 1.0), CAMERA, np.zeros((3, 3)))
     np.testing.assert_allclose(
         with_zero.covariance_odom,
@@ -65,7 +65,7 @@ def test_a_pose_without_error_is_no_pose_error() -> None:
         (np.diag([1e200, 1.0, 1.0]), "the pose's share included"),
     ],
 )
-def test_a_pose_covariance_that_is_none_is_refused(pose: FloatArray, message: str) -> None:
+def test_a_matrix_that_is_not_a_covariance_is_refused(pose: FloatArray, message: str) -> None:
     tracker = PersonTracker()
     with pytest.raises(TrackingError, match=message):
         tracker.update([observe((3, 0), 0.0)], 0.0, CAMERA, pose_covariance_odom=pose)
@@ -73,15 +73,15 @@ def test_a_pose_covariance_that_is_none_is_refused(pose: FloatArray, message: st
 
 
 def figure_of_eight(now: float) -> FloatArray:
-    """A camera that drives an eight of 3 m by 1.5 m in 12 s and looks along its path."""
+    """Return the pose of a camera on a figure of eight, 3 m by 1.5 m in 12 s, looking ahead."""
     phase = 2.0 * math.pi * now / 12.0
     x, y = 1.5 * math.sin(phase), 0.75 * math.sin(2.0 * phase)
     yaw = math.atan2(1.5 * math.cos(2.0 * phase), 1.5 * math.cos(phase))
     return camera_at(x, y, yaw, 0.05 * math.sin(9.0 * now))
 
 
-def test_a_camera_in_a_figure_of_eight_sees_what_a_fixed_one_sees() -> None:
-    """Own noise for either camera, pose errors for the moving one: equal within the covariance."""
+def test_a_camera_in_a_figure_of_eight_gives_the_tracks_of_a_fixed_one() -> None:
+    """Each camera has its own noise, the moving one also pose errors: equal within covariance."""
     rng = np.random.default_rng(12)
     starts = np.array([[4.0, -3.0], [-4.0, 2.0], [3.0, 3.0], [-3.0, -3.0]])
     velocities = np.array([[-0.3, 0.6], [0.7, 0.0], [0.0, 0.0], [0.0, 0.0]])
@@ -104,18 +104,18 @@ def test_a_camera_in_a_figure_of_eight_sees_what_a_fixed_one_sees() -> None:
             [observe(p, now, T_odom_camera=T) for p in measured], now, T, pose_covariance_odom=pose
         )
         if step % 40 == 39:
-            # A measurement in 300 falls outside its gate and starts a track that is soon dropped.
-            sure = [
+            # One measurement in 300 is outside its gate and starts a track that is soon deleted.
+            confirmed = [
                 [t for t in seen if t.status != "tentative"] for seen in (seen_fixed, seen_moving)
             ]
-            assert [len(tracks) for tracks in sure] == [4, 4]
+            assert [len(tracks) for tracks in confirmed] == [4, 4]
             for place in places:
-                a, b = nearest(sure[0], place), nearest(sure[1], place)
+                a, b = nearest(confirmed[0], place), nearest(confirmed[1], place)
                 assert a.id == b.id <= 4
                 state_a = np.concatenate([a.position_odom_m, a.velocity_odom_mps])
                 state_b = np.concatenate([b.position_odom_m, b.velocity_odom_mps])
                 spread = a.covariance_odom + b.covariance_odom
                 distances.append((state_a - state_b) @ np.linalg.solve(spread, state_a - state_b))
-    # Straight walkers deviate less than the filter reckons with, so only the upper bound is due.
+    # Straight walkers deviate less than the filter expects, so there is only an upper bound.
     assert np.sum(distances) < chi2.ppf(0.995, df=4 * len(distances))
     assert max(distances) < chi2.ppf(0.9999, df=4)

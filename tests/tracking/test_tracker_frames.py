@@ -1,4 +1,4 @@
-"""Frames of reference: neither the camera's motion nor the choice of odom may matter."""
+"""Frames of reference: the camera's motion and the choice of odom do not matter."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ NOISE_M2 = np.array([[0.01, 0.004], [0.004, 0.03]])
 def crowd(
     camera_of: Callable[[float], FloatArray], world: FloatArray | None = None
 ) -> tuple[PersonTrack, ...]:
-    """Three walkers, one of them hidden for a while, seen for two seconds by a given camera.
+    """Return the tracks of three walkers, one of them hidden for a while, after two seconds.
 
-    ``world`` (4, 4) turns and shifts odom: the same camera images, other names for places.
+    ``world`` (4, 4) rotates and shifts odom while the camera images stay the same.
     """
     rng = np.random.default_rng(5)
     starts = np.array([[3.0, -1.0], [4.0, 1.5], [6.0, 0.0]])
@@ -70,11 +70,11 @@ def assert_same(
         assert b.awareness_lower == pytest.approx(a.awareness_lower, abs=1e-12)
 
 
-def test_a_moving_camera_sees_what_a_fixed_one_sees() -> None:
+def test_a_moving_camera_gives_the_tracks_of_a_fixed_one() -> None:
     assert_same(crowd(lambda _: camera_at()), crowd(moving_camera))
 
 
-def test_people_who_stand_still_have_no_velocity_however_the_camera_moves() -> None:
+def test_standing_people_have_no_velocity_however_the_camera_moves() -> None:
     tracker = PersonTracker()
     for step in range(60):
         now = step * PERIOD_S
@@ -86,7 +86,7 @@ def test_people_who_stand_still_have_no_velocity_however_the_camera_moves() -> N
 
 @settings(max_examples=25)
 @given(x_m=st.floats(-100.0, 100.0), y_m=st.floats(-100.0, 100.0), yaw=st.floats(-math.pi, math.pi))
-def test_turning_and_shifting_the_world_turns_and_shifts_the_tracks(
+def test_rotating_and_shifting_the_world_rotates_and_shifts_the_tracks(
     x_m: float, y_m: float, yaw: float
 ) -> None:
     world = np.eye(4)

@@ -1,19 +1,54 @@
-"""Many filters in one array against filterpy's, one object a person."""
+"""The Kalman filters of all people in one array: motion model, and updates against filterpy's."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.linalg import expm
 from tracking_scenes import white_acceleration
 
 from tracking._kalman import correct
-from tracking._motion import carry, damped_process_noise, damped_transition
+from tracking._motion import (
+    damped_process_noise,
+    damped_transition,
+    predict,
+    process_noise,
+    transition,
+)
 
 Q_DENSITY_M2PS3 = 0.05
 TAU_S = 1.0
 PEOPLE, FRAMES = 15, 40
+
+steps = st.floats(1e-3, 5.0)
+densities = st.floats(1e-3, 10.0)
+
+
+@pytest.mark.parametrize("dt_s", [0.01, 0.05, 0.4, 3.0])
+def test_motion_solves_the_stochastic_differential_equation(dt_s: float) -> None:
+    F, Q = white_acceleration(dt_s, 0.05)
+    np.testing.assert_allclose(transition(dt_s), F, atol=1e-12)
+    np.testing.assert_allclose(process_noise(dt_s, 0.05), Q, atol=1e-12)
+
+
+@given(first=steps, second=steps, q=densities)
+def test_two_steps_equal_one_step(first: float, second: float, q: float) -> None:
+    F2 = transition(second)
+    np.testing.assert_allclose(F2 @ transition(first), transition(first + second), atol=1e-12)
+    np.testing.assert_allclose(
+        F2 @ process_noise(first, q) @ F2.T + process_noise(second, q),
+        process_noise(first + second, q),
+        rtol=1e-9,
+        atol=1e-15,
+    )
+
+
+def test_a_step_of_zero_changes_nothing() -> None:
+    np.testing.assert_array_equal(transition(0.0), np.eye(4))
+    np.testing.assert_array_equal(process_noise(0.0, 0.05), np.zeros((4, 4)))
 
 
 def covariances(rng: np.random.Generator, count: int, size: int) -> np.ndarray:
@@ -21,25 +56,25 @@ def covariances(rng: np.random.Generator, count: int, size: int) -> np.ndarray:
     return root @ root.transpose(0, 2, 1) + 0.01 * np.eye(size)
 
 
-def person(state: np.ndarray, covariance: np.ndarray) -> KalmanFilter:
+def filter_of(state: np.ndarray, covariance: np.ndarray) -> KalmanFilter:
     kalman = KalmanFilter(dim_x=4, dim_z=2)
     kalman.x, kalman.P, kalman.H = state.copy(), covariance.copy(), np.eye(2, 4)
     return kalman
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_batch_is_filterpy_for_every_person(seed: int) -> None:
+def test_the_batch_agrees_with_filterpy_for_every_person(seed: int) -> None:
     rng = np.random.default_rng(seed)
     states, spreads = rng.normal(0.0, 3.0, (PEOPLE, 4)), covariances(rng, PEOPLE, 4)
-    reference = [person(x, P) for x, P in zip(states, spreads, strict=True)]
+    reference = [filter_of(x, P) for x, P in zip(states, spreads, strict=True)]
     for _ in range(FRAMES):
         dt_s = float(rng.choice([1e-3, 0.03, 0.05, 0.4, 2.0]))
-        # Some coast and stand: their velocity decays for the last part of the step.
+        # Some people are unseen and standing: their velocity decays in the last part of the step.
         damped_s = np.where(
             rng.uniform(size=PEOPLE) < 0.3, rng.choice([0.3, 0.8], PEOPLE) * dt_s, 0.0
         )
         damped_s[rng.uniform(size=PEOPLE) < 0.1] = dt_s
-        states, spreads = carry(states, spreads, dt_s, damped_s, TAU_S, Q_DENSITY_M2PS3)
+        states, spreads = predict(states, spreads, dt_s, damped_s, TAU_S, Q_DENSITY_M2PS3)
         for one, damped in zip(reference, damped_s.tolist(), strict=True):
             F, Q = white_acceleration(dt_s - damped, Q_DENSITY_M2PS3)
             one.predict(F=F, Q=Q)
@@ -73,7 +108,7 @@ def test_the_damped_motion_solves_its_stochastic_differential_equation(dt_s: flo
     assert np.linalg.eigvalsh(Q)[0] >= -1e-12 * np.linalg.eigvalsh(Q)[-1]
 
 
-def test_over_no_time_damping_is_constant_velocity() -> None:
+def test_over_a_short_step_damped_motion_is_constant_velocity() -> None:
     dt_s = 1e-4
     F, Q = white_acceleration(dt_s, Q_DENSITY_M2PS3)
     short = np.array([dt_s])

@@ -1,4 +1,4 @@
-"""Frames that come out of order count as if they had come in order, or are refused."""
+"""Frames that come out of order: processed as if they had come in order, or refused."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ LAG_S = TrackerConfig().max_lag_s
 Frame = tuple[float, list[PersonObservation], FloatArray]
 
 
-def film(seed: int, frames: int = 60, *, repeats: bool = False) -> list[Frame]:
-    """Three walkers and clutter in front of a camera that turns; stamps in order."""
+def make_frames(seed: int, frames: int = 60, *, repeats: bool = False) -> list[Frame]:
+    """Return frames of three walkers and clutter from a turning camera, in order of stamps."""
     rng = np.random.default_rng(seed)
     starts = rng.uniform((2.0, -2.0), (6.0, 2.0), (3, 2))
     velocities = rng.normal(0.0, 0.8, (3, 2))
-    now, shown = 0.0, []
+    now, frame_list = 0.0, []
     for _ in range(frames):
         now += float(rng.choice([0.0, PERIOD_S] if repeats else [0.02, PERIOD_S, 0.12]))
         T = camera_at(0.2 * now, 0.0, 0.3 * np.sin(now))
@@ -39,8 +39,8 @@ def film(seed: int, frames: int = 60, *, repeats: bool = False) -> list[Frame]:
             )
             for place in places
         ]
-        shown.append((now, people, T))
-    return shown
+        frame_list.append((now, people, T))
+    return frame_list
 
 
 def play(tracker: PersonTracker, frames: list[Frame]) -> tuple[PersonTrack, ...]:
@@ -51,17 +51,19 @@ def play(tracker: PersonTracker, frames: list[Frame]) -> tuple[PersonTrack, ...]
 
 
 def delayed(frames: list[Frame], rng: np.random.Generator, share: float = 1.0) -> list[Frame]:
-    """The frames in the order in which they come with latencies within the lag."""
-    latest = [now + share * LAG_S * rng.uniform() for now, *_ in frames]
-    return [frames[i] for i in sorted(range(len(frames)), key=lambda i: latest[i])]
+    """Return the frames in the order of arrival, with random latencies within the lag."""
+    arrivals_s = [now + share * LAG_S * rng.uniform() for now, *_ in frames]
+    return [frames[i] for i in sorted(range(len(frames)), key=lambda i: arrivals_s[i])]
 
 
-@pytest.mark.parametrize("seen_view", [False, True])
+@pytest.mark.parametrize("has_view", [False, True])
 @settings(max_examples=20, deadline=None)
 @given(seed=st.integers(0, 10**6))
-def test_frames_shuffled_within_the_lag_are_frames_in_order(seen_view: bool, seed: int) -> None:
-    frames = film(seed)
-    view = CameraView(Camera.from_fov(640, 480, 1.2)) if seen_view else None
+def test_frames_shuffled_within_the_lag_give_the_tracks_of_frames_in_order(
+    has_view: bool, seed: int
+) -> None:
+    frames = make_frames(seed)
+    view = CameraView(Camera.from_fov(640, 480, 1.2)) if has_view else None
     shuffled = delayed(frames, np.random.default_rng(seed + 1))
     in_order, late = PersonTracker(view=view), PersonTracker(view=view)
     expected, got = play(in_order, frames), play(late, shuffled)
@@ -72,8 +74,8 @@ def test_frames_shuffled_within_the_lag_are_frames_in_order(seen_view: bool, see
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_frames_of_one_stamp_keep_the_order_in_which_they_come(seed: int) -> None:
-    frames = film(seed, 40, repeats=True)
+def test_frames_with_the_same_stamp_keep_their_order_of_arrival(seed: int) -> None:
+    frames = make_frames(seed, 40, repeats=True)
     rng = np.random.default_rng(seed)
     latency = {now: LAG_S * rng.uniform() for now, *_ in frames}
     shuffled = sorted(frames, key=lambda frame: frame[0] + latency[frame[0]])
@@ -88,20 +90,20 @@ def test_a_late_frame_returns_the_tracks_of_the_latest_stamp() -> None:
     assert track.id == 1
 
 
-def test_a_late_frame_can_reveal_that_somebody_new_is_somebody_known() -> None:
+def test_a_late_frame_can_show_that_a_new_person_is_a_known_one() -> None:
     def seen(tracker: PersonTracker, x_m: float, now: float) -> tuple[PersonTrack, ...]:
         return tracker.update([observe((x_m, 0.0), now)], now, CAMERA)
 
     tracker = PersonTracker()
     seen(tracker, 3.0, 0.0)
-    # Too fast for one person, who has not been seen for long, until the frame in between comes.
+    # 1.4 m is outside the gate and starts a new track, until the frame in between comes.
     assert {track.id for track in seen(tracker, 4.4, 0.4)} == {2}
     assert {track.id for track in seen(tracker, 3.7, 0.2)} == {1}
 
 
-def test_too_late_is_refused_counted_and_leaves_no_trace() -> None:
+def test_a_frame_that_is_too_late_is_refused_and_counted_and_changes_nothing() -> None:
     tracker, twin = PersonTracker(), PersonTracker()
-    frames = film(3)
+    frames = make_frames(3)
     play(tracker, frames[:40])
     play(twin, frames[:40])
     last_s = frames[39][0]
@@ -116,7 +118,7 @@ def test_too_late_is_refused_counted_and_leaves_no_trace() -> None:
     assert tracker.refused_late_frames == 2
 
 
-def test_without_a_lag_every_earlier_frame_is_too_late() -> None:
+def test_with_a_lag_of_zero_every_earlier_frame_is_too_late() -> None:
     tracker = PersonTracker(TrackerConfig(max_lag_s=0.0))
     tracker.update([], 1.0, CAMERA)
     tracker.update([], 1.0, CAMERA)
@@ -124,13 +126,13 @@ def test_without_a_lag_every_earlier_frame_is_too_late() -> None:
         tracker.update([], 1.0 - 1e-9, CAMERA)
 
 
-def test_a_frame_before_the_very_first_may_be_late_too() -> None:
-    first, second = film(8)[:2]
+def test_a_frame_before_the_first_one_may_be_late_too() -> None:
+    first, second = make_frames(8)[:2]
     tracker, twin = PersonTracker(), PersonTracker()
     assert as_bytes(play(tracker, [second, first])) == as_bytes(play(twin, [first, second]))
 
 
-def test_a_view_that_fails_leaves_no_trace() -> None:
+def test_a_view_that_fails_changes_nothing() -> None:
     class Failing:
         fails = False
 
@@ -139,18 +141,18 @@ def test_a_view_that_fails_leaves_no_trace() -> None:
 
     view = Failing()
     tracker, twin = PersonTracker(view=view), PersonTracker(view=view)
-    frames = film(4)
+    frames = make_frames(4)
     play(tracker, frames[:40])
     play(twin, frames[:40])
     view.fails = True
     late_s = frames[36][0] + 1e-3
-    with pytest.raises(TrackingError, match=r"one number in \[0, 1\] a position"):
+    with pytest.raises(TrackingError, match=r"one number in \[0, 1\] per position"):
         tracker.update([], late_s, CAMERA)
     view.fails = False
     assert as_bytes(play(tracker, frames[40:])) == as_bytes(play(twin, frames[40:]))
 
 
-def test_the_history_has_a_bound_at_any_frame_rate() -> None:
+def test_the_history_is_bounded_at_any_frame_rate() -> None:
     tracker = PersonTracker()
     for step in range(400):
         tracker.update([observe((3.0, 0.0), 1e-4 * step)], 1e-4 * step, CAMERA)

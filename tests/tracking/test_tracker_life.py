@@ -1,4 +1,4 @@
-"""Tracks are born, confirmed, lost, found and dropped; who is who stays so."""
+"""The life of a track: initiation, confirmation, coasting, deletion, and stable ids."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ CONFIG = TrackerConfig()
 def walk(
     tracker: PersonTracker, first: int, last: int, *, period_s: float = PERIOD_S
 ) -> tuple[PersonTrack, ...]:
-    """Show one walker at 1.2 m/s in the frames first … last − 1."""
+    """Show one walker at 1.2 m/s in the frames from ``first`` to ``last`` − 1."""
     tracks: tuple[PersonTrack, ...] = ()
     for step in range(first, last):
         now = step * period_s
@@ -29,14 +29,14 @@ def walk(
 
 @pytest.mark.parametrize("period_s", [0.03, 0.05, 0.4, 0.8])
 @pytest.mark.parametrize("hits", [1, 3, 4])
-def test_so_many_frames_confirm_at_any_rate(period_s: float, hits: int) -> None:
+def test_confirm_hits_frames_confirm_at_any_rate(period_s: float, hits: int) -> None:
     tracker = PersonTracker(TrackerConfig(confirm_hits=hits))
     statuses = [walk(tracker, k, k + 1, period_s=period_s)[0].status for k in range(hits + 1)]
     assert statuses == ["tentative"] * (hits - 1) + ["confirmed"] * 2
 
 
 @pytest.mark.parametrize("missed", [(), (1,), (2, 4)])
-def test_a_person_who_is_missed_now_and_then_is_confirmed_all_the_same(
+def test_a_person_who_is_missed_now_and_then_is_still_confirmed(
     missed: tuple[int, ...],
 ) -> None:
     tracker = PersonTracker()
@@ -47,8 +47,8 @@ def test_a_person_who_is_missed_now_and_then_is_confirmed_all_the_same(
     assert (track.id, track.status) == (1, "confirmed")
 
 
-def test_hits_too_far_apart_confirm_nobody() -> None:
-    """What appears at one place every third frame is no person in front of the camera."""
+def test_hits_too_far_apart_confirm_no_track() -> None:
+    """One detection in four frames at one place is not enough for a person."""
     tracker = PersonTracker(TrackerConfig(max_tentative_gap_s=1.0))
     for step in range(60):
         now = step * PERIOD_S
@@ -56,26 +56,26 @@ def test_hits_too_far_apart_confirm_nobody() -> None:
         assert all(track.status == "tentative" for track in tracker.predict(now))
 
 
-def test_clutter_alone_confirms_next_to_nobody() -> None:
+def test_clutter_alone_confirms_hardly_any_track() -> None:
     rng = np.random.default_rng(5)
     tracker, confirmed = PersonTracker(), set()
     for step in range(1000):
         now = step * PERIOD_S
-        # 0.03 false detections per square metre and frame, three times what is reckoned with.
+        # 0.03 false detections per square metre and frame, three times the density assumed.
         places = rng.uniform((0.0, -4.0), (8.0, 4.0), (rng.poisson(0.03 * 64), 2))
         tracks = tracker.update([observe(place, now) for place in places], now, CAMERA)
         confirmed |= {track.id for track in tracks if track.status != "tentative"}
     assert len(confirmed) <= 5  # of about 1900 false detections
 
 
-def test_a_frame_that_is_repeated_confirms_nobody() -> None:
+def test_a_repeated_frame_confirms_no_track() -> None:
     tracker = PersonTracker()
     for _ in range(10):
         (track,) = walk(tracker, 0, 1)
     assert track.status == "tentative"
 
 
-def test_a_second_set_of_one_instant_is_a_second_measurement() -> None:
+def test_a_second_frame_with_the_same_stamp_is_a_second_measurement() -> None:
     tracker = PersonTracker()
     walk(tracker, 0, 20)
     (before,) = tracker.predict(19 * PERIOD_S)
@@ -83,11 +83,11 @@ def test_a_second_set_of_one_instant_is_a_second_measurement() -> None:
     assert after.id == before.id
     assert np.trace(after.covariance_odom) < np.trace(before.covariance_odom)
     (unseen,) = tracker.update((), 19 * PERIOD_S, CAMERA)
-    # Another camera that does not see the person takes nothing away.
+    # Another camera that does not see the person changes nothing.
     assert as_bytes([unseen]) == as_bytes([after])
 
 
-def test_out_of_sight_a_person_coasts_and_is_dropped_by_the_clock() -> None:
+def test_an_unseen_person_coasts_and_is_deleted_after_max_coast_s() -> None:
     tracker = PersonTracker()
     walk(tracker, 0, 20)
     last_s, previous = 19 * PERIOD_S, tracker.predict(19 * PERIOD_S)[0]
@@ -112,7 +112,7 @@ def test_out_of_sight_a_person_coasts_and_is_dropped_by_the_clock() -> None:
     assert now - last_s == pytest.approx(CONFIG.max_coast_s, abs=2 * PERIOD_S)
 
 
-def test_a_tentative_track_dies_soon() -> None:
+def test_a_tentative_track_is_deleted_soon() -> None:
     gap_s = CONFIG.max_tentative_gap_s
     for unseen_s, kept in ((gap_s - 0.01, 1), (gap_s + 0.01, 0)):
         tracker = PersonTracker()
@@ -120,8 +120,8 @@ def test_a_tentative_track_dies_soon() -> None:
         assert len(tracker.update((), unseen_s, CAMERA)) == kept
 
 
-def test_a_tentative_track_outlives_the_time_in_which_no_frame_looked() -> None:
-    """A planner that runs ahead of a late camera must not lose whom the last frame showed."""
+def test_a_tentative_track_is_kept_while_no_frame_comes() -> None:
+    """A planner ahead of a late camera must not lose the people of the last frame."""
     tracker = PersonTracker()
     walk(tracker, 0, 1)
     assert [track.status for track in tracker.predict(0.4)] == ["tentative"]
@@ -129,7 +129,7 @@ def test_a_tentative_track_outlives_the_time_in_which_no_frame_looked() -> None:
     assert len(walk(tracker, 9, 10)) == 1
 
 
-def test_a_jump_of_the_clock_ages_everyone_out() -> None:
+def test_after_a_jump_of_the_clock_everyone_is_new() -> None:
     tracker = PersonTracker()
     (before,) = walk(tracker, 0, 20)
     now = 1e6
@@ -140,9 +140,7 @@ def test_a_jump_of_the_clock_ages_everyone_out() -> None:
 
 
 @pytest.mark.parametrize(("gap_s", "same"), [(2.9, True), (3.1, False)])
-def test_whoever_stands_where_a_person_was_lost_too_long_ago_is_somebody_new(
-    gap_s: float, same: bool
-) -> None:
+def test_a_person_at_the_place_of_one_lost_too_long_ago_is_new(gap_s: float, same: bool) -> None:
     tracker = PersonTracker()
     for step in range(20):
         now = step * PERIOD_S
@@ -153,7 +151,7 @@ def test_whoever_stands_where_a_person_was_lost_too_long_ago_is_somebody_new(
 
 
 @pytest.mark.parametrize("hidden_s", [0.5, 1.5, 2.5])
-def test_a_walker_behind_a_rack_is_found_again(hidden_s: float) -> None:
+def test_a_walker_behind_a_rack_keeps_the_id(hidden_s: float) -> None:
     rng = np.random.default_rng(17)
     kept, trials = 0, 20
     for _ in range(trials):
@@ -193,8 +191,8 @@ def test_crossing_people_keep_their_ids(angle_rad: float, offset_m: float) -> No
     assert kept == trials
 
 
-def test_a_match_in_doubt_counts_for_less() -> None:
-    """With two people in arm's reach the covariance admits that either may have been measured."""
+def test_an_ambiguous_match_has_less_weight() -> None:
+    """With two people within reach of each other the covariance is larger."""
     spreads = {}
     for factor in (1.0, 3.0):
         tracker = PersonTracker(TrackerConfig(ambiguous_noise_factor=factor))
@@ -208,7 +206,7 @@ def test_a_match_in_doubt_counts_for_less() -> None:
     assert spreads[3.0, 3.0] == pytest.approx(spreads[1.0, 3.0])
 
 
-def test_predict_is_a_frame_without_people_that_never_was() -> None:
+def test_predict_returns_the_tracks_of_an_empty_frame() -> None:
     tracker = PersonTracker()
     walk(tracker, 0, 20)
     tracker.update([observe((8.0, 2.0), 1.0)], 1.0, CAMERA)
@@ -218,7 +216,7 @@ def test_predict_is_a_frame_without_people_that_never_was() -> None:
         predicted = tracker.predict(now)
         assert as_bytes(tracker.predict(1.0)) == before
         shown = copy.deepcopy(tracker).update((), now, CAMERA)
-        # A tentative track dies by frames that do not show it, so it may be in the first only.
+        # Only frames delete a tentative track early, so it may be missing from the second.
         confirmed = [track for track in predicted if track.status != "tentative"]
         assert [t.id for t in confirmed] == [t.id for t in shown if t.status != "tentative"]
         for a, b in zip(confirmed, shown, strict=False):
@@ -246,7 +244,7 @@ frames = st.lists(
 
 @settings(max_examples=80)
 @given(frames)
-def test_whatever_is_seen_the_tracks_are_sound(sequence: list[tuple[float, Any]]) -> None:
+def test_the_tracks_are_valid_after_any_frames(sequence: list[tuple[float, Any]]) -> None:
     tracker, now = PersonTracker(), 0.0
     ever: set[int] = set()
     lower: dict[int, float] = {}
@@ -266,9 +264,9 @@ def test_whatever_is_seen_the_tracks_are_sound(sequence: list[tuple[float, Any]]
         tracks = tracker.update(observations, now, CAMERA)
         ids = [track.id for track in tracks]
         assert ids == sorted(set(ids))
-        # An id that is not alive is a new one.
+        # An id that was not in use is a new one.
         assert all(i > max(ever, default=0) for i in set(ids) - alive)
-        # Every observation has its track, at its place.
+        # Observations have tracks.
         assert len([t for t in tracks if t.time_since_seen_s == 0.0]) >= bool(seen)
         for track in tracks:
             np.linalg.cholesky(track.covariance_odom)

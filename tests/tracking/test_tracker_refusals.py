@@ -1,4 +1,4 @@
-"""Bad input is refused by name and leaves no trace."""
+"""Bad input is refused by name and changes nothing."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ NOW_S = 10 * PERIOD_S
 
 
 def watched() -> PersonTracker:
-    """A tracker that knows a confirmed person and a tentative one."""
+    """Return a tracker with a confirmed track and a tentative one."""
     tracker = PersonTracker()
     for step in range(10):
         now = step * PERIOD_S
@@ -86,15 +86,15 @@ REFUSED: dict[str, tuple[Callable[[PersonTracker], Any], str]] = {
         lambda t: t.update([*seen(), observe((1.0, 0.0), LAST_S)], NOW_S, CAMERA),
         r"observations\[2\].stamp_s = 0.45\d* s must be that of its frame, 0.5 s",
     ),
-    "a place off the Earth": (
+    "a position off the Earth": (
         lambda t: t.update([*seen(), observe((1e300, 0.0), NOW_S)], NOW_S, CAMERA),
         r"observations\[2\] must lie within",
     ),
-    "a place beyond numbers": (
+    "a position that overflows": (
         lambda t: t.update([observe((1.7e308, 1.7e308), NOW_S)], NOW_S, camera_at(yaw_rad=0.8)),
         r"observations\[0\] must lie within",
     ),
-    "no idea where": (
+    "a position without bound": (
         lambda t: t.update([observe((1, 0), NOW_S, covariance_odom_m2=1e200)], NOW_S, CAMERA),
         r"observations\[0\].position_covariance_m2 must sum to at most",
     ),
@@ -102,7 +102,7 @@ REFUSED: dict[str, tuple[Callable[[PersonTracker], Any], str]] = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_what_is_refused_is_named_and_leaves_no_trace(case: str) -> None:
+def test_refused_input_is_named_and_changes_nothing(case: str) -> None:
     call, message = REFUSED[case]
     tracker, twin = watched(), watched()
     with pytest.raises(TrackingError, match=message):
@@ -117,7 +117,7 @@ def test_what_is_refused_is_named_and_leaves_no_trace(case: str) -> None:
         )
 
 
-def test_a_generator_that_fails_leaves_no_trace() -> None:
+def test_a_generator_that_fails_changes_nothing() -> None:
     def failing() -> Any:
         yield observe((3.5, 0.0), NOW_S)
         raise ConnectionError("camera gone")
@@ -128,7 +128,7 @@ def test_a_generator_that_fails_leaves_no_trace() -> None:
     assert as_bytes(tracker.predict(NOW_S)) == as_bytes(twin.predict(NOW_S))
 
 
-def test_before_the_first_frame_there_is_nobody_at_any_time() -> None:
+def test_before_the_first_frame_there_are_no_tracks_at_any_time() -> None:
     tracker = PersonTracker()
     assert tracker.last_stamp_s is None
     assert tracker.predict(-1e9) == ()

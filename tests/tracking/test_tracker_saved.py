@@ -1,4 +1,4 @@
-"""A tracker that was saved goes on as if it had never stopped."""
+"""A saved and restored tracker continues bit for bit."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_tracker_late_frames import delayed, film, play
+from test_tracker_late_frames import delayed, make_frames, play
 from tracking_scenes import CAMERA, as_bytes
 
 from perception import Camera
@@ -20,8 +20,8 @@ VIEW = CameraView(Camera.from_fov(640, 480, 1.2))
 
 @pytest.mark.parametrize("stop", [0, 1, 2, 17, 40, 59])
 def test_a_restored_tracker_continues_bit_for_bit(tmp_path: Path, stop: int) -> None:
-    # Late frames come on both sides of the stop, so the frames kept for replay matter.
-    frames = delayed(film(6), np.random.default_rng(0), share=0.9)
+    # There are late frames before and after the stop, so the frames kept for replay matter.
+    frames = delayed(make_frames(6), np.random.default_rng(0), share=0.9)
     tracker = PersonTracker(TrackerConfig(max_coast_s=2.0), view=VIEW)
     play(tracker, frames[:stop])
     tracker.save(tmp_path / "tracker.json")
@@ -37,14 +37,14 @@ def test_a_restored_tracker_continues_bit_for_bit(tmp_path: Path, stop: int) -> 
 
 def test_a_state_is_plain_json() -> None:
     tracker = PersonTracker()
-    play(tracker, film(2))
+    play(tracker, make_frames(2))
     state = tracker.state()
     text = json.dumps(state, allow_nan=False)
     assert json.loads(text) == json.loads(json.dumps(PersonTracker.from_state(state).state()))
     assert PersonTracker.from_state(json.loads(text)).state() == tracker.state()
 
 
-def test_the_count_of_refused_frames_is_kept() -> None:
+def test_the_count_of_refused_frames_is_saved() -> None:
     tracker = PersonTracker()
     tracker.update([], 10.0, CAMERA)
     with pytest.raises(TrackingError):
@@ -54,7 +54,7 @@ def test_the_count_of_refused_frames_is_kept() -> None:
 
 def broken(change: Callable[[dict[str, Any]], Any]) -> dict[str, Any]:
     tracker = PersonTracker()
-    play(tracker, film(2))
+    play(tracker, make_frames(2))
     state: dict[str, Any] = json.loads(json.dumps(tracker.state()))
     assert state["latest"]["tracks"]["ids"]
     change(state)
@@ -71,7 +71,7 @@ WRONG: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
     "another version": (lambda s: s.update(version=2), "must have version 1.*got 2"),
     "a missing part": (lambda s: s.pop("latest"), "latest"),
     "an unknown part": (lambda s: s.update(lates=1), "unknown key 'lates'"),
-    "a column cut short": (lambda s: tracks(s)["states"].pop(), "one entry a track"),
+    "a column cut short": (lambda s: tracks(s)["states"].pop(), "one entry per track"),
     "text for a number": (
         lambda s: tracks(s)["states"].__setitem__(0, ["a", 0, 0, 0]),
         r"latest\.tracks\.states\.0\.0",
@@ -80,16 +80,16 @@ WRONG: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
         lambda s: tracks(s)["ids"].__setitem__(-1, tracks(s)["ids"][0] - 1),
         "ids must be above 0 and increase|next_id",
     ),
-    "an id that will come again": (lambda s: s["latest"].update(next_id=1), "next_id must be"),
-    "an id beyond counting": (
+    "an id that would be used again": (lambda s: s["latest"].update(next_id=1), "next_id must be"),
+    "an id too large": (
         lambda s: s["latest"].update(next_id=2**70),
         r"latest\.next_id",
     ),
-    "a sight of the future": (
+    "a hit in the future": (
         lambda s: tracks(s)["hit_stamps_s"][0].__setitem__(-1, 1e9),
         "hit_stamps_s must end in a stamp of at most",
     ),
-    "no covariance": (
+    "a matrix that is not a covariance": (
         lambda s: tracks(s)["covariances"][0][0].__setitem__(0, -1.0),
         r"latest\.tracks\.covariances\[0\] must be positive semi-definite",
     ),
@@ -97,7 +97,7 @@ WRONG: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
         lambda s: tracks(s)["awareness_variances"].__setitem__(0, 0.0),
         "awareness_variances must be above 0",
     ),
-    "time going back": (lambda s: s["frames"].reverse(), "must not go back"),
+    "stamps that go back": (lambda s: s["frames"].reverse(), "must not go back"),
     "another last stamp": (lambda s: s["latest"].update(stamp_s=1e3), r"latest\.stamp_s must be"),
     "another number of hits": (
         lambda s: s["config"].update(confirm_hits=7),
@@ -123,13 +123,13 @@ def test_a_broken_state_is_refused_by_name(tmp_path: Path, case: str) -> None:
         PersonTracker.load(path)
 
 
-def test_a_file_that_is_none_is_refused_by_name(tmp_path: Path) -> None:
+def test_an_unusable_file_is_refused_by_name(tmp_path: Path) -> None:
     with pytest.raises(TrackingError, match=r"cannot read .*nothing\.json: No such file"):
         PersonTracker.load(tmp_path / "nothing.json")
     tracker = PersonTracker()
     with pytest.raises(TrackingError, match=r"cannot write .*tracker\.json: No such file"):
         tracker.save(tmp_path / "nowhere" / "tracker.json")
-    play(tracker, film(2))
+    play(tracker, make_frames(2))
     path = tmp_path / "half.json"
     tracker.save(path)
     whole = path.read_bytes()
@@ -139,6 +139,6 @@ def test_a_file_that_is_none_is_refused_by_name(tmp_path: Path) -> None:
             PersonTracker.load(path)
 
 
-def test_a_state_that_is_no_mapping_is_refused() -> None:
+def test_a_state_that_is_not_a_mapping_is_refused() -> None:
     with pytest.raises(TrackingError, match="state must be a mapping, got list"):
         PersonTracker.from_state([])  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""Whoever should have been seen is dropped soon; whoever could not be seen is remembered."""
+"""Views: people who should have been seen are deleted soon, others are kept for longer."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tracking_scenes import CAMERA, PERIOD_S, FloatArray, camera_at, observe
 
 from perception import Camera
 from tracking import CameraView, PersonTrack, PersonTracker, TrackerConfig, TrackingError, View
-from tracking._track_management import open_share
+from tracking._track_management import unoccluded_share
 
 CONFIG = TrackerConfig()
 LENS = Camera.from_fov(640, 480, math.radians(60.0))
@@ -29,7 +29,7 @@ def watch(
     until_s: float = 2.0,
     noise_m: float = 0.0,
 ) -> tuple[float, tuple[PersonTrack, ...]]:
-    """Show a person, who ends at ``person_m``, and others who stand; returns the last stamp."""
+    """Show a person who ends at ``person_m`` and others who stand; return the last stamp."""
     rng = np.random.default_rng(1)
     tracks: tuple[PersonTrack, ...] = ()
     now = 0.0
@@ -50,7 +50,7 @@ def kept_for_s(
     others_m: tuple[tuple[float, float], ...] = (),
     period_s: float = PERIOD_S,
 ) -> float:
-    """How long a person goes on being reported who no frame shows any more."""
+    """Return how long a person is reported after the last frame that showed them."""
     for step in range(1, round(20.0 / period_s)):
         now = from_s + step * period_s
         people = [observe(spot, now, T_odom_camera=camera) for spot in others_m]
@@ -59,8 +59,8 @@ def kept_for_s(
     return math.inf
 
 
-# Where the person stops being seen, how they move, where the camera then looks, and who is in
-# front; how long they must be kept. The camera looks along x, half its angle of view is 30°.
+# The person's last position and velocity, the camera's pose from then on, the people in front, and
+# how long the track must be kept. The camera looks along x with half an angle of view of 30°.
 MISSED_S, COAST_S, STANDING_S = (
     CONFIG.max_missed_s,
     CONFIG.max_coast_s,
@@ -94,7 +94,7 @@ CASES: dict[str, tuple[tuple[float, float], tuple[float, float], FloatArray, Any
 
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("period_s", [0.05, 0.2])
-def test_how_long_somebody_unseen_is_kept(case: str, period_s: float) -> None:
+def test_an_unseen_person_is_kept_for_the_expected_time(case: str, period_s: float) -> None:
     place, velocity, camera, others, expected_s = CASES[case]
     tracker = PersonTracker(view=VIEW)
     now, tracks = watch(tracker, place, velocity, others_m=others)
@@ -104,7 +104,7 @@ def test_how_long_somebody_unseen_is_kept(case: str, period_s: float) -> None:
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_without_a_view_nobody_knows_and_all_are_kept_alike(case: str) -> None:
+def test_without_a_view_every_person_is_kept_for_the_same_time(case: str) -> None:
     place, velocity, camera, others, _ = CASES[case]
     tracker = PersonTracker()
     now, tracks = watch(tracker, place, velocity, others_m=others)
@@ -112,19 +112,19 @@ def test_without_a_view_nobody_knows_and_all_are_kept_alike(case: str) -> None:
     assert kept_s == pytest.approx(COAST_S, abs=PERIOD_S + 1e-9)
 
 
-def test_no_ghost_stays_at_the_edge_of_view() -> None:
-    """Whoever walks out of the image leaves no track inside it, wherever they were seen last."""
+def test_no_false_track_stays_at_the_edge_of_the_view() -> None:
+    """A person who walks out of the image leaves no track inside it."""
     for edge_m in np.linspace(1.6, 2.3, 8):  # the image ends at 4 m · tan 30° = 2.31 m
         tracker = PersonTracker(view=VIEW)
         now, _ = watch(tracker, (4.0, edge_m), (0.0, 1.2), noise_m=0.03)
         for step in range(1, 60):
             later = now + step * PERIOD_S
-            for ghost in tracker.update((), later, CAMERA):
-                inside = VIEW.visibility(ghost.position_odom_m[None], CAMERA)[0] == 1.0
+            for track in tracker.update((), later, CAMERA):
+                inside = VIEW.visibility(track.position_odom_m[None], CAMERA)[0] == 1.0
                 assert not inside or later - now <= MISSED_S + PERIOD_S
 
 
-def test_partly_hidden_is_kept_for_a_time_in_between() -> None:
+def test_a_partly_hidden_person_is_kept_for_a_time_in_between() -> None:
     kept = []
     for aside_m in (0.0, 0.15, 0.25, 0.35, 0.5, 0.8):
         tracker = PersonTracker(view=VIEW)
@@ -137,13 +137,13 @@ def test_partly_hidden_is_kept_for_a_time_in_between() -> None:
     assert MISSED_S < kept[3] < STANDING_S
 
 
-def test_two_people_who_were_both_lost_hide_nobody() -> None:
+def test_a_person_who_is_not_seen_hides_nobody() -> None:
     tracker = PersonTracker(view=VIEW)
     now, tracks = watch(tracker, (5.0, 0.0), others_m=((2.5, 0.0),))
     assert kept_for_s(tracker, tracks[0].id, now, CAMERA) == pytest.approx(MISSED_S, abs=0.11)
 
 
-def test_one_frame_after_a_pause_drops_nobody() -> None:
+def test_one_frame_after_a_pause_deletes_nobody() -> None:
     tracker = PersonTracker(view=VIEW)
     now, (track,) = watch(tracker, (4.0, 0.0))
     assert [t.id for t in tracker.update((), now + 2.0, CAMERA)] == [track.id]
@@ -151,14 +151,15 @@ def test_one_frame_after_a_pause_drops_nobody() -> None:
     assert tracker.update((), now + 2.0 + MISSED_S + PERIOD_S, CAMERA) == ()
 
 
-def test_a_person_beside_the_robot_stays_where_they_stand() -> None:
-    """The robot passes somebody who stands; their place is remembered, and honestly uncertain."""
+def test_a_standing_person_beside_the_robot_keeps_the_position() -> None:
+    """The robot passes a standing person: the position is kept, with a consistent covariance."""
+    # Once the person is out of view, every fourth frame will do: the rate does not matter there.
+    stamps_s = [*np.arange(34) * PERIOD_S, *np.arange(36, 230, 4) * PERIOD_S]
     errors, spreads = [], []
     for seed in range(30):
         rng = np.random.default_rng(seed)
         tracker = PersonTracker(TrackerConfig(max_standing_coast_s=10.0), view=VIEW)
-        for step in range(230):
-            now = step * PERIOD_S
+        for now in stamps_s:
             T = camera_at(0.6 * now, 0.0)
             ahead = 3.0 - 0.6 * now
             measured = rng.normal((3.0, 1.0), 0.1)
@@ -190,7 +191,7 @@ def test_the_memory_of_a_standing_person_does_not_depend_on_the_frame_rate() -> 
         np.testing.assert_allclose(other.covariance_odom, ends[0].covariance_odom, atol=1e-9)
 
 
-def test_a_walker_is_not_taken_for_somebody_who_stands() -> None:
+def test_a_walker_does_not_count_as_standing() -> None:
     for seed in range(10):
         rng = np.random.default_rng(seed)
         tracker = PersonTracker(view=VIEW)
@@ -208,49 +209,48 @@ angles = st.floats(-math.pi, math.pi)
 
 
 @given(turn=angles, ranges=st.tuples(st.floats(0.5, 10.0), st.floats(0.5, 10.0)), aside=angles)
-def test_hiding_is_a_matter_of_bearing_and_distance(
+def test_occlusion_depends_on_bearing_and_distance_only(
     turn: float, ranges: tuple[float, float], aside: float
 ) -> None:
     far, near = ranges
     at = np.array([[far * math.cos(turn), far * math.sin(turn)]])
     front = np.array([[near * math.cos(turn + aside), near * math.sin(turn + aside)]])
-    (share,) = open_share(at, front, np.zeros(2), 0.25)
+    (share,) = unoccluded_share(at, front, np.zeros(2), 0.25)
     assert 0.0 <= share <= 1.0
     if near + 0.25 > far or abs(aside) > math.asin(0.25 / near) + math.asin(min(0.25 / far, 1.0)):
         assert share == 1.0
     shift = np.array([3.0, -7.0])
-    moved = open_share(at + shift, front + shift, shift, 0.25)
+    moved = unoccluded_share(at + shift, front + shift, shift, 0.25)
     assert moved[0] == pytest.approx(share, abs=1e-9)
 
 
-def test_two_people_side_by_side_hide_a_third_between_them() -> None:
+def test_two_people_side_by_side_hide_a_third_behind_them() -> None:
     pair = np.array([[2.5, -0.16], [2.5, 0.16]])
     middle = np.array([[5.0, 0.0]])
-    assert open_share(middle, pair, np.zeros(2), 0.25)[0] == 0.0
-    assert 0.0 < open_share(middle, pair[:1], np.zeros(2), 0.25)[0] < 0.5
+    assert unoccluded_share(middle, pair, np.zeros(2), 0.25)[0] == 0.0
+    assert 0.0 < unoccluded_share(middle, pair[:1], np.zeros(2), 0.25)[0] < 0.5
 
 
-def test_a_camera_sees_what_is_in_its_image_and_in_range() -> None:
+def test_people_in_the_image_and_in_range_are_visible() -> None:
     places = [(4.0, 0.0), (4.0, 2.2), (4.0, 2.4), (-4.0, 0.0), (9.0, 0.0), (7.2, 0.0), (0.3, 0.0)]
-    said = VIEW.visibility(places, CAMERA)
-    assert said[[0, 2, 3, 4, 6]].tolist() == [1.0, 0.0, 0.0, 0.0, 0.0]
-    assert 0.0 < said[1] < 1.0
-    assert said[5] == pytest.approx(0.5)
-    # Looking up at the ceiling it sees nobody.
+    visibility = VIEW.visibility(places, CAMERA)
+    assert visibility[[0, 2, 3, 4, 6]].tolist() == [1.0, 0.0, 0.0, 0.0, 0.0]
+    assert 0.0 < visibility[1] < 1.0
+    assert visibility[5] == pytest.approx(0.5)
+    # A camera that looks up at the ceiling sees nobody.
     assert VIEW.visibility(places, camera_at(pitch_rad=-1.2)).max() == 0.0
     turned = camera_at(1.0, 2.0, 2.1)
     world = np.array([[math.cos(2.1), -math.sin(2.1)], [math.sin(2.1), math.cos(2.1)]])
     there = np.asarray(places) @ world.T + (1.0, 2.0)
-    np.testing.assert_allclose(VIEW.visibility(there, turned), said, atol=1e-9)
+    np.testing.assert_allclose(VIEW.visibility(there, turned), visibility, atol=1e-9)
 
 
-def test_a_lens_with_distortion_does_not_fold_the_world_into_its_image() -> None:
+def test_a_lens_with_distortion_has_one_visible_interval_of_bearings() -> None:
     lens = Camera(640, 480, 400.0, 400.0, 320.0, 240.0, np.array([-0.35, 0.12, 0.0, 0.0, 0.0]))
     bearings = np.linspace(-1.5, 1.5, 301)
     places = 4.0 * np.column_stack((np.cos(bearings), np.sin(bearings)))
     seen = CameraView(lens).visibility(places, CAMERA) > 0.0
     assert seen.any()
-    # One interval of bearings around straight ahead.
     assert np.abs(np.diff(seen.astype(int))).sum() == 2
 
 
@@ -271,13 +271,13 @@ def test_bad_views_are_refused_by_name() -> None:
 
 
 @pytest.mark.parametrize("answer", [[0.5, 0.5], [[1.0]], [2.0], [-0.1], [math.nan]])
-def test_a_view_that_answers_nonsense_is_refused(answer: list[Any]) -> None:
-    class Nonsense:
+def test_an_invalid_visibility_is_refused(answer: list[Any]) -> None:
+    class InvalidView:
         def visibility(self, _positions: FloatArray, _T: FloatArray) -> FloatArray:
             return np.array(answer)
 
-    tracker = PersonTracker(view=Nonsense())
+    tracker = PersonTracker(view=InvalidView())
     now, _ = watch(tracker, (4.0, 0.0))
-    with pytest.raises(TrackingError, match=r"one number in \[0, 1\] a position, 1 in all"):
+    with pytest.raises(TrackingError, match=r"one number in \[0, 1\] per position, 1 in all"):
         tracker.update((), now + PERIOD_S, CAMERA)
     assert tracker.last_stamp_s == now

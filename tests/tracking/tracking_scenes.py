@@ -25,7 +25,7 @@ _OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 def camera_at(
     x_m: float = 0.0, y_m: float = 0.0, yaw_rad: float = 0.0, pitch_rad: float = 0.0
 ) -> FloatArray:
-    """T_odom_camera of a camera 1.4 m up, turned left by yaw and then down by pitch."""
+    """Return T_odom_camera of a camera 1.4 m up, turned left by yaw and then down by pitch."""
     c, s = math.cos(yaw_rad), math.sin(yaw_rad)
     cp, sp = math.cos(pitch_rad), math.sin(pitch_rad)
     yaw = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -48,7 +48,7 @@ def observe(
     awareness: float | None = None,
     awareness_std: float = 0.07,
 ) -> PersonObservation:
-    """What a camera at T_odom_camera reports of a person at (x, y); covariance (2, 2) or scalar."""
+    """Return a camera's observation of a person at (x, y); the covariance is (2, 2) or a scalar."""
     point = np.array([*np.asarray(position_odom_m, dtype=float), CHEST_HEIGHT_M])
     covariance = np.eye(3) * 0.02
     covariance[:2, :2] = np.asarray(covariance_odom_m2) * (
@@ -68,7 +68,7 @@ def observe(
 
 
 def as_bytes(tracks: Sequence[PersonTrack]) -> list[tuple[object, ...]]:
-    """Everything that tracks say, for comparison to the last bit."""
+    """Return all values of the tracks, for comparison to the last bit."""
     return [
         (
             track.id,
@@ -94,7 +94,7 @@ def nearest(tracks: Sequence[PersonTrack], position_odom_m: ArrayLike) -> Person
 
 @lru_cache(maxsize=64)
 def white_acceleration(dt_s: float, density_m2ps3: float) -> tuple[FloatArray, FloatArray]:
-    """F and Q by Van Loan's matrix exponential, an oracle that knows the equation only."""
+    """Return F and Q by Van Loan's matrix exponential, from the differential equation alone."""
     A = np.zeros((4, 4))
     A[0, 2] = A[1, 3] = 1.0
     W = np.diag([0.0, 0.0, density_m2ps3, density_m2ps3])

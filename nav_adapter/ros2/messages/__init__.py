@@ -1,7 +1,7 @@
-"""ROS 2 messages as frozen dataclasses, one module a ROS package; no ROS needed.
+"""ROS 2 messages as frozen dataclasses, with one module per ROS package; no ROS is needed.
 
-Field names, order and types are those of the ``.msg`` files of ROS 2 Humble to Kilted, so the class
-alone decides the wire format, the schema of a recording and the name of the type.
+Names, order and types of the fields are those of the ``.msg`` files of ROS 2 Humble to Kilted. Wire
+format, schema of a recording and name of the type follow from the class alone.
 """
 
 from __future__ import annotations

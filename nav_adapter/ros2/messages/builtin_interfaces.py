@@ -9,7 +9,7 @@ from .._message import Int32, Message, UInt32
 
 @dataclass(frozen=True)
 class Time(Message):
-    """Seconds and nanoseconds since the epoch of the clock."""
+    """A time: seconds and nanoseconds since the epoch of the clock."""
 
     sec: Int32 = 0
     nanosec: UInt32 = 0
@@ -17,7 +17,7 @@ class Time(Message):
 
 @dataclass(frozen=True)
 class Duration(Message):
-    """A span of time; zero lasts for ever where RViz reads it."""
+    """A duration; RViz reads 0 as infinite."""
 
     sec: Int32 = 0
     nanosec: UInt32 = 0

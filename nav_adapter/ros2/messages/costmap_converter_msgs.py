@@ -11,7 +11,7 @@ from .std_msgs import Header
 
 @dataclass(frozen=True)
 class ObstacleMsg(Message):
-    """One point and a radius is a circle."""
+    """An obstacle: a polygon, or a circle if it has one point and a radius."""
 
     header: Header = Header()
     polygon: Polygon = Polygon()
@@ -23,7 +23,7 @@ class ObstacleMsg(Message):
 
 @dataclass(frozen=True)
 class ObstacleArrayMsg(Message):
-    """All obstacles of one instant."""
+    """All obstacles at one time."""
 
     header: Header = Header()
     obstacles: tuple[ObstacleMsg, ...] = ()

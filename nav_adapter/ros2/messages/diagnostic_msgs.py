@@ -11,7 +11,7 @@ from .std_msgs import Header
 
 @dataclass(frozen=True)
 class KeyValue(Message):
-    """A name and what belongs to it."""
+    """A name and its value."""
 
     key: String = ""
     value: String = ""
@@ -19,7 +19,7 @@ class KeyValue(Message):
 
 @dataclass(frozen=True)
 class DiagnosticStatus(Message):
-    """How one part of the robot is."""
+    """The status of one part of the robot."""
 
     OK: ClassVar[int] = 0
     WARN: ClassVar[int] = 1
@@ -35,7 +35,7 @@ class DiagnosticStatus(Message):
 
 @dataclass(frozen=True)
 class DiagnosticArray(Message):
-    """How several parts are at one instant."""
+    """The status of several parts at one time."""
 
     header: Header = Header()
     status: tuple[DiagnosticStatus, ...] = ()

@@ -10,7 +10,7 @@ from .std_msgs import Header
 
 @dataclass(frozen=True)
 class Point(Message):
-    """Metres."""
+    """A point in metres."""
 
     x: Float64 = 0.0
     y: Float64 = 0.0
@@ -19,7 +19,7 @@ class Point(Message):
 
 @dataclass(frozen=True)
 class Point32(Message):
-    """Metres, in single precision."""
+    """A point in metres, in single precision."""
 
     x: Float32 = 0.0
     y: Float32 = 0.0
@@ -37,7 +37,7 @@ class Vector3(Message):
 
 @dataclass(frozen=True)
 class Quaternion(Message):
-    """A rotation; the default is none."""
+    """A rotation; the default is the identity."""
 
     x: Float64 = 0.0
     y: Float64 = 0.0
@@ -47,7 +47,7 @@ class Quaternion(Message):
 
 @dataclass(frozen=True)
 class Pose(Message):
-    """Where, and which way round."""
+    """A position and an orientation."""
 
     position: Point = Point()
     orientation: Quaternion = Quaternion()
@@ -55,7 +55,7 @@ class Pose(Message):
 
 @dataclass(frozen=True)
 class PoseWithCovariance(Message):
-    """Covariance row by row over x, y, z and rotations about X, Y, Z."""
+    """A pose with covariance, row by row over x, y, z and rotations about X, Y, Z."""
 
     pose: Pose = Pose()
     covariance: Float64x36 = (0.0,) * 36
@@ -63,7 +63,7 @@ class PoseWithCovariance(Message):
 
 @dataclass(frozen=True)
 class Twist(Message):
-    """Velocity in m/s and rad/s."""
+    """A velocity in m/s and rad/s."""
 
     linear: Vector3 = Vector3()
     angular: Vector3 = Vector3()
@@ -71,7 +71,7 @@ class Twist(Message):
 
 @dataclass(frozen=True)
 class TwistWithCovariance(Message):
-    """Covariance as in a pose."""
+    """A velocity with covariance, in the order of a pose."""
 
     twist: Twist = Twist()
     covariance: Float64x36 = (0.0,) * 36
@@ -79,7 +79,7 @@ class TwistWithCovariance(Message):
 
 @dataclass(frozen=True)
 class Transform(Message):
-    """Of a child frame in its parent."""
+    """The pose of a child frame in its parent."""
 
     translation: Vector3 = Vector3()
     rotation: Quaternion = Quaternion()
@@ -87,7 +87,7 @@ class Transform(Message):
 
 @dataclass(frozen=True)
 class TransformStamped(Message):
-    """The header names the parent."""
+    """A transform whose parent is the frame of the header."""
 
     header: Header = Header()
     child_frame_id: String = ""
@@ -96,14 +96,14 @@ class TransformStamped(Message):
 
 @dataclass(frozen=True)
 class Polygon(Message):
-    """Corners; the last joins the first."""
+    """The corners of a polygon; the last is joined to the first."""
 
     points: tuple[Point32, ...] = ()
 
 
 @dataclass(frozen=True)
 class PolygonStamped(Message):
-    """With time and frame."""
+    """A polygon with time and frame."""
 
     header: Header = Header()
     polygon: Polygon = Polygon()
@@ -111,7 +111,7 @@ class PolygonStamped(Message):
 
 @dataclass(frozen=True)
 class PolygonInstance(Message):
-    """One of several, known by its id."""
+    """A polygon with an id."""
 
     polygon: Polygon = Polygon()
     id: Int64 = 0
@@ -119,7 +119,7 @@ class PolygonInstance(Message):
 
 @dataclass(frozen=True)
 class PolygonInstanceStamped(Message):
-    """With time and frame."""
+    """A polygon with id, time and frame."""
 
     header: Header = Header()
     polygon: PolygonInstance = PolygonInstance()

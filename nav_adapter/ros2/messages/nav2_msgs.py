@@ -12,7 +12,7 @@ from .unique_identifier_msgs import UUID
 
 @dataclass(frozen=True)
 class SpeedLimit(Message):
-    """In m/s or in per cent of the controller's maximum; 0.0 means that there is no limit."""
+    """A limit in m/s or in per cent of the controller's maximum; 0.0 means no limit."""
 
     header: Header = Header()
     percentage: Bool = False

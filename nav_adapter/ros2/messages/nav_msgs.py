@@ -12,7 +12,7 @@ from .std_msgs import Header
 
 @dataclass(frozen=True)
 class MapMetaData(Message):
-    """Size, resolution (m) and the pose of cell (0, 0)'s lower left corner."""
+    """Size, resolution (m), and the pose of the lower left corner of cell (0, 0)."""
 
     map_load_time: Time = Time()
     resolution: Float32 = 0.0
@@ -23,7 +23,7 @@ class MapMetaData(Message):
 
 @dataclass(frozen=True)
 class OccupancyGrid(Message):
-    """Row by row from the lower left: 0 free to 100 occupied, −1 unknown."""
+    """A grid, row by row from the lower left: 0 free to 100 occupied, −1 unknown."""
 
     header: Header = Header()
     info: MapMetaData = MapMetaData()

@@ -11,7 +11,7 @@ from .std_msgs import Header
 
 @dataclass(frozen=True)
 class Person(Message):
-    """Velocity is a Point there; a tag's name stands at the same place in ``tagnames``."""
+    """A person; ``tagnames`` holds the names of ``tags``, and the velocity is a Point."""
 
     name: String = ""
     position: Point = Point()
@@ -23,7 +23,7 @@ class Person(Message):
 
 @dataclass(frozen=True)
 class People(Message):
-    """Everybody at one instant."""
+    """All people at one time."""
 
     header: Header = Header()
     people: tuple[Person, ...] = ()

@@ -10,7 +10,7 @@ from .std_msgs import Header
 
 @dataclass(frozen=True)
 class Image(Message):
-    """Raw pixels; ``step`` bytes a row."""
+    """Raw pixels, with ``step`` bytes per row."""
 
     header: Header = Header()
     height: UInt32 = 0
@@ -23,7 +23,7 @@ class Image(Message):
 
 @dataclass(frozen=True)
 class CompressedImage(Message):
-    """The bytes of a JPEG or PNG file."""
+    """An image as the bytes of a JPEG or PNG file."""
 
     header: Header = Header()
     format: String = ""
@@ -32,7 +32,7 @@ class CompressedImage(Message):
 
 @dataclass(frozen=True)
 class RegionOfInterest(Message):
-    """Part of an image; all zero is the whole."""
+    """A part of an image; all zeros for the whole image."""
 
     x_offset: UInt32 = 0
     y_offset: UInt32 = 0
@@ -43,7 +43,7 @@ class RegionOfInterest(Message):
 
 @dataclass(frozen=True)
 class CameraInfo(Message):
-    """Calibration: k is the camera matrix, d the distortion."""
+    """A calibration: k is the camera matrix, d the distortion."""
 
     header: Header = Header()
     height: UInt32 = 0

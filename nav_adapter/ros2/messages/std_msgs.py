@@ -10,7 +10,7 @@ from .builtin_interfaces import Time
 
 @dataclass(frozen=True)
 class Header(Message):
-    """When, and in which frame."""
+    """A time and a frame."""
 
     stamp: Time = Time()
     frame_id: String = ""

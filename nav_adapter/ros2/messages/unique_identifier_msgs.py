@@ -9,6 +9,6 @@ from .._message import Message, UInt8x16
 
 @dataclass(frozen=True)
 class UUID(Message):
-    """16 bytes after RFC 9562."""
+    """A UUID of 16 bytes, after RFC 9562."""
 
     uuid: UInt8x16 = bytes(16)

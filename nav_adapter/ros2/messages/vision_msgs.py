@@ -11,7 +11,7 @@ from .std_msgs import Header
 
 @dataclass(frozen=True)
 class BoundingBox3D(Message):
-    """Pose of the centre, and the sides."""
+    """A box: pose of the centre and lengths of the sides."""
 
     center: Pose = Pose()
     size: Vector3 = Vector3()
@@ -19,7 +19,7 @@ class BoundingBox3D(Message):
 
 @dataclass(frozen=True)
 class ObjectHypothesis(Message):
-    """What it is, and how sure that is."""
+    """A class and its score."""
 
     class_id: String = ""
     score: Float64 = 0.0
@@ -27,7 +27,7 @@ class ObjectHypothesis(Message):
 
 @dataclass(frozen=True)
 class ObjectHypothesisWithPose(Message):
-    """With the pose of the object."""
+    """A class, its score and the pose of the object."""
 
     hypothesis: ObjectHypothesis = ObjectHypothesis()
     pose: PoseWithCovariance = PoseWithCovariance()
@@ -35,7 +35,7 @@ class ObjectHypothesisWithPose(Message):
 
 @dataclass(frozen=True)
 class Detection3D(Message):
-    """One object; the id stays the same over time."""
+    """One object; its id stays the same over time."""
 
     header: Header = Header()
     results: tuple[ObjectHypothesisWithPose, ...] = ()
@@ -45,7 +45,7 @@ class Detection3D(Message):
 
 @dataclass(frozen=True)
 class Detection3DArray(Message):
-    """All objects of one instant."""
+    """All objects at one time."""
 
     header: Header = Header()
     detections: tuple[Detection3D, ...] = ()

@@ -14,7 +14,7 @@ from .std_msgs import ColorRGBA, Header
 
 @dataclass(frozen=True)
 class UVCoordinate(Message):
-    """A place in a texture."""
+    """A position in a texture."""
 
     u: Float32 = 0.0
     v: Float32 = 0.0
@@ -22,7 +22,7 @@ class UVCoordinate(Message):
 
 @dataclass(frozen=True)
 class MeshFile(Message):
-    """A mesh that comes along."""
+    """A mesh file."""
 
     filename: String = ""
     data: UInt8s = b""
@@ -63,6 +63,6 @@ class Marker(Message):
 
 @dataclass(frozen=True)
 class MarkerArray(Message):
-    """Shapes of one instant."""
+    """The shapes at one time."""
 
     markers: tuple[Marker, ...] = ()

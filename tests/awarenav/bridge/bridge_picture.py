@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from awarenav.cli import main
-from nav_adapter.ros2._stamps import to_time
+from nav_adapter.ros2.conversions import to_time
 from nav_adapter.ros2.messages.geometry_msgs import (
     Quaternion,
     Transform,

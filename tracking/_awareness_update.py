@@ -1,4 +1,4 @@
-"""What a frame does to the awareness of every track."""
+"""Update of every track's awareness with one frame."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from .awareness_filter import AwarenessBelief, drift, forget, measure
 
 
 def belief_of(tracks: TrackTable) -> AwarenessBelief:
-    """Return what is believed of the awareness of every track."""
+    """Return the awareness of every track as a belief."""
     return AwarenessBelief(
         tracks.awareness_means, tracks.awareness_variances, tracks.awareness_bounds
     )
 
 
-def attend(
+def update_awareness(
     tracks: TrackTable,
     previous_stamp_s: float,
     stamp_s: float,
@@ -29,41 +29,41 @@ def attend(
     evidence_variances: FloatArray,
     config: AwarenessFilterConfig,
 ) -> TrackTable:
-    """Return the tracks after what a frame says, or fails to say, about their awareness.
+    """Return the tracks with their awareness after one frame.
 
     Args:
         tracks: with beliefs at ``previous_stamp_s``.
-        previous_stamp_s: of the frame before.
-        stamp_s: of the frame.
+        previous_stamp_s: stamp of the frame before.
+        stamp_s: stamp of the frame.
         interval_s: > 0, time that the frame stands for.
-        seen: (N,) whom the frame shows.
-        ambiguous: (N,) who may be somebody else: their belief falls as if unseen, then goes back
-            to the prior.
+        seen: (N,) True for people in the frame.
+        ambiguous: (N,) True for ambiguous matches: the belief drifts as if unseen and is then reset
+            to the prior, since the measurement may be another person's.
         evidence_means: (N,) of logit(α); NaN without a usable face.
         evidence_variances: (N,) of logit(α); NaN without a usable face.
         config: settings.
     """
     dt_s = stamp_s - previous_stamp_s
-    attended = seen & ~ambiguous
-    shows_face = attended & ~np.isnan(evidence_means)
+    observed = seen & ~ambiguous
+    shows_face = observed & ~np.isnan(evidence_means)
     before = belief_of(tracks)
     belief, stamps = before, tracks.evidence_stamps_s
     if dt_s > 0.0:
         unseen_s = max(config.unseen_time_constant_s, config.memory_s)
         no_face_s = max(config.no_face_time_constant_s, config.memory_s)
-        # Two frames with a face vouch for the time between them, unless it is long.
+        # A face in two frames in a row counts for the time between them, unless it is long.
         continued = shows_face & (stamps == previous_stamp_s)
         continued &= dt_s <= config.max_evidence_gap_s
-        constants_s = np.where(attended & ~shows_face, no_face_s, unseen_s)
+        constants_s = np.where(observed & ~shows_face, no_face_s, unseen_s)
         constants_s = np.where(continued, config.evidence_time_constant_s, constants_s)
         belief = drift(before, dt_s, constants_s, config)
     if shows_face.any():
         measured = measure(belief, evidence_means, evidence_variances, interval_s, config)
-        # Nothing that a possible ghost shows may shrink an obstacle, now or later.
+        # A tentative track may be clutter: its evidence must never shrink an obstacle.
         bound = np.where(tracks.confirmed, measured.bound, belief.bound)
         counts = shows_face
         if dt_s <= 0.0:
-            # A second opinion of one instant adds no time: it may only lower the bound.
+            # A second measurement at the same stamp may only lower the bound.
             counts = shows_face & ((stamps != stamp_s) | (bound < belief.bound))
         belief = AwarenessBelief(
             np.where(counts, measured.mean, belief.mean),

@@ -13,7 +13,7 @@ from perception import Camera, PerceptionError
 from .._errors import NavError
 from .messages.sensor_msgs import CameraInfo
 
-# sensor_msgs/image_encodings.hpp: samples a pixel, and how it becomes RGB.
+# sensor_msgs/image_encodings.hpp: samples per pixel, and OpenCV's conversion to RGB.
 _ENCODINGS: Final[dict[str, tuple[int, int | None]]] = {
     "rgb8": (3, None),
     "bgr8": (3, cv2.COLOR_BGR2RGB),
@@ -41,16 +41,16 @@ _DISTORTION_MODELS: Final = ("plumb_bob", "rational_polynomial")
 
 
 def picture_of(message: Any) -> NDArray[np.uint8]:
-    """The picture of a message, (H, W, 3) uint8 RGB.
+    """Return the image of a message, (H, W, 3) uint8 RGB.
 
-    Sixteen bits become eight by their full range, transparency is dropped, and the orientation that
-    a picture file may claim is ignored: the calibration is of the pixels as they are.
+    16-bit values are scaled to 8 bits over their full range. Transparency is dropped. The
+    orientation in a file's metadata is ignored, since the calibration is for the pixels as stored.
 
     Args:
-        message: ``sensor_msgs`` Image or CompressedImage, ours or as another library has read it.
+        message: ``sensor_msgs`` Image or CompressedImage, of this package or of another library.
 
     Raises:
-        NavError: an encoding that is not known here, too few bytes, or a damaged file.
+        NavError: for an unsupported encoding, too few bytes, or a damaged file.
     """
     if not hasattr(message, "encoding"):
         return _decompressed(message)
@@ -62,7 +62,7 @@ def picture_of(message: Any) -> NDArray[np.uint8]:
     row = width * depth * (2 if wide else 1)
     if height * width == 0 or step < row or len(message.data) < height * step:
         raise NavError(
-            f"{width} x {height} px of {message.encoding} with {step} bytes a row need "
+            f"{width} x {height} px of {message.encoding} with {step} bytes per row need "
             f"{height * max(step, row)} bytes and at least one pixel, got {len(message.data)} bytes"
         )
     rows = np.frombuffer(message.data, np.uint8, height * step).reshape(height, step)[:, :row]
@@ -79,10 +79,10 @@ def picture_of(message: Any) -> NDArray[np.uint8]:
 
 
 def camera_of(message: CameraInfo) -> Camera:
-    """The camera of a ``camera_info`` message: its matrix k and distortion d.
+    """Return the camera of a ``camera_info`` message: its matrix k and distortion d.
 
     Raises:
-        NavError: an uncalibrated driver's zeros, or a distortion model that is not known here.
+        NavError: for the zeros of an uncalibrated driver, or an unsupported distortion model.
     """
     if not message.k[0] > 0.0:
         raise NavError("camera_info has no calibration (k is zero): calibrate the camera")
@@ -114,7 +114,7 @@ def _decompressed(message: Any) -> NDArray[np.uint8]:
         bgr = None
     if bgr is None:
         raise NavError(
-            f"a compressed image must hold a picture file, got {data.size} bytes of format "
+            f"a compressed image must hold an image file, got {data.size} bytes of format "
             f"{message.format!r} that cannot be read"
         )
     return np.asarray(cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB), dtype=np.uint8)
