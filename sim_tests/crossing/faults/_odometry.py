@@ -35,7 +35,9 @@ class FaultyOdometry:
         rng: random generator of the first outage's time.
     """
 
-    def __init__(self, fault: Fault, T_camera_assumed: FloatArray | None, rng: np.random.Generator) -> None:
+    def __init__(
+        self, fault: Fault, T_camera_assumed: FloatArray | None, rng: np.random.Generator
+    ) -> None:
         self._fault = fault
         self._T_camera_assumed = T_camera_assumed
         self._first_outage_s = float(rng.uniform(0.0, fault.lost_odometry.every_s))
