@@ -96,7 +96,7 @@ def run_crossing(
     meter = SafetyMeter(NOVA_CARTER)
     injection = FaultInjection(fault, seed)
     with Stage(scenario, offsets, people_rng, renderer=renderer) as stage:
-        driver = planner if planner is not None else _default_planner(scenario, stage)
+        driver = planner if planner is not None else _default_planner(scenario)
         camera_model, timing = _camera_and_timing(scenario, perception)
         eyes = make_eyes(
             perception,
@@ -213,7 +213,7 @@ def _make_tracker(
     )
 
 
-def _default_planner(scenario: Scenario, stage: Stage) -> LocalPlanner:
+def _default_planner(scenario: Scenario) -> LocalPlanner:
     straight = scenario.robot.straight_on_speed_mps
     if straight is not None:
         return StraightOn(straight)

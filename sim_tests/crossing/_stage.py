@@ -233,14 +233,14 @@ class Stage(AbstractContextManager["Stage"]):
         return tuple(walkers)
 
     def _place_workers(self) -> None:
-        robot, movers = self._robot_body(), self._movers()
+        robot, others = self._robot_body(), self._moving_bodies()
         motions = []
         for index, (worker, behaviour) in enumerate(
             zip(self.workers, self._behaviours, strict=True)
         ):
             around = Surroundings(
                 robot,
-                movers[:index] + movers[index + 1 :],
+                others[:index] + others[index + 1 :],
                 partial(self._sees_robot, worker),
             )
             motions.append(self._move_or_hold(index, worker, behaviour.motion(self.t_s, around)))
@@ -284,7 +284,7 @@ class Stage(AbstractContextManager["Stage"]):
             (camera_x, camera_y, camera_z),
         )
 
-    def _movers(self) -> tuple[MovingBody, ...]:
+    def _moving_bodies(self) -> tuple[MovingBody, ...]:
         """Return all people where they were last placed; none before the first placement."""
         return tuple(
             MovingBody(*motion.position_odom_m.tolist(), *motion.velocity_odom_mps.tolist())

@@ -31,7 +31,7 @@ class ComparisonRow:
 def compare_policies(
     seed: int = 0, perception: str = "keypoints", progress: bool = False
 ) -> tuple[ComparisonRow, ...]:
-    """Run one crossing without people, with a blind robot, and with an aware robot and two workers.
+    """Run the same crossing without people, blind, and aware with two kinds of worker.
 
     The worker walks the same path in every run. Only the gaze and the robot's policy differ.
     """

@@ -39,7 +39,7 @@ class CameraSpec(StrictConfig):
         mount: ``"front"``: in front of the head of the robot's post; ``"top"``: on top of it, where
             nothing hides the sides.
         picture_scale: with ``perception="pixels"`` the images have this share of the width and
-            height; half the pixels a side render four times as fast.
+            height; half the width and height render four times as fast.
         scenery_divisor: these images take one sample of the scenery per block of this many pixels a
             side; people get full resolution.
         sensor: exposure, noise and blur of rendered images; the default adds none.
@@ -87,7 +87,7 @@ class CameraSpec(StrictConfig):
         return ring_of_views(camera, np.radians(self.views_deg))
 
     def camera(self, scale: float = 1.0) -> Camera:
-        """Return the camera model of one view, with ``scale`` times the pixels a side."""
+        """Return the camera model of one view, with width and height times ``scale``."""
         return Camera.from_fov(
             round(self.width_px * scale),
             round(self.height_px * scale),

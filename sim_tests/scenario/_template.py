@@ -99,7 +99,7 @@ class ScenarioTemplate:
 
     @property
     def attention(self) -> Literal["attentive", "unaware", "mixed"]:
-        """Whether people notice the robot."""
+        """Label of the people's attention, see :class:`Scenario`."""
         return self._median.attention
 
     @property

@@ -88,7 +88,7 @@ class Sighting:
 
     Attributes:
         stamp_s: time of the image.
-        T_odom_camera: (4, 4) pose of the camera at that time.
+        T_odom_camera: (4, 4) pose of the camera at that time, as the robot knows it.
         observations: observations of people, each with the index of its worker.
     """
 

@@ -50,7 +50,7 @@ class FaultyDetections:
         remaining = [
             (self._biased(observation), worker)
             for (observation, worker), draw in zip(observations, draws, strict=True)
-            if draw >= self._fault.miss_rate and not self._bursts.hide(worker, stamp_s)
+            if draw >= self._fault.miss_rate and not self._bursts.hides(worker, stamp_s)
         ]
         ghosts = self._ghosts.observe(stamp_s, T_odom_camera)
         return (*remaining, *((ghost, NOBODY) for ghost in ghosts))
@@ -76,7 +76,7 @@ class _PersonBursts:
         self._key = int(rng.integers(2**63))
         self._processes: dict[int, _BurstProcess] = {}
 
-    def hide(self, worker: int, stamp_s: float) -> bool:
+    def hides(self, worker: int, stamp_s: float) -> bool:
         """Return whether a person is in a burst; ``stamp_s`` grows from call to call."""
         if self._bursts.for_s == 0.0:
             return False

@@ -19,7 +19,7 @@ _EARLY_S: Final = 1.0e-6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Odometry:
-    """What the robot knows about itself: its state, and the pose of its camera (4, 4)."""
+    """An odometry message: the robot's state, and the pose of its camera (4, 4)."""
 
     state: RobotState
     T_odom_camera: FloatArray

@@ -23,7 +23,7 @@ from ._scene import FootprintBox, Scene
 _BRAKING_SAMPLES: Final = 16
 # Tolerance for rounding when a motion is compared with waiting.
 _SLACK_M: Final = 1e-3
-# Costs closer than this are a tie, which the order of the samples settles, not the rounding.
+# Costs closer than this are equal; the order of the samples then decides, not the rounding.
 _TIE: Final = 1e-9
 # A slower robot counts as standing.
 _STANDING_MPS: Final = 0.02
@@ -31,9 +31,9 @@ _STANDING: Final = Poses(*(np.asarray(value) for value in (0.0, 0.0, 1.0, 0.0)))
 
 
 class SamplingPlanner:
-    """Drive a differential-drive robot to a goal among moving people and fixed boxes.
+    """A dynamic-window planner for a differential-drive robot (Fox, Burgard and Thrun 1997).
 
-    A dynamic-window planner (Fox, Burgard and Thrun 1997). A candidate is a target speed and a yaw
+    It drives to a goal among moving people and fixed boxes. A candidate is a target speed and a yaw
     rate that is held for a while. Each is rolled out in closed form and judged twice:
 
     * It must be *safe*: one tick of it followed by full braking keeps ``clearance_m`` to every box

@@ -135,11 +135,11 @@ def test_impossible_faults_are_refused(text, message, tmp_path):
 def test_the_miss_rate_is_the_share_of_lost_observations():
     detections = FaultyDetections(Fault(miss_rate=0.3), CAMERA, np.random.default_rng(0))
     seen = ((observation(), 0), (observation(), 1))
-    kept = [len(detections.apply(seen, 0.05 * n, T_ODOM_CAMERA)) for n in range(4000)]
-    share = 1.0 - np.mean(kept) / 2.0
+    remaining = [len(detections.apply(seen, 0.05 * n, T_ODOM_CAMERA)) for n in range(4000)]
+    share = 1.0 - np.mean(remaining) / 2.0
     assert share == pytest.approx(0.3, abs=4.0 * math.sqrt(0.3 * 0.7 / 8000))
     # Losses are independent: the number lost of two is binomial.
-    assert kept.count(0) / 4000 == pytest.approx(0.09, abs=4.0 * math.sqrt(0.09 * 0.91 / 4000))
+    assert remaining.count(0) / 4000 == pytest.approx(0.09, abs=4.0 * math.sqrt(0.09 * 0.91 / 4000))
 
 
 def test_bursts_hide_a_person_for_their_share_of_the_time_independent_of_others():

@@ -44,10 +44,10 @@ def test_an_interrupted_run_is_continued_to_the_same_bytes(rendered: Path, tmp_p
     # Killed in the middle of a line, with an image that has no line yet.
     (tmp_path / "truth.jsonl").write_text("".join(lines[:4]) + lines[5][:60], "utf-8")
     (tmp_path / "000001.png").unlink()
-    kept = (tmp_path / "000003.png").stat().st_mtime_ns
+    modified_ns = (tmp_path / "000003.png").stat().st_mtime_ns
     render(CONFIG, tmp_path, processes=1, progress=False)
     assert contents(tmp_path) == whole
-    assert (tmp_path / "000003.png").stat().st_mtime_ns == kept
+    assert (tmp_path / "000003.png").stat().st_mtime_ns == modified_ns
 
 
 def test_a_folder_with_images_of_other_settings_is_left_alone(rendered: Path) -> None:

@@ -165,8 +165,8 @@ def test_drawings_are_small_and_reproducible(tmp_path, capsys):
         first, second = (tmp_path / folder / f"{name}.png" for folder in ("one", "two"))
         assert first.read_bytes() == second.read_bytes()
         assert first.stat().st_size < 40_000
-        with Image.open(first) as picture:
-            pixels = np.asarray(picture.convert("RGB")).reshape(-1, 3)
+        with Image.open(first) as image:
+            pixels = np.asarray(image.convert("RGB")).reshape(-1, 3)
         # It contains the robot's blue and the hall's grey.
         for colour in ((0x1F, 0x5F, 0x8B), (0xC9, 0xCC, 0xD1)):
             assert (np.abs(pixels - np.array(colour)).max(axis=1) <= 6).sum() > 200
