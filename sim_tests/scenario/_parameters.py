@@ -24,7 +24,7 @@ def find_parameters(data: Mapping[str, Any], source: str) -> dict[str, Distribut
         source: name of the scenario in messages.
 
     Raises:
-        SimError: for an impossible distribution, and for one outside these keys.
+        SimError: for an impossible distribution, and for one outside people, workers and robot.
     """
     found: dict[str, Distribution] = {}
     for path, kind, settings in _distributions_in(data, (), source):
