@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-from ._crossing import CrossingFrame, CrossingResult, Observer, StraightOn, run_crossing
+from ._crossing import Observer, run_crossing
 from ._drawing import TopView, draw_camera_view
-from ._metrics import STANDING_SPEED_MPS
-from ._stage import Stage
+from ._metrics import CLEARANCE_M, STANDING_SPEED_MPS, ContactEvent, SafetyMeter
+from ._result import CrossingFrame, CrossingResult
+from ._stage import Stage, TrueView
+from .planner import StraightOn
 
 __all__ = [
+    "CLEARANCE_M",
     "STANDING_SPEED_MPS",
+    "ContactEvent",
     "CrossingFrame",
     "CrossingResult",
     "Observer",
+    "SafetyMeter",
     "Stage",
     "StraightOn",
     "TopView",
+    "TrueView",
     "draw_camera_view",
     "run_crossing",
 ]

@@ -1,4 +1,4 @@
-"""Pictures of a crossing: the camera view with what was understood, and a map from above."""
+"""Drawings of a crossing: annotated camera images, and a map from above."""
 
 from __future__ import annotations
 
@@ -10,81 +10,44 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from awarenav.drawing import awareness_colour
+from awarenav.drawing import awareness_colour, dot, line
 from perception import AttentionCone, Camera
-from perception.arrays import FloatArray
+from perception.arrays import FloatArray, ImageRgb
 
-from ._crossing import CrossingFrame
+from ._result import CrossingFrame
 from ._stage import Stage
 from .eyes import NOBODY
 
-Image = NDArray[np.uint8]
-
 _FONT: Final = cv2.FONT_HERSHEY_SIMPLEX
-_INK: Final = (40, 40, 46)
-_PAPER: Final = (246, 245, 242)
-_RACK: Final = (176, 182, 190)
-_ROBOT: Final = (38, 84, 140)
+_TEXT_COLOUR: Final = (40, 40, 46)
+_BACKGROUND_COLOUR: Final = (246, 245, 242)
+_RACK_COLOUR: Final = (176, 182, 190)
+_ROBOT_COLOUR: Final = (38, 84, 140)
+_PATH_COLOUR: Final = (120, 120, 126)
 _CONE_LENGTH_M: Final = 0.4
+# Radius of the disc that marks a person on the map.
+_PERSON_RADIUS_M: Final = 0.22
+# Points farther than this outside the image are not drawn.
+_FAR_PX: Final = 1.0e4
 _SHIFT: Final = 4  # sub-pixel bits of OpenCV's drawing functions
 
 
-def _write(image: Image, lines: list[str], corner: tuple[int, int], size: float) -> None:
-    """Lines of text on a plate, its lower left corner at ``corner`` for one line."""
-    height = round(34 * size)
-    widths = [cv2.getTextSize(text, _FONT, size, 1)[0][0] for text in lines]
-    left, top = corner[0], corner[1] - height
-    plate = image[max(top, 0) : top + height * len(lines) + 4, max(left - 4, 0) :]
-    plate = plate[:, : max(widths) + 8]
-    np.copyto(plate, (0.25 * plate + 0.75 * np.array(_PAPER)).astype(np.uint8))
-    for row, text in enumerate(lines):
-        base = (left, top + height * (row + 1) - round(9 * size))
-        cv2.putText(image, text, base, _FONT, size, _INK, 1, cv2.LINE_AA)
-
-
-def _fixed(points: Any) -> NDArray[np.int32]:
-    fixed: NDArray[np.int32] = np.round(points * (1 << _SHIFT)).astype(np.int32).reshape(-1, 1, 2)
-    return fixed
-
-
-def _fill(image: Image, points: FloatArray, colour: Any, opacity: float) -> None:
-    """Blend a convex polygon into the image."""
-    hull = cv2.convexHull(points.astype(np.float32))
-    layer = image.copy()
-    cv2.fillConvexPoly(layer, _fixed(hull.reshape(-1, 2)), colour, cv2.LINE_AA, _SHIFT)
-    cv2.addWeighted(layer, opacity, image, 1.0 - opacity, 0.0, dst=image)
-
-
-def _line(image: Image, ends: FloatArray, colour: Any, width_px: int) -> None:
-    cv2.polylines(image, [_fixed(ends)], False, colour, width_px, cv2.LINE_AA, _SHIFT)
-
-
-def _cone_rim(apex: FloatArray, gaze: FloatArray, half_angle_rad: float) -> FloatArray:
-    """(24, 3) points of the rim of an attention cone cut off at a length that can be drawn."""
-    side = np.cross(gaze, [0.0, 0.0, 1.0] if abs(gaze[2]) < 0.9 else [1.0, 0.0, 0.0])
-    side /= np.linalg.norm(side)
-    angles = np.linspace(0.0, 2.0 * math.pi, 24, endpoint=False)[:, None]
-    ring = np.cos(angles) * side + np.sin(angles) * np.cross(gaze, side)
-    radius = _CONE_LENGTH_M * math.tan(half_angle_rad)
-    return np.asarray(apex + _CONE_LENGTH_M * gaze + radius * ring)
-
-
 def draw_camera_view(
-    picture: Image, camera: Camera, frame: CrossingFrame, stage: Stage, cone: AttentionCone
-) -> Image:
-    """Draw boxes, gaze cones, α, radius and speed limit into the robot's camera picture.
+    picture: ImageRgb, camera: Camera, frame: CrossingFrame, stage: Stage, cone: AttentionCone
+) -> ImageRgb:
+    """Draw boxes, gaze cones, α, radius and speed limit into an image of the robot's camera.
 
     Args:
-        picture: (H, W, 3) RGB of ``camera``.
-        camera: the camera that rendered the picture (any size with the robot's field of view).
-        frame: what was understood.
-        stage: for the place of the eyes, where the cone is drawn.
+        picture: (H, W, 3) RGB image of ``camera``.
+        camera: camera of the image: any size, with the robot's field of view.
+        frame: the frame to draw.
+        stage: gives the position of the eyes, where the cone is drawn.
         cone: the attention cone.
 
     Returns:
-        A new picture.
+        A new image.
     """
-    image: Image = picture.copy()
+    image: ImageRgb = picture.copy()
     rotation, origin = frame.T_odom_camera[:3, :3], frame.T_odom_camera[:3, 3]
     scale = camera.width_px / stage.scenario.camera.width_px
 
@@ -97,11 +60,10 @@ def draw_camera_view(
         ring[:, :2] = obstacle.center_odom_m + obstacle.radius_m * np.stack(
             [np.cos(angles), np.sin(angles)], axis=1
         )
-        line = pixels(ring)
         colour = awareness_colour(obstacle.awareness_lower)
-        for start, end in itertools.pairwise(line):
-            if np.isfinite([start, end]).all() and np.abs([start, end]).max() < 1e4:
-                _line(image, np.array([start, end]), colour, 2)
+        for ends in itertools.pairwise(pixels(ring)):
+            if _drawable(np.array(ends)):
+                line(image, np.array(ends), colour, 2)
     for observation, worker in zip(frame.observations, frame.observed_workers, strict=True):
         colour = awareness_colour(observation.awareness)
         if observation.gaze_camera is not None and worker != NOBODY:
@@ -109,11 +71,11 @@ def draw_camera_view(
             gaze = rotation @ observation.gaze_camera
             rim = pixels(np.vstack([eyes, _cone_rim(eyes, gaze, cone.half_angle_rad)]))
             rim = rim[np.isfinite(rim).all(axis=1)]
-            if len(rim) > 2 and np.abs(rim).max() < 1e4:
+            if len(rim) > 2 and _drawable(rim):
                 _fill(image, rim, colour, 0.16)
-            tip = pixels(np.stack([eyes, eyes + _CONE_LENGTH_M * gaze]))
-            if np.isfinite(tip).all() and np.abs(tip).max() < 1e4:
-                _line(image, tip, colour, 2)
+            axis = pixels(np.stack([eyes, eyes + _CONE_LENGTH_M * gaze]))
+            if _drawable(axis):
+                line(image, axis, colour, 2)
         if observation.box_xyxy_px is not None:
             left, top, right, bottom = (observation.box_xyxy_px * scale).round().astype(int)
             cv2.rectangle(
@@ -126,6 +88,82 @@ def draw_camera_view(
             _write(image, [text], (int(left) + 4, max(int(top) - 4, 18)), 0.42)
     _write(image, _captions(frame), (8, 18), 0.42)
     return image
+
+
+class TopView:
+    """A map of the hall from above: odom x to the right, y up.
+
+    Args:
+        stage: the stage to draw.
+        size_px: width and height.
+        window_m: x_min, y_min, x_max, y_max of the visible part.
+    """
+
+    def __init__(
+        self,
+        stage: Stage,
+        size_px: tuple[int, int],
+        window_m: tuple[float, float, float, float],
+    ) -> None:
+        x_min, y_min, x_max, y_max = window_m
+        self._scale = min(size_px[0] / (x_max - x_min), size_px[1] / (y_max - y_min))
+        centre = 0.5 * np.array([x_min + x_max, y_min + y_max])
+        self._offset = 0.5 * np.array(size_px) - self._scale * centre * (1.0, -1.0)
+        self._background = np.full((size_px[1], size_px[0], 3), _BACKGROUND_COLOUR, np.uint8)
+        for x0, y0, x1, y1 in stage.warehouse.obstacle_boxes_odom:
+            corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
+            cv2.fillConvexPoly(
+                self._background,
+                _fixed_point(self._pixels(corners)),
+                _RACK_COLOUR,
+                cv2.LINE_AA,
+                _SHIFT,
+            )
+        self._robot_path: list[FloatArray] = []
+        self._worker_paths: list[list[FloatArray]] = [[] for _ in stage.workers]
+
+    def _pixels(self, points_odom_m: FloatArray) -> FloatArray:
+        return np.asarray(points_odom_m * (self._scale, -self._scale) + self._offset)
+
+    def draw(self, frame: CrossingFrame, stage: Stage, cone: AttentionCone) -> ImageRgb:
+        """Draw one frame; the paths grow with every call."""
+        image: ImageRgb = self._background.copy()
+        state = frame.robot_state
+        self._robot_path.append(state.position_odom_m)
+        line(image, self._pixels(np.array(self._robot_path)), _ROBOT_COLOUR, 1)
+        for path, view in zip(self._worker_paths, frame.truth, strict=True):
+            path.append(view.position_odom_m)
+            line(image, self._pixels(np.array(path)), _PATH_COLOUR, 1)
+        for obstacle in frame.constraints.obstacles:
+            colour = awareness_colour(obstacle.awareness_lower)
+            outline = self._pixels(np.asarray(obstacle.polygon.exterior.coords)[:, :2])
+            _fill(image, outline, colour, 0.22)
+            cv2.polylines(image, [_fixed_point(outline)], True, colour, 1, cv2.LINE_AA, _SHIFT)
+        for worker, view in zip(stage.workers, frame.truth, strict=True):
+            eyes = worker.eyes_odom_m[:2]
+            gaze = (frame.T_odom_camera[:3, :3] @ view.gaze_camera)[:2]
+            heading = math.atan2(gaze[1], gaze[0])
+            angles = np.linspace(-cone.half_angle_rad, cone.half_angle_rad, 15) + heading
+            arc = eyes + 1.1 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+            sector = self._pixels(np.vstack([eyes, arc]))
+            _fill(image, sector, awareness_colour(view.awareness), 0.3)
+            centre = self._pixels(view.position_odom_m[None])
+            dot(image, centre, _PERSON_RADIUS_M * self._scale, _TEXT_COLOUR)
+        heading = state.heading_odom_rad
+        rotation = np.array(
+            [[math.cos(heading), -math.sin(heading)], [math.sin(heading), math.cos(heading)]]
+        )
+        outline = self._pixels(stage.amr.profile.footprint_m @ rotation.T + state.position_odom_m)
+        cv2.fillConvexPoly(image, _fixed_point(outline), _ROBOT_COLOUR, cv2.LINE_AA, _SHIFT)
+        nose = np.stack([state.position_odom_m, state.position_odom_m + 0.7 * rotation[:, 0]])
+        line(image, self._pixels(nose), _ROBOT_COLOUR, 2)
+        self._draw_scale(image)
+        return image
+
+    def _draw_scale(self, image: ImageRgb) -> None:
+        y_px = image.shape[0] - 14.0
+        line(image, np.array([[14.0, y_px], [14.0 + self._scale, y_px]]), _TEXT_COLOUR, 2)
+        _write(image, ["1 m"], (16, image.shape[0] - 18), 0.4)
 
 
 def _captions(frame: CrossingFrame) -> list[str]:
@@ -141,86 +179,41 @@ def _captions(frame: CrossingFrame) -> list[str]:
     ]
 
 
-class TopView:
-    """A map of the hall from above: odom x to the right, y up.
+def _cone_rim(apex: FloatArray, gaze: FloatArray, half_angle_rad: float) -> FloatArray:
+    """Return 24 points (24, 3) on the rim of an attention cone, cut off at the drawn length."""
+    side = np.cross(gaze, [0.0, 0.0, 1.0] if abs(gaze[2]) < 0.9 else [1.0, 0.0, 0.0])
+    side /= np.linalg.norm(side)
+    angles = np.linspace(0.0, 2.0 * math.pi, 24, endpoint=False)[:, None]
+    ring = np.cos(angles) * side + np.sin(angles) * np.cross(gaze, side)
+    radius = _CONE_LENGTH_M * math.tan(half_angle_rad)
+    return np.asarray(apex + _CONE_LENGTH_M * gaze + radius * ring)
 
-    Args:
-        stage: the stage that is drawn.
-        size_px: width and height.
-        window_m: x_min, y_min, x_max, y_max of the part that is shown.
-    """
 
-    def __init__(
-        self,
-        stage: Stage,
-        size_px: tuple[int, int],
-        window_m: tuple[float, float, float, float],
-    ) -> None:
-        x_min, y_min, x_max, y_max = window_m
-        self._scale = min(size_px[0] / (x_max - x_min), size_px[1] / (y_max - y_min))
-        centre = 0.5 * np.array([x_min + x_max, y_min + y_max])
-        self._offset = 0.5 * np.array(size_px) - self._scale * centre * (1.0, -1.0)
-        self._background = np.full((size_px[1], size_px[0], 3), _PAPER, np.uint8)
-        for x0, y0, x1, y1 in stage.warehouse.obstacle_boxes_odom:
-            corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
-            cv2.fillConvexPoly(
-                self._background, _fixed(self._pixels(corners)), _RACK, cv2.LINE_AA, _SHIFT
-            )
-        self._robot_path: list[FloatArray] = []
-        self._worker_paths: list[list[FloatArray]] = [[] for _ in stage.workers]
+def _drawable(points_px: FloatArray) -> bool:
+    return bool(np.isfinite(points_px).all() and np.abs(points_px).max() < _FAR_PX)
 
-    def _pixels(self, points_odom_m: FloatArray) -> FloatArray:
-        return np.asarray(points_odom_m * (self._scale, -self._scale) + self._offset)
 
-    def draw(self, frame: CrossingFrame, stage: Stage, cone: AttentionCone) -> Image:
-        """Draw one frame; paths grow with every call."""
-        image: Image = self._background.copy()
-        state = frame.robot_state
-        self._robot_path.append(state.position_odom_m)
-        self._path(image, self._robot_path, _ROBOT)
-        for worker, view in enumerate(frame.truth):
-            self._worker_paths[worker].append(view.position_odom_m)
-            self._path(image, self._worker_paths[worker], (120, 120, 126))
-        for obstacle in frame.constraints.obstacles:
-            colour = awareness_colour(obstacle.awareness_lower)
-            outline = self._pixels(np.asarray(obstacle.polygon.exterior.coords)[:, :2])
-            _fill(image, outline, colour, 0.22)
-            cv2.polylines(image, [_fixed(outline)], True, colour, 1, cv2.LINE_AA, _SHIFT)
-        for worker, view in enumerate(frame.truth):
-            eyes = stage.workers[worker].eyes_odom_m[:2]
-            gaze = (frame.T_odom_camera[:3, :3] @ view.gaze_camera)[:2]
-            heading = math.atan2(gaze[1], gaze[0])
-            spread = np.linspace(-cone.half_angle_rad, cone.half_angle_rad, 15) + heading
-            fan = eyes + 1.1 * np.stack([np.cos(spread), np.sin(spread)], axis=1)
-            _fill(
-                image,
-                self._pixels(np.vstack([eyes, fan])),
-                awareness_colour(view.awareness),
-                0.3,
-            )
-            self._disc(image, view.position_odom_m, 0.22, _INK)
-        heading = state.heading_odom_rad
-        turn = np.array(
-            [[math.cos(heading), -math.sin(heading)], [math.sin(heading), math.cos(heading)]]
-        )
-        outline = self._pixels(stage.amr.profile.footprint_m @ turn.T + state.position_odom_m)
-        cv2.fillConvexPoly(image, _fixed(outline), _ROBOT, cv2.LINE_AA, _SHIFT)
-        nose = self._pixels(
-            np.stack([state.position_odom_m, state.position_odom_m + 0.7 * turn[:, 0]])
-        )
-        _line(image, nose, _ROBOT, 2)
-        metre = np.array(
-            [[14.0, image.shape[0] - 14.0], [14.0 + self._scale, image.shape[0] - 14.0]]
-        )
-        _line(image, metre, _INK, 2)
-        _write(image, ["1 m"], (16, image.shape[0] - 18), 0.4)
-        return image
+def _fill(image: ImageRgb, points_px: FloatArray, colour: Any, opacity: float) -> None:
+    """Blend the convex hull of points (N, 2) into the image."""
+    hull = cv2.convexHull(points_px.astype(np.float32))
+    layer = image.copy()
+    cv2.fillConvexPoly(layer, _fixed_point(hull.reshape(-1, 2)), colour, cv2.LINE_AA, _SHIFT)
+    cv2.addWeighted(layer, opacity, image, 1.0 - opacity, 0.0, dst=image)
 
-    def _disc(self, image: Image, centre: FloatArray, radius_m: float, colour: Any) -> None:
-        u, v = _fixed(self._pixels(centre[None])).reshape(2).tolist()
-        radius = round(radius_m * self._scale * (1 << _SHIFT))
-        cv2.circle(image, (u, v), radius, colour, -1, cv2.LINE_AA, _SHIFT)
 
-    def _path(self, image: Image, path: list[FloatArray], colour: Any) -> None:
-        points = _fixed(self._pixels(np.array(path)))
-        cv2.polylines(image, [points], False, colour, 1, cv2.LINE_AA, _SHIFT)
+def _write(image: ImageRgb, lines: list[str], corner: tuple[int, int], size: float) -> None:
+    """Write lines of text on a plate; ``corner`` is the lower left one of the first line."""
+    height = round(34 * size)
+    widths = [cv2.getTextSize(text, _FONT, size, 1)[0][0] for text in lines]
+    left, top = corner[0], corner[1] - height
+    plate = image[max(top, 0) : top + height * len(lines) + 4, max(left - 4, 0) :]
+    plate = plate[:, : max(widths) + 8]
+    np.copyto(plate, (0.25 * plate + 0.75 * np.array(_BACKGROUND_COLOUR)).astype(np.uint8))
+    for row, text in enumerate(lines):
+        base = (left, top + height * (row + 1) - round(9 * size))
+        cv2.putText(image, text, base, _FONT, size, _TEXT_COLOUR, 1, cv2.LINE_AA)
+
+
+def _fixed_point(points_px: Any) -> NDArray[np.int32]:
+    fixed: NDArray[np.int32] = np.round(points_px * (1 << _SHIFT)).astype(np.int32)
+    return fixed.reshape(-1, 1, 2)

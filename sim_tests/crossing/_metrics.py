@@ -1,4 +1,4 @@
-"""What is measured in a crossing: separation, its safety margin, contacts and who caused them."""
+"""Safety figures of a crossing: separation, separation margin, and contacts with their cause."""
 
 from __future__ import annotations
 
@@ -10,17 +10,24 @@ import numpy as np
 from nav_adapter import RobotProfile, protective_separation_m
 from perception.arrays import FloatArray
 
-#: A robot slower than this stands (wheel motors never hold exactly zero).
+#: A robot at this speed or slower counts as standing (wheel motors never hold exactly zero).
 STANDING_SPEED_MPS: Final = 0.03
 #: C + Z of the separation margin, as in decision 8 of the design.
 CLEARANCE_M: Final = 0.10
-#: Near a person: the distance within which the robot's highest speed is reported.
+#: Distance to a person within which the robot's highest speed is reported.
 NEAR_M: Final = 2.0
 
 
 @dataclass(frozen=True, slots=True)
 class ContactEvent:
-    """A touch of robot and person; ``by`` is ``"robot"`` when the robot moved into the person."""
+    """A contact of robot and person.
+
+    Attributes:
+        t_s: time at which it began.
+        worker: number of the person.
+        by: ``"robot"`` when the robot moved into the person, else ``"person"``.
+        robot_speed_mps: speed of the robot at that time.
+    """
 
     t_s: float
     worker: int
@@ -30,14 +37,21 @@ class ContactEvent:
 
 @dataclass(slots=True)
 class SafetyMeter:
-    """Accumulates the safety figures of one episode.
+    """The safety figures of one episode, accumulated.
 
-    The separation margin is S − S_p: the distance between the surfaces of robot and person less
-    the protective separation of ISO 13855 and ISO/TS 15066 for their speeds towards each other, as
-    the simulation knows them. It counts while the robot moves; a robot that stands has done what
-    the standards ask of it, and its margin is S − C − Z.
+    The separation margin is S − S_p: the distance between the surfaces of robot and person, minus
+    the protective separation of ISO 13855 and ISO/TS 15066 for their true closing speeds. It counts
+    while the robot moves. A standing robot has done what the standards ask: its margin is
+    S − C − Z.
 
-    ``separations_m`` holds the separation of each person at the latest measurement.
+    Attributes:
+        robot: limits of the robot.
+        min_separation_m: smallest separation.
+        min_margin_m: smallest margin while the robot moved.
+        violation_time_s: time with a negative margin while the robot moved.
+        max_speed_near_mps: highest speed of the robot within :data:`NEAR_M` of a person.
+        contacts: all contacts.
+        separations_m: separation of each person at the latest measurement.
     """
 
     robot: RobotProfile
@@ -49,7 +63,7 @@ class SafetyMeter:
     separations_m: list[float] = field(default_factory=list)
     _touching: set[int] = field(default_factory=set)
 
-    def separation(
+    def add_separation(
         self,
         separation_m: float,
         robot_velocity_mps: FloatArray,
@@ -57,14 +71,14 @@ class SafetyMeter:
         towards_human: FloatArray,
         dt_s: float,
     ) -> float:
-        """Account for one person over one control cycle and return the separation margin.
+        """Add the separation of one person over one measurement; return the separation margin.
 
         Args:
-            separation_m: between the surfaces, 0 when touching.
+            separation_m: distance between the surfaces, 0 when touching.
             robot_velocity_mps: (2,) in odom.
             human_velocity_mps: (2,) in odom.
             towards_human: (2,) unit vector from the robot to the person, in odom.
-            dt_s: length of the cycle.
+            dt_s: time since the last measurement.
         """
         speed = float(np.linalg.norm(robot_velocity_mps))
         robot_closing = max(float(robot_velocity_mps @ towards_human), 0.0)
@@ -99,7 +113,7 @@ class SafetyMeter:
         robot_velocity_mps: FloatArray,
         towards_human: FloatArray,
     ) -> None:
-        """Record that robot and worker touch now; a touch that goes on is one contact."""
+        """Record that robot and person touch; a continuing touch is one contact."""
         if worker in self._touching:
             return
         self._touching.add(worker)
@@ -110,5 +124,5 @@ class SafetyMeter:
         )
 
     def release(self, worker: int) -> None:
-        """Record that robot and worker do not touch (any more)."""
+        """Record that robot and person do not touch."""
         self._touching.discard(worker)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
 
 import numpy as np
 
-from awarenav.closing import Closing
 from perception import AttentionCone
 from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
@@ -33,28 +33,28 @@ from ..world.bullet import pybullet
 from ..world.render import RendererName
 from ._metrics import STANDING_SPEED_MPS, SafetyMeter
 
-# Surfaces are measured exactly once centres are nearer than this; farther away a bound will do.
+# Distances between surfaces are exact with centres closer than this, else a lower bound.
 _EXACT_WITHIN_M: Final = 4.0
-# How far the true separation of a body with arms down lies above its bound.
+# A body with arms down is at most this much farther away than its lower bound.
 _NEARER_THAN_BOUND_M: Final = 0.45
-# Bodies move at their full rate and physics looks for contacts once surfaces were nearer than this
-# in the last control cycle; nobody closes it within one.
+# Bodies move at their full rate, and contacts are checked, once surfaces were closer than this in
+# the last control cycle; nobody covers this distance within one.
 _TOUCH_WITHIN_M: Final = 0.8
 _BODY_UPDATE_HZ: Final = 60.0
-# A body that moves deeper than this into the robot in one update is held.
+# A body that would move deeper than this into the robot in one update is held.
 _DEEPER_M: Final = 0.002
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrueView:
-    """The truth about one worker at one instant.
+    """The truth about one person at one instant.
 
     Attributes:
-        position_camera_m: (3,) centre line at chest height, camera frame.
+        position_camera_m: (3,) centre line at chest height, in the camera frame.
         gaze_camera: (3,) unit vector of the gaze, eyes included.
-        awareness: cone score of the true gaze at the robot; 0 without a line of sight.
-        position_odom_m: (2,).
-        velocity_odom_mps: (2,).
+        awareness: cone score of the true gaze towards the robot; 0 without a line of sight.
+        position_odom_m: (2,) position.
+        velocity_odom_mps: (2,) velocity.
     """
 
     position_camera_m: FloatArray
@@ -74,17 +74,16 @@ class TrueView:
         return -float(self.position_camera_m[0])
 
 
-class Stage(Closing):
-    """Everything that moves in one crossing.
+class Stage(AbstractContextManager["Stage"]):
+    """Hall, robot and people of one crossing, moved together by physics.
 
-    People are numbered throughout: scripted workers first, then those who react, then those who
-    are replayed.
+    People are numbered in this order: scripted workers, people who react, replayed people.
 
     Args:
-        scenario: what happens.
+        scenario: the scenario.
         start_offsets_s: how much later each scripted worker starts.
-        people_rng: what the people who react draw from; None is the generator of seed 0.
-        renderer: what draws it, should pictures be taken.
+        people_rng: random generator of the people who react; None for the generator of seed 0.
+        renderer: renderer for images of the stage.
     """
 
     def __init__(
@@ -109,7 +108,7 @@ class Stage(Closing):
             self.walkers = self._walkers(
                 np.random.default_rng(0) if people_rng is None else people_rng
             )
-            self._cast: tuple[PersonBehaviour, ...] = (
+            self._behaviours: tuple[PersonBehaviour, ...] = (
                 *(
                     Scripted(script, float(offset))
                     for script, offset in zip(scenario.workers, start_offsets_s, strict=True)
@@ -118,8 +117,8 @@ class Stage(Closing):
                 *(() if scenario.replay_csv is None else replayed_people(scenario.replay_csv)),
             )
             self.workers = tuple(
-                Worker(self.warehouse, actor.stature_m, look=actor.look, stride_m=actor.stride_m)
-                for actor in self._cast
+                Worker(self.warehouse, each.stature_m, look=each.look, stride_m=each.stride_m)
+                for each in self._behaviours
             )
         except BaseException:
             self.warehouse.close()
@@ -128,68 +127,71 @@ class Stage(Closing):
         self._motions: tuple[PersonMotion, ...] = ()
         steps = 1.0 / (_BODY_UPDATE_HZ * self.warehouse.physics_dt_s)
         self._steps_per_body_update = max(round(steps), 1)
-        self._close = [False] * len(self.workers)
+        self._near_robot = [False] * len(self.workers)
         half_length, half_width = np.abs(self.amr.profile.footprint_m).max(axis=0).tolist()
         self._half_size_m: tuple[float, float] = (half_length, half_width)
         self._held = [False] * len(self.workers)
-        self._velocity_mps: FloatArray | None = None
+        self._last_velocity_mps: FloatArray | None = None
         self._place_workers()
 
     def close(self) -> None:
-        """End the physics world."""
+        """Close the warehouse."""
         self.warehouse.close()
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
 
     @property
     def t_s(self) -> float:
-        """Simulated time."""
+        """Simulated time in seconds."""
         return self.warehouse.time_s
 
     def advance(self, until_s: float, meter: SafetyMeter) -> None:
-        """Run physics to ``until_s``, moving the workers and recording contacts."""
+        """Run physics until ``until_s``; move the people and record contacts."""
         while self.t_s < until_s - 0.5 * self.warehouse.physics_dt_s:
-            # Far from the robot a body that moves once a control cycle touches nobody either.
-            if any(self._close) and self.warehouse.steps % self._steps_per_body_update == 0:
+            # Far from the robot, bodies move once per control cycle and touch nobody.
+            if any(self._near_robot) and self.warehouse.steps % self._steps_per_body_update == 0:
                 self._place_workers()
             self.amr.advance(self.warehouse.physics_dt_s)
-            # A collision slows the robot in the step that finds it, and in the one before, which
-            # lets it come just as far as the body: what counts is how it came.
-            earlier, now = self._velocity_mps, None
-            if any(self._close):
-                now = self.robot_velocity_odom_mps
-            self._velocity_mps = now
+            # A collision slows the robot in the step that reports it, and in the one before, which
+            # stops the robot at the body. The velocity before the collision is the one that counts.
+            previous, current = self._last_velocity_mps, None
+            if any(self._near_robot):
+                current = self.robot_velocity_odom_mps
+            self._last_velocity_mps = current
             self.warehouse.step()
-            if now is None:
+            if current is None:
                 continue
-            came = now
-            if earlier is not None and earlier @ earlier > now @ now:
-                came = earlier
+            velocity = current
+            if previous is not None and previous @ previous > current @ current:
+                velocity = previous
             if abs(self.amr.driven_speed_mps) <= STANDING_SPEED_MPS:
-                came = np.zeros(2)  # it stands: what moves it is who walks into it
-            for index, close in enumerate(self._close):
-                if close:
-                    self._look_for_contact(index, came, meter)
+                velocity = np.zeros(2)  # only a person who walks into it moves a standing robot
+            for index, near in enumerate(self._near_robot):
+                if near:
+                    self._update_contact(index, velocity, meter)
         self._place_workers()
 
     def measure(self, meter: SafetyMeter, dt_s: float) -> tuple[float, ...]:
-        """Account for the separation of every worker; returns the separation margins."""
+        """Measure the separation of every person; return the separation margins."""
         velocity = self.robot_velocity_odom_mps
         margins = []
         meter.separations_m.clear()
         for index, motion in enumerate(self._motions):
             separation, towards = self._separation(index)
-            self._close[index] = separation < _TOUCH_WITHIN_M
+            self._near_robot[index] = separation < _TOUCH_WITHIN_M
             margins.append(
-                meter.separation(separation, velocity, motion.velocity_odom_mps, towards, dt_s)
+                meter.add_separation(separation, velocity, motion.velocity_odom_mps, towards, dt_s)
             )
         return tuple(margins)
 
     @property
     def robot_velocity_odom_mps(self) -> FloatArray:
-        """(2,) velocity of the base origin."""
+        """Velocity (2,) of the base origin."""
         return self.amr.velocity_odom_mps
 
     def truth(self, cone: AttentionCone, T_odom_camera: FloatArray) -> tuple[TrueView, ...]:
-        """The truth about every worker, from the robot's camera."""
+        """Return the truth about every person, seen from the robot's camera."""
         rotation, origin = T_odom_camera[:3, :3], T_odom_camera[:3, 3]
         views = []
         for worker, motion in zip(self.workers, self._motions, strict=True):
@@ -210,16 +212,16 @@ class Stage(Closing):
 
     @property
     def motions(self) -> tuple[PersonMotion, ...]:
-        """What everybody does now."""
+        """Motion of every person now."""
         return self._motions
 
     @property
     def outcomes(self) -> tuple[PersonOutcome, ...]:
-        """What has become of the people who react, in their order."""
+        """Outcomes of the people who react, in their order."""
         return tuple(walker.outcome() for walker in self.walkers)
 
     def _walkers(self, rng: np.random.Generator) -> tuple[Walker, ...]:
-        """The people who react, each with a generator of their own."""
+        """Return the people who react, each with a random generator of their own."""
         jitter = self.scenario.start_jitter_s
         walkers = []
         for spec, own in zip(
@@ -231,23 +233,25 @@ class Stage(Closing):
         return tuple(walkers)
 
     def _place_workers(self) -> None:
-        robot, movers = self._robot_body(), self._movers()
+        robot, others = self._robot_body(), self._moving_bodies()
         motions = []
-        for index, (worker, actor) in enumerate(zip(self.workers, self._cast, strict=True)):
+        for index, (worker, behaviour) in enumerate(
+            zip(self.workers, self._behaviours, strict=True)
+        ):
             around = Surroundings(
                 robot,
-                movers[:index] + movers[index + 1 :],
+                others[:index] + others[index + 1 :],
                 partial(self._sees_robot, worker),
             )
-            motions.append(self._put(index, worker, actor.motion(self.t_s, around)))
+            motions.append(self._move_or_hold(index, worker, behaviour.motion(self.t_s, around)))
         self._motions = tuple(motions)
 
-    def _put(self, index: int, worker: Worker, motion: PersonMotion) -> PersonMotion:
-        """Pose a body; one that would move into the robot stays where it was.
+    def _move_or_hold(self, index: int, worker: Worker, motion: PersonMotion) -> PersonMotion:
+        """Move a body; one that would move into the robot stays where it was.
 
-        Nothing moves a posed body, so one put into the robot would throw it over.
+        Physics cannot push a body away, so a body inside the robot would throw the robot over.
         """
-        before = self._motions[index] if self._motions and self._close[index] else None
+        before = self._motions[index] if self._motions and self._near_robot[index] else None
         depth_m = 0.0 if before is None else self._depth_m(worker)
         _pose(worker, motion)
         self._held[index] = False
@@ -255,11 +259,11 @@ class Stage(Closing):
             return motion
         _pose(worker, before)
         self._held[index] = True
-        self._cast[index].hold()
+        self._behaviours[index].hold()
         return replace(before, velocity_odom_mps=np.zeros(2))
 
     def _depth_m(self, worker: Worker) -> float:
-        """How far body and robot reach into each other, 0 when apart."""
+        """Return how deep body and robot overlap, 0 when apart."""
         pairs = pybullet.getClosestPoints(
             self.amr.body, worker.body, 0.0, physicsClientId=self.warehouse.client
         )
@@ -280,8 +284,8 @@ class Stage(Closing):
             (camera_x, camera_y, camera_z),
         )
 
-    def _movers(self) -> tuple[MovingBody, ...]:
-        """Where everybody was when last placed; nobody is anywhere before that."""
+    def _moving_bodies(self) -> tuple[MovingBody, ...]:
+        """Return all people where they were last placed; none before the first placement."""
         return tuple(
             MovingBody(*motion.position_odom_m.tolist(), *motion.velocity_odom_mps.tolist())
             for motion in self._motions
@@ -292,7 +296,7 @@ class Stage(Closing):
         return sees(worker, camera, through=frozenset({self.amr.body}))
 
     def _separation(self, index: int) -> tuple[float, FloatArray]:
-        """Distance between the surfaces and the direction (2,) from robot to worker."""
+        """Return the distance between the surfaces and the direction (2,) from robot to worker."""
         base = self.amr.T_odom_base[:2, 3]
         centre = self._motions[index].position_odom_m - base
         distance = float(np.linalg.norm(centre))
@@ -300,8 +304,8 @@ class Stage(Closing):
         bound = distance - self.amr.profile.circumscribed_radius_m - BODY_RADIUS_M
         if distance > _EXACT_WITHIN_M:
             return bound, towards
-        # Pairs of shapes farther apart than asked for cost nothing, and one is always nearer than
-        # this, but for what is carried on the far side.
+        # Pairs of shapes beyond the given distance cost nothing. One pair is always closer than the
+        # first distance, except for what a person carries on the far side.
         for within in (max(bound, 0.0) + _NEARER_THAN_BOUND_M, _EXACT_WITHIN_M):
             pairs = pybullet.getClosestPoints(
                 self.amr.body,
@@ -319,7 +323,7 @@ class Stage(Closing):
         separation = max(float(closest[8]), 0.0)
         return separation, gap / length if separation > 0.0 and length > 1e-3 else towards
 
-    def _look_for_contact(
+    def _update_contact(
         self, index: int, robot_velocity_mps: FloatArray, meter: SafetyMeter
     ) -> None:
         touching = pybullet.getContactPoints(
@@ -328,7 +332,7 @@ class Stage(Closing):
         if self._held[index] or any(point[8] <= 0.0 for point in touching):
             _, towards = self._separation(index)
             meter.touch(self.t_s, index, robot_velocity_mps, towards)
-            self._cast[index].touch(*(-towards).tolist())
+            self._behaviours[index].touch(*(-towards).tolist())
         else:
             meter.release(index)
 

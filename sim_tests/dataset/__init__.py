@@ -1,4 +1,4 @@
-"""Rendered pictures of people with the truth about each of them: ``awarenav render``."""
+"""Rendered images of people, with the truth about each person: ``awarenav render``."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING
 from awarenav.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from ._config import RenderConfig
+    from ._config import RenderConfig, parse_image_size
     from ._render import render
     from ._scene import RenderScene, random_pose
 
 __all__ = [
     "RenderConfig",
     "RenderScene",
+    "parse_image_size",
     "random_pose",
     "render",
 ]
@@ -21,7 +22,10 @@ __all__ = [
 __getattr__ = lazy_names(
     __name__,
     {
-        "._config": ("RenderConfig",),
+        "._config": (
+            "RenderConfig",
+            "parse_image_size",
+        ),
         "._render": ("render",),
         "._scene": (
             "RenderScene",

@@ -1,4 +1,4 @@
-"""What ``awarenav render`` makes: settings that name a set of pictures completely."""
+"""Settings of ``awarenav render``."""
 
 from __future__ import annotations
 
@@ -20,26 +20,26 @@ _SIZE = re.compile(r"^(\d+)x(\d+)$")
 
 
 class RenderConfig(StrictConfig):
-    """Randomised pictures of people in warehouses; the same settings give the same bytes.
+    """Settings of a set of randomised images; the same settings give the same bytes.
 
     Attributes:
-        frames: how many pictures.
-        scenes: how many halls with a cast of workers the pictures are spread over; None is one
-            for every twenty pictures.
-        people: the most people in a picture; each has between one and this many.
-        width_px: of a picture.
-        height_px: of a picture.
-        horizontal_fov_deg: of the camera.
-        min_range_m: nobody stands nearer to the camera.
-        max_range_m: nobody stands farther away.
-        supersampling: samples a pixel and side; 2 smooths edges and costs three times as much.
-        seed: of everything random.
+        frames: number of images.
+        scenes: number of scenes, each a hall with workers, that the images are spread over; None
+            for one per twenty images.
+        people: largest number of people in an image; each image has between one and this many.
+        width_px: image width.
+        height_px: image height.
+        horizontal_fov_deg: horizontal field of view of the camera.
+        min_range_m: smallest distance of a person from the camera.
+        max_range_m: largest distance of a person from the camera.
+        supersampling: samples per pixel and side; 2 smooths edges and costs three times as much.
+        seed: seed of everything random.
         sensor: noise and exposure of the camera; the default adds none.
-        workers: who appears: names of shipped workers or .npz files; None is all who are shipped.
-        layouts: names of the halls; None is all.
-        variants: numbers of the first and the last variant of a hall's goods and colours.
-        eyes: ``"wander"``: they turn in the head, by 7° sideways and 3.4° up and down (standard
-            deviation); ``"ahead"``: the gaze is the head's direction.
+        workers: names of shipped workers, or .npz files; None for all shipped workers.
+        layouts: names of the halls; None for all.
+        variants: first and last number of the variants of a hall's goods and colours.
+        eyes: ``"wander"``: the eyes turn in the head, by 7° sideways and 3.4° up and down (standard
+            deviations); ``"ahead"``: the gaze is the direction of the head.
     """
 
     error: ClassVar[type[ValueError]] = SimError
@@ -88,7 +88,7 @@ class RenderConfig(StrictConfig):
 
     @classmethod
     def checked(cls, **values: Any) -> RenderConfig:
-        """Validate settings given one by one; raises SimError that names each wrong one."""
+        """Validate settings given as keywords; raises SimError that names each wrong one."""
         try:
             return cls(**values)
         except ValidationError as cause:
@@ -101,22 +101,22 @@ class RenderConfig(StrictConfig):
 
     @property
     def scene_count(self) -> int:
-        """How many scenes there are; never more than pictures."""
+        """Number of scenes; never more than images."""
         wanted = math.ceil(self.frames / 20) if self.scenes is None else self.scenes
         return min(wanted, self.frames)
 
     def scene_of(self, frame: int) -> int:
-        """The scene that a picture shows; neighbouring pictures share theirs."""
+        """Return the scene of an image; consecutive images share a scene."""
         return frame * self.scene_count // self.frames
 
     @property
     def camera(self) -> Camera:
-        """The camera of every picture."""
+        """Camera of every image."""
         return Camera.from_fov(self.width_px, self.height_px, math.radians(self.horizontal_fov_deg))
 
 
-def picture_size(text: str) -> tuple[int, int]:
-    """Read ``640x480``; raises SimError for anything else."""
+def parse_image_size(text: str) -> tuple[int, int]:
+    """Return width and height of a text such as ``640x480``; raises SimError for other texts."""
     match = _SIZE.match(text.strip())
     if match is None:
         raise SimError(f"size must be WIDTHxHEIGHT in pixels such as 640x480, got {text!r}")

@@ -1,4 +1,4 @@
-"""A page of small pictures with what is known about the people in them."""
+"""A contact sheet: small images with true boxes and gazes."""
 
 from __future__ import annotations
 
@@ -22,18 +22,19 @@ _WIDTH_PX: Final = 320
 _GAP_PX: Final = 4
 # Length of a drawn gaze.
 _GAZE_M: Final = 0.45
+# A gaze that ends closer to the image plane than this is not drawn.
 _NEAR_M: Final = 0.2
 
 
 def write_contact_sheet(
     folder: Path, records: Sequence[Record], camera: Camera, path: Path
 ) -> None:
-    """Write a sample of the pictures of ``folder``, spread evenly, with true boxes and gazes.
+    """Write up to 24 evenly spaced images of ``folder`` with true boxes and gazes.
 
-    Boxes and gaze lines take the colour of the awareness score, from red to green.
+    Boxes and gaze lines have the colour of the awareness score, from red to green.
 
     Raises:
-        SimError: when a picture cannot be read.
+        SimError: when an image cannot be read.
     """
     count = min(_COLUMNS * _ROWS, len(records))
     chosen = [records[k * len(records) // count] for k in range(count)]
@@ -52,20 +53,20 @@ def write_contact_sheet(
         row, column = divmod(number, _COLUMNS)
         top, left = _GAP_PX + row * (height + _GAP_PX), _GAP_PX + column * (_WIDTH_PX + _GAP_PX)
         sheet[top : top + height, left : left + _WIDTH_PX] = tile
-    good, data = cv2.imencode(".png", sheet[..., ::-1])
-    if not good:
+    encoded, data = cv2.imencode(".png", sheet[..., ::-1])
+    if not encoded:
         raise SimError(f"cannot encode {path.name}")
     path.write_bytes(data.tobytes())
 
 
 def _tile(folder: Path, record: Record, camera: Camera) -> NDArray[np.uint8]:
-    picture = cv2.imread(str(folder / str(record["frame"])), cv2.IMREAD_COLOR)
-    if picture is None:
+    image = cv2.imread(str(folder / str(record["frame"])), cv2.IMREAD_COLOR)
+    if image is None:
         raise SimError(f"cannot read {folder / str(record['frame'])}")
-    scale = _WIDTH_PX / picture.shape[1]
-    size = _WIDTH_PX, round(picture.shape[0] * scale)
+    scale = _WIDTH_PX / image.shape[1]
+    size = _WIDTH_PX, round(image.shape[0] * scale)
     tile = np.ascontiguousarray(
-        cv2.resize(picture, size, interpolation=cv2.INTER_AREA)[..., ::-1], dtype=np.uint8
+        cv2.resize(image, size, interpolation=cv2.INTER_AREA)[..., ::-1], dtype=np.uint8
     )
     for person in record["people"]:
         colour = awareness_colour(person["awareness"])
@@ -82,7 +83,7 @@ def _draw_gaze(
     scale: float,
     colour: tuple[int, int, int],
 ) -> None:
-    """A line from the nose along the gaze, seen in perspective."""
+    """Draw a line from the nose along the gaze, in perspective."""
     if not person["keypoints"].get("nose", (0.0, 0.0, 0.0))[2]:
         return
     nose = np.array(person["keypoints_camera_m"]["nose"])

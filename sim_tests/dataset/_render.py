@@ -1,4 +1,4 @@
-"""``awarenav render``: pictures of people in warehouses with the truth about every one of them."""
+"""Rendering of a set of images with truth, in several processes, resumable."""
 
 from __future__ import annotations
 
@@ -25,38 +25,38 @@ from ._contact_sheet import write_contact_sheet
 _TRUTH: Final = "truth.jsonl"
 _SETTINGS: Final = "render.yaml"
 _SHEET: Final = "contact_sheet.png"
-# A process that has said nothing for so long is asked whether it still lives.
+# Time without a record after which the processes are checked for being alive.
 _POLL_S: Final = 1.0
 
 
 def render(
     config: RenderConfig, out: Path, *, processes: int | None = None, progress: bool = True
 ) -> Path:
-    """Write the pictures of ``config`` into a folder; continues one that was interrupted.
+    """Write the images of ``config`` into a folder; continue an interrupted set.
 
-    ``000000.png`` … are written whole or not at all, ``truth.jsonl`` grows by a line a picture and
-    is sorted at the end, ``camera.yaml`` is ROS camera_info, ``render.yaml`` the settings and
-    ``contact_sheet.png`` a sample with the true boxes.
+    Images ``000000.png`` … appear whole or not at all. ``truth.jsonl`` grows by one line per image
+    and is sorted at the end. ``camera.yaml`` is ROS camera_info, ``render.yaml`` holds the
+    settings, and ``contact_sheet.png`` shows a sample with the true boxes.
 
     Args:
-        config: what to render.
+        config: settings of the set.
         out: folder, made when missing.
-        processes: how many work at once; None is one a processor.
-        progress: shows a bar on standard error.
+        processes: number of processes; None for one per processor.
+        progress: show a progress bar on standard error.
 
     Returns:
-        The truth file.
+        Path of the truth file.
 
     Raises:
-        SimError: when ``out`` holds the pictures of other settings, or a process died.
+        SimError: when ``out`` holds images of other settings, or all processes died.
     """
-    _claim(config, out)
+    _check_folder(config, out)
     truth = out / _TRUTH
-    done = {record["frame"]: record for record in _finished(out)}
+    done = {record["frame"]: record for record in _finished_records(out)}
     write_records(truth, done.values())
     missing = [frame for frame in range(config.frames) if frame_name(frame) not in done]
     config.camera.to_yaml(out / "camera.yaml")
-    tasks = _by_scene(config, missing)
+    tasks = _group_by_scene(config, missing)
     workers = min(processes or os.cpu_count() or 1, max(len(tasks), 1))
     with (
         truth.open("a", encoding="utf-8") as file,
@@ -69,7 +69,7 @@ def render(
             disable=not progress,
         ) as bar,
     ):
-        for record in _records(config, out, tasks, workers):
+        for record in _render_tasks(config, out, tasks, workers):
             file.write(record_line(record))
             file.flush()
             bar.update()
@@ -80,12 +80,12 @@ def render(
 
 
 def frame_name(frame: int) -> str:
-    """File of a picture."""
+    """Return the file name of an image."""
     return f"{frame:06d}.png"
 
 
-def _claim(config: RenderConfig, out: Path) -> None:
-    """Note the settings, or refuse a folder that holds another set of pictures."""
+def _check_folder(config: RenderConfig, out: Path) -> None:
+    """Write the settings into a new folder; refuse a folder that holds another set of images."""
     if out.exists() and not out.is_dir():
         raise SimError(f"--out must be a folder, {out} is a file")
     out.mkdir(parents=True, exist_ok=True)
@@ -99,7 +99,7 @@ def _claim(config: RenderConfig, out: Path) -> None:
                 if getattr(present, name) != getattr(config, name)
             ]
             raise SimError(
-                f"{out} holds pictures made with other settings ({'; '.join(differ)}); "
+                f"{out} holds images made with other settings ({'; '.join(differ)}); "
                 "use the same settings to continue it, or another folder"
             )
         return
@@ -111,51 +111,53 @@ def _claim(config: RenderConfig, out: Path) -> None:
     config.to_yaml(settings)
 
 
-def _finished(out: Path) -> list[Record]:
-    """Records whose pictures are there."""
+def _finished_records(out: Path) -> list[Record]:
+    """Return the records whose images exist."""
     truth = out / _TRUTH
     records = read_records(truth) if truth.exists() else []
     return [record for record in records if (out / str(record["frame"])).is_file()]
 
 
-def _by_scene(config: RenderConfig, frames: Sequence[int]) -> list[list[int]]:
-    """Pictures that are missing, those of one scene together."""
+def _group_by_scene(config: RenderConfig, frames: Sequence[int]) -> list[list[int]]:
+    """Return the frames in groups of one scene each."""
     scenes: dict[int, list[int]] = {}
     for frame in frames:
         scenes.setdefault(config.scene_of(frame), []).append(frame)
     return list(scenes.values())
 
 
-def _records(
+def _render_tasks(
     config: RenderConfig, out: Path, tasks: list[list[int]], workers: int
 ) -> Iterator[Record]:
-    """Records as they come; in this process when one is enough."""
+    """Yield records as they are made; one worker runs in this process."""
     if workers <= 1:
         for task in tasks:
             yield from _scene_records(config, out, task)
         return
     context = multiprocessing.get_context("spawn")
-    todo, made = context.Queue(), context.Queue()
+    task_queue, record_queue = context.Queue(), context.Queue()
     for task in tasks:
-        todo.put(task)
+        task_queue.put(task)
     for _ in range(workers):
-        todo.put(None)
+        task_queue.put(None)
     settings = config.model_dump_json()
-    crew = [
-        context.Process(target=_work, args=(settings, str(out), todo, made), daemon=True)
+    processes = [
+        context.Process(
+            target=_render_scenes, args=(settings, str(out), task_queue, record_queue), daemon=True
+        )
         for _ in range(workers)
     ]
-    for process in crew:
+    for process in processes:
         process.start()
     try:
         left = sum(map(len, tasks))
         while left:
             try:
-                line = made.get(timeout=_POLL_S)
+                line = record_queue.get(timeout=_POLL_S)
             except queue.Empty:
-                if not any(process.is_alive() for process in crew) and made.empty():
+                if not any(process.is_alive() for process in processes) and record_queue.empty():
                     raise SimError(
-                        f"every rendering process ended with {left} pictures to go; "
+                        f"every rendering process ended with {left} images to go; "
                         "run the command again to continue"
                     ) from None
                 continue
@@ -165,41 +167,41 @@ def _records(
             left -= 1
             yield record
     finally:
-        for process in crew:
+        for process in processes:
             process.terminate()
-        for process in crew:
+        for process in processes:
             process.join()
 
 
-def _work(settings: str, out: str, todo: Any, made: Any) -> None:
-    """A process: scene after scene until there is none."""
+def _render_scenes(settings: str, out: str, task_queue: Any, record_queue: Any) -> None:
+    """Run one process: render scenes until the queue of tasks ends."""
     cv2.setNumThreads(1)
     config = RenderConfig.model_validate_json(settings)
     try:
-        while (task := todo.get()) is not None:
+        while (task := task_queue.get()) is not None:
             for record in _scene_records(config, Path(out), task):
-                made.put(record_line(record))
+                record_queue.put(record_line(record))
     except KeyboardInterrupt:
         return
     except Exception as error:
-        made.put(json.dumps({"error": f"{type(error).__name__}: {error}"}))
+        record_queue.put(json.dumps({"error": f"{type(error).__name__}: {error}"}))
 
 
 def _scene_records(config: RenderConfig, out: Path, frames: list[int]) -> Iterator[Record]:
-    """Render pictures of one scene and write them."""
+    """Render and write the images of one scene; yield their records."""
     from ._scene import RenderScene  # noqa: PLC0415 - the parent process needs no simulator
 
     with RenderScene(config, config.scene_of(frames[0])) as scene:
         for frame in frames:
             image, record = scene.snapshot(frame)
-            _write_picture(out / frame_name(frame), image)
+            _write_png(out / frame_name(frame), image)
             yield record
 
 
-def _write_picture(path: Path, image_rgb: NDArray[np.uint8]) -> None:
-    """Write a PNG whole or not at all."""
-    good, data = cv2.imencode(".png", image_rgb[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 3])
-    if not good:
+def _write_png(path: Path, image_rgb: NDArray[np.uint8]) -> None:
+    """Write a PNG; the file appears whole or not at all."""
+    encoded, data = cv2.imencode(".png", image_rgb[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 3])
+    if not encoded:
         raise SimError(f"cannot encode {path.name}")
     part = path.with_name(path.name + ".part")
     part.write_bytes(data.tobytes())

@@ -1,11 +1,11 @@
-"""``awarenav render`` from its options to its last line."""
+"""The command ``awarenav render``: from its options to a set of images."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
 
-from ._config import RenderConfig, picture_size
+from ._config import RenderConfig, parse_image_size
 from ._render import render
 
 
@@ -34,7 +34,7 @@ def render_command(options: RenderOptions) -> int:
     Raises:
         SimError: for options that cannot be used.
     """
-    width, height = picture_size(options.size)
+    width, height = parse_image_size(options.size)
     config = RenderConfig.checked(
         frames=options.frames,
         people=options.people,
@@ -52,7 +52,7 @@ def render_command(options: RenderOptions) -> int:
     )
     truth = render(config, options.out, processes=options.processes)
     print(
-        f"Written to {options.out}: {config.frames} pictures, camera.yaml, {truth.name}, "
+        f"Written to {options.out}: {config.frames} images, camera.yaml, {truth.name}, "
         "contact_sheet.png"
     )
     return 0

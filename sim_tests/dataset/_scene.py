@@ -1,15 +1,15 @@
-"""One randomised scene: a hall, its light, a cast of workers, and snapshots of them."""
+"""One randomised scene: a hall, its light, its workers, and images of them."""
 
 from __future__ import annotations
 
 import math
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from awarenav.closing import Closing
 from awarenav.records import Record
 from perception import Camera
 from perception.arrays import FloatArray
@@ -25,13 +25,13 @@ from ._truth import frame_truth
 _CAMERA_CLEARANCE_M: Final = 0.6
 _PERSON_CLEARANCE_M: Final = 0.40
 _PERSON_SPACING_M: Final = 0.8
-# A robot looks along its way, not at a shelf before its lens.
+# Straight ahead the view of the camera is free for at least this distance.
 _OPEN_AHEAD_M: Final = 3.0
-# So much of a person's width lies within the picture, to either side of the middle.
+# Half width of a person that must fit into the image.
 _HALF_WIDTH_M: Final = 0.28
-# Share of the people who may stand out of the camera's line of sight, behind a rack or a pallet.
+# Share of the people who may stand behind a rack or a pallet, out of the camera's line of sight.
 _HIDDEN_SHARE: Final = 0.08
-# Share of the people who may stand before or behind another.
+# Share of the people who may stand in front of or behind another person.
 _OVERLAP_SHARE: Final = 0.15
 _TRIES: Final = 40
 _CAMERA_TRIES: Final = 500
@@ -45,17 +45,17 @@ class _Place:
     y_m: float
 
 
-class RenderScene(Closing):
-    """A hall with a cast; :meth:`snapshot` rearranges it at random and takes a picture.
+class RenderScene(AbstractContextManager["RenderScene"]):
+    """A hall with workers; :meth:`snapshot` places them at random and renders an image.
 
     Args:
-        config: what is rendered.
-        number: which scene, from 0.
+        config: settings of the set of images.
+        number: number of the scene, from 0.
 
     Attributes:
         warehouse: the hall.
-        workers: the cast.
-        renderer: what the camera sees.
+        workers: the workers of this scene.
+        renderer: the renderer of the camera.
     """
 
     def __init__(self, config: RenderConfig, number: int) -> None:
@@ -73,7 +73,7 @@ class RenderScene(Closing):
         try:
             self.workers = tuple(
                 Worker(self.warehouse, _stature_m(look, rng), look=look)
-                for look in _cast(config, number)
+                for look in _worker_names(config, number)
             )
             self.renderer = CameraRenderer(
                 self.warehouse,
@@ -86,16 +86,19 @@ class RenderScene(Closing):
             raise
 
     def close(self) -> None:
-        """End the scene."""
+        """Close the warehouse."""
         self.warehouse.close()
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
 
     @property
     def camera(self) -> Camera:
-        """The camera of every picture."""
+        """Camera of every image."""
         return self._config.camera
 
     def snapshot(self, frame: int) -> tuple[NDArray[np.uint8], Record]:
-        """Picture number ``frame`` (H, W, 3) and the truth about it; the same every time."""
+        """Return image number ``frame`` (H, W, 3) and its truth; reproducible."""
         rng = np.random.default_rng([self._config.seed, 2, frame])
         T_odom_camera = self.arrange(rng)
         camera = self._config.camera
@@ -103,7 +106,7 @@ class RenderScene(Closing):
         people = frame_truth(self.renderer, camera, T_odom_camera, view, self.workers)
         record: Record = {
             "frame": f"{frame:06d}.png",
-            # Snapshots are not a film: a second apart, no tracker takes them for one.
+            # Images are independent: one second apart, a tracker does not join them to one track.
             "stamp_s": float(frame),
             "T_odom_camera": np.round(T_odom_camera, 6).tolist(),
             "people": people,
@@ -114,28 +117,28 @@ class RenderScene(Closing):
         return expose(view.rgb, self._config.sensor, rng), record
 
     def clear(self) -> None:
-        """Send everybody out of the hall."""
+        """Move all workers out of the hall."""
         for worker in self.workers:
             worker.place((self.warehouse.layout.x_min_m - 9.0, 0.0), 0.0)
 
     def arrange(self, rng: np.random.Generator) -> FloatArray:
-        """Put camera and people somewhere at random; returns T_odom_camera (4, 4)."""
+        """Place camera and workers at random; return T_odom_camera (4, 4)."""
         config = self._config
         wanted = int(rng.integers(1, len(self.workers) + 1))
-        cast = rng.permutation(len(self.workers))[:wanted]
+        chosen = rng.permutation(len(self.workers))[:wanted]
         self.clear()
         places: list[_Place] = []
         for _ in range(_CAMERA_TRIES):
             T_odom_camera, heading = self._camera_pose(rng)
-            places = self._places(T_odom_camera[:3, 3], heading, wanted, rng)
+            places = self._free_places(T_odom_camera[:3, 3], heading, wanted, rng)
             if places:
                 break
         else:
             raise SimError(
-                f"hall {self.layout_name!r} has no room for people {config.min_range_m:g} to "
-                f"{config.max_range_m:g} m before a camera; use shorter ranges"
+                f"hall {self.layout_name!r} has no free place {config.min_range_m:g} to "
+                f"{config.max_range_m:g} m in front of a camera; use shorter ranges"
             )
-        for row, place in zip(cast.tolist(), places, strict=False):
+        for row, place in zip(chosen.tolist(), places, strict=False):
             random_pose(
                 self.workers[row], (place.x_m, place.y_m), T_odom_camera[:3, 3], rng, config.eyes
             )
@@ -158,10 +161,10 @@ class RenderScene(Closing):
         pitch, roll = rng.normal(0.0, np.radians([3.0, 0.7]))
         return _pose_matrix((x, y, height), heading, float(pitch), float(roll)), heading
 
-    def _places(
+    def _free_places(
         self, origin: FloatArray, heading: float, wanted: int, rng: np.random.Generator
     ) -> list[_Place]:
-        """Up to ``wanted`` free places in view, none on top of another."""
+        """Return up to ``wanted`` free places in view that do not collide."""
         config, boxes = self._config, self.warehouse.obstacle_boxes_odom
         layout = self.warehouse.layout
         half_fov = 0.5 * math.radians(config.horizontal_fov_deg)
@@ -187,8 +190,8 @@ class RenderScene(Closing):
         return places
 
 
-def _cast(config: RenderConfig, number: int) -> list[str]:
-    """Who plays in a scene: the whole troupe comes round, in a shuffled order."""
+def _worker_names(config: RenderConfig, number: int) -> list[str]:
+    """Return the workers of a scene; over the scenes all workers take turns, in shuffled order."""
     names = list(config.workers or worker_names())
     order = np.random.default_rng([config.seed, 3]).permutation(len(names)).tolist()
     first = number * config.people
@@ -196,7 +199,7 @@ def _cast(config: RenderConfig, number: int) -> list[str]:
 
 
 def _stature_m(look: str, rng: np.random.Generator) -> float:
-    """Each body appears a little larger or smaller than it was made."""
+    """Return the worker's stature with a random variation of 1.2 %."""
     stature = load_worker(look).stature_m
     return float(np.clip(stature * rng.normal(1.0, 0.012), 1.45, 2.05))
 
@@ -208,13 +211,13 @@ def random_pose(
     rng: np.random.Generator,
     eyes: str = "wander",
 ) -> None:
-    """Any heading, any activity, the head anywhere that a neck allows.
+    """Place a worker with random heading, activity, gait, head pose and gaze.
 
     Args:
-        worker: who.
-        position_odom_m: (2,) where.
-        camera_odom_m: (3,) the robot's camera, at which three in ten look.
-        rng: of all of it.
+        worker: the worker to place.
+        position_odom_m: (2,) position.
+        camera_odom_m: (3,) the robot's camera; three in ten workers look at it.
+        rng: random generator.
         eyes: see :class:`RenderConfig`.
     """
     x, y = position_odom_m
@@ -226,7 +229,7 @@ def random_pose(
     yaw, pitch = rng.normal(0.0, math.radians(25.0)), rng.normal(-0.05, math.radians(10.0))
     if activity == "phone":
         yaw, pitch = 0.3 * yaw, math.radians(-30.0) + 0.6 * pitch
-    elif kind < 0.3:  # at the robot, where the neck reaches that far
+    elif kind < 0.3:  # at the robot, as far as the neck turns
         away = math.atan2(camera_odom_m[1] - y, camera_odom_m[0] - x)
         yaw = math.remainder(away - heading, math.tau) + 0.2 * yaw
     elif kind < 0.5:
@@ -250,7 +253,7 @@ def random_pose(
 def _pose_matrix(
     position_odom_m: tuple[float, float, float], heading: float, pitch: float, roll: float
 ) -> FloatArray:
-    """T_odom_camera of a level robot's camera that looks down by ``pitch``."""
+    """Return T_odom_camera (4, 4) of a camera that looks down by ``pitch``."""
     ch, sh, cp, sp = math.cos(heading), math.sin(heading), math.cos(pitch), math.sin(pitch)
     forward = np.array([cp * ch, cp * sh, -sp])
     right = np.array([sh, -ch, 0.0])
@@ -265,7 +268,7 @@ def _pose_matrix(
 
 
 def _collide(first: _Place, second: _Place, origin: FloatArray, may_overlap: bool) -> bool:
-    """Whether two people stand too close, or one before the other as seen from the camera."""
+    """Return whether two people stand too close, or overlap as seen from the camera."""
     if math.hypot(first.x_m - second.x_m, first.y_m - second.y_m) < _PERSON_SPACING_M:
         return True
     a, b = (
@@ -279,12 +282,12 @@ def _collide(first: _Place, second: _Place, origin: FloatArray, may_overlap: boo
 
 
 def _clearance_m(boxes: FloatArray, x: float, y: float) -> float:
-    """Distance of a point from the nearest of (N, 4) boxes; 0 inside one."""
+    """Return the distance from a point to the nearest of (N, 4) boxes; 0 inside one."""
     dx = np.maximum(np.maximum(boxes[:, 0] - x, x - boxes[:, 2]), 0.0)
     dy = np.maximum(np.maximum(boxes[:, 1] - y, y - boxes[:, 3]), 0.0)
     return float(np.hypot(dx, dy).min())
 
 
 def _blocked(boxes: FloatArray, start: tuple[float, float], end: tuple[float, float]) -> bool:
-    """Whether the straight line between two points crosses one of (N, 4) boxes."""
+    """Return whether the straight line between two points crosses one of (N, 4) boxes."""
     return bool(crosses_boxes(boxes, start, end)[0])

@@ -1,4 +1,4 @@
-"""The truth about the people in one picture: boxes, keypoints, gaze, position, awareness."""
+"""The truth about the people in one image: boxes, keypoints, gaze, position, awareness."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from ..world import keypoints_in_front, sees
 from ..world.camera import CameraRenderer, RenderedView
 
 _NAMES: Final = (*COCO_NAMES, *FOOT_NAMES, "neck")
-# Fewer pixels than this of a person are not worth a box.
+# A person with fewer visible pixels than this gets no record.
 _LEAST_PIXELS: Final = 12
-# A person nearer to the image plane than this is not in front of the camera.
+# Corners of a person's bounding box are moved at least this far in front of the camera.
 _NEAR_M: Final = 0.2
 
 
@@ -32,34 +32,34 @@ def frame_truth(
     workers: Sequence[Worker],
     cone: AttentionCone | None = None,
 ) -> list[Record]:
-    """Return a record of every worker of whom ``view`` shows something.
+    """Return one record per worker who is visible in ``view``.
 
     Args:
-        renderer: to draw each worker alone, for what is hidden of them.
-        camera: that took the picture.
-        T_odom_camera: (4, 4).
-        view: the whole picture.
-        workers: of the picture's warehouse.
-        cone: scores awareness; None is the default cone.
+        renderer: draws each worker alone, to measure how much of them is hidden.
+        camera: camera of the image.
+        T_odom_camera: (4, 4) pose of the camera.
+        view: the rendered image.
+        workers: all workers of the warehouse.
+        cone: scores awareness; None for the default cone.
     """
     cone = AttentionCone() if cone is None else cone
     people = []
     for index, worker in enumerate(workers):
         mask = view.actors == worker.actor
-        seen = int(np.count_nonzero(mask))
-        if seen < _LEAST_PIXELS:
+        visible = int(np.count_nonzero(mask))
+        if visible < _LEAST_PIXELS:
             continue
         rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
         box = [int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1]
-        shape = _silhouette(renderer, camera, T_odom_camera, worker)
+        inside, total = _silhouette_pixels(renderer, camera, T_odom_camera, worker)
         people.append(
             {
                 "id": index,
                 "box_xyxy_px": [float(edge) for edge in box],
                 **_geometry(camera, T_odom_camera, view, worker, cone),
                 "score": 1.0,
-                "occlusion": round(1.0 - min(seen / max(shape[0], seen), 1.0), 4),
-                "truncation": round(1.0 - shape[0] / max(shape[1], 1), 4),
+                "occlusion": round(1.0 - min(visible / max(inside, visible), 1.0), 4),
+                "truncation": round(1.0 - inside / max(total, 1), 4),
                 "look": Path(worker.asset.name).stem,
                 "stature_m": round(worker.stature_m, 4),
                 "heading_odom_rad": round(worker.heading_odom_rad, 5),
@@ -69,13 +69,13 @@ def frame_truth(
     return people
 
 
-def _silhouette(
+def _silhouette_pixels(
     renderer: CameraRenderer,
     camera: Camera,
     T_odom_camera: FloatArray,
     worker: Worker,
 ) -> tuple[int, int]:
-    """Pixels of the worker drawn alone: inside the picture, and altogether."""
+    """Return the pixels of the worker drawn alone: inside the image, and in total."""
     low, high = worker.skin.bounds_odom_m()
     corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
     points = (corners - T_odom_camera[:3, 3]) @ T_odom_camera[:3, :3]
@@ -83,7 +83,7 @@ def _silhouette(
     pixels = camera.project(points)
     first = np.floor(pixels.min(axis=0)) - 1.0
     last = np.ceil(pixels.max(axis=0)) + 2.0
-    # One picture beside the real one on every side is far enough for whoever leans out of it.
+    # One image size beyond the image on every side is enough for people at its border.
     size = np.array([camera.width_px, camera.height_px])
     first, last = np.maximum(first, -size), np.minimum(last, 2 * size)
     if (last <= first).any():

@@ -1,4 +1,4 @@
-"""Measures how fast crossings run, against real time and against bare physics in the same run."""
+"""The speed of crossings, compared with real time and with bare physics in the same run."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ..scenario import Scenario
 from ..world import Warehouse
 from ..world.hall import WarehouseLayout
 
-#: What the project asks of a quiet computer: keypoints on one core, pixels with networks on two.
+#: Goals on an otherwise idle computer: keypoints on one core, pixels with networks on two.
 GOALS: Final = {
     "crossing_keypoints_real_time_factor": 15.0,
     "crossing_pixels_real_time_factor": 1.0,
@@ -27,9 +27,10 @@ GOALS: Final = {
 
 
 def measure(repeats: int = 3) -> tuple[Metric, ...]:
-    """Time crossings on this machine; the best of ``repeats`` counts, since noise only slows.
+    """Time crossings on this machine; the best of ``repeats`` counts, since other load only slows.
 
-    A peer runs in the same process: PyBullet stepping the empty hall, which no crossing can beat.
+    The reference runs in the same process: PyBullet stepping the empty hall, faster than any
+    crossing.
     """
     names = ("crossing_attentive", "crossing_distracted")
     with tqdm(total=6, desc="bench", unit="figure", leave=False, file=sys.stderr) as bar:
@@ -70,12 +71,12 @@ def measure(repeats: int = 3) -> tuple[Metric, ...]:
 
 
 def _factor(name: str, run: tuple[float, float]) -> Metric:
-    # A bare speed depends on the machine; the wide tolerance only catches a change of kind.
+    # The speed depends on the machine; the wide tolerance only detects large changes.
     return Metric(name, run[0] / run[1], "x real time", "higher", 0.6)
 
 
 def _time_bare_physics() -> float:
-    """Wall seconds a simulated second for the empty hall."""
+    """Return the wall seconds per simulated second of the empty hall."""
     with Warehouse(WarehouseLayout.crossing()) as warehouse:
         steps = round(5.0 / warehouse.physics_dt_s)
         start = time.perf_counter()
@@ -85,7 +86,7 @@ def _time_bare_physics() -> float:
 
 
 def _time_runs(names: Iterable[str], perception: str) -> tuple[float, float]:
-    """Simulated and wall seconds of the named crossings, loading the world included."""
+    """Return simulated and wall seconds of the named crossings, with the loading of the world."""
     simulated = 0.0
     start = time.perf_counter()
     for name in names:
@@ -95,7 +96,7 @@ def _time_runs(names: Iterable[str], perception: str) -> tuple[float, float]:
 
 
 def bench_command(baseline_path: Path, out: Path | None, *, as_json: bool = False) -> int:
-    """Measure, print the figures beside the baseline and return the exit status.
+    """Measure, print the figures beside the baseline, and return the exit status.
 
     Raises:
         AwarenavError: for a baseline that cannot be read, and a file that cannot be written.

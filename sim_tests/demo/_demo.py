@@ -1,4 +1,4 @@
-"""The demonstration: the paper's encounter, then what awareness buys in a crossing."""
+"""The demonstration: the paper's encounter, then a crossing with and without awareness."""
 
 from __future__ import annotations
 
@@ -14,14 +14,15 @@ from perception import AwarenessPipeline, Camera
 
 from ..crossing import CrossingResult, run_crossing
 from ..scenario import Scenario
-from ._encounter import case_values, run_encounter
+from ._cases import case_values
+from ._encounter import run_encounter
 from ._figures import plot_comparison
 from ._tables import EpisodeTable
 
 
 @dataclass(frozen=True, slots=True)
 class ComparisonRow:
-    """One line of the comparison: what it is called and how it went."""
+    """One row of the comparison: a label and the crossing."""
 
     label: str
     result: CrossingResult
@@ -30,10 +31,9 @@ class ComparisonRow:
 def compare_policies(
     seed: int = 0, perception: str = "keypoints", progress: bool = False
 ) -> tuple[ComparisonRow, ...]:
-    """Run the same crossing with nobody there, blind, and aware with two kinds of worker.
+    """Run the same crossing without people, blind, and aware with two kinds of worker.
 
-    The worker walks the same way in every run; only where he looks and what the robot makes of it
-    differ.
+    The worker walks the same path in every run. Only the gaze and the robot's policy differ.
     """
     attentive = Scenario.shipped("crossing_attentive")
     distracted = Scenario.shipped("crossing_distracted")
@@ -52,7 +52,7 @@ def compare_policies(
 
 
 def comparison_table(rows: tuple[ComparisonRow, ...]) -> str:
-    """The comparison as text."""
+    """Return the comparison as text."""
     header = (
         f"{'':26s}{'time to':>9s}{'smallest':>12s}{'top speed':>12s}{'margin':>12s}{'':>10s}\n"
         f"{'crossing':26s}{'goal':>9s}{'separation':>12s}{'within 2 m':>12s}{'violated':>12s}"
@@ -62,12 +62,12 @@ def comparison_table(rows: tuple[ComparisonRow, ...]) -> str:
     for row in rows:
         result = row.result
         goal = "never" if result.time_to_goal_s is None else f"{result.time_to_goal_s:.2f} s"
-        nobody = not result.frames or not result.frames[0].truth
+        empty = not result.frames or not result.frames[0].truth
         lines.append(
             f"{row.label:26s}{goal:>9s}"
             + (
                 f"{'-':>12s}{'-':>12s}{'-':>12s}{'-':>10s}"
-                if nobody
+                if empty
                 else f"{result.min_separation_m:>10.2f} m{result.max_speed_within_2m_mps:>8.2f} m/s"
                 f"{result.violation_time_s:>10.2f} s{len(result.contacts):>10d}"
             )
@@ -76,7 +76,10 @@ def comparison_table(rows: tuple[ComparisonRow, ...]) -> str:
 
 
 def delay_won_back(rows: tuple[ComparisonRow, ...]) -> float | None:
-    """The share of the blind robot's delay that awareness of an attentive worker wins back."""
+    """Return the share of the blind robot's delay that an aware robot does not have.
+
+    None if one of the robots does not reach the goal, or the blind one has no delay.
+    """
     free, blind, aware = (row.result.time_to_goal_s for row in rows[:3])
     if free is None or blind is None or aware is None or blind <= free:
         return None
@@ -84,7 +87,7 @@ def delay_won_back(rows: tuple[ComparisonRow, ...]) -> float | None:
 
 
 def encounter_table(result: CrossingResult) -> str:
-    """The encounter's three cases beside the paper's, as text."""
+    """Return the three cases of the encounter beside the paper's values, as text."""
     lines = [f"{'case':27s}{'':11s}{'alpha':>8s}{'d_fwd':>9s}{'d_lat':>9s}", "-" * 64]
     last = None
     for case, perception, alpha, forward, lateral in case_values(result):
@@ -102,10 +105,10 @@ def encounter_table(result: CrossingResult) -> str:
     return "\n".join(lines)
 
 
-def _tables(
+def _tables_as_data(
     encounter: CrossingResult, rows: tuple[ComparisonRow, ...], share: float | None
 ) -> dict[str, Any]:
-    """Both tables as plain data."""
+    """Return both tables as plain data."""
     return {
         "encounter": [
             {
@@ -146,43 +149,43 @@ def run_demo(
     Args:
         out: folder for ``encounter.png``, ``encounter.mp4``, ``encounter.csv``, ``crossings.png``
             and ``episodes.csv``; made when missing.
-        seed: of everything random.
+        seed: seed of everything random.
         video: whether to render the video.
-        perception: ``"keypoints"``, or ``"pixels"``: rendered, through the shipped networks.
+        perception: ``"keypoints"``, or ``"pixels"``: rendered images, through the shipped networks.
         as_json: print the tables as JSON.
     """
     if perception == "pixels":
-        AwarenessPipeline(Camera.from_fov(640, 480, 1.0))  # says at once which networks are absent
-    # Words would spoil JSON.
-    words = sys.stderr if as_json else sys.stdout
+        AwarenessPipeline(Camera.from_fov(640, 480, 1.0))  # fails now if networks are missing
+    # With JSON on standard output, text goes to standard error.
+    text_stream = sys.stderr if as_json else sys.stdout
     out.mkdir(parents=True, exist_ok=True)
     scenario = Scenario.shipped("paper_encounter")
-    print(f"The encounter of the paper: {scenario.duration_s:g} s", file=words)
+    print(f"The encounter of the paper: {scenario.duration_s:g} s", file=text_stream)
     total = round(scenario.duration_s * scenario.control_hz)
     with tqdm(total=total, desc="encounter", unit="frame", file=sys.stderr) as bar:
 
-        def advance(done: int) -> None:
-            bar.update(done - bar.n)
+        def update_bar(finished: int) -> None:
+            bar.update(finished - bar.n)
 
         encounter = run_encounter(
-            out, seed=seed, video=video, perception=perception, progress=advance
+            out, seed=seed, video=video, perception=perception, progress=update_bar
         )
-    print(encounter_table(encounter), file=words)
-    print("\nThe same crossing, with and without awareness", file=words)
+    print(encounter_table(encounter), file=text_stream)
+    print("\nThe same crossing, with and without awareness", file=text_stream)
     rows = compare_policies(seed, perception, progress=True)
     with EpisodeTable(out / "episodes.csv") as table:
         for row in rows:
             table.add(row.result)
     plot_comparison(out / "crossings.png", [(row.label, row.result) for row in rows])
-    print(comparison_table(rows), file=words)
+    print(comparison_table(rows), file=text_stream)
     share = delay_won_back(rows)
     if share is not None:
         print(
             f"\nAn attentive worker gives back {share:.0%} of the time that the blind robot loses.",
-            file=words,
+            file=text_stream,
         )
     if as_json:
-        print(json_text(_tables(encounter, rows, share)), end="")
+        print(json_text(_tables_as_data(encounter, rows, share)), end="")
     names = ["encounter.png", *(["encounter.mp4"] if video else []), "encounter.csv"]
     written = ", ".join([*names, "crossings.png", "episodes.csv"])
-    print(f"\nWritten to {out}: {written}", file=words)
+    print(f"\nWritten to {out}: {written}", file=text_stream)

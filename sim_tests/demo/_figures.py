@@ -1,23 +1,180 @@
-"""The plot of the crossings with and without awareness."""
+"""The plots of the demonstration: the encounter, and crossings with and without awareness."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from awarenav.figures import new_figure
+from awarenav.drawing import awareness_colour
+from awarenav.figures import Axes, new_figure
+from perception.arrays import FloatArray, ImageRgb
 
 from ..crossing import CrossingFrame, CrossingResult
+from ._cases import CAMERA_PERIOD_S, CASES, EncounterCase
 
 _COLOURS: Final = ("#8a8f98", "#b3261e", "#2e7d4f", "#d9822b")
 _STYLES: Final = ("-", "-", "-", "--")
+_TRUTH_COLOUR: Final = "#1f4e79"
+_PERCEPTION_COLOUR: Final = "#d9822b"
+_BOUND_COLOUR: Final = "#7fb77e"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CaseImages:
+    """One case of the encounter: its frame, and the views of the robot and of the worker."""
+
+    case: EncounterCase
+    frame: CrossingFrame
+    robot_view: ImageRgb
+    eye_view: ImageRgb
+
+
+@dataclass(frozen=True, slots=True)
+class _Panel:
+    """A quantity of the encounter over time: truth, perception and the paper's value."""
+
+    title: str
+    true: Callable[[CrossingFrame], float | None]
+    observed: Callable[[CrossingFrame], float | None]
+    of_case: Callable[[EncounterCase], float]
+
+
+def plot_encounter(path: Path, result: CrossingResult, images: Sequence[CaseImages]) -> None:
+    """Plot the encounter: images of the three cases, and awareness and position over time.
+
+    Args:
+        path: the PNG file.
+        result: the encounter.
+        images: images of each case.
+    """
+    figure = new_figure(16.0, 6.9)
+    grid = figure.add_gridspec(2, 6, height_ratios=[1.0, 1.9])
+    for column, case_images in enumerate(images):
+        for side, (image, name) in enumerate(
+            ((case_images.robot_view, "robot's camera"), (case_images.eye_view, "worker's eyes"))
+        ):
+            axes = figure.add_subplot(grid[0, 2 * column + side])
+            title = f"({column + 1}) {case_images.case.t_s:.2f} s: {case_images.case.meaning}"
+            _show_image(axes, image, title if side == 0 else "", name)
+            _colour_frame(axes, case_images.frame.truth[0].awareness)
+    panels = (
+        _Panel(
+            "awareness score α",
+            lambda f: f.truth[0].awareness,
+            lambda f: None if (o := f.observation_of(0)) is None else o.awareness,
+            lambda c: c.awareness,
+        ),
+        _Panel(
+            "forward distance d_fwd (m)",
+            lambda f: f.truth[0].d_fwd_m,
+            _observed_position(lambda p: float(p[2])),
+            lambda c: c.d_fwd_m,
+        ),
+        _Panel(
+            "lateral offset d_lat (m), left positive",
+            lambda f: f.truth[0].d_lat_m,
+            _observed_position(lambda p: -float(p[0])),
+            lambda c: c.d_lat_m,
+        ),
+    )
+    for index, panel in enumerate(panels):
+        axes = figure.add_subplot(grid[1, 2 * index : 2 * index + 2])
+        _plot_panel(axes, panel, result, with_bound=index == 0)
+    figure.savefig(path, dpi=110)
+
+
+def _show_image(axes: Axes, image: ImageRgb, title: str, name: str) -> None:
+    axes.imshow(image)
+    axes.set_xticks([])
+    axes.set_yticks([])
+    axes.set_title(title, loc="left", fontsize=10)
+    axes.set_xlabel(name, fontsize=9)
+
+
+def _colour_frame(axes: Axes, awareness: float) -> None:
+    red, green, blue = awareness_colour(awareness)
+    for spine in axes.spines.values():
+        spine.set_color((red / 255.0, green / 255.0, blue / 255.0))
+        spine.set_linewidth(2.0)
+
+
+def _plot_panel(axes: Axes, panel: _Panel, result: CrossingResult, *, with_bound: bool) -> None:
+    time = np.array([frame.t_s for frame in result.frames])
+    axes.plot(
+        *_with_gaps(time, _values(result, panel.observed)),
+        color=_PERCEPTION_COLOUR,
+        lw=0.7,
+        label=f"from {result.perception}",
+    )
+    if with_bound:
+        _plot_bound(axes, result, time)
+    axes.plot(time, _values(result, panel.true), color=_TRUTH_COLOUR, lw=1.4, label="truth")
+    axes.plot(
+        [case.t_s for case in CASES],
+        [panel.of_case(case) for case in CASES],
+        "o",
+        mfc="none",
+        mec="black",
+        ms=8,
+        label="paper",
+    )
+    for number, case in enumerate(CASES, start=1):
+        axes.axvline(case.t_s, color="0.8", lw=0.8, zorder=0)
+        axes.annotate(
+            f"({number})",
+            (case.t_s, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(2, -11),
+            textcoords="offset points",
+            fontsize=8,
+            color="0.35",
+        )
+    axes.set_title(panel.title, fontsize=10, loc="left")
+    axes.set_xlabel("time (s)")
+    axes.grid(alpha=0.25)
+    axes.legend(fontsize=8, loc="best")
+
+
+def _plot_bound(axes: Axes, result: CrossingResult, time: FloatArray) -> None:
+    """Plot the highest lower bound of all tracks, which the robot acts on."""
+    lower = _values(
+        result, lambda f: max((track.awareness_lower for track in f.tracks), default=None)
+    )
+    axes.fill_between(time, 0.0, lower, color=_BOUND_COLOUR, alpha=0.45, lw=0, label="lower bound")
+    axes.set_ylim(-0.02, 1.05)
+
+
+def _values(result: CrossingResult, pick: Callable[[CrossingFrame], float | None]) -> FloatArray:
+    """Return one number per frame, NaN where there is none."""
+    return np.array([np.nan if (v := pick(f)) is None else v for f in result.frames], dtype=float)
+
+
+def _observed_position(
+    pick: Callable[[FloatArray], float],
+) -> Callable[[CrossingFrame], float | None]:
+    """Return a function of a frame that picks from the first worker's observed position."""
+
+    def of(frame: CrossingFrame) -> float | None:
+        observation = frame.observation_of(0)
+        return None if observation is None else pick(observation.position_camera_m)
+
+    return of
+
+
+def _with_gaps(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the finite values with a NaN where images are missing for two periods or more."""
+    finite = np.isfinite(values)
+    times, finite_values = time[finite], values[finite].copy()
+    breaks = np.flatnonzero(np.diff(times) > 2.0 * CAMERA_PERIOD_S) + 1
+    return np.insert(times, breaks, times[breaks]), np.insert(finite_values, breaks, np.nan)
 
 
 def plot_comparison(path: Path, rows: Sequence[tuple[str, CrossingResult]]) -> None:
-    """Draw what the robot knew and did in each crossing, over its position along the aisle.
+    """Plot speed, awareness and obstacle radius of each crossing over the robot's position.
 
     Args:
         path: the PNG file.

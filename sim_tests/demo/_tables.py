@@ -1,13 +1,13 @@
-"""The tables that runs leave behind: one row an episode, one row an encounter frame."""
+"""The tables ``episodes.csv`` (one row per episode) and ``encounter.csv`` (two per frame)."""
 
 from __future__ import annotations
 
 import csv
 from collections.abc import Iterable
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Final
 
-from awarenav.closing import Closing
 from awarenav.files import csv_number
 
 from ..crossing import CrossingFrame, CrossingResult
@@ -33,7 +33,7 @@ ENCOUNTER_COLUMNS: Final = ("t_s", "perception", "awareness", "d_fwd_m", "d_lat_
 
 
 def episode_row(result: CrossingResult) -> list[str]:
-    """The row of ``episodes.csv`` for one crossing, in the order of :data:`EPISODE_COLUMNS`."""
+    """Return the row of ``episodes.csv`` of a crossing, in the order of :data:`EPISODE_COLUMNS`."""
     return [
         result.scenario,
         str(result.seed),
@@ -53,8 +53,8 @@ def episode_row(result: CrossingResult) -> list[str]:
     ]
 
 
-class EpisodeTable(Closing):
-    """Writes ``episodes.csv`` row by row, so that an interrupted run leaves whole rows behind.
+class EpisodeTable(AbstractContextManager["EpisodeTable"]):
+    """A writer of ``episodes.csv``; after an interrupted run the file holds whole rows.
 
     Args:
         path: the file; an existing one is replaced.
@@ -67,8 +67,11 @@ class EpisodeTable(Closing):
         self._file.flush()
 
     def close(self) -> None:
-        """Close the file; the rows are already in it."""
+        """Close the file; all rows are already written."""
         self._file.close()
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
 
     def add(self, result: CrossingResult) -> None:
         """Append one crossing."""
@@ -77,13 +80,13 @@ class EpisodeTable(Closing):
 
 
 def encounter_rows(frame: CrossingFrame, perception: str = "keypoints") -> list[list[str]]:
-    """Rows of ``encounter.csv`` for one frame: the truth, then what perception made of it.
+    """Return the rows of ``encounter.csv`` of one frame: truth, then perception.
 
     A frame without an observation, or without evidence of awareness, has empty cells.
     """
     true = frame.truth[0]
-    seen = frame.observation_of(0)
-    position = None if seen is None else seen.position_camera_m
+    observation = frame.observation_of(0)
+    position = None if observation is None else observation.position_camera_m
     return [
         [
             csv_number(frame.t_s),
@@ -95,7 +98,7 @@ def encounter_rows(frame: CrossingFrame, perception: str = "keypoints") -> list[
         [
             csv_number(frame.t_s),
             perception,
-            csv_number(None if seen is None else seen.awareness),
+            csv_number(None if observation is None else observation.awareness),
             csv_number(None if position is None else float(position[2])),
             csv_number(None if position is None else -float(position[0])),
         ],
@@ -105,7 +108,7 @@ def encounter_rows(frame: CrossingFrame, perception: str = "keypoints") -> list[
 def write_encounter(
     path: Path, frames: Iterable[CrossingFrame], perception: str = "keypoints"
 ) -> None:
-    """Write ``encounter.csv``, two rows a frame; the file appears whole or not at all."""
+    """Write ``encounter.csv``, two rows per frame; the file appears whole or not at all."""
     partial = path.with_name(path.name + ".part")
     with partial.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 from awarenav.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from ._distributions import Choice, Distribution, Integers
+    from ._distributions import Choice, Distribution, Integers, read_distribution
     from ._files import shipped_scenarios
-    from ._scenario import CameraSpec, Scenario
+    from ._scenario import CameraSpec, RobotTask, Scenario
     from ._template import ScenarioTemplate, shipped_templates
 
 __all__ = [
@@ -17,8 +17,10 @@ __all__ = [
     "Choice",
     "Distribution",
     "Integers",
+    "RobotTask",
     "Scenario",
     "ScenarioTemplate",
+    "read_distribution",
     "shipped_scenarios",
     "shipped_templates",
 ]
@@ -30,10 +32,12 @@ __getattr__ = lazy_names(
             "Choice",
             "Distribution",
             "Integers",
+            "read_distribution",
         ),
         "._files": ("shipped_scenarios",),
         "._scenario": (
             "CameraSpec",
+            "RobotTask",
             "Scenario",
         ),
         "._template": (

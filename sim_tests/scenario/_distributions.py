@@ -1,8 +1,9 @@
-"""Distributions that a scenario may put where a number stands."""
+"""Distributions that may take the place of a number in a scenario."""
 
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from typing import Any, ClassVar, Final, Protocol
 
 from pydantic import Field, ValidationError, model_validator
@@ -14,14 +15,14 @@ from tracking.config import StrictConfig
 
 from ..world.errors import SimError
 
-# Of a standard normal.
+# Third quartile of a standard normal distribution.
 _UPPER_QUARTILE: Final = float(ndtri(0.75))
-# Where a lognormal without limits of its own ends: at this quantile and at 1 minus it.
+# A lognormal distribution without limits ends at this quantile and at 1 minus it.
 _TAIL: Final = 0.005
 
 
 class Distribution(Protocol):
-    """What a number is drawn from: by its quantile function, so one draw takes one uniform."""
+    """A distribution that is drawn from by its quantile function: one draw takes one uniform."""
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -30,16 +31,16 @@ class Distribution(Protocol):
 
     @property
     def median(self) -> float:
-        """The value that stands for the distribution where nothing is drawn."""
+        """Value that stands for the distribution where nothing is drawn."""
         ...
 
     def quantile(self, share: float) -> float:
-        """The value below which ``share`` (0 to 1) of all draws lie."""
+        """Return the value below which ``share`` (0 to 1) of all draws lie."""
         ...
 
 
-class Uniform(StrictConfig):
-    """Equally likely everywhere from ``low`` to ``high``."""
+class _Limited(StrictConfig):
+    """Base of the distributions that always have the limits ``low`` and ``high``."""
 
     error: ClassVar[type[ValueError]] = SimError
 
@@ -47,7 +48,7 @@ class Uniform(StrictConfig):
     high: float
 
     @model_validator(mode="after")
-    def _in_order(self) -> Uniform:
+    def _in_order(self) -> _Limited:
         _check_order(self.low, self.high)
         return self
 
@@ -58,51 +59,47 @@ class Uniform(StrictConfig):
 
     @property
     def median(self) -> float:
-        """The middle."""
+        """Value below which half of all draws lie; the upper of two whole numbers."""
         return self.quantile(0.5)
+
+    @abstractmethod
+    def quantile(self, share: float) -> float:
+        """Return the value below which ``share`` (0 to 1) of all draws lie."""
+
+
+class Uniform(_Limited):
+    """A uniform distribution from ``low`` to ``high``."""
 
     def quantile(self, share: float) -> float:
         """See :class:`Distribution`."""
-        share = _checked(share)
+        share = _checked_share(share)
         return (1.0 - share) * self.low + share * self.high
 
 
-class Normal(StrictConfig):
-    """A normal distribution cut off at ``low`` and ``high``; ``mean`` and ``std`` before that."""
+class Normal(_Limited):
+    """A normal distribution cut off at ``low`` and ``high``.
 
-    error: ClassVar[type[ValueError]] = SimError
+    ``mean`` and ``std`` are those before the cut.
+    """
 
     mean: float
     std: float = Field(gt=0.0)
-    low: float
-    high: float
 
     @model_validator(mode="after")
-    def _in_order(self) -> Normal:
-        _check_order(self.low, self.high)
+    def _mean_within(self) -> Normal:
         _check_within("mean", self.mean, self.low, self.high)
         return self
 
-    @property
-    def bounds(self) -> tuple[float, float]:
-        """Smallest and largest value."""
-        return self.low, self.high
-
-    @property
-    def median(self) -> float:
-        """Half of all draws lie below it."""
-        return self.quantile(0.5)
-
     def quantile(self, share: float) -> float:
         """See :class:`Distribution`."""
-        return _cut_quantile(share, self.mean, self.std, self.low, self.high)
+        return _truncated_normal_quantile(share, self.mean, self.std, self.low, self.high)
 
 
 class LogNormal(StrictConfig):
     """A lognormal distribution by its median and quartiles, cut off at ``low`` and ``high``.
 
-    Quartiles that are not symmetric about the median on a logarithmic scale give their mean spread.
-    Without limits it ends at its 0.5 and 99.5 % quantiles.
+    The spread is that of the two quartiles on a logarithmic scale; they need not be symmetric about
+    the median. Without limits the distribution ends at its 0.5 % and 99.5 % quantiles.
     """
 
     error: ClassVar[type[ValueError]] = SimError
@@ -136,7 +133,7 @@ class LogNormal(StrictConfig):
     def quantile(self, share: float) -> float:
         """See :class:`Distribution`."""
         low, high = self.bounds
-        logarithm = _cut_quantile(
+        logarithm = _truncated_normal_quantile(
             share, math.log(self.median), self._log_std, math.log(low), math.log(high)
         )
         return min(max(math.exp(logarithm), low), high)
@@ -147,37 +144,20 @@ class LogNormal(StrictConfig):
         return math.log(third / first) / (2.0 * _UPPER_QUARTILE)
 
 
-class Integers(StrictConfig):
+class Integers(_Limited):
     """The whole numbers from ``low`` to ``high``, both included, equally likely."""
-
-    error: ClassVar[type[ValueError]] = SimError
 
     low: int
     high: int
 
-    @model_validator(mode="after")
-    def _in_order(self) -> Integers:
-        _check_order(self.low, self.high)
-        return self
-
-    @property
-    def bounds(self) -> tuple[float, float]:
-        """Smallest and largest value."""
-        return self.low, self.high
-
-    @property
-    def median(self) -> float:
-        """The middle one, the upper of two."""
-        return self.quantile(0.5)
-
     def quantile(self, share: float) -> float:
         """See :class:`Distribution`."""
         count = self.high - self.low + 1
-        return self.low + min(int(_checked(share) * count), count - 1)
+        return self.low + min(int(_checked_share(share) * count), count - 1)
 
 
 class Choice(StrictConfig):
-    """One of some numbers, equally likely; a number that is listed twice is twice as likely."""
+    """A choice among listed numbers, equally likely; one listed twice is twice as likely."""
 
     error: ClassVar[type[ValueError]] = SimError
 
@@ -190,13 +170,13 @@ class Choice(StrictConfig):
 
     @property
     def median(self) -> float:
-        """The middle one in order of size, the upper of two."""
+        """Middle value in order of size; the upper of two."""
         return self.quantile(0.5)
 
     def quantile(self, share: float) -> float:
         """See :class:`Distribution`."""
         count = len(self.values)
-        return sorted(self.values)[min(int(_checked(share) * count), count - 1)]
+        return sorted(self.values)[min(int(_checked_share(share) * count), count - 1)]
 
 
 _KINDS: Final[dict[str, type[StrictConfig]]] = {
@@ -206,20 +186,20 @@ _KINDS: Final[dict[str, type[StrictConfig]]] = {
     "integers": Integers,
     "choice": Choice,
 }
-#: What may stand in a file: ``{uniform: {low: 1.0, high: 2.0}}`` and so on.
+#: Names of the distributions in a file: ``{uniform: {low: 1.0, high: 2.0}}`` and so on.
 DISTRIBUTIONS: Final = tuple(_KINDS)
 
 
 def read_distribution(path: str, kind: str, data: Any) -> Distribution:
-    """The distribution that ``{kind: data}`` describes.
+    """Return the distribution that ``{kind: data}`` describes.
 
     Args:
-        path: where it stands, for messages.
+        path: its path in the file, for messages.
         kind: one of :data:`DISTRIBUTIONS`.
         data: its settings: a mapping, for ``choice`` a list.
 
     Raises:
-        SimError: naming the path for an unknown kind, unknown keys or values that are not possible.
+        SimError: naming the path, for an unknown kind, unknown keys or impossible values.
     """
     if kind not in _KINDS:
         raise SimError(f"{path}: {not_one_of('a distribution', kind, DISTRIBUTIONS)}")
@@ -238,21 +218,21 @@ def read_distribution(path: str, kind: str, data: Any) -> Distribution:
     return found
 
 
-def error_text(error: ValidationError, root: str = "") -> str:
-    """Each complaint of pydantic as ``path: what is wrong``, in one line."""
-    said = []
+def error_text(error: ValidationError) -> str:
+    """Return each complaint of pydantic as ``path: what is wrong``, on one line."""
+    complaints = []
     for each in error.errors(include_url=False):
-        path = ".".join([root, *map(str, each["loc"])]).strip(".")
-        what = each["msg"].removeprefix("Value error, ")
+        path = ".".join(map(str, each["loc"])).strip(".")
+        message = each["msg"].removeprefix("Value error, ")
         if each["type"] in ("float_type", "int_type") and isinstance(each["input"], dict):
             kind = next(iter(each["input"]), None)
-            what = "must be a number, or a distribution: " + not_one_of(
+            message = "must be a number, or a distribution: " + not_one_of(
                 "its kind", kind, DISTRIBUTIONS
             )
         elif each["type"] not in ("value_error", "missing"):
-            what = f"{what}, got {each['input']!r}"
-        said.append(f"{path}: {what}" if path else what)
-    return "; ".join(said)
+            message = f"{message}, got {each['input']!r}"
+        complaints.append(f"{path}: {message}" if path else message)
+    return "; ".join(complaints)
 
 
 def _check_order(low: float, high: float) -> None:
@@ -265,12 +245,14 @@ def _check_within(name: str, value: float, low: float, high: float) -> None:
         raise ValueError(f"{name} must lie from low {low:g} to high {high:g}, got {value:g}")
 
 
-def _checked(share: float) -> float:
+def _checked_share(share: float) -> float:
     return finite_number("share", share, SimError, minimum=0.0, maximum=1.0)
 
 
-def _cut_quantile(share: float, mean: float, std: float, low: float, high: float) -> float:
-    """Quantile of a normal distribution that is cut off at ``low`` and ``high``."""
+def _truncated_normal_quantile(
+    share: float, mean: float, std: float, low: float, high: float
+) -> float:
+    """Return a quantile of the normal distribution that is cut off at ``low`` and ``high``."""
     first, last = float(ndtr((low - mean) / std)), float(ndtr((high - mean) / std))
-    value = mean + std * float(ndtri(first + _checked(share) * (last - first)))
+    value = mean + std * float(ndtri(first + _checked_share(share) * (last - first)))
     return min(max(value, low), high)

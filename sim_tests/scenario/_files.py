@@ -1,4 +1,4 @@
-"""Scenario files: where they are, and the defaults that they share."""
+"""Scenario and camera files: the shipped ones, users' own, and the defaults that they share."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _LOADER: Final[Any] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 def shipped_scenarios() -> tuple[str, ...]:
-    """Names of the scenarios that come with the package, sorted."""
+    """Return the names of the scenarios that come with the package, sorted."""
     return _names_in(_FOLDER)
 
 
@@ -29,7 +29,7 @@ def shipped_text(name: str) -> tuple[str, str]:
     """Return the plain name and the YAML of a shipped scenario.
 
     Args:
-        name: its name, or its name and version as ``name@2``; see :func:`require_version`.
+        name: such as ``name``, or ``name@2`` with a version; see :func:`require_version`.
 
     Raises:
         SimError: for a name that is not shipped.
@@ -42,7 +42,7 @@ def shipped_text(name: str) -> tuple[str, str]:
 
 
 def require_version(name: str, version: int) -> None:
-    """Check that a name asks for no version, or for this one.
+    """Check the version in a name such as ``name@2``; a name without one is always right.
 
     Raises:
         SimError: for another version.
@@ -51,61 +51,53 @@ def require_version(name: str, version: int) -> None:
     if at and wanted != str(version):
         raise SimError(
             f"scenario {plain!r} has version {version}, got {name!r}: results of different "
-            "versions do not compare"
+            "versions cannot be compared"
         )
 
 
 def shipped_cameras() -> tuple[str, ...]:
-    """Names of the cameras that come with the package, sorted."""
+    """Return the names of the cameras that come with the package, sorted."""
     return _names_in(_CAMERAS)
 
 
 def camera_data(name: str) -> dict[str, Any]:
-    """The keys of a scenario's ``camera``, from a YAML file or a shipped camera's name.
+    """Return the keys of a scenario's ``camera``, from a YAML file or a shipped camera's name.
 
     Raises:
-        SimError: for a name that is not shipped and a file that cannot be read.
+        SimError: for a name that is not shipped, and for a file that cannot be read.
     """
     if name.endswith((".yaml", ".yml")):
-        return parse(read_text(Path(name)), name)
+        return parse_yaml(_read_text(Path(name)), name)
     names = shipped_cameras()
     if name not in names:
         raise SimError(f"{not_one_of('camera', name, names)}, or a YAML file")
-    return parse((_CAMERAS / f"{name}.yaml").read_text("utf-8"), name)
-
-
-def read_text(path: Path) -> str:
-    """A user's file; raises SimError when it cannot be read."""
-    try:
-        return path.read_text(encoding="utf-8")
-    except OSError as cause:
-        raise SimError(f"cannot read {path}: {cause.strerror or cause}") from cause
-    except UnicodeDecodeError as cause:
-        raise SimError(f"{path} is not valid YAML: {cause}") from cause
+    return parse_yaml((_CAMERAS / f"{name}.yaml").read_text("utf-8"), name)
 
 
 def read_file(path: Path) -> dict[str, Any]:
-    """Return the mapping in a scenario's file; its ``replay_csv`` is relative to it.
+    """Return the mapping in a scenario's file, with an absolute path as ``replay_csv``.
+
+    In the file ``replay_csv`` is relative to the file's own folder.
 
     Raises:
-        SimError: naming the file, when it cannot be read or is no YAML mapping.
+        SimError: naming the file, when it cannot be read or holds no YAML mapping.
     """
-    data = parse(read_text(path), str(path))
+    data = parse_yaml(_read_text(path), str(path))
     replay = data.get("replay_csv")
     if isinstance(replay, str):
         data["replay_csv"] = str((path.parent / replay).resolve())
     return data
 
 
-def parse(text: str, source: str) -> dict[str, Any]:
-    """The mapping in a scenario's YAML, with the shared defaults that it ``extends`` filled in.
+def parse_yaml(text: str, source: str) -> dict[str, Any]:
+    """Return the mapping in a scenario's YAML, with the shared defaults filled in.
 
-    ``extends: NAME`` takes the keys of ``shipped/defaults/NAME.yaml`` that the file does not give
-    itself; mappings are merged key by key, everything else is replaced.
+    ``extends: NAME`` takes the keys of ``shipped/defaults/NAME.yaml`` that the file does not have.
+    Mappings are merged key by key, everything else is replaced.
 
     Args:
         text: YAML.
-        source: what to call it in messages.
+        source: name of the text in messages.
 
     Raises:
         SimError: for text that is not a YAML mapping, and for unknown defaults.
@@ -122,16 +114,26 @@ def parse(text: str, source: str) -> dict[str, Any]:
     name = data.pop("extends")
     if name not in names:
         raise SimError(f"{source}: {not_one_of('extends', name, names)}")
-    defaults = parse((_DEFAULTS / f"{name}.yaml").read_text("utf-8"), str(name))
+    defaults = parse_yaml((_DEFAULTS / f"{name}.yaml").read_text("utf-8"), str(name))
     return _merged(defaults, data)
 
 
-def _merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
-    merged = copy.deepcopy(below)
-    for key, value in above.items():
-        under = merged.get(key)
-        if isinstance(under, dict) and isinstance(value, dict):
-            merged[key] = _merged(under, value)
+def _read_text(path: Path) -> str:
+    """Return the text of a user's file; raises SimError when it cannot be read."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError as cause:
+        raise SimError(f"cannot read {path}: {cause.strerror or cause}") from cause
+    except UnicodeDecodeError as cause:
+        raise SimError(f"{path} is not valid YAML: {cause}") from cause
+
+
+def _merged(defaults: dict[str, Any], data: dict[str, Any]) -> dict[str, Any]:
+    merged = copy.deepcopy(defaults)
+    for key, value in data.items():
+        default = merged.get(key)
+        if isinstance(default, dict) and isinstance(value, dict):
+            merged[key] = _merged(default, value)
         else:
             merged[key] = value
     return merged

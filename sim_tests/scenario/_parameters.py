@@ -1,4 +1,4 @@
-"""Distributions inside a scenario's data: found by their paths, and replaced by numbers."""
+"""The distributions in a scenario's data: find them by path, put numbers in their place."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from perception.arrays import finite_number
 from ..world.errors import SimError
 from ._distributions import DISTRIBUTIONS, Distribution, read_distribution
 
-# Where numbers may vary; hall, camera and clock belong to the question that is asked.
+# Keys whose numbers may vary. Hall, camera and duration are the same in every episode.
 _VARIABLE: Final = ("people", "workers", "robot")
 
 
@@ -21,10 +21,10 @@ def find_parameters(data: Mapping[str, Any], source: str) -> dict[str, Distribut
 
     Args:
         data: the keys of a scenario, as read from YAML.
-        source: what to call it in messages.
+        source: name of the scenario in messages.
 
     Raises:
-        SimError: for a distribution that is impossible, or where none may be.
+        SimError: for an impossible distribution, and for one outside people, workers and robot.
     """
     found: dict[str, Distribution] = {}
     for path, kind, settings in _distributions_in(data, (), source):
@@ -49,11 +49,11 @@ def with_numbers(
     Args:
         data: the keys of a scenario.
         parameters: its distributions, from :func:`find_parameters`.
-        values: of some parameters; the others get their medians.
-        source: what to call it in messages.
+        values: numbers for some parameters; the others get their medians.
+        source: name of the scenario in messages.
 
     Raises:
-        SimError: for a path that is no parameter, and a value that is no finite number.
+        SimError: for a path that is no parameter, and for a value that is not finite.
     """
     for path in values:
         if path not in parameters:
@@ -63,20 +63,20 @@ def with_numbers(
         value = values.get(path)
         if value is None:
             value = distribution.median
-        _put(filled, path, finite_number(path, value, SimError))
+        _set_number(filled, path, finite_number(path, value, SimError))
     return filled
 
 
 def _distributions_in(
     node: Any, path: tuple[str, ...], source: str
 ) -> Iterator[tuple[tuple[str, ...], str, Any]]:
-    """Path, kind and settings of every distribution in a tree of mappings and lists."""
+    """Yield path, kind and settings of every distribution in a tree of mappings and lists."""
     if isinstance(node, Mapping):
         kinds = [key for key in node if key in DISTRIBUTIONS]
         if kinds and path:
             if len(node) > 1:
                 raise SimError(
-                    f"{source}: {'.'.join(path)}: a distribution stands alone, got the keys "
+                    f"{source}: {'.'.join(path)}: a distribution must be the only key, got "
                     f"{', '.join(map(str, node))}"
                 )
             yield path, kinds[0], node[kinds[0]]
@@ -88,9 +88,9 @@ def _distributions_in(
             yield from _distributions_in(value, (*path, str(number)), source)
 
 
-def _put(data: Any, path: str, value: float) -> None:
-    *way, last = path.split(".")
+def _set_number(data: Any, path: str, value: float) -> None:
+    *parents, last = path.split(".")
     node = data
-    for step in way:
-        node = node[int(step) if isinstance(node, list) else step]
+    for key in parents:
+        node = node[int(key) if isinstance(node, list) else key]
     node[int(last) if isinstance(node, list) else last] = value

@@ -1,4 +1,4 @@
-"""A crossing as data: hall, robot task, camera and what each worker does."""
+"""A crossing as data: hall, robot task, camera and people."""
 
 from __future__ import annotations
 
@@ -21,25 +21,30 @@ from ..world.camera import CameraTiming, SensorConfig
 from ..world.errors import SimError
 from ..world.hall import LAYOUTS, WarehouseLayout
 from ._distributions import error_text
-from ._files import parse, read_file, require_version, shipped_text
+from ._files import parse_yaml, read_file, require_version, shipped_text
 from ._parameters import find_parameters, with_numbers
 
 
-def _layout(value: Any) -> Any:
-    if not isinstance(value, str):
-        return value
-    if value not in LAYOUTS:
-        raise ValueError(
-            f"layout must be one of {', '.join(map(repr, LAYOUTS))} or a mapping, got {value!r}"
-        )
-    return LAYOUTS[value]()
-
-
 class CameraSpec(StrictConfig):
-    """The robot's camera: image size, horizontal field of view, sensor and timing.
+    """The robot's camera: image size, field of view, sensor and timing.
 
     A camera that sees more than a pinhole can, a fisheye or a panorama, has several flat views cut
-    from its picture (:mod:`perception.surround`); sizes and angles are those of each.
+    from its image (:mod:`perception.surround`). Sizes and angles are those of one view.
+
+    Attributes:
+        width_px: image width.
+        height_px: image height.
+        horizontal_fov_deg: horizontal field of view.
+        views_deg: headings of the flat views from straight ahead, left positive; the first is 0.
+        mount: ``"front"``: in front of the head of the robot's post; ``"top"``: on top of it, where
+            nothing hides the sides.
+        picture_scale: with ``perception="pixels"`` the images have this share of the width and
+            height; half the width and height render four times as fast.
+        scenery_divisor: these images take one sample of the scenery per block of this many pixels a
+            side; people get full resolution.
+        sensor: exposure, noise and blur of rendered images; the default adds none.
+        timing: frame rate, losses and delays; the default is one frame per control cycle, without
+            delay.
     """
 
     error: ClassVar[type[ValueError]] = SimError
@@ -47,30 +52,22 @@ class CameraSpec(StrictConfig):
     width_px: int = Field(default=1280, ge=16, le=8192)
     height_px: int = Field(default=960, ge=16, le=8192)
     horizontal_fov_deg: float = Field(default=90.0, gt=0.0, lt=180.0)
-    #: Headings of the flat views from straight ahead, left positive; the first is 0.
     views_deg: tuple[float, ...] = (0.0,)
-    #: In front of the head of the robot's post, or on its top, from where nothing hides the sides.
     mount: Literal["front", "top"] = "front"
-    #: Share of these pixels a side that the pictures of ``perception="pixels"`` have: half as many
-    #: are rendered four times as fast.
     picture_scale: float = Field(default=1.0, gt=0.0, le=1.0)
-    #: Those pictures have one sample of scenery in a block of so many pixels a side; people have as
-    #: many samples as they need.
     scenery_divisor: int = Field(default=1, ge=1, le=8)
-    #: Exposure, noise and blur of rendered pictures; the default adds none.
     sensor: SensorConfig = SensorConfig()
-    #: Frame rate, losses and delays; the default is a frame every control cycle, at once.
     timing: CameraTiming = CameraTiming()
 
     @model_validator(mode="after")
-    def _blocks_fill_the_picture(self) -> CameraSpec:
+    def _blocks_fill_the_image(self) -> CameraSpec:
         size = (
             round(self.width_px * self.picture_scale),
             round(self.height_px * self.picture_scale),
         )
         if any(length % self.scenery_divisor for length in size):
             raise ValueError(
-                f"scenery_divisor must divide the width and height of the pictures, {size[0]} and "
+                f"scenery_divisor must divide the width and height of the images, {size[0]} and "
                 f"{size[1]} px, got {self.scenery_divisor}"
             )
         return self
@@ -86,11 +83,11 @@ class CameraSpec(StrictConfig):
         return self
 
     def flat_views(self, camera: Camera) -> tuple[FlatView, ...]:
-        """The views, each with this camera model."""
+        """Return the views, each with this camera model."""
         return ring_of_views(camera, np.radians(self.views_deg))
 
     def camera(self, scale: float = 1.0) -> Camera:
-        """The camera model of a view, or one with ``scale`` times the pixels a side."""
+        """Return the camera model of one view, with width and height times ``scale``."""
         return Camera.from_fov(
             round(self.width_px * scale),
             round(self.height_px * scale),
@@ -99,7 +96,22 @@ class CameraSpec(StrictConfig):
 
 
 class RobotTask(StrictConfig):
-    """Where the robot starts and where it shall go; metres in odom."""
+    """The robot's start and goal, in odom.
+
+    Attributes:
+        start_x_m: start position.
+        start_y_m: start position.
+        start_heading_deg: heading at the start.
+        goal_x_m: goal position.
+        goal_y_m: goal position.
+        goal_tolerance_m: distance from the goal at which it counts as reached.
+        straight_on_speed_mps: the robot drives straight ahead at this speed without a planner, as
+            in the paper's encounter; None for a planner.
+        lane_half_width_m: the robot keeps to a lane this wide on either side of the straight line
+            to its goal, as fleet managers ask for with keep-out zones. The planner sees everything
+            beyond as a wall; without it a local planner would follow people into the aisles. People
+            ignore the lane. None for no lane.
+    """
 
     error: ClassVar[type[ValueError]] = SimError
 
@@ -109,11 +121,7 @@ class RobotTask(StrictConfig):
     goal_x_m: float
     goal_y_m: float = 0.0
     goal_tolerance_m: float = Field(default=0.25, gt=0.0)
-    #: Drives straight on at this speed without a planner, as in the paper's encounter.
     straight_on_speed_mps: float | None = Field(default=None, gt=0.0)
-    #: The robot keeps to a lane this wide on either side of the straight way to its goal,
-    #: as fleets ask for with keep-out zones: the planner sees everything beyond as a wall, a local
-    #: one would else follow people into the aisles that they take. People walk where they like.
     lane_half_width_m: float | None = Field(default=None, ge=0.5)
 
     @model_validator(mode="after")
@@ -121,29 +129,39 @@ class RobotTask(StrictConfig):
         along_axis = self.start_x_m == self.goal_x_m or self.start_y_m == self.goal_y_m
         if self.lane_half_width_m is not None and not along_axis:
             raise ValueError(
-                "lane_half_width_m needs a way along odom x or y, got one from "
+                "lane_half_width_m needs a start and goal along odom x or y, got "
                 f"({self.start_x_m:g}, {self.start_y_m:g}) to ({self.goal_x_m:g}, "
                 f"{self.goal_y_m:g}) m"
             )
         return self
 
 
+def _layout(value: Any) -> Any:
+    if not isinstance(value, str):
+        return value
+    if value not in LAYOUTS:
+        raise ValueError(
+            f"layout must be one of {', '.join(map(repr, LAYOUTS))} or a mapping, got {value!r}"
+        )
+    return LAYOUTS[value]()
+
+
 class Scenario(StrictConfig):
-    """One crossing, named by a sentence.
+    """One crossing.
 
     Attributes:
         name: identifier, also of the shipped file.
-        version: counts changes after which results do not compare with earlier ones.
-        description: what happens, in one sentence.
-        attention: ``"attentive"`` where everybody notices the robot in time, ``"unaware"`` where
-            nobody does, ``"mixed"`` otherwise.
-        duration_s: the longest an episode lasts.
-        control_hz: frames, planning cycles and log rows a second.
+        version: number that grows with every change after which results cannot be compared.
+        description: one sentence.
+        attention: ``"attentive"`` if everybody notices the robot in time, ``"unaware"`` if nobody
+            does, ``"mixed"`` otherwise.
+        duration_s: longest duration of an episode.
+        control_hz: control cycles per second; each is one frame.
         layout: the hall, a name of :data:`LAYOUTS` or a mapping of :class:`WarehouseLayout`.
         robot: the robot's task.
         camera: the robot's camera.
-        workers: scripted people: the same whatever the robot does.
-        people: those who look, react and walk by themselves; every name once.
+        workers: scripted people, who move the same whatever the robot does.
+        people: people who look, react and walk by themselves; names are unique.
         replay_csv: table of recorded people to replay, see :func:`read_recordings`; relative
             to the scenario's own file.
         start_jitter_s: each worker and each person starts up to this much earlier or later, drawn
@@ -167,7 +185,7 @@ class Scenario(StrictConfig):
     start_jitter_s: float = Field(default=0.0, ge=0.0)
 
     @model_validator(mode="after")
-    def _names_once(self) -> Scenario:
+    def _unique_names(self) -> Scenario:
         names = [person.name for person in self.people]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
@@ -176,22 +194,22 @@ class Scenario(StrictConfig):
 
     @classmethod
     def shipped(cls, name: str) -> Scenario:
-        """One of the scenarios that come with the package, its distributions at their medians.
+        """Load a scenario that comes with the package, with distributions at their medians.
 
         Raises:
             SimError: for another name; ``name@2`` also for another version.
         """
         plain, text = shipped_text(name)
-        scenario = cls._at_medians(parse(text, plain), plain)
+        scenario = cls._at_medians(parse_yaml(text, plain), plain)
         require_version(name, scenario.version)
         return scenario
 
     @classmethod
     def from_yaml(cls, path: str | Path) -> Scenario:
-        """Read a scenario's file, its distributions at their medians.
+        """Read a scenario's file, with distributions at their medians.
 
         Raises:
-            SimError: naming file and key of what is wrong.
+            SimError: naming the file and the wrong key.
         """
         return cls._at_medians(read_file(Path(path)), str(path))
 
@@ -201,10 +219,10 @@ class Scenario(StrictConfig):
 
         Args:
             data: without distributions.
-            source: what to call it in messages.
+            source: name of the scenario in messages.
 
         Raises:
-            SimError: naming the key of what is wrong.
+            SimError: naming the wrong key.
         """
         try:
             return cls.model_validate(data)
@@ -217,7 +235,7 @@ class Scenario(StrictConfig):
 
     @property
     def planner_boxes_odom_m(self) -> FloatArray:
-        """(N, 4) what a planner has to keep clear of: the hall's boxes and what is off the lane."""
+        """Boxes (N, 4) that a planner must avoid: those of the hall, and the area off the lane."""
         boxes, task = self.layout.obstacle_boxes_odom, self.robot
         half = task.lane_half_width_m
         if half is None:
@@ -233,10 +251,10 @@ class Scenario(StrictConfig):
         return np.vstack([boxes, *np.array(real).reshape(-1, 1, 4)])
 
     def to_text(self) -> str:
-        """YAML for :meth:`ScenarioTemplate.from_text`: the scenario as plain data."""
+        """Return the scenario as YAML, for :meth:`ScenarioTemplate.from_text`."""
         return yaml.safe_dump(self.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
 
     def without_people(self) -> Scenario:
-        """The same task in an empty hall: what the robot could do if nobody were there."""
-        nobody: dict[str, Any] = {"workers": (), "people": (), "replay_csv": None}
-        return self.model_copy(update={"name": f"{self.name}_without_people", **nobody})
+        """Return the same task in a hall without people."""
+        empty: dict[str, Any] = {"workers": (), "people": (), "replay_csv": None}
+        return self.model_copy(update={"name": f"{self.name}_without_people", **empty})

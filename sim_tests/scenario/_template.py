@@ -1,4 +1,4 @@
-"""A scenario in which numbers may be distributions: one file, as many episodes as are wanted."""
+"""Scenarios in which numbers may be distributions: one file, any number of episodes."""
 
 from __future__ import annotations
 
@@ -12,13 +12,20 @@ import numpy as np
 import yaml
 
 from ._distributions import Distribution
-from ._files import camera_data, parse, read_file, require_version, shipped_scenarios, shipped_text
+from ._files import (
+    camera_data,
+    parse_yaml,
+    read_file,
+    require_version,
+    shipped_scenarios,
+    shipped_text,
+)
 from ._parameters import find_parameters, with_numbers
 from ._scenario import Scenario
 
 
 class ScenarioTemplate:
-    """A scenario some numbers of which are distributions.
+    """A scenario in which some numbers are distributions.
 
     Any number under ``people``, ``workers`` and ``robot`` may be a mapping such as
     ``{uniform: {low: 1.0, high: 2.0}}``, ``{normal: {mean:, std:, low:, high:}}``,
@@ -27,11 +34,11 @@ class ScenarioTemplate:
 
     Args:
         data: the keys of a scenario, as read from YAML.
-        source: what to call it in messages.
+        source: name of the scenario in messages.
 
     Raises:
-        SimError: naming the path of what is wrong: unknown keys, impossible distributions, and a
-            scenario that is not valid at the medians.
+        SimError: naming the wrong path, for unknown keys, impossible distributions, and a scenario
+            that is not valid at the medians.
     """
 
     __slots__ = ("_data", "_median", "_parameters", "_source")
@@ -44,17 +51,21 @@ class ScenarioTemplate:
 
     @classmethod
     def from_yaml(cls, path: str | Path) -> ScenarioTemplate:
-        """Read a file; its ``replay_csv`` is meant relative to it. Raises SimError naming it."""
+        """Read a file; its ``replay_csv`` is relative to its folder.
+
+        Raises:
+            SimError: naming the file, if it cannot be used.
+        """
         return cls(read_file(Path(path)), str(path))
 
     @classmethod
     def from_text(cls, text: str, source: str = "scenario") -> ScenarioTemplate:
-        """Read YAML, e.g. that of :meth:`to_text`."""
-        return cls(parse(text, source), source)
+        """Read YAML, for example the text of :meth:`to_text`."""
+        return cls(parse_yaml(text, source), source)
 
     @classmethod
     def shipped(cls, name: str) -> ScenarioTemplate:
-        """One that comes with the package, by its name, or by its name and version: ``name@2``.
+        """Load one that comes with the package, by ``name``, or by ``name@2`` with a version.
 
         Raises:
             SimError: for other names and versions.
@@ -66,49 +77,49 @@ class ScenarioTemplate:
 
     @classmethod
     def named(cls, name: str) -> ScenarioTemplate:
-        """A YAML file if the name ends so, else a shipped one."""
+        """Load a YAML file if the name ends in ``.yaml`` or ``.yml``, else a shipped one."""
         if name.endswith((".yaml", ".yml")):
             return cls.from_yaml(name)
         return cls.shipped(name)
 
     @property
     def name(self) -> str:
-        """Of the scenario."""
+        """Name of the scenario."""
         return self._median.name
 
     @property
     def version(self) -> int:
-        """Counts changes after which results do not compare."""
+        """Number that grows with every change after which results cannot be compared."""
         return self._median.version
 
     @property
     def id(self) -> str:
-        """Name and version, ``"crossing_from_left@1"``."""
+        """Name and version, such as ``"crossing_from_left@1"``."""
         return f"{self.name}@{self.version}"
 
     @property
     def attention(self) -> Literal["attentive", "unaware", "mixed"]:
-        """Whether people notice the robot."""
+        """Label of the people's attention, see :class:`Scenario`."""
         return self._median.attention
 
     @property
     def description(self) -> str:
-        """What happens, in one sentence."""
+        """One sentence about the scenario."""
         return self._median.description
 
     def parameters(self) -> dict[str, Distribution]:
-        """What varies: the distributions by dotted path, e.g. ``"people.0.speed_mps"``."""
+        """Return the distributions by dotted path, such as ``"people.0.speed_mps"``."""
         return dict(self._parameters)
 
     def median(self) -> Scenario:
-        """The scenario with every distribution at its median."""
+        """Return the scenario with every distribution at its median."""
         return self._median
 
     def sample(self, rng: np.random.Generator) -> Scenario:
         """Draw a scenario.
 
-        Each parameter draws from a stream of its own, which depends on the generator and on the
-        parameter's path alone: a parameter more or fewer changes none of the others.
+        Each parameter has a random stream of its own, which depends only on the generator and on
+        the parameter's path: adding or removing a parameter changes none of the others.
 
         Raises:
             SimError: if the values drawn are not valid together.
@@ -122,24 +133,24 @@ class ScenarioTemplate:
         )
 
     def for_seed(self, seed: int) -> Scenario:
-        """The scenario of an episode with this seed."""
+        """Return the scenario of the episode with this seed."""
         return self.sample(np.random.default_rng(seed))
 
     def with_values(self, values: Mapping[str, float]) -> Scenario:
-        """The scenario with these values of parameters and the medians of the others.
+        """Return the scenario with these values of parameters and the medians of the others.
 
         Raises:
-            SimError: for a path that is no parameter, and for values that the scenario refuses.
+            SimError: for a path that is no parameter, and for values that are not valid.
         """
         data = with_numbers(self._data, self._parameters, values, self._source)
         return Scenario.from_data(data, self._source)
 
     def with_camera(self, name: str) -> ScenarioTemplate:
-        """The same scenario with another camera on the robot.
+        """Return the same scenario with another camera on the robot.
 
         Args:
-            name: of a shipped camera (``"forward"``, ``"surround"``), or a YAML file with the keys
-                of :class:`CameraSpec`; empty for the scenario's own.
+            name: a shipped camera (``"forward"``, ``"surround"``), or a YAML file with the keys of
+                :class:`CameraSpec`; empty for the scenario's own.
 
         Raises:
             SimError: for other names, and for a camera that is not valid.
@@ -151,7 +162,7 @@ class ScenarioTemplate:
         )
 
     def to_text(self) -> str:
-        """YAML for :meth:`from_text`, which stands for itself: shared defaults are written out."""
+        """Return YAML for :meth:`from_text`, with the shared defaults written out."""
         return yaml.safe_dump(self._data, sort_keys=False, allow_unicode=True)
 
     def __eq__(self, other: object) -> bool:
@@ -165,12 +176,12 @@ class ScenarioTemplate:
 
 
 def shipped_templates() -> tuple[ScenarioTemplate, ...]:
-    """Every scenario that comes with the package, sorted by name."""
+    """Return every scenario that comes with the package, sorted by name."""
     return tuple(ScenarioTemplate.shipped(name) for name in shipped_scenarios())
 
 
 def _uniform(key: list[int], path: str) -> float:
-    """A number in [0, 1) that depends on the key and on the path alone."""
+    """Return a number in [0, 1) that depends only on the key and the path."""
     digest = hashlib.sha256(path.encode()).digest()
     words = [int.from_bytes(digest[at : at + 4], "little") for at in range(0, 16, 4)]
     stream = np.random.default_rng(np.random.SeedSequence([*key, *words]))

@@ -1,20 +1,30 @@
-"""How the robot perceives people in a crossing: truth, simulated keypoints, or pixels."""
+"""Perception of people in a crossing: the truth, simulated keypoints, or pixels."""
 
 from __future__ import annotations
 
-from ._eyes import ORACLE, MapView, PerceptionKind, Sighting, TimedEyes, make_eyes
-from ._keypoint_camera import KeypointNoise
-from ._pixel_eyes import NOBODY, PIXEL_RATE_HZ, pixel_timing
+from ._eyes import NOBODY, Eyes, Sighting, SurroundEyes, TimedEyes, WorkerObservations
+from ._keypoint_camera import KeypointCamera, KeypointNoise
+from ._make_eyes import ORACLE, PerceptionKind, make_eyes
+from ._map_view import MapView
+from ._pixel_eyes import PIXEL_RATE_HZ, PixelEyes, match_to_workers, pixel_timing
+from ._true_eyes import TrueEyes
 
 __all__ = [
     "NOBODY",
     "ORACLE",
     "PIXEL_RATE_HZ",
+    "Eyes",
+    "KeypointCamera",
     "KeypointNoise",
     "MapView",
     "PerceptionKind",
+    "PixelEyes",
     "Sighting",
+    "SurroundEyes",
     "TimedEyes",
+    "TrueEyes",
+    "WorkerObservations",
     "make_eyes",
+    "match_to_workers",
     "pixel_timing",
 ]

@@ -1,7 +1,7 @@
-"""A camera that sees keypoints: true ones, projected, hidden by what stands in front, and noisy.
+"""A camera that detects keypoints: projected true keypoints with occlusion and noise.
 
-It stands where a person detector and a pose network would stand, so that everything behind them
-runs as on a robot, at a fraction of the cost of rendering and inference.
+It replaces person detector and pose network. Everything behind them runs as on a robot, at a
+fraction of the cost of rendering and inference.
 """
 
 from __future__ import annotations
@@ -25,22 +25,22 @@ from ...world.errors import SimError
 _LAYOUT: Final = "coco_wholebody"
 _LAYOUT_SIZE: Final = 133
 _KEYPOINTS: Final = 23
-# Of the bodies that hide: a face asks for a finer head than joints ask for limbs.
+# Level of detail of the bodies that hide a keypoint; a face needs a finer head than a joint.
 _FACE_DETAIL: Final = 1
 _BODY_DETAIL: Final = 2
-# Fewer seen keypoints than this (about a quarter of a body) and a detector finds nobody.
-_MIN_SEEN: Final = 5
+# A person with fewer visible keypoints (about a quarter of a body) is not detected.
+_MIN_VISIBLE: Final = 5
 _NEAR_M: Final = 0.1
 
 
 class KeypointNoise(StrictConfig):
-    """How far keypoints are from the truth.
+    """Noise of the keypoints.
 
     Attributes:
-        pixel_std_px: of each coordinate, independent between frames.
-        lift_std_m: of each keypoint's depth relative to the body's root; 45 mm is what a current
-            whole-body network shows.
-        miss_rate: fraction of frames in which a visible person is not detected.
+        pixel_std_px: standard deviation of each coordinate, independent between frames.
+        lift_std_m: standard deviation of each keypoint's depth relative to the body's root; 45 mm
+            is typical of a current whole-body network.
+        miss_rate: share of the frames in which a visible person is not detected.
     """
 
     error: ClassVar[type[ValueError]] = SimError
@@ -51,11 +51,11 @@ class KeypointNoise(StrictConfig):
 
 
 class TrueBody(Protocol):
-    """What the camera asks of a worker."""
+    """A person in front of the camera."""
 
     @property
     def keypoints_odom_m(self) -> FloatArray:
-        """(23, 3) COCO body keypoints, then the feet of COCO-WholeBody."""
+        """Keypoints (23, 3): COCO body keypoints, then the feet of COCO-WholeBody."""
         ...
 
     @property
@@ -64,73 +64,74 @@ class TrueBody(Protocol):
         ...
 
     def reach_odom_m(self) -> FloatArray:
-        """(2, 3) low and high corner of a box about all keypoints; cheaper than they are."""
+        """Return low and high corner (2, 3) of a box around all keypoints; a cheap bound."""
         ...
 
 
-class Sight(Protocol):
-    """What the camera asks of the world: what stands in the way."""
+class OcclusionTest(Protocol):
+    """A test of lines of sight, such as :class:`~sim_tests.world.sightlines.SightLines`."""
 
     def blocked(
         self, eye_odom_m: FloatArray, ends_odom_m: FloatArray, detail: NDArray[np.int64]
     ) -> NDArray[np.bool_]:
-        """(K,) whether anything lies between the eye (3,) and each of the points (K, 3).
+        """Return (K,) whether anything lies between the eye (3,) and each of the points (K, 3).
 
-        ``detail`` (K,) is of the bodies held against each line: 0 the finest, 2 the coarsest.
+        ``detail`` (K,) is the level of detail of the bodies: 0 the finest, 2 the coarsest.
         """
         ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Sighting:
+class _VisiblePerson:
     worker: int
     detection: PersonDetection
     keypoints: PersonKeypoints
 
 
 class KeypointCamera:
-    """Detector and pose estimator in one: see :class:`perception.PersonDetector`, `PoseEstimator`.
+    """A :class:`perception.PersonDetector` and :class:`perception.PoseEstimator` in one.
 
-    Call :meth:`look` once a frame, then hand the camera to the pipeline.
+    Call :meth:`look` once per frame, then run the pipeline with this camera.
 
     Args:
-        camera: the camera model.
-        sight: what hides what.
-        noise: how far keypoints are from the truth.
-        rng: source of that noise.
+        camera: camera model.
+        sight: occlusion test of the hall.
+        noise: noise of the keypoints.
+        rng: random generator of the noise.
     """
 
     def __init__(
         self,
         camera: Camera,
-        sight: Sight,
+        sight: OcclusionTest,
         noise: KeypointNoise,
         rng: np.random.Generator,
     ) -> None:
         self._camera = camera
-        self._lines = sight
+        self._sight = sight
         self._noise = noise
         self._rng = rng
-        self._sightings: tuple[_Sighting, ...] = ()
-        self._sides = _frustum(camera)
+        self._visible: tuple[_VisiblePerson, ...] = ()
+        self._frustum_normals = _frustum_normals(camera)
 
     def look(self, T_odom_camera: FloatArray, workers: Sequence[TrueBody]) -> tuple[int, ...]:
-        """Take a frame; returns which workers are in it, in the order of the detections."""
-        sightings = (
-            self._sight(index, worker, T_odom_camera) for index, worker in enumerate(workers)
+        """Take a frame; return the visible workers' indices, in the order of the detections."""
+        people = (
+            self._detect_worker(index, worker, T_odom_camera)
+            for index, worker in enumerate(workers)
         )
-        self._sightings = tuple(seen for seen in sightings if seen is not None)
-        return tuple(seen.worker for seen in self._sightings)
+        self._visible = tuple(person for person in people if person is not None)
+        return tuple(person.worker for person in self._visible)
 
     def detect(self, image_rgb: Any) -> tuple[PersonDetection, ...]:
-        """The people of the last frame; the picture itself is not used."""
-        return tuple(seen.detection for seen in self._sightings)
+        """Return the people of the last frame; the image itself is not used."""
+        return tuple(person.detection for person in self._visible)
 
     def estimate(
         self, image_rgb: Any, detections: tuple[PersonDetection, ...]
     ) -> tuple[PersonKeypoints, ...]:
-        """Keypoints of the given detections, which must be those of the last frame."""
-        by_detection = {id(seen.detection): seen.keypoints for seen in self._sightings}
+        """Return the keypoints of detections, which must be those of the last frame."""
+        by_detection = {id(person.detection): person.keypoints for person in self._visible}
         try:
             return tuple(by_detection[id(detection)] for detection in detections)
         except KeyError:
@@ -138,9 +139,11 @@ class KeypointCamera:
                 "detections must be those that detect() returned for this frame"
             ) from None
 
-    def _sight(self, index: int, worker: TrueBody, T_odom_camera: FloatArray) -> _Sighting | None:
-        # Every worker draws the same amount of noise whether seen or not: what happens to one
-        # never changes the luck of another.
+    def _detect_worker(
+        self, index: int, worker: TrueBody, T_odom_camera: FloatArray
+    ) -> _VisiblePerson | None:
+        # Every worker draws the same amount of noise, visible or not, so that the noise of one
+        # worker does not depend on another.
         missed = self._rng.random() < self._noise.miss_rate
         pixel_noise = self._rng.normal(0.0, 1.0, (_KEYPOINTS, 2)) * self._noise.pixel_std_px
         lift_noise = self._rng.normal(0.0, 1.0, _KEYPOINTS) * self._noise.lift_std_m
@@ -157,31 +160,31 @@ class KeypointCamera:
             & (pixels[:, 1] >= -0.5)
             & (pixels[:, 1] < self._camera.height_px - 0.5)
         )
-        if np.count_nonzero(inside) < _MIN_SEEN:
+        if np.count_nonzero(inside) < _MIN_VISIBLE:
             return None
-        seen = inside & self._unhidden(points, points_odom, inside, origin)
-        if np.count_nonzero(seen) < _MIN_SEEN:
+        visible = inside & self._unhidden(points, points_odom, inside, origin)
+        if np.count_nonzero(visible) < _MIN_VISIBLE:
             return None
-        noisy = np.where(seen[:, None], pixels + pixel_noise, 0.0)
-        # A lifting network knows proportions, not stature: its skeleton has the average size.
+        noisy = np.where(visible[:, None], pixels + pixel_noise, 0.0)
+        # A lifting network knows the proportions but not the stature: skeletons have average size.
         root = points[11:13].mean(axis=0)
         lifted = (points - root) * (MEAN_STATURE_M / worker.stature_m)
         lifted[:, 2] += lift_noise
         keypoints = PersonKeypoints(
-            _padded(noisy), _padded(lifted), _padded(seen.astype(float)), _LAYOUT
+            _padded(noisy), _padded(lifted), _padded(visible.astype(float)), _LAYOUT
         )
-        return _Sighting(index, self._box(noisy[seen]), keypoints)
+        return _VisiblePerson(index, self._detection(noisy[visible]), keypoints)
 
     def _is_outside(self, box_odom_m: FloatArray, T_odom_camera: FloatArray) -> bool:
-        """True only when all of a box (2, 3) lies beyond one side of the picture."""
-        normals = self._sides @ T_odom_camera[:3, :3].T
+        """Return True only when all of a box (2, 3) lies beyond one side of the image."""
+        normals = self._frustum_normals @ T_odom_camera[:3, :3].T
         middle = 0.5 * (box_odom_m[0] + box_odom_m[1]) - T_odom_camera[:3, 3]
         half = 0.5 * (box_odom_m[1] - box_odom_m[0])
         return bool((normals @ middle + np.abs(normals) @ half < 0.0).any())
 
-    def _box(self, pixels: FloatArray) -> PersonDetection:
+    def _detection(self, pixels: FloatArray) -> PersonDetection:
         low, high = pixels.min(axis=0), pixels.max(axis=0)
-        # Keypoints lie inside the outline: hair, hands and shoes reach about a twelfth further.
+        # Keypoints lie inside the outline: hair, hands and shoes reach about a twelfth farther.
         margin = 0.08 * float((high - low).max())
         corners = np.array([low - margin, high + margin])
         limit = np.array([self._camera.width_px, self._camera.height_px])
@@ -191,23 +194,23 @@ class KeypointCamera:
     def _unhidden(
         self, points: FloatArray, points_odom: FloatArray, inside: Any, eye_odom_m: FloatArray
     ) -> Any:
-        """Which of the keypoints inside the image nothing hides."""
+        """Return which of the keypoints inside the image are not hidden."""
         unhidden = np.zeros(len(points), dtype=bool)
         rows = np.flatnonzero(inside)
         face = rows < FACE_KEYPOINTS
-        # A line ends where the surface may lie before the keypoint, along the optical axis.
+        # A line ends before the keypoint, where the surface of the body may be.
         tolerance = np.where(face, FACE_DEPTH_M, JOINT_DEPTH_M)
         share = np.maximum(1.0 - tolerance / points[rows, 2], 0.0)[:, None]
         ends = eye_odom_m + share * (points_odom[rows] - eye_odom_m)
         detail = np.where(face, _FACE_DETAIL, _BODY_DETAIL)
-        unhidden[rows] = ~self._lines.blocked(eye_odom_m, ends, detail)
+        unhidden[rows] = ~self._sight.blocked(eye_odom_m, ends, detail)
         return unhidden
 
 
-def _frustum(camera: Camera) -> FloatArray:
-    """(M, 3) normals, pointing inwards, of the planes that bound what a camera sees."""
+def _frustum_normals(camera: Camera) -> FloatArray:
+    """Return the normals (M, 3), pointing inwards, of the planes that bound the field of view."""
     ahead = np.array([[0.0, 0.0, 1.0]])
-    if camera.distortion is not None:  # whose picture is bounded by no planes
+    if camera.distortion is not None:  # an image with distortion is not bounded by planes
         return ahead
     left, top = (-0.5 - camera.cx_px) / camera.fx_px, (-0.5 - camera.cy_px) / camera.fy_px
     right = (camera.width_px - 0.5 - camera.cx_px) / camera.fx_px
@@ -217,7 +220,7 @@ def _frustum(camera: Camera) -> FloatArray:
 
 
 def _padded(values: FloatArray) -> FloatArray:
-    """Rows of the 23 body and foot keypoints in the 133 of COCO-WholeBody; the rest is unseen."""
+    """Return the 23 body and foot keypoints as the first of 133 rows (COCO-WholeBody)."""
     out = np.zeros((_LAYOUT_SIZE, *values.shape[1:]))
     out[: len(values)] = values
     return out

@@ -1,4 +1,4 @@
-"""The robot's own camera and networks: rendered pixels through the whole pipeline."""
+"""Eyes that pass rendered images through the awareness pipeline."""
 
 from __future__ import annotations
 
@@ -15,32 +15,31 @@ from perception.arrays import FloatArray
 from ...world.camera import CameraTiming, PictureRenderer, SensorConfig, SimulatedCamera
 from ...world.errors import SimError
 from .._stage import Stage, TrueView
+from ._eyes import NOBODY, WorkerObservations
 
-#: Index of an observation that shows none of the workers.
-NOBODY: Final = -1
-#: Frames a second of a camera whose scenario does not say: pictures are costly to render.
+#: Frame rate of rendered cameras whose scenario gives none: images are costly to render.
 PIXEL_RATE_HZ: Final = 10.0
-# A box shows a worker when it and the worker's pixels overlap so much, or stand as near.
-_SAME_IOU: Final = 0.3
-_SAME_PLACE_M: Final = 0.5
+# An observation shows a worker if the boxes overlap this much, or the positions are this close.
+_MIN_IOU: Final = 0.3
+_MAX_DISTANCE_M: Final = 0.5
 
 
 class PixelEyes:
-    """Renders what the robot's camera sees and hands it to an awareness pipeline.
+    """Eyes with a rendered camera and an awareness pipeline.
 
-    The pipeline gets the picture, its stamp and the floor, which a robot knows from its own pose
-    and the mounting of its camera. Nothing else of the simulation reaches it; which worker an
-    observation shows is found out afterwards, for metrics and pictures only.
+    The pipeline gets the image, its stamp and the floor, which a robot knows from its own pose and
+    the mounting of its camera. Nothing else of the simulation reaches it. The worker of each
+    observation is found afterwards, for metrics and drawings only.
 
     Args:
-        stage: what is seen.
-        camera: of the robot.
+        stage: the stage of the crossing.
+        camera: camera model.
         sensor: noise, exposure and blur.
-        rng: of the sensor's noise.
-        pipeline: what the pictures go through.
-        renderer: of the pictures; None is a :class:`~sim_tests.CameraRenderer`.
-        T_camera_assumed: (4, 4) the camera as the robot believes it to be mounted, in the true
-            camera's frame; None where it is mounted as believed.
+        rng: random generator of the sensor's noise.
+        pipeline: pipeline for the images.
+        renderer: renderer of the images; None for a :class:`~sim_tests.CameraRenderer`.
+        T_camera_assumed: (4, 4) pose of the camera as the robot assumes it, in the true camera's
+            frame; None where they are the same.
 
     Raises:
         SimError: for a pipeline with another camera.
@@ -59,7 +58,7 @@ class PixelEyes:
         self._stage = stage
         self._pipeline = pipeline
         theirs = self._pipeline.camera
-        # The renderer draws without distortion, whatever the pipeline believes.
+        # Rendered images have no distortion.
         if (theirs.width_px, theirs.height_px) != (camera.width_px, camera.height_px) or not (
             theirs.distortion is None and np.allclose(theirs.matrix, camera.matrix)
         ):
@@ -79,58 +78,58 @@ class PixelEyes:
 
     def observe(
         self, stamp_s: float, T_odom_camera: FloatArray, truth: tuple[TrueView, ...]
-    ) -> tuple[tuple[PersonObservation, int], ...]:
-        """Take a picture; return what the pipeline makes of it, each with its worker.
-
-        An observation that shows none of the workers has the index :data:`NOBODY`.
-        """
+    ) -> WorkerObservations:
+        """Render an image; return the observations of the pipeline, each with its worker."""
         frame = self._camera.capture(stamp_s, T_odom_camera)
         assumed = frame.T_odom_camera
         if self._T_camera_assumed is not None:
             assumed = assumed @ self._T_camera_assumed
-        seen = self._pipeline.process(frame.rgb, stamp_s, floor=FloorPlane.from_pose(assumed))
+        observations = self._pipeline.process(
+            frame.rgb, stamp_s, floor=FloorPlane.from_pose(assumed)
+        )
         boxes = [_box_of(frame.actors == worker.actor) for worker in self._stage.workers]
-        return tuple(zip(seen, who_is_who(seen, truth, boxes), strict=True))
+        workers = match_to_workers(observations, truth, boxes)
+        return tuple(zip(observations, workers, strict=True))
 
 
 def pixel_timing(timing: CameraTiming) -> CameraTiming:
-    """The timing of a rendered camera: :data:`PIXEL_RATE_HZ` where the scenario names no rate."""
+    """Return the timing with :data:`PIXEL_RATE_HZ` where the scenario gives no rate."""
     return timing.model_copy(update={"rate_hz": timing.rate_hz or PIXEL_RATE_HZ})
 
 
-def who_is_who(
-    seen: Sequence[PersonObservation],
+def match_to_workers(
+    observations: Sequence[PersonObservation],
     truth: Sequence[TrueView],
     boxes: Sequence[FloatArray | None],
 ) -> tuple[int, ...]:
-    """Which worker each observation shows, one to one, or :data:`NOBODY`.
+    """Return the worker of each observation, one to one, or :data:`NOBODY`.
 
     Args:
-        seen: the observations.
-        truth: of every worker.
-        boxes: (4,) of the pixels that show each worker; None for one of whom nothing shows.
+        observations: the observations of one image.
+        truth: the truth about each worker.
+        boxes: (4,) box of the pixels that show each worker; None for an invisible worker.
     """
-    found = [NOBODY] * len(seen)
-    if not seen or not truth:
-        return tuple(found)
-    affinity = np.zeros((len(seen), len(truth)))
-    for row, observation in enumerate(seen):
+    matched = [NOBODY] * len(observations)
+    if not observations or not truth:
+        return tuple(matched)
+    affinity = np.zeros((len(observations), len(truth)))
+    for row, observation in enumerate(observations):
         for column, (view, box) in enumerate(zip(truth, boxes, strict=True)):
-            if box is None:  # nobody can have been seen who does not show
+            if box is None:
                 continue
             distance = float(np.linalg.norm(observation.position_camera_m - view.position_camera_m))
-            near = distance <= _SAME_PLACE_M
+            close = distance <= _MAX_DISTANCE_M
             overlap = 0.0 if observation.box_xyxy_px is None else _iou(observation.box_xyxy_px, box)
-            if near or overlap >= _SAME_IOU:
+            if close or overlap >= _MIN_IOU:
                 affinity[row, column] = overlap + 1.0 / (1.0 + distance)
     for row, column in zip(*linear_sum_assignment(affinity, maximize=True), strict=True):
         if affinity[row, column] > 0.0:
-            found[row] = int(column)
-    return tuple(found)
+            matched[row] = int(column)
+    return tuple(matched)
 
 
 def _box_of(mask: NDArray[np.bool_]) -> FloatArray | None:
-    """(4,) left, top, right, bottom of the true pixels, maxima exclusive."""
+    """Return the box (4,) of the true pixels, maxima exclusive; None without any."""
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     if not rows.size:
         return None

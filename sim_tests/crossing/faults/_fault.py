@@ -1,7 +1,4 @@
-"""Something that stops for a while, again and again.
-
-What is wrong with a robot's senses in a crossing, as data.
-"""
+"""Faults of camera, detections and odometry as data."""
 
 from __future__ import annotations
 
@@ -18,16 +15,16 @@ from ...world.errors import SimError
 
 
 class Outage(StrictConfig):
-    """Something that stops for a while, again and again; the default never stops.
+    """A repeated outage; the default has none.
 
-    Within an episode the first outage begins at a time drawn evenly from the first ``every_s``, so
-    that over many episodes every instant of an encounter is hit.
+    In each episode the first outage begins at a random time within the first ``every_s``, uniformly
+    distributed, so that over many episodes every instant of an encounter is hit.
 
     Attributes:
-        for_s: how long each lasts; 0 for none.
-        every_s: from the beginning of one to that of the next, longer than ``for_s``.
-        fresh_stamps: what was last known is repeated as if it were new, which nobody downstream can
-            tell; False repeats it with the stamp that it had.
+        for_s: duration of each outage; 0 for none.
+        every_s: time from the beginning of one to that of the next, longer than ``for_s``.
+        fresh_stamps: the last message is repeated as if it were new, which no receiver can tell;
+            False repeats it with its old stamp.
     """
 
     error: ClassVar[type[ValueError]] = SimError
@@ -45,15 +42,15 @@ class Outage(StrictConfig):
         return self
 
     def holds(self, t_s: float, first_s: float) -> bool:
-        """Whether it is down at ``t_s`` when the first outage begins at ``first_s``."""
+        """Return whether there is an outage at ``t_s`` if the first one begins at ``first_s``."""
         return t_s >= first_s and (t_s - first_s) % self.every_s < self.for_s
 
 
 class Bursts(StrictConfig):
-    """Stretches in which the detector does not see a person at all, each person on their own.
+    """Periods in which the detector misses a person, independent for each person.
 
     Attributes:
-        for_s: mean length, exponentially distributed; 0 for none.
+        for_s: mean duration, exponentially distributed; 0 for none.
         every_s: mean time between two of them, exponentially distributed.
     """
 
@@ -64,14 +61,14 @@ class Bursts(StrictConfig):
 
 
 class Ghosts(StrictConfig):
-    """People whom the detector sees and who are not there.
+    """False detections of people.
 
-    A ghost stands where it appeared in the camera's view, 1 m to 8 m away. Every other one has a
-    face, with an α drawn evenly from [0, 1]; the others give no evidence of awareness.
+    A ghost stands where it appeared in the camera's view, 1 m to 8 m away. Half of them have a
+    face, with an α uniformly distributed in [0, 1]; the others give no evidence of awareness.
 
     Attributes:
-        rate_hz: new ones a second (a Poisson process); 0 for none.
-        for_s: mean life, exponentially distributed.
+        rate_hz: new ghosts per second (a Poisson process); 0 for none.
+        for_s: mean lifetime, exponentially distributed.
     """
 
     error: ClassVar[type[ValueError]] = SimError
@@ -81,29 +78,29 @@ class Ghosts(StrictConfig):
 
 
 class Fault(StrictConfig):
-    """What is wrong with a robot's senses; the default is nothing, to the last bit.
+    """A fault of camera, detections or odometry; the default changes nothing, bit for bit.
 
-    Camera and odometry themselves are as good as the scenario says: faults come on top, drawn from
-    random streams of their own, so that everything else in an episode stays what it was.
+    Camera and odometry follow the scenario; the fault is added to them. It draws from random
+    streams of its own, so that everything else in an episode stays the same.
 
     Attributes:
-        name: what tables call it.
+        name: name in tables.
         description: one sentence.
-        miss_rate: share of the observations that are lost, each on its own.
-        bursts: stretches in which a person is not seen.
-        ghosts: people who are not there.
-        drop_rate: share of the frames that never arrive.
-        latency_s: every frame arrives so much later.
-        latency_jitter_s: up to so much more, evenly distributed.
-        frozen_camera: the last picture is delivered again and again. With fresh stamps people seem
-            to stand still in the picture, and so to move with the robot.
-        pitch_error_deg: the robot believes its camera to look so much higher than it does.
-        yaw_error_deg: so much farther left.
-        odometry_delay_s: the newest pose and speed of the robot known to it are so old, and bear
-            the stamp of their time. Frames are placed with the newest pose known.
-        lost_odometry: pose and speed stay the last ones known.
-        awareness_bias: added to every observed α, the sum clipped to [0, 1].
-        awareness_std_factor: on the standard deviation given with every observed α; below 1 is
+        miss_rate: share of the observations that are lost, independently.
+        bursts: periods in which a person is missed.
+        ghosts: false detections.
+        drop_rate: share of the images that never arrive.
+        latency_s: delay of every image.
+        latency_jitter_s: largest additional delay, uniformly distributed.
+        frozen_camera: the last image is delivered again and again. With fresh stamps people seem to
+            stand still in the image, and so to move with the robot.
+        pitch_error_deg: the robot assumes that its camera looks this much higher than it does.
+        yaw_error_deg: the same to the left.
+        odometry_delay_s: age of the newest pose and speed that the robot knows; they have their
+            true stamps. Images are placed with the newest known pose.
+        lost_odometry: pose and speed stay at the last known ones.
+        awareness_bias: added to every observed α; the sum is clipped to [0, 1].
+        awareness_std_factor: factor on the standard deviation of every observed α; below 1 is
             over-confident.
     """
 
@@ -127,7 +124,7 @@ class Fault(StrictConfig):
 
     @classmethod
     def shipped(cls, name: str) -> Fault:
-        """Load one of the faults that come with the package; raises SimError for others."""
+        """Load a fault that comes with the package; raises SimError for other names."""
         if name not in (names := shipped_faults()):
             raise SimError(not_one_of("fault", name, names))
         text = (resources.files("sim_tests.crossing.faults") / f"{name}.yaml").read_text("utf-8")
@@ -135,17 +132,17 @@ class Fault(StrictConfig):
 
     @classmethod
     def of(cls, name: str) -> Fault:
-        """The shipped fault of that name, or the one in a ``.yaml`` or ``.yml`` file."""
+        """Load a shipped fault, or one from a ``.yaml`` or ``.yml`` file."""
         return cls.from_yaml(name) if name.endswith((".yaml", ".yml")) else cls.shipped(name)
 
     def to_text(self) -> str:
-        """The fault as YAML: what differs from the default."""
+        """Return the fault as YAML, without default values."""
         data = self.model_dump(mode="json", exclude_defaults=True)
         return yaml.safe_dump({"name": self.name, **data}, sort_keys=False, allow_unicode=True)
 
 
 def shipped_faults() -> tuple[str, ...]:
-    """Names of the faults that come with the package, sorted."""
+    """Return the names of the faults that come with the package, sorted."""
     folder = resources.files("sim_tests.crossing.faults")
     names = (entry.name for entry in folder.iterdir() if entry.name.endswith(".yaml"))
     return tuple(sorted(name.removesuffix(".yaml") for name in names))

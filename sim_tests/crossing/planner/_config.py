@@ -13,7 +13,7 @@ from ...world.errors import SimError
 
 
 class PlannerConfig(StrictConfig):
-    """What :class:`SamplingPlanner` samples, how far it looks ahead and what it prefers.
+    """Settings of :class:`SamplingPlanner`: sampling, horizon, clearances and cost weights.
 
     The weights multiply dimensionless costs. One unit is the gain of driving straight to a far goal
     at the robot's maximum speed over standing still.
@@ -22,11 +22,11 @@ class PlannerConfig(StrictConfig):
     error: ClassVar[type[ValueError]] = SimError
 
     horizon_s: float = Field(default=3.0, ge=1.0, le=10.0)
-    """How far ahead candidates are rolled out and people predicted, in seconds."""
+    """Horizon of roll-outs and predictions of people, in seconds."""
     step_s: float = Field(default=0.2, ge=0.05, le=0.5)
-    """Time between the poses at which a roll-out is judged, in seconds."""
+    """Time between the poses of a roll-out, in seconds."""
     turn_time_s: float = Field(default=0.8, gt=0.0, le=10.0)
-    """A candidate turns this long and then goes straight, in seconds."""
+    """Time for which a candidate turns before it goes straight, in seconds."""
     speed_samples: int = Field(default=7, ge=2, le=50)
     """Number of target speeds from 0 to the highest allowed; both ends included."""
     yaw_rate_samples: int = Field(default=17, ge=3, le=101)
@@ -39,38 +39,38 @@ class PlannerConfig(StrictConfig):
     """Largest change of the commanded yaw rate, in rad/s²."""
 
     goal_tolerance_m: float = Field(default=0.1, gt=0.0, le=1.0)
-    """Closer than this the goal counts as reached and the robot stops, in metres."""
+    """Distance at which the goal counts as reached and the robot stops, in metres."""
     goal_deceleration_fraction: float = Field(default=0.6, gt=0.0, le=1.0)
     """Share of the robot's deceleration used to arrive at the goal; the rest is in reserve."""
 
     clearance_m: float = Field(default=0.05, ge=0.0, le=1.0)
     """Gap between footprint and obstacle that a braking robot must keep, in metres."""
     standing_speed_mps: float = Field(default=0.3, ge=0.0)
-    """Slower people count as standing, in m/s: the robot heads past them instead of at them."""
+    """Speed below which people count as standing, in m/s; the robot heads past them."""
     detour_margin_m: float = Field(default=0.10, ge=0.0)
-    """What that heading leaves beyond the footprint's half width and ``clearance_m``, in metres."""
+    """Margin of that heading beyond the footprint's half width and ``clearance_m``, in metres."""
     person_comfort_m: float = Field(default=0.40, gt=0.0, le=3.0)
     """Gap to a person's radius below which closeness costs, in metres."""
     static_comfort_m: float = Field(default=0.25, gt=0.0, le=3.0)
     """Gap to a static box below which closeness costs, in metres."""
     front_time_s: float = Field(default=1.2, ge=0.0, le=5.0)
-    """Being in the strip that a person walks through in this time costs, in seconds; it makes the
-    robot pass behind a crossing person."""
+    """Length of the strip ahead of a walking person, in seconds; being in it costs, so that the
+    robot passes behind a crossing person."""
     late_weight: float = Field(default=0.3, ge=0.0, le=1.0)
     """Weight of closeness to people at the end of the horizon relative to closeness now."""
     late_static_weight: float = Field(default=0.0, ge=0.0, le=1.0)
-    """The same for boxes: the robot will have turned again before it is there."""
+    """The same for boxes; small, since the robot will turn again before it is there."""
 
     heading_weight: float = Field(default=0.3, ge=0.0)
     """Cost of facing away from the goal (by π) at the end of the roll-out."""
     person_weight: float = Field(default=1.5, ge=0.0)
     """Cost of touching a person's radius now."""
     room_m: float = Field(default=2.0, gt=0.0, le=5.0)
-    """Gap to the body of somebody who stands, in metres, below which nearness costs between ways
-    that are driven at the same speed: near people every limit is low, whatever their radius, so the
-    robot passes at a distance where there is room."""
+    """Gap to the body of a standing person below which closeness costs, in metres; compares only
+    candidates of the same speed. Near people every speed limit is low, whatever their radius, so
+    the robot passes at a distance where it can."""
     room_weight: float = Field(default=2.0, ge=0.0)
-    """Weight of that."""
+    """Weight of the closeness within ``room_m``."""
     front_weight: float = Field(default=0.6, ge=0.0)
     """Cost of being in the strip that a person walks through now."""
     static_weight: float = Field(default=0.5, ge=0.0)
@@ -84,7 +84,7 @@ class PlannerConfig(StrictConfig):
 
     @model_validator(mode="after")
     def _turns_to_its_goal(self) -> PlannerConfig:
-        """Refuse weights with which a standing robot would rather stand than face its goal."""
+        """Refuse weights with which standing costs less than turning to the goal."""
         gain = self.heading_weight * self.turn_time_s / math.pi
         price = (self.smoothness_weight + self.keep_right_weight) / self.max_yaw_rate_radps
         if gain <= price:

@@ -1,7 +1,4 @@
-"""Gaps between a moving rectangle and discs, strips and boxes, for many poses at once.
-
-What surrounds the robot at the instant of a plan, and how far any pose would be from it.
-"""
+"""People and boxes around the robot at the time of a plan, and the gaps from many poses to them."""
 
 from __future__ import annotations
 
@@ -23,7 +20,7 @@ class Rectangles(NamedTuple):
 
     Attributes:
         centers: poses of the centres, heading along the length.
-        half_length_m: one number, or one a pose.
+        half_length_m: one number, or one per pose.
         half_width_m: one number.
     """
 
@@ -38,15 +35,15 @@ def disc_gap_m(
     y_m: FloatArray,
     radius_m: FloatArray,
 ) -> FloatArray:
-    """Distance from rectangles to discs; negative where they overlap.
+    """Return the distance from rectangles to discs; negative where they overlap.
 
     Exact while the disc's centre is outside the rectangle; inside, minus the radius.
 
     Args:
-        rectangles: the first shape.
+        rectangles: the rectangles.
         x_m: disc centres in the frame of the rectangles, broadcast against their poses.
-        y_m: the same along y.
-        radius_m: of the discs.
+        y_m: disc centres, the same along y.
+        radius_m: radii of the discs.
     """
     centers, half_length, half_width = rectangles
     c, s = centers.cos_heading, centers.sin_heading
@@ -63,10 +60,9 @@ def strip_distance_m(
     velocity_y_mps: FloatArray,
     ahead_s: float,
 ) -> FloatArray:
-    """Distance from points to the segments that walkers cover in the next ``ahead_s``.
+    """Return the distance from points to the segments that people walk in the next ``ahead_s``.
 
-    ``rel_x_m`` and ``rel_y_m`` are point minus walker. For someone who stands it is the distance
-    to that person.
+    ``rel_x_m`` and ``rel_y_m`` are point minus person. The segment of a standing person is a point.
     """
     speed2 = velocity_x_mps * velocity_x_mps + velocity_y_mps * velocity_y_mps
     inverse = 1.0 / np.maximum(speed2, 1e-12)
@@ -78,11 +74,11 @@ def strip_distance_m(
 
 
 def box_gap_m(rectangles: Rectangles, boxes_m: FloatArray) -> FloatArray:
-    """Lower bound of the distance from rectangles to the nearest axis-aligned box.
+    """Return a lower bound of the distance from rectangles to the nearest axis-aligned box.
 
     A rectangle counts with its axis-aligned bounding box, and a diagonal gap with its larger
-    component: exact along a wall, smaller than the distance past a corner, never larger. Negative
-    where the bounding box overlaps a box; infinite without boxes.
+    component: exact along a wall, below the true distance at a corner. Negative where the bounding
+    box overlaps a box; infinite without boxes.
 
     Args:
         rectangles: in the frame of the boxes.
@@ -110,17 +106,17 @@ class FootprintBox:
         center_m: (x, y) in the base frame.
         half_size_m: half the length and half the width.
         reach_m: distance from the base origin to the farthest corner.
-        turning_room_m: how far the circle of that radius reaches beyond the front edge.
+        turning_margin_m: distance by which the circle of that radius exceeds the front edge.
     """
 
     center_m: tuple[float, float]
     half_size_m: tuple[float, float]
     reach_m: float
-    turning_room_m: float
+    turning_margin_m: float
 
     @classmethod
     def of(cls, robot: RobotProfile) -> FootprintBox:
-        """Bound the outline of ``robot``."""
+        """Return the box of ``robot``."""
         x_min, y_min = robot.footprint_m.min(axis=0).tolist()
         x_max, y_max = robot.footprint_m.max(axis=0).tolist()
         reach = math.hypot(max(-x_min, x_max), max(-y_min, y_max))
@@ -131,27 +127,26 @@ class FootprintBox:
             reach - x_max,
         )
 
-    def at(self, base_poses: Poses, room_m: FloatArray | float = 0.0) -> Rectangles:
-        """The footprint at these base poses, with its front edge moved out by ``room_m``."""
+    def at(self, base_poses: Poses, front_margin_m: FloatArray | float = 0.0) -> Rectangles:
+        """Return the footprint at base poses, with its front edge moved out by a margin."""
         x, y, c, s = base_poses
-        along = self.center_m[0] + 0.5 * room_m
+        along = self.center_m[0] + 0.5 * front_margin_m
         across = self.center_m[1]
         if np.ndim(along) or along != 0.0:
             x, y = np.asarray(x + along * c), np.asarray(y + along * s)
         if across != 0.0:
             x, y = np.asarray(x - across * s), np.asarray(y + across * c)
         half_length, half_width = self.half_size_m
-        return Rectangles(Poses(x, y, c, s), half_length + 0.5 * room_m, half_width)
+        return Rectangles(Poses(x, y, c, s), half_length + 0.5 * front_margin_m, half_width)
 
 
 class Scene:
-    """People and boxes around the robot, asked in the base frame of the instant of the plan.
+    """People and boxes around the robot, in the base frame at the time of the plan.
 
-    People are held as (P, 1, 1, 1) arrays, so that the gaps of (T, V, W) poses come out as
-    (P, T, V, W).
+    People are (P, 1, 1, 1) arrays, so that the gaps of (T, V, W) poses are (P, T, V, W).
 
     Args:
-        robot_state: the base pose.
+        robot_state: pose of the base.
         constraints: the people.
         boxes_odom_m: (N, 4) x_min, y_min, x_max, y_max.
     """
@@ -168,36 +163,37 @@ class Scene:
         x0, y0 = robot_state.position_odom_m.tolist()
         c, s = math.cos(robot_state.heading_odom_rad), math.sin(robot_state.heading_odom_rad)
         self._base_odom = Poses(*(np.asarray(value) for value in (x0, y0, c, s)))
-        self._rows: list[tuple[float, float, float, float]] = []
+        self._people: list[tuple[float, float, float, float]] = []
         self._radii = [person.radius_m for person in constraints.obstacles]
         for person in constraints.obstacles:
             x, y = person.center_odom_m.tolist()
             vx, vy = person.velocity_odom_mps.tolist()
             x, y = x - x0, y - y0
-            self._rows.append((c * x + s * y, c * y - s * x, c * vx + s * vy, c * vy - s * vx))
-        columns = np.array(self._rows, dtype=np.float64).reshape(-1, 4).T.reshape(4, -1, 1, 1, 1)
+            self._people.append((c * x + s * y, c * y - s * x, c * vx + s * vy, c * vy - s * vx))
+        columns = np.array(self._people, dtype=np.float64).reshape(-1, 4).T.reshape(4, -1, 1, 1, 1)
         self._x_m, self._y_m, self._vx_mps, self._vy_mps = columns
         self._radius_m = np.array(self._radii, dtype=np.float64).reshape(-1, 1, 1, 1)
 
     def standing_discs_m(
         self, speed_mps: float, margin_m: float
     ) -> list[tuple[float, float, float]]:
-        """(x, y, radius + margin) of everyone slower than ``speed_mps``."""
+        """Return (x, y, radius + margin) of all people slower than ``speed_mps``."""
         return [
             (x, y, radius + margin_m)
-            for (x, y, vx, vy), radius in zip(self._rows, self._radii, strict=True)
+            for (x, y, vx, vy), radius in zip(self._people, self._radii, strict=True)
             if vx * vx + vy * vy < speed_mps * speed_mps
         ]
 
     def people_gap_m(self, robot: Rectangles, t_s: FloatArray) -> FloatArray:
-        """(P, T, V, W) gap between the robot and each person's disc, ``t_s`` from now."""
+        """Return the gap (P, T, V, W) from the robot to each person's disc, ``t_s`` from now."""
         return disc_gap_m(robot, *self._places_m(t_s), self._radius_m)
 
     def body_gap_m(self, robot: Rectangles, t_s: FloatArray, standing_mps: float) -> FloatArray:
-        """(S, T, V, W) gap to the body of everyone slower than that whose disc the robot is not in.
+        """Return the gap (S, T, V, W) to the body of each standing person.
 
-        Walkers are passed by what they are about to use, see :meth:`strip_gap_m`; and who is in a
-        disc has to get out of it first.
+        Standing people are slower than ``standing_mps``. People whose disc contains the robot are
+        left out, because the robot has to leave the disc first. For walking people see
+        :meth:`strip_gap_m`.
         """
         speed2 = self._vx_mps**2 + self._vy_mps**2
         apart_m = np.hypot(self._x_m, self._y_m) - self._radius_m - robot.half_width_m
@@ -206,9 +202,9 @@ class Scene:
         return disc_gap_m(robot, x_m[counts], y_m[counts], np.asarray(BODY_RADIUS_M))
 
     def strip_gap_m(self, robot: Rectangles, t_s: FloatArray, ahead_s: float) -> FloatArray:
-        """(P, T, V, W) gap to what each person's disc sweeps from ``t_s`` on for ``ahead_s``.
+        """Return the gap (P, T, V, W) to the area that each person's disc sweeps in ``ahead_s``.
 
-        The robot counts as a disc of half its width.
+        The sweep begins at ``t_s`` from now. The robot counts as a disc of half its width.
         """
         x_m, y_m = self._places_m(t_s)
         distance = strip_distance_m(
@@ -221,10 +217,10 @@ class Scene:
         return np.asarray(distance - (self._radius_m + robot.half_width_m))
 
     def _places_m(self, t_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """(P, T, 1, 1) x and y of everybody, ``t_s`` from now."""
+        """Return x and y (P, T, 1, 1) of all people, ``t_s`` from now."""
         return self._x_m + self._vx_mps * t_s, self._y_m + self._vy_mps * t_s
 
     def box_gap_m(self, robot: Rectangles) -> FloatArray:
-        """(T, V, W) gap between the robot and the nearest box, a lower bound."""
-        centers_odom = robot.centers.seen_from(self._base_odom)
+        """Return a lower bound (T, V, W) of the gap between the robot and the nearest box."""
+        centers_odom = robot.centers.transformed(self._base_odom)
         return box_gap_m(robot._replace(centers=centers_odom), self._boxes_odom_m)

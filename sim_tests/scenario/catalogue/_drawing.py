@@ -1,4 +1,4 @@
-"""A scenario seen from above: hall, ways, times, and where people look."""
+"""Drawing of a scenario from above: hall, paths with times, and gaze directions."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from ...actors.robot import NOVA_CARTER
 from ...world.errors import SimError
 from .._scenario import Scenario
 from .._template import ScenarioTemplate
-from ._checks import closest_approaches, person_plan, robot_plan
+from ._plans import closest_approaches, person_plan, robot_plan
 
 _WIDTH_IN: Final = 6.8
 _DPI: Final = 100
@@ -39,26 +39,26 @@ _PROP: Final = "#a98f6b"
 _ROBOT: Final = "#1f5f8b"
 _FAINT: Final = "#6b7280"
 _DRAWS: Final = 12
-#: Dots along the ways, this far apart.
-_EVERY_S: Final = 2.0
-# The picture shows everybody this long before the closest approach.
+# Time between the dots along a path.
+_DOT_STEP_S: Final = 2.0
+# People and robot are drawn where they are this long before the closest approach.
 _BEFORE_S: Final = 1.5
 _SECTOR_M: Final = 1.5
 _SECTOR_HALF_DEG: Final = 60.0
 _BODY_M: Final = 0.25
-# Beyond what matters by so much.
+# Space around the paths in the drawing.
 _MARGIN_M: Final = 0.8
-# Who watches, who glances, who never looks: distinct without colour by their fill.
+# Colours of people who watch the robot, glance at it, or never look; sectors also differ by fill.
 _WATCHES: Final = "#2e7d4f"
 _GLANCES: Final = "#b8860b"
 _NEVER: Final = "#b3261e"
 
 
 def scenario_figure(template: ScenarioTemplate) -> Figure:
-    """The plan view of a scenario at its medians, with thin lines for other draws of the ways.
+    """Return the drawing of a scenario at its medians, with thin lines for other draws.
 
-    Everybody stands where they would be 1.5 s before robot and people are nearest if nobody
-    reacted; dots are 2 s apart. A sector of ±60° shows where a person looks.
+    People and robot stand where they would be 1.5 s before their closest approach if nobody
+    reacted. Dots are 2 s apart. A sector of ±60° shows the gaze of a person.
     """
     scenario = template.median()
     x_min, y_min, x_max, y_max = _window(scenario)
@@ -75,7 +75,7 @@ def scenario_figure(template: ScenarioTemplate) -> Figure:
     axes.set_title(template.id, loc="left", fontweight="bold", fontsize=10)
     axes.set_title(template.attention, loc="right", fontsize=9, color=_FAINT)
     _draw_hall(axes, scenario)
-    now_s = _moment_s(scenario)
+    now_s = _drawn_time_s(scenario)
     _draw_robot(axes, scenario, now_s)
     robot_m = robot_plan(scenario.robot, np.array([now_s]))[0]
     others = [template.for_seed(seed).people for seed in range(_DRAWS)]
@@ -85,26 +85,28 @@ def scenario_figure(template: ScenarioTemplate) -> Figure:
         _draw_person(axes, spec, now_s, robot_m)
     for script in scenario.workers:
         _draw_worker(axes, script, now_s, scenario.duration_s, robot_m)
-    _draw_key(figure, axes, scenario)
+    _draw_legend(figure, axes, scenario)
     return figure
 
 
 def save_drawing(figure: Figure, path: Path) -> None:
-    """Write a drawing whole or not at all; a PNG with a palette, which is a third of the size.
+    """Write a drawing; the file appears whole or not at all.
+
+    A PNG gets a palette, which makes it a third of the size.
 
     Raises:
-        SimError: for a place that cannot be written.
+        SimError: for a file that cannot be written.
     """
     if path.suffix.lower() != ".png":
         save_figure(figure, path)
         return
     drawn = BytesIO()
     figure.savefig(drawn, format="png")
-    picture = Image.open(drawn).convert("RGB")
+    image = Image.open(drawn).convert("RGB")
     part = path.with_name(path.name + ".part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        picture.quantize(_COLOURS, dither=Image.Dither.NONE).save(part, "PNG", optimize=True)
+        image.quantize(_COLOURS, dither=Image.Dither.NONE).save(part, "PNG", optimize=True)
         part.replace(path)
     except OSError as cause:
         raise SimError(f"cannot write {path}: {cause.strerror or cause}") from cause
@@ -113,23 +115,23 @@ def save_drawing(figure: Figure, path: Path) -> None:
 
 
 def _window(scenario: Scenario) -> tuple[float, float, float, float]:
-    """The part of the hall that matters: ways and what is beside them."""
+    """Return x_min, y_min, x_max, y_max of the part to draw: the paths and what is beside them."""
     task, hall = scenario.robot, scenario.layout
     places = [(task.start_x_m, task.start_y_m), (task.goal_x_m, task.goal_y_m)]
     places += [(point.x_m, point.y_m) for person in scenario.people for point in person.route]
     places += [(point.x_m, point.y_m) for script in scenario.workers for point in script.path]
     corners = np.array(places)
     low, high = corners.min(axis=0) - _MARGIN_M, corners.max(axis=0) + _MARGIN_M
-    # An aisle is seen with its racks, a cross aisle as far as it is needed.
+    # Show the racks on both sides of the aisle, and cross aisles only as far as they are used.
     low[1], high[1] = np.clip(low[1], -4.8, -3.3), np.clip(high[1], 3.3, 4.8)
     x_min, y_min = np.maximum(low, (hall.x_min_m, hall.y_min_m)).tolist()
     x_max, y_max = np.minimum(high, (hall.x_max_m, hall.y_max_m)).tolist()
     return x_min, y_min, x_max, y_max
 
 
-def _moment_s(scenario: Scenario) -> float:
-    nearest = closest_approaches(scenario).values()
-    return max(min(nearest)[1] - _BEFORE_S, 0.0) if nearest else 0.0
+def _drawn_time_s(scenario: Scenario) -> float:
+    approaches = closest_approaches(scenario).values()
+    return max(min(approaches)[1] - _BEFORE_S, 0.0) if approaches else 0.0
 
 
 def _draw_hall(axes: Axes, scenario: Scenario) -> None:
@@ -143,13 +145,13 @@ def _draw_hall(axes: Axes, scenario: Scenario) -> None:
 
 def _draw_robot(axes: Axes, scenario: Scenario, now_s: float) -> None:
     task = scenario.robot
-    times = np.arange(0.0, scenario.duration_s, _EVERY_S)
-    way = robot_plan(task, times)
-    arrived = 1 + int(np.flatnonzero((way == way[-1]).all(axis=1))[0])
+    times = np.arange(0.0, scenario.duration_s, _DOT_STEP_S)
+    path = robot_plan(task, times)
+    arrived = 1 + int(np.flatnonzero((path == path[-1]).all(axis=1))[0])
     axes.plot(
         [task.start_x_m, task.goal_x_m], [task.start_y_m, task.goal_y_m], color=_ROBOT, lw=1.6
     )
-    _draw_times(axes, way[:arrived], times[:arrived], _ROBOT, below=True)
+    _draw_times(axes, path[:arrived], times[:arrived], _ROBOT, below=True)
     axes.plot(task.goal_x_m, task.goal_y_m, "s", color=_ROBOT, mfc="white", ms=7, zorder=4)
     here = robot_plan(task, np.array([now_s]))[0]
     heading = math.atan2(task.goal_y_m - task.start_y_m, task.goal_x_m - task.start_x_m)
@@ -175,10 +177,10 @@ def _draw_person(axes: Axes, spec: PersonSpec, now_s: float, robot_m: FloatArray
 
     here = place(now_s)
     if len(spec.route) > 1:
-        times = np.arange(math.ceil(spec.start_s / _EVERY_S) * _EVERY_S, 60.0, _EVERY_S)
-        way, walked = person_plan(spec, times)
+        times = np.arange(math.ceil(spec.start_s / _DOT_STEP_S) * _DOT_STEP_S, 60.0, _DOT_STEP_S)
+        path, walked = person_plan(spec, times)
         moving = int(np.searchsorted(walked, walked[-1]))
-        _draw_times(axes, way[:moving], times[:moving], _colour(spec))
+        _draw_times(axes, path[:moving], times[:moving], _colour(spec))
         _draw_arrow(axes, np.array([[point.x_m, point.y_m] for point in spec.route]), spec)
     facing = _facing_rad(spec, place, now_s)
     glances = spec.glances
@@ -199,11 +201,11 @@ def _draw_worker(
 ) -> None:
     times = np.arange(0.0, until_s, 0.1)
     motions = [script.motion(float(t)) for t in times]
-    way = np.array([motion.position_odom_m for motion in motions])
-    axes.plot(*way.T, color=_GLANCES, lw=1.4)
-    every = round(_EVERY_S / 0.1)
+    path = np.array([motion.position_odom_m for motion in motions])
+    axes.plot(*path.T, color=_GLANCES, lw=1.4)
+    every = round(_DOT_STEP_S / 0.1)
     last = min(round(script.path[-1].t_s / 0.1) + 1, len(times))
-    _draw_times(axes, way[:last:every], times[:last:every], _GLANCES)
+    _draw_times(axes, path[:last:every], times[:last:every], _GLANCES)
     now = script.motion(now_s)
     here = now.position_odom_m
     to_robot = math.atan2(*(robot_m - here)[::-1].tolist())
@@ -213,10 +215,10 @@ def _draw_worker(
 
 
 def _draw_times(
-    axes: Axes, way: FloatArray, times: FloatArray, colour: str, *, below: bool = False
+    axes: Axes, path: FloatArray, times: FloatArray, colour: str, *, below: bool = False
 ) -> None:
-    axes.plot(*way.T, "o", color=colour, ms=3.2, zorder=3)
-    for place, t_s in zip(way, times, strict=True):
+    axes.plot(*path.T, "o", color=colour, ms=3.2, zorder=3)
+    for place, t_s in zip(path, times, strict=True):
         axes.annotate(
             f"{t_s:g}",
             (float(place[0]), float(place[1])),
@@ -226,7 +228,7 @@ def _draw_times(
             fontsize=6.5,
             color=colour,
             zorder=6,
-            annotation_clip=True,  # those outside the picture are left out
+            annotation_clip=True,  # those outside the drawing are left out
         )
 
 
@@ -268,7 +270,7 @@ def _draw_body(axes: Axes, here: FloatArray, facing_rad: float, colour: str) -> 
 
 
 def _facing_rad(spec: PersonSpec, place: Callable[[float], FloatArray], now_s: float) -> float:
-    """The way the body faces: along the walk, or back, or as told while it stands."""
+    """Return the heading of the body: along the path, backwards, or as specified while standing."""
     step = place(now_s + 0.05) - place(now_s - 0.05)
     if float(np.linalg.norm(step)) < 1e-6:
         if spec.heading_deg is not None:
@@ -287,8 +289,8 @@ def _colour(spec: PersonSpec) -> str:
     return _WATCHES if spec.glances.watches else _GLANCES
 
 
-def _draw_key(figure: Figure, axes: Axes, scenario: Scenario) -> None:
-    """Say what the colours mean, those that occur."""
+def _draw_legend(figure: Figure, axes: Axes, scenario: Scenario) -> None:
+    """Draw the legend of the colours that occur."""
     present = [_colour(spec) for spec in scenario.people]
     texts = {
         _WATCHES: "watches the robot once noticed",

@@ -1,8 +1,7 @@
-"""``awarenav scenario`` from its options to its last line."""
+"""The subcommands of ``awarenav scenario``: list, show, draw and validate."""
 
 from __future__ import annotations
 
-import re
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,19 +14,19 @@ from ...world.errors import SimError
 from .._distributions import Choice, Distribution
 from .._files import shipped_scenarios
 from .._template import ScenarioTemplate, shipped_templates
-from ._checks import CONFLICT_M, meetings, problems
+from ._checks import CHECKED_DRAWS, template_problems
+from ._plans import CONFLICT_M, approach_statistics
 
 _FORMATS: Final = (".png", ".svg", ".pdf")
-_CHECKED_DRAWS: Final = 100
-#: A scenario in which fewer draws than this bring robot and people together tests little.
-_ENOUGH: Final = 0.8
+# A scenario with a smaller share of conflicts than this tests little.
+_MIN_CONFLICT_SHARE: Final = 0.8
 
 
 def list_command(*, as_json: bool = False) -> int:
     """Print the shipped scenarios."""
     templates = shipped_templates()
     if as_json:
-        print(json_text([_summary(template) for template in templates]), end="")
+        print(json_text([_list_row(template) for template in templates]), end="")
         return 0
     width = max(len(template.id) for template in templates)
     print(f"{'scenario':{width}}  attention  people  varies")
@@ -40,8 +39,8 @@ def list_command(*, as_json: bool = False) -> int:
     return 0
 
 
-def _summary(template: ScenarioTemplate) -> dict[str, Any]:
-    """A line of the list as plain data."""
+def _list_row(template: ScenarioTemplate) -> dict[str, Any]:
+    """Return a row of the list as plain data."""
     scenario = template.median()
     return {
         "name": template.name,
@@ -57,7 +56,7 @@ def show_command(name: str, *, yaml: bool, seed: int | None) -> int:
     """Print one scenario: in words, or as YAML."""
     template = ScenarioTemplate.named(name)
     if seed is not None and not yaml:
-        raise SimError("--seed goes with --yaml: without it the whole scenario is described")
+        raise SimError("--seed needs --yaml: the description covers all draws of a scenario")
     if yaml:
         text = template.to_text() if seed is None else template.for_seed(seed).to_text()
         print(text, end="")
@@ -67,7 +66,7 @@ def show_command(name: str, *, yaml: bool, seed: int | None) -> int:
 
 
 def description_lines(template: ScenarioTemplate) -> list[str]:
-    """What happens, who is there, what varies and whether they meet."""
+    """Return the description: the task, the people, what varies, and the closest approach."""
     scenario = template.median()
     task = scenario.robot
     lines = [
@@ -91,19 +90,20 @@ def description_lines(template: ScenarioTemplate) -> list[str]:
             f"  {path:{width}}  {distribution_text(distribution)}"
             for path, distribution in template.parameters().items()
         ]
-    met = meetings(template)
-    if met is not None:
-        draws = "the scenario" if met.draws == 1 else f"{met.draws} draws"
+    statistics = approach_statistics(template)
+    if statistics is not None:
+        draws = "the scenario" if statistics.draws == 1 else f"{statistics.draws} draws"
         lines += [
             "",
-            f"if nobody reacted: centres nearer than {CONFLICT_M:g} m in {met.share:.0%} of "
-            f"{draws}, {met.median_m:.2f} m at {met.median_s:.1f} s in the median",
+            f"if nobody reacted: centres nearer than {CONFLICT_M:g} m in "
+            f"{statistics.conflict_share:.0%} of {draws}, {statistics.median_distance_m:.2f} m at "
+            f"{statistics.median_time_s:.1f} s in the median",
         ]
     return lines
 
 
 def distribution_text(distribution: Distribution) -> str:
-    """A distribution in a few words."""
+    """Return a short description of a distribution."""
     low, high = distribution.bounds
     if isinstance(distribution, Choice):
         return f"one of {', '.join(f'{value:g}' for value in distribution.values)}"
@@ -113,30 +113,30 @@ def distribution_text(distribution: Distribution) -> str:
 
 def draw_command(names: Sequence[str], out: str) -> int:
     """Draw scenarios into a file or a folder."""
-    from ._drawing import save_drawing, scenario_figure  # noqa: PLC0415 - others need no matplotlib
+    from ._drawing import save_drawing, scenario_figure  # noqa: PLC0415 - needs matplotlib
 
     chosen = [each for name in names for each in (shipped_scenarios() if name == "all" else [name])]
     templates = [ScenarioTemplate.named(name) for name in chosen]
     path = Path(out)
-    one = path.suffix.lower() in _FORMATS
-    if one and len(templates) > 1:
+    is_file = path.suffix.lower() in _FORMATS
+    if is_file and len(templates) > 1:
         raise SimError(
             f"--out must be a folder for {len(templates)} scenarios, got the file {path}"
         )
-    if not one and path.suffix:
+    if not is_file and path.suffix:
         raise SimError(f"--out must end in {', '.join(_FORMATS)} or be a folder, got {path}")
-    if one and path.resolve() in {Path(name).resolve() for name in chosen}:
-        raise SimError(f"--out {path} would replace a scenario")
+    if is_file and path.resolve() in {Path(name).resolve() for name in chosen}:
+        raise SimError(f"--out {path} would overwrite a scenario")
     for template in templates:
-        file = path if one else path / f"{template.name}.png"
+        file = path if is_file else path / f"{template.name}.png"
         save_drawing(scenario_figure(template), file)
         print(file)
     return 0
 
 
 def validate_command(files: Sequence[str]) -> int:
-    """Check scenarios and say what is wrong with each; 2 if one cannot be run."""
-    worst = 0
+    """Check scenarios and print what is wrong; return 0, or 2 if one cannot be run."""
+    status = 0
     for file in files:
         try:
             template = ScenarioTemplate.named(file)
@@ -144,39 +144,25 @@ def validate_command(files: Sequence[str]) -> int:
         except SimError as error:
             found, template = (str(error),), None
         if found or template is None:
-            worst = 2
+            status = 2
             print(f"{file}: cannot be run")
             print("\n".join(f"  {problem}" for problem in found))
             continue
         print(f"{file}: {template.id}, {len(template.parameters())} numbers vary: can be run")
         for remark in _remarks(template):
             print(f"  {remark}")
-    return worst
-
-
-def template_problems(template: ScenarioTemplate) -> tuple[str, ...]:
-    """What makes draws of a scenario impossible, each with the first seed that has it."""
-    first: dict[str, str] = {}
-    for seed in range(_CHECKED_DRAWS if template.parameters() else 1):
-        try:
-            found = problems(template.for_seed(seed))
-        except SimError as error:
-            found = (str(error),)
-        for problem in found:
-            # With other numbers it is the same problem.
-            first.setdefault(re.sub(r"[-\d.]+", "", problem), f"{problem} (seed {seed})")
-    return tuple(first.values())
+    return status
 
 
 def _remarks(template: ScenarioTemplate) -> list[str]:
-    met = meetings(template, _CHECKED_DRAWS)
-    if met is None:
-        return ["nobody is in it but the robot, or only those of replay_csv"]
+    statistics = approach_statistics(template, CHECKED_DRAWS)
+    if statistics is None:
+        return ["it has no people, or only those of replay_csv"]
     remark = (
         f"if nobody reacted, robot and somebody would be nearer than {CONFLICT_M:g} m in "
-        f"{met.share:.0%} of {met.draws} draws"
+        f"{statistics.conflict_share:.0%} of {statistics.draws} draws"
     )
-    if met.share < _ENOUGH:
+    if statistics.conflict_share < _MIN_CONFLICT_SHARE:
         remark += ": it hardly tests the robot; let people start earlier or later"
     return [remark]
 

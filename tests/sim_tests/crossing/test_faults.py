@@ -1,4 +1,4 @@
-"""Faults do what they say, and a fault of strength zero does nothing."""
+"""Faults do what they describe, and a fault of strength zero does nothing."""
 
 import math
 
@@ -10,10 +10,16 @@ from nav_adapter import RobotState
 from perception import Camera, PersonObservation
 from sim_tests import Scenario, SimError, run_crossing
 from sim_tests.crossing.eyes import TimedEyes
-from sim_tests.crossing.faults import Fault, FaultInjection, shipped_faults
-from sim_tests.crossing.faults._detections import FaultyDetections
-from sim_tests.crossing.faults._fault import Bursts, Ghosts, Outage
-from sim_tests.crossing.faults._frames import FaultyEyes
+from sim_tests.crossing.faults import (
+    Bursts,
+    Fault,
+    FaultInjection,
+    FaultyDetections,
+    FaultyEyes,
+    Ghosts,
+    Outage,
+    shipped_faults,
+)
 from sim_tests.world.camera import CameraTiming
 
 CAMERA = Camera.from_fov(640, 480, math.radians(90.0))
@@ -36,17 +42,17 @@ def observation(stamp_s=0.0, awareness=0.5, std=0.1, x_m=4.0):
     )
 
 
-class Walker:
-    """Eyes that see one person, who comes nearer by 1 m a second from 100 m."""
+class WalkerEyes:
+    """Eyes that see one person, who approaches at 1 m/s from 100 m."""
 
     def observe(self, stamp_s, T_odom_camera, truth):
         return ((observation(stamp_s, x_m=100.0 - stamp_s), 0),)
 
 
 def looks(fault, seconds=30.0, rate_hz=20.0, seed=0):
-    """Time and sightings of each tick behind faulty eyes."""
+    """Return time and sightings of each tick of faulty eyes."""
     rng = np.random.default_rng(seed)
-    eyes = FaultyEyes(fault, TimedEyes(Walker(), CameraTiming(), rng), CAMERA, rng)
+    eyes = FaultyEyes(fault, TimedEyes(WalkerEyes(), CameraTiming(), rng), CAMERA, rng)
     ticks = np.arange(round(seconds * rate_hz)) / rate_hz
     return [(float(t), eyes.look(float(t), T_ODOM_CAMERA, T_ODOM_CAMERA, ())) for t in ticks]
 
@@ -68,7 +74,7 @@ def trace(result):
 
 
 @pytest.mark.parametrize("perception", ["truth", "keypoints"])
-def test_a_fault_of_strength_zero_is_no_fault_to_the_last_bit(perception):
+def test_a_fault_of_strength_zero_changes_nothing_bit_for_bit(perception):
     zero = Fault(
         name="zero",
         bursts=Bursts(for_s=0.0, every_s=1.0),
@@ -83,7 +89,7 @@ def test_a_fault_of_strength_zero_is_no_fault_to_the_last_bit(perception):
     assert trace(run_crossing(scenario, fault=Fault(miss_rate=0.9), **options)) != plain
 
 
-def test_a_fault_is_the_same_for_the_same_seed_and_another_for_another():
+def test_a_fault_depends_on_its_seed_alone():
     fault = Fault(name="half", miss_rate=0.5, drop_rate=0.2, ghosts=Ghosts(rate_hz=1.0))
 
     def seen(seed):
@@ -93,7 +99,7 @@ def test_a_fault_is_the_same_for_the_same_seed_and_another_for_another():
     assert seen(1) != seen(2)
 
 
-def test_shipped_faults_are_named_as_their_files_and_round_trip(tmp_path):
+def test_shipped_faults_are_named_after_their_files_and_round_trip(tmp_path):
     assert {
         "misses_30", "latency_300ms", "frozen_camera", "wrong_pitch_5deg", "biased_alpha", "ghosts",
         "bursts", "lost_odometry", "overconfident_alpha",
@@ -117,7 +123,7 @@ def test_shipped_faults_are_named_as_their_files_and_round_trip(tmp_path):
         ("name: a b", "name"),
     ],
 )
-def test_faults_that_make_no_sense_are_refused(text, message, tmp_path):
+def test_impossible_faults_are_refused(text, message, tmp_path):
     path = tmp_path / "fault.yaml"
     path.write_text(text)
     with pytest.raises(SimError, match=message):
@@ -126,23 +132,23 @@ def test_faults_that_make_no_sense_are_refused(text, message, tmp_path):
         Fault.shipped("misses_3")
 
 
-def test_misses_lose_their_share_of_the_observations():
+def test_the_miss_rate_is_the_share_of_lost_observations():
     detections = FaultyDetections(Fault(miss_rate=0.3), CAMERA, np.random.default_rng(0))
     seen = ((observation(), 0), (observation(), 1))
-    kept = [len(detections.of(seen, 0.05 * n, T_ODOM_CAMERA)) for n in range(4000)]
-    share = 1.0 - np.mean(kept) / 2.0
+    remaining = [len(detections.apply(seen, 0.05 * n, T_ODOM_CAMERA)) for n in range(4000)]
+    share = 1.0 - np.mean(remaining) / 2.0
     assert share == pytest.approx(0.3, abs=4.0 * math.sqrt(0.3 * 0.7 / 8000))
-    # Each on its own: the number lost of two is binomial.
-    assert kept.count(0) / 4000 == pytest.approx(0.09, abs=4.0 * math.sqrt(0.09 * 0.91 / 4000))
+    # Losses are independent: the number lost of two is binomial.
+    assert remaining.count(0) / 4000 == pytest.approx(0.09, abs=4.0 * math.sqrt(0.09 * 0.91 / 4000))
 
 
-def test_bursts_hide_a_person_for_their_share_of_the_time_whoever_else_is_there():
+def test_bursts_hide_a_person_for_their_share_of_the_time_independent_of_others():
     fault = Fault(bursts=Bursts(for_s=0.5, every_s=2.0))
 
     def hidden(people):
         detections = FaultyDetections(fault, CAMERA, np.random.default_rng(1))
         seen = tuple((observation(), index) for index in people)
-        frames = (detections.of(seen, 0.05 * n, T_ODOM_CAMERA) for n in range(40_000))
+        frames = (detections.apply(seen, 0.05 * n, T_ODOM_CAMERA) for n in range(40_000))
         return np.array([all(index != people[-1] for _, index in frame) for frame in frames])
 
     alone, beside = hidden((4,)), hidden((1, 4))
@@ -154,11 +160,11 @@ def test_bursts_hide_a_person_for_their_share_of_the_time_whoever_else_is_there(
     assert np.mean(lengths_s) == pytest.approx(0.5, abs=4.0 * 0.5 / math.sqrt(700))
 
 
-def test_ghosts_are_as_many_as_littles_law_says_and_stand_in_view():
+def test_the_number_of_ghosts_follows_littles_law_and_they_stand_in_view():
     fault = Fault(ghosts=Ghosts(rate_hz=2.0, for_s=0.5))
     detections = FaultyDetections(fault, CAMERA, np.random.default_rng(2))
-    frames = [detections.of((), 0.05 * n, T_ODOM_CAMERA) for n in range(20_000)]
-    # A Poisson number of mean 1 is there at a time; it is remembered for about 2 · 0.5 s.
+    frames = [detections.apply((), 0.05 * n, T_ODOM_CAMERA) for n in range(20_000)]
+    # At each time a Poisson number of mean 1 is present; it is correlated over about 2 · 0.5 s.
     assert np.mean([len(frame) for frame in frames]) == pytest.approx(
         1.0, abs=4.0 / math.sqrt(1000)
     )
@@ -178,31 +184,31 @@ def test_ghosts_are_as_many_as_littles_law_says_and_stand_in_view():
     ("awareness", "bias", "expected"),
     [(0.5, 0.3, 0.8), (0.9, 0.3, 1.0), (0.1, -0.3, 0.0), (None, 0.3, None)],
 )
-def test_a_bias_is_added_and_clipped_and_invents_no_evidence(awareness, bias, expected):
+def test_a_bias_is_added_and_clipped_but_creates_no_evidence(awareness, bias, expected):
     fault = Fault(awareness_bias=bias, awareness_std_factor=0.5)
     detections = FaultyDetections(fault, CAMERA, np.random.default_rng(0))
-    ((seen, _),) = detections.of(((observation(awareness=awareness), 0),), 0.0, T_ODOM_CAMERA)
+    ((seen, _),) = detections.apply(((observation(awareness=awareness), 0),), 0.0, T_ODOM_CAMERA)
     assert seen.awareness == (None if expected is None else pytest.approx(expected))
     assert seen.awareness_std == (None if expected is None else pytest.approx(0.05))
 
 
-def test_latency_delays_every_frame_and_keeps_its_stamp():
+def test_latency_delays_every_image_and_keeps_its_stamp():
     for t_s, sightings in looks(Fault(latency_s=0.3), 5.0):
         assert [s.stamp_s for s in sightings] == ([] if t_s < 0.299 else [pytest.approx(t_s - 0.3)])
 
 
-def test_dropped_frames_never_arrive():
+def test_dropped_images_never_arrive():
     arrived = sum(len(sightings) for _, sightings in looks(Fault(drop_rate=0.3), 200.0))
     assert arrived / 4000 == pytest.approx(0.7, abs=4.0 * math.sqrt(0.21 / 4000))
 
 
 @pytest.mark.parametrize("fresh", [True, False])
-def test_a_frozen_camera_repeats_its_last_picture(fresh):
+def test_a_frozen_camera_repeats_its_last_image(fresh):
     fault = Fault(frozen_camera=Outage(for_s=1.0, every_s=10.0, fresh_stamps=fresh))
     frozen = 0
     last_true_s = None
     for t_s, (sighting,) in looks(fault, 40.0):
-        ((seen, _),) = sighting.seen
+        ((seen, _),) = sighting.observations
         taken_s = 100.0 - seen.position_camera_m[2]
         assert seen.stamp_s == sighting.stamp_s
         if taken_s == pytest.approx(t_s):
@@ -230,10 +236,10 @@ def known_states(fault, seconds=25.0):
         state = RobotState(t_s, [t_s, 0.0], 0.0, 1.0, 0.0)
         T = np.array(T_ODOM_CAMERA)
         T[0, 3] = t_s
-        yield t_s, odometry.known(state, T)
+        yield t_s, odometry.update(state, T)
 
 
-def test_late_odometry_is_old_and_says_so():
+def test_delayed_odometry_has_its_true_stamp():
     for t_s, known in known_states(Fault(odometry_delay_s=0.2)):
         assert known.state.stamp_s == pytest.approx(max(t_s - 0.2, 0.0))
         assert known.state.position_odom_m[0] == pytest.approx(max(t_s - 0.2, 0.0))
@@ -241,7 +247,7 @@ def test_late_odometry_is_old_and_says_so():
 
 
 @pytest.mark.parametrize("fresh", [True, False])
-def test_lost_odometry_stays_where_it_was(fresh):
+def test_lost_odometry_stays_at_the_last_known_pose(fresh):
     fault = Fault(lost_odometry=Outage(for_s=2.0, every_s=10.0, fresh_stamps=fresh))
     lost = [
         (t_s, known)
@@ -262,18 +268,18 @@ def test_lost_odometry_stays_where_it_was(fresh):
         (0.0, 5.0, [math.cos(math.radians(5)), math.sin(math.radians(5)), 0.0]),
     ],
 )
-def test_a_wrong_mounting_turns_the_assumed_camera_up_and_left(pitch_deg, yaw_deg, axis):
+def test_a_mounting_error_turns_the_assumed_camera_up_and_left(pitch_deg, yaw_deg, axis):
     fault = Fault(pitch_error_deg=pitch_deg, yaw_error_deg=yaw_deg)
     injection = FaultInjection(fault, 0)
     state = RobotState(0.0, [0.0, 0.0], 0.0, 0.0, 0.0)
-    assumed = injection.odometry().known(state, T_ODOM_CAMERA).T_odom_camera
+    assumed = injection.odometry().update(state, T_ODOM_CAMERA).T_odom_camera
     np.testing.assert_allclose(assumed[:3, 2], axis, atol=1e-12)
     np.testing.assert_allclose(assumed[:3, 3], T_ODOM_CAMERA[:3, 3])
     np.testing.assert_allclose(assumed[:3, :3] @ assumed[:3, :3].T, np.eye(3), atol=1e-12)
 
 
-def test_the_robot_acts_on_what_it_knows_and_the_frames_keep_the_truth():
-    """With odometry that has been silent for a second, everybody counts as unaware and it stops."""
+def test_the_robot_acts_on_faulty_odometry_and_frames_keep_the_truth():
+    """After a second without odometry everybody counts as unaware and the robot stops."""
     fault = Fault(lost_odometry=Outage(for_s=9.9, every_s=10.0, fresh_stamps=False))
     options = {"policy": "balanced", "seed": 0}
     plain, broken = (

@@ -6,7 +6,7 @@ import pytest
 from perception import Camera
 from perception.anthropometry import MEAN_STATURE_M
 from sim_tests import KeypointNoise, SimError
-from sim_tests.crossing.eyes._keypoint_camera import KeypointCamera
+from sim_tests.crossing.eyes import KeypointCamera
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
 # Looking along odom x from a height of 1.4 m.
@@ -30,7 +30,7 @@ class Body:
 
 
 class Wall:
-    """A wall at a distance over part of the picture."""
+    """A wall at a distance over part of the image."""
 
     def __init__(self, depth_m=np.inf, from_u_px=0.0):
         self.depth_m = depth_m
@@ -42,7 +42,7 @@ class Wall:
         return behind & (CAMERA.project(points)[:, 0] >= self.from_u_px)
 
 
-def seen(body, wall=None, noise=EXACT, seed=0):
+def look(body, wall=None, noise=EXACT, seed=0):
     camera = KeypointCamera(CAMERA, wall or Wall(), noise, np.random.default_rng(seed))
     workers = camera.look(T_ODOM_CAMERA, [body])
     detections = camera.detect(None)
@@ -51,7 +51,7 @@ def seen(body, wall=None, noise=EXACT, seed=0):
 
 def test_without_noise_the_keypoints_are_the_projected_truth():
     body = Body()
-    workers, (detection,), (keypoints,) = seen(body)
+    workers, (detection,), (keypoints,) = look(body)
     points = (body.keypoints_odom_m - T_ODOM_CAMERA[:3, 3]) @ T_ODOM_CAMERA[:3, :3]
     pixels = CAMERA.project(points)
     visible = keypoints.scores[:23] > 0
@@ -69,23 +69,23 @@ def test_without_noise_the_keypoints_are_the_projected_truth():
     assert np.all(pixels[visible] <= [right, bottom])
 
 
-def test_what_stands_in_front_hides_and_what_stands_behind_does_not():
+def test_a_wall_hides_what_is_behind_it():
     body = Body()
-    _, _, (behind,) = seen(body, Wall(3.5))
+    _, _, (behind,) = look(body, Wall(3.5))
     assert behind.scores[:23].sum() >= 15
-    assert seen(body, Wall(2.0))[0] == ()
-    _, _, (half,) = seen(body, Wall(2.0, from_u_px=320.0))
+    assert look(body, Wall(2.0))[0] == ()
+    _, _, (half,) = look(body, Wall(2.0, from_u_px=320.0))
     u = half.keypoints_px[:, 0][half.scores > 0]
     assert 5 <= len(u) < behind.scores.sum()
     assert u.max() <= 325.0
 
 
-def test_a_person_behind_or_beside_the_camera_is_not_seen():
-    assert seen(Body(x_m=-3.0))[0] == ()
-    assert seen(Body(x_m=1.0, y_m=4.0))[0] == ()
+def test_a_person_outside_the_field_of_view_is_not_detected():
+    assert look(Body(x_m=-3.0))[0] == ()
+    assert look(Body(x_m=1.0, y_m=4.0))[0] == ()
 
 
-def test_noise_has_the_stated_size_and_is_independent_between_frames():
+def test_noise_has_the_configured_size_and_is_independent_between_frames():
     noise = KeypointNoise(pixel_std_px=2.0, lift_std_m=0.05, miss_rate=0.0)
     camera = KeypointCamera(CAMERA, Wall(), noise, np.random.default_rng(0))
     pixels, lifts = [], []
@@ -101,14 +101,14 @@ def test_noise_has_the_stated_size_and_is_independent_between_frames():
     assert abs(np.mean(lag[1:] * lag[:-1])) < 0.3
 
 
-def test_people_are_missed_at_the_stated_rate():
+def test_people_are_missed_at_the_configured_rate():
     noise = KeypointNoise(miss_rate=0.3)
     camera = KeypointCamera(CAMERA, Wall(), noise, np.random.default_rng(1))
     found = [len(camera.look(T_ODOM_CAMERA, [Body()])) for _ in range(1000)]
     assert np.mean(found) == pytest.approx(0.7, abs=0.05)
 
 
-def test_the_luck_of_one_person_does_not_depend_on_another():
+def test_the_noise_of_one_person_does_not_depend_on_another():
     noise = KeypointNoise()
     alone = KeypointCamera(CAMERA, Wall(), noise, np.random.default_rng(2))
     together = KeypointCamera(CAMERA, Wall(), noise, np.random.default_rng(2))

@@ -1,4 +1,4 @@
-"""Rendered pictures through the whole pipeline, in the closed loop."""
+"""Rendered images through the whole pipeline, alone and in the closed loop."""
 
 from __future__ import annotations
 
@@ -19,11 +19,15 @@ from perception import (
 )
 from perception.networks import OnnxPersonDetector
 from sim_tests import KeypointNoise, Scenario, SimError, run_crossing
-from sim_tests.crossing import Stage
-from sim_tests.crossing._stage import TrueView
-from sim_tests.crossing.eyes import NOBODY, PIXEL_RATE_HZ, pixel_timing
-from sim_tests.crossing.eyes._keypoint_camera import KeypointCamera
-from sim_tests.crossing.eyes._pixel_eyes import PixelEyes, who_is_who
+from sim_tests.crossing import Stage, TrueView
+from sim_tests.crossing.eyes import (
+    NOBODY,
+    PIXEL_RATE_HZ,
+    KeypointCamera,
+    PixelEyes,
+    match_to_workers,
+    pixel_timing,
+)
 from sim_tests.world.camera import CameraTiming, SensorConfig
 from sim_tests.world.sightlines import SightLines
 
@@ -62,7 +66,7 @@ def stage(scenario: Scenario) -> Iterator[Stage]:
 
 
 class Blind:
-    """Sees no keypoints: the pipeline then places people by their boxes, without awareness."""
+    """A pose estimator without keypoints: people are located by their boxes, without awareness."""
 
     def estimate(
         self, image_rgb: np.ndarray, detections: tuple[PersonDetection, ...]
@@ -84,30 +88,30 @@ def view(x_m: float, z_m: float) -> TrueView:
     )
 
 
-def test_observations_are_given_to_the_workers_they_show():
+def test_observations_are_matched_to_the_workers_they_show():
     truth = (view(-1.0, 3.0), view(1.0, 4.0), view(0.0, 9.0))
     boxes = [np.array([50.0, 50, 150, 350]), np.array([400.0, 80, 480, 320]), None]
     seen = (
-        observation(1.1, 4.2, (402, 84, 478, 322)),  # by box and place
+        observation(1.1, 4.2, (402, 84, 478, 322)),  # by box and position
         observation(-1.0, 4.5, (52, 50, 150, 340)),  # by box alone
-        observation(0.1, 8.9, (300, 100, 330, 200)),  # where a worker is of whom nothing shows
+        observation(0.1, 8.9, (300, 100, 330, 200)),  # at an invisible worker
         observation(3.0, 3.0, (600, 100, 640, 200)),  # a ghost
     )
-    assert who_is_who(seen, truth, boxes) == (1, 0, NOBODY, NOBODY)
-    assert who_is_who(seen[:2], (), []) == (NOBODY, NOBODY)
-    assert who_is_who((), truth, boxes) == ()
+    assert match_to_workers(seen, truth, boxes) == (1, 0, NOBODY, NOBODY)
+    assert match_to_workers(seen[:2], (), []) == (NOBODY, NOBODY)
+    assert match_to_workers((), truth, boxes) == ()
 
 
-def test_one_worker_is_never_two_observations():
+def test_a_worker_is_matched_to_one_observation_only():
     truth, boxes = (view(0.0, 3.0),), [np.array([100.0, 100, 200, 400])]
     twice = (
         observation(0.3, 3.0, (110, 100, 220, 400)),
         observation(0.0, 3.0, (100, 100, 200, 400)),
     )
-    assert who_is_who(twice, truth, boxes) == (NOBODY, 0)
+    assert match_to_workers(twice, truth, boxes) == (NOBODY, 0)
 
 
-def test_rendered_people_are_observed_where_they_are(stage: Stage):
+def test_rendered_people_are_observed_at_their_true_positions(stage: Stage):
     cone = AttentionCone()
     lines = SightLines(stage.warehouse.layout, actors=stage.warehouse.actors)
     keypoints = KeypointCamera(CAMERA, lines, KeypointNoise(), np.random.default_rng(0))
@@ -118,16 +122,16 @@ def test_rendered_people_are_observed_where_they_are(stage: Stage):
     keypoints.look(T_odom_camera, stage.workers)
     seen = eyes.observe(0.25, T_odom_camera, truth)
     assert sorted(worker for _, worker in seen) == [0, 1]
-    for found, worker in seen:
-        assert found.stamp_s == 0.25
+    for each, worker in seen:
+        assert each.stamp_s == 0.25
         true = truth[worker].position_camera_m
-        assert np.linalg.norm(found.position_camera_m - true) < 0.05 * np.linalg.norm(true)
-    alpha = {worker: found.awareness or 0.0 for found, worker in seen}
+        assert np.linalg.norm(each.position_camera_m - true) < 0.05 * np.linalg.norm(true)
+    alpha = {worker: each.awareness or 0.0 for each, worker in seen}
     assert alpha[0] > 0.6
     assert alpha[1] < 0.1
 
 
-def test_a_camera_without_a_rate_takes_ten_frames_a_second():
+def test_a_rendered_camera_without_a_rate_takes_ten_images_a_second():
     assert pixel_timing(CameraTiming()).rate_hz == PIXEL_RATE_HZ
     assert pixel_timing(CameraTiming(rate_hz=4.0, drop_rate=0.1)) == CameraTiming(
         rate_hz=4.0, drop_rate=0.1
@@ -135,7 +139,7 @@ def test_a_camera_without_a_rate_takes_ten_frames_a_second():
 
 
 @pytest.mark.skipif(not RTMDET.is_file(), reason=f"needs {RTMDET.name} in the folder of models")
-def test_a_crossing_is_driven_by_what_a_genuine_detector_sees_in_the_pictures(scenario: Scenario):
+def test_a_crossing_runs_with_a_real_detector_on_rendered_images(scenario: Scenario):
     detector = OnnxPersonDetector(RTMDET)
     results = []
     for _ in range(2):
@@ -151,10 +155,10 @@ def test_a_crossing_is_driven_by_what_a_genuine_detector_sees_in_the_pictures(sc
     workers = set()
     for frame in result.frames:
         for found, worker in zip(frame.observations, frame.observed_workers, strict=True):
-            # A box alone tells nothing of awareness, and no evidence is never awareness.
+            # A box alone is no evidence of awareness.
             assert found.awareness is None
             left, _, right, _ = found.box_xyxy_px
-            # A sliver of a person at the picture's border has no height to tell the range by.
+            # A person cut off by the border of the image has no height that gives the range.
             cut_off = left < 1.0 or right > CAMERA.width_px - 1.0
             if worker != NOBODY and not cut_off:
                 workers.add(worker)
@@ -166,7 +170,7 @@ def test_a_crossing_is_driven_by_what_a_genuine_detector_sees_in_the_pictures(sc
     assert first == second
 
 
-def test_pictures_can_be_smaller_than_the_camera(scenario: Scenario):
+def test_images_can_be_smaller_than_the_camera(scenario: Scenario):
     half = scenario.camera.model_copy(update={"picture_scale": 0.5})
     small = scenario.model_copy(update={"camera": half, "duration_s": 0.2})
     camera = half.camera(0.5)

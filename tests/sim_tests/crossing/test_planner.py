@@ -1,4 +1,4 @@
-"""The reference planner in closed loop with an exact unicycle, and its mathematics."""
+"""The reference planner in closed loop with an exact unicycle, and properties of its commands."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def constraints(
 
 
 def gap_m(state: RobotState, center: tuple[float, float], radius_m: float) -> float:
-    """Exact distance between the robot's outline and a disc, negative where they overlap."""
+    """Return the exact distance from the robot's outline to a disc, negative where they overlap."""
     return float(shapely.distance(outline(state), shapely.Point(center))) - radius_m
 
 
@@ -52,7 +52,7 @@ def outline(state: RobotState, corners_m: np.ndarray = OUTLINE_M) -> shapely.Pol
 
 
 def drive(state: RobotState, command: tuple[float, float], dt_s: float = DT_S) -> RobotState:
-    """Exact arc at the mean of the old and the commanded twist: speeds ramp over the tick."""
+    """Drive an exact arc at the mean of the old and the commanded twist."""
     speed = 0.5 * (state.speed_mps + command[0])
     turn = 0.5 * (state.yaw_rate_radps + command[1]) * dt_s
     chord = speed * dt_s * float(np.sinc(0.5 * turn / math.pi))
@@ -111,16 +111,16 @@ def simulate(
 
 
 def reversals(speeds: np.ndarray) -> int:
-    """How often speeding up turns into slowing down or back."""
+    """Return how often the acceleration changes its sign."""
     change = np.diff(speeds)
     signs = np.sign(change[np.abs(change) > 0.02])
     return int((np.diff(signs) != 0).sum())
 
 
-# --- behaviour ---------------------------------------------------------------------------------
+# --- behaviour in closed loop ------------------------------------------------------------------
 
 
-def test_an_empty_world_is_crossed_straight_at_full_speed_without_overshoot() -> None:
+def test_without_obstacles_the_robot_drives_straight_at_full_speed_without_overshoot() -> None:
     run = simulate([])
     assert run.arrived
     assert np.abs(run.path_m[:, 1]).max() < 1e-9
@@ -132,7 +132,7 @@ def test_an_empty_world_is_crossed_straight_at_full_speed_without_overshoot() ->
 
 @settings(max_examples=25, deadline=None)
 @given(st.floats(-math.pi, math.pi), st.floats(0.12, 4.0), st.floats(0.0, 1.5))
-def test_a_goal_anywhere_around_is_reached(bearing: float, distance: float, speed: float) -> None:
+def test_a_goal_in_any_direction_is_reached(bearing: float, distance: float, speed: float) -> None:
     goal = (distance * math.cos(bearing), distance * math.sin(bearing))
     run = simulate([], goal, start=RobotState(0.0, (0, 0), 0.0, speed, 0.0))
     assert run.arrived
@@ -154,12 +154,12 @@ def test_a_crossing_person_is_passed_behind(side: float, radius_m: float, start_
     assert reversals(run.speeds_mps) <= 9
 
 
-def test_a_person_who_is_long_past_costs_no_time() -> None:
+def test_a_person_who_has_passed_costs_no_time() -> None:
     run = simulate([walker(4.0, -1.0, 0.0, 1.2, 0.5)])
     assert run.duration_s == simulate([]).duration_s
 
 
-def test_a_standing_person_in_an_aisle_is_passed_where_the_radius_leaves_room() -> None:
+def test_a_standing_person_in_an_aisle_is_passed_if_the_radius_permits() -> None:
     run = simulate([walker(4.0, 0.0, 0.0, 0.0, 0.5)], boxes=AISLE)
     assert run.arrived
     assert run.gaps_m.min() > 0.05
@@ -168,7 +168,7 @@ def test_a_standing_person_in_an_aisle_is_passed_where_the_radius_leaves_room() 
     assert run.duration_s < EMPTY_TIME_S + 3.0
 
 
-def test_a_robot_waits_at_an_aisle_that_a_radius_closes_and_goes_on_when_it_opens() -> None:
+def test_a_robot_waits_while_a_radius_blocks_the_aisle_and_continues_when_it_shrinks() -> None:
     def person(t: float) -> tuple[tuple[float, float], tuple[float, float], float]:
         return (4.0, 0.0), (0.0, 0.0), 1.0 if t < 12.0 else 0.45
 
@@ -187,7 +187,7 @@ def test_a_person_walking_towards_the_robot_in_an_aisle_is_passed_on_the_right()
     assert run.path_m[:, 1].max() < 0.1
 
 
-def test_three_people_at_once() -> None:
+def test_three_people_are_avoided_at_once() -> None:
     people = [
         walker(3.0, -4.0, 0.0, 1.2, 0.5),
         walker(5.0, 4.0, 0.0, -1.0, 0.6),
@@ -199,7 +199,7 @@ def test_three_people_at_once() -> None:
 
 
 @pytest.mark.parametrize("limit_mps", [0.0, 0.4])
-def test_a_fallen_limit_is_met_by_full_braking_and_no_harder(limit_mps: float) -> None:
+def test_a_lower_limit_is_met_by_full_braking(limit_mps: float) -> None:
     run = simulate([], limit_mps=lambda t: 1.5 if t < 2.0 else limit_mps, duration_s=5.0)
     times = np.array([state.stamp_s for state in run.states])
     expected = np.maximum(1.5 - (times - 2.0), limit_mps)
@@ -207,7 +207,7 @@ def test_a_fallen_limit_is_met_by_full_braking_and_no_harder(limit_mps: float) -
     np.testing.assert_allclose(run.speeds_mps[after], expected[after], atol=1e-9)
 
 
-def test_a_robot_overlapped_from_behind_drives_out() -> None:
+def test_a_robot_in_a_disc_from_behind_drives_out() -> None:
     run = simulate([walker(-0.8, 0.1, 0.0, 0.0, 1.0)])
     assert run.arrived
     assert run.gaps_m[0, 0] < -0.5
@@ -215,7 +215,7 @@ def test_a_robot_overlapped_from_behind_drives_out() -> None:
 
 
 @pytest.mark.parametrize("y_m", [0.0, 0.3])
-def test_a_robot_overlapped_from_ahead_turns_on_the_spot_and_drives_out(y_m: float) -> None:
+def test_a_robot_in_a_disc_from_ahead_turns_on_the_spot_and_drives_out(y_m: float) -> None:
     run = simulate([walker(1.0, y_m, 0.0, 0.0, 1.1)])
     assert run.gaps_m[0, 0] < -0.3
     swing = ROBOT.circumscribed_radius_m - HALF_LENGTH_M
@@ -232,7 +232,7 @@ def test_a_person_who_walks_over_a_waiting_robot_does_not_freeze_it() -> None:
     assert run.arrived
 
 
-def test_a_robot_that_cannot_reverse_keeps_the_room_to_turn_round() -> None:
+def test_a_robot_at_a_wall_keeps_enough_distance_to_turn_around() -> None:
     stuck = simulate([], (0.5, -3.0), boxes=AISLE, duration_s=10.0).states[-1]
     assert stuck.speed_mps < 0.05
     assert abs(math.sin(stuck.heading_odom_rad)) > 0.9  # it faces the wall
@@ -252,7 +252,7 @@ def test_boxes_are_never_hit(seed: int) -> None:
     assert run.path_m[:, 0].max() > 0.5
 
 
-def test_an_off_centre_footprint_is_kept_off_the_wall() -> None:
+def test_an_off_centre_footprint_keeps_clear_of_the_wall() -> None:
     corners = OUTLINE_M + np.array([0.2, -0.15])
     planner = SamplingPlanner(RobotProfile(corners, 1.5, 1.0, 1.0, 0.3), AISLE)
     solid = shapely.union_all(shapely.box(*AISLE.T))
@@ -263,7 +263,7 @@ def test_an_off_centre_footprint_is_kept_off_the_wall() -> None:
     assert state.position_odom_m[0] > 1.0
 
 
-# --- what holds for every command ----------------------------------------------------------------
+# --- properties of every command -----------------------------------------------------------------
 
 coordinate = st.floats(-4.0, 4.0)
 person_data = st.tuples(
@@ -304,7 +304,7 @@ def test_the_command_is_reachable_and_within_the_limit(
 def test_a_moving_robot_can_always_stop_clear_of_discs_and_boxes(
     state: RobotState, people: list, boxes: np.ndarray | None
 ) -> None:
-    """Replays the command and full braking in fine steps against exact geometry."""
+    """Replay the command and full braking in fine steps against exact geometry."""
     planner = SamplingPlanner(ROBOT, boxes)
     v, w = planner.plan(state, GOAL, constraints(people), DT_S)
     if v == pytest.approx(max(state.speed_mps - DT_S, 0.0), abs=1e-9):
@@ -355,7 +355,7 @@ def test_turning_and_shifting_the_world_changes_nothing(
     assert there == pytest.approx(here, abs=1e-6)
 
 
-def test_boxes_may_be_turned_by_right_angles() -> None:
+def test_turning_the_boxes_by_a_right_angle_changes_nothing() -> None:
     person = ((2.5, 0.3), (-0.4, 0.1), 0.5)
     state = RobotState(0.0, (0.3, -0.2), 0.1, 0.8, 0.05)
     here = SamplingPlanner(ROBOT, AISLE).plan(state, GOAL, constraints([person]), DT_S)
@@ -371,7 +371,7 @@ def test_boxes_may_be_turned_by_right_angles() -> None:
     assert there == pytest.approx(here, abs=1e-6)
 
 
-def test_the_command_depends_on_nothing_but_the_arguments() -> None:
+def test_the_command_depends_only_on_the_arguments() -> None:
     used, fresh = SamplingPlanner(ROBOT, AISLE), SamplingPlanner(ROBOT, AISLE)
     scene = constraints([((3.0, 0.0), (-0.5, 0.2), 0.6)])
     for x in (1.0, 2.0, -1.0):

@@ -1,4 +1,4 @@
-"""The mathematics under the reference planner, against quadrature and exact geometry."""
+"""The mathematics of the reference planner, against quadrature and exact geometry."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
+from sim_tests.crossing.planner._detour import detour_bearing_rad
 from sim_tests.crossing.planner._rollout import (
     Poses,
-    detour_bearing_rad,
     follow_arcs,
     ramp_integral,
     stopping_integral,
@@ -66,8 +66,6 @@ def test_follow_arcs_is_exact_for_a_constant_twist(speed: float, yaw_rate: float
 
 
 pose_data = st.tuples(st.floats(-2, 2), st.floats(-2, 2), st.floats(-4, 4))
-
-
 coordinate = st.floats(-4.0, 4.0)
 
 
@@ -80,7 +78,7 @@ def rectangle(x: float, y: float, heading: float) -> tuple[Rectangles, shapely.P
 
 
 @given(pose_data, coordinate, coordinate, st.floats(0.1, 1.5))
-def test_disc_gap_is_the_distance(
+def test_the_disc_gap_is_the_distance(
     pose: tuple[float, float, float], x: float, y: float, radius: float
 ) -> None:
     rectangles, polygon = rectangle(*pose)
@@ -89,7 +87,7 @@ def test_disc_gap_is_the_distance(
 
 
 @given(pose_data, coordinate, coordinate, st.floats(0.1, 2.0), st.floats(0.1, 2.0))
-def test_box_gap_is_never_more_than_the_distance(
+def test_the_box_gap_is_a_lower_bound_of_the_distance(
     pose: tuple[float, float, float], x: float, y: float, length: float, width: float
 ) -> None:
     rectangles, polygon = rectangle(*pose)
@@ -98,7 +96,7 @@ def test_box_gap_is_never_more_than_the_distance(
 
 
 @given(pose_data)
-def test_box_gap_is_the_distance_along_a_wall(pose: tuple[float, float, float]) -> None:
+def test_the_box_gap_is_the_distance_along_a_wall(pose: tuple[float, float, float]) -> None:
     rectangles, polygon = rectangle(*pose)
     wall = np.array([[-9.0, 3.0, 9.0, 4.0]])
     gap = float(box_gap_m(rectangles, wall))
@@ -106,17 +104,17 @@ def test_box_gap_is_the_distance_along_a_wall(pose: tuple[float, float, float]) 
 
 
 @given(coordinate, coordinate, st.floats(-1.6, 1.6), st.floats(-1.6, 1.6), st.floats(0.0, 2.0))
-def test_strip_distance_is_the_distance_to_the_way_ahead(
+def test_the_strip_distance_is_the_distance_to_the_path_ahead(
     x: float, y: float, vx: float, vy: float, ahead_s: float
 ) -> None:
     assume(math.hypot(vx, vy) * ahead_s > 1e-6)
-    way = shapely.LineString([(0.0, 0.0), (vx * ahead_s, vy * ahead_s)])
+    path = shapely.LineString([(0.0, 0.0), (vx * ahead_s, vy * ahead_s)])
     distance = strip_distance_m(*(np.asarray(value) for value in (x, y, vx, vy)), ahead_s)
-    assert float(distance) == pytest.approx(way.distance(shapely.Point(x, y)), abs=1e-5)
+    assert float(distance) == pytest.approx(path.distance(shapely.Point(x, y)), abs=1e-5)
 
 
 @given(st.floats(-3, 3), st.floats(0.5, 5.0), st.floats(-math.pi, math.pi), st.floats(0.2, 2.0))
-def test_a_detour_leaves_what_hides_the_goal_by_the_nearer_side(
+def test_a_detour_passes_a_disc_in_front_of_the_goal_on_the_nearer_side(
     goal_bearing: float, distance: float, bearing: float, radius: float
 ) -> None:
     disc = (distance * math.cos(bearing), distance * math.sin(bearing), radius)
@@ -135,7 +133,7 @@ def test_a_detour_leaves_what_hides_the_goal_by_the_nearer_side(
         assert turn <= half_angle + 0.05 + 1e-7  # up to the preference for the right
 
 
-def test_a_detour_takes_the_side_that_boxes_leave_open_and_none_if_both_are_closed() -> None:
+def test_a_detour_takes_the_free_side_and_none_if_both_are_blocked() -> None:
     disc = (3.0, 0.0, 1.0)
     half_angle = math.asin(1.0 / 3.0)
     assert detour_bearing_rad(0.0, 6.0, [disc], lambda _x, _y: True) == pytest.approx(-half_angle)

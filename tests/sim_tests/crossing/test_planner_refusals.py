@@ -1,4 +1,4 @@
-"""What the reference planner and its settings refuse, and how they say so."""
+"""Arguments and settings that the reference planner refuses, with their messages."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from pydantic import ValidationError
 
 from nav_adapter import NavConstraints, RobotProfile, RobotState
 from sim_tests import SimError
-from sim_tests.crossing.planner import SamplingPlanner
-from sim_tests.crossing.planner._config import PlannerConfig
+from sim_tests.crossing.planner import PlannerConfig, SamplingPlanner
 
 OUTLINE_M = np.array([[0.36, 0.25], [-0.36, 0.25], [-0.36, -0.25], [0.36, -0.25]])
 ROBOT = RobotProfile(OUTLINE_M, 1.5, 1.0, 1.0, 0.3)
@@ -38,7 +37,7 @@ def test_unusable_boxes_are_refused_by_name(boxes: list[list[float]]) -> None:
         SamplingPlanner(ROBOT, boxes)
 
 
-def test_weights_that_freeze_a_robot_facing_away_are_refused() -> None:
+def test_weights_with_which_a_robot_never_turns_to_its_goal_are_refused() -> None:
     with pytest.raises(ValidationError, match="heading_weight"):
         PlannerConfig(heading_weight=0.05)
 

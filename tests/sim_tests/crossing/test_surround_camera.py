@@ -1,9 +1,10 @@
-"""A camera that looks all around: a rendered panorama, and crossings with it."""
+"""A camera with a view in all directions: a rendered panorama, and crossings with it."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -15,17 +16,15 @@ from pydantic import ValidationError
 from perception import AttentionCone, Camera, FloorPlane
 from perception.surround import PanoramaLens, SurroundPipeline, ring_of_views
 from sim_tests import CameraRenderer, Scenario, SimError, run_crossing
-from sim_tests.crossing import Stage
-from sim_tests.crossing.eyes import KeypointNoise, _eyes, make_eyes
-from sim_tests.crossing.eyes._eyes import Eyes, SurroundEyes
+from sim_tests.crossing import CrossingResult, Stage
+from sim_tests.crossing.eyes import Eyes, KeypointNoise, SurroundEyes, make_eyes
 from sim_tests.scenario import CameraSpec, ScenarioTemplate, shipped_templates
 from sim_tests.search._templates import named_templates
 from sim_tests.study.runs import plan_jobs
-from sim_tests.study.runs._plan import template_of
 
 CONE = AttentionCone()
-# Three workers about the robot: ahead on the left border of two views, behind across the seam of a
-# panorama, and to the right, who looks away.
+# Three workers around the robot: ahead at the left, at the border of two views; behind, across the
+# seam of a panorama; and to the right, looking away.
 THREE = """
 name: three_around
 description: Three workers stand around the robot.
@@ -53,7 +52,7 @@ def scenario(tmp_path_factory: pytest.TempPathFactory) -> Scenario:
 
 
 def panorama(stage: Stage, T_odom_camera: np.ndarray, width_px: int) -> np.ndarray:
-    """The whole sphere as a 360° camera gives it, put together from the six faces of a cube."""
+    """Return the image of a 360° camera, composed of the six faces of a cube."""
     size = width_px // 3
     face = Camera.from_fov(size, size, 0.5 * math.pi)
     renderer = CameraRenderer(stage.warehouse)
@@ -63,7 +62,7 @@ def panorama(stage: Stage, T_odom_camera: np.ndarray, width_px: int) -> np.ndarr
     rays = np.stack(
         [np.sin(heading) * np.cos(down), np.sin(down), np.cos(heading) * np.cos(down)], axis=-1
     )
-    picture = np.zeros((*heading.shape, 3), np.uint8)
+    image = np.zeros((*heading.shape, 3), np.uint8)
     turns = [
         view.rotation_camera_view for view in ring_of_views(face, np.radians([0, 90, 180, -90]))
     ]
@@ -77,19 +76,19 @@ def panorama(stage: Stage, T_odom_camera: np.ndarray, width_px: int) -> np.ndarr
         u, v = (each.reshape(here.shape) for each in pixels.T)
         drawn = renderer.render(face, T).rgb
         flat = cv2.remap(drawn, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        picture[here] = flat[here]
-    return picture
+        image[here] = flat[here]
+    return image
 
 
-def test_the_shipped_networks_find_everybody_in_a_panorama(scenario: Scenario) -> None:
+def test_the_shipped_networks_detect_all_people_in_a_panorama(scenario: Scenario) -> None:
     lens = PanoramaLens(2400, 1200)
     flat = Camera.from_fov(1092, 828, math.radians(110.0))
     pipeline = SurroundPipeline(lens, ring_of_views(flat, np.radians([0, 90, 180, -90])))
     with Stage(scenario, np.zeros(3)) as stage:
         T_odom_camera = stage.amr.T_odom_camera
         truth = stage.truth(CONE, T_odom_camera)
-        picture = panorama(stage, T_odom_camera, lens.width_px)
-        seen = pipeline.process(picture, 0.0, FloorPlane.from_pose(T_odom_camera))
+        image = panorama(stage, T_odom_camera, lens.width_px)
+        seen = pipeline.process(image, 0.0, FloorPlane.from_pose(T_odom_camera))
     assert len(seen) == 3
     for known, seam in zip(truth, (False, True, False), strict=True):
         nearest = min(
@@ -109,7 +108,7 @@ def test_the_shipped_networks_find_everybody_in_a_panorama(scenario: Scenario) -
             assert nearest.awareness is None or nearest.awareness < 0.2
 
 
-def test_a_surround_camera_sees_everybody_once_and_nobody_else(scenario: Scenario) -> None:
+def test_a_surround_camera_reports_each_person_once_and_nobody_else(scenario: Scenario) -> None:
     noise = KeypointNoise(miss_rate=0.0)
     with Stage(scenario, np.zeros(3)) as stage:
         camera = scenario.camera.camera()
@@ -125,12 +124,12 @@ def test_a_surround_camera_sees_everybody_once_and_nobody_else(scenario: Scenari
                 away = observation.position_camera_m - truth[worker].position_camera_m
                 spread = observation.position_covariance_m2 + 0.1**2 * np.eye(3)
                 assert away @ np.linalg.solve(spread, away) < 25.0
-            # Who looks at the robot is seen to, from whichever view.
+            # The two who look at the robot are observed as aware, from any view.
             assert all((seen[worker].awareness or 0.0) > 0.7 for worker in (0, 1))
 
 
-class Noted:
-    """Eyes of one view, with a note of whom they have seen in this frame."""
+class RecordedEyes:
+    """Eyes of one view that record the workers they have seen in this frame."""
 
     def __init__(self, eyes: Eyes, shown: list[int]) -> None:
         self._eyes, self._shown = eyes, shown
@@ -141,30 +140,39 @@ class Noted:
         return rows
 
 
+@lru_cache(maxsize=2)
+def run_counted(name: str) -> tuple[CrossingResult, Counter[str]]:
+    """Run a crossing with the surround camera; count what its views show and it reports."""
+    tally: Counter[str] = Counter()
+    shown: list[int] = []
+    make, observe = SurroundEyes.__init__, SurroundEyes.observe
+
+    def make_recorded(self: SurroundEyes, views: Any, eyes: Any) -> None:
+        make(self, views, [RecordedEyes(each, shown) for each in eyes])
+
+    def observe_counted(self: SurroundEyes, *frame: Any) -> Any:
+        shown.clear()
+        rows = observe(self, *frame)
+        in_views, reported = Counter(shown), Counter(worker for _, worker in rows)
+        tally["in several views"] += len(shown) - len(in_views)
+        tally["twice"] += sum(reported.values()) - len(reported)
+        tally["seen"] += len(in_views)
+        tally["lost"] += len(in_views.keys() - reported.keys())
+        return rows
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(SurroundEyes, "__init__", make_recorded)
+        patch.setattr(SurroundEyes, "observe", observe_counted)
+        template = ScenarioTemplate.shipped(name).with_camera("surround")
+        result = run_crossing(template.for_seed(0), policy="balanced", perception="keypoints")
+    return result, tally
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["crowd_of_eight", "standing_in_aisle"])
-def test_in_a_crossing_everybody_is_seen_once(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whom several views show is reported once, and whom one shows is not lost, save rarely."""
-    tally: Counter[str] = Counter()
-
-    class Counted(SurroundEyes):
-        def __init__(self, views: Any, eyes: Any) -> None:
-            self._shown: list[int] = []
-            super().__init__(views, [Noted(each, self._shown) for each in eyes])
-
-        def observe(self, *frame: Any) -> Any:
-            self._shown.clear()
-            rows = super().observe(*frame)
-            shown, told = Counter(self._shown), Counter(worker for _, worker in rows)
-            tally["in several views"] += len(self._shown) - len(shown)
-            tally["twice"] += sum(told.values()) - len(told)
-            tally["seen"] += len(shown)
-            tally["lost"] += len(shown.keys() - told.keys())
-            return rows
-
-    monkeypatch.setattr(_eyes, "SurroundEyes", Counted)
-    template = ScenarioTemplate.shipped(name).with_camera("surround")
-    result = run_crossing(template.for_seed(0), policy="balanced", perception="keypoints")
+def test_in_a_crossing_each_person_is_reported_once(name: str) -> None:
+    """People in several views are reported once, and people in one view are rarely lost."""
+    result, tally = run_counted(name)
     assert result.success
     assert tally["in several views"] > 50
     assert tally["twice"] <= 0.02 * tally["in several views"]
@@ -172,26 +180,26 @@ def test_in_a_crossing_everybody_is_seen_once(name: str, monkeypatch: pytest.Mon
 
 
 @pytest.mark.slow
-def test_who_has_passed_is_still_seen() -> None:
-    """A worker beside and behind the robot leaves the field of the camera ahead, not of this."""
-    template = ScenarioTemplate.shipped("standing_in_aisle")
-    behind = {}
-    for camera in ("forward", "surround"):
-        result = run_crossing(
-            template.with_camera(camera).for_seed(0), policy="balanced", perception="keypoints"
-        )
-        behind[camera] = sum(
+def test_a_person_behind_the_robot_is_still_observed() -> None:
+    """A worker behind the robot is outside the view of the forward camera, not of this one."""
+    template = ScenarioTemplate.shipped("standing_in_aisle").with_camera("forward")
+    forward = run_crossing(template.for_seed(0), policy="balanced", perception="keypoints")
+    surround, _ = run_counted("standing_in_aisle")
+    behind = [
+        sum(
             observation.position_camera_m[2] < 0.0
             for frame in result.frames
             for observation in frame.observations
         )
-    assert behind["forward"] == 0
-    assert behind["surround"] > 20
+        for result in (forward, surround)
+    ]
+    assert behind[0] == 0
+    assert behind[1] > 20
 
 
 def test_the_camera_of_a_scenario_can_be_replaced(tmp_path: Path) -> None:
     for template in shipped_templates():
-        if template.name != "paper_encounter":  # which has a camera of its own
+        if template.name != "paper_encounter":  # it has a camera of its own
             assert template.with_camera("forward").median() == template.median()
         assert template.with_camera("") is template
         around = template.with_camera("surround")
@@ -210,14 +218,14 @@ def test_the_camera_of_a_scenario_can_be_replaced(tmp_path: Path) -> None:
         template.with_camera(str(own))
 
 
-def test_all_plans_take_a_camera() -> None:
+def test_runs_and_searches_accept_a_camera() -> None:
     jobs = plan_jobs(["runs_out"], ["blind"], [0], camera="surround")
-    assert template_of(jobs[0].scenario).median().camera.mount == "top"
+    assert ScenarioTemplate.from_text(jobs[0].scenario).median().camera.mount == "top"
     (template,) = named_templates(["runs_out"], "surround")
     assert template.median().camera.mount == "top"
 
 
-def test_views_that_cannot_be_are_refused() -> None:
+def test_impossible_views_are_refused() -> None:
     with pytest.raises(ValidationError, match=r"must begin with 0, straight ahead, got \[90"):
         CameraSpec(views_deg=(90.0, 0.0))
     with pytest.raises(ValidationError, match=r"must lie in \[-180, 180\]"):

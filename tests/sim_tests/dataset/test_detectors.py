@@ -1,4 +1,4 @@
-"""Networks trained on photographs of people find the rendered workers, and nobody else."""
+"""Networks trained on photographs of people detect the rendered workers, and nothing else."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ MAX_FALSE_SHARE = 0.03
 
 
 @dataclass(frozen=True)
-class Picture:
+class LabelledImage:
     image_rgb: np.ndarray
-    everyone: np.ndarray  # (N, 4) boxes of all who show
-    clear: np.ndarray  # (M, 4) boxes of those at most a fifth hidden
+    visible_boxes: np.ndarray  # (N, 4) all people
+    clear_boxes: np.ndarray  # (M, 4) people of whom less than a fifth is hidden
     looks: tuple[str, ...]
 
 
 @pytest.fixture(scope="module")
-def pictures() -> list[Picture]:
-    taken = []
+def images() -> list[LabelledImage]:
+    images = []
     frame = 0
     for number in range(CONFIG.scene_count):
         with RenderScene(CONFIG, number) as scene:
@@ -35,8 +35,8 @@ def pictures() -> list[Picture]:
                 image, record = scene.snapshot(frame)
                 people = record["people"]
                 clear = [p for p in people if p["occlusion"] < MAX_OCCLUSION]
-                taken.append(
-                    Picture(
+                images.append(
+                    LabelledImage(
                         image,
                         np.array([p["box_xyxy_px"] for p in people]).reshape(-1, 4),
                         np.array([p["box_xyxy_px"] for p in clear]).reshape(-1, 4),
@@ -44,31 +44,31 @@ def pictures() -> list[Picture]:
                     )
                 )
                 frame += 1
-    return taken
+    return images
 
 
 @pytest.mark.parametrize("name", REQUIRED)
-def test_a_network_that_never_saw_a_render_finds_the_workers(
-    name: str, pictures: list[Picture]
+def test_a_network_trained_on_photographs_detects_the_workers(
+    name: str, images: list[LabelledImage]
 ) -> None:
     if not (MODELS / f"{name}.onnx").is_file():
         pytest.skip(f"needs {name}.onnx in the folder of genuine models")
     detector = GenuineDetector(name)
     found = wanted = false_frames = 0
-    for picture in pictures:
-        people = detector.people(picture.image_rgb, least_score=LEAST_SCORE)
-        for box in picture.clear:
+    for image in images:
+        people = detector.people(image.image_rgb, least_score=LEAST_SCORE)
+        for box in image.clear_boxes:
             wanted += 1
             found += bool((iou(people.boxes_xyxy_px, box) >= 0.5).any())
         sure = people.boxes_xyxy_px[people.scores >= 0.5]
-        false_frames += any(iou(picture.everyone, box).max(initial=0.0) < 0.5 for box in sure)
+        false_frames += any(iou(image.visible_boxes, box).max(initial=0.0) < 0.5 for box in sure)
     assert wanted >= 100
     assert found / wanted >= REQUIRED[name], f"{name} finds {found} of {wanted} workers"
-    assert false_frames / len(pictures) <= MAX_FALSE_SHARE, (
-        f"{name} sees people who are not there in {false_frames} of {len(pictures)} pictures"
+    assert false_frames / len(images) <= MAX_FALSE_SHARE, (
+        f"{name} has false detections in {false_frames} of {len(images)} images"
     )
 
 
-def test_every_worker_is_among_them(pictures: list[Picture]) -> None:
-    seen = {look for picture in pictures for look in picture.looks}
+def test_every_shipped_worker_appears(images: list[LabelledImage]) -> None:
+    seen = {look for image in images for look in image.looks}
     assert seen == set(worker_names())

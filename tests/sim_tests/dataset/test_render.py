@@ -1,4 +1,4 @@
-"""``awarenav render``: reproducible, resumable, and true to its pictures."""
+"""``awarenav render``: reproducible, resumable, and with a truth that matches its images."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ from awarenav.cli import main
 from awarenav.records import read_records
 from perception import Camera
 from sim_tests import SimError
-from sim_tests.dataset import RenderConfig, RenderScene, render
-from sim_tests.dataset._config import picture_size
+from sim_tests.dataset import RenderConfig, RenderScene, parse_image_size, render
 
 CONFIG = RenderConfig(frames=8, scenes=3, people=2, width_px=192, height_px=144, seed=5)
 
@@ -30,7 +29,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {entry.name: entry.read_bytes() for entry in folder.iterdir()}
 
 
-def test_the_same_settings_give_the_same_bytes_with_any_number_of_processes(
+def test_the_same_settings_give_the_same_bytes_for_any_number_of_processes(
     rendered: Path, tmp_path: Path
 ) -> None:
     render(CONFIG, tmp_path, processes=2, progress=False)
@@ -42,38 +41,38 @@ def test_an_interrupted_run_is_continued_to_the_same_bytes(rendered: Path, tmp_p
     for name, data in whole.items():
         (tmp_path / name).write_bytes(data)
     lines = (rendered / "truth.jsonl").read_text("utf-8").splitlines(keepends=True)
-    # Killed in the middle of a line, with a picture that nothing is written about yet.
+    # Killed in the middle of a line, with an image that has no line yet.
     (tmp_path / "truth.jsonl").write_text("".join(lines[:4]) + lines[5][:60], "utf-8")
     (tmp_path / "000001.png").unlink()
-    kept = (tmp_path / "000003.png").stat().st_mtime_ns
+    modified_ns = (tmp_path / "000003.png").stat().st_mtime_ns
     render(CONFIG, tmp_path, processes=1, progress=False)
     assert contents(tmp_path) == whole
-    assert (tmp_path / "000003.png").stat().st_mtime_ns == kept
+    assert (tmp_path / "000003.png").stat().st_mtime_ns == modified_ns
 
 
-def test_a_folder_with_other_pictures_is_left_alone(rendered: Path) -> None:
+def test_a_folder_with_images_of_other_settings_is_left_alone(rendered: Path) -> None:
     before = contents(rendered)
     with pytest.raises(SimError, match=r"other settings \(seed: 5, asked for 6\)"):
         render(CONFIG.model_copy(update={"seed": 6}), rendered, progress=False)
     assert contents(rendered) == before
 
 
-def test_a_file_of_somebody_else_is_not_overwritten(tmp_path: Path) -> None:
+def test_a_truth_file_without_settings_is_not_overwritten(tmp_path: Path) -> None:
     (tmp_path / "truth.jsonl").write_text("mine\n", "utf-8")
     with pytest.raises(SimError, match="another folder"):
         render(CONFIG, tmp_path, progress=False)
     assert (tmp_path / "truth.jsonl").read_text("utf-8") == "mine\n"
 
 
-def test_truth_agrees_with_itself_and_with_the_pictures(rendered: Path) -> None:
+def test_the_truth_is_consistent_and_matches_the_images(rendered: Path) -> None:
     camera = Camera.from_yaml(rendered / "camera.yaml")
     records = read_records(rendered / "truth.jsonl")
     assert [record["frame"] for record in records] == [f"{k:06d}.png" for k in range(8)]
     people = 0
     for record in records:
-        picture = cv2.imread(str(rendered / record["frame"]))
-        assert picture is not None
-        assert picture.shape == (144, 192, 3)
+        image = cv2.imread(str(rendered / record["frame"]))
+        assert image is not None
+        assert image.shape == (144, 192, 3)
         T = np.array(record["T_odom_camera"])
         assert T[:3, :3] @ T[:3, :3].T == pytest.approx(np.eye(3), abs=1e-5)
         for person in record["people"]:
@@ -103,7 +102,7 @@ def test_truth_agrees_with_itself_and_with_the_pictures(rendered: Path) -> None:
     assert people >= 8
 
 
-def test_nobody_is_aware_who_faces_away(rendered: Path) -> None:
+def test_a_person_who_looks_away_is_unaware(rendered: Path) -> None:
     people = [p for r in read_records(rendered / "truth.jsonl") for p in r["people"]]
     for person in people:
         nose = np.array(person["keypoints_camera_m"]["nose"])
@@ -115,12 +114,12 @@ def test_nobody_is_aware_who_faces_away(rendered: Path) -> None:
             assert person["awareness"] == pytest.approx(expected, abs=0.12)
 
 
-def test_the_command_renders_and_says_where(
+def test_the_command_renders_and_prints_the_folder(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     arguments = ["--frames", "2", "--size", "96x72", "--seed", "3", "--processes", "1"]
     assert main(["render", *arguments, "--out", str(tmp_path / "set")]) == 0
-    assert "2 pictures" in capsys.readouterr().out
+    assert "2 images" in capsys.readouterr().out
     assert {entry.name for entry in (tmp_path / "set").iterdir()} == {
         "000000.png",
         "000001.png",
@@ -150,17 +149,17 @@ def test_settings_out_of_range_are_refused_by_name(
     assert not (tmp_path / "x").exists()
 
 
-def test_ranges_longer_than_the_hall_are_refused() -> None:
+def test_ranges_beyond_the_size_of_the_hall_are_refused() -> None:
     far = CONFIG.model_copy(update={"min_range_m": 29.0, "max_range_m": 30.0})
     with RenderScene(far, 0) as scene, pytest.raises(SimError, match="29 to 30 m"):
         scene.snapshot(0)
 
 
-def test_sizes_are_read() -> None:
-    assert picture_size("1280x720") == (1280, 720)
+def test_an_image_size_is_parsed() -> None:
+    assert parse_image_size("1280x720") == (1280, 720)
 
 
-def test_pictures_are_spread_over_the_scenes() -> None:
+def test_images_are_spread_evenly_over_the_scenes() -> None:
     config = RenderConfig(frames=50, scenes=7)
     scenes = [config.scene_of(frame) for frame in range(50)]
     assert scenes == sorted(scenes)

@@ -1,4 +1,4 @@
-"""The networks in the box on people, clothes and halls that they have never seen."""
+"""The shipped networks on people, clothes and halls outside their training data."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FRAMES = 100
 
 @pytest.fixture(scope="module")
 def held_out(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Rendered frames and what the shipped networks make of them."""
+    """A folder of rendered images and the estimates of the shipped networks."""
     folder = tmp_path_factory.mktemp("held_out")
     size = ["--frames", str(FRAMES), "--scenes", "10", "--range", "1.5", "6", "--eyes", "ahead"]
     halls = ["--layouts", "crossing", "staging_hall", "--seed", "77"]
@@ -28,12 +28,12 @@ def held_out(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_the_figures_of_the_model_cards_hold_on_a_sample(held_out):
+def test_the_shipped_networks_reach_the_figures_of_their_model_cards_on_a_sample(held_out):
     report = judge_files(held_out / "truth.jsonl", held_out / "seen.jsonl")
     overall = report["overall"]
     assert overall["people"] >= 100
     assert report["detection"]["ap50"] >= 0.97
-    # Medians of a hundred people scatter about those of nine hundred, which have 5°, 15° and 4 %.
+    # The model cards have 5°, 15° and 4 % for nine hundred people; a hundred scatter more.
     assert overall["head_median_deg"] <= 6.0
     assert overall["head_p90_deg"] <= 18.0
     assert overall["position_median"] <= 0.05
@@ -41,7 +41,7 @@ def test_the_figures_of_the_model_cards_hold_on_a_sample(held_out):
     assert overall["false_aware"] <= 0.02
 
 
-def test_nobody_is_seen_in_an_empty_hall_or_on_a_grey_picture():
+def test_nobody_is_detected_in_images_without_people():
     camera = Camera.from_fov(640, 480, np.radians(60.0))
     pipeline = AwarenessPipeline(camera)
     rng = np.random.default_rng(0)
@@ -53,7 +53,7 @@ def test_nobody_is_seen_in_an_empty_hall_or_on_a_grey_picture():
         assert pipeline.process(image, 0.0) == ()
 
 
-def test_estimates_without_a_face_are_not_aware(held_out):
+def test_people_seen_from_behind_are_never_estimated_as_aware(held_out):
     truth = {record["frame"]: record["people"] for record in read_records(held_out / "truth.jsonl")}
     backs = 0
     for line in (held_out / "seen.jsonl").read_text().splitlines():
@@ -64,8 +64,8 @@ def test_estimates_without_a_face_are_not_aware(held_out):
                 if np.abs(np.array(known["box_xyxy_px"]) - box).max() > 12:
                     continue
                 forward = np.array(known["head_forward_camera"])
-                way = np.array(known["position_camera_m"])
-                cosine = forward @ way / np.linalg.norm(way)
+                position = np.array(known["position_camera_m"])
+                cosine = forward @ position / np.linalg.norm(position)
                 if cosine > np.cos(np.radians(45.0)):  # looks away from the camera
                     backs += 1
                     assert person["awareness"] is None or person["awareness"] < 0.2

@@ -5,38 +5,38 @@ from PIL import Image
 from awarenav.cli import main
 from sim_tests import ScenarioTemplate, SimError, run_crossing, shipped_scenarios
 from sim_tests.actors.behaviour import PersonSpec
-from sim_tests.scenario._scenario import RobotTask
-from sim_tests.scenario.catalogue._checks import (
+from sim_tests.scenario import RobotTask
+from sim_tests.scenario.catalogue import (
+    approach_statistics,
     closest_approaches,
-    meetings,
     person_plan,
-    problems,
     robot_plan,
+    scenario_problems,
+    template_problems,
 )
-from sim_tests.scenario.catalogue._show import template_problems
 
-# Their scripted people stop beside the robot's way on purpose.
+# Their scripted people stop beside the robot's path on purpose.
 BESIDE = {"crossing_attentive", "crossing_distracted", "paper_encounter"}
 
 
 @pytest.mark.parametrize("name", sorted(set(shipped_scenarios()) - BESIDE))
-def test_robot_and_people_would_meet_if_nobody_reacted(name):
-    met = meetings(ScenarioTemplate.shipped(name), 200)
-    assert met is not None
-    assert met.share >= 0.8
-    # Not at the start, before anybody could react, unless somebody comes from behind.
-    assert met.median_s > 2.0
+def test_robot_and_people_would_come_close_if_nobody_reacted(name):
+    statistics = approach_statistics(ScenarioTemplate.shipped(name), 200)
+    assert statistics is not None
+    assert statistics.conflict_share >= 0.8
+    # Not at the start, before anybody could react.
+    assert statistics.median_time_s > 2.0
 
 
 @pytest.mark.parametrize("name", shipped_scenarios())
-def test_shipped_scenarios_can_be_acted_out(name):
+def test_shipped_scenarios_can_be_run(name):
     template = ScenarioTemplate.shipped(name)
     assert template_problems(template) == ()
     assert template.median().duration_s <= 40.0
 
 
 @pytest.mark.parametrize("name", sorted(set(shipped_scenarios()) - BESIDE))
-def test_attention_says_who_looks(name):
+def test_the_attention_label_matches_how_people_look(name):
     template = ScenarioTemplate.shipped(name)
     people = template.median().people
     if template.attention == "attentive":
@@ -47,7 +47,7 @@ def test_attention_says_who_looks(name):
         assert any(each.glances.notices_within_m > 0.0 for each in people)
 
 
-def test_left_and_right_are_mirror_images():
+def test_crossings_from_left_and_right_are_mirror_images():
     left, right = (
         ScenarioTemplate.shipped(f"crossing_from_{side}").for_seed(11).people[0]
         for side in ("left", "right")
@@ -57,10 +57,10 @@ def test_left_and_right_are_mirror_images():
     assert right.model_copy(update={"route": mirrored}) == left
 
 
-def test_the_plans_are_those_of_uniform_motion():
+def test_plans_follow_uniform_motion():
     t_s = np.array([0.0, 1.0, 1.5, 3.5, 100.0])
     robot = robot_plan(RobotTask(goal_x_m=6.0, goal_y_m=8.0), t_s)
-    # At 1 m/s² to 1.5 m/s, then evenly, along a line of slope 4/3.
+    # At 1 m/s² to 1.5 m/s, then at constant speed, along a line of slope 4/3.
     along = np.array([0.0, 0.5, 1.125, 4.125, 10.0])
     np.testing.assert_allclose(robot, along[:, None] * [0.6, 0.8], atol=1e-12)
 
@@ -69,18 +69,18 @@ def test_the_plans_are_those_of_uniform_motion():
         name="a", route=route, speed_mps=2.0, start_s=1.0, pauses=({"at_m": 3.0, "for_s": 2.0},)
     )
     times = np.array([0.0, 1.5, 2.5, 4.4, 5.5, 9.0])
-    way, walked = person_plan(spec, times)
+    path, walked = person_plan(spec, times)
     np.testing.assert_allclose(walked, [0, 1, 3, 3, 5, 8])
-    np.testing.assert_allclose(way, [[0, 0], [1, 0], [3, 0], [3, 0], [4, 1], [4, 4]])
+    np.testing.assert_allclose(path, [[0, 0], [1, 0], [3, 0], [3, 0], [4, 1], [4, 4]])
 
     back = spec.model_copy(update={"turns_back_at_m": 5.0, "pauses": ()})
-    way, walked = person_plan(back, np.array([3.5, 4.5, 9.0]))
-    np.testing.assert_allclose(way, [[4, 1], [3, 0], [0, 0]])
+    path, walked = person_plan(back, np.array([3.5, 4.5, 9.0]))
+    np.testing.assert_allclose(path, [[4, 1], [3, 0], [0, 0]])
     np.testing.assert_allclose(walked, [5, 7, 10])
 
 
-def test_the_closest_approach_is_that_of_the_closed_form():
-    # Both at even speed on perpendicular lines: distance = delay · v_r v_p / √(v_r² + v_p²).
+def test_the_closest_approach_agrees_with_the_closed_form():
+    # Both at constant speed on perpendicular lines: distance = delay · v_r v_p / √(v_r² + v_p²).
     data = {
         "name": "a",
         "duration_s": 30.0,
@@ -97,38 +97,39 @@ def test_the_closest_approach_is_that_of_the_closed_form():
     }
     delay_s = (6.0 / 1.5 + 0.75) - (2.0 + 4.0 / 1.2)
     expected = abs(delay_s) * 1.5 * 1.2 / np.hypot(1.5, 1.2)
-    apart, _ = closest_approaches(ScenarioTemplate(data).median())["p"]
-    assert apart == pytest.approx(expected, abs=1e-3)
+    distance, _ = closest_approaches(ScenarioTemplate(data).median())["p"]
+    assert distance == pytest.approx(expected, abs=1e-3)
 
 
-def _changed(name, **person):
+def changed(name, **person):
     data = ScenarioTemplate.shipped(name).median().model_dump()
     data["people"][0].update(person)
     return ScenarioTemplate(data).median()
 
 
-def test_impossible_places_are_named():
-    inside = _changed("crossing_from_left", route=({"x_m": 0, "y_m": 2.4}, {"x_m": 7.8, "y_m": 0}))
-    assert any("route point 0 at (0, 2.4) m is in" in each for each in problems(inside))
-    through = _changed("crossing_from_left", route=({"x_m": 0, "y_m": 0}, {"x_m": 0, "y_m": 4}))
-    assert any("from route point 0 to 1 leads through" in each for each in problems(through))
-    outside = _changed("crossing_from_left", route=({"x_m": 99, "y_m": 0},))
-    assert any("outside the hall" in each for each in problems(outside))
+def test_impossible_positions_are_reported():
+    inside = changed("crossing_from_left", route=({"x_m": 0, "y_m": 2.4}, {"x_m": 7.8, "y_m": 0}))
+    assert any("route point 0 at (0, 2.4) m is in" in each for each in scenario_problems(inside))
+    through = changed("crossing_from_left", route=({"x_m": 0, "y_m": 0}, {"x_m": 0, "y_m": 4}))
+    found = scenario_problems(through)
+    assert any("from route point 0 to 1 leads through" in each for each in found)
+    outside = changed("crossing_from_left", route=({"x_m": 99, "y_m": 0},))
+    assert any("outside the hall" in each for each in scenario_problems(outside))
     replay = inside.model_copy(update={"people": (), "replay_csv": "nowhere.csv"})
-    assert problems(replay) == ("replay_csv: there is no file nowhere.csv",)
+    assert scenario_problems(replay) == ("replay_csv: there is no file nowhere.csv",)
 
 
-def test_list_names_them_all(capsys):
+def test_list_shows_every_scenario(capsys):
     assert main(["scenario", "list"]) == 0
-    said = capsys.readouterr().out
-    assert all(f"{name}@1" in said for name in shipped_scenarios())
+    output = capsys.readouterr().out
+    assert all(f"{name}@1" in output for name in shipped_scenarios())
 
 
-def test_show_says_what_varies_and_writes_yaml_to_start_from(capsys, tmp_path):
+def test_show_describes_what_varies_and_writes_yaml_that_can_be_read_back(capsys, tmp_path):
     assert main(["scenario", "show", "stops_midway"]) == 0
-    said = capsys.readouterr().out
-    assert "people.0.pauses.0.for_s" in said
-    assert "of 200 draws" in said
+    output = capsys.readouterr().out
+    assert "people.0.pauses.0.for_s" in output
+    assert "of 200 draws" in output
     assert main(["scenario", "show", "stops_midway", "--yaml"]) == 0
     path = tmp_path / "mine.yaml"
     path.write_text(capsys.readouterr().out)
@@ -140,23 +141,23 @@ def test_show_says_what_varies_and_writes_yaml_to_start_from(capsys, tmp_path):
     assert main(["scenario", "show", "stops_midway", "--seed", "4"]) == 2
 
 
-def test_validate_tells_good_files_from_bad_ones(capsys, tmp_path):
+def test_validate_accepts_good_files_and_reports_bad_ones(capsys, tmp_path):
     good, bad, idle = (tmp_path / f"{name}.yaml" for name in ("good", "bad", "idle"))
     text = ScenarioTemplate.shipped("reads_phone").to_text()
     good.write_text(text)
     bad.write_text(text.replace("x_m: 7.8", "x_m: 70.8"))
     idle.write_text(text.replace("low: 0.0", "low: 18.0").replace("high: 1.0", "high: 19.0"))
     assert main(["scenario", "validate", str(good), str(idle)]) == 0
-    said = capsys.readouterr().out
-    assert "reads_phone@1, 2 numbers vary: can be run" in said
-    assert "in 0% of 100 draws: it hardly tests the robot" in said
+    output = capsys.readouterr().out
+    assert "reads_phone@1, 2 numbers vary: can be run" in output
+    assert "in 0% of 100 draws: it hardly tests the robot" in output
     assert main(["scenario", "validate", str(good), str(bad)]) == 2
-    said = capsys.readouterr().out
-    assert "outside the hall" in said
-    assert said.count("route point 0") == 1
+    output = capsys.readouterr().out
+    assert "outside the hall" in output
+    assert output.count("route point 0") == 1
 
 
-def test_drawings_are_small_and_the_same_each_time(tmp_path, capsys):
+def test_drawings_are_small_and_reproducible(tmp_path, capsys):
     names = ["crowd_of_eight", "intersection"]
     for folder in ("one", "two"):
         assert main(["scenario", "draw", *names, "--out", str(tmp_path / folder)]) == 0
@@ -164,9 +165,9 @@ def test_drawings_are_small_and_the_same_each_time(tmp_path, capsys):
         first, second = (tmp_path / folder / f"{name}.png" for folder in ("one", "two"))
         assert first.read_bytes() == second.read_bytes()
         assert first.stat().st_size < 40_000
-        with Image.open(first) as picture:
-            pixels = np.asarray(picture.convert("RGB")).reshape(-1, 3)
-        # The robot's blue and the hall's grey are in it.
+        with Image.open(first) as image:
+            pixels = np.asarray(image.convert("RGB")).reshape(-1, 3)
+        # It contains the robot's blue and the hall's grey.
         for colour in ((0x1F, 0x5F, 0x8B), (0xC9, 0xCC, 0xD1)):
             assert (np.abs(pixels - np.array(colour)).max(axis=1) <= 6).sum() > 200
     assert main(["scenario", "draw", *names, "--out", str(tmp_path / "x.png")]) == 2
@@ -176,7 +177,7 @@ def test_drawings_are_small_and_the_same_each_time(tmp_path, capsys):
         ScenarioTemplate.named("late_glanc")
 
 
-def test_the_lane_is_free_and_what_is_beyond_is_not():
+def test_the_lane_is_free_and_the_area_beyond_is_not():
     scenario = ScenarioTemplate.shipped("crossing_from_left").median()
     hall = scenario.layout.obstacle_boxes_odom
     boxes = scenario.planner_boxes_odom_m
@@ -188,7 +189,7 @@ def test_the_lane_is_free_and_what_is_beyond_is_not():
             assert inside.any() == closed
     plain = ScenarioTemplate.shipped("crossing_attentive").median()
     np.testing.assert_array_equal(plain.planner_boxes_odom_m, plain.layout.obstacle_boxes_odom)
-    with pytest.raises(SimError, match="needs a way along odom x or y"):
+    with pytest.raises(SimError, match="needs a start and goal along odom x or y"):
         ScenarioTemplate(
             {
                 "name": "a",
@@ -198,7 +199,7 @@ def test_the_lane_is_free_and_what_is_beyond_is_not():
         )
 
 
-def test_a_lane_along_y_is_the_lane_along_x_turned():
+def test_a_lane_along_y_is_the_rotated_lane_along_x():
     task = {"goal_x_m": 0.0, "goal_y_m": 4.0, "lane_half_width_m": 1.0}
     turned = ScenarioTemplate({"name": "a", "duration_s": 5.0, "layout": "open", "robot": task})
     beyond = turned.median().planner_boxes_odom_m[-2:]
@@ -207,7 +208,7 @@ def test_a_lane_along_y_is_the_lane_along_x_turned():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(set(shipped_scenarios()) - {"paper_encounter"}))
-def test_the_robot_reaches_its_goal_and_runs_into_nobody(name):
+def test_the_robot_reaches_its_goal_without_hitting_anybody(name):
     template = ScenarioTemplate.shipped(name)
     for seed in (0, 1):
         result = run_crossing(template.for_seed(seed), policy="balanced", seed=seed)

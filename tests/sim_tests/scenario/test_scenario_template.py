@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from sim_tests import Scenario, ScenarioTemplate, SimError, run_crossing, shipped_scenarios
-from sim_tests.scenario import shipped_templates
-from sim_tests.scenario._distributions import read_distribution
+from sim_tests.scenario import read_distribution, shipped_templates
 
 BASE = {
     "name": "mine",
@@ -54,14 +53,14 @@ def test_quantiles_stay_within_bounds_and_rise(ends, one, other):
         assert low <= first <= second <= high
 
 
-def test_draws_follow_the_distribution_that_is_named():
+def test_draws_follow_the_named_distribution():
     share = (np.arange(4000) + 0.5) / 4000
     normal = read_distribution("x", "normal", {"mean": 1.3, "std": 0.2, "low": 0.9, "high": 1.5})
     expected = stats.truncnorm((0.9 - 1.3) / 0.2, (1.5 - 1.3) / 0.2, 1.3, 0.2)
     drawn = np.array([normal.quantile(each) for each in share])
     np.testing.assert_allclose(drawn, expected.ppf(share), atol=1e-9)
 
-    # Length of a glance at a vehicle: its quartiles come back.
+    # Duration of a glance at a vehicle: its quartiles are reproduced.
     glance = read_distribution(
         "x", "lognormal", {"median": 0.83, "quartiles": [0.47, 1.5], "low": 1e-3, "high": 1e3}
     )
@@ -75,7 +74,7 @@ def test_draws_follow_the_distribution_that_is_named():
     assert set(counts.tolist()) == {1000}
 
 
-def test_parameters_are_the_distributions_by_path():
+def test_parameters_lists_the_distributions_by_path():
     paths = template().parameters()
     assert list(paths) == ["people.0.route.0.y_m", "people.0.speed_mps", "people.0.start_s"]
     assert paths["people.0.start_s"].bounds == (0.0, 2.0)
@@ -87,7 +86,7 @@ def test_the_same_generator_draws_the_same_scenario():
     assert first != template().for_seed(4)
 
 
-def test_a_parameter_more_changes_no_other_and_neither_does_their_order():
+def test_adding_or_reordering_parameters_changes_no_other_draw():
     plain = template().for_seed(7).people[0]
     fewer = template(start_s=1.0).for_seed(7).people[0]
     assert (fewer.speed_mps, fewer.route) == (plain.speed_mps, plain.route)
@@ -102,7 +101,7 @@ def test_a_parameter_more_changes_no_other_and_neither_does_their_order():
     assert ScenarioTemplate(data).for_seed(7).people[0] == plain
 
 
-def test_draws_of_many_seeds_are_uniform_and_not_correlated():
+def test_draws_of_many_seeds_are_uniform_and_uncorrelated():
     drawn = np.array(
         [
             (person.start_s / 2.0, person.route[0].y_m - 5.0)
@@ -114,7 +113,7 @@ def test_draws_of_many_seeds_are_uniform_and_not_correlated():
     assert abs(np.corrcoef(drawn.T)[0, 1]) < 0.15
 
 
-def test_given_values_replace_draws_and_medians_stand_for_the_rest():
+def test_given_values_replace_draws_and_the_others_are_medians():
     person = template().with_values({"people.0.speed_mps": 1.0}).people[0]
     assert person.speed_mps == 1.0
     assert person.start_s == 1.0
@@ -138,7 +137,7 @@ def test_shipped_templates_round_trip_through_text_and_pickle(name):
     assert again.for_seed(99) == drawn
 
 
-def test_a_file_takes_shared_defaults_and_its_recording_from_beside_it(tmp_path):
+def test_a_file_extends_shared_defaults_and_finds_its_recording_in_its_folder(tmp_path):
     path = tmp_path / "mine.yaml"
     path.write_text(
         "name: mine\nextends: crossing_hall\nreplay_csv: people.csv\nrobot: {start_x_m: -1.0}\n"
@@ -149,12 +148,12 @@ def test_a_file_takes_shared_defaults_and_its_recording_from_beside_it(tmp_path)
     assert (mine.robot.start_x_m, mine.robot.goal_x_m) == (-1.0, hall.robot.goal_x_m)
     assert mine.replay_csv == str(tmp_path / "people.csv")
     assert Scenario.from_yaml(path) == mine
-    nobody = mine.without_people()
-    assert (nobody.people, nobody.workers, nobody.replay_csv) == ((), (), None)
+    empty = mine.without_people()
+    assert (empty.people, empty.workers, empty.replay_csv) == ((), (), None)
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "message"),
     [
         ({"speed_mps": {"unifrom": {"low": 1, "high": 2}}}, "did you mean 'uniform'"),
         ({"speed_mps": {"uniform": {"low": 2, "high": 1}}}, r"people\.0\.speed_mps: uniform: low"),
@@ -168,50 +167,50 @@ def test_a_file_takes_shared_defaults_and_its_recording_from_beside_it(tmp_path)
             "mean must lie from low 1 to high 2, got 3",
         ),
         ({"speed_mps": {"lognormal": {"median": 1, "quartiles": [1.2, 2]}}}, "quartiles must"),
-        ({"speed_mps": {"uniform": {"low": 1, "high": 2}, "unit": "m/s"}}, "stands alone"),
+        ({"speed_mps": {"uniform": {"low": 1, "high": 2}, "unit": "m/s"}}, "must be the only key"),
         ({"spede_mps": 1.0}, "did you mean 'speed_mps'"),
         ({"speed_mps": "fast"}, r"people\.0\.speed_mps.*got 'fast'"),
         ({"name": {"choice": [1, 2]}}, r"people\.0\.name"),
     ],
 )
-def test_what_cannot_be_is_refused_by_its_path(change, said):
-    with pytest.raises(SimError, match=said):
+def test_impossible_values_are_refused_by_path(change, message):
+    with pytest.raises(SimError, match=message):
         template(**change)
 
 
-def test_distributions_belong_to_people_and_robot():
+def test_only_numbers_of_people_and_robot_may_be_distributions():
     with pytest.raises(SimError, match="duration_s: only numbers under people, workers, robot"):
         ScenarioTemplate({**BASE, "duration_s": {"uniform": {"low": 10, "high": 20}}})
     varied = {**BASE, "robot": {"goal_x_m": {"choice": [10.0, 12.0]}}}
     assert {ScenarioTemplate(varied).for_seed(seed).robot.goal_x_m for seed in range(9)} == {10, 12}
 
 
-def test_two_people_of_one_name_are_refused():
+def test_two_people_with_the_same_name_are_refused():
     twins = {**BASE, "people": BASE["people"] * 2}
     with pytest.raises(SimError, match="must be unique, got worker twice"):
         ScenarioTemplate(twins)
 
 
-def test_files_that_are_no_scenarios_are_refused_by_name(tmp_path):
+def test_files_that_are_not_scenarios_are_refused_by_name(tmp_path):
     with pytest.raises(SimError, match=r"cannot read .*none\.yaml"):
         ScenarioTemplate.from_yaml(tmp_path / "none.yaml")
-    for text, said in (
+    for text, message in (
         ("a: [", r"mine\.yaml is not valid YAML"),
         ("- a", r"mine\.yaml must hold a mapping"),
         ("name: a\nextends: crossing_hal", "did you mean 'crossing_hall'"),
     ):
         (tmp_path / "mine.yaml").write_text(text)
-        with pytest.raises(SimError, match=said):
+        with pytest.raises(SimError, match=message):
             ScenarioTemplate.from_yaml(tmp_path / "mine.yaml")
 
 
-def test_versions_are_part_of_a_name():
+def test_a_name_may_ask_for_a_version():
     assert ScenarioTemplate.shipped("crossing_from_left@1").id == "crossing_from_left@1"
     with pytest.raises(SimError, match="has version 1, got 'crossing_from_left@2'"):
         ScenarioTemplate.shipped("crossing_from_left@2")
 
 
-def test_a_drawn_crossing_starts_where_it_was_drawn():
+def test_a_crossing_starts_at_the_drawn_position():
     text = (
         "name: short\nduration_s: 0.5\n"
         "robot: {start_x_m: {uniform: {low: -1, high: 1}}, goal_x_m: 8}\n"
@@ -225,11 +224,11 @@ def test_a_drawn_crossing_starts_where_it_was_drawn():
     assert starts == pytest.approx(drawn, abs=1e-9)
 
 
-def test_shipped_templates_are_all_there_and_named_after_their_files():
+def test_every_shipped_template_is_named_after_its_file():
     assert [each.name for each in shipped_templates()] == list(shipped_scenarios())
 
 
-def test_a_crossing_by_name_is_drawn_by_its_seed():
+def test_a_crossing_run_by_name_is_drawn_by_its_seed():
     by_name = run_crossing("standing_in_aisle", policy="assertive", seed=2)
     drawn = ScenarioTemplate.shipped("standing_in_aisle").for_seed(2)
     given = run_crossing(drawn, policy="assertive", seed=2)

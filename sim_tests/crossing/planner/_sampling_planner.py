@@ -1,9 +1,9 @@
-"""A reference local planner: what a crossing is driven by when no other planner is given."""
+"""The reference local planner: a dynamic-window planner among moving people and fixed boxes."""
 
 from __future__ import annotations
 
 import math
-from typing import Protocol, runtime_checkable
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,60 +13,40 @@ from perception.arrays import FloatArray, finite_array, finite_number
 
 from ...world.errors import SimError
 from ._config import PlannerConfig
-from ._rollout import (
-    Poses,
-    detour_bearing_rad,
-    follow_arcs,
-    ramp_integral,
-    stopping_integral,
-    window,
-)
+from ._detour import detour_bearing_rad
+from ._rollout import Poses, clip_to_window, follow_arcs, ramp_integral, stopping_integral
 from ._scene import FootprintBox, Scene
 
-# Poses of a braking robot that are judged, the last one at rest: at most 0.1 s apart at 1.5 m/s and
-# 1 m/s², in which even two who approach at 3 m/s cut a corner by less than the clearance.
-_BRAKING_SAMPLES = 16
-# A motion may bring the robot nearer than waiting would by no more than this: rounding, not a step.
-_SLACK_M = 1e-3
-# Costs closer than this are a tie, which the order of the samples settles, not the rounding.
-_TIE = 1e-9
-# Slower than this a robot stands.
-_STANDING_MPS = 0.02
-_STANDING = Poses(*(np.asarray(value) for value in (0.0, 0.0, 1.0, 0.0)))
-
-
-@runtime_checkable
-class LocalPlanner(Protocol):
-    """Anything that drives a robot to a goal within the adapter's constraints."""
-
-    def plan(
-        self,
-        robot_state: RobotState,
-        goal_odom_m: FloatArray,
-        constraints: NavConstraints,
-        dt_s: float,
-    ) -> tuple[float, float]:
-        """Return ``(speed_mps, yaw_rate_radps)`` for the next ``dt_s``; the goal is (2,)."""
-        ...
+# Number of checked poses of a braking robot; the last one is at rest. From 1.5 m/s at 1 m/s² they
+# are at most 0.1 s apart. At a closing speed of 3 m/s this cuts a corner by less than the
+# clearance.
+_BRAKING_SAMPLES: Final = 16
+# Tolerance for rounding when a motion is compared with waiting.
+_SLACK_M: Final = 1e-3
+# Costs closer than this are equal; the order of the samples then decides, not the rounding.
+_TIE: Final = 1e-9
+# A slower robot counts as standing.
+_STANDING_MPS: Final = 0.02
+_STANDING: Final = Poses(*(np.asarray(value) for value in (0.0, 0.0, 1.0, 0.0)))
 
 
 class SamplingPlanner:
-    """Drive a differential-drive robot to a goal among moving people and fixed boxes.
+    """A dynamic-window planner for a differential-drive robot (Fox, Burgard and Thrun 1997).
 
-    A dynamic-window planner (Fox, Burgard and Thrun 1997) whose candidates are a target speed and a
-    yaw rate that is held for a while. Each is rolled out in closed form and judged twice:
+    It drives to a goal among moving people and fixed boxes. A candidate is a target speed and a yaw
+    rate that is held for a while. Each is rolled out in closed form and judged twice:
 
     * It must be *safe*: one tick of it followed by full braking keeps ``clearance_m`` to every box
       and, until the robot stands, to every person's disc moving on at constant velocity. Where that
       gap is already gone, because a radius grew or a person walked up, motion that leaves at least
-      the gap that waiting would leave is safe too, so that the robot can get out. Towards people a
-      standing robot may always turn on the spot; in front of it, it keeps the room to do so.
+      the gap that waiting would leave is safe too, so that the robot can get out. A moving robot
+      keeps enough distance ahead to turn on the spot; near people a standing robot always may.
     * It should be *good*: near the goal soon, facing it, away from people, boxes and the strip that
-      a walking person is about to use, with room to people's bodies, without needless turning.
-      Where someone stands in front of the goal, it is swung to the tangent past that person.
+      a walking person is about to use, at a distance from people's bodies, without needless
+      turning. If someone stands in front of the goal, the robot heads for the tangent past them.
 
     If nothing is safe the robot brakes as hard as it may along its present curve. It never
-    reverses. The command depends on the arguments alone: there is no memory between calls. People
+    reverses. The command depends only on the arguments: there is no memory between calls. People
     and goal are judged in the robot's frame, so turning or shifting the world changes nothing.
 
     Args:
@@ -100,7 +80,7 @@ class SamplingPlanner:
         self._braking_share = along_time(0.0, 1.0, _BRAKING_SAMPLES)
         self._speed_share = np.linspace(0.0, 1.0, config.speed_samples)
         spread = np.linspace(-1.0, 1.0, config.yaw_rate_samples)
-        # Two more are filled in for each plan: "go on as now" and "face the goal".
+        # Two more are filled in for each plan: the present rate, and the one that faces the goal.
         self._yaw_share = np.append(np.sign(spread) * np.abs(spread) ** 1.5, [0.0, 0.0])
 
     def plan(
@@ -113,17 +93,16 @@ class SamplingPlanner:
         """Choose the command for the next tick.
 
         Args:
-            robot_state: where the robot is and how it moves.
-            goal_odom_m: (2,) where its base origin is to go.
-            constraints: people as discs and the speed limit, at the instant of the state.
-            dt_s: how long the command will be held, > 0.
+            robot_state: state of the robot.
+            goal_odom_m: (2,) goal of its base origin.
+            constraints: people as discs and the speed limit, at the time of the state.
+            dt_s: time for which the command is held, > 0.
 
         Returns:
-            ``(speed_mps, yaw_rate_radps)``. The speed is within what the robot reaches in
-            ``dt_s``, never negative, and above ``constraints.speed_limit_mps`` only where full
-            braking does not get below it in one tick. The yaw rate is such that no corner of the
-            footprint turns about the base origin faster than the speed limit, with the same
-            exception.
+            ``(speed_mps, yaw_rate_radps)``. The robot can reach the speed in ``dt_s``. It is never
+            negative, and above ``constraints.speed_limit_mps`` only where full braking does not get
+            below the limit in one tick. The yaw rate is such that no corner of the footprint turns
+            about the base origin faster than the speed limit, with the same exception.
 
         Raises:
             SimError: if the goal is not two finite numbers or ``dt_s`` is not positive.
@@ -138,17 +117,17 @@ class SamplingPlanner:
 
         speeds = self._target_speeds(limit_mps, goal_distance_m)
         reach_m = max(robot_state.speed_mps, float(speeds[-1])) * self.config.horizon_s
-        scene = Scene(robot_state, constraints, self._near(robot_state, reach_m))
+        scene = Scene(robot_state, constraints, self._boxes_within(robot_state, reach_m))
         bearing_rad = self._bearing(goal_x_m, goal_y_m, scene)
         yaw_rates = self._target_yaw_rates(robot_state, limit_mps, bearing_rad)
         speed_now, yaw_rate_now = robot_state.speed_mps, robot_state.yaw_rate_radps
         fall = self.robot.max_deceleration_mps2 * dt_s
         rise = self.robot.max_acceleration_mps2 * dt_s
         yaw_step = self.config.max_yaw_acceleration_radps2 * dt_s
-        speed_commands = np.maximum(window(speeds, speed_now, fall, rise), 0.0)
-        yaw_commands = window(yaw_rates, yaw_rate_now, yaw_step, yaw_step)
+        speed_commands = np.maximum(clip_to_window(speeds, speed_now, fall, rise), 0.0)
+        yaw_commands = clip_to_window(yaw_rates, yaw_rate_now, yaw_step, yaw_step)
 
-        # Most candidates differ only in where they lead: few distinct commands are in the window.
+        # Many candidates begin with the same command: few distinct ones are in the window.
         rows, row_of = _distinct(speed_commands)
         columns, column_of = _distinct(yaw_commands)
         safe = self._safe(rows, columns, speed_now, dt_s, scene)
@@ -160,7 +139,7 @@ class SamplingPlanner:
         return float(speed_commands[row]), float(yaw_commands[column])
 
     def _brake(self, robot_state: RobotState, dt_s: float) -> tuple[float, float]:
-        """Full braking along the present curve, as far as the yaw acceleration allows."""
+        """Return full braking along the present curve, as far as the yaw acceleration allows."""
         speed, yaw_rate = max(robot_state.speed_mps, 0.0), robot_state.yaw_rate_radps
         stop_s = speed / self.robot.max_deceleration_mps2
         yaw_stop_s = max(stop_s, abs(yaw_rate) / self.config.max_yaw_acceleration_radps2)
@@ -170,13 +149,13 @@ class SamplingPlanner:
         )
 
     def _target_speeds(self, limit_mps: float, goal_distance_m: float) -> FloatArray:
-        """(V,) from 0 to the limit, or to what can still stop at the goal."""
+        """Return (V,) speeds from 0 to the limit, or to the one that can still stop at the goal."""
         gentle_mps2 = self.config.goal_deceleration_fraction * self.robot.max_deceleration_mps2
         top_mps = min(limit_mps, math.sqrt(2.0 * gentle_mps2 * goal_distance_m))
         return np.asarray(top_mps * self._speed_share)
 
     def _bearing(self, goal_x_m: float, goal_y_m: float, scene: Scene) -> float:
-        """Where to head: to the goal, or past whoever stands in front of it."""
+        """Return the bearing of the goal, or past a person who stands in front of it."""
         bearing_rad = math.atan2(goal_y_m, goal_x_m)
         if bearing_rad > math.pi - 1e-6:  # behind: turn the same way whatever the rounding
             bearing_rad -= math.tau
@@ -198,16 +177,16 @@ class SamplingPlanner:
     def _target_yaw_rates(
         self, robot_state: RobotState, limit_mps: float, bearing_rad: float
     ) -> FloatArray:
-        """(W,) both ways up to the limit, then the present rate and the one that faces the goal."""
-        # People stand beside the robot too: its corners keep to the speed limit as it turns.
+        """Return (W,) rates up to the limit, the present one, and the one that faces the goal."""
+        # The corners of a turning robot obey the speed limit too, for people beside it.
         top_radps = min(self.config.max_yaw_rate_radps, limit_mps / self._footprint.reach_m)
         yaw_rates = np.asarray(top_radps * self._yaw_share)
-        wishes = (robot_state.yaw_rate_radps, bearing_rad / self.config.turn_time_s)
-        yaw_rates[-2:] = [min(max(wish, -top_radps), top_radps) for wish in wishes]
+        extra = (robot_state.yaw_rate_radps, bearing_rad / self.config.turn_time_s)
+        yaw_rates[-2:] = [min(max(rate, -top_radps), top_radps) for rate in extra]
         return yaw_rates
 
-    def _near(self, robot_state: RobotState, reach_m: float) -> FloatArray:
-        """The boxes that a roll-out of length ``reach_m`` or full braking could come close to."""
+    def _boxes_within(self, robot_state: RobotState, reach_m: float) -> FloatArray:
+        """Return the boxes within reach of a roll-out of length ``reach_m``, or of full braking."""
         boxes = self._boxes_odom_m
         if not len(boxes):
             return boxes
@@ -226,7 +205,7 @@ class SamplingPlanner:
         dt_s: float,
         scene: Scene,
     ) -> NDArray[np.bool_]:
-        """(V, W) whether one tick of a command and full braking after it keep the clearance."""
+        """Return (V, W) whether one tick of a command and then full braking keep the clearance."""
         safe = np.ones((len(speeds), len(yaw_rates)), dtype=bool)
         if not (scene.has_people or scene.has_boxes):
             return safe
@@ -234,22 +213,24 @@ class SamplingPlanner:
         stop_s = v / self.robot.max_deceleration_mps2
         yaw_stop_s = np.maximum(stop_s, np.abs(w) / self.config.max_yaw_acceleration_radps2)
         t_s = dt_s + yaw_stop_s * self._braking_share
-        # During the tick the speed is between what it was and the command: count the larger.
+        # During the tick the speed lies between the present one and the command: take the larger.
         extra_m = np.maximum(speed_now_mps - v, 0.0) * dt_s
         poses = follow_arcs(
             stopping_integral(v, stop_s, dt_s, t_s) + extra_m,
             stopping_integral(w, yaw_stop_s, dt_s, t_s),
         )
         # A robot that never reverses must not drive to where it cannot turn on the spot.
-        room_m = np.where(v > 0.0, self._footprint.turning_room_m, 0.0)
-        moving, waiting = self._footprint.at(poses, room_m), self._footprint.at(_STANDING, room_m)
+        margin_m = np.where(v > 0.0, self._footprint.turning_margin_m, 0.0)
+        moving = self._footprint.at(poses, margin_m)
+        waiting = self._footprint.at(_STANDING, margin_m)
         clearance_m = self.config.clearance_m
         if scene.has_people:
-            # Of people the gap that is there counts, without that room: else it could be used up.
+            # The present gap to people is measured without this margin: else it could be used up.
             still = self._footprint.at(_STANDING)
             enough = np.minimum(clearance_m, scene.people_gap_m(still, t_s) - _SLACK_M)
             safe &= (scene.people_gap_m(moving, t_s) >= enough).all(axis=(0, 1))
-            # Always a way out: the corners keep to the turning circle and to the speed limit.
+            # Turning on the spot is always allowed: the corners stay within the turning circle and
+            # the speed limit.
             safe |= v <= 0.0
         if scene.has_boxes:
             enough = np.minimum(clearance_m, scene.box_gap_m(waiting) - _SLACK_M)
@@ -264,7 +245,7 @@ class SamplingPlanner:
         goal: tuple[float, float],
         scene: Scene,
     ) -> FloatArray:
-        """(V, W) cost of each candidate over the horizon, dimensionless.
+        """Return the cost (V, W) of each candidate over the horizon, dimensionless.
 
         ``goal`` is the distance to it (m) and the bearing to head for (rad).
         """
@@ -273,7 +254,7 @@ class SamplingPlanner:
         rate = np.where(
             v > robot_state.speed_mps, robot.max_acceleration_mps2, robot.max_deceleration_mps2
         )
-        # The roll-out ends when it has gone as far as the goal is: nobody drives past it.
+        # A roll-out ends when it is as long as the distance to the goal.
         goal_distance_m, bearing_rad = goal
         path = np.minimum(ramp_integral(robot_state.speed_mps, v, rate, t_s), goal_distance_m)
         yaw_acceleration = config.max_yaw_acceleration_radps2
@@ -291,26 +272,26 @@ class SamplingPlanner:
             ahead = _closeness(strip_gap, config.person_comfort_m)
             worst = config.person_weight * close + config.front_weight * ahead
             weighted = worst * self._late_people
-            # The worst moment decides; the mean still shows the way out to a robot that is inside.
+            # The worst moment decides; the mean leads a robot inside a disc out of it.
             cost += (weighted.max(axis=1) + weighted.sum(axis=1) / len(t_s)).sum(axis=0)
             gaps_m = scene.body_gap_m(rectangles, t_s, config.standing_speed_mps)
             if len(gaps_m):
-                room = (_closeness(gaps_m, config.room_m).sum(axis=1) / len(t_s)).max(axis=0)
-                # Between ways only: nearness is no reason to stop, the limit sees to that.
-                cost += config.room_weight * (room - room.min(axis=1, keepdims=True))
+                near = (_closeness(gaps_m, config.room_m).sum(axis=1) / len(t_s)).max(axis=0)
+                # Compares yaw rates at equal speed only: the speed limit slows the robot already.
+                cost += config.room_weight * (near - near.min(axis=1, keepdims=True))
             cost += config.keep_right_weight * np.maximum(turning, 0.0)
         if scene.has_boxes:
             close = _closeness(scene.box_gap_m(rectangles), config.static_comfort_m)
             worst_box = (close * self._late_static).max(axis=0)
             if abs(robot_state.speed_mps) < _STANDING_MPS:
-                # A turn on the spot is the way out: the swing of its corners costs nothing.
+                # A turn on the spot leads out: the swing of its corners costs nothing.
                 now = scene.box_gap_m(self._footprint.at(_STANDING))
                 worst_box[0] = _closeness(now, config.static_comfort_m)
             cost += config.static_weight * worst_box
         return cost
 
     def _goal_cost(self, poses: Poses, goal_distance_m: float, bearing_rad: float) -> FloatArray:
-        """(V, W) cost of being far from the goal, on average, and of facing away from it."""
+        """Return the cost (V, W) of mean distance to the goal and of facing away from it."""
         to_x = goal_distance_m * math.cos(bearing_rad) - poses.x_m
         to_y = goal_distance_m * math.sin(bearing_rad) - poses.y_m
         distance = np.sqrt(to_x * to_x + to_y * to_y)
@@ -331,14 +312,14 @@ def _in_base(robot_state: RobotState, point_odom_m: FloatArray) -> tuple[float, 
 
 
 def _distinct(values: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
-    """The distinct values in order of appearance, and for each value its index among them."""
+    """Return the distinct values in order of appearance, and the index of each value in them."""
     index: dict[float, int] = {}
     index_of = [index.setdefault(value, len(index)) for value in values.tolist()]
     return np.array(list(index)), np.array(index_of, dtype=np.intp)
 
 
 def _closeness(gap_m: FloatArray, comfort_m: float) -> FloatArray:
-    """0 from ``comfort_m`` on, growing quadratically to 1 at contact, and 1 inside."""
+    """Return 0 for gaps from ``comfort_m``, rising quadratically to 1 at contact, and 1 inside."""
     share = np.minimum(np.maximum(1.0 - gap_m / comfort_m, 0.0), 1.0)
     return np.asarray(share * share)
 

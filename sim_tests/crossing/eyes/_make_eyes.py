@@ -1,0 +1,100 @@
+"""The eyes of a crossing by the name of the perception."""
+
+from __future__ import annotations
+
+from typing import Final, Literal, get_args
+
+import numpy as np
+
+from perception import AttentionCone, AwarenessPipeline, Camera
+from perception.arrays import FloatArray
+from perception.surround import FlatView
+
+from ...world.camera import CoarseSceneryRenderer
+from ...world.errors import SimError
+from ...world.sightlines import SightLines
+from .._stage import Stage
+from ._eyes import Eyes, SurroundEyes
+from ._keypoint_camera import KeypointNoise
+from ._keypoint_eyes import KeypointEyes
+from ._map_view import MapView
+from ._pixel_eyes import PixelEyes
+from ._true_eyes import TrueEyes
+
+PerceptionKind = Literal["truth", "keypoints", "pixels"]
+#: One more, for comparison: the truth about everybody who is not hidden by a rack, all around.
+ORACLE: Final = "oracle"
+
+
+def make_eyes(
+    kind: str,
+    stage: Stage,
+    camera: Camera,
+    cone: AttentionCone,
+    noise: KeypointNoise,
+    rng: np.random.Generator,
+    pipeline: AwarenessPipeline | None = None,
+    T_camera_assumed: FloatArray | None = None,
+) -> Eyes:
+    """Return the eyes of a perception.
+
+    Args:
+        kind: one of :data:`PerceptionKind`, or :data:`ORACLE`.
+        stage: the stage of the crossing.
+        camera: camera model of one view.
+        cone: attention cone.
+        noise: noise of the keypoint camera.
+        rng: random generator of the noise.
+        pipeline: pipeline for pixels; None for the shipped networks.
+        T_camera_assumed: see :class:`PixelEyes`.
+
+    Raises:
+        SimError: for another kind.
+    """
+    if kind == "truth":
+        return TrueEyes()
+    if kind == ORACLE:
+        return TrueEyes(MapView.of(stage.warehouse))
+    views = stage.scenario.camera.flat_views(camera)
+    if kind == "keypoints":
+        warehouse = stage.warehouse
+        sight = SightLines(warehouse.layout, warehouse.variant, warehouse.actors)
+        eyes: list[Eyes] = [KeypointEyes(stage, camera, cone, noise, rng, sight) for _ in views]
+    elif kind == "pixels":
+        eyes = _pixel_eyes(stage, views, cone, rng, pipeline, T_camera_assumed)
+    else:
+        valid = ", ".join(map(repr, get_args(PerceptionKind)))
+        raise SimError(f"perception must be one of {valid}, got {kind!r}")
+    return eyes[0] if len(views) == 1 else SurroundEyes(views, eyes)
+
+
+def _pixel_eyes(
+    stage: Stage,
+    views: tuple[FlatView, ...],
+    cone: AttentionCone,
+    rng: np.random.Generator,
+    pipeline: AwarenessPipeline | None,
+    T_camera_assumed: FloatArray | None,
+) -> list[Eyes]:
+    """Return the eyes of every view; they share networks and renderer."""
+    spec, camera = stage.scenario.camera, views[0].camera
+    renderer = CoarseSceneryRenderer(stage.warehouse, spec.scenery_divisor)
+    if pipeline is None:
+        # Workers in a crossing turn their heads; their eyes follow.
+        pipeline = AwarenessPipeline(camera, cone=cone, eye_in_head_std_rad=0.0)
+    return [
+        PixelEyes(
+            stage,
+            camera,
+            spec.sensor,
+            view_rng,
+            pipeline,
+            renderer,
+            None
+            if T_camera_assumed is None
+            else view.T_camera_view.T @ T_camera_assumed @ view.T_camera_view,
+        )
+        for view, view_rng in zip(
+            views, [rng] if len(views) == 1 else rng.spawn(len(views)), strict=True
+        )
+    ]

@@ -1,0 +1,65 @@
+"""The paper's encounter: its three cases, and awareness over its whole time."""
+
+import numpy as np
+import pytest
+
+from sim_tests import Scenario, run_crossing
+from sim_tests.demo import CASES, case_values
+
+
+@pytest.fixture(scope="module")
+def encounter():
+    return run_crossing("paper_encounter", policy="balanced", perception="keypoints", seed=0)
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.meaning)
+@pytest.mark.parametrize(
+    ("perception", "alpha_tolerance", "distance_tolerance_m"),
+    [("truth", 0.02, 0.05), ("keypoints", 0.10, 0.12)],
+)
+def test_the_encounter_reproduces_the_cases_of_the_paper(
+    encounter, case, perception, alpha_tolerance, distance_tolerance_m
+):
+    (row,) = [r for r in case_values(encounter) if r[0] is case and r[1] == perception]
+    _, _, alpha, forward, lateral = row
+    assert alpha == pytest.approx(case.awareness, abs=alpha_tolerance)
+    assert forward == pytest.approx(case.d_fwd_m, abs=distance_tolerance_m)
+    assert lateral == pytest.approx(case.d_lat_m, abs=distance_tolerance_m)
+
+
+@pytest.fixture(scope="module")
+def encounter_in_pixels():
+    # The last of the paper's three cases is at 16.25 s.
+    scenario = Scenario.shipped("paper_encounter").model_copy(update={"duration_s": 16.5})
+    return run_crossing(scenario, policy="balanced", perception="pixels", seed=0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.meaning)
+def test_the_encounter_in_pixels_reproduces_the_cases_of_the_paper(encounter_in_pixels, case):
+    (row,) = [r for r in case_values(encounter_in_pixels) if r[0] is case and r[1] == "pixels"]
+    _, _, alpha, forward, lateral = row
+    assert alpha == pytest.approx(case.awareness, abs=0.10)
+    assert forward == pytest.approx(case.d_fwd_m, abs=0.15)
+    assert lateral == pytest.approx(case.d_lat_m, abs=0.15)
+
+
+def test_the_encounter_has_60_frames_a_second_for_25_seconds(encounter):
+    assert len(encounter.frames) == 1500
+    assert encounter.frames[-1].t_s == pytest.approx(25.0 - 1.0 / 60.0)
+
+
+def test_awareness_from_keypoints_follows_the_truth(encounter):
+    """Over the whole encounter, front, profile and back: small errors, realistic deviations."""
+    pairs = [
+        (frame.truth[0].awareness, each.awareness, each.awareness_std)
+        for frame in encounter.frames
+        if (each := frame.observation_of(0)) is not None and each.awareness is not None
+    ]
+    truth, alpha, std = np.array(pairs).T
+    assert len(truth) > 1000
+    assert np.mean(np.abs(alpha - truth)) < 0.03
+    assert np.percentile(np.abs(alpha - truth), 95) < 0.12
+    assert not np.any((alpha - 1.28 * std > 0.3) & (truth == 0.0))
+    partly = (truth > 0.1) & (truth < 0.9)
+    assert 0.5 < np.mean(np.abs(alpha - truth)[partly] < std[partly]) < 0.85
