@@ -19,9 +19,7 @@ from sim_tests.crossing import Stage
 from sim_tests.crossing.eyes import KeypointNoise, _eyes, make_eyes
 from sim_tests.crossing.eyes._eyes import Eyes, SurroundEyes
 from sim_tests.scenario import CameraSpec, ScenarioTemplate, shipped_templates
-from sim_tests.search._templates import named_templates
-from sim_tests.study.runs import plan_jobs
-from sim_tests.study.runs._plan import template_of
+from sim_tests.study.runs import named_templates, plan_jobs, template_of
 
 CONE = AttentionCone()
 # Three workers about the robot: ahead on the left border of two views, behind across the seam of a

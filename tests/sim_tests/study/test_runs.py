@@ -16,8 +16,7 @@ from run_scenes import short_jobs
 
 from sim_tests import SimError
 from sim_tests.study.measures import read_records
-from sim_tests.study.runs import Job, run_episode, run_jobs
-from sim_tests.study.runs._run_folder import read_jobs, read_run
+from sim_tests.study.runs import Job, read_jobs, read_run, run_episode, run_jobs
 
 HERE = Path(__file__).parent
 
@@ -160,7 +159,7 @@ def test_an_unfinished_run_is_not_overwritten_unless_told(serial, tmp_path):
     with pytest.raises(SimError, match="2 of 8 episodes done: go on with --resume"):
         run_jobs(short_jobs(1), tmp_path, workers=1)
     assert table(tmp_path).decode() == "".join(lines[:3])
-    assert len(run_jobs(short_jobs(1), tmp_path, workers=1, afresh=True)) == 2
+    assert len(run_jobs(short_jobs(1), tmp_path, workers=1, overwrite=True)) == 2
 
 
 def test_folders_and_numbers_that_cannot_be_used_are_refused(tmp_path):

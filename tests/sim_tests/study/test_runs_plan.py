@@ -6,11 +6,19 @@ from run_scenes import short, short_jobs
 
 from nav_adapter import AwarenessPolicy, NavError
 from sim_tests import SimError
+from sim_tests.crossing.eyes import ORACLE
 from sim_tests.crossing.faults import Fault
 from sim_tests.crossing.planner import SamplingPlanner
 from sim_tests.scenario import ScenarioTemplate
-from sim_tests.study.runs import job_key, make_planner, plan_jobs, run_episode
-from sim_tests.study.runs._plan import ORACLE, fault_of, policy_of, template_of
+from sim_tests.study.runs import (
+    fault_of,
+    job_key,
+    make_planner,
+    plan_jobs,
+    policy_of,
+    run_episode,
+    template_of,
+)
 
 
 def test_every_combination_is_planned_once_and_seeds_are_paired():
