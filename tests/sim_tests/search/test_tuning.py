@@ -190,18 +190,16 @@ def test_an_evaluation_counts_contacts_and_errors_and_means():
     assert found.minus(found, "time_lost_s").value == 0.0
 
 
-# A robot that slows down for a person beside its way, as far as its policy asks for.
+# A person beside the robot's way, for whom the policies slow down differently.
 _SCENARIO = """
 name: passing
-description: A person stands beside the robot's way and looks at it.
+description: A person stands beside the robot's way and looks away.
 duration_s: 5.0
 control_hz: 10.0
 layout: {x_min_m: -3.0, y_min_m: -3.0, x_max_m: 6.0, y_max_m: 3.0}
 robot: {goal_x_m: 1.5}
 workers:
   - path: [{t_s: 0.0, x_m: {uniform: {low: 1.5, high: 2.0}}, y_m: 1.8}]
-    gaze: [{t_s: 0.0, look: robot}]
-    heading: [{t_s: 0.0, heading_deg: -135.0}]
 """
 _TUNE = ["tune", "--trials", "4", "--generation", "3", "--episodes", "1", "--held-out", "1"]
 _TUNE += ["--perception", "truth"]

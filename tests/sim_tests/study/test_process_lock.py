@@ -42,11 +42,20 @@ def test_a_lock_is_free_again_when_its_holder_is_killed(tmp_path):
 
 def test_a_waiting_process_gets_the_lock_when_it_is_released(tmp_path):
     path = tmp_path / "a.lock"
-    first = ProcessLock(path)
-    threading.Timer(0.2, first.close).start()
-    with ProcessLock(path) as second:
-        assert second.held
-        assert not first.held
+    held = []
+
+    def wait() -> None:
+        with ProcessLock(path) as second:
+            held.append(second.held)
+
+    with ProcessLock(path):
+        waiting = threading.Thread(target=wait)
+        waiting.start()
+        waiting.join(0.2)
+        assert waiting.is_alive()
+        assert not held
+    waiting.join()
+    assert held == [True]
 
 
 def test_a_lock_that_cannot_be_written_is_refused(tmp_path):
