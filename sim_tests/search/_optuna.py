@@ -1,4 +1,4 @@
-"""The one place that imports Optuna and SQLAlchemy, which Optuna brings."""
+"""Optuna and SQLAlchemy, which Optuna brings; the only module that imports them."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Many crossings: runs, measures, the report, and the test suite for planners."""
+"""Many crossings: runs, metrics, the report, and the test suite for planners."""

@@ -1,4 +1,4 @@
-"""What ``awarenav crossings`` does."""
+"""The command ``awarenav crossings``: run episodes, print a table, write the report."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from perception import AwarenessPipeline, Camera
 from ..crossing.eyes import PerceptionKind
 from ..world.errors import SimError
 from .measures import EpisodeRecord, summarise, table_text
-from .runs import ERRORS, plan_jobs, run_jobs
+from .runs import RunFiles, plan_jobs, run_jobs
 
-#: What the command line calls the reference planner.
-REFERENCE: Final = "reference"
+# The name of the reference planner on the command line.
+_REFERENCE: Final = "reference"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,10 +45,12 @@ class CrossingsOptions:
 def crossings_command(options: CrossingsOptions) -> int:
     """Run episodes, print a short table, write the report.
 
+    All errors are raised before anything runs.
+
     Raises:
-        SimError: something unknown or unusable was asked for; nothing has run then.
-        NavError: an unknown preset or unusable policy file; nothing has run then.
-        PerceptionError: for pixels, when the shipped networks cannot be loaded; nothing has run.
+        SimError: an unknown or unusable option.
+        NavError: an unknown preset or unusable policy file.
+        PerceptionError: for pixels, the shipped networks cannot be loaded.
     """
     jobs = plan_jobs(
         options.scenario,
@@ -60,7 +62,8 @@ def crossings_command(options: CrossingsOptions) -> int:
         faults=options.fault,
     )
     if options.perception == "pixels":
-        AwarenessPipeline(Camera.from_fov(640, 480, 1.0))  # says at once which networks are absent
+        # Refuses missing networks before anything runs.
+        AwarenessPipeline(Camera.from_fov(640, 480, 1.0))
     records = run_jobs(
         jobs,
         options.out,
@@ -74,7 +77,7 @@ def crossings_command(options: CrossingsOptions) -> int:
     if options.as_json:
         print(json_text([asdict(row) for row in summarise(records).policies]), end="")
     else:
-        print(short_table(records))
+        print(_short_table(records))
         print(f"\nWritten to {options.out}: episodes.csv with {len(records)} episodes")
     failed = [number for number, record in enumerate(records) if record.error]
     if failed:
@@ -82,7 +85,7 @@ def crossings_command(options: CrossingsOptions) -> int:
         print(
             f"{len(failed)} of {len(records)} episodes failed; episode {failed[0]} "
             f"({first.scenario}, seed {first.seed}): {first.error}\n"
-            f"{options.out / ERRORS} has the tracebacks",
+            f"{RunFiles(options.out).errors} has the tracebacks",
             file=sys.stderr,
         )
     if not options.no_report:
@@ -90,8 +93,8 @@ def crossings_command(options: CrossingsOptions) -> int:
     return 1 if failed else 0
 
 
-def short_table(records: Iterable[EpisodeRecord]) -> str:
-    """One line a policy (and planner, perception and fault where there are several)."""
+def _short_table(records: Iterable[EpisodeRecord]) -> str:
+    """Return a table with one line per policy (and planner, perception, fault if several)."""
     header = ("policy", "episodes", "success", "robot contacts", "time lost s", "least m", "failed")
     rows: list[Sequence[str]] = []
     for row in summarise(records).policies:
@@ -112,11 +115,11 @@ def short_table(records: Iterable[EpisodeRecord]) -> str:
 
 
 def _about(options: CrossingsOptions) -> dict[str, Any]:
-    """What run.json says of the command; the same for a run and its resumption."""
+    """Return the command and its settings for run.json; resuming a run gives the same."""
     settings: dict[str, Any] = {
         "scenario": list(options.scenario),
         "policy": list(options.policy),
-        "planner": [each or REFERENCE for each in options.planner],
+        "planner": [each or _REFERENCE for each in options.planner],
         "perception": options.perception,
         "fault": list(options.fault),
         "episodes": options.episodes,
@@ -126,8 +129,8 @@ def _about(options: CrossingsOptions) -> dict[str, Any]:
         settings["camera"] = options.camera
     words = ["awarenav", "crossings"]
     for name, value in settings.items():
-        many = value if isinstance(value, list) else [value]
-        words += [f"--{name}", *map(str, many)]
+        values = value if isinstance(value, list) else [value]
+        words += [f"--{name}", *map(str, values)]
     return {"command": shlex.join([*words, "--out", str(options.out)]), "settings": settings}
 
 
@@ -136,7 +139,7 @@ def _write_report(out: Path, *, as_json: bool) -> None:
         from .report import write_report  # noqa: PLC0415 - needs the extra bench
 
         path = write_report(out, progress=True)
-    except SimError as error:  # the episodes are there, and a page can be made any time
+    except SimError as error:  # the episodes are complete; the report can be made later
         print(f"no report: {error}; then: awarenav report {out}", file=sys.stderr)
         return
     print(f"Report: {path}", file=sys.stderr if as_json else sys.stdout)

@@ -1,1 +1,41 @@
-"""Situations searched in which a policy does worst: ``awarenav falsify``."""
+"""The situations in which a policy does worst, found by optimisation: ``awarenav falsify``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from awarenav.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from ._falsify import Budget
+    from ._no_floor_planner import NoFloorPlanner
+    from ._restarted_search import CONTACT_SCORE, NO_MARGIN_SCORE, RestartedSearch, score
+    from ._scenario_space import ScenarioSpace
+    from ._worst_cases import worst_trials
+
+__all__ = [
+    "CONTACT_SCORE",
+    "NO_MARGIN_SCORE",
+    "Budget",
+    "NoFloorPlanner",
+    "RestartedSearch",
+    "ScenarioSpace",
+    "score",
+    "worst_trials",
+]
+
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "._falsify": ("Budget",),
+        "._no_floor_planner": ("NoFloorPlanner",),
+        "._restarted_search": (
+            "CONTACT_SCORE",
+            "NO_MARGIN_SCORE",
+            "RestartedSearch",
+            "score",
+        ),
+        "._scenario_space": ("ScenarioSpace",),
+        "._worst_cases": ("worst_trials",),
+    },
+)

@@ -1,48 +1,48 @@
-"""What a falsification was asked for.
-
-``awarenav falsify`` from its settings to what it found.
-"""
+"""A falsification: the search over several scenarios for the smallest separation margins."""
 
 from __future__ import annotations
 
 import math
-import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 import yaml
-from tqdm import tqdm
 
-from ...scenario import Scenario, ScenarioTemplate
+from ...scenario import Scenario
 from ...study.measures import EpisodeRecord
-from ...study.runs import Job, make_planner
+from ...study.runs import Job, ProcessLock, make_planner
 from ...world.errors import SimError
-from .._crew import Crew
-from .._file_lock import FileLock
-from .._search import Outcome, Parameters
-from .._settings_file import keep_settings
-from ._hunt import CONTACT, Find, Hunt, score
-from ._no_floor import LABEL, PLANNER
-from ._people_space import PeopleSpace
+from .._episode_runner import EpisodeRunner
+from .._files import templates_of, write_or_check_settings
+from .._optimizer import Outcome, ParameterValues
+from ._no_floor_planner import LABEL, PLANNER
+from ._restarted_search import CONTACT_SCORE, EvaluatedTrial, RestartedSearch, score
+from ._scenario_space import ScenarioSpace
+
+_SETTINGS_FILE: Final = "falsify.json"
+# Share of the episodes that go to all scenarios alike; the rest go to the worst of them.
+_FIRST_SHARE: Final = 0.5
+# One scenario in so many is among the worst.
+_WORST_ONE_IN: Final = 3
 
 
 @dataclass(frozen=True, slots=True)
 class FalsifySettings:
-    """What a falsification was asked for.
+    """The settings of a falsification.
 
     Attributes:
-        policy_name: what tables call the policy.
+        policy_name: name of the policy in tables.
         policy: YAML of the policy.
         scenarios: YAML of the templates.
-        episodes: how many in all.
-        people: how many people of a scenario are varied.
+        episodes: least number of episodes in all.
+        people: number of people of a scenario that are varied.
         perception: ``"truth"``, ``"keypoints"`` or ``"pixels"``.
         planner: ``"module:Class"``, empty for the reference planner.
-        seed: of every episode, and of the search.
-        generation: episodes a generation of CMA-ES.
-        unsafe_no_floor: the floor was taken away on purpose.
+        seed: seed of every episode, and of the search.
+        generation: episodes per generation of CMA-ES.
+        unsafe_no_floor: run the planner without the adapter's floor, on purpose.
     """
 
     policy_name: str
@@ -57,65 +57,100 @@ class FalsifySettings:
     unsafe_no_floor: bool = False
 
 
-SETTINGS_FILE: Final = "falsify.json"
-# Half of the episodes go to all scenarios alike, the rest to the worst third of them.
-_FIRST_HALF: Final = 0.5
-_SHARE_KEPT: Final = 3
-
-
 @dataclass(frozen=True, slots=True)
 class Falsification:
-    """What a falsification came to.
+    """The result of a falsification.
 
     Attributes:
-        settings: what was asked for.
-        spaces: the variations, by scenario.
-        finds: every episode, by scenario in the order in which they ran.
+        settings: its settings.
+        spaces: search spaces by scenario.
+        trials: every episode, by scenario, in the order in which they were proposed.
     """
 
     settings: FalsifySettings
-    spaces: dict[str, PeopleSpace]
-    finds: tuple[Find, ...]
+    spaces: dict[str, ScenarioSpace]
+    trials: tuple[EvaluatedTrial, ...]
 
     @property
     def contacts(self) -> int:
-        """Episodes in which the robot moved into a person."""
-        return sum(find.score <= CONTACT for find in self.finds)
+        """Number of episodes in which the robot moved into a person."""
+        return sum(trial.score <= CONTACT_SCORE for trial in self.trials)
 
     @property
     def errors(self) -> int:
-        """Episodes without a result."""
-        return sum(bool(find.notes.get("error")) for find in self.finds)
+        """Number of episodes without a result."""
+        return sum(bool(trial.notes.get("error")) for trial in self.trials)
+
+
+@dataclass(frozen=True, slots=True)
+class Budget:
+    """The episodes of a falsification, in whole generations.
+
+    Attributes:
+        first: episodes in every scenario.
+        total_if_worst: episodes in each of the worst scenarios, the first ones included.
+        worst: number of the worst scenarios.
+    """
+
+    first: int
+    total_if_worst: int
+    worst: int
+
+    @classmethod
+    def of(cls, episodes: int, scenarios: int, generation: int) -> Budget:
+        """Return a budget of at least a number of episodes.
+
+        Raises:
+            SimError: fewer episodes than one generation per scenario.
+        """
+        if episodes < generation * scenarios:
+            raise SimError(
+                f"--episodes must be at least one generation of {generation} per scenario, "
+                f"{generation * scenarios} for {scenarios}, got {episodes}"
+            )
+        if scenarios == 1:
+            all_episodes = math.ceil(episodes / generation) * generation
+            return cls(all_episodes, all_episodes, 0)
+        worst = max(scenarios // _WORST_ONE_IN, 1)
+        first = max(int(_FIRST_SHARE * episodes / scenarios) // generation, 1) * generation
+        rest = max(episodes - first * scenarios, 0)
+        more = math.ceil(rest / (worst * generation)) * generation
+        return cls(first, first + more, worst)
+
+    def total(self, scenarios: int) -> int:
+        """Return the episodes of all scenarios together."""
+        return self.first * scenarios + (self.total_if_worst - self.first) * self.worst
 
 
 def falsify(
     settings: FalsifySettings, folder: Path, *, workers: int, resume: bool
 ) -> Falsification:
-    """Search until the episodes asked for have run.
+    """Search until all episodes have run.
 
     Args:
-        settings: what is asked for.
+        settings: settings of the search.
         folder: made when missing; holds the studies.
-        workers: processes that run episodes; the result does not depend on their number.
-        resume: go on with what is there.
+        workers: number of processes that run episodes; the result does not depend on it.
+        resume: continue the search in the folder.
 
     Raises:
-        SimError: settings that do not go together, or another process that works in the folder.
+        SimError: settings that do not fit together, or another process that works in the folder.
     """
-    templates = [ScenarioTemplate.from_text(text) for text in settings.scenarios]
-    spaces = {each.name: PeopleSpace(each, settings.people) for each in templates}
-    budget = _budget(settings, len(spaces))
+    templates = templates_of(settings.scenarios)
+    spaces = {each.name: ScenarioSpace(each, settings.people) for each in templates}
+    budget = Budget.of(settings.episodes, len(spaces), settings.generation)
     if settings.planner:
-        make_planner(settings.planner, templates[0].median())  # says at once what is wrong with it
-    keep_settings(settings, folder, SETTINGS_FILE, "falsification", resume=resume)
-    with FileLock(folder / "locks" / "folder.lock", wait=False) as lock:
+        make_planner(settings.planner, templates[0].median())  # refuses an unusable planner
+    write_or_check_settings(settings, folder, _SETTINGS_FILE, "falsification", resume=resume)
+    with ProcessLock(folder / "locks" / "folder.lock", wait=False) as lock:
         if not lock.held:
             raise SimError(f"another process falsifies in {folder}")
-        return _search(settings, folder, spaces, budget, workers)
+        with EpisodeRunner(workers, "falsify", budget.total(len(spaces))) as runner:
+            return _search(settings, folder, spaces, budget, runner)
 
 
 def job_of(settings: FalsifySettings, scenario: Scenario) -> Job:
-    """The episode that plays a variation."""
+    """Return the job of a variation."""
     name = settings.policy_name + (f" {LABEL}" if settings.unsafe_no_floor else "")
     return Job(
         scenario=scenario_text(scenario),
@@ -128,13 +163,62 @@ def job_of(settings: FalsifySettings, scenario: Scenario) -> Job:
 
 
 def scenario_text(scenario: Scenario) -> str:
-    """A concrete scenario as YAML."""
+    """Return a concrete scenario as YAML."""
     data = scenario.model_dump(mode="json")
     return yaml.safe_dump(data, sort_keys=False, allow_unicode=True)
 
 
-def outcome_of(record: EpisodeRecord) -> Outcome:
-    """What a search is told of an episode."""
+def _search(
+    settings: FalsifySettings,
+    folder: Path,
+    spaces: dict[str, ScenarioSpace],
+    budget: Budget,
+    runner: EpisodeRunner,
+) -> Falsification:
+    """Search in all scenarios, then further in the worst of them."""
+    searches = {
+        name: RestartedSearch(
+            name,
+            space.ranges,
+            space.neutral,
+            _evaluator(settings, space, runner),
+            folder,
+            seed=settings.seed,
+            generation=settings.generation,
+        )
+        for name, space in spaces.items()
+    }
+    trials: dict[str, list[EvaluatedTrial]] = {}
+
+    def search_up_to(episodes: int, names: Sequence[str]) -> None:
+        for name in names:
+            trials[name] = searches[name].run(episodes)
+            done = sum(map(len, trials.values()))
+            if runner.bar.n < done:  # episodes of an earlier process
+                runner.bar.update(done - runner.bar.n)
+
+    search_up_to(budget.first, list(searches))
+    by_score = sorted(searches, key=lambda name: min(trial.score for trial in trials[name]))
+    search_up_to(budget.total_if_worst, by_score[: budget.worst])
+    return Falsification(
+        settings, spaces, tuple(trial for name in searches for trial in trials[name])
+    )
+
+
+def _evaluator(
+    settings: FalsifySettings, space: ScenarioSpace, runner: EpisodeRunner
+) -> Callable[[Sequence[ParameterValues]], list[Outcome]]:
+    """Return the function that runs the variations of one scenario."""
+
+    def evaluate(batch: Sequence[ParameterValues]) -> list[Outcome]:
+        runner.bar.set_postfix_str(space.template.name)
+        jobs = [job_of(settings, space.scenario(values)) for values in batch]
+        return [_outcome(record) for record in runner.run(jobs)]
+
+    return evaluate
+
+
+def _outcome(record: EpisodeRecord) -> Outcome:
     notes: dict[str, object] = {
         "min_margin_m": record.min_margin_m,
         "min_separation_m": record.min_separation_m,
@@ -147,68 +231,3 @@ def outcome_of(record: EpisodeRecord) -> Outcome:
         "error": record.error,
     }
     return Outcome((score(record),), notes=notes)
-
-
-def _search(
-    settings: FalsifySettings,
-    folder: Path,
-    spaces: dict[str, PeopleSpace],
-    budget: tuple[int, int, int],
-    workers: int,
-) -> Falsification:
-    first, more, kept = budget
-    total = first * len(spaces) + (more - first) * kept
-    with (
-        tqdm(total=total, desc="falsify", unit="episode", file=sys.stderr) as bar,
-        Crew(workers, lambda record: bar.update()) as crew,
-    ):
-
-        def hunt(name: str, space: PeopleSpace) -> Hunt:
-            def evaluate(batch: Sequence[Parameters]) -> list[Outcome]:
-                bar.set_postfix_str(name)
-                jobs = [job_of(settings, space.scenario(parameters)) for parameters in batch]
-                return [outcome_of(record) for record in crew.run(jobs)]
-
-            return Hunt(
-                name,
-                space.ranges,
-                space.neutral,
-                evaluate,
-                folder,
-                seed=settings.seed,
-                generation=settings.generation,
-            )
-
-        hunts = {name: hunt(name, space) for name, space in spaces.items()}
-        found: dict[str, list[Find]] = {}
-
-        def go_on(names: Sequence[str], episodes: int) -> None:
-            for name in names:
-                found[name] = hunts[name].run(episodes)
-                done = sum(map(len, found.values()))
-                if bar.n < done:  # what an earlier run had left
-                    bar.update(done - bar.n)
-
-        go_on(list(hunts), first)
-        worst = sorted(hunts, key=lambda name: min(find.score for find in found[name]))
-        go_on(worst[:kept], more)
-    return Falsification(settings, spaces, tuple(find for name in hunts for find in found[name]))
-
-
-def _budget(settings: FalsifySettings, scenarios: int) -> tuple[int, int, int]:
-    """Episodes a scenario at first, in all for those that are kept, and how many are kept.
-
-    Together at least as many as were asked for, in whole generations.
-    """
-    size = settings.generation
-    if settings.episodes < size * scenarios:
-        raise SimError(
-            f"--episodes must be at least one generation of {size} a scenario, {size * scenarios} "
-            f"for {scenarios}, got {settings.episodes}"
-        )
-    kept = max(scenarios // _SHARE_KEPT, 1)
-    if scenarios == 1:
-        return (math.ceil(settings.episodes / size) * size,) * 2 + (0,)
-    first = max(int(_FIRST_HALF * settings.episodes / scenarios) // size, 1) * size
-    more = math.ceil(max(settings.episodes - first * scenarios, 0) / (kept * size)) * size
-    return first, first + more, kept

@@ -1,7 +1,4 @@
-"""The policies that no other beats in both objectives, and which of them to look at.
-
-What a policy came to over many episodes.
-"""
+"""The evaluation of a policy over many episodes, and the Pareto front of several policies."""
 
 from __future__ import annotations
 
@@ -13,11 +10,17 @@ import numpy as np
 
 from ...study.measures import EpisodeRecord, Interval, bootstrap_interval, paired_difference
 
+#: The objectives, which are minimised: fields of :class:`EpisodeRecord`.
+OBJECTIVES: Final = ("time_lost_s", "violation_time_s")
+
 Point = tuple[float, float]
 
 
-def front(points: Sequence[Point]) -> list[int]:
-    """Rows of the points that no other dominates, by the first objective; of equals the first."""
+def pareto_front(points: Sequence[Point]) -> list[int]:
+    """Return the rows of the points that no other dominates, sorted by the first objective.
+
+    Of equal points, only the first is returned.
+    """
     order = sorted(range(len(points)), key=lambda row: (points[row], row))
     best, rows = float("inf"), []
     for row in order:
@@ -28,31 +31,27 @@ def front(points: Sequence[Point]) -> list[int]:
 
 
 def knee(points: Sequence[Point]) -> int:
-    """Row of the point of a front that lies farthest from the line between its ends.
+    """Return the row of the point of a front that is farthest from the line between its ends.
 
-    Both objectives are scaled to [0, 1] over the front (Das 1999). The first of a front of one or
-    two points.
+    Both objectives are scaled to [0, 1] over the front (Das 1999). A front of one or two points
+    has its knee at the first.
     """
     if len(points) < 3:
         return 0
     values = np.array(points)
     span = np.ptp(values, axis=0)
     scaled = (values - values.min(axis=0)) / np.where(span > 0.0, span, 1.0)
-    # On the way from (0, 1) to (1, 0), how far towards (0, 0).
+    # Distance from the line between (0, 1) and (1, 0) towards (0, 0), times √2.
     return int((1.0 - scaled.sum(axis=1)).argmax())
-
-
-#: What is made small, fields of :class:`EpisodeRecord`.
-OBJECTIVES: Final = ("time_lost_s", "violation_time_s")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evaluation:
-    """What a policy came to over many episodes.
+    """The evaluation of a policy over many episodes.
 
     Attributes:
-        records: of the episodes that have a result, by scenario and seed.
-        errors: of those that have none.
+        records: records of the episodes with a result, sorted by scenario and seed.
+        errors: errors of the others.
     """
 
     records: tuple[EpisodeRecord, ...]
@@ -60,35 +59,35 @@ class Evaluation:
 
     @classmethod
     def of(cls, records: Sequence[EpisodeRecord]) -> Evaluation:
-        """From episodes."""
-        good = [record for record in records if not record.error]
-        good.sort(key=lambda record: (record.scenario, record.seed))
-        return cls(tuple(good), tuple(record.error for record in records if record.error))
+        """Return the evaluation of episodes."""
+        completed = [record for record in records if not record.error]
+        completed.sort(key=lambda record: (record.scenario, record.seed))
+        return cls(tuple(completed), tuple(record.error for record in records if record.error))
 
     @property
     def objectives(self) -> tuple[float, float]:
-        """Mean time lost and mean time with a negative margin, seconds an episode."""
+        """Mean time lost and mean violation time, seconds per episode."""
         time_s, violation_s = (float(np.mean(self._values(name))) for name in OBJECTIVES)
         return time_s, violation_s
 
     @property
     def deficit_m(self) -> float:
-        """By how much the separation margin was negative at most, mean over episodes."""
-        least = [record.min_margin_m for record in self.records]
-        return float(np.mean([0.0 if value is None else max(0.0, -value) for value in least]))
+        """Mean over episodes of the deepest negative separation margin."""
+        margins = [record.min_margin_m for record in self.records]
+        return float(np.mean([0.0 if value is None else max(0.0, -value) for value in margins]))
 
     @property
     def robot_contacts(self) -> int:
-        """Episodes in which the robot moved into a person."""
+        """Number of episodes in which the robot moved into a person."""
         return sum(record.robot_contacts > 0 for record in self.records)
 
     @property
     def reached(self) -> int:
-        """Episodes that reached the goal."""
+        """Number of episodes that reached the goal."""
         return sum(record.time_to_goal_s is not None for record in self.records)
 
     def interval(self, objective: str) -> Interval:
-        """Mean of an objective with its 95 % interval, drawn within scenarios."""
+        """Return the mean of an objective with its 95 % interval, resampled within scenarios."""
         return bootstrap_interval(
             self._values(objective),
             np.random.default_rng(0),
@@ -96,7 +95,7 @@ class Evaluation:
         )
 
     def minus(self, base: Evaluation, objective: str) -> Interval:
-        """The mean less that of another policy on the same episodes, with its 95 % interval."""
+        """Return the mean difference to another policy on the same episodes, with its interval."""
         return paired_difference(base.records, self.records, objective)
 
     def _values(self, name: str) -> list[float]:

@@ -1,4 +1,4 @@
-"""The policies among which a tuning searches."""
+"""The search space of a tuning: policies that differ from a base policy in some numbers."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from nav_adapter import AwarenessPolicy, NavError
 from perception.anthropometry import BODY_RADIUS_M
 
 from ...world.errors import SimError
-from .._search import Range
+from .._optimizer import Range
 
-#: ISO 13855: nobody who has not noticed the robot counts as slower.
-WALKING_SPEED_MPS: Final = 1.6
-# No search reaches below these, whatever a file of ranges says.
-_LEAST: Final = {
+# Walking speed of ISO 13855: the least speed assumed for an unaware person.
+_WALKING_SPEED_MPS: Final = 1.6
+# Lower bounds of all ranges: the floor.
+_LOWER_BOUNDS: Final = {
     "inflation.aware_radius_m": BODY_RADIUS_M + 0.10,
     "inflation.unaware_radius_m": BODY_RADIUS_M + 0.10,
-    "speed.unaware_human_speed_mps": WALKING_SPEED_MPS,
+    "speed.unaware_human_speed_mps": _WALKING_SPEED_MPS,
     "margins.minimum_clearance_m": 0.10,
     "margins.separation_clearance_m": 0.10,
     "margins.uncertainty_sigmas": 1.0,
     "filter.lower_bound_confidence": 0.5,
 }
-# The second is moved to no more than the first.
+# Pairs of keys: the second value is lowered to the first.
 _AT_MOST: Final = (
     ("inflation.unaware_radius_m", "inflation.aware_radius_m"),
     ("speed.unaware_human_speed_mps", "speed.aware_human_speed_mps"),
@@ -41,7 +41,7 @@ _AT_MOST: Final = (
     ("timing.stop_after_s", "timing.stale_after_s"),
     ("timing.stale_after_s", "timing.fresh_within_s"),
 )
-# The second is moved to at least so much above the first.
+# Pairs of keys: the second value is raised to this gap above the first.
 _ABOVE: Final = (
     ("inflation.unaware_below", "inflation.aware_above", 0.05),
     ("speed.unaware_below", "speed.aware_above", 0.05),
@@ -49,7 +49,7 @@ _ABOVE: Final = (
     ("outline.unaware_below", "outline.aware_above", 0.05),
     ("rules.zones.stop_within_m", "rules.zones.full_speed_beyond_m", 0.1),
 )
-# Parts that a policy may lack; searching in one brings it in.
+# Parts that a policy may lack; a range in one adds it with these values.
 _OPTIONAL: Final = {
     "rules.near_cap": {"within_m": 1.5, "speed_mps": 1.5},
     "rules.zones": {"stop_within_m": 0.0, "full_speed_beyond_m": 0.5},
@@ -57,10 +57,10 @@ _OPTIONAL: Final = {
 
 
 class PolicyRange(Range):
-    """Where a parameter of a policy is searched.
+    """The search range of a parameter of a policy.
 
     Attributes:
-        also: other places in the policy that get the same value.
+        also: other keys of the policy that get the same value.
     """
 
     error: ClassVar[type[ValueError]] = SimError
@@ -71,16 +71,16 @@ class PolicyRange(Range):
 class PolicySpace:
     """The policies that differ from a base policy in some numbers.
 
-    Every point of the space is a valid policy: numbers that do not go together are moved to the
-    nearest that do. None reaches below the floor, and none takes the unaware for slower than the
-    walking speed of ISO 13855.
+    Every point of the space is a valid policy: numbers that do not fit together are moved to the
+    nearest that do. No policy is below the floor, and none assumes that an unaware person is slower
+    than the walking speed of ISO 13855.
 
     Args:
-        base: everything that is not searched.
-        ranges: where to search, by dotted place in the policy's file; None for the shipped ranges.
+        base: the policy that gives all other numbers.
+        ranges: search ranges, by dotted key of the policy file; None for the shipped ranges.
 
     Raises:
-        SimError: for a place that the policy does not have, or a range below the floor.
+        SimError: a key that the policy does not have, or a range below the floor.
     """
 
     def __init__(
@@ -88,42 +88,42 @@ class PolicySpace:
     ) -> None:
         self.ranges = dict(shipped_ranges() if ranges is None else ranges)
         self._data: dict[str, Any] = base.model_dump(mode="json")
-        for path, each in self.ranges.items():
-            for place in (path, *each.also):
-                least = _LEAST.get(place)
-                if least is not None and each.low < least - 1e-9:
+        for key, each in self.ranges.items():
+            for place in (key, *each.also):
+                bound = _LOWER_BOUNDS.get(place)
+                if bound is not None and each.low < bound - 1e-9:
                     raise SimError(
-                        f"{place}: must not be searched below {least:g}, got {each.low:g}"
+                        f"{place}: must not be searched below {bound:g}, got {each.low:g}"
                     )
                 for part, values in _OPTIONAL.items():
                     if place.startswith(part + ".") and _get(self._data, part) is None:
                         _put(self._data, part, dict(values))
                 if not isinstance(_get(self._data, place), float | int):
-                    near = difflib.get_close_matches(place, _numbers(self._data), n=1)
+                    near = difflib.get_close_matches(place, _number_keys(self._data), n=1)
                     hint = f"; did you mean {near[0]!r}?" if near else ""
                     raise SimError(f"the policy has no number {place!r}{hint}")
         for corner in (0.0, 1.0):
             self.policy({p: (1 - corner) * r.low + corner * r.high for p, r in self.ranges.items()})
 
     def base_parameters(self) -> dict[str, float]:
-        """Where the base policy lies, or the nearest point of the space."""
-        return {path: each.clipped(_get(self._data, path)) for path, each in self.ranges.items()}
+        """Return the point of the base policy, or the nearest point of the space."""
+        return {key: each.clipped(_get(self._data, key)) for key, each in self.ranges.items()}
 
     def policy(self, parameters: Mapping[str, float]) -> AwarenessPolicy:
-        """The policy at a point of the space.
+        """Return the policy at a point of the space.
 
         Raises:
-            SimError: for values that no policy may have.
+            SimError: values that no policy may have.
         """
         data = copy.deepcopy(self._data)
-        for path, value in parameters.items():
-            for place in (path, *self.ranges[path].also):
+        for key, value in parameters.items():
+            for place in (key, *self.ranges[key].also):
                 _put(data, place, value)
         for larger, smaller in _AT_MOST:
-            if _both(data, larger, smaller):
+            if _has_both(data, larger, smaller):
                 _put(data, smaller, min(_get(data, smaller), _get(data, larger)))
         for below, above, gap in _ABOVE:
-            if _both(data, below, above):
+            if _has_both(data, below, above):
                 _put(data, above, max(_get(data, above), _get(data, below) + gap))
         ceiling_m = data["margins"]["maximum_radius_m"]
         if ceiling_m is not None:
@@ -137,24 +137,24 @@ class PolicySpace:
 
 
 def shipped_ranges() -> dict[str, PolicyRange]:
-    """The ranges of ``ranges.yaml``."""
+    """Return the ranges of ``ranges.yaml``."""
     text = (resources.files("sim_tests.search.tune") / "ranges.yaml").read_text("utf-8")
-    return _ranges(text, "ranges.yaml")
+    return _parse_ranges(text, "ranges.yaml")
 
 
 def read_ranges(path: str | Path) -> dict[str, PolicyRange]:
-    """The ranges of a file.
+    """Return the ranges of a file.
 
     Raises:
-        SimError: naming the file and what is wrong.
+        SimError: an unusable file; the message names it and the error.
     """
     try:
-        return _ranges(Path(path).read_text(encoding="utf-8"), str(path))
+        return _parse_ranges(Path(path).read_text(encoding="utf-8"), str(path))
     except (OSError, UnicodeDecodeError) as cause:
         raise SimError(f"cannot read {path}: {cause}") from cause
 
 
-def _ranges(text: str, source: str) -> dict[str, PolicyRange]:
+def _parse_ranges(text: str, source: str) -> dict[str, PolicyRange]:
     try:
         data = yaml.safe_load(text)
     except yaml.YAMLError as cause:
@@ -165,15 +165,16 @@ def _ranges(text: str, source: str) -> dict[str, PolicyRange]:
             "inflation.aware_radius_m: {low: 0.4, high: 0.8}"
         )
     ranges = {}
-    for path, each in data.items():
+    for key, each in data.items():
         try:
-            ranges[str(path)] = PolicyRange.model_validate(each)
+            ranges[str(key)] = PolicyRange.model_validate(each)
         except ValidationError as cause:
-            raise SimError(f"{source}: {path}: {cause}") from cause
+            raise SimError(f"{source}: {key}: {cause}") from cause
     return ranges
 
 
 def _get(data: Mapping[str, Any], place: str) -> Any:
+    """Return the value at a dotted key; None without one."""
     node: Any = data
     for key in place.split("."):
         if not isinstance(node, Mapping) or key not in node:
@@ -182,15 +183,16 @@ def _get(data: Mapping[str, Any], place: str) -> Any:
     return node
 
 
-def _both(data: Mapping[str, Any], *places: str) -> bool:
-    """Whether the policy has a value in all of these places."""
+def _has_both(data: Mapping[str, Any], *places: str) -> bool:
+    """Return whether the policy has a value in all of these places."""
     return all(_get(data, place) is not None for place in places)
 
 
 def _put(data: dict[str, Any], place: str, value: Any) -> None:
-    *way, last = place.split(".")
+    """Set the value at a dotted key, if the policy has that key."""
+    *parents, last = place.split(".")
     node = data
-    for key in way:
+    for key in parents:
         if not isinstance(node.get(key), dict):
             return
         node = node[key]
@@ -198,11 +200,12 @@ def _put(data: dict[str, Any], place: str, value: Any) -> None:
         node[last] = value
 
 
-def _numbers(data: Mapping[str, Any], start: str = "") -> list[str]:
+def _number_keys(data: Mapping[str, Any], start: str = "") -> list[str]:
+    """Return the dotted keys of all numbers."""
     found = []
     for key, value in data.items():
         if isinstance(value, Mapping):
-            found += _numbers(value, f"{start}{key}.")
+            found += _number_keys(value, f"{start}{key}.")
         elif isinstance(value, float | int) and not isinstance(value, bool):
             found.append(f"{start}{key}")
     return found

@@ -1,21 +1,17 @@
-"""``awarenav tune`` from its options to its last line."""
+"""The command ``awarenav tune``: search, write the chosen policies, print a table."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
 
-from awarenav.policies import read_policy
-from nav_adapter import AwarenessPolicy
-
 from ...crossing.eyes import PerceptionKind
-from ...study.runs import policy_text
-from .._search import Method
-from .._templates import named_templates
+from .._files import common_settings
+from .._optimizer import SamplerName
 from ._evaluation import OBJECTIVES
-from ._files import table_lines, write_tuning
-from ._judge import TuneSettings
 from ._policy_space import read_ranges, shipped_ranges
+from ._results import table_lines, write_tuning
+from ._settings import TuneSettings
 from ._tune import Tuning, require_trials, tune
 
 
@@ -30,7 +26,7 @@ class TuneOptions:
     episodes: int
     held_out: int
     generation: int
-    sampler: Method
+    sampler: SamplerName
     perception: PerceptionKind
     camera: str
     planner: str
@@ -45,18 +41,14 @@ def tune_command(options: TuneOptions) -> int:
     """Run the command and return its exit status.
 
     Raises:
-        SimError: for options that cannot be used.
-        NavError: for a policy that cannot be used.
+        SimError: an unusable option.
+        NavError: an unusable policy.
     """
-    policy: AwarenessPolicy = read_policy(options.policy)
+    common = common_settings(options.policy, options.scenario, options.camera)
     ranges = shipped_ranges() if options.ranges is None else read_ranges(options.ranges)
     settings = TuneSettings(
-        policy_name=Path(options.policy).stem,
-        policy=policy_text(policy),
-        scenarios=tuple(
-            template.to_text() for template in named_templates(options.scenario, options.camera)
-        ),
-        ranges={path: each.model_dump(mode="json") for path, each in ranges.items()},
+        **common,
+        ranges={key: each.model_dump(mode="json") for key, each in ranges.items()},
         trials=options.trials,
         episodes=options.episodes,
         held_out=options.held_out,
@@ -83,6 +75,7 @@ def tune_command(options: TuneOptions) -> int:
 
 
 def _verdict(tuning: Tuning) -> list[str]:
+    """Return what the tuning has found, as lines of text."""
     base = tuning.anchors[0]
     if not tuning.front:
         return ["In every trial the robot moved into a person at least once: none was chosen."]

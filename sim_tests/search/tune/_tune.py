@@ -1,8 +1,7 @@
-"""``awarenav tune`` from its settings to its files."""
+"""A tuning: the search for policies with little time lost and little margin violated."""
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -10,41 +9,40 @@ from pathlib import Path
 from typing import Final, cast
 
 import yaml
-from tqdm import tqdm
 
 from nav_adapter import AwarenessPolicy
 
-from ...scenario import ScenarioTemplate
-from ...study.runs import plan_jobs
+from ...study.runs import ProcessLock, plan_jobs
 from ...world.errors import SimError
-from .._crew import Crew
-from .._file_lock import FileLock
+from .._episode_runner import EpisodeRunner
+from .._files import templates_of, write_or_check_settings
+from .._optimizer import Optimizer, Outcome, SamplerName
 from .._optuna import optuna
-from .._search import Method, Outcome, Search
-from .._settings_file import keep_settings
-from .._trials import NOTES, Ticket, TrialBook
-from ._evaluation import Evaluation, front, knee
-from ._judge import Judge, TuneSettings
+from .._shared_study import NOTES, Claim, SharedStudy
+from ._evaluation import Evaluation, knee, pareto_front
+from ._evaluator import PolicyEvaluator
 from ._policy_space import PolicyRange, PolicySpace
+from ._settings import TuneSettings
 
-#: Evaluated beside the trials.
-PRESETS: Final = ("blind", "conservative", "balanced", "assertive")
-#: Trials in which the robot moved into a person are not chosen.
-CONSTRAINT: Final = "robot_contacts"
+_SETTINGS_FILE: Final = "tune.json"
+# Evaluated beside the trials.
+_PRESETS: Final = ("blind", "conservative", "balanced", "assertive")
+# A trial in which the robot moved into a person is not chosen.
+_CONSTRAINT: Final = "robot_contacts"
 _POLL_S: Final = 0.5
 _MOST_CHOSEN: Final = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidate:
-    """A policy with what it came to on both sets of seeds.
+    """A policy with its evaluation on both sets of seeds.
 
     Attributes:
-        name: a preset, the base policy, or why a trial was chosen.
-        trial: its number; None for presets and the base policy.
+        name: a preset, the base policy, or the reason why a trial was chosen.
+        trial: number of the trial; None for presets and the base policy.
         policy: the policy.
-        tuning: on the tuning seeds.
-        held_out: on the held-out seeds.
+        tuning: evaluation on the tuning seeds.
+        held_out: evaluation on the held-out seeds.
     """
 
     name: str
@@ -56,16 +54,16 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tuning:
-    """What a tuning came to.
+    """The result of a tuning.
 
     Attributes:
-        settings: what was asked for.
-        space: where was searched.
+        settings: its settings.
+        space: its search space.
         study: Optuna's study.
-        trials: all finished ones, by number.
-        front: those on the front, without contact caused by the robot, by time lost.
+        trials: all finished trials, by number.
+        front: trials on the Pareto front without a contact caused by the robot, by time lost.
         anchors: the base policy and the presets.
-        chosen: from the front.
+        chosen: trials chosen from the front.
     """
 
     settings: TuneSettings
@@ -85,139 +83,179 @@ def tune(
     resume: bool,
     report: Callable[[Tuning], None] = lambda tuning: None,
 ) -> Tuning:
-    """Search policies until the trials asked for are finished, here or by other processes.
+    """Search until all trials are finished, by this or other processes.
 
     Args:
-        settings: what is asked for.
+        settings: settings of the search.
         folder: made when missing; holds the study.
-        workers: processes that run episodes.
-        resume: go on with what is there.
+        workers: number of processes that run episodes.
+        resume: continue the search in the folder.
         report: called with the result while the study is open.
 
     Raises:
-        SimError: settings that do not go together, or episodes of a preset that have no result.
+        SimError: settings that do not fit together, or a preset with an episode without a result.
     """
     base = AwarenessPolicy.model_validate(yaml.safe_load(settings.policy))
-    ranges = {path: PolicyRange.model_validate(each) for path, each in settings.ranges.items()}
+    ranges = {key: PolicyRange.model_validate(each) for key, each in settings.ranges.items()}
     space = PolicySpace(base, ranges)
-    search = Search(
-        cast(Method, settings.sampler),
+    optimizer = Optimizer(
+        cast(SamplerName, settings.sampler),
         space.ranges,
         generation=settings.generation,
         seed=settings.seed,
         objectives=2,
-        first=[space.base_parameters()],
+        initial=[space.base_parameters()],
     )
-    plan_jobs(  # says at once what cannot be run
-        [ScenarioTemplate.from_text(text) for text in settings.scenarios],
+    plan_jobs(  # refuses what cannot be run
+        templates_of(settings.scenarios),
         [(settings.policy_name, base)],
         settings.tuning_seeds,
         planners=[settings.planner],
         perception=settings.perception,
     )
-    anchors = {settings.policy_name: base}
-    for name in PRESETS:
-        preset = AwarenessPolicy.preset(name)
-        if name in anchors and anchors[name] != preset:
-            raise SimError(f"a policy of your own needs a name of its own, got {name!r}")
-        anchors[name] = preset
-    keep_settings(settings, folder, "tune.json", "tuning", resume=resume, may_grow=["trials"])
-    each_trial, each_held = (
-        seeds * len(settings.scenarios) for seeds in (settings.episodes, settings.held_out)
+    anchors = _anchors(settings.policy_name, base)
+    write_or_check_settings(
+        settings, folder, _SETTINGS_FILE, "tuning", resume=resume, may_grow=["trials"]
     )
     with (
-        TrialBook(folder, "tune", search, settings.trials) as book,
-        tqdm(desc="tune", unit="episode", smoothing=0.05, file=sys.stderr) as bar,
-        Crew(workers, lambda record: bar.update()) as crew,
+        SharedStudy(folder, "tune", optimizer, settings.trials) as study,
+        EpisodeRunner(workers, "tune") as runner,
     ):
-        judge = Judge(settings, crew, folder)
-        left = settings.trials - book.finished
-        bar.total = each_trial * (left + len(anchors)) + each_held * (len(anchors) + _MOST_CHOSEN)
-        bar.set_postfix_str("presets")
+        evaluator = PolicyEvaluator(settings, runner, folder)
+        runner.bar.total = _planned_episodes(settings, study.finished_count, len(anchors))
+        runner.bar.set_postfix_str("presets")
         tuned = {
-            name: judge.sure(name, each, settings.tuning_seeds) for name, each in anchors.items()
+            name: evaluator.evaluate_all(name, policy, settings.tuning_seeds)
+            for name, policy in anchors.items()
         }
-        while not book.done:
-            bar.set_postfix_str(f"{book.finished} of {settings.trials} trials")
-            tickets = book.claim(1)
-            if not tickets:
-                bar.set_postfix_str("others work on the rest of this generation")
-                time.sleep(_POLL_S)
-            for ticket in tickets:
-                book.tell(ticket, _tried(ticket, space, judge, settings))
-        bar.set_postfix_str("held-out seeds")
-        trials = book.finished_trials()
-        best = feasible_front(trials)
-        held = settings.held_out_seeds
+        _run_trials(study, settings, space, evaluator, runner)
+        runner.bar.set_postfix_str("held-out seeds")
+        trials = study.finished_trials()
+        front = feasible_front(trials)
 
         def anchor(name: str, policy: AwarenessPolicy) -> Candidate:
-            return Candidate(name, None, policy, tuned[name], judge.sure(name, policy, held))
+            held_out = evaluator.evaluate_all(name, policy, settings.held_out_seeds)
+            return Candidate(name, None, policy, tuned[name], held_out)
 
         def candidate(name: str, trial: optuna.trial.FrozenTrial) -> Candidate:
-            policy, label = space.policy(trial.params), f"trial_{trial.number:04d}"
-            tuning = judge.sure(label, policy, settings.tuning_seeds)
-            return Candidate(name, trial.number, policy, tuning, judge.sure(label, policy, held))
+            policy, label = space.policy(trial.params), _trial_label(trial.number)
+            on_tuning_seeds = evaluator.evaluate_all(label, policy, settings.tuning_seeds)
+            held_out = evaluator.evaluate_all(label, policy, settings.held_out_seeds)
+            return Candidate(name, trial.number, policy, on_tuning_seeds, held_out)
 
         tuning = Tuning(
             settings=settings,
             space=space,
-            study=book.study,
+            study=study.study,
             trials=tuple(trials),
-            front=tuple(best),
-            anchors=tuple(anchor(name, each) for name, each in anchors.items()),
+            front=tuple(front),
+            anchors=tuple(anchor(name, policy) for name, policy in anchors.items()),
             chosen=tuple(
                 candidate(name, trial)
-                for name, trial in _chosen(best, tuned[settings.policy_name]).items()
+                for name, trial in _chosen(front, tuned[settings.policy_name]).items()
             ),
         )
-        bar.total = bar.n  # whatever was known before, and reasons that share a trial
-        bar.close()
-        with FileLock(folder / "locks" / "report.lock"):  # several processes may end at once
+        runner.bar.total = runner.bar.n  # some episodes were known before, some trials chosen twice
+        runner.bar.close()
+        with ProcessLock(folder / "locks" / "report.lock"):  # several processes may end at once
             report(tuning)
     return tuning
-
-
-def _tried(ticket: Ticket, space: PolicySpace, judge: Judge, settings: TuneSettings) -> Outcome:
-    name = f"trial_{ticket.number:04d}"
-    found = judge.run(name, space.policy(ticket.parameters), settings.tuning_seeds)
-    if found.errors:
-        # Episodes without a result must not make a policy look better.
-        return Outcome(None, notes={"error": found.errors[0]})
-    return Outcome(
-        found.objectives,
-        {CONSTRAINT: float(found.robot_contacts)},
-        {
-            "deficit_m": found.deficit_m,
-            "robot_contacts": found.robot_contacts,
-            "reached": found.reached,
-        },
-    )
 
 
 def feasible_front(
     trials: Sequence[optuna.trial.FrozenTrial],
 ) -> list[optuna.trial.FrozenTrial]:
-    """The trials on the front, by time lost, of those that keep every constraint."""
-    good = [
+    """Return the Pareto front of the trials that satisfy every constraint, by time lost."""
+    feasible = [
         trial
         for trial in trials
         if trial.state == optuna.trial.TrialState.COMPLETE
         and all(value <= 0.0 for value in trial.constraints.values())
     ]
-    return [good[row] for row in front([(t.values[0], t.values[1]) for t in good])]
+    rows = pareto_front([(trial.values[0], trial.values[1]) for trial in feasible])
+    return [feasible[row] for row in rows]
+
+
+def require_trials(tuning: Tuning) -> None:
+    """Raise SimError if no trial has a result."""
+    if not any(trial.state == optuna.trial.TrialState.COMPLETE for trial in tuning.trials):
+        first = next(iter(tuning.trials)).user_attrs.get(NOTES, {}).get("error", "")
+        raise SimError(f"no trial could be judged; the first said: {first}")
+
+
+def _anchors(policy_name: str, base: AwarenessPolicy) -> dict[str, AwarenessPolicy]:
+    """Return the base policy and the presets by name; refuse a base with the name of a preset."""
+    anchors = {policy_name: base}
+    for name in _PRESETS:
+        preset = AwarenessPolicy.preset(name)
+        if name in anchors and anchors[name] != preset:
+            raise SimError(f"a policy of your own needs a name of its own, got {name!r}")
+        anchors[name] = preset
+    return anchors
+
+
+def _planned_episodes(settings: TuneSettings, finished_trials: int, anchors: int) -> int:
+    """Return the number of episodes that are left at most."""
+    per_trial, per_held_out = (
+        seeds * len(settings.scenarios) for seeds in (settings.episodes, settings.held_out)
+    )
+    left = settings.trials - finished_trials
+    return per_trial * (left + anchors) + per_held_out * (anchors + _MOST_CHOSEN)
+
+
+def _run_trials(
+    study: SharedStudy,
+    settings: TuneSettings,
+    space: PolicySpace,
+    evaluator: PolicyEvaluator,
+    runner: EpisodeRunner,
+) -> None:
+    """Evaluate trials until all are finished, by this or other processes."""
+
+    def outcomes_of(claims: Sequence[Claim]) -> list[Outcome]:
+        return [_outcome(claim, space, evaluator, settings) for claim in claims]
+
+    while not study.is_complete:
+        runner.bar.set_postfix_str(f"{study.finished_count} of {settings.trials} trials")
+        if not study.evaluate(1, outcomes_of):
+            runner.bar.set_postfix_str("others work on the rest of this generation")
+            time.sleep(_POLL_S)
+
+
+def _outcome(
+    claim: Claim, space: PolicySpace, evaluator: PolicyEvaluator, settings: TuneSettings
+) -> Outcome:
+    policy = space.policy(claim.parameters)
+    evaluation = evaluator.evaluate(_trial_label(claim.number), policy, settings.tuning_seeds)
+    if evaluation.errors:
+        # Episodes without a result must not make a policy look better.
+        return Outcome(None, notes={"error": evaluation.errors[0]})
+    return Outcome(
+        evaluation.objectives,
+        {_CONSTRAINT: float(evaluation.robot_contacts)},
+        {
+            "deficit_m": evaluation.deficit_m,
+            "robot_contacts": evaluation.robot_contacts,
+            "reached": evaluation.reached,
+        },
+    )
+
+
+def _trial_label(number: int) -> str:
+    return f"trial_{number:04d}"
 
 
 def _chosen(
-    best: list[optuna.trial.FrozenTrial], base: Evaluation
+    front: Sequence[optuna.trial.FrozenTrial], base: Evaluation
 ) -> dict[str, optuna.trial.FrozenTrial]:
-    """Which trials of the front to look at, by why; a trial may be there for several reasons."""
-    if not best:
+    """Return the chosen trials of the front by reason; a trial may have several reasons."""
+    if not front:
         return {}
-    points = [(trial.values[0], trial.values[1]) for trial in best]
+    points = [(trial.values[0], trial.values[1]) for trial in front]
     chosen = {
-        "least_time_lost": best[0],
-        "knee": best[knee(points)],
-        "least_violation": best[-1],
+        "least_time_lost": front[0],
+        "knee": front[knee(points)],
+        "least_violation": front[-1],
     }
     time_s, violation_s = base.objectives
     better = [
@@ -226,12 +264,5 @@ def _chosen(
         if point[0] <= time_s and point[1] <= violation_s and point != (time_s, violation_s)
     ]
     if better:
-        chosen["beats_base"] = best[better[knee([points[row] for row in better])]]
+        chosen["beats_base"] = front[better[knee([points[row] for row in better])]]
     return chosen
-
-
-def require_trials(tuning: Tuning) -> None:
-    """Raise SimError when no trial could be judged."""
-    if not any(trial.state == optuna.trial.TrialState.COMPLETE for trial in tuning.trials):
-        first = next(iter(tuning.trials)).user_attrs.get(NOTES, {}).get("error", "")
-        raise SimError(f"no trial could be judged; the first said: {first}")

@@ -1,4 +1,4 @@
-"""Measures of crossings and their statistics: ``awarenav compare``."""
+"""Metrics of crossings, their statistics over many episodes, and ``awarenav compare``."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 from awarenav.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from ._bootstrap import bootstrap_interval, ratio_interval, ratio_intervals
+    from ._bootstrap import bootstrap_interval, ratio_interval
     from ._driving import path_length_m
     from ._interval import Interval, proportion_interval, zero_of_n_upper
     from ._measure import measure
+    from ._metrics import METRICS, SHARES, Metric
     from ._pairs import (
         paired,
         paired_difference,
@@ -21,16 +22,19 @@ if TYPE_CHECKING:
     )
     from ._record import RECORD_COLUMNS, EpisodeRecord, record_row
     from ._record_file import read_record_file, read_records, write_records
-    from ._summary import BASELINE, Comparison, Summary, SummaryRow, summarise, summarise_sources
+    from ._summary import BASELINE, Comparison, Summary, SummaryRow, summarise
     from ._summary_text import summary_text, table_text
     from ._variants import Variant, labels
 
 __all__ = [
     "BASELINE",
+    "METRICS",
     "RECORD_COLUMNS",
+    "SHARES",
     "Comparison",
     "EpisodeRecord",
     "Interval",
+    "Metric",
     "Summary",
     "SummaryRow",
     "Variant",
@@ -42,12 +46,10 @@ __all__ = [
     "path_length_m",
     "proportion_interval",
     "ratio_interval",
-    "ratio_intervals",
     "read_record_file",
     "read_records",
     "record_row",
     "summarise",
-    "summarise_sources",
     "summary_text",
     "table_text",
     "violates_more",
@@ -64,7 +66,6 @@ __getattr__ = lazy_names(
         "._bootstrap": (
             "bootstrap_interval",
             "ratio_interval",
-            "ratio_intervals",
         ),
         "._driving": ("path_length_m",),
         "._interval": (
@@ -73,6 +74,11 @@ __getattr__ = lazy_names(
             "zero_of_n_upper",
         ),
         "._measure": ("measure",),
+        "._metrics": (
+            "METRICS",
+            "SHARES",
+            "Metric",
+        ),
         "._pairs": (
             "paired",
             "paired_difference",
@@ -97,7 +103,6 @@ __getattr__ = lazy_names(
             "Summary",
             "SummaryRow",
             "summarise",
-            "summarise_sources",
         ),
         "._summary_text": (
             "summary_text",

@@ -1,8 +1,7 @@
-"""Awareness in an episode: how well it was estimated, and who stood how to the robot."""
+"""Awareness in an episode: the error of its estimate, and the class of the nearest person."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -17,32 +16,32 @@ from ._trace import Trace
 if TYPE_CHECKING:
     from ...crossing import CrossingResult
 
-#: A track belongs to a person no farther away than this.
+#: Largest distance between a track and its person.
 MATCHED_WITHIN_M: Final = 1.0
-#: From here up somebody counts as aware, and a track's lower bound as saying so.
+#: A person is aware from this α on; the robot judges them aware from this lower bound on.
 AWARE_FROM: Final = 0.5
-#: So long before the closest approach it is judged,
+#: Time before the closest approach over which awareness is judged.
 JUDGED_OVER_S: Final = 3.0
-#: and somebody who was aware for this share of the time was aware.
+#: Share of that time for which a person must be aware to be classed as aware.
 AWARE_SHARE: Final = 0.5
-#: Nobody farther away was encountered: the far edge of Hall's social distance.
+#: Largest separation of an encounter: the far edge of Hall's social distance.
 ENCOUNTER_WITHIN_M: Final = 3.6
-#: Separations that differ by less are the same.
+#: Separations that differ by less count as equal.
 SAME_SEPARATION_M: Final = 0.01
 
 
 def matched_tracks(
     tracks_odom_m: FloatArray, people_odom_m: FloatArray
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Rows of tracks and of people that belong together, by the least sum of distances.
+    """Return the rows of tracks and of their people, matched by the least sum of distances.
 
     Args:
-        tracks_odom_m: (T, 2).
-        people_odom_m: (P, 2).
+        tracks_odom_m: (T, 2) positions of the tracks.
+        people_odom_m: (P, 2) positions of the people.
     """
     gaps = tracks_odom_m[:, None, :] - people_odom_m[None, :, :]
     distances = np.hypot(gaps[..., 0], gaps[..., 1])
-    # A pair beyond the bound costs so much that as many as possible lie within it.
+    # The cost of a pair beyond the bound is so high that as many pairs as possible lie within it.
     within = distances <= MATCHED_WITHIN_M
     costs = np.where(within, distances, 1e3)
     track, person = linear_sum_assignment(costs)
@@ -51,9 +50,9 @@ def matched_tracks(
 
 
 def track_awareness(result: CrossingResult, trace: Trace) -> tuple[FloatArray, FloatArray]:
-    """(N, P) α and its lower bound of each person's track; NaN where there is none.
+    """Return α and its lower bound of each person's track, (N, P) each; NaN without a track.
 
-    Tentative tracks count too: the policy reckons with them.
+    Tentative tracks count too, because the policy uses them.
     """
     mean = np.full(trace.awareness.shape, np.nan)
     lower = np.full(trace.awareness.shape, np.nan)
@@ -71,16 +70,19 @@ def track_awareness(result: CrossingResult, trace: Trace) -> tuple[FloatArray, F
 
 
 def awareness_error(true: FloatArray, tracked: FloatArray) -> float | None:
-    """Mean |α of the track − true α| over all instants and people with a track; None without."""
+    """Return the mean |α of the track − true α| over all instants and tracked people.
+
+    None without a track.
+    """
     known = np.isfinite(tracked)
     return float(np.abs(tracked - true)[known].mean()) if known.any() else None
 
 
 def nearest_person(separation_m: FloatArray) -> tuple[int, int] | None:
-    """Instant and person (rows of an (N, P) array) of the closest approach.
+    """Return the instant and the person of the closest approach, as indices of an (N, P) array.
 
     The instant is the first within 1 cm of the smallest separation: while both stand, the last
-    micrometres are chance. None if nobody came within 3.6 m.
+    micrometres are random. None if nobody came within 3.6 m.
     """
     if not separation_m.size:
         return None
@@ -93,24 +95,25 @@ def nearest_person(separation_m: FloatArray) -> tuple[int, int] | None:
 
 
 def awareness_class(t_s: FloatArray, true: FloatArray, lower: FloatArray, row: int) -> Awareness:
-    """How one person stood to the robot in the 3 s before an instant, and what was made of it.
+    """Return the awareness class of one person over the 3 s before an instant.
 
-    Aware: true α ≥ 0.5 for at least half of the time. Judged aware: the track's lower bound ≥ 0.5
-    for at least half of it; an instant without a track says "not aware".
+    The person is aware if the true α is ≥ 0.5 for at least half of that time. The robot judges
+    them aware if the lower bound of the track is ≥ 0.5 for at least half of it. An instant without
+    a track counts as not aware.
 
     Args:
-        t_s: (N,).
-        true: (N,) α of the person.
-        lower: (N,) of the person's track, NaN where there is none.
-        row: of the instant.
+        t_s: (N,) times.
+        true: (N,) true α of the person.
+        lower: (N,) lower bound of the person's track, NaN without a track.
+        row: index of the instant.
     """
     window = slice(int(np.searchsorted(t_s, t_s[row] - JUDGED_OVER_S - 1e-9)), row + 1)
-    aware = _for_long(true[window])
-    judged = _for_long(np.nan_to_num(lower[window], nan=0.0))
+    aware = _mostly_aware(true[window])
+    judged = _mostly_aware(np.nan_to_num(lower[window], nan=0.0))
     if aware:
         return "aware" if judged else "missed_aware"
     return "falsely_aware" if judged else "unaware"
 
 
-def _for_long(values: FloatArray | Sequence[float]) -> bool:
-    return float(np.mean(np.asarray(values) >= AWARE_FROM)) >= AWARE_SHARE
+def _mostly_aware(values: FloatArray) -> bool:
+    return float(np.mean(values >= AWARE_FROM)) >= AWARE_SHARE

@@ -16,8 +16,8 @@ from ...world.errors import SimError
 from ._interval import Interval
 
 RESAMPLES: Final = 4000
-# Drawn at once, to bound the memory.
-_CELLS_AT_ONCE: Final = 2_000_000
+# Resamples are drawn in batches of so many numbers, to bound the memory.
+_NUMBERS_PER_BATCH: Final = 2_000_000
 
 
 def bootstrap_interval(
@@ -28,24 +28,16 @@ def bootstrap_interval(
     strata: Sequence[Hashable] | None = None,
     resamples: int = RESAMPLES,
 ) -> Interval:
-    """The mean of some values with its BCa bootstrap interval; see :func:`ratio_intervals`.
+    """Return the mean of (N,) finite values with its bootstrap interval.
 
-    Args:
-        values: (N,) finite.
-        rng: draws the resamples.
-        level: of confidence, in (0, 1).
-        strata: N labels; values are drawn again from those of their own label.
-        resamples: how many.
+    :func:`ratio_intervals` describes the method and the other arguments.
 
     Raises:
-        SimError: values that are not finite, or labels that are not as many.
+        SimError: values that are not finite, or another number of labels than of values.
     """
-    checked = finite_array("values", values, ("N",), SimError)[:, None]
-    return replace(
-        ratio_intervals(
-            checked, np.ones_like(checked), rng, level, strata=strata, resamples=resamples
-        )[0],
-        n=len(checked),
+    checked = finite_array("values", values, ("N",), SimError)
+    return ratio_interval(
+        checked, np.ones_like(checked), rng, level, strata=strata, resamples=resamples
     )
 
 
@@ -58,15 +50,9 @@ def ratio_interval(
     strata: Sequence[Hashable] | None = None,
     resamples: int = RESAMPLES,
 ) -> Interval:
-    """The ratio of two sums over episodes with its bootstrap interval; see :func:`ratio_intervals`.
+    """Return the ratio of two sums over (N,) episodes with its bootstrap interval.
 
-    Args:
-        numerators: (N,) finite.
-        denominators: (N,) finite; all 1 for a mean.
-        rng: draws the resamples.
-        level: of confidence, in (0, 1).
-        strata: N labels, or None.
-        resamples: how many.
+    :func:`ratio_intervals` describes the method and the other arguments.
     """
     top = finite_array("numerators", numerators, ("N",), SimError)
     bottom = finite_array("denominators", denominators, (len(top),), SimError)
@@ -84,29 +70,30 @@ def ratio_intervals(
     strata: Sequence[Hashable] | None = None,
     resamples: int = RESAMPLES,
 ) -> tuple[Interval, ...]:
-    """Ratios of sums over the same episodes, each with its bootstrap interval.
+    """Return M ratios of sums over the same N episodes, each with its bootstrap interval.
 
-    Bias-corrected and accelerated (Efron 1987), the acceleration from the empirical influence
-    (Davison and Hinkley 1997, section 5.4). Within a stratum of n, n − 1 are drawn with replacement
-    and weighted n/(n − 1) (Rao and Wu 1988): the plain bootstrap's variance is too small by
-    (n − 1)/n, which matters for a few seeds a scenario. Strata of one are put together.
+    The interval is bias-corrected and accelerated (BCa; Efron 1987). The acceleration comes from
+    the empirical influence (Davison and Hinkley 1997, section 5.4). Resamples are drawn within
+    strata: of n episodes, n − 1 are drawn with replacement and weighted n/(n − 1) (Rao and Wu
+    1988). The variance of the plain bootstrap is too small by (n − 1)/n, which matters with few
+    seeds per scenario. Strata of one episode are joined.
 
     Args:
         numerators: (N, M) finite.
-        denominators: (N, M) finite; 1 for a mean, and 0 over 0 for an episode to which the figure
+        denominators: (N, M) finite; 1 for a mean, and 0 over 0 for an episode to which the metric
             does not apply.
         rng: draws the resamples.
-        level: of confidence, in (0, 1).
-        strata: N labels; episodes are drawn again from those of their own label. None for one.
-        resamples: how many.
+        level: confidence of the interval, in (0, 1).
+        strata: a label for each of the N episodes, or None for a single stratum.
+        resamples: number of resamples.
 
     Returns:
-        M intervals. NaN without episodes or with a sum of denominators that is not positive;
-        unbounded for a single episode, or when resamples with such a sum are more than the
-        interval may leave out.
+        M intervals. The value is NaN without episodes, or where the sum of denominators is not
+        positive. The interval is unbounded for a single episode, or where more resamples have such
+        a sum than the interval may leave out.
 
     Raises:
-        SimError: numbers that are not finite, or labels that are not as many.
+        SimError: numbers that are not finite, or another number of labels than of episodes.
     """
     top = finite_array("numerators", numerators, ("N", "M"), SimError)
     bottom = finite_array("denominators", denominators, top.shape, SimError)
@@ -114,8 +101,8 @@ def ratio_intervals(
     if level >= 1.0:
         raise SimError(f"level must lie in (0, 1), got {level:g}")
     if strata is not None and len(strata) != len(top):
-        raise SimError(f"strata must be {len(top)} labels, one a value, got {len(strata)}")
-    groups = _groups(strata, len(top)) if len(top) > 1 else []
+        raise SimError(f"strata must be {len(top)} labels, one per value, got {len(strata)}")
+    groups = _strata_rows(strata, len(top)) if len(top) > 1 else []
     tops, bottoms = np.zeros((2, resamples, top.shape[1]))
     for group in groups:
         for rows, weights in _draws(len(group), resamples, rng):
@@ -137,7 +124,17 @@ def _interval(
     groups: list[NDArray[np.intp]],
     level: float,
 ) -> Interval:
-    """One ratio: (N,) terms, (B,) resampled sums, and how many terms there really are."""
+    """Return the interval of one ratio.
+
+    Args:
+        top: (N,) numerators.
+        bottom: (N,) denominators.
+        tops: (B,) resampled sums of the numerators.
+        bottoms: (B,) resampled sums of the denominators.
+        n: number of episodes to which the metric applies.
+        groups: rows of each stratum.
+        level: confidence.
+    """
     total = float(bottom.sum())
     if total <= 0.0:
         return Interval(np.nan, -np.inf, np.inf, n)
@@ -150,8 +147,11 @@ def _interval(
     return Interval(value, low, high, n)
 
 
-def _groups(strata: Sequence[Hashable] | None, n: int) -> list[NDArray[np.intp]]:
-    """Rows of each stratum, at least two in each; singles together, or with the smallest."""
+def _strata_rows(strata: Sequence[Hashable] | None, n: int) -> list[NDArray[np.intp]]:
+    """Return the rows of each stratum, at least two per stratum.
+
+    Strata of one row are joined; a single one joins the smallest stratum.
+    """
     if strata is None:
         return [np.arange(n)]
     rows: dict[Hashable, list[int]] = {}
@@ -169,10 +169,10 @@ def _groups(strata: Sequence[Hashable] | None, n: int) -> list[NDArray[np.intp]]
 def _draws(
     size: int, resamples: int, rng: np.random.Generator
 ) -> Iterator[tuple[slice, FloatArray]]:
-    """Some resamples at a time: which, and (some, size) the weight of each episode in them."""
-    some = max(_CELLS_AT_ONCE // size, 1)
-    for start in range(0, resamples, some):
-        count = min(some, resamples - start)
+    """Yield batches of resamples: their rows, and the (batch, size) weight of each episode."""
+    batch = max(_NUMBERS_PER_BATCH // size, 1)
+    for start in range(0, resamples, batch):
+        count = min(batch, resamples - start)
         drawn = rng.integers(0, size, (count, size - 1)) + size * np.arange(count)[:, None]
         times = np.bincount(drawn.ravel(), minlength=count * size).reshape(count, size)
         weights: FloatArray = times * np.float64(size / (size - 1))
@@ -180,7 +180,7 @@ def _draws(
 
 
 def _acceleration(residuals: FloatArray, groups: list[NDArray[np.intp]]) -> float:
-    """Skewness of the empirical influence over six; the scale of the influence cancels."""
+    """Return a sixth of the skewness of the empirical influence; its scale cancels."""
     largest = float(np.abs(residuals).max())
     if largest < np.finfo(np.float64).tiny:
         return 0.0
@@ -195,11 +195,12 @@ def _acceleration(residuals: FloatArray, groups: list[NDArray[np.intp]]) -> floa
 def _bca(
     value: float, resampled: FloatArray, acceleration: float, level: float
 ) -> tuple[float, float]:
-    # Ties count half: with few distinct values much of the mass may lie on the estimate itself.
+    """Return both ends of the BCa interval of an estimate, from its resampled values."""
+    # Ties count half: with few distinct values, many resamples may equal the estimate.
     tolerance = 1e-12 * max(abs(value), float(np.abs(resampled).max()))
     below = float(np.mean(resampled < value - tolerance))
     below += 0.5 * float(np.mean(np.abs(resampled - value) <= tolerance))
-    # A whole resample on one side would send the bias to infinity.
+    # With all resamples on one side, the bias would be infinite.
     least = 0.5 / len(resampled)
     bias = float(ndtri(min(max(below, least), 1.0 - least)))
     ends = ndtri(np.array([0.5 * (1.0 - level), 0.5 * (1.0 + level)]))

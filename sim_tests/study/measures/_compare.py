@@ -1,4 +1,4 @@
-"""What ``awarenav compare`` does."""
+"""The command ``awarenav compare``: tables of one or more runs."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from awarenav.files import json_text
 
 from ...world.errors import SimError
 from ._record_file import read_records, write_records
-from ._summary import summarise_sources
+from ._summary import BASELINE, summarise_sources
 from ._summary_text import summary_text
 
-EPISODES_NAME: Final = "episodes.csv"
+_EPISODES: Final = "episodes.csv"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,44 +31,45 @@ class CompareOptions:
 
 
 def compare_command(options: CompareOptions) -> int:
-    """Read runs, print their tables, and write their episodes into one file if asked.
+    """Read runs, print their tables, and write their episodes to ``--out``.
 
     Raises:
-        SimError: a run cannot be read, a baseline asked for is not there, or an option is out of
-            range.
+        SimError: a run cannot be read, the baseline is not among its policies, or an option is out
+            of range.
     """
-    names = _names(options.runs)
+    names = _run_names(options.runs)
     if not 0.0 < options.level < 1.0:
         raise SimError(f"--level must lie in (0, 1), got {options.level:g}")
     if options.out is not None and options.out.suffix not in (".csv", ".parquet"):
         raise SimError(f"--out must be a .csv or .parquet file, got {options.out}")
     sources = {
-        name: read_records(_table(path)) for name, path in zip(names, options.runs, strict=True)
+        name: read_records(_episodes_file(path))
+        for name, path in zip(names, options.runs, strict=True)
     }
-    everything = [record for records in sources.values() for record in records]
-    if not everything:
+    records = [record for table in sources.values() for record in table]
+    if not records:
         raise SimError(f"no episodes yet in {', '.join(map(str, options.runs))}")
-    _check_baseline(options.baseline, sorted({record.policy for record in everything}))
+    _check_baseline(options.baseline, sorted({record.policy for record in records}))
     summary = summarise_sources(
         sources, baseline=options.baseline, level=options.level, seed=options.seed
     )
     print(json_text(asdict(summary)).rstrip() if options.as_json else summary_text(summary))
     if options.out is not None:
-        write_records(options.out, everything)
+        write_records(options.out, records)
     return 0
 
 
-def _table(path: Path) -> Path:
-    return path / EPISODES_NAME if path.is_dir() else path
+def _episodes_file(path: Path) -> Path:
+    return path / _EPISODES if path.is_dir() else path
 
 
-def _names(runs: Sequence[Path]) -> list[str]:
-    """A name for each run: the shortest end of its path that no other has."""
+def _run_names(runs: Sequence[Path]) -> list[str]:
+    """Return a name for each run: the shortest end of its path that tells it from the others."""
     if len(runs) == 1:
         return [""]
     parts = [run.resolve().parts for run in runs]
     if len(set(parts)) < len(parts):
-        raise SimError(f"each run once, got {', '.join(map(str, runs))}")
+        raise SimError(f"give each run once, got {', '.join(map(str, runs))}")
     depth = next(
         depth
         for depth in range(1, max(map(len, parts)) + 1)
@@ -78,8 +79,9 @@ def _names(runs: Sequence[Path]) -> list[str]:
 
 
 def _check_baseline(baseline: str, policies: Sequence[str]) -> None:
-    if baseline in policies or (baseline == "blind" and len(policies) >= 1):
-        return  # the default needs not be there: then nothing is compared
+    """Refuse a baseline that is not among the policies, except the default."""
+    if baseline in policies or (baseline == BASELINE and len(policies) >= 1):
+        return  # without the default baseline, nothing is compared
     near = difflib.get_close_matches(baseline, policies, n=1)
     hint = f"; did you mean {near[0]!r}?" if near else ""
     raise SimError(

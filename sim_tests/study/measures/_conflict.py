@@ -1,6 +1,6 @@
-"""The robot's outline against discs: how far, and how long until they touch.
+"""Surrogate measures of conflict: time to collision and post-encroachment time.
 
-Surrogates of conflict: time to collision and post-encroachment time.
+The robot is the convex hull of its footprint, and a person is a disc.
 """
 
 from __future__ import annotations
@@ -16,15 +16,23 @@ from perception.arrays import FloatArray
 
 from ._trace import Trace
 
+# Poses are compared at this rate; a robot at 1.5 m/s moves 75 mm in between.
+_COMPARED_HZ: Final = 20.0
+# The nearest pairs of poses, this many, are compared again at this many instants about theirs.
+_REFINED_PAIRS: Final = 8
+_REFINED_INSTANTS: Final = 11
+# Instants of the robot that are compared at once, to bound the memory.
+_ROWS_AT_ONCE: Final = 512
+
 
 class Outline:
-    """The convex hull of a footprint.
+    """The convex hull of a robot's footprint.
 
     Args:
         footprint_m: (M, 2) corners in the base frame, not all on one line.
 
     Attributes:
-        reach_m: of the corner that is farthest from the base origin.
+        reach_m: distance of the farthest corner from the base origin.
     """
 
     def __init__(self, footprint_m: FloatArray) -> None:
@@ -38,7 +46,7 @@ class Outline:
         self.reach_m = float(np.hypot(footprint_m[:, 0], footprint_m[:, 1]).max())
 
     def gap(self, points_base_m: FloatArray) -> FloatArray:
-        """(N, 2) vector from the nearest point of the outline to each of N points; 0 inside."""
+        """Return the (N, 2) vectors from the outline's nearest points to N points; 0 inside."""
         to = points_base_m[:, None, :] - self._corners
         along = np.clip(np.einsum("nmi,mi->nm", to, self._along), 0.0, self._lengths)
         gaps = to - along[..., None] * self._along
@@ -49,7 +57,7 @@ class Outline:
         return gap
 
     def distance(self, points_base_m: FloatArray) -> FloatArray:
-        """(N,) distance of N points; 0 inside."""
+        """Return the (N,) distances of N points from the outline; 0 inside."""
         gap = self.gap(points_base_m)
         distance: FloatArray = np.hypot(gap[:, 0], gap[:, 1])
         return distance
@@ -57,23 +65,25 @@ class Outline:
     def time_to_disc(
         self, centres_base_m: FloatArray, velocities_base_mps: FloatArray, radius_m: float
     ) -> FloatArray:
-        """When discs at constant velocities first touch the outline, s; infinite if never.
+        """Return the times at which moving discs first touch the outline, s; infinite if never.
 
-        Exact: the disc's centre against the outline grown by the radius, which is bounded by the
-        edges moved outwards and circles about the corners. Discs that overlap the outline give 0
-        if they come nearer, and infinity if they do not.
+        The times are exact. A disc touches the outline where its centre reaches the outline grown
+        by the radius; that shape is bounded by the edges moved outwards and by circles about the
+        corners. For a disc that overlaps the outline, the time is 0 if it comes nearer, else
+        infinite.
 
         Args:
-            centres_base_m: (N, 2).
-            velocities_base_mps: (N, 2) relative to the outline, which does not turn.
-            radius_m: > 0 of the discs.
+            centres_base_m: (N, 2) centres of the discs.
+            velocities_base_mps: (N, 2) constant velocities relative to the outline, which does not
+                turn.
+            radius_m: radius of the discs, > 0.
 
         Returns:
-            (N,).
+            (N,) times.
         """
         to = centres_base_m[:, None, :] - self._corners
         velocity = velocities_base_mps[:, None, :]
-        # A velocity all but along an edge reaches it after longer than a float can say: never.
+        # A velocity almost parallel to an edge gives a time beyond a float: the disc never touches.
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             outwards = np.einsum("nki,mi->nm", velocity, self._outward)
             to_edge = (radius_m - np.einsum("nmi,mi->nm", to, self._outward)) / outwards
@@ -86,7 +96,7 @@ class Outline:
             approach = -np.einsum("nmi,nki->nm", to, velocity)
             beyond = np.einsum("nmi,nmi->nm", to, to) - radius_m**2
             discriminant = approach**2 - speed2 * beyond
-            # The nearer root in the form that loses no digits.
+            # The smaller root, in the form without cancellation.
             to_corner = beyond / (approach + np.sqrt(np.maximum(discriminant, 0.0)))
             hits = (approach > 0.0) & (discriminant >= 0.0) & (beyond >= 0.0)
             to_corner = np.where(hits, to_corner, np.inf)
@@ -97,20 +107,12 @@ class Outline:
         return np.where(distance < radius_m, np.where(closing, 0.0, np.inf), time)
 
 
-# Poses are compared at so many instants a second; a robot at 1.5 m/s moves 75 mm in between.
-_COMPARED_HZ: Final = 20.0
-# So many of the nearest pairs are looked at again at so many instants about theirs.
-_REFINED: Final = 8
-_FINER: Final = 11
-_ROWS_AT_ONCE: Final = 512
-
-
 def min_time_to_collision_s(
     trace: Trace, outline: Outline, body_radius_m: float = BODY_RADIUS_M
 ) -> float | None:
-    """The smallest time to collision of the episode; None if no course ever led to one.
+    """Return the smallest time to collision of the episode; None if there was never one.
 
-    At each instant: when outline and body disc would touch if robot and person kept their
+    At each instant it is the time until outline and body disc touch if robot and person keep their
     velocities (Hayward 1972). The robot's turning is not extrapolated.
     """
     if not trace.people:
@@ -130,14 +132,14 @@ def min_time_to_collision_s(
 def post_encroachment_s(
     trace: Trace, outline: Outline, body_radius_m: float = BODY_RADIUS_M
 ) -> float | None:
-    """The smallest post-encroachment time; None if no place was used by both.
+    """Return the smallest post-encroachment time; None if robot and people shared no place.
 
-    The time between one of robot and person leaving a place and the other entering it (Allen, Shin
-    and Cooper 1978), the smallest over all places and people. A place lies in the robot's outline
-    at t and in the body disc at t' exactly if the two overlap, so it is the smallest |t − t'| over
-    overlapping poses. Poses are compared every 0.05 s and, about the nearest of them, every 0.01 s
-    on straight lines in between. 0 means that the outline and the disc overlapped at one instant,
-    which a body, being slimmer, need not have felt.
+    It is the time between one of robot and person leaving a place and the other entering it (Allen,
+    Shin and Cooper 1978), the smallest over all places and people. A place lies in the robot's
+    outline at t and in the body disc at t' exactly if the two overlap. The result is therefore the
+    smallest |t − t'| over overlapping poses. Poses are compared every 0.05 s and, about the nearest
+    of them, every 0.01 s on straight lines in between. 0 means that the outline and the disc
+    overlapped at one instant. The body is slimmer than the disc and may not have been touched.
     """
     step = 1
     if len(trace.t_s) > 1:
@@ -149,7 +151,7 @@ def post_encroachment_s(
         for first in range(0, len(t_s), _ROWS_AT_ONCE):
             robot_s = t_s[first : first + _ROWS_AT_ONCE]
             robot_row, person_row, apart_s = paths.overlaps(robot_s, t_s, smallest)
-            for best in np.argsort(apart_s, kind="stable")[:_REFINED]:
+            for best in np.argsort(apart_s, kind="stable")[:_REFINED_PAIRS]:
                 fine = paths.overlaps(
                     paths.around(robot_s[robot_row[best]]),
                     paths.around(t_s[person_row[best]]),
@@ -160,7 +162,7 @@ def post_encroachment_s(
 
 
 class _Paths:
-    """Robot's and one person's way, at any instant."""
+    """The paths of the robot and of one person, interpolated at any instant."""
 
     def __init__(self, trace: Trace, person: int, outline: Outline, body_radius_m: float) -> None:
         self._t_s = trace.t_s
@@ -171,34 +173,34 @@ class _Paths:
         self._radius_m = body_radius_m
 
     def around(self, t_s: float) -> FloatArray:
-        """Instants about one."""
-        fine = t_s + np.linspace(-1.0, 1.0, _FINER) / _COMPARED_HZ
-        there: FloatArray = fine[(fine >= self._t_s[0]) & (fine <= self._t_s[-1])]
-        return there
+        """Return finely spaced instants about one instant."""
+        fine = t_s + np.linspace(-1.0, 1.0, _REFINED_INSTANTS) / _COMPARED_HZ
+        inside: FloatArray = fine[(fine >= self._t_s[0]) & (fine <= self._t_s[-1])]
+        return inside
 
     def overlaps(
         self, robot_s: FloatArray, person_s: FloatArray, less_than_s: float
     ) -> tuple[NDArray[np.intp], NDArray[np.intp], FloatArray]:
-        """Rows of both instants whose poses overlap, and the time between them."""
+        """Return the rows of both instants whose poses overlap, and the time between them."""
         robot, person = self._at(robot_s, self._robot_m), self._at(person_s, self._person_m)
         offsets = person[None, :, :] - robot[:, None, :]
         apart_s = np.abs(person_s[None, :] - robot_s[:, None])
         reach = self._outline.reach_m + self._radius_m
         near = np.einsum("nki,nki->nk", offsets, offsets) < reach**2
         row, column = np.nonzero(near & (apart_s < less_than_s))
-        turned = _turned(
+        offsets_base = _to_base(
             offsets[row, column], np.interp(robot_s, self._t_s, self._heading_rad)[row]
         )
-        kept = self._outline.distance(turned) < self._radius_m
-        row, column = row[kept], column[kept]
+        overlap = self._outline.distance(offsets_base) < self._radius_m
+        row, column = row[overlap], column[overlap]
         return row, column, apart_s[row, column]
 
     def _at(self, t_s: FloatArray, path_m: FloatArray) -> FloatArray:
         return np.stack([np.interp(t_s, self._t_s, path_m[:, axis]) for axis in (0, 1)], axis=1)
 
 
-def _turned(vectors_odom: FloatArray, heading_odom_rad: FloatArray) -> FloatArray:
-    """(N, 2) vectors in the axes of a base frame each."""
+def _to_base(vectors_odom: FloatArray, heading_odom_rad: FloatArray) -> FloatArray:
+    """Return (N, 2) vectors, each in the axes of its own base frame."""
     cos, sin = np.cos(heading_odom_rad), np.sin(heading_odom_rad)
     x, y = vectors_odom.T
     return np.stack([cos * x + sin * y, cos * y - sin * x], axis=1)

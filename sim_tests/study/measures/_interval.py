@@ -1,7 +1,4 @@
-"""A figure with its confidence interval.
-
-Shares of episodes: exact intervals, and what none of n says.
-"""
+"""An estimate with its confidence interval, and exact intervals of shares."""
 
 from __future__ import annotations
 
@@ -17,14 +14,14 @@ from ...world.errors import SimError
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """A figure and what the data leave open about it.
+    """An estimate with its confidence interval.
 
     Attributes:
         value: the estimate; NaN when there is none.
         low: lower end of the interval, −inf where the data do not bound it.
         high: upper end, +inf where the data do not bound it.
-        n: episodes, or pairs of them, behind it.
-        left_out: episodes or pairs that could not say anything.
+        n: number of episodes, or of pairs of episodes, behind the estimate.
+        left_out: number of episodes or pairs to which the metric does not apply.
     """
 
     value: float
@@ -35,20 +32,20 @@ class Interval:
 
     @property
     def known(self) -> bool:
-        """There is an estimate."""
+        """Whether there is an estimate."""
         return math.isfinite(self.value)
 
     @property
     def bounded(self) -> bool:
-        """The interval is finite on both sides."""
+        """Whether the interval is finite on both sides."""
         return math.isfinite(self.low) and math.isfinite(self.high)
 
     def text(self, decimals: int = 2, scale: float = 1.0) -> str:
-        """``"1.23 [1.01, 1.50]"``; ``"1.23 [?]"`` without bounds, a dash without a value.
+        """Return ``"1.23 [1.01, 1.50]"``, ``"1.23 [?]"`` without bounds, a dash without a value.
 
         Args:
-            decimals: of all three.
-            scale: multiplies all three, 100 for per cent.
+            decimals: of the value and both ends.
+            scale: multiplies the value and both ends; 100 for per cent.
         """
         if not self.known:
             return "–"
@@ -60,33 +57,33 @@ class Interval:
 
 
 def number_text(value: float, decimals: int) -> str:
-    """A number with so many decimals, without a negative zero."""
+    """Return a number with the given decimals; a negative zero loses its sign."""
     text = f"{value:.{decimals}f}"
     return text.lstrip("-") if float(text) == 0.0 else text
 
 
 def zero_of_n_upper(n: int, level: float = 0.95) -> float:
-    """Upper bound of a share of which n independent trials showed none: 1 − (1 − level)^(1/n).
+    """Return the upper bound of a share after 0 of n independent trials: 1 − (1 − level)^(1/n).
 
-    The one-sided bound of Clopper and Pearson (1934), about 3/n at 95 %; 1 without trials.
+    This is the one-sided bound of Clopper and Pearson (1934), about 3/n at 95 %; 1 for n = 0.
 
     Raises:
         SimError: n < 0, or level outside (0, 1).
     """
-    n, level = _checked(n, n, level)
+    level = _checked_level(n, n, level)
     return 1.0 if n == 0 else float(1.0 - (1.0 - level) ** (1.0 / n))
 
 
 def proportion_interval(count: int, n: int, level: float = 0.95) -> Interval:
-    """The share ``count`` of ``n`` with its exact interval (Clopper and Pearson 1934).
+    """Return the share ``count / n`` with its exact interval (Clopper and Pearson 1934).
 
-    Two-sided; for none and for all of n the one free end is the one-sided bound, as in
+    The interval is two-sided. For a count of 0 or n, its one free end is the one-sided bound of
     :func:`zero_of_n_upper`.
 
     Raises:
         SimError: not 0 ≤ count ≤ n, or level outside (0, 1).
     """
-    n, level = _checked(count, n, level)
+    level = _checked_level(count, n, level)
     if n == 0:
         return Interval(float("nan"), 0.0, 1.0, 0)
     if count == 0:
@@ -99,10 +96,11 @@ def proportion_interval(count: int, n: int, level: float = 0.95) -> Interval:
     return Interval(count / n, low, high, n)
 
 
-def _checked(count: int, n: int, level: float) -> tuple[int, float]:
+def _checked_level(count: int, n: int, level: float) -> float:
+    """Return the level; refuse a count that is not between 0 and n."""
     if not 0 <= count <= n:
         raise SimError(f"a share must be of 0 to n episodes, got {count} of {n}")
     level = finite_number("level", level, SimError, minimum=0.0, exclusive_minimum=True)
     if level >= 1.0:
         raise SimError(f"level must lie in (0, 1), got {level:g}")
-    return n, level
+    return level

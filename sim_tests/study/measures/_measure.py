@@ -1,4 +1,4 @@
-"""From a crossing to its row: every measure of docs/metrics.md."""
+"""The record of a crossing: every metric of docs/metrics.md."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from ...actors.behaviour import PersonOutcome
     from ...crossing import CrossingResult
 
-#: Zones of E. T. Hall, The Hidden Dimension (1966): far edges of the intimate and personal one.
+#: Far edges of the intimate and the personal zone (E. T. Hall, The Hidden Dimension, 1966).
 INTIMATE_M: Final = 0.45
 PERSONAL_M: Final = 1.2
 
@@ -40,21 +40,22 @@ def measure(
     attention: str = "mixed",
     fault: str = "",
 ) -> EpisodeRecord:
-    """All measures of a crossing; docs/metrics.md defines them.
+    """Return all metrics of a crossing, as docs/metrics.md defines them.
 
-    Numbers are rounded to the six decimals that files keep: a record read again is equal.
+    Numbers are rounded to the six decimals that files keep, so that a record read from a file is
+    equal.
 
     Args:
         result: the crossing.
-        time_without_people_s: time to goal of the same task without people; None if the goal was
-            not reached then, or nobody ran it.
-        length_without_people_m: way driven in it.
-        scenario_version: as the scenario says.
-        attention: as the scenario says.
+        time_without_people_s: time to goal of the same task without people; None if that run did
+            not reach the goal or was not made.
+        length_without_people_m: driven length of the same task without people.
+        scenario_version: version of the scenario.
+        attention: the scenario's ``attention``.
         fault: name of the fault, empty for none.
 
     Raises:
-        SimError: a result without frames, or whose frames do not hold all people.
+        SimError: a result without frames, or with frames that do not hold all people.
     """
     trace = Trace.of(result)
     outline = Outline(result.robot.footprint_m)
@@ -62,9 +63,9 @@ def measure(
     path_m = path_length_m(trace.robot_odom_m)
     deceleration, jerk = peak_deceleration_and_jerk(trace.t_s, trace.speed_mps)
     delay_s, detour_m = human_cost(result.people)
-    awareness, reaction, error = _regard(result, trace)
+    awareness, reaction, error = _awareness_of_nearest(result, trace)
     by_robot = [contact for contact in result.contacts if contact.by == "robot"]
-    separation_m, speed_then = _closest(result, trace, nearest_m)
+    separation_m, speed_then = _smallest_separation(result, trace, nearest_m)
     return _rounded(
         EpisodeRecord(
             scenario=result.scenario,
@@ -117,10 +118,10 @@ def measure(
 def time_lost_s(
     time_to_goal_s: float | None, duration_s: float, time_without_people_s: float | None
 ) -> float | None:
-    """Time over that of the same task without people.
+    """Return the time over that of the same task without people.
 
-    An episode that does not reach its goal loses all of its duration. None where the task cannot
-    be done without people either, or nobody tried.
+    An episode that does not reach its goal loses all of its duration. None where the time without
+    people is not known.
     """
     if time_without_people_s is None:
         return None
@@ -128,10 +129,10 @@ def time_lost_s(
 
 
 def human_cost(people: Iterable[PersonOutcome]) -> tuple[float | None, float | None]:
-    """Delay (s) and detour (m) of all who reached the end of their way, over their free walks.
+    """Return the summed delay (s) and detour (m) of people over their free walks.
 
-    Both None when nobody did. People who were still on their way when the episode ended are left
-    out: what they lost is not known.
+    Only people who reached the end of their route count; the loss of the others is not known. Both
+    are None when nobody reached it.
     """
     arrived = [
         (person.time_s - person.free_time_s, person.length_m - person.free_length_m)
@@ -145,10 +146,10 @@ def human_cost(people: Iterable[PersonOutcome]) -> tuple[float | None, float | N
     return sum(delay for delay, _ in arrived), sum(detour for _, detour in arrived)
 
 
-def _closest(
+def _smallest_separation(
     result: CrossingResult, trace: Trace, nearest_m: FloatArray
 ) -> tuple[float | None, float | None]:
-    """Smallest separation and the robot's speed then; a contact is a separation of 0."""
+    """Return the smallest separation and the robot's speed then; a contact is a separation of 0."""
     if not trace.people:
         return None, None
     if result.contacts:
@@ -157,23 +158,26 @@ def _closest(
     return float(nearest_m[row]), abs(float(trace.speed_mps[row]))
 
 
-def _regard(result: CrossingResult, trace: Trace) -> tuple[Awareness, str, float | None]:
-    """Awareness and reaction of the person who came nearest, and the error of α over all."""
+def _awareness_of_nearest(
+    result: CrossingResult, trace: Trace
+) -> tuple[Awareness, str, float | None]:
+    """Return awareness class and reaction of the nearest person, and the error of α over all."""
     mean, lower = track_awareness(result, trace)
     error = awareness_error(trace.awareness, mean)
     closest = nearest_person(trace.separation_m)
     if closest is None:
         return "", "", error
     row, person = closest
-    verdict = awareness_class(trace.t_s, trace.awareness[:, person], lower[:, person], row)
+    awareness = awareness_class(trace.t_s, trace.awareness[:, person], lower[:, person], row)
     reacting = person - result.scripted
     reaction = ""
     if 0 <= reacting < len(result.people):
         reaction = result.people[reacting].reaction
-    return verdict, reaction, error
+    return awareness, reaction, error
 
 
 def _rounded(record: EpisodeRecord) -> EpisodeRecord:
+    """Return the record with its numbers rounded as files keep them."""
     numbers = {
         field.name: rounded(getattr(record, field.name))
         for field in fields(record)

@@ -1,4 +1,4 @@
-"""Policies against each other on the same scenarios and seeds."""
+"""Comparison of two policies over pairs of episodes of the same scenario and seed."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from ._record import COLUMN_KINDS, EpisodeRecord
 
 Pair = tuple[EpisodeRecord, EpisodeRecord]
 
-# Two violation times that differ by less are equal.
+# Violation times that differ by less count as equal.
 _SAME_TIME_S: Final = 1e-6
 
 
 def paired(base: Iterable[EpisodeRecord], other: Iterable[EpisodeRecord]) -> tuple[Pair, ...]:
-    """Episodes of the same scenario, version and seed, ordered by these.
+    """Return the pairs of episodes of the same scenario, version and seed, ordered by these.
 
-    The same seed sets the same people on their way; what they do then may depend on the robot.
+    Both episodes start with the same people; what they do later may depend on the robot.
 
     Raises:
         SimError: one side has an episode twice.
@@ -39,16 +39,17 @@ def paired_difference(
     rng: np.random.Generator | None = None,
     level: float = 0.95,
 ) -> Interval:
-    """Mean of ``other`` − ``base`` over pairs, with its bootstrap interval within scenarios.
+    """Return the mean of ``other`` − ``base`` over pairs, with its bootstrap interval.
 
-    Pairs in which the figure does not apply to both are left out and counted.
+    Resamples are drawn within scenarios. Pairs in which the field is None on either side are left
+    out and counted.
 
     Args:
         base: episodes of one policy.
-        other: episodes of the other.
+        other: episodes of the other policy.
         field: a number, count or flag of :class:`EpisodeRecord`.
-        rng: draws the resamples; None for one of seed 0.
-        level: of confidence.
+        rng: draws the resamples; None for a generator with seed 0.
+        level: confidence of the interval.
 
     Raises:
         SimError: one side has an episode twice, or the field holds no number.
@@ -57,7 +58,9 @@ def paired_difference(
         raise SimError(f"field must be a number of an episode, got {field!r}")
     pairs = paired(base, other)
     kept = _with_numbers(pairs, field)
-    differences = [_number(second, field) - _number(first, field) for first, second in kept]
+    differences = [
+        _finite_value(second, field) - _finite_value(first, field) for first, second in kept
+    ]
     interval = bootstrap_interval(differences, _rng(rng), level, strata=_scenarios(kept))
     return replace(interval, left_out=len(pairs) - len(kept))
 
@@ -68,25 +71,26 @@ def won_back(
     rng: np.random.Generator | None = None,
     level: float = 0.95,
 ) -> Interval:
-    """Share of the time that ``blind`` loses which ``policy`` wins back.
+    """Return the share that ``policy`` wins back of the time that ``blind`` loses.
 
-    Σ (lost by blind − lost by policy) / Σ lost by blind over pairs: of all time lost, not a mean
-    of shares, in which an episode that lost next to nothing would weigh as much as any. Its
-    interval comes from resampling pairs within scenarios.
+    The share is Σ (lost by blind − lost by policy) / Σ lost by blind over pairs. It is not a mean
+    of shares, in which an episode that lost almost no time would weigh as much as any other.
+    Resamples are drawn within scenarios.
 
     Args:
-        blind: episodes of the policy compared with.
-        policy: episodes of the other.
-        rng: draws the resamples; None for one of seed 0.
-        level: of confidence.
+        blind: episodes of the baseline policy.
+        policy: episodes of the other policy.
+        rng: draws the resamples; None for a generator with seed 0.
+        level: confidence of the interval.
 
     Returns:
-        NaN if ``blind`` loses no time; pairs without the same task without people are left out.
+        The share; NaN if ``blind`` loses no time. Pairs without a known time without people are
+        left out.
 
     Raises:
         SimError: one side has an episode twice.
     """
-    return _ratio(paired(blind, policy), "time_lost_s", "time_lost_s", -1.0, rng, level)
+    return _ratio_of_sums(paired(blind, policy), "time_lost_s", "time_lost_s", -1.0, rng, level)
 
 
 def violation_excess(
@@ -95,14 +99,17 @@ def violation_excess(
     rng: np.random.Generator | None = None,
     level: float = 0.95,
 ) -> Interval:
-    """How much longer ``policy`` violates the margin, relative to the violation of ``blind``.
+    """Return the additional violation time of ``policy``, relative to that of ``blind``.
 
-    Σ (violation of policy − of blind) / Σ violation of blind over pairs; 0.02 is 2 % more.
+    It is Σ (violation of policy − of blind) / Σ violation of blind over pairs; 0.02 is 2 % more.
 
     Returns:
-        NaN if ``blind`` never violates the margin; see :func:`violation_excess_of_time` then.
+        The ratio; NaN if ``blind`` never violates the margin. Use
+        :func:`violation_excess_of_time` then.
     """
-    return _ratio(paired(blind, policy), "violation_time_s", "violation_time_s", 1.0, rng, level)
+    return _ratio_of_sums(
+        paired(blind, policy), "violation_time_s", "violation_time_s", 1.0, rng, level
+    )
 
 
 def violation_excess_of_time(
@@ -111,23 +118,27 @@ def violation_excess_of_time(
     rng: np.random.Generator | None = None,
     level: float = 0.95,
 ) -> Interval:
-    """How much longer ``policy`` violates the margin, relative to the time that ``blind`` takes."""
-    return _ratio(paired(blind, policy), "violation_time_s", "duration_s", 1.0, rng, level)
+    """Return the additional violation time of ``policy``, relative to the duration of ``blind``."""
+    return _ratio_of_sums(paired(blind, policy), "violation_time_s", "duration_s", 1.0, rng, level)
 
 
 def violates_more(
     blind: Iterable[EpisodeRecord], policy: Iterable[EpisodeRecord], level: float = 0.95
 ) -> Interval:
-    """Share of pairs in which ``policy`` violates the margin for longer than ``blind``; exact."""
+    """Return the share of pairs in which ``policy`` violates the margin longer than ``blind``.
+
+    Its interval is exact.
+    """
     pairs = _with_numbers(paired(blind, policy), "violation_time_s")
     more = sum(
-        _number(second, "violation_time_s") > _number(first, "violation_time_s") + _SAME_TIME_S
+        _finite_value(second, "violation_time_s")
+        > _finite_value(first, "violation_time_s") + _SAME_TIME_S
         for first, second in pairs
     )
     return proportion_interval(more, len(pairs), level)
 
 
-def _ratio(
+def _ratio_of_sums(
     pairs: tuple[Pair, ...],
     field: str,
     over: str,
@@ -135,11 +146,14 @@ def _ratio(
     rng: np.random.Generator | None,
     level: float,
 ) -> Interval:
-    """Σ sign·(policy − blind) of one field over Σ of another of blind."""
+    """Return Σ sign · (policy − blind) of ``field``, divided by Σ of ``over`` of blind."""
     kept = _with_numbers(_with_numbers(pairs, field), over)
     interval = ratio_interval(
-        [sign * (_number(second, field) - _number(first, field)) for first, second in kept],
-        [_number(first, over) for first, _ in kept],
+        [
+            sign * (_finite_value(second, field) - _finite_value(first, field))
+            for first, second in kept
+        ],
+        [_finite_value(first, over) for first, _ in kept],
         _rng(rng),
         level,
         strata=_scenarios(kept),
@@ -155,7 +169,7 @@ def _with_numbers(pairs: Sequence[Pair], field: str) -> tuple[Pair, ...]:
     )
 
 
-def _number(record: EpisodeRecord, field: str) -> float:
+def _finite_value(record: EpisodeRecord, field: str) -> float:
     value = float(getattr(record, field))
     if not math.isfinite(value):
         raise SimError(f"{field} of {record.scenario}, seed {record.seed} is not finite: {value}")

@@ -1,4 +1,4 @@
-"""The one place that imports pyarrow: episodes as a Parquet file."""
+"""Tables of episodes as Parquet files; the only module that imports pyarrow."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from ...world.errors import SimError
-from ._record import COLUMN_KINDS, EpisodeRecord, check_columns, parse_row, plain_text, rounded
+from ._record import COLUMN_KINDS, EpisodeRecord, check_columns, one_line, parse_row, rounded
 
 try:
     import pyarrow as pa
@@ -27,12 +27,14 @@ _SCHEMA: Final = pa.schema([(name, _TYPES[kind]) for name, kind in COLUMN_KINDS.
 
 
 def write_parquet(path: Path, records: tuple[EpisodeRecord, ...]) -> None:
-    """Write episodes, typed, nulls where nothing applies; the file appears whole or not at all.
+    """Write episodes with typed columns, None as null; the file appears whole or not at all.
 
     Raises:
         SimError: the file cannot be written.
     """
-    columns = {name: [_plain(getattr(record, name)) for record in records] for name in COLUMN_KINDS}
+    columns = {
+        name: [_parquet_value(getattr(record, name)) for record in records] for name in COLUMN_KINDS
+    }
     partial = path.with_name(path.name + ".part")
     try:
         pq.write_table(pa.table(columns, schema=_SCHEMA), partial)
@@ -42,10 +44,10 @@ def write_parquet(path: Path, records: tuple[EpisodeRecord, ...]) -> None:
 
 
 def read_parquet(path: Path) -> tuple[EpisodeRecord, ...]:
-    """Read what :func:`write_parquet` wrote.
+    """Read episodes that :func:`write_parquet` wrote.
 
     Raises:
-        SimError: the file cannot be read or is no table of episodes.
+        SimError: the file cannot be read or is not a table of episodes.
     """
     try:
         table = pq.read_table(path)
@@ -54,19 +56,19 @@ def read_parquet(path: Path) -> tuple[EpisodeRecord, ...]:
     names = tuple(table.column_names)
     check_columns(names, str(path))
     return tuple(
-        parse_row(names, [_text(row[name]) for name in names], f"{path}, row {number}")
+        parse_row(names, [_csv_cell(row[name]) for name in names], f"{path}, row {number}")
         for number, row in enumerate(table.to_pylist(), start=1)
     )
 
 
-def _plain(value: Any) -> Any:
+def _parquet_value(value: Any) -> Any:
     if isinstance(value, str):
-        return plain_text(value)
+        return one_line(value)
     return rounded(value) if isinstance(value, float) else value
 
 
-def _text(value: Any) -> str:
-    """A cell as the CSV file has it, so that both formats pass the same checks."""
+def _csv_cell(value: Any) -> str:
+    """Return a value as a cell of the CSV file, so that both formats pass the same checks."""
     if value is None:
         return ""
     return str(value).lower() if isinstance(value, bool) else str(value)

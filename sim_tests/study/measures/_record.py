@@ -1,7 +1,4 @@
-"""One episode as one row: what every table, report and search reads.
-
-An episode as a row of text and back: one schema for files, resumed runs and tables.
-"""
+"""The record of one episode, and its row in a table: one schema for all files and tables."""
 
 from __future__ import annotations
 
@@ -13,23 +10,25 @@ from typing import Any, Final, Literal, get_args
 
 from ...world.errors import SimError
 
-#: How the person who came nearest stood to the robot before the encounter, and what the robot made
-#: of it; empty when nobody came near.
+#: Whether the person who came nearest was aware of the robot before the encounter, and whether the
+#: robot judged that correctly; empty when nobody came near.
 Awareness = Literal["", "aware", "unaware", "falsely_aware", "missed_aware"]
 
 
 @dataclass(frozen=True, slots=True)
 class EpisodeRecord:
-    """One episode; the definitions stand in docs/metrics.md. None: does not apply.
+    """The metrics of one episode, as docs/metrics.md defines them.
+
+    None means that a metric does not apply to the episode.
 
     Attributes:
-        scenario: its name.
+        scenario: name of the scenario.
         seed: of the episode.
         policy: name of the policy.
         planner: name of the planner.
         perception: ``"truth"``, ``"keypoints"`` or ``"pixels"``.
         success: the goal was reached and the robot touched nobody by its own motion.
-        contact: robot and a person touched.
+        contact: the robot and a person touched.
         contact_by: ``"robot"``, ``"person"`` or empty.
         min_separation_m: smallest distance between the surfaces of robot and person.
         time_to_goal_s: None when the goal was not reached.
@@ -38,31 +37,33 @@ class EpisodeRecord:
         violation_time_s: how long the margin was negative at a moving robot.
         contacts: number of contacts.
         duration_s: simulated time.
-        scenario_version: of the scenario.
+        scenario_version: version of the scenario.
         attention: the scenario's ``attention``: ``"attentive"``, ``"unaware"`` or ``"mixed"``.
         fault: name of the fault, empty for none.
-        time_without_people_s: the same task in the empty hall.
-        time_lost_s: over that; an episode that does not reach the goal lost all of its time.
-        path_length_m: driven.
+        time_without_people_s: time to goal of the same task in the empty hall.
+        time_lost_s: time over ``time_without_people_s``; an episode that does not reach the goal
+            loses all of its time.
+        path_length_m: length of the path that the robot drove.
         spl: success weighted by path length (Anderson et al. 2018).
-        speed_at_min_separation_mps: of the robot.
-        min_time_to_collision_s: smallest.
+        speed_at_min_separation_mps: the robot's speed at the smallest separation.
+        min_time_to_collision_s: smallest time to collision.
         post_encroachment_s: smallest time between one leaving a place and the other entering it.
-        intimate_s: with a person's surface within 0.45 m.
-        personal_s: within 1.2 m.
+        intimate_s: time with a person's surface within 0.45 m.
+        personal_s: time with a person's surface within 1.2 m.
         robot_contacts: contacts of a robot that moved into a person.
         person_contacts: contacts of people who walked into the robot.
         contact_speed_mps: the robot's highest speed at a contact that it caused.
-        peak_deceleration_mps2: of the robot.
-        peak_jerk_mps3: of the robot.
+        peak_deceleration_mps2: highest deceleration of the robot.
+        peak_jerk_mps3: largest jerk of the robot.
         stops: how often the robot came to a stand before the goal.
-        human_delay_s: of all people, over their free walks.
-        human_detour_m: of all people, over their free ways.
-        warnings: alerts asked for.
-        awareness_error: mean |α of the track − true α| over the people tracked.
-        awareness: how the person who came nearest stood to the robot.
-        reaction: of that person, see :class:`PersonOutcome`.
-        error: why there is no result, empty when there is; everything else is then empty or False.
+        human_delay_s: delay of all people, over their free walks.
+        human_detour_m: detour of all people, over their free walks.
+        warnings: number of alerts that the robot asked for.
+        awareness_error: mean |α of the track − true α| over the tracked people.
+        awareness: awareness of the person who came nearest, and the robot's judgement of it.
+        reaction: reaction of that person, see :class:`PersonOutcome`.
+        error: the error that ended the episode, empty for none; with an error, every metric keeps
+            its default.
     """
 
     scenario: str
@@ -106,10 +107,26 @@ class EpisodeRecord:
     reaction: str = ""
     error: str = ""
 
+    @property
+    def versioned_scenario(self) -> str:
+        """The scenario, followed by its version from 2 on."""
+        version = "" if self.scenario_version == 1 else f" v{self.scenario_version}"
+        return self.scenario + version
+
+    @property
+    def robot_touched(self) -> bool:
+        """Whether the robot moved into a person."""
+        return self.robot_contacts > 0 or self.contact_by == "robot"
+
+    @property
+    def person_touched(self) -> bool:
+        """Whether a person walked into the robot."""
+        return self.person_contacts > 0 or self.contact_by == "person"
+
 
 Kind = Literal["text", "flag", "count", "number"]
 
-#: Numbers are written with so many decimals: micrometres, and far below what physics repeats.
+#: Decimals of numbers in files: micrometres.
 DECIMALS: Final = 6
 
 _KINDS: Final[dict[str, Kind]] = {
@@ -119,22 +136,22 @@ _KINDS: Final[dict[str, Kind]] = {
     "int": "count",
     "float | None": "number",
 }
-#: Columns of ``episodes.csv`` in their order, and what each holds.
+#: Columns of ``episodes.csv`` in their order, and the kind of each.
 COLUMN_KINDS: Final[dict[str, Kind]] = {
     field.name: _KINDS[str(field.type)] for field in fields(EpisodeRecord)
 }
 RECORD_COLUMNS: Final = tuple(COLUMN_KINDS)
-#: Columns that a table cannot do without; others take their defaults.
-NEEDED_COLUMNS: Final = tuple(
+#: Columns that every table must have; others take their defaults.
+REQUIRED_COLUMNS: Final = tuple(
     field.name for field in fields(EpisodeRecord) if field.default is MISSING
 )
 
 
 def rounded(value: float | None) -> float | None:
-    """A number as it will be read back from a file; None for None, NaN and infinity.
+    """Return a number as it is read back from a file; None for None, NaN and infinity.
 
-    A record measured now and the same one read again are equal, so that a run that was resumed
-    gives what an uninterrupted one gives.
+    A record in memory therefore equals the same record read from a file, and a resumed run gives
+    the same records as an uninterrupted one.
     """
     if value is None or not math.isfinite(value):
         return None
@@ -142,24 +159,24 @@ def rounded(value: float | None) -> float | None:
 
 
 def record_row(record: EpisodeRecord) -> list[str]:
-    """The cells of one episode in the order of :data:`RECORD_COLUMNS`.
+    """Return the cells of one episode in the order of :data:`RECORD_COLUMNS`.
 
-    Numbers have six decimals, what does not apply is empty, and line breaks in texts become
-    spaces, so that an episode is a line whatever its error message says.
+    Numbers have six decimals, and None is an empty cell. Line breaks in texts become spaces, so
+    that an episode is always one line.
     """
-    return [_cell(kind, getattr(record, name)) for name, kind in COLUMN_KINDS.items()]
+    return [_cell_text(kind, getattr(record, name)) for name, kind in COLUMN_KINDS.items()]
 
 
-def plain_text(text: str) -> str:
-    """A text on one line, and without NUL, which the csv module refuses before Python 3.11."""
+def one_line(text: str) -> str:
+    """Return a text on one line and without NUL, which the csv module of Python 3.10 refuses."""
     return " ".join(text.replace("\0", "").splitlines())
 
 
 def check_columns(columns: Sequence[str], source: str) -> None:
-    """Refuse a header that is not that of a table of episodes.
+    """Check the header of a table of episodes.
 
     Raises:
-        SimError: a column is unknown, there twice, or a needed one is missing.
+        SimError: a column is unknown or there twice, or a required one is missing.
     """
     for name in columns:
         if name not in COLUMN_KINDS:
@@ -171,31 +188,31 @@ def check_columns(columns: Sequence[str], source: str) -> None:
             )
         if list(columns).count(name) > 1:
             raise SimError(f"{source} has the column {name!r} {list(columns).count(name)} times")
-    missing = [name for name in NEEDED_COLUMNS if name not in columns]
+    missing = [name for name in REQUIRED_COLUMNS if name not in columns]
     if missing:
         raise SimError(f"{source} is not a table of episodes: it has no column {missing[0]!r}")
 
 
 def parse_row(columns: Sequence[str], cells: Sequence[str], source: str) -> EpisodeRecord:
-    """The episode of a row.
+    """Return the episode of a row.
 
     Args:
-        columns: the header, checked.
-        cells: as many texts.
+        columns: the header, already checked.
+        cells: one text per column.
         source: file and line, for messages.
 
     Raises:
-        SimError: a cell does not hold what its column says, or there are more or fewer cells.
+        SimError: a cell does not fit its column, or there are more or fewer cells than columns.
     """
     if len(cells) != len(columns):
         raise SimError(f"{source} has {len(cells)} cells, its header {len(columns)}")
     values: dict[str, Any] = {
-        name: _value(name, cell, source) for name, cell in zip(columns, cells, strict=True)
+        name: _parse_cell(name, cell, source) for name, cell in zip(columns, cells, strict=True)
     }
     return EpisodeRecord(**values)
 
 
-def _cell(kind: Kind, value: Any) -> str:
+def _cell_text(kind: Kind, value: Any) -> str:
     if kind == "number":
         number = rounded(value)
         return "" if number is None else f"{number:.{DECIMALS}f}"
@@ -203,10 +220,10 @@ def _cell(kind: Kind, value: Any) -> str:
         return str(bool(value)).lower()
     if kind == "count":
         return str(int(value))
-    return plain_text(str(value))
+    return one_line(str(value))
 
 
-def _value(name: str, cell: str, source: str) -> Any:
+def _parse_cell(name: str, cell: str, source: str) -> Any:
     kind = COLUMN_KINDS[name]
     if kind == "flag":
         if cell not in ("true", "false"):

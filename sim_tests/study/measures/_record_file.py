@@ -1,4 +1,4 @@
-"""Tables of episodes on disk: ``episodes.csv``, and the same as Parquet."""
+"""Tables of episodes on disk: ``episodes.csv``, and the same table as Parquet."""
 
 from __future__ import annotations
 
@@ -18,12 +18,13 @@ _PARQUET_SUFFIX: Final = ".parquet"
 
 @dataclass(frozen=True, slots=True)
 class RecordFile:
-    """What a table of episodes held.
+    """The content of a table of episodes.
 
     Attributes:
-        records: one for each whole row, in their order.
-        torn: text of a last row that an interruption left unfinished; empty without one.
-        whole_bytes: length of the file up to the end of its last whole row: cut it there to go on.
+        records: one per whole row, in the order of the rows.
+        torn: text of an unfinished last row, which an interruption leaves; empty without one.
+        whole_bytes: length of the file up to the end of its last whole row; to resume a run, cut
+            the file there.
     """
 
     records: tuple[EpisodeRecord, ...]
@@ -34,11 +35,11 @@ class RecordFile:
 def read_record_file(path: Path | str) -> RecordFile:
     """Read ``episodes.csv``, with or without an unfinished last row.
 
-    A row counts once its line end is written. Columns may come in any order, and those that an
-    earlier version did not write take their defaults.
+    A row counts once its line end is written. Columns may come in any order. A column that an
+    earlier version did not write takes its default.
 
     Raises:
-        SimError: the file cannot be read, is no table of episodes, or a whole row is wrong.
+        SimError: the file cannot be read, is not a table of episodes, or a whole row is wrong.
     """
     path = Path(path)
     try:
@@ -48,7 +49,9 @@ def read_record_file(path: Path | str) -> RecordFile:
     whole_bytes = content.rfind(b"\n") + 1
     torn = content[whole_bytes:].decode("utf-8", errors="replace")
     try:
-        text = content[:whole_bytes].decode("utf-8-sig")  # a spreadsheet may have put a mark there
+        text = content[:whole_bytes].decode(
+            "utf-8-sig"
+        )  # a spreadsheet may have written a byte order mark
         rows = list(csv.reader(io.StringIO(text, newline=""), strict=True))
     except (UnicodeDecodeError, csv.Error) as cause:
         raise SimError(f"{path} is not a table of episodes: {cause}") from cause
@@ -67,15 +70,15 @@ def read_record_file(path: Path | str) -> RecordFile:
 
 
 def read_records(path: Path | str) -> tuple[EpisodeRecord, ...]:
-    """The episodes of a CSV file, or of a Parquet file by its suffix.
+    """Return the episodes of a CSV file, or of a file with the suffix ``.parquet``.
 
-    An unfinished last row is left out and reported on the standard error stream.
+    An unfinished last row is left out and reported on standard error.
 
     Raises:
         SimError: as :func:`read_record_file`.
     """
     if Path(path).suffix == _PARQUET_SUFFIX:
-        from ._parquet import read_parquet  # noqa: PLC0415 - an extra, needed for this alone
+        from ._parquet import read_parquet  # noqa: PLC0415 - an optional dependency
 
         return read_parquet(Path(path))
     found = read_record_file(path)
@@ -88,14 +91,16 @@ def read_records(path: Path | str) -> tuple[EpisodeRecord, ...]:
 
 
 def write_records(path: Path | str, records: Iterable[EpisodeRecord]) -> None:
-    """Write episodes as CSV, or as Parquet by its suffix; the file appears whole or not at all.
+    """Write episodes as CSV, or as Parquet to a file with the suffix ``.parquet``.
+
+    The file appears whole or not at all.
 
     Raises:
         SimError: the file cannot be written.
     """
     path = Path(path)
     if path.suffix == _PARQUET_SUFFIX:
-        from ._parquet import write_parquet  # noqa: PLC0415 - an extra, needed for this alone
+        from ._parquet import write_parquet  # noqa: PLC0415 - an optional dependency
 
         write_parquet(path, tuple(records))
         return

@@ -1,21 +1,17 @@
-"""One policy against another on the same scenarios and seeds.
-
-One policy over one part of the episodes.
-
-Many episodes summed up: a row a policy, split by scenario, awareness and attention.
-"""
+"""A summary of many episodes: one row per policy, split by scenario, awareness and attention."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Final
 
 import numpy as np
 
 from ._bootstrap import ratio_intervals
 from ._interval import Interval, proportion_interval
-from ._metric_info import METRICS
+from ._metrics import METRICS
 from ._pairs import (
     paired,
     paired_difference,
@@ -27,22 +23,28 @@ from ._pairs import (
 from ._record import EpisodeRecord
 from ._variants import Variant, baselines_of, labels
 
+#: Policy that others are compared with, unless another is named.
+BASELINE: Final = "blind"
+
+_Part = Callable[[EpisodeRecord], str]
+_Groups = Mapping[Variant, Sequence[EpisodeRecord]]
+
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """One policy against the baseline over one part of the paired episodes.
+    """One policy compared with the baseline over one part of the paired episodes.
 
     Attributes:
-        variant: the policy.
-        baseline: compared with.
+        variant: label of the policy.
+        baseline: label of the policy compared with.
         part: a scenario or an attention; empty for all.
-        pairs: how many.
-        won_back: share of the time lost by the baseline that is won back.
-        time_lost_s: mean difference to the baseline; negative is faster.
-        violation_excess: longer violation of the margin, relative to that of the baseline.
-        violation_excess_of_time: the same relative to the baseline's duration.
-        violates_more: share of pairs with a longer violation.
-        min_separation_m: mean difference of the smallest separation.
+        pairs: number of pairs.
+        won_back: share of the time lost by the baseline that the policy wins back.
+        time_lost_s: mean difference in time lost; negative means that the policy is faster.
+        violation_excess: additional violation time, relative to that of the baseline.
+        violation_excess_of_time: additional violation time, relative to the baseline's duration.
+        violates_more: share of pairs in which the policy violates the margin longer.
+        min_separation_m: mean difference in the smallest separation.
     """
 
     variant: str
@@ -62,16 +64,18 @@ class SummaryRow:
     """One policy over one part of the episodes.
 
     Attributes:
-        variant: the policy, and what else tells it from others.
-        part: of the episodes: a scenario, an awareness class, an attention; empty for all.
-        episodes: how many.
-        errors: of them, those that broke off with an error: no success, and in no other figure.
-        success: share of all episodes.
-        robot_contact: share of the episodes that ran in which the robot moved into somebody.
-        person_contact: share in which somebody walked into the robot.
+        variant: label of the policy.
+        part: a scenario, an awareness class or an attention; empty for all.
+        episodes: number of episodes.
+        errors: number of episodes that broke off with an error. They count as no success and enter
+            no other figure.
+        success: share of successes in all episodes.
+        robot_contact: share of the episodes without an error in which the robot moved into a
+            person.
+        person_contact: share of them in which a person walked into the robot.
         means: mean of each of :data:`METRICS` over the episodes to which it applies.
-        worst: the worst value of each that occurred; without those that occurred nowhere, and
-            those of which neither way is worse.
+        worst: worst value of each metric, where it applies to an episode and has a better
+            direction.
     """
 
     variant: str
@@ -85,28 +89,21 @@ class SummaryRow:
     worst: Mapping[str, float]
 
 
-#: Compared with unless another is named.
-BASELINE: Final = "blind"
-
-_Part = Callable[[EpisodeRecord], str]
-_Groups = Mapping[Variant, Sequence[EpisodeRecord]]
-
-
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """Many episodes summed up.
+    """A summary of many episodes.
 
     Attributes:
-        baseline: name of the policy compared with; empty when no episode is of it.
-        level: of every interval.
-        policies: a row a policy.
-        scenarios: a row a policy and scenario.
-        attentions: a row a policy and attention of the scenario.
-        awareness: a row a policy and class of the person who came nearest. A class depends on what
-            the policy's own run made of that person: not paired across policies.
-        comparisons: each policy against the baseline, and against itself in the first of several
-            tables: over all, then by attention.
-        scenario_comparisons: the same by scenario.
+        baseline: name of the policy compared with; empty when it has no episode.
+        level: confidence of every interval.
+        policies: one row per policy.
+        scenarios: one row per policy and scenario.
+        attentions: one row per policy and attention of the scenario.
+        awareness: one row per policy and awareness class of the nearest person. The class depends
+            on the policy's own run, so these rows are not paired across policies.
+        comparisons: each policy compared with the baseline, and with itself in the first of several
+            tables: over all episodes, then by attention.
+        scenario_comparisons: the same comparisons by scenario.
     """
 
     baseline: str
@@ -126,13 +123,13 @@ def summarise(
     level: float = 0.95,
     seed: int = 0,
 ) -> Summary:
-    """Sum up episodes; the result does not depend on their order.
+    """Return the summary of episodes; it does not depend on their order.
 
     Args:
-        records: of any policies, scenarios and seeds.
+        records: episodes of any policies, scenarios and seeds.
         baseline: name of the policy that others are compared with.
-        level: of the intervals.
-        seed: of the bootstrap.
+        level: confidence of the intervals.
+        seed: seed of the bootstrap.
 
     Raises:
         SimError: an episode is there twice.
@@ -147,11 +144,11 @@ def summarise_sources(
     level: float = 0.95,
     seed: int = 0,
 ) -> Summary:
-    """Sum up episodes of several tables, as :func:`summarise`.
+    """Return the summary of episodes of several tables, as :func:`summarise`.
 
     Args:
-        sources: records by the name of their table; with several, each variant is also compared
-            with itself in the first.
+        sources: records by the name of their table. With several tables, each variant is also
+            compared with itself in the first.
         baseline: as in :func:`summarise`.
         level: as in :func:`summarise`.
         seed: as in :func:`summarise`.
@@ -162,7 +159,7 @@ def summarise_sources(
         for record in records:
             groups.setdefault(Variant.of(record, source), []).append(record)
     for group in groups.values():
-        group.sort(key=_order)
+        group.sort(key=_episode_order)
     ordered = {
         variant: groups[variant]
         for variant in sorted(
@@ -178,10 +175,11 @@ def summarise_sources(
         )
     }
     names = labels(ordered)
+    by_scenario, by_attention = attrgetter("versioned_scenario"), attrgetter("attention")
 
     def rows(part_of: _Part) -> tuple[SummaryRow, ...]:
         return tuple(
-            _row(names[variant], part, chosen, level, rng)
+            _summary_row(names[variant], part, chosen, level, rng)
             for part in _parts(ordered, part_of)
             for variant, group in ordered.items()
             if (chosen := [record for record in group if part_of(record) == part])
@@ -189,7 +187,7 @@ def summarise_sources(
 
     def comparisons(part_of: _Part) -> tuple[Comparison, ...]:
         return tuple(
-            _compare(
+            _comparison(
                 (names[variant], names[base], part),
                 [record for record in ordered[base] if part_of(record) == part],
                 [record for record in group if part_of(record) == part],
@@ -206,32 +204,28 @@ def summarise_sources(
         baseline=baseline if any(each.policy == baseline for each in ordered) else "",
         level=level,
         policies=rows(lambda record: ""),
-        scenarios=rows(_scenario),
-        attentions=rows(lambda record: record.attention),
-        awareness=rows(_awareness),
-        comparisons=comparisons(lambda record: "") + comparisons(lambda record: record.attention),
-        scenario_comparisons=comparisons(_scenario),
+        scenarios=rows(by_scenario),
+        attentions=rows(by_attention),
+        awareness=rows(_awareness_part),
+        comparisons=comparisons(lambda record: "") + comparisons(by_attention),
+        scenario_comparisons=comparisons(by_scenario),
     )
 
 
-def _order(record: EpisodeRecord) -> tuple[str, int, int]:
+def _episode_order(record: EpisodeRecord) -> tuple[str, int, int]:
     return record.scenario, record.scenario_version, record.seed
 
 
 def _parts(groups: _Groups, part_of: _Part) -> list[str]:
+    """Return every part that holds an episode."""
     return sorted({part_of(record) for group in groups.values() for record in group})
 
 
-def _scenario(record: EpisodeRecord) -> str:
-    version = "" if record.scenario_version == 1 else f" v{record.scenario_version}"
-    return record.scenario + version
-
-
-def _awareness(record: EpisodeRecord) -> str:
+def _awareness_part(record: EpisodeRecord) -> str:
     return record.awareness or ("error" if record.error else "nobody near")
 
 
-def _row(
+def _summary_row(
     variant: str,
     part: str,
     records: Sequence[EpisodeRecord],
@@ -239,7 +233,7 @@ def _row(
     rng: np.random.Generator,
 ) -> SummaryRow:
     ran = [record for record in records if not record.error]
-    values = [[getattr(record, metric.name) for metric in METRICS] for record in ran]
+    values = [[getattr(record, name) for name in METRICS] for record in ran]
     table = np.array(values, dtype=np.float64).reshape(len(ran), len(METRICS))  # None becomes NaN
     present = np.isfinite(table)
     intervals = ratio_intervals(
@@ -250,28 +244,24 @@ def _row(
         strata=[(record.scenario, record.scenario_version) for record in ran],
     )
     worst = {}
-    for metric, column, there in zip(METRICS, table.T, present.T, strict=True):
-        if there.any() and metric.better != "neither":
-            pick = np.min if metric.better == "higher" else np.max
-            worst[metric.name] = float(pick(column[there]))
+    for metric, column, applies in zip(METRICS.values(), table.T, present.T, strict=True):
+        if applies.any() and metric.better != "neither":
+            worst_of = np.min if metric.better == "higher" else np.max
+            worst[metric.name] = float(worst_of(column[applies]))
     return SummaryRow(
         variant=variant,
         part=part,
         episodes=len(records),
         errors=len(records) - len(ran),
         success=proportion_interval(sum(r.success for r in ran), len(records), level),
-        robot_contact=proportion_interval(
-            sum(r.robot_contacts > 0 or r.contact_by == "robot" for r in ran), len(ran), level
-        ),
-        person_contact=proportion_interval(
-            sum(r.person_contacts > 0 or r.contact_by == "person" for r in ran), len(ran), level
-        ),
-        means={metric.name: interval for metric, interval in zip(METRICS, intervals, strict=True)},
+        robot_contact=proportion_interval(sum(r.robot_touched for r in ran), len(ran), level),
+        person_contact=proportion_interval(sum(r.person_touched for r in ran), len(ran), level),
+        means=dict(zip(METRICS, intervals, strict=True)),
         worst=worst,
     )
 
 
-def _compare(
+def _comparison(
     names: tuple[str, str, str],
     base: Sequence[EpisodeRecord],
     group: Sequence[EpisodeRecord],

@@ -1,26 +1,19 @@
-"""A summary as tables for the terminal."""
+"""The summary of many episodes as tables for the terminal."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Final
+from collections.abc import Callable, Iterable, Sequence
+from typing import TypeVar
 
 from ._interval import Interval, number_text
-from ._metric_info import METRIC_BY_NAME
+from ._metrics import METRICS
+from ._summary import Comparison, Summary, SummaryRow
 
-if TYPE_CHECKING:
-    from ._summary import Comparison, Summary, SummaryRow
-
-_ATTENTIONS: Final = {
-    "": "all",
-    "attentive": "attentive",
-    "unaware": "unaware",
-    "mixed": "mixed",
-}
+_Row = TypeVar("_Row", Comparison, SummaryRow)
 
 
 def summary_text(summary: Summary) -> str:
-    """All tables, each with a heading, and what was left out."""
+    """Return all tables of a summary, each with a heading, and notes on what is left out."""
     if not summary.policies:
         return "no episodes"
     percent = f"{100.0 * summary.level:g} %"
@@ -41,12 +34,12 @@ def summary_text(summary: Summary) -> str:
         ("By scenario", summary.scenarios),
     ):
         blocks.append(_titled(title, _part_table(rows)))
-    blocks += _notes(summary)
+    blocks.append("\n".join(_notes(summary)))
     return "\n\n".join(blocks)
 
 
 def table_text(header: Sequence[str], rows: Iterable[Sequence[str]], left: int = 1) -> str:
-    """Columns aligned, the first ``left`` of them to the left and the others to the right."""
+    """Return aligned columns: the first ``left`` of them left-aligned, the others right-aligned."""
     lines = [list(header), *(list(row) for row in rows)]
     widths = [max(len(line[column]) for line in lines) for column in range(len(header))]
 
@@ -61,8 +54,118 @@ def table_text(header: Sequence[str], rows: Iterable[Sequence[str]], left: int =
     return "\n".join([line_text(lines[0]), rule, *(line_text(line) for line in lines[1:])])
 
 
-def share_text(share: Interval) -> str:
-    """``"3 of 200 (≤ 4.3 %)"``: how many, and the upper end of the exact interval."""
+def _titled(title: str, table: str) -> str:
+    return f"{title}\n\n{table}"
+
+
+def _policy_table(rows: Sequence[SummaryRow]) -> str:
+    return _table(
+        rows,
+        {
+            "policy": lambda row: row.variant,
+            "success": _successes,
+            "time to goal s": _mean("time_to_goal_s"),
+            "time lost s": _mean("time_lost_s"),
+            "SPL": _mean("spl", bounds=False),
+            "personal zone s": _mean("personal_s"),
+        },
+    )
+
+
+def _safety_table(rows: Sequence[SummaryRow]) -> str:
+    return _table(
+        rows,
+        {
+            "policy": lambda row: row.variant,
+            "contact by robot": lambda row: _share_text(row.robot_contact),
+            "by person": lambda row: _share_text(row.person_contact),
+            "least m": _worst("min_separation_m"),
+            "margin m": _worst("min_margin_m"),
+            "violated s": _worst("violation_time_s"),
+            "TTC s": _worst("min_time_to_collision_s"),
+            "PET s": _worst("post_encroachment_s"),
+        },
+    )
+
+
+def _comparison_table(comparisons: Sequence[Comparison]) -> str:
+    return _table(
+        comparisons,
+        {
+            "policy": lambda each: each.variant,
+            "against": lambda each: each.baseline,
+            "episodes": lambda each: each.part or "all",
+            "pairs": lambda each: str(each.pairs),
+            "won back %": lambda each: each.won_back.text(0, 100.0),
+            "time lost s": lambda each: _signed(each.time_lost_s),
+            "violation %": lambda each: _signed(each.violation_excess, 0, 100.0),
+            "% of time": lambda each: _signed(each.violation_excess_of_time, 2, 100.0),
+            "longer violation": lambda each: _share_text(each.violates_more),
+        },
+        left=3,
+    )
+
+
+def _part_table(rows: Sequence[SummaryRow]) -> str:
+    return _table(
+        rows,
+        {
+            "episodes": lambda row: row.part.replace("_", " "),
+            "policy": lambda row: row.variant,
+            "success": _successes,
+            "by robot": _robot_contacts,
+            "time lost s": _mean("time_lost_s"),
+            "least m": _worst("min_separation_m"),
+            "margin m": _worst("min_margin_m"),
+            "violated s": _mean("violation_time_s", bounds=False),
+            "α error": _mean("awareness_error", bounds=False),
+        },
+        left=2,
+    )
+
+
+def _table(rows: Sequence[_Row], columns: dict[str, Callable[[_Row], str]], left: int = 1) -> str:
+    """Return a table whose columns are functions of a row, by their header."""
+    return table_text(
+        tuple(columns), ([cell(row) for cell in columns.values()] for row in rows), left
+    )
+
+
+def _mean(name: str, *, bounds: bool = True) -> Callable[[SummaryRow], str]:
+    """Return the column of a metric's mean, with or without its interval."""
+    decimals = METRICS[name].decimals
+
+    def cell(row: SummaryRow) -> str:
+        interval = row.means[name]
+        if bounds or not interval.known:
+            return interval.text(decimals)
+        return number_text(interval.value, decimals)
+
+    return cell
+
+
+def _worst(name: str) -> Callable[[SummaryRow], str]:
+    """Return the column of a metric's worst value."""
+    decimals = METRICS[name].decimals
+
+    def cell(row: SummaryRow) -> str:
+        value = row.worst.get(name)
+        return "–" if value is None else number_text(value, decimals)
+
+    return cell
+
+
+def _successes(row: SummaryRow) -> str:
+    return f"{round(row.success.value * row.episodes)} of {row.episodes}"
+
+
+def _robot_contacts(row: SummaryRow) -> str:
+    share = row.robot_contact
+    return str(round(share.value * share.n)) if share.n else "–"
+
+
+def _share_text(share: Interval) -> str:
+    """Return ``"3 of 200 (≤ 4.3 %)"``: the count, and the upper end of the exact interval."""
     if not share.n:
         return "–"
     count = round(share.value * share.n)
@@ -73,146 +176,13 @@ def _percent(share: float) -> str:
     return f"{100.0 * share:.2g} %" if share < 0.0995 else f"{100.0 * share:.0f} %"
 
 
-def _titled(title: str, table: str) -> str:
-    return f"{title}\n\n{table}"
-
-
-def _mean(row: SummaryRow, name: str, bounds: bool = True) -> str:
-    interval, decimals = row.means[name], METRIC_BY_NAME[name].decimals
-    if bounds or not interval.known:
-        return interval.text(decimals)
-    return number_text(interval.value, decimals)
-
-
-def _worst(row: SummaryRow, name: str) -> str:
-    value = row.worst.get(name)
-    return "–" if value is None else number_text(value, METRIC_BY_NAME[name].decimals)
-
-
-def _policy_table(rows: Sequence[SummaryRow]) -> str:
-    header = ("policy", "success", "time to goal s", "time lost s", "SPL", "personal zone s")
-    return table_text(
-        header,
-        (
-            (
-                row.variant,
-                f"{round(row.success.value * row.episodes)} of {row.episodes}",
-                _mean(row, "time_to_goal_s"),
-                _mean(row, "time_lost_s"),
-                _mean(row, "spl", bounds=False),
-                _mean(row, "personal_s"),
-            )
-            for row in rows
-        ),
-    )
-
-
-def _safety_table(rows: Sequence[SummaryRow]) -> str:
-    header = (
-        "policy",
-        "contact by robot",
-        "by person",
-        "least m",
-        "margin m",
-        "violated s",
-        "TTC s",
-        "PET s",
-    )
-    return table_text(
-        header,
-        (
-            (
-                row.variant,
-                share_text(row.robot_contact),
-                share_text(row.person_contact),
-                *(
-                    _worst(row, name)
-                    for name in (
-                        "min_separation_m",
-                        "min_margin_m",
-                        "violation_time_s",
-                        "min_time_to_collision_s",
-                        "post_encroachment_s",
-                    )
-                ),
-            )
-            for row in rows
-        ),
-    )
-
-
-def _comparison_table(comparisons: Sequence[Comparison]) -> str:
-    header = (
-        "policy",
-        "against",
-        "episodes",
-        "pairs",
-        "won back %",
-        "time lost s",
-        "violation %",
-        "% of time",
-        "longer violation",
-    )
-    return table_text(
-        header,
-        (
-            (
-                each.variant,
-                each.baseline,
-                _ATTENTIONS.get(each.part, each.part),
-                str(each.pairs),
-                each.won_back.text(0, 100.0),
-                _signed(each.time_lost_s),
-                _signed(each.violation_excess, 0, 100.0),
-                _signed(each.violation_excess_of_time, 2, 100.0),
-                share_text(each.violates_more),
-            )
-            for each in comparisons
-        ),
-        left=3,
-    )
-
-
 def _signed(interval: Interval, decimals: int = 2, scale: float = 1.0) -> str:
     text = interval.text(decimals, scale)
     return f"+{text}" if interval.known and round(interval.value * scale, decimals) > 0.0 else text
 
 
-def _part_table(rows: Sequence[SummaryRow]) -> str:
-    header = (
-        "episodes",
-        "policy",
-        "success",
-        "by robot",
-        "time lost s",
-        "least m",
-        "margin m",
-        "violated s",
-        "α error",
-    )
-    return table_text(
-        header,
-        (
-            (
-                row.part.replace("_", " "),
-                row.variant,
-                f"{round(row.success.value * row.episodes)} of {row.episodes}",
-                str(round(row.robot_contact.value * row.robot_contact.n))
-                if row.robot_contact.n
-                else "–",
-                _mean(row, "time_lost_s"),
-                _worst(row, "min_separation_m"),
-                _worst(row, "min_margin_m"),
-                _mean(row, "violation_time_s", bounds=False),
-                _mean(row, "awareness_error", bounds=False),
-            )
-            for row in rows
-        ),
-        left=2,
-    )
-
-
 def _notes(summary: Summary) -> list[str]:
+    """Return the legend, and one line for each policy with episodes that are left out."""
     notes = [
         "won back: share of the time that the other loses. violation: longer violation of the\n"
         "margin S − S_p, relative to that of the other, and to the time that it takes. least,\n"
@@ -227,11 +197,11 @@ def _notes(summary: Summary) -> list[str]:
             )
         lost = row.means["time_lost_s"]
         ran = row.episodes - row.errors
-        astray = ran - row.means["time_to_goal_s"].n
-        if astray:
+        not_reached = ran - row.means["time_to_goal_s"].n
+        if not_reached:
             notes.append(
-                f"{row.variant}: {astray} of {ran} episodes did not reach the goal; they lost all "
-                "of their time, and have no time to goal"
+                f"{row.variant}: {not_reached} of {ran} episodes did not reach the goal; they lost "
+                "all of their time, and have no time to goal"
             )
         if lost.n < ran:
             notes.append(
@@ -244,4 +214,4 @@ def _notes(summary: Summary) -> list[str]:
                 f"{each.variant}: {each.won_back.left_out} of {each.pairs} pairs are left out of "
                 "the time won back"
             )
-    return ["\n".join(notes)]
+    return notes

@@ -1,4 +1,4 @@
-"""What the measures of an episode are made from: its truth as arrays over time."""
+"""The true course of an episode as arrays over time, from which its metrics are computed."""
 
 from __future__ import annotations
 
@@ -21,13 +21,14 @@ class Trace:
 
     Attributes:
         t_s: (N,) increasing.
-        robot_odom_m: (N, 2) base origin.
-        heading_odom_rad: (N,).
-        speed_mps: (N,) of the base origin along the heading.
-        people_odom_m: (N, P, 2) centre lines.
-        people_odom_mps: (N, P, 2).
+        robot_odom_m: (N, 2) positions of the base origin.
+        heading_odom_rad: (N,) headings of the robot.
+        speed_mps: (N,) speed of the base origin along the heading.
+        people_odom_m: (N, P, 2) positions of the centre lines.
+        people_odom_mps: (N, P, 2) velocities.
         awareness: (N, P) true α.
-        separation_m: (N, P) between the surfaces; a lower bound with centres more than 4 m apart.
+        separation_m: (N, P) distances between the surfaces; a lower bound where the centres are
+            more than 4 m apart.
     """
 
     t_s: FloatArray
@@ -41,10 +42,10 @@ class Trace:
 
     @classmethod
     def of(cls, result: CrossingResult) -> Trace:
-        """The course of a crossing.
+        """Return the trace of a crossing.
 
         Raises:
-            SimError: it has no frames, or the number of people changes on the way.
+            SimError: the crossing has no frames, or the number of people changes.
         """
         frames = result.frames
         if not frames:
@@ -76,16 +77,19 @@ class Trace:
 
     @property
     def people(self) -> int:
-        """How many."""
+        """Number of people."""
         return int(self.separation_m.shape[1])
 
     def to_base(self, vectors_odom: FloatArray) -> FloatArray:
-        """(N, P, 2) vectors turned into the axes of the base frame of their instant."""
+        """Return (N, P, 2) vectors in the axes of the base frame at their instant."""
         cos = np.cos(self.heading_odom_rad)[:, None]
         sin = np.sin(self.heading_odom_rad)[:, None]
         x, y = vectors_odom[..., 0], vectors_odom[..., 1]
         return np.stack([cos * x + sin * y, cos * y - sin * x], axis=-1)
 
     def time_with(self, condition: FloatArray) -> float:
-        """How long a condition (N,) held, each instant standing for the time to the next, s."""
+        """Return the seconds during which a condition (N,) held.
+
+        Each instant stands for the time to the next one.
+        """
         return float(np.diff(self.t_s) @ condition[:-1].astype(np.float64))

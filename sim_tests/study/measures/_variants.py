@@ -1,4 +1,4 @@
-"""Episodes by what was tried: policy, and planner, perception and fault where they differ."""
+"""Variants: the combinations of policy, planner, perception and fault that a run compares."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ _NO_FAULT: Final = "no fault"
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """What was tried.
+    """One combination of what a run compares.
 
     Attributes:
-        policy: name.
-        planner: name.
-        perception: name.
-        fault: name, empty for none.
-        source: which table it comes from, empty when there is one.
+        policy: name of the policy.
+        planner: name of the planner.
+        perception: ``"truth"``, ``"keypoints"``, ``"pixels"`` or ``"oracle"``.
+        fault: name of the fault, empty for none.
+        source: name of the table that its episodes come from, empty with a single table.
     """
 
     policy: str
@@ -31,37 +31,37 @@ class Variant:
 
     @classmethod
     def of(cls, record: EpisodeRecord, source: str = "") -> Variant:
-        """What was tried in an episode."""
+        """Return the variant of an episode."""
         return cls(record.policy, record.planner, record.perception, record.fault, source)
 
 
 def labels(variants: Iterable[Variant]) -> dict[Variant, str]:
-    """A name for each: the policy, and what tells it from others of the same policy."""
+    """Return a label for each variant: its policy, and the fields in which the policy's differ."""
     found = list(dict.fromkeys(variants))
 
     def label(variant: Variant) -> str:
         same = [each for each in found if each.policy == variant.policy]
-        telling = [
+        differing = [
             getattr(variant, field) or _NO_FAULT
             for field in ("planner", "perception", "fault", "source")
             if len({getattr(each, field) for each in same}) > 1
         ]
-        return ", ".join([variant.policy, *telling])
+        return ", ".join([variant.policy, *differing])
 
     return {variant: label(variant) for variant in found}
 
 
 def baselines_of(variant: Variant, variants: Iterable[Variant], policy: str) -> tuple[Variant, ...]:
-    """What a variant is compared with.
+    """Return the variants that a variant is compared with.
 
-    First the baseline policy in the likest conditions: with the same planner, and if there is a
-    choice from the same table, under the same fault and with the same perception, in this order.
-    Then the same variant in the first of several tables.
+    The first is the baseline policy with the same planner. Where there are several, the one under
+    the most similar conditions is taken: the same table, then the same fault, then the same
+    perception. The second is the same variant in the first of several tables.
 
     Args:
-        variant: to be compared.
-        variants: all there are; the first table's first.
-        policy: name of the baseline.
+        variant: the variant to compare.
+        variants: all variants, those of the first table first.
+        policy: name of the baseline policy.
     """
     known = tuple(variants)
     found: list[Variant] = []

@@ -7,8 +7,18 @@ from typing import TYPE_CHECKING
 from awarenav.lazy import lazy_names
 
 if TYPE_CHECKING:
+    from ._text import number, percent
     from ._write import write_report
 
-__all__ = ["write_report"]
+__all__ = ["number", "percent", "write_report"]
 
-__getattr__ = lazy_names(__name__, {"._write": ("write_report",)})
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "._text": (
+            "number",
+            "percent",
+        ),
+        "._write": ("write_report",),
+    },
+)

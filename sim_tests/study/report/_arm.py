@@ -1,7 +1,4 @@
-"""An episode as the report knows it: its row and its number.
-
-The things compared: a policy, with the planner and the perception that it ran with.
-"""
+"""The arms of a comparison: a policy with the planner and perception that it ran with."""
 
 from __future__ import annotations
 
@@ -11,14 +8,23 @@ from typing import Final, Literal
 
 from ..measures import BASELINE, EpisodeRecord, Variant, labels
 
+Role = Literal["reference", "candidate", "ceiling"]
+
+#: The policy that knows the truth.
+CEILING: Final = "oracle"
+# Looks of marks: the shapes of the template and the colours of its style sheet.
+_LOOKS: Final = 6
+_REFERENCE_LOOK: Final = 0
+_CEILING_LOOK: Final = 2
+
 
 @dataclass(frozen=True, slots=True)
 class Episode:
     """One episode of a run.
 
     Attributes:
-        number: counts jobs from 0; what ``awarenav replay`` asks for. None where no job is known.
-        record: its row.
+        number: number of its job, from 0, as ``awarenav replay`` takes it; None without a job.
+        record: its row in ``episodes.csv``.
     """
 
     number: int | None
@@ -26,35 +32,25 @@ class Episode:
 
     @property
     def pair(self) -> tuple[str, int, int]:
-        """Scenario, version and seed: what episodes of different policies have in common."""
+        """Scenario, version and seed, which paired episodes of different policies share."""
         return self.record.scenario, self.record.scenario_version, self.record.seed
-
-
-Role = Literal["reference", "candidate", "ceiling"]
-
-#: The policy that knows the truth.
-CEILING: Final = "oracle"
-# Looks of marks: see the shapes of the template and the colours of its style sheet.
-_LOOKS: Final = 6
-_REFERENCE_LOOK: Final = 0
-_CEILING_LOOK: Final = 2
 
 
 @dataclass(frozen=True, slots=True)
 class Arm:
-    """One thing compared.
+    """One arm of the comparison, in the sense of a clinical trial.
 
     Attributes:
-        name: as tables call it; unique.
+        name: unique name in tables.
         policy: name of the policy.
         planner: name of the planner.
-        perception: what the robot saw with.
-        role: ``"reference"`` ignores awareness, ``"ceiling"`` knows the truth, the others are to
-            be judged.
+        perception: name of the perception.
+        role: ``"reference"`` ignores awareness, ``"ceiling"`` knows the truth, and a verdict is
+            about each ``"candidate"``.
         look: number of its colour and shape.
-        episodes: under the fault (or none) that most of the page is about; no errors among them.
-        others: under other faults; no errors among them.
-        errors: those that broke off.
+        episodes: episodes without an error, under the fault of the report.
+        others: episodes without an error, under other faults.
+        errors: episodes that ended in an error.
     """
 
     name: str
@@ -69,11 +65,11 @@ class Arm:
 
 
 def arms_of(episodes: Sequence[Episode], fault: str) -> tuple[Arm, ...]:
-    """Sort episodes by what they are to be compared for: reference, candidates, ceiling.
+    """Return the arms of a run: reference, candidates, ceiling.
 
     Args:
-        episodes: all of a run.
-        fault: that most of the page is about, empty for none.
+        episodes: all episodes of the run.
+        fault: fault of the report, empty for none.
     """
     groups: dict[Variant, list[Episode]] = {}
     for episode in episodes:
@@ -91,7 +87,7 @@ def arms_of(episodes: Sequence[Episode], fault: str) -> tuple[Arm, ...]:
         look = {"reference": _REFERENCE_LOOK, "ceiling": _CEILING_LOOK}.get(role)
         if look is None:
             look = free[sum(arm.role == "candidate" for arm in arms) % len(free)]
-        good = [episode for episode in groups[variant] if not episode.record.error]
+        completed = [episode for episode in groups[variant] if not episode.record.error]
         arms.append(
             Arm(
                 names[variant],
@@ -100,16 +96,16 @@ def arms_of(episodes: Sequence[Episode], fault: str) -> tuple[Arm, ...]:
                 variant.perception,
                 role,
                 look,
-                tuple(each for each in good if each.record.fault == fault),
-                tuple(each for each in good if each.record.fault != fault),
+                tuple(each for each in completed if each.record.fault == fault),
+                tuple(each for each in completed if each.record.fault != fault),
                 tuple(each for each in groups[variant] if each.record.error),
             )
         )
     return tuple(arms)
 
 
-def judged(arms: Sequence[Arm]) -> tuple[Arm, ...]:
-    """The arms that a verdict is about: the candidates, or all where there are none."""
+def judged_arms(arms: Sequence[Arm]) -> tuple[Arm, ...]:
+    """Return the arms that verdicts are about: the candidates, or all arms without candidates."""
     return tuple(arm for arm in arms if arm.role == "candidate") or tuple(arms)
 
 

@@ -1,16 +1,15 @@
-"""Episodes by how the person who came nearest stood to the robot, and what it made of that."""
+"""Section of a report: episodes by awareness of the nearest person and the robot's judgement."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Final
 
-from ._figures import Figures, estimate
-from ._measure import MARGIN, TIME_LOST, VIOLATION
 from ._panel import Panel, panel, scale_over
+from ._statistics import MARGIN, TIME_LOST, VIOLATION, RunStatistics, estimate
 from ._text import count, plural
 
-#: Value of ``awareness``, heading and meaning.
+#: Awareness class, heading and meaning of each group.
 GROUPS: Final = (
     ("aware", "Aware, and recognised", "The person had seen the robot, and the robot knew."),
     ("unaware", "Unaware, and recognised", "The person had not, and the robot did not think so."),
@@ -25,18 +24,18 @@ GROUPS: Final = (
         "The mistake that costs time: the person had seen the robot, but it did not know.",
     ),
 )
-_MEASURES: Final = (TIME_LOST, VIOLATION, MARGIN)
+_METRICS: Final = (TIME_LOST, VIOLATION, MARGIN)
 
 
 @dataclass(frozen=True, slots=True)
 class AwarenessGroup:
-    """One kind of encounter.
+    """The episodes of one awareness class.
 
     Attributes:
-        title: of the group.
+        title: heading of the group.
         meaning: one sentence.
-        counts: for each arm its look, name, episodes and contacts caused by the robot, as texts.
-        panels: measures on axes that all groups share.
+        counts: look and name of each arm, its episodes and its robot contacts, as texts.
+        panels: metrics on axes that all groups share.
     """
 
     title: str
@@ -45,16 +44,16 @@ class AwarenessGroup:
     panels: tuple[Panel, ...]
 
 
-def split_by_awareness(figures: Figures) -> tuple[AwarenessGroup, ...]:
-    """The groups that hold any episode."""
+def split_by_awareness(statistics: RunStatistics) -> tuple[AwarenessGroup, ...]:
+    """Return the groups that hold any episode."""
     rows = {
-        kind: [(arm, figures.by_awareness(arm, kind)) for arm in figures.shown]
+        kind: [(arm, statistics.by_awareness(arm, kind)) for arm in statistics.shown]
         for kind, _, _ in GROUPS
     }
     scales = {}
-    for measure in _MEASURES:
-        estimates = [estimate(row, measure) for group in rows.values() for _, row in group]
-        scales[measure.key] = scale_over([each for each in estimates if each.known])
+    for metric in _METRICS:
+        estimates = [estimate(row, metric) for part in rows.values() for _, row in part]
+        scales[metric.name] = scale_over([each for each in estimates if each.known])
     groups = []
     for kind, title, meaning in GROUPS:
         if all(row is None for _, row in rows[kind]):
@@ -63,15 +62,15 @@ def split_by_awareness(figures: Figures) -> tuple[AwarenessGroup, ...]:
         for arm, row in rows[kind]:
             episodes = 0 if row is None else row.robot_contact.n
             hits = 0 if row is None or not episodes else round(row.robot_contact.value * episodes)
-            said = plural(hits, "robot contact") if episodes else ""
-            counts.append((arm.look, arm.name, count(episodes), said))
+            contacts = plural(hits, "robot contact") if episodes else ""
+            counts.append((arm.look, arm.name, count(episodes), contacts))
         panels = tuple(
             panel(
-                measure,
-                [(arm, arm.name, estimate(row, measure)) for arm, row in rows[kind]],
-                scale=scales[measure.key],
+                metric,
+                [(arm, arm.name, estimate(row, metric)) for arm, row in rows[kind]],
+                scale=scales[metric.name],
             )
-            for measure in _MEASURES
+            for metric in _METRICS
         )
         groups.append(AwarenessGroup(title, meaning, tuple(counts), panels))
     return tuple(groups)

@@ -1,64 +1,97 @@
-"""Policies against each other: measures as intervals, differences on the same seeds."""
+"""Section of a report: metrics of every arm, and differences on the same seeds."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
-from ._figures import Figures, estimate
-from ._measure import FURTHER, MAIN, Measure
+from ..measures import METRICS, SHARES, Metric
 from ._panel import Panel, panel
+from ._statistics import MARGIN, TIME_LOST, VIOLATION, RunStatistics, estimate
 
-#: Kinds of scenario by what their people look at.
+#: Metrics that are shown first.
+MAIN: Final = (
+    SHARES["robot_contacts"],
+    TIME_LOST,
+    VIOLATION,
+    SHARES["success"],
+    MARGIN,
+    METRICS["speed_at_min_separation_mps"],
+)
+#: Metrics that are shown on demand.
+FURTHER: Final = (
+    SHARES["person_contacts"],
+    *(
+        METRICS[name]
+        for name in (
+            "min_separation_m",
+            "min_time_to_collision_s",
+            "post_encroachment_s",
+            "personal_s",
+            "intimate_s",
+            "human_delay_s",
+            "human_detour_m",
+            "stops",
+            "peak_deceleration_mps2",
+            "peak_jerk_mps3",
+            "spl",
+            "awareness_error",
+            "warnings",
+        )
+    ),
+)
+#: Attentions of scenarios: what their people look at.
 ATTENTIONS: Final = ("attentive", "mixed", "unaware")
+# Fields of a Comparison.
 _PAIRED: Final = (
-    Measure(
+    Metric(
         "won_back",
         "Time won back",
         "%",
-        "more",
+        "higher",
         "Σ (time lost by the reference − by the policy) / Σ time lost by the reference, over pairs "
         "of the same scenario and seed.",
         share=True,
     ),
-    Measure(
+    Metric(
         "time_lost_s",
         "Difference in time lost",
         "s",
-        "less",
+        "lower",
         "Mean over pairs: the policy's less the reference's.",
     ),
-    Measure(
+    Metric(
         "violation_excess",
         "Margin violated longer",
         "%",
-        "less",
+        "lower",
         "Σ (time of violation of the policy − of the reference) / Σ that of the reference, over "
         "pairs.",
         share=True,
     ),
-    Measure(
+    Metric(
         "min_separation_m",
         "Difference in smallest separation",
         "m",
-        "",
+        "neither",
         "Mean over pairs: the policy's less the reference's.",
         decimals=3,
     ),
 )
-#: What pairs tell that episodes alone do not; for the definitions.
+#: Metrics that only pairs have, for the definitions.
 PAIRED_ONLY: Final = (_PAIRED[0], _PAIRED[2])
 
 
 @dataclass(frozen=True, slots=True)
 class ComparisonSection:
-    """All panels.
+    """The panels of the comparison.
 
     Attributes:
-        main: every arm, every scenario.
-        further: measures for those who want more.
+        main: metrics that are shown first, over all scenarios.
+        further: metrics that are shown on demand, over all scenarios.
         references: names of the arms that differences are taken from.
-        paired: differences from them and time won back, by attention of the scenarios.
+        paired: differences and time won back, by attention of the scenarios.
     """
 
     main: tuple[Panel, ...]
@@ -67,35 +100,38 @@ class ComparisonSection:
     paired: tuple[Panel, ...]
 
 
-def compare(figures: Figures) -> ComparisonSection:
-    """Draw up the comparison."""
+def comparison_section(statistics: RunStatistics) -> ComparisonSection:
+    """Return the panels of the comparison."""
     groups = [
         (arm, f"{arm.name}, {attention}", against)
-        for arm in figures.shown
+        for arm in statistics.shown
         for attention in ATTENTIONS
-        if (against := figures.against(arm, attention)) is not None and against.pairs
+        if (against := statistics.against(arm, attention)) is not None and against.pairs
     ]
     paired = [
         panel(
-            measure,
-            [(arm, label, getattr(against, measure.key)) for arm, label, against in groups],
-            signed=measure.key != "won_back",
+            metric,
+            [(arm, label, getattr(against, metric.name)) for arm, label, against in groups],
+            signed=metric.name != "won_back",
         )
-        for measure in _PAIRED
-        if any(getattr(against, measure.key).known for _, _, against in groups)
+        for metric in _PAIRED
+        if any(getattr(against, metric.name).known for _, _, against in groups)
     ]
     return ComparisonSection(
-        tuple(_panel(figures, measure) for measure in MAIN if _known(figures, measure)),
-        tuple(_panel(figures, measure) for measure in FURTHER if _known(figures, measure)),
+        _panels(statistics, MAIN),
+        _panels(statistics, FURTHER),
         tuple(dict.fromkeys(against.baseline for _, _, against in groups)),
         tuple(paired),
     )
 
 
-def _panel(figures: Figures, measure: Measure) -> Panel:
-    rows = [(arm, arm.name, estimate(figures.whole(arm), measure)) for arm in figures.shown]
-    return panel(measure, rows)
-
-
-def _known(figures: Figures, measure: Measure) -> bool:
-    return any(estimate(figures.whole(arm), measure).known for arm in figures.shown)
+def _panels(statistics: RunStatistics, metrics: Iterable[Metric]) -> tuple[Panel, ...]:
+    """Return a panel of all arms for each metric that is known for any of them."""
+    panels = []
+    for metric in metrics:
+        rows = [
+            (arm, arm.name, estimate(statistics.of_arm(arm), metric)) for arm in statistics.shown
+        ]
+        if any(interval.known for _, _, interval in rows):
+            panels.append(panel(metric, rows))
+    return tuple(panels)

@@ -1,20 +1,19 @@
-"""What each fault does to each policy, against the same seeds without it."""
+"""Section of a report: each fault with each arm, compared with the same seeds without it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..measures import paired_difference
+from ..measures import Metric, paired_difference
 from ._arm import Arm, Episode
-from ._figures import Figures, robot_contacts, touched
-from ._measure import TIME_LOST, VIOLATION, Measure
+from ._statistics import TIME_LOST, VIOLATION, RunStatistics, robot_contacts
 from ._text import NOTHING, count, number, percent
 
 
 @dataclass(frozen=True, slots=True)
 class FaultRow:
-    """One fault with one arm, as texts; differences are against the same seeds without a fault."""
+    """One fault with one arm, as texts; differences are to the same seeds without a fault."""
 
     fault: str
     arm: str
@@ -30,14 +29,14 @@ class FaultRow:
     least_margin: str
 
 
-def faults_of(figures: Figures) -> tuple[FaultRow, ...]:
-    """A row a fault and arm, in the order of faults' names; empty without faults."""
+def fault_rows(statistics: RunStatistics) -> tuple[FaultRow, ...]:
+    """Return one row per fault and arm, sorted by fault; empty without faults."""
     rows = []
-    for arm in figures.arms:
+    for arm in statistics.arms:
         for fault in sorted({each.record.fault for each in arm.others}):
             episodes = tuple(each for each in arm.others if each.record.fault == fault)
             contacts = robot_contacts(episodes)
-            hits = sum(touched(each.record) for each in episodes)
+            hits = sum(each.record.robot_touched for each in episodes)
             margins = [
                 each.record.min_margin_m
                 for each in episodes
@@ -54,18 +53,18 @@ def faults_of(figures: Figures) -> tuple[FaultRow, ...]:
                     percent(contacts.high),
                     hits > 0,
                     number(lost, 1),
-                    _more(arm, episodes, TIME_LOST, 1),
+                    _difference_text(arm, episodes, TIME_LOST, 1),
                     number(violated, 2),
-                    _more(arm, episodes, VIOLATION, 2),
+                    _difference_text(arm, episodes, VIOLATION, 2),
                     number(min(margins) if margins else None, 2),
                 )
             )
     return tuple(sorted(rows, key=lambda row: row.fault))
 
 
-def _more(arm: Arm, episodes: Sequence[Episode], measure: Measure, decimals: int) -> str:
+def _difference_text(arm: Arm, episodes: Sequence[Episode], metric: Metric, decimals: int) -> str:
     before, now = ([each.record for each in part] for part in (arm.episodes, episodes))
-    change = paired_difference(before, now, measure.key)
+    change = paired_difference(before, now, metric.name)
     if not change.known:
         return NOTHING
     if not change.bounded:
@@ -76,6 +75,6 @@ def _more(arm: Arm, episodes: Sequence[Episode], measure: Measure, decimals: int
     return f"{number(change.value, decimals, sign=True)} ({ends})"
 
 
-def _mean(episodes: Sequence[Episode], measure: Measure) -> float | None:
-    known = [value for each in episodes if (value := getattr(each.record, measure.key)) is not None]
+def _mean(episodes: Sequence[Episode], metric: Metric) -> float | None:
+    known = [value for each in episodes if (value := getattr(each.record, metric.name)) is not None]
     return sum(known) / len(known) if known else None

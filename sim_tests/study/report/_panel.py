@@ -1,7 +1,4 @@
-"""An axis: values to places in per cent of its length, and round numbers to mark it with.
-
-Intervals side by side: what the page draws as a small plot with a row an arm.
-"""
+"""Forest plots: one interval per row on a common axis, with places in per cent of its length."""
 
 from __future__ import annotations
 
@@ -10,10 +7,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from ..measures import Interval
+from ..measures import Interval, Metric
 from ._arm import Arm
-from ._measure import Measure
 from ._text import NOTHING, count, number, percent
+
+# An estimate from less than this fraction of the most episodes does not stretch an axis.
+_FEW: Final = 20
+_HINTS: Final = {"lower": "less is better", "higher": "more is better", "neither": ""}
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,30 +25,30 @@ class Scale:
 
     @classmethod
     def over(cls, values: Iterable[float], *, zero: bool = False, pad: float = 0.06) -> Scale:
-        """The axis that holds all values with some room about them.
+        """Return the axis that holds all values, with a margin at both ends.
 
         Args:
-            values: finite; without any the axis runs from 0 to 1.
-            zero: also holds 0, without room beyond it.
-            pad: room at each end, as a share of the length.
+            values: finite; without any, the axis runs from 0 to 1.
+            zero: the axis also holds 0, without a margin beyond it.
+            pad: margin at each end, as a share of the length.
         """
         known = [*values, *([0.0] if zero else [])]
         low, high = (min(known), max(known)) if known else (0.0, 1.0)
         if high - low < 1e-9:
             low, high = (low, low + 1.0) if zero and low == 0.0 else (low - 0.5, high + 0.5)
-        room = pad * (high - low)
+        margin = pad * (high - low)
         return cls(
-            low if zero and low == 0.0 else low - room,
-            high if zero and high == 0.0 else high + room,
+            low if zero and low == 0.0 else low - margin,
+            high if zero and high == 0.0 else high + margin,
         )
 
     def place(self, value: float) -> float:
-        """Where a value lies, in per cent; values beyond an end lie at it."""
+        """Return the place of a value in per cent; a value beyond an end lies at the end."""
         share = (value - self.low) / (self.high - self.low)
         return round(100.0 * min(max(share, 0.0), 1.0), 2)
 
     def ticks(self, most: int = 5) -> tuple[tuple[float, str], ...]:
-        """At most so many round values in the axis: places in per cent and texts."""
+        """Return at most ``most`` round values in the axis: places in per cent, and texts."""
         step = _round_step((self.high - self.low) / max(most - 1, 1))
         decimals = max(0, -math.floor(math.log10(step) + 1e-9))
         first, last = math.ceil(self.low / step - 1e-9), math.floor(self.high / step + 1e-9)
@@ -59,30 +59,26 @@ class Scale:
 
 
 def _round_step(least: float) -> float:
-    """The smallest of 1, 2, 5 times a power of ten that is not below ``least``."""
+    """Return the smallest of 1, 2, 5 times a power of ten that is not below ``least``."""
     power = 10.0 ** math.floor(math.log10(least))
     return next(
         factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= least * 0.999
     )
 
 
-# Estimates from less than this part of the episodes of others do not stretch an axis.
-_FEW: Final = 20
-
-
 @dataclass(frozen=True, slots=True)
 class PanelRow:
-    """One interval: places in per cent of the panel's width, None for no data.
+    """One row of a panel; places are in per cent of its width, None for no data.
 
     Attributes:
-        label: name of the arm.
-        look: of the arm's mark.
+        label: name of the row.
+        look: number of the arm's colour and shape.
         value: the estimate as text.
-        interval: its ends as text.
-        count: of episodes or pairs, as text.
-        place: of the estimate.
-        low: place of the interval's end.
-        high: place of the interval's end.
+        interval: ends of the interval as text.
+        count: number of episodes or pairs, as text.
+        place: place of the estimate.
+        low: place of the interval's lower end.
+        high: place of the interval's upper end.
     """
 
     label: str
@@ -97,16 +93,16 @@ class PanelRow:
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """A plot of intervals.
+    """A forest plot of one metric.
 
     Attributes:
-        title: of the measure.
-        unit: of the numbers; those in per cent carry their sign.
-        hint: which way is better, empty where neither is.
+        title: title of the metric.
+        unit: unit of the numbers; numbers in per cent have their own sign.
+        hint: the better direction in words; empty where the report names none.
         meaning: one sentence.
-        rows: one an arm.
-        ticks: place and text of round values.
-        zero: place of 0, None where the axis has none inside.
+        rows: rows of the plot.
+        ticks: places and texts of round values.
+        zero: place of 0; None where 0 is not inside the axis.
     """
 
     title: str
@@ -119,41 +115,41 @@ class Panel:
 
 
 def panel(
-    measure: Measure,
+    metric: Metric,
     rows: Sequence[tuple[Arm, str, Interval]],
     *,
     scale: Scale | None = None,
     signed: bool = False,
 ) -> Panel:
-    """Draw up a panel.
+    """Return the panel of a metric.
 
     Args:
-        measure: what is shown.
+        metric: the metric.
         rows: arm, label and estimate of each row.
-        scale: shared with other panels; default one for these rows, in per cent for shares.
-        signed: writes a plus before gains, for differences.
+        scale: axis shared with other panels; default one for these rows, in per cent for shares.
+        signed: write a plus before positive numbers, for differences.
     """
-    factor = 100.0 if measure.share else 1.0
+    factor = 100.0 if metric.share else 1.0
     known = [estimate for _, _, estimate in rows if estimate.known]
     if scale is None:
-        scale = scale_over(known, factor, measure.from_zero)
-    hint = {"less": "less is better", "more": "more is better"}.get(measure.better, "")
+        scale = scale_over(known, factor, metric.from_zero)
+    hint = _HINTS[metric.better] if metric.says_better else ""
     inside = scale.low < 0.0 < scale.high
     return Panel(
-        measure.title,
-        measure.unit,
+        metric.title,
+        metric.unit,
         hint,
-        measure.meaning,
-        tuple(_row(measure, scale, factor, signed, *row) for row in rows),
+        metric.meaning,
+        tuple(_panel_row(metric, scale, factor, signed, *row) for row in rows),
         scale.ticks(6),
         scale.place(0.0) if inside else None,
     )
 
 
 def scale_over(estimates: Sequence[Interval], factor: float = 1.0, from_zero: bool = True) -> Scale:
-    """The axis that holds all estimates, their intervals unless they are much wider, and 0.
+    """Return the axis that holds all estimates with their intervals, and 0.
 
-    The interval of a few episodes would squeeze all the others; it is cut off at the axis's end.
+    An interval of few episodes would compress all others; the end of the axis cuts it off.
     """
     most = max((each.n for each in estimates), default=0)
     ends = [factor * end for each in estimates for end in _ends(each, most)]
@@ -166,8 +162,8 @@ def _ends(estimate: Interval, most: int) -> tuple[float, ...]:
     return estimate.low, estimate.value, estimate.high
 
 
-def _row(
-    measure: Measure,
+def _panel_row(
+    metric: Metric,
     scale: Scale,
     factor: float,
     signed: bool,
@@ -179,9 +175,9 @@ def _row(
         return PanelRow(label, arm.look, NOTHING, "no data", "", None, None, None)
 
     def text(value: float) -> str:
-        if measure.share:
+        if metric.share:
             return percent(value, sign=signed)
-        return number(value, measure.decimals, sign=signed)
+        return number(value, metric.decimals, sign=signed)
 
     return PanelRow(
         label,

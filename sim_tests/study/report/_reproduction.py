@@ -1,4 +1,4 @@
-"""What it takes to run the same again."""
+"""Section of a report: the configuration of the run, from which it can be repeated."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ class Reproduction:
     """The configuration of a run.
 
     Attributes:
-        command: that started it, empty when not known.
-        facts: name and value of everything else that ``run.json`` says.
-        scenarios: ``name@version``.
-        seeds: as ranges.
-        policies: name and YAML.
-        faults: name and YAML.
+        command: the command line; empty when not known.
+        facts: names and values of everything else in ``run.json``.
+        scenarios: each as ``name@version``.
+        seeds: the seeds as ranges.
+        policies: names and YAML texts.
+        faults: names and YAML texts.
     """
 
     command: str
@@ -32,37 +32,37 @@ class Reproduction:
     faults: tuple[tuple[str, str], ...]
 
 
-def reproduction(folder: RunData) -> Reproduction:
-    """Gather what a run's folder says about itself."""
-    run = dict(folder.run)
-    command = run.pop("command", "")
+def reproduction(run: RunData) -> Reproduction:
+    """Return the configuration of a run."""
+    facts = dict(run.about)
+    command = facts.pop("command", "")
     if isinstance(command, list):
         command = " ".join(map(str, command))
-    records = [each.record for each in folder.episodes]
+    records = [each.record for each in run.episodes]
     return Reproduction(
         str(command),
-        tuple(_flat(run)),
+        tuple(_flat(facts)),
         tuple(sorted({f"{each.scenario}@{each.scenario_version}" for each in records})),
-        ranges(each.seed for each in records),
-        _texts((job.policy_name, job.policy) for job in folder.jobs),
-        _texts((job.fault_name, job.fault) for job in folder.jobs if job.fault_name),
+        _ranges(each.seed for each in records),
+        _distinct((job.policy_name, job.policy) for job in run.jobs),
+        _distinct((job.fault_name, job.fault) for job in run.jobs if job.fault_name),
     )
 
 
-def ranges(numbers: Iterable[int]) -> str:
-    """Whole numbers as ranges: ``0–4, 7``."""
+def _ranges(numbers: Iterable[int]) -> str:
+    """Return whole numbers as ranges: ``0–4, 7``."""
     parts = []
-    for _, run in itertools.groupby(
+    for _, pairs in itertools.groupby(
         enumerate(sorted(set(numbers))), key=lambda pair: pair[1] - pair[0]
     ):
-        values = [value for _, value in run]
+        values = [value for _, value in pairs]
         parts.append(f"{values[0]}–{values[-1]}" if len(values) > 1 else str(values[0]))
     return ", ".join(parts)
 
 
-def title_of(folder: RunData, policies: int) -> str:
-    """What was run, in a few words."""
-    records = [each.record for each in folder.episodes]
+def title_of(run: RunData, policies: int) -> str:
+    """Return the title of a report: the numbers of crossings, scenarios, policies and seeds."""
+    records = [each.record for each in run.episodes]
     scenarios = len({(each.scenario, each.scenario_version) for each in records})
     return (
         f"{plural(len(records), 'crossing')}: {plural(scenarios, 'scenario')}, "
@@ -72,7 +72,7 @@ def title_of(folder: RunData, policies: int) -> str:
 
 
 def _flat(content: Any, prefix: str = "") -> list[tuple[str, str]]:
-    """Nested mappings as dotted names; a list in one line."""
+    """Return nested mappings with dotted names, and a list as one line."""
     if isinstance(content, dict):
         return [
             pair
@@ -84,6 +84,6 @@ def _flat(content: Any, prefix: str = "") -> list[tuple[str, str]]:
     return [(prefix, "–" if content is None else str(content))]
 
 
-def _texts(pairs: Iterable[tuple[str, str]]) -> tuple[tuple[str, str], ...]:
-    """Every name with each of the texts that it stands for, in order."""
+def _distinct(pairs: Iterable[tuple[str, str]]) -> tuple[tuple[str, str], ...]:
+    """Return each pair of a name and its text once, in order."""
     return tuple(dict.fromkeys(pairs))

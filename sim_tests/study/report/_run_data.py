@@ -1,4 +1,4 @@
-"""A run's folder, read with patience: what is torn or missing is said, not fatal."""
+"""The data of a run as a report reads them; a missing or incomplete file is no error."""
 
 from __future__ import annotations
 
@@ -7,39 +7,36 @@ import shlex
 from dataclasses import dataclass, fields
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import yaml
 
 from ...world.errors import SimError
 from ..measures import EpisodeRecord, read_record_file
-from ..runs import Job
+from ..runs import Job, RunFiles
 from ._arm import Episode
 from ._text import count, plural
 
-_EPISODES: Final = "episodes.csv"
-_JOBS: Final = "jobs.jsonl"
-_RUN: Final = "run.json"
-
-Key = tuple[str, int, int, str, str, str]
+# Scenario, version, seed, policy, perception and fault.
+_Key = tuple[str, int, int, str, str, str]
 
 
 @dataclass(frozen=True, slots=True)
 class RunData:
-    """What a run left behind.
+    """The data in the folder of a run.
 
     Attributes:
-        path: of the folder, as given.
-        episodes: in the order of their numbers.
-        jobs: by their numbers; empty without ``jobs.jsonl``.
-        run: content of ``run.json``; empty without.
-        missing: what is missing or unfinished, a sentence each.
+        path: the folder, as given.
+        episodes: the episodes in the order of their numbers.
+        jobs: the jobs by their numbers; empty without ``jobs.jsonl``.
+        about: content of ``run.json``; empty without the file.
+        missing: sentences on what is missing or unfinished.
     """
 
     path: Path
     episodes: tuple[Episode, ...]
     jobs: tuple[Job, ...]
-    run: dict[str, Any]
+    about: dict[str, Any]
     missing: tuple[str, ...]
 
     @classmethod
@@ -47,24 +44,26 @@ class RunData:
         """Read a folder.
 
         Raises:
-            SimError: there is no ``episodes.csv``, or it is no table of episodes.
+            SimError: there is no ``episodes.csv``, or it is not a table of episodes.
         """
         path = Path(path)
-        if not (path / _EPISODES).is_file():
+        files = RunFiles(path)
+        if not files.episodes.is_file():
             raise SimError(
-                f"{path} holds no {_EPISODES}; give the folder that `awarenav crossings --out DIR` "
-                "wrote"
+                f"{path} holds no {files.episodes.name}; give the folder that "
+                "`awarenav crossings --out DIR` wrote"
             )
         missing: list[str] = []
-        table = read_record_file(path / _EPISODES)
+        table = read_record_file(files.episodes)
         if table.torn:
-            missing.append(f"The last row of {_EPISODES} is unfinished and left out.")
-        jobs = _read_jobs(path / _JOBS, missing)
-        run = _read_run(path / _RUN, missing)
-        records, twice = _once(table.records)
-        if twice:
+            missing.append(f"The last row of {files.episodes.name} is unfinished and left out.")
+        jobs = _read_jobs(files.jobs, missing)
+        about = _read_about(files.run, missing)
+        records, repeated = _without_repeats(table.records)
+        if repeated:
             missing.append(
-                f"{plural(twice, 'row')} of {_EPISODES} repeat an episode; the first counts."
+                f"{plural(repeated, 'row')} of {files.episodes.name} repeat an episode; the first "
+                "counts."
             )
         episodes = _numbered(records, jobs)
         if jobs and len(records) < len(jobs):
@@ -75,26 +74,26 @@ class RunData:
         unknown = sum(episode.number is None for episode in episodes)
         if jobs and unknown:
             missing.append(
-                f"{plural(unknown, 'episode')} in {_EPISODES} stand in no line of {_JOBS}, so they "
-                "have no replay command."
+                f"{plural(unknown, 'episode')} in {files.episodes.name} stand in no line of "
+                f"{files.jobs.name}, so they have no replay command."
             )
-        return cls(path, episodes, jobs, run, tuple(missing))
+        return cls(path, episodes, jobs, about, tuple(missing))
 
     def replay(self, episode: Episode) -> str:
-        """The command that shows an episode again; empty where its job is not known."""
+        """Return the command that replays an episode; empty where its job is not known."""
         if episode.number is None:
             return ""
         return f"{self.replay_prefix}{episode.number}"
 
     @property
     def replay_prefix(self) -> str:
-        """The command up to the number."""
+        """The replay command up to the number of the episode."""
         return f"awarenav replay {shlex.quote(str(self.path))} "
 
 
 @lru_cache(maxsize=4096)
-def scenario_identity(text: str) -> tuple[str, int]:
-    """Name and version of a scenario's YAML; an empty name where it cannot be read."""
+def _scenario_identity(text: str) -> tuple[str, int]:
+    """Return name and version of a scenario's YAML; an empty name for an unreadable one."""
     try:
         content = yaml.load(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
         return str(content["name"]), int(content.get("version", 1))
@@ -103,8 +102,9 @@ def scenario_identity(text: str) -> tuple[str, int]:
 
 
 def _read_jobs(path: Path, missing: list[str]) -> tuple[Job, ...]:
+    """Return the jobs up to the first unreadable line; note in ``missing`` what is left out."""
     if not path.is_file():
-        missing.append(f"There is no {_JOBS}: episodes have no replay command.")
+        missing.append(f"There is no {path.name}: episodes have no replay command.")
         return ()
     jobs: list[Job] = []
     names = {field.name for field in fields(Job)}
@@ -113,40 +113,45 @@ def _read_jobs(path: Path, missing: list[str]) -> tuple[Job, ...]:
             content = json.loads(line)
             jobs.append(Job(**{key: content[key] for key in content if key in names}))
         except (ValueError, TypeError):
-            # Numbers count lines, so nothing after this one may be used.
-            missing.append(f"Line {len(jobs) + 1} of {_JOBS} is unreadable; the rest is left out.")
+            # The number of a job is that of its line, so no later line can be used.
+            missing.append(
+                f"Line {len(jobs) + 1} of {path.name} is unreadable; the rest is left out."
+            )
             break
     return tuple(jobs)
 
 
-def _read_run(path: Path, missing: list[str]) -> dict[str, Any]:
+def _read_about(path: Path, missing: list[str]) -> dict[str, Any]:
+    """Return the content of ``run.json``; note in ``missing`` why it is empty."""
     try:
         content = json.loads(path.read_text("utf-8"))
     except FileNotFoundError:
-        missing.append(f"There is no {_RUN}: the command and the versions are not known.")
+        missing.append(f"There is no {path.name}: the command and the versions are not known.")
         return {}
     except (OSError, ValueError):
-        missing.append(f"{_RUN} is unreadable: the command and the versions are not known.")
+        missing.append(f"{path.name} is unreadable: the command and the versions are not known.")
         return {}
     if not isinstance(content, dict):
-        missing.append(f"{_RUN} holds no mapping: the command and the versions are not known.")
+        missing.append(f"{path.name} holds no mapping: the command and the versions are not known.")
         return {}
     return content
 
 
-def _once(records: tuple[EpisodeRecord, ...]) -> tuple[tuple[EpisodeRecord, ...], int]:
-    """The first record of every episode, and how many others there were."""
-    first: dict[tuple[Key, str], EpisodeRecord] = {}
+def _without_repeats(
+    records: tuple[EpisodeRecord, ...],
+) -> tuple[tuple[EpisodeRecord, ...], int]:
+    """Return the first record of every episode, and the number of the others."""
+    first: dict[tuple[_Key, str], EpisodeRecord] = {}
     for record in records:
         first.setdefault((_key(record), record.planner), record)
     return tuple(first.values()), len(records) - len(first)
 
 
 def _numbered(records: tuple[EpisodeRecord, ...], jobs: tuple[Job, ...]) -> tuple[Episode, ...]:
-    """Records with the number of the job that each came from."""
-    waiting: dict[Key, list[int]] = {}
+    """Return the records as episodes, each with the number of its job."""
+    waiting: dict[_Key, list[int]] = {}
     for number, job in enumerate(jobs):
-        key = (*scenario_identity(job.scenario), job.seed, job.policy_name, job.perception)
+        key = (*_scenario_identity(job.scenario), job.seed, job.policy_name, job.perception)
         waiting.setdefault((*key, job.fault_name), []).append(number)
     episodes = []
     for record in records:
@@ -160,7 +165,7 @@ def _numbered(records: tuple[EpisodeRecord, ...], jobs: tuple[Job, ...]) -> tupl
     )
 
 
-def _key(record: EpisodeRecord) -> Key:
+def _key(record: EpisodeRecord) -> _Key:
     return (
         record.scenario,
         record.scenario_version,

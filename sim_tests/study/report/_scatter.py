@@ -1,4 +1,4 @@
-"""Every episode as a mark: the time it lost over the smallest margin it left."""
+"""Section of a report: a scatter plot of time lost over the smallest margin of every episode."""
 
 from __future__ import annotations
 
@@ -8,15 +8,14 @@ from typing import Any, Final
 
 from ._arm import Arm, Episode
 from ._episode_list import outcome_of
-from ._figures import touched
 from ._panel import Scale
 from ._text import count, number, plural
 
-#: More marks than this are thinned out; those of the least margin stay.
+#: Most marks in the plot; of more episodes, some with larger margins are left out.
 MOST_MARKS: Final = 3000
-# The right end of the axis leaves out this share of the largest margins, drawn at the edge.
+# Share of the largest margins that lie beyond the right end of the axis and are drawn at the edge.
 _FAR_SHARE: Final = 0.01
-# Above the axis of time: episodes that never arrived.
+# Height in per cent of the strip above the axis of time, for episodes that never arrived.
 _BAND: Final = 9.0
 
 
@@ -25,12 +24,12 @@ class Mark:
     """One episode in the plot.
 
     Attributes:
-        line: of the list of all episodes; the mark links there.
-        label: what a screen reader says.
+        line: line of the list of all episodes, to which the mark links.
+        label: text for a screen reader.
         arm: number of its arm.
-        look: of its arm.
-        x: place across, per cent from the left.
-        y: place down, per cent from the top.
+        look: number of the arm's colour and shape.
+        x: place in per cent from the left.
+        y: place in per cent from the top.
         touched: the robot moved into a person.
     """
 
@@ -45,18 +44,18 @@ class Mark:
 
 @dataclass(frozen=True, slots=True)
 class Scatter:
-    """The plot.
+    """The scatter plot.
 
     Attributes:
-        marks: in the order in which they are drawn.
-        legend: look, name, marks and number of each arm.
-        x_ticks: place and text.
-        y_ticks: place and text.
-        x_zero: place of a margin of 0; None outside of the axis.
-        band: height in per cent of the strip for episodes that never arrived, 0 without.
-        data: for the script: scenarios, arms, the replay command up to the number, and a row a
-            mark.
-        left_out: what is not drawn and why, empty for nothing.
+        marks: the marks in the order in which they are drawn.
+        legend: look, name, number of marks and number of each arm.
+        x_ticks: places and texts.
+        y_ticks: places and texts.
+        x_zero: place of a margin of 0; None outside the axis.
+        band: height in per cent of the strip for episodes that never arrived, 0 without it.
+        data: data for the script: scenarios, arms, the replay command up to the number, and one
+            row per mark.
+        left_out: a note on episodes that are not drawn; empty for none.
     """
 
     marks: tuple[Mark, ...]
@@ -70,11 +69,11 @@ class Scatter:
 
 
 def scatter(arms: Sequence[Arm], listed: Sequence[Episode], replay_prefix: str) -> Scatter | None:
-    """Draw up the plot of all episodes without a fault; None when there is nothing to draw.
+    """Return the plot of the arms' episodes; None without any episode to draw.
 
     Args:
-        arms: what is compared.
-        listed: episodes as the page lists them.
+        arms: the arms of the comparison.
+        listed: episodes in the order of the list of episodes.
         replay_prefix: the command that replays an episode, up to its number.
     """
     points = [(arm, each) for arm in arms for each in arm.episodes if _drawable(each)]
@@ -93,14 +92,14 @@ def scatter(arms: Sequence[Arm], listed: Sequence[Episode], replay_prefix: str) 
     numbers = {arm.name: index for index, arm in enumerate(arms)}
     lines = {id(each): index for index, each in enumerate(listed)}
     marks, rows = [], []
-    # Contacts are drawn last, on top of everything.
-    for arm, each in sorted(shown, key=lambda point: touched(point[1].record)):
+    # Contacts are drawn last, above all other marks.
+    for arm, each in sorted(shown, key=lambda point: point[1].record.robot_touched):
         record = each.record
         key = -1 if each.number is None else each.number
         y = 0.5 * band
         if record.time_to_goal_s is not None:
             y = round(100.0 - y_scale.place(_lost(each)) * (1.0 - band / 100.0), 2)
-        hit = touched(record)
+        hit = record.robot_touched
         label = f"{arm.name}, {record.scenario}, seed {record.seed}"
         x = x_scale.place(_margin(each))
         marks.append(Mark(lines.get(id(each), 0), label, numbers[arm.name], arm.look, x, y, hit))
@@ -110,10 +109,10 @@ def scatter(arms: Sequence[Arm], listed: Sequence[Episode], replay_prefix: str) 
                 numbers[arm.name],
                 places[record.scenario],
                 record.seed,
-                _short(record.min_margin_m),
-                _short(record.min_separation_m),
-                _short(record.speed_at_min_separation_mps),
-                _short(record.time_lost_s),
+                _two_decimals(record.min_margin_m),
+                _two_decimals(record.min_separation_m),
+                _two_decimals(record.speed_at_min_separation_mps),
+                _two_decimals(record.time_lost_s),
                 outcome_of(each),
             ]
         )
@@ -164,12 +163,15 @@ def _lost(episode: Episode) -> float:
 
 
 def _thinned(points: Sequence[tuple[Arm, Episode]]) -> list[tuple[Arm, Episode]]:
-    """All, or the half of :data:`MOST_MARKS` with the least margin and as many of the others."""
+    """Return at most :data:`MOST_MARKS` points.
+
+    Half of them have the smallest margins; the others are evenly spaced in the order of margins.
+    """
     if len(points) <= MOST_MARKS:
         return list(points)
     order = sorted(
         range(len(points)),
-        key=lambda i: (not touched(points[i][1].record), _margin(points[i][1])),
+        key=lambda i: (not points[i][1].record.robot_touched, _margin(points[i][1])),
     )
     worst, rest = order[: MOST_MARKS // 2], order[MOST_MARKS // 2 :]
     step = len(rest) / (MOST_MARKS - len(worst))
@@ -177,5 +179,5 @@ def _thinned(points: Sequence[tuple[Arm, Episode]]) -> list[tuple[Arm, Episode]]
     return [points[index] for index in sorted(kept)]
 
 
-def _short(value: float | None) -> str:
+def _two_decimals(value: float | None) -> str:
     return number(value, 2)

@@ -1,20 +1,19 @@
-"""A row a scenario, the arms side by side under each measure."""
+"""Section of a report: a table with one row per scenario and the arms as columns."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from ..measures import Comparison, EpisodeRecord, SummaryRow
-from ._arm import Arm, judged
-from ._figures import Figures, estimate
-from ._measure import MARGIN, TIME_LOST, VIOLATION, Measure
+from ..measures import Comparison, Metric, SummaryRow
+from ._arm import Arm, judged_arms
+from ._statistics import MARGIN, TIME_LOST, VIOLATION, RunStatistics, estimate
 from ._text import NOTHING, count, number, percent
 
 
 @dataclass(frozen=True, slots=True)
 class TableCell:
-    """A number: what it is sorted by (None last), how it is written, and its style's classes."""
+    """A cell: its sort key (None last), its text and its CSS classes."""
 
     sort: float | None
     text: str
@@ -23,10 +22,10 @@ class TableCell:
 
 @dataclass(frozen=True, slots=True)
 class ColumnGroup:
-    """A measure over several columns.
+    """The columns of one metric.
 
     Attributes:
-        title: of the group.
+        title: heading of the group.
         meaning: what the numbers are.
         columns: look and name of the arm of each column.
     """
@@ -41,11 +40,11 @@ class ScenarioRow:
     """One scenario.
 
     Attributes:
-        name: and version.
-        attention: what its people look at.
-        episodes: of all arms.
-        contacts: caused by the robot, of all arms.
-        cells: the columns of the groups.
+        name: name, with the version from 2 on.
+        attention: the scenario's ``attention``.
+        episodes: number of episodes of all arms.
+        contacts: contacts caused by the robot, by arm.
+        cells: cells in the columns of all groups.
     """
 
     name: str
@@ -57,52 +56,52 @@ class ScenarioRow:
 
 @dataclass(frozen=True, slots=True)
 class ScenarioTable:
-    """The table; cells of a row run through the columns of all groups."""
+    """The table: its groups of columns and its rows."""
 
     groups: tuple[ColumnGroup, ...]
     rows: tuple[ScenarioRow, ...]
 
 
-def tabulate(figures: Figures) -> ScenarioTable:
-    """Draw up the table."""
-    arms = figures.shown
-    winners = [arm for arm in judged(arms) if figures.against(arm) is not None]
+def scenario_table(statistics: RunStatistics) -> ScenarioTable:
+    """Return the table of scenarios."""
+    arms = statistics.shown
+    compared = [arm for arm in judged_arms(arms) if statistics.against(arm) is not None]
     groups = [
         _group("Time lost, s", "mean over the empty hall", arms),
-        *([_group("Won back", "of what the reference loses", winners)] if winners else []),
+        *([_group("Won back", "of what the reference loses", compared)] if compared else []),
         _group("Margin violated, s", "mean an episode", arms),
         _group("Smallest margin, m", "the worst episode", arms),
     ]
     attention = {
-        scenario_part(each.record): each.record.attention for arm in arms for each in arm.episodes
+        each.record.versioned_scenario: each.record.attention
+        for arm in arms
+        for each in arm.episodes
     }
     rows = []
-    for part in sorted(attention):
-        found = [figures.by_scenario(arm, part) for arm in arms]
+    for scenario in sorted(attention):
+        found = [statistics.by_scenario(arm, scenario) for arm in arms]
         cells = [
-            *(_mean(row, TIME_LOST, 1) for row in found),
-            *(_won_back(figures.against(arm, part, scenario=True)) for arm in winners),
-            *(_mean(row, VIOLATION, 2) for row in found),
-            *(_number(None if row is None else row.worst.get(MARGIN.key), 2) for row in found),
+            *(_mean_cell(row, TIME_LOST, 1) for row in found),
+            *(_won_back_cell(statistics.against(arm, scenario, scenario=True)) for arm in compared),
+            *(_mean_cell(row, VIOLATION, 2) for row in found),
+            *(_worst_cell(row, MARGIN, 2) for row in found),
         ]
         episodes = sum(row.episodes for row in found if row is not None)
-        contacts = _contacts([(arm.name, row) for arm, row in zip(arms, found, strict=True)])
-        rows.append(ScenarioRow(part, attention[part], episodes, contacts, _ruled(cells, groups)))
+        contacts = _contacts_cell([(arm.name, row) for arm, row in zip(arms, found, strict=True)])
+        rows.append(
+            ScenarioRow(
+                scenario, attention[scenario], episodes, contacts, _with_rules(cells, groups)
+            )
+        )
     return ScenarioTable(tuple(groups), tuple(rows))
-
-
-def scenario_part(record: EpisodeRecord) -> str:
-    """A scenario as the summary names it."""
-    version = "" if record.scenario_version == 1 else f" v{record.scenario_version}"
-    return record.scenario + version
 
 
 def _group(title: str, meaning: str, arms: Sequence[Arm]) -> ColumnGroup:
     return ColumnGroup(title, meaning, tuple((arm.look, arm.name) for arm in arms))
 
 
-def _contacts(rows: Sequence[tuple[str, SummaryRow | None]]) -> TableCell:
-    """How many episodes of which arms had a contact that the robot caused."""
+def _contacts_cell(rows: Sequence[tuple[str, SummaryRow | None]]) -> TableCell:
+    """Return the cell of the contacts caused by the robot, by arm."""
     hits = {
         name: round(row.robot_contact.value * row.robot_contact.n)
         for name, row in rows
@@ -114,23 +113,27 @@ def _contacts(rows: Sequence[tuple[str, SummaryRow | None]]) -> TableCell:
     return TableCell(total, ", ".join(f"{name} {count(n)}" for name, n in hits.items() if n), "bad")
 
 
-def _mean(row: SummaryRow | None, measure: Measure, decimals: int) -> TableCell:
-    mean = estimate(row, measure)
-    return _number(mean.value if mean.known else None, decimals)
+def _mean_cell(row: SummaryRow | None, metric: Metric, decimals: int) -> TableCell:
+    mean = estimate(row, metric)
+    return _number_cell(mean.value if mean.known else None, decimals)
 
 
-def _won_back(against: Comparison | None) -> TableCell:
+def _worst_cell(row: SummaryRow | None, metric: Metric, decimals: int) -> TableCell:
+    return _number_cell(None if row is None else row.worst.get(metric.name), decimals)
+
+
+def _won_back_cell(against: Comparison | None) -> TableCell:
     if against is None or not against.won_back.known:
         return TableCell(None, NOTHING)
     return TableCell(round(against.won_back.value, 6), percent(against.won_back.value, 0))
 
 
-def _number(value: float | None, decimals: int) -> TableCell:
+def _number_cell(value: float | None, decimals: int) -> TableCell:
     return TableCell(None if value is None else round(value, 6), number(value, decimals))
 
 
-def _ruled(cells: Sequence[TableCell], groups: Sequence[ColumnGroup]) -> tuple[TableCell, ...]:
-    """The cells with a rule before each group."""
+def _with_rules(cells: Sequence[TableCell], groups: Sequence[ColumnGroup]) -> tuple[TableCell, ...]:
+    """Return the cells, marked where a group begins."""
     firsts = {sum(len(group.columns) for group in groups[:i]) for i in range(len(groups))}
     return tuple(
         replace(cell, classes=f"{cell.classes} first".strip()) if place in firsts else cell

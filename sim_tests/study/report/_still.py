@@ -1,4 +1,4 @@
-"""The worst episodes of a run, run again for pictures of their worst instants."""
+"""Section of a report: the worst episodes, with pictures of their worst instants."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ from typing import Final
 
 from tqdm import tqdm
 
-from ._arm import Arm, Episode, judged
-from ._episode_list import badness, outcome_of
-from ._figures import touched
+from ._arm import Arm, Episode, judged_arms
+from ._episode_list import outcome_of, worst_first
 from ._run_data import RunData
 from ._text import number
 
-#: So many at most, and of one scenario with one policy only the worst.
+#: Most episodes that are shown; of each scenario and arm only the worst.
 MOST_STILLS: Final = 6
 
 
@@ -24,12 +23,12 @@ class Still:
     """One episode with its pictures.
 
     Attributes:
-        look: of its arm.
+        look: number of the arm's colour and shape.
         title: arm and scenario.
-        text: what happened, in figures.
-        replay: the command that shows it again.
-        pictures: ``data:`` addresses and what they show.
-        trouble: why there is no picture, or what is wrong with it; empty for nothing.
+        text: figures of the episode.
+        replay: the command that replays it.
+        pictures: ``data:`` addresses, each with a description.
+        trouble: why there is no picture, or what is wrong with it; empty without trouble.
     """
 
     look: int
@@ -41,34 +40,38 @@ class Still:
 
 
 def worst_of(arms: Sequence[Arm]) -> tuple[tuple[Arm, Episode], ...]:
-    """The worst episodes: robot contacts of any arm, then the least margins of those judged."""
+    """Return the worst episodes: robot contacts of any arm, then the smallest margins.
+
+    Only the arms that verdicts are about count for the margins.
+    """
     points = [(arm, each) for arm in arms for each in (*arm.episodes, *arm.others)]
-    chosen = {arm.name for arm in judged(arms)}
+    judged = {arm.name for arm in judged_arms(arms)}
     known = [
         (arm, each)
         for arm, each in points
-        if touched(each.record) or (arm.name in chosen and each.record.min_margin_m is not None)
+        if each.record.robot_touched
+        or (arm.name in judged and each.record.min_margin_m is not None)
     ]
     found: dict[tuple[str, str], tuple[Arm, Episode]] = {}
-    for arm, each in sorted(known, key=lambda point: badness(point[1])):
+    for arm, each in sorted(known, key=lambda point: worst_first(point[1])):
         found.setdefault((arm.name, each.record.scenario), (arm, each))
     return tuple(found.values())[:MOST_STILLS]
 
 
 def make_stills(
-    folder: RunData, arms: Sequence[Arm], *, pictures: bool, progress: bool
+    run: RunData, arms: Sequence[Arm], *, pictures: bool, progress: bool
 ) -> tuple[Still, ...]:
-    """Describe the worst episodes, with pictures if wanted; trouble with one costs only it.
+    """Return the worst episodes, with pictures if wanted; a failure affects only its own episode.
 
     Args:
-        folder: of the run, whose jobs are run again.
-        arms: what is compared.
-        pictures: run the episodes again.
-        progress: show it on the standard error stream.
+        run: the run, whose jobs are run again.
+        arms: the arms of the comparison.
+        pictures: run the episodes again for pictures.
+        progress: show progress on standard error.
     """
     worst = worst_of(arms)
     if not pictures:
-        return tuple(_still(folder, arm, each, (), "") for arm, each in worst)
+        return tuple(_still(run, arm, each, (), "") for arm, each in worst)
     stills = []
     with tqdm(worst, desc="stills", unit="episode", file=sys.stderr, disable=not progress) as bar:
         for arm, episode in bar:
@@ -79,15 +82,15 @@ def make_stills(
                 try:
                     from ._still_pictures import pictures_of  # noqa: PLC0415 - needs the simulator
 
-                    shown, trouble = pictures_of(folder.jobs[episode.number], episode.record)
-                except Exception as error:  # whatever a planner or a renderer raises
+                    shown, trouble = pictures_of(run.jobs[episode.number], episode.record)
+                except Exception as error:  # a planner or a renderer may raise anything
                     trouble = f"No picture: {type(error).__name__}: {error}"
-            stills.append(_still(folder, arm, episode, shown, trouble))
+            stills.append(_still(run, arm, episode, shown, trouble))
     return tuple(stills)
 
 
 def _still(
-    folder: RunData,
+    run: RunData,
     arm: Arm,
     episode: Episode,
     pictures: tuple[tuple[str, str], ...],
@@ -108,7 +111,7 @@ def _still(
         arm.look,
         f"{arm.name}, {record.scenario}",
         ", ".join(parts),
-        folder.replay(episode),
+        run.replay(episode),
         pictures,
         trouble,
     )

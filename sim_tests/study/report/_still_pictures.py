@@ -1,4 +1,4 @@
-"""Pictures of an episode's worst instant: what the robot's camera saw, and the plan."""
+"""Pictures of an episode's worst instant: the image of the robot's camera, and the plan."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from ..runs import Job, observed_episode
 
 _WIDTH_PX: Final = 540
 _JPEG_QUALITY: Final = 80
-# Width of the plan.
+# Width of the area that the plan shows.
 _WINDOW_M: Final = 10.0
-# Paths are drawn through every so many frames.
-_EVERY: Final = 4
-# The table's figures have six decimals.
+# Paths are drawn through every fourth frame.
+_PATH_STEP: Final = 4
+# Tolerance for margins from a table, which has six decimals.
 _SAME_M: Final = 1e-5
 
 Image = NDArray[np.uint8]
 
 
-class _Enough(Exception):  # noqa: N818 - no error
-    """The instant has been drawn; the rest of the episode need not run."""
+class _Drawn(Exception):  # noqa: N818 - no error
+    """Ends the episode after its worst instant has been drawn."""
 
 
-class _Watcher:
-    """Draws the first instant at which the margin of a moving robot comes down to a value."""
+class _WorstInstant:
+    """An observer that draws the first instant at which a moving robot's margin is this small."""
 
     def __init__(self, margin_m: float) -> None:
         self._margin_m = margin_m
@@ -53,7 +53,7 @@ class _Watcher:
         self.least_m = min(self.least_m, *frame.margins_m)
         if self.least_m <= self._margin_m + _SAME_M:
             self._draw(frame, stage)
-            raise _Enough
+            raise _Drawn
 
     def _draw(self, frame: CrossingFrame, stage: Stage) -> None:
         cone = AttentionCone()
@@ -65,49 +65,52 @@ class _Watcher:
         middle = 0.5 * (frame.robot_state.position_odom_m + frame.truth[worker].position_odom_m)
         size_px = (camera.width_px, camera.height_px)
         view = TopView(stage, size_px, _window(middle, size_px))
-        for earlier in self._frames[:-1:_EVERY]:
-            view.draw(earlier, stage, cone)  # which lengthens the paths
+        for earlier in self._frames[:-1:_PATH_STEP]:
+            view.draw(earlier, stage, cone)  # extends the paths
         self.plan = view.draw(frame, stage, cone)
         self.t_s = frame.t_s
 
 
 def pictures_of(job: Job, record: EpisodeRecord) -> tuple[tuple[tuple[str, str], ...], str]:
-    """Run an episode again up to its least margin.
+    """Run an episode again up to its smallest margin, and draw that instant.
 
     Args:
         job: the episode.
         record: its row.
 
     Returns:
-        Pictures as ``data:`` addresses with what they show, and what is wrong, empty for nothing.
+        Pictures as ``data:`` addresses, each with a description, and a message about trouble,
+        empty without trouble.
     """
     if record.min_margin_m is None:
         return (), "No picture: the robot never moved near anybody."
-    watcher = _Watcher(record.min_margin_m)
-    with contextlib.suppress(_Enough):
-        observed_episode(job, watcher)
-    if watcher.camera is None or watcher.plan is None:
+    instant = _WorstInstant(record.min_margin_m)
+    with contextlib.suppress(_Drawn):
+        observed_episode(job, instant)
+    if instant.camera is None or instant.plan is None:
         return (), (
-            f"No picture: run again, the smallest margin was {watcher.least_m:.2f} m. This "
+            f"No picture: run again, the smallest margin was {instant.least_m:.2f} m. This "
             "installation does not repeat the run."
         )
-    when = f"at {watcher.t_s:.2f} s"
+    when = f"at {instant.t_s:.2f} s"
     return (
-        (_address(watcher.camera, ".jpg"), f"What the robot's camera saw {when}"),
-        (_address(watcher.plan, ".png"), f"Robot and people from above {when}"),
+        (_data_address(instant.camera, ".jpg"), f"What the robot's camera saw {when}"),
+        (_data_address(instant.plan, ".png"), f"Robot and people from above {when}"),
     ), ""
 
 
 def _window(
     middle_odom_m: FloatArray, size_px: tuple[int, int]
 ) -> tuple[float, float, float, float]:
+    """Return x_min, y_min, x_max, y_max (m) of the area that the plan shows."""
     x, y = middle_odom_m.tolist()
     half_x = 0.5 * _WINDOW_M
     half_y = half_x * size_px[1] / size_px[0]
     return x - half_x, y - half_y, x + half_x, y + half_y
 
 
-def _address(picture: Image, ending: str) -> str:
+def _data_address(picture: Image, ending: str) -> str:
+    """Return an image as a ``data:`` address."""
     options = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY] if ending == ".jpg" else []
     _, data = cv2.imencode(ending, cv2.cvtColor(picture, cv2.COLOR_RGB2BGR), options)
     kind = {".jpg": "jpeg", ".png": "png"}[ending]

@@ -1,4 +1,4 @@
-"""Numbers as the page writes them."""
+"""Numbers and lists as a report writes them."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Final
 MINUS: Final = "\N{MINUS SIGN}"
 THIN: Final = "\N{NARROW NO-BREAK SPACE}"
 NOTHING: Final = "–"
-# What sums of floats leave between all and all.
+# Rounding error of sums; a share this close to 1 is all.
 _ROUNDING: Final = 1e-9
 
 
 def number(value: float | None, decimals: int = 2, *, sign: bool = False) -> str:
-    """A number with a true minus sign; a dash for None and what is not finite."""
+    """Return a number with a true minus sign; a dash for None, NaN and infinity."""
     if value is None or not math.isfinite(value):
         return NOTHING
     text = f"{value:+.{decimals}f}" if sign else f"{value:.{decimals}f}"
@@ -23,9 +23,9 @@ def number(value: float | None, decimals: int = 2, *, sign: bool = False) -> str
 
 
 def percent(share: float | None, decimals: int | None = None, *, sign: bool = False) -> str:
-    """A share in per cent.
+    """Return a share in per cent.
 
-    Small shares, and those near all, get decimals unless told otherwise: almost all is not all.
+    By default, shares near 0 and 1 get more decimals, so that 99.75 % does not read as 100 %.
     """
     if share is None or not math.isfinite(share):
         return NOTHING
@@ -36,15 +36,10 @@ def percent(share: float | None, decimals: int | None = None, *, sign: bool = Fa
 
 
 def count(amount: int) -> str:
-    """A whole number, thousands set apart."""
+    """Return a whole number with spaces between thousands."""
     return f"{amount:,}".replace(",", THIN)
 
 
 def plural(amount: int, one: str, many: str | None = None) -> str:
-    """A number and its noun."""
+    """Return a number with its noun."""
     return f"{count(amount)} {one if amount == 1 else many or one + 's'}"
-
-
-def listed(names: list[str]) -> str:
-    """Names in a sentence: ``a, b and c``."""
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

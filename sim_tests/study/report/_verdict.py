@@ -1,20 +1,19 @@
-"""What a reader in a hurry takes away: a sentence and four figures, none claiming too much."""
+"""Summary of a report: for each arm one sentence and four figures with their uncertainty."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from ..measures import Comparison, Interval
-from ._arm import Arm, judged
-from ._figures import Figures, robot_contacts
-from ._measure import ROBOT_CONTACTS
+from ..measures import SHARES, Comparison, Interval
+from ._arm import Arm, judged_arms
+from ._statistics import RunStatistics, robot_contacts
 from ._text import NOTHING, count, percent, plural
 
-# Fewer pairs show nothing: their bootstrap interval is too narrow to be trusted.
+# With fewer pairs, the bootstrap interval is too narrow, and no effect counts as shown.
 _FEW_PAIRS: Final = 20
-# None seen says little while the true share may be larger than this.
-_TELLING: Final = 0.05
+# Above this upper bound, "none seen" says too little.
+_LARGEST_SHARE: Final = 0.05
 
 Tone = Literal["good", "bad", "open"]
 
@@ -24,11 +23,11 @@ class Card:
     """One figure.
 
     Attributes:
-        title: what it is.
-        figure: the number, large.
+        title: name of the figure.
+        figure: the number.
         detail: its uncertainty.
-        chip: what it amounts to, in two or three words.
-        tone: of the chip; ``"open"`` where nothing can be said.
+        chip: the assessment in two or three words.
+        tone: tone of the chip; ``"open"`` for no assessment.
     """
 
     title: str
@@ -40,7 +39,7 @@ class Card:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What can be said about one arm."""
+    """The summary of one arm."""
 
     name: str
     look: int
@@ -48,13 +47,13 @@ class Verdict:
     cards: tuple[Card, ...]
 
 
-def verdicts(figures: Figures) -> tuple[Verdict, ...]:
-    """One verdict for each arm that is to be judged."""
-    return tuple(_verdict(figures, arm) for arm in judged(figures.arms))
+def verdicts(statistics: RunStatistics) -> tuple[Verdict, ...]:
+    """Return the verdict of each candidate, or of every arm without candidates."""
+    return tuple(_verdict(statistics, arm) for arm in judged_arms(statistics.arms))
 
 
-def _verdict(figures: Figures, arm: Arm) -> Verdict:
-    # Touching somebody counts whatever made it happen.
+def _verdict(statistics: RunStatistics, arm: Arm) -> Verdict:
+    # Contacts count under every fault.
     contacts = robot_contacts((*arm.episodes, *arm.others))
     if not contacts.n:
         card = Card(
@@ -63,12 +62,12 @@ def _verdict(figures: Figures, arm: Arm) -> Verdict:
         return Verdict(arm.name, arm.look, "No episode finished, so nothing can be said.", (card,))
     cards = [_contact_card(arm, contacts)]
     sentence = _contact_sentence(contacts)
-    whole = figures.against(arm)
+    whole = statistics.against(arm)
     if whole is not None:
-        attentive = figures.against(arm, "attentive")
+        attentive = statistics.against(arm, "attentive")
         known = attentive is not None and attentive.won_back.known
         who, against = ("attentive people", attentive) if known and attentive else ("people", whole)
-        cards += [_won_back_card(who, against), _violation_card(figures, arm, whole)]
+        cards += [_won_back_card(who, against), _violation_card(statistics, arm, whole)]
         sentence += _won_back_sentence(who, against)
     elif arm.role != "reference":
         sentence += " Without the policy blind on the same seeds, time won back cannot be stated."
@@ -81,7 +80,7 @@ def _hits(share: Interval) -> int:
 
 
 def _contact_card(arm: Arm, share: Interval) -> Card:
-    title = ROBOT_CONTACTS.title
+    title = SHARES["robot_contacts"].title
     hits = _hits(share)
     figure = f"{count(hits)} of {count(share.n)}"
     under = f", {plural(len(arm.others), 'episode')} of them under faults" if arm.others else ""
@@ -89,7 +88,7 @@ def _contact_card(arm: Arm, share: Interval) -> Card:
         detail = f"{percent(share.low)} to {percent(share.high)} with 95 % confidence{under}"
         return Card(title, figure, detail, "contacts seen", "bad")
     detail = f"at most {percent(share.high)} with 95 % confidence{under}"
-    if share.high > _TELLING:
+    if share.high > _LARGEST_SHARE:
         return Card(title, figure, detail, "none seen, too few to tell", "open")
     return Card(title, figure, detail, "none seen", "good")
 
@@ -139,8 +138,8 @@ def _won_back_sentence(who: str, against: Comparison) -> str:
     return f" Whether it wins back time from {who} is not shown (95 % interval {_ends(back)})."
 
 
-def _violation_card(figures: Figures, arm: Arm, whole: Comparison) -> Card:
-    unaware = figures.against(arm, "unaware")
+def _violation_card(statistics: RunStatistics, arm: Arm, whole: Comparison) -> Card:
+    unaware = statistics.against(arm, "unaware")
     who, against = ("people", whole) if unaware is None else ("unaware people", unaware)
     change, base = against.violation_excess, "violation time"
     if not change.known:  # the reference violates nothing

@@ -1,7 +1,4 @@
-"""The one place that imports Jinja: the page out of its parts.
-
-From a run's folder to its page.
-"""
+"""The report of a run as one HTML page; the only module that imports Jinja."""
 
 from __future__ import annotations
 
@@ -11,15 +8,14 @@ from typing import Any, Final
 
 from ...world.errors import SimError
 from ._awareness_split import split_by_awareness
-from ._comparison import PAIRED_ONLY, compare
+from ._comparison import FURTHER, MAIN, PAIRED_ONLY, comparison_section
 from ._episode_list import failures, list_episodes
-from ._fault_table import faults_of
-from ._figures import Figures
-from ._measure import FURTHER, MAIN
+from ._fault_table import fault_rows
 from ._reproduction import reproduction, title_of
 from ._run_data import RunData
 from ._scatter import scatter
-from ._scenario_table import tabulate
+from ._scenario_table import scenario_table
+from ._statistics import RunStatistics
 from ._still import make_stills
 from ._text import plural
 from ._verdict import verdicts
@@ -33,12 +29,14 @@ except ImportError as cause:  # pragma: no cover - depends on the installation
         "pip install 'awarenav[bench]'"
     ) from cause
 
+_REPORT: Final = "report.html"
 
-def render_page(**parts: Any) -> str:
-    """The HTML of a page; every text of its parts is escaped.
+
+def _render_page(**parts: Any) -> str:
+    """Return the HTML of a page; every text of its parts is escaped.
 
     Args:
-        parts: what ``templates/report.html`` asks for.
+        parts: variables of ``templates/report.html``.
     """
     environment = Environment(
         loader=PackageLoader("sim_tests.study.report"),
@@ -48,61 +46,57 @@ def render_page(**parts: Any) -> str:
         lstrip_blocks=True,
     )
     folder = resources.files("sim_tests.study.report") / "templates"
-    own = {
+    assets = {
         name: Markup((folder / f"report.{ending}").read_text("utf-8"))
         for name, ending in (("style", "css"), ("script", "js"))
     }
-    page: str = environment.get_template("report.html").render(**own, **parts)
+    page: str = environment.get_template("report.html").render(**assets, **parts)
     return page
-
-
-#: Name of the page in its folder.
-REPORT: Final = "report.html"
 
 
 def write_report(
     out_dir: Path | str, *, stills: bool = True, path: Path | None = None, progress: bool = False
 ) -> Path:
-    """Write the page of a run and return its path; it appears whole or not at all.
+    """Write the report of a run and return its path; the file appears whole or not at all.
 
-    The same folder gives the same page, byte for byte. What is missing or unfinished in the folder
-    is said on the page.
+    The same folder gives the same page, byte for byte. The page says what is missing or unfinished
+    in the folder.
 
     Args:
         out_dir: folder with ``episodes.csv``, ``jobs.jsonl`` and ``run.json``.
-        stills: run the worst episodes again for pictures of them.
-        path: the page; default ``report.html`` in the folder.
-        progress: show it on the standard error stream.
+        stills: run the worst episodes again for pictures.
+        path: the file; default ``report.html`` in the folder.
+        progress: show progress on standard error.
 
     Raises:
-        SimError: there is no ``episodes.csv``, it is no table of episodes, Jinja is not installed,
-            or the page cannot be written.
+        SimError: there is no ``episodes.csv``, it is not a table of episodes, or the page cannot
+            be written.
     """
-    folder = RunData.read(out_dir)
-    figures = Figures.of(folder.episodes)
-    arms = figures.arms
-    listed = list_episodes(folder, arms)
+    run = RunData.read(out_dir)
+    statistics = RunStatistics.of(run.episodes)
+    arms = statistics.arms
+    listed = list_episodes(run, arms)
     errors = sum(len(arm.errors) for arm in arms)
-    page = render_page(
-        title=title_of(folder, len(arms)),
-        folder=folder,
-        condition=f"under the fault {figures.fault}" if figures.fault else "without faults",
+    page = _render_page(
+        title=title_of(run, len(arms)),
+        run=run,
+        condition=f"under the fault {statistics.fault}" if statistics.fault else "without faults",
         arms=arms,
-        verdicts=verdicts(figures),
-        comparison=compare(figures),
-        groups=split_by_awareness(figures),
-        scatter=scatter(arms, listed.episodes, folder.replay_prefix),
-        table=tabulate(figures),
-        stills=make_stills(folder, arms, pictures=stills, progress=progress),
+        verdicts=verdicts(statistics),
+        comparison=comparison_section(statistics),
+        groups=split_by_awareness(statistics),
+        scatter=scatter(arms, listed.episodes, run.replay_prefix),
+        table=scenario_table(statistics),
+        stills=make_stills(run, arms, pictures=stills, progress=progress),
         pictured=stills,
-        faults=faults_of(figures),
-        failures=failures(folder),
+        faults=fault_rows(statistics),
+        failures=failures(run),
         failed=f"{plural(errors, 'episode')} failed",
         episodes=listed,
-        reproduction=reproduction(folder),
-        measures=(*MAIN, *FURTHER, *PAIRED_ONLY),
+        reproduction=reproduction(run),
+        metrics=(*MAIN, *FURTHER, *PAIRED_ONLY),
     )
-    path = folder.path / REPORT if path is None else path
+    path = run.path / _REPORT if path is None else path
     part = path.with_name(path.name + ".part")
     try:
         part.write_text(page, "utf-8")

@@ -9,27 +9,45 @@ from awarenav.lazy import lazy_names
 if TYPE_CHECKING:
     from ._episode import attempt, observed_episode, run_episode
     from ._job import Job
-    from ._plan import JobKey, describe, job_key, plan_jobs, policy_text
+    from ._plan import (
+        JobKey,
+        describe,
+        fault_of,
+        job_key,
+        named_templates,
+        plan_jobs,
+        policy_of,
+        policy_text,
+        template_of,
+    )
     from ._planner_choice import make_planner
     from ._pool import WorkerPool, run_here, tidy
+    from ._process_lock import ProcessLock
     from ._run import run_jobs
-    from ._run_folder import ERRORS
+    from ._run_files import RunFiles, read_jobs, read_run
 
 __all__ = [
-    "ERRORS",
     "Job",
     "JobKey",
+    "ProcessLock",
+    "RunFiles",
     "WorkerPool",
     "attempt",
     "describe",
+    "fault_of",
     "job_key",
     "make_planner",
+    "named_templates",
     "observed_episode",
     "plan_jobs",
+    "policy_of",
     "policy_text",
+    "read_jobs",
+    "read_run",
     "run_episode",
     "run_here",
     "run_jobs",
+    "template_of",
     "tidy",
 ]
 
@@ -45,9 +63,13 @@ __getattr__ = lazy_names(
         "._plan": (
             "JobKey",
             "describe",
+            "fault_of",
             "job_key",
+            "named_templates",
             "plan_jobs",
+            "policy_of",
             "policy_text",
+            "template_of",
         ),
         "._planner_choice": ("make_planner",),
         "._pool": (
@@ -55,7 +77,12 @@ __getattr__ = lazy_names(
             "run_here",
             "tidy",
         ),
+        "._process_lock": ("ProcessLock",),
         "._run": ("run_jobs",),
-        "._run_folder": ("ERRORS",),
+        "._run_files": (
+            "RunFiles",
+            "read_jobs",
+            "read_run",
+        ),
     },
 )

@@ -1,4 +1,4 @@
-"""The one place that imports Dask: episodes on a cluster whose workers come and go."""
+"""Episodes on a Dask cluster whose workers join and leave; the only module that imports Dask."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ...world.errors import SimError
 from ._episode import Attempt, attempt, failed
 from ._job import Job
 from ._job import versions as own_versions
-from ._pool import Numbered, one_thread, tidy
+from ._pool import RETRIES, NumberedJob, one_thread, tidy
 
 try:
     import dask
@@ -27,46 +27,45 @@ except ImportError as cause:  # pragma: no cover - depends on the installation
         "pip install 'awarenav[bench]'"
     ) from cause
 
-#: An embedded cluster on this computer.
-LOCAL: Final = "local"
-# So many episodes a thread are with the scheduler at a time: it is never idle, and a million
-# episodes are never in its memory at once.
+# The address that stands for a cluster on this computer.
+_LOCAL: Final = "local"
+# Episodes per thread that the scheduler has at a time: workers never wait, and a million episodes
+# are never in its memory at once.
 _AHEAD: Final = 4
-_DEATHS_ALLOWED: Final = 1
 _CONNECT_S: Final = 20.0
-# A profiler that looks in a hundred times a second for a dashboard that is not there, and memory
-# handed back at every turn, which tidy() does once an episode, make episodes a fifth slower.
+# Dask samples a profile a hundred times per second for its dashboard, and returns memory at every
+# step. Both make episodes a fifth slower. There is no dashboard, and tidy() returns the memory.
 _LEAN: Final = {
     "distributed.worker.profile.enabled": False,
     "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": None,
 }
 
-# A physics world belongs to one thread at a time, whatever number a worker was started with.
+# A physics world belongs to one thread at a time, even in a worker with several threads.
 _one_at_a_time = threading.Lock()
 
 
 def run_on_cluster(
-    jobs: Sequence[Numbered], scheduler: str, workers: int, versions: Mapping[str, str]
+    jobs: Sequence[NumberedJob], scheduler: str, workers: int, versions: Mapping[str, str]
 ) -> Iterator[tuple[int, Attempt]]:
-    """Run jobs on a Dask cluster, and give each result as soon as it is there.
+    """Run jobs on a Dask cluster, and yield each result as soon as it is there.
 
-    Workers may join and leave at any time. What one was at when it died runs elsewhere, as often as
-    the scheduler's ``allowed-failures`` says, and then once more.
+    Workers may join and leave at any time. The episode of a worker that died runs on another one,
+    as often as the scheduler's ``allowed-failures`` says, and then once more.
 
     Args:
-        jobs: with their numbers.
+        jobs: the jobs with their numbers.
         scheduler: address, or ``"local"`` for ``workers`` processes on this computer.
-        workers: of the local cluster.
-        versions: that workers must have, too.
+        workers: number of processes of the local cluster.
+        versions: versions that every worker must have.
 
     Raises:
-        SimError: no scheduler answers there.
+        SimError: no scheduler answers at the address.
     """
     if not jobs:
         return
     cluster = None
     try:
-        if scheduler == LOCAL:
+        if scheduler == _LOCAL:
             with dask.config.set(_LEAN):
                 cluster = LocalCluster(
                     n_workers=workers,
@@ -80,50 +79,50 @@ def run_on_cluster(
             f"no Dask scheduler answers at {scheduler!r}: {cause}; give tcp://HOST:PORT of one "
             "that runs, or 'local'"
         ) from cause
-    with contextlib.ExitStack() as ending:  # in the opposite order
+    with contextlib.ExitStack() as cleanup:  # runs in the opposite order
         if cluster is not None:
-            ending.callback(cluster.close)
-        ending.callback(client.close)
+            cleanup.callback(cluster.close)
+        cleanup.callback(client.close)
         if cluster is not None:
-            ending.callback(_silence, client)
+            cleanup.callback(_silence, client)
         yield from _run(client, jobs, dict(versions))
 
 
 def _silence(client: Any) -> None:
-    """Let the workers of a local cluster say no more.
+    """Turn off the log of the workers of a local cluster.
 
-    Their heartbeats may find the scheduler gone while all is closed, and report it in many lines.
+    While the cluster closes, their heartbeats may not reach the scheduler, and they would log it.
     """
-    with contextlib.suppress(OSError):  # a scheduler that has gone already
+    with contextlib.suppress(OSError):  # the scheduler has ended already
         client.run(logging.disable, logging.CRITICAL, on_error="ignore")
 
 
 def _run(
-    client: Any, jobs: Sequence[Numbered], versions: dict[str, str]
+    client: Any, jobs: Sequence[NumberedJob], versions: dict[str, str]
 ) -> Iterator[tuple[int, Attempt]]:
-    run = uuid4().hex  # names of tasks: no cluster has seen them before
-    names = itertools.count()
+    run = uuid4().hex  # makes the names of the tasks unique on the cluster
+    task_numbers = itertools.count()
     waiting = deque((number, job, 0) for number, job in jobs)
-    out: dict[Any, tuple[int, Job, int]] = {}
+    sent: dict[Any, tuple[int, Job, int]] = {}
     finished = as_completed(raise_errors=False)
 
     def send() -> None:
         ahead = _AHEAD * max(sum(client.nthreads().values()), 1)
-        while waiting and len(out) < ahead:
+        while waiting and len(sent) < ahead:
             number, job, deaths = waiting.popleft()
-            key = f"episode-{run}-{next(names)}"
+            key = f"episode-{run}-{next(task_numbers)}"
             future = client.submit(_remote, job, versions, key=key, pure=False)
-            out[future] = (number, job, deaths)
+            sent[future] = (number, job, deaths)
             finished.add(future)
 
     send()
     for future in finished:
-        number, job, deaths = out.pop(future)
+        number, job, deaths = sent.pop(future)
         error = future.exception()
         if error is None:
             result: Attempt = future.result()
             yield number, result
-        elif isinstance(error, KilledWorker) and deaths < _DEATHS_ALLOWED:
+        elif isinstance(error, KilledWorker) and deaths < RETRIES:
             waiting.appendleft((number, job, deaths + 1))
         else:
             yield number, failed(job, f"{type(error).__name__}: {error}", str(error))
@@ -132,7 +131,7 @@ def _run(
 
 
 def _remote(job: Job, versions: dict[str, str]) -> Attempt:
-    """What a worker runs."""
+    """Run one episode on a worker; refuse it there if a version differs."""
     own = own_versions()
     for name, version in versions.items():
         if own.get(name) != version:

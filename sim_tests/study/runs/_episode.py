@@ -1,13 +1,13 @@
-"""One episode from beginning to end, whatever happens in it."""
+"""One episode from its job to its record; an error becomes part of the record."""
 
 from __future__ import annotations
 
 import contextlib
 import random
-import traceback
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from traceback import format_exc
 
 import numpy as np
 
@@ -25,35 +25,35 @@ from ._planner_choice import make_planner, planner_label
 
 @dataclass(frozen=True, slots=True)
 class Attempt:
-    """What came of an episode, and the traceback of what went wrong (empty if nothing did)."""
+    """The record of an episode, and the traceback of its error; empty without an error."""
 
     record: EpisodeRecord
-    trace: str = ""
+    traceback: str = ""
 
 
 def run_episode(job: Job) -> EpisodeRecord:
-    """Run and measure one episode; what goes wrong in it is said in ``error``.
+    """Run and measure one episode; an exception becomes ``error`` of the record.
 
-    The same job gives the same record, in whatever process and after whatever else.
+    The same job gives the same record, in every process and after any other jobs.
     """
     return attempt(job).record
 
 
 def attempt(job: Job) -> Attempt:
-    """Run and measure one episode; nothing but an interruption is raised."""
+    """Run and measure one episode; only an interruption is raised."""
     try:
         return Attempt(observed_episode(job)[1])
-    except Exception as error:  # a planner may raise anything, and the other episodes go on
-        return failed(job, f"{type(error).__name__}: {error}", traceback.format_exc())
+    except Exception as error:  # a planner may raise anything, and the run continues
+        return failed(job, f"{type(error).__name__}: {error}", format_exc())
 
 
 def observed_episode(
     job: Job, observer: Observer | None = None
 ) -> tuple[CrossingResult, EpisodeRecord]:
-    """Run and measure one episode, watched by ``observer``; whatever goes wrong is raised."""
+    """Run and measure one episode, watched by ``observer``; exceptions are raised."""
     template, fault = template_of(job.scenario), fault_of(job.fault)
     scenario = template.for_seed(job.seed)
-    with _own_chance(job.seed):
+    with _seeded_globals(job.seed):
         result = run_crossing(
             scenario,
             policy=policy_of(job.policy),
@@ -66,7 +66,8 @@ def observed_episode(
         )
     time_s, length_m = (None, None)
     if scenario.robot.straight_on_speed_mps is None:
-        time_s, length_m = _without_people(_task_text(scenario), job.planner)
+        task = scenario.without_people().model_dump_json()
+        time_s, length_m = _run_without_people(task, job.planner)
     record = measure(
         result,
         time_without_people_s=time_s,
@@ -79,14 +80,14 @@ def observed_episode(
     return result, replace(record, policy=job.policy_name, planner=label)
 
 
-def failed(job: Job, error: str, trace: str = "") -> Attempt:
-    """What to say of an episode without a result."""
+def failed(job: Job, error: str, traceback: str = "") -> Attempt:
+    """Return the record of an episode without a result."""
     try:
         key = job_key(job)
-    except SimError:  # not even the scenario can be read
+    except SimError:  # the scenario cannot be read
         planner = job.planner.rpartition(":")[2]
         record = EpisodeRecord("", job.seed, job.policy_name, planner, job.perception)
-        return Attempt(replace(record, fault=job.fault_name, error=_line(error)), trace)
+        return Attempt(replace(record, fault=job.fault_name, error=_error_text(error)), traceback)
     template = template_of(job.scenario)
     record = EpisodeRecord(
         scenario=key.scenario,
@@ -97,24 +98,20 @@ def failed(job: Job, error: str, trace: str = "") -> Attempt:
         scenario_version=template.version,
         attention=template.attention,
         fault=key.fault,
-        error=_line(error),
+        error=_error_text(error),
     )
-    return Attempt(record, trace)
+    return Attempt(record, traceback)
 
 
-def _line(error: str) -> str:
-    """As it will be read back from the table, where an episode is a line."""
+def _error_text(error: str) -> str:
+    """Return an error as it is read back from the table, where an episode is one line."""
     return " ".join(error.replace("\0", "").splitlines())[:500]
 
 
-def _task_text(scenario: Scenario) -> str:
-    return scenario.without_people().model_dump_json()
-
-
-# Networks load once a process, and run on the one core that an episode has.
+# Networks load once per process, and run on the one core that an episode has.
 @lru_cache(maxsize=4)
 def _pipeline(camera: CameraSpec) -> AwarenessPipeline:
-    """What pixels go through, as :class:`~sim_tests.crossing.eyes.PixelEyes` makes it itself."""
+    """Return the pipeline that :class:`~sim_tests.crossing.eyes.PixelEyes` would make itself."""
     return AwarenessPipeline(
         camera.camera(camera.picture_scale),
         cone=AttentionCone(),
@@ -123,27 +120,27 @@ def _pipeline(camera: CameraSpec) -> AwarenessPipeline:
     )
 
 
-# One process runs many episodes of few tasks.
+# Cached, because one process runs many episodes of few tasks.
 @lru_cache(maxsize=4096)
-def _without_people(task: str, planner: str) -> tuple[float | None, float | None]:
-    """Time to goal and way driven when nobody is there and nothing is wrong."""
+def _run_without_people(task: str, planner: str) -> tuple[float | None, float | None]:
+    """Return time to goal and driven length of a task without people and without a fault."""
     scenario = Scenario.model_validate_json(task)
-    with _own_chance(0):
+    with _seeded_globals(0):
         result = run_crossing(scenario, policy="balanced", planner=make_planner(planner, scenario))
     if result.time_to_goal_s is None:
         return None, None
-    way = np.array([frame.robot_state.position_odom_m for frame in result.frames])
-    return result.time_to_goal_s, path_length_m(way)
+    path_m = np.array([frame.robot_state.position_odom_m for frame in result.frames])
+    return result.time_to_goal_s, path_length_m(path_m)
 
 
 @contextlib.contextmanager
-def _own_chance(seed: int) -> Iterator[None]:
-    """Seed the global generators, which a planner may draw from; afterwards they are as before."""
-    theirs, numpys = random.getstate(), np.random.get_state()  # noqa: NPY002 - planners use it
+def _seeded_globals(seed: int) -> Iterator[None]:
+    """Seed the global generators, which a planner may use; restore their state afterwards."""
+    python_state, numpy_state = random.getstate(), np.random.get_state()  # noqa: NPY002 - planners use it
     random.seed(seed)
     np.random.seed(seed % 2**32)  # noqa: NPY002
     try:
         yield
     finally:
-        random.setstate(theirs)
-        np.random.set_state(numpys)  # noqa: NPY002
+        random.setstate(python_state)
+        np.random.set_state(numpy_state)  # noqa: NPY002

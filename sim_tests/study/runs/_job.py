@@ -1,7 +1,4 @@
-"""One episode to run: plain data, the same on every worker.
-
-Which versions a run's results depend on.
-"""
+"""One episode to run, as plain data, and the versions that its result depends on."""
 
 from __future__ import annotations
 
@@ -15,17 +12,17 @@ from typing import Final
 class Job:
     """One episode to run.
 
-    Scenario, policy and fault are held as YAML text, so that a job means the same wherever it runs
-    and whatever the files become meanwhile.
+    Scenario, policy and fault are YAML text, so that a job gives the same episode on every worker,
+    even if the files change in the meantime.
 
     Attributes:
-        scenario: YAML of a :class:`Scenario`.
-        seed: of the episode.
-        policy_name: what tables call the policy.
+        scenario: YAML of a :class:`ScenarioTemplate`.
+        seed: seed of the episode.
+        policy_name: name of the policy in tables.
         policy: YAML of an :class:`AwarenessPolicy`.
         planner: ``"module:Class"``, empty for the reference planner.
-        perception: ``"truth"``, ``"keypoints"``, or ``"pixels"``.
-        fault_name: what tables call the fault, empty for none.
+        perception: ``"truth"``, ``"keypoints"``, ``"pixels"`` or ``"oracle"``.
+        fault_name: name of the fault in tables, empty for none.
         fault: YAML of a :class:`Fault`, empty for none.
     """
 
@@ -43,11 +40,11 @@ _PACKAGES: Final = ("awarenav", "numpy", "scipy", "opencv-python-headless", "pyb
 
 
 def versions() -> dict[str, str]:
-    """What results depend on, beside the jobs themselves."""
+    """Return the versions that results depend on, beside the jobs themselves."""
     found = {"python": platform.python_version()}
     for name in _PACKAGES:
         try:
             found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:  # pragma: no cover - a checkout on the path
+        except metadata.PackageNotFoundError:  # pragma: no cover - a checkout that is not installed
             found[name] = "unknown"
     return found

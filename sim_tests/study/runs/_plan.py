@@ -1,4 +1,4 @@
-"""Which episodes to run: every combination of what is compared, on the same seeds."""
+"""The plan of a run: every combination of scenario, seed, fault, planner and policy."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from ...world.errors import SimError
 from ._job import Job
 from ._planner_choice import make_planner, planner_label
 
-#: As a fault: none.
-NO_FAULT: Final = "none"
+# The name that stands for "without a fault".
+_NO_FAULT: Final = "none"
 
 
 class JobKey(NamedTuple):
-    """What tells an episode from every other one of a run, as its row in the table has it."""
+    """The key of an episode, unique in its run; its row in the table holds the same values."""
 
     scenario: str
     seed: int
@@ -46,43 +46,41 @@ def plan_jobs(
     faults: Sequence[str | Fault] = ("",),
     camera: str = "",
 ) -> tuple[Job, ...]:
-    """Every scenario with every seed under every fault, planner and policy, in that order.
+    """Return the jobs of every scenario, seed, fault, planner and policy, nested in that order.
 
     Args:
-        scenarios: templates, shipped names, YAML files, or ``"all"``: those that are shipped and
+        scenarios: templates, shipped names, YAML files, or ``"all"`` for the shipped scenarios that
             need a planner.
-        policies: presets' names, YAML files, ``"oracle"`` (``balanced`` with perception that knows
-            the truth: what better eyes could win at most), or pairs of a name for the tables and a
-            policy.
-        seeds: of the episodes, the same for all.
+        policies: names of presets, YAML files, pairs of a name for the tables and a policy, or
+            ``"oracle"``. The oracle is ``balanced`` with perception that knows the truth: the
+            upper bound of what better perception could gain.
+        seeds: seeds of the episodes, the same for all combinations.
         planners: ``"module:Class"``, or empty for the reference planner.
         perception: ``"truth"``, ``"keypoints"`` or ``"pixels"``.
-        faults: shipped names, YAML files, ``"none"`` or empty for none, or faults.
-        camera: a shipped name or a YAML file, in place of every scenario's own; empty for those.
+        faults: faults, shipped names, YAML files, or ``"none"`` or empty for no fault.
+        camera: a shipped name or a YAML file that replaces the camera of every scenario; empty
+            keeps each scenario's own.
 
     Raises:
-        SimError: something of that is unknown or unusable, or two episodes could not be told apart
-            in a table.
+        SimError: an unknown or unusable argument, or two episodes with the same key.
         NavError: an unknown preset or unusable policy file.
     """
     if perception not in get_args(PerceptionKind):
         raise SimError(not_one_of("perception", perception, get_args(PerceptionKind)))
-    templates = [
-        template.with_camera(camera) for each in scenarios for template in _templates(each)
-    ]
-    named = [_policy(each, perception) for each in policies]
-    broken = [_fault(each) for each in faults]
-    numbers = [_seed(seed) for seed in seeds]
+    templates = _expanded(scenarios, camera)
+    policy_texts = [_named_policy(each, perception) for each in policies]
+    fault_texts = [_named_fault(each) for each in faults]
+    checked_seeds = [_checked_seed(seed) for seed in seeds]
     for planner in planners:
         if planner and templates:
-            make_planner(planner, templates[0].median())  # says at once what is wrong with it
+            make_planner(planner, templates[0].median())  # refuses an unusable planner
     jobs = tuple(
-        Job(text, seed, name, policy, planner, sees, fault_name, fault)
+        Job(text, seed, policy_name, policy, planner, policy_perception, fault_name, fault)
         for text in (template.to_text() for template in templates)
-        for seed in numbers
-        for fault_name, fault in broken
+        for seed in checked_seeds
+        for fault_name, fault in fault_texts
         for planner in planners
-        for name, policy, sees in named
+        for policy_name, policy, policy_perception in policy_texts
     )
     seen: set[JobKey] = set()
     for job in jobs:
@@ -96,15 +94,33 @@ def plan_jobs(
     return jobs
 
 
+def named_templates(names: Sequence[str], camera: str = "") -> tuple[ScenarioTemplate, ...]:
+    """Return the scenarios of names and YAML files, each once.
+
+    Args:
+        names: shipped names, YAML files, or ``"all"`` for the shipped scenarios that need a
+            planner.
+        camera: as for :meth:`ScenarioTemplate.with_camera`.
+
+    Raises:
+        SimError: an unknown name, an unusable file or camera, or two scenarios of one name.
+    """
+    found: dict[str, ScenarioTemplate] = {}
+    for template in _expanded(names, camera):
+        if found.setdefault(template.name, template) != template:
+            raise SimError(f"two scenarios are called {template.name!r}; give them other names")
+    return tuple(found.values())
+
+
 def job_key(job: Job) -> JobKey:
-    """What tells the episode from every other one of a run."""
+    """Return the key of a job, which is unique in its run."""
     scenario = template_of(job.scenario).median()
     label = planner_label(job.planner, scenario)
     return JobKey(scenario.name, job.seed, job.policy_name, label, job.perception, job.fault_name)
 
 
 def describe(key: JobKey) -> str:
-    """An episode in words."""
+    """Return an episode in words."""
     fault = f", fault {key.fault}" if key.fault else ""
     return (
         f"{key.scenario}, seed {key.seed}, policy {key.policy}, {key.planner}, "
@@ -114,13 +130,13 @@ def describe(key: JobKey) -> str:
 
 @lru_cache(maxsize=256)
 def template_of(text: str) -> ScenarioTemplate:
-    """The scenario of a job; raises SimError for YAML that is none."""
+    """Return the scenario of a job; raise SimError for YAML that holds none."""
     return ScenarioTemplate.from_text(text)
 
 
 @lru_cache(maxsize=256)
 def policy_of(text: str) -> AwarenessPolicy:
-    """The policy of a job; raises SimError for YAML that is none."""
+    """Return the policy of a job; raise SimError for YAML that holds none."""
     try:
         return AwarenessPolicy.model_validate(yaml.safe_load(text))
     except (ValidationError, yaml.YAMLError) as cause:
@@ -129,7 +145,7 @@ def policy_of(text: str) -> AwarenessPolicy:
 
 @lru_cache(maxsize=256)
 def fault_of(text: str) -> Fault | None:
-    """The fault of a job, None without one; raises SimError for YAML that is none."""
+    """Return the fault of a job, None without one; raise SimError for YAML that holds none."""
     if not text:
         return None
     try:
@@ -139,7 +155,7 @@ def fault_of(text: str) -> Fault | None:
 
 
 def policy_text(policy: AwarenessPolicy) -> str:
-    """A policy as YAML; raises SimError for one with own objects, which cannot be written."""
+    """Return a policy as YAML; raise SimError for one with objects that YAML cannot hold."""
     try:
         data = policy.model_dump(mode="json")
         return yaml.safe_dump(data, sort_keys=False, allow_unicode=True)
@@ -149,23 +165,30 @@ def policy_text(policy: AwarenessPolicy) -> str:
         ) from cause
 
 
-def _templates(scenario: str | ScenarioTemplate) -> list[ScenarioTemplate]:
-    if isinstance(scenario, ScenarioTemplate):
-        return [scenario]
-    if scenario == "all":
-        return [
-            template
-            for template in shipped_templates()
-            if template.median().robot.straight_on_speed_mps is None
-        ]
-    return [ScenarioTemplate.named(scenario)]
+def _expanded(scenarios: Iterable[str | ScenarioTemplate], camera: str) -> list[ScenarioTemplate]:
+    """Return the templates of names and files, with another camera unless it is empty."""
+    templates: list[ScenarioTemplate] = []
+    for each in scenarios:
+        if isinstance(each, ScenarioTemplate):
+            templates.append(each)
+        elif each == "all":
+            templates += [
+                template
+                for template in shipped_templates()
+                if template.median().robot.straight_on_speed_mps is None
+            ]
+        else:
+            templates.append(ScenarioTemplate.named(each))
+    return [template.with_camera(camera) for template in templates]
 
 
-def _policy(policy: str | tuple[str, AwarenessPolicy], perception: str) -> tuple[str, str, str]:
-    """Name, YAML, and what the robot sees with."""
+def _named_policy(
+    policy: str | tuple[str, AwarenessPolicy], perception: str
+) -> tuple[str, str, str]:
+    """Return the name, the YAML and the perception of a policy."""
     if not isinstance(policy, str):
-        name, given = policy
-        return name, policy_text(given), perception
+        name, own_policy = policy
+        return name, policy_text(own_policy), perception
     if policy == ORACLE:
         return ORACLE, policy_text(AwarenessPolicy.preset("balanced")), ORACLE
     if policy.endswith((".yaml", ".yml")):
@@ -173,18 +196,18 @@ def _policy(policy: str | tuple[str, AwarenessPolicy], perception: str) -> tuple
     return policy, policy_text(AwarenessPolicy.preset(policy)), perception
 
 
-def _fault(fault: str | Fault) -> tuple[str, str]:
-    """Name and YAML, both empty for none."""
+def _named_fault(fault: str | Fault) -> tuple[str, str]:
+    """Return the name and the YAML of a fault, both empty for none."""
     if isinstance(fault, str):
-        if fault in ("", NO_FAULT):
+        if fault in ("", _NO_FAULT):
             return "", ""
         fault = Fault.of(fault)
-    if fault.name == NO_FAULT:
+    if fault.name == _NO_FAULT:
         raise SimError(f"a fault must have a name of its own, got {fault.name!r}")
     return fault.name, fault.to_text()
 
 
-def _seed(seed: int) -> int:
+def _checked_seed(seed: int) -> int:
     number = finite_number("seed", seed, SimError, minimum=0)
     if number != int(seed):
         raise SimError(f"seed must be a whole number, got {seed!r}")

@@ -1,4 +1,4 @@
-"""A planner of the user's own, named as ``module:Class``."""
+"""The planner of an episode: the reference planner, or the user's own as ``module:Class``."""
 
 from __future__ import annotations
 
@@ -15,34 +15,34 @@ from ...crossing.planner import LocalPlanner
 from ...scenario import Scenario
 from ...world.errors import SimError
 
-#: What tables call the planner that drives when no other is given.
-REFERENCE: Final = "SamplingPlanner"
+# Names in tables of the reference planner, and of the driver of scenarios without a planner.
+_REFERENCE: Final = "SamplingPlanner"
 _STRAIGHT_ON: Final = "StraightOn"
-# An argument of this name gets the hall's racks and walls.
+# An argument of this name receives the racks and walls of the hall.
 _BOXES: Final = "static_boxes_odom_m"
 
 
 def planner_label(planner: str, scenario: Scenario) -> str:
-    """What tables call a planner: the name after the colon, or that of the default one."""
+    """Return the name of a planner in tables: the part after the colon, or the default's name."""
     if planner:
         return planner.rpartition(":")[2]
-    return REFERENCE if scenario.robot.straight_on_speed_mps is None else _STRAIGHT_ON
+    return _REFERENCE if scenario.robot.straight_on_speed_mps is None else _STRAIGHT_ON
 
 
 def make_planner(planner: str, scenario: Scenario) -> LocalPlanner | None:
-    """A new planner for one episode; None for the default one.
+    """Return a new planner for one episode; None for the default planner.
 
-    What ``module:Class`` names is called with the robot's :class:`~nav_adapter.RobotProfile`, and
-    with ``static_boxes_odom_m=`` (N, 4) x_min, y_min, x_max, y_max of racks and walls if it has an
-    argument of that name. A function that returns a planner will do as well. The module is looked
-    for on the import path and in the working directory.
+    ``module:Class`` names a class, or a function that returns a planner. It is called with the
+    robot's :class:`~nav_adapter.RobotProfile`, and also with ``static_boxes_odom_m=`` if it has an
+    argument of that name: (N, 4) x_min, y_min, x_max, y_max of racks and walls. The module is
+    searched on the import path and in the working directory.
 
     Raises:
-        SimError: there is no such module or class, or what it makes has no ``plan``.
+        SimError: there is no such module or class, or the planner has no ``plan``.
     """
     if not planner:
         return None
-    make, wants_boxes = _maker(planner)
+    make, wants_boxes = _import_maker(planner)
     boxes = {_BOXES: scenario.planner_boxes_odom_m} if wants_boxes else {}
     made = make(NOVA_CARTER, **boxes)
     if not callable(getattr(made, "plan", None)):
@@ -50,12 +50,13 @@ def make_planner(planner: str, scenario: Scenario) -> LocalPlanner | None:
             f"planner {planner!r} made a {type(made).__name__}, which has no method "
             "plan(robot_state, goal_odom_m, constraints, dt_s)"
         )
-    driver: LocalPlanner = made
-    return driver
+    own_planner: LocalPlanner = made
+    return own_planner
 
 
 @lru_cache(maxsize=64)
-def _maker(planner: str) -> tuple[Callable[..., Any], bool]:
+def _import_maker(planner: str) -> tuple[Callable[..., Any], bool]:
+    """Return the class or function of ``module:Class``, and whether it takes the boxes."""
     module_name, colon, name = planner.partition(":")
     if not (colon and module_name and name):
         raise SimError(
@@ -63,13 +64,15 @@ def _maker(planner: str) -> tuple[Callable[..., Any], bool]:
             f"got {planner!r}"
         )
     here = str(Path.cwd())
-    if here not in sys.path and "" not in sys.path:  # as python -m has it, and a script has not
+    if (
+        here not in sys.path and "" not in sys.path
+    ):  # python -m adds it to the path, a script does not
         sys.path.append(here)
     try:
         found: Any = import_module(module_name)
         for part in name.split("."):
             found = getattr(found, part)
-    except Exception as cause:  # whatever a module of the user's does when it is imported
+    except Exception as cause:  # the user's module may raise anything
         raise SimError(
             f"planner {planner!r} cannot be imported: {type(cause).__name__}: {cause}"
         ) from cause
@@ -77,6 +80,6 @@ def _maker(planner: str) -> tuple[Callable[..., Any], bool]:
         raise SimError(f"planner {planner!r} must name a class or a function, got {found!r:.80}")
     try:
         wants_boxes = _BOXES in inspect.signature(found).parameters
-    except (TypeError, ValueError):  # some built in a compiled language do not say
+    except (TypeError, ValueError):  # some compiled classes have no signature
         wants_boxes = False
     return found, wants_boxes

@@ -1,4 +1,4 @@
-"""Worker processes on this computer; one that dies costs the episode it was at, and no other."""
+"""Worker processes on this computer; the death of one costs at most the episode that it ran."""
 
 from __future__ import annotations
 
@@ -11,74 +11,78 @@ import signal
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager
 from multiprocessing.connection import Connection, wait
 from typing import Final, cast
-
-from awarenav.closing import Closing
 
 from ._episode import Attempt, attempt, failed
 from ._job import Job
 
-Numbered = tuple[int, Job]
+#: A job with its number in the run.
+NumberedJob = tuple[int, Job]
+#: Times that an episode is run again after its process has died.
+RETRIES: Final = 1
 
-# Libraries that would take every core for one episode.
+# Settings of libraries that would use every core for one episode.
 _THREAD_SETTINGS: Final = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
     "MKL_NUM_THREADS",
     "NUMEXPR_NUM_THREADS",
 )
-_DEATHS_ALLOWED: Final = 1
 
 
-def run_here(jobs: Sequence[Numbered]) -> Iterator[tuple[int, Attempt]]:
+def run_here(jobs: Sequence[NumberedJob]) -> Iterator[tuple[int, Attempt]]:
     """Run jobs one after another in this process."""
     for number, job in jobs:
         yield number, attempt(job)
 
 
 def run_in_processes(
-    jobs: Sequence[Numbered], workers: int, time_limit_s: float | None = None
+    jobs: Sequence[NumberedJob], workers: int, time_limit_s: float | None = None
 ) -> Iterator[tuple[int, Attempt]]:
-    """Run jobs in processes of their own, and give each result as soon as it is there.
-
-    See :class:`WorkerPool`; the processes live as long as this takes.
+    """Run jobs in a new :class:`WorkerPool`, and yield each result as soon as it is there.
 
     Args:
-        jobs: with their numbers.
-        workers: how many processes, ≥ 1.
+        jobs: the jobs with their numbers.
+        workers: number of processes, ≥ 1.
         time_limit_s: as in :class:`WorkerPool`.
     """
     with WorkerPool(min(workers, len(jobs)), time_limit_s) as pool:
         yield from pool.run(jobs)
 
 
-class WorkerPool(Closing):
-    """Processes that live on from one lot of jobs to the next.
+class WorkerPool(AbstractContextManager["WorkerPool"]):
+    """Worker processes that run several batches of jobs.
 
     An episode whose process dies (killed, out of memory, a crash in compiled code) is run once
-    more; if it dies again, that is its result.
+    more. If that process dies, too, the death is the episode's result.
 
     Args:
-        workers: how many.
-        time_limit_s: an episode that takes longer by the clock is ended, and not run again; None
-            lets each take its time.
+        workers: number of processes.
+        time_limit_s: wall-clock limit of an episode, which is ended there and not run again; None
+            for no limit.
     """
 
     def __init__(self, workers: int, time_limit_s: float | None = None) -> None:
         self._time_limit_s = time_limit_s
-        self._context = multiprocessing.get_context("spawn")  # a fork would share the physics
+        # Not "fork": a forked process would share the physics.
+        self._context = multiprocessing.get_context("spawn")
         with _one_thread_each():
             self._idle = [_Worker(self._context) for _ in range(workers)]
         self._busy: dict[Connection, tuple[_Worker, int, Job, int]] = {}
 
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
     def close(self) -> None:
-        """End the processes, whatever they are at."""
-        _close_all(self._idle, self._busy)
+        """Kill the processes, even in the middle of an episode."""
+        for worker in [*self._idle, *(each for each, *_ in self._busy.values())]:
+            worker.close()
         self._idle, self._busy = [], {}
 
-    def run(self, jobs: Sequence[Numbered]) -> Iterator[tuple[int, Attempt]]:
-        """Run jobs, and give each result as soon as it is there; one lot at a time."""
+    def run(self, jobs: Sequence[NumberedJob]) -> Iterator[tuple[int, Attempt]]:
+        """Run a batch of jobs, and yield each result as soon as it is there."""
         waiting = deque((number, job, 0) for number, job in jobs)
         idle, busy = self._idle, self._busy
         while waiting or busy:
@@ -86,27 +90,27 @@ class WorkerPool(Closing):
                 number, job, deaths = waiting.popleft()
                 worker = idle.pop()
                 busy[worker.pipe] = (worker, number, job, deaths)
-                worker.give(job)
+                worker.send(job)
             ready = cast(
                 list[Connection], wait(list(busy), None if self._time_limit_s is None else 1)
             )
             overdue = self._overdue(ready)
             for pipe in ready:
                 worker, number, job, deaths = busy.pop(pipe)
-                result = worker.take()
+                result = worker.receive()
                 if result is not None:
                     idle.append(worker)
                     yield number, result
                     continue
                 self._replace(worker)
-                if deaths < _DEATHS_ALLOWED:
+                if deaths < RETRIES:
                     waiting.appendleft((number, job, deaths + 1))
                 else:
-                    yield number, died(job, worker.exit_code)
+                    yield number, _worker_died(job, worker.exit_code)
             for pipe in overdue:
                 worker, number, job, _ = busy.pop(pipe)
                 self._replace(worker)
-                yield number, self._ended(job)
+                yield number, self._timed_out(job)
 
     def _replace(self, worker: _Worker) -> None:
         worker.close()
@@ -114,6 +118,7 @@ class WorkerPool(Closing):
             self._idle.append(_Worker(self._context))
 
     def _overdue(self, ready: Sequence[Connection]) -> list[Connection]:
+        """Return the pipes of the processes that are over the time limit without a result."""
         limit_s = self._time_limit_s
         if limit_s is None:
             return []
@@ -124,26 +129,21 @@ class WorkerPool(Closing):
             if pipe not in ready and worker.since_s < latest_s
         ]
 
-    def _ended(self, job: Job) -> Attempt:
+    def _timed_out(self, job: Job) -> Attempt:
         text = f"ended after the time limit of {self._time_limit_s:g} s"
         return failed(job, f"TimeLimit: {text}", text)
 
 
-def _close_all(idle: list[_Worker], busy: dict[Connection, tuple[_Worker, int, Job, int]]) -> None:
-    for worker in [*idle, *(each for each, *_ in busy.values())]:
-        worker.close()
-
-
-def died(job: Job, exit_code: int | None) -> Attempt:
-    """What to say of an episode whose process died, each time it was run."""
+def _worker_died(job: Job, exit_code: int | None) -> Attempt:
+    """Return the result of an episode whose process died each time."""
     how = "" if exit_code is None else f" (exit status {exit_code})"
-    if exit_code is not None and exit_code < 0:
+    if exit_code is not None and exit_code < 0:  # killed by a signal, not on Windows
         how = f" ({signal.Signals(-exit_code).name})"
     text = f"the process that ran it died{how}, and so did a second one"
     return failed(job, f"WorkerDied: {text}", text)
 
 
-class _Worker(Closing):
+class _Worker:
     """One process that runs one job after another."""
 
     def __init__(self, context: multiprocessing.context.SpawnContext) -> None:
@@ -151,7 +151,7 @@ class _Worker(Closing):
         self.since_s = 0.0
         self._process = context.Process(target=_serve, args=(theirs,), daemon=True)
         self._process.start()
-        theirs.close()  # so that the pipe ends when the process does
+        theirs.close()  # the pipe then ends with the process
 
     @property
     def exit_code(self) -> int | None:
@@ -162,24 +162,26 @@ class _Worker(Closing):
         self._process.join()
         self.pipe.close()
 
-    def give(self, job: Job) -> None:
+    def send(self, job: Job) -> None:
         self.since_s = time.monotonic()
-        with contextlib.suppress(OSError):  # it has died: taking its result will tell
+        with contextlib.suppress(OSError):  # a dead process: receive() returns None
             self.pipe.send(job)
 
-    def take(self) -> Attempt | None:
-        """The result, or None from a process that has died."""
+    def receive(self) -> Attempt | None:
+        """Return the result, or None from a process that has died."""
         try:
             result: Attempt = self.pipe.recv()
-        except Exception:  # the end of the pipe, or half an answer
+        except Exception:  # the end of the pipe, or an incomplete result
             self._process.join(5.0)
             return None
         return result
 
 
 def _serve(pipe: Connection) -> None:
-    """Run what comes through the pipe, until its other end is gone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is interrupted, and ends this
+    """Run the jobs that come through the pipe, until its other end is closed."""
+    signal.signal(
+        signal.SIGINT, signal.SIG_IGN
+    )  # the parent handles an interrupt and ends this process
     one_thread()
     with contextlib.suppress(EOFError, OSError):
         while True:
@@ -188,19 +190,19 @@ def _serve(pipe: Connection) -> None:
 
 
 def tidy() -> None:
-    """Give the system back what an episode has used; glibc alone keeps it, and it adds up.
+    """Return the memory of an episode to the system; glibc would keep it, and it adds up.
 
-    Only for processes that do nothing but episodes: what the first one has loaded is taken to stay.
+    Only for processes that run nothing but episodes: the objects of the first one are frozen.
     """
     gc.collect()
     if not gc.get_freeze_count():
-        gc.freeze()  # looking through all modules again costs as much as half a simulated second
-    with contextlib.suppress(AttributeError, OSError):  # another C library
+        gc.freeze()  # scanning all modules each time costs as much as half a simulated second
+    with contextlib.suppress(AttributeError, OSError, TypeError):  # not glibc
         ctypes.CDLL(None).malloc_trim(0)
 
 
 def one_thread() -> None:
-    """Keep this process to one core, where its libraries can still be told."""
+    """Limit the libraries of this process to one thread, as far as they still allow it."""
     import cv2  # noqa: PLC0415 - heavy, and only workers need this
 
     cv2.setNumThreads(1)
@@ -208,7 +210,7 @@ def one_thread() -> None:
 
 @contextlib.contextmanager
 def _one_thread_each() -> Iterator[None]:
-    """Processes started meanwhile use one thread each."""
+    """Let processes that are started in the block use one thread each."""
     before = {name: os.environ.get(name) for name in _THREAD_SETTINGS}
     os.environ.update(dict.fromkeys(_THREAD_SETTINGS, "1"))
     try:

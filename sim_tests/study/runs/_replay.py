@@ -1,12 +1,10 @@
-"""The film and the map of one episode.
-
-What ``awarenav replay`` does: one episode of a run again, seen from above and by the robot.
-"""
+"""The command ``awarenav replay``: one episode of a run again, with a video and a map."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -16,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from awarenav.closing import Closing
 from awarenav.video import VideoWriter
 from perception import AttentionCone
 
@@ -27,10 +24,12 @@ from ..measures import RECORD_COLUMNS, EpisodeRecord, read_record_file, record_r
 from ._episode import observed_episode
 from ._job import Job
 from ._plan import describe, job_key, template_of
-from ._run_folder import EPISODES, key_of, read_jobs
+from ._run_files import RunFiles, read_jobs
+from ._run_folder import record_key
 
 Image = NDArray[np.uint8]
 
+_REPLAYS: Final = "replays"
 _VIDEO_HZ: Final = 10
 _HEIGHT_PX: Final = 480
 _MAP_WIDTH_PX: Final = 720
@@ -38,15 +37,15 @@ _MAP_MARGIN_M: Final = 3.0
 _MAP_PX_PER_M: Final = 60.0
 
 
-class ReplayPictures(Closing):
-    """Films an episode and keeps the map of its closest moment, the paths of all drawn up to it.
+class ReplayPictures(AbstractContextManager["ReplayPictures"]):
+    """The video of an episode, and the map of its closest instant with all paths up to there.
 
     Args:
-        map_path: PNG of the map.
-        video_path: MP4, the robot's camera beside the map; None for none.
+        map_path: PNG file of the map.
+        video_path: MP4 file of the robot's camera beside the map; None for no video.
 
     Attributes:
-        written: what has been written.
+        written: paths of the files that have been written.
     """
 
     def __init__(self, map_path: Path, video_path: Path | None) -> None:
@@ -55,19 +54,22 @@ class ReplayPictures(Closing):
         self._cone = AttentionCone()
         self._view: TopView | None = None
         self._video: VideoWriter | None = None
-        self._ticks = 0
+        self._cycles = 0
         self._closest_m = float("inf")
         self._closest: Image | None = None
         self.written: list[Path] = []
 
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
     def close(self) -> None:
-        """Finish the film; an interrupted one is still a film."""
+        """Finish the video; that of an interrupted episode can be played, too."""
         if self._video is not None:
             self._video.close()
             self._video = None
 
     def finish(self) -> None:
-        """Write the map and finish the film."""
+        """Write the map and finish the video."""
         self.close()
         if self._video_path is not None and self._video_path.exists():
             self.written.append(self._video_path)
@@ -76,9 +78,9 @@ class ReplayPictures(Closing):
             self.written.append(self._map_path)
 
     def add(self, frame: CrossingFrame, stage: Stage) -> None:
-        """Take one control cycle."""
+        """Add one control cycle."""
         every = max(round(stage.scenario.control_hz / _VIDEO_HZ), 1)
-        number, self._ticks = self._ticks, self._ticks + 1
+        number, self._cycles = self._cycles, self._cycles + 1
         nearest_m = min(frame.separations_m, default=float("inf"))
         closer = nearest_m < self._closest_m or self._closest is None
         if number % every and not closer:
@@ -89,23 +91,23 @@ class ReplayPictures(Closing):
         if closer:
             self._closest_m, self._closest = nearest_m, above
         if self._video_path is not None and number % every == 0:
-            self._film(frame, stage, above)
+            self._add_video_frame(frame, stage, above)
 
-    def _film(self, frame: CrossingFrame, stage: Stage, above: Image) -> None:
+    def _add_video_frame(self, frame: CrossingFrame, stage: Stage, above: Image) -> None:
         spec = stage.scenario.camera
         camera = spec.camera(_HEIGHT_PX / spec.height_px)
-        picture = CameraRenderer(stage.warehouse).rgb(camera, frame.T_odom_camera)
-        drawn = draw_camera_view(picture, camera, frame, stage, self._cone)
-        both = np.hstack([drawn, above])
-        both = both[:, : both.shape[1] // 2 * 2]
+        camera_image = CameraRenderer(stage.warehouse).rgb(camera, frame.T_odom_camera)
+        camera_view = draw_camera_view(camera_image, camera, frame, stage, self._cone)
+        image = np.hstack([camera_view, above])
+        image = image[:, : image.shape[1] // 2 * 2]  # the codec needs an even width
         if self._video is None:
-            size = (both.shape[1], both.shape[0])
+            size = (image.shape[1], image.shape[0])
             self._video = VideoWriter(self._video_path, _VIDEO_HZ, size)  # type: ignore[arg-type]
-        self._video.add(both)
+        self._video.add(image)
 
 
 def _window(stage: Stage) -> tuple[float, float, float, float]:
-    """x_min, y_min, x_max, y_max (m): the robot's way and what is near it."""
+    """Return x_min, y_min, x_max, y_max (m) of the robot's way with a margin."""
     task = stage.scenario.robot
     xs, ys = (task.start_x_m, task.goal_x_m), (task.start_y_m, task.goal_y_m)
     return (
@@ -114,9 +116,6 @@ def _window(stage: Stage) -> tuple[float, float, float, float]:
         max(xs) + _MAP_MARGIN_M,
         max(ys) + _MAP_MARGIN_M,
     )
-
-
-_FOLDER: Final = "replays"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,16 +129,16 @@ class ReplayOptions:
 
 
 def replay_command(options: ReplayOptions) -> int:
-    """Run an episode again, write its pictures and say whether its row is the same.
+    """Run an episode again, write its pictures and compare its row with that of the run.
 
     Raises:
-        SimError: the folder holds no run, or not this episode.
+        SimError: the folder holds no run, or the run does not have the episode.
     """
     jobs = read_jobs(options.folder)
     number = find_episode(jobs, options.episode)
     job = jobs[number]
     print(f"Episode {number}: {describe(job_key(job))}")
-    out = options.out if options.out is not None else options.folder / _FOLDER
+    out = options.out if options.out is not None else options.folder / _REPLAYS
     out.mkdir(parents=True, exist_ok=True)
     name = f"episode_{number:05d}"
     scenario = template_of(job.scenario).for_seed(job.seed)
@@ -159,15 +158,15 @@ def replay_command(options: ReplayOptions) -> int:
         pictures.finish()
     for path in pictures.written:
         print(f"Written: {path}")
-    print(_in_words(record))
-    return _compared(options.folder, job, record)
+    print(_description(record))
+    return _compare_row(options.folder, job, record)
 
 
 def find_episode(jobs: Sequence[Job], episode: str) -> int:
-    """The number of an episode from its number, or from SCENARIO:SEED:POLICY[:PLANNER][:FAULT].
+    """Return the number of an episode, given as number or SCENARIO:SEED:POLICY[:PLANNER][:FAULT].
 
     Raises:
-        SimError: there is none such, or more than one.
+        SimError: there is no such episode, or more than one.
     """
     if episode.isdecimal():
         number = int(episode)
@@ -199,19 +198,21 @@ def find_episode(jobs: Sequence[Job], episode: str) -> int:
     raise SimError(f"{episode!r} is {len(found)} episodes of the run, give one's number: {listed}")
 
 
-def _compared(folder: Path, job: Job, record: EpisodeRecord) -> int:
+def _compare_row(folder: Path, job: Job, record: EpisodeRecord) -> int:
+    """Print the difference to the row of the run; return 0 for the same row, else 1."""
+    path = RunFiles(folder).episodes
     key = job_key(job)
-    before = [each for each in read_record_file(folder / EPISODES).records if key_of(each) == key]
+    before = [each for each in read_record_file(path).records if record_key(each) == key]
     if not before:
-        print(f"{folder / EPISODES} has no row of this episode yet")
+        print(f"{path} has no row of this episode yet")
         return 0
     pairs = zip(RECORD_COLUMNS, record_row(before[0]), record_row(record), strict=True)
     changed = [(name, was, now) for name, was, now in pairs if was != now]
     if not changed:
-        print(f"The same row as in {folder / EPISODES}.")
+        print(f"The same row as in {path}.")
         return 0
     print(
-        f"Not the row in {folder / EPISODES}: "
+        f"Not the row in {path}: "
         + "; ".join(
             f"{name} was {was or 'empty'}, is {now or 'empty'}" for name, was, now in changed
         )
@@ -219,7 +220,7 @@ def _compared(folder: Path, job: Job, record: EpisodeRecord) -> int:
     return 1
 
 
-def _in_words(record: EpisodeRecord) -> str:
+def _description(record: EpisodeRecord) -> str:
     goal = "goal not reached"
     if record.time_to_goal_s is not None:
         goal = f"goal after {record.time_to_goal_s:.2f} s"

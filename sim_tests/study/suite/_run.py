@@ -1,4 +1,4 @@
-"""The episodes behind the test-suite: planned at collection, run when the first test asks."""
+"""The episodes of the test suite: planned at collection, run by the first test."""
 
 from __future__ import annotations
 
@@ -15,15 +15,17 @@ from ...world.errors import SimError
 from ..runs import Job, JobKey, describe, job_key, plan_jobs, run_jobs
 from ._thresholds import Thresholds
 
+_PLAN = pytest.StashKey["SuitePlan"]()
+
 
 @dataclass(frozen=True, slots=True)
 class SuitePlan:
-    """What the options ask for.
+    """The options of the test suite.
 
     Attributes:
         jobs: every episode.
-        thresholds: what they must hold.
-        workers: processes, None for one a core.
+        thresholds: thresholds of the episodes.
+        workers: number of processes, None for one per core.
         out: folder for the results.
     """
 
@@ -34,12 +36,15 @@ class SuitePlan:
 
     @classmethod
     def of(cls, config: pytest.Config) -> SuitePlan:
-        """Read the options; raises SimError or NavError for what cannot be used."""
+        """Read the options; raise SimError or NavError for an unusable one."""
 
         def option(name: str) -> str:
             return str(config.getoption(f"--awarenav-{name}"))
 
-        first, episodes = _whole("seed", option("seed"), 0), _whole("episodes", option("episodes"))
+        first, episodes = (
+            _whole_number("seed", option("seed"), 0),
+            _whole_number("episodes", option("episodes")),
+        )
         jobs = plan_jobs(
             config.getoption("--awarenav-scenario") or ["all"],
             [option("policy")],
@@ -56,59 +61,64 @@ class SuitePlan:
             if name not in known and config.getoption("--awarenav-scenario") == []:
                 raise SimError(f"{file}: scenarios: there is no scenario {name!r}")
         return cls(
-            jobs, thresholds, _whole("workers", workers) if workers else None, Path(option("out"))
+            jobs,
+            thresholds,
+            _whole_number("workers", workers) if workers else None,
+            Path(option("out")),
         )
 
     def name(self, number: int) -> str:
-        """Of an episode among the tests."""
+        """Return the name of an episode's test."""
         key = job_key(self.jobs[number])
         return f"{key.scenario}-{key.seed}"
 
 
 class SuiteRun:
-    """Runs the episodes that the chosen tests are about.
+    """The records of the episodes that the selected tests need; making it runs them.
 
     Args:
-        plan: of all of them.
-        wanted: numbers of those to run.
+        plan: the plan of all episodes.
+        wanted: numbers of the episodes to run.
     """
 
     def __init__(self, plan: SuitePlan, wanted: Sequence[int]) -> None:
         self._plan = plan
-        self._place = {number: place for place, number in enumerate(sorted(set(wanted)))}
-        jobs = [plan.jobs[number] for number in self._place]
-        self._records = run_jobs(jobs, plan.out, workers=plan.workers, progress=True, afresh=True)
+        self._row = {number: row for row, number in enumerate(sorted(set(wanted)))}
+        jobs = [plan.jobs[number] for number in self._row]
+        self._records = run_jobs(
+            jobs, plan.out, workers=plan.workers, progress=True, overwrite=True
+        )
 
     def verdict(self, number: int) -> str:
-        """Why an episode fails and how to see it again; empty when it passes."""
-        job, record = self._plan.jobs[number], self._records[self._place[number]]
+        """Return why an episode fails and how to replay it; empty when it passes."""
+        job, record = self._plan.jobs[number], self._records[self._row[number]]
         key = job_key(job)
         failures = list(self._plan.thresholds.of(key.scenario).failures(record))
         return "\n".join(self._lines(failures, key, number)) if failures else ""
 
     def overall(self) -> str:
-        """Why all together fail; empty when they pass."""
+        """Return why all episodes together fail; empty when they pass."""
         failures = list(self._plan.thresholds.failures(self._records))
         if not failures:
             return ""
-        worst = [
+        failed = [
             f"  not a success: {describe(job_key(self._plan.jobs[number]))}\n"
             f"    {self._replay(number)}"
-            for number in self._place
-            if not self._records[self._place[number]].success
+            for number in self._row
+            if not self._records[self._row[number]].success
         ]
-        return "\n".join([*failures, *worst])
+        return "\n".join([*failures, *failed])
 
     def _lines(self, failures: Sequence[str], key: JobKey, number: int) -> Iterator[str]:
         yield f"{'; '.join(failures)} ({describe(key)})"
         yield f"  {self._replay(number)}"
 
     def _replay(self, number: int) -> str:
-        return shlex.join(["awarenav", "replay", str(self._plan.out), str(self._place[number])])
+        return shlex.join(["awarenav", "replay", str(self._plan.out), str(self._row[number])])
 
 
 def planned(config: pytest.Config) -> SuitePlan:
-    """The plan of this pytest run; what is wrong with the options is a collection error."""
+    """Return the plan of this pytest run; an unusable option is a collection error."""
     if _PLAN not in config.stash:
         try:
             config.stash[_PLAN] = SuitePlan.of(config)
@@ -117,10 +127,7 @@ def planned(config: pytest.Config) -> SuitePlan:
     return config.stash[_PLAN]
 
 
-_PLAN = pytest.StashKey[SuitePlan]()
-
-
-def _whole(name: str, text: str, least: int = 1) -> int:
+def _whole_number(name: str, text: str, least: int = 1) -> int:
     if not text.isdecimal() or int(text) < least:
         raise SimError(f"--awarenav-{name} must be a whole number of at least {least}, got {text}")
     return int(text)

@@ -1,4 +1,4 @@
-"""What an episode, and all of them together, must hold to pass."""
+"""The thresholds of one episode, and of all episodes together."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from ..measures import EpisodeRecord
 
 
 class EpisodeThresholds(StrictConfig):
-    """What every single episode must hold; None asks for nothing.
+    """The thresholds of a single episode; None sets no threshold.
 
     Attributes:
-        max_robot_contacts: contacts of a robot that moved into a person.
-        max_contacts: contacts of any kind.
-        min_separation_m: least distance between the surfaces of robot and person.
-        max_violation_time_s: how long the separation margin may be negative at a moving robot.
-        max_time_lost_s: over the same task without people.
-        reaches_goal: within the scenario's duration.
+        max_robot_contacts: most contacts of a robot that moved into a person.
+        max_contacts: most contacts of any kind.
+        min_separation_m: smallest distance between the surfaces of robot and person.
+        max_violation_time_s: longest time with a negative separation margin at a moving robot.
+        max_time_lost_s: most time lost over the same task without people.
+        reaches_goal: the goal must be reached within the scenario's duration.
     """
 
     error: ClassVar[type[ValueError]] = SimError
@@ -36,7 +36,7 @@ class EpisodeThresholds(StrictConfig):
     reaches_goal: bool = False
 
     def failures(self, record: EpisodeRecord) -> Iterator[str]:
-        """What an episode does not hold: name of the check, what was found and what is allowed."""
+        """Yield the failed checks of an episode: name, value found and threshold."""
         if record.error:
             yield f"runs to its end: {record.error}"
             return
@@ -48,27 +48,25 @@ class EpisodeThresholds(StrictConfig):
         ):
             if limit is not None and value is not None and value > limit:
                 yield f"{name}: {value:g}, allowed {limit:g}"
-        least = record.min_separation_m
-        wanted = self.min_separation_m
-        if wanted is not None and least is not None and least < wanted:
-            yield f"min_separation_m: {least:g}, asked for {wanted:g}"
+        separation_m, limit_m = record.min_separation_m, self.min_separation_m
+        if limit_m is not None and separation_m is not None and separation_m < limit_m:
+            yield f"min_separation_m: {separation_m:g}, asked for {limit_m:g}"
         if self.reaches_goal and record.time_to_goal_s is None:
             yield f"reaches_goal: not within {record.duration_s:g} s"
 
 
 class Thresholds(StrictConfig):
-    """What must hold for the suite to pass.
+    """The thresholds of the test suite.
 
-    The default allows no contact that the robot causes in any episode, and asks for nine successes
-    in ten episodes.
+    By default, the robot may cause no contact, and 90 % of the episodes must succeed.
 
     Attributes:
-        episode: of every episode.
-        scenarios: of the episodes of a scenario, by its name, instead of that.
-        min_success_rate: share of all episodes that reach the goal and touch nobody by the robot's
-            own motion.
-        max_mean_violation_time_s: of all episodes.
-        max_mean_time_lost_s: of all episodes.
+        episode: thresholds of every episode.
+        scenarios: thresholds that replace ``episode`` in some scenarios, by the scenario's name.
+        min_success_rate: smallest share of episodes in which the robot reaches the goal and moves
+            into nobody.
+        max_mean_violation_time_s: largest mean violation time of all episodes.
+        max_mean_time_lost_s: largest mean time lost of all episodes.
     """
 
     error: ClassVar[type[ValueError]] = SimError
@@ -80,11 +78,11 @@ class Thresholds(StrictConfig):
     max_mean_time_lost_s: float | None = None
 
     def of(self, scenario: str) -> EpisodeThresholds:
-        """What an episode of a scenario must hold."""
+        """Return the thresholds of an episode of a scenario."""
         return self.scenarios.get(scenario, self.episode)
 
     def failures(self, records: Sequence[EpisodeRecord]) -> Iterator[str]:
-        """What all episodes together do not hold; one that broke off is no success."""
+        """Yield the failed checks of all episodes together; a failed episode is no success."""
         rate = fmean(record.success for record in records)
         if self.min_success_rate is not None and rate < self.min_success_rate:
             yield f"min_success_rate: {rate:.3f}, asked for {self.min_success_rate:g}"

@@ -1,7 +1,7 @@
-"""Options of the crossings' test-suite; pytest loads this wherever awarenav is installed.
+"""The pytest options of the test suite; pytest loads them wherever awarenav is installed.
 
-So it must cost nothing and touch nothing: it adds options, and without ``--pyargs sim_tests``
-nothing reads them.
+This module therefore imports nothing heavy. Only the tests of ``--pyargs sim_tests`` read the
+options.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import pytest
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the options, all of which begin with ``--awarenav``."""
+    """Add the options, which all begin with ``--awarenav``."""
     group = parser.getgroup("awarenav", "crossings of awarenav (pytest --pyargs sim_tests)")
     for name, metavar, default, text in (
         ("planner", "MODULE:CLASS", "", "your planner (default: the reference planner)"),
@@ -18,10 +18,10 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         ("perception", "KIND", "keypoints", "truth, keypoints or pixels (default: keypoints)"),
         ("camera", "NAME|FILE", "", "forward, surround or YAML file (default: the scenarios')"),
         ("fault", "NAME|FILE", "none", "shipped fault or YAML file (default: none)"),
-        ("episodes", "N", "3", "seeds a scenario (default: 3)"),
-        ("seed", "N", "0", "the first of them (default: 0)"),
-        ("workers", "N", "", "processes (default: one a core)"),
-        ("thresholds", "FILE", "", "YAML of what to hold; docs/test-suite.md has the default"),
+        ("episodes", "N", "3", "seeds per scenario (default: 3)"),
+        ("seed", "N", "0", "first seed (default: 0)"),
+        ("workers", "N", "", "worker processes (default: one per core)"),
+        ("thresholds", "FILE", "", "YAML file of thresholds; docs/test-suite.md has the defaults"),
         ("out", "DIR", "awarenav-suite", "folder for the results (default: awarenav-suite)"),
     ):
         group.addoption(f"--awarenav-{name}", metavar=metavar, default=default, help=text)

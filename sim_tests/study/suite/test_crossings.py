@@ -1,4 +1,4 @@
-"""One test an episode, and one over all of them; see docs/test-suite.md."""
+"""One test per episode, and one over all episodes; see docs/test-suite.md."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from ._run import SuiteRun, planned
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Make a test of every episode that the options ask for."""
+    """Make one test for each episode of the options."""
     if "episode" in metafunc.fixturenames:
         plan = planned(metafunc.config)
         numbers = range(len(plan.jobs))
@@ -17,25 +17,25 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 @pytest.fixture(scope="session")
 def crossings(request: pytest.FixtureRequest) -> SuiteRun:
-    """The episodes, run on all cores when the first test asks for one."""
+    """Run the episodes of the selected tests, on all cores."""
     plan = planned(request.config)
-    chosen = [
+    selected = [
         int(str(item.callspec.params["episode"]))
         for item in request.session.items
         if isinstance(item, pytest.Function) and item.function is test_episode
     ]
-    return SuiteRun(plan, chosen or range(len(plan.jobs)))
+    return SuiteRun(plan, selected or range(len(plan.jobs)))
 
 
 def test_episode(crossings: SuiteRun, episode: int) -> None:
-    """An episode holds what its scenario's thresholds ask for."""
+    """An episode meets the thresholds of its scenario."""
     verdict = crossings.verdict(episode)
     if verdict:
         pytest.fail(verdict, pytrace=False)
 
 
 def test_all_episodes(crossings: SuiteRun) -> None:
-    """All episodes together hold what the thresholds ask for."""
+    """All episodes together meet the thresholds."""
     verdict = crossings.overall()
     if verdict:
         pytest.fail(verdict, pytrace=False)

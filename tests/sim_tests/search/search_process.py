@@ -6,17 +6,17 @@ import os
 import signal
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
-from sim_tests.search._search import Outcome, Range, Search
-from sim_tests.search._trials import TrialBook
+from sim_tests.search import Claim, Optimizer, Outcome, Range, SharedStudy
 
 SPACE = {"x": Range(low=-1.0, high=1.0), "y": Range(low=0.1, high=10.0, log=True)}
 
 
-def make_search(method: str = "tpe", generation: int = 4, seed: int = 3) -> Search:
-    objectives = 1 if method == "cmaes" else 2
-    return Search(method, SPACE, generation=generation, seed=seed, objectives=objectives)
+def make_optimizer(sampler: str = "tpe", generation: int = 4, seed: int = 3) -> Optimizer:
+    objectives = 1 if sampler == "cmaes" else 2
+    return Optimizer(sampler, SPACE, generation=generation, seed=seed, objectives=objectives)
 
 
 def outcome(parameters: dict[str, float], objectives: int = 2) -> Outcome:
@@ -27,24 +27,25 @@ def outcome(parameters: dict[str, float], objectives: int = 2) -> Outcome:
 
 
 def work(folder: Path, total: int, die_at: int = -1) -> None:
-    """Work on trials one by one; kill this process in the middle of trial ``die_at``."""
-    with TrialBook(folder, "s", make_search(), total) as book:
-        while not book.done:
-            tickets = book.claim(1)
-            if not tickets:
+    """Evaluate trials one by one; kill this process in the middle of trial ``die_at``."""
+
+    def outcomes_of(claims: Sequence[Claim]) -> list[Outcome]:
+        if any(claim.number == die_at for claim in claims):
+            os.kill(os.getpid(), signal.SIGKILL)
+        return [outcome(claim.parameters) for claim in claims]
+
+    with SharedStudy(folder, "s", make_optimizer(), total) as study:
+        while not study.is_complete:
+            if not study.evaluate(1, outcomes_of):
                 time.sleep(0.02)
-            for ticket in tickets:
-                if ticket.number == die_at:
-                    os.kill(os.getpid(), signal.SIGKILL)
-                book.tell(ticket, outcome(ticket.parameters))
 
 
 def history(folder: Path, total: int) -> list[tuple]:
-    """All that a study holds, but for times."""
-    with TrialBook(folder, "s", make_search(), total) as book:
+    """Everything that a study holds, except times."""
+    with SharedStudy(folder, "s", make_optimizer(), total) as study:
         return [
             (trial.number, trial.state, trial.params, trial.values, trial.constraints)
-            for trial in book.finished_trials()
+            for trial in study.finished_trials()
         ]
 
 

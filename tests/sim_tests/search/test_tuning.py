@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import csv
 import itertools
 import json
 import math
@@ -7,6 +8,7 @@ import subprocess
 import sys
 import time
 
+import optuna
 import pytest
 import yaml
 from hypothesis import given
@@ -15,11 +17,16 @@ from hypothesis import strategies as st
 from awarenav.cli import main
 from nav_adapter import AwarenessPolicy
 from sim_tests import SimError
-from sim_tests.search._optuna import optuna
-from sim_tests.search.tune._evaluation import Evaluation, front, knee
-from sim_tests.search.tune._files import importances
-from sim_tests.search.tune._policy_space import PolicySpace, read_ranges, shipped_ranges
-from sim_tests.search.tune._tune import feasible_front
+from sim_tests.search.tune import (
+    Evaluation,
+    PolicySpace,
+    feasible_front,
+    importances,
+    knee,
+    pareto_front,
+    read_ranges,
+    shipped_ranges,
+)
 from sim_tests.study.measures import EpisodeRecord
 
 _PRESETS = ("blind", "conservative", "balanced", "assertive")
@@ -48,7 +55,7 @@ def test_every_point_of_the_space_is_a_policy_that_keeps_the_floor(name, share):
 
 
 @pytest.mark.parametrize("name", _PRESETS)
-def test_the_base_policy_lies_in_its_space_where_the_ranges_hold_it(name):
+def test_the_base_policy_is_in_its_space_where_the_ranges_include_it(name):
     base, space = AwarenessPolicy.preset(name), _SPACES[name]
     policy = space.policy(space.base_parameters())
     for path, each in space.ranges.items():
@@ -63,7 +70,7 @@ def _number(data: dict, path: str) -> float | None:
     return data
 
 
-def test_one_parameter_may_set_several_places():
+def test_one_parameter_may_set_several_keys():
     space = _SPACES["balanced"]
     policy = space.policy({**space.base_parameters(), "inflation.aware_above": 0.77})
     assert policy.inflation.aware_above == policy.speed.aware_above == 0.77
@@ -84,7 +91,7 @@ def test_one_parameter_may_set_several_places():
         ("timing.hold_s: {low: 5.0, high: 50.0}", "policy that cannot be"),
     ],
 )
-def test_ranges_that_must_not_be_searched_are_refused(tmp_path, text, message):
+def test_ranges_below_the_floor_and_unknown_keys_are_refused(tmp_path, text, message):
     path = tmp_path / "ranges.yaml"
     path.write_text(text)
     with pytest.raises(SimError, match=message):
@@ -100,7 +107,7 @@ def test_ranges_that_must_not_be_searched_are_refused(tmp_path, text, message):
         ("timing.hold_s: {low: 2.0, hihg: 3.0}", "did you mean 'high'"),
     ],
 )
-def test_files_of_ranges_that_cannot_be_read_say_why(tmp_path, text, message):
+def test_unusable_files_of_ranges_are_refused_with_a_reason(tmp_path, text, message):
     path = tmp_path / "ranges.yaml"
     path.write_text(text)
     with pytest.raises(SimError, match=message):
@@ -108,8 +115,8 @@ def test_files_of_ranges_that_cannot_be_read_say_why(tmp_path, text, message):
 
 
 @given(points)
-def test_the_front_is_what_nothing_dominates(given_points):
-    rows = front(given_points)
+def test_the_front_holds_the_points_that_no_other_dominates(given_points):
+    rows = pareto_front(given_points)
     for row, point in enumerate(given_points):
         beaten = any(
             other != point and other[0] <= point[0] and other[1] <= point[1]
@@ -134,7 +141,7 @@ def _trial(number: int, values: tuple[float, float], contacts: float):
     return trial
 
 
-def test_a_trial_with_a_contact_that_the_robot_caused_is_on_no_front():
+def test_a_trial_with_a_contact_caused_by_the_robot_is_on_no_front():
     trials = [_trial(0, (3.0, 3.0), 0.0), _trial(1, (1.0, 1.0), 1.0), _trial(2, (2.0, 4.0), 0.0)]
     assert [trial.number for trial in feasible_front(trials)] == [2, 0]
     assert feasible_front(trials[1:2]) == []
@@ -155,12 +162,12 @@ def _study(values) -> optuna.Study:
     return study
 
 
-def test_importances_are_finite_sum_to_one_and_name_what_matters():
+def test_importances_are_finite_sum_to_one_and_find_the_parameter_that_matters():
     found = importances(_study(lambda a, b: (a + 0.01 * b, 7.0)))
     first = found["time_lost_s"]
     assert sum(first.values()) == pytest.approx(1.0)
     assert first["matters"] > 0.8
-    # An objective in which no trial differs is decided by nothing.
+    # No parameter matters for an objective in which no trial differs.
     assert found["violation_time_s"] == {"matters": 0.0, "idle": 0.0}
     assert all(math.isfinite(v) for each in found.values() for v in each.values())
 
@@ -183,37 +190,40 @@ def test_an_evaluation_counts_contacts_and_errors_and_means():
     assert found.minus(found, "time_lost_s").value == 0.0
 
 
-_TUNE = [
-    "tune",
-    "--scenario",
-    "crossing_attentive",
-    "--trials",
-    "4",
-    "--generation",
-    "3",
-    "--episodes",
-    "1",
-    "--held-out",
-    "1",
-    "--perception",
-    "truth",
-]
+# A person beside the robot's way, for whom the policies slow down differently.
+_SCENARIO = """
+name: passing
+description: A person stands beside the robot's way and looks away.
+duration_s: 5.0
+control_hz: 10.0
+layout: {x_min_m: -3.0, y_min_m: -3.0, x_max_m: 6.0, y_max_m: 3.0}
+robot: {goal_x_m: 1.5}
+workers:
+  - path: [{t_s: 0.0, x_m: {uniform: {low: 1.5, high: 2.0}}, y_m: 1.8}]
+"""
+_TUNE = ["tune", "--trials", "4", "--generation", "3", "--episodes", "1", "--held-out", "1"]
+_TUNE += ["--perception", "truth"]
 
 
 @pytest.mark.slow
-def test_a_tuning_writes_its_files_and_killed_with_two_workers_the_same(tmp_path, capsys):
+def test_a_killed_and_resumed_tuning_with_two_workers_writes_the_same_files(tmp_path, capsys):
+    scenario = tmp_path / "passing.yaml"
+    scenario.write_text(_SCENARIO)
+    arguments = [*_TUNE, "--scenario", str(scenario)]
     one, two = tmp_path / "one", tmp_path / "two"
-    assert main([*_TUNE, "--out", str(one)]) == 0
+    assert main([*arguments, "--out", str(one)]) == 0
     printed = capsys.readouterr().out
     for name in (*_PRESETS, "least_time_lost", "knee", "least_violation"):
         assert f"\n{name}" in printed
-    command = [sys.executable, "-m", "awarenav", *_TUNE, "--out", str(two)]
+    with (one / "trials.csv").open(newline="") as file:
+        assert len({row["time_lost_s"] for row in csv.DictReader(file)}) > 1
+    command = [sys.executable, "-m", "awarenav", *arguments, "--out", str(two)]
     with subprocess.Popen([*command, "--workers", "2"]) as killed:
         while killed.poll() is None and not (two / "evaluations" / "trial_0001-0-0.csv").exists():
             time.sleep(0.05)
         killed.kill()
     assert killed.returncode == -9
-    assert main([*_TUNE, "--out", str(two), "--resume"]) == 0
+    assert main([*arguments, "--out", str(two), "--resume"]) == 0
     capsys.readouterr()
     for name in ("trials.csv", "chosen.json", "importances.json"):
         assert (one / name).read_bytes() == (two / name).read_bytes()
@@ -225,8 +235,8 @@ def test_a_tuning_writes_its_files_and_killed_with_two_workers_the_same(tmp_path
         policy = AwarenessPolicy.from_yaml(path)
         assert path.read_text().startswith("# ")
         assert policy.margins.floor_m >= 0.40
-    # Resumed, a tuning that is done runs nothing and says the same.
-    assert main([*_TUNE, "--out", str(one), "--resume"]) == 0
+    # A complete tuning that is resumed runs nothing and prints the same.
+    assert main([*arguments, "--out", str(one), "--resume"]) == 0
     assert capsys.readouterr().out.endswith(printed)
 
 
@@ -241,15 +251,19 @@ def test_a_tuning_writes_its_files_and_killed_with_two_workers_the_same(tmp_path
         (["--planner", "nowhere"], "module:Class"),
     ],
 )
-def test_a_tuning_that_cannot_be_says_why_and_leaves_nothing(tmp_path, capsys, options, message):
+def test_an_impossible_tuning_is_refused_with_a_reason_and_leaves_nothing(
+    tmp_path, capsys, options, message
+):
     out = tmp_path / "out"
-    assert main([*_TUNE, "--out", str(out), *options]) == 2
+    arguments = [*_TUNE, "--scenario", "crossing_attentive", "--out", str(out)]
+    assert main([*arguments, *options]) == 2
     assert message in capsys.readouterr().err
     assert not out.exists()
 
 
-def test_a_policy_of_ones_own_needs_a_name_of_its_own(tmp_path, capsys):
+def test_an_own_policy_needs_a_name_that_no_preset_has(tmp_path, capsys):
     path = tmp_path / "blind.yaml"
     path.write_text(yaml.safe_dump({"inflation": {"unaware_radius_m": 1.2}}))
-    assert main([*_TUNE, "--policy", str(path), "--out", str(tmp_path / "out")]) == 2
+    arguments = [*_TUNE, "--scenario", "crossing_attentive"]
+    assert main([*arguments, "--policy", str(path), "--out", str(tmp_path / "out")]) == 2
     assert "a name of its own, got 'blind'" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""Planners that go wrong in every way, for runs that must go on."""
+"""Planners that fail in every way, for runs that must continue."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-#: Environment variable: a file that the process that dies once leaves behind.
+#: Environment variable with the path of a file that some planners make.
 MARKER = "AWARENAV_TEST_MARKER"
+#: Environment variable with the seconds that a planner sleeps in every cycle.
+SLEEP_S = "AWARENAV_TEST_SLEEP_S"
 
 
 class Slow:
@@ -24,30 +26,30 @@ class Slow:
         return 0.5, 0.0
 
 
-class Chancy(Slow):
+class UsesGlobalRandom(Slow):
     """Draws from the global generators, as some planners do."""
 
     def plan(self, robot_state, goal_odom_m, constraints, dt_s):
-        theirs = np.random.random()  # noqa: NPY002
-        return 0.2 + 0.4 * random.random() + 0.4 * theirs, 0.0
+        numpy_draw = np.random.random()  # noqa: NPY002
+        return 0.2 + 0.4 * random.random() + 0.4 * numpy_draw, 0.0
 
 
 class Raises(Slow):
-    """Gives up in its first cycle."""
+    """Raises an error in its first cycle."""
 
     def plan(self, robot_state, goal_odom_m, constraints, dt_s):
         raise RuntimeError("no way\nfound, honestly")
 
 
 class Dies(Slow):
-    """Takes its process along."""
+    """Kills its process."""
 
     def plan(self, robot_state, goal_odom_m, constraints, dt_s):
         os.kill(os.getpid(), signal.SIGKILL)
 
 
 class DiesOnce(Slow):
-    """Takes its process along the first time."""
+    """Kills its process the first time."""
 
     def plan(self, robot_state, goal_odom_m, constraints, dt_s):
         marker = Path(os.environ[MARKER])
@@ -58,21 +60,38 @@ class DiesOnce(Slow):
 
 
 class Hangs(Slow):
-    """Never answers."""
+    """Never answers; makes the marker first."""
 
     def plan(self, robot_state, goal_odom_m, constraints, dt_s):
+        Path(os.environ[MARKER]).touch()
         time.sleep(3600.0)
 
 
+class Leaves(Slow):
+    """Makes the marker."""
+
+    def plan(self, robot_state, goal_odom_m, constraints, dt_s):
+        Path(os.environ[MARKER]).touch()
+        return super().plan(robot_state, goal_odom_m, constraints, dt_s)
+
+
+class Sleeps(Slow):
+    """Sleeps in every cycle for as long as the environment says."""
+
+    def plan(self, robot_state, goal_odom_m, constraints, dt_s):
+        time.sleep(float(os.environ.get(SLEEP_S, "0")))
+        return super().plan(robot_state, goal_odom_m, constraints, dt_s)
+
+
 class NoPlan:
-    """Cannot plan."""
+    """Has no method ``plan``."""
 
     def __init__(self, robot):
         pass
 
 
 def with_boxes(robot, static_boxes_odom_m):
-    """A function that makes a planner, and sees the racks."""
+    """Make a planner that knows the racks."""
     planner = Slow(robot)
     planner.boxes = static_boxes_odom_m
     return planner

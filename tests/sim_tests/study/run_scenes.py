@@ -19,11 +19,12 @@ workers:
 
 
 def short(name: str = "short") -> ScenarioTemplate:
-    """A robot that has 0.6 m to go, and somebody who stands somewhere."""
+    """Return a scenario of a robot that drives 0.6 m, and a person who stands."""
     return ScenarioTemplate.from_text(SHORT.format(name=name))
 
 
 def short_jobs(episodes: int = 2, **options):
-    """Episodes of it from the truth, with two policies."""
-    given = {"perception": "truth", **options}
-    return plan_jobs([short()], ["blind", "balanced"], range(episodes), **given)
+    """Return episodes of it with two policies, from the truth unless told otherwise."""
+    return plan_jobs(
+        [short()], ["blind", "balanced"], range(episodes), **{"perception": "truth", **options}
+    )

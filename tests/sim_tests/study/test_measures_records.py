@@ -19,7 +19,7 @@ from sim_tests.study.measures import (
     record_row,
     write_records,
 )
-from sim_tests.study.measures._metric_info import METRIC_BY_NAME
+from sim_tests.study.measures._metrics import METRICS
 from sim_tests.study.measures._record import COLUMN_KINDS, rounded
 
 numbers = st.none() | st.floats(-1e6, 1e6).map(rounded)
@@ -101,7 +101,7 @@ def test_the_documentation_defines_every_column():
 def test_every_number_is_known_to_the_tables():
     numbers = {name for name, kind in COLUMN_KINDS.items() if kind in ("number", "count")}
     elsewhere = {"seed", "scenario_version", "contacts", "duration_s", "time_without_people_s"}
-    assert numbers - elsewhere == set(METRIC_BY_NAME)
+    assert numbers - elsewhere == set(METRICS)
 
 
 def test_numbers_are_what_files_keep():

@@ -18,8 +18,7 @@ from report_runs import MadeUpRun, failed, made_up_run
 from awarenav.cli import main
 from sim_tests import SimError
 from sim_tests.study.measures import summarise, zero_of_n_upper
-from sim_tests.study.report._text import number, percent
-from sim_tests.study.report._write import write_report
+from sim_tests.study.report import number, percent, write_report
 
 HOSTILE = '<script>alert("x")</script>&\'`{{ 7 * 7 }}'
 

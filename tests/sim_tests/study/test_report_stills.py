@@ -13,7 +13,7 @@ import pytest
 from page_reader import PageReader
 
 from sim_tests.study.measures import read_records
-from sim_tests.study.report._write import write_report
+from sim_tests.study.report import write_report
 from sim_tests.study.runs import plan_jobs, run_jobs
 
 

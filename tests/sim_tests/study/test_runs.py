@@ -1,4 +1,4 @@
-"""Runs: the same table however they run, nothing lost when an episode or the run itself dies."""
+"""Runs: the same table in every mode, and nothing lost when an episode or the run is killed."""
 
 import csv
 import json
@@ -16,8 +16,7 @@ from run_scenes import short_jobs
 
 from sim_tests import SimError
 from sim_tests.study.measures import read_records
-from sim_tests.study.runs import Job, run_episode, run_jobs
-from sim_tests.study.runs._run_folder import read_jobs, read_run
+from sim_tests.study.runs import Job, read_jobs, read_run, run_episode, run_jobs
 
 HERE = Path(__file__).parent
 
@@ -34,7 +33,7 @@ def serial(tmp_path_factory):
     return folder
 
 
-def test_a_run_leaves_its_table_its_jobs_and_what_it_was(serial):
+def test_a_run_writes_its_table_its_jobs_and_its_settings(serial):
     jobs = short_jobs(4)
     records = read_records(serial / "episodes.csv")
     assert [(record.seed, record.policy) for record in records] == [
@@ -46,7 +45,7 @@ def test_a_run_leaves_its_table_its_jobs_and_what_it_was(serial):
     assert read_run(serial)["state"] == "complete"
     assert read_run(serial)["versions"]["numpy"]
     assert not (serial / "errors.log").exists()
-    # The row is what the episode gives, wherever it runs.
+    # An episode gives the same row wherever it runs.
     assert run_episode(jobs[5]) == records[5]
 
 
@@ -58,14 +57,14 @@ def test_distributions_are_drawn_from_the_seed_and_not_from_the_policy(serial):
     assert len({min(values) for values in by_seed.values()}) == 4
 
 
-def test_parquet_holds_the_same(serial):
+def test_parquet_holds_the_same_records(serial):
     pytest.importorskip("pyarrow")
     records = read_records(serial / "episodes.csv")
     assert read_records(serial / "episodes.parquet") == records
 
 
-def test_episodes_and_processes_that_fail_cost_no_other(tmp_path, monkeypatch, serial):
-    """In two processes: raising, dying twice, dying once, and the good ones as ever."""
+def test_failing_episodes_and_processes_affect_no_other(tmp_path, monkeypatch, serial):
+    """Two processes: an episode raises, one kills its process twice, one once; others are as ever."""
     monkeypatch.setenv(run_planners.MARKER, str(tmp_path / "died"))
     names = ("Raises", "Dies", "DiesOnce", "Slow")
     jobs = short_jobs(4) + short_jobs(1, planners=[f"run_planners:{name}" for name in names])[::2]
@@ -84,22 +83,34 @@ def test_episodes_and_processes_that_fail_cost_no_other(tmp_path, monkeypatch, s
     assert "episode 8: short, seed 0" in log
 
 
-@pytest.mark.slow
-def test_an_episode_that_never_ends_is_ended(tmp_path, serial):
+def test_an_episode_over_the_time_limit_is_ended(tmp_path, monkeypatch, serial):
+    """The clock jumps over the limit each time that a planner hangs."""
+    marker = tmp_path / "hangs"
+    monkeypatch.setenv(run_planners.MARKER, str(marker))
+    real_clock, skipped_s = time.monotonic, 0.0
+
+    def clock():
+        nonlocal skipped_s
+        if marker.exists():
+            marker.unlink()
+            skipped_s += 1000.0
+        return real_clock() + skipped_s
+
+    monkeypatch.setattr(time, "monotonic", clock)
     jobs = short_jobs(1, planners=["run_planners:Hangs", ""])
-    records = run_jobs(jobs, tmp_path, workers=1, time_limit_s=20.0)
+    records = run_jobs(jobs, tmp_path / "run", workers=1, time_limit_s=900.0)
     assert [record.error for record in records] == [
-        "TimeLimit: ended after the time limit of 20 s",
-        "TimeLimit: ended after the time limit of 20 s",
+        "TimeLimit: ended after the time limit of 900 s",
+        "TimeLimit: ended after the time limit of 900 s",
         "",
         "",
     ]
     assert records[2:] == read_records(serial / "episodes.csv")[:2]
     with pytest.raises(SimError, match="not on a cluster"):
-        run_jobs(jobs, tmp_path / "other", time_limit_s=20.0, scheduler="local")
+        run_jobs(jobs, tmp_path / "other", time_limit_s=900.0, scheduler="local")
 
 
-def test_a_job_that_is_none_is_a_row_too():
+def test_an_invalid_job_gives_a_row_with_an_error():
     job = Job("nonsense: [", 3, "p", "also: nonsense")
     record = run_episode(job)
     assert record.seed == 3
@@ -107,25 +118,29 @@ def test_a_job_that_is_none_is_a_row_too():
 
 
 @pytest.mark.parametrize("tail", ["", "short,2,bli", "short,2,blind,SamplingPlanner,truth,true"])
-def test_a_run_that_was_cut_off_goes_on(tail, serial, tmp_path):
+def test_an_interrupted_run_is_resumed(tail, serial, tmp_path):
     lines = table(serial).decode().splitlines(keepends=True)
     for name in ("jobs.jsonl", "run.json"):
         (tmp_path / name).write_bytes((serial / name).read_bytes())
     about = json.loads((tmp_path / "run.json").read_text())
     (tmp_path / "run.json").write_text(json.dumps({**about, "state": "running"}))
-    # As they ended, not in their order.
+    # Rows in the order in which the episodes ended.
     (tmp_path / "episodes.csv").write_text("".join([lines[0], lines[5], lines[2], lines[1]]) + tail)
     records = run_jobs(short_jobs(4), tmp_path, workers=1, resume=True)
     assert table(tmp_path) == table(serial)
     assert records == read_records(serial / "episodes.csv")
 
 
-def test_resuming_a_complete_run_runs_nothing(serial, tmp_path, monkeypatch):
-    for name in ("jobs.jsonl", "run.json", "episodes.csv"):
-        (tmp_path / name).write_bytes((serial / name).read_bytes())
-    monkeypatch.setattr("sim_tests.study.runs._pool.attempt", None)
-    run_jobs(short_jobs(4), tmp_path, workers=1, resume=True)
-    assert table(tmp_path) == table(serial)
+def test_resuming_a_complete_run_runs_nothing(tmp_path, monkeypatch):
+    marker, folder = tmp_path / "ran", tmp_path / "run"
+    monkeypatch.setenv(run_planners.MARKER, str(marker))
+    jobs = short_jobs(1, planners=["run_planners:Leaves"])
+    records = run_jobs(jobs, folder, workers=1)
+    before = table(folder)
+    marker.unlink()
+    assert run_jobs(jobs, folder, workers=1, resume=True) == records
+    assert table(folder) == before
+    assert not marker.exists()
 
 
 @pytest.mark.parametrize(
@@ -153,17 +168,17 @@ def test_another_version_is_not_resumed(serial, tmp_path):
         run_jobs(short_jobs(4), tmp_path, workers=1, resume=True)
 
 
-def test_an_unfinished_run_is_not_overwritten_unless_told(serial, tmp_path):
+def test_an_unfinished_run_is_only_overwritten_on_request(serial, tmp_path):
     lines = table(serial).decode().splitlines(keepends=True)
     (tmp_path / "run.json").write_text(json.dumps({"state": "running", "episodes": 8}))
     (tmp_path / "episodes.csv").write_text("".join(lines[:3]))
     with pytest.raises(SimError, match="2 of 8 episodes done: go on with --resume"):
         run_jobs(short_jobs(1), tmp_path, workers=1)
     assert table(tmp_path).decode() == "".join(lines[:3])
-    assert len(run_jobs(short_jobs(1), tmp_path, workers=1, afresh=True)) == 2
+    assert len(run_jobs(short_jobs(1), tmp_path, workers=1, overwrite=True)) == 2
 
 
-def test_folders_and_numbers_that_cannot_be_used_are_refused(tmp_path):
+def test_unusable_folders_and_numbers_are_refused(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(SimError, match="cannot run into"):
         run_jobs(short_jobs(1), tmp_path / "file", workers=1)
@@ -182,34 +197,33 @@ sys.path.insert(0, {here!r})
 from run_scenes import short_jobs
 from sim_tests.study.runs import run_jobs
 if __name__ == "__main__":
-    run_jobs(short_jobs(20), {out!r}, workers=2, resume={resume!r})
+    run_jobs(short_jobs(4, planners=["run_planners:Sleeps"]), {out!r}, workers=2)
 """
 
 
-def test_a_run_killed_in_the_middle_goes_on_and_ends_the_same(tmp_path):
-    def script(resume):
-        return RUN.format(here=str(HERE), out=str(tmp_path / "killed"), resume=resume)
-
+def test_a_killed_run_is_resumed_and_ends_with_the_same_table(tmp_path):
+    jobs = short_jobs(4, planners=["run_planners:Sleeps"])
     program = tmp_path / "run.py"
-    program.write_text(script(False))
+    program.write_text(RUN.format(here=str(HERE), out=str(tmp_path / "killed")))
     path = tmp_path / "killed" / "episodes.csv"
-    with subprocess.Popen([sys.executable, program], start_new_session=True) as process:
-        while not path.exists() or path.read_bytes().count(b"\n") < 4:
+    command, slowly = [sys.executable, program], {**os.environ, run_planners.SLEEP_S: "0.1"}
+    with subprocess.Popen(command, env=slowly, start_new_session=True) as process:
+        while not path.exists() or path.read_bytes().count(b"\n") < 3:
             assert process.poll() is None
             time.sleep(0.01)
-        # A second run into the same folder is refused meanwhile.
+        # A second run into the same folder is refused.
         with pytest.raises(SimError, match="another process is running"):
-            run_jobs(short_jobs(20), path.parent, workers=1, resume=True)
+            run_jobs(jobs, path.parent, workers=1, resume=True)
         os.kill(process.pid, signal.SIGKILL)
     done = path.read_bytes().count(b"\n") - 1
-    assert done < 40
+    assert 0 < done < len(jobs)
     deadline = time.monotonic() + 60.0
     while _group_lives(process.pid) and time.monotonic() < deadline:
         time.sleep(0.05)
     assert not _group_lives(process.pid), "workers outlive the run"
-    run_jobs(short_jobs(20), path.parent, workers=1, resume=True)
+    run_jobs(jobs, path.parent, workers=1, resume=True)
     whole = tmp_path / "whole"
-    run_jobs(short_jobs(20), whole, workers=1)
+    run_jobs(jobs, whole, workers=1)
     assert path.read_bytes() == table(whole)
 
 

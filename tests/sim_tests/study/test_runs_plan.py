@@ -1,4 +1,4 @@
-"""What is run: every combination, on the same seeds, each told from every other."""
+"""The plan of a run: every combination once, on the same seeds, with a unique key."""
 
 import numpy as np
 import pytest
@@ -6,11 +6,19 @@ from run_scenes import short, short_jobs
 
 from nav_adapter import AwarenessPolicy, NavError
 from sim_tests import SimError
+from sim_tests.crossing.eyes import ORACLE
 from sim_tests.crossing.faults import Fault
 from sim_tests.crossing.planner import SamplingPlanner
 from sim_tests.scenario import ScenarioTemplate
-from sim_tests.study.runs import job_key, make_planner, plan_jobs, run_episode
-from sim_tests.study.runs._plan import ORACLE, fault_of, policy_of, template_of
+from sim_tests.study.runs import (
+    fault_of,
+    job_key,
+    make_planner,
+    plan_jobs,
+    policy_of,
+    run_episode,
+    template_of,
+)
 
 
 def test_every_combination_is_planned_once_and_seeds_are_paired():
@@ -35,7 +43,7 @@ def test_every_combination_is_planned_once_and_seeds_are_paired():
     assert {key.planner for key in keys} == {"SamplingPlanner", "Slow"}
 
 
-def test_a_job_holds_all_that_it_needs():
+def test_a_job_holds_scenario_policy_and_fault():
     (job,) = plan_jobs(["crossing_attentive"], ["blind"], [0], faults=["frozen_camera"])
     assert template_of(job.scenario) == ScenarioTemplate.shipped("crossing_attentive")
     assert policy_of(job.policy) == AwarenessPolicy.preset("blind")
@@ -68,7 +76,7 @@ def test_all_scenarios_are_those_that_need_a_planner():
         ({"planners": ["run_planners:NoPlan"]}, "NoPlan, which has no method plan"),
     ],
 )
-def test_what_cannot_be_run_is_refused_before_anything_runs(options, message):
+def test_unusable_arguments_are_refused_before_anything_runs(options, message):
     with pytest.raises(SimError, match=message):
         plan_jobs([short()], ["blind"], [0], **options)
 
@@ -84,7 +92,7 @@ def test_seeds_policies_and_scenarios_are_checked():
         plan_jobs([short(), short()], ["blind"], [0])
 
 
-def test_planners_are_made_with_what_they_ask_for():
+def test_planners_are_made_with_the_arguments_they_take():
     scenario = short().median()
     assert make_planner("", scenario) is None
     boxes = scenario.layout.obstacle_boxes_odom
@@ -94,7 +102,7 @@ def test_planners_are_made_with_what_they_ask_for():
     assert isinstance(reference, SamplingPlanner)
 
 
-def test_the_reference_planner_named_as_ones_own_drives_the_same():
+def test_the_reference_planner_given_by_its_name_drives_the_same():
     (plain,) = short_jobs(1)[:1]
     (named,) = short_jobs(1, planners=["sim_tests.crossing.planner:SamplingPlanner"])[:1]
     assert run_episode(named) == run_episode(plain)
@@ -111,7 +119,7 @@ def test_the_reference_planner_named_as_ones_own_drives_the_same():
         ),
     ],
 )
-def test_planners_that_others_wrote_can_be_named(package, planner):
+def test_planners_of_other_libraries_can_be_used(package, planner):
     pytest.importorskip(package)
     record = run_episode(short_jobs(1, planners=[planner])[0])
     assert record.error == ""
@@ -119,11 +127,11 @@ def test_planners_that_others_wrote_can_be_named(package, planner):
     assert record.success
 
 
-def test_a_planner_that_draws_from_global_chance_is_repeated_by_its_seed():
-    first, *_, other = short_jobs(2, planners=["run_planners:Chancy"])
+def test_a_planner_that_uses_the_global_generators_repeats_with_its_seed():
+    first, *_, other = short_jobs(2, planners=["run_planners:UsesGlobalRandom"])
     np.random.seed(1)  # noqa: NPY002
     record = run_episode(first)
     expected = np.random.RandomState(1).random()
-    assert np.random.random() == expected  # noqa: NPY002 - and ours is as it was
+    assert np.random.random() == expected  # noqa: NPY002 - the global generator is unchanged
     assert run_episode(first) == record
     assert run_episode(other).path_length_m != record.path_length_m

@@ -1,4 +1,4 @@
-"""An episode of a run again: the same row, said so; pictures of it."""
+"""Replays: an episode again, with its pictures, and whether its row is the same."""
 
 import pytest
 from run_scenes import short_jobs
@@ -14,7 +14,7 @@ def run(tmp_path_factory):
     return folder
 
 
-def test_a_replay_gives_the_same_row_a_film_and_a_map(run, tmp_path, capsys):
+def test_a_replay_gives_the_same_row_a_video_and_a_map(run, tmp_path, capsys):
     assert main(["replay", str(run), "1", "--out", str(tmp_path)]) == 0
     text = capsys.readouterr().out
     assert "Episode 1: short, seed 0, policy balanced" in text
@@ -23,7 +23,7 @@ def test_a_replay_gives_the_same_row_a_film_and_a_map(run, tmp_path, capsys):
     assert b"ftyp" in (tmp_path / "episode_00001.mp4").read_bytes()[:16]
 
 
-def test_a_replay_that_ends_otherwise_says_in_what(run, tmp_path, capsys):
+def test_a_replay_with_another_row_names_the_difference(run, tmp_path, capsys):
     copy = tmp_path / "copy"
     copy.mkdir()
     rows = (run / "episodes.csv").read_text().replace(",true,false,,", ",false,false,,")
@@ -43,12 +43,12 @@ def test_a_replay_that_ends_otherwise_says_in_what(run, tmp_path, capsys):
         ("short:0:blind", "is 2 episodes of the run, give one's number: 0: short, seed 0"),
     ],
 )
-def test_episodes_that_are_not_there_are_refused(run, episode, message, capsys):
+def test_unknown_episodes_are_refused(run, episode, message, capsys):
     assert main(["replay", str(run), episode, "--no-video"]) == 2
     assert message in capsys.readouterr().err
 
 
-def test_folders_that_hold_no_run_are_refused(tmp_path, capsys):
+def test_folders_without_a_run_are_refused(tmp_path, capsys):
     assert main(["replay", str(tmp_path), "0"]) == 2
     assert "is not the folder of a run" in capsys.readouterr().err
     (tmp_path / "jobs.jsonl").write_text('{"scenario": "x"}\n')

@@ -11,7 +11,7 @@ from run_scenes import SHORT
 
 from sim_tests import SimError
 from sim_tests.study.measures import EpisodeRecord
-from sim_tests.study.suite._thresholds import EpisodeThresholds, Thresholds
+from sim_tests.study.suite import EpisodeThresholds, Thresholds
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]

@@ -1,4 +1,4 @@
-"""The picture of a tuning: every trial, the front, the presets, and what decided."""
+"""The plot of a tuning: trials, front, presets, and the importances of the parameters."""
 
 from __future__ import annotations
 
@@ -11,11 +11,10 @@ import numpy as np
 from awarenav.figures import new_figure, save_figure
 
 from ._evaluation import OBJECTIVES
+from ._tune import Tuning
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from ._tune import Tuning
 
 _TRIAL: Final = "#9aa3ad"
 _FRONT: Final = "#1f5fa8"
@@ -30,14 +29,14 @@ def draw_tuning(tuning: Tuning, importance: Mapping[str, Mapping[str, float]], p
     """Draw trials, front, presets and chosen policies, and the importances beside them."""
     figure = new_figure(12.0, 6.0)
     grid = figure.add_gridspec(2, 2, width_ratios=(1.7, 1.0))
-    _front(figure.add_subplot(grid[:, 0]), tuning)
+    _draw_front(figure.add_subplot(grid[:, 0]), tuning)
     for row, name in enumerate(OBJECTIVES):
-        _bars(figure.add_subplot(grid[row, 1]), name, importance[name])
+        _draw_importances(figure.add_subplot(grid[row, 1]), name, importance[name])
     save_figure(figure, path)
 
 
-def _front(axes: Axes, tuning: Tuning) -> None:
-    judged = [trial for trial in tuning.trials if trial.values is not None]
+def _draw_front(axes: Axes, tuning: Tuning) -> None:
+    evaluated = [trial for trial in tuning.trials if trial.values is not None]
     for touched, colour, marker, label in (
         (False, _TRIAL, "o", "trial"),
         (True, _CONTACT, "x", "trial with a contact caused by the robot"),
@@ -45,7 +44,7 @@ def _front(axes: Axes, tuning: Tuning) -> None:
         points = np.array(
             [
                 trial.values
-                for trial in judged
+                for trial in evaluated
                 if any(value > 0.0 for value in trial.constraints.values()) == touched
             ]
         )
@@ -70,7 +69,7 @@ def _front(axes: Axes, tuning: Tuning) -> None:
     for chosen in tuning.chosen:
         places.setdefault(chosen.tuning.objectives, []).append(chosen.name.replace("_", " "))
     for row, ((x, y), names) in enumerate(sorted(places.items())):
-        below = row % 2 == 0  # neighbours' names do not cover each other
+        below = row % 2 == 0  # so that the names of neighbours do not overlap
         axes.scatter([x], [y], marker="o", s=120, facecolors="none", edgecolors=_CHOSEN, lw=2)
         axes.annotate(
             ",\n".join(names),
@@ -94,7 +93,7 @@ def _front(axes: Axes, tuning: Tuning) -> None:
     axes.legend(loc="upper right", fontsize=8)
 
 
-def _bars(axes: Axes, objective: str, importance: Mapping[str, float]) -> None:
+def _draw_importances(axes: Axes, objective: str, importance: Mapping[str, float]) -> None:
     first = sorted(importance.items(), key=lambda each: -each[1])[:_BARS][::-1]
     names, values = [name for name, _ in first], [value for _, value in first]
     axes.barh(names, values, color=_FRONT)

@@ -1,9 +1,4 @@
-"""What a trial came to.
-
-The interval in which a parameter is searched.
-
-A search that proposes trials in generations and is told what they came to.
-"""
+"""An ask-and-tell optimizer that works in whole generations."""
 
 from __future__ import annotations
 
@@ -19,15 +14,19 @@ from tracking.config import StrictConfig
 from ..world.errors import SimError
 from ._optuna import optuna
 
+SamplerName = Literal["tpe", "nsga2", "cmaes"]
+#: Values of parameters by name.
+ParameterValues = dict[str, float]
+
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What a trial came to.
+    """The result of a trial.
 
     Attributes:
-        values: the objectives, smaller is better; None for a trial that could not be judged.
-        constraints: by name; kept where at most 0.
-        notes: figures to keep beside the trial, plain JSON values.
+        values: objectives, smaller is better; None for a trial without a result.
+        constraints: constraints by name; one is satisfied where it is ≤ 0.
+        notes: other figures of the trial, as plain JSON values.
     """
 
     values: tuple[float, ...] | None
@@ -36,12 +35,12 @@ class Outcome:
 
 
 class Range(StrictConfig):
-    """The interval in which a parameter is searched.
+    """The range in which a parameter is searched.
 
     Attributes:
         low: smallest value.
         high: largest value, above ``low``.
-        log: search in the logarithm.
+        log: search on a logarithmic scale.
     """
 
     error: ClassVar[type[ValueError]] = SimError
@@ -59,60 +58,56 @@ class Range(StrictConfig):
         return self
 
     def clipped(self, value: float) -> float:
-        """The value, or the nearer end."""
+        """Return the value, or the nearest end of the range."""
         return min(max(value, self.low), self.high)
 
 
-Method = Literal["tpe", "nsga2", "cmaes"]
-Parameters = dict[str, float]
+class Optimizer:
+    """An ask-and-tell optimizer whose proposals depend only on its arguments and on the outcomes.
 
-
-class Search:
-    """Proposes trials in generations: a pure function of its arguments and of what it was told.
-
-    Optuna's samplers look at every trial that is finished when they are asked, so that what they
-    propose depends on who was faster. Here a sampler sees whole generations only: all trials of one
-    are proposed before any of them is told, and all are told, in order, before the next. Any number
-    of processes that go through the same outcomes therefore propose the same trials, and a search
-    is resumed by going through them again.
+    Optuna's samplers use every trial that is finished when they are asked, so that their proposals
+    depend on the order in which processes finish. This class shows a sampler whole generations
+    only: it asks for all trials of a generation before it tells any of them, and tells all of them
+    in order before it asks for the next. Processes that tell the same outcomes therefore propose
+    the same trials, and a search is resumed by telling its outcomes again.
 
     Args:
-        method: ``"tpe"`` (Watanabe 2023, several objectives, multivariate), ``"nsga2"`` (Deb et
-            al. 2002), or ``"cmaes"`` (Hansen 2016, one objective; the first generation is random).
-        space: where to search.
-        generation: trials a generation, at least 2.
-        seed: of the sampler.
-        objectives: how many.
-        first: parameters of the first trials, clipped to the space; at most a generation of them.
-        start: where CMA-ES starts; default the middle.
-        spread: CMA-ES's first standard deviation, as a share of each range.
+        sampler: ``"tpe"`` (Watanabe 2023; several objectives, multivariate), ``"nsga2"`` (Deb et
+            al. 2002), or ``"cmaes"`` (Hansen 2016; one objective, the first generation is random).
+        space: range of each parameter.
+        generation: trials per generation, at least 2.
+        seed: seed of the sampler.
+        objectives: number of objectives.
+        initial: values of the first trials, clipped to the space; at most one generation.
+        start: initial mean of CMA-ES; default the middle of the space.
+        spread: initial standard deviation of CMA-ES, as a share of each range.
 
     Raises:
-        SimError: for numbers that do not go together.
+        SimError: arguments that do not fit together.
     """
 
     def __init__(
         self,
-        method: Method,
+        sampler: SamplerName,
         space: Mapping[str, Range],
         *,
         generation: int,
         seed: int,
         objectives: int = 1,
-        first: Sequence[Mapping[str, float]] = (),
+        initial: Sequence[Mapping[str, float]] = (),
         start: Mapping[str, float] | None = None,
         spread: float = 0.2,
     ) -> None:
         if not space:
             raise SimError("nothing to search: there is no parameter with a range")
-        if generation < 2 or len(first) > generation:
+        if generation < 2 or len(initial) > generation:
             raise SimError(
-                "a generation must hold at least 2 trials and all that are given, got "
-                f"{generation} and {len(first)} given"
+                "a generation must hold at least 2 trials and all initial ones, got a generation "
+                f"of {generation} and {len(initial)} initial trials"
             )
-        if method == "cmaes" and objectives != 1:
+        if sampler == "cmaes" and objectives != 1:
             raise SimError(f"cmaes searches for one objective, got {objectives}")
-        self._method = method
+        self._sampler = sampler
         self.space = dict(space)
         self.generation = generation
         self.objectives = objectives
@@ -123,37 +118,37 @@ class Search:
         clipped = None if start is None else self._clipped(start)
         self._study = optuna.create_study(
             directions=["minimize"] * objectives,
-            sampler=_sampler(method, generation, seed, clipped, spread),
+            sampler=_make_sampler(sampler, generation, seed, clipped, spread),
         )
-        for parameters in first:
+        for parameters in initial:
             self._study.enqueue_trial(self._clipped(parameters))
         self._asked: list[optuna.trial.Trial] = []
-        self._proposed: tuple[Parameters, ...] = ()
+        self._proposals: tuple[ParameterValues, ...] = ()
 
     @property
     def distributions(self) -> dict[str, optuna.distributions.BaseDistribution]:
-        """The space in Optuna's terms."""
+        """The space as Optuna's distributions."""
         return dict(self._distributions)
 
-    def propose(self) -> tuple[Parameters, ...]:
-        """The trials of this generation; the same until they have been told."""
+    def ask(self) -> tuple[ParameterValues, ...]:
+        """Return the trials of this generation; the same until their outcomes are told."""
         if not self._asked:
             with warnings.catch_warnings():
-                # Experimental arguments, and what a sampler does before it knows anything.
+                # Optuna warns of experimental arguments, and of random sampling at the start.
                 warnings.simplefilter("ignore")
                 self._asked = [self._study.ask(self._distributions) for _ in range(self.generation)]
-            self._proposed = tuple(dict(trial.params) for trial in self._asked)
-        return self._proposed
+            self._proposals = tuple(dict(trial.params) for trial in self._asked)
+        return self._proposals
 
     def tell(self, outcomes: Sequence[Outcome]) -> None:
-        """What the trials of this generation came to, in order.
+        """Tell the outcomes of this generation, in the order of its trials.
 
         Raises:
-            SimError: for another number of outcomes than of trials, and for constraints, which
-                CMA-ES knows nothing of.
+            SimError: another number of outcomes than of trials, or constraints with CMA-ES, which
+                does not support them.
         """
-        if self._method == "cmaes" and any(outcome.constraints for outcome in outcomes):
-            raise SimError("cmaes knows no constraints; put them into the objective")
+        if self._sampler == "cmaes" and any(outcome.constraints for outcome in outcomes):
+            raise SimError("cmaes supports no constraints; put them into the objective")
         trials, self._asked = self._asked, []
         if len(outcomes) != len(trials):
             raise SimError(f"{len(trials)} trials were proposed, got {len(outcomes)} outcomes")
@@ -165,23 +160,23 @@ class Search:
             else:
                 self._study.tell(trial, list(outcome.values))
 
-    def _clipped(self, parameters: Mapping[str, float]) -> Parameters:
+    def _clipped(self, parameters: Mapping[str, float]) -> ParameterValues:
         unknown = sorted(set(parameters) ^ set(self.space))
         if unknown:
             raise SimError(f"parameters must be those of the space; differing: {unknown}")
         return {name: each.clipped(parameters[name]) for name, each in self.space.items()}
 
 
-def _sampler(
-    method: Method, generation: int, seed: int, start: Parameters | None, spread: float
+def _make_sampler(
+    name: SamplerName, generation: int, seed: int, start: ParameterValues | None, spread: float
 ) -> optuna.samplers.BaseSampler:
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of arguments that Optuna calls experimental
-        if method == "tpe":
+        warnings.simplefilter("ignore")  # Optuna warns of experimental arguments
+        if name == "tpe":
             return optuna.samplers.TPESampler(
                 seed=seed, multivariate=True, n_startup_trials=max(generation, 10)
             )
-        if method == "nsga2":
+        if name == "nsga2":
             return optuna.samplers.NSGAIISampler(seed=seed, population_size=generation)
         return optuna.samplers.CmaEsSampler(
             seed=seed,

@@ -1,4 +1,4 @@
-"""What may be changed about a scripted worker; scripts as mappings, the YAML of WorkerScript."""
+"""Parameters of a scripted worker; the script is a mapping, the YAML of ``WorkerScript``."""
 
 from __future__ import annotations
 
@@ -11,38 +11,40 @@ from scipy.interpolate import PchipInterpolator
 
 from perception.arrays import FloatArray
 
-from ._person_levers import FASTEST_WALK_MPS
-from ._way import Lever, bent
+from ._person_parameters import FASTEST_WALK_MPS
+from ._variation import Parameter, bent_path
 
-#: Nobody speeds up, slows down or swerves harder, unless the script did.
-HARDEST_MPS2: Final = 3.0
+#: Largest acceleration of a worker, unless the script has a larger one.
+LARGEST_ACCELERATION_MPS2: Final = 3.0
 _ASIDE_M: Final = 0.8
 _SHORTEST_PAUSE_S: Final = 0.15
-_CHANGE_S: Final = 0.6  # what hands need from one activity to the next
+# Least time between two activities of the hands.
+_CHANGE_S: Final = 0.6
+# Step at which speed and acceleration are sampled.
 _SAMPLE_S: Final = 0.02
 
 
-def script_levers(script: Mapping[str, Any]) -> dict[str, Lever]:
-    """The levers of a worker: start, pace, way, a pause and when the gaze turns."""
-    levers = {
-        "aside_first_m": Lever.of(-_ASIDE_M, _ASIDE_M, 0.0),
-        "aside_last_m": Lever.of(-_ASIDE_M, _ASIDE_M, 0.0),
+def script_parameters(script: Mapping[str, Any]) -> dict[str, Parameter]:
+    """Return the parameters of a worker: start, pace, path, a pause and the time of the gaze."""
+    parameters = {
+        "aside_first_m": Parameter.of(-_ASIDE_M, _ASIDE_M, 0.0),
+        "aside_last_m": Parameter.of(-_ASIDE_M, _ASIDE_M, 0.0),
     }
     if len(script["path"]) > 1:
-        levers |= {
-            "later_s": Lever.of(-4.0, 4.0, 0.0),
-            "pace": Lever.of(0.6, 1.6, 1.0),
-            "aside_middle_m": Lever.of(-_ASIDE_M, _ASIDE_M, 0.0),
-            "pause_at": Lever.of(0.05, 0.95, 0.5),
-            "pause_s": Lever.of(0.0, 3.0, 0.0),
+        parameters |= {
+            "later_s": Parameter.of(-4.0, 4.0, 0.0),
+            "pace": Parameter.of(0.6, 1.6, 1.0),
+            "aside_middle_m": Parameter.of(-_ASIDE_M, _ASIDE_M, 0.0),
+            "pause_at": Parameter.of(0.05, 0.95, 0.5),
+            "pause_s": Parameter.of(0.0, 3.0, 0.0),
         }
     if len(script["gaze"]) > 1:
-        levers["gaze_later_s"] = Lever.of(-3.0, 3.0, 0.0)
-    return levers
+        parameters["gaze_later_s"] = Parameter.of(-3.0, 3.0, 0.0)
+    return parameters
 
 
 def changed_script(script: Mapping[str, Any], values: Mapping[str, float]) -> dict[str, Any]:
-    """The script with the levers at these values; those that are not given stay."""
+    """Return the script with the given values; parameters without a value stay."""
     path = [[key["t_s"], key["x_m"], key["y_m"]] for key in script["path"]]
     begin, end = path[0][0], path[-1][0]
     pause_s = values.get("pause_s", 0.0)
@@ -60,7 +62,7 @@ def changed_script(script: Mapping[str, Any], values: Mapping[str, float]) -> di
         rows = rows[np.concatenate([[True], np.diff(rows[:, 0]) > 1e-6])]
     elif len(rows) == 2 and values.get("aside_middle_m", 0.0) != 0.0:
         rows = np.array([rows[0], rows.mean(axis=0), rows[1]])
-    points = bent(
+    points = bent_path(
         rows[:, 1:],
         values.get("aside_first_m", 0.0),
         values.get("aside_middle_m", 0.0),
@@ -74,14 +76,14 @@ def changed_script(script: Mapping[str, Any], values: Mapping[str, float]) -> di
     return {
         **script,
         "path": [{"t_s": float(t), "x_m": float(x), "y_m": float(y)} for t, x, y in keys],
-        "heading": _moved(script["heading"], when),
-        "gaze": _moved(script["gaze"], lambda t_s: when(t_s) + gaze_s),
-        "activities": _apart(_moved(script["activities"], when)),
+        "heading": _retimed(script["heading"], when),
+        "gaze": _retimed(script["gaze"], lambda t_s: when(t_s) + gaze_s),
+        "activities": _spaced(_retimed(script["activities"], when)),
     }
 
 
-def peaks(script: Mapping[str, Any]) -> tuple[float, float]:
-    """Highest speed (m/s) and acceleration (m/s²) of the scripted walk."""
+def peak_speed_and_acceleration(script: Mapping[str, Any]) -> tuple[float, float]:
+    """Return the highest speed (m/s) and acceleration (m/s²) of the scripted walk."""
     rows = np.array([[key["t_s"], key["x_m"], key["y_m"]] for key in script["path"]])
     if len(rows) < 2:
         return 0.0, 0.0
@@ -93,24 +95,24 @@ def peaks(script: Mapping[str, Any]) -> tuple[float, float]:
 
 
 def is_human(script: Mapping[str, Any], original: Mapping[str, Any]) -> bool:
-    """Whether a walk keeps to human limits, or to what the original asked for beyond them."""
-    speed, rate = peaks(script)
-    most_speed, most_rate = peaks(original)
+    """Return whether a walk keeps to human limits, or to higher ones of the original."""
+    speed, rate = peak_speed_and_acceleration(script)
+    most_speed, most_rate = peak_speed_and_acceleration(original)
     return speed <= max(most_speed, FASTEST_WALK_MPS) + 1e-6 and (
-        rate <= max(most_rate, HARDEST_MPS2) + 1e-6
+        rate <= max(most_rate, LARGEST_ACCELERATION_MPS2) + 1e-6
     )
 
 
-def script_way(script: Mapping[str, Any]) -> FloatArray:
-    """(N, 2) the waypoints."""
+def script_path(script: Mapping[str, Any]) -> FloatArray:
+    """Return the (N, 2) waypoints."""
     return np.array([[key["x_m"], key["y_m"]] for key in script["path"]], dtype=np.float64)
 
 
-def _moved(keys: Any, when: Callable[[float], float]) -> list[dict[str, Any]]:
+def _retimed(keys: Any, when: Callable[[float], float]) -> list[dict[str, Any]]:
     return [{**key, "t_s": float(when(key["t_s"]))} for key in keys]
 
 
-def _apart(keys: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def _spaced(keys: list[dict[str, Any]]) -> list[dict[str, Any]]:
     for before, key in itertools.pairwise(keys):
         key["t_s"] = max(key["t_s"], before["t_s"] + _CHANGE_S)
     return keys

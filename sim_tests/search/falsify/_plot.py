@@ -1,4 +1,4 @@
-"""The picture of a falsification: how the search went, and the worst cases from above."""
+"""The plot of a falsification: the course of the search, and the worst cases from above."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ import numpy as np
 from awarenav.figures import Circle, Polygon, Rectangle, new_figure, save_figure
 
 from ._falsify import Falsification
-from ._hunt import CONTACT, NOTHING
-from ._worst import WorstCase
+from ._restarted_search import CONTACT_SCORE, NO_MARGIN_SCORE
+from ._worst_cases import WorstCase
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,13 +29,13 @@ _ARROW_M: Final = 0.7
 def draw_falsification(
     falsification: Falsification, cases: Sequence[WorstCase], path: Path
 ) -> None:
-    """Draw the scores over the search, and up to three worst cases from above."""
+    """Draw the scores in the order of the search, and up to three worst cases from above."""
     figure = new_figure(13.0, 8.0)
     grid = figure.add_gridspec(2, _PANELS, height_ratios=(1.0, 1.2))
-    _course(figure.add_subplot(grid[0, :]), falsification)
+    _draw_course(figure.add_subplot(grid[0, :]), falsification)
     for column, case in enumerate(cases[:_PANELS]):
         axes = figure.add_subplot(grid[1, column])
-        _plan(axes, case)
+        _draw_plan(axes, case)
         if column == 0:
             axes.plot([], [], color=_ROBOT, label="robot")
             axes.plot([], [], color=_PERSON, label="person, gaze red")
@@ -43,20 +43,25 @@ def draw_falsification(
     save_figure(figure, path)
 
 
-def _course(axes: Axes, falsification: Falsification) -> None:
+def _draw_course(axes: Axes, falsification: Falsification) -> None:
     colours = [f"C{number}" for number in range(10)]
-    at = 0
+    next_place = 0
     names = list(falsification.spaces)
     for number, name in enumerate(names):
-        scores = np.array([find.score for find in falsification.finds if find.scenario == name])
-        places = at + np.arange(len(scores))
-        at += len(scores)
+        scores = np.array([trial.score for trial in falsification.trials if trial.scenario == name])
+        places = next_place + np.arange(len(scores))
+        next_place += len(scores)
         colour = colours[number % len(colours)]
-        near = (scores < NOTHING) & (scores > CONTACT)
-        axes.scatter(places[near], scores[near], s=6, color=colour, alpha=0.6)
-        touched = scores <= CONTACT
-        if near.any():
-            axes.plot(places[near], np.minimum.accumulate(scores[near]), color=colour, lw=1.4)
+        with_margin = (scores < NO_MARGIN_SCORE) & (scores > CONTACT_SCORE)
+        axes.scatter(places[with_margin], scores[with_margin], s=6, color=colour, alpha=0.6)
+        touched = scores <= CONTACT_SCORE
+        if with_margin.any():
+            axes.plot(
+                places[with_margin],
+                np.minimum.accumulate(scores[with_margin]),
+                color=colour,
+                lw=1.4,
+            )
         axes.scatter(
             places[touched],
             np.full(int(touched.sum()), axes.get_ylim()[0]),
@@ -65,7 +70,7 @@ def _course(axes: Axes, falsification: Falsification) -> None:
         )
         axes.annotate(
             name.replace("_", " "),
-            (places.mean() if len(places) else at, 1.0),
+            (places.mean() if len(places) else next_place, 1.0),
             xycoords=("data", "axes fraction"),
             xytext=(0, -4),
             textcoords="offset points",
@@ -79,7 +84,7 @@ def _course(axes: Axes, falsification: Falsification) -> None:
     settings = falsification.settings
     label = " with its floor taken away (UNSAFE)" if settings.unsafe_no_floor else ""
     axes.set_title(
-        f"{len(falsification.finds)} episodes against {settings.policy_name}{label}: "
+        f"{len(falsification.trials)} episodes against {settings.policy_name}{label}: "
         f"{falsification.contacts} with a contact that the robot caused (crosses)",
         loc="left",
         fontsize=10,
@@ -90,7 +95,7 @@ def _course(axes: Axes, falsification: Falsification) -> None:
     axes.grid(alpha=0.25)
 
 
-def _plan(axes: Axes, case: WorstCase) -> None:
+def _draw_plan(axes: Axes, case: WorstCase) -> None:
     frames = case.result.frames
     margins = [
         min(frame.margins_m, default=math.inf)
@@ -138,7 +143,7 @@ def _plan(axes: Axes, case: WorstCase) -> None:
     if case.result.contacts:
         speed_mps = case.result.contacts[0].robot_speed_mps
     axes.set_title(
-        f"{case.path.stem}: {case.find.scenario.replace('_', ' ')}\nmargin {margin}"
+        f"{case.path.stem}: {case.trial.scenario.replace('_', ' ')}\nmargin {margin}"
         f"{touched}, at {frame.t_s:.1f} s, robot {speed_mps:.2f} m/s",
         fontsize=9,
         loc="left",

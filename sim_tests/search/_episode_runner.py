@@ -1,0 +1,48 @@
+"""The episodes of a search, run by the same processes from its beginning to its end."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
+
+from tqdm import tqdm
+
+from ..study.measures import EpisodeRecord
+from ..study.runs import Job, WorkerPool, run_here
+
+
+class EpisodeRunner(AbstractContextManager["EpisodeRunner"]):
+    """Runs batches of episodes; the records come in the order of the jobs.
+
+    Args:
+        workers: number of processes; 1 runs everything in this process.
+        label: label of the progress bar.
+        total: number of episodes, if known.
+
+    Attributes:
+        bar: the progress bar on standard error, which counts episodes.
+    """
+
+    def __init__(self, workers: int, label: str, total: int | None = None) -> None:
+        self._pool = WorkerPool(workers) if workers > 1 else None
+        self.bar = tqdm(desc=label, total=total, unit="episode", smoothing=0.05, file=sys.stderr)
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the processes and the progress bar."""
+        if self._pool is not None:
+            self._pool.close()
+        self.bar.close()
+
+    def run(self, jobs: Sequence[Job]) -> tuple[EpisodeRecord, ...]:
+        """Run the jobs; ``error`` of a record says why an episode failed."""
+        numbered = list(enumerate(jobs))
+        records: dict[int, EpisodeRecord] = {}
+        results = run_here(numbered) if self._pool is None else self._pool.run(numbered)
+        for number, result in results:
+            records[number] = result.record
+            self.bar.update()
+        return tuple(records[number] for number, _ in numbered)

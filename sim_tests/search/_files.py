@@ -1,0 +1,121 @@
+"""The files of a search: its settings, which a resumed search must repeat, and its tables."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from awarenav.policies import read_policy
+
+from ..scenario import ScenarioTemplate
+from ..study.runs import named_templates, policy_text
+from ..world.errors import SimError
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+
+def common_settings(policy: str, scenarios: Sequence[str], camera: str) -> dict[str, Any]:
+    """Return the settings that tuning and falsification share, as plain values.
+
+    Args:
+        policy: name of a preset, or a YAML file.
+        scenarios: shipped names, YAML files, or ``"all"``.
+        camera: as for :meth:`ScenarioTemplate.with_camera`.
+
+    Returns:
+        ``policy_name``, and ``policy`` and ``scenarios`` as YAML.
+
+    Raises:
+        SimError: an unknown scenario or camera.
+        NavError: an unusable policy.
+    """
+    return {
+        "policy_name": Path(policy).stem,
+        "policy": policy_text(read_policy(policy)),
+        "scenarios": tuple(each.to_text() for each in named_templates(scenarios, camera)),
+    }
+
+
+def templates_of(scenarios: Iterable[str]) -> tuple[ScenarioTemplate, ...]:
+    """Return the scenarios of settings, which hold them as YAML."""
+    return tuple(ScenarioTemplate.from_text(text) for text in scenarios)
+
+
+def write_or_check_settings(
+    settings: DataclassInstance,
+    folder: Path,
+    file: str,
+    search: str,
+    *,
+    resume: bool,
+    may_grow: Sequence[str] = (),
+) -> None:
+    """Write the settings of a new search, or check that a resumed search has the same.
+
+    Args:
+        settings: a dataclass of plain values.
+        folder: made when missing.
+        file: name of the file.
+        search: name of the search in messages: ``"tuning"`` or ``"falsification"``.
+        resume: continue the search in the folder.
+        may_grow: fields that may be larger than in the file.
+
+    Raises:
+        SimError: the folder holds a search and ``resume`` is False, it holds none and ``resume`` is
+            True, or the settings differ.
+    """
+    path = folder / file
+    if path.exists():
+        if not resume:
+            raise SimError(
+                f"{folder} already holds a {search}; give --resume to go on with it, or another "
+                "--out"
+            )
+        _compare(path, json.loads(json.dumps(asdict(settings))), may_grow)
+    elif resume:
+        raise SimError(f"--resume: there is no {search} in {folder}, no {file}")
+    part = path.with_name(f"{path.name}.{os.getpid()}.part")  # several processes may write it
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        part.write_text(json.dumps(asdict(settings), indent=1) + "\n", encoding="utf-8")
+        part.replace(path)
+    except OSError as cause:
+        raise SimError(f"cannot write {path}: {cause.strerror or cause}") from cause
+
+
+def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """Write a CSV file that appears whole or not at all."""
+    part = path.with_name(path.name + ".part")
+    with part.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header)
+        writer.writerows(rows)
+    part.replace(path)
+
+
+def _compare(path: Path, now: dict[str, Any], may_grow: Sequence[str]) -> None:
+    """Raise SimError for the first setting that differs from the file."""
+    try:
+        before = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as cause:
+        raise SimError(f"cannot read {path}: {cause}") from cause
+    for name, value in now.items():
+        was = before.get(name)
+        if value == was or (name in may_grow and was is not None and value > was):
+            continue
+        more = " or more" if name in may_grow else ""
+        raise SimError(
+            f"{path.parent} was begun with another {name}: {_short(was)}, now {_short(value)}; "
+            f"give the same{more} again, or another --out"
+        )
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."

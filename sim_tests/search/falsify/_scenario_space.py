@@ -1,0 +1,142 @@
+"""The search space of a falsification: variations of one scenario."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+import numpy as np
+from pydantic import ValidationError
+
+from ...scenario import Choice, Distribution, Integers, Scenario, ScenarioTemplate
+from ...world.errors import SimError
+from .._optimizer import Range
+from ._person_parameters import changed_person, person_parameters, person_path
+from ._script_parameters import changed_script, is_human, script_parameters, script_path
+from ._variation import RACK_CLEARANCE_M, ROBOT_CLEARANCE_M, Parameter, clearance_m
+
+# An impossible variation is drawn back to a share of its distance from the scenario as written.
+_SHARES: Final = (1.0, 0.75, 0.5, 0.25, 0.0)
+# Searched by quantile, because nothing exists between their values.
+_DISCRETE: Final = (Choice, Integers)
+# Parameters of each kind of person, by its key in the scenario.
+_PARAMETERS: Final = {"workers": script_parameters, "people": person_parameters}
+
+
+class ScenarioSpace:
+    """The variations of a scenario that humans could act out.
+
+    A variation changes the scenario's own distributions and the parameters of its first people
+    (:func:`person_parameters`, :func:`script_parameters`). A variation that leads through a rack,
+    begins at the robot or exceeds human speed or acceleration is drawn back towards the scenario as
+    written, as far as needed. Every point of the space is therefore a scenario.
+
+    Args:
+        template: the scenario.
+        people: number of people that are varied, in the stage's order.
+
+    Raises:
+        SimError: a scenario without people.
+    """
+
+    def __init__(self, template: ScenarioTemplate, people: int = 2) -> None:
+        self.template = template
+        median = template.median()
+        self._median: dict[str, Any] = median.model_dump(mode="json")
+        self._boxes = median.layout.obstacle_boxes_odom
+        everybody = [(kind, row) for kind in _PARAMETERS for row in range(len(self._median[kind]))]
+        varied = everybody[:people]
+        if not varied:
+            raise SimError(f"scenario {template.name!r} has no people to vary")
+        self._varied_people = varied
+        self._distributions = template.parameters()
+        self.parameters: dict[str, Parameter] = {}
+        for kind, row in varied:
+            for name, parameter in _PARAMETERS[kind](self._median[kind][row]).items():
+                self.parameters[f"{kind}.{row}.{name}"] = parameter
+        for path, distribution in self._distributions.items():
+            if path not in self.parameters:
+                self.parameters[path] = _distribution_parameter(distribution)
+
+    @property
+    def ranges(self) -> dict[str, Range]:
+        """Ranges of the parameters."""
+        return {name: each.range for name, each in self.parameters.items()}
+
+    @property
+    def neutral(self) -> dict[str, float]:
+        """Values of the parameters in the scenario as written."""
+        return {name: each.neutral for name, each in self.parameters.items()}
+
+    def scenario(self, values: Mapping[str, float]) -> Scenario:
+        """Return the possible variation nearest to these values; its name is the template's."""
+        for share in _SHARES:
+            data = self._varied(
+                {
+                    name: each.neutral + share * (values[name] - each.neutral)
+                    for name, each in self.parameters.items()
+                }
+            )
+            if share == 0.0 or self._is_possible(data):
+                try:
+                    return Scenario.model_validate(data)
+                except ValidationError as cause:
+                    if share == 0.0:
+                        raise SimError(f"scenario {self.template.name!r}: {cause}") from cause
+        raise AssertionError  # pragma: no cover - the last share always returns or raises
+
+    def _varied(self, values: Mapping[str, float]) -> dict[str, Any]:
+        drawn = {
+            path: _distribution_value(each, values[path])
+            for path, each in self._distributions.items()
+        }
+        data: dict[str, Any] = self.template.with_values(drawn).model_dump(mode="json")
+        data["start_jitter_s"] = 0.0
+        for kind, row in self._varied_people:
+            prefix = f"{kind}.{row}."
+            own_values = {
+                name.removeprefix(prefix): value
+                for name, value in values.items()
+                if name.startswith(prefix)
+            }
+            change = changed_script if kind == "workers" else changed_person
+            data[kind][row] = change(data[kind][row], own_values)
+        return data
+
+    def _is_possible(self, data: Mapping[str, Any]) -> bool:
+        robot = np.array([data["robot"]["start_x_m"], data["robot"]["start_y_m"]])
+        for kind, row in self._varied_people:
+            changed, original = data[kind][row], self._median[kind][row]
+            path_of = script_path if kind == "workers" else person_path
+            path, original_path = path_of(changed), path_of(original)
+            for limit_m, distance_m, original_m in (
+                (
+                    RACK_CLEARANCE_M,
+                    clearance_m(path, self._boxes),
+                    clearance_m(original_path, self._boxes),
+                ),
+                (
+                    ROBOT_CLEARANCE_M,
+                    float(np.linalg.norm(path[0] - robot)),
+                    float(np.linalg.norm(original_path[0] - robot)),
+                ),
+            ):
+                if distance_m < min(limit_m, original_m) - 1e-9:
+                    return False
+            if kind == "workers" and not is_human(changed, original):
+                return False
+        return True
+
+
+def _distribution_parameter(distribution: Distribution) -> Parameter:
+    low, high = distribution.bounds
+    if isinstance(distribution, _DISCRETE):
+        return Parameter.of(0.0, 1.0, 0.5)
+    return Parameter.of(low, high, distribution.median)
+
+
+def _distribution_value(distribution: Distribution, value: float) -> float:
+    if isinstance(distribution, _DISCRETE):
+        return distribution.quantile(value)
+    low, high = distribution.bounds
+    return min(max(value, low), high)

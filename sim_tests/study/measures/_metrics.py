@@ -1,0 +1,245 @@
+"""The metrics of an episode in one table, which the terminal tables and the HTML report read.
+
+docs/metrics.md has the full definitions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Literal
+
+
+@dataclass(frozen=True, slots=True)
+class Metric:
+    """How a number of an episode is named, written and judged.
+
+    Attributes:
+        name: column of ``episodes.csv``.
+        title: for headings.
+        unit: empty for a count or a ratio.
+        better: the better direction.
+        meaning: one sentence.
+        decimals: to print.
+        share: a share of episodes, printed in per cent.
+        from_zero: the axis of a plot includes 0.
+        says_better: a plot says which direction is better.
+    """
+
+    name: str
+    title: str
+    unit: str
+    better: Literal["lower", "higher", "neither"]
+    meaning: str
+    decimals: int = 2
+    share: bool = False
+    from_zero: bool = True
+    says_better: bool = True
+
+
+def _by_name(*metrics: Metric) -> dict[str, Metric]:
+    return {metric.name: metric for metric in metrics}
+
+
+#: Shares of episodes, in per cent.
+SHARES: Final = _by_name(
+    Metric(
+        "success",
+        "Arrived, touching nobody",
+        "%",
+        "higher",
+        "Share of episodes in which the goal was reached and the robot moved into nobody; one "
+        "that failed counts as not reached.",
+        share=True,
+        from_zero=False,
+    ),
+    Metric(
+        "robot_contacts",
+        "Contacts caused by the robot",
+        "%",
+        "lower",
+        "Share of episodes in which the robot moved into a person.",
+        share=True,
+    ),
+    Metric(
+        "person_contacts",
+        "People who walked into the robot",
+        "%",
+        "lower",
+        "Share of episodes in which a person walked into the robot.",
+        share=True,
+    ),
+)
+
+#: Numbers that are averaged over episodes, in the order of docs/metrics.md.
+METRICS: Final = _by_name(
+    Metric(
+        "time_to_goal_s",
+        "Time to goal",
+        "s",
+        "lower",
+        "Time until the goal was reached.",
+    ),
+    Metric(
+        "time_lost_s",
+        "Time lost to people",
+        "s",
+        "lower",
+        "Time over that of the same task in the empty hall; one that never arrives lost all "
+        "its time.",
+    ),
+    Metric(
+        "path_length_m",
+        "Path length",
+        "m",
+        "lower",
+        "Length of the path that the robot drove.",
+    ),
+    Metric(
+        "spl",
+        "Success weighted by path length",
+        "",
+        "higher",
+        "1 for every goal reached on the shortest way (Anderson et al. 2018).",
+        decimals=3,
+    ),
+    Metric(
+        "stops",
+        "Stops",
+        "",
+        "lower",
+        "How often the robot came to a stand before the goal.",
+    ),
+    Metric(
+        "peak_deceleration_mps2",
+        "Peak deceleration",
+        "m/s²",
+        "lower",
+        "The robot's strongest braking.",
+    ),
+    Metric(
+        "peak_jerk_mps3",
+        "Peak jerk",
+        "m/s³",
+        "lower",
+        "The robot's largest jerk.",
+        decimals=1,
+    ),
+    Metric(
+        "min_separation_m",
+        "Smallest separation",
+        "m",
+        "higher",
+        "Smallest distance between the surfaces of robot and person.",
+        says_better=False,  # passing close to an aware person is no fault
+    ),
+    Metric(
+        "speed_at_min_separation_mps",
+        "Speed when nearest",
+        "m/s",
+        "lower",
+        "The robot's speed at the instant of smallest separation.",
+    ),
+    Metric(
+        "max_speed_within_2m_mps",
+        "Highest speed within 2 m",
+        "m/s",
+        "lower",
+        "The robot's highest speed with a person's surface within 2 m.",
+    ),
+    Metric(
+        "min_margin_m",
+        "Smallest margin",
+        "m",
+        "higher",
+        "Smallest separation margin S − S_p at a moving robot: surface distance less the "
+        "protective separation of ISO 13855 and ISO/TS 15066.",
+    ),
+    Metric(
+        "violation_time_s",
+        "Margin violated",
+        "s",
+        "lower",
+        "Seconds an episode with the separation margin S − S_p below 0 at a moving robot.",
+        decimals=3,
+    ),
+    Metric(
+        "min_time_to_collision_s",
+        "Smallest time to collision",
+        "s",
+        "higher",
+        "Time until robot and person would touch if both went straight on, at its smallest.",
+    ),
+    Metric(
+        "post_encroachment_s",
+        "Post-encroachment time",
+        "s",
+        "higher",
+        "Smallest time between one leaving a place and the other entering it.",
+    ),
+    Metric(
+        "intimate_s",
+        "Time within 0.45 m",
+        "s",
+        "lower",
+        "Seconds an episode with a person's surface in the intimate zone.",
+    ),
+    Metric(
+        "personal_s",
+        "Time within 1.2 m",
+        "s",
+        "lower",
+        "Seconds an episode with a person's surface in the personal zone.",
+    ),
+    Metric(
+        "robot_contacts",
+        "Contacts by the robot",
+        "",
+        "lower",
+        "Contacts of a robot that moved into a person.",
+        decimals=3,
+    ),
+    Metric(
+        "person_contacts",
+        "Contacts by people",
+        "",
+        "lower",
+        "Contacts of people who walked into the robot.",
+        decimals=3,
+    ),
+    Metric(
+        "contact_speed_mps",
+        "Speed at contact",
+        "m/s",
+        "lower",
+        "The robot's highest speed at a contact that it caused.",
+    ),
+    Metric(
+        "human_delay_s",
+        "Delay of people",
+        "s",
+        "lower",
+        "Time that people took over their free walks, all people of an episode together.",
+    ),
+    Metric(
+        "human_detour_m",
+        "Detour of people",
+        "m",
+        "lower",
+        "Way that people walked over their free ways, all people of an episode together.",
+    ),
+    Metric(
+        "warnings",
+        "Warnings",
+        "",
+        "neither",
+        "Alerts that the robot asked for.",
+    ),
+    Metric(
+        "awareness_error",
+        "Error of α",
+        "",
+        "lower",
+        "Mean |α of the track − true α| over the people tracked.",
+        decimals=3,
+    ),
+)
