@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from . import options
 from ._app import app, main
-from ._command import Command, CommandGroup, argument, command, group, option
+from ._command import Command, CommandGroup, Option, argument, command, group, option
 from ._types import NUMBER, POSITIVE, SHARE, FilePath, FolderPath, Number, OneOf, Whole
 
 __all__ = [
@@ -21,6 +21,7 @@ __all__ = [
     "FolderPath",
     "Number",
     "OneOf",
+    "Option",
     "Whole",
     "app",
     "argument",
