@@ -14,7 +14,7 @@ from perception import Camera
 from tracking import CameraView, PersonTrack, PersonTracker, TrackerConfig, TrackingError
 
 from ..errors import AwarenavError
-from ..estimate import track_of_each
+from ..estimate import ids_of_tracks
 from ._history import HistoryBook, TrackRun, TrackSample, camera_pose
 from ._recording import ASSUMED_POSITION_STD_M, RecordedFrame, Recording, count
 
@@ -111,7 +111,7 @@ def _measured(
     frame: RecordedFrame, tracks: Sequence[PersonTrack]
 ) -> dict[int, tuple[float, float]]:
     """α of this frame's observations and its standard deviation by the id of their track."""
-    ids = track_of_each(frame.observations, tracks, frame.T_odom_camera)
+    ids = ids_of_tracks(frame.observations, tracks, frame.T_odom_camera)
     return {
         id: (observation.awareness, observation.awareness_std)
         for id, observation in zip(ids, frame.observations, strict=True)

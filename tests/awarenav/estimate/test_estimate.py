@@ -14,9 +14,13 @@ from numbered_pictures import CAMERA, HEIGHT, WIDTH, NumberReader, numbered
 
 from awarenav.cli import main
 from awarenav.errors import AwarenavError
-from awarenav.estimate import fixed_camera_pose
-from awarenav.estimate._camera import CameraChoice, scaled_camera
-from awarenav.estimate._run import EstimateOptions, estimate_command
+from awarenav.estimate import (
+    CameraChoice,
+    EstimateOptions,
+    estimate_command,
+    fixed_camera_pose,
+    scaled_camera,
+)
 from awarenav.estimate.command import estimate as command
 from awarenav.judge import judge_files
 from awarenav.records import read_records
@@ -166,7 +170,7 @@ def test_frames_that_cannot_be_read_or_estimated_are_named_and_the_rest_is_kept(
     assert estimate(reader, source, "--out", out) == 1
     assert names(out) == ["000000.png", "000004.png"]
     said = capsys.readouterr().err
-    for words in ("000001.png is no picture", "another aspect ratio", "the network gave NaN"):
+    for words in ("000001.png is not an image", "another aspect ratio", "the network gave NaN"):
         assert words in said
     assert "3 frames could not be read or estimated" in said
 

@@ -11,7 +11,7 @@ import pytest
 from numbered_pictures import number_of, numbered
 
 from awarenav.errors import AwarenavError
-from awarenav.estimate._open_source import open_source
+from awarenav.estimate import open_source
 
 pytest.importorskip("rosbags", reason="the extra 'rosbag' is not installed")
 

@@ -401,7 +401,7 @@ def test_files_of_different_pictures_are_refused(tmp_path):
     with pytest.raises(AwarenavError, match="holds no frame"):
         judge_files(Path(truth), Path(estimates))
     truth, estimates = files(tmp_path, TRUTH, [TRUTH[0], TRUTH[0]])
-    with pytest.raises(AwarenavError, match="comes twice"):
+    with pytest.raises(AwarenavError, match="two frames have the name"):
         judge_files(Path(truth), Path(estimates))
 
 

@@ -4,15 +4,13 @@ import shutil
 
 import pytest
 from model_files import CONTENT, OTHER, model, names, sha256
-from paths import ROOT
+from paths import SHARED
 
 from awarenav.cli import main
 from awarenav.errors import AwarenavError
-from awarenav.models import _store
-from awarenav.models._catalogue import Catalogue
-from awarenav.models._download import download
+from awarenav.models import Catalogue, download
 
-SHARED = ROOT.parent / "shared" / "models"
+MODELS = SHARED / "models"
 
 
 @pytest.mark.parametrize("verb", [[], ["list"], ["verify"], ["fetch"]])
@@ -34,9 +32,9 @@ def test_catalogue_fetches_nothing_that_binds_the_user():
         catalogue["yolov8"]
 
 
-@pytest.mark.skipif(not SHARED.is_dir(), reason="no genuine networks beside the checkout")
+@pytest.mark.skipif(not MODELS.is_dir(), reason="no genuine networks beside the checkout")
 def test_catalogue_knows_the_genuine_detector():
-    content = (SHARED / "rtmdet_nano_person_320_mmpose.onnx").read_bytes()
+    content = (MODELS / "rtmdet_nano_person_320_mmpose.onnx").read_bytes()
     assert Catalogue.shipped()["rtmdet-nano"].sha256 == sha256(content)
 
 
@@ -64,7 +62,7 @@ def catalogue(server, monkeypatch, tmp_path):
     local = shipped.model_copy(
         update={"models": (model(server, "a.onnx", sha256=sha256(CONTENT), note="a test"),)}
     )
-    monkeypatch.setattr(_store.Catalogue, "shipped", classmethod(lambda _: local))
+    monkeypatch.setattr(Catalogue, "shipped", classmethod(lambda _: local))
     monkeypatch.setenv("AWARENAV_MODELS", str(tmp_path / "models"))
     return local
 

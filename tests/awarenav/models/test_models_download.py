@@ -8,14 +8,10 @@ import urllib.request
 import pytest
 from model_files import CONTENT, OTHER, names, zipped
 from model_server import ModelServer
-from paths import ROOT
 
 from awarenav.errors import AwarenavError
-from awarenav.models import _download
-from awarenav.models._download import BrokenDownloadError, download
-from awarenav.models._store import extract_member
-
-SHARED = ROOT.parent / "shared" / "models"
+from awarenav.models import BrokenDownloadError, download, extract_member
+from awarenav.models._download import _NoDowngrade
 
 
 def test_download_appears_whole(server, tmp_path):
@@ -131,7 +127,7 @@ def test_redirects_are_followed_with_the_range(server, tmp_path):
 
 def test_redirect_that_drops_the_encryption_is_refused():
     request = urllib.request.Request("https://somewhere/a.onnx")
-    follow = _download._NoDowngrade().redirect_request
+    follow = _NoDowngrade().redirect_request
     arguments = (request, io.BytesIO(), 302, "Found", http.client.HTTPMessage())
     with pytest.raises(AwarenavError, match="not encrypted"):
         follow(*arguments, "http://elsewhere/a.onnx")
@@ -183,7 +179,7 @@ def test_truncated_archive_is_refused(tmp_path, keep):
     whole = zipped(**{"x__end2end.onnx": CONTENT})
     archive = tmp_path / "a.zip"
     archive.write_bytes(whole[: keep if isinstance(keep, int) else int(keep * len(whole))])
-    with pytest.raises(AwarenavError, match="no whole ZIP archive"):
+    with pytest.raises(AwarenavError, match="not a complete ZIP archive"):
         extract_member(archive, "end2end.onnx", tmp_path / "out.onnx")
 
 
@@ -192,5 +188,5 @@ def test_damaged_entry_is_refused(tmp_path):
     whole[len(whole) // 2] ^= 0xFF
     archive = tmp_path / "a.zip"
     archive.write_bytes(whole)
-    with pytest.raises(AwarenavError, match="no whole ZIP archive"):
+    with pytest.raises(AwarenavError, match="not a complete ZIP archive"):
         extract_member(archive, "end2end.onnx", tmp_path / "out.onnx")
