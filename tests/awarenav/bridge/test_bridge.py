@@ -21,7 +21,7 @@ pytest.importorskip("mcap", reason="the extra ros2 is not installed")
 from bridge_picture import Picture, odometry, rendered
 from rosbags.highlevel import AnyReader
 
-from awarenav.bridge._run import Outlet
+from awarenav.bridge import TopicPublisher
 from awarenav.cli import main
 from nav_adapter import AwarenessPolicy
 from nav_adapter.ros2 import (
@@ -181,17 +181,17 @@ def test_a_frame_costs_less_than_two_cores_have_at_fifteen_hertz(picture: Pictur
 def test_only_what_somebody_hears_or_records_is_wanted(domain: int, tmp_path: Path) -> None:
     node, other = DdsNode(domain), DdsNode(domain)
     try:
-        outlet = Outlet(node, PUBLISHED, None)
-        # A latched topic must hold its last message for whoever comes.
-        assert {key for key in PUBLISHED if outlet.wants(key)} == {"grid"}
-        assert not outlet.wants("left out")
+        publisher = TopicPublisher(node, PUBLISHED, None)
+        # A latched topic must keep its last message for later subscribers.
+        assert {key for key in PUBLISHED if publisher.wants(key)} == {"grid"}
+        assert not publisher.wants("left out")
         other.subscribe(PUBLISHED["people"])
         end = time.monotonic() + PATIENCE_S
-        while not outlet.wants("people") and time.monotonic() < end:
+        while not publisher.wants("people") and time.monotonic() < end:
             time.sleep(0.01)
-        assert {key for key in PUBLISHED if outlet.wants(key)} == {"grid", "people"}
+        assert {key for key in PUBLISHED if publisher.wants(key)} == {"grid", "people"}
         with McapRecorder(tmp_path / "all.mcap") as recorder:
-            recorded = Outlet(node, PUBLISHED, recorder)
+            recorded = TopicPublisher(node, PUBLISHED, recorder)
             assert all(recorded.wants(key) for key in PUBLISHED)
     finally:
         other.close()
