@@ -13,9 +13,14 @@ from hypothesis import strategies as st
 
 from awarenav.cli import main
 from awarenav.errors import AwarenavError
-from awarenav.judge import JudgeConfig, judge_files, markdown_report, requirements
-from awarenav.judge._judge import judge
-from awarenav.judge._matching import average_precision
+from awarenav.judge import (
+    JudgeConfig,
+    average_precision,
+    judge_files,
+    judge_frames,
+    markdown_report,
+    requirements,
+)
 from awarenav.records import people_by_frame, read_person, write_records
 
 COUNT = 40
@@ -43,7 +48,7 @@ def frames(*people_of_frames):
 
 
 def judged(truth, estimates, config=None, **options):
-    return judge(
+    return judge_frames(
         people_by_frame(truth, "truth"), people_by_frame(estimates, "estimates"), config, **options
     )
 
@@ -395,10 +400,10 @@ def test_bad_options_are_one_line_and_exit_status_2(tmp_path, capsys, arguments,
 def test_files_of_different_pictures_are_refused(tmp_path):
     others = [{**record, "frame": "b" + record["frame"]} for record in TRUTH]
     truth, estimates = files(tmp_path, TRUTH, others)
-    with pytest.raises(AwarenavError, match="share no frame"):
+    with pytest.raises(AwarenavError, match="no frame in common"):
         judge_files(Path(truth), Path(estimates))
     truth, estimates = files(tmp_path, [], TRUTH)
-    with pytest.raises(AwarenavError, match="holds no frame"):
+    with pytest.raises(AwarenavError, match="has no frame"):
         judge_files(Path(truth), Path(estimates))
     truth, estimates = files(tmp_path, TRUTH, [TRUTH[0], TRUTH[0]])
     with pytest.raises(AwarenavError, match="two frames have the name"):
