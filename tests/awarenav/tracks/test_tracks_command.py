@@ -14,12 +14,10 @@ from paths import ROOT
 from recorded_crossing import record_crossing
 from track_lines import lines, pose, standing, walking
 
-from awarenav import figures as _canvas
+from awarenav import figures
 from awarenav.cli import main
 from awarenav.records import write_records
-from awarenav.tracks._follow import follow
-from awarenav.tracks._recording import read_recording
-from awarenav.tracks._tables import CSV_COLUMNS
+from awarenav.tracks import CSV_COLUMNS, read_recording, track_recording
 from perception import Camera
 from sim_tests import Scenario
 from tracking import AwarenessFilterConfig, TrackerConfig
@@ -88,7 +86,7 @@ def test_a_line_a_track_says_when_it_lived_and_how_aware_it_was(estimates, capsy
     header, *body = capsys.readouterr().out.splitlines()
     words = ["id", "born", "(s)", "confirmed", "(s)", "died", "(s)", "seen", "coasted"]
     assert header.split() == [*words, "mean", "α", "lower"]
-    histories = follow(read_recording(estimates)).histories
+    histories = track_recording(read_recording(estimates)).histories
     assert [line.split()[0] for line in body] == ["1", "2"]
     for line, history in zip(body, histories, strict=True):
         _, born, confirmed, died, seen, coasted, alpha, lower = line.split()
@@ -106,7 +104,7 @@ def test_the_table_holds_every_track_at_every_frame(estimates, tmp_path):
     assert tuple(table[0]) == CSV_COLUMNS
     samples = {
         (repr(sample.stamp_s), str(history.id)): sample
-        for history in follow(read_recording(estimates)).histories
+        for history in track_recording(read_recording(estimates)).histories
         for sample in history.frames
     }
     assert [(row["stamp_s"], row["id"]) for row in table] == sorted(
@@ -146,7 +144,7 @@ def test_a_half_written_line_is_said_and_the_rest_is_shown(estimates, capsys):
     estimates.write_text(estimates.read_text("utf-8")[:-20], "utf-8")
     assert run(estimates, "--out", "none") == 0
     said = capsys.readouterr()
-    assert "the last line was cut off in writing and is left out" in said.err
+    assert "the last line is incomplete and is left out" in said.err
     assert len(said.out.splitlines()) == 3
 
 
@@ -191,7 +189,7 @@ def test_who_was_never_confirmed_is_counted(tmp_path, capsys):
     [
         (["--out", "{tmp}/tracks.txt"], "--out must end in .png, .svg, .pdf or be none"),
         (["--csv", "{tmp}"], "--csv must be a file"),
-        (["--csv", "{tmp}/estimates.jsonl"], "would replace what is read"),
+        (["--csv", "{tmp}/estimates.jsonl"], "would replace an input"),
         (["--csv", "{tmp}/out.png"], "--out and --csv are the same file"),
         (["--config", "{tmp}/absent.yaml"], "absent.yaml"),
         (["--config", "{tmp}/estimates.jsonl"], "estimates.jsonl"),
@@ -229,7 +227,7 @@ def test_an_interruption_leaves_the_old_plot_and_no_half_one(estimates, tmp_path
         Path(file).write_bytes(HEADS[".png"])
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(_canvas.Figure, "savefig", interrupted)
+    monkeypatch.setattr(figures.Figure, "savefig", interrupted)
     assert run(estimates, "--out", out) == 130
     assert out.read_bytes() == b"old"
     assert sorted(each.name for each in tmp_path.iterdir()) == ["estimates.jsonl", "out.png"]

@@ -10,7 +10,7 @@ from track_lines import lines, pose, standing
 
 from awarenav.errors import AwarenavError
 from awarenav.records import write_records
-from awarenav.tracks._recording import ASSUMED_POSITION_STD_M, read_recording
+from awarenav.tracks import ASSUMED_POSITION_STD_M, read_recording
 
 RECORDS = lines([standing(4.0, 1.0)], frames=4)
 
@@ -40,7 +40,7 @@ def test_a_last_line_that_was_cut_off_is_left_out_and_said(tmp_path, cut):
     path.write_text(path.read_text("utf-8").rstrip("\n")[:-cut], "utf-8")
     recording = read_recording(path)
     assert len(recording.frames) == len(RECORDS) - 1
-    assert recording.remarks == ("the last line was cut off in writing and is left out",)
+    assert recording.remarks == ("the last line is incomplete and is left out",)
 
 
 def test_blank_lines_are_no_cut_off_ones(tmp_path):
@@ -59,7 +59,7 @@ def test_without_any_pose_the_camera_stands_still(tmp_path):
     assert all((each.T_odom_camera[:2, 3] == 0.0).all() for each in recording.frames)
     # Level and looking along odom x: the camera's right is odom's −y, its forward is odom's x.
     np.testing.assert_allclose(recording.frames[0].T_odom_camera[:3, :3], pose()[:3, :3])
-    assert "stand still" in recording.remarks[0]
+    assert "assumed to be fixed" in recording.remarks[0]
 
 
 def test_a_frame_without_a_pose_among_others_is_left_out(tmp_path):
@@ -88,7 +88,7 @@ def test_awareness_of_unknown_worth_is_no_evidence(tmp_path):
     recording = read(tmp_path, with_person(awareness=1.0, awareness_std=None))
     (seen,) = recording.frames[0].observations
     assert (seen.awareness, seen.awareness_std) == (None, None)
-    assert "taken as no evidence" in recording.remarks[0]
+    assert "counts as no evidence" in recording.remarks[0]
 
 
 def test_a_person_without_a_position_is_left_out(tmp_path):
