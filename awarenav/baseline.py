@@ -33,7 +33,7 @@ class Metric:
     tolerance: float
 
     def is_worse_than(self, baseline: Metric) -> bool:
-        """Whether the value is worse than the baseline by more than the baseline's tolerance."""
+        """Return whether the value is worse than the baseline by more than its tolerance."""
         if baseline.direction == "higher":
             return self.value < baseline.value * (1.0 - baseline.tolerance)
         return self.value > baseline.value * (1.0 + baseline.tolerance)

@@ -39,7 +39,7 @@ def awareness_colour(alpha: float | None) -> Colour:
 
 
 def drawable(points_px: FloatArray) -> bool:
-    """Whether all points are finite and near enough for OpenCV to draw."""
+    """Return whether all points are finite and near enough for OpenCV to draw."""
     return bool(np.isfinite(points_px).all() and np.abs(points_px).max(initial=0.0) < _FAR_PX)
 
 

@@ -113,6 +113,7 @@ class BridgeLoop:
         return good
 
     def _messages(self, topic: Topic | None, *, record: bool = True) -> list[Message]:
+        """Return the received messages of a topic; one that cannot be decoded is refused."""
         if topic is None:
             return []
 

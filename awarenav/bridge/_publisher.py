@@ -30,7 +30,7 @@ class TopicPublisher:
             node.advertise(topic)
 
     def wants(self, key: str) -> bool:
-        """Whether a message of this topic would be received or recorded.
+        """Return whether a message of this topic would be received or recorded.
 
         A message of a latched topic is always wanted, since later subscribers get the last one.
         """

@@ -82,6 +82,7 @@ class RerunRecorder(AbstractContextManager["RerunRecorder"]):
         self._stream.disconnect()
 
     def _draw_frame(self, bridge: AwarenessBridge) -> None:
+        """Record the latest image with keypoints, cones and tracks."""
         image, T = bridge.last_picture, bridge.last_T_odom_camera
         if image is None or T is None or bridge.camera is None:
             return

@@ -47,7 +47,7 @@ _COMPLETE_FAULTS: Final = _shipped("sim_tests", "crossing/faults", "none")
 
 
 def seed(note: str = "", *, default: int | None = 0) -> Decorator:
-    """``--seed``: the seed of all random numbers."""
+    """Add ``--seed``: the seed of all random numbers."""
     text = f"Seed of the random numbers.{note}"
     return option("--seed", type=Whole(0), default=default, metavar="N", help=text)
 
@@ -55,7 +55,7 @@ def seed(note: str = "", *, default: int | None = 0) -> Decorator:
 def out_folder(
     default: str | None, help: str = "Folder of the results.", *, show_default: str | None = None
 ) -> Decorator:
-    """``--out``: a folder."""
+    """Add ``--out``: a folder."""
     return option(
         "--out",
         type=FolderPath(),
@@ -69,7 +69,7 @@ def out_folder(
 def out_file(
     default: str | None, help: str, metavar: str = "FILE", *, show_default: str | None = None
 ) -> Decorator:
-    """``--out``: the file of the results."""
+    """Add ``--out``: the file of the results."""
     return option(
         "--out",
         type=FilePath(),
@@ -81,12 +81,12 @@ def out_file(
 
 
 def resume() -> Decorator:
-    """``--resume``: continue the work in ``--out``."""
+    """Add ``--resume``: continue the work in ``--out``."""
     return option("--resume", is_flag=True, help="Continue the interrupted work in --out.")
 
 
 def workers(default: int | None = None) -> Decorator:
-    """``--workers``: the number of worker processes."""
+    """Add ``--workers``: the number of worker processes."""
     return option(
         "--workers",
         type=POSITIVE,
@@ -98,7 +98,7 @@ def workers(default: int | None = None) -> Decorator:
 
 
 def perception(kinds: Sequence[str] = PERCEPTIONS, note: str = "") -> Decorator:
-    """``--perception``: the kind of perception that the robot has."""
+    """Add ``--perception``: the kind of perception that the robot has."""
     return option(
         "--perception",
         type=OneOf(kinds),
@@ -108,7 +108,7 @@ def perception(kinds: Sequence[str] = PERCEPTIONS, note: str = "") -> Decorator:
 
 
 def camera() -> Decorator:
-    """``--camera``: another camera on the robot of a crossing."""
+    """Add ``--camera``: another camera on the robot of a crossing."""
     return option(
         "--camera",
         default="",
@@ -121,7 +121,7 @@ def camera() -> Decorator:
 
 
 def policy(default: str = "balanced") -> Decorator:
-    """``--policy``: one policy."""
+    """Add ``--policy``: one policy."""
     return option(
         "--policy",
         default=default,
@@ -132,7 +132,7 @@ def policy(default: str = "balanced") -> Decorator:
 
 
 def policies(default: Sequence[str]) -> Decorator:
-    """``--policy``: one or more policies to compare."""
+    """Add ``--policy``: one or more policies to compare."""
     return option(
         "--policy",
         many=True,
@@ -144,7 +144,7 @@ def policies(default: Sequence[str]) -> Decorator:
 
 
 def scenarios(which: str) -> Decorator:
-    """``--scenario``: shipped scenarios and files."""
+    """Add ``--scenario``: shipped scenarios and files."""
     return option(
         "--scenario",
         many=True,
@@ -156,7 +156,7 @@ def scenarios(which: str) -> Decorator:
 
 
 def faults() -> Decorator:
-    """``--fault``: faults of camera, odometry and detections."""
+    """Add ``--fault``: faults of camera, odometry and detections."""
     return option(
         "--fault",
         many=True,
@@ -168,12 +168,12 @@ def faults() -> Decorator:
 
 
 def planner() -> Decorator:
-    """``--planner``: one local planner; empty for the reference planner."""
+    """Add ``--planner``: one local planner; empty for the reference planner."""
     return option("--planner", metavar="MODULE:CLASS", **_planner_settings(REFERENCE_PLANNER))
 
 
 def planners() -> Decorator:
-    """``--planner``: one or more local planners to compare; empty for the reference planner."""
+    """Add ``--planner``: one or more local planners to compare; empty for the reference planner."""
     return option(
         "--planner",
         many=True,
@@ -199,5 +199,5 @@ def _without_reference(context: click.Context, parameter: click.Parameter, value
 
 
 def as_json(what: str = "the table") -> Decorator:
-    """``--json``: print the result as JSON."""
+    """Add ``--json``: print the result as JSON."""
     return option("--json", "as_json", is_flag=True, help=f"Print {what} as JSON.")

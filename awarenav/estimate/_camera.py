@@ -71,7 +71,7 @@ class CameraChoice:
 
     @property
     def known(self) -> bool:
-        """Whether the field of view is known and not assumed."""
+        """True if the field of view is known, False if it is assumed."""
         return self._calibrated is not None or self._fov_deg is not None
 
     def of_size(self, width_px: int, height_px: int) -> Camera:
@@ -86,6 +86,7 @@ class CameraChoice:
         return self._cameras[size]
 
     def _make(self, width_px: int, height_px: int) -> Camera:
+        """Make the camera of images of this size; log what is assumed."""
         camera = self._calibrated
         if camera is None:
             fov_deg = self._fov_deg

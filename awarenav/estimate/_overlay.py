@@ -159,6 +159,7 @@ def _head_position(camera: Camera, person: _Person) -> FloatArray | None:
 
 
 def _draw_skeleton(image: ImageRgb, person: PersonKeypoints, unit: float) -> None:
+    """Draw the bones and the face of a person's visible keypoints."""
     points, seen = person.keypoints_px, person.scores >= _SEEN_SCORE
     thin, thick = max(round(1.6 * unit), 1), max(round(3.4 * unit), 3)
     bones = [

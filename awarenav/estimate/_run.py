@@ -72,7 +72,7 @@ class EstimateOptions:
 
 @dataclass(slots=True)
 class EstimateSummary:
-    """What a run has estimated.
+    """Counts of a run.
 
     Attributes:
         frames: number of frames that were estimated.

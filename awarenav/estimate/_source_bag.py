@@ -99,6 +99,7 @@ class BagSource:
         self._reader.close()
 
     def _chosen_topic(self, topic: str | None) -> str:
+        """Return the image topic that was asked for, or the only one."""
         images = sorted(
             {
                 each.topic

@@ -63,6 +63,7 @@ class FramePrefetcher(AbstractContextManager["FramePrefetcher"]):
         self._source.close()
 
     def _read(self) -> None:
+        """Read frames into the queue until the end, the limit or an error (in the thread)."""
         last: BaseException | None = None
         try:
             taken = 0

@@ -115,7 +115,7 @@ def match_frame(
 def _covers_ignored(
     estimate: PersonRecord, truth: Sequence[PersonRecord], required: Sequence[bool]
 ) -> bool:
-    """Whether half of an estimate's box lies on a person who did not have to be found."""
+    """Return whether half of an estimate's box lies on a person who did not have to be found."""
     box = estimate.box_xyxy_px
     return box is not None and any(
         float(box_cover(box[None], person.box_xyxy_px[None])[0, 0]) >= _MIN_AFFINITY
@@ -176,7 +176,7 @@ def _matches_ignored(
     estimate: PersonRecord,
     values: FloatArray,
 ) -> bool:
-    """Whether an estimate matches, or lies on, a person who did not have to be found."""
+    """Return whether an estimate matches, or lies on, someone who did not have to be found."""
     return _covers_ignored(estimate, truth, required) or any(
         value >= _MIN_AFFINITY for value, needed in zip(values, required, strict=True) if not needed
     )

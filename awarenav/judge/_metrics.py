@@ -59,6 +59,7 @@ def person_metrics(group: Iterable[PersonFrame]) -> dict[str, Any]:
 
 
 def _direction_metrics(found: _Pairs) -> dict[str, Any]:
+    """Return the errors of gaze and head direction."""
     metrics: dict[str, Any] = {
         "gaze_none": _share(sum(e.gaze_camera is None for _, e in found), len(found))
     }
@@ -85,6 +86,7 @@ def _direction_metrics(found: _Pairs) -> dict[str, Any]:
 
 
 def _position_metrics(found: _Pairs) -> dict[str, Any]:
+    """Return the errors of position as shares of range, and their normalised squares (NEES)."""
     relative, along, nees, within = [], [], [], []
     for truth, estimate in found:
         true, guess = truth.position_camera_m, estimate.position_camera_m
@@ -110,6 +112,7 @@ def _position_metrics(found: _Pairs) -> dict[str, Any]:
 
 
 def _awareness_metrics(everyone: Sequence[PersonFrame], found: _Pairs) -> dict[str, Any]:
+    """Return the errors of α, its calibration, and false and missed awareness."""
     known = [each for each in everyone if each.truth.awareness is not None]
     errors, with_none_as_0, inside, inside_all = [], [], [], []
     for truth, estimate in found:

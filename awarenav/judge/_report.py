@@ -45,7 +45,7 @@ class Requirement:
 
     @property
     def met(self) -> bool:
-        """Whether the metric lies between its limits."""
+        """True if the metric lies between its limits."""
         return self.value is not None and self.low <= self.value <= self.high
 
     @property

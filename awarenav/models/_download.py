@@ -99,6 +99,7 @@ def download(
 
 
 def _attempt(url: str, target: Path, timeout_s: float, progress: bool) -> None:
+    """Download what is missing of the file into its ``.part``."""
     request = urllib.request.Request(
         url, headers={"User-Agent": _USER_AGENT, "Accept-Encoding": "identity"}
     )
@@ -142,6 +143,7 @@ def _copy(
     total: int | None,
     progress: bool,
 ) -> None:
+    """Copy the answer to the file; raise if it ends too early."""
     done = start
     with tqdm(
         total=total,

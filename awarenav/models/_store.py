@@ -82,7 +82,7 @@ class ModelStore:
         return OnnxModel(self.path(name), settings=settings, sha256=self.expected_sha256(name))
 
     def is_fetched(self, name: str) -> bool:
-        """Whether the file exists; its contents are not checked."""
+        """Return whether the file exists; its contents are not checked."""
         return (self.folder / self.catalogue[name].file).is_file()
 
     def expected_sha256(self, name: str) -> str | None:

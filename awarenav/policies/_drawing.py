@@ -109,6 +109,7 @@ def _label_axes(axes: Axes, label: str, highest: float) -> None:
 def _draw_limit(
     axes: Axes, policy: AwarenessPolicy, robot: RobotProfile, farthest_m: float
 ) -> QuadMesh:
+    """Draw the map of the speed limit over awareness and distance."""
     distance_m = np.linspace(0.0, farthest_m, 241)
     limit: FloatArray = settled_speed_limit_mps(policy, robot, distance_m[:, None], _AWARENESS)
     limit_map = axes.pcolormesh(

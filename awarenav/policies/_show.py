@@ -110,6 +110,8 @@ def table_lines(name: str, policy: AwarenessPolicy, robot: RobotProfile) -> list
 
 
 def _robot(options: ShowOptions) -> RobotProfile:
+    """Return a robot with the speeds, braking and reaction time of the options."""
+
     def number(option: str, value: float, least: float) -> float:
         return finite_number(
             option,

@@ -51,6 +51,7 @@ def tracks_in_file(recording: Recording) -> TrackedRecording:
 
 
 def _samples_of_tracks(frame: RecordedFrame, path: str) -> Iterator[tuple[int, TrackSample]]:
+    """Yield id and sample of each of the frame's ``tracks``."""
     measured = dict(zip(frame.ids, frame.observations, strict=True))
     for index, track in enumerate(frame.tracks or ()):
         where = f"{path}, frame {frame.name!r}, track {index}"
@@ -96,6 +97,7 @@ def _nonnegative(track: dict[str, Any], name: str, where: str, maximum: float = 
 
 
 def _samples_of_people(frame: RecordedFrame) -> Iterator[tuple[int, TrackSample]]:
+    """Yield id and sample of each person with an id."""
     positions = frame.positions_odom_m()
     for id, observation, position in zip(frame.ids, frame.observations, positions, strict=True):
         if id is None:

@@ -202,7 +202,7 @@ def _draw_legends(
 
 
 def _has_tracker(tracked: TrackedRecording) -> bool:
-    """Whether a tracker made the tracks."""
+    """Return whether a tracker made the tracks."""
     return not any(each.samples[0].status == "given" for each in tracked.histories)
 
 

@@ -94,6 +94,7 @@ def _count_lines(path: Path) -> int:
 
 
 def _frame(record: Record, where: str, counts: Counter[str]) -> RecordedFrame:
+    """Return a record as a frame; ``counts`` counts what is left out."""
     stamp_s = finite_number(f"{where}: stamp_s", record["stamp_s"], AwarenavError)
     pose = record["T_odom_camera"]
     T = (

@@ -105,6 +105,7 @@ def write_csv(path: Path, histories: Sequence[TrackHistory]) -> None:
 
 
 def _csv_row(id: int, sample: TrackSample) -> list[object]:
+    """Return the row of a sample, in the order of :data:`CSV_COLUMNS`."""
     velocity, covariance = sample.velocity_odom_mps, sample.position_covariance_m2
     numbers = (
         *sample.position_odom_m.tolist(),

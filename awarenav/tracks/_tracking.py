@@ -140,6 +140,7 @@ def _samples(
 def _sample(
     track: PersonTrack, stamp_s: float, is_frame: bool, measured: tuple[float, float] | None
 ) -> TrackSample:
+    """Return the sample of a track."""
     seen = is_frame and track.time_since_seen_s == 0.0
     # The tracker calls the prediction of a person in the latest frame confirmed.
     coasting = not seen and track.status == "confirmed"

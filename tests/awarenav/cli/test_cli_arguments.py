@@ -1,4 +1,4 @@
-"""What the command line makes of words: several values, exclusions, suggestions, shared options."""
+"""The parsing of command lines: several values, exclusions, suggestions, shared options."""
 
 from __future__ import annotations
 

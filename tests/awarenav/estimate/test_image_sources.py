@@ -1,4 +1,4 @@
-"""Where frames come from: files, folders, videos, cameras, recordings."""
+"""Sources of frames: files, folders, videos and cameras; and the threads that read them."""
 
 from __future__ import annotations
 

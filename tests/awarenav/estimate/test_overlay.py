@@ -1,4 +1,4 @@
-"""What is drawn into a picture says what was estimated, whatever the picture."""
+"""Drawings of estimates, for every kind of estimate and image."""
 
 from __future__ import annotations
 
