@@ -9,7 +9,7 @@ from paths import ROOT
 pytest.importorskip("rerun", reason="the extra viz is not installed")
 pytest.importorskip("pybullet", reason="the extra sim is not installed")
 
-from bridge_picture import odometry, rendered
+from rendered_image import odometry, rendered
 
 from awarenav.bridge import RerunRecorder, cone_lines
 from awarenav.errors import AwarenavError
@@ -21,24 +21,24 @@ from perception import AttentionCone, AwarenessPipeline, shipped
 ROBOT = ROOT / "docs" / "nav2" / "robot.yaml"
 
 
-def test_a_rerun_recording_has_what_was_seen_and_said(tmp_path: Path) -> None:
+def test_a_rerun_recording_has_inputs_and_outputs_of_the_bridge(tmp_path: Path) -> None:
     path = tmp_path / "run.rrd"
-    picture = rendered(tmp_path / "render")
+    scene = rendered(tmp_path / "render")
     pose_estimator = RecordingPoseEstimator(shipped.shipped_pose_estimator(None))
     head = shipped.shipped_head_pose_estimator(None)
     bridge = AwarenessBridge(
         AwarenessPolicy.preset("balanced"),
         RobotFile.from_yaml(ROBOT).profile(),
         lambda key, message: None,
-        T_base_camera=picture.T_base_camera,
-        camera=picture.camera,
+        T_base_camera=scene.T_base_camera,
+        camera=scene.camera,
         make_pipeline=lambda camera: AwarenessPipeline(camera, None, pose_estimator, head),
     )
     with RerunRecorder(path, pose_estimator, AttentionCone().half_angle_rad) as recorder:
         for tick in range(4):
             now = 1000.0 + 0.1 * tick
             bridge.on_odometry(odometry(now))
-            assert bridge.on_image(picture.image(now), now)
+            assert bridge.on_image(scene.image(now), now)
             recorder.draw(bridge, bridge.tick(now), frame=True)
     data = path.read_bytes()
     assert data.startswith(b"RRF")

@@ -22,8 +22,8 @@ GROUPS = {
 }
 SHORT_SCENARIO = """
 name: short
-description: One second.
-duration_s: 1.0
+description: Half a second.
+duration_s: 0.5
 robot: {goal_x_m: 1.0}
 workers:
   - path: [{t_s: 0.0, x_m: 3.0, y_m: -1.0}]

@@ -9,7 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from numbered_pictures import number_of, numbered
+from numbered_images import number_of, numbered
 
 from awarenav.errors import AwarenavError
 from awarenav.estimate import (
@@ -29,8 +29,8 @@ RED = np.zeros((4, 6, 3), np.uint8)
 RED[..., 0], RED[..., 1] = 200, 16
 
 
-def save(path: Path, picture: np.ndarray) -> Path:
-    assert cv2.imwrite(str(path), picture)
+def save(path: Path, image: np.ndarray) -> Path:
+    assert cv2.imwrite(str(path), image)
     return path
 
 
@@ -42,7 +42,7 @@ def film(path: Path, count: int, rate_hz: int = 12) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("picture", "expected"),
+    ("image", "expected"),
     [
         (RED[..., ::-1], RED),
         (np.dstack([RED[..., ::-1], np.zeros((4, 6), np.uint8)]), RED),
@@ -51,21 +51,21 @@ def film(path: Path, count: int, rate_hz: int = 12) -> Path:
     ],
     ids=["colour", "transparent", "grey", "16 bits"],
 )
-def test_every_kind_of_picture_becomes_rgb(tmp_path, picture, expected):
-    assert np.array_equal(read_image(save(tmp_path / "a.png", picture)), expected)
+def test_every_kind_of_image_becomes_rgb(tmp_path, image, expected):
+    assert np.array_equal(read_image(save(tmp_path / "a.png", image)), expected)
 
 
 @pytest.mark.parametrize(
     "array",
     [np.zeros((4, 4), np.float32), np.zeros((4, 4, 2), np.uint8), np.zeros((0, 4), np.uint8)],
 )
-def test_arrays_that_are_no_picture_are_refused(array):
+def test_arrays_that_are_not_images_are_refused(array):
     with pytest.raises(AwarenavError, match="8 or 16 bits, got"):
         as_rgb(array, "it")
 
 
-@pytest.mark.parametrize("data", [b"", b"no picture", b"\x89PNG\r\n\x1a\n"])
-def test_files_that_are_no_picture_are_refused_by_name(tmp_path, data):
+@pytest.mark.parametrize("data", [b"", b"not an image", b"\x89PNG\r\n\x1a\n"])
+def test_files_that_are_not_images_are_refused_by_name(tmp_path, data):
     path = tmp_path / "a.png"
     path.write_bytes(data)
     with pytest.raises(AwarenavError, match=r"a\.png"):
@@ -76,7 +76,7 @@ def test_a_folder_is_read_in_the_order_of_its_numbers(tmp_path):
     for number in (10, 9, 1):
         save(tmp_path / f"shot{number}.png", numbered(number))
     save(tmp_path / "contact_sheet.png", numbered(0))
-    (tmp_path / "notes.txt").write_text("no picture")
+    (tmp_path / "notes.txt").write_text("not an image")
     source = ImageFiles(tmp_path, interval_s=0.5)
     frames = list(source.frames())
     assert [frame.name for frame in frames] == ["shot1.png", "shot9.png", "shot10.png"]
@@ -86,7 +86,7 @@ def test_a_folder_is_read_in_the_order_of_its_numbers(tmp_path):
     assert source.camera is None
 
 
-def test_a_rendered_set_tells_stamps_poses_and_camera_but_never_people(tmp_path):
+def test_a_rendered_set_gives_stamps_poses_and_camera_but_not_people(tmp_path):
     camera = Camera.from_fov(64, 48, 1.0)
     camera.to_yaml(tmp_path / "camera.yaml")
     save(tmp_path / "000000.png", numbered(0))
@@ -101,7 +101,7 @@ def test_a_rendered_set_tells_stamps_poses_and_camera_but_never_people(tmp_path)
     assert np.array_equal(source.camera.matrix, camera.matrix)
 
 
-def test_a_picture_that_cannot_be_read_is_a_problem_of_its_own(tmp_path):
+def test_an_image_that_cannot_be_read_is_a_frame_with_a_problem(tmp_path):
     for number in range(3):
         save(tmp_path / f"{number}.png", numbered(number))
     whole = (tmp_path / "1.png").read_bytes()
@@ -175,7 +175,7 @@ def test_a_camera_that_is_unplugged_is_a_problem_after_its_last_frame(tmp_path):
         ("99", "cannot open camera"),
     ],
 )
-def test_sources_that_are_none_are_refused(tmp_path, name, message):
+def test_sources_that_cannot_be_opened_are_refused(tmp_path, name, message):
     (tmp_path / "absent.mov").write_bytes(b"no video")
     (tmp_path / "empty").mkdir()
     with pytest.raises(AwarenavError, match=message):
@@ -189,7 +189,7 @@ def test_a_topic_is_for_recordings(tmp_path):
 
 
 class Counting:
-    """A source of numbered pictures that may wait for a sign, or fail."""
+    """A source of numbered images that may wait for a sign, or fail."""
 
     camera = rate_hz = None
 
@@ -222,14 +222,14 @@ class Counting:
         ({"every": 20, "limit": 2}, (0, 20)),
     ],
 )
-def test_reading_ahead_keeps_every_frame_in_order(options, names):
+def test_prefetching_keeps_every_frame_in_order(options, names):
     source = Counting(50)
     with FramePrefetcher(source, **options) as frames:
         assert [frame.name for frame in frames] == [str(number) for number in names]
     assert source.closed
 
 
-def test_reading_ahead_stays_a_few_frames_ahead_and_stops_when_told():
+def test_prefetching_stays_a_few_frames_ahead_and_stops_when_closed():
     source = Counting(1000)
     with FramePrefetcher(source) as frames:
         next(iter(frames))
@@ -237,7 +237,7 @@ def test_reading_ahead_stays_a_few_frames_ahead_and_stops_when_told():
     assert source.made < 20
 
 
-def test_what_goes_wrong_in_reading_is_raised_after_the_frames_before_it():
+def test_an_error_of_the_source_is_raised_after_the_frames_before_it():
     source = Counting(3, error=AwarenavError("the cable"))
     names = []
     with pytest.raises(AwarenavError, match="the cable"), FramePrefetcher(source) as frames:
@@ -253,7 +253,7 @@ def test_a_live_source_gives_its_newest_frame():
         assert [frame.name for frame in frames][-1] == "99"
 
 
-def test_work_is_done_in_order_and_its_error_comes_back():
+def test_background_work_is_done_in_order_and_its_error_is_raised():
     done: list[int] = []
     with BackgroundWorker(done.append) as behind:
         for number in range(100):

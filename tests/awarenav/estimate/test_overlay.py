@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numbered_pictures import CAMERA, HEIGHT, WIDTH, numbered, standing_at
+from numbered_images import CAMERA, HEIGHT, WIDTH, numbered, standing_at
 
 from awarenav import drawing
 from awarenav.drawing import Font, awareness_colour
@@ -55,7 +55,7 @@ def estimate(*observations, keypoints=None, image=GREY, camera=CAMERA, tracks=No
     )
 
 
-def test_a_new_picture_is_drawn_and_the_old_one_is_left():
+def test_the_overlay_is_a_new_image_and_the_old_one_is_unchanged():
     before = GREY.copy()
     drawn = draw_overlay(estimate(observed(), keypoints=(standing_at(0.0, 3.0),)), CONE)
     assert np.array_equal(GREY, before)
@@ -66,7 +66,7 @@ def test_a_new_picture_is_drawn_and_the_old_one_is_left():
 
 @pytest.mark.parametrize("alpha", [0.0, 0.3, 0.5, 1.0, None])
 def test_the_colour_of_the_box_is_alpha(alpha):
-    # Boxes count from the picture's corner: this edge is drawn along the middle of row 200.
+    # Boxes count from the image's corner: this edge is drawn along the middle of row 200.
     seen = observed(alpha=alpha, gaze=None, box=np.array([100.5, 200.5, 300.5, 400.5]))
     image, camera = numbered(10, (640, 480)), Camera.from_fov(640, 480, 1.0)
     drawn = draw_overlay(estimate(seen, image=image, camera=camera), CONE).astype(int)
@@ -109,7 +109,7 @@ finite = st.floats(-4.0, 4.0)
     box=st.tuples(*[st.floats(-500.0, 900.0)] * 4),
     size=st.sampled_from([(1, 1), (7, 5), (33, 31), (WIDTH, HEIGHT)]),
 )
-def test_whatever_was_estimated_can_be_drawn(x_m, z_m, yaw, pitch, alpha, std, box, size):
+def test_any_estimate_can_be_drawn(x_m, z_m, yaw, pitch, alpha, std, box, size):
     gaze = (math.cos(pitch) * math.sin(yaw), math.sin(pitch), math.cos(pitch) * math.cos(yaw))
     low, high = np.minimum(box[:2], box[2:]), np.maximum(box[:2], box[2:])
     seen = observed(x_m, z_m, alpha=alpha, std=std, gaze=gaze, box=np.concatenate([low, high]))
@@ -149,7 +149,7 @@ def test_text_is_as_large_as_its_font_says(plain, monkeypatch):
 @pytest.mark.parametrize(
     ("size", "target"), [((64, 48), (64, 48)), ((63, 47), (64, 48)), ((200, 50), (64, 48))]
 )
-def test_a_picture_is_fitted_whole_into_a_video(size, target):
+def test_an_image_is_fitted_into_a_video_without_cropping(size, target):
     image = np.full((size[1], size[0], 3), 200, np.uint8)
     fitted = fit_image(image, *target)
     assert fitted.shape == (target[1], target[0], 3)
@@ -158,7 +158,7 @@ def test_a_picture_is_fitted_whole_into_a_video(size, target):
     assert lit.sum() == pytest.approx(size[0] * size[1] * scale**2, rel=0.1)
 
 
-def test_videos_folders_and_single_pictures_are_written(tmp_path):
+def test_videos_folders_and_single_images_are_written(tmp_path):
     sizes = [(65, 49), (40, 80)]
     estimates = [estimate(image=numbered(k, size)) for k, size in enumerate(sizes)]
     with OverlayWriter(tmp_path / "new" / "a.mp4", 11.4, CONE) as video:
@@ -176,7 +176,7 @@ def test_videos_folders_and_single_pictures_are_written(tmp_path):
     assert not list(tmp_path.rglob("*.part"))
 
 
-def test_a_video_without_pictures_leaves_nothing_behind(tmp_path):
+def test_a_video_without_images_leaves_nothing_behind(tmp_path):
     with OverlayWriter(tmp_path / "a.mp4", 5.0, CONE):
         pass
     assert list(tmp_path.iterdir()) == []

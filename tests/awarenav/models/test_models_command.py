@@ -14,14 +14,14 @@ MODELS = SHARED / "models"
 
 
 @pytest.mark.parametrize("verb", [[], ["list"], ["verify"], ["fetch"]])
-def test_help_says_what_a_verb_does(verb, capsys):
+def test_help_says_what_a_models_command_does(verb, capsys):
     assert main(["models", *verb, "--help"]) == 0
     text = capsys.readouterr().out
     assert "Usage: awarenav models" in text
     assert not verb or "--out DIR" in text
 
 
-def test_catalogue_fetches_nothing_that_binds_the_user():
+def test_catalogue_fetches_only_networks_with_permissive_licences():
     catalogue = Catalogue.shipped()
     assert {entry.licence for entry in catalogue.models} <= {"Apache-2.0", "MIT", "BSD-3-Clause"}
     assert all(entry.url.startswith("https://") for entry in catalogue.models)
@@ -110,12 +110,12 @@ def test_command_refuses_in_one_line(catalogue, server, arguments, message, caps
     assert server.requests == []
 
 
-def test_hash_that_is_none_is_refused(catalogue, capsys):
+def test_text_that_is_not_a_sha256_is_refused(catalogue, capsys):
     assert main(["models", "fetch", "tiny", "--sha256", "abc"]) == 2
     assert "64 hexadecimal digits" in capsys.readouterr().err
 
 
-def test_full_disk_is_said_before_anything_is_written(server, tmp_path, monkeypatch):
+def test_full_disk_is_reported_before_anything_is_written(server, tmp_path, monkeypatch):
     server.serve("a.onnx", CONTENT)
     usage = shutil.disk_usage(tmp_path)
     monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=1_000_000))

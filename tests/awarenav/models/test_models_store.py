@@ -46,7 +46,7 @@ def test_truncated_archive_leaves_nothing_behind(server, tmp_path):
     assert names(tmp_path) == set()
 
 
-def test_wrong_hash_is_thrown_away_and_what_was_there_stays(server, tmp_path):
+def test_download_with_a_wrong_sha256_is_dropped_and_the_old_file_stays(server, tmp_path):
     server.serve("a.onnx", OTHER)
     (tmp_path / "tiny.onnx").write_bytes(b"what was there")
     fetched = store(tmp_path, model(server, "a.onnx", sha256=sha256(CONTENT)))
@@ -81,7 +81,7 @@ def test_login_page_is_not_trusted_on_first_use(server, tmp_path):
 
 
 @pytest.mark.skipif(not MODELS.is_dir(), reason="no genuine networks beside the checkout")
-def test_first_fetch_is_trusted_and_later_ones_held_to_it(server, tmp_path):
+def test_first_fetch_is_trusted_and_later_ones_must_match_it(server, tmp_path):
     first = (MODELS / "yolox_nano_416_coco.onnx").read_bytes()
     second = (MODELS / "rtmdet_nano_person_320_mmpose.onnx").read_bytes()
     server.serve("a.onnx", first)
@@ -101,7 +101,7 @@ def test_first_fetch_is_trusted_and_later_ones_held_to_it(server, tmp_path):
         fetched.fetch("tiny", sha256=sha256(second), progress=False)
 
 
-def test_users_hash_is_held_to(server, tmp_path):
+def test_download_must_have_the_sha256_of_the_user(server, tmp_path):
     server.serve("a.onnx", CONTENT)
     fetched = store(tmp_path, model(server, "a.onnx"))
     with pytest.raises(AwarenavError, match="expected"):
@@ -113,14 +113,14 @@ def test_users_hash_is_held_to(server, tmp_path):
         pinned.fetch("tiny", sha256=sha256(OTHER), progress=False)
 
 
-def test_file_that_nobody_fetched_is_not_believed(server, tmp_path):
+def test_file_that_was_not_fetched_is_refused(server, tmp_path):
     (tmp_path / "tiny.onnx").write_bytes(CONTENT)
     with pytest.raises(AwarenavError, match="not put there"):
         store(tmp_path, model(server, "a.onnx")).path("tiny")
 
 
 @pytest.mark.parametrize("text", ["{", "[]", '{"models": {"tiny": {}}}', '{"models": 3}'])
-def test_damaged_lock_trusts_nothing(server, tmp_path, text):
+def test_damaged_lock_file_is_refused(server, tmp_path, text):
     (tmp_path / "models.lock.json").write_text(text)
     server.serve("a.onnx", CONTENT)
     with pytest.raises(AwarenavError, match=r"models\.lock\.json cannot be read"):

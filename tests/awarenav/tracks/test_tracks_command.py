@@ -81,7 +81,7 @@ def test_a_plot_is_a_whole_file_and_the_same_every_time(estimates, tmp_path, end
     assert [each.name for each in second.parent.iterdir()] == [second.name]
 
 
-def test_a_line_a_track_says_when_it_lived_and_how_aware_it_was(estimates, capsys):
+def test_the_table_has_one_line_per_track_with_its_life_and_awareness(estimates, capsys):
     assert run(estimates, "--out", "none") == 0
     header, *body = capsys.readouterr().out.splitlines()
     words = ["id", "born", "(s)", "confirmed", "(s)", "died", "(s)", "seen", "coasted"]
@@ -97,7 +97,7 @@ def test_a_line_a_track_says_when_it_lived_and_how_aware_it_was(estimates, capsy
     assert histories[0].seen_frames == 34
 
 
-def test_the_table_holds_every_track_at_every_frame(estimates, tmp_path):
+def test_the_csv_file_has_every_track_at_every_frame(estimates, tmp_path):
     path = tmp_path / "tracks.csv"
     assert run(estimates, "--out", "none", "--csv", path) == 0
     table = rows(path)
@@ -140,7 +140,7 @@ def test_settings_and_camera_come_from_files(tmp_path, capsys):
     assert died_s() == known_view_s
 
 
-def test_a_half_written_line_is_said_and_the_rest_is_shown(estimates, capsys):
+def test_an_incomplete_line_is_reported_and_the_rest_is_shown(estimates, capsys):
     estimates.write_text(estimates.read_text("utf-8")[:-20], "utf-8")
     assert run(estimates, "--out", "none") == 0
     said = capsys.readouterr()
@@ -148,7 +148,7 @@ def test_a_half_written_line_is_said_and_the_rest_is_shown(estimates, capsys):
     assert len(said.out.splitlines()) == 3
 
 
-def test_late_frames_are_said(tmp_path, capsys):
+def test_late_frames_are_reported(tmp_path, capsys):
     records = lines(WALKERS, frames=30)
     records[8], records[9] = records[9], records[8]
     records.append(records.pop(3))
@@ -161,7 +161,7 @@ def test_late_frames_are_said(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(("step_m", "said"), [(0.2, False), (4.0, True)])
-def test_single_pictures_are_no_drive(tmp_path, capsys, step_m, said):
+def test_single_images_of_many_places_are_reported(tmp_path, capsys, step_m, said):
     path = tmp_path / "set.jsonl"
     write_records(path, lines(WALKERS, frames=6, camera=lambda t: pose(10.0 * step_m * t)))
     assert run(path, "--out", "none") == 0
@@ -169,7 +169,7 @@ def test_single_pictures_are_no_drive(tmp_path, capsys, step_m, said):
     assert (f"the camera jumps by {step_m:.1f} m from frame to frame" in error) == said
 
 
-def test_no_people_at_all_is_said_and_drawn(tmp_path, capsys):
+def test_a_file_without_people_is_reported_and_drawn(tmp_path, capsys):
     path = tmp_path / "nobody.jsonl"
     write_records(path, lines([], frames=5))
     assert run(path, "--out", tmp_path / "nobody.png") == 0
@@ -177,7 +177,7 @@ def test_no_people_at_all_is_said_and_drawn(tmp_path, capsys):
     assert (tmp_path / "nobody.png").read_bytes().startswith(HEADS[".png"])
 
 
-def test_who_was_never_confirmed_is_counted(tmp_path, capsys):
+def test_tracks_that_were_never_confirmed_are_counted(tmp_path, capsys):
     path = tmp_path / "clutter.jsonl"
     write_records(path, lines(WALKERS, frames=20, hidden=lambda k, who: who == 1 and k != 7))
     assert run(path, "--out", "none") == 0
@@ -199,7 +199,9 @@ def test_who_was_never_confirmed_is_counted(tmp_path, capsys):
         (["--ids"], "leave out --ids to track them here"),
     ],
 )
-def test_bad_input_is_said_and_nothing_is_written(estimates, tmp_path, capsys, arguments, message):
+def test_bad_input_is_refused_and_nothing_is_written(
+    estimates, tmp_path, capsys, arguments, message
+):
     out = tmp_path / "out.png"
     arguments = [argument.replace("{tmp}", str(tmp_path)) for argument in arguments]
     before = sorted(tmp_path.iterdir())
@@ -219,7 +221,7 @@ def test_a_file_that_holds_no_frames_is_refused(tmp_path, capsys, text):
     assert not (tmp_path / "out.png").exists()
 
 
-def test_an_interruption_leaves_the_old_plot_and_no_half_one(estimates, tmp_path, monkeypatch):
+def test_an_interruption_leaves_the_old_plot_and_no_partial_one(estimates, tmp_path, monkeypatch):
     out = tmp_path / "out.png"
     out.write_bytes(b"old")
 

@@ -71,7 +71,7 @@ def test_a_pause_is_filled_with_predictions_that_fall_and_frames_stay_frames(tmp
         assert len(each.frames) == len(records)
 
 
-def test_late_frames_within_the_lag_give_the_run_of_frames_in_order(tmp_path):
+def test_late_frames_within_the_lag_give_the_tracks_of_sorted_frames(tmp_path):
     records = lines(WALKERS, frames=30)
     shuffled = list(records)
     for k in (3, 9, 17, 24):
@@ -82,7 +82,7 @@ def test_late_frames_within_the_lag_give_the_run_of_frames_in_order(tmp_path):
     assert any("late frames put back" in remark for remark in late.remarks)
 
 
-def test_what_a_late_recording_draws_is_what_the_tracker_says_in_the_end(tmp_path):
+def test_a_recording_with_late_frames_ends_with_the_tracks_of_the_tracker(tmp_path):
     records = lines(WALKERS, frames=30)
     records[20], records[22] = records[22], records[20]
     recording = recorded(tmp_path, records)
@@ -181,7 +181,7 @@ def test_tracks_of_a_file_come_back_as_the_tracker_wrote_them(tmp_path):
         ({"time_since_seen_s": None}, "time_since_seen_s"),
     ],
 )
-def test_a_track_of_a_file_that_is_none_is_refused_by_frame(tmp_path, change, message):
+def test_an_invalid_track_of_a_file_is_refused_by_frame(tmp_path, change, message):
     track = {
         "id": 1,
         "status": "confirmed",

@@ -75,7 +75,7 @@ def test_unseen_spans_cover_every_unseen_frame_and_no_seen_one(shown):
 
 
 @given(st.lists(st.sampled_from(["tentative", "confirmed", "coasting"]), min_size=1, max_size=20))
-def test_stretches_join_without_a_gap_and_have_one_status_each(statuses):
+def test_segments_join_without_a_gap_and_have_one_status_each(statuses):
     made = history([sample(0.1 * k, status=status) for k, status in enumerate(statuses)])
     runs = list(made.segments())
     for (_, before), (_, after) in itertools.pairwise(runs):
@@ -86,7 +86,7 @@ def test_stretches_join_without_a_gap_and_have_one_status_each(statuses):
         assert {each.status for each in run} == {status}
 
 
-def test_a_person_of_the_file_who_comes_back_gets_a_new_stretch():
+def test_a_person_of_the_file_who_comes_back_gets_a_new_segment():
     made = history([sample(stamp_s, status="given") for stamp_s in (0.0, 0.1, 0.2, 2.0, 2.1)])
     assert [len(run) for _, run in made.segments()] == [3, 2]
 
@@ -112,7 +112,7 @@ def test_stamps_that_go_back_are_refused_and_a_second_frame_of_an_instant_keeps_
     assert [each.seen for each in made.samples] == [True, True]
 
 
-def test_who_is_gone_has_died_and_who_is_back_has_not():
+def test_a_track_that_is_missing_has_died_until_it_comes_back():
     builder = HistoryBuilder()
     builder.add(0.0, [(1, sample(0.0)), (2, sample(0.0))])
     builder.add(0.1, [(2, sample(0.1))])

@@ -125,7 +125,7 @@ def test_a_metre_is_as_long_along_x_as_along_y_and_every_track_is_inside(tmp_pat
         assert (y < y_max).all()
 
 
-def test_what_is_left_out_is_said(tmp_path):
+def test_tracks_without_a_panel_are_counted_in_a_note(tmp_path):
     records = lines(crowd(9), frames=20, hidden=lambda k, who: who == 8 and k > 1)
     run = track_recording(recorded(tmp_path, records))
     shown, others = shown_tracks(run.histories, 5)
@@ -141,13 +141,13 @@ def test_those_seen_most_often_come_first(tmp_path):
     assert [each.id for each in shown] == [2, 3]
 
 
-def test_nobody_is_said_in_an_empty_plot(tmp_path):
+def test_an_empty_plot_says_that_there_are_no_people(tmp_path):
     figure = tracks_figure(track_recording(recorded(tmp_path, lines([], frames=7))), "empty")
     assert "no people in 7 frames" in texts(figure)
     assert len(figure.axes) == 1
 
 
-def test_not_even_a_frame_is_an_empty_plot(tmp_path):
+def test_a_file_without_frames_gives_an_empty_plot(tmp_path):
     figure = tracks_figure(track_recording(recorded(tmp_path, [])), "nothing")
     assert "no people in 0 frames" in texts(figure)
     figure.canvas.draw()
@@ -195,6 +195,6 @@ def test_faint_tracks_have_no_ellipses_and_named_ones_have(tmp_path):
     assert np.allclose(centres, [3.0, 0.0], atol=0.05)
 
 
-def test_limits_hold_a_few_metres_even_of_nothing(tmp_path):
+def test_limits_span_three_metres_without_any_track(tmp_path):
     run = track_recording(recorded(tmp_path, []))
     assert plan_limits(run, []) == pytest.approx((-1.5, 1.5, -1.5, 1.5))

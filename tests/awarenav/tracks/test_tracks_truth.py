@@ -47,7 +47,7 @@ def test_every_track_is_the_person_that_it_follows(tmp_path):
         assert person_ids_text(matched) == str(id)
 
 
-def test_a_track_that_changes_to_another_person_is_found_out(tmp_path):
+def test_a_track_that_changes_to_another_person_matches_both(tmp_path):
     truth = recorded(tmp_path, lines(PEOPLE, named=True))
     records = lines(PEOPLE, named=True)
     for record in records[30:]:
@@ -60,7 +60,7 @@ def test_a_track_that_changes_to_another_person_is_found_out(tmp_path):
     assert person_ids_text(matches[1]) == "1, 0"
 
 
-def test_nobody_near_is_nobody(tmp_path):
+def test_a_track_far_from_everybody_matches_nobody(tmp_path):
     truth = true_people(recorded(tmp_path, lines([standing(4.0, 0.0)], named=True)))
     near = tracks_in_file(
         recorded(tmp_path, lines([standing(4.0, 0.99)], named=True), "near.jsonl")
@@ -79,7 +79,7 @@ def test_a_far_track_does_not_take_a_near_ones_person(tmp_path):
     assert (len(matches[0]), len(matches[1])) == (40, 0)
 
 
-def test_the_truth_of_another_instant_is_no_truth(tmp_path):
+def test_truth_with_another_stamp_is_not_matched(tmp_path):
     truth = true_people(recorded(tmp_path, lines([standing(4.0, 0.0)], frames=4, named=True)))
     for shift_s, count in ((0.02, 4), (0.05, 0)):
         records = lines([standing(4.0, 0.0)], frames=4, named=True)
@@ -89,7 +89,7 @@ def test_the_truth_of_another_instant_is_no_truth(tmp_path):
         assert len(match_truth(run.histories, truth)[0]) == count
 
 
-def test_a_truth_without_awareness_says_nothing_about_it(tmp_path):
+def test_truth_without_awareness_gives_nan(tmp_path):
     records = lines([standing(4.0, 0.0)], named=True, awareness=lambda t: None)
     truth = recorded(tmp_path, records)
     beside = truth_beside_tracks(tracks_in_file(truth).histories, truth)

@@ -32,7 +32,7 @@ def stamped(stamp_s: float, frame_id: str) -> Header:
     return Header(Time(seconds, round(1e9 * (stamp_s - seconds))), frame_id)
 
 
-class Picture:
+class RenderedImage:
     """A rendered image with one person, and its messages."""
 
     def __init__(self, folder: Path) -> None:
@@ -70,7 +70,7 @@ def odometry(stamp_s: float) -> Odometry:
     return Odometry(stamped(stamp_s, "odom"), "base_link", twist=twist)
 
 
-def rendered(folder: Path) -> Picture:
+def rendered(folder: Path) -> RenderedImage:
     size = ["--frames", "2", "--people", "1", "--scenes", "1", "--range", "2", "4", "--seed", "3"]
     assert main(["render", *size, "--processes", "1", "--out", str(folder)]) == 0
-    return Picture(folder)
+    return RenderedImage(folder)
