@@ -1,6 +1,6 @@
-"""Awareness-aware navigation: robots that move differently around people who have seen them.
+"""Awareness-aware navigation: a robot moves differently around people who have seen it.
 
-The names of the four packages behind it, imported when they are first used:
+The main names of :mod:`perception`, :mod:`tracking` and :mod:`nav_adapter`, imported on first use:
 ``awarenav.AwarenessPipeline``, ``awarenav.PersonTracker``, ``awarenav.NavAdapter`` and the types
 between them. The command line is :mod:`awarenav.cli`; closed-loop crossings are :mod:`sim_tests`.
 """
@@ -10,7 +10,7 @@ from __future__ import annotations
 from pathlib import Path
 from runpy import run_path
 
-# By path: importing it by name would first run whatever now calls itself perception.
+# Run by its path: an import by name could run a foreign package called perception.
 _CLASH = Path(__file__).parents[1] / "perception" / "_clash.py"
 run_path(str(_CLASH))["require_sole_owner"](__name__)
 

@@ -1,4 +1,4 @@
-"""``python -m awarenav``."""
+"""The command line as ``python -m awarenav``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Measured figures and a committed baseline that they are compared with."""
+"""Metrics, and a committed baseline to compare them with."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ Direction = Literal["higher", "lower"]
 
 @dataclass(frozen=True, slots=True)
 class Metric:
-    """One measured figure.
+    """A measured value.
 
     Attributes:
         name: unique in a baseline.
         value: measured.
         unit: of the value.
-        direction: which way is better.
-        tolerance: relative worsening against the baseline that still counts as equal.
+        direction: whether higher or lower values are better.
+        tolerance: a value that is worse than the baseline by at most this share counts as equal.
     """
 
     name: str
@@ -33,22 +33,22 @@ class Metric:
     tolerance: float
 
     def is_worse_than(self, baseline: Metric) -> bool:
-        """True when the value is worse than the baseline by more than its tolerance."""
+        """Return whether the value is worse than the baseline by more than its tolerance."""
         if baseline.direction == "higher":
             return self.value < baseline.value * (1.0 - baseline.tolerance)
         return self.value > baseline.value * (1.0 + baseline.tolerance)
 
 
 def write_baseline(path: Path, metrics: Iterable[Metric]) -> None:
-    """Write metrics as a baseline; the file appears whole or not at all."""
+    """Write metrics as a baseline file."""
     write_text(path, json_text({"metrics": [asdict(metric) for metric in metrics]}))
 
 
 def read_baseline(path: Path) -> dict[str, Metric]:
-    """Read a baseline by metric name.
+    """Read a baseline file; return its metrics by name.
 
     Raises:
-        AwarenavError: for a file that cannot be read or is no baseline.
+        AwarenavError: for a file that cannot be read or is not a baseline.
     """
     try:
         entries = json.loads(path.read_text(encoding="utf-8"))["metrics"]
@@ -78,9 +78,9 @@ def comparison_text(
     baseline: Mapping[str, Metric],
     goals: Mapping[str, float] | None = None,
 ) -> tuple[str, bool]:
-    """The metrics as text beside the baseline, and whether none is worse than it.
+    """Return a table of metrics and their baseline, and whether none is worse than the baseline.
 
-    Goals are printed too; a busy or slow computer that misses one fails nothing.
+    The table also shows goals; a goal that is not reached is no failure.
     """
     lines = [f"{'metric':42s}{'now':>10s}{'baseline':>10s}  unit"]
     good = True

@@ -1,10 +1,11 @@
-"""Figures drawn by matplotlib without a display; the one module that imports matplotlib."""
+"""Matplotlib figures without a display; no other module of awarenav imports matplotlib."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from .errors import AwarenavError, MissingExtraError
+from .errors import MissingExtraError
+from .files import atomic_path
 
 try:
     from matplotlib import rc_context
@@ -16,12 +17,11 @@ try:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Circle, Ellipse, Patch, Polygon, Rectangle, Wedge
     from matplotlib.ticker import MultipleLocator
-    from PIL import Image  # matplotlib brings it
+    from PIL import Image  # a dependency of matplotlib
 except ImportError as cause:  # pragma: no cover - depends on the installation
     raise MissingExtraError(
-        "a plot needs matplotlib, which is not installed: pip install matplotlib, or the extra "
-        "'sim' that it is part of: pip install 'awarenav[sim]'; tables alone (--out none) work "
-        "without it"
+        "a plot needs matplotlib, which is not installed; it is part of the extra 'sim': "
+        "pip install 'awarenav[sim]'. Without it, only tables can be made (--out none)"
     ) from cause
 
 __all__ = [
@@ -46,13 +46,13 @@ __all__ = [
 def new_figure(
     width_in: float, height_in: float, *, dpi: float = 100.0, constrained: bool = True
 ) -> Figure:
-    """Return an empty white figure that is drawn without a display.
+    """Return an empty white figure.
 
     Args:
-        width_in: inches.
-        height_in: inches.
-        dpi: pixels an inch.
-        constrained: let matplotlib place the axes.
+        width_in: width, inches.
+        height_in: height, inches.
+        dpi: pixels per inch.
+        constrained: whether matplotlib's constrained layout places the axes.
     """
     figure = Figure(
         figsize=(width_in, height_in),
@@ -65,24 +65,18 @@ def new_figure(
 
 
 def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure whole or not at all; the ending says the format.
+    """Write a figure as :func:`~awarenav.files.atomic_path` does, in the format of the suffix.
+
+    Equal figures give equal files.
 
     Raises:
         AwarenavError: for a place that cannot be written.
     """
-    part = path.with_name(path.name + ".part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        # Dates of the day and random names inside the file would make two runs differ.
-        date = {".svg": "Date", ".pdf": "CreationDate"}.get(path.suffix.lower())
-        with rc_context({"svg.hashsalt": "awarenav"}):
-            figure.savefig(
-                part,
-                format=path.suffix[1:].lower(),
-                metadata=None if date is None else {date: None},
-            )
-        part.replace(path)
-    except OSError as cause:
-        raise AwarenavError(f"cannot write {path}: {cause.strerror or cause}") from cause
-    finally:
-        part.unlink(missing_ok=True)
+    # A date and random names in the file would make two runs differ.
+    date = {".svg": "Date", ".pdf": "CreationDate"}.get(path.suffix.lower())
+    with atomic_path(path) as part, rc_context({"svg.hashsalt": "awarenav"}):
+        figure.savefig(
+            part,
+            format=path.suffix[1:].lower(),
+            metadata=None if date is None else {date: None},
+        )

@@ -1,18 +1,22 @@
-"""Text files that appear whole or not at all, and how numbers are written in them."""
+"""Files that appear whole or not at all, and the numbers in text files."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from .errors import AwarenavError
 
 
-def write_text(path: Path, text: str, error: type[AwarenavError] = AwarenavError) -> None:
-    """Write a UTF-8 file whole or not at all; folders that are missing are made.
+@contextmanager
+def atomic_path(path: Path, error: type[AwarenavError] = AwarenavError) -> Iterator[Path]:
+    """Yield a path to write to; the file there replaces ``path`` when the block ends well.
+
+    The file lies beside ``path`` and is removed when the block fails. Missing folders are made.
 
     Raises:
         AwarenavError: or ``error``, for a place that cannot be written.
@@ -20,10 +24,22 @@ def write_text(path: Path, text: str, error: type[AwarenavError] = AwarenavError
     part = path.with_name(path.name + ".part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        part.write_text(text, encoding="utf-8")
+        yield part
         part.replace(path)
     except OSError as cause:
         raise error(f"cannot write {path}: {cause.strerror or cause}") from cause
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str, error: type[AwarenavError] = AwarenavError) -> None:
+    """Write a UTF-8 file as :func:`atomic_path` does.
+
+    Raises:
+        AwarenavError: or ``error``, for a place that cannot be written.
+    """
+    with atomic_path(path, error) as part:
+        part.write_text(text, encoding="utf-8")
 
 
 def json_text(value: Any) -> str:
@@ -32,6 +48,7 @@ def json_text(value: Any) -> str:
 
 
 def _finite(value: Any) -> Any:
+    """Return the value with None in place of numbers that are not finite."""
     if isinstance(value, Mapping):
         return {key: _finite(each) for key, each in value.items()}
     if isinstance(value, list | tuple):

@@ -1,4 +1,4 @@
-"""Names of a package that are imported when they are first used."""
+"""Packages whose names are imported on first use."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from importlib import import_module
 from typing import Any
 
 
-def lazy_names(package: str, homes: Mapping[str, Iterable[str]]) -> Callable[[str], Any]:
-    """Return the ``__getattr__`` of a package that imports its public names on first use (PEP 562).
+def lazy_names(package: str, names_of: Mapping[str, Iterable[str]]) -> Callable[[str], Any]:
+    """Return the ``__getattr__`` of a package that imports its names on first use (PEP 562).
 
-    A command line that only prints help then imports no network and no simulator.
+    Help on the command line then imports neither networks nor the simulator.
 
     Args:
         package: its ``__name__``.
-        homes: names by the module that defines them, relative to the package.
+        names_of: the names that each module defines; modules relative to the package, or absolute.
     """
-    home_of = {name: home for home, names in homes.items() for name in names}
+    module_of = {name: module for module, names in names_of.items() for name in names}
 
     def get(name: str) -> Any:
-        if name not in home_of:
+        if name not in module_of:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        value = getattr(import_module(home_of[name], package), name)
+        value = getattr(import_module(module_of[name], package), name)
         setattr(sys.modules[package], name, value)
         return value
 

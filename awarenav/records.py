@@ -1,12 +1,10 @@
-"""Frames and the people in them as JSON Lines: one schema for truth and for estimates.
+"""Frames and the people in them as JSON Lines: one format for truth and for estimates.
 
 ``{"frame", "stamp_s", "T_odom_camera", "people": [{"id", "box_xyxy_px", "position_camera_m",
-"gaze_camera", "awareness", "awareness_std", "score", "keypoints": {name: [u, v, score]}}]}``; more
-keys may be present. Boxes count pixels from the picture's corner, maxima exclusive; keypoints are
-in the coordinates of :meth:`perception.Camera.project`: a pixel's centre is a whole number.
-
-
-A person of a frame's record, read and checked for judging.
+"gaze_camera", "awareness", "awareness_std", "score", "keypoints": {name: [u, v, score]}}]}``; a
+frame or a person may have more keys. Boxes count pixels from the image's corner, maxima exclusive;
+keypoints are in the coordinates of :meth:`perception.Camera.project`: the centre of a pixel is a
+whole number.
 """
 
 from __future__ import annotations
@@ -30,6 +28,7 @@ from perception.arrays import (
 )
 
 from .errors import AwarenavError
+from .files import atomic_path
 
 Record = dict[str, Any]
 
@@ -37,20 +36,25 @@ _KEYS: Final = ("frame", "stamp_s", "T_odom_camera", "people")
 
 
 def record_line(record: Record) -> str:
-    """One line of a JSON Lines file; refuses what JSON cannot say, such as NaN."""
+    """Return a frame as one line of a JSON Lines file.
+
+    Raises:
+        AwarenavError: for a number that is not finite, which JSON does not have.
+    """
     try:
         return json.dumps(record, separators=(", ", ": "), allow_nan=False) + "\n"
     except ValueError as cause:
         raise AwarenavError(
-            f"frame {record.get('frame')!r} holds a number that is not finite"
+            f"frame {record.get('frame')!r} has a number that is not finite"
         ) from cause
 
 
 def read_records(path: Path) -> list[Record]:
-    """Read a JSON Lines file of frames; a last line that was cut off in writing is left out.
+    """Read a JSON Lines file of frames; an incomplete last line is left out.
 
     Raises:
-        AwarenavError: for a file that cannot be read or a line that is no frame, with its number.
+        AwarenavError: for a file that cannot be read; for a line that is not a frame, with its
+            number.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -74,31 +78,33 @@ def read_records(path: Path) -> list[Record]:
 
 
 def write_records(path: Path, records: Iterable[Record]) -> None:
-    """Write a whole file at once: readers see the old one or the new one, never half of one."""
-    part = path.with_name(path.name + ".part")
-    with part.open("w", encoding="utf-8") as file:
+    """Write a JSON Lines file of frames as :func:`~awarenav.files.atomic_path` does.
+
+    Raises:
+        AwarenavError: for a place that cannot be written, or a number that is not finite.
+    """
+    with atomic_path(path) as part, part.open("w", encoding="utf-8") as file:
         file.writelines(record_line(record) for record in records)
         file.flush()
         os.fsync(file.fileno())
-    part.replace(path)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PersonRecord:
-    """One person of a record; what the record does not say is None.
+    """A person in a frame's record; None for what the record does not have.
 
     Attributes:
         box_xyxy_px: (4,).
         position_camera_m: (3,) the body's centre line at chest height.
         position_covariance_m2: (3, 3).
         gaze_camera: (3,) unit vector.
-        head_forward_camera: (3,) unit vector: the head's forward axis where ``gaze_camera`` holds
-            the eyes' direction (rendered truth).
+        head_forward_camera: (3,) unit vector, the head's forward axis; rendered truth has it, since
+            its ``gaze_camera`` is the direction of the eyes.
         awareness: α in [0, 1].
         awareness_std: ≥ 0.
         score: in [0, 1].
-        occlusion: share of the person that something else hides; 0 where the record is silent.
-        truncation: share of the person outside the picture; 0 where the record is silent.
+        occlusion: share of the person that other things hide; 0 if the record has none.
+        truncation: share of the person outside the image; 0 if the record has none.
     """
 
     box_xyxy_px: FloatArray | None
@@ -126,7 +132,7 @@ class PersonRecord:
 
     @property
     def facing_rad(self) -> float | None:
-        """Angle between the head's forward axis and the way to the camera: 0 faces it."""
+        """Angle between the head's forward axis and the direction to the camera; 0 faces it."""
         forward = self.gaze_camera if self.head_forward_camera is None else self.head_forward_camera
         if forward is None or self.position_camera_m is None or not self.range_m:
             return None
@@ -135,7 +141,11 @@ class PersonRecord:
 
 
 def read_person(person: Any, where: str) -> PersonRecord:
-    """Read one entry of ``people``; raises AwarenavError naming ``where`` for bad values."""
+    """Read an entry of ``people``.
+
+    Raises:
+        AwarenavError: for a value that is not valid; the message begins with ``where``.
+    """
     if not isinstance(person, dict):
         raise AwarenavError(f"{where}: a person must be a mapping, got {person!r:.60}")
 
@@ -176,12 +186,16 @@ def read_person(person: Any, where: str) -> PersonRecord:
 
 
 def people_by_frame(records: list[Record], path: Any) -> dict[str, list[PersonRecord]]:
-    """The people of every frame by its name; raises AwarenavError for a frame that comes twice."""
+    """Return the people of every frame, by the frame's name.
+
+    Raises:
+        AwarenavError: for two frames of one name, or a person that is not valid.
+    """
     frames: dict[str, list[PersonRecord]] = {}
     for record in records:
         name = str(record["frame"])
         if name in frames:
-            raise AwarenavError(f"{path}: frame {name!r} comes twice")
+            raise AwarenavError(f"{path}: two frames have the name {name!r}")
         people = record["people"]
         if not isinstance(people, list):
             raise AwarenavError(

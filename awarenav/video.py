@@ -1,14 +1,14 @@
-"""Writes H.264 video files with PyAV."""
+"""H.264 video files, written with PyAV."""
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .closing import Closing
 from .errors import AwarenavError, MissingExtraError
 
 try:
@@ -20,12 +20,12 @@ except ImportError as cause:  # pragma: no cover - depends on the installation
     ) from cause
 
 
-class VideoWriter(Closing):
-    """An MP4 file that plays everywhere (H.264, yuv420p); it appears when it is complete.
+class VideoWriter(AbstractContextManager["VideoWriter"]):
+    """An MP4 file that common players can play (H.264, yuv420p); it appears when it is closed.
 
     Args:
-        path: the file, ending in ``.mp4``.
-        rate_hz: frames a second.
+        path: of the file, which ends in ``.mp4``.
+        rate_hz: frames per second.
         size_px: width and height, both even.
     """
 
@@ -41,17 +41,20 @@ class VideoWriter(Closing):
         self._stream.pix_fmt = "yuv420p"
         self._stream.options = {"crf": "21", "preset": "veryfast"}
 
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
     def close(self) -> None:
-        """Finish the file. An interrupted video is still a video."""
+        """Finish the file; a video that was interrupted can be played too."""
         for packet in self._stream.encode():
             self._container.mux(packet)
         self._container.close()
         self._partial.replace(self._path)
 
-    def add(self, picture: NDArray[np.uint8]) -> None:
-        """Append one (H, W, 3) RGB picture."""
-        if picture.shape != (self._size_px[1], self._size_px[0], 3):
-            raise AwarenavError(f"pictures must be {self._size_px} px, got shape {picture.shape}")
-        frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
+    def add(self, image: NDArray[np.uint8]) -> None:
+        """Append an (H, W, 3) RGB image."""
+        if image.shape != (self._size_px[1], self._size_px[0], 3):
+            raise AwarenavError(f"images must be {self._size_px} px, got shape {image.shape}")
+        frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="rgb24")
         for packet in self._stream.encode(frame):
             self._container.mux(packet)

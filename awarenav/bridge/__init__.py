@@ -1,1 +1,29 @@
-"""A robot's camera on ROS 2 topics in, constraints for Nav2 out: ``awarenav bridge``."""
+"""From a ROS 2 camera to obstacles and a speed limit for Nav2: ``awarenav bridge``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..lazy import lazy_names
+
+if TYPE_CHECKING:
+    from ._loop import BridgeInputs, BridgeLoop
+    from ._publisher import TopicPublisher
+    from ._rerun import RerunRecorder, cone_lines
+
+__all__ = [
+    "BridgeInputs",
+    "BridgeLoop",
+    "RerunRecorder",
+    "TopicPublisher",
+    "cone_lines",
+]
+
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "._loop": ("BridgeInputs", "BridgeLoop"),
+        "._publisher": ("TopicPublisher",),
+        "._rerun": ("RerunRecorder", "cone_lines"),
+    },
+)

@@ -1,11 +1,11 @@
-"""The loop of the bridge: wait for messages, work the newest frame, publish at a rate."""
+"""The loop of the bridge: waits for messages, processes the newest frame, publishes at a rate."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol, cast
+from typing import TYPE_CHECKING, Final, Protocol, cast
 
 from nav_adapter import NavConstraints, NavError
 from nav_adapter.ros2 import AwarenessBridge, Topic
@@ -17,19 +17,19 @@ from nav_adapter.ros2.messages.tf2_msgs import TFMessage
 if TYPE_CHECKING:
     from nav_adapter.ros2 import DdsNode, McapRecorder
 
-_REPORT_S = 2.0
+_REPORT_PERIOD_S: Final = 2.0
 
 
-class FrameSink(Protocol):
-    """What draws frames and constraints."""
+class BridgeViewer(Protocol):
+    """Shows or records the state of the bridge."""
 
     def draw(self, bridge: AwarenessBridge, constraints: NavConstraints, *, frame: bool) -> None:
-        """Draw the state of the bridge; ``frame`` when a new picture is in it."""
+        """Draw the state of the bridge; ``frame`` says whether it has a new image."""
 
 
 @dataclass(frozen=True)
-class Inputs:
-    """The topics that are read; None for what comes from a file."""
+class BridgeInputs:
+    """The topics that the bridge reads; None for an input that comes from a file."""
 
     image: Topic
     odom: Topic
@@ -39,31 +39,33 @@ class Inputs:
 
 
 class BridgeLoop:
-    """One thread: a frame that takes long delays the next publication, and never two at a time.
+    """Processes and publishes in one thread: a slow frame delays the next publication.
+
+    Attributes:
+        frames: number of frames that were processed.
 
     Args:
-        node: takes and publishes.
-        bridge: works.
-        inputs: what is read.
-        rate_hz: how often everything is published without images; each image adds one.
-        recorder: gets odometry and tf as they were read.
-        drawing: draws.
+        node: receives and sends messages.
+        bridge: processes the messages.
+        inputs: the topics to read.
+        rate_hz: rate of publishing without images; every image adds a publication.
+        recorder: records odometry and tf as received.
+        viewer: shows the state of the bridge.
     """
 
     def __init__(
         self,
         node: DdsNode,
         bridge: AwarenessBridge,
-        inputs: Inputs,
+        inputs: BridgeInputs,
         rate_hz: float,
         *,
         recorder: McapRecorder | None = None,
-        drawing: FrameSink | None = None,
+        viewer: BridgeViewer | None = None,
     ) -> None:
         self._node, self._bridge, self._inputs = node, bridge, inputs
         self._period_s = 1.0 / rate_hz
-        self._recorder, self._drawing = recorder, drawing
-        #: Good frames so far.
+        self._recorder, self._viewer = recorder, viewer
         self.frames = 0
         for topic in (inputs.image, inputs.odom, inputs.camera_info, inputs.tf, inputs.tf_static):
             if topic is not None:
@@ -72,7 +74,7 @@ class BridgeLoop:
     def run(
         self, seconds: float | None = None, *, report: Callable[[str], None] = lambda text: None
     ) -> None:
-        """Run for so long, or until an exception ends it; report every two seconds."""
+        """Run for ``seconds``, or until an exception; ``report`` gets a line every 2 s."""
         began = reported = due = time.monotonic()
         frames_before = 0
         while seconds is None or time.monotonic() - began < seconds:
@@ -81,11 +83,11 @@ class BridgeLoop:
             if not seen and time.monotonic() < due:
                 continue
             constraints = self._bridge.tick(time.time())
-            if self._drawing is not None:
-                self._drawing.draw(self._bridge, constraints, frame=seen)
+            if self._viewer is not None:
+                self._viewer.draw(self._bridge, constraints, frame=seen)
             now = time.monotonic()
             due = now + self._period_s
-            if now - reported >= _REPORT_S:
+            if now - reported >= _REPORT_PERIOD_S:
                 rate_hz = (self.frames - frames_before) / (now - reported)
                 report(
                     f"{rate_hz:4.1f} frames/s  {len(constraints.obstacles)} people  limit "
@@ -94,7 +96,7 @@ class BridgeLoop:
                 reported, frames_before = now, self.frames
 
     def take(self) -> bool:
-        """Hand over what has come; True when a good frame was in it."""
+        """Pass the received messages to the bridge; return whether a frame was processed."""
         inputs, bridge = self._inputs, self._bridge
         for message in self._messages(inputs.tf_static):
             bridge.on_transforms(cast(TFMessage, message), static=True)
@@ -111,8 +113,10 @@ class BridgeLoop:
         return good
 
     def _messages(self, topic: Topic | None, *, record: bool = True) -> list[Message]:
+        """Return the received messages of a topic; one that cannot be decoded is refused."""
         if topic is None:
             return []
+
         from nav_adapter.ros2 import decode  # noqa: PLC0415 - needs the extra ros2
 
         found = []

@@ -1,7 +1,8 @@
-"""A Rerun recording of what the bridge sees and says; the one module that imports ``rerun``."""
+"""Recordings of the bridge for the viewer Rerun; no other module imports ``rerun``."""
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, Final
 
@@ -11,45 +12,50 @@ from nav_adapter import NavConstraints
 from nav_adapter.ros2 import AwarenessBridge
 from perception.arrays import FloatArray
 
-from ..closing import Closing
 from ..drawing import awareness_colour
-from ..errors import AwarenavError
+from ..errors import AwarenavError, MissingExtraError
 from ..estimate import RecordingPoseEstimator
 
 try:
     import rerun as rr
 except ImportError as cause:  # pragma: no cover - depends on the installation
-    raise AwarenavError(
+    raise MissingExtraError(
         "--rerun needs the package rerun-sdk, which is not installed; it is the extra 'viz' (on "
         "Python 3.11 or later): pip install 'awarenav[viz]'"
     ) from cause
 
 _SEEN_SCORE: Final = 0.3
 _JPEG_QUALITY: Final = 80
-_CONE_M: Final = 1.0
-_RIM: Final = np.linspace(0.0, 2.0 * np.pi, 25)
-_EYES_M: Final = 1.6
+_CONE_LENGTH_M: Final = 1.0
+_RIM_ANGLES: Final = np.linspace(0.0, 2.0 * np.pi, 25)
+_EYE_HEIGHT_M: Final = 1.6
 
 
-class RerunRecorder(Closing):
+class RerunRecorder(AbstractContextManager["RerunRecorder"]):
     """Writes image, keypoints, cones, tracks, radii and speed limit to an ``.rrd`` file.
 
     Args:
-        path: of the file; one that is there is replaced.
-        tap: has the keypoints of the latest frame.
+        path: of the file; an existing one is replaced.
+        pose_estimator: has the keypoints of the latest frame.
         half_angle_rad: of the attention cone.
+
+    Raises:
+        AwarenavError: for a path in a folder that does not exist.
     """
 
-    def __init__(self, path: Path, tap: RecordingPoseEstimator, half_angle_rad: float) -> None:
+    def __init__(
+        self, path: Path, pose_estimator: RecordingPoseEstimator, half_angle_rad: float
+    ) -> None:
         if not path.parent.is_dir():
             raise AwarenavError(f"cannot write {path}: there is no folder {path.parent}")
         self._stream = rr.RecordingStream("awarenav")
         self._stream.save(path)
         self._stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-        self._tap, self._half_angle_rad = tap, half_angle_rad
+        self._pose_estimator = pose_estimator
+        self._half_angle_rad = half_angle_rad
 
     def draw(self, bridge: AwarenessBridge, constraints: NavConstraints, *, frame: bool) -> None:
-        """Write the constraints, and the frame when there is a new one."""
+        """Record the constraints, and the latest frame if ``frame``."""
         self._stream.set_time("stamp", timestamp=constraints.stamp_s)
         if frame:
             self._draw_frame(bridge)
@@ -68,13 +74,17 @@ class RerunRecorder(Closing):
             self._stream.log(f"awareness_lower/{each.track_id}", rr.Scalars(aware))
         self._stream.log("world/obstacles", rr.LineStrips3D(rings, colors=colors, labels=labels))
 
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
     def close(self) -> None:
-        """Write what is left and close the file."""
+        """Write what is buffered and close the file."""
         self._stream.disconnect()
 
     def _draw_frame(self, bridge: AwarenessBridge) -> None:
-        picture, T = bridge.last_picture, bridge.last_T_odom_camera
-        if picture is None or T is None or bridge.camera is None:
+        """Record the latest image with keypoints, cones and tracks."""
+        image, T = bridge.last_picture, bridge.last_T_odom_camera
+        if image is None or T is None or bridge.camera is None:
             return
         camera = bridge.camera
         self._stream.log("world/camera", rr.Transform3D(translation=T[:3, 3], mat3x3=T[:3, :3]))
@@ -84,19 +94,17 @@ class RerunRecorder(Closing):
                 image_from_camera=camera.matrix, resolution=[camera.width_px, camera.height_px]
             ),
         )
-        self._stream.log(
-            "world/camera/image", rr.Image(picture).compress(jpeg_quality=_JPEG_QUALITY)
-        )
+        self._stream.log("world/camera/image", rr.Image(image).compress(jpeg_quality=_JPEG_QUALITY))
         keypoints: list[FloatArray] = []
         cones: list[FloatArray] = []
         for seen in bridge.last_observations:
-            person = self._tap.keypoints_of(seen)
+            person = self._pose_estimator.keypoints_of(seen)
             if person is not None:
                 keypoints.append(np.asarray(person.keypoints_px)[person.scores >= _SEEN_SCORE])
             if seen.gaze_camera is not None:
                 apex = T[:3, :3] @ seen.position_camera_m + T[:3, 3]
-                apex[2] = _EYES_M
-                cones += _cone(apex, T[:3, :3] @ seen.gaze_camera, self._half_angle_rad)
+                apex[2] = _EYE_HEIGHT_M
+                cones += cone_lines(apex, T[:3, :3] @ seen.gaze_camera, self._half_angle_rad)
         points: Any = np.concatenate(keypoints) if keypoints else np.empty((0, 2))
         self._stream.log("world/camera/image/keypoints", rr.Points2D(points, radii=2.0))
         self._stream.log("world/cones", rr.LineStrips3D(cones))
@@ -111,13 +119,13 @@ class RerunRecorder(Closing):
         )
 
 
-def _cone(apex: FloatArray, gaze: FloatArray, half_angle_rad: float) -> list[FloatArray]:
-    """Axis, four edges and rim of an attention cone, a metre long."""
+def cone_lines(apex: FloatArray, gaze: FloatArray, half_angle_rad: float) -> list[FloatArray]:
+    """Return rim, four edges and axis of an attention cone of 1 m."""
     gaze = gaze / np.linalg.norm(gaze)
     side = np.cross(gaze, [0.0, 0.0, 1.0] if abs(gaze[2]) < 0.9 else [1.0, 0.0, 0.0])
     side /= np.linalg.norm(side)
     up = np.cross(side, gaze)
-    around = np.cos(_RIM)[:, None] * side + np.sin(_RIM)[:, None] * up
-    rim = apex + _CONE_M * (np.cos(half_angle_rad) * gaze + np.sin(half_angle_rad) * around)
+    around = np.cos(_RIM_ANGLES)[:, None] * side + np.sin(_RIM_ANGLES)[:, None] * up
+    rim = apex + _CONE_LENGTH_M * (np.cos(half_angle_rad) * gaze + np.sin(half_angle_rad) * around)
     edges = [np.stack([apex, rim[index]]) for index in (0, 6, 12, 18)]
-    return [rim, *edges, np.stack([apex, apex + _CONE_M * gaze])]
+    return [rim, *edges, np.stack([apex, apex + _CONE_LENGTH_M * gaze])]

@@ -1,7 +1,4 @@
-"""Where the messages of the bridge go.
-
-What ``awarenav bridge`` does: a DDS node about the bridge, in one loop.
-"""
+"""The work of ``awarenav bridge``: a DDS node and the bridge, in one loop."""
 
 from __future__ import annotations
 
@@ -9,64 +6,26 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, NoReturn
+from typing import Final, NoReturn
 
-from nav_adapter import AwarenessPolicy, NavError
+from nav_adapter import NavError
 from nav_adapter.ros2 import PUBLISHED, READ, AwarenessBridge, Frames, RobotFile, Topic, renamed
-from nav_adapter.ros2.messages import Message
 from perception import AttentionCone, AwarenessPipeline, Camera, PersonDetector
 from perception.arrays import finite_number
 
 from ..errors import AwarenavError
 from ..estimate import SHIPPED, Networks, RecordingPoseEstimator, choose_networks
-from ._loop import BridgeLoop, Inputs
+from ..policies import read_policy
+from ._loop import BridgeInputs, BridgeLoop
+from ._publisher import TopicPublisher
 
-if TYPE_CHECKING:
-    from nav_adapter.ros2 import DdsNode, McapRecorder
-
-
-class Outlet:
-    """Publishes over DDS, and records what it publishes.
-
-    Args:
-        node: has the publishers, which are made here.
-        topics: what is published, by key.
-        recorder: gets it all, if there is one.
-    """
-
-    def __init__(
-        self, node: DdsNode, topics: Mapping[str, Topic], recorder: McapRecorder | None
-    ) -> None:
-        self._node, self._topics, self._recorder = node, topics, recorder
-        for topic in topics.values():
-            node.advertise(topic)
-
-    def wants(self, key: str) -> bool:
-        """Whether a message would reach anybody.
-
-        Who subscribes later gets the next one; of a latched topic the last one must be there.
-        """
-        topic = self._topics.get(key)
-        return topic is not None and (
-            self._recorder is not None or topic.transient_local or self._node.readers_of(topic) > 0
-        )
-
-    def publish(self, key: str, message: Message) -> None:
-        """Send a message, unless its topic is left out."""
-        topic = self._topics.get(key)
-        if topic is not None:
-            cdr = self._node.publish(topic, message)
-            if self._recorder is not None:
-                self._recorder.write(topic, cdr, time.time())
-
-
-# Time for the last messages to leave before the node does.
-_LINGER_S = 0.1
+# The last messages need so long to leave before the node is closed.
+_SEND_TIME_S: Final = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,14 +56,14 @@ class BridgeOptions:
 
 
 def bridge_command(options: BridgeOptions) -> int:
-    """Run the bridge until Ctrl-C, SIGTERM or ``--seconds``."""
+    """Run the bridge until Ctrl-C, SIGTERM or ``--seconds``; return the exit status."""
     rate_hz = finite_number("--rate", options.rate, AwarenavError, minimum=1.0, maximum=200.0)
     seconds = _seconds(options.seconds)
     domain = _domain(options.domain)
     robot = RobotFile.from_yaml(options.robot)
-    policy = _policy(options.policy)
+    policy = read_policy(options.policy)
     camera = None if options.camera is None else Camera.from_yaml(options.camera)
-    published = _published(options.topic, options.only)
+    published = _published_topics(options.topic, options.only)
     networks = choose_networks(options.detector, options.pose, options.head)
     inputs = _inputs(options, with_info=camera is None, with_tf=robot.camera is None)
 
@@ -116,60 +75,62 @@ def bridge_command(options: BridgeOptions) -> int:
         recorder = None
         if options.record is not None:
             recorder = stack.enter_context(McapRecorder(options.record))
-        outlet = Outlet(node, published, recorder)
-        tap = RecordingPoseEstimator(networks.pose_estimator)
+        publisher = TopicPublisher(node, published, recorder)
+        pose_estimator = RecordingPoseEstimator(networks.pose_estimator)
         cone = AttentionCone()
-        drawing = None
+        viewer = None
         if options.rerun is not None:
             from ._rerun import RerunRecorder  # noqa: PLC0415 - needs the extra viz
 
-            drawing = RerunRecorder(options.rerun, tap, cone.half_angle_rad)
-            stack.enter_context(drawing)
+            viewer = RerunRecorder(options.rerun, pose_estimator, cone.half_angle_rad)
+            stack.enter_context(viewer)
 
         if SHIPPED in (options.detector, options.pose):
-            _say("the networks in the box are made for the simulator; see --detector and --pose")
+            _log("the shipped networks are made for the simulator; see --detector and --pose")
         if camera is None:
-            _say(f"waiting for /{options.camera_info.strip('/')}")
+            _log(f"waiting for /{options.camera_info.strip('/')}")
         bridge = AwarenessBridge(
             policy,
             robot.profile(),
-            outlet.publish,
+            publisher.publish,
             frames=Frames(options.odom_frame, options.base_frame, options.camera_frame),
             T_base_camera=None if robot.camera is None else robot.camera.T_base_camera(),
             camera=camera,
             percentage=options.percentage,
-            warn=_say,
-            wanted=outlet.wants,
-            make_pipeline=_pipelines(networks, tap, cone),
+            warn=_log,
+            wanted=publisher.wants,
+            make_pipeline=_pipeline_maker(networks, pose_estimator, cone),
         )
-        loop = BridgeLoop(node, bridge, inputs, rate_hz, recorder=recorder, drawing=drawing)
-        _say(
+        loop = BridgeLoop(node, bridge, inputs, rate_hz, recorder=recorder, viewer=viewer)
+        _log(
             f"domain {domain}: reading /{inputs.image.name} and /{inputs.odom.name}, publishing "
             f"{', '.join('/' + topic.name for topic in published.values())}"
         )
         before = signal.signal(signal.SIGTERM, _interrupt)
         try:
-            loop.run(seconds, report=_say)
+            loop.run(seconds, report=_log)
         except KeyboardInterrupt:
-            pass  # the way in which a bridge ends
+            pass  # the usual end of a bridge
         finally:
             signal.signal(signal.SIGTERM, before)
             bridge.stop(time.time(), "awarenav bridge has ended")
-            time.sleep(_LINGER_S)
-        _say(f"ended after {loop.frames} frames; a stop was published")
+            time.sleep(_SEND_TIME_S)
+        _log(f"ended after {loop.frames} frames; a stop was published")
     return 0
 
 
-def _pipelines(
-    networks: Networks, tap: RecordingPoseEstimator, cone: AttentionCone
+def _pipeline_maker(
+    networks: Networks, pose_estimator: RecordingPoseEstimator, cone: AttentionCone
 ) -> Callable[[Camera], AwarenessPipeline]:
-    """Makes the pipeline of these networks, with the keypoints listened to."""
+    """Return a function that makes the pipeline for a camera."""
 
     def make(camera: Camera) -> AwarenessPipeline:
         detector = networks.detector
         if not isinstance(detector, PersonDetector):
             detector = detector(camera)
-        return AwarenessPipeline(camera, detector, tap, networks.head_pose_estimator, cone)
+        return AwarenessPipeline(
+            camera, detector, pose_estimator, networks.head_pose_estimator, cone
+        )
 
     return make
 
@@ -181,7 +142,7 @@ def _seconds(option: float | None) -> float | None:
 
 
 def _domain(option: int | None) -> int:
-    """The domain asked for, or that of the environment."""
+    """Return the DDS domain of the option, else that of the environment."""
     if option is not None:
         return option
     text = os.environ.get("ROS_DOMAIN_ID", "") or "0"
@@ -194,13 +155,8 @@ def _interrupt(number: int, frame: FrameType | None) -> NoReturn:
     raise KeyboardInterrupt
 
 
-def _policy(name: str) -> AwarenessPolicy:
-    if Path(name).suffix in (".yaml", ".yml"):
-        return AwarenessPolicy.from_yaml(name)
-    return AwarenessPolicy.preset(name)
-
-
-def _published(renames: Sequence[str], only: Sequence[str]) -> dict[str, Topic]:
+def _published_topics(renames: Sequence[str], only: Sequence[str]) -> dict[str, Topic]:
+    """Return the topics to publish by key, renamed and selected as the options say."""
     topics = dict(PUBLISHED)
     for rename in renames:
         key, equals, name = rename.partition("=")
@@ -219,9 +175,9 @@ def _published(renames: Sequence[str], only: Sequence[str]) -> dict[str, Topic]:
     return {key: topic for key, topic in topics.items() if not only or key in only}
 
 
-def _inputs(options: BridgeOptions, *, with_info: bool, with_tf: bool) -> Inputs:
+def _inputs(options: BridgeOptions, *, with_info: bool, with_tf: bool) -> BridgeInputs:
     image = READ["compressed" if options.compressed else "image"]
-    return Inputs(
+    return BridgeInputs(
         image=renamed(image, options.image),
         odom=renamed(READ["odom"], options.odom),
         camera_info=renamed(READ["camera_info"], options.camera_info) if with_info else None,
@@ -230,5 +186,5 @@ def _inputs(options: BridgeOptions, *, with_info: bool, with_tf: bool) -> Inputs
     )
 
 
-def _say(text: str) -> None:
+def _log(text: str) -> None:
     print(f"awarenav bridge: {text}", file=sys.stderr, flush=True)

@@ -1,24 +1,29 @@
-"""The command line: one table of commands, and the options that they share.
+"""The command line: one table of commands, and the options that several of them share.
 
-A command is imported when it is called, so ``awarenav --help`` imports none of them. The commands
-of the simulator come from :mod:`sim_tests`, which the table names and never imports.
+A command is imported when it is called, so ``awarenav --help`` imports none of them. The table
+names the simulator's commands in :mod:`sim_tests` without importing them.
 """
 
 from __future__ import annotations
 
 from . import options
-from ._app import main
-from ._command import Command, CommandGroup, argument, command, group, option
-from ._types import POSITIVE, SHARE, FilePath, FolderPath, OneOf
+from ._app import app, main
+from ._command import Command, CommandGroup, Option, argument, command, group, option
+from ._types import NUMBER, POSITIVE, SHARE, FilePath, FolderPath, Number, OneOf, Whole
 
 __all__ = [
+    "NUMBER",
     "POSITIVE",
     "SHARE",
     "Command",
     "CommandGroup",
     "FilePath",
     "FolderPath",
+    "Number",
     "OneOf",
+    "Option",
+    "Whole",
+    "app",
     "argument",
     "command",
     "group",

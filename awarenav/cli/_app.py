@@ -1,28 +1,29 @@
-"""The table of commands, and ``main``, which runs one of them."""
+"""The command ``awarenav``: its table of commands, and ``main``, which runs one of them."""
 
 from __future__ import annotations
 
-import difflib
+import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
 from typing import Any, Final, NamedTuple
 
 import click
+from click.shell_completion import CompletionItem, shell_complete
 
 from .. import __version__
-from ._command import CommandGroup
+from ._command import BAD_INPUT, INTERRUPTED, CommandGroup
+from ._failure import CommandFailure
 
-# What the extra "sim" installs.
-_SIMULATOR_MODULES: Final = ("av", "matplotlib", "moderngl", "pybullet")
 _PROGRAM: Final = "awarenav"
-_INTERRUPTED: Final = 130
+#: The environment variable through which a shell asks for completions.
+COMPLETION_VARIABLE: Final = "_AWARENAV_COMPLETE"
 
 
 class _Entry(NamedTuple):
-    """A command before it is imported: where it is, and its line in the list."""
+    """A command that is not imported yet: where it is defined, and its line in the list."""
 
-    home: str
+    location: str
     help: str
 
 
@@ -30,7 +31,7 @@ _COMMANDS: Final[dict[str, dict[str, _Entry]]] = {
     "On a robot": {
         "estimate": _Entry(
             "awarenav.estimate.command:estimate",
-            "People in images, videos, cameras and recordings: position, gaze, awareness.",
+            "Estimate position, gaze and awareness of people in images and videos.",
         ),
         "judge": _Entry(
             "awarenav.judge.command:judge",
@@ -42,7 +43,7 @@ _COMMANDS: Final[dict[str, dict[str, _Entry]]] = {
         ),
         "bridge": _Entry(
             "awarenav.bridge.command:bridge",
-            "Read a camera over ROS 2, publish obstacles and a speed limit for Nav2.",
+            "Read a ROS 2 camera; publish obstacles and a speed limit for Nav2.",
         ),
         "models": _Entry(
             "awarenav.models.command:models",
@@ -50,13 +51,13 @@ _COMMANDS: Final[dict[str, dict[str, _Entry]]] = {
         ),
         "policy": _Entry(
             "awarenav.policies.command:policy",
-            "Show a policy's radii and speed limits.",
+            "Show the radii and speed limits of a policy.",
         ),
     },
     "Simulation": {
         "demo": _Entry(
             "sim_tests.demo.command:demo",
-            "The paper's encounter, and what awareness saves in a crossing.",
+            "Run the paper's encounter, and a crossing with and without awareness.",
         ),
         "crossings": _Entry(
             "sim_tests.study.command:crossings",
@@ -68,7 +69,7 @@ _COMMANDS: Final[dict[str, dict[str, _Entry]]] = {
         ),
         "compare": _Entry(
             "sim_tests.study.measures.command:compare",
-            "Tables of finished runs, with confidence intervals.",
+            "Print tables of finished runs, with confidence intervals.",
         ),
         "report": _Entry(
             "sim_tests.study.report.command:report",
@@ -80,7 +81,7 @@ _COMMANDS: Final[dict[str, dict[str, _Entry]]] = {
         ),
         "render": _Entry(
             "sim_tests.dataset.command:render",
-            "Render pictures of people in warehouses, with the truth about them.",
+            "Render images of people in warehouses, with the truth about them.",
         ),
         "tune": _Entry(
             "sim_tests.search.tune.command:tune",
@@ -108,7 +109,7 @@ _ENTRIES: Final = {
 
 
 class _Application(CommandGroup):
-    """The command ``awarenav``: imports the command that is called, and no other."""
+    """The command ``awarenav``; it imports the command that is called, and no other."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(_ENTRIES)
@@ -117,19 +118,17 @@ class _Application(CommandGroup):
         entry = _ENTRIES.get(cmd_name)
         if entry is None:
             return None
-        module, _, name = entry.home.partition(":")
+        module, _, name = entry.location.partition(":")
         found = getattr(import_module(module), name)
         if not isinstance(found, click.Command):
-            raise TypeError(f"{entry.home} must be a command, got {type(found).__name__}")
+            raise TypeError(f"{entry.location} must be a command, got {type(found).__name__}")
         return found
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        if args and not args[0].startswith("-") and args[0] not in _ENTRIES:
-            near = difflib.get_close_matches(args[0], _ENTRIES, n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            ctx.fail(f"there is no command {args[0]!r}{hint}")
+        if args[0] not in _ENTRIES and not args[0].startswith("-") and not ctx.resilient_parsing:
+            raise click.exceptions.NoSuchCommand(args[0], possibilities=_ENTRIES, ctx=ctx)
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -137,17 +136,35 @@ class _Application(CommandGroup):
             with formatter.section(heading):
                 formatter.write_dl([(name, entry.help) for name, entry in commands.items()])
 
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Exit status"):
+            formatter.write_dl(
+                [
+                    ("0", "Success."),
+                    ("1", "A check failed, or part of the work could not be done."),
+                    ("2", "Bad input; nothing was done."),
+                    ("130", "Interrupted; partial results are kept."),
+                ]
+            )
+        super().format_epilog(ctx, formatter)
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        commands = [
+            CompletionItem(name, help=entry.help)
+            for name, entry in _ENTRIES.items()
+            if name.startswith(incomplete)
+        ]
+        return [*commands, *click.Command.shell_complete(self, ctx, incomplete)]
+
 
 @click.group(
     _PROGRAM,
     cls=_Application,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
-    epilog="Exit status: 0 success; 1 a check failed, or part of the work could not be done; "
-    "2 bad input, nothing done; 130 interrupted, partial results kept. "
-    "`awarenav COMMAND --help` explains a command.",
+    epilog="`awarenav COMMAND --help` explains a command.",
 )
 @click.version_option(__version__, prog_name=_PROGRAM, message="%(prog)s %(version)s")
-def _application() -> None:
+def app() -> None:
     """Awareness-aware navigation: see who has noticed the robot, and move accordingly."""
 
 
@@ -155,49 +172,48 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line.
 
     Args:
-        arguments: words behind ``awarenav``; default those of the process.
+        arguments: words after ``awarenav``; default: those of the process.
 
     Returns:
         Exit status: 0 success, 1 a check failed or part of the work could not be done, 2 bad input,
         130 interrupted.
     """
+    if instruction := os.environ.get(COMPLETION_VARIABLE):
+        return shell_complete(app, {}, _PROGRAM, COMPLETION_VARIABLE, instruction)
     words = list(sys.argv[1:] if arguments is None else arguments)
-    called = f"{_PROGRAM} {words[0]}" if words and words[0] in _ENTRIES else _PROGRAM
     try:
-        status: Any = _application.main(args=words, prog_name=_PROGRAM, standalone_mode=False)
+        status = _run(words)
+        sys.stdout.flush()
+    except BrokenPipeError:  # the reader has closed the pipe, as `head` does: no error
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    return status
+
+
+def _run(words: list[str]) -> int:
+    """Run the command of a command line; return the exit status."""
+    try:
+        with app.make_context(_PROGRAM, words) as context:
+            status: Any = app.invoke(context)
+        return int(status or 0)
+    except click.exceptions.Exit as done:  # --help and --version
+        return done.exit_code
     except click.exceptions.NoArgsIsHelpError as error:
         print(error.message)
-        return 2
+        return BAD_INPUT
     except click.UsageError as error:
-        _complain(error)
-        return 2
-    except click.exceptions.Abort:
-        print(f"\n{called}: interrupted; partial results kept", file=sys.stderr)
-        return _INTERRUPTED
-    except ModuleNotFoundError as error:
-        if error.name not in _SIMULATOR_MODULES:
-            raise
-        print(
-            f"{called}: needs {error.name}, which is not installed; it is part of the extra 'sim': "
-            "pip install 'awarenav[sim]'",
-            file=sys.stderr,
-        )
-        return 2
-    except ValueError as error:
-        if not _is_ours(error):
-            raise
-        print(f"{called}: {error}", file=sys.stderr)
-        return 2
-    return int(status or 0)
+        _print_usage_error(error)
+        return BAD_INPUT
+    except CommandFailure as failure:
+        newline = "\n" if failure.status == INTERRUPTED else ""  # after the terminal's ^C
+        print(f"{newline}{failure.command_path}: {failure.message}", file=sys.stderr)
+        return failure.status
+    except KeyboardInterrupt:
+        print(f"\n{_PROGRAM}: interrupted", file=sys.stderr)
+        return INTERRUPTED
 
 
-def _is_ours(error: ValueError) -> bool:
-    from perception.errors import AwarenavError  # noqa: PLC0415 - imports networks, which help needs not
-
-    return isinstance(error, AwarenavError)
-
-
-def _complain(error: click.UsageError) -> None:
+def _print_usage_error(error: click.UsageError) -> None:
     """Print what is wrong with the command line, and which help explains it."""
     context = error.ctx
     path = _PROGRAM if context is None else context.command_path

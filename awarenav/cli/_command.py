@@ -1,37 +1,49 @@
-"""Commands whose options stand in groups, and options that take several values."""
+"""Commands and options: groups of options, several values, options that exclude each other."""
 
 from __future__ import annotations
 
-import os
-import sys
-from collections.abc import Callable, Iterator, Sequence
-from typing import Any, Protocol, TypeVar
+from collections.abc import Callable, Mapping, Sequence, Set
+from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar
 
 import click
 from click.core import ParameterSource
+from click.shell_completion import CompletionItem
+
+from ._failure import CommandFailure, user_message
+
+if TYPE_CHECKING:
+    from click.types import OptionHelpExtra
+
+BAD_INPUT: Final = 2
+INTERRUPTED: Final = 130
+
+_SETTINGS: Final = {
+    "help_option_names": ["-h", "--help"],
+    "max_content_width": 100,
+    "show_default": True,
+}
+# Key of a context's ``meta``: the option that a further word on the line belongs to.
+_OPEN_OPTION: Final = "awarenav.open_option"
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
 class Decorator(Protocol):
-    """What adds a parameter to the function of a command."""
+    """Adds a parameter to the function of a command."""
 
     def __call__(self, function: _Function, /) -> _Function:
         """Return the function with the parameter."""
         ...
 
 
-_SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 100, "show_default": True}
-
-
 class Option(click.Option):
     """An option of a command.
 
     Args:
-        group: heading under which help lists it; None for "Options".
-        many: takes one or more values after one another (``--policy blind balanced``), or is given
-            again for each (``--policy blind --policy balanced``).
-        excludes: another option, which must not be given beside this one.
+        group: heading under which the help lists it; None for "Options".
+        many: whether it takes several values: ``--policy blind balanced`` or
+            ``--policy blind --policy balanced``.
+        excludes: name of another option that cannot be combined with this one.
     """
 
     def __init__(
@@ -46,31 +58,50 @@ class Option(click.Option):
         self.group = group
         self.many = many
         self.excludes = excludes
+        if excludes is not None:
+            self.help = f"{self.help} Not with {excludes}."
+
+    def get_help_extra(self, ctx: click.Context) -> OptionHelpExtra:
+        """Return the remarks after the help; a default in words stands without parentheses."""
+        extra = super().get_help_extra(ctx)
+        if isinstance(self.show_default, str):
+            extra["default"] = self.show_default
+        return extra
 
 
 class Command(click.Command):
-    """A command of ``awarenav``; its callback returns the exit status."""
+    """A command of ``awarenav``; its callback returns the exit status.
+
+    Args:
+        examples: command lines, listed at the end of the help.
+        exit_status: meaning of each exit status, listed at the end of the help.
+    """
+
+    def __init__(
+        self,
+        *args: Any,
+        examples: Sequence[str] = (),
+        exit_status: Mapping[int, str] | None = None,
+        **kwargs: Any,
+    ) -> None:
+        super().__init__(*args, **kwargs)
+        self.examples = tuple(examples)
+        self.exit_status = dict(exit_status or {})
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Parse, with the values of an option that takes many taken one by one."""
-        many = {
-            name
-            for parameter in self.params
-            if isinstance(parameter, Option) and parameter.many
-            for name in parameter.opts
-        }
-        rest = super().parse_args(ctx, list(_one_by_one(args, many)))
-        given = {
-            name
-            for parameter in self.params
-            if parameter.name is not None
-            and ctx.get_parameter_source(parameter.name) is ParameterSource.COMMANDLINE
-            for name in parameter.opts
-        }
-        for parameter in self.params:
-            other = parameter.excludes if isinstance(parameter, Option) else None
-            if other in given and given.intersection(parameter.opts):
-                ctx.fail(f"{parameter.opts[0]} and {other} exclude each other")
+        """Parse the arguments; split the values of options that take several."""
+        options = [each for each in self.params if isinstance(each, Option)]
+        many = {name: option for option in options if option.many for name in option.opts}
+        words, open_name = _split_values(args, many.keys())
+        if open_name is not None:
+            ctx.meta[_OPEN_OPTION] = many[open_name]
+        try:
+            rest = super().parse_args(ctx, words)
+        except click.UsageError as error:
+            error.ctx = error.ctx or ctx  # click gives none where an option lacks its value
+            raise
+        if not ctx.resilient_parsing:
+            _refuse_excluded(ctx, options)
         return rest
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -85,53 +116,114 @@ class Command(click.Command):
             with formatter.section(heading):
                 formatter.write_dl(records)
 
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the examples, the exit status and the closing remark."""
+        if self.examples:
+            with formatter.section("Examples"):
+                for line in self.examples:
+                    formatter.write(f"{'':{formatter.current_indent}}{line}\n")
+        if self.exit_status:
+            with formatter.section("Exit status"):
+                formatter.write_dl([(str(key), text) for key, text in self.exit_status.items()])
+        super().format_epilog(ctx, formatter)
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """Complete a further value of an option that takes several, else an option's name."""
+        option = ctx.meta.get(_OPEN_OPTION)
+        if option is not None and not incomplete.startswith("-"):
+            items: list[CompletionItem] = option.shell_complete(ctx, incomplete)
+            return items
+        return super().shell_complete(ctx, incomplete)
+
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command; a closed output, as behind ``head``, is no error."""
+        """Run the command.
+
+        Raises:
+            CommandFailure: the command was interrupted, or failed with a message for the user.
+        """
         try:
             return super().invoke(ctx)
-        except BrokenPipeError:
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            return 0
+        except KeyboardInterrupt:
+            raise CommandFailure(ctx, "interrupted; partial results kept", INTERRUPTED) from None
+        except (ModuleNotFoundError, ValueError) as error:
+            message = user_message(error)
+            if message is None:
+                raise
+            raise CommandFailure(ctx, message, BAD_INPUT) from error
 
 
 class CommandGroup(click.Group):
-    """A command that has commands of its own, as ``awarenav models list``."""
+    """A command with commands of its own, such as ``awarenav models list``."""
 
     command_class = Command
 
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the commands in the order in which they were added."""
+        return list(self.commands)
 
-def _one_by_one(args: Sequence[str], many: set[str]) -> Iterator[str]:
-    """``--policy a b`` as ``--policy a --policy b``."""
-    name, given = None, False
-    for number, word in enumerate(args):
+
+def _split_values(words: Sequence[str], many: Set[str]) -> tuple[list[str], str | None]:
+    """Rewrite ``--policy a b`` as ``--policy a --policy b``.
+
+    Args:
+        words: of the command line.
+        many: names of the options that take several values.
+
+    Returns:
+        The new words, and the name of the option that a further word would belong to.
+    """
+    split: list[str] = []
+    name: str | None = None
+    has_value = False
+    for index, word in enumerate(words):
         if word == "--":
-            yield from args[number:]
-            return
+            return [*split, *words[index:]], None
         if word.startswith("-") and word != "-":
             stem, equals, _ = word.partition("=")
-            name, given = (stem if stem in many else None), bool(equals)
+            name, has_value = (stem if stem in many else None), bool(equals)
         elif name is not None:
-            if given:
-                yield name
-            given = True
-        yield word
+            if has_value:
+                split.append(name)
+            has_value = True
+        split.append(word)
+    return split, name
+
+
+def _refuse_excluded(ctx: click.Context, options: Sequence[Option]) -> None:
+    """Fail if two options were given that cannot be combined."""
+    given = {
+        name
+        for option in options
+        if option.name is not None
+        and ctx.get_parameter_source(option.name) is ParameterSource.COMMANDLINE
+        for name in option.opts
+    }
+    for option in options:
+        if option.excludes in given and given.intersection(option.opts):
+            ctx.fail(f"{option.opts[0]} and {option.excludes} exclude each other")
 
 
 def command(name: str, **settings: Any) -> Callable[[Callable[..., Any]], click.Command]:
-    """Return a decorator that makes a command of a function; the arguments are click's."""
+    """Return a decorator that makes a :class:`Command` of a function.
+
+    The settings are those of the class and of :func:`click.command`.
+    """
     return click.command(name, cls=Command, context_settings=_SETTINGS, **settings)
 
 
 def group(name: str, **settings: Any) -> Callable[[Callable[..., Any]], CommandGroup]:
-    """Return a decorator that makes a group of commands of a function."""
+    """Return a decorator that makes a :class:`CommandGroup` of a function."""
     return click.group(name, cls=CommandGroup, context_settings=_SETTINGS, **settings)
 
 
 def option(*names: str, **settings: Any) -> Decorator:
-    """Return a decorator that adds an :class:`Option`; the other arguments are click's."""
+    """Return a decorator that adds an :class:`Option`.
+
+    The settings are those of the class and of :func:`click.option`.
+    """
     return click.option(*names, cls=Option, **settings)
 
 
 def argument(name: str, **settings: Any) -> Decorator:
-    """Return a decorator that adds a positional argument; the arguments are click's."""
+    """Return a decorator that adds a positional argument; the settings are click's."""
     return click.argument(name, **settings)

@@ -1,8 +1,9 @@
-"""Types of option values, with messages that name what is valid and what is nearest."""
+"""Types of option values; a refusal says what is valid and which valid word is nearest."""
 
 from __future__ import annotations
 
 import difflib
+import math
 from pathlib import Path
 from typing import Any, Final
 
@@ -10,12 +11,13 @@ import click
 
 
 class Whole(click.ParamType[int]):
-    """A whole number of at least ``least``."""
+    """A whole number within limits."""
 
     name = "whole number"
 
-    def __init__(self, least: int) -> None:
+    def __init__(self, least: int, most: int | None = None) -> None:
         self.least = least
+        self.most = most
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
         """Return the number, or fail and say what is valid."""
@@ -23,24 +25,52 @@ class Whole(click.ParamType[int]):
             number = int(value)
         except ValueError:
             number = self.least - 1
-        if number < self.least:
-            self.fail(
-                f"must be a whole number of at least {self.least}, got {str(value)!r}", param, ctx
+        if number < self.least or (self.most is not None and number > self.most):
+            limits = (
+                f"of at least {self.least}"
+                if self.most is None
+                else f"from {self.least} to {self.most}"
             )
+            self.fail(f"must be a whole number {limits}, got {str(value)!r}", param, ctx)
+        return number
+
+
+class Number(click.ParamType[float]):
+    """A number, within limits if there are any."""
+
+    name = "number"
+
+    def __init__(self, least: float = -math.inf, most: float = math.inf) -> None:
+        self.least = least
+        self.most = most
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """Return the number, or fail and say what is valid."""
+        limits = "" if math.isinf(self.least) else f" from {self.least:g} to {self.most:g}"
+        try:
+            number = float(value)
+        except ValueError:
+            self.fail(f"must be a number{limits}, got {str(value)!r}", param, ctx)
+        if number < self.least or number > self.most:
+            self.fail(f"must be a number{limits}, got {str(value)!r}", param, ctx)
         return number
 
 
 #: A whole number of at least 1.
 POSITIVE: Final = Whole(1)
+#: Any number.
+NUMBER: Final = Number()
 #: A number from 0 to 1.
-SHARE: Final = click.FloatRange(min=0.0, max=1.0)
+SHARE: Final = Number(0.0, 1.0)
 
 
 class OneOf(click.Choice[str]):
-    """One of some words; the message for any other names the nearest."""
+    """One of several words; the message about another word names the nearest."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        """Return the word, or fail with the nearest valid one."""
+        """Return the word, or fail and name the nearest valid one."""
         if value not in self.choices:
             near = difflib.get_close_matches(str(value), self.choices, n=1)
             hint = f"; did you mean {near[0]!r}?" if near else ""
@@ -50,18 +80,18 @@ class OneOf(click.Choice[str]):
 
 
 class FilePath(click.Path):
-    """A file, as :class:`pathlib.Path`; whether it exists is the command's business."""
+    """The path of a file; the command itself checks whether the file exists."""
 
     def __init__(self) -> None:
         super().__init__(path_type=Path)
 
 
 class FolderPath(click.Path):
-    """A folder, as :class:`pathlib.Path`; completion offers folders only."""
+    """The path of a folder; completion offers folders only."""
 
     def __init__(self) -> None:
         super().__init__(path_type=Path, file_okay=False)
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
-        """Return the path; a command says itself what is wrong with a folder."""
+        """Return the path; the command itself checks the folder."""
         return Path(value)

@@ -4,34 +4,79 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from awarenav.lazy import lazy_names
+from ..lazy import lazy_names
 
 if TYPE_CHECKING:
-    from ._camera import fixed_camera_pose
-    from ._estimator import Networks, RecordingPoseEstimator, track_of_each
+    from ._camera import CameraChoice, fixed_camera_pose, scaled_camera
+    from ._estimator import (
+        FrameEstimate,
+        Networks,
+        PeopleEstimator,
+        RecordingPoseEstimator,
+        ids_of_tracks,
+    )
+    from ._images import as_rgb, read_image
     from ._networks import SHIPPED, choose_networks
+    from ._open_source import open_source
+    from ._overlay import draw_overlay
+    from ._overlay_writer import OverlayWriter, fit_image
+    from ._results import estimate_record, track_record
+    from ._run import EstimateOptions, estimate_command
+    from ._source import ImageSource, SourceFrame
+    from ._source_images import ImageFiles
+    from ._source_video import VideoSource
+    from ._threads import BackgroundWorker, FramePrefetcher
 
 __all__ = [
     "SHIPPED",
+    "BackgroundWorker",
+    "CameraChoice",
+    "EstimateOptions",
+    "FrameEstimate",
+    "FramePrefetcher",
+    "ImageFiles",
+    "ImageSource",
     "Networks",
+    "OverlayWriter",
+    "PeopleEstimator",
     "RecordingPoseEstimator",
+    "SourceFrame",
+    "VideoSource",
+    "as_rgb",
     "choose_networks",
+    "draw_overlay",
+    "estimate_command",
+    "estimate_record",
+    "fit_image",
     "fixed_camera_pose",
-    "track_of_each",
+    "ids_of_tracks",
+    "open_source",
+    "read_image",
+    "scaled_camera",
+    "track_record",
 ]
 
 __getattr__ = lazy_names(
     __name__,
     {
-        "._camera": ("fixed_camera_pose",),
+        "._camera": ("CameraChoice", "fixed_camera_pose", "scaled_camera"),
         "._estimator": (
-            "RecordingPoseEstimator",
+            "FrameEstimate",
             "Networks",
-            "track_of_each",
+            "PeopleEstimator",
+            "RecordingPoseEstimator",
+            "ids_of_tracks",
         ),
-        "._networks": (
-            "SHIPPED",
-            "choose_networks",
-        ),
+        "._images": ("as_rgb", "read_image"),
+        "._networks": ("SHIPPED", "choose_networks"),
+        "._open_source": ("open_source",),
+        "._overlay": ("draw_overlay",),
+        "._overlay_writer": ("OverlayWriter", "fit_image"),
+        "._results": ("estimate_record", "track_record"),
+        "._run": ("EstimateOptions", "estimate_command"),
+        "._source": ("ImageSource", "SourceFrame"),
+        "._source_images": ("ImageFiles",),
+        "._source_video": ("VideoSource",),
+        "._threads": ("BackgroundWorker", "FramePrefetcher"),
     },
 )

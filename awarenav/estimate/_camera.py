@@ -1,7 +1,4 @@
-"""The pose of a camera that stands still, at a known height or an unknown one.
-
-Which camera took the pictures: a calibrated one, or an assumed field of view.
-"""
+"""The camera of the images: its calibration or an assumed one, and the pose of a fixed camera."""
 
 from __future__ import annotations
 
@@ -16,19 +13,24 @@ from perception.arrays import FloatArray, finite_number
 
 from ..errors import AwarenavError
 
-# Optical axes (right, down, forward) in axes of the robot (forward, left, up).
-_LEVEL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+#: Assumed without a calibration; webcams and phones have 55 to 75 degrees.
+ASSUMED_FOV_DEG: Final = 60.0
+
+# Optical axes (right, down, forward) of a level camera in axes of the robot (forward, left, up).
+_LEVEL: Final = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+# The size of a scaled video is rounded to whole pixels.
+_ROUNDING_PX: Final = 1.0
 
 
 def fixed_camera_pose(height_m: Any = 0.0, pitch_down_deg: Any = 0.0) -> FloatArray:
-    """T_odom_camera (4, 4) with odom on the floor under the camera, x along its horizontal view.
+    """Return T_odom_camera (4, 4); odom is on the floor under the camera, x along its view.
 
     Args:
         height_m: of the camera above the floor, 0 to 20 m.
-        pitch_down_deg: how far it looks down from the horizontal, −90 to 90.
+        pitch_down_deg: angle by which it looks down from the horizontal, −90 to 90 degrees.
 
     Raises:
-        AwarenavError: for a value outside these.
+        AwarenavError: for a value outside these limits.
     """
     height = finite_number("camera height (m)", height_m, AwarenavError, minimum=0.0, maximum=20.0)
     pitch = math.radians(
@@ -49,58 +51,57 @@ def fixed_camera_pose(height_m: Any = 0.0, pitch_down_deg: Any = 0.0) -> FloatAr
     return pose
 
 
-#: Assumed where nothing is known; webcams and phones lie between 55 and 75 degrees.
-ASSUMED_FOV_DEG: Final = 60.0
-# A video that was scaled from the calibrated size is off by rounding to whole pixels.
-_ROUNDING_PX: Final = 1.0
-
-
 class CameraChoice:
-    """The camera for pictures of any size.
+    """The camera for images of any size.
 
     Args:
-        calibrated: a calibration; pictures of its aspect ratio in another size are taken as scaled.
-        fov_deg: else the horizontal field of view; None assumes :data:`ASSUMED_FOV_DEG`.
-        say: told once for every assumption that is made.
+        calibrated: a calibration; an image of its aspect ratio in another size counts as scaled.
+        fov_deg: horizontal field of view without a calibration; None assumes
+            :data:`ASSUMED_FOV_DEG`.
+        log: gets one message about every assumption.
     """
 
     def __init__(
-        self, calibrated: Camera | None, fov_deg: float | None, say: Callable[[str], None]
+        self, calibrated: Camera | None, fov_deg: float | None, log: Callable[[str], None]
     ) -> None:
         self._calibrated = calibrated
         self._fov_deg = fov_deg
-        self._say = say
+        self._log = log
         self._cameras: dict[tuple[int, int], Camera] = {}
 
     @property
     def known(self) -> bool:
-        """Whether the field of view was given, not assumed."""
+        """True if the field of view is known, False if it is assumed."""
         return self._calibrated is not None or self._fov_deg is not None
 
     def of_size(self, width_px: int, height_px: int) -> Camera:
-        """The camera of a picture; raises AwarenavError where the calibration cannot be of it."""
+        """Return the camera of images of this size.
+
+        Raises:
+            AwarenavError: if the calibrated camera cannot have taken them.
+        """
         size = (width_px, height_px)
         if size not in self._cameras:
-            self._cameras[size] = self._made(width_px, height_px)
+            self._cameras[size] = self._make(width_px, height_px)
         return self._cameras[size]
 
-    def _made(self, width_px: int, height_px: int) -> Camera:
+    def _make(self, width_px: int, height_px: int) -> Camera:
+        """Make the camera of images of this size; log what is assumed."""
         camera = self._calibrated
         if camera is None:
             fov_deg = self._fov_deg
             if fov_deg is None:
                 fov_deg = ASSUMED_FOV_DEG
                 if not self._cameras:
-                    self._say(
+                    self._log(
                         f"no calibration: a horizontal field of view of {fov_deg:g} degrees is "
-                        "assumed, and distances are only as good as that; give --camera or "
-                        "--fov-deg"
+                        "assumed, and distances may be wrong; give --camera or --fov-deg"
                     )
             return Camera.from_fov(width_px, height_px, math.radians(fov_deg))
         if (width_px, height_px) == (camera.width_px, camera.height_px):
             return camera
         scaled = scaled_camera(camera, width_px, height_px)
-        self._say(
+        self._log(
             f"the calibration is for {camera.width_px} x {camera.height_px} px and is scaled to "
             f"{width_px} x {height_px} px"
         )
@@ -108,13 +109,13 @@ class CameraChoice:
 
 
 def scaled_camera(camera: Camera, width_px: int, height_px: int) -> Camera:
-    """The camera of pictures that were scaled to another size of the same aspect ratio.
+    """Return the camera of images that were scaled to another size of the same aspect ratio.
 
-    Pixel centres lie at whole numbers, so the principal point scales about (−0.5, −0.5); lens
-    distortion acts on rays and stays as it is.
+    Pixel centres are at whole numbers, so the principal point scales about (−0.5, −0.5). Lens
+    distortion acts on rays and does not change.
 
     Raises:
-        AwarenavError: when the aspect ratio differs by more than rounding to whole pixels explains.
+        AwarenavError: if the aspect ratio differs by more than rounding to whole pixels.
     """
     ratio = np.array([width_px / camera.width_px, height_px / camera.height_px])
     off_px = (
@@ -123,9 +124,9 @@ def scaled_camera(camera: Camera, width_px: int, height_px: int) -> Camera:
     )
     if min(off_px) > _ROUNDING_PX:
         raise AwarenavError(
-            f"the camera is calibrated for {camera.width_px} x {camera.height_px} px, and a "
-            f"picture of {width_px} x {height_px} px has another aspect ratio: it was "
-            "cropped, or is of another camera"
+            f"the camera is calibrated for {camera.width_px} x {camera.height_px} px, but an image "
+            f"of {width_px} x {height_px} px has another aspect ratio: it was cropped, or is from "
+            "another camera"
         )
     return Camera(
         width_px,

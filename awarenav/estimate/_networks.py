@@ -1,4 +1,4 @@
-"""From names and files on the command line to the networks that do the work."""
+"""Loads the networks that are named on the command line."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ from ..errors import AwarenavError
 from ..models import ModelStore
 from ._estimator import Networks
 
-#: The networks that come with the package.
+#: The name of the networks that come with the package.
 SHIPPED: Final = "shipped"
-MEDIAPIPE: Final = "mediapipe"
-HEADS: Final = ("auto", "network", "pnp", "fused")
+_MEDIAPIPE: Final = "mediapipe"
+_HEADS: Final = ("auto", "network", "pnp", "fused")
 
 
 def choose_networks(
     detector: str = SHIPPED,
     pose: str = SHIPPED,
-    head: str = HEADS[0],
+    head: str = _HEADS[0],
     *,
     min_score: float = 0.25,
     threads: int | None = None,
@@ -48,20 +48,20 @@ def choose_networks(
     """Load the networks.
 
     Args:
-        detector: ``"shipped"``, an ONNX file that the detector recognises, or the name of a
-            network that ``awarenav models fetch`` has brought (as for the other two).
-        pose: ``"shipped"``, ``"mediapipe"`` (an optional extra), or an ONNX file.
-        head: ``"network"`` (the shipped one), ``"pnp"`` (the paper's), ``"fused"`` (both by their
-            uncertainties), ``"auto"`` (the network beside the shipped pose network, else PnP: a
-            network made for the simulator looks at no real head unasked), or an ONNX file of a
-            head-pose network.
-        min_score: people detected with less confidence are dropped.
-        threads: of one network; None leaves it to onnxruntime.
+        detector: ``"shipped"``, an ONNX file, or the name of a network that
+            ``awarenav models fetch`` has downloaded (this holds for the other two as well).
+        pose: ``"shipped"``, ``"mediapipe"`` (needs the extra), or an ONNX file.
+        head: ``"network"`` (the shipped one), ``"pnp"`` (the paper's method), ``"fused"`` (both,
+            weighted by their uncertainties), an ONNX file, or ``"auto"``: the shipped network with
+            the shipped pose network, else PnP. The shipped networks are made for the simulator, so
+            they are used on real images only on request.
+        min_score: people with a lower detection score are dropped.
+        threads: of each network; None leaves the number to onnxruntime.
         provider: ``"cpu"``, ``"cuda"`` or ``"tensorrt"``.
 
     Raises:
-        PerceptionError: for a file that is absent, damaged or of an unknown layout.
-        AwarenavError: for a word that is neither a choice nor a file.
+        PerceptionError: for a file that is missing, damaged or of an unknown layout.
+        AwarenavError: for a word that is neither a valid name nor a file.
     """
     if head == "auto":
         head = "network" if pose == SHIPPED else "pnp"
@@ -75,19 +75,19 @@ def _detector(
     name: str, min_score: float, settings: OnnxSettings
 ) -> PersonDetector | Callable[[Camera], PersonDetector]:
     if name == SHIPPED:
-        verify_shipped_model(DETECTOR)  # before the first frame, not at it
+        verify_shipped_model(DETECTOR)  # now, not at the first frame
         return lambda camera: shipped_detector(settings, camera, score_threshold=min_score)
-    model = _model("--detector", name, (SHIPPED,), settings)
+    model = _onnx_model("--detector", name, (SHIPPED,), settings)
     return OnnxPersonDetector(model, score_threshold=min_score)
 
 
 def _pose(name: str, settings: OnnxSettings) -> PoseEstimator:
     if name == SHIPPED:
         return shipped_pose_estimator(settings)
-    if name == MEDIAPIPE:
+    if name == _MEDIAPIPE:
         mediapipe: PoseEstimator = MediaPipePoseEstimator()
         return mediapipe
-    return OnnxPoseEstimator(_model("--pose", name, (SHIPPED, MEDIAPIPE), settings))
+    return OnnxPoseEstimator(_onnx_model("--pose", name, (SHIPPED, _MEDIAPIPE), settings))
 
 
 def _head(name: str, settings: OnnxSettings) -> HeadPoseEstimator:
@@ -97,11 +97,13 @@ def _head(name: str, settings: OnnxSettings) -> HeadPoseEstimator:
         return shipped_head_pose_estimator(settings)
     if name == "fused":
         return FusedHeadPoseEstimator(shipped_head_pose_estimator(settings), PnpHeadPoseEstimator())
-    return OnnxHeadPoseEstimator(_model("--head", name, HEADS, settings))
+    return OnnxHeadPoseEstimator(_onnx_model("--head", name, _HEADS, settings))
 
 
-def _model(option: str, name: str, names: tuple[str, ...], settings: OnnxSettings) -> OnnxModel:
-    """A file, or a network that ``awarenav models fetch`` has brought."""
+def _onnx_model(
+    option: str, name: str, names: tuple[str, ...], settings: OnnxSettings
+) -> OnnxModel:
+    """Load an ONNX file, or a network that ``awarenav models fetch`` has downloaded."""
     if Path(name).is_file():
         return OnnxModel(name, settings=settings)
     store = ModelStore()
@@ -109,5 +111,5 @@ def _model(option: str, name: str, names: tuple[str, ...], settings: OnnxSetting
         return store.load(name, settings)
     raise AwarenavError(
         f"{option} must be {', '.join(map(repr, names))}, an ONNX file, or a network that "
-        f"'awarenav models list' names, and there is no file {name!r}"
+        f"'awarenav models list' names; there is no file {name!r}"
     )

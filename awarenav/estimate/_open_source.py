@@ -1,4 +1,4 @@
-"""From what the user typed to a source of frames."""
+"""Opens the source of images that the user names."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Final
 
 from ..errors import AwarenavError
-from ._source import PICTURE_SUFFIXES, ImageSource
-from ._source_pictures import PictureSource
+from ._images import IMAGE_SUFFIXES
+from ._source import ImageSource
+from ._source_images import ImageFiles
 from ._source_video import VideoSource
 
 _BAG_SUFFIXES: Final = (".bag", ".db3", ".mcap")
@@ -20,12 +21,12 @@ def open_source(text: str, *, topic: str | None = None, interval_s: float = 1.0)
     """Open an image, a folder of images, a video, a camera, a stream or a recording.
 
     Args:
-        text: a path, a camera's number such as ``0``, or an address such as ``rtsp://…``.
-        topic: the image topic of a recording; None is the only one there is.
-        interval_s: between pictures of a folder that does not say when they were taken.
+        text: a path, the number of a camera such as ``0``, or an address such as ``rtsp://…``.
+        topic: image topic of a recording; None if it has only one.
+        interval_s: time between the images of a folder without stamps, seconds.
 
     Raises:
-        AwarenavError: when there is nothing there, or nothing that can be read.
+        AwarenavError: if there is no such source, or it cannot be read.
     """
     if text.isdigit() and not Path(text).exists():
         return VideoSource.of_camera(int(text))
@@ -35,17 +36,16 @@ def open_source(text: str, *, topic: str | None = None, interval_s: float = 1.0)
     if not path.exists():
         raise AwarenavError(
             f"no such file or folder: {text}{_nearest(path)}; SOURCE is an image, a folder of "
-            "images, a video, a camera's number, a stream's address or a ROS recording"
+            "images, a video, the number of a camera, the address of a stream or a ROS recording"
         )
-    recording = path.suffix.lower() in _BAG_SUFFIXES or (path / "metadata.yaml").exists()
-    if recording:
-        from ._source_bag import BagSource  # noqa: PLC0415 - an optional dependency
+    if path.suffix.lower() in _BAG_SUFFIXES or (path / "metadata.yaml").exists():
+        from ._source_bag import BagSource  # noqa: PLC0415 - needs the extra rosbag
 
         return BagSource(path, topic)
     if topic is not None:
-        raise AwarenavError(f"--topic is for ROS recordings, and {text} is none")
-    if path.is_dir() or path.suffix.lower() in PICTURE_SUFFIXES:
-        return PictureSource(path, interval_s)
+        raise AwarenavError(f"--topic is for ROS recordings; {text} is not one")
+    if path.is_dir() or path.suffix.lower() in IMAGE_SUFFIXES:
+        return ImageFiles(path, interval_s)
     return VideoSource.of_file(text)
 
 

@@ -1,4 +1,4 @@
-"""Draws what was understood of a picture into it."""
+"""Draws the estimate of an image into the image."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from perception.arrays import FloatArray, ImageRgb
 from tracking import PersonTrack
 
 from ..drawing import (
-    NIGHT,
+    DARK,
     WHITE,
     Colour,
-    Lettering,
+    Font,
     awareness_colour,
-    dot,
+    darken_box,
+    draw_disc,
+    draw_line,
     drawable,
-    line,
-    plate,
-    tint,
+    fill_hull,
 )
 from ._estimator import FrameEstimate
 
@@ -50,14 +50,19 @@ _FACE: Final = (
     (kp.LEFT_EAR, _LEFT),
     (kp.RIGHT_EAR, _RIGHT),
 )
-#: Keypoints scored below this are not drawn.
-_SEEN: Final = 0.3
+# Keypoints with a lower score are not drawn.
+_SEEN_SCORE: Final = 0.3
 _CONE_LENGTH_M: Final = 0.24
-_RIM: Final = np.linspace(0.0, 2.0 * math.pi, 24, endpoint=False)[:, None]
+_RIM_ANGLES: Final = np.linspace(0.0, 2.0 * math.pi, 24, endpoint=False)[:, None]
+
+# Left, top, right, bottom in pixels.
+_Box = tuple[int, int, int, int]
 
 
 @dataclass(frozen=True, slots=True)
 class _Person:
+    """A person to draw, and what is known of them."""
+
     observation: PersonObservation
     keypoints: PersonKeypoints | None
     track: PersonTrack | None
@@ -66,16 +71,16 @@ class _Person:
 def draw_overlay(estimate: FrameEstimate, cone: AttentionCone) -> ImageRgb:
     """Draw boxes, skeletons, attention cones, α with its standard deviation, and distances.
 
-    The colour of box and cone is α: red is unaware, green aware, grey without evidence. The gauge
-    under a person's figures shows α, a band of one standard deviation and, with a tracker, a tick
-    at the lower bound that navigation acts on.
+    The colour of box and cone shows α: red is unaware, green aware, grey without evidence. A label
+    at each person has a bar with α, a band of one standard deviation and, with a tracker, a mark at
+    the lower bound, which navigation uses.
 
     Args:
-        estimate: of a frame that has a picture.
+        estimate: of a frame that has an image.
         cone: the attention cone.
 
     Returns:
-        A new picture of the same size.
+        A new image of the same size.
     """
     assert estimate.frame.image_rgb is not None
     image: ImageRgb = estimate.frame.image_rgb.copy()
@@ -87,7 +92,7 @@ def draw_overlay(estimate: FrameEstimate, cone: AttentionCone) -> ImageRgb:
             estimate.observations, estimate.keypoints, estimate.track_ids, strict=True
         )
     ]
-    # Far people first: those in front are drawn over them.
+    # Far people first, so that near people are drawn over them.
     people.sort(key=lambda each: -float(each.observation.position_camera_m[2]))
     for person in people:
         _draw_gaze(image, estimate.camera, person, cone, unit)
@@ -95,51 +100,52 @@ def draw_overlay(estimate: FrameEstimate, cone: AttentionCone) -> ImageRgb:
         if person.keypoints is not None:
             _draw_skeleton(image, person.keypoints, unit)
         _draw_box(image, person.observation, unit)
-    letters = Lettering(round(18 * unit))
-    taken: list[tuple[int, int, int, int]] = []
+    font = Font(round(18 * unit))
+    labels: list[_Box] = []
     for person in reversed(people):
-        taken.append(_draw_figures(image, person, letters, taken, estimate.camera))
-    _draw_caption(image, estimate, letters)
+        labels.append(_draw_label(image, person, font, labels, estimate.camera))
+    _draw_caption(image, estimate, font)
     return image
 
 
 def _draw_gaze(
     image: ImageRgb, camera: Camera, person: _Person, cone: AttentionCone, unit: float
 ) -> None:
+    """Draw the attention cone and its axis."""
     gaze = person.observation.gaze_camera
-    apex = _head(camera, person)
+    apex = _head_position(camera, person)
     if gaze is None or apex is None:
         return
     colour = awareness_colour(person.observation.awareness)
-    # The picture ends at the camera, and so does what is drawn of a gaze that comes close to it.
+    # Points behind the camera cannot be drawn, so the cone of a near person is shorter.
     length = min(_CONE_LENGTH_M, 0.5 * float(apex[2]))
-    rim = camera.project(np.vstack([apex, apex + length * _rim(gaze, cone.half_angle_rad)]))
+    rim = camera.project(np.vstack([apex, apex + length * _cone_rim(gaze, cone.half_angle_rad)]))
     if drawable(rim):
-        # A gaze away from the camera lies behind the body that it is drawn over.
-        tint(image, rim, colour, 0.26 if gaze[2] < 0.0 else 0.13)
-        line(image, np.vstack([rim[1:], rim[1:2]]), colour, 1)
+        # The cone of a gaze away from the camera lies behind the body: it is drawn fainter.
+        fill_hull(image, rim, colour, 0.26 if gaze[2] < 0.0 else 0.13)
+        draw_line(image, np.vstack([rim[1:], rim[1:2]]), colour, 1)
     ray = camera.project(np.stack([apex, apex + 1.4 * length * gaze]))
     if drawable(ray):
-        line(image, ray, NIGHT, round(4 * unit))
-        line(image, ray, colour, max(round(2 * unit), 1))
-        dot(image, ray[0], 3.0 * unit, colour)
+        draw_line(image, ray, DARK, round(4 * unit))
+        draw_line(image, ray, colour, max(round(2 * unit), 1))
+        draw_disc(image, ray[0], 3.0 * unit, colour)
 
 
-def _rim(gaze: FloatArray, half_angle_rad: float) -> FloatArray:
-    """(24, 3) rim of a cone of length 1 along the gaze."""
+def _cone_rim(gaze: FloatArray, half_angle_rad: float) -> FloatArray:
+    """Return the rim (24, 3) of a cone of length 1 along the gaze."""
     side = np.cross(gaze, (0.0, 1.0, 0.0) if abs(gaze[1]) < 0.9 else (1.0, 0.0, 0.0))
     side /= np.linalg.norm(side)
-    ring = np.cos(_RIM) * side + np.sin(_RIM) * np.cross(gaze, side)
+    ring = np.cos(_RIM_ANGLES) * side + np.sin(_RIM_ANGLES) * np.cross(gaze, side)
     return np.asarray(gaze + math.tan(half_angle_rad) * ring)
 
 
-def _head(camera: Camera, person: _Person) -> FloatArray | None:
-    """Where the cone begins: at the head's keypoints, as deep as the body; else atop the box."""
+def _head_position(camera: Camera, person: _Person) -> FloatArray | None:
+    """Return the cone's apex (3,): the head's keypoints, else the top of the box, at body depth."""
     keypoints, box = person.keypoints, person.observation.box_xyxy_px
     pixel = None
     if keypoints is not None:
         head = list(range(kp.NOSE, kp.RIGHT_EAR + 1))
-        weight = np.where(keypoints.scores[head] >= _SEEN, keypoints.scores[head], 0.0)
+        weight = np.where(keypoints.scores[head] >= _SEEN_SCORE, keypoints.scores[head], 0.0)
         if weight.sum() > 0.0:
             pixel = weight @ keypoints.keypoints_px[head] / weight.sum()
     if pixel is None:
@@ -153,7 +159,8 @@ def _head(camera: Camera, person: _Person) -> FloatArray | None:
 
 
 def _draw_skeleton(image: ImageRgb, person: PersonKeypoints, unit: float) -> None:
-    points, seen = person.keypoints_px, person.scores >= _SEEN
+    """Draw the bones and the face of a person's visible keypoints."""
+    points, seen = person.keypoints_px, person.scores >= _SEEN_SCORE
     thin, thick = max(round(1.6 * unit), 1), max(round(3.4 * unit), 3)
     bones = [
         (points[[one, other]], colour)
@@ -161,21 +168,21 @@ def _draw_skeleton(image: ImageRgb, person: PersonKeypoints, unit: float) -> Non
         if seen[one] and seen[other] and drawable(points[[one, other]])
     ]
     for ends, _ in bones:
-        line(image, ends, NIGHT, thick)
+        draw_line(image, ends, DARK, thick)
     for ends, colour in bones:
-        line(image, ends, colour, thin)
+        draw_line(image, ends, colour, thin)
     for index, colour in _FACE:
         if seen[index] and drawable(points[index]):
-            dot(image, points[index], 2.4 * unit, NIGHT)
-            dot(image, points[index], 1.6 * unit, colour)
+            draw_disc(image, points[index], 2.4 * unit, DARK)
+            draw_disc(image, points[index], 1.6 * unit, colour)
 
 
 def _draw_box(image: ImageRgb, observation: PersonObservation, unit: float) -> None:
-    """Brackets at the corners, which hide less than a frame."""
+    """Draw the corners of the box, which hide less of the image than all of it."""
     box = observation.box_xyxy_px
     if box is None or not drawable(box):
         return
-    # Boxes count from the picture's corner, drawing from the centre of its first pixel.
+    # Boxes count from the image's corner, OpenCV from the centre of the first pixel.
     left, top, right, bottom = (box - 0.5).tolist()
     arm = max(min(0.22 * (right - left), 0.22 * (bottom - top), 26.0 * unit), 2.0)
     colour = awareness_colour(observation.awareness)
@@ -186,34 +193,34 @@ def _draw_box(image: ImageRgb, observation: PersonObservation, unit: float) -> N
         (left, bottom, arm, -arm),
     ):
         corner = [(u + du, v), (u, v), (u, v + dv)]
-        line(image, corner, NIGHT, round(4 * unit))
-        line(image, corner, colour, max(round(2 * unit), 1))
+        draw_line(image, corner, DARK, round(4 * unit))
+        draw_line(image, corner, colour, max(round(2 * unit), 1))
 
 
-def _draw_figures(
+def _draw_label(
     image: ImageRgb,
     person: _Person,
-    letters: Lettering,
-    taken: list[tuple[int, int, int, int]],
+    font: Font,
+    labels: list[_Box],
     camera: Camera,
-) -> tuple[int, int, int, int]:
-    """Distance, α and gauge on a plate over the head; returns the plate's rectangle."""
+) -> _Box:
+    """Draw distance, α and a bar over a person's head, beside earlier labels; return the label."""
     observation, track = person.observation, person.track
     alpha, spread = observation.awareness, observation.awareness_std
     distance = f"{np.linalg.norm(observation.position_camera_m):.1f} m"
     first = distance if track is None else f"#{track.id} · {distance}"
     second = "no evidence" if alpha is None else f"α {alpha:.2f} ± {spread:.2f}"
-    gap = max(letters.height_px // 4, 3)
-    gauge = max(letters.height_px // 3, 4)
-    width = max(letters.width(first), letters.width(second), 4 * letters.height_px) + 2 * gap
-    height = 2 * letters.height_px + gauge + 3 * gap
+    gap = max(font.height_px // 4, 3)
+    bar_height = max(font.height_px // 3, 4)
+    width = max(font.width_px(first), font.width_px(second), 4 * font.height_px) + 2 * gap
+    height = 2 * font.height_px + bar_height + 3 * gap
     anchor = observation.box_xyxy_px
     if anchor is None:
         u, v = camera.project(observation.position_camera_m[None])[0].tolist()
         anchor = np.array([u, v, u, v]) if math.isfinite(u) else np.zeros(4)
     left = round(float(np.clip(0.5 * (anchor[0] + anchor[2] - width), 0, image.shape[1] - width)))
     top = round(float(np.clip(anchor[1] - height - gap, 0, image.shape[0] - height)))
-    for other in sorted(taken):
+    for other in sorted(labels):
         if (
             left < other[2]
             and other[0] < left + width
@@ -221,55 +228,55 @@ def _draw_figures(
             and other[1] < top + height
         ):
             top = other[3] + 2 if other[3] + 2 + height <= image.shape[0] else other[1] - height - 2
-    box = (left, top, left + width, top + height)
-    plate(image, box)
+    label = (left, top, left + width, top + height)
+    darken_box(image, label)
     colour = awareness_colour(alpha)
-    line(image, [(left, top), (left, top + height - 1)], colour, max(gap // 2, 2))
+    draw_line(image, [(left, top), (left, top + height - 1)], colour, max(gap // 2, 2))
     row = top + gap // 2
-    letters.write(image, first, (left + gap, row), WHITE)
-    letters.write(image, second, (left + gap, row + letters.height_px), WHITE)
-    bar = (left + gap, row + 2 * letters.height_px + gap // 2, left + width - gap, gauge)
-    _draw_gauge(image, bar, observation, track)
-    return box
+    font.write(image, first, (left + gap, row), WHITE)
+    font.write(image, second, (left + gap, row + font.height_px), WHITE)
+    bar_top = row + 2 * font.height_px + gap // 2
+    bar = (left + gap, bar_top, left + width - gap, bar_top + bar_height)
+    _draw_bar(image, bar, observation, track)
+    return label
 
 
-def _draw_gauge(
-    image: ImageRgb,
-    bar: tuple[int, int, int, int],
-    observation: PersonObservation,
-    track: PersonTrack | None,
+def _draw_bar(
+    image: ImageRgb, bar: _Box, observation: PersonObservation, track: PersonTrack | None
 ) -> None:
-    left, top, right, height = bar
-    span = right - left
-    _fill(image, left, top, right, top + height, (74, 78, 88))
+    """Draw α, its standard deviation and the lower bound on a scale from 0 to 1."""
+    left, top, right, bottom = bar
+    span, height = right - left, bottom - top
+    _fill_box(image, bar, (74, 78, 88))
     alpha, spread = observation.awareness, observation.awareness_std
     if alpha is not None and spread is not None:
         colour = awareness_colour(alpha)
         low, high = max(alpha - spread, 0.0), min(alpha + spread, 1.0)
         faint = tuple((np.array(colour) * 0.55 + 30.0).astype(int).tolist())
-        _fill(image, left, top, left + round(alpha * span), top + height, colour)
-        _fill(
-            image,
+        _fill_box(image, (left, top, left + round(alpha * span), bottom), colour)
+        band = (
             left + round(low * span),
             top + height // 3,
             left + max(round(high * span), round(low * span) + 1),
-            top + height - height // 3,
-            (faint[0], faint[1], faint[2]),
+            bottom - height // 3,
         )
+        _fill_box(image, band, (faint[0], faint[1], faint[2]))
     if track is not None:
-        tick = left + round(track.awareness_lower * (span - 2))
-        _fill(image, tick, top - 2, tick + 2, top + height + 2, WHITE)
+        mark = left + round(track.awareness_lower * (span - 2))
+        _fill_box(image, (mark, top - 2, mark + 2, bottom + 2), WHITE)
 
 
-def _fill(image: ImageRgb, left: int, top: int, right: int, bottom: int, colour: Colour) -> None:
+def _fill_box(image: ImageRgb, box: _Box, colour: Colour) -> None:
+    left, top, right, bottom = box
     image[max(top, 0) : max(bottom, 0), max(left, 0) : max(right, 0)] = colour
 
 
-def _draw_caption(image: ImageRgb, estimate: FrameEstimate, letters: Lettering) -> None:
+def _draw_caption(image: ImageRgb, estimate: FrameEstimate, font: Font) -> None:
+    """Write the stamp and the number of people into the lower left corner."""
     count = len(estimate.observations)
     people = "nobody" if not count else "1 person" if count == 1 else f"{count} people"
     text = f"{estimate.frame.stamp_s:.2f} s · {people}"
-    gap = letters.height_px // 3
-    top = image.shape[0] - letters.height_px - gap
-    plate(image, (0, top - gap // 2, letters.width(text) + 3 * gap, image.shape[0]), 0.55)
-    letters.write(image, text, (gap, top), WHITE)
+    gap = font.height_px // 3
+    top = image.shape[0] - font.height_px - gap
+    darken_box(image, (0, top - gap // 2, font.width_px(text) + 3 * gap, image.shape[0]), 0.55)
+    font.write(image, text, (gap, top), WHITE)

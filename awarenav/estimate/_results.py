@@ -1,12 +1,10 @@
-"""Estimates in the schema of rendered truth.
-
-The growing JSON Lines file of estimates.
-"""
+"""Estimates as JSON Lines, in the format of rendered truth."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, Final
 
@@ -17,33 +15,32 @@ from perception.arrays import FloatArray
 from perception.layouts import COCO_NAMES, FOOT_NAMES, LEFT_SHOULDER, RIGHT_SHOULDER
 from tracking import PersonTrack
 
-from ..closing import Closing
 from ..errors import AwarenavError
 from ..records import Record, read_records, record_line, write_records
 from ._estimator import FrameEstimate
 
-# Digits that a number keeps; far below any error there is.
+# Significant digits of a number; any error of an estimate is far larger.
 _DIGITS: Final = 7
 
 
 def estimate_record(estimate: FrameEstimate, settings: str) -> Record:
-    """One line of the results.
+    """Return the record of a frame's estimate.
 
-    ``id`` is the track's with ``--tracks`` and else null: without a tracker nothing says who is who
-    from one frame to the next. ``T_odom_camera`` is null where no pose was known or assumed.
+    ``id`` is that of the track with ``--tracks``, else null: without a tracker, nobody is
+    identified from frame to frame. ``T_odom_camera`` is null if no pose was known or assumed.
 
     Args:
         estimate: of the frame.
-        settings: a mark of the settings it was made with.
+        settings: hash of the settings; see :func:`settings_hash`.
     """
     record: Record = {
         "frame": estimate.frame.name,
         "stamp_s": round(estimate.frame.stamp_s, 9),
         "T_odom_camera": None
         if estimate.T_odom_camera is None
-        else _numbers(estimate.T_odom_camera),
+        else _rounded_list(estimate.T_odom_camera),
         "people": [
-            _person(observation, keypoints, track_id)
+            _person_record(observation, keypoints, track_id)
             for observation, keypoints, track_id in zip(
                 estimate.observations, estimate.keypoints, estimate.track_ids, strict=True
             )
@@ -51,29 +48,32 @@ def estimate_record(estimate: FrameEstimate, settings: str) -> Record:
         "settings": settings,
     }
     if estimate.tracks is not None:
-        record["tracks"] = [_track(track) for track in estimate.tracks]
+        record["tracks"] = [track_record(track) for track in estimate.tracks]
     return record
 
 
-def _person(
+def _person_record(
     observation: PersonObservation, keypoints: PersonKeypoints | None, track_id: int | None
 ) -> dict[str, Any]:
     box, gaze = observation.box_xyxy_px, observation.gaze_camera
     return {
         "id": track_id,
-        "box_xyxy_px": None if box is None else _numbers(box),
-        "position_camera_m": _numbers(observation.position_camera_m),
-        "position_covariance_m2": _numbers(observation.position_covariance_m2),
-        "gaze_camera": None if gaze is None else _numbers(gaze),
-        "awareness": _number(observation.awareness),
-        "awareness_std": _number(observation.awareness_std),
-        "score": _number(observation.score),
-        "keypoints": {} if keypoints is None else _keypoints(keypoints),
+        "box_xyxy_px": None if box is None else _rounded_list(box),
+        "position_camera_m": _rounded_list(observation.position_camera_m),
+        "position_covariance_m2": _rounded_list(observation.position_covariance_m2),
+        "gaze_camera": None if gaze is None else _rounded_list(gaze),
+        "awareness": _rounded(observation.awareness),
+        "awareness_std": _rounded(observation.awareness_std),
+        "score": _rounded(observation.score),
+        "keypoints": {} if keypoints is None else _keypoint_records(keypoints),
     }
 
 
-def _keypoints(person: PersonKeypoints) -> dict[str, list[float]]:
-    """Body and feet by name, and the neck: the midpoint of the shoulders, as sure as the worse."""
+def _keypoint_records(person: PersonKeypoints) -> dict[str, list[float]]:
+    """Return u, v and score of body, feet and neck by name.
+
+    The neck is the midpoint of the shoulders; its score is the lower of theirs.
+    """
     names = [*COCO_NAMES, *FOOT_NAMES][: len(person.scores)]
     shoulders = [LEFT_SHOULDER, RIGHT_SHOULDER]
     points = np.vstack(
@@ -86,51 +86,56 @@ def _keypoints(person: PersonKeypoints) -> dict[str, list[float]]:
     }
 
 
-def _track(track: PersonTrack) -> dict[str, Any]:
+def track_record(track: PersonTrack) -> dict[str, Any]:
+    """Return an entry of a record's ``tracks``."""
     return {
         "id": track.id,
         "status": track.status,
-        "position_odom_m": _numbers(track.position_odom_m),
-        "velocity_odom_mps": _numbers(track.velocity_odom_mps),
-        "awareness": _number(track.awareness),
-        "awareness_std": _number(track.awareness_std),
-        "awareness_lower": _number(track.awareness_lower),
-        "time_since_seen_s": _number(track.time_since_seen_s),
+        "position_odom_m": _rounded_list(track.position_odom_m),
+        "velocity_odom_mps": _rounded_list(track.velocity_odom_mps),
+        "awareness": _rounded(track.awareness),
+        "awareness_std": _rounded(track.awareness_std),
+        "awareness_lower": _rounded(track.awareness_lower),
+        "time_since_seen_s": _rounded(track.time_since_seen_s),
     }
 
 
-def _numbers(array: FloatArray) -> Any:
-    flat = [_number(value) for value in array.ravel().tolist()]
+def _rounded_list(array: FloatArray) -> Any:
+    """Return a vector as a list, or a matrix as a list of rows, of rounded numbers."""
+    flat = [_rounded(value) for value in array.ravel().tolist()]
     if array.ndim == 1:
         return flat
     return [flat[start : start + array.shape[1]] for start in range(0, len(flat), array.shape[1])]
 
 
-def _number(value: float | None) -> float | None:
+def _rounded(value: float | None) -> float | None:
     return None if value is None else float(f"{value:.{_DIGITS}g}")
 
 
-def settings_mark(settings: Mapping[str, object]) -> str:
-    """Eight hexadecimal digits that differ for different settings."""
+def settings_hash(settings: Mapping[str, object]) -> str:
+    """Return eight hexadecimal digits that differ for different settings."""
     text = repr(sorted((name, str(value)) for name, value in settings.items()))
     return hashlib.sha256(text.encode()).hexdigest()[:8]
 
 
-class ResultsFile(Closing):
-    """Appends a line a frame, on the disk as soon as it is whole.
+class ResultsFile(AbstractContextManager["ResultsFile"]):
+    """A JSON Lines file that gets one line per frame; every line is flushed.
+
+    Attributes:
+        done: names of the frames that a continued file has already.
 
     Args:
         path: of the file.
-        mark: of the settings, which every line carries.
-        resume: continues a file made with the same settings; its frames are in ``done``.
-        overwrite: replaces a file that is there.
+        settings: hash of the settings, which every line has.
+        resume: continues a file that was made with the same settings.
+        overwrite: replaces an existing file.
 
     Raises:
-        AwarenavError: for a file that is there and may not be replaced or cannot be continued.
+        AwarenavError: for an existing file that may not be replaced or cannot be continued.
     """
 
     def __init__(
-        self, path: Path, mark: str, *, resume: bool = False, overwrite: bool = False
+        self, path: Path, settings: str, *, resume: bool = False, overwrite: bool = False
     ) -> None:
         self.done: frozenset[str] = frozenset()
         exists = path.exists()
@@ -144,27 +149,30 @@ class ResultsFile(Closing):
             path.parent.mkdir(parents=True, exist_ok=True)
             if exists and resume:
                 records = read_records(path)
-                _same_settings(path, records, mark)
-                write_records(path, records)  # without a line that was cut off
+                _require_same_settings(path, records, settings)
+                write_records(path, records)  # without an incomplete last line
                 self.done = frozenset(str(record["frame"]) for record in records)
             self._file = path.open("a" if resume else "w", encoding="utf-8")
         except OSError as cause:
             raise AwarenavError(f"cannot write {path}: {cause.strerror or cause}") from cause
 
     def add(self, record: Record) -> None:
-        """Append one frame."""
+        """Append the record of a frame."""
         self._file.write(record_line(record))
         self._file.flush()
 
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
     def close(self) -> None:
-        """Close the file; what was added is in it already."""
+        """Close the file."""
         self._file.close()
 
 
-def _same_settings(path: Path, records: list[Record], mark: str) -> None:
-    others = {str(record.get("settings")) for record in records} - {mark}
+def _require_same_settings(path: Path, records: list[Record], settings: str) -> None:
+    others = {str(record.get("settings")) for record in records} - {settings}
     if others:
         raise AwarenavError(
-            f"{path} was made with other settings (mark {', '.join(sorted(others))}, these have "
-            f"{mark}); use the same ones to continue it, --overwrite, or another file"
+            f"{path} was made with other settings (hash {', '.join(sorted(others))}, now "
+            f"{settings}); use the same settings to continue it, --overwrite, or another file"
         )

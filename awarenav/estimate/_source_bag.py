@@ -1,4 +1,4 @@
-"""Image topics of ROS 1 and ROS 2 recordings; the one place that imports ``rosbags``."""
+"""Image topics of ROS 1 and ROS 2 recordings; no other module imports ``rosbags``."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from nav_adapter.ros2.messages.sensor_msgs import CameraInfo
 from perception import Camera
 from perception.arrays import ImageRgb
 
-from ..errors import AwarenavError
+from ..errors import AwarenavError, MissingExtraError
 from ._source import SourceFrame
 
 try:
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 except ImportError as cause:  # pragma: no cover - depends on the installation
-    raise AwarenavError(
+    raise MissingExtraError(
         "reading recordings needs the package rosbags, which is not installed; it is the extra "
         "'rosbag': pip install 'awarenav[rosbag]'"
     ) from cause
@@ -35,15 +35,15 @@ _INFO: Final = "sensor_msgs/msg/CameraInfo"
 class BagSource:
     """One image topic of a recording: rosbag2 folder, ``.db3``, ``.mcap``, or a ROS 1 ``.bag``.
 
-    Frames carry the stamp of their message's header. The ``camera_info`` topic beside the images
-    is their camera.
+    The stamp of a frame is that of its message's header. The ``camera_info`` topic beside the
+    images is their camera.
 
     Args:
         path: of the recording.
-        topic: of the images (sensor_msgs Image or CompressedImage); None is the only one there is.
+        topic: of the images (sensor_msgs Image or CompressedImage); None if there is only one.
 
     Raises:
-        AwarenavError: for a file that is no recording, or for a topic that is not there.
+        AwarenavError: for a file that is not a recording, or a topic that it does not have.
     """
 
     def __init__(self, path: Path, topic: str | None = None) -> None:
@@ -51,12 +51,12 @@ class BagSource:
         try:
             self._reader = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
             self._reader.open()
-        # The library lets errors of its storage layers through beside its own.
+        # The library also raises errors of its storage layers.
         except Exception as cause:
             raise AwarenavError(f"cannot read the recording {path}: {cause}") from cause
         try:
-            self._topic = self._choose(topic)
-            self.camera = self._camera_info()
+            self._topic = self._chosen_topic(topic)
+            self.camera = self._read_camera()
         except BaseException:
             self._reader.close()
             raise
@@ -69,7 +69,7 @@ class BagSource:
         self.live = False
 
     def frames(self) -> Iterator[SourceFrame]:
-        """Yield the topic's pictures, numbered from 000000."""
+        """Yield the images of the topic, numbered from 000000."""
         messages = self._reader.messages(connections=self._connections)
         last_s, number = -math.inf, 0
         while True:
@@ -88,7 +88,7 @@ class BagSource:
                 stamp_s = recorded_ns * 1.0e-9
             last_s = stamp_s
             try:
-                image = _picture(message, f"{self._topic}, message {number}")
+                image = _rgb_image(message, f"{self._topic}, message {number}")
                 yield SourceFrame(name, stamp_s, image)
             except AwarenavError as error:
                 yield SourceFrame(name, stamp_s, None, None, str(error))
@@ -98,7 +98,8 @@ class BagSource:
         """Close the recording."""
         self._reader.close()
 
-    def _choose(self, topic: str | None) -> str:
+    def _chosen_topic(self, topic: str | None) -> str:
+        """Return the image topic that was asked for, or the only one."""
         images = sorted(
             {
                 each.topic
@@ -116,28 +117,29 @@ class BagSource:
             )
         return images[0] if topic is None else topic
 
-    def _camera_info(self) -> Camera | None:
-        """The first message of the ``camera_info`` topic in the namespace of the images."""
+    def _read_camera(self) -> Camera | None:
+        """Return the camera of the first ``camera_info`` message in the images' namespace."""
         parts = self._topic.split("/")
-        homes = [
+        topics = [
             "/".join(parts[:length]) + "/camera_info" for length in range(len(parts) - 1, 0, -1)
         ]
-        for home in homes[:2]:  # beside image_raw, or beside image_raw/compressed's parent
+        for topic in topics[:2]:  # beside image_raw, or beside the parent of image_raw/compressed
             connections = [
                 each
                 for each in self._reader.connections
-                if each.topic == home and each.msgtype == _INFO
+                if each.topic == topic and each.msgtype == _INFO
             ]
             for connection, _, raw in (
                 self._reader.messages(connections=connections) if connections else ()
             ):
                 message: Any = self._reader.deserialize(raw, connection.msgtype)
-                return _camera(message, home)
+                return _camera(message, topic)
         return None
 
 
 def _camera(message: Any, topic: str) -> Camera | None:
-    # ROS 1 spells the matrices in capitals. An uncalibrated driver sends zeros.
+    """Return the camera of a ``camera_info`` message; None from an uncalibrated driver."""
+    # ROS 1 names the matrices in capitals. An uncalibrated driver sends zeros.
     matrix = np.asarray(getattr(message, "k", getattr(message, "K", ())), dtype=float).reshape(-1)
     distortion = np.asarray(getattr(message, "d", getattr(message, "D", ())), dtype=float)
     if matrix.size != 9 or not matrix[0] > 0.0:
@@ -156,13 +158,14 @@ def _camera(message: Any, topic: str) -> Camera | None:
 
 
 def _stamp_s(message: Any) -> float | None:
-    """The header's stamp; None for zero, which is what a driver without a clock sends."""
+    """Return the header's stamp; None for zero, which a driver without a clock sends."""
     stamp = message.header.stamp
     seconds = float(stamp.sec) + 1.0e-9 * float(stamp.nanosec)
     return seconds if seconds > 0.0 else None
 
 
-def _picture(message: Any, name: str) -> ImageRgb:
+def _rgb_image(message: Any, name: str) -> ImageRgb:
+    """Return the image of a message as RGB."""
     try:
         return picture_of(message)
     except NavError as cause:

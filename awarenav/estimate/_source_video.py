@@ -5,39 +5,41 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
+from typing import Final
 
 import cv2
 
 from perception import Camera
 
 from ..errors import AwarenavError
-from ._source import SourceFrame, as_rgb
+from ._images import as_rgb
+from ._source import SourceFrame
 
-# A file's own count of its frames is an estimate in some containers.
-_MISCOUNTED: int = 2
-_MISCOUNTED_SHARE = 0.01
+# Some containers only estimate their number of frames: so many may be missing.
+_MISCOUNTED_FRAMES: Final = 2
+_MISCOUNTED_SHARE: Final = 0.01
 
 
 class VideoSource:
     """Frames of a ``cv2.VideoCapture``: a file, a camera or a stream.
 
-    The stamps of a file are those of its frames (variable rates included); those of a live source
+    The stamps of a file are those of its frames, also at a variable rate; those of a live source
     are the time since it was opened.
 
     Args:
-        name: for messages.
-        capture: opened.
-        live: a camera or stream, which ends only when something is wrong with it.
+        name: of the source, for messages.
+        capture: the opened capture.
+        live: whether it is a camera or a stream, which ends only if something is wrong.
 
     Raises:
-        AwarenavError: when it is not open.
+        AwarenavError: if the capture is not open.
     """
 
     def __init__(self, name: str, capture: cv2.VideoCapture, *, live: bool) -> None:
         if not capture.isOpened():
             what = "camera or stream" if live else "video"
             hint = (
-                "is it plugged in, free, and the index right?"
+                "is it plugged in, not in use, and its number right?"
                 if live
                 else "it may be damaged, cut off, or of a format that OpenCV cannot decode"
             )
@@ -53,38 +55,38 @@ class VideoSource:
 
     @classmethod
     def of_file(cls, path: str) -> VideoSource:
-        """A video file."""
-        return cls(path, _quietly(path), live=False)
+        """Open a video file."""
+        return cls(path, _open_silently(path), live=False)
 
     @classmethod
     def of_camera(cls, index: int) -> VideoSource:
-        """A camera of this computer by its number."""
-        return cls(str(index), _quietly(index), live=True)
+        """Open a camera of this computer by its number."""
+        return cls(str(index), _open_silently(index), live=True)
 
     @classmethod
     def of_stream(cls, address: str) -> VideoSource:
-        """A network stream such as ``rtsp://…``."""
-        return cls(address, _quietly(address), live=True)
+        """Open a network stream such as ``rtsp://…``."""
+        return cls(address, _open_silently(address), live=True)
 
     def frames(self) -> Iterator[SourceFrame]:
-        """Yield frames numbered from 000000; an early end is a last frame with a ``problem``."""
+        """Yield frames numbered from 000000; after an early end, a frame with a ``problem``."""
         period_s = 1.0 / (self.rate_hz or 30.0)
         start_s, last_s, number = time.monotonic(), -math.inf, 0
         while True:
-            good, picture = self._capture.read()
-            if not good or picture is None:
+            good, image = self._capture.read()
+            if not good or image is None:
                 break
             if self.live:
                 stamp_s = time.monotonic() - start_s
             else:
                 stamp_s = self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
-            # Containers without times say 0 for every frame; the rate is then all there is.
+            # Containers without stamps give 0 for every frame; then only the rate is known.
             if not math.isfinite(stamp_s) or stamp_s <= last_s:
                 stamp_s = 0.0 if number == 0 else last_s + period_s
             last_s = stamp_s
             name = f"{number:06d}"
             try:
-                yield SourceFrame(name, stamp_s, as_rgb(picture, f"{self._name}, frame {name}"))
+                yield SourceFrame(name, stamp_s, as_rgb(image, f"{self._name}, frame {name}"))
             except AwarenavError as error:
                 yield SourceFrame(name, stamp_s, None, None, str(error))
             number += 1
@@ -93,24 +95,25 @@ class VideoSource:
             yield SourceFrame(f"{number:06d}", max(last_s, 0.0), None, None, problem)
 
     def close(self) -> None:
-        """Give the device or file back."""
+        """Release the device or file."""
         self._capture.release()
 
-    def _early_end(self, got: int) -> str:
+    def _early_end(self, read: int) -> str:
+        """Return why the source ended too early after ``read`` frames; empty if it did not."""
         if self.live:
-            return f"{self._name} stopped delivering after {got} frames (unplugged?)"
-        if got == 0:
-            return f"{self._name} holds no frame that can be decoded"
+            return f"{self._name} stopped delivering after {read} frames (unplugged?)"
+        if read == 0:
+            return f"{self._name} has no frame that can be decoded"
         if self.count is None:
             return ""
-        missing = self.count - got
-        if missing <= max(_MISCOUNTED, _MISCOUNTED_SHARE * self.count):
+        missing = self.count - read
+        if missing <= max(_MISCOUNTED_FRAMES, _MISCOUNTED_SHARE * self.count):
             return ""
-        return f"{self._name} ends after {got} of {self.count} frames: it is cut off or damaged"
+        return f"{self._name} ends after {read} of {self.count} frames: it is cut off or damaged"
 
 
-def _quietly(what: str | int) -> cv2.VideoCapture:
-    """Open without OpenCV's own lines on standard error; what is wrong is said once, by us."""
+def _open_silently(what: str | int) -> cv2.VideoCapture:
+    """Open a capture without OpenCV's own messages on standard error."""
     logging = getattr(cv2, "utils", None) and getattr(cv2.utils, "logging", None)
     if logging is None:
         return cv2.VideoCapture(what)

@@ -1,33 +1,32 @@
-"""A source read in a thread of its own, so that decoding and estimating overlap.
-
-Work handed to a thread of its own, in order, so that the giver need not wait for it.
-"""
+"""Threads beside the estimator: one reads frames ahead, one does work in the background."""
 
 from __future__ import annotations
 
 import queue
 import threading
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from typing import Final, Generic, TypeVar
 
-from ..closing import Closing
 from ._source import ImageSource, SourceFrame
 
-_DEPTH: Final = 4
-# How long either side waits before it looks whether the other is still there.
+_QUEUE_SIZE: Final = 4
+# Each side waits so long before it checks whether the other side has ended.
 _POLL_S: Final = 0.1
 
+_Item = TypeVar("_Item")
 
-class ReadAhead(Closing):
-    """Iterates over the frames of a source, a few of which are read ahead.
 
-    A live source is never held up: the newest frame replaces one that was not taken. What the
-    source raises is raised here, after the frames that came before it.
+class FramePrefetcher(AbstractContextManager["FramePrefetcher"]):
+    """Iterates over the frames of a source, a few of which a thread reads ahead.
+
+    A live source never waits: its newest frame replaces one that was not taken yet. An error of the
+    source is raised here, after the frames before it.
 
     Args:
-        source: is closed with this.
-        every: takes each so-many-th frame only.
-        limit: at most so many; None is all.
+        source: is closed with this object.
+        every: takes every N-th frame only.
+        limit: most frames to take; None for all.
     """
 
     def __init__(self, source: ImageSource, *, every: int = 1, limit: int | None = None) -> None:
@@ -35,10 +34,10 @@ class ReadAhead(Closing):
         self._every = every
         self._limit = limit
         self._queue: queue.Queue[SourceFrame | BaseException | None] = queue.Queue(
-            1 if source.live else _DEPTH
+            1 if source.live else _QUEUE_SIZE
         )
         self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._read, name="read ahead", daemon=True)
+        self._thread = threading.Thread(target=self._read, name="prefetch", daemon=True)
         self._thread.start()
 
     def __iter__(self) -> Iterator[SourceFrame]:
@@ -50,24 +49,28 @@ class ReadAhead(Closing):
                 raise item
             yield item
 
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
     def close(self) -> None:
         """Stop reading and close the source."""
         self._stop.set()
         while self._thread.is_alive():
             try:
-                self._queue.get_nowait()  # lets a thread that waits for room see that it shall stop
+                self._queue.get_nowait()  # a thread that waits for a free place then sees the stop
             except queue.Empty:
                 self._thread.join(_POLL_S)
         self._source.close()
 
     def _read(self) -> None:
+        """Read frames into the queue until the end, the limit or an error (in the thread)."""
         last: BaseException | None = None
         try:
             taken = 0
             for index, frame in enumerate(self._source.frames()):
                 if self._stop.is_set():
                     return
-                # What went wrong is always passed on.
+                # A frame with a problem is never skipped.
                 if index % self._every and frame.image_rgb is not None:
                     continue
                 self._put(frame, newest=self._source.live and frame.image_rgb is not None)
@@ -79,6 +82,7 @@ class ReadAhead(Closing):
         self._put(last)
 
     def _put(self, item: SourceFrame | BaseException | None, *, newest: bool = False) -> None:
+        """Put an item into the queue; a ``newest`` one replaces the item that is in it."""
         while not self._stop.is_set():
             try:
                 self._queue.put(item, timeout=0.0 if newest else _POLL_S)
@@ -91,38 +95,38 @@ class ReadAhead(Closing):
                         continue
 
 
-ItemT = TypeVar("ItemT")
+class BackgroundWorker(AbstractContextManager["BackgroundWorker[_Item]"], Generic[_Item]):
+    """Calls a function with one item after another, in a thread.
 
-
-class WriteBehind(Closing, Generic[ItemT]):
-    """Calls a function with one item after another in a thread.
-
-    What the function raises is raised by the next :meth:`put` or by :meth:`close`; nothing is
-    handed to it after that.
+    An error of the function is raised by the next :meth:`put` or by :meth:`close`; the function is
+    not called again after it.
 
     Args:
         work: the function.
     """
 
-    def __init__(self, work: Callable[[ItemT], None]) -> None:
+    def __init__(self, work: Callable[[_Item], None]) -> None:
         self._work = work
-        self._queue: queue.Queue[ItemT | None] = queue.Queue(_DEPTH)
+        self._queue: queue.Queue[_Item | None] = queue.Queue(_QUEUE_SIZE)
         self._error: BaseException | None = None
-        self._thread = threading.Thread(target=self._run, name="write behind", daemon=True)
+        self._thread = threading.Thread(target=self._run, name="background worker", daemon=True)
         self._thread.start()
 
-    def put(self, item: ItemT) -> None:
-        """Hand over an item; waits while several are not done yet."""
+    def put(self, item: _Item) -> None:
+        """Hand over an item; wait while the queue is full."""
         while True:
-            self._complain()
+            self._raise_error()
             try:
                 self._queue.put(item, timeout=_POLL_S)
                 return
             except queue.Full:
                 continue
 
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
     def close(self) -> None:
-        """Wait until everything is done."""
+        """Wait until all items are done."""
         while self._thread.is_alive():
             try:
                 self._queue.put(None, timeout=_POLL_S)
@@ -130,9 +134,10 @@ class WriteBehind(Closing, Generic[ItemT]):
             except queue.Full:
                 continue
         self._thread.join()
-        self._complain()
+        self._raise_error()
 
-    def _complain(self) -> None:
+    def _raise_error(self) -> None:
+        """Raise the error of the function, once."""
         if self._error is not None:
             error, self._error = self._error, None
             raise error

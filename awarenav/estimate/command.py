@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from ..cli import POSITIVE, SHARE, FilePath, OneOf, argument, command, option, options
+from ..cli import NUMBER, POSITIVE, SHARE, FilePath, OneOf, argument, command, option, options
 
 _NETWORKS: Final = "Networks"
 _CAMERA: Final = "Camera"
@@ -12,15 +12,24 @@ _CAMERA: Final = "Camera"
 
 @command(
     "estimate",
-    epilog="Exit status: 0 success; 1 some frames could not be read or estimated (they are named "
-    "on standard error, the others are written); 2 bad input, nothing done; 130 interrupted.",
+    examples=[
+        "awarenav estimate photo.jpg --overlay drawn.jpg",
+        "awarenav estimate video.mp4 --detector yolox-tiny --pose rtmpose-m",
+        "awarenav estimate 0 --fov-deg 70 --tracks --overlay drawn.mp4",
+    ],
+    exit_status={
+        0: "Success.",
+        1: "Some frames could not be read or estimated; standard error names them.",
+        2: "Bad input; nothing was done.",
+        130: "Interrupted; the estimates so far are kept.",
+    },
 )
 @argument(
     "source",
-    help="An image, a folder of images, a video, a camera's number (0), a stream's address "
-    "(rtsp://...), or a ROS recording.",
+    help="An image, a folder of images, a video, the number of a camera (0), the address of a "
+    "stream (rtsp://...), or a ROS recording.",
 )
-@options.out_file("estimates.jsonl", "The results, one JSON line for each frame.")
+@options.out_file("estimates.jsonl", "The results: one JSON line per frame.")
 @options.resume()
 @option("--overwrite", is_flag=True, excludes="--resume", help="Replace the file --out.")
 @option(
@@ -28,36 +37,36 @@ _CAMERA: Final = "Camera"
     default="none",
     metavar="FILE.mp4|DIR|none",
     help="Draw boxes, skeletons, attention cones, awareness and distances into a video or a folder "
-    "of images (for a single image: into an image file).",
+    "of images; for a single image, into an image file.",
 )
 @option("--tracks", is_flag=True, help="Track people from frame to frame.")
 @option("--every", type=POSITIVE, default=1, metavar="N", help="Use every N-th frame only.")
 @option("--frames", type=POSITIVE, metavar="N", help="Stop after N frames.")
-@option("--topic", metavar="NAME", help="Image topic, for a recording with several.")
+@option("--topic", metavar="NAME", help="Image topic of a recording that has several.")
 @option(
     "--detector",
     group=_NETWORKS,
     default="shipped",
     metavar="NAME|FILE",
-    help="ONNX person detector: YOLOv8/11, YOLOX, RTMDet and relatives. The shipped one is made "
-    "for the simulator.",
+    help="Person detector: 'shipped' (made for the simulator), a network that `awarenav models` "
+    "lists, or an ONNX file (YOLOv8, YOLO11, YOLOX, RTMDet).",
 )
 @option(
     "--pose",
     group=_NETWORKS,
     default="shipped",
-    metavar="NAME|FILE|mediapipe",
-    help="ONNX pose network: RTMPose, RTMW, RTMW3D; or MediaPipe (an extra). The shipped one is "
-    "made for the simulator.",
+    metavar="NAME|FILE",
+    help="Pose network: 'shipped' (made for the simulator), a network that `awarenav models` "
+    "lists, an ONNX file (RTMPose, RTMW, RTMW3D), or 'mediapipe' (needs the extra 'mediapipe').",
 )
 @option(
     "--head",
     group=_NETWORKS,
     default="auto",
-    metavar="auto|network|pnp|fused|FILE",
-    help="Head pose from the shipped head network, from PnP on the keypoints, from both, or from "
-    "another ONNX network. 'auto' is the network beside the shipped pose network, and PnP beside "
-    "any other.",
+    metavar="NAME|FILE",
+    help="Head pose: 'network' (the shipped one, made for the simulator), 'pnp' (from the "
+    "keypoints), 'fused' (both), an ONNX file, or 'auto': 'network' with the shipped pose "
+    "network, else 'pnp'.",
 )
 @option(
     "--min-score",
@@ -65,58 +74,59 @@ _CAMERA: Final = "Camera"
     type=SHARE,
     default=0.25,
     metavar="P",
-    help="Drop people detected with less confidence.",
+    help="Drop people whose detection score, from 0 to 1, is below this.",
 )
 @option(
     "--threads",
     group=_NETWORKS,
     type=POSITIVE,
+    show_default="onnxruntime's own choice",
     metavar="N",
-    help="Threads of each network (default: onnxruntime's).",
+    help="Threads of each network.",
 )
 @option(
     "--provider",
     group=_NETWORKS,
     type=OneOf(["cpu", "cuda", "tensorrt"]),
     default="cpu",
-    help="What runs the networks.",
+    help="Processor that runs the networks.",
 )
 @option(
     "--camera",
     group=_CAMERA,
     type=FilePath(),
+    show_default="camera.yaml beside the images, or camera_info of the recording",
     metavar="FILE",
-    help="ROS camera_info YAML (default: camera.yaml beside the images, or the recording's "
-    "camera_info; without either, a field of view of 60 degrees is assumed).",
+    help="Calibration (ROS camera_info YAML). Without any, a horizontal field of view of 60 "
+    "degrees is assumed.",
 )
 @option(
     "--fov-deg",
     group=_CAMERA,
-    type=float,
+    type=NUMBER,
     excludes="--camera",
     metavar="DEG",
-    help="Horizontal field of view instead.",
+    help="Horizontal field of view, instead of a calibration.",
 )
 @option(
     "--camera-height-m",
     group=_CAMERA,
-    type=float,
+    type=NUMBER,
     metavar="M",
-    help="Height of a fixed camera above a level floor; feet then tell distances.",
+    help="Height of a fixed camera above a level floor: distances then follow from the feet.",
 )
 @option(
     "--camera-pitch-deg",
     group=_CAMERA,
-    type=float,
+    type=NUMBER,
     default=0.0,
     metavar="DEG",
-    help="How far that camera looks down.",
+    help="Angle by which that camera looks down from the horizontal.",
 )
 def estimate(**values: Any) -> int:
     """Estimate position, gaze and awareness of the people in every frame of SOURCE.
 
-    Writes one JSON line for each frame, in the schema of the truth that `awarenav render` writes.
-    Ctrl-C keeps what is done.
+    Writes one JSON line per frame, in the format of the truth that `awarenav render` writes.
     """
     from ._run import EstimateOptions, estimate_command  # noqa: PLC0415 - help needs no networks
 

@@ -1,18 +1,22 @@
-"""Estimates of people compared with the truth: ``awarenav judge``."""
+"""Comparison of estimates of people with the truth: ``awarenav judge``."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from awarenav.lazy import lazy_names
+from ..lazy import lazy_names
 
 if TYPE_CHECKING:
-    from ._judge import JudgeConfig, judge_files
+    from ._judge import JudgeConfig, JudgeLimits, judge_files, judge_frames
+    from ._matching import average_precision
     from ._report import markdown_report, requirements
 
 __all__ = [
     "JudgeConfig",
+    "JudgeLimits",
+    "average_precision",
     "judge_files",
+    "judge_frames",
     "markdown_report",
     "requirements",
 ]
@@ -20,13 +24,8 @@ __all__ = [
 __getattr__ = lazy_names(
     __name__,
     {
-        "._judge": (
-            "JudgeConfig",
-            "judge_files",
-        ),
-        "._report": (
-            "markdown_report",
-            "requirements",
-        ),
+        "._judge": ("JudgeConfig", "JudgeLimits", "judge_files", "judge_frames"),
+        "._matching": ("average_precision",),
+        "._report": ("markdown_report", "requirements"),
     },
 )

@@ -1,12 +1,9 @@
-"""Who counts when estimates are judged, and what good estimates are.
-
-``awarenav judge``: estimates of people against the truth about them.
-"""
+"""Compares estimates of people with the truth about them."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Final
 
@@ -16,19 +13,27 @@ from tracking.config import StrictConfig
 
 from ..errors import AwarenavError
 from ..records import PersonRecord, people_by_frame, read_records
-from ._figures import PersonFrame, person_figures
 from ._matching import average_precision, match_frame
+from ._metrics import PersonFrame, person_metrics
+
+#: The people of every frame, by the frame's name.
+Frames = dict[str, list[PersonRecord]]
+
+# Angles between the head's forward axis and the direction to the camera, degrees.
+_FACINGS_DEG: Final = (("front", 0.0, 60.0), ("profile", 60.0, 120.0), ("back", 120.0, 180.1))
+# Bins of range; the lower edge belongs to the bin.
+_RANGES_M: Final = ((0.0, 1.5), (1.5, 3.0), (3.0, 4.5), (4.5, 6.0), (6.0, math.inf))
 
 
 class JudgeConfig(StrictConfig):
-    """Who had to be found: people at least so tall, at most so hidden and so cut off.
+    """Limits for people who have to be found.
 
-    Everybody else is neither a miss when overlooked nor a mistake when found.
+    Other people count neither as missed nor as false positives.
 
     Attributes:
-        min_height_px: of the true box.
-        max_occlusion: share of the person that something else hides, exclusive.
-        max_truncation: share of the person outside the picture, exclusive.
+        min_height_px: least height of the true box.
+        max_occlusion: share of the person that other things hide, exclusive.
+        max_truncation: share of the person outside the image, exclusive.
     """
 
     error: ClassVar[type[ValueError]] = AwarenavError
@@ -39,7 +44,11 @@ class JudgeConfig(StrictConfig):
 
     @classmethod
     def checked(cls, **values: Any) -> JudgeConfig:
-        """Validate settings given one by one; raises AwarenavError that names each wrong one."""
+        """Make a config.
+
+        Raises:
+            AwarenavError: for values that are not valid; the message names each of them.
+        """
         try:
             return cls(**values)
         except ValidationError as cause:
@@ -51,18 +60,18 @@ class JudgeConfig(StrictConfig):
 
 
 class JudgeLimits(StrictConfig):
-    """What the project asks of its own networks on rendered people; ``--gate`` holds them to it.
+    """The project's requirements for its own networks on rendered people; ``--gate`` checks them.
 
     Attributes:
         min_ap50: average precision of detection at IoU ≥ 0.5.
-        max_gaze_median_deg: error of the head's direction.
+        max_gaze_median_deg: median error of the head's direction.
         max_gaze_p90_deg: its 90th percentile.
-        max_position_median: error of position as a share of range.
+        max_position_median: median error of position as a share of range.
         max_awareness_mae: mean absolute error of α.
-        max_false_aware: share of α ≥ 0.5 among estimated α whose truth is 0.
-        within_1sigma: share of |α error| within one reported standard deviation (a normal
-            distribution has 0.68), for a truth or an estimate strictly between 0 and 1.
-        within_1sigma_tolerance: by how much it may differ.
+        max_false_aware: share of α ≥ 0.5 among the estimated α whose true α is 0.
+        within_1sigma: share of α errors within one reported standard deviation (0.68 for a normal
+            distribution), where the true or the estimated α is strictly between 0 and 1.
+        within_1sigma_tolerance: largest difference from it.
     """
 
     error: ClassVar[type[ValueError]] = AwarenavError
@@ -77,66 +86,60 @@ class JudgeLimits(StrictConfig):
     within_1sigma_tolerance: float = 0.08
 
 
-#: Which way the head faces, by the angle between its forward axis and the way to the camera.
-FACINGS: Final = (("front", 0.0, 60.0), ("profile", 60.0, 120.0), ("back", 120.0, 180.1))
-#: Bins of range; the lower edge belongs to the bin.
-RANGES_M: Final = ((0.0, 1.5), (1.5, 3.0), (3.0, 4.5), (4.5, 6.0), (6.0, math.inf))
-
-Frames = dict[str, list[PersonRecord]]
-
-
 def judge_files(
     truth: Path, estimates: Path, config: JudgeConfig | None = None, *, common: bool = False
 ) -> dict[str, Any]:
-    """Judge one JSON Lines file by another; see :func:`judge`.
+    """Compare a JSON Lines file of estimates with one of truth; see :func:`judge_frames`.
 
     Raises:
-        AwarenavError: for files that cannot be read or share no frame.
+        AwarenavError: for files that cannot be read or have no frame in common.
     """
-    known, guessed = (people_by_frame(read_records(path), path) for path in (truth, estimates))
-    if not known:
-        raise AwarenavError(f"{truth} holds no frame")
-    if not known.keys() & guessed.keys():
-        some = [", ".join(map(repr, list(frames)[:2])) for frames in (known, guessed)]
+    true_frames, estimated = (
+        people_by_frame(read_records(path), path) for path in (truth, estimates)
+    )
+    if not true_frames:
+        raise AwarenavError(f"{truth} has no frame")
+    if not true_frames.keys() & estimated.keys():
+        some = [", ".join(map(repr, list(frames)[:2])) for frames in (true_frames, estimated)]
         raise AwarenavError(
-            f"{truth} (frames {some[0]}, …) and {estimates} (frames {some[1] or 'none'}, …) "
-            "share no frame: are they of the same pictures?"
+            f"{truth} (frames {some[0]}, …) and {estimates} (frames {some[1] or 'none'}, …) have "
+            "no frame in common: are they of the same images?"
         )
-    return judge(known, guessed, config, common=common)
+    return judge_frames(true_frames, estimated, config, common=common)
 
 
-def judge(
+def judge_frames(
     truth: Frames, estimates: Frames, config: JudgeConfig | None = None, *, common: bool = False
 ) -> dict[str, Any]:
-    """All figures: of detection, of everybody who had to be found, by facing, by range.
+    """Return all metrics: of detection, and of people who had to be found, by facing and range.
 
     Args:
         truth: the people of every frame.
-        estimates: of every frame; a frame that is missing counts as one in which nobody was
-            found, and a frame that the truth lacks is left out.
-        config: who had to be found.
-        common: leaves out frames that ``estimates`` lacks.
+        estimates: the estimated people of every frame. In a frame that is missing here, nobody was
+            found; a frame that is missing in the truth is left out.
+        config: the people who had to be found.
+        common: leaves out frames that are missing in ``estimates``.
     """
     config = JudgeConfig() if config is None else config
     judged = [name for name in truth if name in estimates or not common]
     detection_frames = []
-    wanted_people: list[PersonFrame] = []
+    required_people: list[PersonFrame] = []
     all_people: list[PersonFrame] = []
-    surplus = 0
+    false_positives = 0
     for name in judged:
-        people, guesses = truth[name], estimates.get(name, [])
-        wanted = [_had_to_be_found(person, config) for person in people]
-        detection_frames.append((people, wanted, guesses))
-        match = match_frame(people, wanted, guesses)
-        surplus += len(match.surplus)
+        people, estimated = truth[name], estimates.get(name, [])
+        required = [_had_to_be_found(person, config) for person in people]
+        detection_frames.append((people, required, estimated))
+        match = match_frame(people, required, estimated)
+        false_positives += len(match.false_positives)
         partner = dict(match.pairs)
         for index, person in enumerate(people):
-            guess = guesses[partner[index]] if index in partner else None
-            all_people.append(PersonFrame(person, guess))
-            if wanted[index]:
-                wanted_people.append(all_people[-1])
-    overall = person_figures(wanted_people)
-    everyone = person_figures(all_people)
+            estimate = estimated[partner[index]] if index in partner else None
+            all_people.append(PersonFrame(person, estimate))
+            if required[index]:
+                required_people.append(all_people[-1])
+    overall = person_metrics(required_people)
+    everyone = person_metrics(all_people)
     return {
         "settings": config.model_dump(),
         "frames": {
@@ -147,8 +150,8 @@ def judge(
         "detection": {
             "ap50": average_precision(detection_frames),
             "recall": overall["recall"],
-            "false_positives": surplus,
-            "false_positives_per_frame": surplus / len(judged) if judged else None,
+            "false_positives": false_positives,
+            "false_positives_per_frame": false_positives / len(judged) if judged else None,
         },
         "overall": overall,
         "hidden_and_small_too": {
@@ -156,14 +159,14 @@ def judge(
             for name in ("people", "found", "unaware_judged", "false_aware_count", "false_aware")
         },
         "by_facing": {
-            name: person_figures(_between(wanted_people, _facing_deg, low, high))
-            for name, low, high in FACINGS
+            name: person_metrics(_between(required_people, _facing_deg, low, high))
+            for name, low, high in _FACINGS_DEG
         },
         "by_range_m": {
-            f"{low:g} to {high:g}" if math.isfinite(high) else f"{low:g} and more": person_figures(
-                _between(wanted_people, _range_m, low, high)
+            f"{low:g} to {high:g}" if math.isfinite(high) else f"{low:g} and more": person_metrics(
+                _between(required_people, _range_m, low, high)
             )
-            for low, high in RANGES_M
+            for low, high in _RANGES_M
         },
     }
 
@@ -185,6 +188,12 @@ def _range_m(person: PersonRecord) -> float | None:
     return person.range_m
 
 
-def _between(people: Sequence[PersonFrame], of: Any, low: float, high: float) -> list[PersonFrame]:
-    values = ((each, of(each.truth)) for each in people)
+def _between(
+    people: Sequence[PersonFrame],
+    value_of: Callable[[PersonRecord], float | None],
+    low: float,
+    high: float,
+) -> list[PersonFrame]:
+    """Return the people whose true value lies from ``low`` to below ``high``."""
+    values = ((each, value_of(each.truth)) for each in people)
     return [each for each, value in values if value is not None and low <= value < high]

@@ -1,92 +1,16 @@
-"""The figures of ``awarenav judge`` as a Markdown table, and what is asked of them."""
+"""The metrics of ``awarenav judge`` as Markdown tables, and the requirements for them."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 from ._judge import JudgeLimits
 
-
-@dataclass(frozen=True, slots=True)
-class Requirement:
-    """One line of what is asked; a figure that nobody contributed to does not meet it."""
-
-    name: str
-    value: float | None
-    low: float
-    high: float
-    unit: str
-
-    @property
-    def met(self) -> bool:
-        """Whether the figure lies between its limits."""
-        return self.value is not None and self.low <= self.value <= self.high
-
-    @property
-    def asked(self) -> str:
-        """The limits as text."""
-        low, high = (_number(limit, self.unit) for limit in (self.low, self.high))
-        if self.low == _LOWEST:
-            return f"≤ {high}"
-        return f"≥ {low}" if self.high == _HIGHEST else f"{low} to {high}"
-
-
-_LOWEST, _HIGHEST = float("-inf"), float("inf")
-
-
-def requirements(figures: dict[str, Any], limits: JudgeLimits | None = None) -> list[Requirement]:
-    """What the project asks and the figures; the gaze is the head's where the truth knows both."""
-    limits = JudgeLimits() if limits is None else limits
-    overall = figures["overall"]
-    gaze = "head" if overall["head_count"] else "gaze"
-    middle, margin = limits.within_1sigma, limits.within_1sigma_tolerance
-    return [
-        Requirement("detection AP50", figures["detection"]["ap50"], limits.min_ap50, _HIGHEST, ""),
-        Requirement(
-            f"{gaze} direction error, median",
-            overall[f"{gaze}_median_deg"],
-            _LOWEST,
-            limits.max_gaze_median_deg,
-            "°",
-        ),
-        Requirement(
-            f"{gaze} direction error, 90th percentile",
-            overall[f"{gaze}_p90_deg"],
-            _LOWEST,
-            limits.max_gaze_p90_deg,
-            "°",
-        ),
-        Requirement(
-            "position error / range, median",
-            overall["position_median"],
-            _LOWEST,
-            limits.max_position_median,
-            "%",
-        ),
-        Requirement(
-            "α mean absolute error", overall["awareness_mae"], _LOWEST, limits.max_awareness_mae, ""
-        ),
-        Requirement(
-            "α ≥ 0.5 where the truth is 0",
-            overall["false_aware"],
-            _LOWEST,
-            limits.max_false_aware,
-            "%",
-        ),
-        Requirement(
-            "error of α within 1σ (truth or estimate in (0, 1))",
-            overall["awareness_within_1sigma"],
-            middle - margin,
-            middle + margin,
-            "%",
-        ),
-    ]
-
-
-# Columns of the tables by group: title, key, unit.
-_COLUMNS: Final = (
+# Rows of the table by group: title, key, unit.
+_GROUP_ROWS: Final = (
     ("people", "people", "n"),
     ("found", "recall", "%"),
     ("no gaze", "gaze_none", "%"),
@@ -109,10 +33,90 @@ _COLUMNS: Final = (
 )
 
 
-def markdown_report(figures: dict[str, Any], limits: JudgeLimits | None = None) -> str:
-    """The whole report."""
-    settings, frames, overall = figures["settings"], figures["frames"], figures["overall"]
-    detection, others = figures["detection"], figures["hidden_and_small_too"]
+@dataclass(frozen=True, slots=True)
+class Requirement:
+    """A requirement for a metric; a metric to which nobody contributed does not meet it."""
+
+    name: str
+    value: float | None
+    low: float
+    high: float
+    unit: str
+
+    @property
+    def met(self) -> bool:
+        """True if the metric lies between its limits."""
+        return self.value is not None and self.low <= self.value <= self.high
+
+    @property
+    def limits(self) -> str:
+        """The limits as text."""
+        low, high = (_value_text(limit, self.unit) for limit in (self.low, self.high))
+        if self.low == -math.inf:
+            return f"≤ {high}"
+        return f"≥ {low}" if self.high == math.inf else f"{low} to {high}"
+
+
+def requirements(metrics: dict[str, Any], limits: JudgeLimits | None = None) -> list[Requirement]:
+    """Return the project's requirements with the metrics.
+
+    The gaze is the direction of the head if the truth has both head and eyes.
+    """
+    limits = JudgeLimits() if limits is None else limits
+    overall = metrics["overall"]
+    gaze = "head" if overall["head_count"] else "gaze"
+    middle, margin = limits.within_1sigma, limits.within_1sigma_tolerance
+    return [
+        Requirement("detection AP50", metrics["detection"]["ap50"], limits.min_ap50, math.inf, ""),
+        Requirement(
+            f"{gaze} direction error, median",
+            overall[f"{gaze}_median_deg"],
+            -math.inf,
+            limits.max_gaze_median_deg,
+            "°",
+        ),
+        Requirement(
+            f"{gaze} direction error, 90th percentile",
+            overall[f"{gaze}_p90_deg"],
+            -math.inf,
+            limits.max_gaze_p90_deg,
+            "°",
+        ),
+        Requirement(
+            "position error / range, median",
+            overall["position_median"],
+            -math.inf,
+            limits.max_position_median,
+            "%",
+        ),
+        Requirement(
+            "α mean absolute error",
+            overall["awareness_mae"],
+            -math.inf,
+            limits.max_awareness_mae,
+            "",
+        ),
+        Requirement(
+            "α ≥ 0.5 where the truth is 0",
+            overall["false_aware"],
+            -math.inf,
+            limits.max_false_aware,
+            "%",
+        ),
+        Requirement(
+            "error of α within 1σ (truth or estimate in (0, 1))",
+            overall["awareness_within_1sigma"],
+            middle - margin,
+            middle + margin,
+            "%",
+        ),
+    ]
+
+
+def markdown_report(metrics: dict[str, Any], limits: JudgeLimits | None = None) -> str:
+    """Return the report as Markdown."""
+    settings, frames, overall = metrics["settings"], metrics["frames"], metrics["overall"]
+    detection, others = metrics["detection"], metrics["hidden_and_small_too"]
     lines = [
         f"{frames['judged']} frames, {overall['people']} people to be found (at least "
         f"{settings['min_height_px']:g} px tall, less than {settings['max_occlusion']:.0%} hidden "
@@ -125,19 +129,22 @@ def markdown_report(figures: dict[str, Any], limits: JudgeLimits | None = None) 
         )
     if frames["unknown"]:
         lines.append(f"{frames['unknown']} estimated frames are not in the truth and left out.")
-    lines += ["", *_table(("figure", "value", "asked", ""), _asked_rows(figures, limits))]
+    lines += ["", *_table(("figure", "value", "asked", ""), _requirement_rows(metrics, limits))]
     rows = [
-        ("found", f"{overall['found']} of {overall['people']} ({_number(overall['recall'], '%')})"),
+        (
+            "found",
+            f"{overall['found']} of {overall['people']} ({_value_text(overall['recall'], '%')})",
+        ),
         (
             "people reported where nobody is, or twice",
             f"{detection['false_positives']} "
-            f"({_number(detection['false_positives_per_frame'], '')} a frame)",
+            f"({_value_text(detection['false_positives_per_frame'], '')} a frame)",
         ),
-        ("found people without a gaze", _number(overall["gaze_none"], "%")),
-        ("found people without an α", _number(overall["awareness_none"], "%")),
+        ("found people without a gaze", _value_text(overall["gaze_none"], "%")),
+        ("found people without an α", _value_text(overall["awareness_none"], "%")),
         (
             "α mean absolute error, no α counted as 0",
-            _number(overall["awareness_mae_none_as_0"], ""),
+            _value_text(overall["awareness_mae_none_as_0"], ""),
         ),
         (
             "α ≥ 0.5 where the truth is 0",
@@ -147,39 +154,44 @@ def markdown_report(figures: dict[str, Any], limits: JudgeLimits | None = None) 
         (
             "the same, hidden and small people too",
             f"{others['false_aware_count']} of {others['unaware_judged']} "
-            f"({_number(others['false_aware'], '%')})",
+            f"({_value_text(others['false_aware'], '%')})",
         ),
         (
             "people with true α ≥ 0.5 recognised",
-            f"{_number(overall['aware_recognised'], '%')} of {overall['aware_people']}",
+            f"{_value_text(overall['aware_recognised'], '%')} of {overall['aware_people']}",
         ),
     ]
-    lines += ["", *_table(("beside that", ""), rows), "", *_groups(figures)]
+    lines += ["", *_table(("beside that", ""), rows), "", *_group_table(metrics)]
     return "\n".join(lines) + "\n"
 
 
-def _asked_rows(figures: dict[str, Any], limits: JudgeLimits | None) -> list[tuple[str, ...]]:
+def _requirement_rows(metrics: dict[str, Any], limits: JudgeLimits | None) -> list[tuple[str, ...]]:
     return [
-        (each.name, _number(each.value, each.unit), each.asked, "yes" if each.met else "**no**")
-        for each in requirements(figures, limits)
+        (
+            each.name,
+            _value_text(each.value, each.unit),
+            each.limits,
+            "yes" if each.met else "**no**",
+        )
+        for each in requirements(metrics, limits)
     ]
 
 
-def _groups(figures: dict[str, Any]) -> list[str]:
-    groups = [("all", figures["overall"]), *figures["by_facing"].items()]
-    groups += [(f"{name} m", group) for name, group in figures["by_range_m"].items()]
+def _group_table(metrics: dict[str, Any]) -> list[str]:
+    """Return the table with a column for each group of people."""
+    groups = [("all", metrics["overall"]), *metrics["by_facing"].items()]
+    groups += [(f"{name} m", group) for name, group in metrics["by_range_m"].items()]
     groups = [(name, group) for name, group in groups if group["people"]]
-    columns = [
-        column for column in _COLUMNS if any(group[column[1]] is not None for _, group in groups)
-    ]
     rows = [
-        (title, *(_number(group[key], unit) for _, group in groups)) for title, key, unit in columns
+        (title, *(_value_text(group[key], unit) for _, group in groups))
+        for title, key, unit in _GROUP_ROWS
+        if any(group[key] is not None for _, group in groups)
     ]
     return _table(("", *(name for name, _ in groups)), rows)
 
 
 def _table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> list[str]:
-    """A Markdown table whose columns line up as plain text too."""
+    """Return a Markdown table whose columns are also aligned as plain text."""
     everything = [header, *rows]
     widths = [max(len(row[column]) for row in everything) for column in range(len(header))]
     widths = [max(width, 3) for width in widths]
@@ -191,7 +203,8 @@ def _table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> list[str
     return [line(header), line(tuple("-" * width for width in widths)), *map(line, rows)]
 
 
-def _number(value: float | None, unit: str) -> str:
+def _value_text(value: float | None, unit: str) -> str:
+    """Return a metric as text; the unit is "%", "°", "n" (a count) or empty."""
     if value is None:
         return "–"
     if unit == "%":

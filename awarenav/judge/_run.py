@@ -1,4 +1,4 @@
-"""``awarenav judge`` from its options to its last line."""
+"""The work of ``awarenav judge``."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class JudgeOptions:
 
 
 def judge_command(options: JudgeOptions) -> int:
-    """Run the command and return its exit status.
+    """Run the command; return the exit status.
 
     Raises:
         AwarenavError: for files or options that cannot be used.
@@ -40,10 +40,10 @@ def judge_command(options: JudgeOptions) -> int:
         max_occlusion=options.max_occlusion,
         max_truncation=options.max_truncation,
     )
-    figures = judge_files(options.truth, options.estimates, config, common=options.common)
-    report = markdown_report(figures)
-    print(json_text(figures) if options.as_json else report, end="")
+    metrics = judge_files(options.truth, options.estimates, config, common=options.common)
+    report = markdown_report(metrics)
+    print(json_text(metrics) if options.as_json else report, end="")
     if out is not None:
-        write_text(out, report if out.suffix == ".md" else json_text(figures))
-    met = all(each.met for each in requirements(figures))
+        write_text(out, report if out.suffix == ".md" else json_text(metrics))
+    met = all(each.met for each in requirements(metrics))
     return 1 if options.gate and not met else 0

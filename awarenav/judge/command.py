@@ -4,52 +4,59 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..cli import FilePath, argument, command, option, options
+from ..cli import NUMBER, FilePath, argument, command, option, options
 
 
 @command(
-    "judge", epilog="Exit status: 0 success; 1 with --gate, a requirement missed; 2 bad input."
+    "judge",
+    examples=["awarenav judge render/truth.jsonl estimates.jsonl --out report.md"],
+    exit_status={
+        0: "Success.",
+        1: "With --gate: a requirement is not met.",
+        2: "Bad input.",
+    },
 )
-@argument("truth", type=FilePath(), metavar="TRUTH.jsonl", help="The truth, a line for each frame.")
+@argument("truth", type=FilePath(), metavar="TRUTH.jsonl", help="The truth: one line per frame.")
 @argument("estimates", type=FilePath(), metavar="ESTIMATES.jsonl", help="Estimates of its frames.")
-@options.out_file(None, "Also write the table (.md) or every figure (.json).", "FILE.md|json")
-@options.as_json("every figure")
+@options.out_file(None, "Also write the report (.md) or all metrics (.json).", "FILE.md|json")
+@options.as_json("all metrics")
 @option(
     "--min-height-px",
-    type=float,
+    type=NUMBER,
     default=40.0,
     metavar="PX",
-    help="People less tall in the image need not be found.",
+    help="People whose box is less tall need not be found.",
 )
 @option(
     "--max-occlusion",
-    type=float,
+    type=NUMBER,
     default=0.5,
     metavar="SHARE",
-    help="People hidden to this share or more need not be found.",
+    help="People hidden to this share or more, from 0 to 1, need not be found.",
 )
 @option(
     "--max-truncation",
-    type=float,
+    type=NUMBER,
     default=0.5,
     metavar="SHARE",
-    help="People outside the image to this share or more need not be found.",
+    help="People outside the image to this share or more, from 0 to 1, need not be found.",
 )
 @option(
     "--common",
     is_flag=True,
-    help="Leave out frames without an estimate. Otherwise nobody was found in them.",
+    help="Ignore frames without an estimate; by default, everybody in them counts as missed.",
 )
 @option(
     "--gate",
     is_flag=True,
-    help="Exit with 1 when a figure misses what the project requires of its own networks.",
+    help="Exit with status 1 unless the metrics meet the project's requirements for its own "
+    "networks.",
 )
 def judge(**values: Any) -> int:
-    """Compare ESTIMATES with TRUTH, both as `awarenav render` and `awarenav estimate` write them.
+    """Compare ESTIMATES with TRUTH, as `awarenav estimate` and `awarenav render` write them.
 
-    Prints a Markdown table: detection (COCO's average precision at IoU 0.5, 101 recalls), gaze,
-    position, awareness, and whether the stated uncertainties hold; by facing and by range.
+    Prints Markdown tables: detection (COCO's average precision at IoU 0.5), gaze, position and
+    awareness, and whether the stated uncertainties hold; for everybody, by facing and by range.
     """
     from ._run import JudgeOptions, judge_command  # noqa: PLC0415 - help needs no arrays
 

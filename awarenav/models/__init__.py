@@ -4,13 +4,31 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from awarenav.lazy import lazy_names
+from ..lazy import lazy_names
 
 if TYPE_CHECKING:
-    from ._store import ModelStore
+    from ._archive import extract_member
+    from ._catalogue import Catalogue, RealModel
+    from ._download import BrokenDownloadError, download
+    from ._store import LockedModel, ModelStore, default_folder
 
 __all__ = [
+    "BrokenDownloadError",
+    "Catalogue",
+    "LockedModel",
     "ModelStore",
+    "RealModel",
+    "default_folder",
+    "download",
+    "extract_member",
 ]
 
-__getattr__ = lazy_names(__name__, {"._store": ("ModelStore",)})
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "._archive": ("extract_member",),
+        "._catalogue": ("Catalogue", "RealModel"),
+        "._download": ("BrokenDownloadError", "download"),
+        "._store": ("LockedModel", "ModelStore", "default_folder"),
+    },
+)

@@ -19,16 +19,16 @@ _FILE: Final = Path(__file__).parent / "catalogue.yaml"
 class RealModel(StrictConfig):
     """A network that ``awarenav models fetch`` gets from its publisher's address."""
 
-    #: What it is asked for by.
+    #: Name on the command line.
     name: str = Field(pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$")
     role: Role
-    #: Of the ONNX file, or of the ZIP archive that holds it.
+    #: Address of the ONNX file, or of the ZIP archive that holds it.
     url: str = Field(pattern=r"^https?://")
-    #: Path of the ONNX file in the archive, or the end of it; None when the address is the file.
+    #: Path of the ONNX file in the archive, or the end of it; None if the address is the file.
     member: str | None = None
-    #: Of the ONNX file; None when it is not known, and what is fetched first is then held to.
+    #: Of the ONNX file; None if it is not known: then the first download sets it.
     sha256: str | None = Field(None, pattern=r"^[0-9a-f]{64}$")
-    #: Of the ONNX file, roughly.
+    #: Of the ONNX file, approximately.
     size_mb: float = Field(gt=0.0)
     licence: str
     publisher: str
@@ -50,12 +50,12 @@ class RealModel(StrictConfig):
     @model_validator(mode="after")
     def _member_of_an_archive(self) -> RealModel:
         if (self.member is not None) != self.url.endswith(".zip"):
-            raise ValueError(f"{self.name}: 'member' belongs to an address that ends in .zip")
+            raise ValueError(f"{self.name}: 'member' goes with an address that ends in .zip")
         return self
 
 
 class NamedModel(StrictConfig):
-    """A network that the command names and does not fetch."""
+    """A network that the command names but does not fetch."""
 
     name: str
     role: Role
@@ -64,7 +64,7 @@ class NamedModel(StrictConfig):
 
 
 class Catalogue(StrictConfig):
-    """All networks for a real robot, by unique names."""
+    """All networks for a real robot, with unique names."""
 
     error: ClassVar[type[ValueError]] = AwarenavError
 
@@ -85,7 +85,11 @@ class Catalogue(StrictConfig):
         return cls.from_yaml(_FILE)
 
     def __getitem__(self, name: str) -> RealModel:
-        """Return the model called ``name``; AwarenavError says which there are."""
+        """Return the network called ``name``.
+
+        Raises:
+            AwarenavError: for a name that is not in the catalogue, or is not fetched.
+        """
         for model in self.models:
             if model.name == name:
                 return model

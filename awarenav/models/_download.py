@@ -1,4 +1,4 @@
-"""Downloads that go on where they broke off and appear whole or not at all."""
+"""Downloads that continue after a break; the file appears when it is complete."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from tqdm import tqdm
 from ..errors import AwarenavError
 
 _CHUNK_BYTES: Final = 1 << 18
-_SPARE_BYTES: Final = 64 << 20  # left free on the disk
-_AGENT: Final = "awarenav"
+_MIN_FREE_BYTES: Final = 64 << 20  # left free on the disk
+_USER_AGENT: Final = "awarenav"
 _CONTENT_RANGE: Final = re.compile(r"bytes (\d+)-\d+/(\d+)")
 _NOT_SATISFIABLE: Final = 416
 _PARTIAL: Final = 206
@@ -34,11 +34,11 @@ _CONNECTION_ERRORS: Final = (
 
 
 class BrokenDownloadError(AwarenavError):
-    """A download that stopped early; what has come is kept and the next attempt goes on from it."""
+    """A download that stopped early; the next attempt continues after the bytes so far."""
 
 
 class _NoDowngrade(urllib.request.HTTPRedirectHandler):
-    """Follows redirects, and none that leads from https to something else."""
+    """Follows redirects, except from https to another scheme."""
 
     def redirect_request(
         self,
@@ -51,7 +51,7 @@ class _NoDowngrade(urllib.request.HTTPRedirectHandler):
     ) -> urllib.request.Request | None:
         if req.full_url.startswith("https:") and not newurl.startswith("https:"):
             raise AwarenavError(
-                f"{req.full_url} redirects to {newurl}, which is not encrypted: refused"
+                f"{req.full_url} redirects to {newurl}, which is not encrypted; refused"
             )
         return super().redirect_request(req, fp, code, msg, headers, newurl)
 
@@ -65,23 +65,24 @@ def download(
     timeout_s: float = 30.0,
     progress: bool = True,
 ) -> None:
-    """Download ``url`` to ``target``, which appears when the last byte has come.
+    """Download ``url`` to ``target``, which appears when it is complete.
 
-    Until then the bytes are in ``target`` with the suffix ``.part``, beside a note of what they are
-    part of. An attempt, in this run or a later one, goes on from there when the server still has
-    the same file (HTTP Range with If-Range, RFC 9110) and starts anew otherwise.
+    Until then the bytes are in ``target`` with the suffix ``.part``; the file ``.part.json`` says
+    which file they belong to. A further attempt, in this call or a later one, continues from there
+    if the server still has the same file (HTTP Range with If-Range, RFC 9110), and starts from the
+    beginning otherwise.
 
     Args:
         url: http or https.
         target: in a folder that exists.
-        attempts: how often in this run, while the connection breaks.
-        pause_s: before the second attempt; it doubles each time.
-        timeout_s: of a silent connection.
-        progress: a bar on stderr.
+        attempts: most attempts in this call, while the connection breaks.
+        pause_s: pause before the second attempt, seconds; it doubles each time.
+        timeout_s: time without data after which a connection counts as broken, seconds.
+        progress: shows a progress bar on standard error.
 
     Raises:
-        BrokenDownloadError: every attempt broke off; run it again to go on.
-        AwarenavError: no such file on the server, a full disk, or no connection.
+        BrokenDownloadError: every attempt was broken off; another call continues.
+        AwarenavError: the server does not have the file, or the disk is full.
     """
     for attempt in range(attempts):
         if attempt:
@@ -93,27 +94,28 @@ def download(
                 raise
         else:
             _part(target).replace(target)
-            _note(target).unlink(missing_ok=True)
+            _state(target).unlink(missing_ok=True)
             return
 
 
 def _attempt(url: str, target: Path, timeout_s: float, progress: bool) -> None:
+    """Download what is missing of the file into its ``.part``."""
     request = urllib.request.Request(
-        url, headers={"User-Agent": _AGENT, "Accept-Encoding": "identity"}
+        url, headers={"User-Agent": _USER_AGENT, "Accept-Encoding": "identity"}
     )
     part = _part(target)
-    have, validator = _resumable(url, target)
-    if have:
-        request.add_header("Range", f"bytes={have}-")
+    done, validator = _resume_point(url, target)
+    if done:
+        request.add_header("Range", f"bytes={done}-")
         request.add_header("If-Range", validator)
     opener = urllib.request.build_opener(_NoDowngrade)
     try:
         with opener.open(request, timeout=timeout_s) as response:
-            start, total = _placed(response, have)
-            if start != have:
+            start, total = _content_range(response, done)
+            if start != done:
                 _discard(target)
-            _check_room(target, total, start)
-            _write_note(url, target, response.headers)
+            _check_free_space(target, total, start)
+            _write_state(url, target, response.headers)
             with part.open("ab" if start else "wb") as file:
                 _copy(response, file, target.name, start, total, progress)
     except urllib.error.HTTPError as cause:
@@ -128,7 +130,7 @@ def _attempt(url: str, target: Path, timeout_s: float, progress: bool) -> None:
         reason = getattr(cause, "reason", None) or cause or type(cause).__name__
         size = part.stat().st_size if part.exists() else 0
         what = f"broke off after {size} bytes ({reason})" if size else f"no connection ({reason})"
-        raise BrokenDownloadError(f"{url}: {what}; run it again to go on") from cause
+        raise BrokenDownloadError(f"{url}: {what}; run it again to continue") from cause
     except OSError as cause:
         raise AwarenavError(f"cannot write {part}: {cause.strerror or cause}") from cause
 
@@ -141,6 +143,7 @@ def _copy(
     total: int | None,
     progress: bool,
 ) -> None:
+    """Copy the answer to the file; raise if it ends too early."""
     done = start
     with tqdm(
         total=total,
@@ -159,44 +162,43 @@ def _copy(
         raise http.client.IncompleteRead(b"", total - done)
 
 
-def _placed(response: http.client.HTTPResponse, have: int) -> tuple[int, int | None]:
-    """Where the answer's first byte belongs, and the size of the whole file if it is told."""
+def _content_range(response: http.client.HTTPResponse, asked: int) -> tuple[int, int | None]:
+    """Return the offset of the answer's first byte in the file, and the file's size if known."""
     length = response.headers.get("Content-Length")
     if response.status != _PARTIAL:
         return 0, None if length is None else int(length)
     found = _CONTENT_RANGE.fullmatch(response.headers.get("Content-Range", "").strip())
-    if found is None or int(found[1]) != have:
+    if found is None or int(found[1]) != asked:
         raise http.client.HTTPException(
-            f"asked from byte {have}, got {response.headers.get('Content-Range')!r}"
+            f"asked from byte {asked}, got {response.headers.get('Content-Range')!r}"
         )
-    return have, int(found[2])
+    return asked, int(found[2])
 
 
-def _resumable(url: str, target: Path) -> tuple[int, str]:
-    """How many bytes of what ``url`` had are here, and what identifies that state of it."""
-    part, note = _part(target), _note(target)
+def _resume_point(url: str, target: Path) -> tuple[int, str]:
+    """Return the number of bytes that are here already, and the validator of their version."""
     try:
-        known = json.loads(note.read_text(encoding="utf-8"))
-        if known["url"] == url and known["validator"]:
-            return part.stat().st_size, str(known["validator"])
+        state = json.loads(_state(target).read_text(encoding="utf-8"))
+        if state["url"] == url and state["validator"]:
+            return _part(target).stat().st_size, str(state["validator"])
     except (OSError, ValueError, KeyError, TypeError):
-        pass  # no note, or none that can be used: start anew
+        pass  # no state, or a damaged one: start from the beginning
     return 0, ""
 
 
-def _write_note(url: str, target: Path, headers: http.client.HTTPMessage) -> None:
+def _write_state(url: str, target: Path, headers: http.client.HTTPMessage) -> None:
     tag = headers.get("ETag", "")
-    # If-Range takes strong tags only; a date stands in where there is none.
+    # If-Range takes strong tags only; without one, the date identifies the version.
     validator = headers.get("Last-Modified", "") if tag.startswith("W/") or not tag else tag
-    _note(target).write_text(json.dumps({"url": url, "validator": validator}), encoding="utf-8")
+    _state(target).write_text(json.dumps({"url": url, "validator": validator}), encoding="utf-8")
 
 
-def _check_room(target: Path, total: int | None, start: int) -> None:
+def _check_free_space(target: Path, total: int | None, start: int) -> None:
     free = shutil.disk_usage(target.parent).free
-    if total is not None and total - start > free - _SPARE_BYTES:
+    if total is not None and total - start > free - _MIN_FREE_BYTES:
         raise AwarenavError(
             f"{target.parent} has {free / 1e6:.0f} MB free; {target.name} needs "
-            f"{(total - start + _SPARE_BYTES) / 1e6:.0f} MB"
+            f"{(total - start + _MIN_FREE_BYTES) / 1e6:.0f} MB"
         )
 
 
@@ -204,10 +206,10 @@ def _part(target: Path) -> Path:
     return target.with_name(target.name + ".part")
 
 
-def _note(target: Path) -> Path:
+def _state(target: Path) -> Path:
     return target.with_name(target.name + ".part.json")
 
 
 def _discard(target: Path) -> None:
     _part(target).unlink(missing_ok=True)
-    _note(target).unlink(missing_ok=True)
+    _state(target).unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""``awarenav models`` from its options to its last line."""
+"""The work of ``awarenav models``."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _WIDTH: Final = 100
 
 
 def list_command(folder: Path | None, *, as_json: bool) -> int:
-    """Print the shipped networks and those for a real robot, and return the exit status.
+    """Print the shipped networks and those for a real robot; return the exit status.
 
     Raises:
         AwarenavError: for a catalogue or a lock file that cannot be read.
@@ -30,7 +30,7 @@ def list_command(folder: Path | None, *, as_json: bool) -> int:
     if as_json:
         print(json_text(_listing(store)), end="")
         return 0
-    print("In the box, made for the simulator:\n")
+    print("Shipped, made for the simulator:\n")
     shipped = shipped_models()
     for model in shipped:
         print(f"  {model.name:16s}{model.size_bytes / 1e6:6.1f} MB  {model.licence}")
@@ -43,10 +43,10 @@ def list_command(folder: Path | None, *, as_json: bool) -> int:
         print(f"  {real.name:16s}{real.size_mb:6.1f} MB  {real.licence}  {real.role}")
         print(_indented(f"{real.publisher}: {real.purpose}."))
         if real.note is not None:
-            print(_indented(f"Mind: {real.note}."))
+            print(_indented(f"Note: {real.note}."))
         print(f"    {real.url}")
         print(f"    sha256 {_hash_text(store, real)}  {_real_state(store, real)}\n")
-    print("Named only, not fetched:\n")
+    print("Named here, but not fetched:\n")
     for other in store.catalogue.elsewhere:
         print(f"  {other.name}  {other.licence}  {other.role}")
         print(_indented(f"{other.why}.") + "\n")
@@ -54,7 +54,7 @@ def list_command(folder: Path | None, *, as_json: bool) -> int:
 
 
 def _listing(store: ModelStore) -> dict[str, Any]:
-    """Everything that the list shows, as plain data."""
+    """Return the contents of the list as plain data."""
     return {
         "folder": str(store.folder),
         "shipped": [
@@ -69,7 +69,7 @@ def _listing(store: ModelStore) -> dict[str, Any]:
 
 
 def verify_command(folder: Path | None, *, as_json: bool) -> int:
-    """Check every sha256 and return the exit status.
+    """Check every sha256; return the exit status.
 
     Raises:
         AwarenavError: for a catalogue or a lock file that cannot be read.
@@ -89,15 +89,15 @@ def verify_command(folder: Path | None, *, as_json: bool) -> int:
     for name, state in states:
         print(f"{name:16s}{state}")
     good = len(states) - len(wrong)
-    print(f"{good} of {len(states)} networks are what they should be" if states else "none here")
+    print(f"{good} of {len(states)} networks are unaltered" if states else "no networks")
     return 1 if wrong else 0
 
 
 def fetch_command(names: Sequence[str], sha256: str | None, folder: Path | None) -> int:
-    """Download networks and return the exit status.
+    """Download networks; return the exit status.
 
     Raises:
-        AwarenavError: for an unknown name, and a download that fails or is not what it should be.
+        AwarenavError: for an unknown name, and for a download that fails or cannot be verified.
     """
     if sha256 is not None and len(names) > 1:
         raise AwarenavError(f"--sha256 is for a single name, got {len(names)}")
@@ -111,12 +111,12 @@ def fetch_command(names: Sequence[str], sha256: str | None, folder: Path | None)
             continue
         print(f"{model.name}: {path} ({model.licence}, {model.publisher})")
         if model.note is not None:
-            print(_indented(f"Mind: {model.note}."))
+            print(_indented(f"Note: {model.note}."))
         if trusted is None:
             print(
                 _indented(
-                    f"Its sha256 {store.expected_sha256(model.name)} was not known beforehand: "
-                    "this first download was trusted, later ones are held to it."
+                    f"Its sha256 {store.expected_sha256(model.name)} was not known before: this "
+                    "first download was trusted, and later ones must match it."
                 ),
                 file=sys.stderr,
             )
@@ -145,7 +145,7 @@ def _hash_text(store: ModelStore, model: RealModel) -> str:
     if model.sha256 is not None:
         return model.sha256
     kept = store.expected_sha256(model.name)
-    return "not known beforehand" if kept is None else f"{kept} (first fetched)"
+    return "not known before" if kept is None else f"{kept} (of the first download)"
 
 
 def _indented(text: str) -> str:

@@ -1,78 +1,28 @@
-"""One file out of a ZIP archive that came from elsewhere.
-
-The folder of fetched networks: what is in it, and that it is what it was.
-"""
+"""The folder of fetched networks, each held to a known sha256."""
 
 from __future__ import annotations
 
-import contextlib
-import fcntl
 import hashlib
 import json
 import os
-import shutil
-import zipfile
-import zlib
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
-from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, Final
+from pathlib import Path
+from typing import Final
+
+import filelock
 
 from perception import PerceptionError
+from perception.networks import OnnxModel, OnnxSettings
 
 from ..errors import AwarenavError
+from ..files import write_text
+from ._archive import extract_member
 from ._catalogue import Catalogue, RealModel
 from ._download import download
 
-if TYPE_CHECKING:
-    from perception.networks import OnnxModel, OnnxSettings
-
-_MAX_BYTES: Final = 2 << 30
-
-
-def extract_member(archive: Path, member: str, target: Path) -> None:
-    """Write one file of a ZIP archive to ``target``, whatever path it has in the archive.
-
-    Nothing is unpacked by its own name, so no entry can land outside ``target``. The archive's own
-    checksum (CRC-32) is checked.
-
-    Args:
-        archive: the ZIP file.
-        member: full path in the archive, or its last parts: ``end2end.onnx`` finds the only entry
-            of that name in any folder.
-        target: the file to write; the caller moves it to its place once it is verified.
-
-    Raises:
-        AwarenavError: for a file that is no ZIP archive or is cut off, and when no entry fits,
-            several do, or the entry is damaged or larger than 2 GiB.
-    """
-    wanted = PurePosixPath(member).parts
-    try:
-        with zipfile.ZipFile(archive) as opened:
-            fitting = [
-                entry
-                for entry in opened.infolist()
-                if not entry.is_dir()
-                and PurePosixPath(entry.filename).parts[-len(wanted) :] == wanted
-            ]
-            if len(fitting) != 1:
-                held = ", ".join(opened.namelist()[:12]) or "nothing"
-                count = "no entry" if not fitting else f"{len(fitting)} entries"
-                raise AwarenavError(f"{archive.name} has {count} called {member}; it holds {held}")
-            (entry,) = fitting
-            if entry.file_size > _MAX_BYTES:
-                raise AwarenavError(
-                    f"{entry.filename} in {archive.name} would be {entry.file_size / 1e9:.1f} GB, "
-                    f"at most {_MAX_BYTES / 1e9:.1f} GB are unpacked"
-                )
-            with opened.open(entry) as source, target.open("wb") as file:
-                shutil.copyfileobj(source, file, 1 << 20)
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as cause:
-        raise AwarenavError(f"{archive.name} is no whole ZIP archive: {cause}") from cause
-    except OSError as cause:
-        raise AwarenavError(f"cannot unpack {archive.name}: {cause.strerror or cause}") from cause
-
-
+#: The environment variable with the folder of fetched networks.
 ENVIRONMENT: Final = "AWARENAV_MODELS"
 
 _LOCK_FILE: Final = "models.lock.json"
@@ -81,13 +31,13 @@ _CHUNK_BYTES: Final = 1 << 20
 
 @dataclass(frozen=True, slots=True)
 class LockedModel:
-    """What was fetched, as the folder's lock file keeps it.
+    """A fetched network, as the folder's lock file keeps it.
 
     Attributes:
         sha256: of the ONNX file.
         size_bytes: of the ONNX file.
         url: where it came from.
-        pinned: whether its sha256 was known beforehand; otherwise the first download was trusted.
+        pinned: whether its sha256 was known before the first download, which was trusted otherwise.
     """
 
     sha256: str
@@ -97,12 +47,12 @@ class LockedModel:
 
 
 class ModelStore:
-    """Fetched networks in a folder, each held to the sha256 that the catalogue or the lock says.
+    """Fetched networks in a folder, each held to the sha256 of the catalogue or the lock file.
 
     Args:
         folder: default ``$AWARENAV_MODELS``, or ``awarenav/models`` in the user's cache folder
-            (``$XDG_CACHE_HOME``, or ``~/.cache``). It is made when something is fetched.
-        catalogue: of what can be fetched; default the package's own.
+            (``$XDG_CACHE_HOME``, or ``~/.cache``). The first fetch makes it.
+        catalogue: of the networks that can be fetched; default the package's own.
     """
 
     def __init__(self, folder: Path | None = None, catalogue: Catalogue | None = None) -> None:
@@ -110,35 +60,36 @@ class ModelStore:
         self.catalogue = Catalogue.shipped() if catalogue is None else catalogue
 
     def path(self, name: str) -> Path:
-        """Return the path of a fetched network after checking that it is unaltered.
+        """Return the path of a fetched network after checking its sha256.
 
         Raises:
-            AwarenavError: for an unknown name, one that has not been fetched, or an altered file.
+            AwarenavError: for an unknown name, a network that is not fetched, or an altered file.
         """
         model = self.catalogue[name]
         path = self.folder / model.file
         if not path.is_file():
             raise AwarenavError(f"{name} is not in {self.folder}: awarenav models fetch {name}")
-        self._check(model, path)
+        self._check_sha256(model, path)
         return path
 
     def load(self, name: str, settings: OnnxSettings | None = None) -> OnnxModel:
-        """Load a fetched network, its sha256 checked on the very bytes that are loaded.
+        """Load a fetched network; the sha256 is checked on the bytes that are loaded.
 
         Raises:
             AwarenavError: as :meth:`path`.
-            PerceptionError: when onnxruntime cannot run it as the settings ask.
+            PerceptionError: if onnxruntime cannot run the network with these settings.
         """
-        from perception.networks import OnnxModel  # noqa: PLC0415
-
         return OnnxModel(self.path(name), settings=settings, sha256=self.expected_sha256(name))
 
     def is_fetched(self, name: str) -> bool:
-        """Whether the file is there; it may have been altered since."""
+        """Return whether the file exists; its contents are not checked."""
         return (self.folder / self.catalogue[name].file).is_file()
 
     def expected_sha256(self, name: str) -> str | None:
-        """The sha256 that the file is held to; None before the first fetch of an unpinned one."""
+        """Return the sha256 that the file must have.
+
+        None before the first fetch of a network whose sha256 the catalogue does not have.
+        """
         locked = self.locked().get(name)
         return self.catalogue[name].sha256 or (None if locked is None else locked.sha256)
 
@@ -150,27 +101,27 @@ class ModelStore:
         progress: bool = True,
         pause_s: float = 1.0,
     ) -> tuple[Path, bool]:
-        """Fetch a network unless it is there and unaltered.
+        """Fetch a network, unless it is there and unaltered.
 
-        The file appears when it is whole and verified. An altered file is replaced.
+        The file appears when it is complete and verified. An altered file is replaced.
 
         Args:
             name: of the catalogue.
             sha256: that the ONNX file must have, from a source that the caller trusts.
-            progress: a bar on stderr.
-            pause_s: before a second attempt at a broken download.
+            progress: shows a progress bar on standard error.
+            pause_s: pause before the second attempt at a broken download, seconds.
 
         Returns:
             The path, and whether anything was downloaded.
 
         Raises:
-            AwarenavError: for an unknown name, a download that fails, a file of another sha256 than
-                the given, the catalogue's or the lock's (what is there then stays), or one that an
-                unpinned address gave and that is no network.
+            AwarenavError: for an unknown name; a download that fails; a file whose sha256 is not
+                the given one, the catalogue's or the lock file's (an existing file then stays); and
+                a first download that is not a network.
         """
         model = self.catalogue[name]
         self._make_folder()
-        with self._alone(model):
+        with self._fetch_lock(model):
             known = self.expected_sha256(name)
             if sha256 is not None and known is not None and sha256 != known:
                 source = "the catalogue" if model.sha256 else "the first fetch"
@@ -181,12 +132,12 @@ class ModelStore:
                 return path, False
             fresh = path.with_name(path.name + ".new")
             try:
-                self._get(model, fresh, progress, pause_s)
+                self._download(model, fresh, progress, pause_s)
                 found = _sha256(fresh)
                 if wanted is not None and found != wanted:
                     raise AwarenavError(
-                        f"{name}: what {model.url} gave has sha256 {found}, expected {wanted}; "
-                        "it was thrown away"
+                        f"{name}: the file of {model.url} has sha256 {found}, expected {wanted}; "
+                        "it is not kept"
                     )
                 if wanted is None:
                     _require_network(fresh, model)
@@ -194,15 +145,17 @@ class ModelStore:
                 fresh.replace(path)
             finally:
                 fresh.unlink(missing_ok=True)
-            entry = LockedModel(found, size_bytes, model.url, pinned=wanted is not None)
-            self._lock(name, entry)
+            self._add_to_lock_file(
+                name, LockedModel(found, size_bytes, model.url, pinned=wanted is not None)
+            )
         return path, True
 
     def locked(self) -> dict[str, LockedModel]:
-        """Return what the folder's lock file says was fetched.
+        """Return the contents of the folder's lock file: the fetched networks by name.
 
         Raises:
-            AwarenavError: for a lock file that is none; what was fetched can then not be trusted.
+            AwarenavError: for a lock file that cannot be read; the networks cannot be verified
+                without it.
         """
         path = self.folder / _LOCK_FILE
         try:
@@ -212,15 +165,15 @@ class ModelStore:
             return {}
         except (OSError, ValueError, KeyError, TypeError, AttributeError) as cause:
             raise AwarenavError(
-                f"{path} cannot be read ({cause}): it says what was fetched; remove it and the "
-                "networks beside it to start anew"
+                f"{path} cannot be read ({cause}): it has the sha256 of each fetched network; "
+                "remove it and the networks beside it, and fetch them again"
             ) from cause
 
-    def _check(self, model: RealModel, path: Path) -> None:
+    def _check_sha256(self, model: RealModel, path: Path) -> None:
         expected = self.expected_sha256(model.name)
         if expected is None:
             raise AwarenavError(
-                f"{path} was not put there by awarenav models fetch, and no sha256 of it is known; "
+                f"{path} was not put there by awarenav models fetch, and its sha256 is not known; "
                 "move it away and fetch it"
             )
         found = _sha256(path)
@@ -230,8 +183,8 @@ class ModelStore:
                 f"awarenav models fetch {model.name} replaces it"
             )
 
-    def _get(self, model: RealModel, fresh: Path, progress: bool, pause_s: float) -> None:
-        """Download to ``fresh``, through the archive where there is one."""
+    def _download(self, model: RealModel, fresh: Path, progress: bool, pause_s: float) -> None:
+        """Download the ONNX file to ``fresh``, from its archive if it comes in one."""
         if model.member is None:
             download(model.url, fresh, pause_s=pause_s, progress=progress)
             return
@@ -248,32 +201,29 @@ class ModelStore:
         except OSError as cause:
             raise AwarenavError(f"cannot make {self.folder}: {cause.strerror or cause}") from cause
 
-    @contextlib.contextmanager
-    def _alone(self, model: RealModel) -> Iterator[None]:
-        """Hold the folder against a second fetch of the same network."""
+    @contextmanager
+    def _fetch_lock(self, model: RealModel) -> Iterator[None]:
+        """Refuse a second fetch of the same network into the folder at the same time."""
+        lock = filelock.FileLock(self.folder / f".{model.name}.lock")
         try:
-            gate = (self.folder / f".{model.name}.lock").open("w")
+            lock.acquire(timeout=0)
+        except filelock.Timeout:
+            raise AwarenavError(f"{model.name} is being fetched to {self.folder} already") from None
         except OSError as cause:
             raise AwarenavError(
                 f"cannot write to {self.folder}: {cause.strerror or cause}"
             ) from cause
-        with gate:
-            try:
-                fcntl.flock(gate, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                raise AwarenavError(
-                    f"{model.name} is being fetched to {self.folder} already"
-                ) from None
+        try:
             yield
+        finally:
+            lock.release()
 
-    def _lock(self, name: str, entry: LockedModel) -> None:
-        with (self.folder / ".lock").open("w") as gate:
-            fcntl.flock(gate, fcntl.LOCK_EX)  # two fetches of two networks may end at once
+    def _add_to_lock_file(self, name: str, entry: LockedModel) -> None:
+        # Fetches of two networks may end at the same time.
+        with filelock.FileLock(self.folder / ".lock"):
             entries = self.locked() | {name: entry}
             text = json.dumps({"models": {key: asdict(value) for key, value in entries.items()}})
-            partial = self.folder / f"{_LOCK_FILE}.part"
-            partial.write_text(text + "\n", encoding="utf-8")
-            partial.replace(self.folder / _LOCK_FILE)
+            write_text(self.folder / _LOCK_FILE, text + "\n")
 
 
 def default_folder() -> Path:
@@ -297,12 +247,10 @@ def _sha256(path: Path) -> str:
 
 
 def _require_network(path: Path, model: RealModel) -> None:
-    # A proxy's login page must not become the file that later downloads are held to.
-    from perception.networks import OnnxModel  # noqa: PLC0415
-
+    """Refuse a file that is not a network, such as the login page of a proxy."""
     try:
         OnnxModel(path)
     except PerceptionError as cause:
         raise AwarenavError(
-            f"{model.name}: what {model.url} gave is no network: {cause}"
+            f"{model.name}: the file of {model.url} is not a network: {cause}"
         ) from cause

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import click
 
 from ..cli import argument, command, group, option, options
 
 _SHA256: Final = re.compile(r"[0-9a-fA-F]{64}")
-_FOLDER: Final = (
-    "Folder of downloaded networks (default: $AWARENAV_MODELS, or awarenav/models in the user's "
-    "cache)."
-)
+
+
+def _models_folder() -> Callable[..., Any]:
+    return options.out_folder(
+        None,
+        "Folder of the downloaded networks.",
+        show_default="$AWARENAV_MODELS, or awarenav/models in the user's cache",
+    )
 
 
 def _hexadecimal(
@@ -29,19 +34,24 @@ def _hexadecimal(
 def models() -> None:
     """List, verify and download networks.
 
-    The shipped networks are made for the simulator. Others, for a real robot, are downloaded from
+    The shipped networks are made for the simulator. Networks for a real robot are downloaded from
     their publishers.
     """
 
 
-@command("list", short_help="List the shipped networks, and those that can be downloaded.")
-@options.out_file(None, _FOLDER, metavar="DIR")
+@command(
+    "list",
+    short_help="List the shipped networks, and those for a real robot.",
+    examples=["awarenav models list --json"],
+    exit_status={0: "Success.", 2: "Bad input."},
+)
+@_models_folder()
 @options.as_json("the list")
 def list_models(out: Path | None, *, as_json: bool) -> int:
-    """List the shipped networks and the networks for a real robot.
+    """List the shipped networks, and the networks for a real robot.
 
     Shows size, sha256 and whether the file is unaltered; for a real robot also licence, address and
-    whether it is downloaded.
+    whether the network is downloaded.
     """
     from ._run import list_command  # noqa: PLC0415 - help needs no networks
 
@@ -51,9 +61,10 @@ def list_models(out: Path | None, *, as_json: bool) -> int:
 @command(
     "verify",
     short_help="Check the sha256 of every network.",
-    epilog="Exit status: 0 all are unaltered; 1 a file is missing or altered.",
+    examples=["awarenav models verify"],
+    exit_status={0: "All are unaltered.", 1: "A file is missing or altered.", 2: "Bad input."},
 )
-@options.out_file(None, _FOLDER, metavar="DIR")
+@_models_folder()
 @options.as_json()
 def verify(out: Path | None, *, as_json: bool) -> int:
     """Check the sha256 of the shipped and of the downloaded networks."""
@@ -62,21 +73,26 @@ def verify(out: Path | None, *, as_json: bool) -> int:
     return verify_command(out, as_json=as_json)
 
 
-@command("fetch", short_help="Download networks for a real robot.")
-@argument("names", nargs=-1, required=True, metavar="NAME...", help="As yolox-tiny or rtmpose-m.")
+@command(
+    "fetch",
+    short_help="Download networks for a real robot.",
+    examples=["awarenav models fetch yolox-tiny rtmpose-m"],
+    exit_status={0: "Success.", 2: "Bad input, or a download failed; run it again to continue."},
+)
+@argument("names", nargs=-1, required=True, metavar="NAME...", help="Names of `models list`.")
 @option(
     "--sha256",
     callback=_hexadecimal,
     metavar="HEX",
-    help="The ONNX file's sha256, from a source you trust; for a single NAME.",
+    help="The sha256 that the ONNX file must have, for a single NAME.",
 )
-@options.out_file(None, _FOLDER, metavar="DIR")
+@_models_folder()
 def fetch(names: tuple[str, ...], sha256: str | None, out: Path | None) -> int:
     """Download networks by the names that `awarenav models list` shows.
 
-    An interrupted download continues when the command is run again; a file appears when it is
-    complete and verified. Where no sha256 is known beforehand, the first download is trusted, its
-    sha256 is kept in models.lock.json, and later downloads must match it.
+    A file appears when it is complete and its sha256 is verified. If the catalogue has no sha256 of
+    a network, the first download is trusted: its sha256 is kept in models.lock.json, and later
+    downloads must match it.
     """
     from ._run import fetch_command  # noqa: PLC0415 - help needs no networks
 

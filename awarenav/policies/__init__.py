@@ -1,10 +1,10 @@
-"""Radius, assumed human speed and speed limit of a policy: ``awarenav policy``."""
+"""Radius, assumed human speed and speed limit of policies: ``awarenav policy``."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from awarenav.lazy import lazy_names
+from ..lazy import lazy_names
 
 if TYPE_CHECKING:
     from ._show import read_policy

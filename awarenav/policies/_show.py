@@ -1,4 +1,4 @@
-"""``awarenav policy show`` from its options to its last line."""
+"""The work of ``awarenav policy show``: a table and a drawing of policies."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ..files import json_text
 _FORMATS: Final = (".png", ".svg", ".pdf")
 _AWARENESS: Final = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 _DISTANCES_M: Final = (1.0, 2.0, 3.0, 5.0)
-# The outline plays no part: distances are counted from it.
+# Any outline will do, since distances are measured from it.
 _FOOTPRINT_M: Final = ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))
 
 
@@ -36,7 +36,7 @@ class ShowOptions:
 
 
 def show_command(options: ShowOptions) -> int:
-    """Run the command and return its exit status.
+    """Run the command; return the exit status.
 
     Raises:
         AwarenavError: for options that cannot be used; nothing is written then.
@@ -55,13 +55,13 @@ def show_command(options: ShowOptions) -> int:
             raise AwarenavError(f"--out must be a file, {out} is a folder")
         if out.resolve() in {Path(name).resolve() for name in options.policies}:
             raise AwarenavError(f"--out {out} would replace a policy")
-        # Tables need no matplotlib; a drawing says at once that it is missing.
+        # Only the drawing needs matplotlib; without it, the command fails before any work.
         from ..figures import save_figure  # noqa: PLC0415
         from ._drawing import policy_figure  # noqa: PLC0415
 
         save_figure(policy_figure(policies, robot, farthest_m), out)
     if options.as_json:
-        print(json_text({name: _figures(policy, robot) for name, policy in policies}), end="")
+        print(json_text({name: _table(policy, robot) for name, policy in policies}), end="")
         return 0
     for name, policy in policies:
         print("\n".join(table_lines(name, policy, robot)))
@@ -71,18 +71,18 @@ def show_command(options: ShowOptions) -> int:
 
 
 def read_policy(name: str) -> AwarenessPolicy:
-    """The policy of a YAML file, or of a preset when it ends in neither .yaml nor .yml.
+    """Return the policy of a YAML file, or the preset if the name ends in neither .yaml nor .yml.
 
     Raises:
-        NavError: naming the file or the presets.
+        NavError: for a file that cannot be used, or a name that is not a preset.
     """
     if Path(name).suffix.lower() in (".yaml", ".yml"):
         return AwarenessPolicy.from_yaml(name)
     return AwarenessPolicy.preset(name)
 
 
-def _figures(policy: AwarenessPolicy, robot: RobotProfile) -> dict[str, Any]:
-    """Everything that the table shows, as plain data."""
+def _table(policy: AwarenessPolicy, robot: RobotProfile) -> dict[str, Any]:
+    """Return the contents of the table as plain data."""
     awareness = np.array(_AWARENESS)
     limits = settled_speed_limit_mps(policy, robot, np.array(_DISTANCES_M), awareness[:, None])
     return {
@@ -95,7 +95,7 @@ def _figures(policy: AwarenessPolicy, robot: RobotProfile) -> dict[str, Any]:
 
 
 def table_lines(name: str, policy: AwarenessPolicy, robot: RobotProfile) -> list[str]:
-    """Radius, human speed and speed limits at some awarenesses, as lines of text."""
+    """Return the table of radius, human speed and speed limits as lines of text."""
     awareness = np.array(_AWARENESS)
     radius = settled_radius_m(policy, awareness)
     human = settled_human_speed_mps(policy, awareness)
@@ -110,6 +110,8 @@ def table_lines(name: str, policy: AwarenessPolicy, robot: RobotProfile) -> list
 
 
 def _robot(options: ShowOptions) -> RobotProfile:
+    """Return a robot with the speeds, braking and reaction time of the options."""
+
     def number(option: str, value: float, least: float) -> float:
         return finite_number(
             option,

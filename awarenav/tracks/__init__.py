@@ -1,1 +1,79 @@
 """Tracks of the people in a file of estimates, drawn and tabulated: ``awarenav tracks``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..lazy import lazy_names
+
+if TYPE_CHECKING:
+    from ._file_tracks import tracks_in_file
+    from ._history import HistoryBuilder, TrackedRecording, TrackHistory, TrackSample
+    from ._page import track_colour
+    from ._plan_view import covariance_ellipse, path_arrows, plan_limits, view_edges_rad
+    from ._plot import shown_tracks, tracks_figure
+    from ._recording import ASSUMED_POSITION_STD_M, RecordedFrame, Recording, read_recording
+    from ._tables import CSV_COLUMNS
+    from ._tracking import track_recording
+    from ._truth import (
+        Truth,
+        TruthMatch,
+        match_truth,
+        person_ids_text,
+        true_people,
+        truth_beside_tracks,
+    )
+
+__all__ = [
+    "ASSUMED_POSITION_STD_M",
+    "CSV_COLUMNS",
+    "HistoryBuilder",
+    "RecordedFrame",
+    "Recording",
+    "TrackHistory",
+    "TrackSample",
+    "TrackedRecording",
+    "Truth",
+    "TruthMatch",
+    "covariance_ellipse",
+    "match_truth",
+    "path_arrows",
+    "person_ids_text",
+    "plan_limits",
+    "read_recording",
+    "shown_tracks",
+    "track_colour",
+    "track_recording",
+    "tracks_figure",
+    "tracks_in_file",
+    "true_people",
+    "truth_beside_tracks",
+    "view_edges_rad",
+]
+
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "._file_tracks": ("tracks_in_file",),
+        "._history": ("HistoryBuilder", "TrackHistory", "TrackSample", "TrackedRecording"),
+        "._page": ("track_colour",),
+        "._plan_view": ("covariance_ellipse", "path_arrows", "plan_limits", "view_edges_rad"),
+        "._plot": ("shown_tracks", "tracks_figure"),
+        "._recording": (
+            "ASSUMED_POSITION_STD_M",
+            "RecordedFrame",
+            "Recording",
+            "read_recording",
+        ),
+        "._tables": ("CSV_COLUMNS",),
+        "._tracking": ("track_recording",),
+        "._truth": (
+            "Truth",
+            "TruthMatch",
+            "match_truth",
+            "person_ids_text",
+            "true_people",
+            "truth_beside_tracks",
+        ),
+    },
+)

@@ -1,11 +1,4 @@
-"""One track at one instant, for drawing and for tables.
-
-The life of one track.
-
-The histories of all tracks, as one frame after another tells them.
-
-Everything that a plot of tracks shows.
-"""
+"""The history of every track of a recording, and the path of the camera."""
 
 from __future__ import annotations
 
@@ -19,23 +12,26 @@ import numpy as np
 
 from perception.arrays import FloatArray
 
+# After a longer time without a frame, the camera has paused.
+_PAUSE_S: Final = 0.5
+
 
 @dataclass(slots=True, eq=False)
 class TrackSample:
-    """What was believed of a person at ``stamp_s``.
+    """The state of a track at ``stamp_s``.
 
     Attributes:
-        stamp_s: the instant.
+        stamp_s: time of the state.
         status: ``"tentative"``, ``"confirmed"``, ``"coasting"``; ``"given"`` without a tracker.
-        is_frame: False for a prediction between two frames.
-        seen: whether the frame at this instant shows the person.
+        is_frame: whether there is a frame at this time; False for a prediction between frames.
+        seen: whether that frame shows the person.
         position_odom_m: (2,).
-        velocity_odom_mps: (2,), or None where it is not known.
-        position_covariance_m2: (2, 2), or None where it is not known.
-        awareness: smoothed α; NaN where there is none, as are the two below.
+        velocity_odom_mps: (2,), or None if it is not known.
+        position_covariance_m2: (2, 2), or None if it is not known.
+        awareness: filtered α; NaN without a filter, as the two below.
         awareness_std: its standard deviation.
-        awareness_lower: its lower bound, the line that counts.
-        measured_awareness: α of the frame's own observation, or None without evidence.
+        awareness_lower: its lower bound, which navigation uses.
+        measured_awareness: α of the frame's own observation; None without evidence.
         measured_awareness_std: its standard deviation.
     """
 
@@ -53,12 +49,12 @@ class TrackSample:
     measured_awareness_std: float | None = None
 
 
-# Longer than this without a frame, the camera has paused.
-_PAUSE_S: Final = 0.5
-
-
 class TrackHistory:
-    """The samples of one identity in the order of their stamps.
+    """The samples of a track in the order of their stamps.
+
+    Attributes:
+        samples: of frames, and of predictions between them.
+        died_s: stamp at which the track was gone; None if it lasts to the end of the recording.
 
     Args:
         id: of the track.
@@ -68,16 +64,19 @@ class TrackHistory:
     def __init__(self, id: int, first: TrackSample) -> None:
         self.id = id
         self.samples: list[TrackSample] = [first]
-        #: When the track was found to be gone; None while it lives to the end of the recording.
         self.died_s: float | None = None
 
     def add(self, sample: TrackSample) -> None:
-        """Append a sample; one of the latest stamp again replaces what was known of it."""
+        """Append a sample; a second sample of the latest stamp replaces the first.
+
+        Raises:
+            ValueError: for a stamp before the latest.
+        """
         latest = self.samples[-1]
         if sample.stamp_s < latest.stamp_s:
             raise ValueError(f"stamps go back: {sample.stamp_s} s after {latest.stamp_s} s")
         if sample.stamp_s == latest.stamp_s:
-            # A second frame of one instant: what was seen stays seen.
+            # What one of the two frames has seen stays seen.
             sample.seen = sample.seen or latest.seen
             if sample.measured_awareness is None:
                 sample.measured_awareness = latest.measured_awareness
@@ -88,7 +87,7 @@ class TrackHistory:
 
     @property
     def frames(self) -> list[TrackSample]:
-        """The samples of frames, without predictions between them."""
+        """The samples of frames, without the predictions between them."""
         return [sample for sample in self.samples if sample.is_frame]
 
     @property
@@ -98,7 +97,7 @@ class TrackHistory:
 
     @property
     def confirmed_s(self) -> float | None:
-        """When the track was first more than tentative."""
+        """Stamp at which the track was first more than tentative; None if it never was."""
         for sample in self.samples:
             if sample.status != "tentative":
                 return sample.stamp_s
@@ -106,7 +105,7 @@ class TrackHistory:
 
     @property
     def seen_frames(self) -> int:
-        """Frames that showed the person."""
+        """Number of frames that show the person."""
         return sum(sample.seen for sample in self.frames)
 
     @property
@@ -116,67 +115,68 @@ class TrackHistory:
 
     @property
     def positions_odom_m(self) -> FloatArray:
-        """(N, 2) of all samples."""
+        """(N, 2) positions of all samples."""
         return np.array([sample.position_odom_m for sample in self.samples])
 
-    def numbers(self, name: str) -> FloatArray:
-        """(N,) one of the awareness fields of all samples, NaN where it is None."""
+    def values(self, name: str) -> FloatArray:
+        """Return an awareness field of all samples (N,), NaN where it is None."""
         values = (getattr(sample, name) for sample in self.samples)
         return np.array([math.nan if value is None else value for value in values])
 
     def mean(self, name: str) -> float:
-        """Mean of an awareness field over the frames; NaN where it has no value."""
+        """Return the mean of an awareness field over the frames; NaN if none has a value."""
         values = [getattr(sample, name) for sample in self.frames]
         values = [value for value in values if value is not None and math.isfinite(value)]
         return sum(values) / len(values) if values else math.nan
 
     def unseen_spans(self) -> Iterator[tuple[float, float]]:
-        """Start and end (s, s) of every time in which nothing showed the person.
+        """Yield start and end (s) of each time in which no frame shows the person.
 
-        That is from the last frame that showed the person to the next that does, or to the end of
-        the track, with frames between that do not, or with a pause of the camera.
+        A span begins with the last frame that shows the person and ends with the next one that
+        does, or with the track. In between there are frames that do not show the person, or the
+        camera pauses.
         """
-        seen_s, overlooked = self.born_s, False
+        seen_s, missed = self.born_s, False
         for sample in self.samples:
             if sample.seen:
-                if overlooked or sample.stamp_s - seen_s > _PAUSE_S:
+                if missed or sample.stamp_s - seen_s > _PAUSE_S:
                     yield seen_s, sample.stamp_s
-                seen_s, overlooked = sample.stamp_s, False
+                seen_s, missed = sample.stamp_s, False
             else:
-                overlooked = overlooked or sample.is_frame
+                missed = missed or sample.is_frame
         end_s = self.samples[-1].stamp_s if self.died_s is None else self.died_s
         if end_s > seen_s:
             yield seen_s, end_s
 
-    def runs(self) -> Iterator[tuple[str, list[TrackSample]]]:
-        """Stretches of one status; each starts with the last sample of the one before.
+    def segments(self) -> Iterator[tuple[str, list[TrackSample]]]:
+        """Yield stretches of one status; each begins with the last sample of the one before.
 
-        A stretch without a tracker ends where the person is not seen for a while.
+        Without a tracker, a segment also ends at a longer time without a frame of the person.
         """
-        stretch = [self.samples[0]]
+        segment = [self.samples[0]]
         status = self.samples[0].status
         for before, sample in itertools.pairwise(self.samples):
             away = sample.status == "given" and sample.stamp_s - before.stamp_s > _PAUSE_S
             if away or sample.status != status:
-                yield status, stretch
+                yield status, segment
                 status = sample.status
-                stretch = [] if away else [before]
-            stretch.append(sample)
-        yield status, stretch
+                segment = [] if away else [before]
+            segment.append(sample)
+        yield status, segment
 
 
-class HistoryBook:
-    """Grows the history of every track and notes who has gone."""
+class HistoryBuilder:
+    """Collects the history of every track, frame by frame."""
 
     def __init__(self) -> None:
         self._histories: dict[int, TrackHistory] = {}
         self._living: set[int] = set()
 
-    def note(self, stamp_s: float, samples: Iterable[tuple[int, TrackSample]]) -> None:
-        """Take the id and the sample of every track that there is at an instant.
+    def add(self, stamp_s: float, samples: Iterable[tuple[int, TrackSample]]) -> None:
+        """Add the id and the sample of every track at a time; stamps must not go back.
 
-        Stamps must not go back. Who is not among them any more has died, until they are back as
-        people in files without a tracker may be.
+        A track that is not among them has died. It lives again if it comes back, as people in a
+        file without a tracker can.
         """
         present: set[int] = set()
         for id, sample in samples:
@@ -192,20 +192,20 @@ class HistoryBook:
         self._living = present
 
     def histories(self) -> tuple[TrackHistory, ...]:
-        """All of them in the order of their ids."""
+        """Return all histories in the order of their ids."""
         return tuple(self._histories[id] for id in sorted(self._histories))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TrackRun:
-    """Tracks and the camera that saw them.
+class TrackedRecording:
+    """The tracks of a recording, and the path of its camera.
 
     Attributes:
         histories: in the order of their ids.
-        camera_stamps_s: (N,) of the frames, ascending.
+        camera_stamps_s: (N,) stamps of the frames, ascending.
         camera_poses: (N, 3) x, y (m) and heading (rad) of the camera's view in odom.
-        remarks: sentences about frames that were refused.
-        source: what the identities are, for the title.
+        remarks: sentences about frames that were late or refused.
+        source: where the ids come from, for the title.
     """
 
     histories: tuple[TrackHistory, ...]
@@ -221,20 +221,20 @@ class TrackRun:
             return 0.0, 0.0
         return float(self.camera_stamps_s[0]), float(self.camera_stamps_s[-1])
 
+    @property
+    def camera_jump_m(self) -> float:
+        """Median distance of the camera from frame to frame; 0 for fewer than three frames.
 
-def camera_jump_m(run: TrackRun) -> float:
-    """How far the camera goes from frame to frame, the median (m); 0 for fewer than three frames.
-
-    Metres mean single pictures of many places, as ``awarenav render`` makes, and not a drive.
-    """
-    if len(run.camera_poses) < 3:
-        return 0.0
-    steps = np.diff(run.camera_poses[:, :2], axis=0)
-    return float(np.median(np.hypot(steps[:, 0], steps[:, 1])))
+        Several metres mean single images of many places, as ``awarenav render`` makes, not a drive.
+        """
+        if len(self.camera_poses) < 3:
+            return 0.0
+        steps = np.diff(self.camera_poses[:, :2], axis=0)
+        return float(np.median(np.hypot(steps[:, 0], steps[:, 1])))
 
 
 def camera_pose(T_odom_camera: FloatArray) -> tuple[float, float, float]:
-    """Where a camera is and looks to on the floor plane: x, y (m), heading (rad)."""
+    """Return position and view of a camera on the floor plane: x, y (m), heading (rad)."""
     x, y = T_odom_camera[:2, 3].tolist()
     ahead = T_odom_camera[:2, 2]
     return x, y, float(np.arctan2(ahead[1], ahead[0]))

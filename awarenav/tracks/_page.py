@@ -1,7 +1,4 @@
-"""One colour an identity, told apart on white.
-
-A figure whose parts are placed in inches.
-"""
+"""A figure whose axes are placed in inches, and its colours."""
 
 from __future__ import annotations
 
@@ -9,14 +6,15 @@ from typing import Final
 
 from ..figures import Axes, new_figure
 
-INK: Final = "#28282e"
-FAINT: Final = "#8a8f98"
-SHADE: Final = "#e4e5e9"
-CAMERA: Final = "#26548c"
-PAPER: Final = "#ffffff"
+TEXT_COLOUR: Final = "#28282e"
+FAINT_COLOUR: Final = "#8a8f98"
+UNSEEN_COLOUR: Final = "#e4e5e9"
+CAMERA_COLOUR: Final = "#26548c"
+BACKGROUND_COLOUR: Final = "#ffffff"
 
-# Ten hues that are dark enough for a thin line on white, then the same ten darker or duller.
-_COLOURS: Final = (
+_DPI: Final = 150
+# Ten hues that are dark enough for a thin line on white, then the same hues darker or duller.
+_TRACK_COLOURS: Final = (
     "#1f77b4",
     "#d95f02",
     "#2e8b45",
@@ -40,20 +38,17 @@ _COLOURS: Final = (
 )
 
 
-def colour_of(index: int) -> str:
-    """The colour of the identity at this place; they come again after twenty."""
-    return _COLOURS[index % len(_COLOURS)]
-
-
-_DPI: Final = 150
+def track_colour(index: int) -> str:
+    """Return the colour of the track with this index; the colours repeat after twenty."""
+    return _TRACK_COLOURS[index % len(_TRACK_COLOURS)]
 
 
 class Page:
-    """A page; places are in inches from its upper left corner.
+    """A figure; positions are in inches from its upper left corner.
 
     Args:
-        width_in: of the page.
-        height_in: of the page.
+        width_in: width, inches.
+        height_in: height, inches.
     """
 
     def __init__(self, width_in: float, height_in: float) -> None:
@@ -61,19 +56,24 @@ class Page:
         self._size = (width_in, height_in)
 
     def axes(self, left: float, top: float, width: float, height: float) -> Axes:
-        """Empty axes."""
-        across, down = self._size
+        """Add empty axes."""
+        page_width, page_height = self._size
         return self.figure.add_axes(
-            (left / across, 1.0 - (top + height) / down, width / across, height / down)
+            (
+                left / page_width,
+                1.0 - (top + height) / page_height,
+                width / page_width,
+                height / page_height,
+            )
         )
 
     def write(self, left: float, base: float, text: str, *, size: float, weight: str = "") -> None:
-        """A line of text on its base line."""
+        """Write a line of text on the base line ``base``."""
         self.figure.text(
             left / self._size[0],
             1.0 - base / self._size[1],
             text,
             fontsize=size,
             weight=weight or "normal",
-            color=INK,
+            color=TEXT_COLOUR,
         )

@@ -1,7 +1,4 @@
-"""One line of an estimates file, checked and ready for the tracker.
-
-An estimates or truth file as frames for the tracker, in the order of its lines.
-"""
+"""A file of estimates or truth as frames for the tracker, in the order of its lines."""
 
 from __future__ import annotations
 
@@ -15,9 +12,12 @@ import numpy as np
 from perception import PersonObservation
 from perception.arrays import FloatArray, finite_number, rigid_transform
 
-from ..errors import AwarenavError
+from ..errors import AwarenavError, counted
 from ..estimate import fixed_camera_pose
 from ..records import PersonRecord, Record, read_person, read_records
+
+#: Standard deviation per axis that is assumed for a position without a covariance.
+ASSUMED_POSITION_STD_M: Final = 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,11 +26,11 @@ class RecordedFrame:
 
     Attributes:
         name: of the frame.
-        stamp_s: when it was taken.
+        stamp_s: time of the image.
         T_odom_camera: (4, 4).
         observations: of the people that have a position.
-        ids: of each observation what the file says it is; None where it does not say.
-        tracks: the line's own tracks as ``awarenav estimate --tracks`` writes them, else None.
+        ids: of each observation, the id in the file; None if it has none.
+        tracks: the tracks that ``awarenav estimate --tracks`` has written; None if there are none.
     """
 
     name: str
@@ -41,24 +41,20 @@ class RecordedFrame:
     tracks: tuple[dict[str, Any], ...] | None
 
     def positions_odom_m(self) -> list[FloatArray]:
-        """Where each observation is on the floor plane, (2,) each."""
+        """Return the position of each observation on the floor plane, (2,) each."""
         T = self.T_odom_camera
         return [T[:2, :3] @ each.position_camera_m + T[:2, 3] for each in self.observations]
 
 
-#: Standard deviation taken, per axis, for a position without a covariance, as in a truth file.
-ASSUMED_POSITION_STD_M: Final = 0.05
-
-
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """What a file holds.
+    """The frames of a file.
 
     Attributes:
         path: of the file.
         frames: in the order of the lines.
         remarks: sentences about everything that was left out or assumed.
-        without_covariance: observations with the assumed position covariance.
+        without_covariance: number of observations with the assumed position covariance.
     """
 
     path: Path
@@ -70,34 +66,35 @@ class Recording:
 def read_recording(path: Path) -> Recording:
     """Read a JSON Lines file of frames.
 
-    A last line that was cut off in writing, a frame without a camera pose beside frames that have
-    one, and a person without a position are left out, each with a remark. Where no frame has a
-    pose, the camera is taken to stand still.
+    An incomplete last line, a frame without a camera pose in a file whose other frames have one,
+    and a person without a position are left out, each with a remark. If no frame has a pose, the
+    camera is assumed to be fixed.
 
     Raises:
-        AwarenavError: for a file that cannot be read, or a line or value that is none, naming it.
+        AwarenavError: for a file that cannot be read, and for a line or value that is not valid.
     """
     records = read_records(path)
-    counts: Counter[str] = Counter(cut=_lines(path) - len(records))
-    still = all(record["T_odom_camera"] is None for record in records)
+    counts: Counter[str] = Counter(incomplete=_count_lines(path) - len(records))
+    fixed = all(record["T_odom_camera"] is None for record in records)
     frames = []
     for record in records:
-        if record["T_odom_camera"] is None and not still:
-            counts["unplaced"] += 1
+        if record["T_odom_camera"] is None and not fixed:
+            counts["no pose"] += 1
             continue
         frames.append(_frame(record, f"{path}, frame {record['frame']!r}", counts))
-    if still and frames:
-        counts["still"] = len(frames)
-    return Recording(path, tuple(frames), tuple(_remarks(counts)), counts["without covariance"])
+    if fixed and frames:
+        counts["fixed camera"] = len(frames)
+    return Recording(path, tuple(frames), tuple(_remarks(counts)), counts["no covariance"])
 
 
-def _lines(path: Path) -> int:
-    """Lines that are not blank."""
+def _count_lines(path: Path) -> int:
+    """Return the number of lines that are not blank."""
     with path.open(encoding="utf-8") as file:
         return sum(1 for line in file if line.strip())
 
 
 def _frame(record: Record, where: str, counts: Counter[str]) -> RecordedFrame:
+    """Return a record as a frame; ``counts`` counts what is left out."""
     stamp_s = finite_number(f"{where}: stamp_s", record["stamp_s"], AwarenavError)
     pose = record["T_odom_camera"]
     T = (
@@ -113,31 +110,32 @@ def _frame(record: Record, where: str, counts: Counter[str]) -> RecordedFrame:
         observation = _observation(person, stamp_s, counts)
         if observation is not None:
             observations.append(observation)
-            ids.append(_identity(entry.get("id"), f"{where}, person {index}"))
+            ids.append(_id(entry.get("id"), f"{where}, person {index}"))
     return RecordedFrame(
         name=str(record["frame"]),
         stamp_s=stamp_s,
         T_odom_camera=T,
         observations=tuple(observations),
         ids=tuple(ids),
-        tracks=_tracks(record.get("tracks"), where),
+        tracks=_track_records(record.get("tracks"), where),
     )
 
 
 def _observation(
     person: PersonRecord, stamp_s: float, counts: Counter[str]
 ) -> PersonObservation | None:
+    """Return the observation of a person; None without a position."""
     if person.position_camera_m is None:
-        counts["nowhere"] += 1
+        counts["no position"] += 1
         return None
     covariance = person.position_covariance_m2
     if covariance is None:
-        counts["without covariance"] += 1
+        counts["no covariance"] += 1
         covariance = ASSUMED_POSITION_STD_M**2 * np.eye(3)
     awareness, std = person.awareness, person.awareness_std
     if awareness is not None and std is None:
-        counts["without std"] += 1
-        awareness = None  # of unknown worth, and so no evidence
+        counts["no std"] += 1
+        awareness = None  # its accuracy is not known, so it is no evidence
     return PersonObservation(
         stamp_s=stamp_s,
         position_camera_m=person.position_camera_m,
@@ -150,7 +148,7 @@ def _observation(
     )
 
 
-def _identity(value: Any, where: str) -> int | None:
+def _id(value: Any, where: str) -> int | None:
     if value is None:
         return None
     if isinstance(value, bool) or not isinstance(value, int):
@@ -158,7 +156,7 @@ def _identity(value: Any, where: str) -> int | None:
     return value
 
 
-def _tracks(value: Any, where: str) -> tuple[dict[str, Any], ...] | None:
+def _track_records(value: Any, where: str) -> tuple[dict[str, Any], ...] | None:
     if value is None:
         return None
     if not isinstance(value, list) or not all(isinstance(track, dict) for track in value):
@@ -167,28 +165,24 @@ def _tracks(value: Any, where: str) -> tuple[dict[str, Any], ...] | None:
 
 
 def _remarks(counts: Counter[str]) -> list[str]:
-    said = {
-        "cut": "the last line was cut off in writing and is left out",
-        "still": "no frame has a T_odom_camera: the camera is taken to stand still, and odom is "
-        "the floor under it",
-        "unplaced": "{} without T_odom_camera left out, since other frames have one",
-        "nowhere": "{} without position_camera_m left out",
-        "without std": "{} with an awareness but no awareness_std: taken as no evidence",
+    """Return a sentence for each kind of thing that was left out or assumed."""
+    sentences = {
+        "incomplete": "the last line is incomplete and is left out",
+        "fixed camera": "no frame has a T_odom_camera: the camera is assumed to be fixed, and odom "
+        "is on the floor under it",
+        "no pose": "{} without T_odom_camera left out, since other frames have one",
+        "no position": "{} without position_camera_m left out",
+        "no std": "{} with an awareness but no awareness_std: it counts as no evidence",
     }
-    things = {"unplaced": "frame"}
+    nouns = {"no pose": "frame"}
     return [
-        sentence.format(count(counts[key], things.get(key, "observation")))
-        for key, sentence in said.items()
+        sentence.format(counted(counts[key], nouns.get(key, "observation")))
+        for key, sentence in sentences.items()
         if counts[key] > 0
     ]
 
 
-def count(number: int, name: str, plural: str | None = None) -> str:
-    """A number and what is counted, in the plural where it must be."""
-    return f"{number} {name}" if number == 1 else f"{number} {plural or name + 's'}"
-
-
 def floor_covariance(T_odom_camera: FloatArray, covariance_camera_m2: FloatArray) -> FloatArray:
-    """(2, 2) covariance on the odom floor plane of one (3, 3) in the camera frame."""
+    """Return the covariance (2, 2) on the odom floor plane of one (3, 3) in the camera frame."""
     turn = T_odom_camera[:2, :3]
     return np.asarray(turn @ covariance_camera_m2 @ turn.T)

@@ -1,4 +1,4 @@
-"""``awarenav tracks`` from its options to its last line."""
+"""The work of ``awarenav tracks``."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from typing import Final
 from perception import Camera
 from tracking import TrackerConfig
 
-from ..errors import AwarenavError
+from ..errors import AwarenavError, counted
 from ..files import json_text
-from ._follow import follow
-from ._given_ids import given_tracks
-from ._history import TrackRun, camera_jump_m
-from ._recording import Recording, count, read_recording
+from ._file_tracks import tracks_in_file
+from ._history import TrackedRecording
+from ._recording import Recording, read_recording
 from ._tables import summary_lines, summary_records, write_csv
-from ._truth import Truth, matched_truth
+from ._tracking import track_recording
+from ._truth import Truth, truth_beside_tracks
 
 _FORMATS: Final = (".png", ".svg", ".pdf")
 _CAMERA: Final = "camera.yaml"
-_JUMP_M: Final = 2.0
-# More lines than this are for --csv.
+# A camera that moves more than this from frame to frame takes single images.
+_MAX_CAMERA_STEP_M: Final = 2.0
 _MOST_LINES: Final = 50
 
 
@@ -42,7 +42,7 @@ class TracksOptions:
 
 
 def tracks_command(options: TracksOptions) -> int:
-    """Run the command and return its exit status.
+    """Run the command; return the exit status.
 
     Raises:
         AwarenavError: for input that cannot be used; nothing is written then.
@@ -52,34 +52,39 @@ def tracks_command(options: TracksOptions) -> int:
     out = None if str(options.out) == "none" else options.out
     _check(options, out)
     if out is not None:
-        # Tables need no matplotlib; a plot says at once that it is missing.
+        # Only the plot needs matplotlib; without it, the command fails before any work.
         from ..figures import save_figure  # noqa: PLC0415
         from ._plot import tracks_figure  # noqa: PLC0415
     config = None if options.config is None else TrackerConfig.from_yaml(options.config)
     camera = _camera(options)
     recording = _read(options.file)
     truth_recording = None if options.truth is None else _read(options.truth)
-    run = given_tracks(recording) if options.ids else follow(recording, config, camera)
-    for remark in run.remarks:
-        say(remark)
-    if (jump_m := camera_jump_m(run)) > _JUMP_M:
-        say(
-            f"the camera jumps by {jump_m:.1f} m from frame to frame: these look like single "
-            "pictures, in which nobody can be followed"
+    if options.ids:
+        tracked = tracks_in_file(recording)
+    else:
+        tracked = track_recording(recording, config, camera)
+    for remark in tracked.remarks:
+        _log(remark)
+    if tracked.camera_jump_m > _MAX_CAMERA_STEP_M:
+        _log(
+            f"the camera jumps by {tracked.camera_jump_m:.1f} m from frame to frame: these look "
+            "like single images, in which people cannot be tracked"
         )
-    truth = None if truth_recording is None else matched_truth(run.histories, truth_recording)
+    truth = None
+    if truth_recording is not None:
+        truth = truth_beside_tracks(tracked.histories, truth_recording)
     if out is not None:
-        title = _title(recording, run)
-        figure = tracks_figure(run, title, camera=camera, truth=truth, most=options.most)
+        title = _title(recording, tracked)
+        figure = tracks_figure(tracked, title, camera=camera, truth=truth, most=options.most)
         save_figure(figure, out)
     if options.csv is not None:
-        write_csv(options.csv, run.histories)
-    _report(options, run, truth, out)
+        write_csv(options.csv, tracked.histories)
+    _report(options, tracked, truth, out)
     return 0
 
 
 def _check(options: TracksOptions, out: Path | None) -> None:
-    """Refuse outputs that are no files of their kind, or that would replace an input."""
+    """Refuse outputs with another suffix, or that would replace an input."""
     if out is not None and out.suffix.lower() not in _FORMATS:
         raise AwarenavError(f"--out must end in {', '.join(_FORMATS)} or be none, got {out}")
     inputs = {
@@ -91,7 +96,7 @@ def _check(options: TracksOptions, out: Path | None) -> None:
         if path is None:
             continue
         if path.resolve() in inputs:
-            raise AwarenavError(f"{name} {path} would replace what is read")
+            raise AwarenavError(f"{name} {path} would replace an input")
         if path.is_dir():
             raise AwarenavError(f"{name} must be a file, {path} is a folder")
     if out is not None and options.csv is not None and out.resolve() == options.csv.resolve():
@@ -99,55 +104,59 @@ def _check(options: TracksOptions, out: Path | None) -> None:
 
 
 def _camera(options: TracksOptions) -> Camera | None:
+    """Return the camera whose field of view the tracker uses, if it is known."""
     path = options.camera
     if path is None:
         path = options.file.parent / _CAMERA
         if not path.exists():
-            say(
-                "no --camera and no camera.yaml beside the file: nobody knows where the camera can "
-                "see, and all who are not seen are kept equally long"
+            _log(
+                "no --camera and no camera.yaml beside the file: the field of view is not known, "
+                "and the tracks of all unseen people are kept equally long"
             )
             return None
-        say(f"the field of view is that of {path}")
+        _log(f"the field of view is that of {path}")
     return Camera.from_yaml(path)
 
 
 def _read(path: Path) -> Recording:
     recording = read_recording(path)
     for remark in recording.remarks:
-        say(f"{path}: {remark}")
+        _log(f"{path}: {remark}")
     return recording
 
 
-def _title(recording: Recording, run: TrackRun) -> str:
-    start_s, end_s = run.span_s
+def _title(recording: Recording, tracked: TrackedRecording) -> str:
+    start_s, end_s = tracked.span_s
     return (
-        f"{recording.path.name}: {count(len(run.histories), 'identity', 'identities')} "
-        f"({run.source}) in {count(len(run.camera_stamps_s), 'frame')}, {end_s - start_s:.1f} s"
+        f"{recording.path.name}: {counted(len(tracked.histories), 'identity', 'identities')} "
+        f"({tracked.source}) in {counted(len(tracked.camera_stamps_s), 'frame')}, "
+        f"{end_s - start_s:.1f} s"
     )
 
 
-def _report(options: TracksOptions, run: TrackRun, truth: Truth | None, out: Path | None) -> None:
+def _report(
+    options: TracksOptions, tracked: TrackedRecording, truth: Truth | None, out: Path | None
+) -> None:
+    """Print the table, or the JSON, and the files that were written."""
     if options.as_json:
         matches = None if truth is None else truth.matches
-        print(json_text(summary_records(run.histories, matches)), end="")
+        print(json_text(summary_records(tracked.histories, matches)), end="")
         return
-    confirmed = [each for each in run.histories if each.confirmed_s is not None]
+    confirmed = [each for each in tracked.histories if each.confirmed_s is not None]
     if confirmed:
         lines = summary_lines(confirmed, None if truth is None else truth.matches)
         print("\n".join(lines[: _MOST_LINES + 1]))
     if len(confirmed) > _MOST_LINES:
         print(f"and {len(confirmed) - _MOST_LINES} more; --csv has all")
-    fleeting = len(run.histories) - len(confirmed)
-    if fleeting:
-        print(f"{count(fleeting, 'track')} never confirmed")
-    if not run.histories:
-        print(f"no people in {count(len(run.camera_stamps_s), 'frame')}")
+    unconfirmed = len(tracked.histories) - len(confirmed)
+    if unconfirmed:
+        print(f"{counted(unconfirmed, 'track')} never confirmed")
+    if not tracked.histories:
+        print(f"no people in {counted(len(tracked.camera_stamps_s), 'frame')}")
     written = [str(path) for path in (out, options.csv) if path is not None]
     if written:
         print(f"Written to {' and '.join(written)}")
 
 
-def say(text: str) -> None:
-    """Tell the user something beside the results."""
+def _log(text: str) -> None:
     print(f"awarenav tracks: {text}", file=sys.stderr)

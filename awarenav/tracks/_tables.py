@@ -1,8 +1,9 @@
-"""Tracks as a table to read and as a table to compute with."""
+"""Tracks as a table of text, as JSON, and as a CSV file."""
 
 from __future__ import annotations
 
 import csv
+import io
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,12 +11,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from ..errors import AwarenavError
-from ..files import csv_number
+from ..files import csv_number, write_text
 from ._history import TrackHistory, TrackSample
-from ._truth import Matched, who
+from ._truth import TruthMatch, person_ids_text
 
-#: Columns of the CSV file: one row a track and frame, empty where nothing is known.
+#: Columns of the CSV file: one row per track and frame; empty for what is not known.
 CSV_COLUMNS: Final = (
     "stamp_s",
     "id",
@@ -38,9 +38,9 @@ _DASH: Final = "–"
 
 def summary_lines(
     histories: Sequence[TrackHistory],
-    matches: dict[int, Matched] | None = None,
+    matches: dict[int, list[TruthMatch]] | None = None,
 ) -> list[str]:
-    """A line a track, with a header: when it lived, how often it was seen, how aware it was."""
+    """Return a table with one line per track: its life, its frames and its awareness."""
     header = ["id", "born (s)", "confirmed (s)", "died (s)", "seen", "coasted", "mean α", "lower"]
     if matches is not None:
         header.append("person")
@@ -48,16 +48,16 @@ def summary_lines(
     for history in histories:
         row = [
             str(history.id),
-            _seconds(history.born_s),
-            _seconds(history.confirmed_s),
-            _seconds(history.died_s),
+            _seconds_text(history.born_s),
+            _seconds_text(history.confirmed_s),
+            _seconds_text(history.died_s),
             str(history.seen_frames),
             str(len(history.frames) - history.seen_frames),
-            _share(_mean_awareness(history)),
-            _share(history.mean("awareness_lower")),
+            _share_text(_mean_awareness(history)),
+            _share_text(history.mean("awareness_lower")),
         ]
         if matches is not None:
-            row.append(who(matches.get(history.id, [])))
+            row.append(person_ids_text(matches.get(history.id, [])))
         rows.append(row)
     widths = [max(len(row[column]) for row in rows) for column in range(len(header))]
     return [
@@ -67,9 +67,9 @@ def summary_lines(
 
 
 def summary_records(
-    histories: Sequence[TrackHistory], matches: dict[int, Matched] | None = None
+    histories: Sequence[TrackHistory], matches: dict[int, list[TruthMatch]] | None = None
 ) -> list[dict[str, Any]]:
-    """The summary as plain data, a mapping for each track; None where nothing is known."""
+    """Return the table as plain data, one mapping per track; None for what is not known."""
     records = []
     for history in histories:
         mean, lower = _mean_awareness(history), history.mean("awareness_lower")
@@ -84,34 +84,28 @@ def summary_records(
             "mean_awareness_lower": lower if math.isfinite(lower) else None,
         }
         if matches is not None:
-            record["person"] = who(matches.get(history.id, []))
+            record["person"] = person_ids_text(matches.get(history.id, []))
         records.append(record)
     return records
 
 
 def write_csv(path: Path, histories: Sequence[TrackHistory]) -> None:
-    """Write a row a track and frame, by stamp and id; the file appears whole or not at all.
+    """Write a CSV file with one row per track and frame, in the order of stamps and ids.
 
     Raises:
         AwarenavError: for a place that cannot be written.
     """
     samples = [(each.stamp_s, history.id, each) for history in histories for each in history.frames]
     samples.sort(key=lambda row: row[:2])
-    part = path.with_name(path.name + ".part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with part.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(CSV_COLUMNS)
-            writer.writerows(_row(id, sample) for _, id, sample in samples)
-        part.replace(path)
-    except OSError as cause:
-        raise AwarenavError(f"cannot write {path}: {cause.strerror or cause}") from cause
-    finally:
-        part.unlink(missing_ok=True)
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(CSV_COLUMNS)
+    writer.writerows(_csv_row(id, sample) for _, id, sample in samples)
+    write_text(path, text.getvalue())
 
 
-def _row(id: int, sample: TrackSample) -> list[object]:
+def _csv_row(id: int, sample: TrackSample) -> list[object]:
+    """Return the row of a sample, in the order of :data:`CSV_COLUMNS`."""
     velocity, covariance = sample.velocity_odom_mps, sample.position_covariance_m2
     numbers = (
         *sample.position_odom_m.tolist(),
@@ -123,7 +117,7 @@ def _row(id: int, sample: TrackSample) -> list[object]:
         sample.measured_awareness,
         sample.measured_awareness_std,
     )
-    # All digits of the stamp, so that rows can be joined with the frames of the file.
+    # The stamp has all its digits, so that rows can be joined with the frames of the file.
     return [
         repr(sample.stamp_s),
         id,
@@ -134,14 +128,14 @@ def _row(id: int, sample: TrackSample) -> list[object]:
 
 
 def _mean_awareness(history: TrackHistory) -> float:
-    """Of the filter, or of the measurements where there is none."""
+    """Return the mean α of the filter; without a filter, that of the measurements."""
     mean = history.mean("awareness")
     return mean if math.isfinite(mean) else history.mean("measured_awareness")
 
 
-def _seconds(value: float | None) -> str:
+def _seconds_text(value: float | None) -> str:
     return _DASH if value is None else f"{value:.2f}"
 
 
-def _share(value: float) -> str:
+def _share_text(value: float) -> str:
     return f"{value:.2f}" if math.isfinite(value) else _DASH

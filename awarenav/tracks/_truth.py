@@ -1,7 +1,4 @@
-"""Where a person truly was, and how aware.
-
-The truth beside tracks: who each track really was at each instant.
-"""
+"""The truth about people, and the person that each track follows."""
 
 from __future__ import annotations
 
@@ -9,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -20,16 +17,23 @@ from ..errors import AwarenavError
 from ._history import TrackHistory
 from ._recording import Recording
 
+#: A line through the truth is broken where a person is missing for longer.
+MAX_TRUTH_GAP_S: Final = 0.5
+# A track farther than this from a person does not follow the person.
+_SAME_PERSON_M: Final = 1.0
+# A true position belongs to a frame if their stamps differ by at most half a period of 20 Hz.
+_SAME_TIME_S: Final = 0.026
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TruePerson:
-    """The truth about one person, with a row for every frame that holds them.
+    """The truth about a person, with a row for every frame of the person.
 
     Attributes:
         id: of the person in the truth file.
         stamps_s: (N,) ascending.
         positions_odom_m: (N, 2).
-        awareness: (N,) true α, NaN where the file does not say.
+        awareness: (N,) true α, NaN where the file has none.
     """
 
     id: int
@@ -38,26 +42,24 @@ class TruePerson:
     awareness: FloatArray
 
 
-# A track farther than this from a person is not that person's.
-_SAME_PERSON_M: Final = 1.0
-# The truth of another instant is no truth; half a frame at 20 Hz.
-_SAME_TIME_S: Final = 0.026
-#: Stamp, person and true α of the frames at which a track is near a person.
-Matched = list[tuple[float, int, float]]
-#: Where the truth is silent about a person for longer, a line through it is broken.
-SILENT_S: Final = 0.5
+class TruthMatch(NamedTuple):
+    """The person that a track is near in a frame, and the person's true α."""
+
+    stamp_s: float
+    person_id: int
+    awareness: float
 
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """The truth beside tracks: its people, and who each track was, by the track's id."""
+    """The people of a truth file, and the matches of each track, by the track's id."""
 
     people: tuple[TruePerson, ...]
-    matches: dict[int, Matched]
+    matches: dict[int, list[TruthMatch]]
 
 
-def matched_truth(histories: Sequence[TrackHistory], truth: Recording) -> Truth:
-    """Read the people of a truth file and tell who each track was.
+def truth_beside_tracks(histories: Sequence[TrackHistory], truth: Recording) -> Truth:
+    """Return the people of a truth file and the matches of tracks with them.
 
     Raises:
         AwarenavError: for people without ids.
@@ -67,7 +69,7 @@ def matched_truth(histories: Sequence[TrackHistory], truth: Recording) -> Truth:
 
 
 def true_people(truth: Recording) -> tuple[TruePerson, ...]:
-    """The people of a truth file in the order of their ids.
+    """Return the people of a truth file in the order of their ids.
 
     Raises:
         AwarenavError: for people without ids.
@@ -91,12 +93,12 @@ def true_people(truth: Recording) -> tuple[TruePerson, ...]:
 
 def match_truth(
     histories: Sequence[TrackHistory], people: Sequence[TruePerson]
-) -> dict[int, Matched]:
-    """Stamp, person and true α for every frame at which a track is near a person, by track id.
+) -> dict[int, list[TruthMatch]]:
+    """Match tracks to people in every frame; return the matches by the track's id.
 
-    One track is one person at a time, so that the distances sum to the least; within 1 m.
+    The matches of a frame are one to one, within 1 m, with the least sum of distances.
     """
-    matches: dict[int, Matched] = {each.id: [] for each in histories}
+    matches: dict[int, list[TruthMatch]] = {each.id: [] for each in histories}
     at: dict[float, list[tuple[int, FloatArray]]] = {}
     for history in histories:
         for sample in history.frames:
@@ -107,27 +109,27 @@ def match_truth(
         ]
         if not present:
             continue
-        places = np.array([person.positions_odom_m[row] for person, row in present])
+        true = np.array([person.positions_odom_m[row] for person, row in present])
         tracked = np.array([position for _, position in at[stamp_s]])
-        distance = np.linalg.norm(tracked[:, None] - places[None], axis=2)
-        # Beyond the gate all pairs are equally wrong, so they cannot pull a near pair apart.
+        distance = np.linalg.norm(tracked[:, None] - true[None], axis=2)
+        # Far pairs all cost the same, so that they cannot prevent the match of a near pair.
         cost = np.minimum(distance, 10.0 * _SAME_PERSON_M)
         for row, column in zip(*linear_sum_assignment(cost), strict=True):
             if distance[row, column] <= _SAME_PERSON_M:
                 person, truth_row = present[column]
                 alpha = float(person.awareness[truth_row])
-                matches[at[stamp_s][row][0]].append((stamp_s, person.id, alpha))
+                matches[at[stamp_s][row][0]].append(TruthMatch(stamp_s, person.id, alpha))
     return matches
 
 
-def who(matched: Sequence[tuple[float, int, float]]) -> str:
-    """The people that a track was, the most frequent first; a dash for nobody."""
-    counts = Counter(person for _, person, _ in matched)
+def person_ids_text(matches: Sequence[TruthMatch]) -> str:
+    """Return the ids of the people that a track has followed, most frequent first; else a dash."""
+    counts = Counter(match.person_id for match in matches)
     return ", ".join(str(person) for person, _ in counts.most_common()) or "–"
 
 
 def _row_at(person: TruePerson, stamp_s: float) -> int | None:
-    """The row of a person that is of this instant."""
+    """Return the row of a person at this stamp; None if there is none."""
     row = int(np.searchsorted(person.stamps_s, stamp_s))
     near = [index for index in (row - 1, row) if 0 <= index < len(person.stamps_s)]
     best = min(near, key=lambda index: abs(person.stamps_s[index] - stamp_s))

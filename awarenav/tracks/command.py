@@ -9,13 +9,19 @@ from ..cli import POSITIVE, FilePath, argument, command, option, options
 
 @command(
     "tracks",
-    epilog="Exit status: 0 success; 2 bad input, nothing written; 130 interrupted. The plot needs "
-    "matplotlib.",
+    examples=[
+        "awarenav tracks estimates.jsonl --out tracks.png --csv tracks.csv",
+        "awarenav tracks estimates.jsonl --truth render/truth.jsonl",
+    ],
+    exit_status={
+        0: "Success.",
+        2: "Bad input; nothing was written.",
+        130: "Interrupted.",
+    },
+    epilog="The plot needs matplotlib.",
 )
 @argument("file", type=FilePath(), metavar="FILE.jsonl", help="Estimates, or rendered truth.")
-@options.out_file(
-    "tracks.png", "The plot; an existing file is replaced.", metavar="FILE.png|svg|pdf|none"
-)
+@options.out_file("tracks.png", "The plot; replaces the file.", "FILE.png|svg|pdf|none")
 @options.as_json()
 @option(
     "--csv", type=FilePath(), metavar="FILE", help="Also write every track at every frame as CSV."
@@ -31,25 +37,26 @@ from ..cli import POSITIVE, FilePath, argument, command, option, options
     "--ids",
     is_flag=True,
     excludes="--config",
-    help="Do not track: show the tracks (`awarenav estimate --tracks`) or ids in the file.",
+    help="Do not track: show the tracks of `awarenav estimate --tracks`, or the ids, in the file.",
 )
 @option(
     "--camera",
     type=FilePath(),
+    show_default="camera.yaml beside FILE.jsonl, if any",
     metavar="FILE",
-    help="ROS camera_info YAML of the field of view (default: camera.yaml beside FILE, if any).",
+    help="Camera whose field of view the tracker uses (ROS camera_info YAML).",
 )
 @option(
     "--most",
     type=POSITIVE,
     default=20,
     metavar="N",
-    help="Tracks with a colour and a panel of their own, the most often seen; others are grey.",
+    help="Give the N tracks that are seen most often a colour and a panel; draw the others grey.",
 )
 def tracks(**values: Any) -> int:
-    """Track the people in FILE; print a line for each track, and plot paths and awareness.
+    """Track the people in FILE.jsonl; print one line per track, and plot paths and awareness.
 
-    FILE is JSON Lines as `awarenav estimate` or `awarenav render` writes them. Frames are processed
+    Reads JSON Lines as `awarenav estimate` and `awarenav render` write them. Frames are processed
     in the order of the file, as on a robot.
     """
     from ._run import TracksOptions, tracks_command  # noqa: PLC0415 - help needs no tracker

@@ -4,63 +4,78 @@ from __future__ import annotations
 
 from typing import Any
 
-from awarenav.cli import POSITIVE, OneOf, command, option, options
+from awarenav.cli import NUMBER, POSITIVE, OneOf, command, option, options
 
 
-@command("render")
-@option("--frames", type=int, default=400, metavar="N", help="Images.")
-@option("--people", type=int, default=3, metavar="N", help="The most people in an image.")
+@command(
+    "render",
+    examples=[
+        "awarenav render --frames 100 --out render",
+        "awarenav render --size 1280x720 --fov 90 --people 6 --range 1 12",
+    ],
+    exit_status={
+        0: "Success.",
+        2: "Bad input; nothing was written.",
+        130: "Interrupted; the images so far are kept.",
+    },
+    epilog="The same command continues an interrupted set of images. Needs the extra 'sim': pip "
+    "install 'awarenav[sim]'.",
+)
+@option("--frames", type=POSITIVE, default=400, metavar="N", help="Number of images.")
+@option("--people", type=POSITIVE, default=3, metavar="N", help="Most people in an image.")
 @option(
     "--scenes",
-    type=int,
+    type=POSITIVE,
+    show_default="one per 20 images",
     metavar="N",
-    help="Halls with a cast that the images are spread over (default: one for each 20 images).",
+    help="Number of scenes (a hall with people) that the images are taken in.",
 )
-@option("--size", default="640x480", metavar="WxH", help="Pixels.")
-@option("--fov", type=float, default=60.0, metavar="DEG", help="Horizontal field of view.")
+@option("--size", default="640x480", metavar="WxH", help="Width and height of an image, pixels.")
+@option("--fov", type=NUMBER, default=60.0, metavar="DEG", help="Horizontal field of view.")
 @option(
     "--range",
     "range_m",
-    type=float,
+    type=NUMBER,
     nargs=2,
     default=(1.5, 8.0),
     metavar="MIN MAX",
-    help="Distance of people from the camera, metres.",
+    help="Distance of people from the camera, m.",
 )
 @option(
     "--workers",
     many=True,
-    metavar="NAME...",
-    help="Who appears: names or .npz files (default: all).",
+    show_default="all",
+    metavar="NAME|FILE...",
+    help="People who appear: shipped workers, or .npz files.",
 )
-@option("--layouts", many=True, metavar="NAME...", help="Halls (default: all).")
+@option("--layouts", many=True, show_default="all", metavar="NAME...", help="Layouts of the halls.")
 @option(
     "--eyes",
     type=OneOf(["wander", "ahead"]),
     default="wander",
-    help="Whether eyes turn in the head (standard deviations 7 and 3.4 degrees) or look ahead.",
+    help="Eyes turn in the head (standard deviations 7 and 3.4 degrees), or look straight ahead.",
 )
 @option(
     "--supersampling",
-    type=int,
+    type=POSITIVE,
     default=1,
     metavar="N",
-    help="Samples for each pixel and side; 2 smooths edges.",
+    help="Samples per pixel in width and in height; 2 smooths edges.",
 )
 @option(
     "--processes",
     type=POSITIVE,
+    show_default="one per processor core",
     metavar="N",
-    help="Worker processes (default: one for each core).",
+    help="Worker processes.",
 )
 @options.out_folder("render")
 @options.seed()
 def render(**values: Any) -> int:
-    """Render pictures of people in randomised warehouses, with the truth about each person.
+    """Render images of people in randomised warehouses, with the truth about each person.
 
-    Writes frames, camera.yaml (ROS camera_info), truth.jsonl (boxes, keypoints, gaze, position,
-    awareness; one line for each frame) and contact_sheet.png. The same command continues an
-    interrupted set.
+    Writes the images, camera.yaml (ROS camera_info), truth.jsonl (boxes, keypoints, gaze, position
+    and awareness: one line per image) and contact_sheet.png.
     """
     from ._run import RenderOptions, render_command  # noqa: PLC0415 - help needs no simulator
 

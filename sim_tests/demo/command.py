@@ -7,7 +7,12 @@ from pathlib import Path
 from awarenav.cli import FilePath, command, option, options
 
 
-@command("demo")
+@command(
+    "demo",
+    examples=["awarenav demo --out demo"],
+    exit_status={0: "Success.", 2: "Bad input, or the extra 'sim' is missing."},
+    epilog="Needs the extra 'sim': pip install 'awarenav[sim]'.",
+)
 @options.out_folder("demo")
 @options.seed()
 @option("--no-video", is_flag=True, help="Write no video (faster).")
@@ -16,7 +21,7 @@ from awarenav.cli import FilePath, command, option, options
 def demo(out: Path, seed: int, *, no_video: bool, perception: str, as_json: bool) -> int:
     """Run the paper's 25 s encounter, and one crossing with and without awareness.
 
-    Prints the tables and writes encounter.png, encounter.mp4, encounter.csv, crossings.png and
+    Prints the results and writes encounter.png, encounter.mp4, encounter.csv, crossings.png and
     episodes.csv.
     """
     from ._demo import run_demo  # noqa: PLC0415 - help needs no simulator
@@ -25,18 +30,30 @@ def demo(out: Path, seed: int, *, no_video: bool, perception: str, as_json: bool
     return 0
 
 
-@command("bench", epilog="Exit status: 0 success; 1 a figure is worse than its tolerance allows.")
+@command(
+    "bench",
+    examples=["awarenav bench --baseline baseline.json", "awarenav bench --out baseline.json"],
+    exit_status={
+        0: "Success.",
+        1: "A metric is worse than the baseline by more than its tolerance.",
+        2: "Bad input.",
+    },
+    epilog="Needs the extra 'sim': pip install 'awarenav[sim]'.",
+)
 @option(
     "--baseline",
     type=FilePath(),
     default="benchmarks/baseline.json",
     metavar="FILE",
-    help="Baseline to compare with, if it exists.",
+    help="Baseline to compare with, if the file exists.",
 )
-@options.out_file(None, "Write the figures as a baseline.")
+@options.out_file(None, "Write the metrics as a baseline.")
 @options.as_json()
 def bench(baseline: Path, out: Path | None, *, as_json: bool) -> int:
-    """Time crossings against real time and against bare physics, and compare with a baseline."""
+    """Measure the speed of crossings, against real time and against bare physics.
+
+    Compares the metrics with a baseline.
+    """
     from ._bench import bench_command  # noqa: PLC0415 - help needs no simulator
 
     return bench_command(baseline, out, as_json=as_json)

@@ -4,14 +4,24 @@ from __future__ import annotations
 
 from typing import Any
 
-from awarenav.cli import POSITIVE, command, option, options
+from awarenav.cli import NUMBER, POSITIVE, command, option, options
 
 
 @command(
     "crossings",
-    epilog="Exit status: 0 success; 1 some episodes failed (DIR/errors.log says how); 2 bad input, "
-    "nothing run. A killed run continues with the same arguments and --resume. `awarenav replay "
-    "DIR N` shows episode N; `awarenav compare DIR` prints more tables.",
+    examples=[
+        "awarenav crossings --scenario blind_corner --policy blind balanced",
+        "awarenav crossings --policy mine.yaml blind --episodes 20 --out run",
+        "awarenav crossings --planner my_planners:Dwa reference --fault none ghosts",
+    ],
+    exit_status={
+        0: "Success.",
+        1: "Some episodes failed; DIR/errors.log has the tracebacks.",
+        2: "Bad input; nothing was run.",
+        130: "Interrupted; the episodes so far are kept.",
+    },
+    epilog="A killed or interrupted run continues with the same command and --resume. `awarenav "
+    "replay DIR N` films episode N; `awarenav compare DIR` prints more tables.",
 )
 @options.scenarios("that have a planner")
 @options.policies(["blind", "balanced"])
@@ -19,20 +29,22 @@ from awarenav.cli import POSITIVE, command, option, options
 @options.perception()
 @options.camera()
 @options.faults()
-@option("--episodes", type=POSITIVE, default=1, metavar="N", help="Seeds for each scenario.")
-@options.seed("the first episode; the next ones count up")
+@option("--episodes", type=POSITIVE, default=1, metavar="N", help="Number of seeds per scenario.")
+@options.seed(" It is that of the first episode; the next ones count up.")
 @options.workers()
 @option(
     "--scheduler",
     metavar="ADDRESS",
-    help="Run on a Dask cluster: tcp://HOST:PORT, or 'local' for one of --workers processes.",
+    help="Run on a Dask cluster: tcp://HOST:PORT, or 'local' for a cluster of --workers processes "
+    "on this computer.",
 )
 @option(
     "--time-limit",
-    type=float,
+    type=NUMBER,
+    show_default="none",
     metavar="S",
-    help="End an episode that takes longer by the clock, e.g. because its planner hangs "
-    "(default: none).",
+    help="End an episode that takes longer than this in real time, for example because its planner "
+    "hangs.",
 )
 @options.out_folder("crossings")
 @options.resume()
@@ -41,8 +53,8 @@ from awarenav.cli import POSITIVE, command, option, options
 def crossings(**values: Any) -> int:
     """Run every scenario with every policy, planner and fault on the same seeds, in closed loop.
 
-    A row is appended to episodes.csv as soon as an episode ends; at the end the rows are put in
-    order and the report is written. An episode that fails says why in its row and costs no other.
+    Every episode that ends appends a row to episodes.csv. At the end the rows are sorted and the
+    report is written. The row of a failed episode has the reason; the other episodes still run.
     """
     from ._crossings import (  # noqa: PLC0415 - help needs no simulator
         CrossingsOptions,

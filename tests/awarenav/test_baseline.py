@@ -28,7 +28,7 @@ def test_baselines_round_trip_and_judge(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["{", "{}", '{"metrics": [{"name": "a"}]}'])
-def test_files_that_are_no_baseline_are_refused(tmp_path: Path, text: str) -> None:
+def test_files_that_are_not_baselines_are_refused(tmp_path: Path, text: str) -> None:
     path = tmp_path / "baseline.json"
     path.write_text(text)
     with pytest.raises(AwarenavError, match="not a baseline"):

@@ -23,7 +23,9 @@ def test_records_survive_writing_and_reading(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("cut", [1, 7, 40])
-def test_a_last_line_cut_off_in_writing_costs_only_itself(tmp_path: Path, cut: int) -> None:
+def test_an_incomplete_last_line_is_left_out_and_the_others_are_read(
+    tmp_path: Path, cut: int
+) -> None:
     path = tmp_path / "truth.jsonl"
     write_records(path, FRAMES)
     text = path.read_text("utf-8").rstrip("\n")
@@ -40,7 +42,7 @@ def test_a_broken_line_in_the_middle_is_refused_by_number(tmp_path: Path) -> Non
         read_records(path)
 
 
-def test_a_line_that_is_no_frame_is_refused(tmp_path: Path) -> None:
+def test_a_line_that_is_not_a_frame_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "truth.jsonl"
     path.write_text('{"frame": "a.png"}\n', "utf-8")
     with pytest.raises(AwarenavError, match="needs the keys frame, stamp_s"):

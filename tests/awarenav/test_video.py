@@ -6,7 +6,7 @@ from awarenav.errors import AwarenavError
 from awarenav.video import VideoWriter
 
 
-def test_a_video_has_its_pictures_at_its_rate(tmp_path):
+def test_a_video_has_its_images_at_its_rate(tmp_path):
     path = tmp_path / "film.mp4"
     greys = [20, 120, 220] * 5
     with VideoWriter(path, 15, (64, 48)) as video:

@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from awarenav.cli import argument, command, group, option, options
 
 
 @group("scenario")
 def scenario() -> None:
-    """List, explain, draw and check scenarios: shipped ones, or YAML files of your own."""
+    """List, explain, draw and check scenarios: shipped ones, or YAML files of yours."""
 
 
-@command("list", short_help="List the shipped scenarios.")
+@command(
+    "list",
+    short_help="List the shipped scenarios.",
+    examples=["awarenav scenario list --json"],
+    exit_status={0: "Success."},
+)
 @options.as_json("the list")
 def list_scenarios(*, as_json: bool) -> int:
     """List the shipped scenarios.
 
-    Shows name and version, who notices the robot, how many people there are, how many numbers vary,
-    and what happens.
+    Shows name and version, whether the people notice the robot, the number of people, the number of
+    values that vary, and what happens.
     """
     from ._show import list_command  # noqa: PLC0415 - help needs no scenarios
 
@@ -26,20 +33,24 @@ def list_scenarios(*, as_json: bool) -> int:
 @command(
     "show",
     short_help="Describe a scenario, or print it as YAML.",
-    epilog="A file to start from: awarenav scenario show crossing_from_left --yaml > mine.yaml",
+    examples=[
+        "awarenav scenario show blind_corner",
+        "awarenav scenario show crossing_from_left --yaml > mine.yaml",
+    ],
+    exit_status={0: "Success.", 2: "Bad input."},
 )
-@argument("scenario", metavar="NAME|FILE", help="Shipped scenario, or YAML file.")
+@argument(
+    "scenario",
+    metavar="NAME|FILE",
+    shell_complete=options.COMPLETE_SCENARIOS,
+    help="A shipped scenario, or a YAML file.",
+)
 @option("--yaml", is_flag=True, help="Print YAML instead, with the shared defaults written out.")
-@option(
-    "--seed",
-    type=int,
-    metavar="N",
-    help="With --yaml: the scenario of the episode with this seed, its numbers drawn.",
-)
+@options.seed(" With --yaml: print the scenario of the episode with this seed.", default=None)
 def show(scenario: str, *, yaml: bool, seed: int | None) -> int:
-    """Describe what happens in a scenario and what varies in it.
+    """Describe what happens in a scenario and what varies.
 
-    Also says how often robot and people would meet if nobody reacted.
+    Also prints how often robot and people would meet if nobody reacted.
     """
     from ._show import show_command  # noqa: PLC0415 - help needs no scenarios
 
@@ -49,48 +60,61 @@ def show(scenario: str, *, yaml: bool, seed: int | None) -> int:
 @command(
     "draw",
     short_help="Draw scenarios from above.",
-    epilog="Exit status: 0 success; 2 bad input, nothing written.",
+    examples=[
+        "awarenav scenario draw crossing_from_left --out left.svg",
+        "awarenav scenario draw all --out drawings",
+    ],
+    exit_status={0: "Success.", 2: "Bad input; nothing was written."},
+    epilog="The drawing needs matplotlib.",
 )
 @argument(
     "scenarios",
     nargs=-1,
     required=True,
     metavar="NAME|FILE...",
-    help="Scenarios, or 'all' shipped ones.",
+    shell_complete=options.COMPLETE_SCENARIOS,
+    help="Shipped scenarios, YAML files, or 'all' shipped ones.",
 )
-@option(
-    "--out",
-    default="scenario.png",
-    metavar="FILE.png|svg|pdf|DIR",
-    help="The drawing; for several scenarios a folder, with a PNG for each.",
+@options.out_file(
+    "scenario.png",
+    "The drawing; for several scenarios a folder, which gets a PNG of each.",
+    "FILE.png|svg|pdf|DIR",
 )
-def draw(scenarios: tuple[str, ...], out: str) -> int:
-    """Draw scenarios from above: hall, paths with times, and where people look.
+def draw(scenarios: tuple[str, ...], out: Path) -> int:
+    """Draw scenarios from above: hall, paths with times, and gaze.
 
-    Numbers that vary are at their medians; thin lines are paths of other episodes. Dots are 2 s
-    apart, sectors show where people look. Everybody stands where they would be 1.5 s before robot
-    and people are nearest.
+    Values that vary are at their medians; thin lines are the paths of other episodes. Dots are 2 s
+    apart; sectors show the directions of gaze. Robot and people stand where they are 1.5 s before
+    they come nearest to each other.
     """
     from ._show import draw_command  # noqa: PLC0415 - help needs no scenarios
 
-    return draw_command(scenarios, out)
+    return draw_command(scenarios, str(out))
 
 
 @command(
     "validate",
     short_help="Check scenario files.",
-    epilog="Exit status: 0 all can be run; 2 one cannot.",
+    examples=["awarenav scenario validate mine.yaml"],
+    exit_status={0: "All can be run.", 2: "One cannot be run."},
 )
-@argument("files", nargs=-1, required=True, metavar="NAME|FILE...", help="YAML files.")
+@argument(
+    "files",
+    nargs=-1,
+    required=True,
+    metavar="NAME|FILE...",
+    shell_complete=options.COMPLETE_SCENARIOS,
+    help="YAML files, or shipped scenarios.",
+)
 def validate(files: tuple[str, ...]) -> int:
-    """Check scenario files: keys and values over many draws, and whether anybody is in a rack.
+    """Check scenario files: keys, values over many draws, and that nobody stands in a rack.
 
-    Also warns where robot and people would hardly ever meet if nobody reacted.
+    Also warns if robot and people would hardly ever meet if nobody reacted.
     """
     from ._show import validate_command  # noqa: PLC0415 - help needs no scenarios
 
     return validate_command(files)
 
 
-for _each in (list_scenarios, show, draw, validate):
-    scenario.add_command(_each)
+for _command in (list_scenarios, show, draw, validate):
+    scenario.add_command(_command)

@@ -9,9 +9,19 @@ from awarenav.cli import POSITIVE, command, option, options
 
 @command(
     "falsify",
-    epilog="Killed or interrupted, the same command with --resume ends with the same result, with "
-    "any number of --workers. Exit status: 0 no contact that the robot caused; 1 some; 2 bad "
-    "input. Needs the extra 'bench'.",
+    examples=[
+        "awarenav falsify --policy mine.yaml --workers 8 --out worst",
+        "awarenav crossings --scenario worst/worst_001.yaml --policy mine.yaml",
+    ],
+    exit_status={
+        0: "The robot caused no contact.",
+        1: "The robot caused a contact.",
+        2: "Bad input.",
+        130: "Interrupted; the episodes so far are kept.",
+    },
+    epilog="A killed or interrupted search continues with the same command and --resume, and ends "
+    "with the same result, whatever --workers is. Needs the extra 'bench': pip install "
+    "'awarenav[bench]'.",
 )
 @options.policy()
 @options.scenarios("that have a planner and people")
@@ -20,23 +30,24 @@ from awarenav.cli import POSITIVE, command, option, options
     type=POSITIVE,
     default=2000,
     metavar="N",
-    help="Episodes at least: half for all scenarios alike, the rest for the worst third.",
+    help="Least number of episodes: half of them are spread over all scenarios, the other half "
+    "over the worst third.",
 )
 @option(
     "--generation",
     type=POSITIVE,
     default=12,
     metavar="N",
-    help="Episodes in a generation of the search.",
+    help="Episodes that are proposed together.",
 )
 @option(
     "--people",
     type=POSITIVE,
     default=2,
     metavar="N",
-    help="How many people of a scenario are varied.",
+    help="Number of people of a scenario that are varied.",
 )
-@option("--worst", type=POSITIVE, default=10, metavar="N", help="Cases to write.")
+@option("--worst", type=POSITIVE, default=10, metavar="N", help="Number of cases to write.")
 @options.perception()
 @options.camera()
 @options.planner()
@@ -44,21 +55,21 @@ from awarenav.cli import POSITIVE, command, option, options
     "--unsafe-no-floor",
     is_flag=True,
     excludes="--planner",
-    help="UNSAFE, in the simulation only: take the adapter's radii and speed limits away from the "
-    "reference planner, to check that the search finds the effect.",
+    help="UNSAFE, for the simulation only: the reference planner ignores the adapter's radii and "
+    "speed limits. Checks that the search finds the contacts.",
 )
-@options.seed("search and episodes")
+@options.seed()
 @options.workers(1)
 @options.out_folder("falsify")
 @options.resume()
 @options.as_json()
 def falsify(**values: Any) -> int:
-    """Search for the situations in which your policy does worst.
+    """Search for the situations in which a policy does worst.
 
     Varies start, path, speed, pauses, gaze and reactions of a scenario's people, within human
-    limits, for the smallest separation margin while the robot moves. Writes worst_001.yaml and so
-    on, which `awarenav crossings --scenario` runs again, episodes.csv, falsify.png, summary.json
-    and the studies.
+    limits, and looks for the smallest separation margin while the robot moves. Writes
+    worst_001.yaml and so on (`awarenav crossings --scenario` runs them again), episodes.csv,
+    falsify.png, summary.json and the studies.
     """
     from ._run import FalsifyOptions, falsify_command  # noqa: PLC0415 - help needs no simulator
 

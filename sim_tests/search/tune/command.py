@@ -9,9 +9,18 @@ from awarenav.cli import POSITIVE, FilePath, OneOf, command, option, options
 
 @command(
     "tune",
-    epilog="Killed or interrupted, the same command with --resume ends with the same study; run in "
-    "several terminals at once, they share the trials. Exit status: 0 success; 2 bad input. Needs "
-    "the extra 'bench'.",
+    examples=[
+        "awarenav tune --trials 200 --workers 8 --out tuning",
+        "awarenav tune --policy mine.yaml --ranges ranges.yaml --scenario blind_corner",
+    ],
+    exit_status={
+        0: "Success.",
+        2: "Bad input.",
+        130: "Interrupted; the trials so far are kept.",
+    },
+    epilog="A killed or interrupted study continues with the same command and --resume, and ends "
+    "with the same result. Several processes that run the command with the same --out share the "
+    "trials. Needs the extra 'bench': pip install 'awarenav[bench]'.",
 )
 @options.policy()
 @options.scenarios("that have a planner")
@@ -19,35 +28,37 @@ from awarenav.cli import POSITIVE, FilePath, OneOf, command, option, options
     "--ranges",
     type=FilePath(),
     metavar="FILE",
-    help="YAML of the parameters to search and their ranges (default: the shipped ranges).",
+    show_default="the shipped ranges",
+    help="Parameters to search, and their ranges (YAML).",
 )
-@option("--trials", type=POSITIVE, default=60, metavar="N", help="Policies to try.")
+@option("--trials", type=POSITIVE, default=60, metavar="N", help="Number of policies to try.")
 @option(
     "--episodes",
     type=POSITIVE,
     default=5,
     metavar="N",
-    help="Tuning seeds, each run in every scenario.",
+    help="Tuning seeds; every trial runs each of them in every scenario.",
 )
 @option(
     "--held-out",
     type=POSITIVE,
     default=10,
     metavar="N",
-    help="Held-out seeds for presets and chosen policies.",
+    help="Held-out seeds, on which the presets and the chosen policies are compared.",
 )
 @option(
     "--generation",
     type=POSITIVE,
     default=6,
     metavar="N",
-    help="Trials proposed together; as many processes can share the work.",
+    help="Trials that are proposed together; so many processes can work at once.",
 )
 @option(
     "--sampler",
     type=OneOf(["tpe", "nsga2"]),
     default="tpe",
-    help="tpe for up to some hundred trials; nsga2 for more, with a --generation of about 20.",
+    help="Search method: tpe for up to a few hundred trials, nsga2 for more (with a --generation "
+    "of about 20).",
 )
 @options.perception()
 @options.camera()
@@ -58,11 +69,11 @@ from awarenav.cli import POSITIVE, FilePath, OneOf, command, option, options
 @options.resume()
 @options.as_json()
 def tune(**values: Any) -> int:
-    """Search the numbers of a policy for little time lost and little margin violated.
+    """Search for policies that lose less time and keep the separation margin.
 
-    Trials with a contact that the robot caused are not chosen. Writes study.db, trials.csv,
-    pareto.png, importances.json, chosen.json, and chosen/*.yaml with their figures on held-out
-    seeds.
+    Varies the numbers of --policy. A policy with which the robot caused a contact is not chosen.
+    Writes study.db, trials.csv, pareto.png, importances.json, chosen.json, and chosen/*.yaml with
+    their results on the held-out seeds.
     """
     from ._run import TuneOptions, tune_command  # noqa: PLC0415 - help needs no simulator
 

@@ -4,11 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
-from awarenav.cli import FilePath, argument, command, option, options
+from awarenav.cli import NUMBER, FilePath, argument, command, option, options
 
 
 @command(
-    "compare", epilog="docs/metrics.md defines every figure. Exit status: 0 success; 2 bad input."
+    "compare",
+    examples=[
+        "awarenav compare crossings",
+        "awarenav compare monday tuesday --baseline balanced --out both.csv",
+    ],
+    exit_status={0: "Success.", 2: "Bad input."},
+    epilog="docs/metrics.md defines every metric.",
 )
 @argument(
     "runs",
@@ -16,23 +22,23 @@ from awarenav.cli import FilePath, argument, command, option, options
     required=True,
     type=FilePath(),
     metavar="DIR|FILE...",
-    help="Folders with an episodes.csv, or such files, also as .parquet.",
+    help="Folders of runs, or files episodes.csv or .parquet.",
 )
-@option("--baseline", default="blind", metavar="NAME", help="Policy that others are compared with.")
+@option("--baseline", default="blind", metavar="NAME", help="Policy to compare with.")
 @option(
     "--level",
-    type=float,
+    type=NUMBER,
     default=0.95,
     metavar="X",
-    help="Confidence of the intervals, between 0 and 1.",
+    help="Confidence level of the intervals, between 0 and 1.",
 )
-@options.seed("the bootstrap")
-@options.out_file(None, "Also write the episodes of all runs into one .csv or .parquet file.")
+@options.seed(" They are those of the bootstrap.")
+@options.out_file(None, "Also write the episodes of all runs into one file.", "FILE.csv|parquet")
 @options.as_json("the summary")
 def compare(**values: Any) -> int:
-    """Print success, time lost, contacts and separation of every policy, with intervals.
+    """Print success, time lost, contacts and separation per policy, with confidence intervals.
 
-    Every policy is compared with the baseline on the same scenarios and seeds. A run may be
+    Compares every policy with the baseline on the same scenarios and seeds. A run may be
     unfinished.
     """
     from ._compare import CompareOptions, compare_command  # noqa: PLC0415 - help needs no statistics

@@ -4,24 +4,30 @@ from __future__ import annotations
 
 from typing import Any
 
-from awarenav.cli import FolderPath, argument, command, option
+from awarenav.cli import FolderPath, argument, command, option, options
 
 
-@command("replay", epilog="Exit status: 0 the same row; 1 another row; 2 bad input.")
-@argument("folder", type=FolderPath(), metavar="DIR", help="Folder of the run.")
+@command(
+    "replay",
+    examples=["awarenav replay run 12", "awarenav replay run blind_corner:3:balanced --no-video"],
+    exit_status={
+        0: "The episode gives the same row as before.",
+        1: "The episode gives another row.",
+        2: "Bad input.",
+    },
+)
+@argument("folder", type=FolderPath(), metavar="DIR", help="Folder of `awarenav crossings --out`.")
 @argument(
     "episode",
-    help="Its number, counted from 0 in the order of episodes.csv and jobs.jsonl; or "
-    "SCENARIO:SEED:POLICY, followed by :PLANNER and :FAULT where that is not enough.",
+    help="The number of the episode in episodes.csv, from 0; or SCENARIO:SEED:POLICY, followed by "
+    ":PLANNER and :FAULT if the run has several.",
 )
-@option(
-    "--out", type=FolderPath(), metavar="DIR", help="Folder of the pictures (default: DIR/replays)."
-)
-@option("--no-video", is_flag=True, help="Draw the map only (faster).")
+@options.out_folder(None, "Folder of the video and the map.", show_default="DIR/replays")
+@option("--no-video", is_flag=True, help="Draw only the map (faster).")
 def replay(**values: Any) -> int:
     """Run one episode of a run again, film it and draw it from above.
 
-    Says whether the episode gives the same row as before.
+    Prints whether the episode gives the same row as before.
     """
     from ._replay import ReplayOptions, replay_command  # noqa: PLC0415 - help needs no simulator
 

@@ -18,10 +18,10 @@ from paths import ROOT
 pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
 pytest.importorskip("mcap", reason="the extra ros2 is not installed")
 
-from bridge_picture import Picture, odometry, rendered
+from rendered_image import RenderedImage, odometry, rendered
 from rosbags.highlevel import AnyReader
 
-from awarenav.bridge._run import Outlet
+from awarenav.bridge import TopicPublisher
 from awarenav.cli import main
 from nav_adapter import AwarenessPolicy
 from nav_adapter.ros2 import (
@@ -42,7 +42,7 @@ CORES = 2
 
 
 @pytest.fixture(scope="module")
-def picture(tmp_path_factory: pytest.TempPathFactory) -> Picture:
+def scene(tmp_path_factory: pytest.TempPathFactory) -> RenderedImage:
     pytest.importorskip("pybullet", reason="the extra sim is not installed")
     return rendered(tmp_path_factory.mktemp("render"))
 
@@ -87,18 +87,20 @@ def command(domain: int, *arguments: str) -> list[str]:
     return [sys.executable, "-m", "awarenav", "bridge", "--domain", str(domain), *arguments]
 
 
-def drive(robot: DdsNode, picture: Picture, heard: dict, done, *, compressed: bool = False) -> bool:
+def drive(
+    robot: DdsNode, scene: RenderedImage, heard: dict, done, *, compressed: bool = False
+) -> bool:
     """Send frames until ``done``, with what Nav2 hears in ``heard``."""
-    robot.publish(READ["tf_static"], picture.mounted())
+    robot.publish(READ["tf_static"], scene.mounted())
     end = time.monotonic() + PATIENCE_S
     while time.monotonic() < end:
         now = time.time()
         robot.publish(READ["odom"], odometry(now))
-        robot.publish(READ["camera_info"], picture.info(now))
+        robot.publish(READ["camera_info"], scene.info(now))
         if compressed:
-            robot.publish(READ["compressed"], picture.compressed(now))
+            robot.publish(READ["compressed"], scene.compressed(now))
         else:
-            robot.publish(READ["image"], picture.image(now))
+            robot.publish(READ["image"], scene.image(now))
         time.sleep(0.04)
         for key, topic in PUBLISHED.items():
             heard[key] += robot.take(topic)
@@ -109,10 +111,10 @@ def drive(robot: DdsNode, picture: Picture, heard: dict, done, *, compressed: bo
 
 @pytest.mark.slow
 @pytest.mark.parametrize("compressed", [False, True], ids=["raw", "compressed"])
-def test_an_image_on_dds_comes_back_as_a_person_and_a_speed_limit(
+def test_an_image_on_dds_gives_a_person_and_a_speed_limit(
     robot: DdsNode,
     domain: int,
-    picture: Picture,
+    scene: RenderedImage,
     robot_without_mount: Path,
     tmp_path: Path,
     compressed: bool,
@@ -129,7 +131,7 @@ def test_an_image_on_dds_comes_back_as_a_person_and_a_speed_limit(
 
     with subprocess.Popen(command(domain, *arguments), stderr=subprocess.PIPE, text=True) as bridge:
         try:
-            assert drive(robot, picture, heard, confirmed, compressed=compressed)
+            assert drive(robot, scene, heard, confirmed, compressed=compressed)
             bridge.send_signal(signal.SIGINT)
             _, said = bridge.communicate(timeout=PATIENCE_S)
         finally:
@@ -137,7 +139,7 @@ def test_an_image_on_dds_comes_back_as_a_person_and_a_speed_limit(
     # Before anything was known it stood still; then the person limits it; last it stands again.
     assert heard["speed_limit"][0].speed_limit == SLOWEST_MPS
     (person,) = heard["people"][-1].people
-    assert np.hypot(*(np.array([person.position.x, person.position.y]) - picture.place_m)) < 0.35
+    assert np.hypot(*(np.array([person.position.x, person.position.y]) - scene.place_m)) < 0.35
     assert SLOWEST_MPS < heard["speed_limit"][-1].speed_limit < 1.5
     (found,) = heard["detections"][-1].detections
     assert found.id == person.name
@@ -154,20 +156,20 @@ def test_an_image_on_dds_comes_back_as_a_person_and_a_speed_limit(
 
 
 @pytest.mark.slow
-def test_a_frame_costs_less_than_two_cores_have_at_fifteen_hertz(picture: Picture) -> None:
+def test_a_frame_costs_less_than_two_cores_have_at_fifteen_hertz(scene: RenderedImage) -> None:
     robot = RobotFile.from_yaml(ROBOT)
     sent: list = []
     bridge = AwarenessBridge(
         AwarenessPolicy.preset("balanced"),
         robot.profile(),
         lambda key, message: sent.append(encode(message)),
-        T_base_camera=picture.T_base_camera,
-        camera=picture.camera,
+        T_base_camera=scene.T_base_camera,
+        camera=scene.camera,
     )
     costs_s = []
     for tick in range(25):
         now = 1000.0 + tick / RATE_HZ
-        frame = picture.image(now)
+        frame = scene.image(now)
         began_s = time.process_time()
         bridge.on_odometry(odometry(now))
         assert bridge.on_image(frame, now)
@@ -178,27 +180,29 @@ def test_a_frame_costs_less_than_two_cores_have_at_fifteen_hertz(picture: Pictur
     assert bridge.tracks[0].status == "confirmed"
 
 
-def test_only_what_somebody_hears_or_records_is_wanted(domain: int, tmp_path: Path) -> None:
+def test_only_messages_with_a_subscriber_or_a_recorder_are_wanted(
+    domain: int, tmp_path: Path
+) -> None:
     node, other = DdsNode(domain), DdsNode(domain)
     try:
-        outlet = Outlet(node, PUBLISHED, None)
-        # A latched topic must hold its last message for whoever comes.
-        assert {key for key in PUBLISHED if outlet.wants(key)} == {"grid"}
-        assert not outlet.wants("left out")
+        publisher = TopicPublisher(node, PUBLISHED, None)
+        # A latched topic must keep its last message for later subscribers.
+        assert {key for key in PUBLISHED if publisher.wants(key)} == {"grid"}
+        assert not publisher.wants("left out")
         other.subscribe(PUBLISHED["people"])
         end = time.monotonic() + PATIENCE_S
-        while not outlet.wants("people") and time.monotonic() < end:
+        while not publisher.wants("people") and time.monotonic() < end:
             time.sleep(0.01)
-        assert {key for key in PUBLISHED if outlet.wants(key)} == {"grid", "people"}
+        assert {key for key in PUBLISHED if publisher.wants(key)} == {"grid", "people"}
         with McapRecorder(tmp_path / "all.mcap") as recorder:
-            recorded = Outlet(node, PUBLISHED, recorder)
+            recorded = TopicPublisher(node, PUBLISHED, recorder)
             assert all(recorded.wants(key) for key in PUBLISHED)
     finally:
         other.close()
         node.close()
 
 
-def test_sigterm_ends_it_well_too(domain: int) -> None:
+def test_sigterm_ends_the_bridge_with_a_stop(domain: int) -> None:
     with subprocess.Popen(
         command(domain, "--robot", str(ROBOT)), stderr=subprocess.PIPE, text=True
     ) as bridge:
@@ -249,7 +253,7 @@ def test_a_domain_in_the_environment_that_is_no_number_is_refused(
     assert "ROS_DOMAIN_ID must be a number" in capsys.readouterr().err
 
 
-def test_a_while_without_a_robot_ends_by_itself(
+def test_the_bridge_ends_after_its_seconds_without_a_robot(
     domain: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     recording = tmp_path / "quiet.mcap"

@@ -9,9 +9,9 @@ from paths import ROOT
 pytest.importorskip("rerun", reason="the extra viz is not installed")
 pytest.importorskip("pybullet", reason="the extra sim is not installed")
 
-from bridge_picture import odometry, rendered
+from rendered_image import odometry, rendered
 
-from awarenav.bridge._rerun import RerunRecorder, _cone
+from awarenav.bridge import RerunRecorder, cone_lines
 from awarenav.errors import AwarenavError
 from awarenav.estimate import RecordingPoseEstimator
 from nav_adapter import AwarenessPolicy
@@ -21,25 +21,24 @@ from perception import AttentionCone, AwarenessPipeline, shipped
 ROBOT = ROOT / "docs" / "nav2" / "robot.yaml"
 
 
-def test_a_rerun_recording_has_what_was_seen_and_said(tmp_path: Path) -> None:
-
+def test_a_rerun_recording_has_inputs_and_outputs_of_the_bridge(tmp_path: Path) -> None:
     path = tmp_path / "run.rrd"
-    picture = rendered(tmp_path / "render")
-    tap = RecordingPoseEstimator(shipped.shipped_pose_estimator(None))
+    scene = rendered(tmp_path / "render")
+    pose_estimator = RecordingPoseEstimator(shipped.shipped_pose_estimator(None))
     head = shipped.shipped_head_pose_estimator(None)
     bridge = AwarenessBridge(
         AwarenessPolicy.preset("balanced"),
         RobotFile.from_yaml(ROBOT).profile(),
         lambda key, message: None,
-        T_base_camera=picture.T_base_camera,
-        camera=picture.camera,
-        make_pipeline=lambda camera: AwarenessPipeline(camera, None, tap, head),
+        T_base_camera=scene.T_base_camera,
+        camera=scene.camera,
+        make_pipeline=lambda camera: AwarenessPipeline(camera, None, pose_estimator, head),
     )
-    with RerunRecorder(path, tap, AttentionCone().half_angle_rad) as recorder:
+    with RerunRecorder(path, pose_estimator, AttentionCone().half_angle_rad) as recorder:
         for tick in range(4):
             now = 1000.0 + 0.1 * tick
             bridge.on_odometry(odometry(now))
-            assert bridge.on_image(picture.image(now), now)
+            assert bridge.on_image(scene.image(now), now)
             recorder.draw(bridge, bridge.tick(now), frame=True)
     data = path.read_bytes()
     assert data.startswith(b"RRF")
@@ -54,10 +53,9 @@ def test_a_rerun_recording_has_what_was_seen_and_said(tmp_path: Path) -> None:
 
 
 def test_a_cone_is_drawn_about_the_gaze_with_its_half_angle() -> None:
-
     apex, gaze = np.array([1.0, 2.0, 1.6]), np.array([0.6, 0.0, 0.8])
     for direction in (gaze, np.array([0.0, 0.0, 1.0])):
-        rim, *edges, axis = _cone(apex, direction, np.pi / 3.0)
+        rim, *edges, axis = cone_lines(apex, direction, np.pi / 3.0)
         off = rim - apex
         assert np.allclose(np.linalg.norm(off, axis=1), 1.0)
         assert np.allclose(off @ direction, 0.5)
@@ -66,6 +64,6 @@ def test_a_cone_is_drawn_about_the_gaze_with_its_half_angle() -> None:
 
 
 def test_a_folder_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    tap = RecordingPoseEstimator(shipped.shipped_pose_estimator(None))
+    pose_estimator = RecordingPoseEstimator(shipped.shipped_pose_estimator(None))
     with pytest.raises(AwarenavError, match="there is no folder"):
-        RerunRecorder(tmp_path / "nowhere" / "run.rrd", tap, 1.0)
+        RerunRecorder(tmp_path / "nowhere" / "run.rrd", pose_estimator, 1.0)

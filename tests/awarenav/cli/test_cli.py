@@ -1,19 +1,22 @@
+"""``awarenav crossings`` and ``awarenav demo`` from the command line to their files."""
+
+from __future__ import annotations
+
 import csv
 
 import pytest
+from command_line import SHORT_SCENARIO
 
 from awarenav.cli import main
-from sim_tests.demo._tables import ENCOUNTER_COLUMNS
 from sim_tests.study.measures import RECORD_COLUMNS
 
-SHORT = """
-name: short
-description: Two seconds.
-duration_s: 2.0
-robot: {goal_x_m: 1.0}
-workers:
-  - path: [{t_s: 0.0, x_m: 3.0, y_m: -1.0}]
-"""
+ENCOUNTER_COLUMNS = [
+    "t_s",
+    "perception",
+    "awareness",
+    "d_fwd_m",
+    "d_lat_m",
+]
 
 
 def rows(path):
@@ -32,9 +35,9 @@ def test_help_says_what_a_command_does(command, capsys):
         assert "--seed" in text
 
 
-def test_crossings_write_a_row_an_episode_with_paired_seeds(tmp_path, capsys):
+def test_crossings_write_one_row_per_episode_with_paired_seeds(tmp_path, capsys):
     scenario = tmp_path / "short.yaml"
-    scenario.write_text(SHORT)
+    scenario.write_text(SHORT_SCENARIO)
     out = tmp_path / "out"
     arguments = ["crossings", "--scenario", str(scenario), "--episodes", "2", "--seed", "7"]
     arguments += ["--workers", "1", "--no-report", "--out", str(out)]
@@ -56,11 +59,11 @@ def test_crossings_write_a_row_an_episode_with_paired_seeds(tmp_path, capsys):
     assert (out / "episodes.csv").read_bytes() == first
 
 
-def test_crossings_that_fail_are_said_and_the_others_are_there(tmp_path, capsys):
+def test_crossings_that_fail_are_reported_and_the_others_are_written(tmp_path, capsys):
     scenario = tmp_path / "short.yaml"
-    scenario.write_text(SHORT)
+    scenario.write_text(SHORT_SCENARIO)
     arguments = ["crossings", "--scenario", str(scenario), "--perception", "truth"]
-    arguments += ["--planner", "run_planners:Raises", "reference", "--policy", "blind"]
+    arguments += ["--planner", "failing_planner:Raises", "reference", "--policy", "blind"]
     arguments += ["--fault", "none", "misses_30", "--workers", "1", "--no-report"]
     assert main([*arguments, "--out", str(tmp_path / "out")]) == 1
     output = capsys.readouterr()
@@ -100,7 +103,7 @@ def test_demo_writes_its_tables_pictures_and_video(tmp_path, capsys):
     for line in ("awareness-blind", "aware, attentive worker", "aware, distracted worker"):
         assert line in text
     header, *body = rows(tmp_path / "encounter.csv")
-    assert tuple(header) == ENCOUNTER_COLUMNS
+    assert header == ENCOUNTER_COLUMNS
     assert len(body) == 3000
     assert {row[1] for row in body} == {"truth", "keypoints"}
     for picture in ("encounter.png", "crossings.png"):

@@ -10,13 +10,17 @@ import av
 import cv2
 import numpy as np
 import pytest
-from numbered_pictures import CAMERA, HEIGHT, WIDTH, NumberReader, numbered
+from numbered_images import CAMERA, HEIGHT, WIDTH, NumberReader, numbered
 
 from awarenav.cli import main
 from awarenav.errors import AwarenavError
-from awarenav.estimate import fixed_camera_pose
-from awarenav.estimate._camera import CameraChoice, scaled_camera
-from awarenav.estimate._run import EstimateOptions, estimate_command
+from awarenav.estimate import (
+    CameraChoice,
+    EstimateOptions,
+    estimate_command,
+    fixed_camera_pose,
+    scaled_camera,
+)
 from awarenav.estimate.command import estimate as command
 from awarenav.judge import judge_files
 from awarenav.records import read_records
@@ -53,7 +57,7 @@ def names(path: Path) -> list[str]:
     return [record["frame"] for record in read_records(path)]
 
 
-def test_a_folder_becomes_a_line_a_frame_in_the_schema_of_truth(tmp_path, capsys):
+def test_a_folder_becomes_one_line_per_frame_in_the_format_of_truth(tmp_path, capsys):
     out = tmp_path / "new" / "out.jsonl"
     reader = NumberReader()
     assert estimate(reader, folder(tmp_path / "set", 4), "--out", out) == 0
@@ -93,14 +97,14 @@ def test_a_video_is_estimated_and_drawn(tmp_path):
         assert len(list(video.decode(video=0))) == 12
 
 
-def test_every_and_frames_thin_out_the_source(tmp_path):
+def test_every_and_frames_select_frames_of_the_source(tmp_path):
     out = tmp_path / "out.jsonl"
     source = folder(tmp_path / "set", 10)
     assert estimate(NumberReader(), source, "--out", out, "--every", 3, "--frames", 3) == 0
     assert names(out) == ["000000.png", "000003.png", "000006.png"]
 
 
-def test_tracks_give_people_an_identity(tmp_path):
+def test_tracks_give_people_an_id(tmp_path):
     out = tmp_path / "out.jsonl"
     assert estimate(NumberReader(), film(tmp_path / "a.mp4", 10), "--out", out, "--tracks") == 0
     records = read_records(out)
@@ -116,7 +120,7 @@ def test_tracks_give_people_an_identity(tmp_path):
     assert np.array(last["T_odom_camera"]).shape == (4, 4)
 
 
-def test_what_is_there_is_neither_replaced_nor_mixed(tmp_path):
+def test_an_existing_file_is_neither_replaced_nor_mixed_with_other_settings(tmp_path):
     out = tmp_path / "out.jsonl"
     source = folder(tmp_path / "set", 4)
     assert estimate(NumberReader(), source, "--out", out, "--frames", 2) == 0
@@ -134,7 +138,7 @@ def test_what_is_there_is_neither_replaced_nor_mixed(tmp_path):
     assert names(out) == ["000000.png"]
 
 
-def test_a_line_that_was_cut_off_is_estimated_again(tmp_path):
+def test_a_frame_with_an_incomplete_line_is_estimated_again(tmp_path):
     out = tmp_path / "out.jsonl"
     source = folder(tmp_path / "set", 3)
     assert estimate(NumberReader(), source, "--out", out) == 0
@@ -146,7 +150,7 @@ def test_a_line_that_was_cut_off_is_estimated_again(tmp_path):
     assert out.read_bytes() == whole
 
 
-def test_ctrl_c_keeps_whole_lines_and_a_video_that_plays(tmp_path):
+def test_ctrl_c_keeps_complete_lines_and_a_playable_video(tmp_path):
     out, drawn = tmp_path / "out.jsonl", tmp_path / "drawn.mp4"
     reader = NumberReader(fail_at=(5,), error=KeyboardInterrupt())
     source = film(tmp_path / "a.mp4", 12)
@@ -166,7 +170,7 @@ def test_frames_that_cannot_be_read_or_estimated_are_named_and_the_rest_is_kept(
     assert estimate(reader, source, "--out", out) == 1
     assert names(out) == ["000000.png", "000004.png"]
     said = capsys.readouterr().err
-    for words in ("000001.png is no picture", "another aspect ratio", "the network gave NaN"):
+    for words in ("000001.png is not an image", "another aspect ratio", "the network gave NaN"):
         assert words in said
     assert "3 frames could not be read or estimated" in said
 
@@ -182,7 +186,7 @@ def test_a_run_in_which_nothing_works_ends_early_and_says_why(tmp_path):
         estimate(reader, source, "--out", tmp_path / "b.jsonl", "--frames", 2)
 
 
-def test_the_truth_beside_the_pictures_gives_no_people_away(tmp_path):
+def test_people_in_the_truth_beside_the_images_are_not_read(tmp_path):
     source = folder(tmp_path / "set", 3)
     pose = fixed_camera_pose(1.1).tolist()
     lines = [
@@ -203,7 +207,7 @@ def test_the_truth_beside_the_pictures_gives_no_people_away(tmp_path):
     assert np.array(records[0]["T_odom_camera"]) == pytest.approx(np.array(pose), abs=1e-6)
 
 
-def test_a_missing_calibration_is_assumed_and_said(tmp_path, capsys):
+def test_a_missing_calibration_is_assumed_and_reported(tmp_path, capsys):
     source = folder(tmp_path / "set", 2, camera=None)
     assert estimate(NumberReader(), source, "--out", tmp_path / "a.jsonl") == 0
     assert "field of view of 60 degrees is assumed" in capsys.readouterr().err
@@ -215,7 +219,7 @@ def test_a_missing_calibration_is_assumed_and_said(tmp_path, capsys):
     assert [r["people"] for r in first] == [r["people"] for r in second]
 
 
-def test_a_scaled_camera_sees_what_the_scaled_picture_shows():
+def test_a_scaled_camera_fits_the_scaled_image():
     camera = Camera(640, 480, 500.0, 510.0, 322.0, 236.0, np.array([-0.2, 0.05, 0.001, 0.002, 0.0]))
     half = scaled_camera(camera, 320, 240)
     points = np.random.default_rng(0).uniform([-1, -1, 2], [1, 1, 5], (20, 3))
@@ -231,7 +235,7 @@ def test_a_scaled_camera_sees_what_the_scaled_picture_shows():
 
 
 @pytest.mark.parametrize("pitch_deg", [0.0, 12.0, -5.0])
-def test_a_standing_camera_looks_where_it_is_pointed(pitch_deg):
+def test_a_fixed_camera_has_its_height_and_pitch(pitch_deg):
     pose = fixed_camera_pose(1.3, pitch_deg)
     forward, down = pose[:3, 2], pose[:3, 1]
     angle = math.radians(pitch_deg)
@@ -267,7 +271,7 @@ def test_bad_input_is_one_line_and_exit_status_2(tmp_path, capsys, arguments, me
     assert not out.exists()
 
 
-def test_a_network_that_is_none_is_refused_before_anything_is_written(tmp_path, capsys):
+def test_a_damaged_network_is_refused_before_anything_is_written(tmp_path, capsys):
     source = folder(tmp_path / "set", 1)
     network = tmp_path / "cut.onnx"
     network.write_bytes(b"\x08\x07 cut off")

@@ -1,4 +1,4 @@
-"""Where frames come from: files, folders, videos, cameras, recordings."""
+"""Sources of frames: files, folders, videos and cameras; and the threads that read them."""
 
 from __future__ import annotations
 
@@ -9,14 +9,19 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from numbered_pictures import number_of, numbered
+from numbered_images import number_of, numbered
 
 from awarenav.errors import AwarenavError
-from awarenav.estimate._open_source import open_source
-from awarenav.estimate._source import SourceFrame, as_rgb, read_picture
-from awarenav.estimate._source_pictures import PictureSource
-from awarenav.estimate._source_video import VideoSource
-from awarenav.estimate._threads import ReadAhead, WriteBehind
+from awarenav.estimate import (
+    BackgroundWorker,
+    FramePrefetcher,
+    ImageFiles,
+    SourceFrame,
+    VideoSource,
+    as_rgb,
+    open_source,
+    read_image,
+)
 from awarenav.video import VideoWriter
 from perception import Camera
 
@@ -24,8 +29,8 @@ RED = np.zeros((4, 6, 3), np.uint8)
 RED[..., 0], RED[..., 1] = 200, 16
 
 
-def save(path: Path, picture: np.ndarray) -> Path:
-    assert cv2.imwrite(str(path), picture)
+def save(path: Path, image: np.ndarray) -> Path:
+    assert cv2.imwrite(str(path), image)
     return path
 
 
@@ -37,7 +42,7 @@ def film(path: Path, count: int, rate_hz: int = 12) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("picture", "expected"),
+    ("image", "expected"),
     [
         (RED[..., ::-1], RED),
         (np.dstack([RED[..., ::-1], np.zeros((4, 6), np.uint8)]), RED),
@@ -46,33 +51,33 @@ def film(path: Path, count: int, rate_hz: int = 12) -> Path:
     ],
     ids=["colour", "transparent", "grey", "16 bits"],
 )
-def test_every_kind_of_picture_becomes_rgb(tmp_path, picture, expected):
-    assert np.array_equal(read_picture(save(tmp_path / "a.png", picture)), expected)
+def test_every_kind_of_image_becomes_rgb(tmp_path, image, expected):
+    assert np.array_equal(read_image(save(tmp_path / "a.png", image)), expected)
 
 
 @pytest.mark.parametrize(
     "array",
     [np.zeros((4, 4), np.float32), np.zeros((4, 4, 2), np.uint8), np.zeros((0, 4), np.uint8)],
 )
-def test_arrays_that_are_no_picture_are_refused(array):
+def test_arrays_that_are_not_images_are_refused(array):
     with pytest.raises(AwarenavError, match="8 or 16 bits, got"):
         as_rgb(array, "it")
 
 
-@pytest.mark.parametrize("data", [b"", b"no picture", b"\x89PNG\r\n\x1a\n"])
-def test_files_that_are_no_picture_are_refused_by_name(tmp_path, data):
+@pytest.mark.parametrize("data", [b"", b"not an image", b"\x89PNG\r\n\x1a\n"])
+def test_files_that_are_not_images_are_refused_by_name(tmp_path, data):
     path = tmp_path / "a.png"
     path.write_bytes(data)
     with pytest.raises(AwarenavError, match=r"a\.png"):
-        read_picture(path)
+        read_image(path)
 
 
 def test_a_folder_is_read_in_the_order_of_its_numbers(tmp_path):
     for number in (10, 9, 1):
         save(tmp_path / f"shot{number}.png", numbered(number))
     save(tmp_path / "contact_sheet.png", numbered(0))
-    (tmp_path / "notes.txt").write_text("no picture")
-    source = PictureSource(tmp_path, interval_s=0.5)
+    (tmp_path / "notes.txt").write_text("not an image")
+    source = ImageFiles(tmp_path, interval_s=0.5)
     frames = list(source.frames())
     assert [frame.name for frame in frames] == ["shot1.png", "shot9.png", "shot10.png"]
     assert [number_of(frame.image_rgb) for frame in frames] == [1, 9, 10]
@@ -81,7 +86,7 @@ def test_a_folder_is_read_in_the_order_of_its_numbers(tmp_path):
     assert source.camera is None
 
 
-def test_a_rendered_set_tells_stamps_poses_and_camera_but_never_people(tmp_path):
+def test_a_rendered_set_gives_stamps_poses_and_camera_but_not_people(tmp_path):
     camera = Camera.from_fov(64, 48, 1.0)
     camera.to_yaml(tmp_path / "camera.yaml")
     save(tmp_path / "000000.png", numbered(0))
@@ -89,19 +94,19 @@ def test_a_rendered_set_tells_stamps_poses_and_camera_but_never_people(tmp_path)
     pose[2, 3] = 1.4
     record = {"frame": "000000.png", "stamp_s": 7.5, "T_odom_camera": pose.tolist()}
     (tmp_path / "truth.jsonl").write_text(json.dumps({**record, "people": "not for us"}) + "\n")
-    source = PictureSource(tmp_path)
+    source = ImageFiles(tmp_path)
     (frame,) = source.frames()
     assert frame.stamp_s == 7.5
     assert np.array_equal(frame.T_odom_camera, pose)
     assert np.array_equal(source.camera.matrix, camera.matrix)
 
 
-def test_a_picture_that_cannot_be_read_is_a_problem_of_its_own(tmp_path):
+def test_an_image_that_cannot_be_read_is_a_frame_with_a_problem(tmp_path):
     for number in range(3):
         save(tmp_path / f"{number}.png", numbered(number))
     whole = (tmp_path / "1.png").read_bytes()
     (tmp_path / "1.png").write_bytes(whole[: len(whole) // 3])
-    frames = list(PictureSource(tmp_path).frames())
+    frames = list(ImageFiles(tmp_path).frames())
     assert [frame.image_rgb is None for frame in frames] == [False, True, False]
     assert "1.png" in frames[1].problem
 
@@ -166,11 +171,11 @@ def test_a_camera_that_is_unplugged_is_a_problem_after_its_last_frame(tmp_path):
     [
         ("absent.mp4", r"no such file.*did you mean .*absent\.mov"),
         ("absent.mov", "cannot open video"),
-        ("empty", "holds no picture"),
+        ("empty", "has no image"),
         ("99", "cannot open camera"),
     ],
 )
-def test_sources_that_are_none_are_refused(tmp_path, name, message):
+def test_sources_that_cannot_be_opened_are_refused(tmp_path, name, message):
     (tmp_path / "absent.mov").write_bytes(b"no video")
     (tmp_path / "empty").mkdir()
     with pytest.raises(AwarenavError, match=message):
@@ -184,7 +189,7 @@ def test_a_topic_is_for_recordings(tmp_path):
 
 
 class Counting:
-    """A source of numbered pictures that may wait for a sign, or fail."""
+    """A source of numbered images that may wait for a sign, or fail."""
 
     camera = rate_hz = None
 
@@ -217,25 +222,25 @@ class Counting:
         ({"every": 20, "limit": 2}, (0, 20)),
     ],
 )
-def test_reading_ahead_keeps_every_frame_in_order(options, names):
+def test_prefetching_keeps_every_frame_in_order(options, names):
     source = Counting(50)
-    with ReadAhead(source, **options) as frames:
+    with FramePrefetcher(source, **options) as frames:
         assert [frame.name for frame in frames] == [str(number) for number in names]
     assert source.closed
 
 
-def test_reading_ahead_stays_a_few_frames_ahead_and_stops_when_told():
+def test_prefetching_stays_a_few_frames_ahead_and_stops_when_closed():
     source = Counting(1000)
-    with ReadAhead(source) as frames:
+    with FramePrefetcher(source) as frames:
         next(iter(frames))
     assert source.closed
     assert source.made < 20
 
 
-def test_what_goes_wrong_in_reading_is_raised_after_the_frames_before_it():
+def test_an_error_of_the_source_is_raised_after_the_frames_before_it():
     source = Counting(3, error=AwarenavError("the cable"))
     names = []
-    with pytest.raises(AwarenavError, match="the cable"), ReadAhead(source) as frames:
+    with pytest.raises(AwarenavError, match="the cable"), FramePrefetcher(source) as frames:
         names.extend(frame.name for frame in frames)
     assert names == ["0", "1", "2"]
     assert source.closed
@@ -243,14 +248,14 @@ def test_what_goes_wrong_in_reading_is_raised_after_the_frames_before_it():
 
 def test_a_live_source_gives_its_newest_frame():
     source = Counting(100, live=True)
-    with ReadAhead(source) as frames:
+    with FramePrefetcher(source) as frames:
         assert source.go_on.wait(10.0)
         assert [frame.name for frame in frames][-1] == "99"
 
 
-def test_work_is_done_in_order_and_its_error_comes_back():
+def test_background_work_is_done_in_order_and_its_error_is_raised():
     done: list[int] = []
-    with WriteBehind(done.append) as behind:
+    with BackgroundWorker(done.append) as behind:
         for number in range(100):
             behind.put(number)
     assert done == list(range(100))
@@ -259,10 +264,10 @@ def test_work_is_done_in_order_and_its_error_comes_back():
         raise OSError("disk full")
 
     with pytest.raises(OSError, match="disk full"):
-        hand_over(WriteBehind(fail), 100)
+        hand_over(BackgroundWorker(fail), 100)
 
 
-def hand_over(behind: WriteBehind[int], count: int) -> None:
+def hand_over(behind: BackgroundWorker[int], count: int) -> None:
     with behind:
         for number in range(count):
             behind.put(number)

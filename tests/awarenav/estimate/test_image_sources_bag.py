@@ -8,10 +8,10 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from numbered_pictures import number_of, numbered
+from numbered_images import number_of, numbered
 
 from awarenav.errors import AwarenavError
-from awarenav.estimate._open_source import open_source
+from awarenav.estimate import open_source
 
 pytest.importorskip("rosbags", reason="the extra 'rosbag' is not installed")
 
@@ -30,10 +30,10 @@ def header(stamp_ns: int) -> Any:
     return TYPES["std_msgs/msg/Header"](time, "camera")
 
 
-def image(picture: np.ndarray, encoding: str, stamp_ns: int, *, padding: int = 0) -> Any:
-    rows = np.ascontiguousarray(picture).view(np.uint8).reshape(picture.shape[0], -1)
+def image(pixels: np.ndarray, encoding: str, stamp_ns: int, *, padding: int = 0) -> Any:
+    rows = np.ascontiguousarray(pixels).view(np.uint8).reshape(pixels.shape[0], -1)
     rows = np.pad(rows, ((0, 0), (0, padding)))
-    height, width = picture.shape[:2]
+    height, width = pixels.shape[:2]
     return TYPES[IMAGE](
         header(stamp_ns), height, width, encoding, 0, rows.shape[1], rows.reshape(-1)
     )
@@ -64,13 +64,13 @@ def stamps(count: int) -> list[int]:
 
 @pytest.mark.parametrize("plugin", [StoragePlugin.SQLITE3, StoragePlugin.MCAP])
 @pytest.mark.parametrize("inside", [False, True], ids=["folder", "file"])
-def test_pictures_stamps_and_camera_come_from_the_recording(tmp_path, plugin, inside):
+def test_images_stamps_and_camera_come_from_the_recording(tmp_path, plugin, inside):
     late_ns = 7_000_000  # between the header's stamp and the recorder's
-    pictures = [(t + late_ns, image(numbered(k), "rgb8", t)) for k, t in enumerate(stamps(6))]
+    images = [(t + late_ns, image(numbered(k), "rgb8", t)) for k, t in enumerate(stamps(6))]
     path = record(
         tmp_path / "bag",
         {
-            "/front/image_raw": (IMAGE, pictures),
+            "/front/image_raw": (IMAGE, images),
             "/front/camera_info": (INFO, [(t, camera_info(t)) for t in stamps(2)]),
         },
         plugin,
@@ -134,7 +134,7 @@ def test_a_bayer_mosaic_gets_its_colours_back(tmp_path):
         assert np.array_equal(frame.image_rgb[4, 4], (red, green, blue)), pattern
 
 
-def test_compressed_pictures_are_decoded(tmp_path):
+def test_compressed_images_are_decoded(tmp_path):
     messages = []
     for number, stamp_ns in enumerate(stamps(3)):
         _, data = cv2.imencode(".jpg", numbered(number))
@@ -164,7 +164,7 @@ def test_one_of_several_topics_has_to_be_chosen(tmp_path):
     source.close()
 
 
-def test_recordings_that_hold_no_pictures_or_are_none_are_refused(tmp_path):
+def test_recordings_without_images_and_other_files_are_refused(tmp_path):
     path = record(tmp_path / "bag", {"/camera_info": (INFO, [(10**9, camera_info(10**9))])})
     with pytest.raises(AwarenavError, match="no topic of type"):
         open_source(str(path))
@@ -174,7 +174,7 @@ def test_recordings_that_hold_no_pictures_or_are_none_are_refused(tmp_path):
             open_source(str(tmp_path / name))
 
 
-def test_a_picture_shorter_than_it_says_is_a_problem_of_its_own(tmp_path):
+def test_an_image_with_too_few_bytes_is_a_frame_with_a_problem(tmp_path):
     short = image(numbered(0), "rgb8", 10**9)
     short.data = short.data[:100]
     odd = image(numbered(0), "16SC1", 10**9)

@@ -1,4 +1,4 @@
-"""What is drawn into a picture says what was estimated, whatever the picture."""
+"""Drawings of estimates, for every kind of estimate and image."""
 
 from __future__ import annotations
 
@@ -12,16 +12,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numbered_pictures import CAMERA, HEIGHT, WIDTH, numbered, standing_at
+from numbered_images import CAMERA, HEIGHT, WIDTH, numbered, standing_at
 
-from awarenav import drawing as _ink
-from awarenav.drawing import Lettering, awareness_colour
+from awarenav import drawing
+from awarenav.drawing import Font, awareness_colour
 from awarenav.errors import AwarenavError
-from awarenav.estimate import _overlay
-from awarenav.estimate._estimator import FrameEstimate
-from awarenav.estimate._overlay import draw_overlay
-from awarenav.estimate._overlay_file import OverlayFile, fit
-from awarenav.estimate._source import SourceFrame
+from awarenav.estimate import FrameEstimate, OverlayWriter, SourceFrame, draw_overlay, fit_image
+from awarenav.estimate._overlay import _draw_label, _Person
 from perception import AttentionCone, Camera, PersonKeypoints, PersonObservation
 from tracking import PersonTrack
 
@@ -58,7 +55,7 @@ def estimate(*observations, keypoints=None, image=GREY, camera=CAMERA, tracks=No
     )
 
 
-def test_a_new_picture_is_drawn_and_the_old_one_is_left():
+def test_the_overlay_is_a_new_image_and_the_old_one_is_unchanged():
     before = GREY.copy()
     drawn = draw_overlay(estimate(observed(), keypoints=(standing_at(0.0, 3.0),)), CONE)
     assert np.array_equal(GREY, before)
@@ -69,7 +66,7 @@ def test_a_new_picture_is_drawn_and_the_old_one_is_left():
 
 @pytest.mark.parametrize("alpha", [0.0, 0.3, 0.5, 1.0, None])
 def test_the_colour_of_the_box_is_alpha(alpha):
-    # Boxes count from the picture's corner: this edge is drawn along the middle of row 200.
+    # Boxes count from the image's corner: this edge is drawn along the middle of row 200.
     seen = observed(alpha=alpha, gaze=None, box=np.array([100.5, 200.5, 300.5, 400.5]))
     image, camera = numbered(10, (640, 480)), Camera.from_fov(640, 480, 1.0)
     drawn = draw_overlay(estimate(seen, image=image, camera=camera), CONE).astype(int)
@@ -86,15 +83,14 @@ def test_red_means_unaware_and_green_aware():
     assert np.all(np.diff(shades[:, 0] - shades[:, 1]) <= 1)
 
 
-def test_plates_of_people_who_stand_together_do_not_cover_each_other():
+def test_labels_of_people_who_stand_together_do_not_cover_each_other():
     people = [observed(0.1 * k, 3.0 + 0.1 * k) for k in range(3)]
-    plates: list[tuple[int, int, int, int]] = []
-    letters = Lettering(18)
+    labels: list[tuple[int, int, int, int]] = []
+    font = Font(18)
     canvas = GREY.copy()
     for seen in people:
-        person = _overlay._Person(seen, None, None)
-        plates.append(_overlay._draw_figures(canvas, person, letters, plates, CAMERA))
-    for one, other in itertools.combinations(plates, 2):
+        labels.append(_draw_label(canvas, _Person(seen, None, None), font, labels, CAMERA))
+    for one, other in itertools.combinations(labels, 2):
         apart = one[2] <= other[0] or other[2] <= one[0] or one[3] <= other[1] or other[3] <= one[1]
         assert apart, (one, other)
 
@@ -113,7 +109,7 @@ finite = st.floats(-4.0, 4.0)
     box=st.tuples(*[st.floats(-500.0, 900.0)] * 4),
     size=st.sampled_from([(1, 1), (7, 5), (33, 31), (WIDTH, HEIGHT)]),
 )
-def test_whatever_was_estimated_can_be_drawn(x_m, z_m, yaw, pitch, alpha, std, box, size):
+def test_any_estimate_can_be_drawn(x_m, z_m, yaw, pitch, alpha, std, box, size):
     gaze = (math.cos(pitch) * math.sin(yaw), math.sin(pitch), math.cos(pitch) * math.cos(yaw))
     low, high = np.minimum(box[:2], box[2:]), np.maximum(box[:2], box[2:])
     seen = observed(x_m, z_m, alpha=alpha, std=std, gaze=gaze, box=np.concatenate([low, high]))
@@ -137,51 +133,51 @@ def test_a_person_without_a_box_or_behind_the_camera_does_no_harm():
 
 
 @pytest.mark.parametrize("plain", [False, True], ids=["as installed", "OpenCV 4"])
-def test_letters_take_the_room_that_they_say(plain, monkeypatch):
+def test_text_is_as_large_as_its_font_says(plain, monkeypatch):
     if plain:  # OpenCV 4 has no typefaces but Hershey's
-        monkeypatch.setattr(_ink, "_typeface", lambda: None)
-    letters = Lettering(18)
+        monkeypatch.setattr(drawing, "_typeface", lambda: None)
+    font = Font(18)
     text = "α 0.34 ± 0.05"
     canvas = np.zeros((40, 300, 3), np.uint8)
-    letters.write(canvas, text, (10, 10), (255, 255, 255))
+    font.write(canvas, text, (10, 10), (255, 255, 255))
     rows, columns = np.nonzero(canvas.any(axis=2))
     assert rows.min() >= 10
-    assert rows.max() < 10 + letters.height_px
-    assert abs((columns.max() + 1 - columns.min()) - letters.width(text)) <= 4
+    assert rows.max() < 10 + font.height_px
+    assert abs((columns.max() + 1 - columns.min()) - font.width_px(text)) <= 4
 
 
 @pytest.mark.parametrize(
     ("size", "target"), [((64, 48), (64, 48)), ((63, 47), (64, 48)), ((200, 50), (64, 48))]
 )
-def test_a_picture_is_fitted_whole_into_a_video(size, target):
+def test_an_image_is_fitted_into_a_video_without_cropping(size, target):
     image = np.full((size[1], size[0], 3), 200, np.uint8)
-    fitted = fit(image, *target)
+    fitted = fit_image(image, *target)
     assert fitted.shape == (target[1], target[0], 3)
     lit = fitted[..., 0] == 200
     scale = min(target[0] / size[0], target[1] / size[1], 1.0)
     assert lit.sum() == pytest.approx(size[0] * size[1] * scale**2, rel=0.1)
 
 
-def test_videos_folders_and_single_pictures_are_written(tmp_path):
+def test_videos_folders_and_single_images_are_written(tmp_path):
     sizes = [(65, 49), (40, 80)]
     estimates = [estimate(image=numbered(k, size)) for k, size in enumerate(sizes)]
-    with OverlayFile(tmp_path / "new" / "a.mp4", 11.4, CONE) as video:
+    with OverlayWriter(tmp_path / "new" / "a.mp4", 11.4, CONE) as video:
         for each in estimates:
             video.add(each)
     with av.open(str(tmp_path / "new" / "a.mp4")) as film:
         assert film.streams.video[0].average_rate == 11
         assert [(f.width, f.height) for f in film.decode(video=0)] == [(66, 50)] * 2
-    with OverlayFile(tmp_path / "folder", 5.0, CONE) as folder:
+    with OverlayWriter(tmp_path / "folder", 5.0, CONE) as folder:
         folder.add(estimates[0])
     assert cv2.imread(str(tmp_path / "folder" / "000000.png")).shape == (49, 65, 3)
-    with OverlayFile(tmp_path / "a.jpg", 5.0, CONE, single=True) as single:
+    with OverlayWriter(tmp_path / "a.jpg", 5.0, CONE, single=True) as single:
         single.add(estimates[0])
     assert cv2.imread(str(tmp_path / "a.jpg")).shape == (49, 65, 3)
     assert not list(tmp_path.rglob("*.part"))
 
 
-def test_a_video_without_pictures_leaves_nothing_behind(tmp_path):
-    with OverlayFile(tmp_path / "a.mp4", 5.0, CONE):
+def test_a_video_without_images_leaves_nothing_behind(tmp_path):
+    with OverlayWriter(tmp_path / "a.mp4", 5.0, CONE):
         pass
     assert list(tmp_path.iterdir()) == []
 
@@ -189,10 +185,10 @@ def test_a_video_without_pictures_leaves_nothing_behind(tmp_path):
 @pytest.mark.parametrize("name", ["a.gif", "a.png"])
 def test_other_files_are_refused(tmp_path, name):
     with pytest.raises(AwarenavError, match=r"must be a \.mp4 file, a folder or 'none'"):
-        OverlayFile(tmp_path / name, 5.0, CONE)
+        OverlayWriter(tmp_path / name, 5.0, CONE)
 
 
 def test_a_folder_that_cannot_be_made_is_named(tmp_path):
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(AwarenavError, match="cannot make the folder"):
-        OverlayFile(Path(tmp_path / "file" / "deeper"), 5.0, CONE)
+        OverlayWriter(Path(tmp_path / "file" / "deeper"), 5.0, CONE)

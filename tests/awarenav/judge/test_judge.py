@@ -13,9 +13,14 @@ from hypothesis import strategies as st
 
 from awarenav.cli import main
 from awarenav.errors import AwarenavError
-from awarenav.judge import JudgeConfig, judge_files, markdown_report, requirements
-from awarenav.judge._judge import judge
-from awarenav.judge._matching import average_precision
+from awarenav.judge import (
+    JudgeConfig,
+    average_precision,
+    judge_files,
+    judge_frames,
+    markdown_report,
+    requirements,
+)
 from awarenav.records import people_by_frame, read_person, write_records
 
 COUNT = 40
@@ -43,7 +48,7 @@ def frames(*people_of_frames):
 
 
 def judged(truth, estimates, config=None, **options):
-    return judge(
+    return judge_frames(
         people_by_frame(truth, "truth"), people_by_frame(estimates, "estimates"), config, **options
     )
 
@@ -226,7 +231,7 @@ def test_trivial_zeros_do_not_flatter_calibration():
     assert overall["awareness_within_1sigma_count"] == 10
 
 
-def test_silence_neither_dilutes_false_awareness_nor_passes_the_gate():
+def test_missing_estimates_neither_dilute_false_awareness_nor_pass_the_gate():
     truth = frames(*[[person(0, awareness=0.0)] for _ in range(20)])
     guess = frames(
         *[
@@ -344,7 +349,7 @@ def test_the_command_prints_the_table_and_writes_figures(tmp_path, capsys):
     assert (tmp_path / "report.md").read_text("utf-8") == printed
 
 
-def test_the_gate_says_no_to_estimates_that_are_not_good_enough(tmp_path, capsys):
+def test_the_gate_fails_for_estimates_that_are_not_good_enough(tmp_path, capsys):
     rng = np.random.default_rng(0)
     truth = frames(*[[person(0, awareness=0.0 if k % 3 else 0.6)] for k in range(300)])
     good = frames(
@@ -369,7 +374,7 @@ def test_the_gate_says_no_to_estimates_that_are_not_good_enough(tmp_path, capsys
         ({"position_covariance_m2": [[1, 2, 0], [0, 1, 0], [0, 0, 1]]}, "symmetric"),
     ],
 )
-def test_values_that_are_none_are_refused_by_frame_and_person(tmp_path, change, message):
+def test_invalid_values_are_refused_by_frame_and_person(tmp_path, change, message):
     bad = frames([person(0)], [{**person(0), **change}])
     paths = files(tmp_path, frames([person(0)], [person(0)]), bad)
     with pytest.raises(
@@ -392,20 +397,20 @@ def test_bad_options_are_one_line_and_exit_status_2(tmp_path, capsys, arguments,
     assert "Traceback" not in error
 
 
-def test_files_of_different_pictures_are_refused(tmp_path):
+def test_files_of_different_images_are_refused(tmp_path):
     others = [{**record, "frame": "b" + record["frame"]} for record in TRUTH]
     truth, estimates = files(tmp_path, TRUTH, others)
-    with pytest.raises(AwarenavError, match="share no frame"):
+    with pytest.raises(AwarenavError, match="no frame in common"):
         judge_files(Path(truth), Path(estimates))
     truth, estimates = files(tmp_path, [], TRUTH)
-    with pytest.raises(AwarenavError, match="holds no frame"):
+    with pytest.raises(AwarenavError, match="has no frame"):
         judge_files(Path(truth), Path(estimates))
     truth, estimates = files(tmp_path, TRUTH, [TRUTH[0], TRUTH[0]])
-    with pytest.raises(AwarenavError, match="comes twice"):
+    with pytest.raises(AwarenavError, match="two frames have the name"):
         judge_files(Path(truth), Path(estimates))
 
 
-def test_who_had_to_be_found_can_be_chosen():
+def test_the_people_who_have_to_be_found_can_be_chosen():
     truth = frames([person(0, occlusion=0.6)])
     assert judged(truth, frames([]))["overall"]["people"] == 0
     strict = JudgeConfig(max_occlusion=0.9)

@@ -9,10 +9,9 @@ from pathlib import Path
 
 from model_server import ModelServer
 
-from awarenav.models import ModelStore
-from awarenav.models._catalogue import Catalogue, RealModel
+from awarenav.models import Catalogue, ModelStore, RealModel
 
-# No network, and quite enough to tell whole from half and old from new.
+# Not a network, but enough to tell a complete file from half of it, and an old one from a new one.
 CONTENT = bytes(range(256)) * 4000
 OTHER = CONTENT[::-1]
 

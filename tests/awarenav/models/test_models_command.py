@@ -4,26 +4,24 @@ import shutil
 
 import pytest
 from model_files import CONTENT, OTHER, model, names, sha256
-from paths import ROOT
+from paths import SHARED
 
 from awarenav.cli import main
 from awarenav.errors import AwarenavError
-from awarenav.models import _store
-from awarenav.models._catalogue import Catalogue
-from awarenav.models._download import download
+from awarenav.models import Catalogue, download
 
-SHARED = ROOT.parent / "shared" / "models"
+MODELS = SHARED / "models"
 
 
 @pytest.mark.parametrize("verb", [[], ["list"], ["verify"], ["fetch"]])
-def test_help_says_what_a_verb_does(verb, capsys):
+def test_help_says_what_a_models_command_does(verb, capsys):
     assert main(["models", *verb, "--help"]) == 0
     text = capsys.readouterr().out
     assert "Usage: awarenav models" in text
     assert not verb or "--out DIR" in text
 
 
-def test_catalogue_fetches_nothing_that_binds_the_user():
+def test_catalogue_fetches_only_networks_with_permissive_licences():
     catalogue = Catalogue.shipped()
     assert {entry.licence for entry in catalogue.models} <= {"Apache-2.0", "MIT", "BSD-3-Clause"}
     assert all(entry.url.startswith("https://") for entry in catalogue.models)
@@ -34,9 +32,9 @@ def test_catalogue_fetches_nothing_that_binds_the_user():
         catalogue["yolov8"]
 
 
-@pytest.mark.skipif(not SHARED.is_dir(), reason="no genuine networks beside the checkout")
+@pytest.mark.skipif(not MODELS.is_dir(), reason="no genuine networks beside the checkout")
 def test_catalogue_knows_the_genuine_detector():
-    content = (SHARED / "rtmdet_nano_person_320_mmpose.onnx").read_bytes()
+    content = (MODELS / "rtmdet_nano_person_320_mmpose.onnx").read_bytes()
     assert Catalogue.shipped()["rtmdet-nano"].sha256 == sha256(content)
 
 
@@ -64,7 +62,7 @@ def catalogue(server, monkeypatch, tmp_path):
     local = shipped.model_copy(
         update={"models": (model(server, "a.onnx", sha256=sha256(CONTENT), note="a test"),)}
     )
-    monkeypatch.setattr(_store.Catalogue, "shipped", classmethod(lambda _: local))
+    monkeypatch.setattr(Catalogue, "shipped", classmethod(lambda _: local))
     monkeypatch.setenv("AWARENAV_MODELS", str(tmp_path / "models"))
     return local
 
@@ -112,12 +110,12 @@ def test_command_refuses_in_one_line(catalogue, server, arguments, message, caps
     assert server.requests == []
 
 
-def test_hash_that_is_none_is_refused(catalogue, capsys):
+def test_text_that_is_not_a_sha256_is_refused(catalogue, capsys):
     assert main(["models", "fetch", "tiny", "--sha256", "abc"]) == 2
     assert "64 hexadecimal digits" in capsys.readouterr().err
 
 
-def test_full_disk_is_said_before_anything_is_written(server, tmp_path, monkeypatch):
+def test_full_disk_is_reported_before_anything_is_written(server, tmp_path, monkeypatch):
     server.serve("a.onnx", CONTENT)
     usage = shutil.disk_usage(tmp_path)
     monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=1_000_000))

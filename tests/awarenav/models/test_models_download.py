@@ -8,14 +8,10 @@ import urllib.request
 import pytest
 from model_files import CONTENT, OTHER, names, zipped
 from model_server import ModelServer
-from paths import ROOT
 
 from awarenav.errors import AwarenavError
-from awarenav.models import _download
-from awarenav.models._download import BrokenDownloadError, download
-from awarenav.models._store import extract_member
-
-SHARED = ROOT.parent / "shared" / "models"
+from awarenav.models import BrokenDownloadError, download, extract_member
+from awarenav.models._download import _NoDowngrade
 
 
 def test_download_appears_whole(server, tmp_path):
@@ -25,7 +21,7 @@ def test_download_appears_whole(server, tmp_path):
     assert names(tmp_path) == {"a.onnx"}
 
 
-def test_download_goes_on_where_it_broke_off(server, tmp_path):
+def test_download_continues_where_it_broke_off(server, tmp_path):
     server.serve("a.onnx", CONTENT, cuts=[300_000, 400_000, None])
     download(server.url("a.onnx"), tmp_path / "a.onnx", pause_s=0.0, progress=False)
     assert (tmp_path / "a.onnx").read_bytes() == CONTENT
@@ -37,7 +33,7 @@ def test_download_goes_on_where_it_broke_off(server, tmp_path):
     assert {request.get("if-range") for request in server.requests[1:]} == {'"1"'}
 
 
-def test_next_run_goes_on_too_and_says_so(server, tmp_path):
+def test_next_call_continues_a_broken_download(server, tmp_path):
     target = tmp_path / "a.onnx"
     server.serve("a.onnx", CONTENT, cuts=[500_000])
     with pytest.raises(BrokenDownloadError, match=r"after 500000 bytes.*run it again"):
@@ -49,7 +45,7 @@ def test_next_run_goes_on_too_and_says_so(server, tmp_path):
 
 
 @pytest.mark.parametrize("etag", [None, 'W/"1"'])
-def test_date_stands_in_for_a_strong_tag(server, tmp_path, etag):
+def test_date_replaces_a_missing_strong_tag(server, tmp_path, etag):
     server.serve("a.onnx", CONTENT, etag=etag, cuts=[500_000])
     server.files["a.onnx"].etag = None  # then the server compares the date
     download(server.url("a.onnx"), tmp_path / "a.onnx", pause_s=0.0, progress=False)
@@ -57,7 +53,7 @@ def test_date_stands_in_for_a_strong_tag(server, tmp_path, etag):
     assert server.requests[-1]["if-range"].startswith("Thu, 01 Jan 1970")
 
 
-def test_halves_of_two_files_are_never_joined(server, tmp_path):
+def test_parts_of_two_files_are_never_joined(server, tmp_path):
     target = tmp_path / "a.onnx"
     server.serve("a.onnx", CONTENT, cuts=[500_000])
     with pytest.raises(BrokenDownloadError):
@@ -67,7 +63,7 @@ def test_halves_of_two_files_are_never_joined(server, tmp_path):
     assert target.read_bytes() == OTHER
 
 
-def test_part_of_another_address_is_not_gone_on_with(server, tmp_path):
+def test_part_from_another_address_is_not_continued(server, tmp_path):
     target = tmp_path / "a.onnx"
     server.serve("a.onnx", CONTENT, cuts=[500_000])
     server.serve("b.onnx", OTHER)  # with the same tag
@@ -94,7 +90,7 @@ def test_finished_part_whose_move_was_interrupted(server, tmp_path):
 
 
 @pytest.mark.parametrize("note", ["", "[]", "{", '{"url": 3}', '{"validator": "x"}'])
-def test_damaged_note_means_starting_anew(server, tmp_path, note):
+def test_damaged_state_means_a_download_from_the_beginning(server, tmp_path, note):
     server.serve("a.onnx", CONTENT)
     (tmp_path / "a.onnx.part").write_bytes(b"rubbish")
     (tmp_path / "a.onnx.part.json").write_text(note)
@@ -113,7 +109,7 @@ def test_busy_server_is_asked_again_and_a_missing_file_is_not(server, tmp_path):
     assert names(tmp_path) == {"a.onnx"}
 
 
-def test_nobody_at_the_address(tmp_path):
+def test_address_without_a_server(tmp_path):
     with ModelServer() as closed:
         url = closed.url("a.onnx")
     with pytest.raises(AwarenavError, match="no connection"):
@@ -131,14 +127,14 @@ def test_redirects_are_followed_with_the_range(server, tmp_path):
 
 def test_redirect_that_drops_the_encryption_is_refused():
     request = urllib.request.Request("https://somewhere/a.onnx")
-    follow = _download._NoDowngrade().redirect_request
+    follow = _NoDowngrade().redirect_request
     arguments = (request, io.BytesIO(), 302, "Found", http.client.HTTPMessage())
     with pytest.raises(AwarenavError, match="not encrypted"):
         follow(*arguments, "http://elsewhere/a.onnx")
     assert follow(*arguments, "https://elsewhere/a.onnx").full_url == "https://elsewhere/a.onnx"
 
 
-def test_member_is_found_in_any_folder_and_lands_where_it_should(tmp_path):
+def test_member_is_found_in_any_folder_and_written_to_the_target(tmp_path):
     archive = tmp_path / "a.zip"
     archive.write_bytes(zipped(**{"2023__x__end2end.onnx": CONTENT, "2023__x__deploy.json": b"{}"}))
     extract_member(archive, "end2end.onnx", tmp_path / "out.onnx")
@@ -183,7 +179,7 @@ def test_truncated_archive_is_refused(tmp_path, keep):
     whole = zipped(**{"x__end2end.onnx": CONTENT})
     archive = tmp_path / "a.zip"
     archive.write_bytes(whole[: keep if isinstance(keep, int) else int(keep * len(whole))])
-    with pytest.raises(AwarenavError, match="no whole ZIP archive"):
+    with pytest.raises(AwarenavError, match="not a complete ZIP archive"):
         extract_member(archive, "end2end.onnx", tmp_path / "out.onnx")
 
 
@@ -192,5 +188,5 @@ def test_damaged_entry_is_refused(tmp_path):
     whole[len(whole) // 2] ^= 0xFF
     archive = tmp_path / "a.zip"
     archive.write_bytes(whole)
-    with pytest.raises(AwarenavError, match="no whole ZIP archive"):
+    with pytest.raises(AwarenavError, match="not a complete ZIP archive"):
         extract_member(archive, "end2end.onnx", tmp_path / "out.onnx")

@@ -1,15 +1,19 @@
 from __future__ import annotations
 
+import subprocess
+import sys
+import threading
 from pathlib import Path
 
+import filelock
 import pytest
 from model_files import CONTENT, OTHER, model, names, sha256, store, zipped
-from paths import ROOT
+from paths import SHARED
 
 from awarenav.errors import AwarenavError
-from awarenav.models._store import default_folder
+from awarenav.models import default_folder
 
-SHARED = ROOT.parent / "shared" / "models"
+MODELS = SHARED / "models"
 
 
 def test_pinned_network_is_fetched_once_and_verified(server, tmp_path):
@@ -37,12 +41,12 @@ def test_truncated_archive_leaves_nothing_behind(server, tmp_path):
     whole = zipped(**{"x__end2end.onnx": CONTENT})
     server.serve("a.zip", whole[: len(whole) // 2])
     entry = model(server, "a.zip", member="end2end.onnx", sha256=sha256(CONTENT))
-    with pytest.raises(AwarenavError, match="no whole ZIP archive"):
+    with pytest.raises(AwarenavError, match="not a complete ZIP archive"):
         store(tmp_path, entry).fetch("tiny", progress=False)
     assert names(tmp_path) == set()
 
 
-def test_wrong_hash_is_thrown_away_and_what_was_there_stays(server, tmp_path):
+def test_download_with_a_wrong_sha256_is_dropped_and_the_old_file_stays(server, tmp_path):
     server.serve("a.onnx", OTHER)
     (tmp_path / "tiny.onnx").write_bytes(b"what was there")
     fetched = store(tmp_path, model(server, "a.onnx", sha256=sha256(CONTENT)))
@@ -70,16 +74,16 @@ def test_altered_network_is_noticed_and_replaced(server, tmp_path):
 def test_login_page_is_not_trusted_on_first_use(server, tmp_path):
     server.serve("a.onnx", b"<html>please log in</html>")
     fetched = store(tmp_path, model(server, "a.onnx"))
-    with pytest.raises(AwarenavError, match="is no network"):
+    with pytest.raises(AwarenavError, match="is not a network"):
         fetched.fetch("tiny", progress=False)
     assert fetched.locked() == {}
     assert names(tmp_path) == set()
 
 
-@pytest.mark.skipif(not SHARED.is_dir(), reason="no genuine networks beside the checkout")
-def test_first_fetch_is_trusted_and_later_ones_held_to_it(server, tmp_path):
-    first = (SHARED / "yolox_nano_416_coco.onnx").read_bytes()
-    second = (SHARED / "rtmdet_nano_person_320_mmpose.onnx").read_bytes()
+@pytest.mark.skipif(not MODELS.is_dir(), reason="no genuine networks beside the checkout")
+def test_first_fetch_is_trusted_and_later_ones_must_match_it(server, tmp_path):
+    first = (MODELS / "yolox_nano_416_coco.onnx").read_bytes()
+    second = (MODELS / "rtmdet_nano_person_320_mmpose.onnx").read_bytes()
     server.serve("a.onnx", first)
     fetched = store(tmp_path, model(server, "a.onnx"))
     path, _ = fetched.fetch("tiny", progress=False)
@@ -97,7 +101,7 @@ def test_first_fetch_is_trusted_and_later_ones_held_to_it(server, tmp_path):
         fetched.fetch("tiny", sha256=sha256(second), progress=False)
 
 
-def test_users_hash_is_held_to(server, tmp_path):
+def test_download_must_have_the_sha256_of_the_user(server, tmp_path):
     server.serve("a.onnx", CONTENT)
     fetched = store(tmp_path, model(server, "a.onnx"))
     with pytest.raises(AwarenavError, match="expected"):
@@ -109,14 +113,14 @@ def test_users_hash_is_held_to(server, tmp_path):
         pinned.fetch("tiny", sha256=sha256(OTHER), progress=False)
 
 
-def test_file_that_nobody_fetched_is_not_believed(server, tmp_path):
+def test_file_that_was_not_fetched_is_refused(server, tmp_path):
     (tmp_path / "tiny.onnx").write_bytes(CONTENT)
     with pytest.raises(AwarenavError, match="not put there"):
         store(tmp_path, model(server, "a.onnx")).path("tiny")
 
 
 @pytest.mark.parametrize("text", ["{", "[]", '{"models": {"tiny": {}}}', '{"models": 3}'])
-def test_damaged_lock_trusts_nothing(server, tmp_path, text):
+def test_damaged_lock_file_is_refused(server, tmp_path, text):
     (tmp_path / "models.lock.json").write_text(text)
     server.serve("a.onnx", CONTENT)
     with pytest.raises(AwarenavError, match=r"models\.lock\.json cannot be read"):
@@ -128,11 +132,59 @@ def test_two_fetches_of_one_network_at_once_are_refused(server, tmp_path):
     server.serve("a.onnx", CONTENT)
     fetched = store(tmp_path, model(server, "a.onnx", sha256=sha256(CONTENT)))
     with (
-        fetched._alone(fetched.catalogue["tiny"]),
-        pytest.raises(AwarenavError, match="being fetched"),
+        filelock.FileLock(tmp_path / ".tiny.lock"),
+        pytest.raises(AwarenavError, match=r"tiny is being fetched to .* already"),
     ):
         fetched.fetch("tiny", progress=False)
+    assert server.requests == []
     assert fetched.fetch("tiny", progress=False)[1]
+
+
+HOLD_LOCK = """
+import sys, time
+import filelock
+with filelock.FileLock(sys.argv[1]):
+    print("held", flush=True)
+    time.sleep(600.0)
+"""
+
+
+def test_a_fetch_that_was_killed_leaves_no_lock_behind(server, tmp_path):
+    server.serve("a.onnx", CONTENT)
+    fetched = store(tmp_path, model(server, "a.onnx", sha256=sha256(CONTENT)))
+    command = [sys.executable, "-c", HOLD_LOCK, str(tmp_path / ".tiny.lock")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as holder:
+        assert holder.stdout.readline() == "held\n"
+        with pytest.raises(AwarenavError, match="being fetched"):
+            fetched.fetch("tiny", progress=False)
+        holder.kill()
+    assert fetched.fetch("tiny", progress=False)[1]
+
+
+def test_fetches_of_two_networks_wait_for_each_other_to_write_the_lock_file(server, tmp_path):
+    server.serve("a.onnx", CONTENT)
+    fetched = store(tmp_path, model(server, "a.onnx", sha256=sha256(CONTENT)))
+    done = threading.Event()
+
+    def fetch():
+        fetched.fetch("tiny", progress=False)
+        done.set()
+
+    other = filelock.FileLock(tmp_path / ".lock")
+    with other:
+        thread = threading.Thread(target=fetch)
+        thread.start()
+        assert not done.wait(0.3)
+        assert fetched.locked() == {}
+    thread.join(30.0)
+    assert done.is_set()
+    assert set(fetched.locked()) == {"tiny"}
+
+
+def test_a_folder_that_cannot_be_written_is_named(server, tmp_path):
+    (tmp_path / ".tiny.lock").mkdir()
+    with pytest.raises(AwarenavError, match=f"cannot write to {tmp_path}"):
+        store(tmp_path, model(server, "a.onnx")).fetch("tiny", progress=False)
 
 
 def test_folder_that_cannot_be_made(server, tmp_path):

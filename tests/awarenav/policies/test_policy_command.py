@@ -92,7 +92,7 @@ def test_bad_input_is_refused_in_one_line(arguments, message, tmp_path, monkeypa
     monkeypatch.chdir(tmp_path)
     assert main(["policy", "show", *arguments]) == 2
     error = capsys.readouterr().err
-    assert error.startswith("awarenav policy: ")
+    assert error.startswith("awarenav policy show: ")
     assert message in error
     assert list(tmp_path.iterdir()) == []
 

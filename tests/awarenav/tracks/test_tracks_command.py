@@ -14,12 +14,10 @@ from paths import ROOT
 from recorded_crossing import record_crossing
 from track_lines import lines, pose, standing, walking
 
-from awarenav import figures as _canvas
+from awarenav import figures
 from awarenav.cli import main
 from awarenav.records import write_records
-from awarenav.tracks._follow import follow
-from awarenav.tracks._recording import read_recording
-from awarenav.tracks._tables import CSV_COLUMNS
+from awarenav.tracks import CSV_COLUMNS, read_recording, track_recording
 from perception import Camera
 from sim_tests import Scenario
 from tracking import AwarenessFilterConfig, TrackerConfig
@@ -83,12 +81,12 @@ def test_a_plot_is_a_whole_file_and_the_same_every_time(estimates, tmp_path, end
     assert [each.name for each in second.parent.iterdir()] == [second.name]
 
 
-def test_a_line_a_track_says_when_it_lived_and_how_aware_it_was(estimates, capsys):
+def test_the_table_has_one_line_per_track_with_its_life_and_awareness(estimates, capsys):
     assert run(estimates, "--out", "none") == 0
     header, *body = capsys.readouterr().out.splitlines()
     words = ["id", "born", "(s)", "confirmed", "(s)", "died", "(s)", "seen", "coasted"]
     assert header.split() == [*words, "mean", "α", "lower"]
-    histories = follow(read_recording(estimates)).histories
+    histories = track_recording(read_recording(estimates)).histories
     assert [line.split()[0] for line in body] == ["1", "2"]
     for line, history in zip(body, histories, strict=True):
         _, born, confirmed, died, seen, coasted, alpha, lower = line.split()
@@ -99,14 +97,14 @@ def test_a_line_a_track_says_when_it_lived_and_how_aware_it_was(estimates, capsy
     assert histories[0].seen_frames == 34
 
 
-def test_the_table_holds_every_track_at_every_frame(estimates, tmp_path):
+def test_the_csv_file_has_every_track_at_every_frame(estimates, tmp_path):
     path = tmp_path / "tracks.csv"
     assert run(estimates, "--out", "none", "--csv", path) == 0
     table = rows(path)
     assert tuple(table[0]) == CSV_COLUMNS
     samples = {
         (repr(sample.stamp_s), str(history.id)): sample
-        for history in follow(read_recording(estimates)).histories
+        for history in track_recording(read_recording(estimates)).histories
         for sample in history.frames
     }
     assert [(row["stamp_s"], row["id"]) for row in table] == sorted(
@@ -142,15 +140,15 @@ def test_settings_and_camera_come_from_files(tmp_path, capsys):
     assert died_s() == known_view_s
 
 
-def test_a_half_written_line_is_said_and_the_rest_is_shown(estimates, capsys):
+def test_an_incomplete_line_is_reported_and_the_rest_is_shown(estimates, capsys):
     estimates.write_text(estimates.read_text("utf-8")[:-20], "utf-8")
     assert run(estimates, "--out", "none") == 0
     said = capsys.readouterr()
-    assert "the last line was cut off in writing and is left out" in said.err
+    assert "the last line is incomplete and is left out" in said.err
     assert len(said.out.splitlines()) == 3
 
 
-def test_late_frames_are_said(tmp_path, capsys):
+def test_late_frames_are_reported(tmp_path, capsys):
     records = lines(WALKERS, frames=30)
     records[8], records[9] = records[9], records[8]
     records.append(records.pop(3))
@@ -163,7 +161,7 @@ def test_late_frames_are_said(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(("step_m", "said"), [(0.2, False), (4.0, True)])
-def test_single_pictures_are_no_drive(tmp_path, capsys, step_m, said):
+def test_single_images_of_many_places_are_reported(tmp_path, capsys, step_m, said):
     path = tmp_path / "set.jsonl"
     write_records(path, lines(WALKERS, frames=6, camera=lambda t: pose(10.0 * step_m * t)))
     assert run(path, "--out", "none") == 0
@@ -171,7 +169,7 @@ def test_single_pictures_are_no_drive(tmp_path, capsys, step_m, said):
     assert (f"the camera jumps by {step_m:.1f} m from frame to frame" in error) == said
 
 
-def test_no_people_at_all_is_said_and_drawn(tmp_path, capsys):
+def test_a_file_without_people_is_reported_and_drawn(tmp_path, capsys):
     path = tmp_path / "nobody.jsonl"
     write_records(path, lines([], frames=5))
     assert run(path, "--out", tmp_path / "nobody.png") == 0
@@ -179,7 +177,7 @@ def test_no_people_at_all_is_said_and_drawn(tmp_path, capsys):
     assert (tmp_path / "nobody.png").read_bytes().startswith(HEADS[".png"])
 
 
-def test_who_was_never_confirmed_is_counted(tmp_path, capsys):
+def test_tracks_that_were_never_confirmed_are_counted(tmp_path, capsys):
     path = tmp_path / "clutter.jsonl"
     write_records(path, lines(WALKERS, frames=20, hidden=lambda k, who: who == 1 and k != 7))
     assert run(path, "--out", "none") == 0
@@ -191,7 +189,7 @@ def test_who_was_never_confirmed_is_counted(tmp_path, capsys):
     [
         (["--out", "{tmp}/tracks.txt"], "--out must end in .png, .svg, .pdf or be none"),
         (["--csv", "{tmp}"], "--csv must be a file"),
-        (["--csv", "{tmp}/estimates.jsonl"], "would replace what is read"),
+        (["--csv", "{tmp}/estimates.jsonl"], "would replace an input"),
         (["--csv", "{tmp}/out.png"], "--out and --csv are the same file"),
         (["--config", "{tmp}/absent.yaml"], "absent.yaml"),
         (["--config", "{tmp}/estimates.jsonl"], "estimates.jsonl"),
@@ -201,7 +199,9 @@ def test_who_was_never_confirmed_is_counted(tmp_path, capsys):
         (["--ids"], "leave out --ids to track them here"),
     ],
 )
-def test_bad_input_is_said_and_nothing_is_written(estimates, tmp_path, capsys, arguments, message):
+def test_bad_input_is_refused_and_nothing_is_written(
+    estimates, tmp_path, capsys, arguments, message
+):
     out = tmp_path / "out.png"
     arguments = [argument.replace("{tmp}", str(tmp_path)) for argument in arguments]
     before = sorted(tmp_path.iterdir())
@@ -221,7 +221,7 @@ def test_a_file_that_holds_no_frames_is_refused(tmp_path, capsys, text):
     assert not (tmp_path / "out.png").exists()
 
 
-def test_an_interruption_leaves_the_old_plot_and_no_half_one(estimates, tmp_path, monkeypatch):
+def test_an_interruption_leaves_the_old_plot_and_no_partial_one(estimates, tmp_path, monkeypatch):
     out = tmp_path / "out.png"
     out.write_bytes(b"old")
 
@@ -229,7 +229,7 @@ def test_an_interruption_leaves_the_old_plot_and_no_half_one(estimates, tmp_path
         Path(file).write_bytes(HEADS[".png"])
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(_canvas.Figure, "savefig", interrupted)
+    monkeypatch.setattr(figures.Figure, "savefig", interrupted)
     assert run(estimates, "--out", out) == 130
     assert out.read_bytes() == b"old"
     assert sorted(each.name for each in tmp_path.iterdir()) == ["estimates.jsonl", "out.png"]

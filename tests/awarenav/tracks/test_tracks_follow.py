@@ -7,10 +7,9 @@ import pytest
 from track_lines import lines, pose, standing, walking
 
 from awarenav.errors import AwarenavError
+from awarenav.estimate import track_record
 from awarenav.records import write_records
-from awarenav.tracks._follow import follow
-from awarenav.tracks._given_ids import given_tracks
-from awarenav.tracks._recording import read_recording
+from awarenav.tracks import read_recording, track_recording, tracks_in_file
 from perception import Camera
 from tracking import PersonTracker, TrackerConfig
 
@@ -34,7 +33,7 @@ def drawn(run):
 
 def test_histories_are_the_tracks_of_the_tracker(tmp_path):
     recording = recorded(tmp_path, lines(WALKERS, hidden=lambda k, who: who == 0 and 15 < k < 22))
-    run = follow(recording)
+    run = track_recording(recording)
     tracker = PersonTracker()
     told = {}
     for frame in recording.frames:
@@ -56,13 +55,13 @@ def test_measured_awareness_goes_to_the_track_that_it_is_of(tmp_path):
     for record in records:
         for who, someone in enumerate(record["people"]):
             someone["awareness"] = 0.2 if who else 0.8
-    run = follow(recorded(tmp_path, records))
+    run = track_recording(recorded(tmp_path, records))
     assert [each.mean("measured_awareness") for each in run.histories] == pytest.approx([0.8, 0.2])
 
 
 def test_a_pause_is_filled_with_predictions_that_fall_and_frames_stay_frames(tmp_path):
     records = [record for record in lines(WALKERS) if not 1.0 < record["stamp_s"] < 2.0]
-    run = follow(recorded(tmp_path, records))
+    run = track_recording(recorded(tmp_path, records))
     for each in run.histories:
         paused = [s for s in each.samples if 1.0 < s.stamp_s < 2.0]
         assert len(paused) >= 5
@@ -72,25 +71,25 @@ def test_a_pause_is_filled_with_predictions_that_fall_and_frames_stay_frames(tmp
         assert len(each.frames) == len(records)
 
 
-def test_late_frames_within_the_lag_give_the_run_of_frames_in_order(tmp_path):
+def test_late_frames_within_the_lag_give_the_tracks_of_sorted_frames(tmp_path):
     records = lines(WALKERS, frames=30)
     shuffled = list(records)
     for k in (3, 9, 17, 24):
         shuffled[k], shuffled[k + 2] = shuffled[k + 2], shuffled[k]
-    in_order = follow(recorded(tmp_path, records))
-    late = follow(recorded(tmp_path, shuffled, "late.jsonl"))
+    in_order = track_recording(recorded(tmp_path, records))
+    late = track_recording(recorded(tmp_path, shuffled, "late.jsonl"))
     assert drawn(late) == drawn(in_order)
     assert any("late frames put back" in remark for remark in late.remarks)
 
 
-def test_what_a_late_recording_draws_is_what_the_tracker_says_in_the_end(tmp_path):
+def test_a_recording_with_late_frames_ends_with_the_tracks_of_the_tracker(tmp_path):
     records = lines(WALKERS, frames=30)
     records[20], records[22] = records[22], records[20]
     recording = recorded(tmp_path, records)
     tracker = PersonTracker()
     for frame in recording.frames:
         tracks = tracker.update(frame.observations, frame.stamp_s, frame.T_odom_camera)
-    last = [each.samples[-1] for each in follow(recording).histories]
+    last = [each.samples[-1] for each in track_recording(recording).histories]
     for track, sample in zip(tracks, last, strict=True):
         assert sample.stamp_s == track.stamp_s
         np.testing.assert_allclose(sample.position_odom_m, track.position_odom_m, atol=1e-9)
@@ -101,8 +100,8 @@ def test_frames_that_come_too_late_are_counted_and_change_nothing(tmp_path):
     records = lines(WALKERS, frames=30)
     without = [record for k, record in enumerate(records) if k != 5]
     late = [*without[:25], records[5], *without[25:]]
-    run = follow(recorded(tmp_path, late))
-    assert drawn(run) == drawn(follow(recorded(tmp_path, without, "without.jsonl")))
+    run = track_recording(recorded(tmp_path, late))
+    assert drawn(run) == drawn(track_recording(recorded(tmp_path, without, "without.jsonl")))
     assert any(remark.startswith("1 late frame refused") for remark in run.remarks)
     assert len(run.camera_stamps_s) == len(without)
 
@@ -112,7 +111,7 @@ def test_settings_and_field_of_view_reach_the_tracker(tmp_path):
     recording = recorded(tmp_path, gone)
 
     def died_s(config=None, camera=None):
-        return follow(recording, config, camera).histories[0].died_s
+        return track_recording(recording, config, camera).histories[0].died_s
 
     assert died_s(TrackerConfig(max_coast_s=1.5)) < died_s() - 1.0
     # Somebody in the middle of the picture, whom frames do not show, is not there.
@@ -121,7 +120,7 @@ def test_settings_and_field_of_view_reach_the_tracker(tmp_path):
 
 def test_the_path_of_the_camera_is_where_it_looks(tmp_path):
     records = lines(WALKERS, frames=5, camera=lambda stamp_s: pose(stamp_s, 2.0, 0.3 * stamp_s))
-    run = follow(recorded(tmp_path, records))
+    run = track_recording(recorded(tmp_path, records))
     stamps = np.arange(5) / 10.0
     expected = np.stack([stamps, np.full(5, 2.0), 0.3 * stamps], axis=1)
     np.testing.assert_allclose(run.camera_poses, expected, atol=1e-12)
@@ -132,12 +131,12 @@ def test_a_frame_that_the_tracker_cannot_use_is_named(tmp_path):
     records = lines([standing(4.0, 0.0)], frames=8)
     records[6]["people"][0]["position_camera_m"] = [0.0, 0.0, 1e9]
     with pytest.raises(AwarenavError, match=r"estimates\.jsonl, frame '000006': .*1e\+07 m"):
-        follow(recorded(tmp_path, records))
+        track_recording(recorded(tmp_path, records))
 
 
 def test_ids_of_a_file_are_taken_as_they_are(tmp_path):
     records = lines(WALKERS, named=True, hidden=lambda k, who: who == 1 and k >= 30)
-    run = given_tracks(recorded(tmp_path, records))
+    run = tracks_in_file(recorded(tmp_path, records))
     assert [each.id for each in run.histories] == [0, 1]
     assert [each.died_s for each in run.histories] == [None, 3.0]
     assert [each.seen_frames for each in run.histories] == [40, 30]
@@ -150,28 +149,26 @@ def test_a_position_covariance_turns_with_the_camera(tmp_path):
     records = lines([standing(0.0, 4.0)], frames=1, named=True, camera=lambda _: pose(0, 0, 1.1))
     spread = np.diag([0.01, 0.02, 0.09])
     records[0]["people"][0]["position_covariance_m2"] = spread.tolist()
-    (one,) = given_tracks(recorded(tmp_path, records)).histories
+    (one,) = tracks_in_file(recorded(tmp_path, records)).histories
     turn = pose(0, 0, 1.1)[:2, :3]
     np.testing.assert_allclose(one.samples[0].position_covariance_m2, turn @ spread @ turn.T)
 
 
 def test_tracks_of_a_file_come_back_as_the_tracker_wrote_them(tmp_path):
-    from awarenav.estimate._results import _track  # noqa: PLC0415
-
     records = lines(WALKERS, hidden=lambda k, who: who == 0 and 15 < k < 22)
     recording = recorded(tmp_path, records)
     tracker = PersonTracker()
     for record, frame in zip(records, recording.frames, strict=True):
         tracks = tracker.update(frame.observations, frame.stamp_s, frame.T_odom_camera)
-        record["tracks"] = [_track(track) for track in tracks]
-    shown = given_tracks(recorded(tmp_path, records, "tracked.jsonl"))
-    tracked = follow(recording)
+        record["tracks"] = [track_record(track) for track in tracks]
+    shown = tracks_in_file(recorded(tmp_path, records, "tracked.jsonl"))
+    tracked = track_recording(recording)
     assert shown.source == "tracks of the file"
     for given, own in zip(shown.histories, tracked.histories, strict=True):
         assert [s.status for s in given.samples] == [s.status for s in own.frames]
         assert [s.seen for s in given.samples] == [s.seen for s in own.frames]
         lower = [s.awareness_lower for s in own.frames]
-        np.testing.assert_allclose(given.numbers("awareness_lower"), lower, atol=1e-6)
+        np.testing.assert_allclose(given.values("awareness_lower"), lower, atol=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -184,7 +181,7 @@ def test_tracks_of_a_file_come_back_as_the_tracker_wrote_them(tmp_path):
         ({"time_since_seen_s": None}, "time_since_seen_s"),
     ],
 )
-def test_a_track_of_a_file_that_is_none_is_refused_by_frame(tmp_path, change, message):
+def test_an_invalid_track_of_a_file_is_refused_by_frame(tmp_path, change, message):
     track = {
         "id": 1,
         "status": "confirmed",
@@ -198,12 +195,12 @@ def test_a_track_of_a_file_that_is_none_is_refused_by_frame(tmp_path, change, me
     records = lines([], frames=3)
     for record in records:
         record["tracks"] = [track]
-    assert len(given_tracks(recorded(tmp_path, records)).histories) == 1
+    assert len(tracks_in_file(recorded(tmp_path, records)).histories) == 1
     records[1]["tracks"] = [{**track, **change}]
     with pytest.raises(AwarenavError, match=f"frame '000001', track 0: {message}"):
-        given_tracks(recorded(tmp_path, records))
+        tracks_in_file(recorded(tmp_path, records))
 
 
 def test_a_file_without_ids_says_so(tmp_path):
     with pytest.raises(AwarenavError, match="leave out --ids"):
-        given_tracks(recorded(tmp_path, lines(WALKERS)))
+        tracks_in_file(recorded(tmp_path, lines(WALKERS)))

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from awarenav.tracks._history import HistoryBook, TrackHistory, TrackSample
+from awarenav.tracks import HistoryBuilder, TrackHistory, TrackSample
 
 
 def sample(stamp_s, *, seen=True, status="confirmed", is_frame=True, awareness=0.5):
@@ -75,9 +75,9 @@ def test_unseen_spans_cover_every_unseen_frame_and_no_seen_one(shown):
 
 
 @given(st.lists(st.sampled_from(["tentative", "confirmed", "coasting"]), min_size=1, max_size=20))
-def test_stretches_join_without_a_gap_and_have_one_status_each(statuses):
+def test_segments_join_without_a_gap_and_have_one_status_each(statuses):
     made = history([sample(0.1 * k, status=status) for k, status in enumerate(statuses)])
-    runs = list(made.runs())
+    runs = list(made.segments())
     for (_, before), (_, after) in itertools.pairwise(runs):
         assert after[0] is before[-1]
     fresh = [runs[0][1], *(run[1:] for _, run in runs[1:])]
@@ -86,9 +86,9 @@ def test_stretches_join_without_a_gap_and_have_one_status_each(statuses):
         assert {each.status for each in run} == {status}
 
 
-def test_a_person_of_the_file_who_comes_back_gets_a_new_stretch():
+def test_a_person_of_the_file_who_comes_back_gets_a_new_segment():
     made = history([sample(stamp_s, status="given") for stamp_s in (0.0, 0.1, 0.2, 2.0, 2.1)])
-    assert [len(run) for _, run in made.runs()] == [3, 2]
+    assert [len(run) for _, run in made.segments()] == [3, 2]
 
 
 def test_means_are_over_frames_and_leave_out_what_is_not_known():
@@ -112,10 +112,10 @@ def test_stamps_that_go_back_are_refused_and_a_second_frame_of_an_instant_keeps_
     assert [each.seen for each in made.samples] == [True, True]
 
 
-def test_who_is_gone_has_died_and_who_is_back_has_not():
-    book = HistoryBook()
-    book.note(0.0, [(1, sample(0.0)), (2, sample(0.0))])
-    book.note(0.1, [(2, sample(0.1))])
-    assert [each.died_s for each in book.histories()] == [0.1, None]
-    book.note(0.2, [(1, sample(0.2))])
-    assert [each.died_s for each in book.histories()] == [None, 0.2]
+def test_a_track_that_is_missing_has_died_until_it_comes_back():
+    builder = HistoryBuilder()
+    builder.add(0.0, [(1, sample(0.0)), (2, sample(0.0))])
+    builder.add(0.1, [(2, sample(0.1))])
+    assert [each.died_s for each in builder.histories()] == [0.1, None]
+    builder.add(0.2, [(1, sample(0.2))])
+    assert [each.died_s for each in builder.histories()] == [None, 0.2]

@@ -11,9 +11,7 @@ from hypothesis import strategies as st
 from track_lines import lines, pose, standing, walking
 
 from awarenav.records import write_records
-from awarenav.tracks._follow import follow
-from awarenav.tracks._given_ids import given_tracks
-from awarenav.tracks._recording import read_recording
+from awarenav.tracks import read_recording, track_recording, tracks_in_file
 from perception import Camera
 
 pytest.importorskip("matplotlib")
@@ -21,9 +19,15 @@ pytest.importorskip("matplotlib")
 from matplotlib.lines import Line2D
 from matplotlib.patches import Ellipse, Wedge
 
-from awarenav.tracks._page import colour_of
-from awarenav.tracks._plan_view import _arrows, _ellipse, plan_limits, view_edges_rad
-from awarenav.tracks._plot import shown_tracks, tracks_figure
+from awarenav.tracks import (
+    covariance_ellipse,
+    path_arrows,
+    plan_limits,
+    shown_tracks,
+    track_colour,
+    tracks_figure,
+    view_edges_rad,
+)
 
 CAMERA = Camera.from_fov(640, 480, math.radians(70.0))
 
@@ -55,7 +59,7 @@ def texts(figure):
 def test_the_ellipse_is_two_standard_deviations_away_in_every_direction(first, second, turn, at):
     axis = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
     covariance = axis @ np.diag([first**2, second**2]) @ axis.T
-    drawn = _ellipse(np.array([1.0, -2.0]), covariance, "k")
+    drawn = covariance_ellipse(np.array([1.0, -2.0]), covariance, "k")
     rim = drawn.get_patch_transform().transform([math.cos(at), math.sin(at)])
     away = rim - [1.0, -2.0]
     assert math.sqrt(away @ np.linalg.solve(covariance, away)) == pytest.approx(2.0, rel=1e-6)
@@ -73,7 +77,7 @@ def test_the_field_of_view_is_that_of_the_camera():
 
 def test_the_field_of_view_is_drawn_where_the_camera_looks(tmp_path):
     records = lines([], frames=20, camera=lambda stamp_s: pose(1.0, 2.0, 0.5))
-    figure = tracks_figure(given_tracks(recorded(tmp_path, records)), "still", camera=CAMERA)
+    figure = tracks_figure(tracks_in_file(recorded(tmp_path, records)), "still", camera=CAMERA)
     (wedge,) = [each for each in figure.axes[0].patches if isinstance(each, Wedge)]
     assert wedge.center == pytest.approx((1.0, 2.0))
     assert 0.5 * (wedge.theta1 + wedge.theta2) == pytest.approx(math.degrees(0.5), abs=0.1)
@@ -82,23 +86,23 @@ def test_the_field_of_view_is_drawn_where_the_camera_looks(tmp_path):
 
 def test_arrows_point_where_people_walk_and_the_standing_have_none(tmp_path):
     people = [walking(3.0, -2.0, 0.6, 0.8), standing(6.0, 2.0)]
-    walker, other = follow(recorded(tmp_path, lines(people))).histories
-    arrows = _arrows(walker, 0.5)
+    walker, other = track_recording(recorded(tmp_path, lines(people))).histories
+    arrows = path_arrows(walker, 0.5)
     assert len(arrows) >= 4
     late = [heading for _, _, heading in arrows[2:]]
     assert late == pytest.approx([math.atan2(0.8, 0.6)] * len(late), abs=0.1)
-    assert _arrows(other, 0.5) == []
+    assert path_arrows(other, 0.5) == []
 
 
 @pytest.mark.parametrize(("number", "columns"), [(1, 1), (6, 1), (7, 2), (20, 3)])
 def test_every_track_has_a_panel_its_colour_and_its_number(tmp_path, number, columns):
-    run = follow(recorded(tmp_path, lines(crowd(number), frames=12)))
+    run = track_recording(recorded(tmp_path, lines(crowd(number), frames=12)))
     figure = tracks_figure(run, "crowd", camera=CAMERA)
     plan, *panels = figure.axes
     assert [each.get_title("left") for each in panels] == [f"track {k + 1}" for k in range(number)]
     assert len({round(each.get_position().x0, 6) for each in panels}) == columns
     assert {each.get_text() for each in plan.texts} >= {str(k + 1) for k in range(number)}
-    assert len({colour_of(k) for k in range(number)}) == number
+    assert len({track_colour(k) for k in range(number)}) == number
     boxes = [each.get_position() for each in figure.axes]
     for index, box in enumerate(boxes):
         assert 0.0 <= box.x0 < box.x1 <= 1.0
@@ -107,7 +111,7 @@ def test_every_track_has_a_panel_its_colour_and_its_number(tmp_path, number, col
 
 
 def test_a_metre_is_as_long_along_x_as_along_y_and_every_track_is_inside(tmp_path):
-    run = follow(recorded(tmp_path, lines([walking(2.0, -9.0, 0.1, 4.0)], frames=45)))
+    run = track_recording(recorded(tmp_path, lines([walking(2.0, -9.0, 0.1, 4.0)], frames=45)))
     plan = tracks_figure(run, "tall").axes[0]
     box = plan.get_position()
     width, height = plan.figure.get_size_inches() * (box.width, box.height)
@@ -121,9 +125,9 @@ def test_a_metre_is_as_long_along_x_as_along_y_and_every_track_is_inside(tmp_pat
         assert (y < y_max).all()
 
 
-def test_what_is_left_out_is_said(tmp_path):
+def test_tracks_without_a_panel_are_counted_in_a_note(tmp_path):
     records = lines(crowd(9), frames=20, hidden=lambda k, who: who == 8 and k > 1)
-    run = follow(recorded(tmp_path, records))
+    run = track_recording(recorded(tmp_path, records))
     shown, others = shown_tracks(run.histories, 5)
     assert [each.id for each in shown] == [1, 2, 3, 4, 5]
     assert {each.id for each in others} == {6, 7, 8, 9}
@@ -133,35 +137,37 @@ def test_what_is_left_out_is_said(tmp_path):
 
 def test_those_seen_most_often_come_first(tmp_path):
     records = lines(crowd(3), frames=30, hidden=lambda k, who: who == 0 and k > 10)
-    shown, _ = shown_tracks(follow(recorded(tmp_path, records)).histories, 2)
+    shown, _ = shown_tracks(track_recording(recorded(tmp_path, records)).histories, 2)
     assert [each.id for each in shown] == [2, 3]
 
 
-def test_nobody_is_said_in_an_empty_plot(tmp_path):
-    figure = tracks_figure(follow(recorded(tmp_path, lines([], frames=7))), "empty")
+def test_an_empty_plot_says_that_there_are_no_people(tmp_path):
+    figure = tracks_figure(track_recording(recorded(tmp_path, lines([], frames=7))), "empty")
     assert "no people in 7 frames" in texts(figure)
     assert len(figure.axes) == 1
 
 
-def test_not_even_a_frame_is_an_empty_plot(tmp_path):
-    figure = tracks_figure(follow(recorded(tmp_path, [])), "nothing")
+def test_a_file_without_frames_gives_an_empty_plot(tmp_path):
+    figure = tracks_figure(track_recording(recorded(tmp_path, [])), "nothing")
     assert "no people in 0 frames" in texts(figure)
     figure.canvas.draw()
 
 
 def test_one_frame_of_one_person_is_drawn(tmp_path):
-    figure = tracks_figure(follow(recorded(tmp_path, lines([standing(3, 0)], frames=1))), "one")
+    figure = tracks_figure(
+        track_recording(recorded(tmp_path, lines([standing(3, 0)], frames=1))), "one"
+    )
     figure.canvas.draw()
     assert any("never confirmed" in text for text in texts(figure))
 
 
 def test_the_thick_line_is_the_lower_bound_and_the_band_is_one_standard_deviation(tmp_path):
-    run = follow(recorded(tmp_path, lines([standing(3.0, 0.0)], awareness=lambda t: 0.7)))
+    run = track_recording(recorded(tmp_path, lines([standing(3.0, 0.0)], awareness=lambda t: 0.7)))
     (history,) = run.histories
     panel = tracks_figure(run, "one").axes[1]
     curves = [each for each in panel.lines if len(each.get_xdata()) == len(history.samples)]
     thickest = max(curves, key=Line2D.get_linewidth)
-    np.testing.assert_array_equal(thickest.get_ydata(), history.numbers("awareness_lower"))
+    np.testing.assert_array_equal(thickest.get_ydata(), history.values("awareness_lower"))
     (band,) = panel.collections
     stamp_s, alpha, std = (
         history.stamps_s[20],
@@ -175,20 +181,20 @@ def test_the_thick_line_is_the_lower_bound_and_the_band_is_one_standard_deviatio
 
 def test_shaded_spans_are_those_in_which_nobody_saw_the_person(tmp_path):
     records = lines([standing(3.0, 0.0)], hidden=lambda k, who: 15 <= k < 25)
-    run = follow(recorded(tmp_path, records))
+    run = track_recording(recorded(tmp_path, records))
     panel = tracks_figure(run, "gap").axes[1]
     spans = [(each.get_x(), each.get_x() + each.get_width()) for each in panel.patches]
     assert spans == [pytest.approx((1.4, 2.5))]
 
 
 def test_faint_tracks_have_no_ellipses_and_named_ones_have(tmp_path):
-    run = follow(recorded(tmp_path, lines([standing(3.0, 0.0)])))
+    run = track_recording(recorded(tmp_path, lines([standing(3.0, 0.0)])))
     plan = tracks_figure(run, "one").axes[0]
     centres = [each.center for each in plan.patches if isinstance(each, Ellipse)]
     assert len(centres) >= 3
     assert np.allclose(centres, [3.0, 0.0], atol=0.05)
 
 
-def test_limits_hold_a_few_metres_even_of_nothing(tmp_path):
-    run = follow(recorded(tmp_path, []))
+def test_limits_span_three_metres_without_any_track(tmp_path):
+    run = track_recording(recorded(tmp_path, []))
     assert plan_limits(run, []) == pytest.approx((-1.5, 1.5, -1.5, 1.5))

@@ -10,7 +10,7 @@ from track_lines import lines, pose, standing
 
 from awarenav.errors import AwarenavError
 from awarenav.records import write_records
-from awarenav.tracks._recording import ASSUMED_POSITION_STD_M, read_recording
+from awarenav.tracks import ASSUMED_POSITION_STD_M, read_recording
 
 RECORDS = lines([standing(4.0, 1.0)], frames=4)
 
@@ -27,39 +27,39 @@ def test_a_person_lands_where_they_stand(tmp_path):
         np.testing.assert_allclose(frame.positions_odom_m(), [[4.0, 1.0]], atol=1e-12)
 
 
-def test_a_whole_file_needs_no_remark(tmp_path):
+def test_a_complete_file_gives_no_remark(tmp_path):
     recording = read(tmp_path, RECORDS)
     assert recording.remarks == ()
     assert recording.without_covariance == 0
 
 
 @pytest.mark.parametrize("cut", [1, 9, 60])
-def test_a_last_line_that_was_cut_off_is_left_out_and_said(tmp_path, cut):
+def test_an_incomplete_last_line_is_left_out_with_a_remark(tmp_path, cut):
     path = tmp_path / "estimates.jsonl"
     write_records(path, RECORDS)
     path.write_text(path.read_text("utf-8").rstrip("\n")[:-cut], "utf-8")
     recording = read_recording(path)
     assert len(recording.frames) == len(RECORDS) - 1
-    assert recording.remarks == ("the last line was cut off in writing and is left out",)
+    assert recording.remarks == ("the last line is incomplete and is left out",)
 
 
-def test_blank_lines_are_no_cut_off_ones(tmp_path):
+def test_blank_lines_are_not_incomplete_lines(tmp_path):
     path = tmp_path / "estimates.jsonl"
     path.write_text("\n" + "\n\n".join(json.dumps(each) for each in RECORDS) + "\n \n", "utf-8")
     recording = read_recording(path)
     assert (len(recording.frames), recording.remarks) == (len(RECORDS), ())
 
 
-def test_an_empty_file_is_a_recording_of_nothing(tmp_path):
+def test_an_empty_file_gives_no_frames(tmp_path):
     assert read(tmp_path, []).frames == ()
 
 
-def test_without_any_pose_the_camera_stands_still(tmp_path):
+def test_without_any_pose_the_camera_is_fixed(tmp_path):
     recording = read(tmp_path, [{**each, "T_odom_camera": None} for each in RECORDS])
     assert all((each.T_odom_camera[:2, 3] == 0.0).all() for each in recording.frames)
     # Level and looking along odom x: the camera's right is odom's −y, its forward is odom's x.
     np.testing.assert_allclose(recording.frames[0].T_odom_camera[:3, :3], pose()[:3, :3])
-    assert "stand still" in recording.remarks[0]
+    assert "assumed to be fixed" in recording.remarks[0]
 
 
 def test_a_frame_without_a_pose_among_others_is_left_out(tmp_path):
@@ -84,11 +84,11 @@ def test_a_truth_file_has_neither_scores_nor_covariances(tmp_path):
     assert recording.without_covariance == 1
 
 
-def test_awareness_of_unknown_worth_is_no_evidence(tmp_path):
+def test_awareness_without_a_standard_deviation_is_no_evidence(tmp_path):
     recording = read(tmp_path, with_person(awareness=1.0, awareness_std=None))
     (seen,) = recording.frames[0].observations
     assert (seen.awareness, seen.awareness_std) == (None, None)
-    assert "taken as no evidence" in recording.remarks[0]
+    assert "counts as no evidence" in recording.remarks[0]
 
 
 def test_a_person_without_a_position_is_left_out(tmp_path):
@@ -109,7 +109,7 @@ def test_a_person_without_a_position_is_left_out(tmp_path):
         ({"tracks": "none"}, "tracks must be a list"),
     ],
 )
-def test_a_frame_that_is_none_is_refused_by_name(tmp_path, change, message):
+def test_an_invalid_frame_is_refused_by_name(tmp_path, change, message):
     with pytest.raises(AwarenavError, match=f"estimates.jsonl, frame '000000'[:,] {message}"):
         read(tmp_path, [{**RECORDS[0], **change}])
 
@@ -125,12 +125,12 @@ def test_a_frame_that_is_none_is_refused_by_name(tmp_path, change, message):
         ({"id": True}, "id must be a whole number or null"),
     ],
 )
-def test_a_person_that_is_none_is_refused_by_number(tmp_path, change, message):
+def test_an_invalid_person_is_refused_by_number(tmp_path, change, message):
     with pytest.raises(AwarenavError, match=f"frame '000000', person 0: {message}"):
         read(tmp_path, with_person(**change))
 
 
-def test_a_number_that_is_none_is_refused(tmp_path):
+def test_a_stamp_that_is_not_finite_is_refused(tmp_path):
     path = tmp_path / "estimates.jsonl"
     path.write_text(json.dumps({**RECORDS[0], "stamp_s": float("nan")}) + "\n", "utf-8")
     with pytest.raises(AwarenavError, match="stamp_s must be finite"):

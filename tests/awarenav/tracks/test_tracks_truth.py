@@ -10,9 +10,14 @@ from track_lines import lines, standing, walking
 
 from awarenav.errors import AwarenavError
 from awarenav.records import write_records
-from awarenav.tracks._given_ids import given_tracks
-from awarenav.tracks._recording import read_recording
-from awarenav.tracks._truth import match_truth, matched_truth, true_people, who
+from awarenav.tracks import (
+    match_truth,
+    person_ids_text,
+    read_recording,
+    tracks_in_file,
+    true_people,
+    truth_beside_tracks,
+)
 
 PEOPLE = [walking(4.0, -2.0, 0.0, 1.0), standing(5.0, 1.0), walking(7.0, 3.0, -0.5, 0.0)]
 
@@ -35,57 +40,59 @@ def test_the_truth_is_where_people_are_and_how_aware(tmp_path):
 
 def test_every_track_is_the_person_that_it_follows(tmp_path):
     truth = recorded(tmp_path, lines(PEOPLE, named=True))
-    beside = matched_truth(given_tracks(truth).histories, truth)
+    beside = truth_beside_tracks(tracks_in_file(truth).histories, truth)
     for id, matched in beside.matches.items():
         assert {person for _, person, _ in matched} == {id}
         assert len(matched) == 40
-        assert who(matched) == str(id)
+        assert person_ids_text(matched) == str(id)
 
 
-def test_a_track_that_changes_to_another_person_is_found_out(tmp_path):
+def test_a_track_that_changes_to_another_person_matches_both(tmp_path):
     truth = recorded(tmp_path, lines(PEOPLE, named=True))
     records = lines(PEOPLE, named=True)
     for record in records[30:]:
         first, second = record["people"][:2]
         first["id"], second["id"] = second["id"], first["id"]
-    run = given_tracks(recorded(tmp_path, records, "switched.jsonl"))
+    run = tracks_in_file(recorded(tmp_path, records, "switched.jsonl"))
     matches = match_truth(run.histories, true_people(truth))
     assert [person for _, person, _ in matches[0]] == [0] * 30 + [1] * 10
-    assert who(matches[0]) == "0, 1"
-    assert who(matches[1]) == "1, 0"
+    assert person_ids_text(matches[0]) == "0, 1"
+    assert person_ids_text(matches[1]) == "1, 0"
 
 
-def test_nobody_near_is_nobody(tmp_path):
+def test_a_track_far_from_everybody_matches_nobody(tmp_path):
     truth = true_people(recorded(tmp_path, lines([standing(4.0, 0.0)], named=True)))
-    near = given_tracks(recorded(tmp_path, lines([standing(4.0, 0.99)], named=True), "near.jsonl"))
-    far = given_tracks(recorded(tmp_path, lines([standing(4.0, 1.01)], named=True), "far.jsonl"))
+    near = tracks_in_file(
+        recorded(tmp_path, lines([standing(4.0, 0.99)], named=True), "near.jsonl")
+    )
+    far = tracks_in_file(recorded(tmp_path, lines([standing(4.0, 1.01)], named=True), "far.jsonl"))
     assert len(match_truth(near.histories, truth)[0]) == 40
     assert match_truth(far.histories, truth)[0] == []
-    assert who([]) == "–"
+    assert person_ids_text([]) == "–"
 
 
 def test_a_far_track_does_not_take_a_near_ones_person(tmp_path):
     truth = true_people(recorded(tmp_path, lines([standing(4.0, 0.0)], named=True)))
     both = [standing(4.0, 0.1), standing(40.0, 0.0)]
-    run = given_tracks(recorded(tmp_path, lines(both, named=True), "both.jsonl"))
+    run = tracks_in_file(recorded(tmp_path, lines(both, named=True), "both.jsonl"))
     matches = match_truth(run.histories, truth)
     assert (len(matches[0]), len(matches[1])) == (40, 0)
 
 
-def test_the_truth_of_another_instant_is_no_truth(tmp_path):
+def test_truth_with_another_stamp_is_not_matched(tmp_path):
     truth = true_people(recorded(tmp_path, lines([standing(4.0, 0.0)], frames=4, named=True)))
     for shift_s, count in ((0.02, 4), (0.05, 0)):
         records = lines([standing(4.0, 0.0)], frames=4, named=True)
         for record in records:
             record["stamp_s"] += shift_s
-        run = given_tracks(recorded(tmp_path, records, "shifted.jsonl"))
+        run = tracks_in_file(recorded(tmp_path, records, "shifted.jsonl"))
         assert len(match_truth(run.histories, truth)[0]) == count
 
 
-def test_a_truth_without_awareness_says_nothing_about_it(tmp_path):
+def test_truth_without_awareness_gives_nan(tmp_path):
     records = lines([standing(4.0, 0.0)], named=True, awareness=lambda t: None)
     truth = recorded(tmp_path, records)
-    beside = matched_truth(given_tracks(truth).histories, truth)
+    beside = truth_beside_tracks(tracks_in_file(truth).histories, truth)
     assert all(math.isnan(alpha) for _, _, alpha in beside.matches[0])
 
 

@@ -1,4 +1,4 @@
-"""Pictures whose grey level tells their number, and networks that see people by that number."""
+"""Images whose grey level is their number, and networks that place a person by that number."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _BODY_M = np.array(
 
 
 def numbered(number: int, size_px: tuple[int, int] = (WIDTH, HEIGHT)) -> np.ndarray:
-    """(H, W, 3) RGB picture of a number from 0 to 29."""
+    """(H, W, 3) RGB image of a number from 0 to 29."""
     return np.full((size_px[1], size_px[0], 3), 8 + _STEP * number, np.uint8)
 
 
@@ -40,7 +40,7 @@ def standing_at(x_m: float, z_m: float, camera: Camera = CAMERA) -> PersonKeypoi
 
 
 class NumberReader:
-    """Detector and pose estimator: one person, who walks to the right from picture to picture."""
+    """Detector and pose estimator: one person, who walks to the right from image to image."""
 
     def __init__(self, camera: Camera = CAMERA, *, fail_at: tuple[int, ...] = (), error=None):
         self.camera = camera

@@ -1,4 +1,4 @@
-"""The real tracker over a recording, with a note of everything that it said."""
+"""Runs the tracker over a recording and keeps its tracks at every frame."""
 
 from __future__ import annotations
 
@@ -13,82 +13,85 @@ from tqdm import tqdm
 from perception import Camera
 from tracking import CameraView, PersonTrack, PersonTracker, TrackerConfig, TrackingError
 
-from ..errors import AwarenavError
-from ..estimate import track_of_each
-from ._history import HistoryBook, TrackRun, TrackSample, camera_pose
-from ._recording import ASSUMED_POSITION_STD_M, RecordedFrame, Recording, count
+from ..errors import AwarenavError, counted
+from ..estimate import ids_of_tracks
+from ._history import HistoryBuilder, TrackedRecording, TrackSample, camera_pose
+from ._recording import ASSUMED_POSITION_STD_M, RecordedFrame, Recording
 
-# Between frames further apart than this, the tracker's prediction is drawn as often.
-_PREDICTED_EVERY_S: Final = 0.1
-# A longer pause is drawn with so many predictions and no more.
+# Period of the predictions between frames that are further apart.
+_PREDICTION_PERIOD_S: Final = 0.1
+# Most predictions in one pause of the camera.
 _MOST_PREDICTIONS: Final = 600
 
 
-def follow(
+def track_recording(
     recording: Recording, config: TrackerConfig | None = None, camera: Camera | None = None
-) -> TrackRun:
-    """Give every frame to the tracker, in the order of the file, and keep what it answers.
+) -> TrackedRecording:
+    """Run the tracker over the frames in the order of the file.
 
-    Late frames that the tracker takes change what it said before. Histories are then those of the
-    frames that it took in the order of their stamps, which the tracker makes of them too.
+    A late frame that the tracker accepts changes its earlier tracks. The histories are therefore
+    those of the accepted frames in the order of their stamps; the tracker ends with the same tracks
+    either way.
 
     Args:
         recording: the frames.
         config: of the tracker; None for its defaults.
-        camera: gives the tracker its view; None when nobody knows where the camera can see.
+        camera: whose field of view the tracker uses; None if it is not known.
 
     Raises:
-        AwarenavError: for a frame that the tracker cannot use, naming it.
+        AwarenavError: for a frame that the tracker cannot use; the message names it.
     """
 
     def tracker() -> PersonTracker:
         return PersonTracker(config, view=None if camera is None else CameraView(camera))
 
-    taken, late, refused = _taken(recording, tracker)
+    accepted, late, refused = _accepted_frames(recording, tracker)
     working = tracker()
-    book = HistoryBook()
-    for frame in tqdm(taken, "tracks", unit="frame", file=sys.stderr, disable=None):
+    builder = HistoryBuilder()
+    for frame in tqdm(accepted, "tracks", unit="frame", file=sys.stderr, disable=None):
         latest_s = frame.stamp_s if working.last_stamp_s is None else working.last_stamp_s
-        for stamp_s in _between(latest_s, frame.stamp_s):
+        for stamp_s in _prediction_stamps(latest_s, frame.stamp_s):
             tracks = working.predict(stamp_s)
-            book.note(stamp_s, _samples(tracks, stamp_s, is_frame=False))
+            builder.add(stamp_s, _samples(tracks, stamp_s, is_frame=False))
         tracks = _update(working, frame, recording)
-        measured = _measured(frame, tracks)
-        book.note(frame.stamp_s, _samples(tracks, frame.stamp_s, is_frame=True, measured=measured))
-    return TrackRun(
-        book.histories(),
-        np.array([frame.stamp_s for frame in taken]),
-        np.array([camera_pose(frame.T_odom_camera) for frame in taken]).reshape(-1, 3),
+        measured = _measured_awareness(frame, tracks)
+        builder.add(
+            frame.stamp_s, _samples(tracks, frame.stamp_s, is_frame=True, measured=measured)
+        )
+    return TrackedRecording(
+        builder.histories(),
+        np.array([frame.stamp_s for frame in accepted]),
+        np.array([camera_pose(frame.T_odom_camera) for frame in accepted]).reshape(-1, 3),
         tuple(_remarks(recording, late, refused)),
         "tracks",
     )
 
 
-def _taken(
+def _accepted_frames(
     recording: Recording, tracker: Callable[[], PersonTracker]
 ) -> tuple[list[RecordedFrame], int, int]:
-    """The frames that a tracker takes, by stamp; how many of them were late; how many it refused.
+    """Return the frames that a tracker accepts, by stamp, and the numbers of late and refused ones.
 
-    Only a tracker that gets them in the order of the file can tell.
+    Only a tracker that gets the frames in the order of the file can tell.
     """
     frames = list(recording.frames)
     if all(earlier.stamp_s <= later.stamp_s for earlier, later in itertools.pairwise(frames)):
         return frames, 0, 0
-    asked = tracker()
-    taken, late = [], 0
+    trial = tracker()
+    accepted, late = [], 0
     for frame in frames:
-        is_late = asked.last_stamp_s is not None and frame.stamp_s < asked.last_stamp_s
-        refused_before = asked.refused_late_frames
+        is_late = trial.last_stamp_s is not None and frame.stamp_s < trial.last_stamp_s
+        refused_before = trial.refused_late_frames
         try:
-            _update(asked, frame, recording)
+            _update(trial, frame, recording)
         except AwarenavError:
-            if asked.refused_late_frames == refused_before:
+            if trial.refused_late_frames == refused_before:
                 raise
             continue
-        taken.append(frame)
+        accepted.append(frame)
         late += is_late
-    taken.sort(key=lambda frame: frame.stamp_s)
-    return taken, late, asked.refused_late_frames
+    accepted.sort(key=lambda frame: frame.stamp_s)
+    return accepted, late, trial.refused_late_frames
 
 
 def _update(
@@ -100,18 +103,18 @@ def _update(
         raise AwarenavError(f"{recording.path}, frame {frame.name!r}: {error}") from error
 
 
-def _between(start_s: float, end_s: float) -> Iterator[float]:
-    """Instants inside a gap at which to ask for a prediction; none inside a short one."""
-    number = min(int((end_s - start_s) / _PREDICTED_EVERY_S), _MOST_PREDICTIONS)
+def _prediction_stamps(start_s: float, end_s: float) -> Iterator[float]:
+    """Yield the stamps of predictions between two frames; none if the frames are close together."""
+    number = min(int((end_s - start_s) / _PREDICTION_PERIOD_S), _MOST_PREDICTIONS)
     for index in range(1, number):
         yield start_s + (end_s - start_s) * index / number
 
 
-def _measured(
+def _measured_awareness(
     frame: RecordedFrame, tracks: Sequence[PersonTrack]
 ) -> dict[int, tuple[float, float]]:
-    """α of this frame's observations and its standard deviation by the id of their track."""
-    ids = track_of_each(frame.observations, tracks, frame.T_odom_camera)
+    """Return α and its standard deviation of a frame's observations, by the id of their track."""
+    ids = ids_of_tracks(frame.observations, tracks, frame.T_odom_camera)
     return {
         id: (observation.awareness, observation.awareness_std)
         for id, observation in zip(ids, frame.observations, strict=True)
@@ -137,12 +140,13 @@ def _samples(
 def _sample(
     track: PersonTrack, stamp_s: float, is_frame: bool, measured: tuple[float, float] | None
 ) -> TrackSample:
+    """Return the sample of a track."""
     seen = is_frame and track.time_since_seen_s == 0.0
-    # A prediction of somebody whom the latest frame showed is still called confirmed.
-    coasts = not seen and track.status == "confirmed"
+    # The tracker calls the prediction of a person in the latest frame confirmed.
+    coasting = not seen and track.status == "confirmed"
     return TrackSample(
         stamp_s=stamp_s,
-        status="coasting" if coasts else track.status,
+        status="coasting" if coasting else track.status,
         is_frame=is_frame,
         seen=seen,
         position_odom_m=track.position_odom_m,
@@ -159,10 +163,11 @@ def _sample(
 def _remarks(recording: Recording, late: int, refused: int) -> Iterator[str]:
     if recording.without_covariance:
         yield (
-            f"{count(recording.without_covariance, 'observation')} without position_covariance_m2: "
-            f"a standard deviation of {ASSUMED_POSITION_STD_M:g} m is taken"
+            f"{counted(recording.without_covariance, 'observation')} without "
+            f"position_covariance_m2: a standard deviation of {ASSUMED_POSITION_STD_M:g} m is "
+            "assumed"
         )
     if late:
-        yield f"{count(late, 'late frame')} put back in time by the tracker"
+        yield f"{counted(late, 'late frame')} put back in time by the tracker"
     if refused:
-        yield f"{count(refused, 'late frame')} refused by the tracker and not used"
+        yield f"{counted(refused, 'late frame')} refused by the tracker and not used"

@@ -1,7 +1,8 @@
-"""Where drawn pictures go: a video or a folder."""
+"""Writes images with their estimates into a video, a folder or a file."""
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -11,34 +12,33 @@ import numpy as np
 from perception import AttentionCone
 from perception.arrays import ImageRgb
 
-from ..closing import Closing
-from ..errors import AwarenavError
+from ..errors import AwarenavError, MissingExtraError
+from ..files import atomic_path
 from ._estimator import FrameEstimate
+from ._images import IMAGE_SUFFIXES
 from ._overlay import draw_overlay
-from ._source import PICTURE_SUFFIXES
 
 if TYPE_CHECKING:
     from ..video import VideoWriter
 
+# A folder with one of these suffixes would be a mistake.
+_FILE_SUFFIXES: Final = (*IMAGE_SUFFIXES, ".avi", ".gif", ".mkv", ".mov", ".webm")
 
-# Nobody who names one of these wants a folder of that name.
-_OTHER_FILES: Final = (*PICTURE_SUFFIXES, ".avi", ".gif", ".mkv", ".mov", ".webm")
 
+class OverlayWriter(AbstractContextManager["OverlayWriter"]):
+    """Draws estimates into a video (``.mp4``), a folder of images, or one image file.
 
-class OverlayFile(Closing):
-    """Draws estimates into a video (``.mp4``), a folder of pictures, or one picture file.
-
-    A video has one size, that of its first picture; pictures of another are fitted in. It appears
-    when it is complete, or interrupted, and is then a playable video.
+    A video has the size of its first image; images of another size are fitted into it. The video
+    appears when it is closed; an interrupted one can be played too.
 
     Args:
-        path: of the video, the folder (which is made) or, for ``single``, the picture.
-        rate_hz: frames a second of a video.
+        path: of the video, the folder (which is made) or, with ``single``, the image file.
+        rate_hz: frames per second of a video.
         cone: the attention cone.
-        single: there is one picture, so a picture file will do.
+        single: whether there is only one image, which may go into an image file.
 
     Raises:
-        AwarenavError: for a path that is none of these, or a video where PyAV is not installed.
+        AwarenavError: for a path that is none of these, or a video if PyAV is not installed.
     """
 
     def __init__(
@@ -51,14 +51,14 @@ class OverlayFile(Closing):
         self._size_px = (0, 0)
         suffix = path.suffix.lower()
         self._is_video = suffix == ".mp4"
-        self._is_file = self._is_video or (single and suffix in PICTURE_SUFFIXES)
-        if suffix in _OTHER_FILES and not self._is_file and not path.is_dir():
-            one = " or, for one image, a picture file" if single else ""
+        self._is_file = self._is_video or (single and suffix in IMAGE_SUFFIXES)
+        if suffix in _FILE_SUFFIXES and not self._is_file and not path.is_dir():
+            single_file = " or, for one image, an image file" if single else ""
             raise AwarenavError(
-                f"--overlay must be a .mp4 file, a folder{one} or 'none', got {path}"
+                f"--overlay must be a .mp4 file, a folder{single_file} or 'none', got {path}"
             )
         if self._is_video:
-            _video_writer()  # what is missing is said before anything is estimated
+            _video_writer()  # fails before the first estimate if PyAV is not installed
         folder = path.parent if self._is_file else path
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -68,22 +68,25 @@ class OverlayFile(Closing):
             ) from cause
 
     def add(self, estimate: FrameEstimate) -> None:
-        """Draw one estimate and append it."""
+        """Draw an estimate and write the image."""
         image = draw_overlay(estimate, self._cone)
         if self._is_video:
             if self._video is None:
-                # H.264 in yuv420p has even sides.
+                # The sides of a yuv420p video are even.
                 width, height = image.shape[1], image.shape[0]
                 self._size_px = width + width % 2, height + height % 2
                 self._video = _video_writer()(self._path, self._rate_hz, self._size_px)
-            self._video.add(fit(image, *self._size_px))
+            self._video.add(fit_image(image, *self._size_px))
         elif self._is_file:
-            _write_picture(self._path, image)
+            _write_image(self._path, image)
         else:
-            _write_picture(self._path / f"{Path(estimate.frame.name).stem}.png", image)
+            _write_image(self._path / f"{Path(estimate.frame.name).stem}.png", image)
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
 
     def close(self) -> None:
-        """Finish a video."""
+        """Finish the video, if there is one."""
         if self._video is not None:
             self._video.close()
 
@@ -92,28 +95,26 @@ def _video_writer() -> type[VideoWriter]:
     try:
         from ..video import VideoWriter  # noqa: PLC0415 - PyAV is an optional dependency
     except ImportError as cause:
-        raise AwarenavError(
+        raise MissingExtraError(
             "drawing into a video needs PyAV, which is not installed: pip install av; or draw into "
             "a folder (--overlay DIR)"
         ) from cause
     return VideoWriter
 
 
-def _write_picture(path: Path, image: ImageRgb) -> None:
-    """Write a picture whole or not at all."""
-    part = path.with_name(path.name + ".part")
+def _write_image(path: Path, image: ImageRgb) -> None:
     try:
         good, data = cv2.imencode(path.suffix, image[..., ::-1])
-        if not good:
-            raise OSError("it cannot be encoded")
-        part.write_bytes(data.tobytes())
-        part.replace(path)
-    except (OSError, cv2.error) as cause:
+    except cv2.error as cause:
         raise AwarenavError(f"cannot write {path}: {cause}") from cause
+    if not good:
+        raise AwarenavError(f"cannot write {path}: it cannot be encoded")
+    with atomic_path(path) as part:
+        part.write_bytes(data.tobytes())
 
 
-def fit(image: ImageRgb, width_px: int, height_px: int) -> ImageRgb:
-    """Put a picture in the middle of one of another size, shrunk when it does not fit."""
+def fit_image(image: ImageRgb, width_px: int, height_px: int) -> ImageRgb:
+    """Return an image of another size with this one in its middle, shrunk if it is too large."""
     height, width = image.shape[:2]
     if (width, height) == (width_px, height_px):
         return image

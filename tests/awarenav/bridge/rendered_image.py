@@ -1,4 +1,4 @@
-"""A rendered picture with a person, as a robot that stands still would send it."""
+"""A rendered image with a person, as the messages of a robot that stands still."""
 
 from __future__ import annotations
 
@@ -27,8 +27,12 @@ from perception import Camera
 from perception.arrays import FloatArray
 
 
-class Picture:
-    """One rendered picture with a person, as a robot that stands still would send it."""
+def stamped(stamp_s: float, frame_id: str) -> Header:
+    return Header(to_time(stamp_s), frame_id)
+
+
+class RenderedImage:
+    """A rendered image with one person, and its messages."""
 
     def __init__(self, folder: Path) -> None:
         lines = (folder / "truth.jsonl").read_text().splitlines()
@@ -41,17 +45,17 @@ class Picture:
 
     def image(self, stamp_s: float) -> Image:
         height, width, _ = self.bgr.shape
-        header = Header(to_time(stamp_s), "camera")
+        header = stamped(stamp_s, "camera")
         return Image(header, height, width, "bgr8", 0, 3 * width, self.bgr.tobytes())
 
     def compressed(self, stamp_s: float) -> CompressedImage:
         data = cv2.imencode(".png", self.bgr)[1].tobytes()
-        return CompressedImage(Header(to_time(stamp_s), "camera"), "png", data)
+        return CompressedImage(stamped(stamp_s, "camera"), "png", data)
 
     def info(self, stamp_s: float) -> CameraInfo:
         k = tuple(self.camera.matrix.ravel().tolist())
         size = self.camera.height_px, self.camera.width_px
-        return CameraInfo(Header(to_time(stamp_s), "camera"), *size, "plumb_bob", (), k)
+        return CameraInfo(stamped(stamp_s, "camera"), *size, "plumb_bob", (), k)
 
     def mounted(self) -> TFMessage:
         turn = Rotation.from_matrix(self.T_base_camera[:3, :3]).as_quat().tolist()
@@ -62,10 +66,10 @@ class Picture:
 
 def odometry(stamp_s: float) -> Odometry:
     twist = TwistWithCovariance(Twist(Vector3(0.5, 0.0, 0.0)))
-    return Odometry(Header(to_time(stamp_s), "odom"), "base_link", twist=twist)
+    return Odometry(stamped(stamp_s, "odom"), "base_link", twist=twist)
 
 
-def rendered(folder: Path) -> Picture:
+def rendered(folder: Path) -> RenderedImage:
     size = ["--frames", "2", "--people", "1", "--scenes", "1", "--range", "2", "4", "--seed", "3"]
     assert main(["render", *size, "--processes", "1", "--out", str(folder)]) == 0
-    return Picture(folder)
+    return RenderedImage(folder)

@@ -1,4 +1,4 @@
-"""A picture file, or a folder of them, as a source of frames."""
+"""An image file, or a folder of image files, as a source of frames."""
 
 from __future__ import annotations
 
@@ -12,27 +12,28 @@ from perception.arrays import FloatArray, finite_number, rigid_transform
 
 from ..errors import AwarenavError
 from ..records import read_records
-from ._source import PICTURE_SUFFIXES, SourceFrame, read_picture
+from ._images import IMAGE_SUFFIXES, read_image
+from ._source import SourceFrame
 
 _CAMERA: Final = "camera.yaml"
 _TRUTH: Final = "truth.jsonl"
-# Pictures of `awarenav render` that are none of its frames.
-_NO_FRAMES: Final = ("contact_sheet.png",)
+# Images of `awarenav render` that are not frames.
+_NOT_FRAMES: Final = ("contact_sheet.png",)
 
 
-class PictureSource:
-    """One picture file, or all of a folder in the order of the numbers in their names.
+class ImageFiles:
+    """One image file, or all image files of a folder in the order of the numbers in their names.
 
-    ``camera.yaml`` beside them is their camera. ``truth.jsonl`` beside them tells when and from
-    where each was taken; nothing that it says about people is read. Without it, pictures have the
-    stamps 0, 1, 2 … times ``interval_s``.
+    ``camera.yaml`` beside them is their camera. ``truth.jsonl`` beside them gives the stamp and the
+    camera pose of each image; what it says about people is not read. Without it, the stamps are 0,
+    1, 2 … times ``interval_s``.
 
     Args:
-        path: file or folder.
-        interval_s: between pictures whose stamps are not known.
+        path: of the file or folder.
+        interval_s: time between images without stamps, seconds.
 
     Raises:
-        AwarenavError: when there is no picture, or the files beside them cannot be read.
+        AwarenavError: if there is no image, or the files beside the images cannot be read.
     """
 
     def __init__(self, path: Path, interval_s: float = 1.0) -> None:
@@ -41,15 +42,15 @@ class PictureSource:
             files = [
                 each
                 for each in path.iterdir()
-                if each.suffix.lower() in PICTURE_SUFFIXES
-                and each.name not in _NO_FRAMES
+                if each.suffix.lower() in IMAGE_SUFFIXES
+                and each.name not in _NOT_FRAMES
                 and not each.name.startswith(".")
             ]
             if not files:
-                raise AwarenavError(f"{path} holds no picture ({', '.join(PICTURE_SUFFIXES)})")
+                raise AwarenavError(f"{path} has no image ({', '.join(IMAGE_SUFFIXES)})")
         else:
             files = [path]
-        self._files = sorted(files, key=_in_order)
+        self._files = sorted(files, key=_natural_order)
         self._interval_s = interval_s
         self._known = _stamps_and_poses(folder / _TRUTH)
         self.camera = Camera.from_yaml(folder / _CAMERA) if (folder / _CAMERA).exists() else None
@@ -58,26 +59,26 @@ class PictureSource:
         self.live = False
 
     def frames(self) -> Iterator[SourceFrame]:
-        """Yield every picture; one that cannot be read has a ``problem``."""
+        """Yield every image; one that cannot be read has a ``problem``."""
         for index, path in enumerate(self._files):
             stamp_s, pose = self._known.get(path.name, (index * self._interval_s, None))
             try:
-                yield SourceFrame(path.name, stamp_s, read_picture(path), pose)
+                yield SourceFrame(path.name, stamp_s, read_image(path), pose)
             except AwarenavError as error:
                 yield SourceFrame(path.name, stamp_s, None, pose, str(error))
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Do nothing: no file is held open."""
 
 
-def _in_order(path: Path) -> tuple[tuple[tuple[int, int | str], ...], str]:
-    """Numbers in a name count as numbers: picture9 comes before picture10."""
+def _natural_order(path: Path) -> tuple[tuple[tuple[int, int | str], ...], str]:
+    """Return a sort key that counts numbers in a name as numbers: image9 before image10."""
     parts = re.split(r"(\d+)", path.name)
     return tuple((0, int(part)) if part.isdigit() else (1, part) for part in parts), path.name
 
 
 def _stamps_and_poses(truth: Path) -> dict[str, tuple[float, FloatArray | None]]:
-    """When and from where each frame of a rendered set was taken."""
+    """Return stamp and camera pose of each frame of a rendered set, by its name."""
     if not truth.exists():
         return {}
     known = {}

@@ -1,4 +1,4 @@
-"""Identities as the file itself gives them, without a tracker of ours."""
+"""The tracks, or the ids of people, that a file has already."""
 
 from __future__ import annotations
 
@@ -11,37 +11,38 @@ import numpy as np
 from perception.arrays import finite_array, finite_number
 from tracking import TrackStatus
 
-from ..errors import AwarenavError
-from ._history import HistoryBook, TrackRun, TrackSample, camera_pose
-from ._recording import RecordedFrame, Recording, count, floor_covariance
+from ..errors import AwarenavError, counted
+from ._history import HistoryBuilder, TrackedRecording, TrackSample, camera_pose
+from ._recording import RecordedFrame, Recording, floor_covariance
 
 
-def given_tracks(recording: Recording) -> TrackRun:
-    """The tracks of a file that has some: of its ``tracks``, else of its people's ids.
+def tracks_in_file(recording: Recording) -> TrackedRecording:
+    """Return the tracks of a file's ``tracks``, else those of its people's ids.
 
-    People without a tracker have an α only where a frame measured one, and no lower bound.
+    People without a tracker have only the α that a frame has measured, and no lower bound.
 
     Raises:
-        AwarenavError: for a file without any identity, or a track that is none.
+        AwarenavError: for a file without tracks and ids, or a track that is not valid.
     """
-    # A file may hold frames out of order; identities need no order to be tracked in.
     frames = sorted(recording.frames, key=lambda frame: frame.stamp_s)
     tracked = any(frame.tracks is not None for frame in frames)
-    named = any(id is not None for frame in frames for id in frame.ids)
-    if not tracked and not named and any(frame.observations for frame in frames):
+    has_ids = any(id is not None for frame in frames for id in frame.ids)
+    if not tracked and not has_ids and any(frame.observations for frame in frames):
         raise AwarenavError(
-            f"{recording.path} gives its people no ids; leave out --ids to track them here"
+            f"{recording.path} has no ids of people; leave out --ids to track them here"
         )
-    book = HistoryBook()
-    nameless = 0
+    builder = HistoryBuilder()
+    without_id = 0
     for frame in frames:
-        samples = _of_tracks(frame, str(recording.path)) if tracked else _of_people(frame)
-        book.note(frame.stamp_s, samples)
-        nameless += sum(id is None for id in frame.ids)
-    remarks = [f"{count(nameless, 'observation')} without an id left out"] if nameless else []
+        samples = (
+            _samples_of_tracks(frame, str(recording.path)) if tracked else _samples_of_people(frame)
+        )
+        builder.add(frame.stamp_s, samples)
+        without_id += sum(id is None for id in frame.ids)
+    remarks = [f"{counted(without_id, 'observation')} without an id left out"] if without_id else []
     poses = [camera_pose(frame.T_odom_camera) for frame in frames]
-    return TrackRun(
-        book.histories(),
+    return TrackedRecording(
+        builder.histories(),
         np.array([frame.stamp_s for frame in frames]),
         np.array(poses).reshape(-1, 3),
         tuple(remarks),
@@ -49,7 +50,8 @@ def given_tracks(recording: Recording) -> TrackRun:
     )
 
 
-def _of_tracks(frame: RecordedFrame, path: str) -> Iterator[tuple[int, TrackSample]]:
+def _samples_of_tracks(frame: RecordedFrame, path: str) -> Iterator[tuple[int, TrackSample]]:
+    """Yield id and sample of each of the frame's ``tracks``."""
     measured = dict(zip(frame.ids, frame.observations, strict=True))
     for index, track in enumerate(frame.tracks or ()):
         where = f"{path}, frame {frame.name!r}, track {index}"
@@ -61,7 +63,6 @@ def _of_tracks(frame: RecordedFrame, path: str) -> Iterator[tuple[int, TrackSamp
                 f"{where}: status must be one of {', '.join(get_args(TrackStatus))}, "
                 f"got {status!r:.60}"
             )
-
         observation = measured.get(id)
         yield (
             id,
@@ -69,7 +70,7 @@ def _of_tracks(frame: RecordedFrame, path: str) -> Iterator[tuple[int, TrackSamp
                 stamp_s=frame.stamp_s,
                 status=str(status),
                 is_frame=True,
-                seen=_number(track, "time_since_seen_s", where) == 0.0,
+                seen=_nonnegative(track, "time_since_seen_s", where) == 0.0,
                 position_odom_m=finite_array(
                     f"{where}: position_odom_m", track.get("position_odom_m"), (2,), AwarenavError
                 ),
@@ -80,22 +81,23 @@ def _of_tracks(frame: RecordedFrame, path: str) -> Iterator[tuple[int, TrackSamp
                     AwarenavError,
                 ),
                 position_covariance_m2=None,
-                awareness=_number(track, "awareness", where, 1.0),
-                awareness_std=_number(track, "awareness_std", where),
-                awareness_lower=_number(track, "awareness_lower", where, 1.0),
+                awareness=_nonnegative(track, "awareness", where, 1.0),
+                awareness_std=_nonnegative(track, "awareness_std", where),
+                awareness_lower=_nonnegative(track, "awareness_lower", where, 1.0),
                 measured_awareness=None if observation is None else observation.awareness,
                 measured_awareness_std=None if observation is None else observation.awareness_std,
             ),
         )
 
 
-def _number(track: dict[str, Any], name: str, where: str, maximum: float = math.inf) -> float:
+def _nonnegative(track: dict[str, Any], name: str, where: str, maximum: float = math.inf) -> float:
     return finite_number(
         f"{where}: {name}", track.get(name), AwarenavError, minimum=0.0, maximum=maximum
     )
 
 
-def _of_people(frame: RecordedFrame) -> Iterator[tuple[int, TrackSample]]:
+def _samples_of_people(frame: RecordedFrame) -> Iterator[tuple[int, TrackSample]]:
+    """Yield id and sample of each person with an id."""
     positions = frame.positions_odom_m()
     for id, observation, position in zip(frame.ids, frame.observations, positions, strict=True):
         if id is None:

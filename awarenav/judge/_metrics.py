@@ -1,4 +1,4 @@
-"""Errors of a group of people in frames: gaze, position, awareness, and their honesty."""
+"""Metrics of estimates of a group of people: gaze, position, awareness, and uncertainties."""
 
 from __future__ import annotations
 
@@ -14,33 +14,37 @@ from perception.arrays import FloatArray
 
 from ..records import PersonRecord
 
-#: α from here on counts as aware.
-AWARE: Final = 0.5
-# Probability of a normal error within one standard deviation.
-ONE_SIGMA: Final = math.erf(math.sqrt(0.5))
-# A truth below this is the cone's exact 0, written with six decimals.
+# A person with this α or more is aware.
+_AWARE: Final = 0.5
+# A true α below this is 0: the cone gives an exact 0, which is written with six decimals.
 _ZERO: Final = 1.0e-9
-# α closer to 0 or 1 than this says nothing about calibration: such an error is trivially small.
+# An α closer than this to 0 or 1 has a trivially small error, which says nothing of calibration.
 _TRIVIAL: Final = 0.01
-_NEES_1SIGMA: Final = float(chi2.ppf(ONE_SIGMA, df=3))
+# Probability of a normal error within one standard deviation.
+_ONE_SIGMA: Final = math.erf(math.sqrt(0.5))
+_NEES_1SIGMA: Final = float(chi2.ppf(_ONE_SIGMA, df=3))
 
 
 @dataclass(frozen=True, slots=True)
 class PersonFrame:
-    """One person in one frame, and what was made of them."""
+    """A person in a frame, and their estimate; None if they were not found."""
 
     truth: PersonRecord
     estimate: PersonRecord | None
 
 
-def person_figures(group: Iterable[PersonFrame]) -> dict[str, Any]:
-    """The figures of a group of people who had to be found.
+_Pairs = Sequence[tuple[PersonRecord, PersonRecord]]
 
-    Shares are of 1; a figure nobody contributes to is None. ``awareness_none`` and ``gaze_none``
-    are the shares of found people about whom the estimate is silent. Of those whose true α is 0,
-    ``false_aware`` is the share with an estimated α ≥ 0.5 among those with an estimate, so that
-    silence does not dilute it. ``aware_recognised`` is the share of people with a true α ≥ 0.5,
-    found or not, whose estimated α says so: what an estimator of zeros would lose.
+
+def person_metrics(group: Iterable[PersonFrame]) -> dict[str, Any]:
+    """Return the metrics of a group of people who had to be found.
+
+    Shares are from 0 to 1; a metric to which nobody contributes is None. ``awareness_none`` and
+    ``gaze_none`` are the shares of found people without an estimate of it. ``false_aware`` is the
+    share of α ≥ 0.5 among the estimated α of people whose true α is 0; people without an estimated
+    α do not count, so they do not dilute it. ``aware_recognised`` is the share of people with an
+    estimated α ≥ 0.5 among all people with a true α ≥ 0.5, found or not; it is 0 for an estimator
+    that always returns 0.
     """
     everyone = list(group)
     found = [(each.truth, each.estimate) for each in everyone if each.estimate is not None]
@@ -48,17 +52,15 @@ def person_figures(group: Iterable[PersonFrame]) -> dict[str, Any]:
         "people": len(everyone),
         "found": len(found),
         "recall": _share(len(found), len(everyone)),
-        **_directions(found),
-        **_positions(found),
-        **_awareness(everyone, found),
+        **_direction_metrics(found),
+        **_position_metrics(found),
+        **_awareness_metrics(everyone, found),
     }
 
 
-_Pairs = Sequence[tuple[PersonRecord, PersonRecord]]
-
-
-def _directions(found: _Pairs) -> dict[str, Any]:
-    figures: dict[str, Any] = {
+def _direction_metrics(found: _Pairs) -> dict[str, Any]:
+    """Return the errors of gaze and head direction."""
+    metrics: dict[str, Any] = {
         "gaze_none": _share(sum(e.gaze_camera is None for _, e in found), len(found))
     }
     for name in ("gaze", "head"):
@@ -67,23 +69,24 @@ def _directions(found: _Pairs) -> dict[str, Any]:
             true, guess = truth.gaze_camera, estimate.gaze_camera
             if name == "head":
                 true = truth.head_forward_camera
-                # What an estimator calls gaze is the head's direction; only truth tells them apart.
+                # The gaze of an estimate is the head's direction; only truth tells them apart.
                 guess = (
                     guess if estimate.head_forward_camera is None else estimate.head_forward_camera
                 )
             if true is not None and guess is not None:
                 sine = float(np.linalg.norm(np.cross(true, guess)))
                 errors.append(math.degrees(math.atan2(sine, float(true @ guess))))
-        figures |= {
+        metrics |= {
             f"{name}_count": len(errors),
             f"{name}_median_deg": _percentile(errors, 50.0),
             f"{name}_p90_deg": _percentile(errors, 90.0),
             f"{name}_over_90deg": _share(sum(error > 90.0 for error in errors), len(errors)),
         }
-    return figures
+    return metrics
 
 
-def _positions(found: _Pairs) -> dict[str, Any]:
+def _position_metrics(found: _Pairs) -> dict[str, Any]:
+    """Return the errors of position as shares of range, and their normalised squares (NEES)."""
     relative, along, nees, within = [], [], [], []
     for truth, estimate in found:
         true, guess = truth.position_camera_m, estimate.position_camera_m
@@ -108,7 +111,8 @@ def _positions(found: _Pairs) -> dict[str, Any]:
     }
 
 
-def _awareness(everyone: Sequence[PersonFrame], found: _Pairs) -> dict[str, Any]:
+def _awareness_metrics(everyone: Sequence[PersonFrame], found: _Pairs) -> dict[str, Any]:
+    """Return the errors of α, its calibration, and false and missed awareness."""
     known = [each for each in everyone if each.truth.awareness is not None]
     errors, with_none_as_0, inside, inside_all = [], [], [], []
     for truth, estimate in found:
@@ -128,10 +132,10 @@ def _awareness(everyone: Sequence[PersonFrame], found: _Pairs) -> dict[str, Any]
         ):
             inside.append(good)
     unaware = [each for each in known if (each.truth.awareness or 0.0) <= _ZERO]
-    judged = [alpha for each in unaware if (alpha := _alpha(each)) is not None]
-    false_aware = sum(alpha >= AWARE for alpha in judged)
-    aware = [each for each in known if (each.truth.awareness or 0.0) >= AWARE]
-    recognised = sum((_alpha(each) or 0.0) >= AWARE for each in aware)
+    judged = [alpha for each in unaware if (alpha := _estimated_alpha(each)) is not None]
+    false_aware = sum(alpha >= _AWARE for alpha in judged)
+    aware = [each for each in known if (each.truth.awareness or 0.0) >= _AWARE]
+    recognised = sum((_estimated_alpha(each) or 0.0) >= _AWARE for each in aware)
     return {
         "awareness_count": len(errors),
         "awareness_none": _share(sum(e.awareness is None for _, e in found), len(found)),
@@ -150,7 +154,7 @@ def _awareness(everyone: Sequence[PersonFrame], found: _Pairs) -> dict[str, Any]
     }
 
 
-def _alpha(each: PersonFrame) -> float | None:
+def _estimated_alpha(each: PersonFrame) -> float | None:
     return None if each.estimate is None else each.estimate.awareness
 
 
@@ -158,7 +162,7 @@ def _mahalanobis2(error: FloatArray, covariance: FloatArray) -> float:
     try:
         return float(error @ np.linalg.solve(covariance, error))
     except np.linalg.LinAlgError:
-        return math.inf if np.any(error) else 0.0  # claims to be exact
+        return math.inf if np.any(error) else 0.0  # a covariance of zeros
 
 
 def _share(part: int, whole: int) -> float | None:

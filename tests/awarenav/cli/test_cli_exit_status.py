@@ -1,0 +1,109 @@
+"""Exit statuses and messages: success, a failed check, bad input, interruption, a closed pipe."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+from command_line import COMMANDS
+from paths import ROOT
+
+from awarenav.cli import main
+from awarenav.errors import AwarenavError, MissingExtraError
+from awarenav.records import write_records
+
+
+@pytest.fixture
+def failing(monkeypatch):
+    """Make ``awarenav policy show`` raise an error."""
+
+    def fail_with(error):
+        def show(**values):
+            raise error
+
+        monkeypatch.setattr(COMMANDS["policy", "show"], "callback", show)
+        return main(["policy", "show", "balanced"])
+
+    return fail_with
+
+
+def test_success_is_0(capsys):
+    assert main(["policy", "show", "balanced", "--out", "none"]) == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_a_check_that_fails_is_1(tmp_path, capsys):
+    path = tmp_path / "truth.jsonl"
+    write_records(path, [{"frame": "a", "stamp_s": 0.0, "T_odom_camera": None, "people": []}])
+    assert main(["judge", str(path), str(path)]) == 0
+    assert main(["judge", str(path), str(path), "--gate"]) == 1  # nobody is there: nothing is met
+
+
+def test_an_error_of_the_library_is_one_line_and_2(failing, capsys):
+    assert failing(AwarenavError("radius_m must be > 0 m, got -1")) == 2
+    assert capsys.readouterr().err == "awarenav policy show: radius_m must be > 0 m, got -1\n"
+    assert failing(MissingExtraError("needs the extra 'viz'")) == 2
+    assert capsys.readouterr().err == "awarenav policy show: needs the extra 'viz'\n"
+
+
+def test_a_simulator_that_is_not_installed_is_one_line_and_2(failing, capsys):
+    error = ModuleNotFoundError("No module named 'pybullet'", name="pybullet")
+    assert failing(error) == 2
+    assert capsys.readouterr().err == (
+        "awarenav policy show: needs pybullet, which is not installed; it is part of the extra "
+        "'sim': pip install 'awarenav[sim]'\n"
+    )
+
+
+def test_an_interruption_is_130(failing, capsys):
+    assert failing(KeyboardInterrupt()) == 130
+    said = capsys.readouterr().err
+    assert said == "\nawarenav policy show: interrupted; partial results kept\n"
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        ValueError("an error in the program"),
+        ModuleNotFoundError("No module named 'nowhere'", name="nowhere"),
+        TypeError("an error in the program"),
+    ],
+    ids=lambda error: type(error).__name__,
+)
+def test_an_error_of_the_program_keeps_its_traceback(failing, error):
+    with pytest.raises(type(error), match=str(error)):
+        failing(error)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [[], ["--help"], ["--version"], ["judge", "--help"], ["completion", "zsh"]],
+    ids=" ".join,
+)
+def test_an_output_that_nobody_reads_is_no_error(words):
+    reading, writing = os.pipe()
+    os.close(reading)
+    try:
+        done = subprocess.run(
+            [sys.executable, "-m", "awarenav", *words],
+            cwd=ROOT,
+            stdout=writing,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+    finally:
+        os.close(writing)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_reader_that_stops_after_a_line_is_no_error():
+    command = f"set -o pipefail; {sys.executable} -m awarenav completion zsh | head -n 1"
+    done = subprocess.run(
+        ["bash", "-c", command], cwd=ROOT, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == "#compdef awarenav\n"
