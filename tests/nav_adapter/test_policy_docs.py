@@ -1,4 +1,4 @@
-"""The figures of docs/policies.md are those of the presets, and its file is a policy."""
+"""The figures in docs/policies.md are those of the presets, and its file is a valid policy."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ DISTANCE_M = np.linspace(0.0, 6.0, 6001)
 
 
 def row(name: str) -> list[list[float]]:
-    """The numbers of a table row: for each preset its value, or the unaware and the aware one."""
+    """Return the numbers of a table row for each preset: one value, or unaware and aware."""
     (line,) = [line for line in TEXT.splitlines() if line.startswith(f"| {name}")]
     cells = line.strip("|").split("|")[1:]
     return [[float(number) for number in re.findall(r"\d+\.\d+", cell)] for cell in cells]
@@ -60,7 +60,7 @@ def test_the_file_shown_is_a_policy() -> None:
     assert policy.outline.sweep_s == 1.0
 
 
-def test_every_test_that_the_safety_argument_names_exists() -> None:
+def test_every_test_named_in_the_safety_argument_exists() -> None:
     root = ROOT
     safety = (root / "docs" / "safety.md").read_text(encoding="utf-8")
     named = re.findall(r"`((?:tests/[\w/]+/)?test_\w+\.py)?(?:::(test_\w+))?`", safety)

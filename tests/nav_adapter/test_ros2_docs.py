@@ -1,18 +1,17 @@
-"""docs/nav2.md and its files say what the code does."""
+"""docs/nav2.md and its files agree with the code."""
 
 from __future__ import annotations
 
 import re
 import shlex
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, get_args, get_type_hints
 
 import yaml
 from paths import ROOT
 
 from awarenav.bridge.command import bridge
 from nav_adapter import Alert, NavConstraints
-from nav_adapter._alert import AlertKind
 from nav_adapter.ros2 import PUBLISHED, READ, SLOWEST_MPS, RobotFile, Topic, alerts
 from nav_adapter.ros2.messages import ros_type
 
@@ -42,14 +41,14 @@ def test_nav2_reads_what_is_published() -> None:
     people = costmap[costmap["plugins"][0]]
     assert names[people["map_topic"]].message.__name__ == "OccupancyGrid"
     assert names[people["map_topic"]].transient_local == people["map_subscribe_transient_local"]
-    # Nav2's static layer asks the costmap for these, and says nothing to those under its own name.
+    # Nav2's static layer reads these from the costmap and ignores them under its own name.
     assert costmap["use_maximum"] is True
     assert not {"use_maximum", "transform_tolerance"} & set(people)
     (source,) = monitor["observation_sources"]
     assert names[monitor[source]["topic"]].message.__name__ == "PolygonInstanceStamped"
     (zone,) = monitor["polygons"]
     assert names[monitor[zone]["polygon_sub_topic"]].message.__name__ == "PolygonStamped"
-    # The watchdog of the chain: silence must stop the robot, the default rate must not be silence.
+    # The watchdog of the chain: silence stops the robot, and the default rate is no silence.
     assert 2.0 / _default("rate") < monitor["source_timeout"] <= 1.0
     robot = RobotFile.from_yaml(DOCS / "nav2" / "robot.yaml")
     assert controller["FollowPath"]["vx_max"] == robot.max_speed_mps
@@ -58,12 +57,14 @@ def test_nav2_reads_what_is_published() -> None:
 
 
 def test_alerts_have_the_names_that_are_documented() -> None:
-    asked = tuple(Alert(1, kind, 1.0, 0.0, "why") for kind in get_args(AlertKind))
+    asked = tuple(
+        Alert(1, kind, 1.0, 0.0, "why") for kind in get_args(get_type_hints(Alert)["kind"])
+    )
     message = alerts(NavConstraints(0.0, (), 0.0, "why", False, alerts=asked))
     assert [status.name for status in message.status if f"`{status.name}`" not in TEXT] == []
 
 
-def test_the_launch_file_starts_a_command_that_there_is() -> None:
+def test_the_launch_file_starts_a_command_that_exists() -> None:
     launch = yaml.safe_load((DOCS / "nav2" / "awarenav.launch.yaml").read_text())["launch"]
     (program,) = [entry["executable"] for entry in launch if "executable" in entry]
     defaults = {entry["arg"]["name"]: entry["arg"]["default"] for entry in launch if "arg" in entry}
