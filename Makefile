@@ -1,4 +1,4 @@
-# Every target sets up what it needs: a virtual environment in .venv with the pinned packages.
+# Every target first sets up a virtual environment in .venv with the pinned packages.
 #   make demo        make test        make test PYTEST_ARGS="-k camera"        make setup PYTHON=python3.10
 
 VENV := .venv
@@ -15,36 +15,36 @@ export PYTHON
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{printf "%-14s %s\n", $$1, $$2}'
 
-setup: ## make or repair .venv (PYTHON=… names the interpreter, 3.10 or 3.11)
+setup: ## make or repair .venv (PYTHON=… chooses the interpreter, 3.10 or 3.11)
 	@sh tools/setup_venv.sh
 
-demo: setup ## run the paper's encounter and the three crossings; results in demo/
+demo: setup ## run the paper's encounter and the demonstration crossings; results in demo/
 	$(AWARENAV) demo --out demo
 
-# Cheap checks first, so that a slip shows in seconds.
-test: lint ## lint, then every test; the wheel is built, installed and imported too
+# Cheap checks first, so that a mistake shows in seconds.
+test: lint ## run the linters, then every test; also build, install and import the wheel
 	$(PYTEST) $(PYTEST_ARGS)
 
 mutants: setup ## change constants of safety and geometry, one at a time: every change must fail a test
 	$(PY) -m tools.mutants
 
-lint: setup ## ruff, import layers, strict types
+lint: setup ## run ruff, the import contracts and strict type checks
 	$(PY) -m ruff check .
 	$(PY) -m ruff format --check .
 	$(VENV)/bin/lint-imports
 	$(PY) -m mypy
 
-bench: setup ## measure speed
+bench: setup ## measure the speed of crossings and of perception
 	$(AWARENAV) bench
 	$(PY) -m benchmarks.perception_speed
 
-# The extra mediapipe brings another build of OpenCV along, so it is not in the lock.
+# The extra mediapipe brings another build of OpenCV, so it is not in the lock.
 lock: setup ## pin the newest packages that pyproject.toml allows, for every supported Python
 	@command -v uv >/dev/null || $(PY) -m pip install --quiet uv
 	PATH="$$PATH:$(VENV)/bin" uv pip compile --universal --python-version 3.10 --extra dev \
 		--upgrade --quiet --custom-compile-command "make lock" \
 		--output-file requirements.lock pyproject.toml
 
-clean: ## remove results and caches (not .venv: remove that by hand)
+clean: ## remove results and caches, but not .venv
 	rm -rf demo build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	find . -name .venv -prune -o -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,8 +1,9 @@
-"""The command line that all benchmarks share: baseline, output file, and the verdict."""
+"""Command line shared by all benchmarks: baseline, output file, and exit status."""
 
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -21,15 +22,19 @@ def count(text: str) -> int:
     return value
 
 
-def make_parser(program: str, description: str, baseline: Path) -> argparse.ArgumentParser:
-    """Return a parser with ``--baseline`` and ``--out``.
+def make_parser(
+    program: str, description: str, baseline: Path | None = None
+) -> argparse.ArgumentParser:
+    """Return a parser, with ``--baseline`` and ``--out`` for a benchmark that has a baseline.
 
     Args:
-        program: module that is run, as ``"benchmarks.adapter"``.
-        description: what is measured.
-        baseline: the committed baseline.
+        program: module to run, such as ``"benchmarks.adapter"``.
+        description: what the benchmark measures.
+        baseline: the committed baseline, if any.
     """
     parser = argparse.ArgumentParser(prog=f"python -m {program}", description=description)
+    if baseline is None:
+        return parser
     parser.add_argument(
         "--baseline",
         type=Path,
@@ -41,6 +46,11 @@ def make_parser(program: str, description: str, baseline: Path) -> argparse.Argu
     return parser
 
 
+def add_seed(parser: argparse.ArgumentParser) -> None:
+    """Add ``--seed``, which :func:`parse` checks."""
+    parser.add_argument("--seed", type=int, default=0, metavar="S", help="default: 0")
+
+
 def parse(
     parser: argparse.ArgumentParser, arguments: Sequence[str] | None
 ) -> tuple[argparse.Namespace, dict[str, Metric]]:
@@ -48,11 +58,19 @@ def parse(
     options = parser.parse_args(arguments)
     if options.out is not None and not options.out.absolute().parent.is_dir():
         parser.error(f"--out must be a file in a folder that exists, got {options.out}")
+    if getattr(options, "seed", 0) < 0:
+        parser.error(f"--seed must be 0 or more, got {options.seed}")
     try:
         baseline = read_baseline(options.baseline) if options.baseline.exists() else {}
     except AwarenavError as error:
         parser.error(str(error))
     return options, baseline
+
+
+def bad_input(parser: argparse.ArgumentParser, error: Exception) -> int:
+    """Print an error and return the exit status of bad input."""
+    print(f"{parser.prog}: {error}", file=sys.stderr)
+    return 2
 
 
 def finish(
@@ -61,13 +79,13 @@ def finish(
     baseline: dict[str, Metric],
     out: Path | None,
 ) -> int:
-    """Print what is not as wanted, write the figures if asked, and return the exit status.
+    """Print missed goals and worse figures, write the figures, and return the exit status.
 
     Args:
-        metrics: measured.
-        missed: goals that were missed, a line each.
-        baseline: to compare with; empty compares nothing.
-        out: file for the figures.
+        metrics: the measured figures.
+        missed: one line for each goal that was missed.
+        baseline: figures to compare with; empty for no comparison.
+        out: file for the figures; None writes none.
     """
     lines = [*worse_than(baseline, metrics), *missed]
     for line in lines:

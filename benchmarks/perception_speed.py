@@ -1,12 +1,12 @@
-"""Measures perception: frames a second, the time outside the networks, and rtmlib beside it.
+"""Measures perception: frames per second, and the time outside the networks against rtmlib's.
 
     python -m benchmarks.perception_speed
 
-The clip is rendered: 640×480 pixels, two people. Time outside the networks is processor time of the
-calling thread less that in the networks, which run on one thread; rtmlib (see requirements.txt)
-prepares and reads the very same model files and pictures in the same run. A part whose package or
-file is not there is left out, saying so. Exit status 1 when a figure is worse than the baseline
-allows, or when ours costs more than rtmlib's.
+The clip is rendered: 640×480 pixels, two people. Time outside the networks is the processor time of
+the calling thread less that in the networks, which run on one thread. rtmlib (see requirements.txt)
+uses the same model files and images in the same run. A part whose package or file is missing is
+left out, with a message. Exit status 1 when a figure is worse than the baseline allows, or when
+ours costs more than rtmlib's.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ import onnxruntime as ort
 
 from awarenav.baseline import Metric, write_baseline
 from awarenav.errors import AwarenavError
-from benchmarks._harness import make_parser, parse
+from awarenav.records import read_records
+from benchmarks._harness import bad_input, count, make_parser, parse
 from perception import AwarenessPipeline, Camera, PersonDetection, PersonDetector
 from perception.networks import NETWORK_TIME, OnnxPersonDetector, OnnxPoseEstimator, OnnxSettings
 from perception.networks.heads import OnnxHeadPoseEstimator
@@ -36,8 +37,8 @@ ONE_THREAD = OnnxSettings(intra_op_threads=1)
 TWO_THREADS = OnnxSettings(intra_op_threads=2)
 REPEATS = 7
 BASELINE = Path(__file__).with_name("perception_baseline.json")
-LIMIT_MS = 2.0  # outside the networks, two people
-#: Genuine detectors: file, rtmlib's class and the input's height and width.
+LIMIT_MS = 2.0  # wanted outside the networks, two people
+#: Detectors trained on photographs: file, rtmlib's class, height and width of the input.
 DETECTORS = {
     "yolox": ("yolox_nano_416_coco.onnx", "YOLOX", (416, 416)),
     "rtmdet": ("rtmdet_nano_person_320_mmpose.onnx", "RTMDet", (320, 320)),
@@ -46,7 +47,7 @@ DETECTORS = {
 
 @dataclass(frozen=True)
 class Frame:
-    """A picture and the boxes (2, 4) of the two people in it."""
+    """An image and the boxes (2, 4) of the two people in it."""
 
     image_rgb: Any
     boxes_xyxy_px: Any
@@ -58,7 +59,7 @@ class Frame:
 
 
 class TimedSession:
-    """A session of onnxruntime whose runs count as time in networks, as those of ours do."""
+    """An onnxruntime session for the peer, whose runs count as time in networks, like ours."""
 
     def __init__(self, path: Path) -> None:
         options = ort.SessionOptions()
@@ -77,7 +78,7 @@ class TimedSession:
 
 
 def peer_tool(make: Callable[..., Any], path: Path, size: tuple[int, int]) -> Any:
-    """A tool of rtmlib with its network on one thread, timed."""
+    """Return a tool of rtmlib with its network on one thread, timed."""
     with contextlib.redirect_stdout(sys.stderr):
         tool = make(str(path), model_input_size=size, backend="onnxruntime")
     tool.session = TimedSession(path)
@@ -85,22 +86,21 @@ def peer_tool(make: Callable[..., Any], path: Path, size: tuple[int, int]) -> An
 
 
 class TwoPeople:
-    """Runs a detector and reports the two people who are there, so that all runs do the same."""
+    """A detector that runs its network and returns known detections, so that all runs are equal."""
 
     def __init__(self, detector: PersonDetector) -> None:
         self.detector = detector
         self.detections: tuple[PersonDetection, ...] = ()
 
     def detect(self, image_rgb: Any) -> tuple[PersonDetection, ...]:
-        """Run the network, and return what is known."""
+        """Run the network; return the known detections."""
         self.detector.detect(image_rgb)
         return self.detections
 
 
 def clip(frames: int) -> tuple[Camera, list[Frame]]:
-    """Render pictures with two people in them."""
-    from awarenav.records import read_records  # noqa: PLC0415 - needs the simulator
-    from sim_tests.dataset import RenderConfig, render  # noqa: PLC0415
+    """Render images with two people in each; return the camera and at most ``frames`` images."""
+    from sim_tests.dataset import RenderConfig, render  # noqa: PLC0415 - needs the simulator
 
     config = RenderConfig(frames=3 * frames, scenes=1, people=2, max_range_m=6.0, seed=4)
     with tempfile.TemporaryDirectory() as folder:
@@ -109,7 +109,7 @@ def clip(frames: int) -> tuple[Camera, list[Frame]]:
         pairs = [record for record in records if len(record["people"]) == 2][:frames]
         if not pairs:
             raise AwarenavError(
-                f"none of {config.frames} pictures shows two people; take more --frames"
+                f"none of {config.frames} images shows two people; use more --frames"
             )
         return camera, [
             Frame(
@@ -121,9 +121,9 @@ def clip(frames: int) -> tuple[Camera, list[Frame]]:
 
 
 def outside_ms(call: Callable[[Frame], Any], frames: Sequence[Frame]) -> float:
-    """Processor milliseconds a frame outside the networks.
+    """Return the processor milliseconds per frame outside the networks.
 
-    Each frame's best of seven counts: other programs and cold caches only slow.
+    The best of seven runs of a frame counts: other programs and cold caches can only slow it down.
     """
     call(frames[0])
     best = np.full(len(frames), np.inf)
@@ -137,22 +137,22 @@ def outside_ms(call: Callable[[Frame], Any], frames: Sequence[Frame]) -> float:
 
 
 def peers() -> Any | None:
-    """The peer's package, where it is installed."""
+    """Return the peer's package, or None where it is not installed."""
     try:
-        import rtmlib  # noqa: PLC0415
+        import rtmlib  # noqa: PLC0415 - an optional peer
     except ImportError:
         return None
     return rtmlib
 
 
-def measure(models: Path, count: int) -> list[Metric]:
-    """All figures that the packages and files at hand allow."""
+def measure(models: Path, frame_count: int) -> list[Metric]:
+    """Return every figure that the installed packages and files allow."""
     cv2.setNumThreads(1)
     skipped = []
     try:
-        camera, frames = clip(count)
+        camera, frames = clip(frame_count)
     except ImportError as error:
-        print(f"left out, all of it: the clip needs the extra 'sim' ({error})", file=sys.stderr)
+        print(f"nothing measured: the clip needs the extra 'sim' ({error})", file=sys.stderr)
         return []
     metrics = pipeline_metrics(camera, frames)
     rtmlib = peers()
@@ -165,7 +165,7 @@ def measure(models: Path, count: int) -> list[Metric]:
                     name, models / file, getattr(rtmlib, kind), size, frames
                 )
             else:
-                skipped.append(f"{name}: {models / file} is not there (--models)")
+                skipped.append(f"{name}: there is no {models / file} (--models)")
         metrics += pose_metrics(rtmlib, frames)
     for reason in skipped:
         print(f"left out, {reason}", file=sys.stderr)
@@ -173,44 +173,49 @@ def measure(models: Path, count: int) -> list[Metric]:
 
 
 def pipeline_metrics(camera: Camera, frames: Sequence[Frame]) -> list[Metric]:
-    detector = TwoPeople(OnnxPersonDetector(shipped_model_path(DETECTOR), settings=ONE_THREAD))
-    pipeline = AwarenessPipeline(
-        camera,
-        detector,
-        OnnxPoseEstimator(shipped_model_path(POSE), settings=ONE_THREAD),
-        OnnxHeadPoseEstimator(shipped_model_path(HEAD), settings=ONE_THREAD),
-    )
-
-    def process(frame: Frame, through: AwarenessPipeline = pipeline) -> None:
-        detector.detections = frame.detections
-        through.process(frame.image_rgb, 0.0)
-
+    """Return the figures of the whole pipeline with the shipped networks."""
+    pipeline, process = shipped_pipeline(camera, ONE_THREAD)
     outside = outside_ms(process, frames)
-    inside = 1e3 * pipeline.last_timings.networks_s  # of the last frame; all run the same networks
-    detector.detector = OnnxPersonDetector(shipped_model_path(DETECTOR), settings=TWO_THREADS)
-    fast = AwarenessPipeline(
-        camera,
-        detector,
-        OnnxPoseEstimator(shipped_model_path(POSE), settings=TWO_THREADS),
-        OnnxHeadPoseEstimator(shipped_model_path(HEAD), settings=TWO_THREADS),
-    )
+    # Of the last frame; every frame runs the same networks.
+    inside = 1e3 * pipeline.last_timings.networks_s
+    _, process = shipped_pipeline(camera, TWO_THREADS)
     times = []
     for _ in range(REPEATS):
         began = time.perf_counter()
         for frame in frames:
-            process(frame, fast)
+            process(frame)
         times.append((time.perf_counter() - began) / len(frames))
     return [
-        # Bare times depend on the machine; wide tolerances only catch a change of kind.
+        # Bare times depend on the computer; wide tolerances only catch a large change.
         Metric("pipeline_frames_per_s_two_threads", 1.0 / min(times), "frames/s", "higher", 0.6),
         Metric("pipeline_outside_networks", outside, "ms/frame", "lower", 1.0),
         Metric("pipeline_in_networks_one_thread", inside, "ms/frame", "lower", 1.0),
     ]
 
 
+def shipped_pipeline(
+    camera: Camera, settings: OnnxSettings
+) -> tuple[AwarenessPipeline, Callable[[Frame], None]]:
+    """Return a pipeline of the shipped networks, and a function that runs it on a frame."""
+    detector = TwoPeople(OnnxPersonDetector(shipped_model_path(DETECTOR), settings=settings))
+    pipeline = AwarenessPipeline(
+        camera,
+        detector,
+        OnnxPoseEstimator(shipped_model_path(POSE), settings=settings),
+        OnnxHeadPoseEstimator(shipped_model_path(HEAD), settings=settings),
+    )
+
+    def process(frame: Frame) -> None:
+        detector.detections = frame.detections
+        pipeline.process(frame.image_rgb, 0.0)
+
+    return pipeline, process
+
+
 def detector_metrics(
     name: str, path: Path, peer: Any, size: tuple[int, int], frames: Sequence[Frame]
 ) -> list[Metric]:
+    """Return the figures of one detector, ours and the peer's."""
     detector = OnnxPersonDetector(path, settings=ONE_THREAD)
     other = peer_tool(peer, path, size)
     bgr = {id(frame): frame.image_rgb[..., ::-1].copy() for frame in frames}
@@ -222,6 +227,7 @@ def detector_metrics(
 
 
 def pose_metrics(rtmlib: Any, frames: Sequence[Frame]) -> list[Metric]:
+    """Return the figures of the shipped pose network, ours and the peer's."""
     path = shipped_model_path(POSE)
     estimator = OnnxPoseEstimator(path, settings=ONE_THREAD)
     other = peer_tool(rtmlib.RTMPose3d, path, (144, 192))
@@ -233,6 +239,7 @@ def pose_metrics(rtmlib: Any, frames: Sequence[Frame]) -> list[Metric]:
 
 
 def compared(name: str, ours_ms: float, theirs_ms: float) -> list[Metric]:
+    """Return our time outside the network, and its ratio to the peer's."""
     return [
         Metric(f"{name}_outside_network", ours_ms, "ms/frame", "lower", 1.0),
         Metric(f"{name}_outside_over_rtmlib", ours_ms / theirs_ms, "x", "lower", 0.5),
@@ -240,7 +247,7 @@ def compared(name: str, ours_ms: float, theirs_ms: float) -> list[Metric]:
 
 
 def report(metrics: Sequence[Metric], baseline: dict[str, Metric]) -> tuple[str, bool]:
-    """The figures as text beside the baseline, and whether all are as they should be."""
+    """Return the figures as text beside the baseline, and whether all are good enough."""
     lines = [f"{'figure':42s}{'now':>10s}{'baseline':>10s}  unit"]
     good = True
     for metric in metrics:
@@ -250,34 +257,32 @@ def report(metrics: Sequence[Metric], baseline: dict[str, Metric]) -> tuple[str,
             verdict = "   MORE THAN RTMLIB"
         good = good and not verdict
         if metric.name == "pipeline_outside_networks" and metric.value > LIMIT_MS:
-            verdict += f"   above {LIMIT_MS:g}, the aim on an idle machine"
+            verdict += f"   above {LIMIT_MS:g}, the aim on an idle computer"
         before = "-" if known is None else f"{known.value:.3g}"
         lines.append(f"{metric.name:42s}{metric.value:10.3g}{before:>10s}  {metric.unit}{verdict}")
     return "\n".join(lines), good
 
 
 def main() -> int:
+    """Run the benchmark; return 0 for success, 1 for a worse figure, 2 for bad input."""
     parser = make_parser(
         "benchmarks.perception_speed",
-        "Measure frames a second and the time outside the networks, with rtmlib on the same model "
-        "files in the same run beside it.",
+        "Measure frames per second and the time outside the networks, and compare with rtmlib on "
+        "the same model files in the same run.",
         BASELINE,
     )
     shared = Path(__file__).resolve().parents[2] / "shared" / "models"
     parser.add_argument(
-        "--models", type=Path, default=shared, metavar="DIR", help="folder of genuine detectors"
+        "--models", type=Path, default=shared, metavar="DIR", help="folder of the detectors"
     )
     parser.add_argument(
-        "--frames", type=int, default=12, metavar="N", help="pictures of the clip (default: 12)"
+        "--frames", type=count, default=12, metavar="N", help="images of the clip (default: 12)"
     )
     options, baseline = parse(parser, None)
-    if options.frames < 1:
-        parser.error(f"--frames must be at least 1, got {options.frames}")
     try:
         metrics = measure(options.models, options.frames)
     except AwarenavError as error:
-        print(f"{parser.prog}: {error}", file=sys.stderr)
-        return 2
+        return bad_input(parser, error)
     text, good = report(metrics, baseline)
     print(text)
     if options.out is not None:

@@ -1,10 +1,10 @@
-"""Measures what many episodes cost: processor time, memory, storage, and what workers gain.
+"""Measures the cost of many episodes: processor time, memory, storage, and the gain of workers.
 
     python -m benchmarks.runs_scale [--episodes 4] [--pixels] [--dask]
 
-Prints a Markdown table and a plan for a million episodes; docs/scale.md holds the figures of a
-quiet computer. Cost is processor time of one process, so that a busy computer changes little; what
-two workers gain is wall time and wants a quiet one.
+Prints a Markdown table and a plan for a million episodes; docs/scale.md has the figures of a quiet
+computer. Cost is processor time of one process, so a busy computer changes it little. The gain of
+two workers is wall time and needs a quiet computer. Memory is read with ``resource``: Linux only.
 """
 
 from __future__ import annotations
@@ -17,9 +17,10 @@ import tempfile
 import time
 from pathlib import Path
 
+from benchmarks._harness import count, make_parser
 from sim_tests.study.runs import Job, attempt, plan_jobs, run_jobs, tidy
 
-#: Cheap, middling and costly ones; what follows is their mean.
+#: Cheap, medium and costly scenarios; the figures are their mean.
 SCENARIOS = ("crossing_attentive", "crossing_from_left", "blind_corner", "crowd_of_eight")
 POLICIES = ("blind", "balanced")
 MILLION = 1_000_000
@@ -28,32 +29,29 @@ _FILES = ("jobs.jsonl", "episodes.csv", "episodes.parquet")
 
 def main() -> int:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
-    parser.add_argument("--episodes", type=int, default=4, help="seeds a scenario (default: 4)")
-    parser.add_argument("--pixels", action="store_true", help="pixels, too (minutes)")
-    parser.add_argument("--dask", action="store_true", help="two workers with Dask as well")
+    parser = make_parser(
+        "benchmarks.runs_scale",
+        "Measure the cost of many episodes: processor time, memory, storage, and the gain of "
+        "workers.",
+    )
+    parser.add_argument(
+        "--episodes", type=count, default=4, metavar="N", help="seeds per scenario (default: 4)"
+    )
+    parser.add_argument("--pixels", action="store_true", help="measure pixels too (minutes)")
+    parser.add_argument("--dask", action="store_true", help="measure two Dask workers too")
     parser.add_argument("--of", metavar="PERCEPTION", help=argparse.SUPPRESS)
     options = parser.parse_args()
-    if options.of:  # a process of its own, whose memory is that of a worker
+    if options.of:  # in a process of its own, whose memory is that of a worker
         print(_cost(options.of, options.episodes))
         return 0
     kinds = ["truth", "keypoints", *(["pixels"] if options.pixels else [])]
-    print("| perception | CPU s an episode | x real time | memory of a worker | 10⁶ episodes |")
+    print("| perception | CPU s per episode | x real time | memory of a worker | 10⁶ episodes |")
     print("| --- | --- | --- | --- | --- |")
     for kind in kinds:
-        command = [
-            sys.executable,
-            "-m",
-            "benchmarks.runs_scale",
-            "--of",
-            kind,
-            "--episodes",
-            str(options.episodes),
-        ]
-        cost_s, simulated_s, peak_mb = map(
-            float,
-            subprocess.run(command, check=True, capture_output=True, text=True).stdout.split(),
-        )
+        command = [sys.executable, "-m", "benchmarks.runs_scale", "--of", kind]
+        command += ["--episodes", str(options.episodes)]
+        done = subprocess.run(command, check=True, capture_output=True, text=True)
+        cost_s, simulated_s, peak_mb = map(float, done.stdout.split())
         hours = cost_s * MILLION / 3600.0
         print(
             f"| `{kind}` | {cost_s:.2f} | {simulated_s / cost_s:.1f} | {peak_mb:.0f} MB | "
@@ -68,9 +66,9 @@ def _jobs(perception: str, episodes: int) -> tuple[Job, ...]:
 
 
 def _cost(perception: str, episodes: int) -> str:
-    """Processor seconds and simulated seconds an episode, and peak memory in MB."""
+    """Return processor seconds and simulated seconds per episode, and peak memory in MB."""
     jobs = _jobs(perception, episodes)
-    attempt(jobs[0])  # imports and caches, which a worker pays once
+    attempt(jobs[0])  # imports and caches: once per worker
     start, simulated_s = time.process_time(), 0.0
     for job in jobs:
         simulated_s += attempt(job).record.duration_s or 0.0
@@ -81,6 +79,7 @@ def _cost(perception: str, episodes: int) -> str:
 
 
 def _print_storage_and_gain(episodes: int, dask: bool) -> None:
+    """Run the same episodes in several ways; print file sizes and times."""
     jobs = _jobs("keypoints", episodes)
     times_s: dict[str, float] = {}
     tables = set()
@@ -94,13 +93,13 @@ def _print_storage_and_gain(episodes: int, dask: bool) -> None:
             run_jobs(jobs, out, progress=True, **way)  # type: ignore[arg-type]
             times_s[name] = time.perf_counter() - start
             tables.add((out / "episodes.csv").read_bytes())
-        print("\n| file | bytes an episode | 10⁶ episodes |\n| --- | --- | --- |")
+        print("\n| file | bytes per episode | 10⁶ episodes |\n| --- | --- | --- |")
         for file in _FILES:
             path = out / file
             if path.exists():
                 size = path.stat().st_size / len(jobs)
                 print(f"| `{file}` | {size:.0f} | {size * MILLION / 1e9:.2f} GB |")
-    print(f"\n{len(jobs)} episodes from keypoints, starting the processes included:")
+    print(f"\n{len(jobs)} episodes from keypoints, with the start of the processes:")
     for name, time_s in times_s.items():
         print(f"  {name:15s}{time_s:7.1f} s   x {times_s['1 worker'] / time_s:.2f}")
     print("  the same table, byte for byte" if len(tables) == 1 else "  DIFFERENT TABLES")

@@ -1,8 +1,8 @@
-"""A robot with eight metres to go and a person who walks across its way.
+"""A robot drives eight metres, and a person walks across its path.
 
-What the other examples drive in: a disc with wheels, without physics (``examples/planners`` has
-it), and cameras all around. The person looks elsewhere for two seconds and then at the robot. Run
-by itself, it shows a planner that only obeys the speed limit and drives straight on.
+The other examples drive in this world: the robot is a disc on wheels with 360° cameras, without
+physics (``examples/planners`` has physics). The person looks elsewhere for two seconds and then at
+the robot. Run by itself, this file shows a planner that obeys the speed limit and drives straight.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ ROBOT = RobotProfile(
     max_deceleration_mps2=1.0,
     reaction_time_s=0.3,
 )
-#: speed (m/s) and yaw rate (rad/s) from state and constraints.
+#: Planner: speed (m/s) and yaw rate (rad/s) from state and constraints.
 Plan = Callable[[RobotState, NavConstraints], tuple[float, float]]
 
 
 def drive(plan: Plan) -> None:
-    """Drive with a planner, print a line a second, and at the end what came of it."""
+    """Drive with a planner; print one line per second, and a summary at the end."""
     policy = AwarenessPolicy.preset("balanced")
     tracker = PersonTracker(TrackerConfig(awareness=policy.filter))
     adapter = NavAdapter(policy, ROBOT)
@@ -67,27 +67,29 @@ def drive(plan: Plan) -> None:
 
 
 def towards_goal(state: RobotState) -> tuple[float, float]:
-    """Distance (m) and bearing (rad, from the heading) of the goal."""
+    """Return distance (m) and bearing (rad, from the heading) of the goal."""
     dx, dy = GOAL_ODOM_M - state.position_odom_m
     off = math.atan2(dy, dx) - state.heading_odom_rad
     return math.hypot(dx, dy), math.atan2(math.sin(off), math.cos(off))
 
 
 def follow_velocity(state: RobotState, velocity_odom_mps: np.ndarray) -> tuple[float, float]:
-    """Speed and yaw rate of a wheeled robot that shall come to have a velocity."""
+    """Return speed and yaw rate with which a wheeled robot approaches a velocity."""
     vx, vy = velocity_odom_mps
     off = math.atan2(vy, vx) - state.heading_odom_rad
     off = math.atan2(math.sin(off), math.cos(off))
     speed = math.hypot(vx, vy)
-    # Turn before going: the component along the heading is all that it can have now.
+    # Turn first: now the robot can only move along its heading.
     return speed * max(math.cos(off), 0.0), (2.0 * off if speed > 0.02 else 0.0)
 
 
 def _person_odom_m(now: float) -> np.ndarray:
+    """Return the person's position (2,)."""
     return np.array([5.0, -3.0 + 0.7 * now])
 
 
 def _observed(T_odom_camera: np.ndarray, now: float) -> tuple[PersonObservation, ...]:
+    """Return the observations of one frame."""
     position = (np.linalg.inv(T_odom_camera) @ [*_person_odom_m(now), 1.2, 1.0])[:3]
     return (
         PersonObservation(
@@ -103,7 +105,7 @@ def _observed(T_odom_camera: np.ndarray, now: float) -> tuple[PersonObservation,
 
 
 def _camera_pose(state: RobotState, now: float) -> np.ndarray:
-    """T_odom_camera of the camera that looks the person's way, 1.4 m above the base."""
+    """Return T_odom_camera of the camera that faces the person, 1.4 m above the base."""
     x, y = state.position_odom_m
     dx, dy = _person_odom_m(now) - state.position_odom_m
     c, s = dx / math.hypot(dx, dy), dy / math.hypot(dx, dy)
@@ -111,6 +113,7 @@ def _camera_pose(state: RobotState, now: float) -> np.ndarray:
 
 
 def _moved(state: RobotState, command: tuple[float, float]) -> RobotState:
+    """Return the robot's state after a cycle, with limited acceleration and yaw rate."""
     speed, yaw_rate = command
     speed = max(speed, state.speed_mps - ROBOT.max_deceleration_mps2 * DT_S, 0.0)
     speed = min(speed, state.speed_mps + ROBOT.max_acceleration_mps2 * DT_S)
@@ -121,7 +124,7 @@ def _moved(state: RobotState, command: tuple[float, float]) -> RobotState:
 
 
 def straight_on(state: RobotState, constraints: NavConstraints) -> tuple[float, float]:
-    """Obey the limit and steer at the goal."""
+    """Obey the limit and steer to the goal."""
     distance_m, bearing_rad = towards_goal(state)
     return min(constraints.speed_limit_mps, distance_m), bearing_rad
 

@@ -1,9 +1,9 @@
-"""Follow the people of an estimates file, or of one that this script makes up.
+"""Track the people in a file of estimates, or in made-up estimates.
 
-``python examples/follow_people.py FILE.jsonl`` takes what ``awarenav estimate`` wrote, with a pose
-of the camera in every line. Without a file a person walks past a standing camera, looks at it, is
-hidden for a second and looks away: watch how the lower bound, on which navigation acts, rises with
-what is seen and falls as soon as nothing is.
+``python examples/follow_people.py FILE.jsonl`` reads the output of ``awarenav estimate``, with a
+camera pose in every line. Without a file, a person walks past a standing camera, looks at it, is
+hidden for a second and looks away. The lower bound, which navigation uses, rises while the person
+is seen looking and falls as soon as nothing is seen.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ T_ODOM_CAMERA = [[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 1.4], [0, 0, 0, 1]]
 
 
 def made_up() -> Iterator[dict[str, Any]]:
-    """Four seconds of one person, ten frames a second, as lines of an estimates file."""
+    """Yield four seconds of one person at 10 frames/s, as lines of a file of estimates."""
     for tick in range(41):
         stamp_s = 0.1 * tick
         person = {
@@ -44,7 +44,7 @@ def made_up() -> Iterator[dict[str, Any]]:
 
 
 def follow(lines: Iterable[dict[str, Any]]) -> Iterator[tuple[PersonTrack, ...]]:
-    """The tracks after every frame."""
+    """Yield the tracks after every frame."""
     tracker = PersonTracker()
     for line in lines:
         stamp_s = line["stamp_s"]
@@ -64,7 +64,7 @@ def follow(lines: Iterable[dict[str, Any]]) -> Iterator[tuple[PersonTrack, ...]]
 
 
 def main() -> None:
-    """Print a line a track and frame."""
+    """Print one line per track and frame."""
     lines = made_up()
     if len(sys.argv) > 1:
         text = Path(sys.argv[1]).read_text(encoding="utf-8")

@@ -1,8 +1,8 @@
 """Model-predictive control of the speed along a fixed path, in SciPy.
 
-The integration is the call of ``predicted_circles``: where people will be at each step, with a
-radius that grows for what they might do instead. ``examples/planners/model_predictive.py`` has the
-whole robot, in do-mpc.
+The integration is the call of ``predicted_circles``: positions of people at each step, with a
+radius that grows for other things that they might do. ``examples/planners/model_predictive.py``
+controls the whole robot, in do-mpc.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ _TIMES_S = _STEP_S * np.arange(1, _STEPS + 1)
 
 
 def plan(state: RobotState, constraints: NavConstraints) -> tuple[float, float]:
-    """The first speed of the plan that goes farthest without entering a circle."""
+    """Return speed and yaw rate of the plan that goes farthest without entering a circle."""
     people = predicted_circles(constraints, _TIMES_S, growth_mps=0.05)
     distance_m, bearing_rad = towards_goal(state)
     top_mps = min(constraints.speed_limit_mps, distance_m)
-    free_m = _free_way_m(state, people)
+    free_m = _free_distance_m(state, people)
 
-    # Speeds of the steps; ways are their sums. As far as possible, as soon as possible.
+    # The variables are the speeds of the steps; distances are their sums.
     sums = _STEP_S * np.tril(np.ones((_STEPS, _STEPS)))
     changes = np.eye(_STEPS) - np.eye(_STEPS, k=-1)
     rise, fall = ROBOT.max_acceleration_mps2 * _STEP_S, ROBOT.max_deceleration_mps2 * _STEP_S
@@ -35,7 +35,7 @@ def plan(state: RobotState, constraints: NavConstraints) -> tuple[float, float]:
         -sums.sum(axis=0),
         A_ub=np.vstack([sums, changes, -changes]),
         b_ub=np.concatenate([free_m, rise + now, fall - now]),
-        # What is faster than the limit may brake down to it.
+        # A robot above the limit may brake down to it.
         bounds=[(0.0, max(top_mps, state.speed_mps - fall * (k + 1))) for k in range(_STEPS)],
     )
     speed = float(found.x[0]) if found.success else 0.0  # no plan: brake
@@ -43,14 +43,14 @@ def plan(state: RobotState, constraints: NavConstraints) -> tuple[float, float]:
     return min(state.speed_mps + step, constraints.reachable_speed_limit_mps), bearing_rad
 
 
-def _free_way_m(state: RobotState, people: np.ndarray) -> np.ndarray:
-    """(T,) the way along the heading that people leave free at each step."""
+def _free_distance_m(state: RobotState, people: np.ndarray) -> np.ndarray:
+    """Return the free distance (T,) along the heading at each step."""
     c, s = np.cos(state.heading_odom_rad), np.sin(state.heading_odom_rad)
     dx, dy = np.moveaxis(people[..., :2] - state.position_odom_m, -1, 0)
     ahead, aside = c * dx + s * dy, c * dy - s * dx
-    room = people[..., 4] + ROBOT_RADIUS_M
-    blocks = (np.abs(aside) < room) & (ahead > 0.0)
-    start = ahead - np.sqrt(np.maximum(room**2 - aside**2, 0.0))
+    reach_m = people[..., 4] + ROBOT_RADIUS_M
+    blocks = (np.abs(aside) < reach_m) & (ahead > 0.0)
+    start = ahead - np.sqrt(np.maximum(reach_m**2 - aside**2, 0.0))
     free = np.where(blocks, np.maximum(start, 0.0), np.inf).min(axis=0, initial=100.0)
     return np.asarray(free)
 

@@ -1,7 +1,7 @@
 """A path-integral planner (MPPI, Williams et al. 2016) in NumPy.
 
 The integration is the call of ``people_cost`` and the limit that clips the samples. MPPI clips
-its speeds at once, whatever the robot can brake: the drive ramps.
+its speeds at once, even below what the robot can brake to, so the drive ramps.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ _SPREAD = np.array([0.3, 0.6])
 
 
 class Mppi:
-    """Keeps its last plan as the mean of the next samples."""
+    """MPPI with the last plan as the mean of the next samples."""
 
     def __init__(self, rng: np.random.Generator) -> None:
         self._rng = rng
         self._mean = np.zeros((_STEPS, 2))  # speed, yaw rate
 
     def __call__(self, state: RobotState, constraints: NavConstraints) -> tuple[float, float]:
-        """Speed and yaw rate."""
+        """Return speed and yaw rate."""
         controls = self._mean + _SPREAD * self._rng.standard_normal((_SAMPLES, _STEPS, 2))
         controls[..., 0] = np.clip(controls[..., 0], 0.0, constraints.speed_limit_mps)
         controls[..., 1] = np.clip(controls[..., 1], -MAX_YAW_RATE_RADPS, MAX_YAW_RATE_RADPS)

@@ -1,7 +1,7 @@
-"""People in a costmap with Nav2's values, on top of what is in it already.
+"""People in a costmap with Nav2's values, on top of its previous content.
 
-``python examples/nav2_costmap.py [PICTURE.png]``: the person walks across a map with a rack. The
-painter takes away what it painted before, so the rack and the unknown cells come back.
+``python examples/nav2_costmap.py [IMAGE.png]``: a person walks across a map with a rack. The
+painter removes what it painted before, so the rack and the unknown cells come back.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _ORIGIN_ODOM_M = (-1.0, -5.0)
 
 
 def track(stamp_s: float) -> PersonTrack:
-    """A person on the way across who watches the robot from the second second on."""
+    """Return a person who walks across and watches the robot after two seconds."""
     return PersonTrack(
         id=1,
         stamp_s=stamp_s,
@@ -38,7 +38,7 @@ def track(stamp_s: float) -> PersonTrack:
 
 
 def main() -> None:
-    """Print the cells that cost something, once a second, and keep a picture if asked to."""
+    """Print the number of cells with a cost once per second; write an image if asked."""
     footprint = np.array([[0.36, 0.25], [-0.36, 0.25], [-0.36, -0.25], [0.36, -0.25]])
     robot = RobotProfile(footprint, 1.5, 1.0, 1.0, 0.3)
     adapter = NavAdapter(AwarenessPolicy.preset("balanced"), robot)
@@ -48,7 +48,7 @@ def main() -> None:
     costmap[:, 180:] = 255  # not seen yet
     static = costmap.copy()
     painter = CostmapPainter(costmap, _ORIGIN_ODOM_M, _RESOLUTION_M, inscribed_radius_m=0.25)
-    pictures = []
+    images = []
     for tick in range(51):
         stamp_s = 0.1 * tick
         state = RobotState(stamp_s, np.zeros(2), 0.0, 0.0, 0.0)
@@ -56,11 +56,11 @@ def main() -> None:
         if tick % 10 == 0:
             lethal, costly = (int((costmap >= least).sum()) for least in (254, 1))
             print(f"{stamp_s:3.1f} s  {lethal} cells lethal or unknown, {costly} cost something")
-            pictures.append(cv2.applyColorMap(costmap[::-1], cv2.COLORMAP_VIRIDIS))
+            images.append(cv2.applyColorMap(costmap[::-1], cv2.COLORMAP_VIRIDIS))
     painter.clear()
     print(f"cells that differ from the map without people: {int((costmap != static).sum())}")
     if len(sys.argv) > 1:
-        cv2.imwrite(str(Path(sys.argv[1])), np.hstack(pictures[::2]))
+        cv2.imwrite(str(Path(sys.argv[1])), np.hstack(images[::2]))
 
 
 if __name__ == "__main__":

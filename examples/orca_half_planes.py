@@ -1,7 +1,7 @@
-"""ORCA with the robot doing all the avoiding: half-planes and a small solver from SciPy.
+"""ORCA in which the robot does all the avoiding: half-planes and a solver from SciPy.
 
-The integration is the call of ``half_planes``. ORCA has no notion of acceleration: the velocity
-that it picks may be out of reach within a tick, and the drive here ramps.
+The integration is the call of ``half_planes``. ORCA has no acceleration limit: the velocity that
+it chooses may be out of reach in one cycle, so the drive ramps.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from nav_adapter.exporters import half_planes
 
 
 def plan(state: RobotState, constraints: NavConstraints) -> tuple[float, float]:
-    """Speed and yaw rate towards the allowed velocity nearest to the wished one."""
+    """Return speed and yaw rate towards the allowed velocity nearest to the desired one."""
     heading = np.array([math.cos(state.heading_odom_rad), math.sin(state.heading_odom_rad)])
     velocity = state.speed_mps * heading
     rows = half_planes(constraints, state.position_odom_m, velocity, ROBOT_RADIUS_M)
@@ -25,15 +25,15 @@ def plan(state: RobotState, constraints: NavConstraints) -> tuple[float, float]:
 
     limit_mps = constraints.speed_limit_mps
     to_goal = GOAL_ODOM_M - state.position_odom_m
-    wish = to_goal * min(limit_mps / float(np.hypot(*to_goal)), 1.0)
-    # A person straight ahead has no nearer side; leaning right, as people do, decides it.
-    wish = wish + 0.05 * limit_mps * np.array([heading[1], -heading[0]])
-    if (normals @ wish >= bounds).all():
-        return follow_velocity(state, wish)
+    desired = to_goal * min(limit_mps / float(np.hypot(*to_goal)), 1.0)
+    # A person straight ahead has no nearer side; a bias to the right, as people have, decides.
+    desired = desired + 0.05 * limit_mps * np.array([heading[1], -heading[0]])
+    if (normals @ desired >= bounds).all():
+        return follow_velocity(state, desired)
     found = minimize(
-        lambda v: float(np.sum((v - wish) ** 2)),
+        lambda v: float(np.sum((v - desired) ** 2)),
         np.zeros(2),
-        jac=lambda v: 2.0 * (v - wish),
+        jac=lambda v: 2.0 * (v - desired),
         constraints=[
             {"type": "ineq", "fun": lambda v: normals @ v - bounds, "jac": lambda v: normals},
             {"type": "ineq", "fun": lambda v: limit_mps**2 - v @ v, "jac": lambda v: -2.0 * v},

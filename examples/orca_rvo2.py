@@ -1,9 +1,9 @@
-"""The RVO2 library of ORCA's authors, through ``pip install pyrvo``.
+"""The RVO2 library by ORCA's authors (``pip install pyrvo``).
 
-The integration is an agent a person and ``set_agent_max_speed`` for the limit. The library takes
-every agent for one that does half of the avoiding. The robot's agent thus does half of what is
-left in every tick, which is late but converges; where that is not enough, take the half-planes
-(``orca_half_planes.py``), which leave nothing to the person. Nor does RVO2 limit acceleration.
+The integration is one agent per person, and the limit as the robot's maximum speed. The library
+assumes that every agent does half of the avoiding. The robot therefore does half of the remainder
+in every cycle, which is late but converges. Where that is not enough, use the half-planes
+(``orca_half_planes.py``), which leave nothing to the person. RVO2 does not limit acceleration.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ except ImportError:
 
 
 def plan(state: RobotState, constraints: NavConstraints) -> tuple[float, float]:
-    """Speed and yaw rate towards the velocity that RVO2 chooses."""
+    """Return speed and yaw rate towards the velocity that RVO2 chooses."""
     simulator = pyrvo.RVOSimulator()
     simulator.set_time_step(DT_S)
     people = circles(constraints)
@@ -33,10 +33,10 @@ def plan(state: RobotState, constraints: NavConstraints) -> tuple[float, float]:
     limit_mps = constraints.speed_limit_mps
     heading = np.array([math.cos(state.heading_odom_rad), math.sin(state.heading_odom_rad)])
     to_goal = GOAL_ODOM_M - state.position_odom_m
-    wish = to_goal * min(limit_mps / float(np.hypot(*to_goal)), 1.0)
-    wish = wish + 0.05 * limit_mps * np.array([heading[1], -heading[0]])
+    desired = to_goal * min(limit_mps / float(np.hypot(*to_goal)), 1.0)
+    desired = desired + 0.05 * limit_mps * np.array([heading[1], -heading[0]])
     velocity = state.speed_mps * heading
-    _agent(simulator, state.position_odom_m, velocity, wish, ROBOT_RADIUS_M, limit_mps)
+    _agent(simulator, state.position_odom_m, velocity, desired, ROBOT_RADIUS_M, limit_mps)
     simulator.do_step()
     chosen = simulator.get_agent_velocity(len(people))
     speed, yaw_rate = follow_velocity(state, np.array([chosen.x, chosen.y]))
@@ -47,13 +47,13 @@ def _agent(
     simulator: pyrvo.RVOSimulator,
     position: tuple[float, float],
     velocity: tuple[float, float],
-    wish: tuple[float, float],
+    desired: tuple[float, float],
     radius_m: float,
     max_speed_mps: float,
 ) -> None:
     agent = simulator.add_agent(tuple(position), 15.0, 10, 3.0, 3.0, radius_m, max_speed_mps)
     simulator.set_agent_velocity(agent, tuple(velocity))
-    simulator.set_agent_pref_velocity(agent, tuple(wish))
+    simulator.set_agent_pref_velocity(agent, tuple(desired))
 
 
 if __name__ == "__main__":

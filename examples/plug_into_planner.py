@@ -1,7 +1,7 @@
-"""The adapter between people seen by a camera and a local planner, in a loop of your own.
+"""The adapter between a camera and a local planner, in a loop of your own.
 
-Run it: ``python examples/plug_into_planner.py``. A person walks across the robot's way, first
-looking elsewhere, then at the robot; watch radius and speed limit follow.
+Run it with ``python examples/plug_into_planner.py``. A person walks across the robot's path and
+looks first elsewhere, then at the robot. Radius and speed limit follow.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ T_ODOM_CAMERA = np.array(
 
 
 def observed(stamp_s: float) -> tuple[PersonObservation, ...]:
-    """One frame of a camera: ``AwarenessPipeline.process`` on a robot, a script here."""
+    """Return the people in one frame: ``AwarenessPipeline.process`` on a robot, a script here."""
     looking = stamp_s > 1.5
     return (
         PersonObservation(
@@ -37,7 +37,7 @@ def observed(stamp_s: float) -> tuple[PersonObservation, ...]:
 
 
 def main() -> None:
-    """Print what a planner would be given, ten times a second."""
+    """Print the planner's input ten times per second."""
     footprint = np.array([[0.36, 0.25], [-0.36, 0.25], [-0.36, -0.25], [0.36, -0.25]])
     robot = RobotProfile(
         footprint_m=footprint,

@@ -1,9 +1,9 @@
-"""A dynamic-window planner that knows one robot radius and points, as many small ones do.
+"""A dynamic-window planner with one robot radius and point obstacles, as many small ones have.
 
-The integration is the line that makes points of people and the one that takes the speed limit.
-Such a planner lists the speeds that it reaches within a tick, v − a·dt to v + a·dt. A limit below
-that window leaves it without a candidate, and a robot at full speed then gets the command 0: so it
-is given ``reachable_speed_limit_mps``, which full braking can follow.
+The integration is one line that converts people to points, and one that reads the speed limit.
+Such a planner enumerates the speeds that it reaches in one cycle, v − a·dt to v + a·dt. A limit
+below that window leaves it without a candidate, and a robot at full speed then gets the command 0.
+It therefore reads ``reachable_speed_limit_mps``, which full braking can follow.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _COMFORT_M = 0.3
 
 
 def plan(state: RobotState, constraints: NavConstraints) -> tuple[float, float]:
-    """Speed and yaw rate of the cheapest arc."""
+    """Return speed and yaw rate of the cheapest arc."""
     obstacles = points(constraints, spacing_m=0.1)
     limit_mps = constraints.reachable_speed_limit_mps
 
@@ -48,7 +48,7 @@ def plan(state: RobotState, constraints: NavConstraints) -> tuple[float, float]:
         gap_m = apart.min(axis=(1, 2)) - ROBOT_RADIUS_M
         cost += np.where(gap_m > 0.0, 2.0 * np.maximum(_COMFORT_M - gap_m, 0.0), math.inf)
     if not np.isfinite(cost).any():
-        return 0.0, 0.0  # every arc ends in somebody: brake
+        return 0.0, 0.0  # every arc hits a person: brake
     best = int(cost.argmin())
     return float(v[best]), float(w[best])
 

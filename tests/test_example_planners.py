@@ -1,4 +1,4 @@
-"""Planners that others wrote obey the adapter, and awareness pays with each of them."""
+"""Third-party planners obey the adapter, and awareness saves time with each of them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SLOW = pytest.param("do-mpc", marks=pytest.mark.slow)
 
 @pytest.fixture(scope="module")
 def examples() -> Iterator[None]:
-    """The examples are no part of the package: they are found from the project's root."""
+    """Make the examples importable, which are not part of the package."""
     sys.path.insert(0, str(ROOT))
     yield
     sys.path.remove(str(ROOT))
@@ -27,7 +27,7 @@ def examples() -> Iterator[None]:
 
 @pytest.fixture(scope="module", params=["ir-sim", SLOW])
 def rows(request, examples):
-    """Nobody, an aware worker, an unaware one, an unaware one with a wider radius."""
+    """Crossings with nobody, an aware worker, an unaware one, and one with a wider radius."""
     package, module, name = PLANNERS[request.param]
     if importlib.util.find_spec(package) is None:
         pytest.skip(f"{request.param} is not installed (extra dev)")
@@ -56,7 +56,7 @@ def test_a_larger_radius_gives_a_larger_separation(rows):
 def test_the_speed_stays_at_or_under_the_limit(rows):
     for row in rows:
         assert row.excess_mps <= 0.03, row.worker
-        # Not for want of a limit.
+        # There was a limit to obey.
         slowest = min(frame.constraints.speed_limit_mps for frame in row.result.frames)
         assert row.worker == "nobody" or slowest < 1.0
 
@@ -97,7 +97,7 @@ def test_the_command_writes_the_table_that_it_prints(tmp_path):
         (("--out", "no/such/folder/table.md"), "a folder that exists"),
     ],
 )
-def test_a_command_without_meaning_is_refused(arguments, message):
+def test_bad_input_is_refused(arguments, message):
     pytest.importorskip("pybullet", reason="the crossings need the extra sim")
     done = command(*arguments)
     assert done.returncode == 2

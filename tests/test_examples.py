@@ -1,4 +1,4 @@
-"""Every example runs, as a newcomer would run it."""
+"""Every example runs, and so does the Python code on the pages."""
 
 import os
 import re
@@ -12,9 +12,9 @@ EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 SEARCHED = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
 
 
-# What is not installed with the core.
+# Packages that an example needs beyond the core.
 NEEDS = {"orca_rvo2": "pyrvo"}
-# They end with a line that says how it went.
+# Examples that drive end with a line of results.
 DRIVING = (
     "crossing_person",
     "point_obstacle_dwa",
@@ -26,7 +26,7 @@ DRIVING = (
 
 
 def printed(name, *arguments):
-    """What an example prints, run with warnings as errors."""
+    """Return the output of an example, run with warnings as errors."""
     done = subprocess.run(
         [sys.executable, "-W", "error", str(ROOT / "examples" / name), *arguments],
         capture_output=True,
@@ -63,7 +63,7 @@ def test_the_costmap_example_leaves_the_map_as_it_was(tmp_path):
     assert picture.stat().st_size > 1000
 
 
-def test_the_plug_in_example_shows_room_shrinking_for_an_aware_person():
+def test_the_plug_in_example_shows_the_radius_shrink_for_an_aware_person():
     out = printed("plug_into_planner.py")
     radii = [float(text) for text in re.findall(r"radius +([0-9.]+) m", out)]
     limits = [float(text) for text in re.findall(r"limit +([0-9.]+) m/s", out)]
@@ -82,7 +82,7 @@ def test_the_plug_in_example_shows_room_shrinking_for_an_aware_person():
     ],
 )
 def test_a_page_shows_code_that_runs(page):
-    """Python blocks of the page, in order, in one namespace."""
+    """Run the Python blocks of the page in order, in one namespace."""
     blocks = re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(), re.S)
     assert blocks
     namespace: dict[str, object] = {}

@@ -1,4 +1,4 @@
-"""The verdicts of benchmarks/perception_speed.py; its figures are measured, not tested."""
+"""Pass and fail of benchmarks/perception_speed.py; its figures are measured, not tested."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ def benchmark():
 @pytest.mark.parametrize(
     ("ours_ms", "good"), [(0.5, True), (0.999, True), (1.0, False), (2, False)]
 )
-def test_more_than_the_peer_fails_without_a_baseline(benchmark, ours_ms, good):
+def test_a_higher_cost_than_the_peer_fails_without_a_baseline(benchmark, ours_ms, good):
     text, verdict = benchmark.report(benchmark.compared("pose", ours_ms, 1.0), {})
     assert verdict is good
     assert ("MORE THAN RTMLIB" in text) is not good
 
 
-def test_worse_than_the_baseline_fails(benchmark):
+def test_a_figure_worse_than_the_baseline_fails(benchmark):
     before = {"speed": Metric("speed", 40.0, "frames/s", "higher", 0.5)}
     for value, good in ((30.0, True), (10.0, False)):
         now = [Metric("speed", value, "frames/s", "higher", 0.5)]

@@ -1,10 +1,10 @@
-"""Takes the pictures of a report that docs/bench.md shows, and looks for faults on the way.
+"""Takes the screenshots of a report for docs/bench.md, and checks the page.
 
     python tools/report_screenshots.py crossings/report.html docs/images
 
-Needs Playwright (``pip install playwright``) and a Chromium, which ``--chromium`` names where it is
-not on the path. Exit status 1 when the page asks the network for anything, says something on the
-console, is wider than its window, or has text of less contrast than WCAG AA asks for.
+Needs Playwright (``pip install playwright``) and a Chromium; ``--chromium`` names one that is not
+on the path. Exit status 1 when the page requests anything from the network, writes to the console,
+is wider than its window, or has text of less contrast than WCAG AA requires.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Any, Final
 import cv2
 from playwright.sync_api import sync_playwright
 
-# Name, width, height, colours, and the section at the top.
+# Name, width (px), height (px), colour scheme, and the section at the top.
 VIEWS: Final = (
     ("report_summary", 1280, 1180, "light", None),
     ("report_episodes", 1280, 860, "light", "#scatter"),
@@ -27,10 +27,10 @@ VIEWS: Final = (
     ("report_phone", 390, 1180, "light", None),
     ("report_phone_dark", 390, 1180, "dark", "#scatter"),
 )
-# Pictures in the docs stay below this.
-_MOST_BYTES: Final = 200_000
+# Largest size of a screenshot.
+_MAX_BYTES: Final = 200_000
 
-# Elements that reach beyond the window, other than those that scroll on their own.
+# Elements that reach beyond the window, except those that scroll.
 _TOO_WIDE: Final = """() => {
   const width = document.documentElement.clientWidth;
   return [...document.querySelectorAll("body *")]
@@ -38,7 +38,7 @@ _TOO_WIDE: Final = """() => {
     .filter((e) => e.getBoundingClientRect().right > width + 1)
     .map((e) => e.tagName + "." + e.className);
 }"""
-# Contrast after WCAG 2.2, 1.4.3, of every text that is shown.
+# Visible text with too little contrast after WCAG 2.2, 1.4.3.
 _TOO_FAINT: Final = """() => {
   const numbers = (text) => (text.match(/[\\d.]+/g) || []).map(Number);
   const light = (colour) => {
@@ -67,11 +67,16 @@ _TOO_FAINT: Final = """() => {
 
 
 def main() -> int:
-    """Take all pictures and return 1 if anything is wrong with the page."""
+    """Take all screenshots; return 1 if the page has a fault."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("page", type=Path)
-    parser.add_argument("out", type=Path)
-    parser.add_argument("--chromium", default=shutil.which("chromium"), metavar="FILE")
+    parser.add_argument("page", type=Path, metavar="REPORT.html", help="the report")
+    parser.add_argument("out", type=Path, metavar="DIR", help="folder of the screenshots")
+    parser.add_argument(
+        "--chromium",
+        default=shutil.which("chromium"),
+        metavar="FILE",
+        help="the browser (default: chromium on the path)",
+    )
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     faults: list[str] = []
@@ -82,7 +87,7 @@ def main() -> int:
         for view in VIEWS:
             faults += _take(browser, options.page.resolve().as_uri(), options.out, *view)
         browser.close()
-    print("\n".join(faults) if faults else "nothing wrong with the page")
+    print("\n".join(faults) if faults else "the page has no faults")
     return 1 if faults else 0
 
 
@@ -96,6 +101,7 @@ def _take(
     colours: str,
     section: str | None,
 ) -> list[str]:
+    """Take one screenshot and return the faults of the page."""
     context = browser.new_context(
         viewport={"width": width, "height": height}, color_scheme=colours, reduced_motion="reduce"
     )
@@ -109,7 +115,7 @@ def _take(
         lambda request: (
             None
             if request.url.startswith(("file:", "data:"))
-            else faults.append(f"{name}: asks for {request.url}")
+            else faults.append(f"{name}: requests {request.url}")
         ),
     )
     page.goto(page_uri)
@@ -122,17 +128,17 @@ def _take(
     page.screenshot(path=str(path))
     _shrink(path)
     faults += [f"{name}: too wide: {each}" for each in page.evaluate(_TOO_WIDE)]
-    faults += [f"{name}: too faint: {each}" for each in page.evaluate(_TOO_FAINT)]
+    faults += [f"{name}: too little contrast: {each}" for each in page.evaluate(_TOO_FAINT)]
     context.close()
     print(f"{path}: {path.stat().st_size / 1e3:.0f} kB")
     return faults
 
 
 def _shrink(path: Path) -> None:
-    """Make a picture smaller until it has less than the most bytes."""
+    """Make a screenshot smaller until it has at most ``_MAX_BYTES``."""
     whole = cv2.imread(str(path))
     share = 1.0
-    while path.stat().st_size > _MOST_BYTES and share > 0.3:
+    while path.stat().st_size > _MAX_BYTES and share > 0.3:
         share -= 0.1
         small = cv2.resize(whole, None, fx=share, fy=share, interpolation=cv2.INTER_AREA)
         cv2.imwrite(str(path), small, [cv2.IMWRITE_PNG_COMPRESSION, 9])

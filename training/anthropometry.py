@@ -1,9 +1,9 @@
 """Measures the body constants of ``perception.anthropometry`` on a parametric body model.
 
-Needs ``pip install anny==0.6.2 torch`` (nothing else of the project does). Averages 27 adult bodies
-of the default topology (body data of MakeHuman, CC0), three values each of gender, height and
-weight, by the model's own COCO keypoint definitions, and prints limb lengths as fractions of the
-stature and the head template in the paper's head frame.
+It averages 27 adult bodies of the default topology (body data of MakeHuman, CC0), with three values
+each of gender, height and weight, by the model's own COCO keypoint definitions. It prints limb
+lengths as fractions of the stature, and the head template in the paper's head frame. Needs
+``pip install anny==0.6.2 torch``.
 
     python training/anthropometry.py
 """

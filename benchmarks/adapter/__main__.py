@@ -1,4 +1,4 @@
-"""``python -m benchmarks.adapter``."""
+"""Entry point of ``python -m benchmarks.adapter``."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ from nav_adapter.exporters import CostmapPainter
 from ._crowd import CELLS, DT_S, ORIGIN_ODOM_M, RESOLUTION_M, ROBOT, crowd, robot_at
 from ._naive import paint_naively
 
-#: The steps whose sum is a cycle; the painter and the naive way are alternatives to the costmap.
+#: Steps whose sum is a cycle. The painter and the naive costmap are alternatives to "costmap".
 CYCLE = ("update", "circles", "costmap")
 _NAIVE_FRAMES = 3
 Result = TypeVar("Result")
@@ -25,8 +25,9 @@ Result = TypeVar("Result")
 def cost_ms(people: int, frames: int, repeats: int, seed: int, naive: bool) -> dict[str, float]:
     """Return the median processor milliseconds of each step over the frames.
 
-    The least time of a frame over the repeats counts: other programs only slow. The first half
-    second is left out, in which everybody is new. ``naive`` adds the naive way, on three frames.
+    The least time of a frame over the repeats counts, since other programs can only slow it down.
+    The first half second, in which every person is new, is left out. ``naive`` adds the naive
+    costmap, on three frames.
     """
     tracks = crowd(people, frames, np.random.default_rng([seed, people]))
     steps = (*CYCLE, "painter", *(("naive",) if naive else ()))

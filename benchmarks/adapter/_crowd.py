@@ -1,4 +1,4 @@
-"""People who walk about on the map, all of them within its ten metres."""
+"""Tracks of people who walk about on a map of ten metres."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ ROBOT = RobotProfile(
 
 
 def robot_at(stamp_s: float) -> RobotState:
-    """Return a robot in the middle of the map that drives at half a metre a second."""
+    """Return a robot in the middle of the map that drives at 0.5 m/s."""
     return RobotState(stamp_s, np.zeros(2), 0.0, 0.5, 0.0)
 
 
 def crowd(people: int, frames: int, rng: np.random.Generator) -> list[tuple[PersonTrack, ...]]:
-    """Return the tracks of every frame: half of the people aware, all of them walking."""
+    """Return the tracks of every frame: all people walk, half of them are aware."""
     start = rng.uniform(-0.45 * SIDE_M, 0.45 * SIDE_M, (people, 2))
     direction = rng.uniform(-np.pi, np.pi, people)
     velocity = 0.7 * np.stack([np.cos(direction), np.sin(direction)], axis=1)
@@ -56,5 +56,5 @@ def crowd(people: int, frames: int, rng: np.random.Generator) -> list[tuple[Pers
 
 
 def _on_map(position: FloatArray) -> FloatArray:
-    """Who walks off one side comes back on the other."""
+    """Return a position on the map: a person who leaves one side comes back on the other."""
     return np.asarray((position + 0.5 * SIDE_M) % SIDE_M - 0.5 * SIDE_M)

@@ -1,4 +1,4 @@
-"""The costmap as one would first write it: shapely's distance of every cell to every polygon."""
+"""The costmap as a first version: shapely's distance of every cell to every polygon."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ._crowd import CELLS, ORIGIN_ODOM_M, RESOLUTION_M
 
 
 def paint_naively(costmap: NDArray[np.uint8], constraints: NavConstraints) -> None:
-    """Paint what :func:`nav_adapter.paint_costmap` paints, with polygons for circles."""
+    """Paint like :func:`nav_adapter.paint_costmap`, with polygons instead of circles."""
     x = ORIGIN_ODOM_M[0] + RESOLUTION_M * (np.arange(CELLS[1]) + 0.5)
     y = ORIGIN_ODOM_M[1] + RESOLUTION_M * (np.arange(CELLS[0]) + 0.5)
     cells = shapely.points(*np.meshgrid(x, y))

@@ -1,1 +1,7 @@
-"""How many pictures a second ``awarenav bridge`` works through, how late, and at what cost."""
+"""Throughput, latency and processor time of ``awarenav bridge``."""
+
+from __future__ import annotations
+
+from ._cli import main
+
+__all__ = ["main"]

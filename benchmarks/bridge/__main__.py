@@ -1,4 +1,4 @@
-"""``python -m benchmarks.bridge``."""
+"""Entry point of ``python -m benchmarks.bridge``."""
 
 from __future__ import annotations
 

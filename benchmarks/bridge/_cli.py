@@ -1,9 +1,8 @@
-"""The command line of the benchmark."""
+"""Command line of the benchmark."""
 
 from __future__ import annotations
 
 import argparse
-import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,30 +11,30 @@ from awarenav.baseline import Metric
 from awarenav.cli import main as awarenav
 from awarenav.errors import AwarenavError
 
-from .._harness import count, finish, make_parser, parse
+from .._harness import bad_input, count, finish, make_parser, parse
 
 BASELINE = Path(__file__).with_name("baseline.json")
-#: Pictures a second on two cores.
+#: Least images per second on two cores.
 WANTED_HZ = 15.0
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the benchmark; 0 when all is as it should be, 1 when a figure is not, 2 for bad input."""
+    """Run the benchmark; return 0 for success, 1 for a missed goal, 2 for bad input."""
     parser = make_parser(
         "benchmarks.bridge",
-        "Send one rendered picture of 640 × 480 again and again over DDS on loopback "
-        "to `awarenav bridge` with the networks in the box, with odometry at 50 Hz and a listener "
-        "on every topic, and count what comes back. Bridge, sender and listener share the cores. "
-        "Anything else that runs on them slows it: use a computer that does nothing else.",
+        "Send one rendered image of 640 × 480 again and again over DDS on loopback to `awarenav "
+        "bridge` with the shipped networks, with odometry at 50 Hz and a listener on every topic, "
+        "and count the speed limits that come back. Bridge, sender and listener share the cores. "
+        "Use a computer that runs nothing else.",
         BASELINE,
     )
     parser.add_argument("--seconds", type=count, default=20, metavar="S", help="default: 20")
     parser.add_argument(
-        "--rate", type=count, default=30, metavar="HZ", help="pictures sent a second (default: 30)"
+        "--rate", type=count, default=30, metavar="HZ", help="images sent per second (default: 30)"
     )
     parser.add_argument("--cores", type=count, default=2, metavar="N", help="default: 2 (Linux)")
     parser.add_argument(
-        "--people", type=count, default=1, metavar="N", help="in the picture (default: 1)"
+        "--people", type=count, default=1, metavar="N", help="people in the image (default: 1)"
     )
     parser.add_argument("--compressed", action="store_true", help="send JPEG files")
     parser.add_argument(
@@ -48,18 +47,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         metrics = _metrics(options)
     except AwarenavError as error:
-        print(f"{parser.prog}: {error}", file=sys.stderr)
-        return 2
+        return bad_input(parser, error)
     for metric in metrics:
         print(f"{metric.name:24s}{metric.value:9.2f} {metric.unit}")
     missed = []
     if metrics[0].value < min(WANTED_HZ, options.rate):
-        missed.append(f"{metrics[0].value:.1f} pictures a second, {WANTED_HZ:g} wanted")
+        missed.append(f"{metrics[0].value:.1f} images per second, at least {WANTED_HZ:g} wanted")
     return finish(metrics, missed, baseline, options.out)
 
 
 def _metrics(options: argparse.Namespace) -> list[Metric]:
-    # Only now: help works without the extra ros2.
+    # Imported late so that the help works without the extra ros2.
     from ._measure import measure  # noqa: PLC0415
 
     with tempfile.TemporaryDirectory() as temporary:
@@ -69,7 +67,7 @@ def _metrics(options: argparse.Namespace) -> list[Metric]:
             _render(folder, options.people)
         figures = measure(folder, options.seconds, options.rate, options.cores, options.compressed)
     print(f"{figures.people} of {options.people} people confirmed")
-    # Bare figures depend on the machine; wide tolerances only catch a change of kind.
+    # Bare figures depend on the computer; wide tolerances only catch a large change.
     return [
         Metric("bridge_pictures_per_s", figures.frames_per_s, "1/s", "higher", 0.3),
         Metric("bridge_latency", figures.latency_ms, "ms", "lower", 0.5),
@@ -81,4 +79,4 @@ def _render(folder: Path, people: int) -> None:
     size = ["--frames", "1", "--scenes", "1", "--people", str(people), "--range", "2", "4"]
     status = awarenav(["render", *size, "--seed", "3", "--processes", "1", "--out", str(folder)])
     if status != 0:
-        raise AwarenavError(f"awarenav render has ended with status {status}")
+        raise AwarenavError(f"awarenav render ended with status {status}")

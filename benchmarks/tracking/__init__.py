@@ -1,1 +1,29 @@
-"""Ours, norfair, Stone Soup and a naive tracker side by side on the same simulated walkers."""
+"""Our tracker, norfair, Stone Soup and a naive tracker on the same simulated walkers."""
+
+from __future__ import annotations
+
+from ._consistency import Consistency, on_own_model, on_walkers, white_acceleration_walk
+from ._contender import Contender, run
+from ._judges import GATE_M, Scores, TrackedFrame, judge
+from ._measurements import OCCLUDED, OPEN, Recording, SensorSettings, record
+from ._walkers import WalkerSettings, walk
+
+__all__ = [
+    "GATE_M",
+    "OCCLUDED",
+    "OPEN",
+    "Consistency",
+    "Contender",
+    "Recording",
+    "Scores",
+    "SensorSettings",
+    "TrackedFrame",
+    "WalkerSettings",
+    "judge",
+    "on_own_model",
+    "on_walkers",
+    "record",
+    "run",
+    "walk",
+    "white_acceleration_walk",
+]

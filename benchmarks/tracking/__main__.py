@@ -1,4 +1,4 @@
-"""``python -m benchmarks.tracking``."""
+"""Entry point of ``python -m benchmarks.tracking``."""
 
 from __future__ import annotations
 

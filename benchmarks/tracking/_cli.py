@@ -1,4 +1,4 @@
-"""The command line of the benchmark."""
+"""Command line of the benchmark."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tqdm import tqdm
 from awarenav.baseline import Metric
 from tracking import TrackerConfig, TrackingError
 
-from .._harness import count, finish, make_parser, parse
+from .._harness import bad_input, count, finish, make_parser, parse
 from ._consistency import on_own_model, on_walkers, open_gates
 from ._contender import Contender, run
 from ._cost import cost_ms
@@ -46,22 +46,21 @@ _NEEDS = {"norfair": "norfair", "stonesoup-gnn": "stonesoup", "stonesoup-jpda": 
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the benchmark; 0 when all is as it should be, 1 when a figure is not, 2 for bad input."""
+    """Run the benchmark; return 0 for success, 1 for a missed goal, 2 for bad input."""
     parser = _parser()
     options, baseline = parse(parser, arguments)
     try:
         config = (
             TrackerConfig() if options.config is None else TrackerConfig.from_yaml(options.config)
         )
-        missing = [m for m in ("motmetrics", "trackeval") if find_spec(m) is None]
-        if "scores" in options.parts and missing:
-            parser.error(
-                f"{' and '.join(missing)} not found; see benchmarks/tracking/requirements.txt "
-                "or leave out the scores (--parts cost,consistency)"
-            )
     except TrackingError as error:
-        print(f"{parser.prog}: {error}", file=sys.stderr)
-        return 2
+        return bad_input(parser, error)
+    missing = [name for name in ("motmetrics", "trackeval") if find_spec(name) is None]
+    if "scores" in options.parts and missing:
+        parser.error(
+            f"{' and '.join(missing)} not found; see benchmarks/tracking/requirements.txt "
+            "or leave out the scores (--parts cost,consistency)"
+        )
     makers = _makers(options.trackers, config)
     metrics: list[Metric] = []
     missed: list[str] = []
@@ -77,8 +76,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = make_parser(
         "benchmarks.tracking",
-        "Run several trackers on the same simulated walkers, judge them with "
-        "motmetrics and TrackEval, compare their processor time, and check the covariance of ours.",
+        "Run several trackers on the same simulated walkers, judge them with motmetrics and "
+        "TrackEval, compare their processor time, and check the covariance of ours.",
         BASELINE,
     )
     parser.add_argument(
@@ -86,28 +85,28 @@ def _parser() -> argparse.ArgumentParser:
         type=_counts,
         default=[20],
         metavar="N,N",
-        help="how many walkers, at a constant density (default: 20; the full run: 5,20,50,100)",
+        help="numbers of walkers, at a constant density (default: 20; the full run: 5,20,50,100)",
     )
     parser.add_argument(
         "--seeds",
         type=count,
         default=STANDARD_SEEDS,
         metavar="N",
-        help="runs of each set (default: 10)",
+        help="runs per set (default: 10)",
     )
     parser.add_argument(
         "--seed",
         type=int,
         default=0,
         metavar="S",
-        help="first seed (default: 0; from 100 on are those that the trackers were tuned on)",
+        help="first seed (default: 0; the trackers were tuned on seeds from 100 on)",
     )
     parser.add_argument(
         "--frames",
         type=count,
         default=STANDARD_FRAMES,
         metavar="N",
-        help="of a run, 20 a second (default: 500)",
+        help="frames per run, 20 per second (default: 500)",
     )
     parser.add_argument(
         "--sets",
@@ -135,11 +134,9 @@ def _parser() -> argparse.ArgumentParser:
         type=count,
         default=20,
         metavar="N",
-        help="leave Stone Soup out beyond N people; 100 take it an hour (default: 20)",
+        help="leave Stone Soup out beyond N people; 100 people take an hour (default: 20)",
     )
-    parser.add_argument(
-        "--config", type=Path, metavar="FILE", help="YAML of TrackerConfig for ours"
-    )
+    parser.add_argument("--config", type=Path, metavar="FILE", help="TrackerConfig for ours (YAML)")
     return parser
 
 
@@ -152,14 +149,14 @@ def _subset(valid: Sequence[str]) -> Callable[[str], list[str]]:
         chosen = text.split(",")
         for name in chosen:
             if name not in valid:
-                raise argparse.ArgumentTypeError(f"{name!r} is none of {', '.join(valid)}")
+                raise argparse.ArgumentTypeError(f"must be of {', '.join(valid)}; got {name!r}")
         return chosen
 
     return parse
 
 
 def _makers(names: Sequence[str], config: TrackerConfig) -> dict[str, Callable[[], Contender]]:
-    """Return a maker for each tracker whose package is there, saying which are left out."""
+    """Return a maker for each tracker that is installed; print which ones are left out."""
     makers: dict[str, Callable[[], Contender]] = {
         "ours": lambda: Ours(config),
         "naive": Naive,
@@ -177,7 +174,7 @@ def _makers(names: Sequence[str], config: TrackerConfig) -> dict[str, Callable[[
 
 
 def _is_standard(options: argparse.Namespace) -> bool:
-    """Say whether the figures may be compared with the baseline; tell when not."""
+    """Return whether the figures may be compared with the baseline; print when not."""
     standard = (options.seed, options.seeds, options.frames) == (0, STANDARD_SEEDS, STANDARD_FRAMES)
     if not standard or options.config is not None:
         print("not compared with the baseline: it holds for the default seeds, frames and settings")
@@ -188,6 +185,7 @@ def _is_standard(options: argparse.Namespace) -> bool:
 def _affordable(
     options: argparse.Namespace, makers: dict[str, Callable[[], Contender]], people: int
 ) -> dict[str, Callable[[], Contender]]:
+    """Return the trackers, without Stone Soup where it would take hours."""
     if people <= options.stonesoup_up_to:
         return makers
     return {name: make for name, make in makers.items() if not name.startswith("stonesoup")}
@@ -199,6 +197,7 @@ def _scores(
     metrics: list[Metric],
     missed: list[str],
 ) -> None:
+    """Judge the trackers on every set and number of people."""
     print(SCORE_HEADER)
     for name in options.sets:
         for people in options.people:
@@ -235,6 +234,7 @@ def _cost(
     metrics: list[Metric],
     missed: list[str],
 ) -> None:
+    """Compare the processor time of the trackers."""
     print(f"\n{'processor time':16s}{'people':>6s}{'ms/frame':>10s}{'ours over it':>14s}")
     for people in (20, 100):
         rng = np.random.default_rng([options.seed, people])
@@ -251,6 +251,7 @@ def _cost(
 def _consistency(
     options: argparse.Namespace, config: TrackerConfig, metrics: list[Metric], missed: list[str]
 ) -> None:
+    """Check the covariance of our tracker."""
     wide = open_gates(config)
     print(f"\n{'consistency of ours':28s}{'NEES':>7s}{'in band':>9s}{'NIS':>7s}{'95 % band':>15s}")
     for dt_s in tqdm(STEPS_S, desc="consistency", leave=False, file=sys.stderr):

@@ -1,4 +1,4 @@
-"""Whether the tracker's covariance is as large as its errors: NEES and NIS."""
+"""Consistency of the tracker's covariance with its errors: NEES and NIS."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ class Consistency:
     """Mean normalised squared errors, and the 95 % band that they should lie in.
 
     Attributes:
-        nees: of position and velocity, mean over walkers and frames; 4 where all is well.
-        nees_inside: share of frames at which the mean over walkers lies in its 95 % band.
-        nis: of the innovations, mean over all; 2 where all is well.
-        nis_band: of that mean.
+        nees: of position and velocity, mean over walkers and frames; 4 if consistent.
+        nees_inside: share of frames in which the mean over walkers lies in its 95 % band.
+        nis: of the innovations, mean over all; 2 if consistent.
+        nis_band: 95 % band of that mean.
     """
 
     nees: float
@@ -38,16 +38,16 @@ class Consistency:
 def on_own_model(
     dt_s: float, walkers: int, frames: int, rng: np.random.Generator, config: TrackerConfig
 ) -> Consistency:
-    """Follow walkers whose motion is the tracker's own model: exact white acceleration.
+    """Track walkers who move by the tracker's own model, exact white acceleration.
 
-    Every walker is alone with a tracker of their own, so that nothing but the filter is judged.
+    Every walker has a tracker of their own, so that only the filter is judged.
     """
     nees, nis = np.empty((walkers, frames)), np.empty((walkers, frames - 1))
     for walker in range(walkers):
         truth = white_acceleration_walk(dt_s, frames, rng, config)
         measured = truth[:, :2] + rng.normal(0.0, NOISE_STD_M, (frames, 2))
         nees[walker], nis[walker] = _follow_one(truth, measured, dt_s, config)
-    # Walkers are independent, frames of one walker are not: a band a frame, over walkers.
+    # Walkers are independent, frames of one walker are not: one band per frame, over walkers.
     low, high = chi2.ppf([0.025, 0.975], 4 * walkers) / walkers
     mean = nees.mean(axis=0)
     band = chi2.ppf([0.025, 0.975], 2 * nis.size) / nis.size
@@ -62,21 +62,22 @@ def on_own_model(
 def white_acceleration_walk(
     dt_s: float, frames: int, rng: np.random.Generator, config: TrackerConfig
 ) -> FloatArray:
-    """Return (frames, 4) drawn from the tracker's own motion model and prior of the velocity."""
+    """Return states (frames, 4) drawn from the tracker's motion model and velocity prior."""
     q = config.acceleration_density_m2ps3
     root = np.linalg.cholesky(q * np.array([[dt_s**3 / 3.0, dt_s**2 / 2.0], [dt_s**2 / 2.0, dt_s]]))
     truth = np.zeros((frames, 4))
     truth[0, 2:] = rng.normal(0.0, config.initial_velocity_std_mps, 2)
     for frame in range(1, frames):
-        kick = root @ rng.normal(size=(2, 2))
-        truth[frame, :2] = truth[frame - 1, :2] + dt_s * truth[frame - 1, 2:] + kick[0]
-        truth[frame, 2:] = truth[frame - 1, 2:] + kick[1]
+        noise = root @ rng.normal(size=(2, 2))
+        truth[frame, :2] = truth[frame - 1, :2] + dt_s * truth[frame - 1, 2:] + noise[0]
+        truth[frame, 2:] = truth[frame - 1, 2:] + noise[1]
     return truth
 
 
 def _follow_one(
     truth: FloatArray, measured: FloatArray, dt_s: float, config: TrackerConfig
 ) -> tuple[FloatArray, FloatArray]:
+    """Return NEES (frames,) and NIS (frames - 1,) of one walker."""
     tracker = PersonTracker(config)
     nees, nis = np.empty(len(truth)), np.empty(len(truth) - 1)
     R = NOISE_STD_M**2 * np.eye(2)
@@ -94,7 +95,7 @@ def _follow_one(
 
 
 def open_gates(config: TrackerConfig) -> TrackerConfig:
-    """Return the settings with gates that let everything pass: gates cut off the tails."""
+    """Return the settings with gates wide open, since gates cut off the tails."""
     return config.model_copy(
         update={
             "gate_probability": 1.0 - 1e-12,
@@ -108,7 +109,7 @@ def open_gates(config: TrackerConfig) -> TrackerConfig:
 def on_walkers(recording: Recording, config: TrackerConfig) -> dict[str, float]:
     """Return mean NEES of position (2) and of position and velocity (4) on simulated people.
 
-    Each person alone, without clutter and neighbours: the motion model is judged, not the matches.
+    Each person is tracked alone, without clutter: the motion model is judged, not association.
     """
     rng = np.random.default_rng(0)
     four: list[float] = []

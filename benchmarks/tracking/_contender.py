@@ -1,4 +1,4 @@
-"""What the benchmark asks of a tracker."""
+"""Interface of a tracker in the benchmark."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from typing import Any, Protocol
 from ._judges import TrackedFrame
 from ._measurements import Recording
 
-#: Every tracker keeps a person unseen for this long: a little longer than the longest spell out of
-#: sight. Settings that peers do not share are tuned for each, on seeds that are not judged.
+#: Time for which every tracker keeps an unseen person: slightly more than the longest spell out of
+#: sight. Settings that the trackers do not share are tuned for each, on seeds that are not judged.
 MAX_UNSEEN_S = 1.2
 
 
 class Contender(Protocol):
     """A tracker under test, fed frame by frame.
 
-    ``begin`` makes a fresh tracker and brings the measurements into its own form; ``advance`` is
-    what a robot would call for every frame and all that is timed; ``report`` reads its result.
+    ``begin`` makes a fresh tracker and converts the measurements into its own form. ``advance`` is
+    the call of every frame, and the only one that is timed. ``report`` reads its result.
     """
 
     name: str
@@ -28,10 +28,10 @@ class Contender(Protocol):
         """Take the next frame."""
 
     def report(self, result: Any) -> TrackedFrame:
-        """Return the people whom the tracker holds for real, seen in this frame or not."""
+        """Return the confirmed people, seen in this frame or not."""
 
 
 def run(contender: Contender, recording: Recording) -> list[TrackedFrame]:
-    """Return what a tracker makes of a recording."""
+    """Return the tracks of every frame of a recording."""
     contender.begin(recording)
     return [contender.report(contender.advance(i)) for i in range(len(recording.stamps_s))]

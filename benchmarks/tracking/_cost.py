@@ -1,4 +1,4 @@
-"""What a frame costs each tracker, in processor time, on the same frames in the same run."""
+"""Processor time per frame of each tracker, on the same frames in the same run."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ from ._measurements import Recording
 def cost_ms(
     contenders: Sequence[Contender], recording: Recording, repeats: int
 ) -> dict[str, float]:
-    """Return the median processor milliseconds a frame of each tracker.
+    """Return the median processor milliseconds per frame of each tracker.
 
-    The trackers take turns on whole recordings, and each frame's least time over the repeats
-    counts: other programs only slow. Making the input and reading the result are not timed.
+    The trackers take turns on whole recordings. For each frame the least time over the repeats
+    counts, since other programs can only slow it down. Making the input and reading the result are
+    not timed.
     """
     frames = len(recording.stamps_s)
     least = {contender.name: np.full(frames, np.inf) for contender in contenders}

@@ -1,4 +1,4 @@
-"""The figures of the benchmark as text and as a baseline, and what they are held to."""
+"""Figures of the benchmark as text and as a baseline, and their targets."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from awarenav.baseline import Metric
 
 from ._judges import Scores
 
-#: Ours at 20 people: least MOTA, least IDF1, most switches (means over seeds).
+#: Targets of our tracker with 20 people: least MOTA, least IDF1, most switches (seed means).
 TARGETS = {"open": (0.985, 0.95, 4.0), "occluded": (0.94, 0.72, 35.0)}
-#: Most processor time of ours against a peer's: (people, peer) -> ratio.
+#: Most processor time of our tracker relative to a peer's: (people, peer) -> ratio.
 COST_TARGETS = {(20, "norfair"): 0.75, (20, "stonesoup-gnn"): 0.05, (100, "norfair"): 0.5}
-#: Least share of frames whose NEES lies in its 95 % band: frames of one run hang together, so that
-#: the share scatters around 0.95.
+#: Least share of frames whose NEES lies in its 95 % band. Frames of one run are correlated, so the
+#: share scatters around 0.95.
 INSIDE_TARGET = 0.85
 
 SCORE_HEADER = (
@@ -26,7 +26,7 @@ SCORE_HEADER = (
 
 
 def score_line(name: str, people: int, tracker: str, scores: Sequence[Scores]) -> str:
-    """Return one tracker's row: means over seeds, ± their standard deviation."""
+    """Return one tracker's row: mean over seeds ± standard deviation."""
 
     def mean(field: str) -> float:
         return float(np.mean([getattr(score, field) for score in scores]))
@@ -52,13 +52,13 @@ def score_metrics(name: str, people: int, tracker: str, scores: Sequence[Scores]
         Metric(f"{key}_mota", mean["mota"], "1", "higher", 0.005),
         Metric(f"{key}_idf1", mean["idf1"], "1", "higher", 0.03),
         Metric(f"{key}_hota", mean["hota"], "1", "higher", 0.03),
-        # Few and far between, so they scatter.
+        # Switches are rare, so their number scatters.
         Metric(f"{key}_switches", mean["switches"], "switches/run", "lower", 0.5),
     ]
 
 
 def missed_scores(name: str, people: int, tracker: str, scores: Sequence[Scores]) -> list[str]:
-    """Return what ours misses of its targets in one set."""
+    """Return the targets that our tracker misses in one set, one line each."""
     if tracker != "ours" or people != 20 or name not in TARGETS:
         return []
     mota, idf1, switches = TARGETS[name]
@@ -74,7 +74,7 @@ def missed_scores(name: str, people: int, tracker: str, scores: Sequence[Scores]
 
 
 def cost_metrics(people: int, cost_ms: Mapping[str, float]) -> list[Metric]:
-    """Return ratios of our processor time to each peer's; bare times say more of the machine."""
+    """Return ratios of our processor time to each peer's; bare times depend on the computer."""
     return [
         Metric(f"cost_{people}_over_{peer}", cost_ms["ours"] / value, "x", "lower", 0.4)
         for peer, value in cost_ms.items()
@@ -83,7 +83,7 @@ def cost_metrics(people: int, cost_ms: Mapping[str, float]) -> list[Metric]:
 
 
 def missed_costs(people: int, cost_ms: Mapping[str, float]) -> list[str]:
-    """Return what ours costs too much."""
+    """Return the cost targets that our tracker misses, one line each."""
     missed = []
     for (crowd, peer), most in COST_TARGETS.items():
         if crowd == people and peer in cost_ms and "ours" in cost_ms:

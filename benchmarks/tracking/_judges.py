@@ -1,4 +1,4 @@
-"""Two judges of the same tracks, motmetrics and TrackEval, with one gate."""
+"""Scores of tracks by two judges, motmetrics and TrackEval, with one gate."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from scipy.spatial.distance import cdist
 
 from ._walkers import FloatArray
 
-#: A track further than this from a person is not that person.
+#: Largest distance between a person and a track that counts as that person.
 GATE_M = 1.0
-_MOST_MOTA_APART = 0.01
-_MOST_IDF1_APART = 0.001
+_MAX_MOTA_DIFFERENCE = 0.01
+_MAX_IDF1_DIFFERENCE = 0.001
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackedFrame:
-    """What a tracker reports for one frame: ids (K,) and positions (K, 2) in metres."""
+    """Tracks of one frame: ids (K,) and positions (K, 2) in metres."""
 
     ids: NDArray[np.int64]
     positions_m: FloatArray
@@ -30,14 +30,14 @@ class TrackedFrame:
 
 @dataclass(frozen=True, slots=True)
 class Scores:
-    """Figures of one run, all of the whole run at once.
+    """Figures of one whole run.
 
     Attributes:
         mota: multiple object tracking accuracy (motmetrics).
         idf1: share of frames with the right identity (motmetrics).
         switches: identity switches (motmetrics).
-        misses: people a frame without a track (motmetrics).
-        false_positives: tracks a frame without a person (motmetrics).
+        misses: people without a track, summed over frames (motmetrics).
+        false_positives: tracks without a person, summed over frames (motmetrics).
         hota: higher order tracking accuracy, mean over its thresholds (TrackEval).
         mota_trackeval: MOTA by TrackEval.
         idf1_trackeval: IDF1 by TrackEval.
@@ -55,19 +55,19 @@ class Scores:
     switches_trackeval: float
 
     def disagreement(self) -> str | None:
-        """Say how the judges differ by more than their rules explain; None when they do not.
+        """Return a message if the judges differ by more than their rules explain, else None.
 
-        Identity is one assignment over the whole run, and the same for both. For MOTA each keeps
-        the matches of the frame before in its own way, which may leave a neighbour without one.
+        Identity is one assignment over the whole run, the same for both. For MOTA each judge keeps
+        the matches of the previous frame in its own way, which may leave a neighbour unmatched.
         """
         mota, idf1 = abs(self.mota - self.mota_trackeval), abs(self.idf1 - self.idf1_trackeval)
-        if mota <= _MOST_MOTA_APART and idf1 <= _MOST_IDF1_APART:
+        if mota <= _MAX_MOTA_DIFFERENCE and idf1 <= _MAX_IDF1_DIFFERENCE:
             return None
         return f"the judges differ by {mota:.4f} in MOTA and {idf1:.4f} in IDF1"
 
 
 def judge(truth: FloatArray, tracked: Sequence[TrackedFrame]) -> Scores:
-    """Judge tracks against truth (T, N, ≥ 2); everybody counts in every frame, seen or not."""
+    """Judge tracks against truth (T, N, ≥ 2); every person counts in every frame, seen or not."""
     distances = [
         cdist(people[:, :2], frame.positions_m) if len(frame.ids) else np.empty((len(people), 0))
         for people, frame in zip(truth, tracked, strict=True)
@@ -90,7 +90,7 @@ def _motmetrics(
         )
     names = ["mota", "idf1", "num_switches", "num_misses", "num_false_positives"]
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of pandas, at motmetrics
+        warnings.simplefilter("ignore")  # of pandas, about motmetrics
         row = motmetrics.metrics.create().compute(accumulator, metrics=names, name="run").iloc[0]
     return {
         "mota": float(row["mota"]),
@@ -104,7 +104,7 @@ def _motmetrics(
 def _trackeval(
     truth: FloatArray, tracked: Sequence[TrackedFrame], distances: Sequence[FloatArray]
 ) -> dict[str, float]:
-    with contextlib.redirect_stdout(io.StringIO()):  # it prints which of its own sets it misses
+    with contextlib.redirect_stdout(io.StringIO()):  # it prints which of its data sets are missing
         import trackeval.metrics  # noqa: PLC0415 - an optional peer
 
     frames, people = truth.shape[:2]
@@ -121,7 +121,7 @@ def _trackeval(
         "num_tracker_dets": sum(len(i) for i in ids),
         "gt_ids": [np.arange(people)] * frames,
         "tracker_ids": ids,
-        # As in TrackEval's own 3-D sets: 1 at no distance, the threshold of 0.5 at the gate.
+        # As in TrackEval's own 3-D sets: 1 at distance 0, the threshold of 0.5 at the gate.
         "similarity_scores": [np.maximum(0.0, 1.0 - 0.5 * d / GATE_M) for d in distances],
     }
     quiet = {"PRINT_CONFIG": False}

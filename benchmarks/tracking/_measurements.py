@@ -1,4 +1,4 @@
-"""What a detector would report of the walkers: noise, misses, clutter and spells out of sight."""
+"""Simulated detections of the walkers: noise, misses, clutter and spells out of sight."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from ._walkers import FloatArray, WalkerSettings, walk
 
 @dataclass(frozen=True, slots=True)
 class SensorSettings:
-    """How people are measured; the defaults are those of the benchmark.
+    """Settings of the sensor; the defaults are those of the benchmark.
 
     Attributes:
-        rate_hz: frames a second.
+        rate_hz: frames per second.
         noise_std_m: of a measured position, on each axis.
         miss_probability: chance that a visible person is not reported in a frame.
-        clutter_per_m2: false reports a frame and square metre (Poisson, uniform over the hall).
-        seen_mean_s: mean time between two spells out of sight, or None without such spells.
+        clutter_per_m2: false reports per frame and square metre (Poisson, uniform over the hall).
+        seen_mean_s: mean time between two spells out of sight; None for no such spells.
         unseen_s: shortest and longest spell.
     """
 
@@ -37,15 +37,15 @@ OCCLUDED = SensorSettings(seen_mean_s=2.5)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Recording:
-    """Truth and measurements of one run; every tracker is given the same.
+    """Truth and measurements of one run, the same for every tracker.
 
     Attributes:
         stamps_s: (T,).
         truth: (T, N, 4) x, y (m), vx, vy (m/s).
         visible: (T, N) False during a spell out of sight.
-        measured_m: T arrays (M, 2), in no order that says whom they show.
+        measured_m: T arrays (M, 2), in random order.
         noise_std_m: of a measured position, on each axis.
-        clutter_per_m2: false reports a frame and square metre.
+        clutter_per_m2: false reports per frame and square metre.
         miss_probability: chance that a visible person is not reported.
     """
 
@@ -94,7 +94,7 @@ def record(
 def _visible(
     people: int, stamps_s: FloatArray, sensor: SensorSettings, rng: np.random.Generator
 ) -> NDArray[np.bool_]:
-    """Draw spells out of sight, independently for each person, from a random phase on."""
+    """Return (T, N) visibility with spells out of sight, drawn independently for each person."""
     visible = np.ones((len(stamps_s), people), dtype=bool)
     if sensor.seen_mean_s is None:
         return visible

@@ -1,4 +1,4 @@
-"""What one writes in an afternoon: a filterpy filter a person, and the Hungarian method."""
+"""A tracker of an afternoon: one filterpy filter per person, and the Hungarian method."""
 
 from __future__ import annotations
 
@@ -16,14 +16,15 @@ from ._measurements import Recording
 
 @dataclass(frozen=True, slots=True)
 class NaiveSettings:
-    """Chosen on the tuning seeds, as those of the others are.
+    """Settings, chosen on the tuning seeds like those of the other trackers.
 
     Attributes:
-        gate_sigma: a measurement at a larger Mahalanobis distance from its track is not taken.
+        gate_sigma: largest Mahalanobis distance between a measurement and its track.
         acceleration_density_m2ps3: of the white acceleration.
         velocity_std_mps: of a new track.
-        confirm_hits: a track is real from this measurement on.
-        max_unseen_s: a track unseen for longer is dropped; a new one already after one frame.
+        confirm_hits: measurements that confirm a track.
+        max_unseen_s: time after which an unseen track is dropped; a new one is dropped after one
+            frame.
     """
 
     gate_sigma: float = 3.4
@@ -39,7 +40,7 @@ class _Track:
 
 
 class Naive:
-    """Constant velocity, Mahalanobis distance, one gate."""
+    """A tracker with constant velocity, the Mahalanobis distance and one gate."""
 
     name = "naive"
 
@@ -68,8 +69,8 @@ class Naive:
             track.kalman.predict()
             track.unseen += 1
         free = list(range(len(measured)))
-        for real in (True, False):
-            tracks = [t for t in self._tracks if (t.hits >= settings.confirm_hits) == real]
+        for confirmed in (True, False):
+            tracks = [t for t in self._tracks if (t.hits >= settings.confirm_hits) == confirmed]
             if tracks and free:
                 self._match(tracks, measured, free)
         limit = round(settings.max_unseen_s / self._dt_s)
@@ -84,14 +85,14 @@ class Naive:
         return [track for track in self._tracks if track.hits >= settings.confirm_hits]
 
     def report(self, result: Any) -> TrackedFrame:
-        """Return tracks with enough hits."""
+        """Return the confirmed tracks."""
         return TrackedFrame(
             np.array([track.number for track in result], dtype=np.int64),
             np.array([track.kalman.x[:2] for track in result]).reshape(-1, 2),
         )
 
     def _match(self, tracks: list[_Track], measured_m: Any, free: list[int]) -> None:
-        """Give tracks their measurements and strike these off the free ones."""
+        """Assign measurements to tracks and remove them from the free ones."""
         gate = self._settings.gate_sigma
         columns = list(free)
         distance = np.array([self._distances(t.kalman, measured_m[columns]) for t in tracks])

@@ -1,4 +1,4 @@
-"""norfair with its own constant-velocity filter, in units of the benchmark."""
+"""The peer norfair with its own constant-velocity filter, in units of the benchmark."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from ._measurements import Recording
 
 @dataclass(frozen=True, slots=True)
 class NorfairSettings:
-    """Tuned for this benchmark on seeds that are not judged; README.md says over what.
+    """Settings, tuned for this benchmark on seeds that are not judged (ranges in README.md).
 
     Attributes:
-        distance_threshold_m: a measurement further than this from its track is not taken.
-        max_unseen_s: a track unseen for longer is dropped (norfair's hit counter).
-        initialization_delay: hits beyond the first before a track is real.
+        distance_threshold_m: largest distance between a measurement and its track.
+        max_unseen_s: time after which an unseen track is dropped (norfair's hit counter).
+        initialization_delay: hits after the first that confirm a track.
         acceleration_density_m2ps3: of the white acceleration; norfair adds it to the velocity.
         velocity_std_mps: of a new track.
     """
@@ -40,7 +40,7 @@ class Norfair:
         self._settings = settings or NorfairSettings()
 
     def begin(self, recording: Recording) -> None:
-        """Start over, on this recording. norfair knows frames, not seconds."""
+        """Start over, on this recording; norfair counts frames, not seconds."""
         from norfair import Detection, Tracker  # noqa: PLC0415 - an optional peer
         from norfair.filter import OptimizedKalmanFilterFactory  # noqa: PLC0415
 

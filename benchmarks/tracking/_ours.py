@@ -1,4 +1,4 @@
-"""Our tracker, fed as a robot feeds it: observations in the frame of a camera overhead."""
+"""Our tracker, fed as on a robot: observations in the frame of a camera overhead."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _CHEST_M = 1.2
 
 
 def observation(place_m: Any, stamp_s: float, noise_std_m: float) -> PersonObservation:
-    """Return what the camera overhead reports of somebody at x, y who looks at it."""
+    """Return the observation of a person at x, y (odom, m) who looks at the camera overhead."""
     x, y = place_m
     return PersonObservation(
         stamp_s=stamp_s,
@@ -45,7 +45,7 @@ class Ours:
     name = "ours"
 
     def __init__(self, config: TrackerConfig | None = None) -> None:
-        # No view: people here go unseen by chance, so none should be given up any sooner.
+        # Without a view: people are unseen by chance here, so no track should be dropped sooner.
         base = config or TrackerConfig()
         self._config = base.model_copy(update={"max_coast_s": MAX_UNSEEN_S})
         self._tracker = PersonTracker(self._config)

@@ -1,4 +1,4 @@
-"""Stone Soup: global nearest neighbour, and joint probabilistic data association."""
+"""The peer Stone Soup: global nearest neighbour, and joint probabilistic data association."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ _BEGIN = datetime.datetime(2024, 1, 1)
 
 @dataclass(frozen=True, slots=True)
 class StoneSoupSettings:
-    """The usual ones, with the sensor's true figures where Stone Soup asks for them.
+    """Common settings, with the sensor's true figures where Stone Soup asks for them.
 
     Attributes:
-        gate_sigma: Mahalanobis distance beyond which a measurement is not taken (GNN).
-        gate_probability: the same as a probability (JPDA).
+        gate_sigma: largest Mahalanobis distance between a measurement and its track (GNN).
+        gate_probability: the gate as a probability (JPDA).
         acceleration_density_m2ps3: of the white acceleration.
         velocity_std_mps: of a new track.
-        confirm_hits: measurements before the initiator gives a track away.
-        max_unseen_s: a track unseen for longer is dropped.
+        confirm_hits: measurements that confirm a track (of the initiator).
+        max_unseen_s: time after which an unseen track is dropped.
     """
 
     gate_sigma: float = 3.4
@@ -128,7 +128,7 @@ class StoneSoup(ABC):
         return next(self._tracks)[1]
 
     def report(self, result: Any) -> TrackedFrame:
-        """Return the tracks outside the initiator."""
+        """Return the confirmed tracks, which have left the initiator."""
         tracks = list(result)
         return TrackedFrame(
             np.array([self._ids.setdefault(t.id, len(self._ids)) for t in tracks], dtype=np.int64),
@@ -137,7 +137,7 @@ class StoneSoup(ABC):
 
 
 class StoneSoupGnn(StoneSoup):
-    """Global nearest neighbour by the Mahalanobis distance."""
+    """Stone Soup with global nearest neighbour by the Mahalanobis distance."""
 
     name = "stonesoup-gnn"
 
@@ -150,9 +150,9 @@ class StoneSoupGnn(StoneSoup):
 
 
 class StoneSoupJpda(StoneSoup):
-    """Joint probabilistic data association, its marginals by loopy belief propagation.
+    """Stone Soup with joint probabilistic data association by loopy belief propagation.
 
-    Enumerating joint events, as Stone Soup's plain ``JPDA`` does, is out of reach for 20 people.
+    Stone Soup's plain ``JPDA`` enumerates joint events, which is not feasible for 20 people.
     """
 
     name = "stonesoup-jpda"

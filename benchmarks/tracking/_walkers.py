@@ -1,8 +1,8 @@
-"""People who walk to goals, avoid one another, turn and stand: the truth that trackers are given.
+"""Simulated people who walk to goals, avoid one another, turn and stand: the truth.
 
-A social force in the manner of Helbing and Molnár (Phys. Rev. E 51, 1995, 4282): everybody is
-pulled towards their own desired velocity and pushed away by those near them and by the walls. The
-desired velocity itself turns smoothly, so nobody changes direction from one frame to the next.
+The model is a social force after Helbing and Molnár (Phys. Rev. E 51, 1995, 4282). Every person is
+pulled towards their own desired velocity and pushed away by people nearby and by the walls. The
+desired velocity turns smoothly, so nobody changes direction from one frame to the next.
 """
 
 from __future__ import annotations
@@ -15,26 +15,26 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-# The motion is integrated in steps no longer than this and sampled at the frames.
+# Longest step of the integration; the motion is sampled at the frames.
 _STEP_S = 0.025
-# The push of a wall upon somebody who touches it, and the distance over which it falls by e.
+# Push of a wall on a person who touches it, and the distance over which it falls by e.
 _WALL_MPS2, _WALL_RANGE_M = 3.0, 0.3
 
 
 @dataclass(frozen=True, slots=True)
 class WalkerSettings:
-    """How people move; the defaults are those of the benchmark.
+    """Settings of the motion; the defaults are those of the benchmark.
 
     Attributes:
-        area_per_person_m2: the square hall grows with the number of people, at this density.
-        speed_mean_mps: mean of the speed that a person likes to walk at.
-        speed_std_mps: its standard deviation over people.
-        relaxation_s: how fast a person reaches the velocity they want.
-        turn_s: how fast the wanted velocity itself follows a new goal.
+        area_per_person_m2: area of the square hall divided by the number of people.
+        speed_mean_mps: mean over people of the preferred walking speed.
+        speed_std_mps: standard deviation of that speed.
+        relaxation_s: time constant with which a person reaches the desired velocity.
+        turn_s: time constant with which the desired velocity follows a new goal.
         personal_space_m: centre distance at which the push of another person is strongest.
         push_mps2: acceleration of that push.
-        push_range_m: the push falls by e over this distance.
-        stand_probability: how often a person who arrives stands for a while.
+        push_range_m: distance over which the push falls by e.
+        stand_probability: probability that a person who arrives stands for a while.
         stand_s: shortest and longest stay.
     """
 
@@ -65,7 +65,7 @@ class Walkers:
     def __init__(self, people: int, settings: WalkerSettings, rng: np.random.Generator) -> None:
         self._settings, self._rng, self._people = settings, rng, people
         self._side_m = settings.side_m(people)
-        self.positions_m = self._apart()
+        self.positions_m = self._starting_places()
         self._speeds = np.clip(
             rng.normal(settings.speed_mean_mps, settings.speed_std_mps, people), 0.5, 2.0
         )
@@ -73,11 +73,11 @@ class Walkers:
         self._stands_s = np.where(
             rng.random(people) < 0.25, rng.uniform(*settings.stand_s, people), 0.0
         )
-        self._wanted = self._desired()
-        self.velocities_mps: FloatArray = self._wanted.copy()
+        self._desired_mps = self._velocity_to_goal()
+        self.velocities_mps: FloatArray = self._desired_mps.copy()
 
     def advance(self, dt_s: float) -> None:
-        """Move everybody by ``dt_s``."""
+        """Move all people by ``dt_s``."""
         steps = max(1, int(np.ceil(dt_s / _STEP_S - 1e-9)))
         for _ in range(steps):
             self._step(dt_s / steps)
@@ -86,7 +86,7 @@ class Walkers:
         margin = min(0.5, 0.1 * self._side_m)
         return self._rng.uniform(margin, self._side_m - margin, (count, 2))
 
-    def _apart(self) -> FloatArray:
+    def _starting_places(self) -> FloatArray:
         """Draw starting places at least 0.6 m from one another."""
         places: list[Any] = []
         while len(places) < self._people:
@@ -95,7 +95,7 @@ class Walkers:
                 places.append(place)
         return np.array(places)
 
-    def _desired(self) -> FloatArray:
+    def _velocity_to_goal(self) -> FloatArray:
         """Return the velocity towards the goal, slower near it and zero while standing."""
         way = self._goals_m - self.positions_m
         distance = np.hypot(way[:, 0], way[:, 1])
@@ -112,9 +112,11 @@ class Walkers:
             stands = rng.random(count) < settings.stand_probability
             self._stands_s[arrived] = np.where(stands, rng.uniform(*settings.stand_s, count), 0.0)
             self._goals_m[arrived] = self._places(count)
-        self._wanted += (self._desired() - self._wanted) * min(1.0, dt_s / settings.turn_s)
-        pull = (self._wanted - self.velocities_mps) / settings.relaxation_s
-        # Who stands gives way less than who walks.
+        self._desired_mps += (self._velocity_to_goal() - self._desired_mps) * min(
+            1.0, dt_s / settings.turn_s
+        )
+        pull = (self._desired_mps - self.velocities_mps) / settings.relaxation_s
+        # A standing person gives way less than a walking one.
         push = self._push() * np.where(self._stands_s > 0.0, 0.25, 1.0)[:, None]
         velocities = self.velocities_mps + (pull + push) * dt_s
         speed = np.hypot(velocities[:, 0], velocities[:, 1])
@@ -124,12 +126,12 @@ class Walkers:
         self.velocities_mps = velocities
 
     def _push(self) -> FloatArray:
-        """Return the acceleration (N, 2) by which others and the walls keep each person away."""
+        """Return the acceleration (N, 2) of each person away from others and from the walls."""
         settings = self._settings
         offset = self.positions_m[:, None] - self.positions_m[None]
         distance = np.hypot(offset[..., 0], offset[..., 1])
         np.fill_diagonal(distance, np.inf)
-        # Somebody ahead is given more room than somebody behind.
+        # A person ahead gets more distance than a person behind.
         heading = self.velocities_mps / np.maximum(np.hypot(*self.velocities_mps.T)[:, None], 1e-9)
         cosine = -(offset * heading[:, None]).sum(axis=-1) / distance
         strength = (
@@ -138,7 +140,7 @@ class Walkers:
             * (0.65 + 0.35 * cosine)
         )
         away = offset / distance[..., None]
-        # A little to the right of the line between the two, or people who meet head-on would stop.
+        # The push points a little to the right, or people who meet head-on would stop.
         right = np.stack([away[..., 1], -away[..., 0]], axis=-1)
         push = (strength[..., None] * (0.85 * away - 0.5 * right)).sum(axis=1)
         low_m, high_m = self.positions_m, self._side_m - self.positions_m
@@ -154,7 +156,7 @@ def walk(
 ) -> FloatArray:
     """Return the truth (T, N, 4) as x, y (m) and vx, vy (m/s) at increasing stamps."""
     crowd = Walkers(people, settings or WalkerSettings(), rng)
-    crowd.advance(2.0)  # past the start, at which everybody walks as they like
+    crowd.advance(2.0)  # past the start, where no person has been pushed yet
     truth = np.empty((len(stamps_s), people, 4))
     for frame, stamp_s in enumerate(stamps_s):
         if frame:

@@ -1,1 +1,42 @@
-"""Awareness on simulated attention: how soon it is known, how soon it is given up, and how sure."""
+"""Awareness over time on simulated attention: delay, false awareness and coverage."""
+
+from __future__ import annotations
+
+from ._attention import Attention, autoregressive, directions, simulate
+from ._camera import Measured, measure, track
+from ._cli import judge, main, make_set, missed_targets
+from ._filters import HistogramFilter, LogitGaussian, Smoothed, hold_latest
+from ._scores import (
+    FALSE_SHARE,
+    Scores,
+    onset_times_s,
+    release_times_s,
+    score,
+    threshold_for,
+    time_unseen_s,
+)
+
+__all__ = [
+    "FALSE_SHARE",
+    "Attention",
+    "HistogramFilter",
+    "LogitGaussian",
+    "Measured",
+    "Scores",
+    "Smoothed",
+    "autoregressive",
+    "directions",
+    "hold_latest",
+    "judge",
+    "main",
+    "make_set",
+    "measure",
+    "missed_targets",
+    "onset_times_s",
+    "release_times_s",
+    "score",
+    "simulate",
+    "threshold_for",
+    "time_unseen_s",
+    "track",
+]

@@ -1,4 +1,4 @@
-"""``python -m benchmarks.tracking_awareness``."""
+"""Entry point of ``python -m benchmarks.tracking_awareness``."""
 
 from __future__ import annotations
 

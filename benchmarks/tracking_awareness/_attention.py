@@ -1,4 +1,4 @@
-"""The truth: people who walk about in front of a robot and glance at it."""
+"""Simulated people who walk about in front of a robot and glance at it: the truth."""
 
 from __future__ import annotations
 
@@ -19,33 +19,33 @@ BEARING_RAD: Final = math.radians(28.0)
 HEAD_ABOVE_CAMERA_M: Final = 0.4
 CHEST_ABOVE_CAMERA_M: Final = 0.1
 
-# Lengths of glances and of the pauses between them: lognormal, median and spread of the logarithm
-# so that the quartiles are 0.47 and 1.50 s, and 0.63 and 1.98 s as near as a lognormal comes.
+# Lengths of glances and of the pauses between them: median and spread of the logarithm of a
+# lognormal whose quartiles come nearest to 0.47 and 1.50 s, and to 0.63 and 1.98 s.
 GLANCE_S: Final = (0.83, 0.86)
 LOOK_AWAY_S: Final = (1.03, 0.85)
 TURN_S: Final = (0.2, 0.3)
-# A glance need not hit the robot's centre; who looks away looks about where they walk.
+# A glance need not hit the robot's centre; a person who looks away looks about where they walk.
 GLANCE_OFFSET_RAD: Final = (math.radians(8.0), math.radians(5.0))
 LOOK_AWAY_SPREAD_RAD: Final = math.radians(30.0)
-# … but not at the robot: that would be a glance.
+# Least angle off the robot while looking away: nearer would be a glance.
 LOOK_AWAY_RAD: Final = (math.radians(45.0), math.radians(90.0))
-# Eyes stray from the head's direction sideways and up and down, as the renderer moves them.
+# Eyes wander about the head's direction, sideways and up and down, as the renderer moves them.
 EYE_STD_RAD: Final = (math.radians(7.0), math.radians(3.4))
 EYE_CORRELATION_S: Final = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Attention:
-    """T frames of N people, each alone with the robot, in the frame of its resting, level camera.
+    """True attention of N people over T frames, in the frame of a level camera that stands still.
 
-    Angles are (T, N, 2): yaw to the robot's left and pitch up, against the line from the head to
-    the camera; (0, 0) looks straight at the robot.
+    Each person is alone with the robot. Angles are (T, N, 2): yaw to the robot's left and pitch up,
+    against the line from the head to the camera. (0, 0) looks straight at the robot.
 
     Attributes:
         stamps_s: (T,).
-        heads_camera_m: (T, N, 3) between the eyes.
-        gaze_rad: where the eyes look, which is what counts.
-        head_rad: where the head points, which is what a camera can measure.
+        heads_camera_m: (T, N, 3) points between the eyes.
+        gaze_rad: direction of the eyes, which defines the true α.
+        head_rad: direction of the head, which a camera can measure.
         awareness: (T, N) true α, the cone's score of the gaze.
     """
 
@@ -63,14 +63,14 @@ def simulate(rng: np.random.Generator, people: int, duration_s: float, rate_hz: 
     gaze = np.empty((len(stamps), people, 2))
     for person in range(people):
         heads[:, person], heading = _walk(rng, stamps)
-        gaze[:, person] = _glances(rng, stamps, _against_sight(heading, heads[:, person]))
+        gaze[:, person] = _gaze_angles(rng, stamps, _heading_to_sight(heading, heads[:, person]))
     eyes = autoregressive(rng, stamps, np.full(people, EYE_CORRELATION_S), 2) * EYE_STD_RAD
     scores = AttentionCone().scores(heads, directions(heads, gaze), np.zeros(3))
     return Attention(stamps, heads, gaze, gaze - eyes, scores)
 
 
 def directions(heads_camera_m: FloatArray, angles_rad: FloatArray) -> FloatArray:
-    """(…, 3) unit vectors, camera frame, for (…, 2) yaw and pitch against the line of sight."""
+    """Return unit vectors (…, 3), camera frame, of yaw and pitch (…, 2) to the line of sight."""
     sight = -heads_camera_m
     level = np.hypot(sight[..., 0], sight[..., 2])
     yaw = np.arctan2(sight[..., 0], sight[..., 2]) + angles_rad[..., 0]
@@ -82,7 +82,10 @@ def directions(heads_camera_m: FloatArray, angles_rad: FloatArray) -> FloatArray
 def autoregressive(
     rng: np.random.Generator, stamps_s: FloatArray, correlation_s: FloatArray, width: int
 ) -> FloatArray:
-    """(T, N, width) unit-variance first-order autoregressive noise; (N,) correlation times."""
+    """Return first-order autoregressive noise (T, N, width) of unit variance.
+
+    ``correlation_s`` is (N,).
+    """
     noise = rng.standard_normal((len(stamps_s), len(correlation_s), width))
     for step in range(1, len(stamps_s)):
         keep = np.exp(-(stamps_s[step] - stamps_s[step - 1]) / correlation_s)[:, None]
@@ -91,7 +94,7 @@ def autoregressive(
 
 
 def _walk(rng: np.random.Generator, stamps_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(T, 3) head and (T,) heading (of +z towards +x) of somebody who walks from place to place."""
+    """Return head (T, 3) and heading (T,), of +z towards +x, of a person who walks about."""
     places, times = [_place(rng)], [0.0]
     while times[-1] <= stamps_s[-1]:
         if rng.random() < 0.2:
@@ -109,18 +112,19 @@ def _walk(rng: np.random.Generator, stamps_s: FloatArray) -> tuple[FloatArray, F
 
 
 def _place(rng: np.random.Generator) -> FloatArray:
+    """Return a random place in view: x, z in the camera frame."""
     reach, bearing = rng.uniform(*RANGE_M), rng.uniform(-BEARING_RAD, BEARING_RAD)
     return np.array([reach * math.sin(bearing), reach * math.cos(bearing)])
 
 
-def _against_sight(heading: FloatArray, heads_camera_m: FloatArray) -> FloatArray:
-    """(T,) heading against the line of sight, in [−π, π)."""
+def _heading_to_sight(heading: FloatArray, heads_camera_m: FloatArray) -> FloatArray:
+    """Return the heading (T,) to the line of sight, in [−π, π)."""
     sight = np.arctan2(-heads_camera_m[:, 0], -heads_camera_m[:, 2])
     return (heading - sight + math.pi) % (2.0 * math.pi) - math.pi
 
 
-def _glances(rng: np.random.Generator, stamps_s: FloatArray, ahead: FloatArray) -> FloatArray:
-    """(T, 2) gaze that goes to and fro between the robot and elsewhere, in smooth turns."""
+def _gaze_angles(rng: np.random.Generator, stamps_s: FloatArray, ahead: FloatArray) -> FloatArray:
+    """Return gaze angles (T, 2) that turn smoothly between the robot and elsewhere."""
     gaze = np.empty((len(stamps_s), 2))
     looks = bool(rng.random() < 0.5)
     start_s, current = 0.0, _target(rng, looks, ahead[0])
@@ -132,19 +136,20 @@ def _glances(rng: np.random.Generator, stamps_s: FloatArray, ahead: FloatArray) 
         turn_s = rng.uniform(*TURN_S)
 
         since_s = np.append(stamps_s[first:last], end_s) - start_s
-        turned = _turned(since_s / turn_s, current, target)
+        turned = _smooth_turn(since_s / turn_s, current, target)
         gaze[first:last] = turned[:-1]
         start_s, looks, current = end_s, not looks, turned[-1]
     return gaze
 
 
-def _turned(share: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
-    """(K, 2) angles after (K,) shares of a turn that begins and ends smoothly."""
+def _smooth_turn(share: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
+    """Return angles (K, 2) after shares (K,) of a turn that begins and ends smoothly."""
     share = np.clip(share, 0.0, 1.0)[:, None]
     return np.asarray(start + share * share * (3.0 - 2.0 * share) * (end - start))
 
 
 def _target(rng: np.random.Generator, looks: bool, ahead_rad: float) -> FloatArray:
+    """Return the gaze angles (2,) of the next glance at the robot or look elsewhere."""
     offset = rng.normal(0.0, GLANCE_OFFSET_RAD)
     if looks:
         return offset

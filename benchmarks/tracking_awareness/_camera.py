@@ -1,9 +1,9 @@
-"""What a camera makes of it: measured α ± σ and places, with errors as the shipped networks have.
+"""A simulated camera: measured α ± σ and positions, with the errors of the shipped networks.
 
-The direction errors are of three parts: a bias of each person in each pose, one that lasts for
-some tenths of a second, and one that is new in every frame. Their size is that of the shipped
-networks on people they have not seen (docs/perception.md: median 4.9°, 90th percentile 13°, from
-3.7° of faces in front to 8.3° of backs); α and σ come from those by the pipeline's own mathematics.
+The direction error has three parts: a bias of each person in each pose, an error that lasts for
+some tenths of a second, and one that is new in every frame. Their size is that of the first shipped
+networks on people they have not seen: median 4.9°, 90th percentile 13°, from 3.7° for faces in
+front to 8.3° for backs. α and σ follow from the errors by the pipeline's own mathematics.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ from ._attention import (
     directions,
 )
 
-# Standard deviation of either angle for a head seen in front, in profile and from behind, nearby.
+# Standard deviation of either angle for a near head in front view, in profile and from behind.
 ASPECT_RAD: Final = np.radians((0.0, 90.0, 180.0))
 ASPECT_STD_RAD: Final = np.radians((3.1, 4.1, 7.0))
-# Shares of the variance.
+# Shares of the variance of the bias and of the lasting error.
 BIAS_SHARE, LASTING_SHARE = 0.3, 0.4
 LASTING_S: Final = (0.2, 0.5)
 OUTLIERS: Final = 0.015
 PERSON_SPREAD: Final = 0.3
-#: What the network reports is this much wider, so that 68 % of α lie within its σ in spite of all.
-TOLD_FACTOR: Final = 1.15
+#: Factor on the reported σ, chosen so that 68 % of the errors of α lie within it.
+REPORTED_STD_FACTOR: Final = 1.15
 MISSES: Final = 0.1
 FOCAL_PX: Final = 554.0  # 640 pixels at 60°
 FACE_WIDTH_M: Final = 0.156
 FACE_EDGE_RAD, FACE_SOFTNESS_RAD = math.radians(98.0), math.radians(5.0)
-# Spells: mean time between them, shortest and longest.
+# Spells: mean time between them, shortest and longest (s).
 UNSEEN_S: Final = (8.0, 0.5, 2.0)
 NO_FACE_S: Final = (10.0, 0.3, 1.5)
 _BATCH: Final = 2000
@@ -51,14 +51,14 @@ _BATCH: Final = 2000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Measured:
-    """What T frames of N people say.
+    """Measurements of N people in T frames.
 
     Attributes:
-        seen: (T, N) whether the frame shows the person.
-        awareness: (T, N) measured α; NaN without a face, or unseen.
-        awareness_std: (T, N) its σ; NaN likewise.
-        chests_camera_m: (T, N, 3) measured places.
-        chest_covariances_m2: (T, N, 3, 3) of them.
+        seen: (T, N) True where the frame shows the person.
+        awareness: (T, N) measured α; NaN where no face or no person is seen.
+        awareness_std: (T, N) σ of α; NaN likewise.
+        chests_camera_m: (T, N, 3) measured positions.
+        chest_covariances_m2: (T, N, 3, 3) covariances of the positions.
         error_rad: (T, N) angle between the measured and the true direction of the head.
     """
 
@@ -70,7 +70,7 @@ class Measured:
     error_rad: FloatArray
 
 
-def look(attention: Attention, rng: np.random.Generator) -> Measured:
+def measure(attention: Attention, rng: np.random.Generator) -> Measured:
     """Measure simulated people."""
     frames, people = attention.awareness.shape
     stamps, heads = attention.stamps_s, attention.heads_camera_m
@@ -79,9 +79,9 @@ def look(attention: Attention, rng: np.random.Generator) -> Measured:
     extra = math.radians(20.0) * (12.0 * distance / (FOCAL_PX * FACE_WIDTH_M)) ** 4
     std = np.interp(aspect, ASPECT_RAD, ASPECT_STD_RAD)
     std *= np.sqrt(0.5 + 0.5 * (distance / 4.0) ** 2)
-    # The pipeline's widening for small faces is cautious: half of it is true.
+    # The pipeline's term for small faces is cautious: the true error is half of it.
     true_std = np.sqrt(std**2 + (0.5 * extra) ** 2)
-    # Some people are read better than others, and the network does not know whom.
+    # Some people are measured better than others; the reported σ does not show that.
     true_std *= np.exp(rng.normal(0.0, PERSON_SPREAD, people))
     lasting = autoregressive(rng, stamps, np.asarray(rng.uniform(*LASTING_S, people)), 2)
     noise = (
@@ -92,13 +92,13 @@ def look(attention: Attention, rng: np.random.Generator) -> Measured:
     angles = attention.head_rad + noise * true_std[..., None]
     wrong = rng.random((frames, people)) < OUTLIERS
     angles[wrong, 0] = rng.uniform(-math.pi, math.pi, int(wrong.sum()))
-    told_std = TOLD_FACTOR * std * np.exp(rng.normal(0.0, 0.2, std.shape))
+    reported_std = REPORTED_STD_FACTOR * std * np.exp(rng.normal(0.0, 0.2, std.shape))
 
     missed = rng.random((frames, people)) < MISSES
     unseen = missed | _spells(rng, stamps, people, UNSEEN_S)
-    faceless = unseen | _spells(rng, stamps, people, NO_FACE_S)
-    alpha, alpha_std = _awareness(heads, angles, told_std, extra, ~faceless)
-    chests, covariances = _places(rng, heads)
+    no_face = unseen | _spells(rng, stamps, people, NO_FACE_S)
+    alpha, alpha_std = _awareness(heads, angles, reported_std, extra, ~no_face)
+    chests, covariances = _measured_chests(rng, heads)
     measured, true = directions(heads, angles), directions(heads, attention.head_rad)
     error = np.arccos(np.clip((measured * true).sum(axis=2), -1.0, 1.0))
     return Measured(~unseen, alpha, alpha_std, chests, covariances, error)
@@ -107,11 +107,10 @@ def look(attention: Attention, rng: np.random.Generator) -> Measured:
 def track(
     attention: Attention, measured: Measured, config: TrackerConfig
 ) -> tuple[FloatArray, FloatArray]:
-    """(T, N) awareness and awareness_lower of the real tracker; 0 where there is no track.
+    """Return awareness and awareness_lower (T, N) of the real tracker; 0 without a track.
 
-    Each person has a lane of their own, far from the others', so that all can share one tracker.
-    Where somebody has two tracks, the awareness is that of the one seen last and the bound that of
-    the one that claims more.
+    Each person has a lane far from the others', so that all can share one tracker. Where a person
+    has two tracks, the awareness is that of the track seen last, and the bound is the higher one.
     """
     lane_m = 100.0
     T_odom_camera = np.array([[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 1.2], [0, 0, 0, 1.0]])
@@ -150,13 +149,13 @@ def _observation(
 
 
 def _angle(angles_rad: FloatArray) -> FloatArray:
-    """(…,) angle of (…, 2) yaw and pitch from the line of sight, nearly level."""
+    """Return the angle (…,) of yaw and pitch (…, 2) to the nearly level line of sight."""
     cosine = np.cos(angles_rad[..., 0]) * np.cos(angles_rad[..., 1])
     return np.asarray(np.arccos(np.clip(cosine, -1.0, 1.0)))
 
 
 def _bias(rng: np.random.Generator, yaw_rad: FloatArray) -> FloatArray:
-    """(T, N, 2) error of unit variance that is a smooth function of the pose, each person's own."""
+    """Return an error (T, N, 2) of unit variance: for each person a smooth function of the pose."""
     people, waves = yaw_rad.shape[1], np.arange(1, 4)
     weights = rng.standard_normal((2, people, 2, len(waves))) / math.sqrt(len(waves))
     phase = yaw_rad[..., None, None] * waves
@@ -166,7 +165,7 @@ def _bias(rng: np.random.Generator, yaw_rad: FloatArray) -> FloatArray:
 def _spells(
     rng: np.random.Generator, stamps_s: FloatArray, people: int, kind: tuple[float, float, float]
 ) -> BoolArray:
-    """(T, N) True within spells that come at random."""
+    """Return (T, N), True within spells that come at random."""
     between_s, shortest_s, longest_s = kind
     inside = np.zeros((len(stamps_s), people), dtype=bool)
     for person in range(people):
@@ -181,7 +180,7 @@ def _spells(
 def _awareness(
     heads: FloatArray, angles: FloatArray, std: FloatArray, extra: FloatArray, shown: BoolArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Measured α and σ by the pipeline's mathematics, NaN where nothing is shown."""
+    """Return measured α and σ by the pipeline's mathematics, NaN where no face is seen."""
     alpha, alpha_std = np.full(std.shape, np.nan), np.full(std.shape, np.nan)
     rows, people = np.nonzero(shown)
     gaze = directions(heads, angles)[rows, people]
@@ -213,8 +212,8 @@ def _awareness(
     return alpha, alpha_std
 
 
-def _places(rng: np.random.Generator, heads: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Measured chests and their covariances: 4 % of the range along the ray, 1 % across."""
+def _measured_chests(rng: np.random.Generator, heads: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return measured chests and their covariances: 4 % of the range along the ray, 1 % across."""
     chests = heads + np.array([0.0, HEAD_ABOVE_CAMERA_M - CHEST_ABOVE_CAMERA_M, 0.0])
     reach = np.linalg.norm(chests, axis=2)[..., None]
     ray = chests / reach

@@ -1,4 +1,4 @@
-"""The command line of the benchmark."""
+"""Command line of the benchmark."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from tracking import AwarenessFilterConfig, TrackerConfig
 
 from .._harness import finish, make_parser, parse
 from ._attention import Attention, FloatArray, simulate
-from ._camera import Measured, look, track
-from ._filters import Filter, Jumps, LogitGaussian, Smoothed, held
+from ._camera import Measured, measure, track
+from ._filters import Filter, HistogramFilter, LogitGaussian, Smoothed, hold_latest
 from ._plot import plot
 from ._scores import FALSE_SHARE, Scores, score, threshold_for
 
@@ -26,7 +26,7 @@ BASELINE: Final = Path(__file__).with_name("baseline.json")
 RATES_HZ: Final = (10.0, 20.0, 30.0)
 OURS: Final = "tracker"
 
-#: Figure of the tracker: least and greatest value asked for.
+#: Wanted range of each figure of the tracker.
 TARGETS: Final[dict[str, tuple[float, float]]] = {
     "coverage": (0.88, 0.97),
     "false_unseen": (0.0, 0.0),
@@ -38,21 +38,21 @@ TARGETS: Final[dict[str, tuple[float, float]]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Set:
-    """Simulated people and what a camera made of them."""
+class SimulatedSet:
+    """Simulated people and their measurements."""
 
     rate_hz: float
     attention: Attention
     measured: Measured
 
 
-Judged = Callable[[Set], tuple[FloatArray, FloatArray]]
+Contender = Callable[[SimulatedSet], tuple[FloatArray, FloatArray]]
 
 
-def contenders() -> dict[str, Judged]:
-    """The tracker and what else was tried, by name."""
+def contenders() -> dict[str, Contender]:
+    """Return the tracker and the filters that were tried, by name."""
 
-    def alone(one: Filter) -> Judged:
+    def alone(one: Filter) -> Contender:
         return lambda data: one(data.attention.stamps_s, data.measured)
 
     return {
@@ -62,30 +62,30 @@ def contenders() -> dict[str, Judged]:
             data.measured,
             TrackerConfig(awareness=AwarenessFilterConfig(memory_s=1.0)),
         ),
-        # From here on without a tracker, which costs some frames for births and doubtful matches.
+        # The rest without a tracker, which loses some frames to births and ambiguous matches.
         "the tracker's filter, alone": alone(LogitGaussian()),
         "… with a narrower prior (σ 1.5)": alone(
             LogitGaussian(AwarenessFilterConfig(prior_std_logit=1.5))
         ),
-        "… quick down: surprise resets": alone(LogitGaussian(surprise=2.5)),
-        "… slow up: a jump takes two frames": alone(LogitGaussian(doubt=2.5)),
+        "… quick down: low outliers reset": alone(LogitGaussian(reset_below_sigmas=2.5)),
+        "… slow up: a jump takes two frames": alone(LogitGaussian(reset_above_sigmas=2.5)),
         "… with a lasting error estimated": alone(LogitGaussian(bias_std_logit=0.5)),
-        "histogram of α that jumps": alone(Jumps()),
-        "two states (HMM; bound is P(aware))": alone(Jumps(bins=2)),
+        "histogram of α that jumps": alone(HistogramFilter()),
+        "two states (HMM; bound is P(aware))": alone(HistogramFilter(bins=2)),
         "exponential smoothing of α": alone(Smoothed()),
-        "latest α held until the next": alone(held),
+        "latest α held until the next": alone(hold_latest),
     }
 
 
-def make_set(seed: int, rate_hz: float, people: int, duration_s: float) -> Set:
-    """Simulate one set; seed and rate alone decide what happens in it."""
+def make_set(seed: int, rate_hz: float, people: int, duration_s: float) -> SimulatedSet:
+    """Return a simulated set, which depends on its arguments alone."""
     rng = np.random.default_rng([seed, round(rate_hz)])
     attention = simulate(rng, people, duration_s, rate_hz)
-    return Set(rate_hz, attention, look(attention, rng))
+    return SimulatedSet(rate_hz, attention, measure(attention, rng))
 
 
-def judge(data: Set, lower: FloatArray, threshold: float) -> Scores:
-    """Score a lower bound on a set."""
+def judge(data: SimulatedSet, lower: FloatArray, threshold: float) -> Scores:
+    """Return the scores of a lower bound on a set."""
     measured = data.measured
     return score(
         data.attention.stamps_s,
@@ -97,29 +97,29 @@ def judge(data: Set, lower: FloatArray, threshold: float) -> Scores:
     )
 
 
-def missed(scores: Scores) -> list[str]:
-    """Name the figures that miss what is asked for; not a number is a miss."""
+def missed_targets(scores: Scores) -> list[str]:
+    """Return the names of the figures outside their wanted range; NaN is outside."""
     return [
         name for name, (low, high) in TARGETS.items() if not low <= getattr(scores, name) <= high
     ]
 
 
 def metrics(rate_hz: float, scores: Scores) -> list[Metric]:
-    """The tracker's figures as a baseline keeps them; they do not depend on the machine."""
+    """Return the tracker's figures for the baseline; they do not depend on the computer."""
     found = []
     for name in TARGETS:
         higher = name in ("coverage", "recall")
         direction: Direction = "higher" if higher else "lower"
         unit = "s" if name.endswith("_s") else "share"
         value = float(getattr(scores, name))
-        # A frame more or less in the times, two per cent in the shares.
+        # One frame for times, two per cent for shares.
         tolerance = 0.02 if unit == "share" else 1.0 / (rate_hz * max(value, 1.0 / rate_hz))
         found.append(Metric(f"{rate_hz:g}hz_{name}", value, unit, direction, tolerance))
     return found
 
 
-def line(name: str, threshold: float, scores: Scores) -> str:
-    """One row of the table."""
+def table_row(name: str, threshold: float, scores: Scores) -> str:
+    """Return one row of the table."""
     values = (getattr(scores, field.name) for field in fields(scores))
     return f"{name:46s}{threshold:7.3f}" + "".join(f"{value:10.3f}" for value in values)
 
@@ -131,7 +131,7 @@ HEADER: Final = (
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run it; exit status 1 when the tracker misses what is asked for or its baseline."""
+    """Run the benchmark; return 0 for success, 1 for a missed target or a worse figure."""
     options, baseline = _parse(arguments)
     judged = {OURS: contenders()[OURS]} if options.only_ours else contenders()
     found: list[Metric] = []
@@ -147,11 +147,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 threshold = threshold_for(one(train)[1], train.attention.awareness, FALSE_SHARE)
                 awareness, lower = one(test)
                 scores = judge(test, lower, threshold)
-                bar.write(line(name, threshold, scores), file=sys.stdout)
+                bar.write(table_row(name, threshold, scores), file=sys.stdout)
                 bar.update()
                 if name != OURS:
                     continue
-                faults += [f"{rate_hz:g} Hz: {fault} misses its aim" for fault in missed(scores)]
+                faults += [
+                    f"{rate_hz:g} Hz: {fault} misses its target" for fault in missed_targets(scores)
+                ]
                 found += metrics(rate_hz, scores)
                 if options.plot is not None and rate_hz == 20.0:
                     plot(
@@ -162,24 +164,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _parse(arguments: Sequence[str] | None) -> tuple[argparse.Namespace, dict[str, Metric]]:
-    """Read the command line and the baseline that it names."""
+    """Return the options of the command line and the baseline that they name."""
     parser = make_parser(
         "benchmarks.tracking_awareness",
-        "Judge awareness over time on simulated attention: people walk about in front "
-        "of a robot and glance at it, a camera measures α ± σ with errors that last, misses them, "
-        "loses their faces. The threshold on the lower bound is set on the training seed for 1 % "
-        "false awareness and judged on the test seed.",
+        "Judge awareness over time on simulated attention. People walk about in front of a robot "
+        "and glance at it. A camera measures α ± σ with errors that last, and misses people and "
+        "faces. The threshold on the lower bound is set on the training seed for 1 % false "
+        "awareness and judged on the test seed.",
         BASELINE,
     )
     parser.add_argument("--people", type=int, default=40, metavar="N", help="default: 40")
     parser.add_argument(
-        "--duration", type=float, default=60.0, metavar="S", help="seconds of each (default: 60)"
+        "--duration", type=float, default=60.0, metavar="S", help="seconds per person (default: 60)"
     )
     parser.add_argument("--train-seed", type=int, default=1, metavar="N", help="default: 1")
     parser.add_argument("--test-seed", type=int, default=101, metavar="N", help="default: 101")
     parser.add_argument("--only-ours", action="store_true", help="leave the other filters out")
     parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw one person at 20 Hz")
-    parser.add_argument("--person", type=int, default=0, metavar="N", help="whom to draw")
+    parser.add_argument("--person", type=int, default=0, metavar="N", help="the person to draw")
     options, baseline = parse(parser, arguments)
     if options.people < 1 or not 5.0 <= options.duration <= 3600.0:
         parser.error("--people must be at least 1 and --duration 5 to 3600 s")

@@ -1,8 +1,7 @@
-"""Filters of awareness that were tried, all on the same evidence.
+"""Awareness filters that were tried, all on the same measurements.
 
-Each takes stamps (T,) and what the frames say (T, N) and returns the awareness and its lower bound,
-(T, N). None of them knows about tracks that are new or mistaken for each other; the tracker's own
-is judged through the tracker.
+Each takes stamps (T,) and measurements (T, N) and returns awareness and its lower bound, (T, N).
+None of them handles new or mistaken tracks. The tracker's own filter is judged through the tracker.
 """
 
 from __future__ import annotations
@@ -23,11 +22,12 @@ from ._camera import Measured
 
 Filter: TypeAlias = Callable[[FloatArray, Measured], tuple[FloatArray, FloatArray]]
 
+#: Quantile of the one-sided lower bound.
 Z: Final = NormalDist().inv_cdf(0.9)
 
 
-def held(stamps_s: FloatArray, measured: Measured) -> tuple[FloatArray, FloatArray]:
-    """The latest measurement and its own bound α − zσ, held until the next: what not to do."""
+def hold_latest(stamps_s: FloatArray, measured: Measured) -> tuple[FloatArray, FloatArray]:
+    """Return the latest measurement and its bound α − zσ, held until the next: a bad idea."""
     alpha = measured.awareness.copy()
     lower = np.maximum(alpha - Z * measured.awareness_std, 0.0)
     for row in range(len(stamps_s)):
@@ -40,7 +40,7 @@ def held(stamps_s: FloatArray, measured: Measured) -> tuple[FloatArray, FloatArr
 
 @dataclass(frozen=True)
 class Smoothed:
-    """Exponential smoothing of α and of its spread, towards 0 without evidence."""
+    """Exponential smoothing of α and of its variance, towards 0 without evidence."""
 
     time_constant_s: float = 0.2
 
@@ -67,19 +67,18 @@ class LogitGaussian:
 
     Attributes:
         config: settings.
-        surprise: where a measurement lies this many σ below what was expected, the belief goes back
-            to the prior before it counts (quick down, slow up); infinite for never.
-        doubt: where a measurement lies this many σ above what was expected, the belief goes back to
-            the prior and the measurement itself does not count (a jump takes two frames); infinite
-            for never.
-        bias_std_logit: part of the error of every measurement that lasts for ``bias_s``, estimated
-            beside logit(α); 0 for none.
-        bias_s: time constant of that.
+        reset_below_sigmas: a measurement this many σ below the expected one resets the belief to
+            the prior before it counts (quick down, slow up); infinite for never.
+        reset_above_sigmas: a measurement this many σ above the expected one resets the belief to
+            the prior and does not count itself (a jump takes two frames); infinite for never.
+        bias_std_logit: standard deviation of an error that lasts for ``bias_s``, estimated beside
+            logit(α); 0 for none.
+        bias_s: time constant of that error.
     """
 
     config: AwarenessFilterConfig = field(default_factory=AwarenessFilterConfig)
-    surprise: float = math.inf
-    doubt: float = math.inf
+    reset_below_sigmas: float = math.inf
+    reset_above_sigmas: float = math.inf
     bias_std_logit: float = 0.0
     bias_s: float = 0.3
 
@@ -94,7 +93,7 @@ class LogitGaussian:
             np.full(shape[1], start.variance),
             np.full(shape[1], -math.inf),
         )
-        lasting = _LastingError(shape[1], self.bias_std_logit**2, self.bias_s)
+        lasting = _LastingBias(shape[1], self.bias_std_logit**2, self.bias_s)
         means, variances = gaussian.evidence(measured.awareness, measured.awareness_std, config)
         before = np.zeros(shape[1], dtype=bool)
         for row, stamp_s in enumerate(stamps_s):
@@ -117,8 +116,8 @@ class LogitGaussian:
             else:
                 after = self._measure(belief, mean, variance, dt_s if row else math.inf)
             belief = _choose(shown, after, belief)
-            told = gaussian.estimate(belief, config)
-            alpha[row], lower[row] = told.awareness, told.awareness_lower
+            estimate = gaussian.estimate(belief, config)
+            alpha[row], lower[row] = estimate.awareness, estimate.awareness_lower
         return alpha, lower
 
     def _measure(
@@ -131,13 +130,13 @@ class LogitGaussian:
         config = self.config
         spread = np.sqrt(belief.variance + variance)
         reset = gaussian.forget(belief, config)
-        high = mean > belief.mean + self.doubt * spread
-        belief = _choose(mean < belief.mean - self.surprise * spread, reset, belief)
+        high = mean > belief.mean + self.reset_above_sigmas * spread
+        belief = _choose(mean < belief.mean - self.reset_below_sigmas * spread, reset, belief)
         return _choose(high, reset, gaussian.measure(belief, mean, variance, interval_s, config))
 
 
-class _LastingError:
-    """An error that all measurements share for a while, as a second state beside logit(α)."""
+class _LastingBias:
+    """An error that measurements share for a while: a second state beside logit(α)."""
 
     def __init__(self, people: int, variance: float, time_constant_s: float) -> None:
         self._stationary, self._time_constant_s = variance, time_constant_s
@@ -172,20 +171,20 @@ class _LastingError:
 
 
 @dataclass(frozen=True)
-class Jumps:
-    """A histogram of α that jumps: gaze stays where it is until it is somewhere else.
+class HistogramFilter:
+    """A histogram filter of α with jumps: gaze stays constant between sudden changes.
 
-    Between frames a share 1 − exp(−dt/τ) of the belief is drawn anew from what people do (with
-    evidence) or from the prior (without); exact for any dt. A measurement is wrong altogether with
-    a small probability. Two bins make it the two-state hidden Markov model of aware and unaware.
+    Between frames a share 1 − exp(−dt/τ) of the belief is replaced by the distribution of people's
+    α (with evidence) or by the prior (without); exact for any dt. A measurement is an outlier with
+    a small probability. With two bins it is the two-state hidden Markov model of aware and unaware.
 
     Attributes:
-        bins: of α, the first of which is 0.
+        bins: number of levels of α, the first of which is 0.
         stay_s: τ with evidence.
-        unseen_s: τ without.
+        unseen_s: τ without evidence.
         correlation_s: frames closer than this count in part (likelihood to the power dt / this).
-        outliers: probability that a measurement says nothing.
-        least_std: floor of a measurement's σ.
+        outliers: probability that a measurement is an outlier.
+        least_std: least σ of a measurement.
     """
 
     bins: int = 21
@@ -198,26 +197,28 @@ class Jumps:
     def __call__(self, stamps_s: FloatArray, measured: Measured) -> tuple[FloatArray, FloatArray]:
         """Run over all frames."""
         if self.bins == 2:
-            levels, extra, people_do = np.array([0.0, 0.8]), 0.12, np.array([0.5, 0.5])
-            unknown = np.array([0.95, 0.05])
+            levels, extra, usual = np.array([0.0, 0.8]), 0.12, np.array([0.5, 0.5])
+            prior = np.array([0.95, 0.05])
         else:
             levels, extra = np.linspace(0.0, 1.0, self.bins), 0.0
-            people_do = np.full(self.bins, 0.5 / (self.bins - 1))
-            people_do[0] = 0.5
-            unknown = np.where(levels == 0.0, 0.9, 0.1 / (self.bins - 1))
-        belief = np.tile(unknown, (measured.awareness.shape[1], 1))
+            usual = np.full(self.bins, 0.5 / (self.bins - 1))
+            usual[0] = 0.5
+            prior = np.where(levels == 0.0, 0.9, 0.1 / (self.bins - 1))
+        belief = np.tile(prior, (measured.awareness.shape[1], 1))
         alpha = np.zeros_like(measured.awareness)
         lower = np.zeros_like(alpha)
         for row in range(1, len(stamps_s)):
             dt_s = float(stamps_s[row] - stamps_s[row - 1])
             shown = ~np.isnan(measured.awareness[row])
             keep = np.exp(-dt_s / np.where(shown, self.stay_s, self.unseen_s))[:, None]
-            fresh = np.where(shown[:, None], people_do, unknown)
+            fresh = np.where(shown[:, None], usual, prior)
             belief = keep * belief + (1.0 - keep) * fresh
-            said = np.where(shown, measured.awareness[row], 0.0)[:, None]
+            measured_alpha = np.where(shown, measured.awareness[row], 0.0)[:, None]
             std = np.where(shown, measured.awareness_std[row], 1.0)[:, None]
             std = np.sqrt(np.maximum(std, self.least_std) ** 2 + extra**2)
-            density = np.exp(-0.5 * ((said - levels) / std) ** 2) / (std * math.sqrt(2 * math.pi))
+            density = np.exp(-0.5 * ((measured_alpha - levels) / std) ** 2) / (
+                std * math.sqrt(2 * math.pi)
+            )
             likelihood = (1.0 - self.outliers) * density + self.outliers
             power = min(1.0, dt_s / self.correlation_s) if self.correlation_s else 1.0
             belief = np.where(shown[:, None], belief * likelihood**power, belief)
@@ -226,7 +227,7 @@ class Jumps:
             if self.bins == 2:
                 bound = belief[:, 1]
             else:
-                # The tenth percentile: α is at least the level below which a tenth of belief lies.
+                # The tenth percentile of the belief.
                 bound = levels[(np.cumsum(belief, axis=1) > 0.1).argmax(axis=1)]
             lower[row] = np.where(shown, bound, np.minimum(bound, lower[row - 1]))
         return alpha, lower

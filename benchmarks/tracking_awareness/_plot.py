@@ -1,4 +1,4 @@
-"""One person over time: truth, measurements, belief and the bound that decides."""
+"""Plot of one person over time: truth, measurements, estimate and lower bound."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def plot(
     person: int,
     span_s: float = 20.0,
 ) -> None:
-    """Write a picture of the first ``span_s`` of one person."""
+    """Plot the first ``span_s`` seconds of one person into a file."""
     rows = attention.stamps_s < span_s
     stamps = attention.stamps_s[rows]
     alpha, std = measured.awareness[rows, person], measured.awareness_std[rows, person]

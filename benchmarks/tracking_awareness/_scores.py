@@ -1,7 +1,7 @@
-"""What is asked of awareness over time, measured on simulated truth.
+"""Scores of awareness over time against simulated truth.
 
-A person is aware at a true α of at least 0.5 and unaware below 0.2; in between neither is held
-against anybody.
+A person is aware at a true α of at least 0.5 and unaware below 0.2. In between, neither answer
+counts as a mistake.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from ._attention import BoolArray, FloatArray
 AWARE, UNAWARE = 0.5, 0.2
 FALSE_SHARE: Final = 0.01
 UNSEEN_S: Final = 0.3
-#: Who looks away has passed from aware to unaware within this time.
+#: A person looks away when α passes from aware to unaware within this time.
 TURN_AWAY_S: Final = 0.4
 
 
@@ -28,16 +28,16 @@ class Scores:
     Attributes:
         coverage: of frames with evidence, share whose true α is at least the lower bound.
         coverage_partial: the same where 0 < true α.
-        false_share: of frames whose person is unaware, share above the threshold.
-        false_unseen: of frames whose person has been unseen for more than 0.3 s and is unaware,
-            share above the threshold.
-        above_unseen: the same whatever the person does meanwhile.
-        recall: of frames that show a person who is aware, share above the threshold.
-        onset_s: median time from the beginning of awareness, seen, to the threshold; spells that
-            end unrecognised count as endless.
+        false_share: of frames with an unaware person, share above the threshold.
+        false_unseen: of frames with an unaware person unseen for more than 0.3 s, share above the
+            threshold.
+        above_unseen: the same for aware and unaware people.
+        recall: of frames that show an aware person, share above the threshold.
+        onset_s: median time from the beginning of awareness, in sight, to the threshold; spells
+            that end unrecognised count as infinite.
         onset_found: share of those spells that are recognised.
-        release_s: 95th percentile of the time from losing awareness to the threshold: somebody who
-            was above it turns away, or is no longer seen.
+        release_s: 95th percentile of the time until the bound falls to the threshold, after a
+            person above it turns away or goes out of sight.
     """
 
     coverage: float
@@ -64,7 +64,7 @@ def score(
     lower: FloatArray,
     threshold: float,
 ) -> Scores:
-    """Judge a lower bound; (T,) stamps, everything else (T, N)."""
+    """Return the scores of a lower bound; stamps (T,), everything else (T, N)."""
     above = lower > threshold
     long_unseen = time_unseen_s(stamps_s, seen) > UNSEEN_S
     covered = truth >= lower
@@ -84,7 +84,7 @@ def score(
 
 
 def time_unseen_s(stamps_s: FloatArray, seen: BoolArray) -> FloatArray:
-    """(T, N) time since each person was last seen; infinite before the first time."""
+    """Return the time (T, N) since each person was last seen; infinite before the first time."""
     last = np.where(seen, stamps_s[:, None], -math.inf)
     return stamps_s[:, None] - np.maximum.accumulate(last, axis=0)
 
@@ -92,10 +92,10 @@ def time_unseen_s(stamps_s: FloatArray, seen: BoolArray) -> FloatArray:
 def onset_times_s(
     stamps_s: FloatArray, truth: FloatArray, seen: BoolArray, above: BoolArray
 ) -> FloatArray:
-    """Times from the last frame before a person is aware to the first above the threshold.
+    """Return times from the last frame before awareness to the first above the threshold.
 
-    Counted are those who begin in sight and below the threshold; infinite for a spell that ends
-    before it is recognised.
+    Spells that begin in sight and below the threshold count. The time is infinite for a spell that
+    ends before it is recognised.
     """
     times = []
     aware = truth >= AWARE
@@ -114,10 +114,11 @@ def onset_times_s(
 def release_times_s(
     stamps_s: FloatArray, truth: FloatArray, seen: BoolArray, above: BoolArray
 ) -> FloatArray:
-    """Times from the last frame of awareness, or in sight, to the first at or below the threshold.
+    """Return times from the end of awareness, or of sight, to the first frame not above threshold.
 
-    Awareness ends when true α falls from ``AWARE`` to below ``UNAWARE`` within ``TURN_AWAY_S``;
-    sight ends for longer than ``UNSEEN_S``. Counted are those above the threshold at that frame.
+    Awareness ends when true α falls from ``AWARE`` to below ``UNAWARE`` within ``TURN_AWAY_S``.
+    Sight ends when the person is unseen for longer than ``UNSEEN_S``. Only frames above the
+    threshold at that instant count.
     """
     times = []
     turning = math.ceil(TURN_AWAY_S / (stamps_s[1] - stamps_s[0]))
@@ -134,14 +135,14 @@ def release_times_s(
             falls = _first(~above[row + 1 :, person])
             back = _first(aware[row + 1 :, person]) if turns else math.inf
             if turns and back < falls:
-                continue  # they look again: nothing to release
+                continue  # the person looks again: nothing to release
             if row + 1 + falls < len(stamps_s):
                 times.append(stamps_s[row + 1 + falls] - stamps_s[row])
     return np.array(times)
 
 
 def _first(flags: BoolArray) -> int:
-    """Index of the first True, or the length."""
+    """Return the index of the first True, or the length."""
     return int(np.argmax(flags)) if flags.any() else len(flags)
 
 

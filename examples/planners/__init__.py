@@ -1,1 +1,1 @@
-"""Planners that others wrote, driving the crossings of this package in PyBullet."""
+"""Third-party planners in crossings of this package in PyBullet."""

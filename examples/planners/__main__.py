@@ -1,4 +1,4 @@
-"""``python -m examples.planners``: the crossings with every planner, as a Markdown table."""
+"""Command ``python -m examples.planners``: a Markdown table of crossings with every planner."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from sim_tests import NOVA_CARTER, LocalPlanner, SamplingPlanner
 
 from ._compare import HEADER, Row, compare, scenario
 
-# The package that it needs, the module here and its class.
+# Package that the planner needs, module here, and class.
 _OTHERS = {
     "ir-sim": ("irsim", "velocity_obstacles", "VelocityObstaclePlanner"),
     "do-mpc": ("do_mpc", "model_predictive", "ModelPredictivePlanner"),
@@ -26,27 +26,27 @@ _CASES = 4
 
 
 def main() -> int:
-    """Run the comparison; 0: every planner obeyed and touched nobody, 1: not so, 2: none there."""
+    """Run the comparison; return 0 if every crossing was good, 1 if not, 2 without a planner."""
     parser = argparse.ArgumentParser(
         prog="python -m examples.planners",
-        description="Cross a warehouse in PyBullet with the reference planner and with planners "
-        "that others wrote: with nobody there, with a worker who watches the robot, with one who "
-        "does not, and with a wider radius round that one.",
+        description="Cross a warehouse in PyBullet with the reference planner and third-party "
+        "planners: with nobody there, with a worker who watches the robot, with one who does not, "
+        "and with a wider radius for that one.",
     )
     parser.add_argument(
         "--planner",
         choices=_NAMES,
         action="append",
-        help="only this one; may be given more than once (default: all that are installed)",
+        help="planner to run; may be given more than once (default: all that are installed)",
     )
     parser.add_argument(
         "--perception",
         choices=("truth", "keypoints", "pixels"),
         default="truth",
-        help="what the robot sees with (default: truth, all around and through walls)",
+        help="perception of the robot (default: truth, in all directions and through walls)",
     )
-    parser.add_argument("--seed", type=int, default=0, help="of every crossing (default: 0)")
-    parser.add_argument("--out", type=Path, metavar="FILE", help="write the table there as well")
+    parser.add_argument("--seed", type=int, default=0, help="seed of every crossing (default: 0)")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="also write the table into a file")
     options = parser.parse_args()
     if options.seed < 0:
         parser.error(f"--seed must be 0 or more, got {options.seed}")
@@ -79,10 +79,11 @@ def main() -> int:
 
 
 def _maker(name: str) -> Callable[[], LocalPlanner]:
+    """Return a function that makes a new planner."""
     if name == "reference":
         boxes = scenario("crossing_attentive").layout.obstacle_boxes_odom
         return lambda: SamplingPlanner(NOVA_CARTER, boxes)
-    # Only now: the packages need not all be there, and take a second to import.
+    # Imported late: the packages are optional, and take a second to import.
     _, module, planner = _OTHERS[name]
     make = getattr(import_module(f".{module}", __package__), planner)
     return lambda: cast(LocalPlanner, make(NOVA_CARTER))

@@ -1,4 +1,4 @@
-"""The same crossing with every planner, and what came of it."""
+"""The same crossings with every planner, and their results."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from nav_adapter import AwarenessPolicy
 from sim_tests import NOVA_CARTER, CrossingResult, LocalPlanner, Scenario, run_crossing
 
-#: Where the worker stops, metres to the left of the robot's way: near enough that a wide circle
-#: reaches over it.
+#: Distance of the worker's stop to the left of the robot's path, metres: near enough that a wide
+#: circle covers the path.
 STOPS_AT_Y_M = 1.5
-#: Radii of unaware people, metres: of the shipped policy, and wider.
+#: Radii of unaware people, metres: that of the shipped policy, and a wider one.
 RADII_M = {"": 1.0, ", wide": 1.5}
-# The motors overshoot a ramp by about this.
+# Overshoot of the motors on a ramp, about.
 _OVERSHOOT_MPS = 0.03
 
 
@@ -28,10 +28,10 @@ class Row:
 
     @property
     def excess_mps(self) -> float:
-        """The most that the speed was above what was allowed a tick before, m/s.
+        """The largest excess of the speed over that allowed one cycle before, m/s.
 
-        Allowed is the limit, and what full braking left of a higher speed: the limit may fall
-        faster than the robot can brake.
+        Allowed is the limit, or what full braking leaves of a higher speed, since the limit may
+        fall faster than the robot can brake.
         """
         frames = self.result.frames
         return max(
@@ -46,16 +46,16 @@ class Row:
 
     @property
     def kept_the_limit(self) -> bool:
-        """Whether the speed stayed within what was allowed."""
+        """True if the speed stayed within the allowed one."""
         return self.excess_mps <= _OVERSHOOT_MPS
 
     @property
     def is_good(self) -> bool:
-        """Whether the goal was reached within the limit and the robot touched nobody."""
+        """True if the robot reached the goal within the limit and touched nobody."""
         return self.result.success and self.kept_the_limit
 
     def line(self) -> str:
-        """A row of a Markdown table."""
+        """Return a row of a Markdown table."""
         time_s = self.result.time_to_goal_s
         took = "never" if time_s is None else f"{time_s:.1f}"
         separation_m = self.result.min_separation_m
@@ -72,7 +72,7 @@ HEADER = (
 
 
 def scenario(name: str) -> Scenario:
-    """Return a shipped crossing whose worker stops nearer to the robot's way."""
+    """Return a shipped crossing whose worker stops nearer to the robot's path."""
     data = Scenario.shipped(name).model_dump()
     path = data["workers"][0]["path"]
     for point in path:
@@ -82,7 +82,7 @@ def scenario(name: str) -> Scenario:
 
 
 def policy(unaware_radius_m: float) -> AwarenessPolicy:
-    """Return the default policy with other radii of unaware people."""
+    """Return the default policy with another radius for unaware people."""
     balanced = AwarenessPolicy.preset("balanced")
     data = balanced.model_dump()
     data["inflation"]["unaware_radius_m"] = unaware_radius_m
@@ -100,10 +100,10 @@ def compare(
     """Cross with nobody, an aware worker, an unaware one, and one with a wider radius.
 
     Args:
-        name: of the planner.
-        make: a new planner for each crossing.
+        name: name of the planner.
+        make: returns a new planner for each crossing.
         perception: as in :func:`sim_tests.run_crossing`.
-        seed: of every crossing.
+        seed: seed of every crossing.
         done: called with each row.
     """
     aware, unaware = scenario("crossing_attentive"), scenario("crossing_distracted")

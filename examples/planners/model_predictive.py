@@ -1,7 +1,7 @@
-"""A nonlinear model-predictive controller of do-mpc (``pip install do-mpc``, LGPL-3.0 licence).
+"""A nonlinear model-predictive controller in do-mpc (``pip install do-mpc``, LGPL-3.0 licence).
 
-Everything that the adapter says goes in as a time-varying parameter: it changes every tick, and so
-does what is predicted for the stages ahead.
+The adapter's output enters as time-varying parameters, because it and its prediction over the
+stages change every cycle.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from nav_adapter.exporters import predicted_circles
 from perception.arrays import FloatArray
 
 with warnings.catch_warnings():
-    warnings.simplefilter("ignore")  # about parts of it that are not installed
+    warnings.simplefilter("ignore")  # about optional parts that are not installed
     import do_mpc
 
-# do-mpc hands casadi objects to numpy; newer releases of casadi ask that this be agreed to.
+# do-mpc passes casadi objects to numpy; newer releases of casadi require consent to that.
 with contextlib.suppress(AttributeError):
     casadi.GlobalOptions.setNumpyMode(-1)
 
@@ -29,22 +29,22 @@ _STAGES = 20
 _STAGE_S = 0.15
 _SLOTS = 4
 _MAX_YAW_RATE_RADPS = 1.0
-# A stage's excess over limit or circle costs this much, so that there always is a solution.
+# Cost of a stage's excess over limit or circle; soft, so that there always is a solution.
 _PENALTY = 1000.0
 _QUIET = {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": 0, "ipopt.max_iter": 60}
 
 
 class ModelPredictivePlanner:
-    """Drives a differential-drive robot by optimising the next three seconds.
+    """A planner for a differential drive that optimises the next three seconds.
 
-    States x, y, heading, speed; inputs acceleration and yaw rate. People are soft constraints on
-    the distance at each stage, from where they will be then. So is the speed limit, which falls
-    over the stages no faster than the robot brakes: a hard bound under the present speed would
-    leave the solver without a solution.
+    States are x, y, heading and speed; inputs are acceleration and yaw rate. People are soft
+    constraints on the distance to their predicted position at each stage. The speed limit is a soft
+    constraint too. It falls over the stages no faster than the robot brakes, because a hard bound
+    below the present speed would leave the solver without a solution.
 
     Args:
         robot: footprint and limits.
-        replan_s: how long a solution is held.
+        replan_s: time for which a solution is held.
     """
 
     def __init__(self, robot: RobotProfile, replan_s: float = 0.1) -> None:
@@ -81,6 +81,7 @@ class ModelPredictivePlanner:
         constraints: NavConstraints,
         limit_mps: float,
     ) -> tuple[float, float]:
+        """Return the first speed and yaw rate of the optimal plan."""
         speed = robot_state.speed_mps
         braked = speed - self._robot.max_deceleration_mps2 * self._times_s
         self._caps_mps = np.maximum(limit_mps, braked)
@@ -98,10 +99,11 @@ class ModelPredictivePlanner:
             self._mpc.set_initial_guess()
             self._started = True
         acceleration, yaw_rate = self._mpc.make_step(state).ravel().tolist()
-        # What the drive shall reach: where the speed will be after the stage.
+        # The speed after the stage is the command for the drive.
         return speed + acceleration * _STAGE_S, yaw_rate
 
     def _model(self) -> do_mpc.model.Model:
+        """Return the robot's motion, with the parameters of goal, limit and people."""
         model = do_mpc.model.Model("continuous")
         x, y, heading, speed = (
             model.set_variable("_x", name) for name in ("x", "y", "heading", "speed")
@@ -123,6 +125,7 @@ class ModelPredictivePlanner:
         return model
 
     def _controller(self, model: do_mpc.model.Model) -> do_mpc.controller.MPC:
+        """Return the controller with its objective and constraints."""
         mpc = do_mpc.controller.MPC(model)
         mpc.settings.n_horizon = _STAGES
         mpc.settings.t_step = _STAGE_S
@@ -142,8 +145,8 @@ class ModelPredictivePlanner:
         for slot in range(_SLOTS):
             gap_x = model.x["x"] - model.tvp[f"px{slot}"]
             gap_y = model.x["y"] - model.tvp[f"py{slot}"]
-            room = model.tvp[f"pr{slot}"] + robot.circumscribed_radius_m
-            mpc.set_nl_cons(f"person{slot}", room - casadi.hypot(gap_x, gap_y + 1e-6), **soft)
+            reach = model.tvp[f"pr{slot}"] + robot.circumscribed_radius_m
+            mpc.set_nl_cons(f"person{slot}", reach - casadi.hypot(gap_x, gap_y + 1e-6), **soft)
         template = mpc.get_tvp_template()
 
         def tvp(_: float) -> object:

@@ -1,6 +1,6 @@
 """ir-sim's velocity-obstacle behaviour as a local planner (``pip install ir-sim``, MIT licence).
 
-Fiorini and Shiller 1998: choose the velocity nearest to the wished one that leads into nobody.
+After Fiorini and Shiller 1998: choose the collision-free velocity nearest to the desired one.
 """
 
 from __future__ import annotations
@@ -14,28 +14,28 @@ import numpy as np
 from nav_adapter import NavConstraints, RobotProfile, RobotState, circles
 from perception.arrays import FloatArray
 
-with contextlib.redirect_stdout(io.StringIO()):  # it reports the windowing systems it misses
+with contextlib.redirect_stdout(io.StringIO()):  # it reports missing windowing systems
     from irsim.lib.behavior.behavior_methods import DiffRVO
 
-# Half of the velocities that it looks at are slower, half are faster by up to this.
+# Candidate velocities are slower and faster by up to this.
 _WINDOW_MPS = 1.0
 _SLOW_DOWN_WITHIN_M = 1.0
 
 
 class VelocityObstaclePlanner:
-    """Drives a differential-drive robot by velocity obstacles.
+    """A planner for a differential drive with velocity obstacles.
 
-    Three things to know about the behaviour, each met below:
+    Three properties of ir-sim's behaviour need care:
 
     * Its candidates are a grid of 0.05 m/s within ``acce`` of the present velocity, along x and y.
-      A window of deceleration times tick (0.05 m/s) is one candidate: it needs a wider one, and the
-      drive ramps.
+      A window of deceleration times cycle time (0.05 m/s) would be one candidate. The window is
+      therefore wider, and the drive ramps.
     * ``vxmax`` and ``vymax`` bound a box, whose diagonal is 1.41 times as fast.
-    * It forgets everybody whose centre is beyond ``neighbor_threshold``, 3 m unless told.
+    * It ignores people whose centre is beyond ``neighbor_threshold``, by default 3 m.
 
     Args:
         robot: footprint and limits.
-        lookahead_s: people count whose circle the robot could reach within this time.
+        lookahead_s: only people whose circle the robot could reach within this time count.
     """
 
     def __init__(self, robot: RobotProfile, lookahead_s: float = 4.0) -> None:
@@ -55,7 +55,7 @@ class VelocityObstaclePlanner:
             return 0.0, 0.0
         to_goal = goal_odom_m - robot_state.position_odom_m
         distance_m = float(np.hypot(*to_goal))
-        wish = to_goal * (limit_mps * min(1.0 / distance_m, 1.0 / _SLOW_DOWN_WITHIN_M))
+        desired = to_goal * (limit_mps * min(1.0 / distance_m, 1.0 / _SLOW_DOWN_WITHIN_M))
         heading = robot_state.heading_odom_rad
         velocity = robot_state.speed_mps * np.array([math.cos(heading), math.sin(heading)])
         people = circles(constraints)
@@ -64,7 +64,7 @@ class VelocityObstaclePlanner:
         near = people[gap_m < closing_mps * self._lookahead_s]
         radius_m = self._robot.circumscribed_radius_m
         speed, yaw_rate = DiffRVO(
-            [*robot_state.position_odom_m, *velocity, radius_m, *wish, heading],
+            [*robot_state.position_odom_m, *velocity, radius_m, *desired, heading],
             near.tolist(),
             vxmax=limit_mps,
             vymax=limit_mps,

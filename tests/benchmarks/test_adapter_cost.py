@@ -1,18 +1,26 @@
-"""The benchmark of the adapter compares like with like."""
+"""The benchmark of the adapter compares equal costmaps, and refuses bad input."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from benchmarks.adapter._cli import main
-from benchmarks.adapter._cost import CYCLE, cost_ms
-from benchmarks.adapter._crowd import CELLS, ORIGIN_ODOM_M, RESOLUTION_M, ROBOT, crowd, robot_at
-from benchmarks.adapter._naive import paint_naively
+from benchmarks.adapter import (
+    CELLS,
+    CYCLE,
+    ORIGIN_ODOM_M,
+    RESOLUTION_M,
+    ROBOT,
+    cost_ms,
+    crowd,
+    main,
+    paint_naively,
+    robot_at,
+)
 from nav_adapter import AwarenessPolicy, NavAdapter, paint_costmap
 
 
-def test_both_ways_paint_the_same_costmap() -> None:
+def test_the_naive_costmap_equals_ours() -> None:
     (tracks,) = crowd(6, 1, np.random.default_rng(3))
     policy = AwarenessPolicy.preset("balanced")
     constraints = NavAdapter(policy, ROBOT).update(tracks, robot_at(0.0), 0.0)
@@ -28,7 +36,7 @@ def test_both_ways_paint_the_same_costmap() -> None:
     assert ratio[ours[ring] > 30].max() <= 1.15
 
 
-def test_everybody_walks_and_stays_on_the_map() -> None:
+def test_people_walk_and_stay_on_the_map() -> None:
     frames = crowd(30, 50, np.random.default_rng(0))
     positions = np.array([[track.position_odom_m for track in frame] for frame in frames])
     assert np.abs(positions).max() <= 5.0
@@ -50,7 +58,7 @@ def test_every_step_has_a_cost_of_its_own() -> None:
         (["--out", "no/such/folder/x.json"], "a folder that exists"),
     ],
 )
-def test_input_without_meaning_is_refused(
+def test_bad_input_is_refused(
     arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as stopped:
@@ -59,7 +67,7 @@ def test_input_without_meaning_is_refused(
     assert message in capsys.readouterr().err
 
 
-def test_a_broken_baseline_is_said(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_broken_baseline_is_refused(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
     broken = tmp_path / "baseline.json"
     broken.write_text("{}")
     with pytest.raises(SystemExit) as stopped:

@@ -1,4 +1,4 @@
-"""The benchmark of the bridge measures the bridge, and says so when it cannot."""
+"""The benchmark of the bridge gives figures, or a message if it cannot."""
 
 from __future__ import annotations
 
@@ -9,29 +9,29 @@ import pytest
 
 pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
 
-from benchmarks.bridge._cli import main
+from benchmarks.bridge import main
 
 
 @pytest.fixture(autouse=True)
 def as_before(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The benchmark sets network and cores of its process for good."""
+    """Undo the network and the cores that the benchmark sets for its process."""
     monkeypatch.setenv("CYCLONEDDS_URI", os.environ.get("CYCLONEDDS_URI", ""))
     if hasattr(os, "sched_setaffinity"):
         monkeypatch.setattr(os, "sched_setaffinity", lambda pid, cores: None)
 
 
 @pytest.mark.slow
-def test_pictures_come_back(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_figure_is_measured(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("pybullet", reason="the extra sim is not installed")
     out = tmp_path / "figures.json"
-    # However slow this computer is: 0 or 1, and figures.
+    # A slow computer may miss the goal (1), but there are figures.
     assert main(["--seconds", "2", "--rate", "10", "--out", str(out)]) in (0, 1)
     said = capsys.readouterr().out
     assert "1 of 1 people confirmed" in said
     lines = [line.split() for line in said.splitlines() if line.startswith("bridge_")]
     figures = {name: float(value) for name, value, _ in lines}
     assert 0.0 < figures["bridge_pictures_per_s"] <= 12.0
-    # The networks alone take this long anywhere.
+    # The networks alone take at least this long on any computer.
     assert figures["bridge_cpu_per_picture"] > 1.0
     assert figures["bridge_latency"] > 1.0
     assert "bridge_latency" in out.read_text()
@@ -44,7 +44,7 @@ def test_pictures_come_back(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
         (["--out", "no/such/folder/x.json"], "a folder that exists"),
     ],
 )
-def test_input_without_meaning_is_refused(
+def test_bad_input_is_refused(
     arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as stopped:
@@ -53,7 +53,7 @@ def test_input_without_meaning_is_refused(
     assert message in capsys.readouterr().err
 
 
-def test_a_folder_without_pictures_is_said(
+def test_a_folder_without_images_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["--render", str(tmp_path)]) == 2

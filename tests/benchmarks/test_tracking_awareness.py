@@ -1,4 +1,4 @@
-"""The simulation of attention behind benchmarks/tracking_awareness, and what is asked of it."""
+"""The simulated attention of benchmarks/tracking_awareness, its scores and its command."""
 
 from __future__ import annotations
 
@@ -9,28 +9,38 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.tracking_awareness._attention import autoregressive, directions, simulate
-from benchmarks.tracking_awareness._camera import Measured, look, track
-from benchmarks.tracking_awareness._cli import judge, main, make_set, missed
-from benchmarks.tracking_awareness._filters import Jumps, LogitGaussian, Smoothed, held
-from benchmarks.tracking_awareness._scores import (
+from benchmarks.tracking_awareness import (
     FALSE_SHARE,
+    HistogramFilter,
+    LogitGaussian,
+    Measured,
+    Smoothed,
+    autoregressive,
+    directions,
+    hold_latest,
+    judge,
+    main,
+    make_set,
+    measure,
+    missed_targets,
     onset_times_s,
     release_times_s,
     score,
+    simulate,
     threshold_for,
     time_unseen_s,
+    track,
 )
 from perception import AttentionCone
 from tracking import TrackerConfig
 
 FILTERS = [
     LogitGaussian(),
-    LogitGaussian(surprise=2.5),
-    LogitGaussian(doubt=2.5),
+    LogitGaussian(reset_below_sigmas=2.5),
+    LogitGaussian(reset_above_sigmas=2.5),
     LogitGaussian(bias_std_logit=0.5),
-    Jumps(),
-    Jumps(bins=2),
+    HistogramFilter(),
+    HistogramFilter(bins=2),
     Smoothed(),
 ]
 
@@ -55,13 +65,13 @@ def test_true_awareness_is_the_cone_of_the_angle_between_gaze_and_robot(small):
     angle = np.arccos(np.clip((gaze * sight).sum(axis=2), -1.0, 1.0))
     edge = AttentionCone().half_angle_rad
     expected = np.where(angle < edge, 1.0 - np.tan(np.minimum(angle, edge)) / math.tan(edge), 0.0)
-    # arccos is blunt near 0.
+    # arccos is inexact near 0.
     assert attention.awareness == pytest.approx(expected, abs=1e-6)
     straight = directions(attention.heads_camera_m, np.zeros_like(attention.gaze_rad))
     assert straight == pytest.approx(sight, abs=1e-12)
 
 
-def test_glances_and_pauses_last_as_long_as_they_should():
+def test_glances_have_the_lengths_that_were_set():
     attention = simulate(np.random.default_rng(0), 60, 120.0, 50.0)
     # A turn takes a quarter of a second, and the cone is left within part of it.
     aware = attention.awareness >= 0.5
@@ -78,7 +88,7 @@ def test_glances_and_pauses_last_as_long_as_they_should():
     assert reach.max() < 8.01
 
 
-def test_errors_are_those_of_the_shipped_networks():
+def test_errors_are_as_large_as_those_of_the_shipped_networks():
     data = make_set(7, 10.0, 60, 60.0)
     near = np.linalg.norm(data.attention.heads_camera_m, axis=2) < 6.0
     degrees = np.degrees(data.measured.error_rad[near])
@@ -100,8 +110,8 @@ def test_autoregressive_noise_has_unit_variance_and_its_correlation_time():
     assert lagged == pytest.approx(math.exp(-1.0), abs=0.04)
 
 
-def test_the_filter_tried_alone_is_that_of_the_tracker(small):
-    # Of people who stand still and are placed exactly, so that there is no doubt who is who.
+def test_the_filter_alone_equals_the_filter_in_the_tracker(small):
+    # People stand still at exact positions, so that no match is ambiguous.
     still = np.broadcast_to((0.0, 0.0, 3.0), small.measured.chests_camera_m.shape)
     measured = replace(
         small.measured,
@@ -126,23 +136,23 @@ def test_no_filter_raises_its_bound_without_evidence(one, small):
     assert ((lower >= 0.0) & (lower <= 1.0)).all()
 
 
-def test_holding_on_is_the_danger(small):
+def test_holding_the_latest_value_is_dangerous(small):
     stamps, seen = small.attention.stamps_s, small.measured.seen
     unseen = time_unseen_s(stamps, seen) > 0.3
     truth = small.attention.awareness
-    for one, dangerous in ((held, True), (LogitGaussian(), False)):
+    for one, dangerous in ((hold_latest, True), (LogitGaussian(), False)):
         _, lower = one(stamps, small.measured)
         above = lower > threshold_for(lower, truth)
         assert above[unseen].any() == dangerous
 
 
-def test_the_threshold_lets_one_per_cent_through():
+def test_one_per_cent_of_unaware_frames_exceed_the_threshold():
     rng = np.random.default_rng(2)
     lower, truth = rng.random((1000, 20)), np.zeros((1000, 20))
     assert (lower > threshold_for(lower, truth)).mean() == pytest.approx(FALSE_SHARE, abs=1e-3)
 
 
-def test_times_are_counted_in_closed_cases():
+def test_onset_and_release_times_of_known_cases():
     stamps = np.arange(40) * 0.1
     truth = np.zeros((40, 1))
     truth[10:20] = 0.9
@@ -152,14 +162,14 @@ def test_times_are_counted_in_closed_cases():
     assert onset_times_s(stamps, truth, seen, above) == pytest.approx([0.3])
     assert release_times_s(stamps, truth, seen, above) == pytest.approx([0.3])
     assert np.isinf(onset_times_s(stamps, truth, seen, np.zeros_like(above))).all()
-    # Who is no longer seen is to be given up although they still look.
+    # A person who is no longer seen must be released although they still look.
     truth[10:] = 0.9
     seen[16:] = False
     assert release_times_s(stamps, truth, seen, above) == pytest.approx([0.7])
     assert time_unseen_s(stamps, seen)[-1, 0] == pytest.approx(stamps[-1] - stamps[15])
 
 
-def test_shares_are_counted_in_closed_cases():
+def test_shares_of_known_cases():
     stamps = np.arange(4) * 0.1
     truth = np.array([[0.0], [0.1], [0.8], [0.9]])
     lower = np.array([[0.0], [0.3], [0.5], [0.1]])
@@ -172,13 +182,13 @@ def test_shares_are_counted_in_closed_cases():
 
 
 @pytest.mark.parametrize("rate_hz", [10.0, 20.0, 30.0])
-def test_the_tracker_does_what_is_asked_on_seeds_it_was_not_tuned_on(rate_hz):
+def test_the_tracker_meets_its_targets_on_seeds_it_was_not_tuned_on(rate_hz):
     train, test = (make_set(seed, rate_hz, 16, 40.0) for seed in (31, 32))
     _, lower = track(train.attention, train.measured, TrackerConfig())
     threshold = threshold_for(lower, train.attention.awareness)
     _, lower = track(test.attention, test.measured, TrackerConfig())
     scores = judge(test, lower, threshold)
-    assert missed(scores) == [], scores
+    assert missed_targets(scores) == [], scores
 
 
 def test_a_camera_that_sees_nobody_measures_nothing(small):
@@ -194,9 +204,9 @@ def test_a_camera_that_sees_nobody_measures_nothing(small):
     assert not lower.any()
 
 
-def test_every_measured_alpha_is_one_of_a_person_in_sight():
+def test_only_people_in_sight_have_a_measured_alpha():
     attention = simulate(np.random.default_rng(9), 5, 10.0, 20.0)
-    measured = look(attention, np.random.default_rng(10))
+    measured = measure(attention, np.random.default_rng(10))
     shown = ~np.isnan(measured.awareness)
     assert (measured.seen | ~shown).all()
     assert (shown == ~np.isnan(measured.awareness_std)).all()
@@ -214,7 +224,7 @@ def test_every_measured_alpha_is_one_of_a_person_in_sight():
         ["--out", "nowhere/figures.json"],
     ],
 )
-def test_the_command_refuses_what_it_cannot_do(arguments, capsys):
+def test_the_command_refuses_bad_input(arguments, capsys):
     with pytest.raises(SystemExit) as stopped:
         main(arguments)
     assert stopped.value.code == 2

@@ -1,11 +1,11 @@
-"""The judges, on tracks whose scores are known by counting."""
+"""The judges of tracks, on cases whose scores are known by counting."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from benchmarks.tracking._judges import GATE_M, TrackedFrame, judge
+from benchmarks.tracking import GATE_M, TrackedFrame, judge
 
 pytest.importorskip("motmetrics", reason="see benchmarks/tracking/requirements.txt")
 pytest.importorskip("trackeval", reason="see benchmarks/tracking/requirements.txt")
@@ -41,12 +41,12 @@ def test_the_gate_is_one_metre_for_both_judges() -> None:
     inside = judge(TRUTH, frames([[1, 2]] * FRAMES, [[0.99 * GATE_M, 5.0]] * FRAMES))
     outside = judge(TRUTH, frames([[1, 2]] * FRAMES, [[1.01 * GATE_M, 5.0]] * FRAMES))
     assert inside.mota == inside.mota_trackeval == 1.0
-    # One person missed and one track at nobody, in every frame.
+    # One missed person and one false track in every frame.
     assert outside.mota == outside.mota_trackeval == 0.0
     assert outside.misses == outside.false_positives == FRAMES
 
 
-def test_no_tracks_at_all_is_a_score_too() -> None:
+def test_no_tracks_at_all_give_a_score() -> None:
     score = judge(TRUTH, frames([[]] * FRAMES, [[]] * FRAMES))
     assert score.mota == 0.0
     assert score.misses == 2 * FRAMES

@@ -1,4 +1,4 @@
-"""The walkers and their measurements: the ground that trackers are compared on."""
+"""The simulated walkers and their measurements, on which trackers are compared."""
 
 from __future__ import annotations
 
@@ -7,9 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.tracking._consistency import white_acceleration_walk
-from benchmarks.tracking._measurements import OCCLUDED, OPEN, Recording, record
-from benchmarks.tracking._walkers import WalkerSettings, walk
+from benchmarks.tracking import (
+    OCCLUDED,
+    OPEN,
+    Recording,
+    WalkerSettings,
+    record,
+    walk,
+    white_acceleration_walk,
+)
 from tracking import TrackerConfig
 
 STAMPS_S = np.arange(400) / 20.0
@@ -66,7 +72,7 @@ def test_misses_and_clutter_are_as_frequent_as_set() -> None:
     assert recording.visible.all()
 
 
-def test_noise_is_as_large_as_set_and_measurements_do_not_say_whose_they_are() -> None:
+def test_noise_is_as_large_as_set_and_measurements_come_in_random_order() -> None:
     sensor = replace(OPEN, miss_probability=0.0, clutter_per_m2=0.0, noise_std_m=0.01)
     recording = record(5, 300, np.random.default_rng(2), sensor)
     first, errors = [], []
@@ -86,7 +92,7 @@ def test_spells_out_of_sight_last_as_long_as_set(occluded: Recording) -> None:
         begins, ends = edges[shown[edges]], edges[~shown[edges]]
         lengths += [int(ends[ends > begin][0] - begin) for begin in begins if (ends > begin).any()]
     assert len(lengths) > 50
-    # Two spells may follow each other within a frame and then look like one; it is rare.
+    # Rarely, two spells follow each other within a frame and look like one.
     assert np.percentile(lengths, 95) <= 20
     assert min(lengths) >= 10
 
@@ -97,7 +103,7 @@ def test_nobody_is_measured_while_out_of_sight() -> None:
     assert [len(m) for m in recording.measured_m] == recording.visible.sum(axis=1).tolist()
 
 
-def test_walkers_of_the_own_model_spread_as_white_acceleration_does() -> None:
+def test_walkers_of_the_trackers_model_spread_as_white_acceleration_does() -> None:
     config = TrackerConfig(initial_velocity_std_mps=1e-3)
     rng = np.random.default_rng(7)
     ends = np.array([white_acceleration_walk(0.1, 21, rng, config)[-1] for _ in range(600)])

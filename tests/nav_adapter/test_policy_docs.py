@@ -60,7 +60,7 @@ def test_the_file_shown_is_a_valid_policy() -> None:
     assert policy.outline.sweep_s == 1.0
 
 
-def test_every_test_that_the_safety_argument_names_exists() -> None:
+def test_every_test_named_in_the_safety_argument_exists() -> None:
     root = ROOT
     safety = (root / "docs" / "safety.md").read_text(encoding="utf-8")
     named = re.findall(r"`((?:tests/[\w/]+/)?test_\w+\.py)?(?:::(test_\w+))?`", safety)

@@ -1,4 +1,4 @@
-"""The head network in a mirror; needs PyTorch, which only training does."""
+"""The head network is symmetric under mirroring, and its outputs have their shapes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def net():
     return HeadNet().eval()
 
 
-def test_what_is_seen_in_a_mirror_is_the_mirror_image(net):
+def test_the_output_for_a_mirrored_crop_is_the_mirrored_output(net):
     x = torch.rand(3, 3, 64, 64)
     with torch.no_grad():
         one, other = averaged(net, x), averaged(net, x.flip(3))
@@ -44,7 +44,7 @@ def test_what_is_seen_in_a_mirror_is_the_mirror_image(net):
     np.testing.assert_allclose(covariance, MIRROR @ mirrored @ MIRROR, atol=1e-5)
 
 
-def test_the_exported_outputs_are_what_the_layout_says(net):
+def test_the_exported_outputs_follow_the_layout(net):
     with torch.no_grad():
         outputs = dict(
             zip(HeadExport.names, HeadExport(net)(torch.rand(2, 3, 64, 64)), strict=True)

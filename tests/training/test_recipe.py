@@ -1,4 +1,4 @@
-"""What the networks learn from stays apart from what they are judged on."""
+"""Training data differs from evaluation data, and its crops equal those in use."""
 
 from __future__ import annotations
 
@@ -11,14 +11,11 @@ from perception.networks.heads._crops import head_crop
 from perception.networks.heads._ray_view import looking_at
 from sim_tests.dataset import RenderConfig
 from sim_tests.world.hall import LAYOUTS
-from training.networks._augment import similarity, warp, with_surroundings
-from training.networks._head_sample import HeadSample, cropped
-from training.networks._recipe import Recipe
-from training.workers._people import PEOPLE
-from training.workers._random import random_person
+from training.networks import HeadSample, Recipe, cropped, similarity, warp, with_surroundings
+from training.workers import PEOPLE, random_person
 
 
-def test_judging_has_halls_goods_and_colours_of_its_own():
+def test_evaluation_has_its_own_halls_goods_and_colours():
     recipe = Recipe()
     held_out = recipe.held_out()
     shipped = RenderConfig()
@@ -28,7 +25,7 @@ def test_judging_has_halls_goods_and_colours_of_its_own():
     assert held_out.seed != recipe.seed
 
 
-def test_a_random_crowd_is_the_same_for_the_same_seed_and_nobody_who_ships():
+def test_a_random_crowd_is_the_same_for_the_same_seed_and_has_no_shipped_worker():
     crowd = [random_person(number) for number in range(60)]
     assert crowd == [random_person(number) for number in range(60)]
     assert crowd[0] != random_person(0, seed=1)
@@ -52,20 +49,20 @@ def test_a_random_crowd_is_as_varied_as_a_warehouse():
 
 
 @pytest.mark.parametrize("side", [20.0, 41.3, 64.0, 97.0, 150.5])
-def test_the_head_crop_of_training_is_the_head_crop_of_use(side):
+def test_the_head_crop_in_training_equals_the_head_crop_in_use(side):
     image = np.random.default_rng(4).integers(0, 256, (240, 320, 3), np.uint8)
     centre = np.array([171.3, 118.8])
     oversampling = max(1, int(np.ceil(side / 64)))
-    # Training counts from the picture's corner, use from the middle of its first pixel.
+    # Training counts from the image's corner, use from the centre of its first pixel.
     matrix = similarity(centre + 0.5, 64 / side, 0.0, (64, 64), flip=False)
     theirs = warp(image, matrix, (64, 64), oversampling)
     ours = head_crop(image, centre, side)
-    # OpenCV rounds coordinates to 1/32 pixel, the two ways round differently.
+    # OpenCV rounds coordinates to 1/32 pixel, differently for the two crops.
     assert np.abs(theirs.astype(int) - ours.astype(int)).mean() < 3.0
     assert np.corrcoef(theirs.ravel(), ours.ravel())[0, 1] > 0.999
 
 
-def test_off_the_axis_of_a_wide_lens_too():
+def test_the_crops_are_equal_off_the_axis_of_a_wide_lens_too():
     rng = np.random.default_rng(5)
     image = cv2.GaussianBlur(rng.integers(0, 256, (240, 320, 3), np.uint8), (0, 0), 1.5)
     camera = Camera.from_fov(320, 240, np.radians(110.0))
@@ -91,7 +88,7 @@ def test_off_the_axis_of_a_wide_lens_too():
     assert moved["centre"][0] == pytest.approx(0.4, abs=0.02)
 
 
-def test_surroundings_are_grey_beyond_the_picture_and_repeated_within():
+def test_surroundings_are_grey_outside_the_image_and_repeated_within():
     patch = np.full((10, 12, 3), 200, np.uint8)
     larger, origin = with_surroundings(patch, (0, 20), (640, 480), 4)
     assert larger.shape == (18, 20, 3)

@@ -1,6 +1,7 @@
-"""``python -m training.networks``: makes the networks that ship with ``perception``.
+"""Command ``python -m training.networks``: make the networks that ship with ``perception``.
 
-Crowd, pictures, three networks, export; every stage goes on where it was interrupted.
+The stages are a crowd and its images, three networks, and the export. Every stage continues where
+it was interrupted.
 """
 
 from __future__ import annotations
@@ -66,22 +67,25 @@ _ENTRIES: Final = (
 
 
 def main() -> None:
-    """Run the stages asked for; all by default."""
+    """Run the stages asked for, by default all."""
     parser = argparse.ArgumentParser(prog="python -m training.networks", description=__doc__)
     parser.add_argument(
-        "stages", nargs="*", metavar="STAGE", help=f"of {', '.join(_STAGES)} (default: all)"
+        "stages", nargs="*", metavar="STAGE", help=f"some of {', '.join(_STAGES)} (default: all)"
     )
     parser.add_argument(
-        "--work", type=Path, default=_ROOT / "build" / "networks", help="folder for what is made"
+        "--work",
+        type=Path,
+        default=_ROOT / "build" / "networks",
+        help="folder of intermediate results",
     )
-    parser.add_argument("--out", type=Path, default=_MODELS, help="folder for the networks")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--processes", type=int, default=2, help="rendering at once")
-    parser.add_argument("--quick", action="store_true", help="in miniature, to see that it runs")
+    parser.add_argument("--out", type=Path, default=_MODELS, help="folder of the networks")
+    parser.add_argument("--seed", type=int, default=0, help="default: %(default)s")
+    parser.add_argument("--processes", type=int, default=2, help="processes that render")
+    parser.add_argument("--quick", action="store_true", help="a tiny run that checks every stage")
     chosen = parser.parse_args()
     unknown = [stage for stage in chosen.stages if stage not in _STAGES]
     if unknown:
-        parser.error(f"no stage is called {', '.join(unknown)}; there are {', '.join(_STAGES)}")
+        parser.error(f"there is no stage {', '.join(unknown)}; stages are {', '.join(_STAGES)}")
     stages = chosen.stages or list(_STAGES)
     recipe = replace(Recipe(), seed=chosen.seed)
     recipe = recipe.quick() if chosen.quick else recipe
@@ -102,7 +106,7 @@ def main() -> None:
 
 
 def _crowd(recipe: Recipe, folder: Path) -> tuple[str, ...]:
-    """Files of random workers, made where they are missing."""
+    """Return the files of the random workers; make those that are missing."""
     command = ["-m", "training.workers", "--random", str(recipe.crowd), "--jobs", "2"]
     command += ["--seed", str(recipe.seed), "--out", str(folder)]
     subprocess.run([sys.executable, *command], cwd=_ROOT, check=True)
@@ -110,7 +114,7 @@ def _crowd(recipe: Recipe, folder: Path) -> tuple[str, ...]:
 
 
 def _export(recipe: Recipe, check: Path, checkpoints: Path, out: Path) -> None:
-    """Write what the checkpoints hold, with what calibration on held-out people says."""
+    """Write the networks of the checkpoints, calibrated on held-out people."""
     nets: dict[str, nn.Module] = {"detector": DetectorNet(), "pose": PoseNet(), "head": HeadNet()}
     for name, net in nets.items():
         saved = torch.load(checkpoints / f"{name}.pt", map_location="cpu", weights_only=True)
@@ -121,7 +125,7 @@ def _export(recipe: Recipe, check: Path, checkpoints: Path, out: Path) -> None:
     assert isinstance(pose, PoseNet)
     assert isinstance(detector, DetectorNet)
     factors = calibration(predictions(head, HeadData(check, recipe.seed)))
-    print("standard deviations are multiplied by", factors)
+    print("factors on the standard deviations:", factors)
     export_head(head, out / "head_pose.onnx", factors)
 
     def with_scale(scale: float) -> OnnxPoseEstimator:
@@ -131,7 +135,7 @@ def _export(recipe: Recipe, check: Path, checkpoints: Path, out: Path) -> None:
     crowd = sorted(check.with_name("crowd_check").glob("*.npz"))
     statures_m = [load_worker(str(path)).stature_m for path in crowd]
     scale, noise = limb_scale(with_scale, check, statures_m)
-    print(f"limbs count as {scale:.3f} of those of perception.anthropometry, noise {noise:.3f}")
+    print(f"limb scale against perception.anthropometry: {scale:.3f}, noise {noise:.3f}")
     export_pose(pose, out / "person_pose.onnx", scale, noise)
     export_detector(detector, out / "person_detector.onnx")
     print("written", write_manifest(out, _ENTRIES))

@@ -1,4 +1,4 @@
-"""What is done to pictures so that networks do not learn this renderer by heart."""
+"""Random changes of images, so that networks do not overfit to this renderer."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def with_surroundings(
     margin_px: int,
     outside: int = OUTSIDE_GREY,
 ) -> tuple[NDArray[np.uint8], tuple[int, int]]:
-    """Enlarge a patch: by ``outside`` where the whole picture ends, else by repeating its edge."""
+    """Return a patch with a margin: ``outside`` where the image ends, else its repeated edge."""
     height, width = patch.shape[:2]
     ends = (
         (origin[1] <= 0, origin[1] + height >= size[1]),
@@ -42,14 +42,14 @@ def warp(
     oversampling: int = 1,
     outside: int = OUTSIDE_GREY,
 ) -> NDArray[np.uint8]:
-    """Affine crop in continuous coordinates: (0, 0) is the corner of either picture.
+    """Return an affine crop in continuous coordinates: (0, 0) is the corner of either image.
 
     Args:
         image: (H, W, 3).
         out_from_image: (2, 3).
         size: width and height of the result.
-        oversampling: samples a pixel and side, averaged.
-        outside: grey level where there is no picture.
+        oversampling: samples per pixel and side, averaged.
+        outside: grey level outside the image.
     """
     k = oversampling
     matrix = out_from_image * k
@@ -75,7 +75,10 @@ def similarity(
     *,
     flip: bool,
 ) -> NDArray[np.float64]:
-    """(2, 3) that takes ``centre`` to the middle of the result, enlarged, turned, mirrored."""
+    """Return the matrix (2, 3) that moves ``centre`` to the middle of the result.
+
+    It also scales, turns and mirrors.
+    """
     c, s = scale * np.cos(angle_rad), scale * np.sin(angle_rad)
     turn = np.array([[c, -s], [s, c]])
     if flip:
@@ -85,7 +88,7 @@ def similarity(
 
 
 def degraded(image: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint8]:
-    """Blur, smear or compression, each now and then."""
+    """Return the image with random blur, motion blur or compression, or unchanged."""
     kind = rng.random()
     if kind < 0.15:
         return np.asarray(cv2.GaussianBlur(image, (0, 0), rng.uniform(0.4, 1.2)), dtype=np.uint8)
@@ -106,7 +109,7 @@ def degraded(image: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.u
 def covered(
     image: NDArray[np.uint8], rng: np.random.Generator, other: NDArray[np.uint8]
 ) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
-    """Hide a rectangle behind a part of another picture; returns it as (4,) x1, y1, x2, y2."""
+    """Return the image with a hidden rectangle, and the rectangle (4,): x1, y1, x2, y2."""
     height, width = image.shape[:2]
     w, h = rng.uniform(0.12, 0.6) * width, rng.uniform(0.12, 0.6) * height
     x, y = rng.uniform(-0.5 * w, width - 0.5 * w), rng.uniform(-0.5 * h, height - 0.5 * h)
@@ -124,5 +127,5 @@ def covered(
 
 
 def inside_of(points: NDArray[Any], box: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which points (…, 2) lie in a rectangle."""
+    """Return flags (…) of the points (…, 2) that lie in a rectangle."""
     return np.asarray(((points >= box[:2]) & (points <= box[2:])).all(axis=-1))

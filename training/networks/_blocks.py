@@ -10,7 +10,7 @@ from torch.nn import functional as F  # noqa: N812 - PyTorch's own habit
 def conv(
     inward: int, outward: int, kernel: int = 3, stride: int = 1, *, act: bool = True
 ) -> nn.Sequential:
-    """Convolution, batch normalisation and, by default, ReLU."""
+    """Return convolution, batch normalisation and, by default, ReLU."""
     layers: list[nn.Module] = [
         nn.Conv2d(inward, outward, kernel, stride, kernel // 2, bias=False),
         nn.BatchNorm2d(outward),
@@ -29,7 +29,7 @@ class Residual(nn.Module):
         self.second = conv(channels, channels, act=False)
 
     def forward(self, x: Tensor) -> Tensor:
-        """Same shape in and out."""
+        """Return a tensor of the same shape."""
         return F.relu(x + self.second(self.first(x)))
 
 
@@ -47,19 +47,19 @@ class Backbone(nn.Module):
         self.stride32 = nn.Sequential(conv(128, 192, 3, 2), Residual(192))
 
     def forward(self, x: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """(N, 3, H, W) to three feature maps, finest first."""
+        """Return three feature maps of (N, 3, H, W), finest first."""
         fine = self.stride8(x)
         middle = self.stride16(fine)
         return fine, middle, self.stride32(middle)
 
 
 def enlarged(x: Tensor, like: Tensor) -> Tensor:
-    """Nearest-neighbour enlargement to the size of another map."""
+    """Return a map enlarged to the size of another one by nearest neighbour."""
     return F.interpolate(x, size=like.shape[-2:], mode="nearest")
 
 
 def rotation_from_6d(x: Tensor) -> Tensor:
-    """(N, 6) to (N, 3, 3): Gram–Schmidt on two columns (Zhou et al. 2019)."""
+    """Return rotations (N, 3, 3) of (N, 6): Gram–Schmidt on two columns (Zhou et al. 2019)."""
     first = F.normalize(x[:, :3], dim=1)
     second = x[:, 3:] - (first * x[:, 3:]).sum(1, keepdim=True) * first
     second = F.normalize(second, dim=1)
@@ -67,7 +67,7 @@ def rotation_from_6d(x: Tensor) -> Tensor:
 
 
 def cross(a: Tensor, b: Tensor) -> Tensor:
-    """Cross product of (N, 3) in plain arithmetic, which every exporter knows."""
+    """Return the cross product of (N, 3) in plain arithmetic, which every exporter supports."""
     return torch.stack(
         [
             a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1],
@@ -79,12 +79,12 @@ def cross(a: Tensor, b: Tensor) -> Tensor:
 
 
 def soft_labels(position: Tensor, bins: int, per_unit: float, sigma_bins: float) -> Tensor:
-    """Gaussian label over bins: (…,) positions to (…, bins), each summing to one (SimCC)."""
+    """Return Gaussian labels (…, bins) of positions (…,), each with sum one (SimCC)."""
     index = torch.arange(bins, dtype=torch.float32)
     label = torch.exp(-0.5 * ((index - position[..., None] * per_unit) / sigma_bins) ** 2)
     return label / (label.sum(-1, keepdim=True) + 1e-6)
 
 
 def cross_entropy(logits: Tensor, label: Tensor) -> Tensor:
-    """Cross entropy against soft labels over the last axis."""
+    """Return the cross entropy against soft labels over the last axis."""
     return -(label * logits.log_softmax(-1)).sum(-1)

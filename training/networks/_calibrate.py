@@ -1,4 +1,4 @@
-"""How long limbs look to the pose network: one number, measured on held-out people."""
+"""Limb scale of the pose network: one number, measured on held-out people."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from perception.layouts import LEFT_HIP, RIGHT_HIP
 
 from ._samples import Frame, picture, read_shards
 
-# People of whom less shows say little about limbs.
-_FEWEST_KEYPOINTS: Final = 12
+# Least visible keypoints of a person who counts.
+_MIN_KEYPOINTS: Final = 12
 # Median absolute deviation of a normal distribution with unit variance.
 _MAD_OF_A_NORMAL: Final = 0.6745
 
@@ -24,16 +24,16 @@ _MAD_OF_A_NORMAL: Final = 0.6745
 def limb_scale(
     estimator_of: Any, folder: Path, statures_m: Any, rounds: int = 3
 ) -> tuple[float, float]:
-    """The limb scale with which the median range from the body alone is right, and its noise.
+    """Return the limb scale for which the median range from the body is right, and its noise.
 
-    A network's keypoints lie where its labels put them, and depths that are guessed too small make
-    limbs look shorter and people farther away. One number sets both right on average.
+    A network's keypoints depend on the labels' definitions, and depths that are estimated too small
+    make limbs look shorter and people farther away. One number corrects both on average.
 
     Args:
-        estimator_of: makes the :class:`OnnxPoseEstimator` with a given scale.
-        folder: of shards with people who were not learned from.
-        statures_m: of these people; adults on average would appear at other ranges.
-        rounds: of the fixed point; the skeleton's own claim to be in metres damps each.
+        estimator_of: returns the :class:`OnnxPoseEstimator` for a scale.
+        folder: folder of shards with people who were not used for training.
+        statures_m: statures of these people, which differ from the average adult's.
+        rounds: rounds of the fixed-point iteration, which the skeleton's metric scale damps.
 
     Returns:
         The scale, and the relative standard deviation of ranges beyond that of statures.
@@ -50,9 +50,9 @@ def limb_scale(
 
 
 def _range_errors(estimator: OnnxPoseEstimator, frames: list[Frame]) -> Iterator[float]:
-    """Logarithms of estimated over true range of the middle of the hips."""
+    """Yield logarithms of estimated over true range of the middle of the hips."""
     for frame in frames:
-        people = [p for p in frame.people if p.visible.sum() >= _FEWEST_KEYPOINTS]
+        people = [p for p in frame.people if p.visible.sum() >= _MIN_KEYPOINTS]
         if not people:
             continue
         image = picture(frame.png)

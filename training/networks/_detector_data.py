@@ -1,4 +1,4 @@
-"""Whole pictures to learn from."""
+"""Whole images as training data of the detector."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from perception import Camera
 from perception.shipped import detector_input_size
 
 from ._augment import covered, degraded, similarity, warp
+from ._batch import Batch, stacked_images
 from ._detector_net import HEIGHT, WIDTH
-from ._fit import Batch
 from ._samples import picture, read_shards
 
-#: People in a batch's picture are padded to so many.
-MOST: Final = 8
-# Of whom less shows than this (pixels of a 640 × 480 picture, keypoints), nobody is asked.
-_FEWEST_PIXELS: Final = 350
-_FEWEST_KEYPOINTS: Final = 4
+#: Number to which the people of an image are padded in a batch.
+MAX_PEOPLE: Final = 8
+# People who show less than this (pixels of a 640 × 480 image, keypoints) are ignored.
+_MIN_PIXELS: Final = 350
+_MIN_KEYPOINTS: Final = 4
 
 
 @dataclass
 class FrameSample:
-    """A picture, boxes (N, 4) from its corner, and which of them are to be found (N,).
+    """An image, boxes (N, 4) from its corner, and flags (N,) of the boxes to be found.
 
-    ``scale`` takes the picture's pixels to those of the network in use.
+    ``scale`` converts the image's pixels to those of the network in use.
     """
 
     image: NDArray[np.uint8]
@@ -39,7 +39,7 @@ class FrameSample:
 
 
 class DetectorData:
-    """All whole pictures of some shards, in memory; :meth:`batch` draws and distorts them."""
+    """All whole images of some shards, in memory."""
 
     def __init__(self, folder: Path, seed: int, first: int = 0, last: int | None = None) -> None:
         self._seed = seed
@@ -48,7 +48,7 @@ class DetectorData:
             for frame in shard["frames"]:
                 boxes = [person.box_xyxy_px for person in frame.people]
                 wanted = [
-                    person.pixels >= _FEWEST_PIXELS and person.visible.sum() >= _FEWEST_KEYPOINTS
+                    person.pixels >= _MIN_PIXELS and person.visible.sum() >= _MIN_KEYPOINTS
                     for person in frame.people
                 ]
                 image = picture(frame.png)
@@ -60,21 +60,21 @@ class DetectorData:
                         _scale_in_use(image, frame.focal_px),
                     )
                 )
-        # Pictures of wide lenses get a much larger input in use, so they are not judged whole.
+        # Images of wide lenses get a much larger input in use, so they are not judged whole.
         self._whole = [f for f in self.frames if f.scale <= 1.4 * _fit_scale(f.image)]
 
     def batch(self, step: int, count: int = 16) -> Batch:
-        """``count`` pictures; the same for the same step."""
+        """Return ``count`` random, distorted images; the same step gives the same images."""
         rng = np.random.default_rng([self._seed, 42, step])
         return _stacked([self._distorted(rng) for _ in range(count)])
 
     @property
     def stills(self) -> int:
-        """How many pictures :meth:`still` has."""
+        """The number of images of :meth:`still`."""
         return len(self._whole)
 
     def still(self, start: int, stop: int) -> Batch:
-        """Pictures ``start`` to ``stop`` letterboxed, the whole of each."""
+        """Return images ``start`` to ``stop``, whole and letterboxed, not distorted."""
         return _stacked(
             [
                 _placed(frame, _fit_scale(frame.image), np.zeros(2))
@@ -122,6 +122,7 @@ def _placed(
     flip: bool = False,
     angle: float = 0.0,
 ) -> FrameSample:
+    """Return the sample scaled, shifted, turned and mirrored into the network's input."""
     middle = 0.5 * np.array(frame.image.shape[1::-1]) + shift
     matrix = similarity(middle, scale, angle, (WIDTH, HEIGHT), flip=flip)
     image = warp(frame.image, matrix, (WIDTH, HEIGHT))
@@ -141,7 +142,7 @@ def _placed(
 
 
 def _hidden(frame: FrameSample, cover: NDArray[np.float64]) -> FrameSample:
-    """Boxes after something was put before the people: cut where it hides a whole side."""
+    """Return the sample after a rectangle hides something: boxes are cut where a side is hidden."""
     boxes, wanted = frame.boxes.copy(), frame.wanted.copy()
     for row, (x1, y1, x2, y2) in enumerate(boxes):
         across = cover[0] <= x1 and cover[2] >= x2
@@ -166,15 +167,15 @@ def _hidden(frame: FrameSample, cover: NDArray[np.float64]) -> FrameSample:
 
 
 def _stacked(samples: list[FrameSample]) -> Batch:
-    boxes = np.zeros((len(samples), MOST, 4), np.float32)
-    kind = np.zeros((len(samples), MOST), np.float32)  # 0 nobody, 1 to be found, 2 not asked
+    """Return the samples as one batch, boxes padded to ``MAX_PEOPLE``."""
+    boxes = np.zeros((len(samples), MAX_PEOPLE, 4), np.float32)
+    kind = np.zeros((len(samples), MAX_PEOPLE), np.float32)  # 0 no person, 1 to be found, 2 ignored
     for row, sample in enumerate(samples):
-        count = min(len(sample.boxes), MOST)
+        count = min(len(sample.boxes), MAX_PEOPLE)
         boxes[row, :count] = sample.boxes[:count]
         kind[row, :count] = np.where(sample.wanted[:count], 1.0, 2.0)
-    images = torch.from_numpy(np.stack([sample.image for sample in samples]))
     return {
-        "image": images.permute(0, 3, 1, 2),
+        "image": stacked_images([sample.image for sample in samples]),
         "boxes": torch.from_numpy(boxes),
         "kind": torch.from_numpy(kind),
     }

@@ -14,7 +14,7 @@ STRIDES: Final = (8, 16, 32)
 
 
 class DetectorNet(nn.Module):
-    """Feature pyramid, then a score and four distances to the sides of the box in every cell."""
+    """A feature pyramid with a score and the distances to the four sides of the box per cell."""
 
     inner = 64
 
@@ -32,7 +32,7 @@ class DetectorNet(nn.Module):
             nn.init.constant_(layer.bias[1:], 1.0)
 
     def forward(self, x: Tensor) -> tuple[Tensor, Tensor]:
-        """(N, 3, 256, 320) to logits (N, cells) and corners of boxes (N, cells, 4) in pixels."""
+        """Return logits (N, cells) and corners of boxes (N, cells, 4), px, of (N, 3, 256, 320)."""
         maps = self.backbone(x)
         levels = [lateral(part) for lateral, part in zip(self.lateral, maps, strict=True)]
         for finer in (1, 0):
@@ -51,12 +51,12 @@ class DetectorNet(nn.Module):
 def cells(
     sizes: list[tuple[int, int]], device: torch.device | None = None
 ) -> tuple[Tensor, Tensor]:
-    """Centres (cells, 2) in pixels and strides (cells,), finest level first, row by row.
+    """Return centres (cells, 2) in pixels and strides (cells,), finest level first, row by row.
 
     Args:
-        sizes: rows and columns of each level; read off tensors while the network is exported, they
-            stay open, and the file takes pictures of any size that 32 divides.
-        device: of the result.
+        sizes: rows and columns of each level. During the export they are read from tensors, so they
+            stay open, and the file takes images of any size that 32 divides.
+        device: device of the result.
     """
     points, strides = [], []
     for stride, (rows, columns) in zip(STRIDES, sizes, strict=True):
@@ -68,14 +68,14 @@ def cells(
     return torch.cat(points), torch.cat(strides)
 
 
-#: Of a picture of the usual size.
+#: Rows and columns of each level for an image of the usual size.
 GRID: Final = [(HEIGHT // stride, WIDTH // stride) for stride in STRIDES]
 
 
 class DetectorExport(nn.Module):
-    """(1, 5, cells): centre, width and height in pixels, and the score, as YOLOv8 has them.
+    """The detector with YOLOv8's output (1, 5, cells): centre, width, height (px), and score.
 
-    The picture may have any size that 32 divides: a wide-angle camera needs more pixels.
+    The image may have any size that 32 divides, because a wide-angle camera needs more pixels.
     """
 
     names = ("output0",)
@@ -85,7 +85,7 @@ class DetectorExport(nn.Module):
         self.net = net
 
     def forward(self, x: Tensor) -> Tensor:
-        """(1, 3, 256, 320) RGB in 0–1."""
+        """Return the output for RGB (1, 3, 256, 320) in 0–1."""
         logits, boxes = self.net(x)
         centre = 0.5 * (boxes[..., :2] + boxes[..., 2:])
         size = boxes[..., 2:] - boxes[..., :2]

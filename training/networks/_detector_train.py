@@ -1,4 +1,4 @@
-"""Training and judging the detector: task-aligned assignment (Feng et al. 2021), GIoU, BCE."""
+"""Training and evaluation of the detector: task-aligned assignment (Feng et al. 2021), GIoU."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F  # noqa: N812
 
+from ._batch import Batch, output_on_photographed
 from ._detector_data import DetectorData
 from ._detector_net import GRID, DetectorNet, cells
-from ._fit import Batch, fit
-from ._photograph import photographed
+from ._fit import fit
 from ._recipe import Recipe
 
-_TOP: Final = 10
+_CANDIDATES: Final = 10
 _ALPHA, _BETA = 0.5, 6.0
 
 
@@ -24,7 +24,7 @@ def train_detector(recipe: Recipe, shards: Path, held_out: Path, folder: Path) -
     """Train the detector on the shards; figures on held-out people go to the log."""
     torch.manual_seed(recipe.seed + 2)
     data, check = DetectorData(shards, recipe.seed), DetectorData(held_out, recipe.seed)
-    print(f"{len(data.frames)} pictures to learn from, {check.stills} to check", flush=True)
+    print(f"{len(data.frames)} images for training, {check.stills} held out", flush=True)
     return fit(
         "detector",
         DetectorNet(),
@@ -38,29 +38,26 @@ def train_detector(recipe: Recipe, shards: Path, held_out: Path, folder: Path) -
 
 
 def normalised(images: Tensor) -> Tensor:
-    """Pixels in 0–1, as YOLOv8 takes them."""
+    """Return pixels in 0–1, as YOLOv8 takes them."""
     return (images.float() / 255.0).contiguous(memory_format=torch.channels_last)
 
 
 def detector_loss(net: nn.Module, batch: Batch, done: float) -> dict[str, Tensor]:
-    """Named losses of a batch."""
-    generator = torch.Generator().manual_seed(int(batch["boxes"].sum()) % (2**31))
-    device = batch["image"].device
-    images = photographed(batch["image"].cpu(), generator).to(device)
-    with torch.autocast(device.type, dtype=torch.bfloat16):
-        logits, boxes = net(normalised(images))
+    """Return the losses of a batch by name."""
+    logits, boxes = output_on_photographed(net, batch, normalised, int(batch["boxes"].sum()))
     logits, boxes = logits.float(), boxes.float()
-    quality, owner, unasked = assigned(logits, boxes, batch, *cells(GRID, device))
+    points, strides = cells(GRID, batch["image"].device)
+    quality, owner, ignored = assigned(logits, boxes, batch, points, strides)
     positive = quality > 0.0
     target = torch.gather(batch["boxes"], 1, owner[..., None].expand(-1, -1, 4))
-    # The quality itself weighs the boxes, as in the assignment.
+    # Boxes are weighted by the quality, as in the assignment.
     weight = quality[positive]
     total = weight.sum().clamp(min=1.0)
     overlap = giou(boxes[positive], target[positive])
     entropy = F.binary_cross_entropy_with_logits(logits, quality, reduction="none")
-    shown = (~unasked | positive).float()
+    counted = (~ignored | positive).float()
     return {
-        "score": (entropy * shown).sum() / total,
+        "score": (entropy * counted).sum() / total,
         "box": 2.0 * ((1.0 - overlap) * weight).sum() / total,
     }
 
@@ -69,23 +66,22 @@ def detector_loss(net: nn.Module, batch: Batch, done: float) -> dict[str, Tensor
 def assigned(
     logits: Tensor, boxes: Tensor, batch: Batch, points: Tensor, strides: Tensor
 ) -> tuple[Tensor, Tensor, Tensor]:
-    """Which cells answer for which person.
+    """Return the assignment of cells to people.
 
     Returns:
-        quality (N, cells): what the score is to be, 0 where nobody is; owner (N, cells): row of
-        the person; unasked (N, cells): cells within somebody of whom too little shows.
+        quality (N, cells): target of the score, 0 where no person is; owner (N, cells): row of the
+        person; ignored (N, cells): cells within a person of whom too little shows.
     """
     truth, kind = batch["boxes"], batch["kind"]
     low, high = truth[:, :, None, :2], truth[:, :, None, 2:]
     inside = ((points > low) & (points < high)).all(-1)  # (N, M, cells)
-    # A cell far coarser than the person cannot see it.
     wanted = (kind == 1.0)[..., None]
     iou = pairwise_iou(truth, boxes)
     metric = logits.sigmoid()[:, None] ** _ALPHA * iou**_BETA
     metric = metric * (inside & wanted)
-    top = metric.topk(_TOP, dim=2)
+    top = metric.topk(_CANDIDATES, dim=2)
     chosen = torch.zeros_like(metric).scatter_(2, top.indices, (top.values > 1e-9).float()) > 0.0
-    # Where a person's cells are all hopeless yet, the nearest ones are taken.
+    # While all cells of a person are poor, the nearest ones of the right level are taken.
     centre = 0.5 * (truth[..., :2] + truth[..., 2:])
     size = (truth[..., 2:] - truth[..., :2]).amax(-1)
     right = (torch.log2(size[..., None] / (6.0 * strides)).abs() < 1.0) & inside & wanted
@@ -94,7 +90,7 @@ def assigned(
     first = torch.zeros_like(metric).scatter_(2, near.indices, (near.values < 1e8).float()) > 0.0
     poor = (iou * chosen).amax(2, keepdim=True) < 0.3
     chosen = chosen | (first & poor)
-    # A cell answers for one person: the one that it overlaps most.
+    # A cell belongs to the person that it overlaps most.
     rank = torch.where(chosen, iou + 1e-6, torch.zeros_like(iou))
     best, owner = rank.max(1)
     own = chosen & (
@@ -105,12 +101,12 @@ def assigned(
     reach = (iou * own).amax(2, keepdim=True)
     quality = (score / largest * reach.clamp(min=0.05)).amax(1)
     quality = torch.where(best > 0.0, quality.clamp(min=0.02), torch.zeros_like(quality))
-    unasked = (inside & (kind == 2.0)[..., None]).any(1)
-    return quality, owner, unasked
+    ignored = (inside & (kind == 2.0)[..., None]).any(1)
+    return quality, owner, ignored
 
 
 def pairwise_iou(a: Tensor, b: Tensor) -> Tensor:
-    """(N, M, 4) and (N, C, 4) to (N, M, C)."""
+    """Return the IoU (N, M, C) of boxes (N, M, 4) and (N, C, 4)."""
     low = torch.maximum(a[:, :, None, :2], b[:, None, :, :2])
     high = torch.minimum(a[:, :, None, 2:], b[:, None, :, 2:])
     shared = (high - low).clamp(min=0.0).prod(-1)
@@ -120,7 +116,7 @@ def pairwise_iou(a: Tensor, b: Tensor) -> Tensor:
 
 
 def giou(a: Tensor, b: Tensor) -> Tensor:
-    """Generalised IoU (Rezatofighi et al. 2019) of (K, 4) pairs."""
+    """Return the generalised IoU (Rezatofighi et al. 2019) of K pairs of boxes (K, 4)."""
     low, high = torch.maximum(a[:, :2], b[:, :2]), torch.minimum(a[:, 2:], b[:, 2:])
     shared = (high - low).clamp(min=0.0).prod(-1)
     area = (a[:, 2:] - a[:, :2]).clamp(min=0.0).prod(-1) + (b[:, 2:] - b[:, :2]).prod(-1)
@@ -130,7 +126,7 @@ def giou(a: Tensor, b: Tensor) -> Tensor:
 
 
 def judge_detector(net: nn.Module, data: DetectorData, step: int = 16) -> dict[str, float]:
-    """Average precision at IoU 0.5 on held-out pictures, and people found at score 0.3."""
+    """Return average precision at IoU 0.5 on held-out images, and people found at score 0.3."""
     net.eval()
     device = next(net.parameters()).device
     scores, hits, wanted = [], [], 0
@@ -170,7 +166,7 @@ def judge_detector(net: nn.Module, data: DetectorData, step: int = 16) -> dict[s
 
 
 def suppressed(boxes: Tensor, scores: Tensor, least: float = 0.02) -> tuple[Tensor, Tensor]:
-    """Boxes that are left after suppressing overlaps above 0.6, best first."""
+    """Return boxes and scores after non-maximum suppression at IoU 0.6, best first."""
     order = scores.argsort(descending=True)[:200]
     order = order[scores[order] >= least]
     boxes, scores = boxes[order], scores[order]

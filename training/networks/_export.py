@@ -1,4 +1,4 @@
-"""From trained networks to the ONNX files that ship."""
+"""Export of trained networks as the shipped ONNX files."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from ._pose_net import PoseExport, PoseNet
 
 _OPSET: Final = 17
 _LICENCE: Final = "Apache-2.0"
-# What half-precision weights may change, as a share of the output's range.
+# Largest change by half-precision weights, as a share of the output's range.
 _TOLERANCE: Final = 1e-2
-# Weights of fewer elements stay as they are.
+# Least elements of a tensor that is stored in half precision.
 _LARGE: Final = 1024
 
 
 def export_detector(net: DetectorNet, path: Path) -> None:
-    """Write the detector with the metadata by which YOLOv8 exports are recognised.
+    """Write the detector with the metadata that identify a YOLOv8 export.
 
     Height and width are open, as in exports with ``dynamic=True``; ``imgsz`` is the usual size.
     """
@@ -47,10 +47,11 @@ def export_pose(net: PoseNet, path: Path, limb_scale: float, scale_std: float = 
     """Write the pose network in RTMW3D's layout with COCO's 17 keypoints.
 
     Args:
-        net: trained.
-        path: of the file.
+        net: trained network.
+        path: file to write.
         limb_scale: see :func:`._calibrate.limb_scale`.
-        scale_std: what the network's noise leaves open of the body's scale; 0 is left out.
+        scale_std: relative standard deviation of the body's scale by the network's noise; 0 is left
+            out.
     """
     metadata = {
         "description": "whole-body pose of awarenav, made for its simulator",
@@ -83,7 +84,7 @@ def export_head(net: HeadNet, path: Path, factors: Mapping[str, float]) -> None:
 
 
 def _halve(model: onnx.ModelProto) -> None:
-    """Store large weights in half precision; the runtime widens them once, when it loads them."""
+    """Store large weights in half precision; the runtime widens them when it loads the model."""
     graph = model.graph
     casts = []
     for tensor in graph.initializer:
@@ -106,9 +107,9 @@ def _export(
     metadata: Mapping[str, str],
     open_axes: Mapping[str, Mapping[int, str]] | None = None,
 ) -> None:
-    """Export, describe, and compare with PyTorch; the file is written whole or not at all.
+    """Export, add metadata, and compare with PyTorch; the file is written whole or not at all.
 
-    The number of pictures is open unless ``open_axes`` says otherwise.
+    The number of images is open unless ``open_axes`` says otherwise.
     """
     assert isinstance(module, nn.Module)
     module = module.cpu().float().eval()

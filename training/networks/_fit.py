@@ -1,4 +1,4 @@
-"""The training loop: bfloat16 on a CPU, averaged weights, checkpoints to go on from."""
+"""Training loop with averaged weights and checkpoints to continue from."""
 
 from __future__ import annotations
 
@@ -14,8 +14,10 @@ from typing import Any, Final
 import torch
 from torch import Tensor, nn
 
-Batch = dict[str, Tensor]
-_EVERY: Final = 500
+from ._batch import Batch
+
+# Steps between two checkpoints, and batches that are prepared ahead.
+_CHECKPOINT_STEPS: Final = 500
 _AHEAD: Final = 4
 
 
@@ -32,18 +34,19 @@ def fit(
     judge: Callable[[nn.Module], dict[str, float]] | None = None,
     helpers: int = 2,
 ) -> nn.Module:
-    """Train, or go on with training from the last checkpoint; returns the averaged network.
+    """Train, or continue from the last checkpoint; return the averaged network.
 
     Args:
-        name: of the checkpoint file.
-        net: to be trained.
-        batch_of: the batch of a step; the same for the same step, so that training can be resumed.
-        loss_of: network, batch and share of the training done, to named losses to minimise.
-        steps: of the optimiser, under a cosine schedule.
-        folder: of the checkpoints and the log.
-        learning_rate: the highest.
-        weight_decay: of AdamW.
-        judge: figures on held-out data, now and then.
+        name: name of the checkpoint file.
+        net: the network.
+        batch_of: returns the batch of a step; the same step must give the same batch, so that
+            training can be resumed.
+        loss_of: returns named losses of the network, a batch and the share of training done.
+        steps: optimiser steps, under a cosine schedule.
+        folder: folder of the checkpoints and the log.
+        learning_rate: highest learning rate.
+        weight_decay: weight decay of AdamW.
+        judge: returns figures on held-out data, called at every fourth checkpoint.
         helpers: threads that prepare batches.
     """
     folder.mkdir(parents=True, exist_ok=True)
@@ -87,17 +90,18 @@ def fit(
                 total.backward()
                 nn.utils.clip_grad_norm_(net.parameters(), 5.0)
                 optimiser.step()
-            _blend(average, net, min(0.998, (step + 1) / (step + 10)))
+            _update_average(average, net, min(0.998, (step + 1) / (step + 10)))
             for key, value in losses.items():
                 sums[key] = sums.get(key, 0.0) + float(value.detach())
-            if (step + 1) % _EVERY == 0 or step + 1 == steps:
-                since = (step % _EVERY) + 1
+            if (step + 1) % _CHECKPOINT_STEPS == 0 or step + 1 == steps:
+                since = (step % _CHECKPOINT_STEPS) + 1
                 record: dict[str, Any] = {
                     "step": step + 1,
                     "minutes": (time.perf_counter() - started) / 60,
                 }
                 record |= {key: value / since for key, value in sums.items()}
-                if judge is not None and ((step + 1) % (4 * _EVERY) == 0 or step + 1 == steps):
+                is_judged = (step + 1) % (4 * _CHECKPOINT_STEPS) == 0 or step + 1 == steps
+                if judge is not None and is_judged:
                     record |= judge(average)
                 sums = {}
                 text = json.dumps({k: round(v, 4) for k, v in record.items()})
@@ -108,8 +112,8 @@ def fit(
     return average
 
 
-def _blend(average: nn.Module, net: nn.Module, keep: float) -> None:
-    """Exponential moving average of weights; statistics of normalisation too."""
+def _update_average(average: nn.Module, net: nn.Module, keep: float) -> None:
+    """Update the moving average of weights and normalisation statistics."""
     with torch.no_grad():
         for old, new in zip(average.state_dict().values(), net.state_dict().values(), strict=True):
             if old.dtype.is_floating_point:

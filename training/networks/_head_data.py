@@ -1,4 +1,4 @@
-"""Head crops to learn from."""
+"""Head crops as training data of the head network."""
 
 from __future__ import annotations
 
@@ -7,27 +7,27 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from perception.networks.heads import ray_axes, ray_stretch
 
 from ._augment import covered, degraded, inside_of, warp, with_surroundings
-from ._fit import Batch
+from ._batch import Batch, stacked
 from ._head_sample import LEAST_SEEN, SIZE, HeadSample, cropped
 from ._samples import HEAD_SIDE_M, Frame, Patch, PersonTruth, picture, read_shards
 
-#: So much of a crop's side around the head is kept of a picture.
+#: Part of an image kept around a head, as a share of the crop's side.
 _REACH: Final = 0.95
+#: Share of crops without a head.
 _NEGATIVES: Final = 0.05
 #: Share of the training after which crops are distorted less.
 LATE: Final = 0.75
-_FEWEST_PX: Final = 10.0
-_SMALLEST_PX: Final = 18.0
+_MIN_SIDE_PX: Final = 10.0
+_MIN_COARSE_PX: Final = 18.0
 
 
 class HeadData:
-    """All heads of some shards, in memory; :meth:`batch` draws and distorts them."""
+    """All heads of some shards, in memory."""
 
     def __init__(self, folder: Path, seed: int, first: int = 0, last: int | None = None) -> None:
         self._seed = seed
@@ -48,15 +48,18 @@ class HeadData:
             self.heads.append(sample)
 
     def batch(self, step: int, done: float, count: int = 64) -> Batch:
-        """``count`` crops; the same for the same step. The last quarter is distorted less."""
+        """Return ``count`` random crops; the same step gives the same crops.
+
+        Crops are distorted less from ``LATE`` on, the last quarter of the training.
+        """
         rng = np.random.default_rng([self._seed, 22, step])
         strength = 1.0 if done < LATE else 0.5
-        return _stacked([self._distorted(rng, strength) for _ in range(count)])
+        return stacked([self._distorted(rng, strength) for _ in range(count)])
 
     def still(self, start: int, stop: int, jitter: float = 0.05, spread: float = 0.07) -> Batch:
-        """Crops ``start`` to ``stop`` placed as in use, not distorted."""
+        """Return crops ``start`` to ``stop``, placed as in use, not distorted."""
         rng = np.random.default_rng([self._seed, 23, start])
-        return _stacked(
+        return stacked(
             [
                 cropped(
                     head, rng.normal(0, jitter, 2), np.exp(rng.normal(0, spread)), 0.0, flip=False
@@ -70,13 +73,13 @@ class HeadData:
             return self._nobody(rng)
         head = self.heads[int(rng.integers(len(self.heads)))]
         angle = np.radians(rng.normal(0.0, 12.0)) if rng.random() < 0.5 else 0.0
-        # How far first guesses lie from the head; the second pass is better than this.
+        # First guesses lie this far off the head; the second pass is nearer.
         wide = 1.0 if rng.random() < 0.5 * strength else 0.4
         shift = np.clip(rng.normal(0.0, 0.11 * wide, 2), -0.3, 0.3)
         enlarged = float(np.exp(np.clip(rng.normal(0.0, 0.17 * wide), -0.4, 0.4)))
         coarse = None
         if rng.random() < 0.3 * strength:
-            low = min(_SMALLEST_PX, head.side_px)
+            low = min(_MIN_COARSE_PX, head.side_px)
             coarse = int(np.exp(rng.uniform(np.log(low), np.log(max(head.side_px, low + 1.0)))))
         sample = cropped(head, shift, enlarged, angle, flip=bool(rng.random() < 0.5), coarse=coarse)
         if rng.random() < 0.16 * strength:
@@ -86,6 +89,7 @@ class HeadData:
         return sample
 
     def _nobody(self, rng: np.random.Generator) -> dict[str, Any]:
+        """Return a crop without a head."""
         other = self.others[int(rng.integers(len(self.others)))]
         height, width = other.shape[:2]
         image = warp(other, np.array([[64 / width, 0, 0], [0, 64 / height, 0.0]]), (SIZE, SIZE))
@@ -122,18 +126,19 @@ def _sample(
     intrinsics: tuple[float, float, float],
     person: PersonTruth,
 ) -> HeadSample | None:
+    """Return a head with its surroundings; None for one that is too small or hidden."""
     focal, cx, cy = intrinsics
     x, y, z = person.head_centre_camera_m.tolist()
     # Continuous coordinates: half a pixel more than those of pixel centres.
     centre = np.array([focal * x / z + cx + 0.5, focal * y / z + cy + 0.5])
     side = HEAD_SIDE_M * focal / float(np.sqrt(x * x + y * y + z * z))
-    if side < _FEWEST_PX or person.head_seen < 0.05:
+    if side < _MIN_SIDE_PX or person.head_seen < 0.05:
         return None
     stretch = ray_stretch(ray_axes(np.array([[x / z, y / z]])))[0]
     reach = np.ceil(_REACH * side * np.abs(stretch).sum(axis=1)).astype(int)
     low = np.floor(centre).astype(int) - reach
     high = low + 2 * reach
-    # What the patch has of that rectangle, and what lies beside it.
+    # The part of that rectangle that the patch has.
     height, width = image.shape[:2]
     left, top = np.maximum(low - origin, 0).tolist()
     right, bottom = np.minimum(high - origin, [width, height]).tolist()
@@ -157,13 +162,13 @@ def _sample(
 
 
 def _hide(sample: dict[str, Any], rng: np.random.Generator, other: NDArray[np.uint8]) -> None:
-    """Put something before the head."""
+    """Hide a part of the head behind another image."""
     sample["image"], box = covered(sample["image"], rng, other)
     box = box / SIZE
     sample["visible"] = sample["visible"] & ~inside_of(sample["keypoints"], box)
     v, u = np.mgrid[-1:1:9j, -1:1:9j].reshape(2, -1)
     disk = np.stack([u, v], axis=1)[u**2 + v**2 <= 1.0]
-    # The disk of the head's size, as in the shards.
+    # A disk of the size of the head, as in the shards.
     points = sample["centre"] + disk * 0.2 * np.exp(-sample["log_side"])
     hidden = inside_of(points, box).mean()
     if hidden > 1.0 - LEAST_SEEN:
@@ -175,7 +180,7 @@ def _hide(sample: dict[str, Any], rng: np.random.Generator, other: NDArray[np.ui
 def _elsewhere(
     frame: Frame, image: NDArray[np.uint8], rng: np.random.Generator
 ) -> Iterable[NDArray[np.uint8]]:
-    """Squares of a picture without a head in their middle; half of them on bodies."""
+    """Yield squares of an image without a head in their middle; about half of them on bodies."""
     height, width = image.shape[:2]
     for _ in range(2):
         side = float(np.exp(rng.uniform(np.log(20.0), np.log(140.0))))
@@ -196,14 +201,3 @@ def _elsewhere(
         high = np.minimum(centre + half, [width, height]).astype(int)
         if (high - low).min() > 8:
             yield image[low[1] : high[1], low[0] : high[0]].copy()
-
-
-def _stacked(samples: list[dict[str, Any]]) -> Batch:
-    batch = {
-        key: torch.from_numpy(np.stack([np.asarray(s[key], np.float32) for s in samples]))
-        for key in samples[0]
-        if key != "image"
-    }
-    images = np.stack([sample["image"] for sample in samples])
-    batch["image"] = torch.from_numpy(images).permute(0, 3, 1, 2)
-    return batch

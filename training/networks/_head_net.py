@@ -1,4 +1,4 @@
-"""The head network: a 64 × 64 crop to rotation, keypoints, place, and how sure it is."""
+"""Head network: rotation, keypoints and place of a 64 × 64 crop, with their uncertainty."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from torch import Tensor, nn
 
 from ._blocks import Residual, conv, rotation_from_6d
 
-#: Bins a keypoint coordinate is classified into, over one crop side and a quarter to either side.
+#: Bins of a keypoint coordinate, over the crop's side and a quarter beyond either end.
 BINS: Final = 96
 SPAN: Final = (-0.25, 1.25)
 KEYPOINTS: Final = 5
@@ -17,9 +17,9 @@ _SWAP: Final = [0, 2, 1, 4, 3]
 
 
 class HeadNet(nn.Module):
-    """Dense residual network with flattened heads (pooling loses the direction of a face).
+    """A dense residual network with flattened heads (pooling loses the direction of a face).
 
-    Forward returns raw tensors by name; :class:`HeadExport` turns them into the shipped layout.
+    The forward pass returns raw tensors; :class:`HeadExport` converts them to the shipped layout.
     """
 
     size = 64
@@ -47,11 +47,11 @@ class HeadNet(nn.Module):
         self.seen = nn.Linear(320, KEYPOINTS + 1)
 
     def forward(self, x: Tensor) -> dict[str, Tensor]:
-        """(N, 3, 64, 64) to named tensors."""
+        """Return named tensors of crops (N, 3, 64, 64)."""
         fine = self.fine(x)
         trunk = self.trunk(self.coarse(fine))
         tokens = self.tokens(self.maps(fine).flatten(2))
-        # What it knows of its own errors must not bend what it says.
+        # The losses of the uncertainty must not change the estimates.
         spread = self.spread(trunk.detach())
         return {
             "rotation_6d": self.rotation(trunk),
@@ -66,20 +66,20 @@ class HeadNet(nn.Module):
 
 
 def head_rotation(rotation_6d: Tensor) -> Tensor:
-    """(N, 3, 3) R_ray_head in the paper's head frame; the six numbers are forward and right."""
+    """Return R_ray_head (N, 3, 3) in the paper's head frame; the six numbers: forward, right."""
     columns = rotation_from_6d(rotation_6d)
     return torch.stack([columns[:, :, 2], columns[:, :, 0], columns[:, :, 1]], dim=2)
 
 
 def keypoint_means(logits: Tensor) -> Tensor:
-    """Expectation over bins in units of the crop's side: (…, bins) to (…,)."""
+    """Return the mean (…,) over bins (…, bins), in units of the crop's side."""
     low, high = SPAN
     centres = low + (high - low) * (torch.arange(BINS, device=logits.device) + 0.5) / BINS
     return (logits.softmax(-1) * centres).sum(-1)
 
 
 def spread_factor(raw: Tensor) -> Tensor:
-    """(N, 6) to the lower Cholesky factor (N, 3, 3) of the rotation's covariance, in rad."""
+    """Return the lower Cholesky factor (N, 3, 3) of the rotation's covariance, rad, of (N, 6)."""
     scale = torch.exp(raw[:, :3].clamp(-5.0, 1.0))
     zero = torch.zeros_like(raw[:, 0])
     rows = [
@@ -91,7 +91,7 @@ def spread_factor(raw: Tensor) -> Tensor:
 
 
 def averaged(net: nn.Module, x: Tensor) -> dict[str, Tensor]:
-    """What the network says of crops and of their mirror images, mirrored back, averaged."""
+    """Return the mean output for crops and for their mirror images, mirrored back."""
     count = x.shape[0]
     out = net(torch.cat([x, x.flip(3)]))
     mean = {}
@@ -112,7 +112,7 @@ def averaged(net: nn.Module, x: Tensor) -> dict[str, Tensor]:
         elif name == "seen":
             other = other[:, [*_SWAP, KEYPOINTS]]
         elif name == "rotation_spread":
-            # A mirrored turn δ is −diag(−1, 1, 1) δ.
+            # The mirror image of a rotation vector δ is −diag(−1, 1, 1) δ.
             other = other * other.new_tensor([1.0, 1.0, 1.0, -1.0, -1.0, 1.0])
         mean[name] = 0.5 * (straight + other)
     return mean
@@ -125,13 +125,13 @@ def _unit(x: Tensor) -> Tensor:
 class HeadExport(nn.Module):
     """The network with the outputs of the shipped layout (see ``perception/models/head_pose.md``).
 
-    It looks at every crop twice, the second time in a mirror, which takes a tenth off its errors.
+    Every crop is processed twice, once mirrored, which reduces the errors by a tenth.
 
     Args:
-        net: trained.
-        rotation_factor: what calibration multiplies the rotation's standard deviations with.
-        side_factor: likewise for the crop's side.
-        keypoint_factor: likewise for the keypoints.
+        net: trained network.
+        rotation_factor: factor on the rotation's standard deviations, from the calibration.
+        side_factor: factor on that of the crop's side.
+        keypoint_factor: factor on those of the keypoints.
     """
 
     names = (
@@ -158,7 +158,7 @@ class HeadExport(nn.Module):
         self.factors = (rotation_factor, side_factor, keypoint_factor)
 
     def forward(self, x: Tensor) -> tuple[Tensor, ...]:
-        """(N, 3, 64, 64) to the nine outputs in the order of :attr:`names`."""
+        """Return the nine outputs for crops (N, 3, 64, 64), in the order of :attr:`names`."""
         out = averaged(self.net, x)
         factor = spread_factor(out["rotation_spread"]) * self.factors[0]
         seen = torch.sigmoid(out["seen"])

@@ -1,4 +1,4 @@
-"""One head to learn from, and crops about it: as use cuts them, or off the mark."""
+"""One head as training data, and crops about it, cut as in use or off centre."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from ._augment import inside_of, similarity, warp
 SIZE: Final = 64
 _SWAP: Final = [0, 2, 1, 4, 3]
 _MIRROR: Final = np.diag([-1.0, 1.0, 1.0])
-# Mirroring a head swaps its right (z) with its left.
+# Mirroring a head swaps its right (z) and left.
 _MIRROR_HEAD: Final = np.diag([1.0, 1.0, -1.0])
-#: A crop of which less than this is the head shows none.
+#: Least visible share of a head for a crop to count as showing one.
 LEAST_SEEN: Final = 0.35
 
 
 @dataclass
 class HeadSample:
-    """A head at the camera's own resolution. Pixels from the corner of ``image``.
+    """A head at the camera's own resolution; pixels count from the corner of ``image``.
 
-    ``side_px`` is what a crop's side measures for the camera turned to the head.
+    ``side_px`` is the side of a crop for a camera turned to the head.
     """
 
     image: NDArray[np.uint8]
@@ -48,11 +48,11 @@ def cropped(
     flip: bool,
     coarse: int | None = None,
 ) -> dict[str, Any]:
-    """A crop about the head, off by ``shift`` of its side, with everything turned along."""
+    """Return a crop about the head, off by ``shift`` of its side, with its transformed truth."""
     side = head.side_px * enlarged
     middle = head.centre + _looking_at(head, head.centre)[1] @ (shift * side)
     axes, stretch = _looking_at(head, middle)
-    # As head_crop cuts it: a square of the camera that is turned to the middle.
+    # As head_crop cuts it: a square for the camera that is turned to the middle.
     turn = similarity(np.zeros(2), SIZE / side, angle, (SIZE, SIZE), flip=flip)
     linear = turn[:, :2] @ np.linalg.inv(stretch)
     matrix = np.column_stack([linear, turn[:, 2] - linear @ middle])
@@ -60,7 +60,7 @@ def cropped(
     if coarse is None:
         image = warp(head.image, matrix, (SIZE, SIZE), int(np.clip(np.ceil(drawn / SIZE), 1, 8)))
     else:
-        # As from farther away: few pixels first, then enlarged.
+        # As from farther away: few pixels, then enlarged.
         small = max(8, round(coarse * enlarged))
         step = int(np.clip(np.ceil(drawn / small), 1, 8))
         image = warp(head.image, matrix * small / SIZE, (small, small), step)
@@ -89,6 +89,6 @@ def cropped(
 def _looking_at(
     head: HeadSample, point: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Ray axes (3, 3) of a point of the picture and how the lens draws what lies around it."""
+    """Return ray axes (3, 3) and stretch (2, 2) of the lens at a point of the image."""
     axes = ray_axes((point - head.principal_point)[None] / head.focal_px)
     return axes[0], ray_stretch(axes)[0]

@@ -1,4 +1,4 @@
-"""Training, judging and calibrating the head network."""
+"""Training, evaluation and calibration of the head network."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F  # noqa: N812
 
+from ._batch import Batch, output_on_photographed
 from ._blocks import cross_entropy, soft_labels
-from ._fit import Batch, fit
+from ._fit import fit
 from ._head_data import LATE, HeadData
 from ._head_net import BINS, SPAN, HeadNet, averaged, head_rotation, keypoint_means, spread_factor
-from ._photograph import photographed
 from ._recipe import Recipe
 
 MEAN, STD = 120.0, 60.0
@@ -25,7 +25,7 @@ def train_head(recipe: Recipe, shards: Path, held_out: Path, folder: Path) -> nn
     """Train the head network on the shards; figures on held-out people go to the log."""
     torch.manual_seed(recipe.seed)
     data, check = HeadData(shards, recipe.seed), HeadData(held_out, recipe.seed)
-    print(f"{len(data.heads)} heads to learn from, {len(check.heads)} to check", flush=True)
+    print(f"{len(data.heads)} heads for training, {len(check.heads)} held out", flush=True)
     return fit(
         "head",
         HeadNet(),
@@ -39,17 +39,15 @@ def train_head(recipe: Recipe, shards: Path, held_out: Path, folder: Path) -> nn
 
 
 def normalised(images: Tensor) -> Tensor:
-    """Pixels as the network takes them."""
+    """Return pixels as the network takes them."""
     return ((images.float() - MEAN) / STD).contiguous(memory_format=torch.channels_last)
 
 
 def head_loss(net: nn.Module, batch: Batch, done: float) -> dict[str, Tensor]:
-    """Named losses of a batch."""
-    generator = torch.Generator().manual_seed(int(batch["keypoints"].sum().abs() * 1e4) % (2**31))
-    device = batch["image"].device
-    images = photographed(batch["image"].cpu(), generator, 1.0 if done < LATE else 0.5).to(device)
-    with torch.autocast(device.type, dtype=torch.bfloat16):
-        out = net(normalised(images))
+    """Return the losses of a batch by name."""
+    seed = int(batch["keypoints"].sum().abs() * 1e4)
+    strength = 1.0 if done < LATE else 0.5
+    out = output_on_photographed(net, batch, normalised, seed, strength)
     out = {key: value.float() for key, value in out.items()}
     weight = batch["weight"]
     count = weight.sum().clamp(min=1.0)
@@ -66,8 +64,8 @@ def head_loss(net: nn.Module, batch: Batch, done: float) -> dict[str, Tensor]:
     low, high = SPAN
     bins = (target - low) / (high - low) * BINS - 0.5
     within = ((target > low) & (target < high)).all(-1).float()
-    # What is hidden is still to be placed, but matters less.
-    matters = within * (0.3 + 0.7 * batch["visible"])
+    # Hidden keypoints count too, but weigh less.
+    keypoint_weight = within * (0.3 + 0.7 * batch["visible"])
     entropy = cross_entropy(
         out["u"], soft_labels(bins[..., 0].cpu(), BINS, 1.0, 1.2).to(bins.device)
     )
@@ -76,17 +74,17 @@ def head_loss(net: nn.Module, batch: Batch, done: float) -> dict[str, Tensor]:
     )
     means = torch.stack([keypoint_means(out["u"]), keypoint_means(out["v"])], dim=2)
     away = (means - target).abs().sum(-1)
-    losses["keypoints"] = mean((matters * (0.12 * entropy + 4.0 * away)).mean(1))
+    losses["keypoints"] = mean((keypoint_weight * (0.12 * entropy + 4.0 * away)).mean(1))
 
     place = torch.cat([4.0 * (batch["centre"] - 0.5), 4.0 * batch["log_side"][:, None]], dim=1)
     losses["place"] = mean((out["place"] - place).abs().sum(1))
     seen = torch.cat([batch["visible"], batch["head"][:, None]], dim=1)
-    believed = F.binary_cross_entropy_with_logits(out["seen"], seen, reduction="none")
-    # Nobody's keypoints are not to be seen either; only half-hidden heads are left out.
+    seen_loss = F.binary_cross_entropy_with_logits(out["seen"], seen, reduction="none")
+    # Crops without a head count too; only half-hidden heads are left out.
     unsure = ((weight == 0.0) & (batch["head"] > 0.0)).float()
-    losses["seen"] = ((believed.mean(1) + believed[:, -1]) * (1.0 - unsure)).mean()
+    losses["seen"] = ((seen_loss.mean(1) + seen_loss[:, -1]) * (1.0 - unsure)).mean()
 
-    # How wrong it is, as it says itself: Student's t, so that few bad cases do not spoil the rest.
+    # The network's own uncertainty: Student's t, so that a few bad cases do not dominate.
     turn = rotation_vector(true @ rotation.detach().transpose(1, 2))
     losses["spread"] = 0.15 * mean(_student(turn, spread_factor(out["rotation_spread"])))
     side_error = (out["place"][:, 2].detach() - place[:, 2]) / 4.0
@@ -99,7 +97,7 @@ def head_loss(net: nn.Module, batch: Batch, done: float) -> dict[str, Tensor]:
 
 
 def rotation_vector(rotation: Tensor) -> Tensor:
-    """(N, 3, 3) to (N, 3): the logarithm, good up to almost half a turn."""
+    """Return the rotation vectors (N, 3) of rotations (N, 3, 3), exact up to almost 180°."""
     skew = 0.5 * torch.stack(
         [
             rotation[:, 2, 1] - rotation[:, 1, 2],
@@ -115,7 +113,7 @@ def rotation_vector(rotation: Tensor) -> Tensor:
 
 
 def _student(error: Tensor, factor: Tensor) -> Tensor:
-    """Negative logarithm of Student's t in three dimensions, less a constant."""
+    """Return the negative logarithm of Student's t in three dimensions, less a constant."""
     whitened = torch.linalg.solve_triangular(factor, error[:, :, None], upper=False)[:, :, 0]
     nu = _DEGREES_OF_FREEDOM
     log_det = factor.diagonal(dim1=1, dim2=2).log().sum(1)
@@ -123,12 +121,13 @@ def _student(error: Tensor, factor: Tensor) -> Tensor:
 
 
 def _laplace(error: Tensor, log_scale: Tensor) -> Tensor:
+    """Return the negative logarithm of the Laplace density, less a constant."""
     log_scale = log_scale.clamp(-7.0, 1.0)
     return log_scale + error * torch.exp(-log_scale)
 
 
 def predictions(net: nn.Module, data: HeadData, step: int = 256) -> dict[str, Any]:
-    """Errors of every head in ``data``, cropped as in use."""
+    """Return the errors of every head in ``data``, cropped as in use."""
     net.eval()
     parts: dict[str, list[Any]] = {}
     device = next(net.parameters()).device
@@ -161,7 +160,7 @@ def predictions(net: nn.Module, data: HeadData, step: int = 256) -> dict[str, An
 
 
 def judge_head(net: nn.Module, data: HeadData) -> dict[str, float]:
-    """Figures on held-out heads."""
+    """Return figures on held-out heads."""
     found = predictions(net, data)
     good = found["weight"] > 0.5
     gaze = found["gaze_deg"][good]
@@ -178,7 +177,7 @@ def judge_head(net: nn.Module, data: HeadData) -> dict[str, float]:
 
 
 def calibration(found: dict[str, Any]) -> dict[str, float]:
-    """Factors on the standard deviations that put 68.3 % of the errors within one of them."""
+    """Return factors on the standard deviations that put 68.3 % of the errors within one."""
     good = found["weight"] > 0.5
     shown = found["shown"] & good[:, None]
     rotation = np.abs(found["whitened"][good])

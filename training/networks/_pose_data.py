@@ -1,4 +1,4 @@
-"""Crops of people to learn from."""
+"""Crops of people as training data of the pose network."""
 
 from __future__ import annotations
 
@@ -7,24 +7,23 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from ._augment import covered, degraded, inside_of, similarity, warp, with_surroundings
-from ._fit import Batch
+from ._batch import Batch, stacked
 from ._pose_net import HEIGHT, WIDTH
 from ._samples import PersonTruth, picture, read_shards
 
 _SWAP: Final = [0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 16, 15]
 _PADDING: Final = 1.25
-_FEWEST_PX: Final = 12.0
-# Person crops are black beyond the picture, as OpenMMLab's are.
+_MIN_BOX_PX: Final = 12.0
+# Person crops are black outside the image, as OpenMMLab's are.
 _OUTSIDE: Final = 0
 
 
 @dataclass
 class PersonSample:
-    """A person at the camera's own resolution. Pixels from the corner of ``image``."""
+    """A person at the camera's own resolution; pixels count from the corner of ``image``."""
 
     image: NDArray[np.uint8]
     box: NDArray[np.float64]
@@ -34,7 +33,7 @@ class PersonSample:
 
 
 class PoseData:
-    """All people of some shards, in memory; :meth:`batch` draws and distorts them."""
+    """All people of some shards, in memory."""
 
     def __init__(self, folder: Path, seed: int, first: int = 0, last: int | None = None) -> None:
         self._seed = seed
@@ -57,9 +56,9 @@ class PoseData:
     ) -> None:
         box = person.box_xyxy_px.astype(np.float64)
         extent = box[2:] - box[:2]
-        if extent.min() < _FEWEST_PX or person.visible.sum() < 3:
+        if extent.min() < _MIN_BOX_PX or person.visible.sum() < 3:
             return
-        # A crop never reaches farther than this, distorted as it may be.
+        # Half the size of the largest distorted crop.
         half = 0.5 * _PADDING * max(extent[0], extent[1] * WIDTH / HEIGHT) * 1.25
         half = np.array([half, half * HEIGHT / WIDTH])
         middle = 0.5 * (box[:2] + box[2:])
@@ -80,13 +79,13 @@ class PoseData:
         )
 
     def batch(self, step: int, count: int = 32) -> Batch:
-        """``count`` crops; the same for the same step."""
+        """Return ``count`` random, distorted crops; the same step gives the same crops."""
         rng = np.random.default_rng([self._seed, 32, step])
-        return _stacked([self._distorted(rng) for _ in range(count)])
+        return stacked([self._distorted(rng) for _ in range(count)])
 
     def still(self, start: int, stop: int) -> Batch:
-        """Crops ``start`` to ``stop`` as in use."""
-        return _stacked(
+        """Return crops ``start`` to ``stop``, cut as in use, not distorted."""
+        return stacked(
             [_crop(p, np.zeros(2), 1.0, 0.0, flip=False) for p in self.people[start:stop]]
         )
 
@@ -110,6 +109,7 @@ class PoseData:
 def _crop(
     person: PersonSample, shift: NDArray[np.float64], enlarged: float, angle: float, *, flip: bool
 ) -> dict[str, Any]:
+    """Return a crop of a person with its keypoints, shifted by ``shift`` of its size."""
     extent = (person.box[2:] - person.box[:2]) * _PADDING
     width = max(extent[0], extent[1] * WIDTH / HEIGHT) * enlarged
     height = width * HEIGHT / WIDTH
@@ -128,14 +128,3 @@ def _crop(
         "visible": visible & within,
         "depth": depth,
     }
-
-
-def _stacked(samples: list[dict[str, Any]]) -> Batch:
-    batch = {
-        key: torch.from_numpy(np.stack([np.asarray(s[key], np.float32) for s in samples]))
-        for key in samples[0]
-        if key != "image"
-    }
-    images = np.stack([sample["image"] for sample in samples])
-    batch["image"] = torch.from_numpy(images).permute(0, 3, 1, 2)
-    return batch

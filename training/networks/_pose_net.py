@@ -1,4 +1,4 @@
-"""The pose network: a 144 × 192 crop of a person to SimCC coordinates in x, y and depth."""
+"""Pose network: SimCC coordinates in x, y and depth of a 144 × 192 crop of a person."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from ._blocks import Backbone, conv, enlarged
 
 KEYPOINTS: Final = 17
 WIDTH, HEIGHT = 144, 192
-#: Bins a pixel, as in RTMPose.
+#: Bins per pixel, as in RTMPose.
 SPLIT: Final = 2
 BINS_X, BINS_Y, BINS_Z = WIDTH * SPLIT, HEIGHT * SPLIT, WIDTH * SPLIT
-#: Half of the range of depth, RTMW3D's.
+#: Half of the range of depth, as in RTMW3D.
 Z_RANGE_M: Final = 2.1744869
 
 
 class PoseNet(nn.Module):
-    """Feature pyramid to stride 8, one map a keypoint, flattened, to three rows of bins."""
+    """A feature pyramid to stride 8 with a map per keypoint, flattened to three rows of bins."""
 
     hidden = 224
 
@@ -50,7 +50,7 @@ class PoseNet(nn.Module):
         )
 
     def forward(self, x: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """(N, 3, 192, 144) to logits (N, 17, bins) of x, y, z and (N, 17) of visibility."""
+        """Return logits (N, 17, bins) of x, y, z and (N, 17) of visibility, of (N, 3, 192, 144)."""
         fine, middle, coarse = self.backbone(x)
         middle = self.fuse_middle(middle + enlarged(self.coarse_to_middle(coarse), middle))
         fine = self.fuse_fine(fine + enlarged(self.middle_to_fine(middle), fine))
@@ -62,7 +62,7 @@ class PoseNet(nn.Module):
 
 
 class PoseExport(nn.Module):
-    """RTMW3D's outputs; the peak of x and of y is the probability that the keypoint shows."""
+    """The network with RTMW3D's outputs; peaks of x and y are the probability of visibility."""
 
     names = ("simcc_x", "simcc_y", "simcc_z")
 
@@ -71,7 +71,7 @@ class PoseExport(nn.Module):
         self.net = net
 
     def forward(self, x: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """(N, 3, 192, 144) to (N, 17, 288), (N, 17, 384), (N, 17, 288)."""
+        """Return (N, 17, 288), (N, 17, 384), (N, 17, 288) of (N, 3, 192, 144)."""
         *rows, seen = self.net(x)
         shown = torch.sigmoid(seen)[..., None]
         peaks = [torch.exp(row - row.amax(-1, keepdim=True)) for row in rows]
@@ -79,10 +79,10 @@ class PoseExport(nn.Module):
 
 
 def z_bins(z_m: Tensor) -> Tensor:
-    """Depth relative to the middle of the hips to bins."""
+    """Return the bins of depths relative to the middle of the hips."""
     return (z_m / Z_RANGE_M + 1.0) * (0.5 * WIDTH) * SPLIT
 
 
 def z_metres(bins: Tensor) -> Tensor:
-    """Bins to depth in metres: (bin / 2 / 72 − 1) · 2.1744869."""
+    """Return the depths of bins in metres: (bin / 2 / 72 − 1) · 2.1744869."""
     return (bins / SPLIT / (0.5 * WIDTH) - 1.0) * Z_RANGE_M

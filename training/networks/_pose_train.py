@@ -1,4 +1,4 @@
-"""Training and judging the pose network."""
+"""Training and evaluation of the pose network."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F  # noqa: N812
 
+from ._batch import Batch, output_on_photographed
 from ._blocks import cross_entropy, soft_labels
-from ._fit import Batch, fit
-from ._photograph import photographed
+from ._fit import fit
 from ._pose_data import PoseData
 from ._pose_net import BINS_X, BINS_Y, BINS_Z, SPLIT, PoseNet, z_bins, z_metres
 from ._recipe import Recipe
@@ -27,7 +27,7 @@ def train_pose(recipe: Recipe, shards: Path, held_out: Path, folder: Path) -> nn
     """Train the pose network on the shards; figures on held-out people go to the log."""
     torch.manual_seed(recipe.seed + 1)
     data, check = PoseData(shards, recipe.seed), PoseData(held_out, recipe.seed)
-    print(f"{len(data.people)} people to learn from, {len(check.people)} to check", flush=True)
+    print(f"{len(data.people)} people for training, {len(check.people)} held out", flush=True)
     return fit(
         "pose",
         PoseNet(),
@@ -41,28 +41,25 @@ def train_pose(recipe: Recipe, shards: Path, held_out: Path, folder: Path) -> nn
 
 
 def normalised(images: Tensor) -> Tensor:
-    """Pixels as RTMPose takes them."""
+    """Return pixels as RTMPose takes them."""
     mean = torch.tensor(MEAN, device=images.device).view(1, 3, 1, 1)
     std = torch.tensor(STD, device=images.device).view(1, 3, 1, 1)
     return ((images.float() - mean) / std).contiguous(memory_format=torch.channels_last)
 
 
 def _bins(batch: Batch) -> tuple[Tensor, Tensor, Tensor]:
-    """Targets in bins: RTMPose's bin b stands for the pixel centre at b / 2."""
+    """Return the targets in bins: RTMPose's bin b is the pixel centre at b / 2."""
     pixels = batch["keypoints"] - 0.5
     return pixels[..., 0] * SPLIT, pixels[..., 1] * SPLIT, z_bins(batch["depth"])
 
 
 def pose_loss(net: nn.Module, batch: Batch, done: float) -> dict[str, Tensor]:
-    """Named losses of a batch."""
-    generator = torch.Generator().manual_seed(int(batch["keypoints"].sum().abs()) % (2**31))
+    """Return the losses of a batch by name."""
     device = batch["image"].device
-    images = photographed(batch["image"].cpu(), generator).to(device)
-    with torch.autocast(device.type, dtype=torch.bfloat16):
-        out = net(normalised(images))
+    out = output_on_photographed(net, batch, normalised, int(batch["keypoints"].sum().abs()))
     x, y, z, seen = (part.float() for part in out)
     target_x, target_y, target_z = _bins(batch)
-    # What is hidden is guessed, and matters less.
+    # Hidden keypoints are guesses and weigh less.
     weight = batch["within"] * (0.3 + 0.7 * batch["visible"])
     count = weight.sum().clamp(min=1.0)
 
@@ -83,12 +80,13 @@ def pose_loss(net: nn.Module, batch: Batch, done: float) -> dict[str, Tensor]:
 
 
 def _mean(logits: Tensor) -> Tensor:
+    """Return the mean bin."""
     index = torch.arange(logits.shape[-1], dtype=torch.float32, device=logits.device)
     return (logits.softmax(-1) * index).sum(-1)
 
 
 def _peak(logits: Tensor) -> Tensor:
-    """Bin of the peak, refined by the mean of its neighbourhood."""
+    """Return the bin of the peak, refined by the mean of its neighbourhood."""
     bins = logits.shape[-1]
     top = logits.argmax(-1, keepdim=True)
     near = (top + torch.arange(-4, 5, device=logits.device)).clamp(0, bins - 1)
@@ -97,7 +95,7 @@ def _peak(logits: Tensor) -> Tensor:
 
 
 def judge_pose(net: nn.Module, data: PoseData, step: int = 64) -> dict[str, float]:
-    """Figures on held-out people: pixels of the crop, metres of depth, visibility."""
+    """Return figures on held-out people: pixels of the crop, metres of depth, visibility."""
     net.eval()
     device = next(net.parameters()).device
     pixels, depths, right, shown = [], [], [], []

@@ -1,4 +1,4 @@
-"""Every number of the recipe."""
+"""All numbers of the training recipe."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from dataclasses import dataclass, replace
 
 @dataclass(frozen=True)
 class Recipe:
-    """What is rendered and how long is trained.
+    """Amounts of rendered data and of training.
 
     The shipped workers, two of the five layouts and the first eight variants of goods and colours
-    stay unseen: they are for evaluation.
+    are left for evaluation.
 
     Attributes:
-        seed: of everything random.
-        crowd: number of random workers made to learn from.
-        scenes: halls with a cast of the crowd; a scene is rendered as one shard.
-        frames: whole pictures a scene, for the detector and the pose network.
-        person_patches: exact crops of a person a scene, for the pose network.
-        head_patches: exact crops of a head a scene.
-        layouts: halls to learn from.
-        variants: first and last variant of goods and colours to learn from.
+        seed: seed of everything random.
+        crowd: number of random workers.
+        scenes: halls with people of the crowd; a scene is rendered as one shard.
+        frames: whole images per scene, for the detector and the pose network.
+        person_patches: exact crops of people per scene, for the pose network.
+        head_patches: exact crops of heads per scene.
+        layouts: halls for training.
+        variants: first and last variant of goods and colours for training.
         detector_steps: optimiser steps.
         pose_steps: optimiser steps.
         head_steps: optimiser steps.
@@ -39,7 +39,7 @@ class Recipe:
     head_steps: int = 26000
 
     def held_out(self) -> Recipe:
-        """Other people in other goods and colours: to watch over training and to calibrate."""
+        """Return a recipe with other people, goods and colours, for validation and calibration."""
         first = self.variants[1] + 1
         return replace(
             self,
@@ -52,7 +52,7 @@ class Recipe:
         )
 
     def quick(self) -> Recipe:
-        """The same in miniature, to see that everything runs; its networks are useless."""
+        """Return a tiny recipe that checks every stage; its networks are useless."""
         return replace(
             self,
             crowd=2,

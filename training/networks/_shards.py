@@ -1,9 +1,8 @@
-"""Pictures to learn from: whole frames, exact crops of people and of heads, with their truth.
+"""Rendered training data: whole images, exact crops of people and of heads, with their truth.
 
-A scene is one shard, a file written whole or not at all; shards that are there are not made again.
-Crops are rendered at the camera's own resolution through the rectangle of the picture that they
-fill, with the hall around them, so that a crop equals that part of a whole picture at a tenth of
-its cost.
+A scene is one shard: a file that is written whole or not at all. Existing shards are not made
+again. Crops are rendered at the camera's own resolution, in the rectangle of the image that they
+fill, so that a crop equals that part of the whole image at a tenth of its cost.
 """
 
 from __future__ import annotations
@@ -32,20 +31,20 @@ from ._samples import HEAD_SIDE_M, Frame, Patch, PersonTruth
 _BODY: Final = 17
 _SIZES: Final = ((640, 480), (640, 480), (640, 480), (848, 480), (800, 600))
 _FIELDS_DEG: Final = (55.0, 72.0)
-# Robots also look about with wide lenses, which stretch whatever stands at the side.
+# Robots also use wide lenses, which stretch people at the side.
 _WIDE_SHARE: Final = 0.25
 _WIDE_SIZES: Final = ((640, 480), (800, 600), (960, 600))
 _WIDE_FIELDS_DEG: Final = (80.0, 122.0)
-# Share of whole pictures that show nobody.
+# Share of whole images without people.
 _EMPTY_SHARE: Final = 0.12
-_FEWEST_PIXELS: Final = 60
+_MIN_PIXELS: Final = 60
 _SQUARE: Final = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [-1.0, 1.0, 0.0], [1.0, 1.0, 0.0]])
-#: Around a head, the disk in which its pixels are counted.
+#: Radius of the disk about a head in which its pixels are counted.
 _HEAD_RADIUS_M: Final = 0.08
 
 
 def shard_path(folder: Path, scene: int) -> Path:
-    """Where a scene's pictures are."""
+    """Return the path of a scene's shard."""
     return folder / f"scene{scene:04d}.pkl"
 
 
@@ -53,15 +52,15 @@ def make_shards(recipe: Recipe, workers: tuple[str, ...], folder: Path, processe
     """Render the scenes that are missing.
 
     Args:
-        recipe: how many and what.
+        recipe: the amounts.
         workers: ``.npz`` files of the crowd.
-        folder: of the shards.
-        processes: rendering at once.
+        folder: folder of the shards.
+        processes: processes that render.
     """
     folder.mkdir(parents=True, exist_ok=True)
     todo = [scene for scene in range(recipe.scenes) if not shard_path(folder, scene).exists()]
     context = multiprocessing.get_context("spawn")
-    # PyBullet keeps the memory of a closed world; fresh processes give it back.
+    # PyBullet keeps the memory of a closed world; new processes give it back.
     with context.Pool(processes, maxtasksperchild=6) as pool:
         task = partial(_make_shard, recipe, workers, folder)
         for _ in tqdm(pool.imap_unordered(task, todo), total=len(todo), desc="scenes"):
@@ -84,7 +83,7 @@ def _make_shard(recipe: Recipe, workers: tuple[str, ...], folder: Path, scene: i
 
 
 def _config(recipe: Recipe, workers: tuple[str, ...], rng: np.random.Generator) -> RenderConfig:
-    """A camera much like the one of the rendered sets, and now and then a little different."""
+    """Return a camera similar to that of the rendered sets, sometimes with a wide lens."""
     wide = bool(rng.random() < _WIDE_SHARE)
     sizes = _WIDE_SIZES if wide else _SIZES
     width, height = sizes[int(rng.integers(len(sizes)))]
@@ -105,6 +104,7 @@ def _config(recipe: Recipe, workers: tuple[str, ...], rng: np.random.Generator) 
 
 
 def _frame(hall: RenderScene, rng: np.random.Generator) -> Frame:
+    """Return a whole image with its truth."""
     camera = hall.camera
     T_odom_camera = hall.arrange(rng)
     if rng.random() < _EMPTY_SHARE:
@@ -121,17 +121,17 @@ def _frame(hall: RenderScene, rng: np.random.Generator) -> Frame:
 def _patches(
     hall: RenderScene, rng: np.random.Generator, wanted: int, *, whole: bool
 ) -> Iterator[Patch]:
-    """Crops of people, or of heads in four attitudes each."""
+    """Yield crops of people, or of heads in four poses each."""
     camera = hall.camera
     size = np.array([camera.width_px, camera.height_px])
     made = 0
     while made < wanted:
         T_odom_camera = hall.arrange(rng)
-        # Whoever takes no part waits outside the hall.
+        # Workers who take no part stand outside the hall.
         here = [w for w in hall.workers if w.position_odom_m[0] > hall.warehouse.layout.x_min_m]
         for worker in here:
-            for attitude in range(1 if whole else 4):
-                if attitude:
+            for pose in range(1 if whole else 4):
+                if pose:
                     x, y = worker.position_odom_m.tolist()
                     random_pose(worker, (x, y), T_odom_camera[:3, 3], rng)
                 box = _rectangle(camera, T_odom_camera, worker, whole=whole)
@@ -154,13 +154,13 @@ def _patches(
 
 
 def _rectangle(camera: Any, T_odom_camera: Any, worker: Worker, *, whole: bool) -> Any:
-    """What to render: the body with all that a crop may show of its surroundings."""
+    """Return the rectangle to render: the body with all surroundings that a crop may show."""
     if whole:
         pixels = camera.project(_in_camera(T_odom_camera, worker.keypoints_odom_m))
         low, high = np.nanmin(pixels, axis=0), np.nanmax(pixels, axis=0)
         pad = 0.30 * (high - low) + 0.10 * (high - low).max()
         return np.concatenate([low - pad, high + pad])
-    # A square across the ray, which a wide lens draws larger than one across the axis.
+    # A square across the ray, which a wide lens draws larger than on the axis.
     centre = _head_centre(T_odom_camera, worker)
     (axes,) = ray_axes(centre[None, :2] / centre[2])
     corners = centre + 0.80 * HEAD_SIDE_M * (_SQUARE @ axes.T)
@@ -172,10 +172,10 @@ def _rectangle(camera: Any, T_odom_camera: Any, worker: Worker, *, whole: bool) 
 def _truth(
     hall: RenderScene, worker: Worker, T_odom_camera: Any, view: Any, origin: tuple[int, int]
 ) -> PersonTruth | None:
-    """Truth in pixels of the whole picture; None for somebody who does not show."""
+    """Return the truth in pixels of the whole image; None for a person who is not visible."""
     mask = view.actors == worker.actor
     seen = int(np.count_nonzero(mask))
-    if seen < _FEWEST_PIXELS // 4:
+    if seen < _MIN_PIXELS // 4:
         return None
     camera = hall.camera
     points = _in_camera(T_odom_camera, worker.keypoints_odom_m[:_BODY])
@@ -203,7 +203,7 @@ def _truth(
 
 
 def _head_seen(mask: Any, pixel: Any, radius_px: float) -> float:
-    """Share of the disk about the head's centre that shows this person."""
+    """Return the share of the disk about the head's centre that shows this person."""
     height, width = mask.shape
     v, u = np.mgrid[-1:1:9j, -1:1:9j].reshape(2, -1)
     inside = u**2 + v**2 <= 1.0
@@ -225,5 +225,5 @@ def _in_camera(T_odom_camera: Any, points_odom_m: Any) -> Any:
 def _packed(rgb: Any) -> bytes:
     good, data = cv2.imencode(".png", rgb[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 1])
     if not good:
-        raise RuntimeError("a picture could not be encoded")
+        raise RuntimeError("an image could not be encoded as PNG")
     return bytes(data)

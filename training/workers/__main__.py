@@ -1,6 +1,6 @@
-"""``python -m training.workers``: makes the workers that ship with ``sim_tests``.
+"""Command ``python -m training.workers``: make the workers that ship with ``sim_tests``.
 
-With ``--random N`` it makes a crowd instead, for networks to learn from.
+With ``--random N`` it makes a random crowd instead, as training data of the networks.
 """
 
 from __future__ import annotations
@@ -19,27 +19,29 @@ _FOLDER = Path(__file__).parents[2] / "sim_tests" / "actors" / "body" / "workers
 
 
 def main() -> None:
-    """Make all workers, or those named."""
+    """Make all workers, or the named ones."""
     parser = argparse.ArgumentParser(prog="python -m training.workers", description=__doc__)
-    parser.add_argument("names", nargs="*", help="which workers; all by default")
+    parser.add_argument("names", nargs="*", help="workers to make (default: all)")
     parser.add_argument("--out", type=Path, default=_FOLDER, help="folder (default: %(default)s)")
-    parser.add_argument("--jobs", type=int, default=1, help="workers made at once")
-    parser.add_argument("--random", type=int, default=0, metavar="N", help="N random ones instead")
-    parser.add_argument("--seed", type=int, default=0, help="of the random ones")
+    parser.add_argument("--jobs", type=int, default=1, help="processes (default: %(default)s)")
+    parser.add_argument(
+        "--random", type=int, default=0, metavar="N", help="make N random workers instead"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="seed of the random workers")
     chosen = parser.parse_args()
     if chosen.random and chosen.out == _FOLDER:
         parser.error("--random needs --out: a random crowd does not ship")
     people = [person for person in PEOPLE if not chosen.names or person.name in chosen.names]
     unknown = set(chosen.names) - {person.name for person in people}
     if unknown:
-        parser.error(f"no worker is called {', '.join(sorted(unknown))}")
+        parser.error(f"there is no worker {', '.join(sorted(unknown))}")
     chosen.out.mkdir(parents=True, exist_ok=True)
     if chosen.random:
         crowd = (random_person(number, chosen.seed) for number in range(chosen.random))
-        # The .npz is written last: who has one is finished.
+        # The .npz is written last: a worker that has one is complete.
         people = [person for person in crowd if not (chosen.out / f"{person.name}.npz").exists()]
     start, total = time.perf_counter(), 0
-    # A fresh process each, so that a worker's files do not depend on who came before.
+    # A new process for each, so that a worker's files do not depend on earlier workers.
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(chosen.jobs, mp_context=context, max_tasks_per_child=1) as pool:
         made = pool.map(make, people, [chosen.out] * len(people))

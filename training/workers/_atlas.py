@@ -1,4 +1,4 @@
-"""From fine pieces to a textured mesh of few triangles: simplify, unwrap, bake."""
+"""Textured meshes of few triangles from fine pieces: simplify, unwrap, bake."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ._cloth import open_edges
 from ._noise import Shade
 from ._piece import Array, Piece, Triangles, vertex_normals
 
-#: Texels a length gets, relative to cloth.
+#: Texels per length, relative to cloth.
 _SHARPNESS: Final = {
     "face": 2.6,
     "eye": 3.2,
@@ -30,7 +30,7 @@ _SHARPNESS: Final = {
     "sock": 0.5,
     "sole": 0.6,
 }
-#: A difference in normals as a distance: keeps the two sides of thin cloth apart.
+#: Distance that a difference in normals counts as: separates the two sides of thin cloth.
 _NORMAL_M: Final = 0.05
 _CREASE_COS: Final = np.cos(np.radians(60.0))
 _PADDING_PX: Final = 4
@@ -84,7 +84,7 @@ class Part:
 
     @property
     def sharpness(self) -> float:
-        """Texels a length gets, relative to cloth."""
+        """Texels per length, relative to cloth."""
         return _SHARPNESS.get(self.fine.label, 1.0)
 
 
@@ -92,7 +92,7 @@ Paint = Callable[[Samples], Array]
 
 
 class Fine:
-    """A fine piece, ready to be asked what lies at a place."""
+    """A fine piece that can be sampled at any place."""
 
     def __init__(self, piece: Piece, shade: Shade) -> None:
         spacing = 0.003 if piece.label in ("face", "eye") else 0.008
@@ -115,7 +115,7 @@ class Fine:
         self._tree = cKDTree(np.column_stack([vertices, _NORMAL_M * self._normals]))
 
     def at(self, points_m: Array, normals: Array) -> Samples:
-        """The nearest places, three neighbours mixed."""
+        """Return samples at the nearest places, a mixture of three neighbours."""
         count = min(3, len(self._points))
         distance, rows = self._tree.query(
             np.column_stack([points_m, _NORMAL_M * normals]), k=count, workers=1
@@ -134,7 +134,7 @@ class Fine:
             take(self._canon),
             take(self._normals),
             take(self._shade),
-            # Mixing leaves traces of what lies near: exactly 0 and 1 away from the joints.
+            # Mixing leaves traces of neighbours; weights are exactly 0 or 1 away from joints.
             np.clip((take(self._weights) - 0.01) / 0.98, 0.0, 1.0),
         )
 
@@ -154,11 +154,11 @@ def bake(pieces: list[Piece], fine: list[Fine], level: int, size_px: int, paint:
 
 
 def _unwrap(parts: list[Part], size_px: int) -> tuple[Triangles, Triangles, Array]:
-    """Charts of all parts on one sheet, as large as they fit.
+    """Lay the charts of all parts on one sheet, as large as possible.
 
-    The parts go to the library as one mesh: given several it works on them at once, and crashes
-    now and then. Returns rows of the parts' vertices one after the other, triangles of those rows
-    in the parts' order, and texture coordinates.
+    The library gets the parts as one mesh, because it sometimes crashes with several meshes.
+    Returns rows of the concatenated vertices of the parts, triangles of those rows in the parts'
+    order, and texture coordinates.
     """
     points = np.concatenate([part.vertices_m * part.sharpness for part in parts])
     normals = np.concatenate([part.normals for part in parts])
@@ -180,7 +180,7 @@ def _unwrap(parts: list[Part], size_px: int) -> tuple[Triangles, Triangles, Arra
         atlas.generate(chart, pack)
         if atlas.atlas_count == 1 and max(atlas.width, atlas.height) <= size_px:
             rows, index, uv = atlas[0]
-            # The library normalises by its own sheet, which may be smaller than ours.
+            # The library normalises by its own sheet, which may be smaller than the texture.
             uv = uv.astype(np.float64) * [atlas.width / size_px, atlas.height / size_px]
             return rows.astype(np.int64), index.astype(np.int64).reshape(-1, 3), uv
         fill *= 0.88
@@ -193,7 +193,7 @@ def _assemble(parts: list[Part], size_px: int, paint: Paint) -> Baked:
     points = np.concatenate([part.vertices_m for part in parts])[rows]
     normals = np.concatenate([part.normals for part in parts])[rows]
     weights = np.concatenate([part.weights for part in parts])[rows]
-    # Painted finer than kept: the renderer takes the nearest texel, so edges must be smooth here.
+    # Painted finer, then reduced: the renderer takes the nearest texel, so edges must be smooth.
     fine_px = size_px * (_OVERSAMPLING if size_px > 300 else 2 * _OVERSAMPLING)
     picture = np.zeros((fine_px, fine_px, 3))
     known = np.zeros((fine_px, fine_px), dtype=bool)
@@ -215,7 +215,7 @@ def _assemble(parts: list[Part], size_px: int, paint: Paint) -> Baked:
 def _texels(
     uv: Array, triangles: Triangles, points: Array, normals: Array, size_px: int
 ) -> tuple[NDArray[np.int64], Array, Array]:
-    """Texels that charts cover, grown by half a texel; the place and normal on the mesh of each."""
+    """Return the texels of all charts, grown by half a texel, with their places and normals."""
     corner = np.column_stack([uv[:, 0], 1.0 - uv[:, 1]]) * size_px - 0.5
     owner = np.full((size_px, size_px), -1, dtype=np.int32)
     for row, triangle in enumerate(triangles):
@@ -238,7 +238,7 @@ def _texels(
 
 
 def with_lip(piece: Piece) -> Piece:
-    """The piece with its open edges folded inwards."""
+    """Return the piece with its open edges folded inwards."""
     if piece.lip_m == 0.0:
         return piece
     edges = open_edges(piece.triangles)
@@ -257,7 +257,7 @@ def with_lip(piece: Piece) -> Piece:
 
 
 def _simplify(piece: Piece, budget: int) -> tuple[Array, Triangles]:
-    """Quadric edge collapse down to a budget of triangles."""
+    """Reduce a piece to a budget of triangles by quadric edge collapse."""
     if len(piece.triangles) <= budget:
         return piece.vertices_m, piece.triangles
     for aggressiveness in (3, 5, 7, 9):
@@ -292,7 +292,7 @@ def _refine(
             count = int((cut >= 0).sum())
             if count == 0:
                 continue
-            # Turn the triangle so that the odd edge comes first.
+            # Rotate the triangle so that the odd edge comes first.
             turn = int(np.argmax(cut >= 0)) if count == 1 else int(np.argmin(cut >= 0))
             a, b, c = (int(corner[(turn + k) % 3]) for k in range(3))
             ab, bc, ca = (int(cut[(turn + k) % 3]) for k in range(3))
@@ -307,7 +307,7 @@ def _refine(
 
 
 def _settled(vertices: Array, triangles: Triangles, samples: Fine, step: float) -> Array:
-    """Weights from the fine piece, evened out where the nearest place was another limb's."""
+    """Return weights from the fine piece, corrected where the nearest place is on another limb."""
     weights = samples.at(vertices, vertex_normals(vertices, triangles)).weights
     one, other = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
     a, b = np.concatenate([one, other]), np.concatenate([other, one])
@@ -326,7 +326,7 @@ def _settled(vertices: Array, triangles: Triangles, samples: Fine, step: float) 
 def _split_creases(vertices: Array, triangles: Triangles) -> tuple[Triangles, Array, Triangles]:
     """Double vertices along sharp edges.
 
-    Returns for each new vertex the row it comes from, its normal (smooth but across sharp edges),
+    Returns the original row and the normal of each new vertex (smooth except across sharp edges),
     and the triangles.
     """
     corners = vertices[triangles]
@@ -357,7 +357,7 @@ def _split_creases(vertices: Array, triangles: Triangles) -> tuple[Triangles, Ar
 
 
 def shade_of(pieces: list[Piece], *, forearms: bool) -> Shade:
-    """How the pieces shade each other; hips keep no shade of hands that will not stay there."""
+    """Return the shade between the pieces; hips get none from the hands, which move away."""
     rng = np.random.default_rng(0)
     clouds = []
     for piece in pieces:
@@ -369,7 +369,7 @@ def shade_of(pieces: list[Piece], *, forearms: bool) -> Shade:
 
 
 def _sample(mesh: trimesh.Trimesh, rng: np.random.Generator) -> Array:
-    """Random points on a surface, about four a square centimetre."""
+    """Return random points on a surface, about four per square centimetre."""
     count = int(mesh.area * 4.0e4)
     face = np.searchsorted(np.cumsum(mesh.area_faces) / mesh.area, rng.random(count)).clip(
         0, len(mesh.faces) - 1

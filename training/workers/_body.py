@@ -22,7 +22,7 @@ _TO_BODY: Final = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 _DOWN: Final = np.array([0.0, 0.0, -1.0])
 _JOINTS: Final = 16
 _SPINE_BLEND_M: Final = 0.095
-#: Skin bends this far either side of a limb's joint: elbow and knee, wrist.
+#: Length of the bend on either side of a joint: elbow and knee, wrist.
 _LIMB_BLEND_M: Final = {5: 0.065, 8: 0.065, 11: 0.075, 14: 0.075, 6: 0.035, 9: 0.035}
 _FINGER_CURL_RAD: Final = np.radians((20.0, 26.0, 18.0))
 KEYPOINTS: Final = (
@@ -67,7 +67,7 @@ class Body:
 
 
 class BodyModel:
-    """``anny`` in its default topology, posed to rest."""
+    """The model ``anny`` in its default topology, posed to rest."""
 
     def __init__(self) -> None:
         torch.set_num_threads(1)
@@ -90,7 +90,7 @@ class BodyModel:
         *,
         abduction_rad: float,
     ) -> Body:
-        """Pose a body: legs vertical, arms hanging, palms towards the thighs, soles at z = 0."""
+        """Return a body at rest: legs vertical, arms down, palms inwards, soles at z = 0."""
         values = dict.fromkeys(self._model.phenotype_labels, 0.5) | dict(phenotype)
         local = dict.fromkeys(self._model.local_change_labels, 0.0) | dict(changes or {})
         _, heads = self._run(values, local, {})
@@ -116,7 +116,7 @@ class BodyModel:
     def height_for(
         self, scalp_z_m: float, phenotype: Mapping[str, float], changes: Mapping[str, float]
     ) -> dict[str, float]:
-        """The phenotype whose bare body is ``scalp_z_m`` tall, by bisection over its height."""
+        """Return the phenotype with a bare body ``scalp_z_m`` tall, by bisection over height."""
         low, high = 0.0, 1.0
         for _ in range(14):
             height = 0.5 * (low + high)
@@ -132,7 +132,7 @@ class BodyModel:
     def _run(
         self, phenotype: dict[str, float], changes: dict[str, float], pose: dict[str, Array]
     ) -> tuple[Array, dict[str, Array]]:
-        """Vertices and bone heads with bones turned by ``pose``, rotations in the body frame."""
+        """Return vertices and bone heads for ``pose``, rotations of the bones in the body frame."""
         total: list[Array] = []
         parameters = torch.eye(4)[None, None].repeat(1, len(self._bones), 1, 1)
         for row, (name, parent) in enumerate(zip(self._bones, self._parents, strict=True)):
@@ -148,7 +148,7 @@ class BodyModel:
         return vertices, dict(zip(self._bones, heads, strict=True))
 
     def _rest_pose(self, heads: dict[str, Array], abduction_rad: float) -> dict[str, Array]:
-        """Rotation of each bone that takes the model's A-pose to rest."""
+        """Return the rotation of each bone from the model's A-pose to rest."""
         pose: dict[str, Array] = {}
         for side, left in (("L", 1.0), ("R", -1.0)):
             bone = {name.removesuffix(f".{side}"): p for name, p in heads.items()}
@@ -169,7 +169,7 @@ class BodyModel:
             pose[f"upperarm01.{side}"] = arm
             elbow = _turn(bone["wrist"] - bone["lowerarm01"], fore)
             pose[f"lowerarm01.{side}"] = elbow
-            # The hand: fingers along the forearm, palm towards the thigh and a little back.
+            # The hand: fingers along the forearm, palm towards the thigh and slightly back.
             along = bone["finger3-1"] - bone["wrist"]
             across = bone["finger2-1"] - bone["finger5-1"]
             palm = left * np.cross(along, across)
@@ -199,7 +199,7 @@ class BodyModel:
         return joints
 
     def _weights(self, vertices: Array, bones: dict[str, Array], joints: Array) -> Array:
-        """(N, 16): the share of the model's skinning that lies beyond each joint."""
+        """Return (N, 16), the share of the model's skinning weights beyond each joint."""
         weights = np.zeros((len(vertices), _JOINTS))
         for column, (bone, side) in enumerate(
             [(b, s) for part in (_LIMB_BONES[:3], _LIMB_BONES[3:]) for s in "LR" for b in part],
@@ -224,7 +224,7 @@ class BodyModel:
 
     @staticmethod
     def _bend(weights: Array, vertices: Array, joints: Array) -> None:
-        """Elbows, wrists and knees bend over a set length of limb; the skull is rigid."""
+        """Give elbows, wrists and knees bends of fixed length; make the skull rigid."""
         for joint, reach in _LIMB_BLEND_M.items():
             wrist = joint in (6, 9)
             before = joints[joint - 1]
@@ -240,12 +240,12 @@ class BodyModel:
 
     @staticmethod
     def _snap(weights: Array) -> Array:
-        """Exactly 0 and 1 away from the joints."""
+        """Return weights that are exactly 0 or 1 away from the joints."""
         snapped: Array = np.clip((weights - 0.02) / 0.96, 0.0, 1.0)
         return snapped
 
     def _beyond(self, bone: str) -> list[int]:
-        """Rows of ``bone`` and of every bone that hangs on it."""
+        """Return the rows of ``bone`` and of all its descendants."""
         rows = [self._bones.index(bone)]
         for row, parent in enumerate(self._parents):
             if parent in rows:
@@ -253,14 +253,14 @@ class BodyModel:
         return rows
 
     def _smooth(self, values: Array, rounds: int) -> Array:
-        """Mean with the neighbours, ``rounds`` times; keeps the order of the columns."""
+        """Return values averaged with the neighbours' ``rounds`` times, columns still in order."""
         step = self.neighbours()
         for _ in range(rounds):
             values = 0.5 * values + 0.5 * (step @ values)
         return values
 
     def neighbours(self) -> csr_matrix:
-        """(N, N) the mean over a vertex's neighbours."""
+        """Return the matrix (N, N) of the mean over each vertex's neighbours."""
         ends = np.concatenate(
             [self._faces[:, [0, 1]], self._faces[:, [1, 2]], self._faces[:, [2, 0]]]
         )
@@ -271,7 +271,7 @@ class BodyModel:
         return diags(1.0 / np.maximum(joined.sum(axis=1).A1, 1.0)) @ joined
 
     def _split(self) -> tuple[Triangles, tuple[Triangles, Triangles]]:
-        """Skin and the two eyeballs; the tongue is left out."""
+        """Return the triangles of the skin and of the two eyeballs, without the tongue."""
         count = self._skinning.shape[0]
         edges = (np.ones(len(self._faces) * 2), np.r_[self._faces[:, :2], self._faces[:, 1:]].T)
         _, part = connected_components(csr_matrix(edges, shape=(count, count)), directed=False)
@@ -284,7 +284,7 @@ class BodyModel:
         return skin, (eyes[0], eyes[1])
 
     def _keypoint_regressor(self) -> Array:
-        """(23, N) the model's own COCO definitions: weighted means of vertices."""
+        """Return the model's own COCO definitions (23, N): weights of vertices."""
         file = Path(anny.__file__).parent / "data" / "keypoints" / "coco.pth"
         rows = torch.load(file, weights_only=False)
         used = self._model.base_mesh_vertex_indices.numpy()
@@ -299,13 +299,13 @@ def _unit(vector: Array) -> Array:
 
 
 def _about(axis: Any, angle_rad: float) -> Array:
-    """Rotation matrix about an axis."""
+    """Return the rotation matrix about an axis."""
     turn: Array = Rotation.from_rotvec(_unit(np.asarray(axis, dtype=float)) * angle_rad).as_matrix()
     return turn
 
 
 def _turn(start: Array, end: Array) -> Array:
-    """The smallest rotation that takes one direction to the other."""
+    """Return the smallest rotation from one direction to the other."""
     axis = np.cross(_unit(start), _unit(end))
     sine = float(np.linalg.norm(axis))
     if sine < 1e-9:
@@ -314,7 +314,7 @@ def _turn(start: Array, end: Array) -> Array:
 
 
 def _frame(along: Array, towards: Array) -> Array:
-    """Columns: ``along``, ``towards`` made perpendicular to it, and their cross product."""
+    """Return columns ``along``, ``towards`` made perpendicular to it, and their cross product."""
     first = _unit(along)
     second = _unit(towards - (towards @ first) * first)
     return np.stack([first, second, np.cross(first, second)], axis=1)

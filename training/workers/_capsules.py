@@ -12,7 +12,7 @@ Row = tuple[int, Array, Array, float]
 
 
 def capsules(body: Body, pieces: list[Piece]) -> list[Row]:
-    """One capsule a rigid part: pelvis, torso, head, and four (with foot or hand) a limb."""
+    """Return a capsule per rigid part: pelvis, torso, head, and the parts of each limb."""
     cloud = np.concatenate([piece.vertices_m for piece in pieces])
     follow = np.concatenate([piece.weights for piece in pieces])
     label = np.concatenate([np.full(len(piece.vertices_m), piece.label) for piece in pieces])
@@ -37,7 +37,7 @@ def capsules(body: Body, pieces: list[Piece]) -> list[Row]:
 
 
 def _radius(points: Array, start: Array, end: Array) -> float:
-    """Mean distance of a surface from an axis, and a little for what stands out."""
+    """Return the mean distance of a surface from an axis, with a small margin."""
     along = end - start
     share = np.clip((points - start) @ along / (along @ along), 0.0, 1.0)
     away = np.linalg.norm(points - start - share[:, None] * along, axis=1)
@@ -45,7 +45,7 @@ def _radius(points: Array, start: Array, end: Array) -> float:
 
 
 def _along(joint: int, start: Array, end: Array, points: Array) -> Row:
-    """From joint to joint, shifted to the middle of the surface about them."""
+    """Return a capsule from joint to joint, shifted to the middle of the surface about them."""
     unit = (end - start) / np.linalg.norm(end - start)
     across = points - start - ((points - start) @ unit)[:, None] * unit
     shift = 0.5 * (np.percentile(across, 5, axis=0) + np.percentile(across, 95, axis=0))
@@ -54,7 +54,7 @@ def _along(joint: int, start: Array, end: Array, points: Array) -> Row:
 
 
 def _across(joint: int, points: Array) -> Row:
-    """A capsule that lies from side to side."""
+    """Return a capsule that lies from side to side."""
     low, high = np.percentile(points, [1, 99], axis=0)
     radius = 0.5 * float(high[0] - low[0])
     half = max(0.5 * float(high[1] - low[1]) - radius, 0.01)
@@ -65,7 +65,7 @@ def _across(joint: int, points: Array) -> Row:
 
 
 def _upright(joint: int, points: Array) -> Row:
-    """A capsule that stands."""
+    """Return an upright capsule."""
     low, high = np.percentile(points, [1, 99], axis=0)
     radius = 0.25 * float(high[0] - low[0] + high[1] - low[1])
     center = 0.5 * (low + high)
@@ -75,7 +75,7 @@ def _upright(joint: int, points: Array) -> Row:
 
 
 def _principal(joint: int, points: Array, flat: bool) -> Row:
-    """A capsule along the longest direction of a hand or foot."""
+    """Return a capsule along the longest direction of a hand or foot."""
     center = 0.5 * (points.min(axis=0) + points.max(axis=0))
     _, _, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
     unit = axes[0]

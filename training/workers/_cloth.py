@@ -23,14 +23,14 @@ class Cut:
     share: Array
 
     def __call__(self, values: Array) -> Array:
-        """Values given at the mesh's vertices, at the part's."""
+        """Return values at the part's vertices, given those at the mesh's."""
         share = self.share.reshape(-1, *([1] * (values.ndim - 1)))
         mixed: Array = (1.0 - share) * values[self.first] + share * values[self.second]
         return mixed
 
 
 def cut(triangles: Triangles, field: Array) -> Cut:
-    """Keep the part of a mesh in which ``field`` (a value a vertex) is positive."""
+    """Return the part of a mesh in which ``field`` (a value per vertex) is positive."""
     inside = field[triangles] > 0.0
     count = inside.sum(axis=1)
     kept: list[list[tuple[int, int]]] = [
@@ -47,7 +47,7 @@ def cut(triangles: Triangles, field: Array) -> Cut:
         else:
             kept.extend([[ab, (b, b), (c, c)], [ab, (c, c), ca]])
     if not kept:
-        raise ValueError("nothing of the mesh lies where the field is positive")
+        raise ValueError("the field is positive nowhere on the mesh")
     corners = np.array(kept, dtype=np.int64).reshape(-1, 2)
     pairs, rows = np.unique(corners, axis=0, return_inverse=True)
     first, second = pairs[:, 0], pairs[:, 1]
@@ -65,11 +65,11 @@ def drape(
     slack: float = 0.5,
     reach_m: Array | float = 0.08,
 ) -> Array:
-    """Stretch cloth over a surface: smooth it again and again, never nearer than its offset.
+    """Return cloth over a surface: smoothed in rounds, but never nearer than its offset.
 
-    Hollows that cloth would bridge (between the breasts, along the spine, behind the knee) are
-    bridged, muscles vanish. ``slack`` is how far a round moves towards the neighbours' mean,
-    ``reach_m`` how much farther than its offset the cloth may stand off.
+    Cloth bridges hollows (between the breasts, along the spine, behind the knee), and muscles
+    disappear. In each round the cloth moves by the share ``slack`` towards the neighbours' mean.
+    It may stand off by at most ``reach_m`` more than its offset.
     """
     cloth = surface_m + normals * offset_m[:, None]
     for _ in range(rounds):
@@ -84,7 +84,7 @@ def drape(
 def smooth_normals(
     vertices_m: Array, triangles: Triangles, neighbours: csr_matrix, rounds: int = 8
 ) -> Array:
-    """(N, 3) unit normals averaged with their neighbours'."""
+    """Return unit normals (N, 3), averaged with the neighbours'."""
     normals = vertex_normals(vertices_m, triangles)
     for _ in range(rounds):
         normals = 0.4 * normals + 0.6 * (neighbours @ normals)
@@ -93,7 +93,7 @@ def smooth_normals(
 
 
 def open_edges(triangles: Triangles) -> Triangles:
-    """(E, 2) edges of a single triangle, in that triangle's direction."""
+    """Return the border edges (E, 2), in the direction of their only triangle."""
     edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     _, rows, counts = np.unique(
         np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
@@ -102,7 +102,7 @@ def open_edges(triangles: Triangles) -> Triangles:
 
 
 def signed_distance(polygon: Array, points: Array) -> Array:
-    """Distance of 2-D points to a polygon's border, positive within."""
+    """Return the distance of 2-D points to a polygon's border, positive inside."""
     start, end = polygon, np.roll(polygon, -1, axis=0)
     along = end - start
     to_point = points[:, None] - start[None]

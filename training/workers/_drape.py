@@ -1,4 +1,4 @@
-"""How a worker's clothes hang on a body, before they are cut."""
+"""Clothes draped over a body, before they are cut."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Drapes:
     ) -> None:
         self._body, self._at, self._neighbours = body, places, neighbours
         self._normals = smooth_normals(body.vertices_m, body.triangles, neighbours)
-        # At the neck cloth lies close, else it would span from shoulder to jaw.
+        # At the neck cloth lies close, or it would span from shoulder to jaw.
         self._open = smoothstep(neckline, 0.015, 0.11)
         self.shirt_m = self._shirt(slack_m, sleeve_m)
         self.vest_m = self._vest()
@@ -61,7 +61,7 @@ class Drapes:
         return drape(self.shirt_m, outward, gap, self._neighbours, rounds=30, reach_m=reach)
 
     def _trousers(self) -> Array:
-        """Slack that grows downwards, shanks as straight tubes down to the shoe."""
+        """Return trousers with slack that grows downwards and straight tubes about the shanks."""
         body, z = self._body, self._at.canon_m[:, 2]
         loose = 0.009 + 0.007 * smoothstep(z, 0.95, 0.55)
         surface = drape(body.vertices_m, self._normals, loose, self._neighbours, rounds=44)
@@ -84,7 +84,7 @@ class Drapes:
             surface[rows] = points
         for _ in range(4):
             surface = 0.5 * surface + 0.5 * (self._neighbours @ surface)
-        # The lowest 15 cm are drawn out to the shoe.
+        # The lowest 15 cm widen towards the shoe.
         low, high = body.joints_m[12, 2] + 0.022, body.joints_m[12, 2] + 0.15
         share = np.clip((surface[:, 2] - low) / (high - low), 0.0, 1.0)
         stretched = _HEM_Z_M + share * (high - _HEM_Z_M)

@@ -1,4 +1,4 @@
-"""Baseball caps, safety helmets and glasses; all of them follow the head rigidly."""
+"""Baseball caps, safety helmets and glasses, which follow the head rigidly."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from ._person import Person
 from ._piece import Array, Piece, smoothstep
 from ._places import Places
 
-#: A hat's edge on the average head: the height of a plane above the ears, and its slope.
+#: Plane of a hat's edge on the average head: height above the ears, and slope.
 _EDGE: Final = {"cap": (1.752, 0.20), "helmet": (1.757, 0.16)}
 _EAR_X_M: Final = 0.035
 
 
 def hat_line(person: Person, places: Places) -> Array | None:
-    """(N,) metres above the edge of the hat over the average body; None for a bare head."""
+    """Return heights (N,) above the hat's edge on the average body, m; None for a bare head."""
     kind = person.headwear[0]
     if kind == "none":
         return None
@@ -29,7 +29,7 @@ def hat_line(person: Person, places: Places) -> Array | None:
 
 
 def hats(body: Body, person: Person, places: Places, hair_m: Array) -> list[Piece]:
-    """What is worn on the head and before the eyes."""
+    """Return the pieces of the hat and of the glasses."""
     made = []
     kind = person.headwear[0]
     line = hat_line(person, places)
@@ -42,7 +42,7 @@ def hats(body: Body, person: Person, places: Places, hair_m: Array) -> list[Piec
 
 
 def _ellipsoid(points: Array, clear_m: float) -> tuple[Array, Array]:
-    """Centre and semi-axes of an upright ellipsoid's upper half that holds the points."""
+    """Return centre and semi-axes of an upright half-ellipsoid that contains the points."""
     low, high = points.min(axis=0), points.max(axis=0)
     center = np.array([0.5 * (low[0] + high[0]), 0.0, low[2]])
     axes = np.array([0.5 * (high[0] - low[0]), 0.5 * (high[1] - low[1]), high[2] - low[2]])
@@ -52,7 +52,7 @@ def _ellipsoid(points: Array, clear_m: float) -> tuple[Array, Array]:
 
 
 def _edge(kind: str, places: Places, body: Body) -> tuple[float, float]:
-    """Height at the ears and slope of a hat's edge on this body."""
+    """Return the height at the ears and the slope of a hat's edge on this body."""
     height, slope = _EDGE[kind]
     row = int(np.argmin(np.linalg.norm(places.canon_m - [_EAR_X_M, 0.075, height], axis=1)))
     return float(body.vertices_m[row, 2]), slope
@@ -134,7 +134,7 @@ def _worn(
 
 
 def _glasses(body: Body, places: Places) -> Piece:
-    """A dark frame: two rims, a bridge, two temples."""
+    """Return a dark frame: two rims, a bridge, two temples."""
     parts: list[tuple[Array, Array]] = []
     bar = 0.0016
     eyes = body.joints_m[2:4]
@@ -178,7 +178,7 @@ def _glasses(body: Body, places: Places) -> Piece:
 
 
 def _rod(path: list[Array], radius_m: float) -> tuple[Array, Array]:
-    """A thin four-sided rod along a path that is mostly horizontal."""
+    """Return a thin four-sided rod along a mostly horizontal path."""
     rings = []
     for k, point in enumerate(path):
         along = path[min(k + 1, len(path) - 1)] - path[max(k - 1, 0)]

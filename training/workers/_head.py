@@ -35,7 +35,7 @@ _THICK_M: Final = {
 
 
 class Head:
-    """Makes what is above the collar, but for hats."""
+    """Everything above the collar except hats."""
 
     def __init__(
         self,
@@ -57,11 +57,11 @@ class Head:
         self.hair_m = self._grow()
 
     def pieces(self) -> list[Piece]:
-        """Face and neck, eyes, hair."""
+        """Return the pieces of face and neck, eyes and hair."""
         return [self._face(), *self._eyes(), *self._hair()]
 
     def _grow(self) -> Array:
-        """Surface of the hair over every vertex; the skin where there is none."""
+        """Return the surface of the hair over every vertex; the skin where there is no hair."""
         top, side = _THICK_M[self._person.hair]
         if top == 0.0:
             return self._body.vertices_m
@@ -76,7 +76,7 @@ class Head:
         return drape(self._body.vertices_m, self._normals, thick, self._neighbours, rounds, 0.4)
 
     def _face(self) -> Piece:
-        """Skin down to below the collar; what hair covers thickly is left out."""
+        """Return the skin down to below the collar, without parts under thick hair."""
         z = self._at.canon_m[:, 2]
         neck = np.minimum(0.080 - self._neckline, np.where(self._at.arm > 0.5, -1.0, z - 1.40))
         field = neck
@@ -85,7 +85,7 @@ class Head:
         if self._hat_line is not None:
             field = np.minimum(field, 0.02 - self._hat_line)
         part = cut(self._body.triangles, field)
-        # Skin under cloth lies deeper, so that coarse levels of detail do not mix them up.
+        # Skin under cloth lies deeper, so that coarse levels of detail keep them apart.
         sunk = 0.014 * smoothstep(self._neckline, 0.008, 0.035)
         lift = self._beard() - np.where(self._at.arm > 0.5, 0.0, sunk)
         return Piece(
@@ -98,7 +98,7 @@ class Head:
         )
 
     def _beard(self) -> Array:
-        """How far a beard stands off the skin."""
+        """Return the thickness of the beard over the skin."""
         return 0.007 * max(0.0, self._person.beard - 0.4) / 0.6 * beard_mask(self._at.canon_m)
 
     def _eyes(self) -> list[Piece]:
@@ -142,7 +142,7 @@ class Head:
         return made
 
     def _fit(self, canon: Array) -> Array:
-        """A place about the average head, about this one: scaled with the head's size."""
+        """Return a place of the average head on this head, scaled with its size."""
         own = self._body.vertices_m[self._scalp_rows()]
         average = self._at.canon_m[self._scalp_rows()]
         scale = np.ptp(own, axis=0) / np.ptp(average, axis=0)
@@ -163,7 +163,7 @@ class Head:
         return self._rigid(points * axes + center, triangles, (120, 50, 16))
 
     def _tail(self) -> Piece:
-        """A tail from the back of the head down to the nape."""
+        """Return a tail from the back of the head down to the nape."""
         share = np.linspace(0.0, 1.0, 16)
         x = -0.047 - 0.062 * np.sin(share * 2.3) + 0.026 * share
         z = 1.758 - 0.205 * share**1.25
@@ -182,12 +182,12 @@ class Head:
         return self._rigid(points, triangles, (180, 70, 24))
 
     def _curtain(self) -> Piece:
-        """Hair that hangs round the sides and the back down to the jaw."""
+        """Return hair at the sides and the back down to the jaw."""
         angle = np.radians(np.linspace(58.0, 302.0, 44))
         share = np.linspace(0.0, 1.0, 14)[:, None]
         back = 0.5 - 0.5 * np.cos(angle)
         z = 1.795 - share * (0.152 + 0.022 * back)
-        # Out of the scalp, over the ears, in again at the ends.
+        # From the scalp over the ears and back to the neck at the ends.
         swell = (
             0.70 + 0.37 * np.sin(np.clip(share * 1.25, 0.0, 1.0) * 0.5 * np.pi) - 0.09 * share**4
         )
@@ -205,7 +205,7 @@ class Head:
 
 
 def beard_mask(canon: Array) -> Array:
-    """1 where a full beard grows on the average face, 0 elsewhere."""
+    """Return 1 where a full beard grows on the average face, 0 elsewhere."""
     x, y, z = canon.T
     side = np.abs(y)
     # The cheek line runs from the sideburn down to the corner of the mouth.
@@ -220,7 +220,7 @@ def beard_mask(canon: Array) -> Array:
 
 
 def sphere(rings: int, sides: int) -> tuple[Array, Array]:
-    """A unit sphere as a lofted grid with its poles on z."""
+    """Return a unit sphere as a lofted grid with its poles on z."""
     polar = np.linspace(1e-3, np.pi - 1e-3, rings)[:, None]
     around = np.linspace(0.0, 2.0 * np.pi, sides + 1)[None]
     grid = np.stack(
@@ -235,7 +235,7 @@ def sphere(rings: int, sides: int) -> tuple[Array, Array]:
 
 
 def loft(rings: Array) -> tuple[Array, Array]:
-    """Triangles between rings of points that run downwards, counter-clockwise seen from above."""
+    """Return triangles between rings of points that run downwards, counter-clockwise from above."""
     count, sides = rings.shape[:2]
     i, j = np.meshgrid(np.arange(count - 1), np.arange(sides - 1), indexing="ij")
     a = (i * sides + j).ravel()

@@ -1,4 +1,4 @@
-"""One worker from first to last."""
+"""All steps that make one worker."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ from ._shoes import SOLE_M, shoes
 
 #: Side of the texture at each level of detail.
 TEXTURE_PX: Final = (1024, 512, 256)
-#: Arms are held this far from the body, heavier people's a little further.
+#: Angle of the arms from the body; larger for heavier people.
 _ABDUCTION_RAD: Final = np.radians(9.0)
 
 
 @lru_cache(maxsize=1)
 def model() -> BodyModel:
-    """The body model, loaded once."""
+    """Return the body model, loaded once."""
     return BodyModel()
 
 
 def make(person: Person, folder: Path) -> int:
-    """Make a worker and write its files; returns their size in bytes."""
+    """Make a worker and write its files; return their size in bytes."""
     cv2.setNumThreads(1)
     body = _body(person)
     places = Places(model().average())
@@ -54,7 +54,7 @@ def make(person: Person, folder: Path) -> int:
 
 
 def _body(person: Person) -> Body:
-    """The naked body, standing on the soles of its shoes."""
+    """Return the naked body, standing on the soles of its shoes."""
     shape = model().height_for(person.stature_m - SOLE_M, person.phenotype, person.changes)
     heavy = max(0.0, person.phenotype["weight"] - 0.5)
     body = model().rest(shape, person.changes, abduction_rad=_ABDUCTION_RAD + 0.16 * heavy)

@@ -1,4 +1,4 @@
-"""Noise and shade over space: what makes paint look like cloth."""
+"""Noise and shade over space, which make paint look like cloth."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ class Noise:
         self._values = rng.standard_normal((_LATTICE, _LATTICE, _LATTICE))
 
     def __call__(self, points_m: Array, wavelength_m: float | tuple[float, float, float]) -> Array:
-        """(N,) zero-mean noise of unit spread with features about ``wavelength_m`` large."""
+        """Return zero-mean noise (N,) of unit spread with features of about ``wavelength_m``."""
         at = (points_m / np.asarray(wavelength_m) * 2.0).T % _LATTICE
         values: Array = map_coordinates(self._values, at, order=1, mode="grid-wrap")
         return values * 1.7
 
     def layered(self, points_m: Array, wavelength_m: float, octaves: int = 3) -> Array:
-        """Noise at halving wavelengths and amplitudes."""
+        """Return noise summed over halving wavelengths and amplitudes."""
         total = np.zeros(len(points_m))
         for octave in range(octaves):
             total += self(points_m + 0.37 * octave, wavelength_m / 2**octave) / 2**octave
@@ -33,7 +33,7 @@ class Noise:
 
 
 class Shade:
-    """How much of the sky a place sees, from how much of the body surrounds it."""
+    """Ambient light at a place, from how much of the body surrounds it."""
 
     _CELL_M: Final = 0.01
 
@@ -48,7 +48,7 @@ class Shade:
         self._far = gaussian_filter(filled, 0.06 / self._CELL_M)
 
     def __call__(self, points_m: Array, normals: Array) -> Array:
-        """(N,) factor on the colour: 1 in the open, less in folds and between limbs."""
+        """Return factors (N,) on the colour: 1 in the open, less in folds and between limbs."""
         near = self._at(self._near, points_m + 0.022 * normals)
         far = self._at(self._far, points_m + 0.060 * normals)
         light = 1.0 - 1.0 * np.maximum(near - 0.20, 0.0) - 1.1 * np.maximum(far - 0.12, 0.0)

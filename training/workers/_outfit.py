@@ -1,4 +1,4 @@
-"""Clothes of a worker, cut and labelled: shirt, collar, vest, trousers, gloves, and bare arms."""
+"""Clothes of a worker, cut and labelled: shirt, collar, vest, trousers, gloves, bare arms."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ TOPS: Final = {
     "jacket": Top(0.870, 0.540, 1.585, 0.42, 0.019),
     "overalls": Top(1.010, 0.525, 1.568, 0.30, 0.010),
 }
-#: Collars: height, how far they lean out, how far they fold down again, opening at the throat.
+#: Collars: height, outward lean, length of the fold, opening at the throat.
 _COLLARS: Final = {
     "polo": (0.026, 0.006, 0.030, 16.0),
     "shirt": (0.028, 0.006, 0.032, 14.0),
@@ -46,10 +46,10 @@ _OVERLAP_M: Final = 0.03
 
 
 class Outfit:
-    """Cuts one worker's clothes.
+    """Clothes of one worker, cut from draped cloth.
 
-    Paint and cut lines are laid out on the same clothes as the average body wears them: bands and
-    hems run level.
+    Paint and cut lines are laid out on the same clothes of the average body, so that bands and hems
+    run level.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class Outfit:
         self._normals = smooth_normals(body.vertices_m, body.triangles, neighbours, 3)
 
     def pieces(self) -> list[Piece]:
-        """Everything below the chin but the shoes."""
+        """Return all pieces below the chin except the shoes."""
         top = self._shirt()
         made = [top, self._trousers(), self._socks(), *self._hands()]
         if self._person.top in _COLLARS:
@@ -134,7 +134,7 @@ class Outfit:
         return self._piece("top", field, at_m, self._mean.shirt_m, budget, 0.008)
 
     def _tucked(self) -> Array:
-        """1 where the shirt is worn inside the trousers, 0 elsewhere and for shirts worn over."""
+        """Return 1 where the shirt is inside the trousers, 0 elsewhere."""
         inside = smoothstep(self._on_shirt.below(1.040), 0.0, 0.020)
         return inside if self._top.hem_z_m > 1.0 else np.zeros_like(inside)
 
@@ -146,17 +146,17 @@ class Outfit:
         waist = 1.040 if self._top.hem_z_m > 1.0 else self._top.hem_z_m + 0.06
         field = np.minimum(self._on_trousers.below(waist), self._at.foot())
         budget = (1100, 310, 110)
-        # Under a shirt that hangs over them trousers lie closer.
+        # Trousers lie closer under a shirt that hangs over them.
         over = self._on_trousers.canon_m[:, 2] - self._top.hem_z_m
         covered = smoothstep(over, 0.0, 0.030) * (1.0 - self._tucked().max())
         at_m = self._own.trousers_m - 0.010 * covered[:, None] * self._normals
         piece = self._piece("trousers", field, at_m, self._mean.trousers_m, budget, 0.007)
-        # Hems belong to the shank: the foot turns under them.
+        # Hems follow the shank; the foot turns under them.
         piece.weights[:, [12, 15]] = 0.0
         return piece
 
     def _collar(self) -> Piece:
-        """A strip that stands up from the shirt's neckline and folds over."""
+        """Return a strip that stands up from the shirt's neckline and folds over."""
         height, lean, fold, gap_deg = _COLLARS[self._person.top]
         part = cut(self._body.triangles, self._whole_shirt())
         own, canon = part(self._own.shirt_m), part(self._mean.shirt_m)
@@ -204,7 +204,7 @@ class Outfit:
         return self._piece("sock", ankle, self._body.vertices_m, self._at.canon_m, (140, 60, 0))
 
     def _hands(self) -> list[Piece]:
-        """Hands, bare or gloved, and what of the arms no sleeve covers."""
+        """Return the hands, bare or gloved, and the parts of the arms without a sleeve."""
         bare_m, canon = self._body.vertices_m, self._at.canon_m
         along = np.where(self._at.arm > 0.3, self._at.along_arm_m, -1.0)
         bare = along - (self._top.sleeve_m - _OVERLAP_M)

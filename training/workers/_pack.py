@@ -1,4 +1,4 @@
-"""Writes a worker in the quantised form that ``sim_tests`` loads."""
+"""Files of a worker, in the quantised form that ``sim_tests`` loads."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _JPEG: Final = (
 
 
 def pack(folder: Path, person: Person, body: Body, levels: list[Baked], capsules: list[Row]) -> int:
-    """Write ``<name>.npz`` and one JPEG a level; returns the bytes written.
+    """Write ``<name>.npz`` and one JPEG per level; return the bytes written.
 
     Vertices are kept to 0.1 mm, normals to 1/127, texture coordinates to 1/65535, weights to 1/255.
     """

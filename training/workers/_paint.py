@@ -16,7 +16,7 @@ _SILVER = np.array([206.0, 208.0, 206.0])
 
 
 class Painter:
-    """Paints one worker; places are those of the average body."""
+    """Paint of one worker; places are those of the average body."""
 
     def __init__(self, person: Person, rng: np.random.Generator) -> None:
         self._person = person
@@ -41,18 +41,18 @@ class Painter:
         }
 
     def __call__(self, samples: Samples) -> Array:
-        """(N, 3) RGB, 0 to 255."""
+        """Return colours (N, 3), RGB in 0–255."""
         rgb = self._by_label[samples.label](samples)
         shaded: Array = rgb * samples.shade[:, None]
         return shaded
 
     def _cloth(self, s: Samples, rgb: Array, folds: float, weave: float = 0.025) -> Array:
-        """Cloth with folds: across the limbs near the joints, hanging elsewhere."""
+        """Return cloth with folds, across the limbs near the joints and hanging elsewhere."""
         canon = s.canon_m
         fine = self._noise(canon, 0.004) * weave + 0.015 * self._noise.layered(canon, 0.15)
         bent = np.zeros(len(canon))
         for joint in (5, 8, 11, 14):
-            # Where the skin bends, cloth creases: most where the weight is in between.
+            # Cloth creases where the skin bends, most where the weight is in between.
             share = s.weights[:, joint]
             bent += 4.0 * share * (1.0 - share)
         waist = smoothstep(np.abs(canon[:, 2] - 1.02), 0.14, 0.0)
@@ -60,13 +60,13 @@ class Painter:
         hanging = self._ridges(canon, (0.045, 0.045, 0.26))
         crease = np.tanh(0.8 * across + 0.5 * hanging)
         light = 1.0 + folds * crease + fine
-        # Light from above: what faces down is darker.
+        # Light comes from above: surfaces that face down are darker.
         light *= 1.0 + 0.05 * s.normals[:, 2]
         shaded: Array = rgb * light[:, None]
         return shaded
 
     def _ridges(self, canon: Array, wavelength_m: tuple[float, float, float]) -> Array:
-        """Noise with narrow dark valleys between broad bright folds."""
+        """Return noise with narrow dark valleys between broad bright folds."""
         ridged: Array = 0.9 - 1.6 * np.exp(-(((self._noise(canon, wavelength_m)) / 0.45) ** 2))
         return ridged
 
@@ -134,7 +134,7 @@ class Painter:
     def _pocket(
         rgb: Array, s: Samples, y_m: float, z_m: float, half_m: float, depth_m: float
     ) -> None:
-        """The stitched outline of a patch pocket on the chest."""
+        """Paint the stitched outline of a patch pocket on the chest."""
         x, y, z = s.canon_m.T
         inside = np.maximum(np.abs(y - y_m) - half_m, np.abs(z - z_m) - depth_m)
         rgb[(np.abs(inside) < 0.0018) & (x > 0.03)] *= 0.72

@@ -22,7 +22,7 @@ _LINED_AGE: Final = 0.74
 
 
 def skin(s: Samples, person: Person, noise: Noise) -> Array:
-    """Skin of face, neck, arms and hands."""
+    """Return the skin of face, neck, arms and hands."""
     mottle = 0.025 * noise.layered(s.canon_m, 0.05) + 0.012 * noise(s.canon_m, 0.004)
     rgb: Array = np.array(person.skin, dtype=np.float64) * (1.0 + mottle)[:, None]
     if s.label != "face":
@@ -38,7 +38,7 @@ def skin(s: Samples, person: Person, noise: Noise) -> Array:
 
 
 class _Face:
-    """Paints features over skin, one after the other."""
+    """Features painted over skin, one after the other."""
 
     def __init__(self, s: Samples, person: Person, noise: Noise, rgb: Array) -> None:
         self.rgb = rgb
@@ -54,7 +54,7 @@ class _Face:
         self.rgb += (over - self.rgb) * np.clip(share, 0.0, 1.0)[:, None]
 
     def flush(self) -> None:
-        """Cheeks, tip of the nose and ears are redder."""
+        """Redden cheeks, tip of the nose and ears."""
         side, z = self._side, self._z
         red = self._base * [1.02, 0.80, 0.78]
         cheeks = np.exp(-(((side - 0.042) / 0.018) ** 2) - ((z - 1.685) / 0.016) ** 2)
@@ -63,7 +63,7 @@ class _Face:
         self._blend(red, 0.35 * smoothstep(side, 0.072, 0.080) * smoothstep(self._x, -0.02, 0.0))
 
     def shadows(self) -> None:
-        """In the orbits and under the lower lip."""
+        """Darken the orbits and the place under the lower lip."""
         side, z = self._side, self._z
         orbit = np.exp(-(((side - 0.026) / 0.018) ** 2) - ((z - 1.727) / 0.012) ** 2)
         self._blend(self._base * 0.72, 0.45 * self._front * orbit)
@@ -71,7 +71,7 @@ class _Face:
         self._blend(self._base * 0.78, 0.5 * self._front * under)
 
     def mouth(self) -> None:
-        """Lips, the dark line where they meet, and what lies behind them."""
+        """Paint lips, the dark line between them, and the inside of the mouth."""
         side, z = self._side, self._z
         upper = (z - _MOUTH_Z_M) / (0.0095 - 0.10 * side)
         lower = (_MOUTH_Z_M - z) / (0.0115 - 0.12 * side)
@@ -87,7 +87,7 @@ class _Face:
         self._blend(self._base * [0.30, 0.20, 0.19], behind * smoothstep(self._x, 0.05, 0.08))
 
     def nose(self) -> None:
-        """Nostrils and the crease about the wings."""
+        """Paint nostrils and the crease about the wings."""
         hole = np.hypot((self._side - 0.0085) / 0.0048, (self._z - 1.6765) / 0.0030)
         dark = 0.9 * self._front * smoothstep(hole, 1.1, 0.7) * smoothstep(self._x, 0.11, 0.12)
         self._blend(self._base * [0.35, 0.25, 0.22], dark)
@@ -95,7 +95,7 @@ class _Face:
         self._blend(self._base * 0.76, 0.5 * self._front * smoothstep(wing, 1.2, 0.6))
 
     def eyes(self) -> None:
-        """Lash lines about the eyes."""
+        """Paint lash lines about the eyes."""
         above = self._z > _EYE_Z_M
         lid = np.hypot(
             (self._side - _EYE_Y_M) / 0.0165, (self._z - _EYE_Z_M) / np.where(above, 0.0068, 0.0056)
@@ -104,7 +104,7 @@ class _Face:
         self._blend(self._base * 0.22, dark * self._front * np.exp(-(((lid - 1.0) / 0.14) ** 2)))
 
     def brows(self) -> None:
-        """Brows that rise and thin outwards."""
+        """Paint brows that rise and thin outwards."""
         along = (self._side - 0.012) / 0.042
         inner = np.clip(along, 0.0, 1.0)
         arch = _BROW_Z_M + 0.006 * np.sin(inner * 2.3) - 0.003 * along
@@ -115,13 +115,13 @@ class _Face:
         self._blend(self._hair * 0.75 + self._base * 0.06, 0.88 * self._front * brow)
 
     def beard(self) -> None:
-        """From stubble to a full beard."""
+        """Paint anything from stubble to a full beard."""
         grain = 0.85 + 0.3 * self._noise(self._canon, (0.004, 0.004, 0.008))
         grown = min(1.0, 0.35 + 0.65 * self._person.beard) * beard_mask(self._canon) * grain
         self._blend(self._hair * 0.85 + self._base * 0.12, grown)
 
     def lines(self) -> None:
-        """Lines of age on the forehead and from the nose to the mouth."""
+        """Paint lines of age on the forehead and from the nose to the mouth."""
         side, z = self._side, self._z
         brow = (np.abs(np.sin((z - 1.75) / 0.013 * np.pi)) > 0.985) * smoothstep(z, 1.752, 1.757)
         self._blend(self._base * 0.82, 0.5 * self._front * brow * smoothstep(side, 0.045, 0.03))
@@ -131,7 +131,7 @@ class _Face:
 
 
 def eye(s: Samples, person: Person) -> Array:
-    """White, iris and pupil by the angle from the way the eye looks."""
+    """Return white, iris and pupil by the angle to the eye's axis."""
     x, y, z = s.canon_m.T
     away = np.hypot(y, z) / np.maximum(np.linalg.norm(s.canon_m, axis=1), 1e-9)
     ahead = x > 0.0
@@ -149,7 +149,7 @@ def eye(s: Samples, person: Person) -> Array:
 
 
 def hair(s: Samples, person: Person, noise: Noise) -> Array:
-    """Strands that run down from the crown."""
+    """Return strands that run down from the crown."""
     x, y, z = s.canon_m.T
     base = np.array(person.hair_colour, dtype=np.float64)
     around = np.arctan2(y, -(x - 0.0))

@@ -1,4 +1,4 @@
-"""The workers that ship: women and men of several builds, ages and skins, in everyday work wear."""
+"""The shipped workers: women and men of several builds, ages and skins, in work wear."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from ._person import Person
 
 
 def build(amount: float, belly: float = 0.0) -> dict[str, float]:
-    """Changes of girth: 1 heavy, −1 thin; the model's own weight changes little."""
+    """Return shape changes for a girth, 1 heavy to −1 thin; the model's weight does little."""
     girths = {"waist": 0.9, "hips": 0.6, "bust": 0.5, "thigh": 0.5, "upperarm": 0.6, "neck": 0.5}
     out = {f"measure-{name}-circ-incr": amount * share for name, share in girths.items()}
     return out | {"stomach-pregnant-incr": belly, "head-fat-incr": 0.6 * amount}

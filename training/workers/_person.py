@@ -1,4 +1,4 @@
-"""What tells one worker from another."""
+"""Description of one worker."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ class Person:
     """One worker.
 
     Attributes:
-        name: of the files.
-        description: who this is, in a line.
-        stature_m: with shoes, without hat.
-        phenotype: of the body model, each in [0, 1]: gender (0 male, 1 female), age (0.66 is a
-            young adult, 1 old), muscle, weight, proportions.
+        name: name of the files.
+        description: one line about the person.
+        stature_m: height with shoes, without hat.
+        phenotype: inputs of the body model, each in [0, 1]: gender (0 male, 1 female), age (0.66
+            is a young adult, 1 old), muscle, weight, proportions.
         changes: further shape changes of the body model, in [−1, 1].
-        skin: colour.
+        skin: colour of the skin.
         hair_colour: of hair, brows and beard.
-        hair: style.
+        hair: hair style.
         beard: 0 shaved to 1 full.
-        headwear: what is on the head, and its colour.
-        glasses: whether glasses are worn.
+        headwear: kind and colour.
+        glasses: True with glasses.
         top: kind of upper garment.
         top_colour: its main colour.
         top_trim: the second colour of checks, collar, hood or bib.
         vest: colour of a hi-vis vest over it, if any.
-        trousers: colour.
-        denim: trousers are jeans.
-        reflective_legs: reflective bands about the shins.
-        shoes: colour.
-        gloves: colour, if worn.
+        trousers: colour of the trousers.
+        denim: True for jeans.
+        reflective_legs: True for reflective bands about the shins.
+        shoes: colour of the shoes.
+        gloves: colour of the gloves, if any.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""What a worker is made of: labelled surfaces that know which joints they follow."""
+"""Pieces of a worker: labelled surfaces with the weights of the joints that they follow."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ class Piece:
         vertices_m: (V, 3).
         triangles: (T, 3), counter-clockwise as seen from outside.
         weights: (V, 16) of the joints.
-        canon_m: (V, 3) the same place on the average body: paint is laid out there, so that brows
-            and pockets sit right on everybody. Pieces that are not skin deep use their own frame.
-        detail: (V,) how much denser this surface is kept when triangles are saved, 1 on average.
+        canon_m: (V, 3) the same place on the average body, where paint is laid out, so that brows
+            and pockets sit right on every body. Pieces off the skin use their own frame.
+        detail: (V,) density of the surface after simplification, 1 on average.
         budget: triangles at each level of detail; 0 leaves the piece out.
-        lip_m: how far the open edges are folded inwards; 0 leaves them open.
+        lip_m: depth of the inward fold of open edges; 0 leaves them open.
     """
 
     label: str
@@ -36,16 +36,16 @@ class Piece:
     lip_m: float = 0.0
 
     def normals(self) -> Array:
-        """(V, 3) unit normals, the mean of the triangles about a vertex weighted by their area."""
+        """Return unit normals (V, 3): means of the triangles about a vertex, weighted by area."""
         return vertex_normals(self.vertices_m, self.triangles)
 
     def moved(self, offset_m: Array) -> Piece:
-        """The same surface with every vertex moved."""
+        """Return the same surface with every vertex moved."""
         return replace(self, vertices_m=self.vertices_m + offset_m)
 
 
 def vertex_normals(vertices_m: Array, triangles: Triangles) -> Array:
-    """(V, 3) unit normals, the mean of the triangles about a vertex weighted by their area."""
+    """Return unit normals (V, 3): means of the triangles about a vertex, weighted by area."""
     corners = vertices_m[triangles]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     total = np.zeros_like(vertices_m)
@@ -55,6 +55,6 @@ def vertex_normals(vertices_m: Array, triangles: Triangles) -> Array:
 
 
 def smoothstep(value: Array, low: float, high: float) -> Array:
-    """0 below ``low``, 1 above ``high``, a smooth cubic between; ``low`` may exceed ``high``."""
+    """Return 0 below ``low``, 1 above ``high``, a cubic between; ``low`` may exceed ``high``."""
     share = np.clip((value - low) / (high - low), 0.0, 1.0)
     return share * share * (3.0 - 2.0 * share)

@@ -1,7 +1,7 @@
-"""Where things sit on the average body: the lines along which clothes are cut.
+"""Fields on the average body along whose zero lines clothes are cut.
 
-Every field is positive inside and roughly in metres of the average body (1.83 m tall), so that one
-number serves every worker.
+Every field is positive inside and roughly in metres of the average body (1.83 m tall), so that the
+same numbers serve every worker.
 """
 
 from __future__ import annotations
@@ -44,33 +44,33 @@ class Places:
         return out
 
     def above(self, z_m: float) -> Array:
-        """Higher than ``z_m``; arms count as high."""
+        """Return the field of places higher than ``z_m``; arms count as high."""
         return np.where(self.arm > 0.3, _FAR, self.canon_m[:, 2] - z_m)
 
     def below(self, z_m: float) -> Array:
-        """Lower than ``z_m``; arms count as high."""
+        """Return the field of places lower than ``z_m``; arms count as high."""
         return -self.above(z_m)
 
     def sleeve(self, length_m: float) -> Array:
-        """Arms no further than ``length_m`` from the shoulder, and all the rest."""
+        """Return the field of arms up to ``length_m`` from the shoulder, and everything else."""
         return np.where(self.arm > 0.3, length_m - self.along_arm_m, _FAR)
 
     def collar(self, z_m: float, slope: float = 0.42) -> Array:
-        """Below a ring about the neck, ``z_m`` high at the body's axis and falling to the front."""
+        """Return the field below a ring about the neck, at ``z_m`` on the axis, lower in front."""
         x, _, z = self.canon_m.T
         return np.where(self.arm > 0.6, _FAR, (z_m - slope * (x - 0.01) - z) * 0.92)
 
     def neckline_v(self, z_m: float) -> Array:
-        """Outside a V that opens from ``z_m`` on the chest."""
+        """Return the field outside a V that opens from ``z_m`` on the chest."""
         x, y, z = self.canon_m.T
         return np.where(x > 0.02, z_m + 2.1 * np.abs(y) - z, _FAR) * 0.45
 
     def armhole(self) -> Array:
-        """The trunk within the armholes of a sleeveless garment."""
+        """Return the field of the trunk within the armholes of a sleeveless garment."""
         _, y, z = self.canon_m.T
         shoulder = np.where(z > 1.40, 0.172 - np.abs(y), _FAR)
         return np.minimum(shoulder, 0.16 * (0.35 - self.arm))
 
     def foot(self) -> Array:
-        """Above the ankle."""
+        """Return the field above the ankle."""
         return self.canon_m[:, 2] - 0.105

@@ -1,4 +1,4 @@
-"""Workers drawn at random, for networks to learn from; none of them ships."""
+"""Random workers as training data of the networks; none of them ships."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from ._people import build
 from ._person import Colour, Person
 
-# A plane of skin tones: from light to dark, and how far a tone strays towards red or yellow.
+# Ends of the range of skin tones.
 _LIGHT_SKIN: Final = np.array([242.0, 202.0, 178.0])
 _DARK_SKIN: Final = np.array([70.0, 46.0, 36.0])
 _HAIR: Final = (
@@ -32,10 +32,10 @@ _FACES: Final = (
 
 
 def random_person(number: int, seed: int = 0) -> Person:
-    """Person ``number`` of a crowd; the same for the same seed.
+    """Return person ``number`` of a crowd; the same seed gives the same person.
 
-    Women and men, 18 to 70 years, 1.48 to 2.00 m, any build, skin, hair and work wear. Caps and
-    helmets are worn by half, since a head under a hat is what a warehouse shows most.
+    Women and men, 18 to 70 years, 1.48 to 2.00 m, any build, skin, hair and work wear. Half of them
+    wear caps or helmets, as most people in a warehouse do.
     """
     rng = np.random.default_rng([seed, number])
     woman = bool(rng.random() < 0.5)
@@ -46,7 +46,7 @@ def random_person(number: int, seed: int = 0) -> Person:
     hair = str(rng.choice(_STYLES, p=_styles(woman)))
     top_colour = _colour(rng)
     vest = _HI_VIS[int(rng.integers(len(_HI_VIS)))] if rng.random() < 0.45 else None
-    # As many thin as heavy: a crowd of heavy heads teaches that heads are near.
+    # As many thin as heavy people: networks trained on heavy heads only take heads for near.
     girth = float(np.clip(rng.normal(0.05, 0.45), -0.8, 1.1))
     changes = build(girth, max(0.0, 0.35 * girth * float(rng.random())))
     for name in rng.choice(_FACES, size=3, replace=False):
@@ -93,7 +93,7 @@ def _skin(rng: np.random.Generator) -> Colour:
 
 
 def _colour(rng: np.random.Generator, *, muted: bool = False) -> Colour:
-    """Any hue; clothes are more often dull or dark than bright."""
+    """Return a colour of any hue, more often dull or dark than bright."""
     saturation = rng.beta(1.2, 3.0) if muted else rng.beta(1.2, 1.6)
     value = rng.uniform(0.12, 0.6) if muted else rng.uniform(0.12, 0.95)
     return _rounded(255.0 * np.array(colorsys.hsv_to_rgb(rng.random(), saturation, value)))

@@ -10,13 +10,13 @@ import trimesh
 from ._body import Body
 from ._piece import Array, Piece, Triangles
 
-#: Thickness of the sole under the foot: the body stands that much higher.
+#: Thickness of the sole under the foot, by which the body stands higher.
 SOLE_M: Final = 0.026
 _AROUND: Final = 16
 
 
 def shoes(body: Body, average: Body) -> list[Piece]:
-    """Upper and sole of both feet; ``body`` already stands on its soles' upper side."""
+    """Return upper and sole of both feet; ``body`` already stands on top of the soles."""
     made: list[Piece] = []
     for ankle in (12, 15):
         axis, shape = _axis(body, ankle), _axis(average, ankle)
@@ -31,7 +31,7 @@ def shoes(body: Body, average: Body) -> list[Piece]:
 
 
 def _axis(body: Body, ankle: int) -> tuple[Array, Array, float, float]:
-    """Heel on the floor, forward direction, length and half width of a foot's shoe."""
+    """Return heel on the floor, forward direction, length and half width of a foot's shoe."""
     foot = body.vertices_m[body.weights[:, ankle] > 0.9]
     foot = foot[foot[:, 2] < body.joints_m[ankle, 2]]
     low = foot - foot.mean(axis=0)
@@ -45,14 +45,14 @@ def _axis(body: Body, ankle: int) -> tuple[Array, Array, float, float]:
 
 
 def _place(points: Array, heel: Array, forward: Array, length: float, half: float) -> Array:
-    """Unit shoe (length 1, half width 1, heights in metres) to the body frame."""
+    """Map a unit shoe (length 1, half width 1, heights in metres) to the body frame."""
     side = np.array([-forward[1], forward[0]])
     flat = heel + points[:, :1] * length * forward + points[:, 1:2] * half * side
     return np.column_stack([flat, points[:, 2]])
 
 
 def _half_width(x: Array) -> Array:
-    """Half width of the last along its length, 1 at the ball of the foot."""
+    """Return the half width of the last along its length, 1 at the ball of the foot."""
     return np.interp(
         x,
         [0.0, 0.03, 0.10, 0.22, 0.42, 0.56, 0.70, 0.82, 0.91, 0.97, 1.0],
@@ -61,7 +61,7 @@ def _half_width(x: Array) -> Array:
 
 
 def _height(x: Array) -> Array:
-    """Top of the upper above the floor."""
+    """Return the height of the upper above the floor."""
     return SOLE_M + np.interp(
         x,
         [0.0, 0.04, 0.12, 0.30, 0.40, 0.52, 0.66, 0.80, 0.92, 0.98, 1.0],
@@ -107,7 +107,7 @@ def _sole() -> tuple[Array, Triangles]:
 
 
 def _grid(rings: Array) -> tuple[Array, Triangles]:
-    """Triangles between neighbouring rings of points."""
+    """Return the triangles between neighbouring rings of points."""
     count, sides = rings.shape[:2]
     i, j = np.meshgrid(np.arange(count - 1), np.arange(sides - 1), indexing="ij")
     a = (i * sides + j).ravel()
@@ -118,7 +118,7 @@ def _grid(rings: Array) -> tuple[Array, Triangles]:
 
 
 def _outwards(vertices: Array, triangles: Triangles) -> Triangles:
-    """Triangles all wound the same way, those of an open shell with their backs to the floor."""
+    """Return triangles wound the same way, those of an open shell facing away from the floor."""
     shell = trimesh.Trimesh(vertices, triangles, process=False)
     trimesh.repair.fix_normals(shell)
     wound = np.asarray(shell.faces, dtype=np.int64)

@@ -1,4 +1,4 @@
-"""The robot's side of the wire: a camera that shows one rendered picture, and wheels."""
+"""Drivers of a robot on DDS: a camera that sends one rendered image, and odometry."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ from nav_adapter.ros2.messages.tf2_msgs import TFMessage
 from perception import Camera
 from sim_tests import SimError
 
-#: Odometry between two pictures at any rate: the adapter's data never grow old.
-ODOMETRY_S = 0.02
+# Short enough that the adapter's odometry is never stale, whatever the rate of the images.
+_ODOMETRY_PERIOD_S = 0.02
 _SPEED_MPS = 0.5
 
 
-class Robot:
-    """Sends what a robot's drivers send, and hears what its planners would.
+class RobotDrivers:
+    """Sends what a robot's drivers send, and receives what its planners would.
 
     Args:
-        folder: what ``awarenav render`` wrote.
+        folder: output of ``awarenav render``.
         domain: DDS domain.
         compressed: send JPEG files instead of pixels.
     """
@@ -47,8 +47,8 @@ class Robot:
         frame = _first_frame(folder)
         self.node = DdsNode(domain)
         self._image = READ["compressed" if compressed else "image"]
-        # Pictures as camera drivers send them: what is lost of a reliable one stays in the way of
-        # the next for a reader that asks for none of it again.
+        # Best effort, as camera drivers send images: lost parts of a reliable image would hold up
+        # the next one for a reader that does not ask for them again.
         self.node.advertise(self._image)
         for topic in (READ["camera_info"], READ["odom"], READ["tf_static"]):
             self.node.advertise(replace(topic, reliable=True))
@@ -66,8 +66,8 @@ class Robot:
         """Leave the domain."""
         self.node.close()
 
-    def say_where_the_camera_is(self) -> None:
-        """Send the static transform and the calibration."""
+    def send_calibration(self) -> None:
+        """Send the camera's mount (static transform) and its calibration."""
         T = self._T_base_camera
         turn = Quaternion(*Rotation.from_matrix(T[:3, :3]).as_quat().tolist())
         mount = Transform(Vector3(*T[:3, 3].tolist()), turn)
@@ -78,9 +78,9 @@ class Robot:
         info = CameraInfo(_header("camera"), *size, "plumb_bob", (), k)
         self.node.publish(READ["camera_info"], info)
 
-    def show(self) -> None:
-        """Send the picture, with the wheels' state before it."""
-        self.roll()
+    def send_image(self) -> None:
+        """Send odometry, then the image."""
+        self.send_odometry()
         if self._jpeg:
             message: Image | CompressedImage = CompressedImage(
                 _header("camera"), "jpeg", self._jpeg
@@ -90,28 +90,29 @@ class Robot:
             message = Image(_header("camera"), height, width, "bgr8", 0, 3 * width, self._bytes)
         self.node.publish_cdr(self._image, encode(message))
 
-    def roll(self) -> None:
+    def send_odometry(self) -> None:
         """Send odometry."""
         twist = TwistWithCovariance(Twist(Vector3(_SPEED_MPS, 0.0, 0.0)))
         self.node.publish(READ["odom"], Odometry(_header("odom"), "base_link", twist=twist))
-        self._odometry_due_s = time.monotonic() + ODOMETRY_S
+        self._odometry_due_s = time.monotonic() + _ODOMETRY_PERIOD_S
 
-    def listen(self, until_s: float) -> list[float]:
-        """Roll on until then, and return when each speed limit came (monotonic, s).
+    def receive_until(self, until_s: float) -> list[float]:
+        """Receive until a time, and return when each speed limit came (monotonic, s).
 
-        Everything is taken, so that the bridge sends everything; nothing is decoded.
+        Odometry is sent meanwhile. Every topic is read, so that the bridge sends every message;
+        nothing is decoded.
         """
-        heard = []
+        received_s = []
         while (left_s := until_s - time.monotonic()) > 0.0:
             self.node.wait(min(left_s, max(0.0, self._odometry_due_s - time.monotonic())))
             now = time.monotonic()
             for key, topic in PUBLISHED.items():
                 came = self.node.take_cdr(topic)
                 if key == "speed_limit":
-                    heard += [now] * len(came)
+                    received_s += [now] * len(came)
             if now >= self._odometry_due_s:
-                self.roll()
-        return heard
+                self.send_odometry()
+        return received_s
 
 
 def _first_frame(folder: Path) -> dict[str, Any]:
