@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from awarenav.drawing import awareness_colour, dot, line
+from awarenav.drawing import awareness_colour, draw_disc, draw_line
 from perception import AttentionCone, Camera
 from perception.arrays import FloatArray, ImageRgb
 
@@ -63,7 +63,7 @@ def draw_camera_view(
         colour = awareness_colour(obstacle.awareness_lower)
         for ends in itertools.pairwise(pixels(ring)):
             if _drawable(np.array(ends)):
-                line(image, np.array(ends), colour, 2)
+                draw_line(image, np.array(ends), colour, 2)
     for observation, worker in zip(frame.observations, frame.observed_workers, strict=True):
         colour = awareness_colour(observation.awareness)
         if observation.gaze_camera is not None and worker != NOBODY:
@@ -75,7 +75,7 @@ def draw_camera_view(
                 _fill(image, rim, colour, 0.16)
             axis = pixels(np.stack([eyes, eyes + _CONE_LENGTH_M * gaze]))
             if _drawable(axis):
-                line(image, axis, colour, 2)
+                draw_line(image, axis, colour, 2)
         if observation.box_xyxy_px is not None:
             left, top, right, bottom = (observation.box_xyxy_px * scale).round().astype(int)
             cv2.rectangle(
@@ -130,10 +130,10 @@ class TopView:
         image: ImageRgb = self._background.copy()
         state = frame.robot_state
         self._robot_path.append(state.position_odom_m)
-        line(image, self._pixels(np.array(self._robot_path)), _ROBOT_COLOUR, 1)
+        draw_line(image, self._pixels(np.array(self._robot_path)), _ROBOT_COLOUR, 1)
         for path, view in zip(self._worker_paths, frame.truth, strict=True):
             path.append(view.position_odom_m)
-            line(image, self._pixels(np.array(path)), _PATH_COLOUR, 1)
+            draw_line(image, self._pixels(np.array(path)), _PATH_COLOUR, 1)
         for obstacle in frame.constraints.obstacles:
             colour = awareness_colour(obstacle.awareness_lower)
             outline = self._pixels(np.asarray(obstacle.polygon.exterior.coords)[:, :2])
@@ -148,7 +148,7 @@ class TopView:
             sector = self._pixels(np.vstack([eyes, arc]))
             _fill(image, sector, awareness_colour(view.awareness), 0.3)
             centre = self._pixels(view.position_odom_m[None])
-            dot(image, centre, _PERSON_RADIUS_M * self._scale, _TEXT_COLOUR)
+            draw_disc(image, centre, _PERSON_RADIUS_M * self._scale, _TEXT_COLOUR)
         heading = state.heading_odom_rad
         rotation = np.array(
             [[math.cos(heading), -math.sin(heading)], [math.sin(heading), math.cos(heading)]]
@@ -156,13 +156,13 @@ class TopView:
         outline = self._pixels(stage.amr.profile.footprint_m @ rotation.T + state.position_odom_m)
         cv2.fillConvexPoly(image, _fixed_point(outline), _ROBOT_COLOUR, cv2.LINE_AA, _SHIFT)
         nose = np.stack([state.position_odom_m, state.position_odom_m + 0.7 * rotation[:, 0]])
-        line(image, self._pixels(nose), _ROBOT_COLOUR, 2)
+        draw_line(image, self._pixels(nose), _ROBOT_COLOUR, 2)
         self._draw_scale(image)
         return image
 
     def _draw_scale(self, image: ImageRgb) -> None:
         y_px = image.shape[0] - 14.0
-        line(image, np.array([[14.0, y_px], [14.0 + self._scale, y_px]]), _TEXT_COLOUR, 2)
+        draw_line(image, np.array([[14.0, y_px], [14.0 + self._scale, y_px]]), _TEXT_COLOUR, 2)
         _write(image, ["1 m"], (16, image.shape[0] - 18), 0.4)
 
 

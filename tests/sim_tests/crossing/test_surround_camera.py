@@ -19,7 +19,7 @@ from sim_tests import CameraRenderer, Scenario, SimError, run_crossing
 from sim_tests.crossing import CrossingResult, Stage
 from sim_tests.crossing.eyes import Eyes, KeypointNoise, SurroundEyes, make_eyes
 from sim_tests.scenario import CameraSpec, ScenarioTemplate, shipped_templates
-from sim_tests.study.runs import named_templates, plan_jobs, template_of
+from sim_tests.study.runs import named_templates, plan_jobs
 
 CONE = AttentionCone()
 # Three workers around the robot: ahead at the left, at the border of two views; behind, across the

@@ -64,7 +64,7 @@ def test_parquet_holds_the_same_records(serial):
 
 
 def test_failing_episodes_and_processes_affect_no_other(tmp_path, monkeypatch, serial):
-    """Two processes: an episode raises, one kills its process twice, one once; others are as ever."""
+    """Two processes: one planner raises, one kills its process twice, one once."""
     monkeypatch.setenv(run_planners.MARKER, str(tmp_path / "died"))
     names = ("Raises", "Dies", "DiesOnce", "Slow")
     jobs = short_jobs(4) + short_jobs(1, planners=[f"run_planners:{name}" for name in names])[::2]
