@@ -26,7 +26,6 @@ COPIED: Final = (
 )
 _BRISK: Final = "tests/nav_adapter/test_safety_brisk.py"
 _INVARIANTS: Final = "tests/nav_adapter/test_safety_invariants.py"
-_POLICY: Final = "tests/nav_adapter/test_policy_docs.py"
 _SEPARATION: Final = "tests/nav_adapter/test_separation.py"
 
 
@@ -52,7 +51,7 @@ MUTANTS: Final = (
     # Policies.
     Mutant("least_clearance", "nav_adapter/policies/_margins.py", "Field(default=0.10, ge=0.10, le=2.0)", "Field(default=0.10, ge=0.05, le=2.0)", "tests/nav_adapter/test_policy.py"),
     Mutant("unseen_sigmas", "nav_adapter/policies/_margins.py", "unseen_sigmas: float = Field(default=2.5", "unseen_sigmas: float = Field(default=2.0", "tests/nav_adapter"),
-    Mutant("unaware_human_speed", "nav_adapter/policies/_human_speed.py", "unaware_human_speed_mps: float = Field(default=1.6", "unaware_human_speed_mps: float = Field(default=1.4", _POLICY),
+    Mutant("unaware_human_speed", "nav_adapter/policies/_human_speed.py", "unaware_human_speed_mps: float = Field(default=1.6", "unaware_human_speed_mps: float = Field(default=1.4", _SEPARATION),
     Mutant("stale_after", "nav_adapter/policies/_margins.py", "stale_after_s: float = Field(default=0.5", "stale_after_s: float = Field(default=1.0", "tests/nav_adapter"),
     # Bodies and heads.
     Mutant("body_radius", "perception/anthropometry.py", "BODY_RADIUS_M: Final = 0.30", "BODY_RADIUS_M: Final = 0.25", "tests/nav_adapter tests/perception/test_body.py"),
@@ -94,7 +93,7 @@ def main(words: Sequence[str]) -> int:
 
 
 def _misfit(mutant: Mutant) -> str:
-    """What is wrong with a line of the table; empty when it fits the code."""
+    """Return what is wrong with a line of the table; empty if it fits the code."""
     count = (ROOT / mutant.file).read_text(encoding="utf-8").count(mutant.text)
     return "" if count == 1 else f"{mutant.name}: {mutant.file} has {mutant.text!r} {count} times"
 

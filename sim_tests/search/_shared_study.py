@@ -97,7 +97,7 @@ class SharedStudy(AbstractContextManager["SharedStudy"]):
 
     @property
     def is_complete(self) -> bool:
-        """Whether all trials are finished."""
+        """True if all trials are finished."""
         return self.finished_count >= self._total
 
     def finished_trials(self) -> list[optuna.trial.FrozenTrial]:

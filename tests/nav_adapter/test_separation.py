@@ -9,6 +9,7 @@ from nav_scenes import finite
 from scipy.optimize import brentq
 
 from nav_adapter import NavError, max_speed_mps, protective_separation_m
+from nav_adapter.policies import InterpolatedHumanSpeed
 
 SETTINGS = {
     "deceleration_mps2": finite(0.2, 4.0),
@@ -22,6 +23,16 @@ def test_published_figures() -> None:
         [1.0, 2.0, 3.0, 5.0], 1.6, deceleration_mps2=1.0, reaction_time_s=0.3, clearance_m=0.1
     )
     np.testing.assert_allclose(limits, [0.21, 0.64, 1.01, 1.63], atol=0.005)
+
+
+def test_an_unaware_person_walks_at_the_speed_of_iso_13855_unless_told_otherwise() -> None:
+    unaware_mps = InterpolatedHumanSpeed(unaware_below=0.3, aware_above=0.7).human_speed_mps(0.0)
+    assert unaware_mps == 1.6
+    # The robot of the published figures, 3 m from that person.
+    limit = max_speed_mps(
+        3.0, unaware_mps, deceleration_mps2=1.0, reaction_time_s=0.3, clearance_m=0.1
+    )
+    assert limit == pytest.approx(1.01, abs=0.005)
 
 
 def test_a_separation_too_small_for_a_float_gives_a_limit_of_0() -> None:

@@ -1,4 +1,4 @@
-"""What users get: the wheel's content, and the core in an environment without the simulator."""
+"""The wheel's content, and the core in an environment without the simulator."""
 
 from __future__ import annotations
 

@@ -8,8 +8,9 @@ from filterpy.kalman import KalmanFilter
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
-from tracking_scenes import white_acceleration
+from tracking_scenes import CAMERA, observe, white_acceleration
 
+from tracking import PersonTracker
 from tracking._kalman import correct
 from tracking._motion import (
     damped_process_noise,
@@ -49,6 +50,18 @@ def test_two_steps_equal_one_step(first: float, second: float, q: float) -> None
 def test_a_step_of_zero_changes_nothing() -> None:
     np.testing.assert_array_equal(transition(0.0), np.eye(4))
     np.testing.assert_array_equal(process_noise(0.0, 0.05), np.zeros((4, 4)))
+
+
+@pytest.mark.parametrize("dt_s", [0.1, 0.5, 1.0])
+def test_a_tracker_predicts_with_a_drift_of_022_mps_per_second(dt_s: float) -> None:
+    """The default acceleration density is q = 0.05 m²/s³: √(q · 1 s) = 0.22 m/s, per axis."""
+    tracker = PersonTracker()
+    for step in range(30):
+        now = 0.05 * step
+        (track,) = tracker.update([observe((4.0, 1.2 * now), now)], now, CAMERA)
+    (later,) = tracker.predict(now + dt_s)
+    F, Q = white_acceleration(dt_s, 0.05)
+    np.testing.assert_allclose(later.covariance_odom, F @ track.covariance_odom @ F.T + Q)
 
 
 def covariances(rng: np.random.Generator, count: int, size: int) -> np.ndarray:

@@ -205,6 +205,24 @@ def test_a_walker_does_not_count_as_standing() -> None:
         assert tracker.update((), now + COAST_S + 0.1, away) == ()
 
 
+@pytest.mark.parametrize(("noise_m", "least", "most"), [(0.01, 0.0, 0.4), (0.1, 0.6, 1.0)])
+def test_standing_means_a_velocity_that_the_sensor_cannot_tell_from_0(
+    noise_m: float, least: float, most: float
+) -> None:
+    """A person who walks at 0.25 m/s is remembered as standing only if the sensor is coarse."""
+    standing = []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        tracker = PersonTracker(TrackerConfig(position_noise_floor_m=noise_m), view=VIEW)
+        for step in range(40):
+            now = step * PERIOD_S
+            place = rng.normal((4.0, 0.25 * now), noise_m)
+            tracker.update([observe(place, now, covariance_odom_m2=noise_m**2)], now, CAMERA)
+        away = camera_at(yaw_rad=3.0)
+        standing.append(bool(tracker.update((), now + COAST_S + 0.1, away)))
+    assert least <= np.mean(standing) <= most
+
+
 angles = st.floats(-math.pi, math.pi)
 
 

@@ -48,7 +48,7 @@ class WorstCase:
 
     @property
     def replays(self) -> bool:
-        """Whether the file gives the margin and the contacts of the trial."""
+        """True if the file gives the margin and the contacts of the trial."""
         notes = self.trial.notes
         return (self.record.min_margin_m, self.record.robot_contacts) == (
             notes["min_margin_m"],

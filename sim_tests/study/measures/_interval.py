@@ -32,12 +32,12 @@ class Interval:
 
     @property
     def known(self) -> bool:
-        """Whether there is an estimate."""
+        """True if there is an estimate."""
         return math.isfinite(self.value)
 
     @property
     def bounded(self) -> bool:
-        """Whether the interval is finite on both sides."""
+        """True if the interval is finite on both sides."""
         return math.isfinite(self.low) and math.isfinite(self.high)
 
     def text(self, decimals: int = 2, scale: float = 1.0) -> str:

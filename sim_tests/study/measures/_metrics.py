@@ -11,7 +11,7 @@ from typing import Final, Literal
 
 @dataclass(frozen=True, slots=True)
 class Metric:
-    """How a number of an episode is named, written and judged.
+    """A number of an episode: its name, its unit and its better direction.
 
     Attributes:
         name: column of ``episodes.csv``.

@@ -10,8 +10,8 @@ from typing import Any, Final, Literal, get_args
 
 from ...world.errors import SimError
 
-#: Whether the person who came nearest was aware of the robot before the encounter, and whether the
-#: robot judged that correctly; empty when nobody came near.
+#: Awareness of the person who came nearest, before the encounter, and the robot's error about it if
+#: there is one; empty if nobody came near.
 Awareness = Literal["", "aware", "unaware", "falsely_aware", "missed_aware"]
 
 
@@ -115,12 +115,12 @@ class EpisodeRecord:
 
     @property
     def robot_touched(self) -> bool:
-        """Whether the robot moved into a person."""
+        """True if the robot moved into a person."""
         return self.robot_contacts > 0 or self.contact_by == "robot"
 
     @property
     def person_touched(self) -> bool:
-        """Whether a person walked into the robot."""
+        """True if a person walked into the robot."""
         return self.person_contacts > 0 or self.contact_by == "person"
 
 

@@ -47,7 +47,7 @@ _PLACES = {"attentive": 0, "mixed": 1, "unaware": 2}
 
 @dataclass(frozen=True)
 class MadeUpRun:
-    """What is written: episodes, their jobs in the same order, and what ``run.json`` says."""
+    """The content of a run: episodes, their jobs in the same order, and what ``run.json`` says."""
 
     records: tuple[EpisodeRecord, ...]
     jobs: tuple[Job, ...]
