@@ -15,7 +15,7 @@ Direction = Literal["higher", "lower"]
 
 
 @dataclass(frozen=True, slots=True)
-class Metric:
+class MeasuredValue:
     """A measured value.
 
     Attributes:
@@ -32,19 +32,19 @@ class Metric:
     direction: Direction
     tolerance: float
 
-    def is_worse_than(self, baseline: Metric) -> bool:
+    def is_worse_than(self, baseline: MeasuredValue) -> bool:
         """Return whether the value is worse than the baseline by more than its tolerance."""
         if baseline.direction == "higher":
             return self.value < baseline.value * (1.0 - baseline.tolerance)
         return self.value > baseline.value * (1.0 + baseline.tolerance)
 
 
-def write_baseline(path: Path, metrics: Iterable[Metric]) -> None:
+def write_baseline(path: Path, metrics: Iterable[MeasuredValue]) -> None:
     """Write metrics as a baseline file."""
     write_text(path, json_text({"metrics": [asdict(metric) for metric in metrics]}))
 
 
-def read_baseline(path: Path) -> dict[str, Metric]:
+def read_baseline(path: Path) -> dict[str, MeasuredValue]:
     """Read a baseline file; return its metrics by name.
 
     Raises:
@@ -52,7 +52,7 @@ def read_baseline(path: Path) -> dict[str, Metric]:
     """
     try:
         entries = json.loads(path.read_text(encoding="utf-8"))["metrics"]
-        return {entry["name"]: Metric(**entry) for entry in entries}
+        return {entry["name"]: MeasuredValue(**entry) for entry in entries}
     except OSError as cause:
         raise AwarenavError(
             f"cannot read the baseline {path}: {cause.strerror or cause}"
@@ -64,7 +64,9 @@ def read_baseline(path: Path) -> dict[str, Metric]:
         ) from cause
 
 
-def worse_than(baseline: Mapping[str, Metric], metrics: Iterable[Metric]) -> list[str]:
+def worse_than(
+    baseline: Mapping[str, MeasuredValue], metrics: Iterable[MeasuredValue]
+) -> list[str]:
     """Return a line for each metric that is worse than its baseline by more than its tolerance."""
     return [
         f"{metric.name}: {metric.value:.3g} {metric.unit}, {baseline[metric.name].value:.3g} before"
@@ -74,8 +76,8 @@ def worse_than(baseline: Mapping[str, Metric], metrics: Iterable[Metric]) -> lis
 
 
 def comparison_text(
-    metrics: Iterable[Metric],
-    baseline: Mapping[str, Metric],
+    metrics: Iterable[MeasuredValue],
+    baseline: Mapping[str, MeasuredValue],
     goals: Mapping[str, float] | None = None,
 ) -> tuple[str, bool]:
     """Return a table of metrics and their baseline, and whether none is worse than the baseline.

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from awarenav.baseline import Metric, read_baseline, worse_than, write_baseline
+from awarenav.baseline import MeasuredValue, read_baseline, worse_than, write_baseline
 from awarenav.errors import AwarenavError
 
 
@@ -53,7 +53,7 @@ def add_seed(parser: argparse.ArgumentParser) -> None:
 
 def parse(
     parser: argparse.ArgumentParser, arguments: Sequence[str] | None
-) -> tuple[argparse.Namespace, dict[str, Metric]]:
+) -> tuple[argparse.Namespace, dict[str, MeasuredValue]]:
     """Parse a command line and read the baseline that it names; exits with 2 for bad input."""
     options = parser.parse_args(arguments)
     if options.out is not None and not options.out.absolute().parent.is_dir():
@@ -74,9 +74,9 @@ def bad_input(parser: argparse.ArgumentParser, error: Exception) -> int:
 
 
 def finish(
-    metrics: Sequence[Metric],
+    metrics: Sequence[MeasuredValue],
     missed: Sequence[str],
-    baseline: dict[str, Metric],
+    baseline: dict[str, MeasuredValue],
     out: Path | None,
 ) -> int:
     """Print missed goals and worse figures, write the figures, and return the exit status.

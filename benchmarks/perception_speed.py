@@ -24,7 +24,7 @@ import cv2
 import numpy as np
 import onnxruntime as ort
 
-from awarenav.baseline import Metric, write_baseline
+from awarenav.baseline import MeasuredValue, write_baseline
 from awarenav.errors import AwarenavError
 from awarenav.records import read_records
 from benchmarks._harness import bad_input, count, make_parser, parse
@@ -46,7 +46,7 @@ DETECTORS = {
 
 
 @dataclass(frozen=True)
-class Frame:
+class RenderedFrame:
     """An image and the boxes (2, 4) of the two people in it."""
 
     image_rgb: Any
@@ -98,7 +98,7 @@ class TwoPeople:
         return self.detections
 
 
-def clip(frames: int) -> tuple[Camera, list[Frame]]:
+def clip(frames: int) -> tuple[Camera, list[RenderedFrame]]:
     """Render images with two people in each; return the camera and at most ``frames`` images."""
     from sim_tests.dataset import RenderConfig, render  # noqa: PLC0415 - needs the simulator
 
@@ -112,7 +112,7 @@ def clip(frames: int) -> tuple[Camera, list[Frame]]:
                 f"none of {config.frames} images shows two people; use more --frames"
             )
         return camera, [
-            Frame(
+            RenderedFrame(
                 cv2.cvtColor(cv2.imread(str(Path(folder) / record["frame"])), cv2.COLOR_BGR2RGB),
                 np.array([person["box_xyxy_px"] for person in record["people"]]),
             )
@@ -120,7 +120,7 @@ def clip(frames: int) -> tuple[Camera, list[Frame]]:
         ]
 
 
-def outside_ms(call: Callable[[Frame], Any], frames: Sequence[Frame]) -> float:
+def outside_ms(call: Callable[[RenderedFrame], Any], frames: Sequence[RenderedFrame]) -> float:
     """Return the processor milliseconds per frame outside the networks.
 
     The best of seven runs of a frame counts: other programs and cold caches can only slow it down.
@@ -145,7 +145,7 @@ def peers() -> Any | None:
     return rtmlib
 
 
-def measure(models: Path, frame_count: int) -> list[Metric]:
+def measure(models: Path, frame_count: int) -> list[MeasuredValue]:
     """Return every figure that the installed packages and files allow."""
     cv2.setNumThreads(1)
     skipped = []
@@ -172,7 +172,7 @@ def measure(models: Path, frame_count: int) -> list[Metric]:
     return metrics
 
 
-def pipeline_metrics(camera: Camera, frames: Sequence[Frame]) -> list[Metric]:
+def pipeline_metrics(camera: Camera, frames: Sequence[RenderedFrame]) -> list[MeasuredValue]:
     """Return the figures of the whole pipeline with the shipped networks."""
     pipeline, process = shipped_pipeline(camera, ONE_THREAD)
     outside = outside_ms(process, frames)
@@ -187,15 +187,17 @@ def pipeline_metrics(camera: Camera, frames: Sequence[Frame]) -> list[Metric]:
         times.append((time.perf_counter() - began) / len(frames))
     return [
         # Bare times depend on the computer; wide tolerances only catch a large change.
-        Metric("pipeline_frames_per_s_two_threads", 1.0 / min(times), "frames/s", "higher", 0.6),
-        Metric("pipeline_outside_networks", outside, "ms/frame", "lower", 1.0),
-        Metric("pipeline_in_networks_one_thread", inside, "ms/frame", "lower", 1.0),
+        MeasuredValue(
+            "pipeline_frames_per_s_two_threads", 1.0 / min(times), "frames/s", "higher", 0.6
+        ),
+        MeasuredValue("pipeline_outside_networks", outside, "ms/frame", "lower", 1.0),
+        MeasuredValue("pipeline_in_networks_one_thread", inside, "ms/frame", "lower", 1.0),
     ]
 
 
 def shipped_pipeline(
     camera: Camera, settings: OnnxSettings
-) -> tuple[AwarenessPipeline, Callable[[Frame], None]]:
+) -> tuple[AwarenessPipeline, Callable[[RenderedFrame], None]]:
     """Return a pipeline of the shipped networks, and a function that runs it on a frame."""
     detector = TwoPeople(OnnxPersonDetector(shipped_model_path(DETECTOR), settings=settings))
     pipeline = AwarenessPipeline(
@@ -205,7 +207,7 @@ def shipped_pipeline(
         OnnxHeadPoseEstimator(shipped_model_path(HEAD), settings=settings),
     )
 
-    def process(frame: Frame) -> None:
+    def process(frame: RenderedFrame) -> None:
         detector.detections = frame.detections
         pipeline.process(frame.image_rgb, 0.0)
 
@@ -213,8 +215,8 @@ def shipped_pipeline(
 
 
 def detector_metrics(
-    name: str, path: Path, peer: Any, size: tuple[int, int], frames: Sequence[Frame]
-) -> list[Metric]:
+    name: str, path: Path, peer: Any, size: tuple[int, int], frames: Sequence[RenderedFrame]
+) -> list[MeasuredValue]:
     """Return the figures of one detector, ours and the peer's."""
     detector = OnnxPersonDetector(path, settings=ONE_THREAD)
     other = peer_tool(peer, path, size)
@@ -226,7 +228,7 @@ def detector_metrics(
     )
 
 
-def pose_metrics(rtmlib: Any, frames: Sequence[Frame]) -> list[Metric]:
+def pose_metrics(rtmlib: Any, frames: Sequence[RenderedFrame]) -> list[MeasuredValue]:
     """Return the figures of the shipped pose network, ours and the peer's."""
     path = shipped_model_path(POSE)
     estimator = OnnxPoseEstimator(path, settings=ONE_THREAD)
@@ -238,15 +240,17 @@ def pose_metrics(rtmlib: Any, frames: Sequence[Frame]) -> list[Metric]:
     )
 
 
-def compared(name: str, ours_ms: float, theirs_ms: float) -> list[Metric]:
+def compared(name: str, ours_ms: float, theirs_ms: float) -> list[MeasuredValue]:
     """Return our time outside the network, and its ratio to the peer's."""
     return [
-        Metric(f"{name}_outside_network", ours_ms, "ms/frame", "lower", 1.0),
-        Metric(f"{name}_outside_over_rtmlib", ours_ms / theirs_ms, "x", "lower", 0.5),
+        MeasuredValue(f"{name}_outside_network", ours_ms, "ms/frame", "lower", 1.0),
+        MeasuredValue(f"{name}_outside_over_rtmlib", ours_ms / theirs_ms, "x", "lower", 0.5),
     ]
 
 
-def report(metrics: Sequence[Metric], baseline: dict[str, Metric]) -> tuple[str, bool]:
+def report(
+    metrics: Sequence[MeasuredValue], baseline: dict[str, MeasuredValue]
+) -> tuple[str, bool]:
     """Return the figures as text beside the baseline, and whether all are good enough."""
     lines = [f"{'figure':42s}{'now':>10s}{'baseline':>10s}  unit"]
     good = True

@@ -8,7 +8,7 @@ import sys
 import pytest
 from paths import ROOT
 
-from awarenav.baseline import Metric
+from awarenav.baseline import MeasuredValue
 
 SCRIPT = ROOT / "benchmarks" / "perception_speed.py"
 
@@ -35,7 +35,7 @@ def test_a_higher_cost_than_the_peer_fails_without_a_baseline(benchmark, ours_ms
 
 
 def test_a_figure_worse_than_the_baseline_fails(benchmark):
-    before = {"speed": Metric("speed", 40.0, "frames/s", "higher", 0.5)}
+    before = {"speed": MeasuredValue("speed", 40.0, "frames/s", "higher", 0.5)}
     for value, good in ((30.0, True), (10.0, False)):
-        now = [Metric("speed", value, "frames/s", "higher", 0.5)]
+        now = [MeasuredValue("speed", value, "frames/s", "higher", 0.5)]
         assert benchmark.report(now, before)[1] is good

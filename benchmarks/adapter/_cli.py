@@ -8,7 +8,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from awarenav.baseline import Metric
+from awarenav.baseline import MeasuredValue
 
 from .._harness import add_seed, count, finish, make_parser, parse
 from ._cost import CYCLE, cost_ms
@@ -56,25 +56,27 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return finish(metrics, _missed(costs, metrics), baseline, options.out)
 
 
-def _metrics(costs: dict[int, dict[str, float]]) -> list[Metric]:
+def _metrics(costs: dict[int, dict[str, float]]) -> list[MeasuredValue]:
     few, more, most = PEOPLE
     slope_ms = (costs[more]["cycle"] - costs[few]["cycle"]) / (more - few)
     steeper_ms = (costs[most]["cycle"] - costs[more]["cycle"]) / (most - more)
     return [
         # A bare time depends on the computer; the wide tolerance only catches a large change.
-        Metric("adapter_20_cycle", costs[few]["cycle"], "ms", "lower", 1.0),
-        Metric(
+        MeasuredValue("adapter_20_cycle", costs[few]["cycle"], "ms", "lower", 1.0),
+        MeasuredValue(
             "adapter_20_costmap_over_naive",
             costs[few]["costmap"] / costs[few]["naive"],
             "x",
             "lower",
             0.5,
         ),
-        Metric("adapter_a_person_more_500_over_100", steeper_ms / slope_ms, "x", "lower", 0.5),
+        MeasuredValue(
+            "adapter_a_person_more_500_over_100", steeper_ms / slope_ms, "x", "lower", 0.5
+        ),
     ]
 
 
-def _missed(costs: dict[int, dict[str, float]], metrics: list[Metric]) -> list[str]:
+def _missed(costs: dict[int, dict[str, float]], metrics: list[MeasuredValue]) -> list[str]:
     missed = []
     cycle_ms = costs[PEOPLE[0]]["cycle"]
     if cycle_ms > MAX_CYCLE_MS:

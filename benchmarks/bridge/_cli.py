@@ -7,7 +7,7 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from awarenav.baseline import Metric
+from awarenav.baseline import MeasuredValue
 from awarenav.cli import main as awarenav
 from awarenav.errors import AwarenavError
 
@@ -56,7 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return finish(metrics, missed, baseline, options.out)
 
 
-def _metrics(options: argparse.Namespace) -> list[Metric]:
+def _metrics(options: argparse.Namespace) -> list[MeasuredValue]:
     # Imported late so that the help works without the extra ros2.
     from ._measure import measure  # noqa: PLC0415
 
@@ -69,9 +69,9 @@ def _metrics(options: argparse.Namespace) -> list[Metric]:
     print(f"{figures.people} of {options.people} people confirmed")
     # Bare figures depend on the computer; wide tolerances only catch a large change.
     return [
-        Metric("bridge_pictures_per_s", figures.frames_per_s, "1/s", "higher", 0.3),
-        Metric("bridge_latency", figures.latency_ms, "ms", "lower", 0.5),
-        Metric("bridge_cpu_per_picture", figures.cpu_ms, "ms", "lower", 0.5),
+        MeasuredValue("bridge_pictures_per_s", figures.frames_per_s, "1/s", "higher", 0.3),
+        MeasuredValue("bridge_latency", figures.latency_ms, "ms", "lower", 0.5),
+        MeasuredValue("bridge_cpu_per_picture", figures.cpu_ms, "ms", "lower", 0.5),
     ]
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from ._consistency import Consistency, on_own_model, on_walkers, white_acceleration_walk
 from ._contender import Contender, run
-from ._judges import GATE_M, Scores, TrackedFrame, judge
-from ._measurements import OCCLUDED, OPEN, Recording, SensorSettings, record
+from ._judges import GATE_M, TrackedFrame, TrackingScores, judge
+from ._measurements import OCCLUDED, OPEN, SensorSettings, SimulatedRecording, record
 from ._walkers import WalkerSettings, walk
 
 __all__ = [
@@ -14,10 +14,10 @@ __all__ = [
     "OPEN",
     "Consistency",
     "Contender",
-    "Recording",
-    "Scores",
     "SensorSettings",
+    "SimulatedRecording",
     "TrackedFrame",
+    "TrackingScores",
     "WalkerSettings",
     "judge",
     "on_own_model",

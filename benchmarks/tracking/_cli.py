@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from awarenav.baseline import Metric
+from awarenav.baseline import MeasuredValue
 from tracking import TrackerConfig, TrackingError
 
 from .._harness import bad_input, count, finish, make_parser, parse
@@ -27,7 +27,7 @@ from ._figures import (
     score_line,
     score_metrics,
 )
-from ._judges import Scores, judge
+from ._judges import TrackingScores, judge
 from ._measurements import OCCLUDED, OPEN, record
 from ._naive import Naive
 from ._norfair import Norfair
@@ -62,7 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             "or leave out the scores (--parts cost,consistency)"
         )
     makers = _makers(options.trackers, config)
-    metrics: list[Metric] = []
+    metrics: list[MeasuredValue] = []
     missed: list[str] = []
     if "scores" in options.parts:
         _scores(options, makers, metrics, missed)
@@ -194,7 +194,7 @@ def _affordable(
 def _scores(
     options: argparse.Namespace,
     makers: dict[str, Callable[[], Contender]],
-    metrics: list[Metric],
+    metrics: list[MeasuredValue],
     missed: list[str],
 ) -> None:
     """Judge the trackers on every set and number of people."""
@@ -202,7 +202,7 @@ def _scores(
     for name in options.sets:
         for people in options.people:
             chosen = _affordable(options, makers, people)
-            scores: dict[str, list[Scores]] = {tracker: [] for tracker in chosen}
+            scores: dict[str, list[TrackingScores]] = {tracker: [] for tracker in chosen}
             with tqdm(
                 total=options.seeds * len(chosen),
                 desc=f"{name}, {people} people",
@@ -231,7 +231,7 @@ def _scores(
 def _cost(
     options: argparse.Namespace,
     makers: dict[str, Callable[[], Contender]],
-    metrics: list[Metric],
+    metrics: list[MeasuredValue],
     missed: list[str],
 ) -> None:
     """Compare the processor time of the trackers."""
@@ -249,7 +249,10 @@ def _cost(
 
 
 def _consistency(
-    options: argparse.Namespace, config: TrackerConfig, metrics: list[Metric], missed: list[str]
+    options: argparse.Namespace,
+    config: TrackerConfig,
+    metrics: list[MeasuredValue],
+    missed: list[str],
 ) -> None:
     """Check the covariance of our tracker."""
     wide = open_gates(config)
@@ -270,4 +273,4 @@ def _consistency(
         recording = record(20, 200, np.random.default_rng([options.seed, 20]), SETS[name])
         for key, value in on_walkers(recording, config).items():
             print(f"walkers, {name}: {key.replace('_', ' ')}: {value:.2f}")
-            metrics.append(Metric(f"{name}_20_{key}", value, "1", "lower", 0.3))
+            metrics.append(MeasuredValue(f"{name}_20_{key}", value, "1", "lower", 0.3))

@@ -11,7 +11,7 @@ from scipy.stats import chi2
 from perception import PersonObservation
 from tracking import PersonTracker, TrackerConfig
 
-from ._measurements import Recording
+from ._measurements import SimulatedRecording
 from ._ours import T_ODOM_CAMERA, observation
 from ._walkers import FloatArray
 
@@ -106,7 +106,7 @@ def open_gates(config: TrackerConfig) -> TrackerConfig:
     )
 
 
-def on_walkers(recording: Recording, config: TrackerConfig) -> dict[str, float]:
+def on_walkers(recording: SimulatedRecording, config: TrackerConfig) -> dict[str, float]:
     """Return mean NEES of position (2) and of position and velocity (4) on simulated people.
 
     Each person is tracked alone, without clutter: the motion model is judged, not association.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, Protocol
 
 from ._judges import TrackedFrame
-from ._measurements import Recording
+from ._measurements import SimulatedRecording
 
 #: Time for which every tracker keeps an unseen person: slightly more than the longest spell out of
 #: sight. Settings that the trackers do not share are tuned for each, on seeds that are not judged.
@@ -21,7 +21,7 @@ class Contender(Protocol):
 
     name: str
 
-    def begin(self, recording: Recording) -> None:
+    def begin(self, recording: SimulatedRecording) -> None:
         """Start over, on this recording."""
 
     def advance(self, frame: int) -> Any:
@@ -31,7 +31,7 @@ class Contender(Protocol):
         """Return the confirmed people, seen in this frame or not."""
 
 
-def run(contender: Contender, recording: Recording) -> list[TrackedFrame]:
+def run(contender: Contender, recording: SimulatedRecording) -> list[TrackedFrame]:
     """Return the tracks of every frame of a recording."""
     contender.begin(recording)
     return [contender.report(contender.advance(i)) for i in range(len(recording.stamps_s))]

@@ -9,11 +9,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from ._contender import Contender
-from ._measurements import Recording
+from ._measurements import SimulatedRecording
 
 
 def cost_ms(
-    contenders: Sequence[Contender], recording: Recording, repeats: int
+    contenders: Sequence[Contender], recording: SimulatedRecording, repeats: int
 ) -> dict[str, float]:
     """Return the median processor milliseconds per frame of each tracker.
 

@@ -7,9 +7,9 @@ from dataclasses import asdict
 
 import numpy as np
 
-from awarenav.baseline import Metric
+from awarenav.baseline import MeasuredValue
 
-from ._judges import Scores
+from ._judges import TrackingScores
 
 #: Targets of our tracker with 20 people: least MOTA, least IDF1, most switches (seed means).
 TARGETS = {"open": (0.985, 0.95, 4.0), "occluded": (0.94, 0.72, 35.0)}
@@ -25,7 +25,7 @@ SCORE_HEADER = (
 )
 
 
-def score_line(name: str, people: int, tracker: str, scores: Sequence[Scores]) -> str:
+def score_line(name: str, people: int, tracker: str, scores: Sequence[TrackingScores]) -> str:
     """Return one tracker's row: mean over seeds ± standard deviation."""
 
     def mean(field: str) -> float:
@@ -42,22 +42,26 @@ def score_line(name: str, people: int, tracker: str, scores: Sequence[Scores]) -
     )
 
 
-def score_metrics(name: str, people: int, tracker: str, scores: Sequence[Scores]) -> list[Metric]:
+def score_metrics(
+    name: str, people: int, tracker: str, scores: Sequence[TrackingScores]
+) -> list[MeasuredValue]:
     """Return a tracker's figures for the baseline."""
     key = f"{name}_{people}_{tracker}"
     mean = {
         field: float(np.mean([asdict(s)[field] for s in scores])) for field in asdict(scores[0])
     }
     return [
-        Metric(f"{key}_mota", mean["mota"], "1", "higher", 0.005),
-        Metric(f"{key}_idf1", mean["idf1"], "1", "higher", 0.03),
-        Metric(f"{key}_hota", mean["hota"], "1", "higher", 0.03),
+        MeasuredValue(f"{key}_mota", mean["mota"], "1", "higher", 0.005),
+        MeasuredValue(f"{key}_idf1", mean["idf1"], "1", "higher", 0.03),
+        MeasuredValue(f"{key}_hota", mean["hota"], "1", "higher", 0.03),
         # Switches are rare, so their number scatters.
-        Metric(f"{key}_switches", mean["switches"], "switches/run", "lower", 0.5),
+        MeasuredValue(f"{key}_switches", mean["switches"], "switches/run", "lower", 0.5),
     ]
 
 
-def missed_scores(name: str, people: int, tracker: str, scores: Sequence[Scores]) -> list[str]:
+def missed_scores(
+    name: str, people: int, tracker: str, scores: Sequence[TrackingScores]
+) -> list[str]:
     """Return the targets that our tracker misses in one set, one line each."""
     if tracker != "ours" or people != 20 or name not in TARGETS:
         return []
@@ -73,10 +77,10 @@ def missed_scores(name: str, people: int, tracker: str, scores: Sequence[Scores]
     return missed
 
 
-def cost_metrics(people: int, cost_ms: Mapping[str, float]) -> list[Metric]:
+def cost_metrics(people: int, cost_ms: Mapping[str, float]) -> list[MeasuredValue]:
     """Return ratios of our processor time to each peer's; bare times depend on the computer."""
     return [
-        Metric(f"cost_{people}_over_{peer}", cost_ms["ours"] / value, "x", "lower", 0.4)
+        MeasuredValue(f"cost_{people}_over_{peer}", cost_ms["ours"] / value, "x", "lower", 0.4)
         for peer, value in cost_ms.items()
         if peer != "ours" and "ours" in cost_ms
     ]

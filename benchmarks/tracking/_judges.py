@@ -29,7 +29,7 @@ class TrackedFrame:
 
 
 @dataclass(frozen=True, slots=True)
-class Scores:
+class TrackingScores:
     """Figures of one whole run.
 
     Attributes:
@@ -66,7 +66,7 @@ class Scores:
         return f"the judges differ by {mota:.4f} in MOTA and {idf1:.4f} in IDF1"
 
 
-def judge(truth: FloatArray, tracked: Sequence[TrackedFrame]) -> Scores:
+def judge(truth: FloatArray, tracked: Sequence[TrackedFrame]) -> TrackingScores:
     """Judge tracks against truth (T, N, ≥ 2); every person counts in every frame, seen or not."""
     distances = [
         cdist(people[:, :2], frame.positions_m) if len(frame.ids) else np.empty((len(people), 0))
@@ -74,7 +74,7 @@ def judge(truth: FloatArray, tracked: Sequence[TrackedFrame]) -> Scores:
     ]
     clear = _motmetrics(truth, tracked, distances)
     other = _trackeval(truth, tracked, distances)
-    return Scores(**clear, **other)
+    return TrackingScores(**clear, **other)
 
 
 def _motmetrics(

@@ -36,7 +36,7 @@ OCCLUDED = SensorSettings(seen_mean_s=2.5)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Recording:
+class SimulatedRecording:
     """Truth and measurements of one run, the same for every tracker.
 
     Attributes:
@@ -64,7 +64,7 @@ def record(
     rng: np.random.Generator,
     sensor: SensorSettings = OPEN,
     walkers: WalkerSettings | None = None,
-) -> Recording:
+) -> SimulatedRecording:
     """Simulate a crowd and measure it."""
     walkers = walkers or WalkerSettings()
     stamps_s = np.arange(frames) / sensor.rate_hz
@@ -80,7 +80,7 @@ def record(
         count = int(rng.poisson(sensor.clutter_per_m2 * side_m**2))
         clutter_m = rng.uniform(0.0, side_m, (count, 2))
         measured.append(rng.permutation(np.concatenate([people_m, clutter_m])))
-    return Recording(
+    return SimulatedRecording(
         stamps_s,
         truth,
         visible,

@@ -11,7 +11,7 @@ from scipy.optimize import linear_sum_assignment
 
 from ._contender import MAX_UNSEEN_S
 from ._judges import TrackedFrame
-from ._measurements import Recording
+from ._measurements import SimulatedRecording
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,9 +48,9 @@ class Naive:
         self._settings = settings or NaiveSettings()
         self._tracks: list[_Track] = []
         self._next = 1
-        self._recording: Recording | None = None
+        self._recording: SimulatedRecording | None = None
 
-    def begin(self, recording: Recording) -> None:
+    def begin(self, recording: SimulatedRecording) -> None:
         """Start over, on this recording."""
         self._tracks, self._next, self._recording = [], 1, recording
         dt, q = float(np.diff(recording.stamps_s).mean()), self._settings.acceleration_density_m2ps3

@@ -9,7 +9,7 @@ import numpy as np
 
 from ._contender import MAX_UNSEEN_S
 from ._judges import TrackedFrame
-from ._measurements import Recording
+from ._measurements import SimulatedRecording
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ class Norfair:
     def __init__(self, settings: NorfairSettings | None = None) -> None:
         self._settings = settings or NorfairSettings()
 
-    def begin(self, recording: Recording) -> None:
+    def begin(self, recording: SimulatedRecording) -> None:
         """Start over, on this recording; norfair counts frames, not seconds."""
         from norfair import Detection, Tracker  # noqa: PLC0415 - an optional peer
         from norfair.filter import OptimizedKalmanFilterFactory  # noqa: PLC0415

@@ -11,7 +11,7 @@ from tracking import PersonTracker, TrackerConfig
 
 from ._contender import MAX_UNSEEN_S
 from ._judges import TrackedFrame
-from ._measurements import Recording
+from ._measurements import SimulatedRecording
 
 #: A camera 8 m up that looks straight down: its x is odom's x, its y is against odom's y.
 T_ODOM_CAMERA = np.array(
@@ -52,7 +52,7 @@ class Ours:
         self._stamps_s: list[float] = []
         self._frames: list[tuple[PersonObservation, ...]] = []
 
-    def begin(self, recording: Recording) -> None:
+    def begin(self, recording: SimulatedRecording) -> None:
         """Start over, on this recording."""
         self._tracker = PersonTracker(self._config)
         self._stamps_s = recording.stamps_s.tolist()

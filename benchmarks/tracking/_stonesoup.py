@@ -11,7 +11,7 @@ import numpy as np
 
 from ._contender import MAX_UNSEEN_S
 from ._judges import TrackedFrame
-from ._measurements import Recording
+from ._measurements import SimulatedRecording
 
 _BEGIN = datetime.datetime(2024, 1, 1)
 
@@ -45,7 +45,7 @@ class StoneSoup(ABC):
     def __init__(self, settings: StoneSoupSettings | None = None) -> None:
         self._settings = settings or StoneSoupSettings()
 
-    def begin(self, recording: Recording) -> None:
+    def begin(self, recording: SimulatedRecording) -> None:
         """Start over, on this recording."""
         from stonesoup.dataassociator.neighbour import GNNWith2DAssignment  # noqa: PLC0415
         from stonesoup.deleter.time import UpdateTimeStepsDeleter  # noqa: PLC0415
@@ -119,7 +119,7 @@ class StoneSoup(ABC):
 
     @abstractmethod
     def _tracker(
-        self, parts: dict[str, Any], nearest: Any, predictor: Any, recording: Recording
+        self, parts: dict[str, Any], nearest: Any, predictor: Any, recording: SimulatedRecording
     ) -> Any:
         """Return the tracker made of these parts."""
 
@@ -142,7 +142,7 @@ class StoneSoupGnn(StoneSoup):
     name = "stonesoup-gnn"
 
     def _tracker(
-        self, parts: dict[str, Any], nearest: Any, predictor: Any, recording: Recording
+        self, parts: dict[str, Any], nearest: Any, predictor: Any, recording: SimulatedRecording
     ) -> Any:
         from stonesoup.tracker.simple import MultiTargetTracker  # noqa: PLC0415
 
@@ -158,7 +158,7 @@ class StoneSoupJpda(StoneSoup):
     name = "stonesoup-jpda"
 
     def _tracker(
-        self, parts: dict[str, Any], nearest: Any, predictor: Any, recording: Recording
+        self, parts: dict[str, Any], nearest: Any, predictor: Any, recording: SimulatedRecording
     ) -> Any:
         from stonesoup.dataassociator.probability import JPDAwithLBP  # noqa: PLC0415
         from stonesoup.hypothesiser.probability import PDAHypothesiser  # noqa: PLC0415

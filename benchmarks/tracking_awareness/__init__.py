@@ -8,7 +8,7 @@ from ._cli import judge, main, make_set, missed_targets
 from ._filters import HistogramFilter, LogitGaussian, Smoothed, hold_latest
 from ._scores import (
     FALSE_SHARE,
-    Scores,
+    AwarenessScores,
     onset_times_s,
     release_times_s,
     score,
@@ -19,10 +19,10 @@ from ._scores import (
 __all__ = [
     "FALSE_SHARE",
     "Attention",
+    "AwarenessScores",
     "HistogramFilter",
     "LogitGaussian",
     "Measured",
-    "Scores",
     "Smoothed",
     "autoregressive",
     "directions",

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from tqdm import tqdm
 
-from awarenav.baseline import Direction, Metric
+from awarenav.baseline import Direction, MeasuredValue
 from tracking import AwarenessFilterConfig, TrackerConfig
 
 from .._harness import finish, make_parser, parse
@@ -20,7 +20,7 @@ from ._attention import Attention, FloatArray, simulate
 from ._camera import Measured, measure, track
 from ._filters import Filter, HistogramFilter, LogitGaussian, Smoothed, hold_latest
 from ._plot import plot
-from ._scores import FALSE_SHARE, Scores, score, threshold_for
+from ._scores import FALSE_SHARE, AwarenessScores, score, threshold_for
 
 BASELINE: Final = Path(__file__).with_name("baseline.json")
 RATES_HZ: Final = (10.0, 20.0, 30.0)
@@ -84,7 +84,7 @@ def make_set(seed: int, rate_hz: float, people: int, duration_s: float) -> Simul
     return SimulatedSet(rate_hz, attention, measure(attention, rng))
 
 
-def judge(data: SimulatedSet, lower: FloatArray, threshold: float) -> Scores:
+def judge(data: SimulatedSet, lower: FloatArray, threshold: float) -> AwarenessScores:
     """Return the scores of a lower bound on a set."""
     measured = data.measured
     return score(
@@ -97,14 +97,14 @@ def judge(data: SimulatedSet, lower: FloatArray, threshold: float) -> Scores:
     )
 
 
-def missed_targets(scores: Scores) -> list[str]:
+def missed_targets(scores: AwarenessScores) -> list[str]:
     """Return the names of the figures outside their wanted range; NaN is outside."""
     return [
         name for name, (low, high) in TARGETS.items() if not low <= getattr(scores, name) <= high
     ]
 
 
-def metrics(rate_hz: float, scores: Scores) -> list[Metric]:
+def metrics(rate_hz: float, scores: AwarenessScores) -> list[MeasuredValue]:
     """Return the tracker's figures for the baseline; they do not depend on the computer."""
     found = []
     for name in TARGETS:
@@ -114,11 +114,11 @@ def metrics(rate_hz: float, scores: Scores) -> list[Metric]:
         value = float(getattr(scores, name))
         # One frame for times, two per cent for shares.
         tolerance = 0.02 if unit == "share" else 1.0 / (rate_hz * max(value, 1.0 / rate_hz))
-        found.append(Metric(f"{rate_hz:g}hz_{name}", value, unit, direction, tolerance))
+        found.append(MeasuredValue(f"{rate_hz:g}hz_{name}", value, unit, direction, tolerance))
     return found
 
 
-def table_row(name: str, threshold: float, scores: Scores) -> str:
+def table_row(name: str, threshold: float, scores: AwarenessScores) -> str:
     """Return one row of the table."""
     values = (getattr(scores, field.name) for field in fields(scores))
     return f"{name:46s}{threshold:7.3f}" + "".join(f"{value:10.3f}" for value in values)
@@ -134,7 +134,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the benchmark; return 0 for success, 1 for a missed target or a worse figure."""
     options, baseline = _parse(arguments)
     judged = {OURS: contenders()[OURS]} if options.only_ours else contenders()
-    found: list[Metric] = []
+    found: list[MeasuredValue] = []
     faults: list[str] = []
     with tqdm(total=len(RATES_HZ) * len(judged), unit="filter", file=sys.stderr) as bar:
         for rate_hz in RATES_HZ:
@@ -163,7 +163,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return finish(found, faults, baseline, options.out)
 
 
-def _parse(arguments: Sequence[str] | None) -> tuple[argparse.Namespace, dict[str, Metric]]:
+def _parse(arguments: Sequence[str] | None) -> tuple[argparse.Namespace, dict[str, MeasuredValue]]:
     """Return the options of the command line and the baseline that they name."""
     parser = make_parser(
         "benchmarks.tracking_awareness",

@@ -22,7 +22,7 @@ TURN_AWAY_S: Final = 0.4
 
 
 @dataclass(frozen=True, slots=True)
-class Scores:
+class AwarenessScores:
     """Figures of one filter; shares in [0, 1].
 
     Attributes:
@@ -63,14 +63,14 @@ def score(
     evident: BoolArray,
     lower: FloatArray,
     threshold: float,
-) -> Scores:
+) -> AwarenessScores:
     """Return the scores of a lower bound; stamps (T,), everything else (T, N)."""
     above = lower > threshold
     long_unseen = time_unseen_s(stamps_s, seen) > UNSEEN_S
     covered = truth >= lower
     onsets = onset_times_s(stamps_s, truth, seen, above)
     releases = release_times_s(stamps_s, truth, seen, above)
-    return Scores(
+    return AwarenessScores(
         coverage=_share(covered, evident),
         coverage_partial=_share(covered, evident & (truth > 0.0)),
         false_share=_share(above, truth < UNAWARE),

@@ -11,7 +11,7 @@ from typing import Final
 
 from tqdm import tqdm
 
-from awarenav.baseline import Metric, comparison_text, read_baseline, write_baseline
+from awarenav.baseline import MeasuredValue, comparison_text, read_baseline, write_baseline
 from awarenav.files import json_text
 
 from ..crossing import run_crossing
@@ -26,7 +26,7 @@ GOALS: Final = {
 }
 
 
-def measure(repeats: int = 3) -> tuple[Metric, ...]:
+def measure(repeats: int = 3) -> tuple[MeasuredValue, ...]:
     """Time crossings on this machine; the best of ``repeats`` counts, since other load only slows.
 
     The reference runs in the same process: PyBullet stepping the empty hall, faster than any
@@ -49,7 +49,7 @@ def measure(repeats: int = 3) -> tuple[Metric, ...]:
         pixels = best(("crossing_attentive",), "pixels")
     return (
         _factor("crossing_truth_real_time_factor", truth),
-        Metric(
+        MeasuredValue(
             "crossing_truth_cost_over_bare_physics",
             truth[1] / truth[0] / physics,
             "x",
@@ -58,7 +58,7 @@ def measure(repeats: int = 3) -> tuple[Metric, ...]:
         ),
         _factor("encounter_60hz_truth_real_time_factor", encounter),
         _factor("crossing_keypoints_real_time_factor", keypoints),
-        Metric(
+        MeasuredValue(
             "crossing_keypoints_cost_over_bare_physics",
             keypoints[1] / keypoints[0] / physics,
             "x",
@@ -70,9 +70,9 @@ def measure(repeats: int = 3) -> tuple[Metric, ...]:
     )
 
 
-def _factor(name: str, run: tuple[float, float]) -> Metric:
+def _factor(name: str, run: tuple[float, float]) -> MeasuredValue:
     # The speed depends on the machine; the wide tolerance only detects large changes.
-    return Metric(name, run[0] / run[1], "x real time", "higher", 0.6)
+    return MeasuredValue(name, run[0] / run[1], "x real time", "higher", 0.6)
 
 
 def _time_bare_physics() -> float:

@@ -10,7 +10,7 @@ import pytest
 from benchmarks.tracking import (
     OCCLUDED,
     OPEN,
-    Recording,
+    SimulatedRecording,
     WalkerSettings,
     record,
     walk,
@@ -27,7 +27,7 @@ def truth() -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def occluded() -> Recording:
+def occluded() -> SimulatedRecording:
     return record(20, 600, np.random.default_rng(4), OCCLUDED)
 
 
@@ -85,7 +85,7 @@ def test_noise_is_as_large_as_set_and_measurements_come_in_random_order() -> Non
     assert len(set(first)) == 5
 
 
-def test_spells_out_of_sight_last_as_long_as_set(occluded: Recording) -> None:
+def test_spells_out_of_sight_last_as_long_as_set(occluded: SimulatedRecording) -> None:
     lengths = []
     for shown in occluded.visible.T:
         edges = np.flatnonzero(np.diff(shown.astype(int)))

@@ -13,7 +13,7 @@ from perception.anthropometry import MEAN_STATURE_M
 from perception.body import place_bodies
 from perception.layouts import LEFT_HIP, RIGHT_HIP
 
-from ._samples import Frame, picture, read_shards
+from ._samples import ImageSample, picture, read_shards
 
 # Least visible keypoints of a person who counts.
 _MIN_KEYPOINTS: Final = 12
@@ -49,7 +49,7 @@ def limb_scale(
     return scale, float(np.sqrt(max(spread**2 - known**2, 0.0)))
 
 
-def _range_errors(estimator: OnnxPoseEstimator, frames: list[Frame]) -> Iterator[float]:
+def _range_errors(estimator: OnnxPoseEstimator, frames: list[ImageSample]) -> Iterator[float]:
     """Yield logarithms of estimated over true range of the middle of the hips."""
     for frame in frames:
         people = [p for p in frame.people if p.visible.sum() >= _MIN_KEYPOINTS]

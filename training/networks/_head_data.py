@@ -14,7 +14,7 @@ from perception.networks.heads import ray_axes, ray_stretch
 from ._augment import covered, degraded, inside_of, warp, with_surroundings
 from ._batch import Batch, stacked
 from ._head_sample import LEAST_SEEN, SIZE, HeadSample, cropped
-from ._samples import HEAD_SIDE_M, Frame, Patch, PersonTruth, picture, read_shards
+from ._samples import HEAD_SIDE_M, ImageSample, Patch, PersonTruth, picture, read_shards
 
 #: Part of an image kept around a head, as a share of the crop's side.
 _REACH: Final = 0.95
@@ -113,7 +113,9 @@ def _of_patch(patch: Patch) -> HeadSample | None:
     )
 
 
-def _of_frame(frame: Frame, image: NDArray[np.uint8], person: PersonTruth) -> HeadSample | None:
+def _of_frame(
+    frame: ImageSample, image: NDArray[np.uint8], person: PersonTruth
+) -> HeadSample | None:
     height, width = image.shape[:2]
     principal = (width / 2.0, height / 2.0)
     return _sample(image, (0, 0), (width, height), (frame.focal_px, *principal), person)
@@ -178,7 +180,7 @@ def _hide(sample: dict[str, Any], rng: np.random.Generator, other: NDArray[np.ui
 
 
 def _elsewhere(
-    frame: Frame, image: NDArray[np.uint8], rng: np.random.Generator
+    frame: ImageSample, image: NDArray[np.uint8], rng: np.random.Generator
 ) -> Iterable[NDArray[np.uint8]]:
     """Yield squares of an image without a head in their middle; about half of them on bodies."""
     height, width = image.shape[:2]

@@ -48,7 +48,7 @@ class PersonTruth:
 
 
 @dataclass(frozen=True)
-class Frame:
+class ImageSample:
     """A whole image (PNG) and the people in it."""
 
     png: bytes

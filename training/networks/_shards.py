@@ -26,7 +26,7 @@ from sim_tests.dataset import RenderConfig, RenderScene, random_pose
 from sim_tests.world import keypoints_in_front
 
 from ._recipe import Recipe
-from ._samples import HEAD_SIDE_M, Frame, Patch, PersonTruth
+from ._samples import HEAD_SIDE_M, ImageSample, Patch, PersonTruth
 
 _BODY: Final = 17
 _SIZES: Final = ((640, 480), (640, 480), (640, 480), (848, 480), (800, 600))
@@ -103,7 +103,7 @@ def _config(recipe: Recipe, workers: tuple[str, ...], rng: np.random.Generator) 
     )
 
 
-def _frame(hall: RenderScene, rng: np.random.Generator) -> Frame:
+def _frame(hall: RenderScene, rng: np.random.Generator) -> ImageSample:
     """Return a whole image with its truth."""
     camera = hall.camera
     T_odom_camera = hall.arrange(rng)
@@ -115,7 +115,7 @@ def _frame(hall: RenderScene, rng: np.random.Generator) -> Frame:
         truth = _truth(hall, worker, T_odom_camera, view, (0, 0))
         if truth is not None:
             people.append(truth)
-    return Frame(_packed(view.rgb), tuple(people), camera.fx_px)
+    return ImageSample(_packed(view.rgb), tuple(people), camera.fx_px)
 
 
 def _patches(

@@ -1,4 +1,4 @@
-"""Odometry that is delayed, lost, or wrong about the mounting of the camera."""
+"""OdometryReading that is delayed, lost, or wrong about the mounting of the camera."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _EARLY_S: Final = 1.0e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Odometry:
+class OdometryReading:
     """An odometry message: the robot's state, and the pose of its camera (4, 4)."""
 
     state: RobotState
@@ -41,13 +41,13 @@ class FaultyOdometry:
         self._fault = fault
         self._T_camera_assumed = T_camera_assumed
         self._first_outage_s = float(rng.uniform(0.0, fault.lost_odometry.every_s))
-        self._arriving: deque[Odometry] = deque()
-        self._known: Odometry | None = None
+        self._arriving: deque[OdometryReading] = deque()
+        self._known: OdometryReading | None = None
 
-    def update(self, state: RobotState, T_odom_camera: FloatArray) -> Odometry:
+    def update(self, state: RobotState, T_odom_camera: FloatArray) -> OdometryReading:
         """Take the true state; return what the robot knows then. Stamps grow from call to call."""
         now_s = state.stamp_s
-        self._arriving.append(Odometry(state, T_odom_camera))
+        self._arriving.append(OdometryReading(state, T_odom_camera))
         outage = self._fault.lost_odometry
         lost = outage.holds(now_s, self._first_outage_s)
         latest_s = now_s - self._fault.odometry_delay_s + _EARLY_S
