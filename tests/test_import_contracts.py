@@ -22,7 +22,7 @@ PLANTED = {
         "from nav_adapter import NavError",
     ),
     "sim_tests: search > study | demo > crossing > scenario | dataset > actors > world": (
-        "sim_tests/world/_sight.py",
+        "sim_tests/world/_visibility.py",
         "from ..crossing import run_crossing",
     ),
     "sim_tests.world: camera > warehouse > render | sightlines > hall": (

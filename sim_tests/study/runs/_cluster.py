@@ -40,6 +40,10 @@ _LEAN: Final = {
     "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": None,
 }
 
+# Even without a dashboard the scheduler serves its status by HTTP, by default on port 8787, which
+# another cluster on this computer may have.
+_FREE_PORT: Final = {"dashboard_address": "127.0.0.1:0"}
+
 # A physics world belongs to one thread at a time, even in a worker with several threads.
 _one_at_a_time = threading.Lock()
 
@@ -72,6 +76,7 @@ def run_on_cluster(
                     threads_per_worker=1,
                     processes=True,
                     dashboard_address=None,
+                    scheduler_kwargs=_FREE_PORT,
                 )
         client = Client(cluster if cluster is not None else scheduler, timeout=_CONNECT_S)
     except (OSError, ValueError, ImportError) as cause:

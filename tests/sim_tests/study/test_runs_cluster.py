@@ -1,7 +1,9 @@
 """The same episodes on a Dask cluster whose workers are killed."""
 
+import contextlib
 import os
 import signal
+import socket
 import threading
 
 import pytest
@@ -24,7 +26,11 @@ pytestmark = [
 @pytest.fixture
 def cluster():
     with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+        n_workers=2,
+        threads_per_worker=1,
+        processes=True,
+        dashboard_address=None,
+        scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},
     ) as running:
         yield running
 
@@ -67,6 +73,16 @@ def test_a_run_on_a_local_cluster_ends_without_log_messages(tmp_path, capfd, mon
     captured = capfd.readouterr()
     # The workers are processes of their own.
     assert "distributed" not in captured.err + captured.out
+
+
+def test_a_local_cluster_needs_no_fixed_port(tmp_path, capfd):
+    with socket.socket() as first:
+        with contextlib.suppress(OSError):  # something else may listen on it already
+            first.bind(("127.0.0.1", 8787))
+            first.listen()
+        records = run_jobs(short_jobs(1), tmp_path / "run", workers=1, scheduler="local")
+    assert all(record.success for record in records)
+    assert "8787" not in capfd.readouterr().err
 
 
 def test_a_scheduler_that_does_not_answer_is_refused(tmp_path, monkeypatch):
