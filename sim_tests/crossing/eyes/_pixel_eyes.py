@@ -12,7 +12,7 @@ from scipy.optimize import linear_sum_assignment
 from perception import AwarenessPipeline, Camera, FloorPlane, PersonObservation
 from perception.arrays import FloatArray
 
-from ...world.camera import CameraTiming, PictureRenderer, SensorConfig, SimulatedCamera
+from ...world.camera import CameraTiming, ImageRenderer, SensorConfig, SimulatedCamera
 from ...world.errors import SimError
 from .._stage import Stage, TrueView
 from ._eyes import NOBODY, WorkerObservations
@@ -52,7 +52,7 @@ class PixelEyes:
         sensor: SensorConfig,
         rng: np.random.Generator,
         pipeline: AwarenessPipeline,
-        renderer: PictureRenderer | None = None,
+        renderer: ImageRenderer | None = None,
         T_camera_assumed: FloatArray | None = None,
     ) -> None:
         self._stage = stage

@@ -6,7 +6,7 @@ from ._coarse_scenery import FINE_PX_PER_M, CoarseSceneryRenderer
 from ._motion_blur import motion_blur, motion_field
 from ._renderer import CameraRenderer, RenderedView
 from ._sensor import SensorConfig, collected_electrons, expose, to_linear, to_srgb
-from ._simulated_camera import CameraFrame, PictureRenderer, SimulatedCamera
+from ._simulated_camera import CameraFrame, ImageRenderer, SimulatedCamera
 from ._timing import CameraTiming, FrameClock, FrameQueue
 
 __all__ = [
@@ -17,7 +17,7 @@ __all__ = [
     "CoarseSceneryRenderer",
     "FrameClock",
     "FrameQueue",
-    "PictureRenderer",
+    "ImageRenderer",
     "RenderedView",
     "SensorConfig",
     "SimulatedCamera",

@@ -50,7 +50,7 @@ class CameraFrame:
         return np.isin(self.actors, self.people)
 
 
-class PictureRenderer(Protocol):
+class ImageRenderer(Protocol):
     """Renders the image of a camera."""
 
     def render(self, camera: Camera, T_odom_camera: Any) -> RenderedView:
@@ -81,7 +81,7 @@ class SimulatedCamera:
         sensor: SensorConfig | None = None,
         timing: CameraTiming | None = None,
         rng: np.random.Generator | None = None,
-        renderer: PictureRenderer | None = None,
+        renderer: ImageRenderer | None = None,
     ) -> None:
         self._warehouse = warehouse
         self._camera = camera
@@ -93,9 +93,7 @@ class SimulatedCamera:
         # Noise and timing have a generator each, so that one never changes the other.
         self._noise_rng, timing_rng = (rng or np.random.default_rng(0)).spawn(2)
         self._clock = FrameClock(timing, timing_rng)
-        self._renderer: PictureRenderer = (
-            CameraRenderer(warehouse) if renderer is None else renderer
-        )
+        self._renderer: ImageRenderer = CameraRenderer(warehouse) if renderer is None else renderer
         self._queue: FrameQueue[CameraFrame] = FrameQueue()
         self._last: tuple[float, FloatArray, dict[int, FloatArray]] | None = None
 
