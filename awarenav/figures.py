@@ -20,8 +20,8 @@ try:
     from PIL import Image  # a dependency of matplotlib
 except ImportError as cause:  # pragma: no cover - depends on the installation
     raise MissingExtraError(
-        "a plot needs matplotlib, which is not installed; it is part of the extra 'sim': "
-        "pip install 'awarenav[sim]'. Without it, only tables can be made (--out none)"
+        "a plot needs matplotlib, which is not installed; it is the extra 'plot': "
+        "pip install 'awarenav[plot]'. Without it, only tables can be made (--out none)"
     ) from cause
 
 __all__ = [

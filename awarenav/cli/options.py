@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
 
 import click
+from click.core import ParameterSource
 from click.shell_completion import CompletionItem
 
 from ._command import Decorator, option
@@ -78,6 +80,40 @@ def out_file(
         metavar=metavar,
         help=help,
     )
+
+
+def plot_file(default: str, help: str) -> Decorator:
+    """Add ``--out``: the file of a plot, or ``none``.
+
+    Without matplotlib the default is ``none``, with a remark; a file that is asked for is an error.
+    """
+
+    def without_matplotlib(context: click.Context, parameter: click.Parameter, out: Path) -> Path:
+        chosen = context.get_parameter_source(str(parameter.name)) is not ParameterSource.DEFAULT
+        if chosen or context.resilient_parsing or _is_installed("matplotlib"):
+            return out
+        print(
+            f"{context.command_path}: no plot, since matplotlib is not installed: "
+            "pip install 'awarenav[plot]'",
+            file=sys.stderr,
+        )
+        return Path("none")
+
+    return option(
+        "--out",
+        type=FilePath(),
+        default=default,
+        metavar="FILE.png|svg|pdf|none",
+        callback=without_matplotlib,
+        help=f"{help} Needs matplotlib.",
+    )
+
+
+def _is_installed(module: str) -> bool:
+    try:
+        return find_spec(module) is not None
+    except ValueError:  # the module is blocked
+        return False
 
 
 def resume() -> Decorator:

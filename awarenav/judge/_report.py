@@ -138,7 +138,7 @@ def markdown_report(metrics: dict[str, Any], limits: JudgeLimits | None = None) 
         (
             "people reported where nobody is, or twice",
             f"{detection['false_positives']} "
-            f"({_value_text(detection['false_positives_per_frame'], '')} a frame)",
+            f"({_value_text(detection['false_positives_per_frame'], '')} per frame)",
         ),
         ("found people without a gaze", _value_text(overall["gaze_none"], "%")),
         ("found people without an α", _value_text(overall["awareness_none"], "%")),

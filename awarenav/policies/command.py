@@ -20,8 +20,7 @@ def policy() -> None:
         "awarenav policy show blind balanced mine.yaml --max-speed 1.2 --out mine.svg",
     ],
     exit_status={0: "Success.", 2: "Bad input; nothing was written."},
-    epilog="The presets are blind, conservative, balanced and assertive. The drawing needs "
-    "matplotlib.",
+    epilog="The presets are blind, conservative, balanced and assertive.",
 )
 @argument(
     "policies",
@@ -31,7 +30,7 @@ def policy() -> None:
     shell_complete=options.COMPLETE_POLICIES,
     help="Presets, or YAML files.",
 )
-@options.out_file("policy.png", "The drawing; replaces the file.", "FILE.png|svg|pdf|none")
+@options.plot_file("policy.png", "The drawing; replaces the file.")
 @options.as_json()
 @option("--max-speed", type=NUMBER, default=1.5, metavar="M/S", help="The robot's maximum speed.")
 @option("--deceleration", type=NUMBER, default=1.0, metavar="M/S²", help="The robot's braking.")

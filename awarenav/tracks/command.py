@@ -18,10 +18,9 @@ from ..cli import POSITIVE, FilePath, argument, command, option, options
         2: "Bad input; nothing was written.",
         130: "Interrupted.",
     },
-    epilog="The plot needs matplotlib.",
 )
 @argument("file", type=FilePath(), metavar="FILE.jsonl", help="Estimates, or rendered truth.")
-@options.out_file("tracks.png", "The plot; replaces the file.", "FILE.png|svg|pdf|none")
+@options.plot_file("tracks.png", "The plot; replaces the file.")
 @options.as_json()
 @option(
     "--csv", type=FilePath(), metavar="FILE", help="Also write every track at every frame as CSV."

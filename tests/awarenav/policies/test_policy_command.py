@@ -111,7 +111,7 @@ sys.exit(main(["policy", "show", "balanced", "--out", {out!r}]))
     [
         (["pybullet", "av"], "a.png", 0, ""),
         (["pybullet", "av", "matplotlib"], "none", 0, ""),
-        (["pybullet", "av", "matplotlib"], "a.png", 2, "needs matplotlib"),
+        (["pybullet", "av", "matplotlib"], "a.png", 2, "awarenav[plot]"),
     ],
 )
 def test_no_simulator_is_needed(blocked, out, status, said, tmp_path):
@@ -126,3 +126,15 @@ def test_no_simulator_is_needed(blocked, out, status, said, tmp_path):
     assert done.returncode == status, done.stderr
     assert said in done.stderr
     assert (tmp_path / "a.png").exists() is (status == 0 and out != "none")
+
+
+def test_without_matplotlib_the_table_is_printed_and_a_remark_says_why_there_is_no_plot(
+    monkeypatch, capsys, tmp_path
+):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    monkeypatch.chdir(tmp_path)
+    assert main(["policy", "show", "balanced"]) == 0
+    printed = capsys.readouterr()
+    assert printed.out.startswith("balanced\n")
+    assert "awarenav[plot]" in printed.err
+    assert list(tmp_path.iterdir()) == []
