@@ -14,7 +14,8 @@ PLANNERS = {
     "ir-sim": ("irsim", "velocity_obstacles", "VelocityObstaclePlanner"),
     "do-mpc": ("do_mpc", "model_predictive", "ModelPredictivePlanner"),
 }
-SLOW = pytest.param("do-mpc", marks=pytest.mark.slow)
+# An episode of this planner also runs in tests/sim_tests/study/test_runs_plan.py.
+FULL = pytest.param("do-mpc", marks=pytest.mark.full)
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +26,7 @@ def examples() -> Iterator[None]:
     sys.path.remove(str(ROOT))
 
 
-@pytest.fixture(scope="module", params=["ir-sim", SLOW])
+@pytest.fixture(scope="module", params=["ir-sim", FULL])
 def rows(request, examples):
     """Crossings with nobody, an aware worker, an unaware one, and one with a wider radius."""
     package, module, name = PLANNERS[request.param]

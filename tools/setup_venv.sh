@@ -91,7 +91,8 @@ make_venv() {
     fi
 }
 
-# The lock names every package, so nothing is resolved here: --no-deps keeps it that way.
+# The lock names every package, so nothing is resolved here: --no-deps keeps it that way. pip would
+# compile every module, which takes as long as all the rest; Python compiles those that it imports.
 install() {
     : >"$INCOMPLETE"
     rm -f "$STAMP"
@@ -101,7 +102,8 @@ install() {
         uv pip install --quiet --python "$VENV/bin/python" --no-deps --no-build-isolation -e .
     else
         say "installing the pinned packages with pip (a minute or two)"
-        "$VENV/bin/python" -m pip install --disable-pip-version-check --no-input --no-deps -r "$LOCK"
+        "$VENV/bin/python" -m pip install --disable-pip-version-check --no-input --no-deps \
+            --no-compile -r "$LOCK"
         "$VENV/bin/python" -m pip install --disable-pip-version-check --no-input --quiet \
             --no-deps --no-build-isolation -e .
     fi

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from ._association import Gates, associate
 from ._awareness_update import update_awareness
@@ -46,7 +46,8 @@ class TrackerState:
 def gates_of(config: TrackerConfig) -> Gates:
     """Return the gates that a config describes."""
     return Gates(
-        mahalanobis2=float(chi2.ppf(config.gate_probability, df=2)),
+        # χ² with two degrees of freedom; scipy.stats would take most of the package's import time.
+        mahalanobis2=float(2.0 * gammaincinv(1.0, config.gate_probability)),
         distance_m=config.gate_distance_m,
         miss_cost=config.miss_cost,
         ambiguity_margin=config.ambiguity_margin,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from perception.arrays import FloatArray
 
@@ -22,7 +22,8 @@ _ZERO: Final = 1.0e-9
 _TRIVIAL: Final = 0.01
 # Probability of a normal error within one standard deviation.
 _ONE_SIGMA: Final = math.erf(math.sqrt(0.5))
-_NEES_1SIGMA: Final = float(chi2.ppf(_ONE_SIGMA, df=3))
+# χ² with three degrees of freedom.
+_NEES_1SIGMA: Final = float(2.0 * gammaincinv(1.5, _ONE_SIGMA))
 
 
 @dataclass(frozen=True, slots=True)

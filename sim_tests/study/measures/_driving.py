@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from perception.arrays import FloatArray
 
@@ -80,6 +79,9 @@ def peak_deceleration_and_jerk(
     window = _window_samples(dt_s)
     if len(t_s) < window:
         return None, None
+    # Takes longer to import than the rest of the package; processes that only read runs do without.
+    from scipy.signal import savgol_filter  # noqa: PLC0415
+
     whole = slice(window // 2, len(t_s) - window // 2)
     slope, curvature = (
         savgol_filter(speeds_mps, window, _DEGREE, deriv=order, delta=dt_s)[whole]

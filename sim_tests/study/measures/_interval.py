@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from scipy.stats import beta
+from scipy.special import betaincinv
 
 from perception.arrays import finite_number
 
@@ -91,8 +91,8 @@ def proportion_interval(count: int, n: int, level: float = 0.95) -> Interval:
     if count == n:
         return Interval(1.0, 1.0 - zero_of_n_upper(n, level), 1.0, n)
     tail = 0.5 * (1.0 - level)
-    low = float(beta.ppf(tail, count, n - count + 1))
-    high = float(beta.ppf(1.0 - tail, count + 1, n - count))
+    low = float(betaincinv(count, n - count + 1, tail))
+    high = float(betaincinv(count + 1, n - count, 1.0 - tail))
     return Interval(count / n, low, high, n)
 
 

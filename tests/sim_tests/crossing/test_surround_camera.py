@@ -168,7 +168,14 @@ def run_counted(name: str) -> tuple[CrossingResult, Counter[str]]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["crowd_of_eight", "standing_in_aisle"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param("crowd_of_eight", marks=pytest.mark.full),
+        "two_people_one_aware",
+        "standing_in_aisle",
+    ],
+)
 def test_in_a_crossing_each_person_is_reported_once(name: str) -> None:
     """People in several views are reported once, and people in one view are rarely lost."""
     result, tally = run_counted(name)

@@ -11,7 +11,7 @@ from genuine_detectors import MODELS, REQUIRED, GenuineDetector, iou
 from sim_tests.actors.body import worker_names
 from sim_tests.dataset import RenderConfig, RenderScene
 
-CONFIG = RenderConfig(frames=72, scenes=12, people=3, seed=7)
+CONFIG = RenderConfig(frames=72, scenes=6, people=3, seed=7)
 MAX_OCCLUSION = 0.2
 LEAST_SCORE = 0.25
 MAX_FALSE_SHARE = 0.03
@@ -47,7 +47,13 @@ def images() -> list[LabelledImage]:
     return images
 
 
-@pytest.mark.parametrize("name", REQUIRED)
+# The largest network takes as long as the other two and the rendering.
+_NETWORKS = [
+    pytest.param(name, marks=pytest.mark.full if "640" in name else ()) for name in REQUIRED
+]
+
+
+@pytest.mark.parametrize("name", _NETWORKS)
 def test_a_network_trained_on_photographs_detects_the_workers(
     name: str, images: list[LabelledImage]
 ) -> None:

@@ -20,7 +20,7 @@ FRAMES = 100
 def held_out(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder of rendered images and the estimates of the shipped networks."""
     folder = tmp_path_factory.mktemp("held_out")
-    size = ["--frames", str(FRAMES), "--scenes", "10", "--range", "1.5", "6", "--eyes", "ahead"]
+    size = ["--frames", str(FRAMES), "--scenes", "5", "--range", "1.5", "6", "--eyes", "ahead"]
     halls = ["--layouts", "crossing", "staging_hall", "--seed", "77"]
     assert main(["render", *size, *halls, "--out", str(folder)]) == 0
     networks = ["--overlay", "none", "--min-score", "0.01"]
