@@ -12,7 +12,8 @@ ATTENTIVE = Scenario.shipped("crossing_attentive")
 DISTRACTED = Scenario.shipped("crossing_distracted")
 
 
-PIXELS = pytest.param("pixels", marks=pytest.mark.slow)
+# The test below runs the crossing of the attentive worker in pixels, a quarter of this.
+PIXELS = pytest.param("pixels", marks=pytest.mark.full)
 
 
 @pytest.fixture(scope="module", params=["truth", "keypoints", PIXELS])
@@ -25,6 +26,16 @@ def comparison(request):
         run_crossing(ATTENTIVE, policy="balanced", **options),
         run_crossing(DISTRACTED, policy="balanced", **options),
     )
+
+
+@pytest.mark.slow
+def test_in_pixels_awareness_of_an_attentive_worker_saves_time():
+    blind = run_crossing(ATTENTIVE, policy="blind", seed=3)
+    result = run_crossing(ATTENTIVE, policy="balanced", perception="pixels", seed=3)
+    assert result.success
+    assert not result.contact
+    assert result.violation_time_s == 0.0
+    assert result.time_to_goal_s < blind.time_to_goal_s - 1.0
 
 
 def test_all_reach_the_goal_and_the_robot_touches_nobody(comparison):

@@ -81,12 +81,12 @@ def test_chosen_tests_run_their_episodes_alone(folder):
     [
         (["--awarenav-planner", "nowhere:Planner"], "No module named 'nowhere'"),
         pytest.param(
-            ["--awarenav-policy", "brave"], "preset must be one of", marks=pytest.mark.slow
+            ["--awarenav-policy", "brave"], "preset must be one of", marks=pytest.mark.full
         ),
         pytest.param(
             ["--awarenav-episodes", "none"],
             "--awarenav-episodes must be a whole number",
-            marks=pytest.mark.slow,
+            marks=pytest.mark.full,
         ),
     ],
 )
