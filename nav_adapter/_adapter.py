@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from perception.arrays import finite_number
@@ -21,6 +21,10 @@ from ._robot import RobotProfile, RobotState
 
 # Tolerated difference between the clocks of two computers, or of a camera and a control loop.
 _CLOCK_TOLERANCE_S = 0.05
+# Positions, speeds and standard deviations beyond these are errors of whoever sent them. Numbers a
+# little larger would overflow in the geometry.
+_MOST_M = 1e8
+_MOST_MPS = 1e4
 
 
 class NavAdapter:
@@ -91,8 +95,10 @@ class NavAdapter:
             alerts, the most urgent first.
 
         Raises:
-            NavError: for input of the wrong type or not finite, an id that occurs twice, a stamp
-                before the last one, or data from the future. The adapter does not change then.
+            NavError: for input of the wrong type or not finite, a position or standard deviation
+                beyond 1e8 m, a speed beyond 10 km/s, an id that occurs twice, a stamp before the
+                last one, or data from the future. After this or any other error the adapter is as
+                it was before the call.
         """
         now = self._checked_stamp(stamp_s)
         current = _checked_tracks(tracks, now)
@@ -112,6 +118,7 @@ class NavAdapter:
             # After a pause in the updates nobody counts as aware any more.
             people = self._rules.after_silence(people)
         people = self._rules.updated(people, current, now, stale)
+        _refuse_absurd(people)
         limit = self._governor.limit(people, robot_state, now, robot_age_s)
         for name, age_s in (("perception", perception_age_s), ("robot state", robot_age_s)):
             if age_s > timing.stop_after_s:
@@ -142,7 +149,7 @@ class NavAdapter:
             alerts=alerts,
             braking_suffices=limit.braking_suffices,
         )
-        # Nothing can fail from here on. A refusal above leaves the adapter unchanged.
+        # Nothing can fail from here on. An error above leaves the adapter unchanged.
         self._people = people
         self._alert_history = alert_history
         self._latest = constraints
@@ -227,3 +234,21 @@ def _checked_tracks(tracks: Iterable[PersonTrack], now: float) -> tuple[PersonTr
         ids.add(track.id)
         _age_s(f"tracks[{index}].stamp_s", track.stamp_s, now)
     return checked
+
+
+def _refuse_absurd(people: Mapping[int, PersonMemory]) -> None:
+    """Refuse people whose finite numbers are too large for any person."""
+    for track_id, person in people.items():
+        x_m, y_m = person.position_odom_m
+        vx_mps, vy_mps = person.velocity_odom_mps
+        place_m, speed_mps = max(abs(x_m), abs(y_m)), max(abs(vx_mps), abs(vy_mps))
+        # A NaN, which an overflow may leave, fails the comparison too.
+        for name, value, most, unit in (
+            ("position_odom_m", place_m, _MOST_M, "m"),
+            ("velocity_odom_mps", speed_mps, _MOST_MPS, "m/s"),
+            ("the standard deviation of covariance_odom", person.sigma_m, _MOST_M, "m"),
+        ):
+            if not value <= most:
+                raise NavError(
+                    f"track {track_id}: {name} must be at most {most:g} {unit}, got {value:g}"
+                )
