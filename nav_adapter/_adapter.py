@@ -21,9 +21,9 @@ from ._robot import RobotProfile, RobotState
 
 # Tolerated difference between the clocks of two computers, or of a camera and a control loop.
 _CLOCK_TOLERANCE_S = 0.05
-# Positions, speeds and standard deviations beyond these are errors of whoever sent them. Numbers a
-# little larger would overflow in the geometry.
-_MOST_M = 1e8
+# Positions, speeds and standard deviations beyond these are errors of whoever sent them. Beyond
+# 1e15 m a circle's corners fall together.
+_MOST_M = 1e12
 _MOST_MPS = 1e4
 
 
@@ -96,7 +96,7 @@ class NavAdapter:
 
         Raises:
             NavError: for input of the wrong type or not finite, a position or standard deviation
-                beyond 1e8 m, a speed beyond 10 km/s, an id that occurs twice, a stamp before the
+                beyond 1e12 m, a speed beyond 10 km/s, an id that occurs twice, a stamp before the
                 last one, or data from the future. After this or any other error the adapter is as
                 it was before the call.
         """
