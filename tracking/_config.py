@@ -87,7 +87,18 @@ class TrackerConfig(StrictConfig):
     """Share of a person's true measurements that pass the Mahalanobis gate."""
 
     gate_distance_m: float = Field(default=1.0, gt=0.0)
-    """Largest distance of a measurement from the predicted position of its track."""
+    """Largest distance of a measurement from the predicted position of its track. With a slow camera
+    it is 3 ``initial_velocity_std_mps`` times the interval between frames, if that is more."""
+
+    detection_probability: float = Field(default=0.9, ge=0.01, le=0.999)
+    """P_D, the share of frames that report a person in sight."""
+
+    detection_correlation_s: float = Field(default=0.15, ge=0.0)
+    """Frames closer than this share their errors, clutter included, and count in proportion."""
+
+    confirm_logit: float = Field(default=2.3)
+    """A track is confirmed once the log-likelihood ratio of its detections to clutter exceeds this
+    minus ln(time between frames / 1 s), …"""
 
     miss_cost: float = Field(default=10.0)
     """Cost of leaving a track and a measurement unmatched, in units of d² + ln det S (S in m²):
@@ -106,18 +117,19 @@ class TrackerConfig(StrictConfig):
     each other, a wrong match would otherwise reverse both velocities."""
 
     confirm_hits: int = Field(default=4, ge=1, le=20)
-    """Number of frames (distinct stamps) that must show a person to confirm the track, …"""
+    """… or once this many frames (distinct stamps) have shown the person …"""
 
     confirm_window_s: float = Field(default=0.5, gt=0.0)
     """… within this time, or within ``confirm_hits`` + 1 frame intervals of a slow camera."""
 
     max_tentative_gap_s: float = Field(default=0.12, ge=0.0)
-    """A tentative track unseen for longer than this is deleted. Each gets at least one more frame,
-    however slow the camera is."""
+    """A tentative track unseen for longer than this is deleted, or after as many missed frames in a
+    row as happen to 1 % of people by chance: two at the default ``detection_probability``."""
 
     max_missed_s: float = Field(default=1.2, gt=0.0)
     """A confirmed track is deleted after this time in which frames should have shown it and did
-    not. Needs a view: without one it is unknown which people should be visible."""
+    not, which needs a view; or if it was last seen at an exit that the tracker has learned and walks
+    away from the camera."""
 
     max_coast_s: float = Field(default=3.0, ge=0.0, le=60.0)
     """A confirmed track unseen for longer than this is deleted, whatever the reason, …"""

@@ -13,13 +13,14 @@ from perception.arrays import FloatArray, covariance_matrix, rigid_transform
 
 from ._config import TrackerConfig
 from ._errors import TrackingError
+from ._exits import MAX_EVENTS, Exits
 from ._measurement import Frame, Measurements
 from ._step import TrackerState
 from ._table import TrackTable
 from .config import StrictConfig
 
 FORMAT: Final = "awarenav-tracker"
-VERSION: Final = 1
+VERSION: Final = 2
 
 _Two: TypeAlias = tuple[float, float]
 _Four: TypeAlias = tuple[float, float, float, float]
@@ -39,6 +40,10 @@ class _TracksRecord(StrictConfig):
     confirmed: list[bool]
     standing: list[bool]
     missed_s: list[float]
+    existence_logits: list[float]
+    birth_stamps_s: list[float]
+    birth_places_camera_m: list[_Two]
+    last_places_camera_m: list[_Two]
 
     @model_validator(mode="after")
     def _check_consistency(self) -> _TracksRecord:
@@ -52,11 +57,27 @@ class _TracksRecord(StrictConfig):
         return self
 
 
+class _ExitsRecord(StrictConfig):
+    """:class:`Exits` as plain values."""
+
+    places_camera_m: list[_Two] = Field(max_length=MAX_EVENTS)
+    returned: list[bool]
+    start_s: float | None
+
+    @model_validator(mode="after")
+    def _check_consistency(self) -> _ExitsRecord:
+        if len(self.places_camera_m) != len(self.returned):
+            raise ValueError("places_camera_m and returned must be of one length")
+        return self
+
+
 class _StateRecord(StrictConfig):
     """A :class:`TrackerState` as plain values."""
 
     stamp_s: float | None
     interval_s: float | None
+    period_s: float | None = Field(gt=0.0)
+    exits: _ExitsRecord
     next_id: int = Field(ge=1, lt=2**63)
     tracks: _TracksRecord
 
@@ -105,7 +126,7 @@ class TrackerRecord(StrictConfig):
     """A tracker without its view, but with the frames that may still be replayed."""
 
     format: Literal["awarenav-tracker"]
-    version: Literal[1]
+    version: Literal[2]
     config: TrackerConfig
     refused_late_frames: int = Field(ge=0)
     base: _StateRecord
@@ -195,9 +216,20 @@ def state_of(record: _StateRecord, confirm_hits: int, name: str) -> TrackerState
         confirmed=np.array(tracks.confirmed, dtype=np.bool_),
         standing=np.array(tracks.standing, dtype=np.bool_),
         missed_s=_array(tracks.missed_s),
+        existence_logits=_array(tracks.existence_logits),
+        birth_stamps_s=_array(tracks.birth_stamps_s),
+        birth_places_camera_m=_array(tracks.birth_places_camera_m).reshape(count, 2),
+        last_places_camera_m=_array(tracks.last_places_camera_m).reshape(count, 2),
+    )
+    events = record.exits
+    exits = Exits(
+        _array(events.places_camera_m).reshape(-1, 2),
+        np.array(events.returned, dtype=np.bool_),
+        math.nan if events.start_s is None else events.start_s,
     )
     interval_s = math.inf if record.interval_s is None else record.interval_s
-    return TrackerState(table, record.next_id, record.stamp_s, interval_s)
+    period_s = math.inf if record.period_s is None else record.period_s
+    return TrackerState(table, record.next_id, record.stamp_s, interval_s, period_s, exits)
 
 
 def frame_of(record: _FrameRecord, name: str) -> Frame:
@@ -222,6 +254,12 @@ def _plain_state(state: TrackerState) -> dict[str, Any]:
     return {
         "stamp_s": state.stamp_s,
         "interval_s": state.interval_s if math.isfinite(state.interval_s) else None,
+        "period_s": state.period_s if math.isfinite(state.period_s) else None,
+        "exits": {
+            "places_camera_m": state.exits.places_camera_m.tolist(),
+            "returned": state.exits.returned.tolist(),
+            "start_s": state.exits.start_s if math.isfinite(state.exits.start_s) else None,
+        },
         "next_id": state.next_id,
         "tracks": {
             "ids": tracks.ids.tolist(),
@@ -235,6 +273,10 @@ def _plain_state(state: TrackerState) -> dict[str, Any]:
             "confirmed": tracks.confirmed.tolist(),
             "standing": tracks.standing.tolist(),
             "missed_s": tracks.missed_s.tolist(),
+            "existence_logits": tracks.existence_logits.tolist(),
+            "birth_stamps_s": tracks.birth_stamps_s.tolist(),
+            "birth_places_camera_m": tracks.birth_places_camera_m.tolist(),
+            "last_places_camera_m": tracks.last_places_camera_m.tolist(),
         },
     }
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from ._awareness_update import belief_of
 from ._config import TrackerConfig
+from ._existence import tentative_gap_s
 from ._step import TrackerState, predicted
 from ._table import BoolArray, TrackTable
 from ._track import PersonTrack, TrackStatus, trusted_track
@@ -27,7 +28,7 @@ def snapshots(
     dt_s = stamp_s - state.stamp_s
     belief = belief_of(tracks)
     if dt_s > 0.0:
-        tracks = tracks.take(~_expired(tracks, stamp_s, config, has_view))
+        tracks = tracks.take(~_expired(tracks, stamp_s, state.period_s, config, has_view))
         if not len(tracks):
             return ()
         tracks = predicted(tracks, state.stamp_s, stamp_s, config)
@@ -58,10 +59,10 @@ def snapshots(
 
 
 def _expired(
-    tracks: TrackTable, stamp_s: float, config: TrackerConfig, has_view: bool
+    tracks: TrackTable, stamp_s: float, period_s: float, config: TrackerConfig, has_view: bool
 ) -> BoolArray:
     """Return (N,) True for tracks that are not reported at ``stamp_s`` any more."""
-    kept_s = max(config.max_tentative_gap_s, config.confirm_window_s)
+    kept_s = max(tentative_gap_s(period_s, config), config.confirm_window_s)
     unconfirmed = ~tracks.confirmed & (stamp_s - tracks.last_seen_s > kept_s)
     return unconfirmed | coasted_too_long(tracks, stamp_s, config, has_view)
 

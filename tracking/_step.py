@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.special import gammaincinv
@@ -11,6 +11,8 @@ from scipy.special import gammaincinv
 from ._association import Gates, associate
 from ._awareness_update import update_awareness
 from ._config import TrackerConfig
+from ._existence import detection_logits, with_evidence
+from ._exits import Exits, floor_places, walked_out
 from ._kalman import correct
 from ._measurement import Frame
 from ._motion import predict
@@ -25,6 +27,11 @@ from ._track_management import (
 )
 from ._views import View
 
+# Share of a new interval in the usual time between frames.
+_PERIOD_GAIN = 0.2
+# How far a person may walk between two frames, in standard deviations of a new track's velocity.
+_REACH_SIGMAS = 3.0
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackerState:
@@ -35,12 +42,16 @@ class TrackerState:
         next_id: of the next track.
         stamp_s: of the latest frame, or None before the first.
         interval_s: between the latest two stamps that differ; infinite before there are two.
+        period_s: usual time between frames, smoothed over pauses; infinite before there are two.
+        exits: where people have appeared and vanished.
     """
 
     tracks: TrackTable
     next_id: int = 1
     stamp_s: float | None = None
     interval_s: float = math.inf
+    period_s: float = math.inf
+    exits: Exits = field(default_factory=Exits.none)
 
 
 def gates_of(config: TrackerConfig) -> Gates:
@@ -63,13 +74,16 @@ def advance(
     previous = stamp if state.stamp_s is None else state.stamp_s
     dt_s = stamp - previous
     interval_s = dt_s if dt_s > 0.0 else state.interval_s
+    period_s = smoothed_period_s(state.period_s, dt_s)
     has_view = view is not None
     tracks = state.tracks
     measured = frame.measurements
     if len(tracks) and dt_s > 0.0:
-        tracks = tracks.take(~expired_before(tracks, stamp, config, has_view))
+        tracks = tracks.take(~expired_before(tracks, stamp, period_s, config, has_view))
         tracks = predicted(tracks, previous, stamp, config)
-    tracks, source, ambiguous = _matched(tracks, frame, interval_s, config, gates)
+    before = tracks
+    tracks, source, ambiguous = _matched(tracks, frame, dt_s, period_s, config, gates)
+    exits = state.exits.after_matches(before, tracks, stamp, period_s)
     unmatched = np.ones(len(measured), dtype=np.bool_)
     unmatched[source[source >= 0]] = False
     if unmatched.any():
@@ -96,9 +110,22 @@ def advance(
     missed_s = missed_time_s(tracks, ~seen, dt_s, frame.T_odom_camera, config, view)
     tracks = tracks.replaced(missed_s=missed_s)
     if not seen.all():
-        tracks = tracks.take(seen | ~due_for_deletion(tracks, stamp, config, has_view))
+        gone = walked_out(tracks, exits, ~seen, frame.T_odom_camera)
+        deleted = ~seen & due_for_deletion(tracks, stamp, period_s, gone, config, has_view)
+        vanished = deleted & tracks.confirmed & ~tracks.standing
+        exits = exits.with_events(tracks.last_places_camera_m[vanished], returned=False)
+        tracks = tracks.take(~deleted)
     next_id = state.next_id + int(np.count_nonzero(unmatched))
-    return TrackerState(tracks, next_id, stamp, interval_s)
+    return TrackerState(tracks, next_id, stamp, interval_s, period_s, exits)
+
+
+def smoothed_period_s(period_s: float, dt_s: float) -> float:
+    """Return the usual time between frames after one more interval; a pause counts as two."""
+    if dt_s <= 0.0:
+        return period_s
+    if not math.isfinite(period_s):
+        return dt_s
+    return period_s + _PERIOD_GAIN * (min(dt_s, 2.0 * period_s) - period_s)
 
 
 def predicted(tracks: TrackTable, from_s: float, to_s: float, config: TrackerConfig) -> TrackTable:
@@ -117,7 +144,12 @@ def predicted(tracks: TrackTable, from_s: float, to_s: float, config: TrackerCon
 
 
 def _matched(
-    tracks: TrackTable, frame: Frame, interval_s: float, config: TrackerConfig, gates: Gates
+    tracks: TrackTable,
+    frame: Frame,
+    dt_s: float,
+    period_s: float,
+    config: TrackerConfig,
+    gates: Gates,
 ) -> tuple[TrackTable, IndexArray, BoolArray]:
     """Match the frame's measurements to the tracks and correct the tracks with them.
 
@@ -128,6 +160,9 @@ def _matched(
     source = np.full(len(tracks), -1, dtype=np.intp)
     ambiguous = np.zeros(len(tracks), dtype=np.bool_)
     measured = frame.measurements
+    if math.isfinite(period_s):
+        reach_m = _REACH_SIGMAS * config.initial_velocity_std_mps * period_s
+        gates = replace(gates, distance_m=max(gates.distance_m, reach_m))
     matches = associate(
         tracks.states[:, :2],
         tracks.covariances[:, :2, :2],
@@ -137,6 +172,14 @@ def _matched(
         gates,
     )
     rows, columns = matches.tracks, matches.measurements
+    logits = detection_logits(
+        tracks.states[rows, :2],
+        tracks.covariances[rows, :2, :2],
+        measured.positions_odom_m[columns],
+        measured.noises_m2[columns],
+        config,
+    )
+    tracks = with_evidence(tracks, rows, logits, dt_s, config)
     if not rows.size:
         return tracks, source, ambiguous
     source[rows], ambiguous[rows] = columns, matches.ambiguous
@@ -149,5 +192,7 @@ def _matched(
         measured.positions_odom_m[columns],
         measured.noises_m2[columns] * factors[:, None, None],
     )
-    tracks = tracks.replaced(states=states, covariances=covariances)
-    return record_hits(tracks, rows, frame.stamp_s, interval_s, config), source, ambiguous
+    places = tracks.last_places_camera_m.copy()
+    places[rows] = floor_places(states[rows, :2], frame.T_odom_camera)
+    tracks = tracks.replaced(states=states, covariances=covariances, last_places_camera_m=places)
+    return record_hits(tracks, rows, frame.stamp_s, period_s, config), source, ambiguous

@@ -32,6 +32,11 @@ class TrackTable:
         confirmed: (N,) whether enough frames have shown the person.
         standing: (N,) whether the person stood still when last seen.
         missed_s: (N,) time since last seen in which frames should have shown the person.
+        existence_logits: (N,) log-likelihood ratio of a person to clutter, of the detections after
+            the first; 0 at the first.
+        birth_stamps_s: (N,) stamps of the first frames that showed the people.
+        birth_places_camera_m: (N, 2) where they were then, relative to the camera (``_exits``).
+        last_places_camera_m: (N, 2) the same for the latest frames that showed them.
     """
 
     ids: IntArray
@@ -45,6 +50,10 @@ class TrackTable:
     confirmed: BoolArray
     standing: BoolArray
     missed_s: FloatArray
+    existence_logits: FloatArray
+    birth_stamps_s: FloatArray
+    birth_places_camera_m: FloatArray
+    last_places_camera_m: FloatArray
 
     @staticmethod
     def empty(confirm_hits: int) -> TrackTable:
@@ -63,6 +72,10 @@ class TrackTable:
             confirmed=no_flags,
             standing=no_flags,
             missed_s=no_numbers,
+            existence_logits=no_numbers,
+            birth_stamps_s=no_numbers,
+            birth_places_camera_m=np.empty((0, 2)),
+            last_places_camera_m=np.empty((0, 2)),
         )
 
     @property

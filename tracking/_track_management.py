@@ -6,6 +6,7 @@ frame should have shown a person depends on the view and on the people who stand
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 import numpy as np
@@ -14,6 +15,8 @@ from perception.arrays import FloatArray
 
 from ._config import TrackerConfig
 from ._errors import TrackingError
+from ._existence import confirming_logit, tentative_gap_s
+from ._exits import floor_places
 from ._kalman import inverse_2x2
 from ._measurement import Frame
 from ._table import BoolArray, IndexArray, TrackTable
@@ -42,6 +45,7 @@ def initiate(
     hits = np.full((count, config.confirm_hits), -np.inf)
     hits[:, -1] = frame.stamp_s
     belief = prior(config.awareness)
+    places = floor_places(states[:, :2], frame.T_odom_camera)
     return TrackTable(
         ids=np.arange(first_id, first_id + count, dtype=np.int64),
         states=states,
@@ -54,6 +58,10 @@ def initiate(
         confirmed=np.full(count, config.confirm_hits <= 1),
         standing=np.zeros(count, dtype=np.bool_),
         missed_s=np.zeros(count),
+        existence_logits=np.zeros(count),
+        birth_stamps_s=np.full(count, frame.stamp_s),
+        birth_places_camera_m=places,
+        last_places_camera_m=places,
     )
 
 
@@ -61,7 +69,7 @@ def record_hits(
     tracks: TrackTable,
     rows: IndexArray,
     stamp_s: float,
-    interval_s: float,
+    period_s: float,
     config: TrackerConfig,
 ) -> TrackTable:
     """Return the tracks after a frame at ``stamp_s`` that shows those of ``rows``.
@@ -76,8 +84,11 @@ def record_hits(
     confirmed = tracks.confirmed
     if not confirmed.all():
         window_s = config.confirm_window_s
-        if np.isfinite(interval_s):
-            window_s = max(window_s, (config.confirm_hits + 1) * interval_s)
+        if np.isfinite(period_s):
+            window_s = max(window_s, (config.confirm_hits + 1) * period_s)
+            sure = tracks.existence_logits[rows] >= confirming_logit(period_s, config)
+            confirmed = confirmed.copy()
+            confirmed[rows[sure]] = True
         confirmed = confirmed | (stamp_s - hits[:, 0] <= window_s)
     standing = tracks.standing.copy()
     standing[rows] = is_standing(tracks.states[rows], tracks.covariances[rows], config)
@@ -131,7 +142,7 @@ def coasted_too_long(
 
 
 def expired_before(
-    tracks: TrackTable, stamp_s: float, config: TrackerConfig, has_view: bool
+    tracks: TrackTable, stamp_s: float, period_s: float, config: TrackerConfig, has_view: bool
 ) -> BoolArray:
     """Return (N,) True for tracks that a frame at ``stamp_s`` can no longer match.
 
@@ -139,15 +150,31 @@ def expired_before(
     """
     gap_s = stamp_s - tracks.last_seen_s
     unconfirmed = ~tracks.confirmed & (gap_s > max(config.max_coast_s, config.max_tentative_gap_s))
-    return coasted_too_long(tracks, stamp_s, config, has_view) | unconfirmed
+    # A track that the last frame has left alive gets a chance too.
+    return (
+        coasted_too_long(
+            tracks, stamp_s - (period_s if math.isfinite(period_s) else 0.0), config, has_view
+        )
+        | unconfirmed
+    )
 
 
 def due_for_deletion(
-    tracks: TrackTable, stamp_s: float, config: TrackerConfig, has_view: bool
+    tracks: TrackTable,
+    stamp_s: float,
+    period_s: float,
+    gone: BoolArray,
+    config: TrackerConfig,
+    has_view: bool,
 ) -> BoolArray:
-    """Return (N,) True for tracks to delete if the frame at ``stamp_s`` does not show them."""
-    unconfirmed = ~tracks.confirmed & (stamp_s - tracks.last_seen_s > config.max_tentative_gap_s)
+    """Return (N,) True for tracks to delete if the frame at ``stamp_s`` does not show them.
+
+    Those of ``gone`` (N,) have walked out of the view; ``max_missed_s`` suffices for them.
+    """
+    gap_s = tentative_gap_s(period_s, config)
+    unconfirmed = ~tracks.confirmed & (stamp_s - tracks.last_seen_s > gap_s)
     missed = tracks.confirmed & (tracks.missed_s > config.max_missed_s)
+    missed |= gone & (stamp_s - tracks.last_seen_s > config.max_missed_s)
     return coasted_too_long(tracks, stamp_s, config, has_view) | unconfirmed | missed
 
 

@@ -29,16 +29,20 @@ from ._figures import (
 )
 from ._judges import TrackingScores, judge
 from ._measurements import OCCLUDED, OPEN, record
-from ._naive import Naive
+from ._naive import Naive, NaiveSettings
 from ._norfair import Norfair
 from ._ours import Ours
+from ._rates import rate_table
 from ._stonesoup import StoneSoupGnn, StoneSoupJpda
 
 BASELINE = Path(__file__).with_name("baseline.json")
 SETS = {"open": OPEN, "occluded": OCCLUDED}
 #: The baseline holds for runs of this size only.
 STANDARD_SEEDS, STANDARD_FRAMES = 10, 500
-PARTS = ("scores", "cost", "consistency")
+PARTS = ("scores", "rates", "cost", "consistency")
+#: Recorded people lie beside the repository, if anywhere; see README.md.
+RECORDINGS = Path(__file__).resolve().parents[3] / "shared" / "data"
+RATE_SEEDS = 3
 COST_FRAMES, COST_REPEATS = 150, 3
 STEPS_S = (0.03, 0.05, 0.1, 0.2, 0.4)
 CONSISTENCY_WALKERS, CONSISTENCY_FRAMES = 60, 60
@@ -55,17 +59,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )
     except TrackingError as error:
         return bad_input(parser, error)
+    judged = {"scores", "rates"} & set(options.parts)
     missing = [name for name in ("motmetrics", "trackeval") if find_spec(name) is None]
-    if "scores" in options.parts and missing:
+    if judged and missing:
         parser.error(
             f"{' and '.join(missing)} not found; see benchmarks/tracking/requirements.txt "
-            "or leave out the scores (--parts cost,consistency)"
+            "or leave out what they judge (--parts cost,consistency)"
         )
     makers = _makers(options.trackers, config)
     metrics: list[MeasuredValue] = []
     missed: list[str] = []
     if "scores" in options.parts:
         _scores(options, makers, metrics, missed)
+    if "rates" in options.parts:
+        _rates(options, config, metrics, missed)
     if "cost" in options.parts:
         _cost(options, makers, metrics, missed)
     if "consistency" in options.parts:
@@ -127,7 +134,7 @@ def _parser() -> argparse.ArgumentParser:
         type=_subset(PARTS),
         default=list(PARTS),
         metavar="NAMES",
-        help="some of scores, cost, consistency (default: all)",
+        help="some of scores, rates, cost, consistency (default: all)",
     )
     parser.add_argument(
         "--stonesoup-up-to",
@@ -135,6 +142,13 @@ def _parser() -> argparse.ArgumentParser:
         default=20,
         metavar="N",
         help="leave Stone Soup out beyond N people; 100 people take an hour (default: 20)",
+    )
+    parser.add_argument(
+        "--recordings",
+        type=Path,
+        default=RECORDINGS,
+        metavar="DIR",
+        help="CSV files of recorded people for the rates, t_s, id, x_m, y_m; left out if absent",
     )
     parser.add_argument("--config", type=Path, metavar="FILE", help="TrackerConfig for ours (YAML)")
     return parser
@@ -226,6 +240,27 @@ def _scores(
                 metrics += score_metrics(name, people, tracker, runs)
                 if options.frames >= STANDARD_FRAMES:
                     missed += missed_scores(name, people, tracker, runs)
+
+
+def _rates(
+    options: argparse.Namespace,
+    config: TrackerConfig,
+    metrics: list[MeasuredValue],
+    missed: list[str],
+) -> None:
+    """Compare the trackers at every frame rate."""
+    makers: dict[str, Callable[[], Contender]] = {
+        "ours": lambda: Ours(config),
+        "naive": Naive,
+        "naive, 3 hits": lambda: Naive(NaiveSettings(confirm_hits=3)),
+    }
+    if "norfair" in options.trackers and find_spec("norfair") is not None:
+        makers["norfair"] = Norfair
+    seeds = range(options.seed, options.seed + min(options.seeds, RATE_SEEDS))
+    sets = {name: SETS[name] for name in options.sets}
+    found, worse = rate_table(sets, makers, seeds, options.recordings)
+    metrics += found
+    missed += worse
 
 
 def _cost(

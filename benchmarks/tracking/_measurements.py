@@ -69,7 +69,7 @@ def record(
     walkers = walkers or WalkerSettings()
     stamps_s = np.arange(frames) / sensor.rate_hz
     truth = walk(people, stamps_s, rng, walkers)
-    visible = _visible(people, stamps_s, sensor, rng)
+    visible = visible_spells(people, stamps_s, sensor, rng)
     side_m = walkers.side_m(people)
     measured = []
     for frame in range(frames):
@@ -91,7 +91,7 @@ def record(
     )
 
 
-def _visible(
+def visible_spells(
     people: int, stamps_s: FloatArray, sensor: SensorSettings, rng: np.random.Generator
 ) -> NDArray[np.bool_]:
     """Return (T, N) visibility with spells out of sight, drawn independently for each person."""

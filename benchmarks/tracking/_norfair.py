@@ -48,7 +48,10 @@ class Norfair:
         self._tracker = Tracker(
             "euclidean",
             distance_threshold=settings.distance_threshold_m,
-            hit_counter_max=round(settings.max_unseen_s / dt_s),
+            # norfair wants a counter above the delay, also for a slow camera.
+            hit_counter_max=max(
+                round(settings.max_unseen_s / dt_s), settings.initialization_delay + 1
+            ),
             initialization_delay=settings.initialization_delay,
             past_detections_length=0,
             filter_factory=OptimizedKalmanFilterFactory(

@@ -46,15 +46,16 @@ class Ours:
 
     def __init__(self, config: TrackerConfig | None = None) -> None:
         # Without a view: people are unseen by chance here, so no track should be dropped sooner.
-        base = config or TrackerConfig()
-        self._config = base.model_copy(update={"max_coast_s": MAX_UNSEEN_S})
+        self._config = config or TrackerConfig()
         self._tracker = PersonTracker(self._config)
         self._stamps_s: list[float] = []
         self._frames: list[tuple[PersonObservation, ...]] = []
 
     def begin(self, recording: SimulatedRecording) -> None:
         """Start over, on this recording."""
-        self._tracker = PersonTracker(self._config)
+        # Half an interval more, since the others round the time to frames.
+        kept_s = MAX_UNSEEN_S + 0.5 * float(np.diff(recording.stamps_s).mean())
+        self._tracker = PersonTracker(self._config.model_copy(update={"max_coast_s": kept_s}))
         self._stamps_s = recording.stamps_s.tolist()
         self._frames = [
             tuple(observation(place, stamp_s, recording.noise_std_m) for place in measured)
