@@ -2,9 +2,17 @@
 
 from __future__ import annotations
 
-from pydantic import Field, model_validator
+from typing import TYPE_CHECKING, Any, Final
 
+from pydantic import Field, ValidationError, model_validator
+
+from ._errors import TrackingError
 from .config import StrictConfig
+
+# Bounds far beyond any sensible setting. Further out the arithmetic overflows or becomes singular.
+_LEAST_S: Final = 1e-4
+_MOST_S: Final = 1e5
+_MOST_M: Final = 1e4
 
 
 class AwarenessFilterConfig(StrictConfig):
@@ -21,27 +29,27 @@ class AwarenessFilterConfig(StrictConfig):
     """Standard deviation of the prior in logit(α); uncertainty never grows beyond it. It is wide
     enough for one turn of the head, about six units of logit(α)."""
 
-    evidence_time_constant_s: float = Field(default=1.0, gt=0.0)
+    evidence_time_constant_s: float = Field(default=1.0, ge=_LEAST_S, le=_MOST_S)
     """Time constant of the drift to the prior between two frames that show a face."""
 
-    unseen_time_constant_s: float = Field(default=0.3, gt=0.0)
+    unseen_time_constant_s: float = Field(default=0.3, ge=_LEAST_S, le=_MOST_S)
     """Time constant of the drift to the prior while no frame shows the person."""
 
-    no_face_time_constant_s: float = Field(default=0.2, gt=0.0)
+    no_face_time_constant_s: float = Field(default=0.2, ge=_LEAST_S, le=_MOST_S)
     """Time constant of the drift to the prior while the person is seen without a usable face."""
 
-    max_evidence_gap_s: float = Field(default=0.25, gt=0.0)
+    max_evidence_gap_s: float = Field(default=0.25, ge=_LEAST_S, le=_MOST_S)
     """Two frames with a face further apart than this are no evidence for the time between them."""
 
-    evidence_correlation_s: float = Field(default=0.1, ge=0.0)
+    evidence_correlation_s: float = Field(default=0.1, ge=0.0, le=_MOST_S)
     """Errors of α this close in time count as one error. This caps the information per second: the
     variance of a frame dt after the last one is multiplied by ``evidence_correlation_s / dt`` where
     that is above one, so a faster camera, or one that repeats frames, adds no certainty."""
 
-    clip_awareness: float = Field(default=0.02, gt=0.0, lt=0.5)
+    clip_awareness: float = Field(default=0.02, ge=1e-9, lt=0.5)
     """ε: α is clipped to [ε, 1 − ε] before the logit."""
 
-    min_evidence_std_logit: float = Field(default=0.3, gt=0.0)
+    min_evidence_std_logit: float = Field(default=0.3, ge=1e-4, le=100.0)
     """Smallest standard deviation of a measurement in logit(α)."""
 
     max_evidence_std: float = Field(default=0.29, gt=0.0, le=0.5)
@@ -72,64 +80,76 @@ class AwarenessFilterConfig(StrictConfig):
 
 
 class TrackerConfig(StrictConfig):
-    """Settings of :class:`~tracking.PersonTracker`."""
+    """Settings of :class:`~tracking.PersonTracker`.
 
-    acceleration_density_m2ps3: float = Field(default=0.05, gt=0.0)
+    Raises:
+        TrackingError: for settings that are unknown, out of range or not finite.
+    """
+
+    if not TYPE_CHECKING:  # type checkers know the settings from the fields
+
+        def __init__(self, **settings: Any) -> None:
+            try:
+                super().__init__(**settings)
+            except ValidationError as cause:
+                raise TrackingError(f"TrackerConfig: {cause}") from cause
+
+    acceleration_density_m2ps3: float = Field(default=0.05, ge=1e-9, le=1e4)
     """Spectral density q of the white acceleration in the motion model of a person."""
 
-    initial_velocity_std_mps: float = Field(default=1.0, gt=0.0, le=3.0)
+    initial_velocity_std_mps: float = Field(default=1.0, ge=1e-4, le=3.0)
     """Standard deviation of a new track's velocity, per axis: how fast people may walk."""
 
-    position_noise_floor_m: float = Field(default=0.05, gt=0.0)
+    position_noise_floor_m: float = Field(default=0.05, ge=1e-4, le=_MOST_M)
     """Smallest standard deviation of a measured position in any direction of the floor plane."""
 
     gate_probability: float = Field(default=0.9999, gt=0.0, lt=1.0)
     """Share of a person's true measurements that pass the Mahalanobis gate."""
 
-    gate_distance_m: float = Field(default=1.0, gt=0.0)
-    """Largest distance of a measurement from the predicted position of its track. With a slow camera
-    it is 3 ``initial_velocity_std_mps`` times the interval between frames, if that is more."""
+    gate_distance_m: float = Field(default=1.0, ge=1e-4, le=_MOST_M)
+    """Largest distance of a measurement from the predicted position of its track. With a slow
+    camera it is 3 ``initial_velocity_std_mps`` times the interval of frames, if that is more."""
 
     detection_probability: float = Field(default=0.9, ge=0.01, le=0.999)
     """P_D, the share of frames that report a person in sight."""
 
-    detection_correlation_s: float = Field(default=0.15, ge=0.0)
+    detection_correlation_s: float = Field(default=0.15, ge=0.0, le=_MOST_S)
     """Frames closer than this share their errors, clutter included, and count in proportion."""
 
-    confirm_logit: float = Field(default=2.3)
+    confirm_logit: float = Field(default=2.3, ge=-1e3, le=1e3)
     """A track is confirmed once the log-likelihood ratio of its detections to clutter exceeds this
     minus ln(time between frames / 1 s), …"""
 
-    miss_cost: float = Field(default=10.0)
+    miss_cost: float = Field(default=10.0, ge=-1e3, le=1e3)
     """Cost of leaving a track and a measurement unmatched, in units of d² + ln det S (S in m²):
     2 ln(P_D / (2π β (1 − P_D))), here for a detection probability P_D of 0.9 and a density β of
     0.01 false or first detections per m² and frame."""
 
-    ambiguity_margin: float = Field(default=4.0, ge=0.0)
+    ambiguity_margin: float = Field(default=4.0, ge=0.0, le=1e3)
     """A match is ambiguous if a rival match costs (d² + ln det S) at most this much more. 4 is a
     likelihood ratio of e²."""
 
-    ambiguity_distance_m: float = Field(default=0.8, ge=0.0)
+    ambiguity_distance_m: float = Field(default=0.8, ge=0.0, le=_MOST_M)
     """Rivals further away than this do not make a match ambiguous."""
 
-    ambiguous_noise_factor: float = Field(default=2.0, ge=1.0)
+    ambiguous_noise_factor: float = Field(default=2.0, ge=1.0, le=1e4)
     """Factor on the variance of a measured position whose match is ambiguous. When two people pass
     each other, a wrong match would otherwise reverse both velocities."""
 
     confirm_hits: int = Field(default=4, ge=1, le=20)
     """… or once this many frames (distinct stamps) have shown the person …"""
 
-    confirm_window_s: float = Field(default=0.5, gt=0.0)
+    confirm_window_s: float = Field(default=0.5, ge=_LEAST_S, le=_MOST_S)
     """… within this time, or within ``confirm_hits`` + 1 frame intervals of a slow camera."""
 
-    max_tentative_gap_s: float = Field(default=0.12, ge=0.0)
+    max_tentative_gap_s: float = Field(default=0.12, ge=0.0, le=_MOST_S)
     """A tentative track unseen for longer than this is deleted, or after as many missed frames in a
     row as happen to 1 % of people by chance: two at the default ``detection_probability``."""
 
-    max_missed_s: float = Field(default=1.2, gt=0.0)
+    max_missed_s: float = Field(default=1.2, ge=_LEAST_S, le=_MOST_S)
     """A confirmed track is deleted after this time in which frames should have shown it and did
-    not, which needs a view; or if it was last seen at an exit that the tracker has learned and walks
-    away from the camera."""
+    not, which needs a view; or if it was last seen at an exit that the tracker has learned, and
+    walks away from the camera."""
 
     max_coast_s: float = Field(default=3.0, ge=0.0, le=60.0)
     """A confirmed track unseen for longer than this is deleted, whatever the reason, …"""
@@ -138,23 +158,23 @@ class TrackerConfig(StrictConfig):
     """… except that a person who stood still, and is out of view or hidden by another person, is
     kept for this long. Needs a view, and counts where it exceeds ``max_coast_s``."""
 
-    standing_speed_mps: float = Field(default=0.3, ge=0.0)
+    standing_speed_mps: float = Field(default=0.3, ge=0.0, le=100.0)
     """A person no faster than this, with a velocity consistent with 0, counts as standing."""
 
-    standing_time_constant_s: float = Field(default=1.0, gt=0.0)
+    standing_time_constant_s: float = Field(default=1.0, ge=_LEAST_S, le=_MOST_S)
     """Time constant with which the velocity of an unseen standing person decays."""
 
-    body_radius_m: float = Field(default=0.25, gt=0.0)
+    body_radius_m: float = Field(default=0.25, ge=1e-3, le=10.0)
     """Radius of a person as an occluder: a body hides the people behind it."""
 
     max_lag_s: float = Field(default=0.5, ge=0.0, le=10.0)
     """A frame up to this much older than the latest is processed as if it had come in order. An
     older one is refused."""
 
-    stamp_tolerance_s: float = Field(default=1e-3, ge=0.0)
+    stamp_tolerance_s: float = Field(default=1e-3, ge=0.0, le=_MOST_S)
     """Largest difference between the stamps of an observation and of its frame."""
 
-    stature_m: float = Field(default=1.75, gt=0.0)
+    stature_m: float = Field(default=1.75, gt=0.0, le=10.0)
     """Stature assumed for every person."""
 
     awareness: AwarenessFilterConfig = Field(default_factory=AwarenessFilterConfig)

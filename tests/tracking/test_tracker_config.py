@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import math
+import warnings
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
-from pydantic import ValidationError
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from pydantic import BaseModel, ValidationError
+from tracking_scenes import CAMERA, observe
 
 from tracking import AwarenessFilterConfig, PersonTracker, TrackerConfig, TrackingError
 
@@ -52,3 +58,83 @@ def test_the_tracker_accepts_only_a_tracker_config() -> None:
     assert PersonTracker(TrackerConfig(confirm_hits=2)).config.confirm_hits == 2
     with pytest.raises(TrackingError, match="config must be a TrackerConfig, got dict"):
         PersonTracker({"confirm_hits": 2})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("setting", ["gate_distance_m", "acceleration_density_m2ps3", "stature_m"])
+def test_settings_that_would_overflow_are_refused_wherever_they_come_from(
+    setting: str, tmp_path: Path
+) -> None:
+    with pytest.raises(TrackingError, match=f"{setting}\n"):
+        TrackerConfig(**{setting: 1e300})
+    path = tmp_path / "tracker.yaml"
+    path.write_text(f"{setting}: 1.0e+300\n", encoding="utf-8")
+    with pytest.raises(TrackingError, match=rf"tracker\.yaml: (?s:.)*{setting}"):
+        TrackerConfig.from_yaml(path)
+    state = PersonTracker().state()
+    state["config"][setting] = 1e300
+    with pytest.raises(TrackingError, match=setting):
+        PersonTracker.from_state(state)
+
+
+def bounds(model: type[BaseModel], name: str) -> tuple[float, float]:
+    """Return the least and the greatest value that a setting accepts."""
+    low, high = -math.inf, math.inf
+    for rule in model.model_fields[name].metadata:
+        low = max(low, getattr(rule, "ge", -math.inf))
+        high = min(high, getattr(rule, "le", math.inf))
+        if (least := getattr(rule, "gt", None)) is not None:
+            low = max(low, math.nextafter(least, math.inf))
+        if (most := getattr(rule, "lt", None)) is not None:
+            high = min(high, math.nextafter(most, -math.inf))
+    return low, high
+
+
+def numbers(model: type[BaseModel]) -> dict[str, tuple[float, float]]:
+    """Return the bounds of every setting of a config that is a number."""
+    return {
+        name: bounds(model, name)
+        for name, field in model.model_fields.items()
+        if field.annotation is float
+    }
+
+
+def test_every_number_has_bounds() -> None:
+    for model in (TrackerConfig, AwarenessFilterConfig):
+        for name, (low, high) in numbers(model).items():
+            assert np.isfinite([low, high]).all(), name
+
+
+@st.composite
+def extreme(draw: st.DrawFn, model: type[BaseModel]) -> dict[str, float]:
+    """Draw some settings at or near their bounds."""
+    found = numbers(model)
+    chosen = draw(st.sets(st.sampled_from(sorted(found)), max_size=4))
+    return {
+        name: draw(st.sampled_from(found[name]) | st.floats(*found[name]))
+        for name in sorted(chosen)
+    }
+
+
+@given(extreme(TrackerConfig), extreme(AwarenessFilterConfig))
+def test_the_tracker_runs_with_any_settings_it_accepts(
+    settings: dict[str, float], of_awareness: dict[str, float]
+) -> None:
+    try:
+        awareness = AwarenessFilterConfig(**of_awareness)  # type: ignore[arg-type]
+    except ValidationError:
+        assume(False)
+    tracker = PersonTracker(TrackerConfig(awareness=awareness, **settings))  # type: ignore[arg-type]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for step in range(12):
+            now = 0.1 * step
+            people = [
+                observe((3.0 + 0.1 * step, 0.0), now, awareness=0.8),
+                observe((4.0, 0.4), now),
+            ]
+            for track in tracker.update(people if step % 5 != 3 else [], now, CAMERA):
+                assert np.isfinite(track.position_odom_m).all()
+                assert np.isfinite(track.velocity_odom_mps).all()
+                assert np.isfinite(track.covariance_odom).all()
+                assert 0.0 <= track.awareness_lower <= track.awareness <= 1.0
+        tracker.predict(now + 30.0)
