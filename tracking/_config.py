@@ -171,6 +171,13 @@ class TrackerConfig(StrictConfig):
     """A frame up to this much older than the latest is processed as if it had come in order. An
     older one is refused."""
 
+    max_pause_s: float = Field(default=10.0, ge=1.0, le=1e12)
+    """A frame later than the last by more than this is refused: its stamp may be wrong."""
+
+    new_clock_after_s: float = Field(default=1.0, ge=0.0, le=_MOST_S)
+    """Refused frames that follow one another for this time, and are more than two, show that the
+    clock has been set. The tracker then starts anew."""
+
     stamp_tolerance_s: float = Field(default=1e-3, ge=0.0, le=_MOST_S)
     """Largest difference between the stamps of an observation and of its frame."""
 

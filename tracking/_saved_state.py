@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any, Final, Literal, TypeAlias
 
 import numpy as np
@@ -17,6 +18,7 @@ from ._exits import MAX_EVENTS, Exits
 from ._measurement import Frame, Measurements
 from ._step import TrackerState
 from ._table import TrackTable
+from .clock import JumpedClock
 from .config import StrictConfig
 
 FORMAT: Final = "awarenav-tracker"
@@ -122,6 +124,22 @@ class _FrameRecord(StrictConfig):
         return self
 
 
+class _JumpedClockRecord(StrictConfig):
+    """:class:`~tracking.clock.JumpedClock` as plain values."""
+
+    first_s: float
+    last_s: float
+    stamps: int = Field(ge=1)
+
+
+class _ClockRecord(StrictConfig):
+    """Jumps of the clock."""
+
+    refused_early_frames: int = Field(ge=0)
+    restarts: int = Field(ge=0)
+    jumped: _JumpedClockRecord | None
+
+
 class TrackerRecord(StrictConfig):
     """A tracker without its view, but with the frames that may still be replayed."""
 
@@ -129,6 +147,7 @@ class TrackerRecord(StrictConfig):
     version: Literal[2]
     config: TrackerConfig
     refused_late_frames: int = Field(ge=0)
+    clock: _ClockRecord
     base: _StateRecord
     frames: list[_FrameRecord]
     latest: _StateRecord
@@ -159,13 +178,24 @@ def to_plain(
     base: TrackerState,
     frames: Sequence[Frame],
     latest: TrackerState,
+    *,
+    clock: tuple[int, int, JumpedClock | None],
 ) -> dict[str, Any]:
-    """Return a tracker as plain JSON values."""
+    """Return a tracker as plain JSON values.
+
+    ``clock`` has the numbers of early frames and of restarts, and the clock that may be new.
+    """
+    early_frames, restarts, jumped = clock
     return {
         "format": FORMAT,
         "version": VERSION,
         "config": config.model_dump(mode="json"),
         "refused_late_frames": refused_late_frames,
+        "clock": {
+            "refused_early_frames": early_frames,
+            "restarts": restarts,
+            "jumped": None if jumped is None else asdict(jumped),
+        },
         "base": _plain_state(base),
         "frames": [_plain_frame(frame) for frame in frames],
         "latest": _plain_state(latest),

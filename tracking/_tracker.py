@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,9 @@ from ._step import TrackerState, advance, gates_of
 from ._table import TrackTable
 from ._track import PersonTrack
 from ._views import View
+from .clock import JumpedClock
+
+_LOG = logging.getLogger("tracking")
 
 
 class PersonTracker:
@@ -40,8 +44,14 @@ class PersonTracker:
     the frames had come in order. This may revise earlier results from after the late frame's stamp:
     a person first seen after it can get another id, or turn out to be a known person.
 
+    A frame that is later than the last by more than ``max_pause_s`` is refused as well, since one
+    wrong stamp would end all tracks. If the refused frames follow one another for
+    ``new_clock_after_s``, the clock has been set: the tracker starts anew, as after :meth:`reset`,
+    counts it in :attr:`clock_restarts` and logs a warning.
+
     The tracker is deterministic. A refused input raises :class:`~tracking.TrackingError` and leaves
-    the tracker as it was, except that :attr:`refused_late_frames` may count it.
+    the tracks as they were; :attr:`refused_late_frames` and :attr:`refused_early_frames` count
+    those refused for their stamp.
 
     Args:
         config: settings; None for the defaults.
@@ -62,6 +72,9 @@ class PersonTracker:
         self._view = view
         self._gates = gates_of(config)
         self._refused_late_frames = 0
+        self._refused_early_frames = 0
+        self._clock_restarts = 0
+        self._jumped: JumpedClock | None = None
         nobody = TrackerState(TrackTable.empty(config.confirm_hits))
         self._history = History(self._advance, config.max_lag_s, nobody)
 
@@ -83,6 +96,23 @@ class PersonTracker:
         """Number of frames that were refused because they came too late."""
         return self._refused_late_frames
 
+    @property
+    def refused_early_frames(self) -> int:
+        """Number of frames that were refused because their stamp jumped ahead."""
+        return self._refused_early_frames
+
+    @property
+    def clock_restarts(self) -> int:
+        """How often the tracker has started anew because the clock had been set."""
+        return self._clock_restarts
+
+    def reset(self) -> None:
+        """Forget all tracks and the clock. Ids go on, and the counts stay."""
+        state = self._history.latest
+        nobody = TrackerState(TrackTable.empty(self._config.confirm_hits), state.next_id)
+        self._history = History(self._advance, self._config.max_lag_s, nobody)
+        self._jumped = None
+
     def update(
         self,
         observations: Iterable[PersonObservation],
@@ -96,29 +126,27 @@ class PersonTracker:
         Args:
             observations: of this frame; empty if it shows nobody.
             stamp_s: time of the frame, at most ``max_lag_s`` before the latest one's. A second
-                frame with the same stamp is a second set of measurements at that time.
+                frame with the same stamp is a second set of measurements at that time. At most
+                ``max_pause_s`` after the latest one's.
             T_odom_camera: (4, 4) pose of the camera at ``stamp_s``.
             pose_covariance_odom: (3, 3) of the camera's x, y (m) and yaw (rad) in odom at
                 ``stamp_s``, or None if the pose is known well enough. All people in a frame share
                 the pose error; the tracker adds it to each of them as if it were independent.
 
         Raises:
-            TrackingError: for a stamp that is not finite, lies too far back or differs from that of
-                an observation by more than ``stamp_tolerance_s``, for a ``T_odom_camera`` that is
-                not a rigid transform, for a ``pose_covariance_odom`` that is not a covariance, and
-                for anything in ``observations`` that is not a
+            TrackingError: for a stamp that is not finite, lies too far back or ahead, or differs
+                from that of an observation by more than ``stamp_tolerance_s``, for a
+                ``T_odom_camera`` that is not a rigid transform, for a ``pose_covariance_odom`` that
+                is not a covariance, and for anything in ``observations`` that is not a
                 :class:`~perception.PersonObservation` or lies out of bounds.
         """
         stamp = finite_number("stamp_s", stamp_s, TrackingError)
-        late = self._history.lateness_error(stamp)
-        if late is not None:
-            self._refused_late_frames += 1
-            raise TrackingError(late)
         T = rigid_transform("T_odom_camera", T_odom_camera, TrackingError)
         pose = None
         if pose_covariance_odom is not None:
             pose = covariance_matrix("pose_covariance_odom", pose_covariance_odom, 3, TrackingError)
         measurements = measurements_of(observations, stamp, T, pose, self._config)
+        self._check_clock(stamp)
         self._history.insert(Frame(stamp, T, measurements))
         latest = self._history.latest
         return self._snapshots(stamp if latest.stamp_s is None else latest.stamp_s)
@@ -155,6 +183,7 @@ class PersonTracker:
             history.base,
             history.frames,
             history.latest,
+            clock=(self._refused_early_frames, self._clock_restarts, self._jumped),
         )
 
     @classmethod
@@ -171,6 +200,11 @@ class PersonTracker:
         record = record_of(state)
         tracker = cls(record.config, view=view)
         tracker._refused_late_frames = record.refused_late_frames
+        tracker._refused_early_frames = record.clock.refused_early_frames
+        tracker._clock_restarts = record.clock.restarts
+        jumped = record.clock.jumped
+        if jumped is not None:
+            tracker._jumped = JumpedClock(jumped.first_s, jumped.last_s, jumped.stamps)
         hits = record.config.confirm_hits
         tracker._history = History(
             tracker._advance,
@@ -214,6 +248,37 @@ class PersonTracker:
             return cls.from_state(state, view=view)
         except TrackingError as cause:
             raise TrackingError(f"{path}: {cause}") from cause
+
+    def _check_clock(self, stamp_s: float) -> None:
+        """Refuse and count a stamp that jumps; start anew if the clock has been set."""
+        last_s, config = self.last_stamp_s, self._config
+        if last_s is None:
+            return
+        message = self._history.lateness_error(stamp_s)
+        early = stamp_s - last_s > config.max_pause_s
+        if early:
+            message = (
+                f"stamp_s = {stamp_s!r} s jumps ahead: the last frame was at {last_s!r} s, and "
+                f"max_pause_s = {config.max_pause_s:g} s"
+            )
+        if message is None:
+            self._jumped = None
+            return
+        self._jumped = JumpedClock.following(self._jumped, stamp_s, config.max_pause_s)
+        if self._jumped.has_lasted(config.new_clock_after_s):
+            _LOG.warning(
+                "the clock has been set: frames at %.3f s after %.3f s; the tracker starts anew",
+                stamp_s,
+                last_s,
+            )
+            self.reset()
+            self._clock_restarts += 1
+            return
+        if early:
+            self._refused_early_frames += 1
+        else:
+            self._refused_late_frames += 1
+        raise TrackingError(message)
 
     def _advance(self, state: TrackerState, frame: Frame) -> TrackerState:
         return advance(state, frame, self._config, self._gates, self._view)

@@ -23,13 +23,15 @@ from perception import (
     PoseEstimator,
 )
 from perception.arrays import FloatArray
-from tracking import CameraView, PersonTrack, PersonTracker
+from tracking import CameraView, PersonTrack, PersonTracker, TrackerConfig
 
 from ._camera import CameraChoice, fixed_camera_pose
 from ._source import SourceFrame
 
 # An observation farther than this from a track does not belong to it.
 _SAME_PERSON_M: Final = 1.5
+# Pictures may lie days apart, and nobody sets a recording's clock.
+_OF_RECORDINGS: Final = TrackerConfig(max_pause_s=1e12, new_clock_after_s=1e5)
 # Accuracy of the height and pitch of a fixed camera that the user types in.
 _MEASURED_STD_M: Final = 0.05
 _MEASURED_STD_RAD: Final = math.radians(2.0)
@@ -156,7 +158,7 @@ class PeopleEstimator:
             if self._tracker is None:
                 # An assumed field of view would drop or keep people wrongly.
                 view = CameraView(camera) if self._cameras.known else None
-                self._tracker = PersonTracker(view=view)
+                self._tracker = PersonTracker(_OF_RECORDINGS, view=view)
             tracks = self._tracker.update(observations, frame.stamp_s, pose)
             track_ids = ids_of_tracks(observations, tracks, pose)
         return FrameEstimate(

@@ -18,6 +18,8 @@ from ..estimate import ids_of_tracks
 from ._history import HistoryBuilder, TrackedRecording, TrackSample, camera_pose
 from ._recording import ASSUMED_POSITION_STD_M, RecordedFrame, Recording
 
+# A recording may have pauses of any length, and nobody sets its clock.
+_OF_RECORDINGS: Final = {"max_pause_s": 1e12, "new_clock_after_s": 1e5}
 # Period of the predictions between frames that are further apart.
 _PREDICTION_PERIOD_S: Final = 0.1
 # Most predictions in one pause of the camera.
@@ -41,9 +43,13 @@ def track_recording(
     Raises:
         AwarenavError: for a frame that the tracker cannot use; the message names it.
     """
+    settings = TrackerConfig() if config is None else config
 
     def tracker() -> PersonTracker:
-        return PersonTracker(config, view=None if camera is None else CameraView(camera))
+        return PersonTracker(
+            settings.model_copy(update=_OF_RECORDINGS),
+            view=None if camera is None else CameraView(camera),
+        )
 
     accepted, late, refused = _accepted_frames(recording, tracker)
     working = tracker()

@@ -133,8 +133,8 @@ def test_a_tentative_track_is_kept_while_no_frame_comes() -> None:
     assert len(walk(tracker, 9, 10)) == 1
 
 
-def test_after_a_jump_of_the_clock_everyone_is_new() -> None:
-    tracker = PersonTracker()
+def test_after_a_long_pause_everyone_is_new() -> None:
+    tracker = PersonTracker(TrackerConfig(max_pause_s=1e6))
     (before,) = walk(tracker, 0, 20)
     now = 1e6
     (after,) = tracker.update([observe(before.position_odom_m, now)], now, CAMERA)
@@ -199,7 +199,7 @@ def test_an_ambiguous_match_has_less_weight() -> None:
     """With two people within reach of each other the covariance is larger."""
     spreads = {}
     for factor in (1.0, 3.0):
-        tracker = PersonTracker(TrackerConfig(ambiguous_noise_factor=factor))
+        tracker = PersonTracker(TrackerConfig(ambiguous_noise_factor=factor, max_pause_s=1e3))
         for apart_m in (0.05, 3.0):
             for step in range(20):
                 now = step * PERIOD_S + 100.0 * apart_m
@@ -249,7 +249,7 @@ frames = st.lists(
 @settings(max_examples=80)
 @given(frames)
 def test_the_tracks_are_valid_after_any_frames(sequence: list[tuple[float, Any]]) -> None:
-    tracker, now = PersonTracker(), 0.0
+    tracker, now = PersonTracker(TrackerConfig(max_pause_s=100.0)), 0.0
     ever: set[int] = set()
     lower: dict[int, float] = {}
     alive: set[int] = set()

@@ -1,0 +1,35 @@
+"""Clocks that jump: stamps that do not follow the last ones, and when to believe them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+# Two stamps may agree by chance.
+_LEAST_STAMPS: Final = 3
+
+
+@dataclass(frozen=True, slots=True)
+class JumpedClock:
+    """Refused stamps that follow one another: one clock, and perhaps the new one.
+
+    Attributes:
+        first_s: the first of them.
+        last_s: the latest.
+        stamps: how many there are.
+    """
+
+    first_s: float
+    last_s: float
+    stamps: int = 1
+
+    @staticmethod
+    def following(before: JumpedClock | None, stamp_s: float, max_pause_s: float) -> JumpedClock:
+        """Return the clock after one more refused stamp, which may begin another one."""
+        if before is not None and 0.0 <= stamp_s - before.last_s <= max_pause_s:
+            return JumpedClock(before.first_s, stamp_s, before.stamps + 1)
+        return JumpedClock(stamp_s, stamp_s)
+
+    def has_lasted(self, seconds: float) -> bool:
+        """Return whether the stamps span this time, and are more than two."""
+        return self.stamps >= _LEAST_STAMPS and self.last_s - self.first_s >= seconds
