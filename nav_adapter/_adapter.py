@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from typing import Final
 
 from perception.arrays import finite_number
 from tracking import PersonTrack
+from tracking.clock import JumpedClock
 
 from ._alert import Alert
 from ._alerting import AlertHistory, alerts_due
+from ._checks import age_of_s, checked_tracks, refuse_absurd
 from ._constraints import NavConstraints
 from ._errors import NavError
 from ._governor import GovernedSpeed, SpeedGovernor
@@ -17,14 +21,52 @@ from ._memory import PersonMemory
 from ._obstacle_rules import ObstacleRules
 from ._obstacles import obstacles_of
 from ._policy import AwarenessPolicy
-from ._robot import RobotProfile, RobotState
+from ._robot import LATERAL_NOISE_MPS, RobotProfile, RobotState
 
-# Tolerated difference between the clocks of two computers, or of a camera and a control loop.
-_CLOCK_TOLERANCE_S = 0.05
-# Positions, speeds and standard deviations beyond these are errors of whoever sent them. Beyond
-# 1e15 m a circle's corners fall together.
-_MOST_M = 1e12
-_MOST_MPS = 1e4
+_LOG = logging.getLogger("nav_adapter")
+# A stamp that is later than the last one by more than this may be wrong.
+_MAX_PAUSE_S: Final = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Memory:
+    """What the adapter remembers of its last update.
+
+    Attributes:
+        people: by id.
+        alert_history: stamps of the latest alerts.
+        constraints: the latest, or None before the first update.
+        given: the latest tracks, state of the robot, and stamp of perception.
+        ceiling_mps: ceiling of the limit during the recovery after stale data, or None.
+    """
+
+    people: Mapping[int, PersonMemory] = field(default_factory=dict)
+    alert_history: AlertHistory = field(default_factory=AlertHistory)
+    constraints: NavConstraints | None = None
+    given: tuple[tuple[PersonTrack, ...], RobotState, float] | None = None
+    ceiling_mps: float | None = None
+
+    @property
+    def stamp_s(self) -> float | None:
+        """Stamp of the last update."""
+        return None if self.constraints is None else self.constraints.stamp_s
+
+
+@dataclass(frozen=True, slots=True)
+class _Clock:
+    """Jumps of the clock.
+
+    Attributes:
+        refused: number of stamps that were refused.
+        restarts: how often the adapter has started anew.
+        jumped: refused stamps that follow one another.
+        before_jump: the memory before a stamp that was far ahead, in case the clock comes back.
+    """
+
+    refused: int = 0
+    restarts: int = 0
+    jumped: JumpedClock | None = None
+    before_jump: _Memory | None = None
 
 
 class NavAdapter:
@@ -43,8 +85,16 @@ class NavAdapter:
     obstacle. People whom the robot cannot reach while it stops limit it less (``docs/safety.md``).
 
     Tentative people, people unseen for longer than ``fresh_within_s`` and, with stale data, all
-    people count as unaware. After stale data, or after a pause in the updates of that length, the
-    limit rises from its last value no faster than the robot accelerates.
+    people count as unaware. For the speed limit, so do people at first sight, until frames have
+    shown them for ``shrink_after_s``. An id at a place that the person could not have reached is
+    first sight too: a tracker may have exchanged ids. After stale data, or after a pause in the
+    updates of that length, the limit rises from its last value no faster than the robot
+    accelerates.
+
+    A stamp that goes back, or that runs 10 s ahead of the robot's state, is refused and counted.
+    When such stamps go on for ``new_clock_after_s``, the clock has been set: the adapter forgets
+    all people, starts anew and logs a warning (logger ``nav_adapter``). If the clock returns after
+    a single update far ahead, the adapter goes on from before that update.
 
     Args:
         policy: radii, human speeds, margins and time behaviour.
@@ -64,12 +114,26 @@ class NavAdapter:
         self._robot = robot
         self._rules = ObstacleRules(policy)
         self._governor = SpeedGovernor(policy, robot, self._rules)
-        self._people: dict[int, PersonMemory] = {}
-        self._alert_history = AlertHistory()
-        self._latest: NavConstraints | None = None
-        self._latest_input: tuple[tuple[PersonTrack, ...], RobotState, float] | None = None
-        # The ceiling of the limit during the recovery after stale data.
-        self._ceiling_mps: float | None = None
+        self._memory = _Memory()
+        self._clock = _Clock()
+        self._warned_of_drive = False
+
+    @property
+    def refused_stamps(self) -> int:
+        """Number of updates that were refused, or discarded later, for their stamp."""
+        return self._clock.refused
+
+    @property
+    def clock_restarts(self) -> int:
+        """How often the adapter has started anew because the clock had been set."""
+        return self._clock.restarts
+
+    def reset(self) -> None:
+        """Forget all people and the clock. The limit then rises from its last value."""
+        latest = self._memory.constraints
+        limit_mps = None if latest is None else latest.speed_limit_mps
+        self._memory = _Memory(ceiling_mps=limit_mps)
+        self._clock = replace(self._clock, jumped=None, before_jump=None)
 
     def update(
         self,
@@ -84,7 +148,8 @@ class NavAdapter:
         Args:
             tracks: the tracker's latest; they are predicted to ``stamp_s`` with constant velocity.
             robot_state: the latest; its age counts too.
-            stamp_s: the present time, not before that of the previous update.
+            stamp_s: the present time, not before that of the previous update, and at most 10 s
+                after it unless ``robot_state`` is as new.
             perception_stamp_s: stamp of the latest frame that perception has processed, with or
                 without people. If it is None, the newest track's stamp is used, and empty
                 ``tracks`` mean that nobody is there. So only with this stamp does a dead camera
@@ -96,66 +161,26 @@ class NavAdapter:
 
         Raises:
             NavError: for input of the wrong type or not finite, a position or standard deviation
-                beyond 1e12 m, a speed beyond 10 km/s, an id that occurs twice, a stamp before the
-                last one, or data from the future. After this or any other error the adapter is as
-                it was before the call.
+                beyond 1e12 m, a speed beyond 10 km/s, an id that occurs twice, a stamp that jumps,
+                or data from the future. After this or any other error the adapter is as it was
+                before the call, but for :attr:`refused_stamps`.
         """
-        now = self._checked_stamp(stamp_s)
-        current = _checked_tracks(tracks, now)
+        now = finite_number("stamp_s", stamp_s, NavError)
+        current = checked_tracks(tracks)
         if not isinstance(robot_state, RobotState):
             raise NavError(f"robot_state must be a RobotState, got {type(robot_state).__name__}")
-        robot_age_s = _age_s("robot_state.stamp_s", robot_state.stamp_s, now)
-        if perception_stamp_s is not None:
-            perceived_s = finite_number("perception_stamp_s", perception_stamp_s, NavError)
-        else:
-            perceived_s = min(now, max((track.stamp_s for track in current), default=now))
-        perception_age_s = _age_s("perception_stamp_s", perceived_s, now)
-
-        timing = self._policy.timing
-        stale = max(robot_age_s, perception_age_s) > timing.stale_after_s
-        people = self._people
-        if self._latest is not None and now - self._latest.stamp_s > timing.stale_after_s:
-            # After a pause in the updates nobody counts as aware any more.
-            people = self._rules.after_silence(people)
-        people = self._rules.updated(people, current, now, stale)
-        _refuse_absurd(people)
-        limit = self._governor.limit(people, robot_state, now, robot_age_s)
-        for name, age_s in (("perception", perception_age_s), ("robot state", robot_age_s)):
-            if age_s > timing.stop_after_s:
-                reason = f"stale data: {name} is {age_s:.2f} s old"
-                limit = replace(limit, limit_mps=0.0, limited_by=reason)
-        limit, ceiling_mps = self._limit_recovery(limit, robot_state, now, stale)
-        alerts: tuple[Alert, ...] = ()
-        alert_history = self._alert_history
-        if self._policy.alerts is not None and not stale:
-            alerts, alert_history = alerts_due(
-                self._policy.alerts,
-                self._robot,
-                people,
-                robot_state,
-                now,
-                self._policy.margins.uncertainty_sigmas,
-                alert_history,
-            )
-        last_s = now if self._latest is None else self._latest.stamp_s
-        braked_mps = abs(robot_state.speed_mps) - self._robot.max_deceleration_mps2 * (now - last_s)
-        constraints = NavConstraints(
-            stamp_s=now,
-            obstacles=obstacles_of(people, now, self._policy),
-            speed_limit_mps=limit.limit_mps,
-            limited_by=limit.limited_by,
-            stale=stale,
-            reachable_speed_limit_mps=max(limit.limit_mps, braked_mps),
-            alerts=alerts,
-            braking_suffices=limit.braking_suffices,
-        )
+        before, clock = self._starting_point(now, robot_state)
+        memory = self._following(before, current, robot_state, now, perception_stamp_s)
         # Nothing can fail from here on. An error above leaves the adapter unchanged.
-        self._people = people
-        self._alert_history = alert_history
-        self._latest = constraints
-        self._latest_input = current, robot_state, perceived_s
-        self._ceiling_mps = ceiling_mps
-        return constraints
+        if clock.restarts > self._clock.restarts:
+            last_s = self._memory.stamp_s
+            _LOG.warning(
+                "the clock has been set: %.3f s after %.3f s; the adapter starts anew", now, last_s
+            )
+        self._memory, self._clock = memory, clock
+        self._warn_of_drive(robot_state)
+        assert memory.constraints is not None
+        return memory.constraints
 
     def watchdog(self, stamp_s: float) -> NavConstraints:
         """Return the constraints at ``stamp_s`` without new input: :meth:`update` with the latest.
@@ -167,28 +192,135 @@ class NavAdapter:
         Raises:
             NavError: for a stamp that is not finite or lies before the last one.
         """
-        now = self._checked_stamp(stamp_s)
-        if self._latest_input is None:
+        now = finite_number("stamp_s", stamp_s, NavError)
+        before = self._memory
+        if before.given is None or before.stamp_s is None:
             return NavConstraints(now, (), 0.0, "stale data: none yet", True)
-        tracks, robot_state, perceived_s = self._latest_input
-        return self.update(tracks, robot_state, now, perception_stamp_s=perceived_s)
+        if now < before.stamp_s:
+            raise NavError(_goes_back(now, before.stamp_s))
+        tracks, robot_state, perceived_s = before.given
+        memory = self._following(before, tracks, robot_state, now, perceived_s)
+        assert memory.constraints is not None
+        if now - before.stamp_s <= _MAX_PAUSE_S:
+            # A stamp far ahead may be wrong, and must not make all later ones late.
+            self._memory = memory
+        return memory.constraints
+
+    def _starting_point(self, now: float, robot_state: RobotState) -> tuple[_Memory, _Clock]:
+        """Return the memory that an update at ``now`` follows, and the clock after it.
+
+        Raises:
+            NavError: for a stamp that jumps, which is counted.
+        """
+        memory, clock = self._memory, self._clock
+        last_s = memory.stamp_s
+        if last_s is None:
+            return memory, clock
+        pause_s = now - last_s
+        if 0.0 <= pause_s <= _MAX_PAUSE_S:
+            return memory, replace(clock, jumped=None, before_jump=None)
+        if pause_s > _MAX_PAUSE_S and now - robot_state.stamp_s <= _MAX_PAUSE_S:
+            # A pause of the caller, as it seems.
+            return memory, replace(clock, jumped=None, before_jump=memory)
+        if pause_s < 0.0 and clock.before_jump is not None:
+            earlier_s = clock.before_jump.stamp_s
+            if earlier_s is not None and 0.0 <= now - earlier_s <= _MAX_PAUSE_S:
+                return clock.before_jump, _Clock(clock.refused + 1, clock.restarts)
+        jumped = JumpedClock.following(clock.jumped, now, _MAX_PAUSE_S)
+        if jumped.has_lasted(self._policy.timing.new_clock_after_s):
+            ceiling_mps = robot_state.travel_mps
+            if memory.constraints is not None:
+                ceiling_mps = min(ceiling_mps, memory.constraints.speed_limit_mps)
+            return _Memory(ceiling_mps=ceiling_mps), _Clock(clock.refused, clock.restarts + 1)
+        self._clock = replace(clock, refused=clock.refused + 1, jumped=jumped)
+        if pause_s < 0.0:
+            raise NavError(_goes_back(now, last_s))
+        raise NavError(
+            f"stamp_s jumps ahead, got {now:.6f} s after {last_s:.6f} s, with a robot_state of "
+            f"{robot_state.stamp_s:.6f} s (at most {_MAX_PAUSE_S:g} s)"
+        )
+
+    def _following(
+        self,
+        before: _Memory,
+        current: tuple[PersonTrack, ...],
+        robot_state: RobotState,
+        now: float,
+        perception_stamp_s: float | None,
+    ) -> _Memory:
+        """Return the memory after an update, with its constraints. Changes nothing."""
+        for index, track in enumerate(current):
+            age_of_s(f"tracks[{index}].stamp_s", track.stamp_s, now)
+        robot_age_s = age_of_s("robot_state.stamp_s", robot_state.stamp_s, now)
+        if perception_stamp_s is not None:
+            perceived_s = finite_number("perception_stamp_s", perception_stamp_s, NavError)
+        else:
+            perceived_s = min(now, max((track.stamp_s for track in current), default=now))
+        perception_age_s = age_of_s("perception_stamp_s", perceived_s, now)
+
+        timing = self._policy.timing
+        stale = max(robot_age_s, perception_age_s) > timing.stale_after_s
+        people = before.people
+        pause_s = 0.0 if before.stamp_s is None else now - before.stamp_s
+        if pause_s > timing.stale_after_s:
+            # After a pause in the updates nobody counts as aware any more.
+            people = self._rules.after_silence(people)
+        people = self._rules.updated(people, current, now, stale)
+        refuse_absurd(people)
+        limit = self._governor.limit(people, robot_state, now, robot_age_s)
+        for name, age_s in (("perception", perception_age_s), ("robot state", robot_age_s)):
+            if age_s > timing.stop_after_s:
+                reason = f"stale data: {name} is {age_s:.2f} s old"
+                limit = replace(limit, limit_mps=0.0, limited_by=reason)
+        if self._drives_sideways(robot_state):
+            limit = replace(limit, limit_mps=0.0, limited_by=self._drive_problem(robot_state))
+        limit, ceiling_mps = self._limit_recovery(before, limit, robot_state, pause_s, stale)
+        alerts: tuple[Alert, ...] = ()
+        alert_history = before.alert_history
+        if self._policy.alerts is not None and not stale:
+            alerts, alert_history = alerts_due(
+                self._policy.alerts,
+                self._robot,
+                people,
+                robot_state,
+                now,
+                self._policy.margins.uncertainty_sigmas,
+                alert_history,
+            )
+        braked_mps = robot_state.travel_mps - self._robot.max_deceleration_mps2 * pause_s
+        constraints = NavConstraints(
+            stamp_s=now,
+            obstacles=obstacles_of(people, now, self._policy),
+            speed_limit_mps=limit.limit_mps,
+            limited_by=limit.limited_by,
+            stale=stale,
+            reachable_speed_limit_mps=max(limit.limit_mps, braked_mps),
+            alerts=alerts,
+            braking_suffices=limit.braking_suffices,
+        )
+        given = current, robot_state, perceived_s
+        return _Memory(people, alert_history, constraints, given, ceiling_mps)
 
     def _limit_recovery(
-        self, limit: GovernedSpeed, robot_state: RobotState, now: float, stale: bool
+        self,
+        before: _Memory,
+        limit: GovernedSpeed,
+        robot_state: RobotState,
+        pause_s: float,
+        stale: bool,
     ) -> tuple[GovernedSpeed, float | None]:
         """Return the limit under the recovery ceiling, and the ceiling, or None without one.
 
         There is a ceiling from stale data on. It rises to the robot's maximum whatever the limit is
         meanwhile, so that more awareness never means less speed.
         """
-        ceiling_mps, timing = self._ceiling_mps, self._policy.timing
-        if self._latest is not None:
-            elapsed_s = now - self._latest.stamp_s
-            if elapsed_s > timing.stale_after_s:
+        ceiling_mps, timing = before.ceiling_mps, self._policy.timing
+        if before.constraints is not None:
+            if pause_s > timing.stale_after_s:
                 # After a pause in the updates the robot may be slower than the limit before it.
-                ceiling_mps = min(self._latest.speed_limit_mps, abs(robot_state.speed_mps))
+                ceiling_mps = min(before.constraints.speed_limit_mps, robot_state.travel_mps)
             if ceiling_mps is not None and not stale:
-                counted_s = min(elapsed_s, timing.fresh_within_s)
+                counted_s = min(pause_s, timing.fresh_within_s)
                 ceiling_mps += self._robot.max_acceleration_mps2 * counted_s
         if ceiling_mps is not None and limit.limit_mps > ceiling_mps:
             limit = replace(limit, limit_mps=ceiling_mps, limited_by="recovery after stale data")
@@ -197,58 +329,24 @@ class NavAdapter:
         done = ceiling_mps is None or ceiling_mps >= self._robot.max_speed_mps
         return limit, (None if done else ceiling_mps)
 
-    def _checked_stamp(self, stamp_s: float) -> float:
-        """Return the stamp after checking that it is finite and does not go back."""
-        now = finite_number("stamp_s", stamp_s, NavError)
-        if self._latest is not None and now < self._latest.stamp_s:
-            raise NavError(
-                f"stamp_s must not go backward, got {now:.6f} s after {self._latest.stamp_s:.6f} s"
-            )
-        return now
+    def _drives_sideways(self, robot_state: RobotState) -> bool:
+        """Return whether a robot moves sideways that cannot, according to its profile."""
+        lateral_mps = abs(robot_state.lateral_mps)
+        return self._robot.drive == "differential" and lateral_mps > LATERAL_NOISE_MPS
 
-
-def _age_s(name: str, stamp_s: float, now: float) -> float:
-    """Return the age of data, at least 0; refuse data from the future."""
-    if stamp_s > now + _CLOCK_TOLERANCE_S:
-        raise NavError(
-            f"{name} must not lie after stamp_s, got {stamp_s:.6f} s and {now:.6f} s "
-            f"(tolerance {_CLOCK_TOLERANCE_S:g} s)"
+    def _drive_problem(self, robot_state: RobotState) -> str:
+        return (
+            f"robot: moves sideways at {abs(robot_state.lateral_mps):.2f} m/s, but its profile "
+            "says drive='differential'"
         )
-    return max(0.0, now - stamp_s)
+
+    def _warn_of_drive(self, robot_state: RobotState) -> None:
+        """Log lateral motion of a differential robot, once until it ends."""
+        sideways = self._drives_sideways(robot_state)
+        if sideways and not self._warned_of_drive:
+            _LOG.warning("%s: the speed limit is 0", self._drive_problem(robot_state))
+        self._warned_of_drive = sideways
 
 
-def _checked_tracks(tracks: Iterable[PersonTrack], now: float) -> tuple[PersonTrack, ...]:
-    """Return the tracks after checking their types, ids and stamps."""
-    try:
-        checked = tuple(tracks)
-    except TypeError:
-        raise NavError(
-            f"tracks must be an iterable of PersonTrack, got {type(tracks).__name__}"
-        ) from None
-    ids: set[int] = set()
-    for index, track in enumerate(checked):
-        if not isinstance(track, PersonTrack):
-            raise NavError(f"tracks[{index}] must be a PersonTrack, got {type(track).__name__}")
-        if track.id in ids:
-            raise NavError(f"tracks must have distinct ids, got id {track.id} twice")
-        ids.add(track.id)
-        _age_s(f"tracks[{index}].stamp_s", track.stamp_s, now)
-    return checked
-
-
-def _refuse_absurd(people: Mapping[int, PersonMemory]) -> None:
-    """Refuse people whose finite numbers are too large for any person."""
-    for track_id, person in people.items():
-        x_m, y_m = person.position_odom_m
-        vx_mps, vy_mps = person.velocity_odom_mps
-        place_m, speed_mps = max(abs(x_m), abs(y_m)), max(abs(vx_mps), abs(vy_mps))
-        # A NaN, which an overflow may leave, fails the comparison too.
-        for name, value, most, unit in (
-            ("position_odom_m", place_m, _MOST_M, "m"),
-            ("velocity_odom_mps", speed_mps, _MOST_MPS, "m/s"),
-            ("the standard deviation of covariance_odom", person.sigma_m, _MOST_M, "m"),
-        ):
-            if not value <= most:
-                raise NavError(
-                    f"track {track_id}: {name} must be at most {most:g} {unit}, got {value:g}"
-                )
+def _goes_back(now: float, last_s: float) -> str:
+    return f"stamp_s must not go backward, got {now:.6f} s after {last_s:.6f} s"

@@ -78,12 +78,11 @@ def _candidates(
     sigmas: float,
 ) -> list[Alert]:
     """Return the alert for each person to warn, without the limit on how often."""
-    if abs(robot_state.speed_mps) <= _STANDING_MPS:
+    if robot_state.travel_mps <= _STANDING_MPS:
         return []
     # The robot's state is ``age_s`` old; it has driven straight on since.
-    heading, age_s = robot_state.heading_odom_rad, now - robot_state.stamp_s
-    speed_mps, position = robot_state.speed_mps, robot_state.position_odom_m.tolist()
-    velocity = speed_mps * math.cos(heading), speed_mps * math.sin(heading)
+    age_s, position = now - robot_state.stamp_s, robot_state.position_odom_m.tolist()
+    velocity = robot_state.velocity_odom_mps
     reach_m = robot.circumscribed_radius_m + BODY_RADIUS_M
     candidates = []
     for track_id, memory in people.items():

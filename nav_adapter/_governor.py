@@ -16,7 +16,7 @@ from ._footprint import Footprint
 from ._memory import PersonMemory
 from ._obstacle_rules import ObstacleRules
 from ._policy import AwarenessPolicy
-from ._robot import RobotProfile, RobotState
+from ._robot import LATERAL_NOISE_MPS, RobotProfile, RobotState
 from ._separation import highest_speed_mps, protective_separation_m
 
 # Below this speed the robot counts as standing: it may start off either way, or turn on the spot.
@@ -98,7 +98,7 @@ class SpeedGovernor:
             row = int(limit.argmin())
             lowest.append((float(limit[row]), row, rule))
         limit_mps, row, rule = min(lowest, key=lambda entry: entry[0])
-        speed_mps = abs(robot_state.speed_mps)
+        speed_mps = robot_state.travel_mps
         # A robot within speed and separation has the whole reaction time left.
         suffices = speed_mps <= lowest[0][0] or self._braking_suffices(
             gaps_m, shares, human_mps, age_s, speed_mps
@@ -119,7 +119,7 @@ class SpeedGovernor:
         Both are (2, N): by the bound from the footprint, and by that from the circumscribed circle.
         """
         count = len(people)
-        base_margin_m = BODY_RADIUS_M + abs(robot_state.speed_mps) * robot_age_s
+        base_margin_m = BODY_RADIUS_M + robot_state.travel_mps * robot_age_s
         margin_m = np.array([base_margin_m + self._uncertainty_m(m, now) for m in people.values()])
         # The nearer of predicted and tracked position counts: the person may have turned round.
         positions = np.array(
@@ -151,11 +151,10 @@ class SpeedGovernor:
         self, offset_odom_m: FloatArray, robot_state: RobotState, robot_age_s: float
     ) -> FloatArray:
         """Return (N,), the share of the stopping distance that can lead to each point."""
-        if abs(robot_state.speed_mps) < _STANDING_MPS:
+        lateral_mps = abs(robot_state.lateral_mps)
+        if abs(robot_state.speed_mps) < _STANDING_MPS and lateral_mps <= LATERAL_NOISE_MPS:
             return np.ones(len(offset_odom_m))
-        heading = robot_state.heading_odom_rad
-        sign = math.copysign(1.0, robot_state.speed_mps)
-        travel_x, travel_y = sign * math.cos(heading), sign * math.sin(heading)
+        travel_x, travel_y = robot_state.travel_direction_odom
         x, y = offset_odom_m.T
         angle_rad = np.abs(np.arctan2(travel_x * y - travel_y * x, travel_x * x + travel_y * y))
         turn_rad = self._turn_rad + abs(robot_state.yaw_rate_radps) * robot_age_s

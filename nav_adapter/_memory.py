@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from tracking import PersonTrack
 
 Vector2 = tuple[float, float]
+
+# Standard deviations by which two positions of one person may differ. 4 are exceeded once in
+# 3000 frames, which costs a moment of speed.
+_EXPLAINED_SIGMAS: Final = 4.0
+# Places closer than this are the same, also for a tracker that reports no uncertainty.
+_SAME_PLACE_M: Final = 0.05
 
 # Stamps closer than this are equal: the stamp of a sighting is a difference of floats, computed
 # anew for every frame.
@@ -30,6 +36,7 @@ class PersonMemory(NamedTuple):
         radius_m: radius of the obstacle.
         sigma_m: standard deviation of the position along its most uncertain direction.
         visible_s: total time in which frames showed the person, as counted for shrinking.
+        known_s: the same, with frames of a tentative track: time since the first sight.
         ahead_m: length by which the obstacle's polygon reaches ahead of its circle.
         direction_odom: unit vector of the person's latest walking direction.
         history: latest sizes, newest last: (``visible_s`` until which it held, radius, ahead).
@@ -46,6 +53,7 @@ class PersonMemory(NamedTuple):
     radius_m: float
     sigma_m: float
     visible_s: float
+    known_s: float
     ahead_m: float
     direction_odom: Vector2
     history: tuple[tuple[float, float, float], ...]
@@ -89,3 +97,24 @@ def position_sigma_m(track: PersonTrack, stamp_s: float) -> float:
     yy = y_y + dt * (y_v + v_y) + dt * dt * v_v
     xy = x_y + dt * (x_v + u_y) + dt * dt * u_v
     return math.sqrt(max(0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy), 0.0))
+
+
+def has_jumped(before: PersonMemory, track: PersonTrack, walking_mps: float) -> bool:
+    """Return whether a track is where the person of the memory cannot be.
+
+    The place is explained by the place of the memory's track, or by its prediction with constant
+    velocity, within the covariances of both and the way walked at ``walking_mps``.
+    """
+    old, stamp_s = before.track, track.stamp_s
+    elapsed_s = max(stamp_s - old.stamp_s, 0.0)
+    x, y = track.position_odom_m.tolist()
+    (old_x, old_y), (vx, vy) = before.track_position_odom_m, before.velocity_odom_mps
+    apart_m = min(
+        math.hypot(x - old_x, y - old_y),
+        math.hypot(x - old_x - elapsed_s * vx, y - old_y - elapsed_s * vy),
+    )
+    way_m = walking_mps * elapsed_s + _SAME_PLACE_M
+    if apart_m <= way_m:
+        return False
+    sigma_m = math.hypot(position_sigma_m(old, stamp_s), position_sigma_m(track, stamp_s))
+    return apart_m > way_m + _EXPLAINED_SIGMAS * sigma_m

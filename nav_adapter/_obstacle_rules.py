@@ -12,7 +12,7 @@ from perception.arrays import finite_number
 from tracking import PersonTrack
 
 from ._errors import NavError
-from ._memory import PersonMemory, Vector2, motion_at, position_sigma_m
+from ._memory import PersonMemory, Vector2, has_jumped, motion_at, position_sigma_m
 from ._policy import AwarenessPolicy
 
 # Below this speed the direction of a velocity is noise.
@@ -29,6 +29,10 @@ class ObstacleRules:
     Obstacles grow at once. They shrink at a bounded rate, to the largest size called for in the
     last ``shrink_after_s``. Both count only time in which frames showed a confirmed person. While
     no frame does, neither repeated nor predicted tracks shrink an obstacle or raise awareness.
+
+    Awareness raises no speed until frames have shown a person for ``shrink_after_s``. A known id at
+    a place that the person could not have reached is somebody new and unaware, and whoever had it
+    is kept for ``hold_s`` under a negative id.
 
     Args:
         policy: radii, human speeds, margins and time behaviour.
@@ -67,10 +71,21 @@ class ObstacleRules:
             now: stamp of the update.
             stale: whether the data are too old to trust.
         """
+        tracks = tuple(tracks)
+        jumped = {
+            track.id
+            for track in tracks
+            if track.id in people
+            and has_jumped(people[track.id], track, self.unaware_human_speed_mps)
+        }
         current = {
-            track.id: self._tracked_person(track, people.get(track.id), now, stale)
+            track.id: self._tracked_person(
+                track, people.get(track.id), now, stale=stale, jumped=track.id in jumped
+            )
             for track in tracks
         }
+        if jumped:
+            people = self._without_owner(people, jumped, tracks)
         for track_id, memory in people.items():
             if track_id not in current and memory.is_kept(now, self._timing.hold_s):
                 # Missing from the input: unaware, and walking on.
@@ -78,6 +93,24 @@ class ObstacleRules:
                     memory.track, memory, 0.0, now, visible_s=0.0
                 )
         return dict(sorted(current.items()))
+
+    def _without_owner(
+        self,
+        people: Mapping[int, PersonMemory],
+        jumped: set[int],
+        tracks: tuple[PersonTrack, ...],
+    ) -> dict[int, PersonMemory]:
+        """Return the people, those under a new id whose own now belongs to somebody else.
+
+        Somebody whose place has another track is known by that one.
+        """
+        kept = {track_id: memory for track_id, memory in people.items() if track_id not in jumped}
+        for track_id in sorted(jumped):
+            memory = people[track_id]
+            walking_mps = self.unaware_human_speed_mps
+            if all(has_jumped(memory, track, walking_mps) for track in tracks):
+                kept[min(0, *kept, *people) - 1] = memory
+        return kept
 
     def after_silence(self, people: Mapping[int, PersonMemory]) -> dict[int, PersonMemory]:
         """Return the people after a pause in the updates: unaware, and no smaller than that."""
@@ -95,24 +128,38 @@ class ObstacleRules:
         return unaware
 
     def human_speed_mps(self, memory: PersonMemory) -> float:
-        """Return the speed that the policy assumes for a person."""
+        """Return the speed that the policy assumes for a person.
+
+        At first sight, and until frames have shown the person for ``shrink_after_s``, it is that
+        for unaware people.
+        """
+        if memory.known_s < self._timing.shrink_after_s - _ROUNDING_S:
+            return self.unaware_human_speed_mps
         return self._policy_human_speed_mps(1.0 if memory.speed_held else memory.awareness_lower)
 
     def _tracked_person(
-        self, track: PersonTrack, before: PersonMemory | None, now: float, stale: bool
+        self,
+        track: PersonTrack,
+        before: PersonMemory | None,
+        now: float,
+        *,
+        stale: bool,
+        jumped: bool,
     ) -> PersonMemory:
         """Return the person of a track in the input."""
         timing = self._timing
         seen_stamp_s = track.stamp_s - track.time_since_seen_s
         trusted = (
             not stale
+            and not jumped
             and track.status != "tentative"
             and now - seen_stamp_s <= timing.fresh_within_s
         )
         lower = track.awareness_lower if trusted else 0.0
-        if before is None:
+        if before is None or jumped:
             return self._new_person(track, seen_stamp_s, lower, now)
         newly_seen_s = before.newly_seen_s(seen_stamp_s)
+        known_s = before.known_s + (0.0 if stale else min(newly_seen_s, timing.fresh_within_s))
         if newly_seen_s == 0.0:
             # Without a new frame there is no new evidence, whatever the track says.
             lower = min(lower, before.awareness_lower)
@@ -121,7 +168,12 @@ class ObstacleRules:
         counts = not stale and track.status == "confirmed"
         visible_s = min(newly_seen_s, timing.fresh_within_s) if counts else 0.0
         return self._known_person(
-            track, before, lower, now, visible_s=visible_s, seen_stamp_s=seen_stamp_s
+            track,
+            before._replace(known_s=known_s),
+            lower,
+            now,
+            visible_s=visible_s,
+            seen_stamp_s=seen_stamp_s,
         )
 
     def _new_person(
@@ -141,6 +193,7 @@ class ObstacleRules:
             radius_m=radius_m,
             sigma_m=sigma_m,
             visible_s=0.0,
+            known_s=0.0,
             ahead_m=ahead_m,
             direction_odom=_walking_direction(velocity, (1.0, 0.0)),
             history=((0.0, radius_m, ahead_m),),
@@ -183,6 +236,7 @@ class ObstacleRules:
             radius_m=max(radius_m, before.radius_m - shrink_m),
             sigma_m=sigma_m,
             visible_s=total_visible_s,
+            known_s=before.known_s,
             ahead_m=max(ahead_m, before.ahead_m - shrink_m),
             direction_odom=_walking_direction(velocity, before.direction_odom),
             history=history,

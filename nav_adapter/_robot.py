@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Final, Literal, get_args
 
 import numpy as np
 from shapely.geometry import MultiPoint
@@ -13,7 +15,13 @@ from perception.arrays import FloatArray, finite_array, finite_number, set_field
 from ._errors import NavError
 
 # An outline below one square millimetre is a line or a point.
-_SMALLEST_FOOTPRINT_M2 = 1e-6
+_SMALLEST_FOOTPRINT_M2: Final = 1e-6
+# Wheels slip and filters of odometry err: lateral speed up to this is noise.
+LATERAL_NOISE_MPS: Final = 0.1
+# The forward speed is given twice with velocity_base_mps.
+_SAME_SPEED_MPS: Final = 1e-6
+
+Drive = Literal["differential", "holonomic"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +36,9 @@ class RobotProfile:
         max_deceleration_mps2: > 0, a deceleration that the brakes always reach.
         reaction_time_s: ≥ 0, from a change in the scene to the start of braking: exposure,
             perception, the period of the control loop and the delay of the drive.
+        drive: ``"differential"`` for a robot that cannot move sideways, ``"holonomic"`` for one
+            that can, None if it is not known. With ``"differential"`` the adapter stops a robot
+            whose state moves sideways, since one of the two is wrong.
     """
 
     footprint_m: FloatArray
@@ -35,8 +46,13 @@ class RobotProfile:
     max_acceleration_mps2: float
     max_deceleration_mps2: float
     reaction_time_s: float
+    drive: Drive | None = None
 
     def __post_init__(self) -> None:
+        if self.drive is not None and self.drive not in get_args(Drive):
+            raise NavError(
+                f"drive must be 'differential', 'holonomic' or None, got {self.drive!r:.80}"
+            )
         footprint = finite_array("footprint_m", self.footprint_m, ("M", 2), NavError)
         if len(footprint) < 3:
             raise NavError(f"footprint_m must have at least 3 corners, got {len(footprint)}")
@@ -78,6 +94,12 @@ class RobotState:
         heading_odom_rad: counter-clockwise from the x axis of odom.
         speed_mps: signed, forward positive.
         yaw_rate_radps: counter-clockwise positive.
+        velocity_base_mps: (2,), forward and left, of a robot that can move sideways. Its first
+            number is ``speed_mps``. None for a robot that moves straight ahead.
+
+    Raises:
+        NavError: for a number that is not finite, a wrong shape, or a ``velocity_base_mps`` that
+            contradicts ``speed_mps``.
     """
 
     stamp_s: float
@@ -85,6 +107,7 @@ class RobotState:
     heading_odom_rad: float
     speed_mps: float
     yaw_rate_radps: float
+    velocity_base_mps: FloatArray | None = None
 
     def __post_init__(self) -> None:
         set_fields(
@@ -95,3 +118,43 @@ class RobotState:
                 for name in ("stamp_s", "heading_odom_rad", "speed_mps", "yaw_rate_radps")
             },
         )
+        if self.velocity_base_mps is None:
+            return
+        velocity = finite_array("velocity_base_mps", self.velocity_base_mps, (2,), NavError)
+        if abs(velocity[0] - self.speed_mps) > _SAME_SPEED_MPS * max(1.0, abs(self.speed_mps)):
+            raise NavError(
+                "speed_mps must be the first number of velocity_base_mps, got "
+                f"{self.speed_mps:g} m/s and {velocity[0]:g} m/s"
+            )
+        set_fields(self, velocity_base_mps=velocity)
+
+    @property
+    def lateral_mps(self) -> float:
+        """Speed to the left."""
+        return 0.0 if self.velocity_base_mps is None else float(self.velocity_base_mps[1])
+
+    @property
+    def travel_mps(self) -> float:
+        """Speed along the direction of travel, ≥ 0."""
+        return math.hypot(self.speed_mps, self.lateral_mps)
+
+    @property
+    def travel_direction_odom(self) -> tuple[float, float]:
+        """Unit vector of the direction of travel; the heading for a robot that stands.
+
+        Lateral noise does not count.
+        """
+        forward, left = math.copysign(1.0, self.speed_mps), 0.0
+        if abs(self.lateral_mps) > LATERAL_NOISE_MPS:
+            travel_mps = self.travel_mps
+            forward, left = self.speed_mps / travel_mps, self.lateral_mps / travel_mps
+        return self._in_odom(forward, left)
+
+    @property
+    def velocity_odom_mps(self) -> tuple[float, float]:
+        """The velocity of the base in odom."""
+        return self._in_odom(self.speed_mps, self.lateral_mps)
+
+    def _in_odom(self, forward: float, left: float) -> tuple[float, float]:
+        cos, sin = math.cos(self.heading_odom_rad), math.sin(self.heading_odom_rad)
+        return forward * cos - left * sin, forward * sin + left * cos

@@ -71,6 +71,8 @@ class TimeBehaviour(StrictConfig):
             constant velocity, until this time after the last sighting.
         stale_after_s: if perception or the robot's state is older, everyone counts as unaware.
         stop_after_s: if either is older than this, the speed limit is 0.
+        new_clock_after_s: when stamps that jump go on for this time, the clock has been set, and
+            the adapter starts anew.
     """
 
     error: ClassVar[type[ValueError]] = NavError
@@ -81,6 +83,7 @@ class TimeBehaviour(StrictConfig):
     hold_s: float = Field(default=1.0, ge=0.0, le=10.0)
     stale_after_s: float = Field(default=0.5, gt=0.0, le=5.0)
     stop_after_s: float = Field(default=1.5, gt=0.0, le=10.0)
+    new_clock_after_s: float = Field(default=1.0, ge=0.0, le=60.0)
 
     @model_validator(mode="after")
     def _check_order(self) -> TimeBehaviour:

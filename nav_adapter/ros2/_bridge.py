@@ -137,15 +137,18 @@ class AwarenessBridge:
         stamp_s = to_seconds(message.header.stamp)
         try:
             T = pose_matrix((position.x, position.y, position.z), rotation)
-            speed_mps = message.twist.twist.linear.x
-            if abs(speed_mps) > _FASTEST_MPS:
-                raise NavError(f"speed must be within {_FASTEST_MPS:g} m/s, got {speed_mps:g} m/s")
+            linear = message.twist.twist.linear
+            speed_mps = math.hypot(linear.x, linear.y)
+            # Written so that NaN is refused too.
+            if not speed_mps <= _FASTEST_MPS:
+                raise NavError(f"speed_mps must be within {_FASTEST_MPS:g} m/s, got {speed_mps:g}")
             state = RobotState(
                 stamp_s,
                 T[:2, 3],
                 math.atan2(T[1, 0], T[0, 0]),
-                speed_mps,
+                linear.x,
                 message.twist.twist.angular.z,
+                np.array([linear.x, linear.y]),
             )
             child = message.child_frame_id or self.frames.base
             self._transforms.add(self.frames.odom, child, stamp_s, T)

@@ -60,8 +60,10 @@ def outgoing(
     if wanted("alerts"):
         yield "alerts", alerts(constraints)
     if wanted("stop_zone"):
-        speed_mps = 0.0 if robot_state is None else robot_state.speed_mps
-        yield "stop_zone", stop_zone(robot, speed_mps, constraints.stamp_s, base_frame=base)
+        moving = robot_state
+        forward, left = (moving.speed_mps, moving.lateral_mps) if moving else (0.0, 0.0)
+        zone = stop_zone(robot, forward, constraints.stamp_s, lateral_mps=left, base_frame=base)
+        yield "stop_zone", zone
     if robot_state is not None and wanted("grid"):
         center = robot_state.position_odom_m
         yield "grid", occupancy_grid(constraints, center, size_m=grid_m, frame_id=odom)

@@ -74,19 +74,20 @@ def stop_zone(
     speed_mps: float,
     stamp_s: float,
     *,
+    lateral_mps: float = 0.0,
     base_frame: str = "base_link",
 ) -> PolygonStamped:
     """Return ``geometry_msgs/PolygonStamped``: the area that a robot passes when it brakes now.
 
     It is the footprint, stretched along the direction of travel by the stopping distance
     v·T + v²/2a (decision 8 without the person): a stop zone that grows with speed, for the
-    collision monitor's ``polygon_sub_topic``.
+    collision monitor's ``polygon_sub_topic``. ``lateral_mps`` is the speed to the left.
     """
-    reach = abs(speed_mps) * robot.reaction_time_s + speed_mps**2 / (
-        2.0 * robot.max_deceleration_mps2
-    )
+    travel_mps = math.hypot(speed_mps, lateral_mps)
+    # The stopping distance over the speed, so that a standing robot has no direction to divide by.
+    stop_s = robot.reaction_time_s + travel_mps / (2.0 * robot.max_deceleration_mps2)
     footprint = np.asarray(robot.footprint_m)
-    ahead = footprint + np.array([math.copysign(reach, speed_mps), 0.0])
+    ahead = footprint + np.array([speed_mps * stop_s, lateral_mps * stop_s])
     zone = MultiPoint(np.concatenate([footprint, ahead])).convex_hull
     return PolygonStamped(header(stamp_s, base_frame), _polygon(zone))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -66,6 +66,8 @@ class RobotFile(StrictConfig):
         max_acceleration_mps2: > 0.
         max_deceleration_mps2: > 0, a deceleration that the brakes always reach.
         reaction_time_s: ≥ 0, from exposure to the start of braking.
+        drive: ``differential``, or ``holonomic`` for a robot that can move sideways. Without it
+            the odometry tells. A ``differential`` robot whose odometry moves sideways is stopped.
         camera: mount of the camera; without it the pose is read from tf.
     """
 
@@ -76,6 +78,7 @@ class RobotFile(StrictConfig):
     max_acceleration_mps2: float = Field(gt=0.0)
     max_deceleration_mps2: float = Field(gt=0.0)
     reaction_time_s: float = Field(ge=0.0)
+    drive: Literal["differential", "holonomic"] | None = None
     camera: CameraMount | None = None
 
     def profile(self) -> RobotProfile:
@@ -90,4 +93,5 @@ class RobotFile(StrictConfig):
             max_acceleration_mps2=self.max_acceleration_mps2,
             max_deceleration_mps2=self.max_deceleration_mps2,
             reaction_time_s=self.reaction_time_s,
+            drive=self.drive,
         )

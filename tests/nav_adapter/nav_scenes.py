@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from hypothesis import strategies as st
 
-from nav_adapter import NavConstraints, RobotProfile, RobotState
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile, RobotState
 from perception.arrays import FloatArray
 from tracking import PersonTrack
 
@@ -58,6 +58,30 @@ def robot_at(
     speed_mps: float = 0.0,
 ) -> RobotState:
     return RobotState(stamp_s, np.asarray(position), heading_rad, speed_mps, 0.0)
+
+
+def settled_update(
+    tracks: Sequence[PersonTrack],
+    *,
+    policy: AwarenessPolicy | None = None,
+    robot: RobotProfile = ROBOT,
+    state: RobotState | None = None,
+) -> NavConstraints:
+    """Return the constraints at 0 s for people who have been seen for 0.4 s, walking as now."""
+    adapter = NavAdapter(AwarenessPolicy() if policy is None else policy, robot)
+    now = robot_at() if state is None else state
+    for ago_s in (0.4, 0.3, 0.2, 0.1, 0.0):
+        earlier = [
+            replace(
+                track,
+                stamp_s=track.stamp_s - ago_s,
+                position_odom_m=track.position_odom_m - ago_s * track.velocity_odom_mps,
+            )
+            for track in tracks
+        ]
+        then = replace(now, stamp_s=now.stamp_s - ago_s)
+        constraints = adapter.update(earlier, then, -ago_s)
+    return constraints
 
 
 def rotation(angle_rad: float) -> FloatArray:

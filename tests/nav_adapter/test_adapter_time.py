@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from nav_scenes import FLOOR_M, ROBOT, crowds, finite, person, robot_at
+from nav_scenes import FLOOR_M, ROBOT, crowds, finite, person, robot_at, settled_update
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, max_speed_mps
 from nav_adapter.policies import SafetyMargins
@@ -197,8 +197,8 @@ def test_awareness_counts_only_for_tracks_seen_recently(
     changes: dict[str, object], trusted: bool
 ) -> None:
     track = replace(person(awareness_lower=1.0), **changes)
-    result = NavAdapter(AwarenessPolicy(), ROBOT).update((track,), robot_at(), 0.0)
-    unaware = NavAdapter(AwarenessPolicy(), ROBOT).update((person(),), robot_at(), 0.0)
+    result = settled_update((track,))
+    unaware = settled_update((person(),))
     assert result.obstacles[0].awareness_lower == (1.0 if trusted else 0.0)
     assert (result.speed_limit_mps > unaware.speed_limit_mps) is trusted
 
@@ -370,4 +370,4 @@ def test_memory_is_bounded_by_the_people_present() -> None:
         assert len(result.obstacles) <= 12
     later = now + 1.5
     assert adapter.update((), robot_at(later), later).obstacles == ()
-    assert adapter._people == {}
+    assert adapter._memory.people == {}

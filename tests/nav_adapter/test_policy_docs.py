@@ -53,6 +53,15 @@ def test_the_table_of_presets_shows_their_figures(column: int, name: str) -> Non
     assert shrinking == [policy.timing.shrink_rate_mps, policy.timing.shrink_after_s]
 
 
+def test_no_preset_has_a_maximum_radius() -> None:
+    """The page, claim C2 and the presets agree."""
+    for name in ("blind", "conservative", "balanced", "assertive"):
+        assert AwarenessPolicy.preset(name).margins.maximum_radius_m is None
+    assert "No preset sets a maximum" in TEXT
+    safety = (ROOT / "docs" / "safety.md").read_text(encoding="utf-8")
+    assert "where a policy sets one (no preset does)" in safety
+
+
 def test_the_file_shown_is_a_valid_policy() -> None:
     (block,) = re.findall(r"```yaml\n(.*?)```", TEXT, flags=re.DOTALL)
     policy = AwarenessPolicy.model_validate(yaml.safe_load(block))

@@ -6,9 +6,9 @@ import math
 
 import pytest
 from hypothesis import given
-from nav_scenes import ROBOT, finite, person, robot_at
+from nav_scenes import ROBOT, finite, person, settled_update
 
-from nav_adapter import AwarenessPolicy, NavAdapter, max_speed_mps
+from nav_adapter import AwarenessPolicy, max_speed_mps
 from nav_adapter.policies import SpeedRules
 from perception.anthropometry import BODY_RADIUS_M
 
@@ -25,7 +25,7 @@ def limit_mps(
     """Return the limit for a person 3 m ahead; a course of 0 is straight away from the robot."""
     velocity = walking_mps * math.cos(course_rad), walking_mps * math.sin(course_rad)
     track = person(position=(AHEAD_M, 0.0), velocity=velocity, awareness_lower=alpha)
-    return NavAdapter(policy, ROBOT).update((track,), robot_at(), 0.0).speed_limit_mps
+    return settled_update((track,), policy=policy).speed_limit_mps
 
 
 def limit_for(human_mps: float) -> float:

@@ -4,16 +4,25 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
+import separation_model
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from nav_policies import policies, robots
 from nav_scenes import crowds, finite, moved_person, moved_robot, numbers, robot_at
 from shapely.geometry import Point
 
-from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile, max_speed_mps
+from nav_adapter import (
+    AwarenessPolicy,
+    NavAdapter,
+    NavConstraints,
+    RobotProfile,
+    RobotState,
+    max_speed_mps,
+)
 from perception.anthropometry import BODY_RADIUS_M
 from tracking import PersonTrack
 
@@ -111,6 +120,67 @@ def test_never_faster_than_speed_and_separation_straight_ahead(
         )
         assert shown[track.id].awareness_lower <= track.awareness_lower
         assert result.speed_limit_mps <= bound + ROUNDING
+
+
+@st.composite
+def scenes(draw: st.DrawFn) -> tuple[AwarenessPolicy, RobotProfile, RobotState, Any]:
+    """A policy, a robot in motion in any direction, and a crowd, as of 0 s."""
+    speed, lateral = draw(finite(-1.5, 1.5)), draw(st.just(0.0) | finite(-1.5, 1.5))
+    state = RobotState(
+        -draw(st.just(0.0) | finite(0.0, 0.4)),
+        np.array(draw(st.tuples(finite(-3, 3), finite(-3, 3)))),
+        draw(finite(-4.0, 4.0)),
+        speed,
+        draw(finite(-1.5, 1.5)),
+        np.array([speed, lateral]),
+    )
+    return draw(policies()), draw(robots()), state, draw(crowds())
+
+
+def _assert_equal_to_the_model(
+    scene: tuple[AwarenessPolicy, RobotProfile, RobotState, Any],
+) -> None:
+    policy, robot, state, people = scene
+    adapter = NavAdapter(policy, robot)
+    for ago_s in (0.4, 0.3, 0.2, 0.1, 0.0):
+        tracks = [
+            replace(
+                track,
+                stamp_s=track.stamp_s - ago_s,
+                position_odom_m=track.position_odom_m - ago_s * track.velocity_odom_mps,
+            )
+            for track in people
+        ]
+        then = replace(state, stamp_s=state.stamp_s - ago_s)
+        result = adapter.update(tracks, then, -ago_s, perception_stamp_s=-ago_s)
+    shown = {obstacle.track_id: obstacle.awareness_lower for obstacle in result.obstacles}
+    # Frames have shown each person for this time since the first update.
+    known_s = 0.0 if result.stale else 4 * min(0.1, policy.timing.fresh_within_s)
+    known = known_s > policy.timing.shrink_after_s - 1e-6
+    alphas = [shown[track.id] if known else 0.0 for track in people]
+    # With hysteresis the speed depends on more than the last lower bound.
+    held = getattr(policy.speed, "shape", "") == "two_level"
+    expected = separation_model.limit_mps(policy, robot, state, people, alphas, 0.0)
+    if not held:
+        assert result.speed_limit_mps <= expected + 1e-6
+    bound = separation_model.limit_mps(policy, robot, state, people, [1.0] * len(people), 0.0)
+    assert result.speed_limit_mps <= bound + 1e-6
+    if not held and result.limited_by.endswith(("speed and separation", "robot maximum")):
+        assert result.speed_limit_mps == pytest.approx(expected, abs=1e-6)
+
+
+@settings(max_examples=100)
+@given(scene=scenes())
+def test_the_limit_is_that_of_a_second_implementation(scene: Any) -> None:
+    """By bisection, with shapely's geometry: ``separation_model``."""
+    _assert_equal_to_the_model(scene)
+
+
+@pytest.mark.full
+@settings(max_examples=5000)
+@given(scene=scenes())
+def test_the_limit_is_that_of_a_second_implementation_in_5000_crowds(scene: Any) -> None:
+    _assert_equal_to_the_model(scene)
 
 
 def _ahead(track: PersonTrack) -> float:

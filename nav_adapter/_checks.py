@@ -1,0 +1,64 @@
+"""Checks of the adapter's input."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Final
+
+from tracking import PersonTrack
+
+from ._errors import NavError
+from ._memory import PersonMemory
+
+# Tolerated difference between the clocks of two computers, or of a camera and a control loop.
+_CLOCK_TOLERANCE_S: Final = 0.05
+# Positions, speeds and standard deviations beyond these are errors of whoever sent them. Beyond
+# 1e15 m a circle's corners fall together.
+_MOST_M: Final = 1e12
+_MOST_MPS: Final = 1e4
+
+
+def age_of_s(name: str, stamp_s: float, now: float) -> float:
+    """Return the age of data, at least 0; refuse data from the future."""
+    if stamp_s > now + _CLOCK_TOLERANCE_S:
+        raise NavError(
+            f"{name} must not lie after stamp_s, got {stamp_s:.6f} s and {now:.6f} s "
+            f"(tolerance {_CLOCK_TOLERANCE_S:g} s)"
+        )
+    return max(0.0, now - stamp_s)
+
+
+def checked_tracks(tracks: Iterable[PersonTrack]) -> tuple[PersonTrack, ...]:
+    """Return the tracks after checking their types and ids."""
+    try:
+        checked = tuple(tracks)
+    except TypeError:
+        raise NavError(
+            f"tracks must be an iterable of PersonTrack, got {type(tracks).__name__}"
+        ) from None
+    ids: set[int] = set()
+    for index, track in enumerate(checked):
+        if not isinstance(track, PersonTrack):
+            raise NavError(f"tracks[{index}] must be a PersonTrack, got {type(track).__name__}")
+        if track.id in ids:
+            raise NavError(f"tracks must have distinct ids, got id {track.id} twice")
+        ids.add(track.id)
+    return checked
+
+
+def refuse_absurd(people: Mapping[int, PersonMemory]) -> None:
+    """Refuse people whose finite numbers are too large for any person."""
+    for track_id, person in people.items():
+        x_m, y_m = person.position_odom_m
+        vx_mps, vy_mps = person.velocity_odom_mps
+        place_m, speed_mps = max(abs(x_m), abs(y_m)), max(abs(vx_mps), abs(vy_mps))
+        # A NaN, which an overflow may leave, fails the comparison too.
+        for name, value, most, unit in (
+            ("position_odom_m", place_m, _MOST_M, "m"),
+            ("velocity_odom_mps", speed_mps, _MOST_MPS, "m/s"),
+            ("the standard deviation of covariance_odom", person.sigma_m, _MOST_M, "m"),
+        ):
+            if not value <= most:
+                raise NavError(
+                    f"track {track_id}: {name} must be at most {most:g} {unit}, got {value:g}"
+                )

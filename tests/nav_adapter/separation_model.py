@@ -1,0 +1,147 @@
+"""Speed and separation once more, from docs/safety.md alone: shapely, eigenvalues and bisection.
+
+Nothing here is imported from the adapter but its settings, so that an error in the adapter's closed
+form, its geometry or its bookkeeping does not repeat itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from shapely.affinity import rotate, translate
+from shapely.geometry import MultiPoint, Point
+
+from nav_adapter import AwarenessPolicy, RobotProfile, RobotState
+from tracking import PersonTrack
+
+BODY_M = 0.30
+
+
+def limit_mps(
+    policy: AwarenessPolicy,
+    robot: RobotProfile,
+    state: RobotState,
+    tracks: Sequence[PersonTrack],
+    awareness: Sequence[float],
+    now: float,
+) -> float:
+    """Return the limit of speed and separation for people with these lower bounds of α."""
+    limits = [
+        _person_limit_mps(policy, robot, state, track, alpha, now)
+        for track, alpha in zip(tracks, awareness, strict=True)
+    ]
+    return min([robot.max_speed_mps, *limits])
+
+
+def _person_limit_mps(
+    policy: AwarenessPolicy,
+    robot: RobotProfile,
+    state: RobotState,
+    track: PersonTrack,
+    alpha: float,
+    now: float,
+) -> float:
+    forward, left = state.speed_mps, 0.0
+    if state.velocity_base_mps is not None:
+        left = float(state.velocity_base_mps[1])
+    travel_mps, state_age_s = math.hypot(forward, left), now - state.stamp_s
+    margin_m = BODY_M + travel_mps * state_age_s + _position_margin_m(policy, track, now)
+    hull = translate(
+        rotate(
+            MultiPoint(robot.footprint_m).convex_hull,
+            state.heading_odom_rad,
+            origin=(0.0, 0.0),
+            use_radians=True,
+        ),
+        *state.position_odom_m,
+    )
+    places = [
+        track.position_odom_m + age_s * track.velocity_odom_mps
+        for age_s in (0.0, now - track.stamp_s)
+    ]
+    footprint_gap_m = min(hull.distance(Point(place)) for place in places) - margin_m
+    reach_m = max(math.hypot(x, y) for x, y in robot.footprint_m)
+    circle_gap_m = (
+        min(math.dist(place, state.position_odom_m) for place in places) - reach_m - margin_m
+    )
+    share = 1.0
+    if abs(forward) >= 0.05 or abs(left) > 0.1:
+        counted = left if abs(left) > 0.1 else 0.0
+        course = state.heading_odom_rad + math.atan2(counted, forward)
+        turn = math.radians(policy.rules.turn_within_stop_deg)
+        turn += abs(state.yaw_rate_radps) * state_age_s
+        share = max(_share(place - state.position_odom_m, course, turn) for place in places)
+    human_mps = _human_mps(policy, state, track, alpha)
+    return max(
+        _fastest_mps(policy, robot, footprint_gap_m, human_mps, now - track.stamp_s, 1.0),
+        _fastest_mps(policy, robot, circle_gap_m, human_mps, now - track.stamp_s, share),
+    )
+
+
+def _share(offset_m: np.ndarray, course_rad: float, turn_rad: float) -> float:
+    """The share of the way that can lead to a point, once the course has turned towards it."""
+    bearing = math.atan2(offset_m[1], offset_m[0])
+    angle = abs(math.remainder(bearing - course_rad, math.tau))
+    return max(0.0, math.cos(max(0.0, angle - turn_rad)))
+
+
+def _position_margin_m(policy: AwarenessPolicy, track: PersonTrack, now: float) -> float:
+    ahead_s = min(now - track.stamp_s, policy.timing.stop_after_s)
+    F = np.eye(4)
+    F[0, 2] = F[1, 3] = ahead_s
+    covariance = (F @ track.covariance_odom @ F.T)[:2, :2]
+    sigma_m = math.sqrt(max(np.linalg.eigvalsh(covariance)[-1], 0.0))
+    sigmas = policy.margins.uncertainty_sigmas
+    if now - (track.stamp_s - track.time_since_seen_s) > policy.timing.fresh_within_s:
+        sigmas = max(sigmas, policy.margins.unseen_sigmas)
+    return sigmas * sigma_m
+
+
+def _human_mps(
+    policy: AwarenessPolicy, state: RobotState, track: PersonTrack, alpha: float
+) -> float:
+    """The speed assumed of a person towards the robot (assumption 1, claim C12)."""
+    assumed, unaware = policy.speed.human_speed_mps(alpha), policy.speed.human_speed_mps(0.0)
+    walking = math.hypot(*track.velocity_odom_mps)
+    closing = 0.0
+    if walking > 0.0:
+        to_robot = state.position_odom_m - track.position_odom_m
+        course = math.atan2(track.velocity_odom_mps[1], track.velocity_odom_mps[0])
+        off = abs(math.remainder(math.atan2(to_robot[1], to_robot[0]) - course, math.tau))
+        brisk = min(max((walking / max(unaware, 1e-9) - 0.75) / 0.25, 0.0), 1.0)
+        turn = math.radians(policy.rules.people_turn_deg) * brisk
+        closing = walking * math.cos(max(off - turn, 0.0))
+    if walking > unaware:
+        excess = walking - unaware
+        running = min(excess / max(0.25 * unaware, 1e-9), 1.0)
+        assumed = max(assumed + excess, (1.0 - running) * assumed + running * walking)
+    return max(assumed, closing)
+
+
+def _fastest_mps(
+    policy: AwarenessPolicy,
+    robot: RobotProfile,
+    gap_m: float,
+    human_mps: float,
+    track_age_s: float,
+    share: float,
+) -> float:
+    """The highest speed whose protective separation fits into the gap, by bisection."""
+    a, T = robot.max_deceleration_mps2, robot.reaction_time_s + track_age_s
+
+    def fits(v: float) -> bool:
+        way_m = v * T + v * v / (2.0 * a)
+        walked_m = human_mps * (T + v / a)
+        return walked_m + share * way_m + policy.margins.separation_clearance_m <= gap_m
+
+    low, high = 0.0, 2.0 * robot.max_speed_mps
+    if not fits(low):
+        return 0.0
+    if fits(high):
+        return high
+    for _ in range(80):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if fits(middle) else (low, middle)
+    return low

@@ -1,0 +1,128 @@
+"""The adapter's clock: one wrong stamp costs one update, a clock that was set costs a second."""
+
+from __future__ import annotations
+
+import logging
+from itertools import pairwise
+
+import pytest
+from nav_scenes import ROBOT, numbers, person, robot_at
+
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, NavError
+from nav_adapter.policies import TimeBehaviour
+
+PERIOD_S = 0.1
+
+
+def step(adapter: NavAdapter, now: float, *, robot_s: float | None = None) -> NavConstraints:
+    """Update with somebody aware 3 m ahead, seen just now, and a robot at 0.5 m/s."""
+    seen_s = now if robot_s is None else robot_s
+    track = person(seen_s, awareness_lower=0.9)
+    return adapter.update((track,), robot_at(seen_s, speed_mps=0.5), now)
+
+
+def play(adapter: NavAdapter, start_s: float, updates: int) -> tuple[int, list[NavConstraints]]:
+    """Return the number of refused updates, and the constraints of the others."""
+    refused, results = 0, []
+    for k in range(updates):
+        try:
+            results.append(step(adapter, start_s + k * PERIOD_S))
+        except NavError:
+            refused += 1
+    return refused, results
+
+
+@pytest.mark.parametrize("jump_s", [11.0, 3600.0, 1e9, -1.0, -3600.0])
+def test_one_wrong_stamp_costs_one_update(jump_s: float) -> None:
+    adapter, twin = (NavAdapter(AwarenessPolicy(), ROBOT) for _ in range(2))
+    for k in range(60):
+        now = 100.0 + k * PERIOD_S
+        if k % 20 == 10:
+            with pytest.raises(NavError, match=r"jumps ahead|must not go backward"):
+                step(adapter, now + jump_s, robot_s=now if jump_s > 0.0 else None)
+        assert numbers(step(adapter, now)) == numbers(step(twin, now))
+    assert (adapter.refused_stamps, adapter.clock_restarts) == (3, 0)
+
+
+def test_an_update_far_ahead_is_forgotten_if_the_clock_returns() -> None:
+    """It may have been a pause of the caller, so it is not refused."""
+    adapter, twin = (NavAdapter(AwarenessPolicy(), ROBOT) for _ in range(2))
+    play(adapter, 100.0, 20), play(twin, 100.0, 20)
+    jumped = step(adapter, 3700.0)
+    assert jumped.obstacles[0].awareness_lower == 0.9
+    assert jumped.obstacles[0].radius_m == 1.0
+    for k in range(20, 40):
+        now = 100.0 + k * PERIOD_S
+        assert numbers(step(adapter, now)) == numbers(step(twin, now))
+    assert (adapter.refused_stamps, adapter.clock_restarts) == (1, 0)
+
+
+def test_a_pause_of_the_caller_is_no_jump() -> None:
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    play(adapter, 0.0, 20)
+    refused, results = play(adapter, 600.0, 40)
+    assert (refused, adapter.refused_stamps, adapter.clock_restarts) == (0, 0, 0)
+    assert results[0].obstacles[0].radius_m == 1.0
+    assert results[-1].obstacles[0].radius_m < 0.5
+
+
+@pytest.mark.parametrize("back_s", [1.5, 3600.0, 1e9])
+def test_a_clock_that_was_set_back_costs_a_second(
+    back_s: float, caplog: pytest.LogCaptureFixture
+) -> None:
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    _, before = play(adapter, 5000.0, 40)
+    with caplog.at_level(logging.WARNING, logger="nav_adapter"):
+        refused, after = play(adapter, 5003.9 - back_s, 60)
+    assert refused * PERIOD_S == pytest.approx(1.0, abs=1.5 * PERIOD_S)
+    assert adapter.refused_stamps == refused
+    assert adapter.clock_restarts == 1
+    assert "the clock has been set" in caplog.text
+    # First sight again: the largest obstacle, and the limit rises no faster than the robot.
+    assert after[0].obstacles[0].radius_m == 1.0
+    assert after[0].speed_limit_mps <= min(before[-1].speed_limit_mps, 0.5)
+    for one, other in pairwise(after):
+        assert other.speed_limit_mps - one.speed_limit_mps <= PERIOD_S + 1e-6
+    assert after[-1].obstacles[0].radius_m < 0.5
+
+
+def test_the_time_until_a_new_clock_is_believed_is_a_setting() -> None:
+    policy = AwarenessPolicy(timing=TimeBehaviour(new_clock_after_s=3.0))
+    adapter = NavAdapter(policy, ROBOT)
+    play(adapter, 5000.0, 5)
+    refused, _ = play(adapter, 10.0, 60)
+    assert refused == 30
+
+
+def test_refused_stamps_that_do_not_follow_one_another_start_nothing_anew() -> None:
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    play(adapter, 5000.0, 5)
+    for k in range(50):
+        with pytest.raises(NavError):
+            step(adapter, 4000.0 - 20.0 * k)
+    assert adapter.clock_restarts == 0
+    assert adapter.refused_stamps == 50
+
+
+def test_a_watchdog_far_ahead_stops_and_leaves_the_clock_alone() -> None:
+    adapter, twin = (NavAdapter(AwarenessPolicy(), ROBOT) for _ in range(2))
+    play(adapter, 0.0, 20), play(twin, 0.0, 20)
+    for ahead_s in (12.0, 3600.0, 1e9):
+        late = adapter.watchdog(ahead_s)
+        assert late.stale
+        assert late.speed_limit_mps == 0.0
+    assert numbers(step(adapter, 2.0)) == numbers(step(twin, 2.0))
+    assert adapter.refused_stamps == 0
+
+
+def test_reset_forgets_people_and_clock_and_lets_the_limit_rise_slowly() -> None:
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    close = person(50.0, position=(1.5, 0.0))
+    low = adapter.update((close,), robot_at(50.0), 50.0).speed_limit_mps
+    adapter.reset()
+    free = adapter.update((), robot_at(1.0), 1.0)
+    assert free.obstacles == ()
+    assert free.speed_limit_mps == low < ROBOT.max_speed_mps
+    for k in range(1, 30):
+        free = adapter.update((), robot_at(1.0 + k * PERIOD_S), 1.0 + k * PERIOD_S)
+    assert free.speed_limit_mps == ROBOT.max_speed_mps

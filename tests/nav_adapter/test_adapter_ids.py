@@ -1,0 +1,160 @@
+"""Ids of a foreign tracker: nobody inherits the awareness of whoever had the id before."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from nav_scenes import ROBOT, finite, person, robot_at
+
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints
+from nav_adapter.policies import TimeBehaviour
+from tracking import PersonTrack
+
+PERIOD_S = 0.05
+FAR, NEAR = (6.0, 0.0), (1.5, 0.6)
+
+
+def frame(adapter: NavAdapter, now: float, *tracks: PersonTrack) -> NavConstraints:
+    return adapter.update(
+        [replace(track, stamp_s=now) for track in tracks], robot_at(now, speed_mps=0.1), now
+    )
+
+
+def seen(adapter: NavAdapter, frames: int, *tracks: PersonTrack, start: int = 0) -> NavConstraints:
+    for k in range(start, start + frames):
+        result = frame(adapter, k * PERIOD_S, *tracks)
+    return result
+
+
+def somebody(track_id: int, at: tuple[float, float], alpha: float, **more: float) -> PersonTrack:
+    return person(track_id=track_id, position=at, awareness_lower=alpha, sigma_m=0.05, **more)
+
+
+def test_exchanged_ids_never_raise_the_limit_at_once() -> None:
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    before = seen(adapter, 40, somebody(1, FAR, 0.95), somebody(2, NEAR, 0.0))
+    swapped = somebody(1, NEAR, 0.95), somebody(2, FAR, 0.0)
+    after = frame(adapter, 40 * PERIOD_S, *swapped)
+    assert after.speed_limit_mps <= before.speed_limit_mps + 1e-9
+    assert [each.track_id for each in after.obstacles] == [1, 2]
+    assert [each.radius_m for each in after.obstacles] == [1.1, 1.1]
+    assert [each.awareness_lower for each in after.obstacles] == [0.0, 0.0]
+    held = seen(adapter, 3, *swapped, start=41)
+    assert held.speed_limit_mps <= before.speed_limit_mps + 1e-9
+    # A tracker that goes on to call this person aware is believed after shrink_after_s.
+    assert seen(adapter, 3, *swapped, start=44).speed_limit_mps > before.speed_limit_mps
+
+
+@pytest.mark.parametrize("alpha", [0.3, 0.95])
+def test_at_first_sight_awareness_raises_no_limit(alpha: float) -> None:
+    adapter, blind = (NavAdapter(AwarenessPolicy(), ROBOT) for _ in range(2))
+    aware, unaware = somebody(1, (2.5, 0.0), alpha), somebody(1, (2.5, 0.0), 0.0)
+    for k in range(8):
+        now = k * PERIOD_S
+        limit = frame(adapter, now, aware).speed_limit_mps
+        lowest = frame(blind, now, unaware).speed_limit_mps
+        if k < 4:
+            assert limit == lowest
+    assert limit > lowest or alpha < 0.5
+
+
+def test_frames_of_a_tentative_track_count_as_sight() -> None:
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    tentative = replace(somebody(1, (2.5, 0.0), 0.0), status="tentative")
+    seen(adapter, 5, tentative)
+    limit = frame(adapter, 5 * PERIOD_S, somebody(1, (2.5, 0.0), 0.95)).speed_limit_mps
+    unaware = frame(
+        NavAdapter(AwarenessPolicy(), ROBOT), 0.0, somebody(1, (2.5, 0.0), 0.0)
+    ).speed_limit_mps
+    assert limit > unaware
+
+
+def test_repeated_tracks_are_no_longer_sight() -> None:
+    """Ten updates with one frame are one sighting."""
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    track = somebody(1, (2.5, 0.0), 0.95)
+    for k in range(5):
+        now = k * PERIOD_S
+        result = adapter.update((track,), robot_at(now, speed_mps=0.1), now)
+    unaware = frame(
+        NavAdapter(AwarenessPolicy(), ROBOT), 0.0, somebody(1, (2.5, 0.0), 0.0)
+    ).speed_limit_mps
+    assert result.speed_limit_mps <= unaware
+
+
+def test_whoever_had_a_reused_id_is_kept_for_a_second() -> None:
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    seen(adapter, 40, somebody(1, NEAR, 0.9))
+    for k in range(40, 58):
+        result = frame(adapter, k * PERIOD_S, somebody(1, FAR, 0.0))
+        ids = [each.track_id for each in result.obstacles]
+        assert ids == [-1, 1]
+        lost = result.obstacles[0]
+        assert lost.center_odom_m == pytest.approx(NEAR)
+        assert lost.awareness_lower == 0.0
+    result = seen(adapter, 10, somebody(1, FAR, 0.0), start=58)
+    assert [each.track_id for each in result.obstacles] == [1]
+
+
+def test_two_who_lose_one_id_after_the_other_are_both_kept() -> None:
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    places = [(2.0, -2.0), (2.0, 2.0), (4.0, 0.0)]
+    for k, place in enumerate(places):
+        result = frame(adapter, k * PERIOD_S, somebody(1, place, 0.0))
+    assert [each.track_id for each in result.obstacles] == [-2, -1, 1]
+    centers = {each.track_id: tuple(each.center_odom_m) for each in result.obstacles}
+    assert centers == {-1: places[0], -2: places[1], 1: places[2]}
+
+
+@given(
+    speed=finite(0.0, 3.0),
+    course=finite(-math.pi, math.pi),
+    turn=finite(-math.pi, math.pi),
+    sigma=finite(0.0, 0.3),
+    period=st.sampled_from([0.05, 0.2, 0.5]),
+)
+def test_nobody_who_walks_counts_as_new(
+    speed: float, course: float, turn: float, sigma: float, period: float
+) -> None:
+    """Not even somebody who stops or turns on the spot between two frames."""
+    adapter = NavAdapter(AwarenessPolicy(timing=TimeBehaviour(shrink_after_s=0.0)), ROBOT)
+    place, shown = np.array([5.0, 0.0]), []
+    for k in range(8):
+        heading = course + (turn if k >= 4 else 0.0)
+        walking = min(speed, 1.5) if k >= 4 else speed
+        velocity = walking * np.array([math.cos(heading), math.sin(heading)])
+        if k > 0:
+            place = place + period * velocity
+        track = person(
+            k * period,
+            position=place.tolist(),
+            velocity=velocity.tolist(),
+            sigma_m=sigma,
+            awareness_lower=0.9,
+        )
+        result = adapter.update((track,), robot_at(k * period), k * period)
+        shown.append([each.awareness_lower for each in result.obstacles])
+    assert shown == [[0.9]] * 8
+
+
+@given(distance=finite(0.0, 8.0), sigma=finite(0.01, 0.3), bearing=finite(-math.pi, math.pi))
+def test_a_jump_beyond_covariance_and_human_speed_is_first_sight(
+    distance: float, sigma: float, bearing: float
+) -> None:
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    moved = 4.0 + distance * math.cos(bearing), distance * math.sin(bearing)
+    first = person(track_id=7, position=(4.0, 0.0), sigma_m=sigma, awareness_lower=0.9)
+    seen(adapter, 20, first)
+    result = frame(adapter, 20 * PERIOD_S, replace(first, position_odom_m=np.array(moved)))
+    (obstacle,) = (each for each in result.obstacles if each.track_id == 7)
+    reach_m = 1.6 * PERIOD_S + 4.0 * math.sqrt(2.0) * sigma
+    if distance > reach_m + 0.06:
+        assert obstacle.awareness_lower == 0.0
+        assert obstacle.radius_m == pytest.approx(1.0 + 2.0 * sigma)
+    elif distance < reach_m:
+        assert obstacle.awareness_lower == 0.9
