@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-import os
-import random
 import signal
 import subprocess
 import sys
@@ -52,21 +50,6 @@ def robot_without_mount(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("robot") / "robot.yaml"
     RobotFile.from_yaml(ROBOT).model_copy(update={"camera": None}).to_yaml(path)
     return path
-
-
-@pytest.fixture
-def domain(monkeypatch: pytest.MonkeyPatch) -> int:
-    interface = '<NetworkInterface name="lo" multicast="false"/>'
-    monkeypatch.setenv(
-        "CYCLONEDDS_URI",
-        f"<CycloneDDS><Domain><General><Interfaces>{interface}</Interfaces>"
-        "<AllowMulticast>false</AllowMulticast></General><Discovery>"
-        '<ParticipantIndex>auto</ParticipantIndex><Peers><Peer address="localhost"/></Peers>'
-        "</Discovery></Domain></CycloneDDS>",
-    )
-    path = os.pathsep.join(part for part in (str(ROOT), os.environ.get("PYTHONPATH")) if part)
-    monkeypatch.setenv("PYTHONPATH", path)
-    return random.SystemRandom().randint(1, 200)
 
 
 @pytest.fixture
