@@ -116,9 +116,11 @@ class BridgeLoop:
             bridge.on_transforms(transforms, time.time())
         for odometry in self._messages(inputs.odom, Odometry):
             bridge.on_odometry(odometry, time.time())
-        if inputs.camera_info is not None and bridge.camera is None:
+        if inputs.camera_info is not None:
+            # Taken even if it is not needed: waiting ends at once while a message is left.
             for cdr in self._node.take_cdr(inputs.camera_info)[-1:]:
-                self._perception.calibrate(self._decoder(inputs.camera_info, cdr, CameraInfo))
+                if bridge.camera is None:
+                    self._perception.calibrate(self._decoder(inputs.camera_info, cdr, CameraInfo))
         for cdr in self._node.take_cdr(inputs.image)[-1:]:
             self._perception.submit(self._decoder(inputs.image, cdr, Image))
 
