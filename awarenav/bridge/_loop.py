@@ -1,14 +1,14 @@
-"""The loop of the bridge: waits for messages, processes the newest frame, publishes at a rate."""
+"""The loop of the bridge: passes messages on and publishes at a fixed rate."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, Protocol, cast
+from typing import TYPE_CHECKING, Final, Protocol, TypeVar, cast
 
 from nav_adapter import NavConstraints, NavError
-from nav_adapter.ros2 import AwarenessBridge, Topic
+from nav_adapter.ros2 import AwarenessBridge, PerceptionThread, Topic
 from nav_adapter.ros2.messages import Message
 from nav_adapter.ros2.messages.nav_msgs import Odometry
 from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, Image
@@ -19,12 +19,17 @@ if TYPE_CHECKING:
 
 _REPORT_PERIOD_S: Final = 2.0
 
+_Message = TypeVar("_Message", bound=Message)
+
 
 class BridgeViewer(Protocol):
     """Shows or records the state of the bridge."""
 
-    def draw(self, bridge: AwarenessBridge, constraints: NavConstraints, *, frame: bool) -> None:
-        """Draw the state of the bridge; ``frame`` says whether it has a new image."""
+    def draw(self, bridge: AwarenessBridge, constraints: NavConstraints) -> None:
+        """Draw constraints, in the thread that publishes."""
+
+    def draw_frame(self, bridge: AwarenessBridge) -> None:
+        """Draw the latest frame, in the thread of perception."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +44,9 @@ class BridgeInputs:
 
 
 class BridgeLoop:
-    """Processes and publishes in one thread: a slow frame delays the next publication.
+    """Publishes at a fixed rate, whatever perception takes, which has a thread of its own.
+
+    A late publication is made up for by one that follows at once; more are left out.
 
     Attributes:
         frames: number of frames that were processed.
@@ -48,7 +55,7 @@ class BridgeLoop:
         node: receives and sends messages.
         bridge: processes the messages.
         inputs: the topics to read.
-        rate_hz: rate of publishing without images; every image adds a publication.
+        rate_hz: rate of publishing.
         recorder: records odometry and tf as received.
         viewer: shows the state of the bridge.
     """
@@ -70,6 +77,7 @@ class BridgeLoop:
         for topic in (inputs.image, inputs.odom, inputs.camera_info, inputs.tf, inputs.tf_static):
             if topic is not None:
                 node.subscribe(topic)
+        self._perception = PerceptionThread(bridge, time.time, on_frame=self._on_frame)
 
     def run(
         self, seconds: float | None = None, *, report: Callable[[str], None] = lambda text: None
@@ -79,14 +87,14 @@ class BridgeLoop:
         frames_before = 0
         while seconds is None or time.monotonic() - began < seconds:
             self._node.wait(due - time.monotonic())
-            seen = self.take()
-            if not seen and time.monotonic() < due:
+            self._take()
+            if time.monotonic() < due:
                 continue
             constraints = self._bridge.tick(time.time())
             if self._viewer is not None:
-                self._viewer.draw(self._bridge, constraints, frame=seen)
+                self._viewer.draw(self._bridge, constraints)
             now = time.monotonic()
-            due = now + self._period_s
+            due = max(due + self._period_s, now)
             if now - reported >= _REPORT_PERIOD_S:
                 rate_hz = (self.frames - frames_before) / (now - reported)
                 report(
@@ -95,37 +103,56 @@ class BridgeLoop:
                 )
                 reported, frames_before = now, self.frames
 
-    def take(self) -> bool:
-        """Pass the received messages to the bridge; return whether a frame was processed."""
+    def close(self) -> bool:
+        """End perception after the frame in hand; return False if that takes too long."""
+        return self._perception.close()
+
+    def _take(self) -> None:
+        """Pass the received messages on, an image after the poses that came before it."""
         inputs, bridge = self._inputs, self._bridge
-        for message in self._messages(inputs.tf_static):
-            bridge.on_transforms(cast(TFMessage, message), static=True)
-        for message in self._messages(inputs.tf):
-            bridge.on_transforms(cast(TFMessage, message))
-        for message in self._messages(inputs.odom):
-            bridge.on_odometry(cast(Odometry, message))
-        for message in self._messages(inputs.camera_info, record=False):
-            bridge.on_camera_info(cast(CameraInfo, message))
-        good = False
-        for message in self._messages(inputs.image, record=False):
-            good |= bridge.on_image(cast(Image, message), time.time())
-        self.frames += good
-        return good
+        for transforms in self._messages(inputs.tf_static, TFMessage):
+            bridge.on_transforms(transforms, static=True)
+        for transforms in self._messages(inputs.tf, TFMessage):
+            bridge.on_transforms(transforms, time.time())
+        for odometry in self._messages(inputs.odom, Odometry):
+            bridge.on_odometry(odometry, time.time())
+        if inputs.camera_info is not None:
+            # Taken even if it is not needed: waiting ends at once while a message is left.
+            for cdr in self._node.take_cdr(inputs.camera_info)[-1:]:
+                if bridge.camera is None:
+                    self._perception.calibrate(self._decoder(inputs.camera_info, cdr, CameraInfo))
+        for cdr in self._node.take_cdr(inputs.image)[-1:]:
+            self._perception.submit(self._decoder(inputs.image, cdr, Image))
 
-    def _messages(self, topic: Topic | None, *, record: bool = True) -> list[Message]:
-        """Return the received messages of a topic; one that cannot be decoded is refused."""
+    def _messages(self, topic: Topic | None, kind: type[_Message]) -> list[_Message]:
+        """Return and record the messages of a topic; one that cannot be decoded is refused."""
+        found: list[_Message] = []
         if topic is None:
-            return []
-
-        from nav_adapter.ros2 import decode  # noqa: PLC0415 - needs the extra ros2
-
-        found = []
+            return found
         for cdr in self._node.take_cdr(topic):
             try:
-                found.append(decode(topic.message, cdr))
+                found.append(self._decoder(topic, cdr, kind)())
             except NavError as problem:
-                self._bridge.refuse(f"/{topic.name}: {problem}")
+                self._bridge.refuse(str(problem))
                 continue
-            if record and self._recorder is not None:
+            if self._recorder is not None:
                 self._recorder.write(topic, cdr, time.time())
         return found
+
+    def _decoder(self, topic: Topic, cdr: bytes, kind: type[_Message]) -> Callable[[], _Message]:
+        """Return a function that decodes a message, or raises NavError with the topic's name."""
+        from nav_adapter.ros2 import decode  # noqa: PLC0415 - needs the extra ros2
+
+        def message() -> _Message:
+            try:
+                return cast(_Message, decode(topic.message, cdr))
+            except NavError as problem:
+                raise NavError(f"/{topic.name}: {problem}") from problem
+
+        return message
+
+    def _on_frame(self) -> None:
+        """Count and draw a frame, in the thread of perception."""
+        self.frames += 1
+        if self._viewer is not None:
+            self._viewer.draw_frame(self._bridge)

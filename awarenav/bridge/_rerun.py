@@ -34,6 +34,8 @@ _EYE_HEIGHT_M: Final = 1.6
 class RerunRecorder(AbstractContextManager["RerunRecorder"]):
     """Writes image, keypoints, cones, tracks, radii and speed limit to an ``.rrd`` file.
 
+    Frames and constraints may be drawn in different threads.
+
     Args:
         path: of the file; an existing one is replaced.
         pose_estimator: has the keypoints of the latest frame.
@@ -54,11 +56,9 @@ class RerunRecorder(AbstractContextManager["RerunRecorder"]):
         self._pose_estimator = pose_estimator
         self._half_angle_rad = half_angle_rad
 
-    def draw(self, bridge: AwarenessBridge, constraints: NavConstraints, *, frame: bool) -> None:
-        """Record the constraints, and the latest frame if ``frame``."""
+    def draw(self, bridge: AwarenessBridge, constraints: NavConstraints) -> None:
+        """Record the constraints."""
         self._stream.set_time("stamp", timestamp=constraints.stamp_s)
-        if frame:
-            self._draw_frame(bridge)
         self._stream.log("speed/limit_mps", rr.Scalars(constraints.speed_limit_mps))
         if bridge.robot_state is not None:
             self._stream.log("speed/robot_mps", rr.Scalars(bridge.robot_state.speed_mps))
@@ -81,12 +81,16 @@ class RerunRecorder(AbstractContextManager["RerunRecorder"]):
         """Write what is buffered and close the file."""
         self._stream.disconnect()
 
-    def _draw_frame(self, bridge: AwarenessBridge) -> None:
-        """Record the latest image with keypoints, cones and tracks."""
-        image, T = bridge.last_picture, bridge.last_T_odom_camera
-        if image is None or T is None or bridge.camera is None:
+    def draw_frame(self, bridge: AwarenessBridge) -> None:
+        """Record the latest image with keypoints, cones and tracks, at the image's stamp.
+
+        The pose estimator must not have gone on to another image.
+        """
+        frame, camera = bridge.frame, bridge.camera
+        if frame is None or camera is None:
             return
-        camera = bridge.camera
+        self._stream.set_time("stamp", timestamp=frame.stamp_s)
+        T = frame.T_odom_camera
         self._stream.log("world/camera", rr.Transform3D(translation=T[:3, 3], mat3x3=T[:3, :3]))
         self._stream.log(
             "world/camera/image",
@@ -94,10 +98,12 @@ class RerunRecorder(AbstractContextManager["RerunRecorder"]):
                 image_from_camera=camera.matrix, resolution=[camera.width_px, camera.height_px]
             ),
         )
-        self._stream.log("world/camera/image", rr.Image(image).compress(jpeg_quality=_JPEG_QUALITY))
+        self._stream.log(
+            "world/camera/image", rr.Image(frame.image).compress(jpeg_quality=_JPEG_QUALITY)
+        )
         keypoints: list[FloatArray] = []
         cones: list[FloatArray] = []
-        for seen in bridge.last_observations:
+        for seen in frame.observations:
             person = self._pose_estimator.keypoints_of(seen)
             if person is not None:
                 keypoints.append(np.asarray(person.keypoints_px)[person.scores >= _SEEN_SCORE])
@@ -108,7 +114,7 @@ class RerunRecorder(AbstractContextManager["RerunRecorder"]):
         points: Any = np.concatenate(keypoints) if keypoints else np.empty((0, 2))
         self._stream.log("world/camera/image/keypoints", rr.Points2D(points, radii=2.0))
         self._stream.log("world/cones", rr.LineStrips3D(cones))
-        tracks = bridge.tracks
+        tracks = frame.tracks
         self._stream.log(
             "world/tracks",
             rr.Arrows3D(

@@ -1,4 +1,4 @@
-"""The work of ``awarenav bridge``: a DDS node and the bridge, in one loop."""
+"""The work of ``awarenav bridge``: a DDS node and the bridge, in one loop beside perception."""
 
 from __future__ import annotations
 
@@ -102,6 +102,7 @@ def bridge_command(options: BridgeOptions) -> int:
             make_pipeline=_pipeline_maker(networks, pose_estimator, cone),
         )
         loop = BridgeLoop(node, bridge, inputs, rate_hz, recorder=recorder, viewer=viewer)
+        stack.callback(_close, loop)
         _log(
             f"domain {domain}: reading /{inputs.image.name} and /{inputs.odom.name}, publishing "
             f"{', '.join('/' + topic.name for topic in published.values())}"
@@ -117,6 +118,11 @@ def bridge_command(options: BridgeOptions) -> int:
             time.sleep(_SEND_TIME_S)
         _log(f"ended after {loop.frames} frames; a stop was published")
     return 0
+
+
+def _close(loop: BridgeLoop) -> None:
+    if not loop.close():
+        _log("perception does not end; the process ends without it")
 
 
 def _pipeline_maker(

@@ -42,7 +42,7 @@ _LOG: Final = "Recordings"
     type=NUMBER,
     default=20.0,
     metavar="HZ",
-    help="Rate of publishing, with or without new images.",
+    help="Rate of publishing, however long perception takes for an image.",
 )
 @option("--seconds", type=NUMBER, metavar="S", help="End after this time.")
 @option(

@@ -12,8 +12,9 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from nav_adapter.ros2 import PUBLISHED, READ, DdsNode, encode
+from nav_adapter.ros2 import PUBLISHED, READ, DdsNode, decode, encode
 from nav_adapter.ros2.messages.builtin_interfaces import Time
+from nav_adapter.ros2.messages.diagnostic_msgs import DiagnosticArray
 from nav_adapter.ros2.messages.geometry_msgs import (
     Quaternion,
     Transform,
@@ -96,23 +97,23 @@ class RobotDrivers:
         self.node.publish(READ["odom"], Odometry(_header("odom"), "base_link", twist=twist))
         self._odometry_due_s = time.monotonic() + _ODOMETRY_PERIOD_S
 
-    def receive_until(self, until_s: float) -> list[float]:
-        """Receive until a time, and return when each speed limit came (monotonic, s).
+    def receive_until(self, until_s: float) -> list[tuple[float, int]]:
+        """Receive until a time (monotonic, s), and return when each publication came.
 
-        Odometry is sent meanwhile. Every topic is read, so that the bridge sends every message;
-        nothing is decoded.
+        With each is the number of frames that the bridge has processed, from its diagnostics.
+        Odometry is sent meanwhile. Every topic is read, so that the bridge sends every message.
         """
-        received_s = []
+        received = []
         while (left_s := until_s - time.monotonic()) > 0.0:
             self.node.wait(min(left_s, max(0.0, self._odometry_due_s - time.monotonic())))
             now = time.monotonic()
             for key, topic in PUBLISHED.items():
                 came = self.node.take_cdr(topic)
-                if key == "speed_limit":
-                    received_s += [now] * len(came)
+                if key == "alerts":
+                    received += [(now, _frames(cdr)) for cdr in came]
             if now >= self._odometry_due_s:
                 self.send_odometry()
-        return received_s
+        return received
 
 
 def _first_frame(folder: Path) -> dict[str, Any]:
@@ -122,6 +123,12 @@ def _first_frame(folder: Path) -> dict[str, Any]:
     except (OSError, IndexError, ValueError) as cause:
         raise SimError(f"{file} is not what `awarenav render` writes: {cause}") from cause
     return frame
+
+
+def _frames(cdr: bytes) -> int:
+    """Return the number of frames from the diagnostics of a publication, 0 in the last one."""
+    state = decode(DiagnosticArray, cdr).status[0]
+    return next((int(pair.value) for pair in state.values if pair.key == "frames"), 0)
 
 
 def _header(frame_id: str) -> Header:

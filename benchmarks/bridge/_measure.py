@@ -37,13 +37,16 @@ class BridgeFigures:
     """Measured figures of the bridge.
 
     Attributes:
-        frames_per_s: images per second that came back as a speed limit.
-        latency_ms: median time from sending an image to receiving its speed limit, one at a time.
+        frames_per_s: images per second that the bridge processed.
+        publications_per_s: publications per second meanwhile.
+        latency_ms: median time from sending an image to the publication that counts on it, one
+            image at a time. It includes the wait for that publication, up to 1 / rate.
         cpu_ms: processor time of the bridge per image, publications and waiting included.
         people: number of people that the bridge confirmed.
     """
 
     frames_per_s: float
+    publications_per_s: float
     latency_ms: float
     cpu_ms: float
     people: int
@@ -65,19 +68,21 @@ def measure(
     try:
         with _bridge(folder, domain, compressed) as process:
             people = _wait_for_people(drivers, process, rate_hz)
-            # Replies to the images sent so far do not count.
-            drivers.receive_until(time.monotonic() + _REPLY_WAIT_S)
+            # Images sent so far do not count.
+            before = drivers.receive_until(time.monotonic() + _REPLY_WAIT_S)
             cpu_before_s, began_s = _cpu_s(process.pid), time.monotonic()
-            frames = 0
+            received = before[-1:]
             due_s = began_s
             while due_s < began_s + seconds:
                 drivers.send_image()
                 due_s += 1.0 / rate_hz
-                frames += len(drivers.receive_until(due_s))
+                received += drivers.receive_until(due_s)
+            frames = received[-1][1] - received[0][1]
             took_s = time.monotonic() - began_s
             cpu_s = _cpu_s(process.pid) - cpu_before_s
             return BridgeFigures(
                 frames_per_s=frames / took_s,
+                publications_per_s=(len(received) - 1) / took_s,
                 latency_ms=1e3 * _median_latency_s(drivers),
                 cpu_ms=1e3 * cpu_s / max(frames, 1),
                 people=people,
@@ -91,8 +96,7 @@ def _bridge(folder: Path, domain: int, compressed: bool) -> Iterator[subprocess.
     file = folder / "robot.yaml"
     # Without a camera mount, which comes over tf, as on most robots.
     RobotFile.from_yaml(ROBOT).model_copy(update={"camera": None}).to_yaml(file)
-    # A timer of 1 Hz publishes nothing while images come, so each speed limit answers an image.
-    arguments = ["--robot", str(file), "--domain", str(domain), "--rate", "1"]
+    arguments = ["--robot", str(file), "--domain", str(domain)]
     if compressed:
         arguments += ["--compressed", "--image", "camera/image_raw/compressed"]
     command = [sys.executable, "-m", "awarenav", "bridge", *arguments]
@@ -126,15 +130,17 @@ def _wait_for_people(drivers: RobotDrivers, process: subprocess.Popen[str], rate
 
 
 def _median_latency_s(drivers: RobotDrivers, images: int = 15) -> float:
-    """Return the median time from an image to its speed limit, one image at a time."""
-    drivers.receive_until(time.monotonic() + _REPLY_WAIT_S)
+    """Return the median time from an image to its first publication, one image at a time."""
+    frames = drivers.receive_until(time.monotonic() + _REPLY_WAIT_S)[-1][1]
     waits_s = []
     for _ in range(images):
+        # Images must not keep step with the publications.
+        drivers.receive_until(time.monotonic() + random.uniform(0.0, 0.05))
         sent_s = time.monotonic()
         drivers.send_image()
-        received_s = drivers.receive_until(sent_s + _REPLY_WAIT_S)
-        if received_s:
-            waits_s.append(received_s[0] - sent_s)
+        received = drivers.receive_until(sent_s + _REPLY_WAIT_S)
+        waits_s += [came_s - sent_s for came_s, count in received if count > frames][:1]
+        frames = received[-1][1] if received else frames
     if not waits_s:
         raise SimError(f"no image came back within {_REPLY_WAIT_S:g} s")
     return float(np.median(waits_s))

@@ -14,10 +14,12 @@ from typing import TYPE_CHECKING, Any
 from ._alerts import alerts
 from ._bridge import AwarenessBridge
 from ._grid import occupancy_grid
+from ._image_perception import PerceivedFrame
 from ._images import camera_of, picture_of
 from ._markers import markers
 from ._outgoing import Frames, outgoing
 from ._people import circle_objects, detections, people, teb_obstacles
+from ._perception_thread import PerceptionThread
 from ._polygons import STOP_POLYGON_ID, collision_polygons, stop_zone
 from ._robot_file import CameraMount, RobotFile
 from ._speed_limit import SLOWEST_MPS, speed_limit
@@ -39,6 +41,8 @@ __all__ = [
     "DdsNode",
     "Frames",
     "McapRecorder",
+    "PerceivedFrame",
+    "PerceptionThread",
     "RobotFile",
     "Topic",
     "TransformBuffer",

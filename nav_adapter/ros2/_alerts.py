@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from .._alert import Alert
 from .._constraints import NavConstraints
 from .conversions import header
@@ -10,7 +12,9 @@ from .messages.diagnostic_msgs import DiagnosticArray, DiagnosticStatus, KeyValu
 _NAME = "awarenav"
 
 
-def alerts(constraints: NavConstraints, *, frame_id: str = "") -> DiagnosticArray:
+def alerts(
+    constraints: NavConstraints, *, frame_id: str = "", details: Mapping[str, str] | None = None
+) -> DiagnosticArray:
     """Return ``diagnostic_msgs/DiagnosticArray``: the state of the limit and one status per alert.
 
     The first status is always there: ``"awarenav: speed limit"``, with ``limited_by`` as its
@@ -22,14 +26,15 @@ def alerts(constraints: NavConstraints, *, frame_id: str = "") -> DiagnosticArra
     Args:
         constraints: the alerts and the limit.
         frame_id: of the header; diagnostics do not use it.
+        details: more values of the first status, by name.
     """
     return DiagnosticArray(
         header(constraints.stamp_s, frame_id),
-        (_limit(constraints), *(_alert(each) for each in constraints.alerts)),
+        (_limit(constraints, details or {}), *(_alert(each) for each in constraints.alerts)),
     )
 
 
-def _limit(constraints: NavConstraints) -> DiagnosticStatus:
+def _limit(constraints: NavConstraints, details: Mapping[str, str]) -> DiagnosticStatus:
     level, text = DiagnosticStatus.OK, constraints.limited_by
     if constraints.stale:
         level = DiagnosticStatus.WARN
@@ -43,6 +48,7 @@ def _limit(constraints: NavConstraints) -> DiagnosticStatus:
         reachable_speed_limit_mps=f"{constraints.reachable_speed_limit_mps:.3f}",
         braking_suffices=str(constraints.braking_suffices).lower(),
         stale=str(constraints.stale).lower(),
+        **details,
     )
 
 

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import logging
 import math
+import threading
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from perception import AwarenessPipeline, Camera, FloorPlane, PerceptionError, PersonObservation
+from perception import AwarenessPipeline, Camera, PerceptionError
 from perception.arrays import FloatArray
-from tracking import CameraView, PersonTrack, PersonTracker, TrackerConfig, TrackingError
+from tracking import PersonTrack, TrackerConfig, TrackingError
 
 from .._adapter import NavAdapter
 from .._constraints import NavConstraints
 from .._errors import NavError
 from .._policy import AwarenessPolicy
 from .._robot import RobotProfile, RobotState
-from ._images import camera_of, picture_of
+from ._clock import CLOCK_TOLERANCE_S, BridgeClock, InputKind
+from ._image_perception import ImagePerception, PerceivedFrame
 from ._outgoing import Frames, outgoing
 from ._transforms import TransformBuffer
 from .conversions import pose_matrix, to_seconds
@@ -27,11 +30,8 @@ from .messages.nav_msgs import Odometry
 from .messages.sensor_msgs import CameraInfo, CompressedImage, Image
 from .messages.tf2_msgs import TFMessage
 
-# Tolerated difference between the clocks of the camera and of this computer.
-_CLOCK_TOLERANCE_S = 0.05
-# Uncertainty of the height and the tilt of a camera on a driving robot.
-_HEIGHT_STD_M = 0.05
-_TILT_STD_RAD = math.radians(2.0)
+_LOG = logging.getLogger("nav_adapter")
+
 # No robot drives so fast: a higher speed is an error of the sender.
 _FASTEST_MPS = 100.0
 
@@ -44,6 +44,15 @@ class AwarenessBridge:
     publishes a stop with the reason. It never stops publishing by itself, and missing data never
     make a person count as aware.
 
+    Perception may have a thread of its own, as :class:`PerceptionThread` gives it one: while
+    :meth:`on_image` and :meth:`on_camera_info` run, :meth:`tick` and the other methods go on with
+    the last frame's people, who grow older, as in :meth:`NavAdapter.watchdog`.
+
+    Messages whose stamp lies more than 0.05 s ahead of ``now_s`` are refused and counted in
+    :attr:`counts`. The clock of ``now_s`` may be stepped back: by up to 0.05 s, time stands still
+    until it has caught up; by more, the robot stops, and if the clock goes on from there for 1 s,
+    tracks and transforms are forgotten with a warning. Static transforms are always kept.
+
     Args:
         policy: of the adapter and of the awareness filter.
         robot: the robot's profile.
@@ -52,7 +61,7 @@ class AwarenessBridge:
         T_base_camera: pose of a fixed camera; None to look it up in tf.
         make_pipeline: makes perception for a camera, once it is known; by default with the shipped
             networks.
-        camera: calibration; None to read it from camera_info.
+        camera: calibration; None to read it from camera_info. With it, the pipeline is made here.
         percentage: as in :func:`speed_limit`.
         warn: called with each problem; a repeated text is passed on only once.
         wanted: called with the key of a topic in every tick; unwanted messages are not made.
@@ -75,27 +84,50 @@ class AwarenessBridge:
         self.frames = frames or Frames()
         self._policy, self._robot, self._publish = policy, robot, publish
         self._T_base_camera = T_base_camera
-        self._make_pipeline = make_pipeline
         self._percentage = percentage
         self._wanted = wanted
         self._warn_user, self._warned = warn, ""
-        self._camera = camera
-        self._pipeline = make_pipeline(camera) if camera is not None else None
+        self._ahead: set[InputKind] = set()
+        self._perception = ImagePerception(
+            make_pipeline, TrackerConfig(awareness=policy.filter), camera
+        )
+        self._adapter = NavAdapter(policy, robot)
         self._transforms = TransformBuffer()
         self._state: RobotState | None = None
-        self._tracks: tuple[PersonTrack, ...] = ()
-        self._perceived_s: float | None = None
-        self._last_tick_s: float | None = None
-        self._start_afresh()
-        #: The latest frame, for drawing: image, observations and T_odom_camera.
-        self.last_picture: NDArray[np.uint8] | None = None
-        self.last_observations: tuple[PersonObservation, ...] = ()
-        self.last_T_odom_camera: FloatArray | None = None
+        self._frame: PerceivedFrame | None = None
+        self._clock = BridgeClock()
+        self._frames = self._perception_failures = 0
+        # For all of the above but the perception, which is not held up by it.
+        self._lock = threading.RLock()
+        # Keeps the messages of one publication together.
+        self._sending = threading.Lock()
+
+    @property
+    def frame(self) -> PerceivedFrame | None:
+        """The latest frame with its image, people and tracks, or None before the first."""
+        return self._frame
 
     @property
     def tracks(self) -> tuple[PersonTrack, ...]:
         """Tracks of the latest frame."""
-        return self._tracks
+        frame = self._frame
+        return () if frame is None else frame.tracks
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Counts since the start, which are published with the alerts.
+
+        ``frames`` that were processed; ``odometry_from_future``, ``transforms_from_future`` and
+        ``images_from_future``, which were refused; ``perception_failures``: images that ended in an
+        error of the program; ``clock_restarts``.
+        """
+        with self._lock:
+            return {
+                "frames": self._frames,
+                **{f"{kind}_from_future": count for kind, count in self._clock.refused.items()},
+                "perception_failures": self._perception_failures,
+                "clock_restarts": self._clock.restarts,
+            }
 
     @property
     def robot_state(self) -> RobotState | None:
@@ -105,28 +137,110 @@ class AwarenessBridge:
     @property
     def camera(self) -> Camera | None:
         """The camera, or None while it is unknown."""
-        return self._camera
+        return self._perception.camera
 
     def on_camera_info(self, message: CameraInfo) -> None:
         """Make the pipeline from the first calibration; later ones are ignored."""
-        if self._camera is not None:
-            return
         try:
-            self._camera = camera_of(message)
-            self._pipeline = self._make_pipeline(self._camera)
+            self._perception.calibrate(message)
         except (NavError, PerceptionError) as problem:
-            self._camera = None
             self._warn(str(problem))
-            return
-        self._start_afresh()
 
-    def on_transforms(self, message: TFMessage, *, static: bool = False) -> None:
-        """Store the transforms of /tf or /tf_static."""
-        for each in message.transforms:
-            self._store_transform(each, static)
+    def on_transforms(
+        self, message: TFMessage, now_s: float | None = None, *, static: bool = False
+    ) -> None:
+        """Store the transforms of /tf or /tf_static.
 
-    def on_odometry(self, message: Odometry) -> None:
-        """Store the robot's state, and its pose as a transform."""
+        Args:
+            message: the transforms.
+            now_s: the present time; None to check the stamps in the next :meth:`tick` only.
+            static: whether they hold at all times; their stamps are then not looked at.
+        """
+        with self._lock:
+            for each in message.transforms:
+                if static or not self._is_future_transform(each, now_s):
+                    self._store_transform(each, static)
+
+    def on_odometry(self, message: Odometry, now_s: float | None = None) -> None:
+        """Store the robot's state, and its pose as a transform.
+
+        Args:
+            message: in the odom frame.
+            now_s: the present time; None to check the stamp in the next :meth:`tick` only.
+        """
+        with self._lock:
+            self._store_odometry(message, now_s)
+
+    def on_image(self, message: Image | CompressedImage, now_s: float) -> bool:
+        """Process one image; return True if it was used."""
+        stamp_s = to_seconds(message.header.stamp)
+        try:
+            with self._lock:
+                if self._perception.camera is None:
+                    raise NavError("no camera_info yet: the image cannot be used")
+                refusal = self._clock.refusal("images", stamp_s, now_s)
+                if refusal is not None:
+                    raise NavError(f"the image's {refusal}")
+                restarts = self._clock.restarts
+                T_odom_camera = self._camera_pose(
+                    self.frames.camera or message.header.frame_id, stamp_s
+                )
+            frame = self._perception.process(
+                message, stamp_s, T_odom_camera, lambda: self._clock.restarts == restarts
+            )
+        except (NavError, PerceptionError, TrackingError) as problem:
+            self._warn(f"image: {problem}")
+            return False
+        with self._lock:
+            if frame is None or self._clock.restarts != restarts:
+                return False
+            self._frame = frame
+            self._frames += 1
+            self._warned = ""
+        return True
+
+    def tick(self, now_s: float) -> NavConstraints:
+        """Publish every topic at ``now_s`` and return the constraints."""
+        with self._sending:
+            with self._lock:
+                restarts = self._clock.restarts
+                time_s = self._clock.advance(now_s)
+                if self._clock.restarts != restarts:
+                    self._restart()
+                if time_s is None:
+                    constraints = _stopped(now_s, "the clock went backward")
+                else:
+                    self._drop_future(time_s)
+                    constraints = self._constraints(time_s)
+                tracks, state = self.tracks, self._state
+                details = {name: str(count) for name, count in self.counts.items()}
+                if self._frame is not None:
+                    details["frame_age_s"] = f"{constraints.stamp_s - self._frame.stamp_s:.3f}"
+            self._send(constraints, tracks, state, details, self._wanted)
+        return constraints
+
+    def refuse(self, problem: str) -> None:
+        """Warn of a message that could not be decoded."""
+        self._warn(problem)
+
+    def perception_failed(self, problem: Exception) -> None:
+        """Count and report an error of the program in :meth:`on_image` or :meth:`on_camera_info`.
+
+        The first one of a kind is logged with its traceback.
+        """
+        with self._lock:
+            self._perception_failures += 1
+        if self._warn(f"perception failed: {type(problem).__name__}: {problem}"):
+            _LOG.error("perception failed", exc_info=problem)
+
+    def stop(self, now_s: float, reason: str) -> NavConstraints:
+        """Publish a stop, before the caller ends."""
+        constraints = _stopped(now_s, reason)
+        with self._sending:
+            self._send(constraints, (), None, {}, lambda key: True)
+        return constraints
+
+    def _store_odometry(self, message: Odometry, now_s: float | None) -> None:
         if message.header.frame_id.lstrip("/") != self.frames.odom:
             self._warn(
                 f"odometry must be in frame {self.frames.odom!r}, got "
@@ -135,6 +249,8 @@ class AwarenessBridge:
             return
         position, rotation = message.pose.pose.position, message.pose.pose.orientation
         stamp_s = to_seconds(message.header.stamp)
+        if self._is_future("odometry", stamp_s, now_s):
+            return
         try:
             T = pose_matrix((position.x, position.y, position.z), rotation)
             linear = message.twist.twist.linear
@@ -158,80 +274,84 @@ class AwarenessBridge:
         if self._state is None or stamp_s >= self._state.stamp_s:
             self._state = state
 
-    def on_image(self, message: Image | CompressedImage, now_s: float) -> bool:
-        """Process one image; return True if it was used."""
-        stamp_s = to_seconds(message.header.stamp)
-        try:
-            if self._pipeline is None:
-                raise NavError("no camera_info yet: the image cannot be used")
-            if stamp_s > now_s + _CLOCK_TOLERANCE_S:
-                raise NavError(
-                    f"the image's stamp is {stamp_s - now_s:.3f} s ahead of this computer's clock"
-                )
-            frame = self.frames.camera or message.header.frame_id
-            T_odom_camera = self._camera_pose(frame, stamp_s)
-            image = picture_of(message)
-            observations = self._pipeline.process(image, stamp_s, floor=_floor(T_odom_camera))
-            tracks = self._tracker.update(observations, stamp_s, T_odom_camera)
-        except (NavError, PerceptionError, TrackingError) as problem:
-            self._warn(f"image: {problem}")
-            return False
-        self._tracks, self._perceived_s = tracks, stamp_s
-        self.last_picture, self.last_observations = image, observations
-        self.last_T_odom_camera = T_odom_camera
-        self._warned = ""
-        return True
-
-    def tick(self, now_s: float) -> NavConstraints:
-        """Publish every topic at ``now_s`` and return the constraints."""
-        if self._last_tick_s is not None and now_s < self._last_tick_s:
-            self._warn("the clock went backward: all tracks are deleted")
-            self._start_afresh()
-            self._state = None
-            self._transforms = TransformBuffer()
-        self._last_tick_s = now_s
-        constraints = self._constraints(now_s)
-        for key, message in outgoing(
-            constraints,
-            self._tracks,
-            self._robot,
-            self._state,
-            self.frames,
-            percentage=self._percentage,
-            wanted=self._wanted,
-        ):
-            self._publish(key, message)
-        return constraints
-
-    def refuse(self, problem: str) -> None:
-        """Warn of a message that could not be decoded."""
-        self._warn(problem)
-
-    def stop(self, now_s: float, reason: str) -> NavConstraints:
-        """Publish a stop, before the caller ends."""
-        constraints = NavConstraints(now_s, (), 0.0, reason, True)
-        for key, message in outgoing(
-            constraints, (), self._robot, None, self.frames, percentage=self._percentage
-        ):
-            self._publish(key, message)
-        return constraints
-
     def _constraints(self, now_s: float) -> NavConstraints:
-        for needed, reason in (
-            (self._state, "no odometry yet"),
-            (self._pipeline, "no camera_info yet"),
-            (self._perceived_s, "no camera frame yet"),
-        ):
-            if needed is None:
-                return NavConstraints(now_s, (), 0.0, reason, True)
-        assert self._state is not None
+        state, frame = self._state, self._frame
+        if state is None:
+            return _stopped(now_s, "no odometry yet")
+        if self._perception.camera is None:
+            return _stopped(now_s, "no camera_info yet")
+        if frame is None:
+            return _stopped(now_s, "no camera frame yet")
         try:
             return self._adapter.update(
-                self._tracks, self._state, now_s, perception_stamp_s=self._perceived_s
+                frame.tracks, state, now_s, perception_stamp_s=frame.stamp_s
             )
         except NavError as problem:
             self._warn(str(problem))
-            return NavConstraints(now_s, (), 0.0, f"refused: {problem}", True)
+            reason = f"refused: {problem}"
+        except Exception as problem:
+            # Publishing must go on, whatever is wrong with these data.
+            reason = f"the adapter failed: {type(problem).__name__}: {problem}"
+            if self._warn(reason):
+                _LOG.error("the adapter failed", exc_info=problem)
+        try:
+            # A stop that keeps the people of the last good data, grown older.
+            older = self._adapter.watchdog(now_s)
+        except Exception:
+            return _stopped(now_s, reason)
+        return replace(older, speed_limit_mps=0.0, limited_by=reason, stale=True)
+
+    def _send(
+        self,
+        constraints: NavConstraints,
+        tracks: tuple[PersonTrack, ...],
+        state: RobotState | None,
+        details: dict[str, str],
+        wanted: Callable[[str], bool],
+    ) -> None:
+        for key, message in outgoing(
+            constraints,
+            tracks,
+            self._robot,
+            state,
+            self.frames,
+            percentage=self._percentage,
+            wanted=wanted,
+            details=details,
+        ):
+            self._publish(key, message)
+
+    def _is_future(self, kind: InputKind, stamp_s: float, now_s: float | None) -> bool:
+        """Return whether a message is from the future; it is then counted."""
+        refusal = None if now_s is None else self._clock.refusal(kind, stamp_s, now_s)
+        # A sender that is always ahead must not flood the terminal: the diagnostics have the count.
+        if refusal is not None and kind not in self._ahead:
+            self._ahead.add(kind)
+            self._warn(f"{kind}: the {refusal}: refused and counted, without further warnings")
+        return refusal is not None
+
+    def _is_future_transform(self, message: TransformStamped, now_s: float | None) -> bool:
+        stamp_s = to_seconds(message.header.stamp)
+        if message.child_frame_id.lstrip("/") == self.frames.odom and now_s is not None:
+            # Localisation stamps map -> odom ahead on purpose, and it is not needed here.
+            return stamp_s > self._clock.read(now_s) + CLOCK_TOLERANCE_S
+        return self._is_future("transforms", stamp_s, now_s)
+
+    def _drop_future(self, now_s: float) -> None:
+        """Forget what is from the future and would shut out good messages until then."""
+        state = self._state
+        if state is not None and self._is_future("odometry", state.stamp_s, now_s):
+            self._state = None
+        self._transforms.forget(after_s=now_s + CLOCK_TOLERANCE_S)
+
+    def _restart(self) -> None:
+        """Forget all that has a stamp of the clock before it was set."""
+        self._adapter = NavAdapter(self._policy, self._robot)
+        self._perception.forget_tracks()
+        self._frame, self._state = None, None
+        self._transforms.forget()
+        self._ahead.clear()
+        self._warn("the clock has been set back: all tracks and moving transforms are deleted")
 
     def _camera_pose(self, frame: str, stamp_s: float) -> FloatArray:
         if self._T_base_camera is None:
@@ -252,25 +372,15 @@ class AwarenessBridge:
         except NavError as problem:
             self._warn(f"tf: {problem}")
 
-    def _start_afresh(self) -> None:
-        """Begin with a new tracker and a new adapter, without tracks."""
-        view = None if self._camera is None else CameraView(self._camera)
-        self._tracker = PersonTracker(TrackerConfig(awareness=self._policy.filter), view=view)
-        self._adapter = NavAdapter(self._policy, self._robot)
-        self._tracks = ()
-        self._perceived_s = None
-        self._last_tick_s = None
-
-    def _warn(self, text: str) -> None:
-        if text != self._warned:
+    def _warn(self, text: str) -> bool:
+        """Pass on a problem; return False for the one that was passed on last."""
+        with self._lock:
+            if text == self._warned:
+                return False
             self._warned = text
-            self._warn_user(text)
+        self._warn_user(text)
+        return True
 
 
-def _floor(T_odom_camera: FloatArray) -> FloorPlane | None:
-    """Return the floor, z = 0 in odom, or None for a camera that is not above it."""
-    if T_odom_camera[2, 3] <= 0.0:
-        return None
-    return FloorPlane.from_pose(
-        T_odom_camera, height_std_m=_HEIGHT_STD_M, tilt_std_rad=_TILT_STD_RAD
-    )
+def _stopped(now_s: float, reason: str) -> NavConstraints:
+    return NavConstraints(now_s, (), 0.0, reason, True)

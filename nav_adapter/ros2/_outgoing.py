@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from tracking import PersonTrack
@@ -43,11 +43,12 @@ def outgoing(
     percentage: bool = False,
     grid_m: float = 10.0,
     wanted: Callable[[str], bool] = lambda key: True,
+    details: Mapping[str, str] | None = None,
 ) -> Iterator[tuple[str, Message]]:
     """Yield topic key (:data:`~nav_adapter.ros2.PUBLISHED`) and message, urgent ones first.
 
     Without ``robot_state`` there is no grid, since it is centred on the robot. A message is made
-    only if ``wanted`` returns True for its key.
+    only if ``wanted`` returns True for its key. ``details`` are for :func:`alerts`.
     """
     odom, base = frames.odom, frames.base
     if wanted("speed_limit"):
@@ -58,7 +59,7 @@ def outgoing(
         ):
             yield "collision_polygons", polygon
     if wanted("alerts"):
-        yield "alerts", alerts(constraints)
+        yield "alerts", alerts(constraints, details=details)
     if wanted("stop_zone"):
         moving = robot_state
         forward, left = (moving.speed_mps, moving.lateral_mps) if moving else (0.0, 0.0)

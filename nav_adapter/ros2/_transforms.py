@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right, insort
 from typing import Final
 
@@ -21,7 +22,8 @@ class TransformBuffer:
     """Stores the transforms of the last 5 s and looks up those between any two frames of a tree.
 
     It interpolates between two stamps. The newest transform is used for up to 0.1 s after its
-    stamp; there is no extrapolation before the oldest. Static transforms hold at all times.
+    stamp; there is no extrapolation before the oldest. Static transforms hold at all times and
+    have no stamp.
     """
 
     def __init__(self) -> None:
@@ -59,6 +61,23 @@ class TransformBuffer:
         insort(history, (stamp, T), key=lambda entry: entry[0])
         while history[-1][0] - history[0][0] > _KEPT_S:
             del history[0]
+
+    def forget(self, *, after_s: float = -math.inf) -> int:
+        """Forget transforms with later stamps, by default all, and return how many.
+
+        Static transforms are kept.
+        """
+        forgotten = 0
+        for child, history in list(self._histories.items()):
+            if child in self._static or history[-1][0] <= after_s:
+                continue
+            kept = [entry for entry in history if entry[0] <= after_s]
+            forgotten += len(history) - len(kept)
+            if kept:
+                self._histories[child] = kept
+            else:
+                del self._histories[child], self._parents[child]
+        return forgotten
 
     def lookup(self, target: str, source: str, stamp_s: float) -> FloatArray:
         """Return T_target_source (4, 4) at ``stamp_s``.

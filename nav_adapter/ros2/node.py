@@ -1,6 +1,7 @@
 """The bridge as an rclpy node, for computers with ROS 2: the same topics, with ROS's clock.
 
-Run it with ``python -m nav_adapter.ros2.node --ros-args -p robot_file:=robot.yaml``. Parameters:
+Run it with ``python -m nav_adapter.ros2.node --ros-args -p robot_file:=robot.yaml``. The executor's
+thread publishes at a fixed rate; perception has a thread of its own. Parameters:
 ``robot_file`` (required), ``policy`` (``balanced``), ``rate_hz`` (20.0), ``compressed`` (false),
 ``percentage`` (false), ``detector_file`` and ``pose_file`` (ONNX; by default the shipped networks,
 which are trained for the simulator), ``odom_frame``, ``base_frame``, ``camera_frame``. Topics are
@@ -27,6 +28,7 @@ from .._errors import NavError
 from .._policy import AwarenessPolicy
 from ._bridge import AwarenessBridge
 from ._outgoing import Frames
+from ._perception_thread import PerceptionThread
 from ._robot_file import RobotFile
 from ._topics import PUBLISHED, READ, Topic
 from .conversions import from_ros, ros_class, to_ros
@@ -86,10 +88,9 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
             warn=self.get_logger().warning,
             wanted=self._wanted,
         )
-        self._subscribe(READ["odom"], lambda m: self._bridge.on_odometry(from_ros(Odometry, m)))
-        self._subscribe(
-            READ["camera_info"], lambda m: self._bridge.on_camera_info(from_ros(CameraInfo, m))
-        )
+        self._perception = PerceptionThread(self._bridge, self._now_s)
+        self._subscribe(READ["odom"], self._odometry)
+        self._subscribe(READ["camera_info"], self._calibration)
         if robot.camera is None:
             self._subscribe(READ["tf"], lambda m: self._transforms(m, False))
             self._subscribe(READ["tf_static"], lambda m: self._transforms(m, True))
@@ -100,18 +101,25 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
         self.create_timer(1.0 / self._parameter("rate_hz", 20.0), self._tick)
 
     def stop(self) -> None:
-        """Publish a stop, before the node ends."""
+        """Publish a stop and end perception, before the node ends."""
         self._bridge.stop(self._now_s(), "the awarenav node has ended")
+        self._perception.close()
 
     def _tick(self) -> None:
         self._bridge.tick(self._now_s())
 
     def _image(self, kind: type[Image] | type[CompressedImage], message: Any) -> None:
-        if self._bridge.on_image(from_ros(kind, message), self._now_s()):
-            self._tick()
+        self._perception.submit(lambda: from_ros(kind, message))
+
+    def _calibration(self, message: Any) -> None:
+        if self._bridge.camera is None:
+            self._perception.calibrate(lambda: from_ros(CameraInfo, message))
+
+    def _odometry(self, message: Any) -> None:
+        self._bridge.on_odometry(from_ros(Odometry, message), self._now_s())
 
     def _transforms(self, message: Any, static: bool) -> None:
-        self._bridge.on_transforms(from_ros(TFMessage, message), static=static)
+        self._bridge.on_transforms(from_ros(TFMessage, message), self._now_s(), static=static)
 
     def _publish(self, key: str, message: Message) -> None:
         publisher = self._publishers_by_key.get(key)

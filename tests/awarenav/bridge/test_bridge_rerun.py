@@ -39,7 +39,8 @@ def test_a_rerun_recording_has_inputs_and_outputs_of_the_bridge(tmp_path: Path) 
             now = 1000.0 + 0.1 * tick
             bridge.on_odometry(odometry(now))
             assert bridge.on_image(scene.image(now), now)
-            recorder.draw(bridge, bridge.tick(now), frame=True)
+            recorder.draw_frame(bridge)
+            recorder.draw(bridge, bridge.tick(now))
     data = path.read_bytes()
     assert data.startswith(b"RRF")
     for entity in (

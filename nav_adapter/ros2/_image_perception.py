@@ -1,0 +1,124 @@
+"""Networks and tracker of the bridge: from an image to tracks."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perception import AwarenessPipeline, Camera, FloorPlane, PersonObservation
+from perception.arrays import FloatArray
+from tracking import CameraView, PersonTrack, PersonTracker, TrackerConfig
+
+from ._images import camera_of, picture_of
+from .messages.sensor_msgs import CameraInfo, CompressedImage, Image
+
+# Uncertainty of the height and the tilt of a camera on a driving robot.
+_HEIGHT_STD_M = 0.05
+_TILT_STD_RAD = math.radians(2.0)
+
+
+@dataclass(frozen=True, eq=False)
+class PerceivedFrame:
+    """One frame: image, people and tracks. Immutable, so that threads can share it.
+
+    Attributes:
+        stamp_s: of the image.
+        tracks: all tracks at that time.
+        image: (H, W, 3) uint8 RGB.
+        observations: one per person seen.
+        T_odom_camera: (4, 4) pose of the camera.
+    """
+
+    stamp_s: float
+    tracks: tuple[PersonTrack, ...]
+    image: NDArray[np.uint8]
+    observations: tuple[PersonObservation, ...]
+    T_odom_camera: FloatArray
+
+
+class ImagePerception:
+    """The pipeline and the tracker, from the first calibration on.
+
+    One thread at a time is in :meth:`process` or :meth:`calibrate`; others wait.
+
+    Args:
+        make_pipeline: makes the pipeline for a camera.
+        config: of the tracker.
+        camera: calibration; None until :meth:`calibrate`.
+    """
+
+    def __init__(
+        self,
+        make_pipeline: Callable[[Camera], AwarenessPipeline],
+        config: TrackerConfig,
+        camera: Camera | None,
+    ) -> None:
+        self._make_pipeline, self._config = make_pipeline, config
+        self._busy = threading.Lock()
+        self._reset_wanted = False
+        self._camera: Camera | None = None
+        if camera is not None:
+            self._start(camera)
+
+    @property
+    def camera(self) -> Camera | None:
+        """The camera, or None while it is unknown. The pipeline exists as soon as it is known."""
+        return self._camera
+
+    def calibrate(self, message: CameraInfo) -> None:
+        """Make pipeline and tracker from the first calibration; later ones are ignored.
+
+        Raises:
+            NavError, PerceptionError: for a calibration or networks that cannot be used.
+        """
+        with self._busy:
+            if self._camera is None:
+                self._start(camera_of(message))
+
+    def forget_tracks(self) -> None:
+        """Delete all tracks before the next frame; from any thread, without waiting."""
+        self._reset_wanted = True
+
+    def process(
+        self,
+        message: Image | CompressedImage,
+        stamp_s: float,
+        T_odom_camera: FloatArray,
+        is_current: Callable[[], bool],
+    ) -> PerceivedFrame | None:
+        """Return the frame of an image, or None if ``is_current`` says that it came too late.
+
+        Raises:
+            NavError, PerceptionError, TrackingError: for an image that cannot be used.
+        """
+        with self._busy:
+            image = picture_of(message)
+            observations = self._pipeline.process(image, stamp_s, floor=_floor(T_odom_camera))
+            # The tracker is reset before the question: tracks that another thread wants deleted
+            # from here on are deleted before the next frame.
+            if self._reset_wanted:
+                self._reset_wanted = False
+                self._tracker.reset()
+            if not is_current():
+                return None
+            tracks = self._tracker.update(observations, stamp_s, T_odom_camera)
+        return PerceivedFrame(stamp_s, tracks, image, observations, T_odom_camera)
+
+    def _start(self, camera: Camera) -> None:
+        self._pipeline = self._make_pipeline(camera)
+        self._tracker = PersonTracker(self._config, view=CameraView(camera))
+        self._camera = camera
+
+
+def _floor(T_odom_camera: FloatArray) -> FloorPlane | None:
+    """Return the floor, z = 0 in odom, or None for a camera that is not above it."""
+    if T_odom_camera[2, 3] <= 0.0:
+        return None
+    return FloorPlane.from_pose(
+        T_odom_camera, height_std_m=_HEIGHT_STD_M, tilt_std_rad=_TILT_STD_RAD
+    )

@@ -1,0 +1,91 @@
+"""A thread for the bridge's perception, so that slow networks delay no publication."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import TypeAlias
+
+from .._errors import NavError
+from ._bridge import AwarenessBridge
+from .messages.sensor_msgs import CameraInfo, CompressedImage, Image
+
+AnyImage: TypeAlias = Image | CompressedImage
+
+
+class PerceptionThread:
+    """Passes calibrations and images to a bridge, in a thread of its own.
+
+    Only the newest image waits while another one is processed, and only the newest calibration; a
+    calibration goes first. Both are given as functions, which decode the message in the thread.
+
+    An error of the program in perception does not end the thread. The bridge reports and counts it
+    (:meth:`AwarenessBridge.perception_failed`), publishes on with older and older people until it
+    stops the robot, and the next image is tried.
+
+    Args:
+        bridge: its :meth:`~AwarenessBridge.tick` is called by another thread.
+        clock: returns the present time, s.
+        on_frame: called in the thread after each frame that was used.
+    """
+
+    def __init__(
+        self,
+        bridge: AwarenessBridge,
+        clock: Callable[[], float],
+        *,
+        on_frame: Callable[[], None] = lambda: None,
+    ) -> None:
+        self._bridge, self._clock, self._on_frame = bridge, clock, on_frame
+        self._calibration: Callable[[], CameraInfo] | None = None
+        self._image: Callable[[], AnyImage] | None = None
+        self._closing = False
+        self._changed = threading.Condition()
+        # A network that hangs must not keep the process from ending.
+        self._thread = threading.Thread(target=self._run, name="perception", daemon=True)
+        self._thread.start()
+
+    def calibrate(self, message: Callable[[], CameraInfo]) -> None:
+        """Hand over a calibration; return at once."""
+        with self._changed:
+            self._calibration = message
+            self._changed.notify()
+
+    def submit(self, message: Callable[[], AnyImage]) -> None:
+        """Hand over an image, which replaces one that is still waiting; return at once."""
+        with self._changed:
+            self._image = message
+            self._changed.notify()
+
+    def close(self, timeout_s: float = 5.0) -> bool:
+        """End the thread after the message in hand; return False if that takes too long."""
+        with self._changed:
+            self._closing = True
+            self._changed.notify()
+        self._thread.join(timeout_s)
+        return not self._thread.is_alive()
+
+    def _run(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._closing or self._calibration or self._image)
+                if self._closing:
+                    return
+                calibration, self._calibration = self._calibration, None
+                image = None
+                if calibration is None:
+                    image, self._image = self._image, None
+            try:
+                self._pass_on(calibration, image)
+            except NavError as problem:
+                self._bridge.refuse(str(problem))
+            except Exception as problem:
+                self._bridge.perception_failed(problem)
+
+    def _pass_on(
+        self, calibration: Callable[[], CameraInfo] | None, image: Callable[[], AnyImage] | None
+    ) -> None:
+        if calibration is not None:
+            self._bridge.on_camera_info(calibration())
+        if image is not None and self._bridge.on_image(image(), self._clock()):
+            self._on_frame()

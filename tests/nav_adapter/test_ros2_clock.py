@@ -1,0 +1,203 @@
+"""Clocks of the bridge: steps back, messages from the future, static transforms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from test_ros2_bridge import INFO, START_S, Listener, image, odometry
+
+from nav_adapter.ros2 import TransformBuffer
+from nav_adapter.ros2.conversions import pose_matrix, to_time, yaw_quaternion
+from nav_adapter.ros2.messages.geometry_msgs import (
+    Quaternion,
+    Transform,
+    TransformStamped,
+    Vector3,
+)
+from nav_adapter.ros2.messages.std_msgs import Header
+from nav_adapter.ros2.messages.tf2_msgs import TFMessage
+from perception import PersonObservation
+
+PERIOD_S = 0.05
+HERE = pose_matrix((0.0, 0.0, 0.0), yaw_quaternion(0.0))
+
+
+def transform(parent: str, child: str, stamp_s: float) -> TFMessage:
+    optical = Quaternion(-0.5, 0.5, -0.5, 0.5)
+    move = Transform(Vector3(0.2, 0.0, 1.4), optical)
+    return TFMessage((TransformStamped(Header(to_time(stamp_s), parent), child, move),))
+
+
+class OneStanding:
+    """Perception of one person 4 m ahead."""
+
+    def process(self, image_rgb, stamp_s, *, floor=None):
+        return (
+            PersonObservation(
+                stamp_s=stamp_s,
+                position_camera_m=np.array([0.0, 0.2, 4.0]),
+                position_covariance_m2=np.diag([0.01, 0.01, 0.01]),
+                gaze_camera=None,
+                awareness=None,
+                awareness_std=None,
+                score=0.9,
+                box_xyxy_px=None,
+            ),
+        )
+
+
+class Robot(Listener):
+    """A bridge that gets odometry and images on one clock, and its camera's mount once."""
+
+    def __init__(self, **settings) -> None:
+        super().__init__(T_base_camera=None, **settings)
+        self.bridge.on_camera_info(INFO)
+        self.bridge.on_transforms(transform("base_link", "camera", START_S), static=True)
+
+    def step(self, now_s: float):
+        self.bridge.on_odometry(odometry(now_s), now_s)
+        self.bridge.on_image(image(now_s), now_s)
+        return self.bridge.tick(now_s)
+
+    def drive(self, start_s: float, seconds: float) -> list:
+        return [self.step(start_s + PERIOD_S * tick) for tick in range(round(seconds / PERIOD_S))]
+
+    def details(self) -> dict[str, str]:
+        return {pair.key: pair.value for pair in self.heard["alerts"][-1].status[0].values}
+
+
+def test_a_clock_step_of_10_ms_back_changes_nothing() -> None:
+    robot = Robot()
+    robot.drive(START_S, 1.0)
+    last_s = START_S + 1.0 - PERIOD_S
+    # The second reading after the step, of a rate so fast that the clock has not caught up.
+    for now_s in (last_s - 0.010, last_s - 0.005):
+        constraints = robot.bridge.tick(now_s)
+        assert constraints.stamp_s == last_s
+        assert not robot.standing()
+    for constraints in robot.drive(last_s + 0.04, 1.0):
+        assert constraints.limited_by == "robot maximum"
+    assert robot.bridge.counts["clock_restarts"] == 0
+    assert robot.warnings == []
+
+
+@settings(max_examples=20)
+@given(st.floats(0.0, 3600.0), st.floats(-3600.0, 3600.0))
+def test_static_transforms_survive_any_clock_step(before_s: float, step_s: float) -> None:
+    robot = Robot(wanted={"speed_limit", "collision_polygons"}.__contains__)
+    robot.drive(START_S + before_s + 3600.0, 0.2)
+    # tf_static is latched: it does not come again.
+    constraints = robot.drive(START_S + before_s + 3600.2 + step_s, 3.0)
+    assert constraints[-1].limited_by == "robot maximum"
+    assert not robot.standing()
+
+
+def test_a_clock_that_was_set_back_starts_the_buffers_anew_after_1_s() -> None:
+    robot = Robot(make_pipeline=lambda camera: OneStanding())
+    robot.drive(START_S, 1.0)
+    (before,) = robot.bridge.tracks
+    new_s = START_S - 500.0
+    constraints = robot.drive(new_s, 2.0)
+    stood = [each.stamp_s for each in constraints if each.speed_limit_mps == 0.0]
+    assert stood[0] == new_s
+    assert 1.0 <= stood[-1] - new_s <= 1.1
+    assert {each.limited_by for each in constraints[:20]} == {"the clock went backward"}
+    assert not constraints[-1].stale
+    assert not robot.standing()
+    assert "the clock has been set back" in "".join(robot.warnings)
+    assert robot.details()["clock_restarts"] == "1"
+    # Ids go on, so that nobody inherits the id of somebody else.
+    (after,) = robot.bridge.tracks
+    assert after.id > before.id
+    assert after.stamp_s == constraints[-1].stamp_s
+
+
+def test_one_wrong_reading_of_the_clock_does_not_delete_people() -> None:
+    robot = Robot()
+    robot.drive(START_S, 1.0)
+    frame = robot.bridge.frame
+    assert robot.bridge.tick(START_S - 100.0).limited_by == "the clock went backward"
+    assert robot.bridge.frame is frame
+    assert robot.step(START_S + 1.0).limited_by == "robot maximum"
+    assert robot.bridge.counts["clock_restarts"] == 0
+
+
+def test_one_odometry_message_from_the_future_does_not_block_the_next_ones() -> None:
+    robot = Robot()
+    robot.drive(START_S, 1.0)
+    now_s = START_S + 1.0
+    robot.bridge.on_odometry(odometry(now_s + 3600.0, x=50.0), now_s)
+    for constraints in robot.drive(now_s, 2.0):
+        assert constraints.limited_by == "robot maximum"
+        assert not constraints.stale
+    assert robot.bridge.robot_state is not None
+    assert robot.bridge.robot_state.stamp_s == constraints.stamp_s
+    assert robot.details()["odometry_from_future"] == "1"
+    assert robot.warnings == [
+        "odometry: the stamp is 3600.000 s ahead of this computer's clock: refused and counted, "
+        "without further warnings"
+    ]
+
+
+def test_without_a_time_odometry_from_the_future_is_dropped_by_the_next_tick() -> None:
+    robot = Robot()
+    robot.drive(START_S, 1.0)
+    now_s = START_S + 1.0
+    robot.bridge.on_odometry(odometry(now_s + 3600.0))
+    assert robot.bridge.tick(now_s).limited_by == "no odometry yet"
+    assert robot.standing()
+    for constraints in robot.drive(now_s + PERIOD_S, 1.0):
+        assert constraints.limited_by == "robot maximum"
+    assert robot.details()["odometry_from_future"] == "1"
+
+
+def test_odometry_slightly_ahead_is_used() -> None:
+    robot = Robot()
+    robot.drive(START_S, 1.0)
+    now_s = START_S + 1.0
+    robot.bridge.on_odometry(odometry(now_s + 0.049), now_s)
+    assert robot.bridge.tick(now_s).limited_by == "robot maximum"
+    assert robot.bridge.robot_state is not None
+    assert robot.bridge.robot_state.stamp_s == pytest.approx(now_s + 0.049)
+
+
+def test_transforms_from_the_future_are_refused_and_counted() -> None:
+    robot = Robot()
+    now_s = START_S
+    robot.bridge.on_transforms(transform("odom", "base_link", now_s + 3600.0), now_s)
+    assert robot.bridge.counts["transforms_from_future"] == 1
+    assert "transforms: the stamp is 3600.000 s ahead" in robot.warnings[-1]
+    # Localisation stamps map -> odom ahead on purpose: neither used nor counted.
+    robot.bridge.on_transforms(transform("map", "odom", now_s + 1.0), now_s)
+    assert robot.bridge.counts["transforms_from_future"] == 1
+    assert robot.drive(now_s, 1.0)[-1].limited_by == "robot maximum"
+
+
+def test_images_from_the_future_are_refused_and_counted() -> None:
+    robot = Robot()
+    robot.drive(START_S, 1.0)
+    now_s = START_S + 1.0
+    for _ in range(3):
+        assert not robot.bridge.on_image(image(now_s + 3600.0), now_s)
+    assert robot.step(now_s).limited_by == "robot maximum"
+    assert robot.details()["images_from_future"] == "3"
+    assert len(robot.warnings) == 1
+
+
+def test_the_buffer_forgets_moving_transforms_only() -> None:
+    buffer = TransformBuffer()
+    buffer.add("base_link", "camera", 0.0, HERE, static=True)
+    for stamp_s in (1.0, 2.0, 3.0):
+        buffer.add("odom", "base_link", stamp_s, HERE)
+    assert buffer.forget(after_s=3.0) == 0
+    assert buffer.forget(after_s=2.0) == 1
+    assert (buffer.lookup("odom", "camera", 2.0) == HERE).all()
+    assert buffer.forget() == 2
+    assert (buffer.lookup("base_link", "camera", 99.0) == HERE).all()
+    with pytest.raises(Exception, match="no transform between"):
+        buffer.lookup("odom", "camera", 2.0)

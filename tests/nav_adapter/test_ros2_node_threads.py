@@ -1,0 +1,127 @@
+"""The rclpy node with a stand-in for rclpy: it publishes while perception is busy."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+import threading
+import time
+from collections import defaultdict
+from collections.abc import Callable
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import pytest
+
+pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
+
+from paths import ROOT
+from test_ros2_bridge import INFO, image, odometry
+
+from nav_adapter.ros2 import PUBLISHED, READ, node
+from nav_adapter.ros2.conversions import to_ros
+
+PATIENCE_S = 20.0
+
+
+class StandInNode:
+    """What the node calls of rclpy's Node."""
+
+    def __init__(self, name: str) -> None:
+        self.sent: dict[str, list[Any]] = defaultdict(list)
+        self.callbacks: dict[str, Callable[[Any], None]] = {}
+
+    def declare_parameter(self, name: str, default: Any) -> Any:
+        given = {"robot_file": str(ROOT / "docs" / "nav2" / "robot.yaml")}
+        return SimpleNamespace(value=given.get(name, default))
+
+    def get_logger(self) -> Any:
+        return SimpleNamespace(warning=lambda text: None)
+
+    def get_clock(self) -> Any:
+        return SimpleNamespace(now=lambda: SimpleNamespace(nanoseconds=time.time_ns()))
+
+    def create_publisher(self, kind: Any, name: str, qos: Any) -> Any:
+        return SimpleNamespace(publish=self.sent[name].append, get_subscription_count=lambda: 1)
+
+    def create_subscription(self, kind: Any, name: str, callback: Any, qos: Any) -> None:
+        self.callbacks[name] = callback
+
+    def create_timer(self, period_s: float, callback: Callable[[], None]) -> None:
+        self.period_s, self.timer = period_s, callback
+
+
+class SlowNetwork:
+    def __init__(self) -> None:
+        self.entered, self.open = threading.Event(), threading.Event()
+
+    def process(self, image_rgb, stamp_s, *, floor=None):
+        self.entered.set()
+        assert self.open.wait(PATIENCE_S)
+        return ()
+
+
+@pytest.fixture
+def node_module(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """The node's module, imported with the stand-in."""
+    anything = SimpleNamespace(RELIABLE=1, BEST_EFFORT=2, TRANSIENT_LOCAL=1, VOLATILE=2)
+    for name, content in {
+        "rclpy": {},
+        "rclpy.node": {"Node": StandInNode},
+        "rclpy.qos": {
+            "DurabilityPolicy": anything,
+            "QoSProfile": lambda **settings: settings,
+            "ReliabilityPolicy": anything,
+        },
+        "rclpy.signals": {"SignalHandlerOptions": anything},
+    }.items():
+        module = ModuleType(name)
+        vars(module).update(content)
+        monkeypatch.setitem(sys.modules, name, module)
+    name = "nav_adapter.ros2.node_of_stand_in"
+    spec = importlib.util.spec_from_file_location(name, node.__file__)
+    assert spec is not None
+    assert spec.loader is not None
+    made: Any = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(made)
+    made.ros_class = lambda kind: SimpleNamespace
+    made.to_ros = lambda message: to_ros(message, lambda kind: SimpleNamespace)
+    return made
+
+
+def test_the_node_publishes_while_perception_is_busy(node_module: Any) -> None:
+    network = SlowNetwork()
+    node_module._pipelines = lambda *files: lambda camera: network
+    ros_node = node_module.AwarenessNode()
+
+    def hear(key: str, message: Any) -> None:
+        ros_node.callbacks[READ[key].name](to_ros(message, lambda kind: SimpleNamespace))
+
+    assert ros_node.period_s == 0.05
+    hear("camera_info", INFO)
+    hear("odom", odometry(time.time()))
+    try:
+        end = time.monotonic() + PATIENCE_S
+        while not network.entered.is_set() and time.monotonic() < end:
+            # Images that come before the pipeline is made are refused.
+            hear("odom", odometry(time.time()))
+            hear("image", image(time.time()))
+            network.entered.wait(0.01)
+        assert network.entered.is_set()
+        for _ in range(10):
+            ros_node.timer()
+        limits = ros_node.sent[PUBLISHED["speed_limit"].name]
+        assert len(limits) == 10
+        assert {name for name, sent in ros_node.sent.items() if sent} >= {
+            PUBLISHED[key].name for key in PUBLISHED if key != "circles"
+        }
+        network.open.set()
+        while not ros_node._bridge.counts["frames"] and time.monotonic() < end:
+            time.sleep(0.01)
+        hear("odom", odometry(time.time()))
+        ros_node.timer()
+        assert limits[-1].speed_limit > limits[0].speed_limit
+    finally:
+        network.open.set()
+        ros_node.stop()
+    assert limits[-1].speed_limit == limits[0].speed_limit
