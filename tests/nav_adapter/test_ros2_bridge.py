@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -363,3 +364,23 @@ def test_damaged_messages_never_crash_the_bridge_and_its_messages_are_valid(
     for messages in nav.heard.values():
         for message in messages:
             encode(message)
+
+
+def test_lateral_speed_of_the_odometry_counts() -> None:
+    """A holonomic robot at 1.2 m/s to the left does not stand."""
+    nav = Listener()
+    twist = TwistWithCovariance(Twist(Vector3(0.0, 1.2, 0.0)))
+    nav.bridge.on_camera_info(INFO)
+    nav.bridge.on_odometry(replace(odometry(START_S), twist=twist))
+    assert nav.bridge.robot_state.travel_mps == 1.2
+    assert nav.bridge.robot_state.velocity_odom_mps == pytest.approx((0.0, 1.2))
+    nav.bridge.on_image(image(START_S), START_S)
+    nav.bridge.tick(START_S)
+    # The stop zone reaches 1.2 · 0.3 + 1.2² / 2 = 1.08 m to the left of the footprint, and no
+    # farther ahead than the footprint.
+    corners = nav.heard["stop_zone"][-1].polygon.points
+    assert max(corner.y for corner in corners) == pytest.approx(0.25 + 1.08)
+    assert max(corner.x for corner in corners) == pytest.approx(0.3625)
+    too_fast = TwistWithCovariance(Twist(Vector3(0.0, 1e3, 0.0)))
+    nav.bridge.on_odometry(replace(odometry(START_S), twist=too_fast))
+    assert "speed_mps must be within 100 m/s" in nav.warnings[-1]
