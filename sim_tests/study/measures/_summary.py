@@ -9,6 +9,8 @@ from typing import Final
 
 import numpy as np
 
+from perception.short_repr import short_repr
+
 from ._bootstrap import ratio_intervals
 from ._interval import Interval, proportion_interval
 from ._metrics import METRICS
@@ -59,7 +61,7 @@ class Comparison:
     min_separation_m: Interval
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class SummaryRow:
     """One policy over one part of the episodes.
 
@@ -88,8 +90,10 @@ class SummaryRow:
     means: Mapping[str, Interval]
     worst: Mapping[str, float]
 
+    __repr__ = short_repr
 
-@dataclass(frozen=True, slots=True)
+
+@dataclass(frozen=True, slots=True, repr=False)
 class Summary:
     """A summary of many episodes.
 
@@ -114,6 +118,8 @@ class Summary:
     awareness: tuple[SummaryRow, ...]
     comparisons: tuple[Comparison, ...]
     scenario_comparisons: tuple[Comparison, ...]
+
+    __repr__ = short_repr
 
 
 def summarise(
