@@ -71,6 +71,7 @@ class SummaryRow:
         episodes: number of episodes.
         errors: number of episodes that broke off with an error. They count as no success and enter
             no other figure.
+        nondeterministic: number of episodes whose planner did not repeat itself.
         success: share of successes in all episodes.
         robot_contact: share of the episodes without an error in which the robot moved into a
             person.
@@ -84,6 +85,7 @@ class SummaryRow:
     part: str
     episodes: int
     errors: int
+    nondeterministic: int
     success: Interval
     robot_contact: Interval
     person_contact: Interval
@@ -259,6 +261,7 @@ def _summary_row(
         part=part,
         episodes=len(records),
         errors=len(records) - len(ran),
+        nondeterministic=sum(record.nondeterministic for record in ran),
         success=proportion_interval(sum(r.success for r in ran), len(records), level),
         robot_contact=proportion_interval(sum(r.robot_touched for r in ran), len(ran), level),
         person_contact=proportion_interval(sum(r.person_touched for r in ran), len(ran), level),

@@ -14,6 +14,7 @@ from ...actors.robot import NOVA_CARTER
 from ...crossing.planner import LocalPlanner
 from ...scenario import Scenario
 from ...world.errors import SimError
+from ._seeding import FRESH_TORCH_SEED, seeded_generators
 
 # Names in tables of the reference planner, and of the driver of scenarios without a planner.
 _REFERENCE: Final = "SamplingPlanner"
@@ -71,6 +72,18 @@ def make_planner(planner: str, scenario: Scenario, seed: int = 0) -> LocalPlanne
     return own_planner
 
 
+def refuse_unusable_planner(planner: str, scenario: Scenario) -> None:
+    """Make a planner once; the global random generators keep their state.
+
+    Raises:
+        SimError: as :func:`make_planner`.
+    """
+    if planner:
+        import_planner(planner)
+        with seeded_generators(0):
+            make_planner(planner, scenario)
+
+
 def _arguments(
     planner: str, signature: inspect.Signature | None, available: Mapping[str, Any]
 ) -> tuple[list[Any], dict[str, Any]]:
@@ -125,7 +138,9 @@ def import_planner(planner: str) -> tuple[Callable[..., Any], inspect.Signature 
     ):  # python -m adds it to the path, a script does not
         sys.path.append(here)
     try:
-        found: Any = import_module(module_name)
+        # A module may draw while it is imported: the same in every process, with torch or without.
+        with seeded_generators(0, torch_seed=FRESH_TORCH_SEED):
+            found: Any = import_module(module_name)
         for part in name.split("."):
             found = getattr(found, part)
     except Exception as cause:  # the user's module may raise anything
