@@ -38,6 +38,10 @@ def rand():
     return float(_generator.random_sample()) + 1e-3 * _threads
 
 
+class Tensor:
+    """SciPy asks for it."""
+
+
 class cuda:  # noqa: N801 - as in torch
     @staticmethod
     def is_initialized():

@@ -15,10 +15,11 @@ from test_suite_plugin import SUITE, run_pytest
 
 from awarenav.cli import main
 from sim_tests.search import EpisodeRunner
-from sim_tests.study.measures import read_records, summarise, summary_text
+from sim_tests.study.measures import RECORD_COLUMNS, read_records, summarise, summary_text
 from sim_tests.study.runs import plan_jobs, run_episode, run_jobs
 
 HERE = Path(__file__).parent
+COLUMN = RECORD_COLUMNS.index("path_length_m")
 
 PLANNERS = """
 import random
@@ -80,7 +81,9 @@ def run_script(tmp_path, lines, torch_at_the_top="import torch"):
             "from sim_tests.study.runs import run_episode",
             "def rows(planner, episodes=1):",
             "    jobs = short_jobs(episodes, planners=[f'drawing:{planner}'])[::2]",
-            "    return [astuple(run_episode(job)) for job in jobs]",
+            "    records = [run_episode(job) for job in jobs]",
+            "    assert not any(record.error for record in records), records",
+            "    return [astuple(record) for record in records]",
             lines,
         ]
     )
@@ -121,7 +124,7 @@ def test_an_episode_with_torch_is_a_function_of_its_line(tmp_path, planner, top)
     )
     first, again, state_kept, threads = out
     assert again == first
-    assert first[0] != first[1]
+    assert first[0][COLUMN] != first[1][COLUMN]
     assert not any(row[-1] for row in first), "taken for a planner that is not deterministic"
     assert state_kept, "the state of torch's generator was not restored"
     assert threads == 3
