@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any, cast
 
 from shapely.geometry import Polygon
 
 from perception.arrays import FloatArray, finite_array, finite_number, set_fields
+from perception.short_repr import short_repr
 
 from ._alert import Alert
 from ._errors import NavError
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class PersonObstacle:
     """One person as an obstacle in the odom frame.
 
@@ -36,7 +37,9 @@ class PersonObstacle:
     radius_m: float
     height_m: float
     awareness_lower: float
-    polygon: Polygon
+    polygon: Polygon = field(repr=False)
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         def positive(name: str) -> float:
@@ -59,7 +62,7 @@ class PersonObstacle:
 
 
 _SET_ID, _SET_CENTER, _SET_VELOCITY, _SET_RADIUS, _SET_HEIGHT, _SET_LOWER, _SET_POLYGON = (
-    cast(Any, getattr(PersonObstacle, field.name)).__set__ for field in fields(PersonObstacle)
+    cast(Any, getattr(PersonObstacle, each.name)).__set__ for each in fields(PersonObstacle)
 )
 
 
@@ -88,7 +91,7 @@ def trusted_obstacle(
     return obstacle
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class NavConstraints:
     """Obstacles and a speed limit for one planning cycle.
 
@@ -118,6 +121,8 @@ class NavConstraints:
     reachable_speed_limit_mps: float = 0.0
     alerts: tuple[Alert, ...] = ()
     braking_suffices: bool = True
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         limit = finite_number("speed_limit_mps", self.speed_limit_mps, NavError, minimum=0.0)

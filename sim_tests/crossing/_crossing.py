@@ -19,6 +19,7 @@ from ..scenario import Scenario, ScenarioTemplate
 from ..world.camera import CameraTiming
 from ..world.errors import SimError
 from ..world.render import RendererName
+from ._command import check_planner, checked_command
 from ._metrics import SafetyMeter
 from ._result import CrossingFrame, CrossingResult
 from ._stage import Stage
@@ -82,13 +83,15 @@ def run_crossing(
             available. Their pixels are nearly, but not exactly, the same.
 
     Raises:
-        SimError: unknown scenario or perception, or an invalid command from the planner.
+        SimError: unknown scenario or perception, a planner without ``plan``, or a command that is
+            not two finite numbers.
         NavError: unknown preset or unusable policy file.
         PerceptionError: for ``"pixels"``, when the shipped networks cannot be loaded.
     """
     if isinstance(scenario, str):
         scenario = ScenarioTemplate.shipped(scenario).for_seed(seed)
     policy_name, policy = _resolve_policy(policy)
+    driver = check_planner(planner) if planner is not None else _default_planner(scenario)
     jitter_rng, camera_rng, timing_rng, people_rng = np.random.default_rng(seed).spawn(4)
     jitter = scenario.start_jitter_s
     offsets = jitter_rng.uniform(-jitter, jitter, len(scenario.workers))
@@ -96,7 +99,6 @@ def run_crossing(
     meter = SafetyMeter(NOVA_CARTER)
     injection = FaultInjection(fault, seed)
     with Stage(scenario, offsets, people_rng, renderer=renderer) as stage:
-        driver = planner if planner is not None else _default_planner(scenario)
         camera_model, timing = _camera_and_timing(scenario, perception)
         eyes = make_eyes(
             perception,
@@ -132,7 +134,8 @@ def run_crossing(
             if newest_s != t_s:
                 tracks = tracker.predict(t_s)
             constraints = adapter.update(tracks, known.state, t_s, perception_stamp_s=newest_s)
-            command = driver.plan(known.state, goal, constraints, dt_s)
+            returned = driver.plan(known.state, goal, constraints, dt_s)
+            command = checked_command(driver, returned, t_s)
             stage.amr.command(*command)
             frame = CrossingFrame(
                 t_s,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from nav_adapter import NavConstraints, RobotProfile, RobotState
 from perception import PersonObservation
 from perception.arrays import FloatArray
+from perception.short_repr import short_repr
 from tracking import PersonTrack
 
 from ..actors.behaviour import PersonOutcome
@@ -15,7 +16,7 @@ from ._metrics import ContactEvent
 from ._stage import TrueView
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class CrossingFrame:
     """One control cycle: truth, perception, constraints and command.
 
@@ -48,6 +49,8 @@ class CrossingFrame:
     margins_m: tuple[float, ...]
     separations_m: tuple[float, ...] = ()
 
+    __repr__ = short_repr
+
     def observation_of(self, worker: int) -> PersonObservation | None:
         """Return the observation of a worker in this frame, or None."""
         for observation, index in zip(self.observations, self.observed_workers, strict=True):
@@ -56,7 +59,7 @@ class CrossingFrame:
         return None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class CrossingResult:
     """The outcome of one crossing.
 
@@ -103,3 +106,5 @@ class CrossingResult:
     people: tuple[PersonOutcome, ...] = ()
     scripted: int = 0
     robot: RobotProfile = NOVA_CARTER
+
+    __repr__ = short_repr

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager
 
 from tqdm import tqdm
 
-from ..study.measures import EpisodeRecord
+from ..study.measures import EpisodeRecord, nondeterminism_notes
 from ..study.runs import Job, WorkerPool, run_here
 
 
@@ -26,6 +26,7 @@ class EpisodeRunner(AbstractContextManager["EpisodeRunner"]):
 
     def __init__(self, workers: int, label: str, total: int | None = None) -> None:
         self._pool = WorkerPool(workers) if workers > 1 else None
+        self._unrepeatable: set[str] = set()
         self.bar = tqdm(desc=label, total=total, unit="episode", smoothing=0.05, file=sys.stderr)
 
     def __exit__(self, *_: object) -> None:
@@ -45,4 +46,13 @@ class EpisodeRunner(AbstractContextManager["EpisodeRunner"]):
         for number, result in results:
             records[number] = result.record
             self.bar.update()
+        self._say_unrepeatable(records.values())
         return tuple(records[number] for number, _ in numbered)
+
+    def _say_unrepeatable(self, records: Iterable[EpisodeRecord]) -> None:
+        """Say once on standard error that a planner is not deterministic."""
+        differing = [record for record in records if record.nondeterministic]
+        new = {record.planner for record in differing} - self._unrepeatable
+        self._unrepeatable |= new
+        for note in nondeterminism_notes(each for each in differing if each.planner in new):
+            self.bar.write(note, file=sys.stderr)

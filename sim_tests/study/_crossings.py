@@ -14,7 +14,7 @@ from perception import AwarenessPipeline, Camera
 
 from ..crossing.eyes import PerceptionKind
 from ..world.errors import SimError
-from .measures import EpisodeRecord, summarise, table_text
+from .measures import EpisodeRecord, nondeterminism_notes, summarise, table_text
 from .runs import RunFiles, plan_jobs, run_jobs
 
 # The name of the reference planner on the command line.
@@ -79,6 +79,8 @@ def crossings_command(options: CrossingsOptions) -> int:
     else:
         print(_short_table(records))
         print(f"\nWritten to {options.out}: episodes.csv with {len(records)} episodes")
+    for note in nondeterminism_notes(records):
+        print(note, file=sys.stderr)
     failed = [number for number, record in enumerate(records) if record.error]
     if failed:
         first = records[failed[0]]

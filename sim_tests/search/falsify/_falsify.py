@@ -12,7 +12,7 @@ import yaml
 
 from ...scenario import Scenario
 from ...study.measures import EpisodeRecord
-from ...study.runs import Job, ProcessLock, make_planner
+from ...study.runs import Job, ProcessLock, refuse_unusable_planner
 from ...world.errors import SimError
 from .._episode_runner import EpisodeRunner
 from .._files import templates_of, write_or_check_settings
@@ -139,8 +139,7 @@ def falsify(
     templates = templates_of(settings.scenarios)
     spaces = {each.name: ScenarioSpace(each, settings.people) for each in templates}
     budget = Budget.of(settings.episodes, len(spaces), settings.generation)
-    if settings.planner:
-        make_planner(settings.planner, templates[0].median())  # refuses an unusable planner
+    refuse_unusable_planner(settings.planner, templates[0].median())
     write_or_check_settings(settings, folder, _SETTINGS_FILE, "falsification", resume=resume)
     with ProcessLock(folder / "locks" / "folder.lock", wait=False) as lock:
         if not lock.held:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     )
     from ._record import RECORD_COLUMNS, EpisodeRecord, record_row
     from ._record_file import read_record_file, read_records, write_records
+    from ._repeatability import nondeterminism_notes
     from ._summary import BASELINE, Comparison, Summary, SummaryRow, summarise
     from ._summary_text import summary_text, table_text
     from ._variants import Variant, labels
@@ -41,6 +42,7 @@ __all__ = [
     "bootstrap_interval",
     "labels",
     "measure",
+    "nondeterminism_notes",
     "paired",
     "paired_difference",
     "path_length_m",
@@ -74,6 +76,7 @@ __getattr__ = lazy_names(
             "zero_of_n_upper",
         ),
         "._measure": ("measure",),
+        "._repeatability": ("nondeterminism_notes",),
         "._metrics": (
             "METRICS",
             "SHARES",

@@ -64,6 +64,8 @@ class EpisodeRecord:
         reaction: reaction of that person, see :class:`PersonOutcome`.
         error: the error that ended the episode, empty for none; with an error, every metric keeps
             its default.
+        nondeterministic: the user's planner gave other commands when it drove the task without
+            people a second time, with the same seed; the row may differ in another run.
     """
 
     scenario: str
@@ -106,6 +108,7 @@ class EpisodeRecord:
     awareness: Awareness = ""
     reaction: str = ""
     error: str = ""
+    nondeterministic: bool = False
 
     @property
     def versioned_scenario(self) -> str:

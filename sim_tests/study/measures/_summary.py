@@ -9,6 +9,8 @@ from typing import Final
 
 import numpy as np
 
+from perception.short_repr import short_repr
+
 from ._bootstrap import ratio_intervals
 from ._interval import Interval, proportion_interval
 from ._metrics import METRICS
@@ -59,7 +61,7 @@ class Comparison:
     min_separation_m: Interval
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class SummaryRow:
     """One policy over one part of the episodes.
 
@@ -69,6 +71,7 @@ class SummaryRow:
         episodes: number of episodes.
         errors: number of episodes that broke off with an error. They count as no success and enter
             no other figure.
+        nondeterministic: number of episodes whose planner did not repeat itself.
         success: share of successes in all episodes.
         robot_contact: share of the episodes without an error in which the robot moved into a
             person.
@@ -82,14 +85,17 @@ class SummaryRow:
     part: str
     episodes: int
     errors: int
+    nondeterministic: int
     success: Interval
     robot_contact: Interval
     person_contact: Interval
     means: Mapping[str, Interval]
     worst: Mapping[str, float]
 
+    __repr__ = short_repr
 
-@dataclass(frozen=True, slots=True)
+
+@dataclass(frozen=True, slots=True, repr=False)
 class Summary:
     """A summary of many episodes.
 
@@ -114,6 +120,8 @@ class Summary:
     awareness: tuple[SummaryRow, ...]
     comparisons: tuple[Comparison, ...]
     scenario_comparisons: tuple[Comparison, ...]
+
+    __repr__ = short_repr
 
 
 def summarise(
@@ -253,6 +261,7 @@ def _summary_row(
         part=part,
         episodes=len(records),
         errors=len(records) - len(ran),
+        nondeterministic=sum(record.nondeterministic for record in ran),
         success=proportion_interval(sum(r.success for r in ran), len(records), level),
         robot_contact=proportion_interval(sum(r.robot_touched for r in ran), len(ran), level),
         person_contact=proportion_interval(sum(r.person_touched for r in ran), len(ran), level),

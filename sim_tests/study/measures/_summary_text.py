@@ -7,6 +7,7 @@ from typing import TypeVar
 
 from ._interval import Interval, number_text
 from ._metrics import METRICS
+from ._repeatability import nondeterminism_note
 from ._summary import Comparison, Summary, SummaryRow
 
 _Row = TypeVar("_Row", Comparison, SummaryRow)
@@ -197,6 +198,8 @@ def _notes(summary: Summary) -> list[str]:
             )
         lost = row.means["time_lost_s"]
         ran = row.episodes - row.errors
+        if row.nondeterministic:
+            notes.append(nondeterminism_note(row.variant, row.nondeterministic, ran))
         not_reached = ran - row.means["time_to_goal_s"].n
         if not_reached:
             notes.append(

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from ...world.errors import SimError
+from ..measures import nondeterminism_notes
 from ._awareness_split import split_by_awareness
 from ._comparison import FURTHER, MAIN, PAIRED_ONLY, comparison_section
 from ._episode_list import failures, list_episodes
@@ -91,6 +92,7 @@ def write_report(
         pictured=stills,
         faults=fault_rows(statistics),
         failures=failures(run),
+        unrepeatable=nondeterminism_notes(each.record for each in run.episodes),
         failed=f"{plural(errors, 'episode')} failed",
         episodes=listed,
         reproduction=reproduction(run),

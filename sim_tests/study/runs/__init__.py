@@ -20,7 +20,7 @@ if TYPE_CHECKING:
         policy_text,
         template_of,
     )
-    from ._planner_choice import make_planner
+    from ._planner_choice import make_planner, refuse_unusable_planner
     from ._pool import WorkerPool, run_here, tidy
     from ._process_lock import ProcessLock
     from ._run import run_jobs
@@ -44,6 +44,7 @@ __all__ = [
     "policy_text",
     "read_jobs",
     "read_run",
+    "refuse_unusable_planner",
     "run_episode",
     "run_here",
     "run_jobs",
@@ -71,7 +72,10 @@ __getattr__ = lazy_names(
             "policy_text",
             "template_of",
         ),
-        "._planner_choice": ("make_planner",),
+        "._planner_choice": (
+            "make_planner",
+            "refuse_unusable_planner",
+        ),
         "._pool": (
             "WorkerPool",
             "run_here",

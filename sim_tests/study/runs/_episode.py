@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-import contextlib
-import random
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from traceback import format_exc
 
-import numpy as np
-
 from perception import AttentionCone, AwarenessPipeline
 from perception.networks import OnnxSettings
 
-from ...crossing import CrossingResult, Observer, run_crossing
-from ...scenario import CameraSpec, Scenario
+from ...crossing import CrossingResult, Observer
+from ...scenario import CameraSpec
 from ...world.errors import SimError
-from ..measures import EpisodeRecord, measure, path_length_m
+from ..measures import EpisodeRecord, measure
 from ._job import Job
 from ._plan import fault_of, job_key, policy_of, template_of
-from ._planner_choice import make_planner, planner_label
+from ._planner_choice import planner_label
+from ._seeded_crossing import FreeRun, free_run, seeded_crossing
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,31 +49,34 @@ def observed_episode(
     """Run and measure one episode, watched by ``observer``; exceptions are raised."""
     template, fault = template_of(job.scenario), fault_of(job.fault)
     scenario = template.for_seed(job.seed)
-    with _seeded_globals(job.seed):
-        result = run_crossing(
-            scenario,
-            policy=policy_of(job.policy),
-            planner=make_planner(job.planner, scenario),
-            perception=job.perception,
-            seed=job.seed,
-            observer=observer,
-            fault=fault,
-            pipeline=_pipeline(scenario.camera) if job.perception == "pixels" else None,
-        )
-    time_s, length_m = (None, None)
-    if scenario.robot.straight_on_speed_mps is None:
-        task = scenario.without_people().model_dump_json()
-        time_s, length_m = _run_without_people(task, job.planner)
+    free = FreeRun(None, None, repeats=True)
+    if job.planner or scenario.robot.straight_on_speed_mps is None:
+        # Before the episode: what a planner imports only while it drives is then there.
+        free = free_run(scenario.without_people().model_dump_json(), job.planner)
+    result = seeded_crossing(
+        scenario,
+        job.planner,
+        job.seed,
+        observer=observer,
+        policy=policy_of(job.policy),
+        perception=job.perception,
+        fault=fault,
+        pipeline=_pipeline(scenario.camera) if job.perception == "pixels" else None,
+    )
     record = measure(
         result,
-        time_without_people_s=time_s,
-        length_without_people_m=length_m,
+        time_without_people_s=free.time_s,
+        length_without_people_m=free.length_m,
         scenario_version=template.version,
         attention=template.attention,
         fault=job.fault_name,
     )
-    label = planner_label(job.planner, scenario)
-    return result, replace(record, policy=job.policy_name, planner=label)
+    return result, replace(
+        record,
+        policy=job.policy_name,
+        planner=planner_label(job.planner, scenario),
+        nondeterministic=not free.repeats,
+    )
 
 
 def failed(job: Job, error: str, traceback: str = "") -> Attempt:
@@ -118,29 +117,3 @@ def _pipeline(camera: CameraSpec) -> AwarenessPipeline:
         eye_in_head_std_rad=0.0,
         onnx_settings=OnnxSettings(intra_op_threads=1),
     )
-
-
-# Cached, because one process runs many episodes of few tasks.
-@lru_cache(maxsize=4096)
-def _run_without_people(task: str, planner: str) -> tuple[float | None, float | None]:
-    """Return time to goal and driven length of a task without people and without a fault."""
-    scenario = Scenario.model_validate_json(task)
-    with _seeded_globals(0):
-        result = run_crossing(scenario, policy="balanced", planner=make_planner(planner, scenario))
-    if result.time_to_goal_s is None:
-        return None, None
-    path_m = np.array([frame.robot_state.position_odom_m for frame in result.frames])
-    return result.time_to_goal_s, path_length_m(path_m)
-
-
-@contextlib.contextmanager
-def _seeded_globals(seed: int) -> Iterator[None]:
-    """Seed the global generators, which a planner may use; restore their state afterwards."""
-    python_state, numpy_state = random.getstate(), np.random.get_state()  # noqa: NPY002 - planners use it
-    random.seed(seed)
-    np.random.seed(seed % 2**32)  # noqa: NPY002
-    try:
-        yield
-    finally:
-        random.setstate(python_state)
-        np.random.set_state(numpy_state)  # noqa: NPY002

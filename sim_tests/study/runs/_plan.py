@@ -19,7 +19,7 @@ from ...crossing.faults import Fault
 from ...scenario import ScenarioTemplate, shipped_templates
 from ...world.errors import SimError
 from ._job import Job
-from ._planner_choice import make_planner, planner_label
+from ._planner_choice import planner_label, refuse_unusable_planner
 
 # The name that stands for "without a fault".
 _NO_FAULT: Final = "none"
@@ -72,8 +72,8 @@ def plan_jobs(
     fault_texts = [_named_fault(each) for each in faults]
     checked_seeds = [_checked_seed(seed) for seed in seeds]
     for planner in planners:
-        if planner and templates:
-            make_planner(planner, templates[0].median())  # refuses an unusable planner
+        if templates:
+            refuse_unusable_planner(planner, templates[0].median())
     jobs = tuple(
         Job(text, seed, policy_name, policy, planner, policy_perception, fault_name, fault)
         for text in (template.to_text() for template in templates)

@@ -20,7 +20,13 @@ from perception import AttentionCone
 from ...crossing import CrossingFrame, Stage, TopView, draw_camera_view
 from ...world.camera import CameraRenderer
 from ...world.errors import SimError
-from ..measures import RECORD_COLUMNS, EpisodeRecord, read_record_file, record_row
+from ..measures import (
+    RECORD_COLUMNS,
+    EpisodeRecord,
+    nondeterminism_notes,
+    read_record_file,
+    record_row,
+)
 from ._episode import observed_episode
 from ._job import Job
 from ._plan import describe, job_key, template_of
@@ -217,6 +223,8 @@ def _compare_row(folder: Path, job: Job, record: EpisodeRecord) -> int:
             f"{name} was {was or 'empty'}, is {now or 'empty'}" for name, was, now in changed
         )
     )
+    for note in nondeterminism_notes([record]):
+        print(note)
     return 1
 
 

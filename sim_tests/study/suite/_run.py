@@ -12,6 +12,7 @@ import pytest
 from nav_adapter import NavError
 
 from ...world.errors import SimError
+from ..measures import nondeterminism_notes
 from ..runs import Job, JobKey, describe, job_key, plan_jobs, run_jobs
 from ._thresholds import Thresholds
 
@@ -88,6 +89,11 @@ class SuiteRun:
         self._records = run_jobs(
             jobs, plan.out, workers=plan.workers, progress=True, overwrite=True
         )
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences about the planner that pytest prints at its end."""
+        return nondeterminism_notes(self._records)
 
     def verdict(self, number: int) -> str:
         """Return why an episode fails and how to replay it; empty when it passes."""

@@ -8,6 +8,9 @@ from __future__ import annotations
 
 import pytest
 
+#: Sentences to print after the tests.
+NOTES = pytest.StashKey[tuple[str, ...]]()
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options, which all begin with ``--awarenav``."""
@@ -32,3 +35,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         default=[],
         help="shipped scenario or YAML file; may be given more than once (default: all)",
     )
+
+
+def pytest_terminal_summary(
+    terminalreporter: pytest.TerminalReporter, config: pytest.Config
+) -> None:
+    """Print what the episodes say about the planner beside passing or failing."""
+    for note in config.stash.get(NOTES, ()):
+        terminalreporter.write_line(f"awarenav: {note}", yellow=True)

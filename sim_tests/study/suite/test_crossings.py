@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from ._run import SuiteRun, planned
+from .plugin import NOTES
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
@@ -24,7 +25,9 @@ def crossings(request: pytest.FixtureRequest) -> SuiteRun:
         for item in request.session.items
         if isinstance(item, pytest.Function) and item.function is test_episode
     ]
-    return SuiteRun(plan, selected or range(len(plan.jobs)))
+    run = SuiteRun(plan, selected or range(len(plan.jobs)))
+    request.config.stash[NOTES] = run.notes
+    return run
 
 
 def test_episode(crossings: SuiteRun, episode: int) -> None:

@@ -1,0 +1,164 @@
+"""Planners of the user's own: README's in every tool, and called with what they ask for."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from paths import ROOT
+from run_scenes import short
+from test_suite_plugin import PLUGIN
+
+from sim_tests import NOVA_CARTER, SimError
+from sim_tests.study.runs import make_planner, plan_jobs
+
+HERE = str(Path(__file__).parent)
+
+
+def readme_planner():
+    """Return the Python block of README.md that defines a planner."""
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text("utf-8"), re.DOTALL)
+    (block,) = (block for block in blocks if "def plan(" in block)
+    return block
+
+
+def run_python(folder, *arguments):
+    """Run a module of Python in a folder that holds README's planner, warnings as errors."""
+    (folder / "my_robot.py").write_text(readme_planner(), encoding="utf-8")
+    return subprocess.run(
+        [sys.executable, "-W", "error", "-m", *arguments],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), HERE])},
+        capture_output=True,
+        text=True,
+        timeout=600,
+        check=False,
+    )
+
+
+def test_the_planner_of_the_readme_passes_crossings(tmp_path):
+    done = run_python(
+        tmp_path, "awarenav", "crossings", "--planner", "my_robot:MyPlanner", "--scenario",
+        "crossing_distracted", "--policy", "balanced", "--perception", "truth", "--episodes", "1",
+        "--workers", "1", "--no-report", "--out", "out",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert re.search(r"^balanced +1 +100 % +0 ", done.stdout, re.MULTILINE), done.stdout
+
+
+def test_the_planner_of_the_readme_passes_the_suite(tmp_path):
+    done = run_python(
+        tmp_path, "pytest", "-p", "no:cacheprovider", *PLUGIN, "--pyargs", "sim_tests",
+        "--awarenav-planner", "my_robot:MyPlanner", "--awarenav-scenario", "crossing_attentive",
+        "--awarenav-perception", "truth", "--awarenav-episodes", "1", "--awarenav-workers", "1",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "2 passed" in done.stdout
+
+
+SIGNATURES = """
+class Base:
+    def plan(self, robot_state, goal_odom_m, constraints, dt_s):
+        return 0.0, 0.0
+
+class Bare(Base):
+    pass
+
+class Init(Base):
+    def __init__(self):
+        self.given = ()
+
+class Robot(Base):
+    def __init__(self, robot):
+        self.given = (robot,)
+
+class AnyName(Base):
+    def __init__(self, vehicle, /, gain=2.0):
+        self.given = (vehicle, gain)
+
+class Tuned(Base):
+    def __init__(self, gain=2.0, limits=None):
+        self.given = (gain, limits)
+
+class Seed(Base):
+    def __init__(self, *, seed):
+        self.given = (seed,)
+
+class Everything(Base):
+    def __init__(self, seed, static_boxes_odom_m, profile, **options):
+        self.given = (seed, static_boxes_odom_m, profile, options)
+
+class HandsOn(Robot):
+    def __init__(self, *args, **options):
+        super().__init__(*args, **options)
+
+class PositionalOnly(Base):
+    def __init__(self, gain=2.0, seed=5, /):
+        self.given = (gain, seed)
+
+def function(seed=None):
+    planner = Init()
+    planner.given = (seed,)
+    return planner
+
+class Asks(Base):
+    def __init__(self, robot, costmap):
+        pass
+
+class Breaks(Base):
+    def __init__(self):
+        raise RuntimeError("no licence")
+"""
+
+
+@pytest.fixture(scope="module")
+def signatures(tmp_path_factory):
+    """Return the module name of planners with all kinds of signatures."""
+    folder = tmp_path_factory.mktemp("planners")
+    (folder / "planner_signatures.py").write_text(SIGNATURES)
+    sys.path.insert(0, str(folder))
+    yield "planner_signatures"
+    sys.path.remove(str(folder))
+
+
+@pytest.mark.parametrize(
+    ("name", "given"),
+    [
+        ("Init", ()),
+        ("Robot", (NOVA_CARTER,)),
+        ("AnyName", (NOVA_CARTER, 2.0)),
+        ("Tuned", (2.0, None)),
+        ("Seed", (7,)),
+        ("HandsOn", (NOVA_CARTER,)),
+        ("PositionalOnly", (2.0, 5)),
+        ("function", (7,)),
+    ],
+)
+def test_a_planner_is_called_with_what_its_signature_asks_for(signatures, name, given):
+    assert make_planner(f"{signatures}:{name}", short().median(), seed=7).given == given
+
+
+def test_a_planner_without_a_constructor_is_made(signatures):
+    assert make_planner(f"{signatures}:Bare", short().median()).plan(None, None, None, 0.1)
+
+
+def test_a_planner_may_ask_for_seed_boxes_and_robot_in_any_order(signatures):
+    scenario = short().median()
+    seed, boxes, robot, options = make_planner(f"{signatures}:Everything", scenario, seed=7).given
+    assert (seed, robot, options) == (7, NOVA_CARTER, {})
+    np.testing.assert_array_equal(boxes, scenario.planner_boxes_odom_m)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("Asks", r"asks for the argument 'costmap' in \(robot, costmap\); it can have the robot"),
+        ("Breaks", "cannot be made: RuntimeError: no licence"),
+    ],
+)
+def test_a_planner_that_cannot_be_made_is_refused_before_anything_runs(signatures, name, message):
+    with pytest.raises(SimError, match=message):
+        plan_jobs([short()], ["blind"], [0], planners=[f"{signatures}:{name}"])
