@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from nav_adapter.ros2 import DdsNode, McapRecorder
 
 _REPORT_PERIOD_S: Final = 2.0
+# So that no queue of poses overflows at a low rate of publishing.
+_LONGEST_WAIT_S: Final = 0.05
 
 _Message = TypeVar("_Message", bound=Message)
 
@@ -74,9 +76,14 @@ class BridgeLoop:
         self._period_s = 1.0 / rate_hz
         self._recorder, self._viewer = recorder, viewer
         self.frames = 0
-        for topic in (inputs.image, inputs.odom, inputs.camera_info, inputs.tf, inputs.tf_static):
+        for topic in (inputs.image, inputs.camera_info):
             if topic is not None:
                 node.subscribe(topic)
+        # Poses are read before each image and each publication. On busy cores, waking for each of
+        # them would cost the networks more time than reading them.
+        for topic in (inputs.odom, inputs.tf, inputs.tf_static):
+            if topic is not None:
+                node.subscribe(topic, wakes=False)
         self._perception = PerceptionThread(bridge, time.time, on_frame=self._on_frame)
 
     def run(
@@ -86,7 +93,7 @@ class BridgeLoop:
         began = reported = due = time.monotonic()
         frames_before = 0
         while seconds is None or time.monotonic() - began < seconds:
-            self._node.wait(due - time.monotonic())
+            self._node.wait(min(due - time.monotonic(), _LONGEST_WAIT_S))
             self._take()
             if time.monotonic() < due:
                 continue

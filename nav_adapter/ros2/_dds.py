@@ -60,11 +60,12 @@ class DdsNode:
             writer = DataWriter(self._participant, self._topic(topic), qos=_qos(topic))
             self._writers[topic.name] = topic, writer
 
-    def subscribe(self, topic: Topic) -> None:
-        """Create a subscriber, for :meth:`take` and :meth:`wait`."""
+    def subscribe(self, topic: Topic, *, wakes: bool = True) -> None:
+        """Create a subscriber, for :meth:`take`, and for :meth:`wait` if it ``wakes``."""
         if topic.name not in self._readers:
             reader = DataReader(self._participant, self._topic(topic), qos=_qos(topic))
-            self._waitset.attach(ReadCondition(reader, _ANY))
+            if wakes:
+                self._waitset.attach(ReadCondition(reader, _ANY))
             self._readers[topic.name] = topic, reader
 
     def publish(self, topic: Topic, message: Message) -> bytes:
@@ -100,7 +101,7 @@ class DdsNode:
         return [each.cdr for each in reader.take(N=topic.depth) if isinstance(each, kind)]
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait for a message; return False if none came in time."""
+        """Wait for a message on a topic that wakes; return False if none came in time."""
         return bool(self._waitset.wait(timeout=max(0, round(timeout_s * 1e9))))
 
     def readers_of(self, topic: Topic) -> int:

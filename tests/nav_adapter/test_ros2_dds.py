@@ -10,6 +10,7 @@ import threading
 import time
 from collections import defaultdict
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -157,6 +158,20 @@ def test_waiting_ends_with_a_message_or_after_the_timeout(node: DdsNode, domain:
     assert node.wait(PATIENCE_S) is True
     assert node.take(topic) == [SpeedLimit(speed_limit=0.5)]
     assert node.take(topic) == []
+
+
+def test_a_topic_that_does_not_wake_is_read_all_the_same(node: DdsNode, domain: int) -> None:
+    quiet, loud = PUBLISHED["speed_limit"], replace(PUBLISHED["speed_limit"], name="loud")
+    node.subscribe(quiet, wakes=False)
+    node.subscribe(loud)
+    for topic in (quiet, loud):
+        node.advertise(topic)
+        assert until(lambda topic=topic: node.readers_of(topic))
+    node.publish(quiet, SpeedLimit(speed_limit=0.5))
+    assert node.wait(0.1) is False
+    assert node.take(quiet) == [SpeedLimit(speed_limit=0.5)]
+    node.publish(loud, SpeedLimit(speed_limit=0.4))
+    assert node.wait(PATIENCE_S) is True
 
 
 @pytest.mark.parametrize("number", [-1, 233])
