@@ -6,6 +6,7 @@ import json
 import multiprocessing
 import os
 import queue
+import re
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -25,12 +26,22 @@ from ._contact_sheet import write_contact_sheet
 _TRUTH: Final = "truth.jsonl"
 _SETTINGS: Final = "render.yaml"
 _SHEET: Final = "contact_sheet.png"
+# All files of a set but its settings.
+_MADE: Final = re.compile(
+    r"(\d{6,}\.png|truth\.jsonl|camera\.yaml|contact_sheet\.png)(\.part|\.damaged)?"
+)
 # Time without a record after which the processes are checked for being alive.
 _POLL_S: Final = 1.0
 
 
 def render(
-    config: RenderConfig, out: Path, *, processes: int | None = None, progress: bool = True
+    config: RenderConfig,
+    out: Path,
+    *,
+    processes: int | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: bool = True,
 ) -> Path:
     """Write the images of ``config`` into a folder; continue an interrupted set.
 
@@ -42,17 +53,27 @@ def render(
         config: settings of the set.
         out: folder, made when missing.
         processes: number of processes; None for one per processor.
+        resume: accept a finished set as well, and require a set to continue.
+        overwrite: remove the set in the folder first.
         progress: show a progress bar on standard error.
 
     Returns:
         Path of the truth file.
 
     Raises:
-        SimError: when ``out`` holds images of other settings, or all processes died.
+        SimError: when ``out`` holds images of other settings, a finished set (with neither
+            ``resume`` nor ``overwrite``) or none (with ``resume``), or all processes died.
     """
-    _check_folder(config, out)
+    if overwrite:
+        _remove_set(out)
+    _check_folder(config, out, resume=resume)
     truth = out / _TRUTH
     done = {record["frame"]: record for record in _finished_records(out)}
+    if len(done) == config.frames and (out / _SHEET).exists() and not resume:
+        raise SimError(
+            f"{out} holds a finished set of {config.frames} images: replace it with --overwrite "
+            "(overwrite=True), choose another --out, or keep it with --resume (resume=True)"
+        )
     write_records(truth, done.values())
     missing = [frame for frame in range(config.frames) if frame_name(frame) not in done]
     config.camera.to_yaml(out / "camera.yaml")
@@ -84,12 +105,28 @@ def frame_name(frame: int) -> str:
     return f"{frame:06d}.png"
 
 
-def _check_folder(config: RenderConfig, out: Path) -> None:
+def _remove_set(out: Path) -> None:
+    """Remove a set of images; its settings go last, so that a kill leaves one that can go on."""
+    settings = out / _SETTINGS
+    if not settings.exists():
+        return
+    try:
+        for path in out.iterdir():
+            if _MADE.fullmatch(path.name):
+                path.unlink()
+        settings.unlink()
+    except OSError as cause:
+        raise SimError(f"cannot replace the images in {out}: {cause.strerror or cause}") from cause
+
+
+def _check_folder(config: RenderConfig, out: Path, *, resume: bool) -> None:
     """Write the settings into a new folder; refuse a folder that holds another set of images."""
     if out.exists() and not out.is_dir():
         raise SimError(f"--out must be a folder, {out} is a file")
-    out.mkdir(parents=True, exist_ok=True)
     settings = out / _SETTINGS
+    if resume and not settings.exists():
+        raise SimError(f"--resume: there are no images in {out}, no {_SETTINGS}")
+    out.mkdir(parents=True, exist_ok=True)
     if settings.exists():
         present = RenderConfig.from_yaml(settings)
         if present != config:
@@ -100,7 +137,7 @@ def _check_folder(config: RenderConfig, out: Path) -> None:
             ]
             raise SimError(
                 f"{out} holds images made with other settings ({'; '.join(differ)}); "
-                "use the same settings to continue it, or another folder"
+                "use the same settings to continue it, --overwrite to replace it, or another folder"
             )
         return
     if (out / _TRUTH).exists():

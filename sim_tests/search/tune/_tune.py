@@ -25,6 +25,15 @@ from ._policy_space import PolicyRange, PolicySpace
 from ._settings import TuneSettings
 
 _SETTINGS_FILE: Final = "tune.json"
+_RESULTS: Final = (
+    "evaluations/*.csv",
+    "evaluations/*.damaged",
+    "trials.csv",
+    "importances.json",
+    "chosen.json",
+    "chosen/*.yaml",
+    "pareto.png",
+)
 # Evaluated beside the trials.
 _PRESETS: Final = ("blind", "conservative", "balanced", "assertive")
 # A trial in which the robot moved into a person is not chosen.
@@ -81,6 +90,7 @@ def tune(
     *,
     workers: int,
     resume: bool,
+    overwrite: bool = False,
     report: Callable[[Tuning], None] = lambda tuning: None,
 ) -> Tuning:
     """Search until all trials are finished, by this or other processes.
@@ -90,6 +100,7 @@ def tune(
         folder: made when missing; holds the study.
         workers: number of processes that run episodes.
         resume: continue the search in the folder.
+        overwrite: replace the search in the folder.
         report: called with the result while the study is open.
 
     Raises:
@@ -115,7 +126,14 @@ def tune(
     )
     anchors = _anchors(settings.policy_name, base)
     write_or_check_settings(
-        settings, folder, _SETTINGS_FILE, "tuning", resume=resume, may_grow=["trials"]
+        settings,
+        folder,
+        _SETTINGS_FILE,
+        "tuning",
+        resume=resume,
+        overwrite=overwrite,
+        results=_RESULTS,
+        may_grow=["trials"],
     )
     with (
         SharedStudy(folder, "tune", optimizer, settings.trials) as study,

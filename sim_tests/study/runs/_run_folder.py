@@ -35,15 +35,15 @@ class RunFolder(AbstractContextManager["RunFolder"]):
         jobs: all episodes of the run.
         about: content of ``run.json`` beside the state: versions, command, settings.
         resume: continue the run that the folder holds.
-        overwrite: replace an unfinished run.
+        overwrite: replace the run that the folder holds.
 
     Attributes:
         done: records of the episodes that are finished, by the number of their job.
 
     Raises:
         SimError: the folder cannot be written; another process runs into it; it holds other
-            episodes than these (with ``resume``); or it holds an unfinished run (with neither
-            ``resume`` nor ``overwrite``).
+            episodes than these (with ``resume``); or it holds a run, finished or not, or another
+            program's ``episodes.csv`` (with neither ``resume`` nor ``overwrite``).
     """
 
     def __init__(
@@ -72,7 +72,7 @@ class RunFolder(AbstractContextManager["RunFolder"]):
                 self._continue()
             else:
                 if not overwrite:
-                    self._refuse_unfinished()
+                    self._refuse_occupied()
                 self._start(jobs)
         except OSError as cause:
             self.close()
@@ -126,16 +126,28 @@ class RunFolder(AbstractContextManager["RunFolder"]):
             os.close(self._file)
             self._file = -1
 
-    def _refuse_unfinished(self) -> None:
-        about = read_run(self._files.folder)
-        if about.get("state") == "running":
-            done = read_record_file(self._files.episodes).records
-            if done:
-                raise SimError(
-                    f"{self._files.folder} holds an unfinished run, with {len(done)} of "
-                    f"{about.get('episodes', '?')} episodes done: go on with --resume "
-                    "(resume=True), or choose another folder or delete this one"
-                )
+    def _refuse_occupied(self) -> None:
+        """Refuse a finished run, an unfinished one with episodes, and another program's table."""
+        folder, about = self._files.folder, read_run(self._files.folder)
+        done = self._files.episodes.read_bytes().count(b"\n") - 1  # the header is no episode
+        if about.get("state") == "running" and done > 0:
+            raise SimError(
+                f"{folder} holds an unfinished run, with {done} of {about.get('episodes', '?')} "
+                "episodes done: go on with --resume (resume=True), replace it with --overwrite "
+                "(overwrite=True), or choose another --out"
+            )
+        if about.get("state") == "complete":
+            raise SimError(
+                f"{folder} holds a finished run of {about.get('episodes', '?')} episodes: replace "
+                "it with --overwrite (overwrite=True), choose another --out, or read its table "
+                "again with --resume (resume=True)"
+            )
+        if about.get("state") != "running" and done >= 0:
+            raise SimError(
+                f"{folder} holds a table {self._files.episodes.name} that is not of a run: there "
+                f"is no {self._files.run.name} beside it; choose another --out, or replace it "
+                "with --overwrite (overwrite=True)"
+            )
 
     def _start(self, jobs: Sequence[Job]) -> None:
         # The old table goes first, so that its rows can never be taken for those of the new jobs.
