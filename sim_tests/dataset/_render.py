@@ -17,7 +17,16 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from awarenav.records import Record, read_records, record_line, write_records
+from awarenav.files import atomic_path
+from awarenav.line_files import LineFile
+from awarenav.records import (
+    Record,
+    continue_records,
+    read_records,
+    record_line,
+    write_records,
+)
+from perception import Camera
 
 from ..world.errors import SimError
 from ._config import RenderConfig
@@ -68,7 +77,7 @@ def render(
         _remove_set(out)
     _check_folder(config, out, resume=resume)
     truth = out / _TRUTH
-    done = {record["frame"]: record for record in _finished_records(out)}
+    done = {record["frame"]: record for record in _finished_records(config, out)}
     if len(done) == config.frames and (out / _SHEET).exists() and not resume:
         raise SimError(
             f"{out} holds a finished set of {config.frames} images: replace it with --overwrite "
@@ -76,11 +85,11 @@ def render(
         )
     write_records(truth, done.values())
     missing = [frame for frame in range(config.frames) if frame_name(frame) not in done]
-    config.camera.to_yaml(out / "camera.yaml")
+    _write(config.camera, out / "camera.yaml")
     tasks = _group_by_scene(config, missing)
     workers = min(processes or os.cpu_count() or 1, max(len(tasks), 1))
     with (
-        truth.open("a", encoding="utf-8") as file,
+        LineFile(truth, SimError) as file,
         tqdm(
             total=config.frames,
             initial=len(done),
@@ -91,8 +100,7 @@ def render(
         ) as bar,
     ):
         for record in _render_tasks(config, out, tasks, workers):
-            file.write(record_line(record))
-            file.flush()
+            file.add(record_line(record))
             bar.update()
     records = sorted(read_records(truth), key=lambda record: str(record["frame"]))
     write_records(truth, records)
@@ -126,7 +134,10 @@ def _check_folder(config: RenderConfig, out: Path, *, resume: bool) -> None:
     settings = out / _SETTINGS
     if resume and not settings.exists():
         raise SimError(f"--resume: there are no images in {out}, no {_SETTINGS}")
-    out.mkdir(parents=True, exist_ok=True)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as cause:
+        raise SimError(f"cannot write {out}: {cause.strerror or cause}") from cause
     if settings.exists():
         present = RenderConfig.from_yaml(settings)
         if present != config:
@@ -145,13 +156,21 @@ def _check_folder(config: RenderConfig, out: Path, *, resume: bool) -> None:
             f"{out} holds a {_TRUTH} without {_SETTINGS}, so it was not made by this command; "
             "use another folder"
         )
-    config.to_yaml(settings)
+    _write(config, settings)
 
 
-def _finished_records(out: Path) -> list[Record]:
-    """Return the records whose images exist."""
+def _write(content: Camera | RenderConfig, path: Path) -> None:
+    try:
+        content.to_yaml(path)
+    except OSError as cause:
+        raise SimError(f"cannot write {path}: {cause.strerror or cause}") from cause
+
+
+def _finished_records(config: RenderConfig, out: Path) -> list[Record]:
+    """Return the records whose images exist; set damaged lines aside."""
     truth = out / _TRUTH
-    records = read_records(truth) if truth.exists() else []
+    names = {frame_name(frame) for frame in range(config.frames)}
+    records = continue_records(truth, names) if truth.exists() else []
     return [record for record in records if (out / str(record["frame"])).is_file()]
 
 
@@ -240,6 +259,5 @@ def _write_png(path: Path, image_rgb: NDArray[np.uint8]) -> None:
     encoded, data = cv2.imencode(".png", image_rgb[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 3])
     if not encoded:
         raise SimError(f"cannot encode {path.name}")
-    part = path.with_name(path.name + ".part")
-    part.write_bytes(data.tobytes())
-    part.replace(path)
+    with atomic_path(path, SimError) as part:
+        part.write_bytes(data.tobytes())
