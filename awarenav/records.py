@@ -26,6 +26,7 @@ from perception.arrays import (
     finite_number,
     unit_vector,
 )
+from perception.documents import parse_json, read_lines
 
 from .errors import AwarenavError
 from .files import atomic_path
@@ -57,23 +58,19 @@ def read_records(path: Path) -> list[Record]:
         AwarenavError: for a file that cannot be read; for a line that is not a frame, with its
             number.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as cause:
-        raise AwarenavError(f"cannot read {path}: {cause}") from cause
-    lines = text.split("\n")
     records = []
-    for number, line in enumerate(lines, start=1):
+    for number, line in enumerate(read_lines(path, AwarenavError), start=1):
         if not line.strip():
             continue
+        where = f"{path}, line {number}"
         try:
-            record = json.loads(line)
-        except json.JSONDecodeError as cause:
-            if number == len(lines):  # no newline after it: the writer was interrupted
+            record = parse_json(line, where, AwarenavError)
+        except AwarenavError:
+            if not line.endswith(b"\n"):  # the writer was interrupted
                 break
-            raise AwarenavError(f"{path}, line {number}: not JSON ({cause})") from cause
+            raise
         if not isinstance(record, dict) or any(key not in record for key in _KEYS):
-            raise AwarenavError(f"{path}, line {number}: a frame needs the keys {', '.join(_KEYS)}")
+            raise AwarenavError(f"{where}: a frame needs the keys {', '.join(_KEYS)}")
         records.append(record)
     return records
 
@@ -114,23 +111,20 @@ def continue_records(path: Path, known: Container[str] | None = None) -> list[Re
         AwarenavError: for a file that cannot be read or written, or of which no line is a frame
             (unless ``known`` says what its frames are).
     """
-    try:
-        *lines, last = path.read_bytes().split(b"\n")
-    except OSError as cause:
-        raise AwarenavError(f"cannot read {path}: {cause.strerror or cause}") from cause
     found: list[tuple[int, bytes, Record]] = []
     damaged = []
-    for number, line in enumerate([*lines, last], start=1):
+    for number, line in enumerate(read_lines(path, AwarenavError), start=1):
         where = f"{path}, line {number}"
         try:
             if line.strip():
-                record = check_record(_strict_json(line), where)
+                value = parse_json(line, where, AwarenavError, finite=True)
+                record = check_record(value, where)
                 if known is not None and record["frame"] not in known:
                     raise AwarenavError(f"{where}: there is no frame {record['frame']!r}")
                 found.append((number, line, record))
         except ValueError as cause:
-            if number <= len(lines):  # else the writer was interrupted
-                damaged.append(DamagedLine(number, line, str(cause)))
+            if line.endswith(b"\n"):  # else the writer was interrupted
+                damaged.append(DamagedLine(number, line.rstrip(b"\n"), str(cause)))
     records: dict[str, Record] = {}
     for _, _, record in found:
         records.setdefault(record["frame"], record)
@@ -139,21 +133,12 @@ def continue_records(path: Path, known: Container[str] | None = None) -> list[Re
         if record["frame"] in differing:  # nothing says which of them is right
             records.pop(record["frame"], None)
             reason = f"another frame has the name {record['frame']!r}"
-            damaged.append(DamagedLine(number, line, reason))
+            damaged.append(DamagedLine(number, line.rstrip(b"\n"), reason))
     if damaged and not records and known is None:
         raise AwarenavError(f"{path} is not a file of frames: {damaged[0].reason}")
     set_aside(path, damaged, "their frames are made again")
     write_records(path, records.values())
     return list(records.values())
-
-
-def _strict_json(line: bytes) -> Any:
-    """Return the value of a line of JSON; NaN and infinities are none."""
-
-    def refuse(name: str) -> None:
-        raise ValueError(f"{name} is not a finite number")
-
-    return json.loads(line.decode("utf-8"), parse_constant=refuse)
 
 
 def write_records(path: Path, records: Iterable[Record]) -> None:

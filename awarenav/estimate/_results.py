@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Mapping
 from contextlib import AbstractContextManager, suppress
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 
 from perception import PersonKeypoints, PersonObservation
 from perception.arrays import FloatArray
+from perception.documents import parse_json, read_lines
 from perception.layouts import COCO_NAMES, FOOT_NAMES, LEFT_SHOULDER, RIGHT_SHOULDER
 from tracking import PersonTrack
 
@@ -175,10 +175,9 @@ class ResultsFile(AbstractContextManager["ResultsFile"]):
 def _require_same_settings(path: Path, settings: str) -> None:
     """Refuse a file whose lines have the mark of other settings; damaged lines have none."""
     others = set()
-    with path.open("rb") as file:
-        for line in file:
-            with suppress(ValueError, AttributeError):
-                others.add(str(json.loads(line).get("settings")))
+    for line in read_lines(path, AwarenavError):
+        with suppress(AwarenavError, AttributeError):
+            others.add(str(parse_json(line, "line", AwarenavError).get("settings")))
     others -= {settings}
     if others:
         raise AwarenavError(

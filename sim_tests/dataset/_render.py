@@ -27,6 +27,7 @@ from awarenav.records import (
     write_records,
 )
 from perception import Camera
+from perception.documents import parse_json
 
 from ..world.errors import SimError
 from ._config import RenderConfig
@@ -217,7 +218,7 @@ def _render_tasks(
                         "run the command again to continue"
                     ) from None
                 continue
-            record = json.loads(line)
+            record = parse_json(line, "a rendering process", SimError)
             if "error" in record:
                 raise SimError(f"rendering failed: {record['error']}")
             left -= 1

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from awarenav.policies import read_policy
+from perception.documents import parse_json, read_json
 
 from ..scenario import ScenarioTemplate
 from ..study.runs import ProcessLock, named_templates, policy_text
@@ -89,7 +90,7 @@ def write_or_check_settings(
                 f"{folder} already holds a {search}; give --resume to go on with it, --overwrite "
                 "to replace it, or another --out"
             )
-        _compare(path, json.loads(json.dumps(asdict(settings))), may_grow)
+        _compare(path, parse_json(json.dumps(asdict(settings)), file, SimError), may_grow)
     elif resume:
         raise SimError(f"--resume: there is no {search} in {folder}, no {file}")
     else:
@@ -143,10 +144,9 @@ def _matching(folder: Path, patterns: Sequence[str]) -> list[Path]:
 
 def _compare(path: Path, now: dict[str, Any], may_grow: Sequence[str]) -> None:
     """Raise SimError for the first setting that differs from the file."""
-    try:
-        before = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as cause:
-        raise SimError(f"cannot read {path}: {cause}") from cause
+    before = read_json(path, SimError)
+    if not isinstance(before, dict):
+        raise SimError(f"{path} must hold settings by name, got {before!r:.60}")
     for name, value in now.items():
         was = before.get(name)
         if value == was or (name in may_grow and was is not None and value > was):

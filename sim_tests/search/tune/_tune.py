@@ -8,11 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, cast
 
-import yaml
-
 from nav_adapter import AwarenessPolicy
 
-from ...study.runs import ProcessLock, plan_jobs
+from ...study.runs import ProcessLock, plan_jobs, policy_of
 from ...world.errors import SimError
 from .._episode_runner import EpisodeRunner
 from .._files import templates_of, write_or_check_settings
@@ -106,7 +104,7 @@ def tune(
     Raises:
         SimError: settings that do not fit together, or a preset with an episode without a result.
     """
-    base = AwarenessPolicy.model_validate(yaml.safe_load(settings.policy))
+    base = policy_of(settings.policy)
     ranges = {key: PolicyRange.model_validate(each) for key, each in settings.ranges.items()}
     space = PolicySpace(base, ranges)
     optimizer = Optimizer(

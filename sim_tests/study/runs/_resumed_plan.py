@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from awarenav.line_files import DamagedLine
+from perception.documents import read_lines
 
 from ...world.errors import SimError
 from ._job import Job
@@ -36,20 +37,19 @@ def read_plan(path: Path, jobs: Sequence[Job]) -> ResumedPlan:
     """
     others: list[tuple[int, bytes]] = []
     confirmed, lines = set(), 0
-    with path.open("rb") as file:
-        for number, line in enumerate(file):
-            lines += 1
-            if number < len(jobs) and line == job_line(jobs[number]).encode():
-                confirmed.add(number)
-            elif number < len(jobs) or others:  # more lines than jobs: their number says it
-                others.append((number, line))
+    for number, line in enumerate(read_lines(path, SimError)):
+        lines += 1
+        if number < len(jobs) and line == job_line(jobs[number]).encode():
+            confirmed.add(number)
+        elif number < len(jobs) or others:  # more lines than jobs: their number says it
+            others.append((number, line))
     damaged, moved = [], []
     for number, line in others:
         try:
             if not line.endswith(b"\n"):
                 raise SimError(f"{path}, line {number + 1} has no end")
-            moved.append((number, parse_job(line.decode("utf-8"), f"{path}, line {number + 1}")))
-        except (SimError, UnicodeDecodeError) as cause:
+            moved.append((number, parse_job(line, f"{path}, line {number + 1}")))
+        except SimError as cause:
             damaged.append(DamagedLine(number + 1, line.rstrip(b"\n"), str(cause)))
     numbers = {job: number for number, job in enumerate(jobs)} if others else {}
     for number, job in moved:
