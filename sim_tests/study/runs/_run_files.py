@@ -48,6 +48,11 @@ class RunFiles:
         return self.folder / "errors.log"
 
     @property
+    def damaged(self) -> tuple[Path, ...]:
+        """Lines of the table and of the plan that were damaged; absent if none was."""
+        return tuple(path.with_name(path.name + ".damaged") for path in (self.episodes, self.jobs))
+
+    @property
     def lock(self) -> Path:
         """The lock file of the process that runs episodes into the folder."""
         return self.folder / ".lock"

@@ -127,6 +127,13 @@ def test_an_episode_with_a_damaged_plan_runs_again(whole, run):
         assert read_jobs(run) == JOBS
 
 
+def test_a_new_run_in_the_folder_removes_the_damaged_lines_of_the_old_one(run):
+    for path in RunFiles(run).damaged:
+        path.write_text("half a line\n")
+    run_jobs(JOBS[:1], run, workers=1, overwrite=True)
+    assert not list(run.glob("*.damaged"))
+
+
 def test_a_damaged_plan_does_not_hide_another_plan(run):
     path = RunFiles(run).jobs
     lines = path.read_bytes().splitlines(keepends=True)
