@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Literal
+
+from perception.documents import read_json
 
 from .errors import AwarenavError
 from .files import json_text, write_text
@@ -51,12 +52,8 @@ def read_baseline(path: Path) -> dict[str, MeasuredValue]:
         AwarenavError: for a file that cannot be read or is not a baseline.
     """
     try:
-        entries = json.loads(path.read_text(encoding="utf-8"))["metrics"]
+        entries = read_json(path, AwarenavError)["metrics"]
         return {entry["name"]: MeasuredValue(**entry) for entry in entries}
-    except OSError as cause:
-        raise AwarenavError(
-            f"cannot read the baseline {path}: {cause.strerror or cause}"
-        ) from cause
     except (ValueError, KeyError, TypeError) as cause:
         raise AwarenavError(
             f"{path} is not a baseline: it must hold a list 'metrics' of name, value, unit, "

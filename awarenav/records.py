@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -26,9 +26,11 @@ from perception.arrays import (
     finite_number,
     unit_vector,
 )
+from perception.documents import parse_json, read_lines
 
 from .errors import AwarenavError
 from .files import atomic_path
+from .line_files import DamagedLine, set_aside
 
 Record = dict[str, Any]
 
@@ -56,25 +58,87 @@ def read_records(path: Path) -> list[Record]:
         AwarenavError: for a file that cannot be read; for a line that is not a frame, with its
             number.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as cause:
-        raise AwarenavError(f"cannot read {path}: {cause}") from cause
-    lines = text.split("\n")
     records = []
-    for number, line in enumerate(lines, start=1):
+    for number, line in enumerate(read_lines(path, AwarenavError), start=1):
         if not line.strip():
             continue
+        where = f"{path}, line {number}"
         try:
-            record = json.loads(line)
-        except json.JSONDecodeError as cause:
-            if number == len(lines):  # no newline after it: the writer was interrupted
+            record = parse_json(line, where, AwarenavError)
+        except AwarenavError:
+            if not line.endswith(b"\n"):  # the writer was interrupted
                 break
-            raise AwarenavError(f"{path}, line {number}: not JSON ({cause})") from cause
+            raise
         if not isinstance(record, dict) or any(key not in record for key in _KEYS):
-            raise AwarenavError(f"{path}, line {number}: a frame needs the keys {', '.join(_KEYS)}")
+            raise AwarenavError(f"{where}: a frame needs the keys {', '.join(_KEYS)}")
         records.append(record)
     return records
+
+
+def check_record(record: Any, where: str) -> Record:
+    """Return a frame after checking every value that this library reads.
+
+    Raises:
+        AwarenavError: for a value that is missing or out of range; the message begins with
+            ``where``.
+    """
+    if not isinstance(record, dict) or any(key not in record for key in _KEYS):
+        raise AwarenavError(f"{where}: a frame needs the keys {', '.join(_KEYS)}")
+    if not isinstance(record["frame"], str):
+        raise AwarenavError(f"{where}: frame must be a name, got {record['frame']!r:.60}")
+    finite_number(f"{where}: stamp_s", record["stamp_s"], AwarenavError)
+    if record["T_odom_camera"] is not None:
+        finite_array(f"{where}: T_odom_camera", record["T_odom_camera"], (4, 4), AwarenavError)
+    if not isinstance(record["people"], list):
+        raise AwarenavError(f"{where}: people must be a list, got {record['people']!r:.60}")
+    for index, person in enumerate(record["people"]):
+        read_person(person, f"{where}, person {index}")
+    return record
+
+
+def continue_records(path: Path, known: Container[str] | None = None) -> list[Record]:
+    """Return the frames of a file that is to be continued, and leave only their lines in it.
+
+    An unfinished last line is removed. A line in front of it that is not a frame, that has a value
+    out of range or the name of an earlier frame, is damaged: it is set aside in the file
+    ``.damaged`` and named on standard error.
+
+    Args:
+        path: of the file.
+        known: valid names of frames; None for any.
+
+    Raises:
+        AwarenavError: for a file that cannot be read or written, or of which no line is a frame
+            (unless ``known`` says what its frames are).
+    """
+    found: list[tuple[int, bytes, Record]] = []
+    damaged = []
+    for number, line in enumerate(read_lines(path, AwarenavError), start=1):
+        where = f"{path}, line {number}"
+        try:
+            if line.strip():
+                value = parse_json(line, where, AwarenavError, finite=True)
+                record = check_record(value, where)
+                if known is not None and record["frame"] not in known:
+                    raise AwarenavError(f"{where}: there is no frame {record['frame']!r}")
+                found.append((number, line, record))
+        except ValueError as cause:
+            if line.endswith(b"\n"):  # else the writer was interrupted
+                damaged.append(DamagedLine(number, line.rstrip(b"\n"), str(cause)))
+    records: dict[str, Record] = {}
+    for _, _, record in found:
+        records.setdefault(record["frame"], record)
+    differing = {record["frame"] for _, _, record in found if records[record["frame"]] != record}
+    for number, line, record in found:
+        if record["frame"] in differing:  # nothing says which of them is right
+            records.pop(record["frame"], None)
+            reason = f"another frame has the name {record['frame']!r}"
+            damaged.append(DamagedLine(number, line.rstrip(b"\n"), reason))
+    if damaged and not records and known is None:
+        raise AwarenavError(f"{path} is not a file of frames: {damaged[0].reason}")
+    set_aside(path, damaged, "their frames are made again")
+    write_records(path, records.values())
+    return list(records.values())
 
 
 def write_records(path: Path, records: Iterable[Record]) -> None:

@@ -8,10 +8,10 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
-import yaml
 from pydantic import GetCoreSchemaHandler, model_validator
 from pydantic_core import CoreSchema, core_schema
 
+from perception.documents import parse_yaml
 from tracking import AwarenessFilterConfig
 from tracking.config import StrictConfig
 
@@ -144,7 +144,9 @@ class AwarenessPolicy(StrictConfig):
             raise NavError(
                 f"preset must be one of {', '.join(map(repr, sorted(files)))}, got {name!r}{hint}"
             )
-        policy = cls.model_validate(yaml.safe_load(files[name].read_text(encoding="utf-8")))
+        policy = cls.model_validate(
+            parse_yaml(files[name].read_text(encoding="utf-8"), name, NavError)
+        )
         if cls is AwarenessPolicy:
             _PRESETS[name] = policy
         return policy

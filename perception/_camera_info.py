@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-import yaml
 
 from .arrays import FloatArray
+from .documents import read_yaml
 from .errors import PerceptionError
 
 # Fields of sensor_msgs/CameraInfo (ROS 2 in lower case, ROS 1 in upper case) and the names that
@@ -56,13 +56,8 @@ def read_camera_info(path: str | Path) -> Calibration:
         PerceptionError: for a file that cannot be read or is not complete; the message names it.
     """
     path = Path(path)
-    try:
-        # Each echoed message ends with "---"; the first message counts.
-        data = next(yaml.safe_load_all(path.read_text(encoding="utf-8")), None)
-    except OSError as cause:
-        raise PerceptionError(f"cannot read {path}: {cause.strerror or cause}") from cause
-    except (yaml.YAMLError, UnicodeDecodeError) as cause:
-        raise PerceptionError(f"{path} is not valid YAML: {cause}") from cause
+    # Each echoed message ends with "---"; the first message counts.
+    data = read_yaml(path, first_document=True)
     if not isinstance(data, dict):
         raise PerceptionError(f"{path} must hold the keys of a ROS camera_info file")
     data = {_MESSAGE_KEYS.get(key, key): value for key, value in data.items()}

@@ -14,6 +14,7 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Final
 
+from .documents import read_json
 from .errors import PerceptionError
 
 DETECTOR: Final = "person_detector"
@@ -77,14 +78,13 @@ def shipped_models(folder: Path | None = None) -> tuple[ShippedModel, ...]:
         PerceptionError: for a missing or invalid manifest.
     """
     path = (_FOLDER if folder is None else folder) / _MANIFEST
-    try:
-        entries = json.loads(path.read_text(encoding="utf-8"))["models"]
-        return tuple(ShippedModel(**entry) for entry in entries)
-    except OSError as cause:
+    if not path.is_file():
         raise PerceptionError(
-            f"the list of shipped networks {path} cannot be read ({cause.strerror or cause}); "
-            f"{_REMEDY}"
-        ) from cause
+            f"the list of shipped networks {path} cannot be read (no such file); {_REMEDY}"
+        )
+    try:
+        entries = read_json(path)["models"]
+        return tuple(ShippedModel(**entry) for entry in entries)
     except (ValueError, KeyError, TypeError) as cause:
         wanted = ", ".join(field.name for field in fields(ShippedModel))
         raise PerceptionError(

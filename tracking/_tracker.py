@@ -10,6 +10,7 @@ from typing import Any
 
 from perception import PersonObservation
 from perception.arrays import covariance_matrix, finite_number, rigid_transform
+from perception.documents import read_json
 
 from ._config import TrackerConfig
 from ._errors import TrackingError
@@ -238,12 +239,7 @@ class PersonTracker:
             TrackingError: naming the file, if it cannot be read or holds no state of a tracker.
         """
         path = Path(path)
-        try:
-            state = json.loads(path.read_text(encoding="utf-8"))
-        except OSError as cause:
-            raise TrackingError(f"cannot read {path}: {cause.strerror or cause}") from cause
-        except (ValueError, RecursionError) as cause:
-            raise TrackingError(f"{path} is not valid JSON: {cause}") from cause
+        state = read_json(path, TrackingError)
         try:
             return cls.from_state(state, view=view)
         except TrackingError as cause:

@@ -13,6 +13,8 @@ from typing import Any, ClassVar, TypeVar
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
+from perception.documents import read_yaml
+
 from ._errors import TrackingError
 
 _ConfigT = TypeVar("_ConfigT", bound="StrictConfig")
@@ -49,12 +51,7 @@ class StrictConfig(BaseModel):
             ValueError: the package's own error, naming the file and the key.
         """
         path = Path(path)
-        try:
-            data = yaml.safe_load(path.read_text(encoding="utf-8"))
-        except OSError as cause:
-            raise cls.error(f"cannot read {path}: {cause.strerror or cause}") from cause
-        except (yaml.YAMLError, UnicodeDecodeError) as cause:
-            raise cls.error(f"{path} is not valid YAML: {cause}") from cause
+        data = read_yaml(path, cls.error)
         if not isinstance(data, dict):
             raise cls.error(f"{path} must hold a mapping of keys, got {type(data).__name__}")
         try:

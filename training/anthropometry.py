@@ -35,7 +35,7 @@ def main() -> None:
     """Print the averages."""
     model = anny.Anny().to(dtype=torch.float32)
     regressors = torch.load(
-        Path(anny.__file__).parent / "data" / "keypoints" / "coco.pth", weights_only=False
+        Path(anny.__file__).parent / "data" / "keypoints" / "coco.pth", weights_only=True
     )
     used = model.base_mesh_vertex_indices.numpy()
     weights = {name: row.numpy()[used] for name, row in regressors.items()}

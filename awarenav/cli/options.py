@@ -121,6 +121,13 @@ def resume() -> Decorator:
     return option("--resume", is_flag=True, help="Continue the interrupted work in --out.")
 
 
+def overwrite() -> Decorator:
+    """Add ``--overwrite``: replace the work in ``--out``; without it, finished work is refused."""
+    return option(
+        "--overwrite", is_flag=True, excludes="--resume", help="Replace the work in --out."
+    )
+
+
 def workers(default: int | None = None) -> Decorator:
     """Add ``--workers``: the number of worker processes."""
     return option(

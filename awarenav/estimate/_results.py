@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,11 +12,13 @@ import numpy as np
 
 from perception import PersonKeypoints, PersonObservation
 from perception.arrays import FloatArray
+from perception.documents import parse_json, read_lines
 from perception.layouts import COCO_NAMES, FOOT_NAMES, LEFT_SHOULDER, RIGHT_SHOULDER
 from tracking import PersonTrack
 
 from ..errors import AwarenavError
-from ..records import Record, read_records, record_line, write_records
+from ..line_files import LineFile
+from ..records import Record, continue_records, record_line
 from ._estimator import FrameEstimate
 
 # Significant digits of a number; any error of an estimate is far larger.
@@ -119,7 +121,9 @@ def settings_hash(settings: Mapping[str, object]) -> str:
 
 
 class ResultsFile(AbstractContextManager["ResultsFile"]):
-    """A JSON Lines file that gets one line per frame; every line is flushed.
+    """A JSON Lines file that gets one line per frame, whole or not at all.
+
+    A damaged line of a continued file is set aside, and its frame is not in ``done``.
 
     Attributes:
         done: names of the frames that a continued file has already.
@@ -148,18 +152,17 @@ class ResultsFile(AbstractContextManager["ResultsFile"]):
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             if exists and resume:
-                records = read_records(path)
-                _require_same_settings(path, records, settings)
-                write_records(path, records)  # without an incomplete last line
-                self.done = frozenset(str(record["frame"]) for record in records)
-            self._file = path.open("a" if resume else "w", encoding="utf-8")
+                _require_same_settings(path, settings)
+                self.done = frozenset(record["frame"] for record in continue_records(path))
+            else:
+                path.write_bytes(b"")
+            self._file = LineFile(path)
         except OSError as cause:
             raise AwarenavError(f"cannot write {path}: {cause.strerror or cause}") from cause
 
     def add(self, record: Record) -> None:
         """Append the record of a frame."""
-        self._file.write(record_line(record))
-        self._file.flush()
+        self._file.add(record_line(record))
 
     def __exit__(self, *error: object) -> None:
         self.close()
@@ -169,8 +172,13 @@ class ResultsFile(AbstractContextManager["ResultsFile"]):
         self._file.close()
 
 
-def _require_same_settings(path: Path, records: list[Record], settings: str) -> None:
-    others = {str(record.get("settings")) for record in records} - {settings}
+def _require_same_settings(path: Path, settings: str) -> None:
+    """Refuse a file whose lines have the mark of other settings; damaged lines have none."""
+    others = set()
+    for line in read_lines(path, AwarenavError):
+        with suppress(AwarenavError, AttributeError):
+            others.add(str(parse_json(line, "line", AwarenavError).get("settings")))
+    others -= {settings}
     if others:
         raise AwarenavError(
             f"{path} was made with other settings (hash {', '.join(sorted(others))}, now "

@@ -14,6 +14,7 @@ from nav_adapter.ros2 import camera_of, picture_of
 from nav_adapter.ros2.messages.sensor_msgs import CameraInfo
 from perception import Camera
 from perception.arrays import ImageRgb
+from perception.documents import read_yaml
 
 from ..errors import AwarenavError, MissingExtraError
 from ._source import SourceFrame
@@ -48,6 +49,8 @@ class BagSource:
 
     def __init__(self, path: Path, topic: str | None = None) -> None:
         self._path = path
+        if (metadata := path / "metadata.yaml").is_file():
+            read_yaml(metadata, AwarenavError)  # refuses what would harm the library
         try:
             self._reader = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
             self._reader.open()

@@ -31,7 +31,7 @@ _CAMERA: Final = "Camera"
 )
 @options.out_file("estimates.jsonl", "The results: one JSON line per frame.")
 @options.resume()
-@option("--overwrite", is_flag=True, excludes="--resume", help="Replace the file --out.")
+@options.overwrite()
 @option(
     "--overlay",
     default="none",

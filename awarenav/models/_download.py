@@ -16,12 +16,21 @@ from typing import IO, Final
 
 from tqdm import tqdm
 
+from perception.documents import read_json
+
 from ..errors import AwarenavError
+from ._connection import Deadline, opener, require_allowed
+
+#: Largest file that is downloaded.
+MAX_BYTES: Final = 2 << 30
 
 _CHUNK_BYTES: Final = 1 << 18
 _MIN_FREE_BYTES: Final = 64 << 20  # left free on the disk
 _USER_AGENT: Final = "awarenav"
-_CONTENT_RANGE: Final = re.compile(r"bytes (\d+)-\d+/(\d+)")
+_CONTENT_RANGE: Final = re.compile(r"bytes (\d{1,15})-\d{1,15}/(\d{1,15})")
+_LENGTH: Final = re.compile(r"[0-9]{1,15}")
+# What can be sent back in a header.
+_VALIDATOR: Final = re.compile(r"[ -~]{1,256}")
 _NOT_SATISFIABLE: Final = 416
 _PARTIAL: Final = 206
 _CONNECTION_ERRORS: Final = (
@@ -33,27 +42,12 @@ _CONNECTION_ERRORS: Final = (
 )
 
 
+class _TooLargeError(AwarenavError):
+    """A file that is larger than allowed."""
+
+
 class BrokenDownloadError(AwarenavError):
     """A download that stopped early; the next attempt continues after the bytes so far."""
-
-
-class _NoDowngrade(urllib.request.HTTPRedirectHandler):
-    """Follows redirects, except from https to another scheme."""
-
-    def redirect_request(
-        self,
-        req: urllib.request.Request,
-        fp: IO[bytes],
-        code: int,
-        msg: str,
-        headers: http.client.HTTPMessage,
-        newurl: str,
-    ) -> urllib.request.Request | None:
-        if req.full_url.startswith("https:") and not newurl.startswith("https:"):
-            raise AwarenavError(
-                f"{req.full_url} redirects to {newurl}, which is not encrypted; refused"
-            )
-        return super().redirect_request(req, fp, code, msg, headers, newurl)
 
 
 def download(
@@ -63,6 +57,8 @@ def download(
     attempts: int = 4,
     pause_s: float = 1.0,
     timeout_s: float = 30.0,
+    limit_s: float = 3600.0,
+    max_bytes: int = MAX_BYTES,
     progress: bool = True,
 ) -> None:
     """Download ``url`` to ``target``, which appears when it is complete.
@@ -73,32 +69,46 @@ def download(
     beginning otherwise.
 
     Args:
-        url: http or https.
+        url: https, or http on this computer; so are redirects.
         target: in a folder that exists.
         attempts: most attempts in this call, while the connection breaks.
         pause_s: pause before the second attempt, seconds; it doubles each time.
         timeout_s: time without data after which a connection counts as broken, seconds.
+        limit_s: most time of this call, seconds, after which nothing is attempted again.
+        max_bytes: largest file.
         progress: shows a progress bar on standard error.
 
     Raises:
-        BrokenDownloadError: every attempt was broken off; another call continues.
-        AwarenavError: the server does not have the file, or the disk is full.
+        BrokenDownloadError: every attempt was broken off, or the time is up; another call
+            continues.
+        AwarenavError: an address that is not allowed, a server that does not have the file or
+            answers with malformed headers, a file that is too large, or a full disk.
     """
-    for attempt in range(attempts):
-        if attempt:
-            time.sleep(pause_s * 2 ** (attempt - 1))
-        try:
-            _attempt(url, target, timeout_s, progress)
-        except BrokenDownloadError:
-            if attempt == attempts - 1:
-                raise
-        else:
-            _part(target).replace(target)
-            _state(target).unlink(missing_ok=True)
-            return
+    require_allowed(url)
+    with Deadline(limit_s) as deadline:
+        for attempt in range(attempts):
+            if attempt:
+                time.sleep(pause_s * 2 ** (attempt - 1))
+            try:
+                _attempt(url, target, timeout_s, deadline, max_bytes, progress)
+                if deadline.expired:  # an answer without a length seems to end there
+                    raise BrokenDownloadError(f"{url}: ended")
+            except BrokenDownloadError as cause:
+                if deadline.expired:
+                    raise BrokenDownloadError(
+                        f"{url}: not finished within {limit_s:g} s; run it again to continue"
+                    ) from cause
+                if attempt == attempts - 1:
+                    raise
+            else:
+                _part(target).replace(target)
+                _state(target).unlink(missing_ok=True)
+                return
 
 
-def _attempt(url: str, target: Path, timeout_s: float, progress: bool) -> None:
+def _attempt(
+    url: str, target: Path, timeout_s: float, deadline: Deadline, max_bytes: int, progress: bool
+) -> None:
     """Download what is missing of the file into its ``.part``."""
     request = urllib.request.Request(
         url, headers={"User-Agent": _USER_AGENT, "Accept-Encoding": "identity"}
@@ -108,16 +118,22 @@ def _attempt(url: str, target: Path, timeout_s: float, progress: bool) -> None:
     if done:
         request.add_header("Range", f"bytes={done}-")
         request.add_header("If-Range", validator)
-    opener = urllib.request.build_opener(_NoDowngrade)
     try:
-        with opener.open(request, timeout=timeout_s) as response:
+        with opener(deadline).open(request, timeout=timeout_s) as response:
             start, total = _content_range(response, done)
+            if total is not None and total > max_bytes:
+                raise _TooLargeError(_too_large(max_bytes))
             if start != done:
                 _discard(target)
             _check_free_space(target, total, start)
             _write_state(url, target, response.headers)
             with part.open("ab" if start else "wb") as file:
-                _copy(response, file, target.name, start, total, progress)
+                _copy(response, file, target.name, start, total, max_bytes, progress)
+    except _TooLargeError as cause:
+        _discard(target)
+        raise AwarenavError(f"{url}: {cause}") from cause
+    except AwarenavError:
+        raise
     except urllib.error.HTTPError as cause:
         with cause:
             if cause.code == _NOT_SATISFIABLE:
@@ -133,6 +149,8 @@ def _attempt(url: str, target: Path, timeout_s: float, progress: bool) -> None:
         raise BrokenDownloadError(f"{url}: {what}; run it again to continue") from cause
     except OSError as cause:
         raise AwarenavError(f"cannot write {part}: {cause.strerror or cause}") from cause
+    except ValueError as cause:  # of the standard library, for headers that it cannot parse
+        raise AwarenavError(f"{url}: the server sends malformed headers: {cause}") from cause
 
 
 def _copy(
@@ -141,9 +159,10 @@ def _copy(
     name: str,
     start: int,
     total: int | None,
+    max_bytes: int,
     progress: bool,
 ) -> None:
-    """Copy the answer to the file; raise if it ends too early."""
+    """Copy the answer to the file; raise if it ends too early or is too large."""
     done = start
     with tqdm(
         total=total,
@@ -155,8 +174,10 @@ def _copy(
         disable=not progress,
     ) as bar:
         while chunk := response.read(_CHUNK_BYTES):
-            file.write(chunk)
             done += len(chunk)
+            if done > max_bytes:
+                raise _TooLargeError(_too_large(max_bytes))
+            file.write(chunk)
             bar.update(len(chunk))
     if total is not None and done != total:
         raise http.client.IncompleteRead(b"", total - done)
@@ -164,9 +185,8 @@ def _copy(
 
 def _content_range(response: http.client.HTTPResponse, asked: int) -> tuple[int, int | None]:
     """Return the offset of the answer's first byte in the file, and the file's size if known."""
-    length = response.headers.get("Content-Length")
     if response.status != _PARTIAL:
-        return 0, None if length is None else int(length)
+        return 0, _content_length(response.headers)
     found = _CONTENT_RANGE.fullmatch(response.headers.get("Content-Range", "").strip())
     if found is None or int(found[1]) != asked:
         raise http.client.HTTPException(
@@ -175,12 +195,26 @@ def _content_range(response: http.client.HTTPResponse, asked: int) -> tuple[int,
     return asked, int(found[2])
 
 
+def _content_length(headers: http.client.HTTPMessage) -> int | None:
+    lengths = {length.strip() for length in headers.get_all("Content-Length", [])}
+    if not lengths:
+        return None
+    if len(lengths) > 1 or not _LENGTH.fullmatch(min(lengths)):
+        raise ValueError(f"Content-Length {', '.join(sorted(lengths))[:80]!r}")
+    return int(lengths.pop())
+
+
+def _too_large(max_bytes: int) -> str:
+    return f"the file is larger than {max_bytes / 1e6:.0f} MB, which is the limit; it is not kept"
+
+
 def _resume_point(url: str, target: Path) -> tuple[int, str]:
     """Return the number of bytes that are here already, and the validator of their version."""
     try:
-        state = json.loads(_state(target).read_text(encoding="utf-8"))
-        if state["url"] == url and state["validator"]:
-            return _part(target).stat().st_size, str(state["validator"])
+        state = read_json(_state(target), AwarenavError)
+        validator = str(state["validator"])
+        if state["url"] == url and _VALIDATOR.fullmatch(validator):
+            return _part(target).stat().st_size, validator
     except (OSError, ValueError, KeyError, TypeError):
         pass  # no state, or a damaged one: start from the beginning
     return 0, ""

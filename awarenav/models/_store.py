@@ -14,6 +14,7 @@ from typing import Final
 import filelock
 
 from perception import PerceptionError
+from perception.documents import read_json
 from perception.networks import OnnxModel, OnnxSettings
 
 from ..errors import AwarenavError
@@ -159,11 +160,11 @@ class ModelStore:
         """
         path = self.folder / _LOCK_FILE
         try:
-            entries = json.loads(path.read_text(encoding="utf-8"))["models"]
+            if not path.exists():
+                return {}
+            entries = read_json(path, AwarenavError)["models"]
             return {name: LockedModel(**entry) for name, entry in entries.items()}
-        except FileNotFoundError:
-            return {}
-        except (OSError, ValueError, KeyError, TypeError, AttributeError) as cause:
+        except (ValueError, KeyError, TypeError, AttributeError) as cause:
             raise AwarenavError(
                 f"{path} cannot be read ({cause}): it has the sha256 of each fetched network; "
                 "remove it and the networks beside it, and fetch them again"
@@ -185,12 +186,18 @@ class ModelStore:
 
     def _download(self, model: RealModel, fresh: Path, progress: bool, pause_s: float) -> None:
         """Download the ONNX file to ``fresh``, from its archive if it comes in one."""
+        # The size in the catalogue is approximate, and an archive holds more than the network.
+        max_bytes = int(1e6 * (2.0 * model.size_mb + 64.0))
+
+        def fetch_to(path: Path) -> None:
+            download(model.url, path, pause_s=pause_s, max_bytes=max_bytes, progress=progress)
+
         if model.member is None:
-            download(model.url, fresh, pause_s=pause_s, progress=progress)
+            fetch_to(fresh)
             return
         archive = fresh.with_name(model.name + ".zip")
         try:
-            download(model.url, archive, pause_s=pause_s, progress=progress)
+            fetch_to(archive)
             extract_member(archive, model.member, fresh)
         finally:
             archive.unlink(missing_ok=True)

@@ -6,6 +6,7 @@ import json
 import multiprocessing
 import os
 import queue
+import re
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -16,7 +17,17 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from awarenav.records import Record, read_records, record_line, write_records
+from awarenav.files import atomic_path
+from awarenav.line_files import LineFile
+from awarenav.records import (
+    Record,
+    continue_records,
+    read_records,
+    record_line,
+    write_records,
+)
+from perception import Camera
+from perception.documents import parse_json
 
 from ..world.errors import SimError
 from ._config import RenderConfig
@@ -25,12 +36,22 @@ from ._contact_sheet import write_contact_sheet
 _TRUTH: Final = "truth.jsonl"
 _SETTINGS: Final = "render.yaml"
 _SHEET: Final = "contact_sheet.png"
+# All files of a set but its settings.
+_MADE: Final = re.compile(
+    r"(\d{6,}\.png|truth\.jsonl|camera\.yaml|contact_sheet\.png)(\.part|\.damaged)?"
+)
 # Time without a record after which the processes are checked for being alive.
 _POLL_S: Final = 1.0
 
 
 def render(
-    config: RenderConfig, out: Path, *, processes: int | None = None, progress: bool = True
+    config: RenderConfig,
+    out: Path,
+    *,
+    processes: int | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: bool = True,
 ) -> Path:
     """Write the images of ``config`` into a folder; continue an interrupted set.
 
@@ -42,24 +63,34 @@ def render(
         config: settings of the set.
         out: folder, made when missing.
         processes: number of processes; None for one per processor.
+        resume: accept a finished set as well, and require a set to continue.
+        overwrite: remove the set in the folder first.
         progress: show a progress bar on standard error.
 
     Returns:
         Path of the truth file.
 
     Raises:
-        SimError: when ``out`` holds images of other settings, or all processes died.
+        SimError: when ``out`` holds images of other settings, a finished set (with neither
+            ``resume`` nor ``overwrite``) or none (with ``resume``), or all processes died.
     """
-    _check_folder(config, out)
+    if overwrite:
+        _remove_set(out)
+    _check_folder(config, out, resume=resume)
     truth = out / _TRUTH
-    done = {record["frame"]: record for record in _finished_records(out)}
+    done = {record["frame"]: record for record in _finished_records(config, out)}
+    if len(done) == config.frames and (out / _SHEET).exists() and not resume:
+        raise SimError(
+            f"{out} holds a finished set of {config.frames} images: replace it with --overwrite "
+            "(overwrite=True), choose another --out, or keep it with --resume (resume=True)"
+        )
     write_records(truth, done.values())
     missing = [frame for frame in range(config.frames) if frame_name(frame) not in done]
-    config.camera.to_yaml(out / "camera.yaml")
+    _write(config.camera, out / "camera.yaml")
     tasks = _group_by_scene(config, missing)
     workers = min(processes or os.cpu_count() or 1, max(len(tasks), 1))
     with (
-        truth.open("a", encoding="utf-8") as file,
+        LineFile(truth, SimError) as file,
         tqdm(
             total=config.frames,
             initial=len(done),
@@ -70,8 +101,7 @@ def render(
         ) as bar,
     ):
         for record in _render_tasks(config, out, tasks, workers):
-            file.write(record_line(record))
-            file.flush()
+            file.add(record_line(record))
             bar.update()
     records = sorted(read_records(truth), key=lambda record: str(record["frame"]))
     write_records(truth, records)
@@ -84,12 +114,31 @@ def frame_name(frame: int) -> str:
     return f"{frame:06d}.png"
 
 
-def _check_folder(config: RenderConfig, out: Path) -> None:
+def _remove_set(out: Path) -> None:
+    """Remove a set of images; its settings go last, so that a kill leaves one that can go on."""
+    settings = out / _SETTINGS
+    if not settings.exists():
+        return
+    try:
+        for path in out.iterdir():
+            if _MADE.fullmatch(path.name):
+                path.unlink()
+        settings.unlink()
+    except OSError as cause:
+        raise SimError(f"cannot replace the images in {out}: {cause.strerror or cause}") from cause
+
+
+def _check_folder(config: RenderConfig, out: Path, *, resume: bool) -> None:
     """Write the settings into a new folder; refuse a folder that holds another set of images."""
     if out.exists() and not out.is_dir():
         raise SimError(f"--out must be a folder, {out} is a file")
-    out.mkdir(parents=True, exist_ok=True)
     settings = out / _SETTINGS
+    if resume and not settings.exists():
+        raise SimError(f"--resume: there are no images in {out}, no {_SETTINGS}")
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as cause:
+        raise SimError(f"cannot write {out}: {cause.strerror or cause}") from cause
     if settings.exists():
         present = RenderConfig.from_yaml(settings)
         if present != config:
@@ -100,7 +149,7 @@ def _check_folder(config: RenderConfig, out: Path) -> None:
             ]
             raise SimError(
                 f"{out} holds images made with other settings ({'; '.join(differ)}); "
-                "use the same settings to continue it, or another folder"
+                "use the same settings to continue it, --overwrite to replace it, or another folder"
             )
         return
     if (out / _TRUTH).exists():
@@ -108,13 +157,21 @@ def _check_folder(config: RenderConfig, out: Path) -> None:
             f"{out} holds a {_TRUTH} without {_SETTINGS}, so it was not made by this command; "
             "use another folder"
         )
-    config.to_yaml(settings)
+    _write(config, settings)
 
 
-def _finished_records(out: Path) -> list[Record]:
-    """Return the records whose images exist."""
+def _write(content: Camera | RenderConfig, path: Path) -> None:
+    try:
+        content.to_yaml(path)
+    except OSError as cause:
+        raise SimError(f"cannot write {path}: {cause.strerror or cause}") from cause
+
+
+def _finished_records(config: RenderConfig, out: Path) -> list[Record]:
+    """Return the records whose images exist; set damaged lines aside."""
     truth = out / _TRUTH
-    records = read_records(truth) if truth.exists() else []
+    names = {frame_name(frame) for frame in range(config.frames)}
+    records = continue_records(truth, names) if truth.exists() else []
     return [record for record in records if (out / str(record["frame"])).is_file()]
 
 
@@ -161,7 +218,7 @@ def _render_tasks(
                         "run the command again to continue"
                     ) from None
                 continue
-            record = json.loads(line)
+            record = parse_json(line, "a rendering process", SimError)
             if "error" in record:
                 raise SimError(f"rendering failed: {record['error']}")
             left -= 1
@@ -203,6 +260,5 @@ def _write_png(path: Path, image_rgb: NDArray[np.uint8]) -> None:
     encoded, data = cv2.imencode(".png", image_rgb[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 3])
     if not encoded:
         raise SimError(f"cannot encode {path.name}")
-    part = path.with_name(path.name + ".part")
-    part.write_bytes(data.tobytes())
-    part.replace(path)
+    with atomic_path(path, SimError) as part:
+        part.write_bytes(data.tobytes())

@@ -25,6 +25,8 @@ class RenderOptions:
     supersampling: int
     processes: int | None
     out: Path
+    resume: bool
+    overwrite: bool
     seed: int
 
 
@@ -50,7 +52,13 @@ def render_command(options: RenderOptions) -> int:
         layouts=list(options.layouts) or None,
         eyes=options.eyes,
     )
-    truth = render(config, options.out, processes=options.processes)
+    truth = render(
+        config,
+        options.out,
+        processes=options.processes,
+        resume=options.resume,
+        overwrite=options.overwrite,
+    )
     print(
         f"Written to {options.out}: {config.frames} images, camera.yaml, {truth.name}, "
         "contact_sheet.png"

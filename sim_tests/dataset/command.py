@@ -18,8 +18,8 @@ from awarenav.cli import NUMBER, POSITIVE, OneOf, command, option, options
         2: "Bad input; nothing was written.",
         130: "Interrupted; the images so far are kept.",
     },
-    epilog="The same command continues an interrupted set of images. Needs the extra 'sim': pip "
-    "install 'awarenav[sim]'.",
+    epilog="The same command continues an interrupted set of images, with or without --resume. "
+    "Needs the extra 'sim': pip install 'awarenav[sim]'.",
 )
 @option("--frames", type=POSITIVE, default=400, metavar="N", help="Number of images.")
 @option("--people", type=POSITIVE, default=3, metavar="N", help="Most people in an image.")
@@ -70,6 +70,8 @@ from awarenav.cli import NUMBER, POSITIVE, OneOf, command, option, options
     help="Worker processes.",
 )
 @options.out_folder("render")
+@options.resume()
+@options.overwrite()
 @options.seed()
 def render(**values: Any) -> int:
     """Render images of people in randomised warehouses, with the truth about each person.

@@ -7,17 +7,14 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, Final
 
-import yaml
-
 from awarenav.errors import not_one_of
+from perception import documents
 
 from ..world.errors import SimError
 
 _FOLDER: Final = resources.files("sim_tests.scenario") / "shipped"
 _DEFAULTS: Final = _FOLDER / "defaults"
 _CAMERAS: Final = _FOLDER / "cameras"
-# The safe loader in C, ten times as fast, where PyYAML was built with it.
-_LOADER: Final[Any] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 def shipped_scenarios() -> tuple[str, ...]:
@@ -67,7 +64,7 @@ def camera_data(name: str) -> dict[str, Any]:
         SimError: for a name that is not shipped, and for a file that cannot be read.
     """
     if name.endswith((".yaml", ".yml")):
-        return parse_yaml(_read_text(Path(name)), name)
+        return _completed(documents.read_yaml(Path(name), SimError), name)
     names = shipped_cameras()
     if name not in names:
         raise SimError(f"{not_one_of('camera', name, names)}, or a YAML file")
@@ -82,7 +79,7 @@ def read_file(path: Path) -> dict[str, Any]:
     Raises:
         SimError: naming the file, when it cannot be read or holds no YAML mapping.
     """
-    data = parse_yaml(_read_text(path), str(path))
+    data = _completed(documents.read_yaml(path, SimError), str(path))
     replay = data.get("replay_csv")
     if isinstance(replay, str):
         data["replay_csv"] = str((path.parent / replay).resolve())
@@ -102,10 +99,11 @@ def parse_yaml(text: str, source: str) -> dict[str, Any]:
     Raises:
         SimError: for text that is not a YAML mapping, and for unknown defaults.
     """
-    try:
-        data = yaml.load(text, _LOADER)
-    except yaml.YAMLError as cause:
-        raise SimError(f"{source} is not valid YAML: {cause}") from cause
+    return _completed(documents.parse_yaml(text, source, SimError), source)
+
+
+def _completed(data: Any, source: str) -> dict[str, Any]:
+    """Return the keys of a scenario with the defaults that it extends."""
     if not isinstance(data, dict):
         raise SimError(f"{source} must hold a mapping of keys, got {type(data).__name__}")
     if "extends" not in data:
@@ -116,16 +114,6 @@ def parse_yaml(text: str, source: str) -> dict[str, Any]:
         raise SimError(f"{source}: {not_one_of('extends', name, names)}")
     defaults = parse_yaml((_DEFAULTS / f"{name}.yaml").read_text("utf-8"), str(name))
     return _merged(defaults, data)
-
-
-def _read_text(path: Path) -> str:
-    """Return the text of a user's file; raises SimError when it cannot be read."""
-    try:
-        return path.read_text(encoding="utf-8")
-    except OSError as cause:
-        raise SimError(f"cannot read {path}: {cause.strerror or cause}") from cause
-    except UnicodeDecodeError as cause:
-        raise SimError(f"{path} is not valid YAML: {cause}") from cause
 
 
 def _merged(defaults: dict[str, Any], data: dict[str, Any]) -> dict[str, Any]:

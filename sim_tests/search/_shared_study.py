@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from typing import Any
 from ..study.runs import ProcessLock
 from ..world.errors import SimError
 from ._optimizer import Optimizer, Outcome, ParameterValues
-from ._optuna import event, optuna
+from ._optuna import DATABASE_ERRORS, event, optuna
 
 #: User attribute of a trial with the notes of its outcome.
 NOTES = "notes"
@@ -179,8 +179,18 @@ class SharedStudy(AbstractContextManager["SharedStudy"]):
             claim.lock.close()
             self._lock_path(number).unlink(missing_ok=True)
 
-    def _locked(self) -> ProcessLock:
-        return ProcessLock(self._locks / "study.lock")
+    @contextmanager
+    def _locked(self) -> Iterator[None]:
+        """Hold the lock of the file; a file that cannot be read or written is a SimError."""
+        with ProcessLock(self._locks / "study.lock"):
+            try:
+                yield
+            except DATABASE_ERRORS as cause:
+                reason = str(cause.__cause__ or cause).splitlines()[0]
+                raise SimError(
+                    f"cannot use {self._locks.parent / 'study.db'}: {reason}; the trials so far "
+                    "are kept, and --resume continues"
+                ) from cause
 
     def _lock_path(self, number: int) -> Path:
         return self._locks / f"{self.name.replace('/', '-')}-{number:06d}.lock"

@@ -38,6 +38,7 @@ class CrossingsOptions:
     time_limit: float | None
     out: Path
     resume: bool
+    overwrite: bool
     no_report: bool
     as_json: bool
 
@@ -71,6 +72,7 @@ def crossings_command(options: CrossingsOptions) -> int:
         scheduler=options.scheduler,
         time_limit_s=options.time_limit,
         resume=options.resume,
+        overwrite=options.overwrite,
         progress=True,
         about=_about(options),
     )

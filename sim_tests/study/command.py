@@ -48,6 +48,7 @@ from awarenav.cli import NUMBER, POSITIVE, command, option, options
 )
 @options.out_folder("crossings")
 @options.resume()
+@options.overwrite()
 @option("--no-report", is_flag=True, help="Write no report.")
 @options.as_json()
 def crossings(**values: Any) -> int:

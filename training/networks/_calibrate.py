@@ -13,7 +13,8 @@ from perception.anthropometry import MEAN_STATURE_M
 from perception.body import place_bodies
 from perception.layouts import LEFT_HIP, RIGHT_HIP
 
-from ._samples import ImageSample, picture, read_shards
+from ._samples import ImageSample, picture
+from ._shard_file import read_shards
 
 # Least visible keypoints of a person who counts.
 _MIN_KEYPOINTS: Final = 12
@@ -38,7 +39,7 @@ def limb_scale(
     Returns:
         The scale, and the relative standard deviation of ranges beyond that of statures.
     """
-    frames = [frame for shard in read_shards(folder) for frame in shard["frames"]]
+    frames = [frame for shard in read_shards(folder) for frame in shard.frames]
     scale, taller = 1.0, np.log(np.mean(statures_m) / MEAN_STATURE_M)
     for _ in range(rounds):
         errors = np.array(list(_range_errors(estimator_of(scale), frames)))

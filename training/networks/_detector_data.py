@@ -16,7 +16,8 @@ from perception.shipped import detector_input_size
 from ._augment import covered, degraded, similarity, warp
 from ._batch import Batch, stacked_images
 from ._detector_net import HEIGHT, WIDTH
-from ._samples import picture, read_shards
+from ._samples import picture
+from ._shard_file import read_shards
 
 #: Number to which the people of an image are padded in a batch.
 MAX_PEOPLE: Final = 8
@@ -45,7 +46,7 @@ class DetectorData:
         self._seed = seed
         self.frames: list[FrameSample] = []
         for shard in read_shards(folder, first, last):
-            for frame in shard["frames"]:
+            for frame in shard.frames:
                 boxes = [person.box_xyxy_px for person in frame.people]
                 wanted = [
                     person.pixels >= _MIN_PIXELS and person.visible.sum() >= _MIN_KEYPOINTS

@@ -14,7 +14,8 @@ from perception.networks.heads import ray_axes, ray_stretch
 from ._augment import covered, degraded, inside_of, warp, with_surroundings
 from ._batch import Batch, stacked
 from ._head_sample import LEAST_SEEN, SIZE, HeadSample, cropped
-from ._samples import HEAD_SIDE_M, ImageSample, Patch, PersonTruth, picture, read_shards
+from ._samples import HEAD_SIDE_M, ImageSample, Patch, PersonTruth, picture
+from ._shard_file import read_shards
 
 #: Part of an image kept around a head, as a share of the crop's side.
 _REACH: Final = 0.95
@@ -35,9 +36,9 @@ class HeadData:
         self.others: list[NDArray[np.uint8]] = []
         rng = np.random.default_rng([seed, 21])
         for shard in read_shards(folder, first, last):
-            for patch in [*shard["heads"], *shard["people"]]:
+            for patch in [*shard.heads, *shard.people]:
                 self._add(_of_patch(patch))
-            for frame in shard["frames"]:
+            for frame in shard.frames:
                 image = picture(frame.png)
                 for person in frame.people:
                     self._add(_of_frame(frame, image, person))

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from ._augment import covered, degraded, inside_of, similarity, warp, with_surroundings
 from ._batch import Batch, stacked
 from ._pose_net import HEIGHT, WIDTH
-from ._samples import PersonTruth, picture, read_shards
+from ._samples import PersonTruth, picture
+from ._shard_file import read_shards
 
 _SWAP: Final = [0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 16, 15]
 _PADDING: Final = 1.25
@@ -39,9 +40,9 @@ class PoseData:
         self._seed = seed
         self.people: list[PersonSample] = []
         for shard in read_shards(folder, first, last):
-            for patch in shard["people"]:
+            for patch in shard.people:
                 self._add(picture(patch.png), patch.origin_px, patch.size_px, patch.person)
-            for frame in shard["frames"]:
+            for frame in shard.frames:
                 image = picture(frame.png)
                 size = (image.shape[1], image.shape[0])
                 for person in frame.people:

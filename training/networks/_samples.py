@@ -1,12 +1,9 @@
-"""Types of the samples in a shard, and reading of shards."""
+"""Types of the samples in a shard."""
 
 from __future__ import annotations
 
-import pickle
-from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import cv2
 import numpy as np
@@ -73,12 +70,6 @@ class Patch:
     size_px: tuple[int, int]
     intrinsics_px: tuple[float, float, float]
     person: PersonTruth
-
-
-def read_shards(folder: Path, first: int = 0, last: int | None = None) -> Iterator[dict[str, Any]]:
-    """Yield the shards of a folder in order."""
-    for path in sorted(folder.glob("scene*.pkl"))[first:last]:
-        yield pickle.loads(path.read_bytes())
 
 
 def picture(png: bytes) -> NDArray[np.uint8]:

@@ -8,7 +8,6 @@ fill, so that a crop equals that part of the whole image at a tenth of its cost.
 from __future__ import annotations
 
 import multiprocessing
-import pickle
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -27,6 +26,7 @@ from sim_tests.world import keypoints_in_front
 
 from ._recipe import Recipe
 from ._samples import HEAD_SIDE_M, ImageSample, Patch, PersonTruth
+from ._shard_file import Shard, shard_path, write_shard
 
 _BODY: Final = 17
 _SIZES: Final = ((640, 480), (640, 480), (640, 480), (848, 480), (800, 600))
@@ -41,11 +41,6 @@ _MIN_PIXELS: Final = 60
 _SQUARE: Final = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [-1.0, 1.0, 0.0], [1.0, 1.0, 0.0]])
 #: Radius of the disk about a head in which its pixels are counted.
 _HEAD_RADIUS_M: Final = 0.08
-
-
-def shard_path(folder: Path, scene: int) -> Path:
-    """Return the path of a scene's shard."""
-    return folder / f"scene{scene:04d}.pkl"
 
 
 def make_shards(recipe: Recipe, workers: tuple[str, ...], folder: Path, processes: int = 2) -> None:
@@ -71,15 +66,12 @@ def _make_shard(recipe: Recipe, workers: tuple[str, ...], folder: Path, scene: i
     cv2.setNumThreads(1)
     rng = np.random.default_rng([recipe.seed, 11, scene])
     with RenderScene(_config(recipe, workers, rng), scene) as hall:
-        shard = {
-            "frames": [_frame(hall, rng) for _ in range(recipe.frames)],
-            "people": list(_patches(hall, rng, recipe.person_patches, whole=True)),
-            "heads": list(_patches(hall, rng, recipe.head_patches, whole=False)),
-        }
-    path = shard_path(folder, scene)
-    part = path.with_suffix(".part")
-    part.write_bytes(pickle.dumps(shard, protocol=pickle.HIGHEST_PROTOCOL))
-    part.replace(path)
+        shard = Shard(
+            tuple(_frame(hall, rng) for _ in range(recipe.frames)),
+            tuple(_patches(hall, rng, recipe.person_patches, whole=True)),
+            tuple(_patches(hall, rng, recipe.head_patches, whole=False)),
+        )
+    write_shard(shard_path(folder, scene), shard)
 
 
 def _config(recipe: Recipe, workers: tuple[str, ...], rng: np.random.Generator) -> RenderConfig:

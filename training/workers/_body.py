@@ -286,7 +286,7 @@ class BodyModel:
     def _keypoint_regressor(self) -> Array:
         """Return the model's own COCO definitions (23, N): weights of vertices."""
         file = Path(anny.__file__).parent / "data" / "keypoints" / "coco.pth"
-        rows = torch.load(file, weights_only=False)
+        rows = torch.load(file, weights_only=True)
         used = self._model.base_mesh_vertex_indices.numpy()
         matrix = np.array([rows[name].double().numpy()[used] for name in KEYPOINTS])
         normal: Array = matrix / matrix.sum(axis=1, keepdims=True)

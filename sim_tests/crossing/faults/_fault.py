@@ -9,6 +9,7 @@ import yaml
 from pydantic import Field, model_validator
 
 from awarenav.errors import not_one_of
+from perception.documents import parse_yaml
 from tracking.config import StrictConfig
 
 from ...world.errors import SimError
@@ -128,7 +129,7 @@ class Fault(StrictConfig):
         if name not in (names := shipped_faults()):
             raise SimError(not_one_of("fault", name, names))
         text = (resources.files("sim_tests.crossing.faults") / f"{name}.yaml").read_text("utf-8")
-        return cls.model_validate(yaml.safe_load(text))
+        return cls.model_validate(parse_yaml(text, name, SimError))
 
     @classmethod
     def of(cls, name: str) -> Fault:

@@ -22,6 +22,7 @@ from ._restarted_search import CONTACT_SCORE, EvaluatedTrial, RestartedSearch, s
 from ._scenario_space import ScenarioSpace
 
 _SETTINGS_FILE: Final = "falsify.json"
+_RESULTS: Final = ("worst_*.yaml", "policy.yaml", "episodes.csv", "summary.json", "falsify.png")
 # Share of the episodes that go to all scenarios alike; the rest go to the worst of them.
 _FIRST_SHARE: Final = 0.5
 # One scenario in so many is among the worst.
@@ -123,7 +124,12 @@ class Budget:
 
 
 def falsify(
-    settings: FalsifySettings, folder: Path, *, workers: int, resume: bool
+    settings: FalsifySettings,
+    folder: Path,
+    *,
+    workers: int,
+    resume: bool,
+    overwrite: bool = False,
 ) -> Falsification:
     """Search until all episodes have run.
 
@@ -132,6 +138,7 @@ def falsify(
         folder: made when missing; holds the studies.
         workers: number of processes that run episodes; the result does not depend on it.
         resume: continue the search in the folder.
+        overwrite: replace the search in the folder.
 
     Raises:
         SimError: settings that do not fit together, or another process that works in the folder.
@@ -140,7 +147,15 @@ def falsify(
     spaces = {each.name: ScenarioSpace(each, settings.people) for each in templates}
     budget = Budget.of(settings.episodes, len(spaces), settings.generation)
     refuse_unusable_planner(settings.planner, templates[0].median())
-    write_or_check_settings(settings, folder, _SETTINGS_FILE, "falsification", resume=resume)
+    write_or_check_settings(
+        settings,
+        folder,
+        _SETTINGS_FILE,
+        "falsification",
+        resume=resume,
+        overwrite=overwrite,
+        results=_RESULTS,
+    )
     with ProcessLock(folder / "locks" / "folder.lock", wait=False) as lock:
         if not lock.held:
             raise SimError(f"another process falsifies in {folder}")

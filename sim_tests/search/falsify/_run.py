@@ -32,6 +32,7 @@ class FalsifyOptions:
     workers: int
     out: Path
     resume: bool
+    overwrite: bool
     as_json: bool
 
 
@@ -57,7 +58,13 @@ def falsify_command(options: FalsifyOptions) -> int:
             "UNSAFE: the adapter's floor is taken away on purpose. No robot may drive like this.",
             file=sys.stderr,
         )
-    falsification = falsify(settings, options.out, workers=options.workers, resume=options.resume)
+    falsification = falsify(
+        settings,
+        options.out,
+        workers=options.workers,
+        resume=options.resume,
+        overwrite=options.overwrite,
+    )
     write_episodes(falsification, options.out / "episodes.csv")
     cases = write_worst(falsification, options.out, options.worst)
     write_summary(falsification, cases, options.out / "summary.json")

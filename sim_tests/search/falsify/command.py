@@ -62,6 +62,7 @@ from awarenav.cli import POSITIVE, command, option, options
 @options.workers(1)
 @options.out_folder("falsify")
 @options.resume()
+@options.overwrite()
 @options.as_json()
 def falsify(**values: Any) -> int:
     """Search for the situations in which a policy does worst.

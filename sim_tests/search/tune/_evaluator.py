@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
 from nav_adapter import AwarenessPolicy
 
-from ...study.measures import EpisodeRecord, read_records, write_records
+from ...study.measures import EpisodeRecord, salvage_record_file, write_records
 from ...study.runs import ProcessLock, plan_jobs
 from ...world.errors import SimError
 from .._episode_runner import EpisodeRunner
@@ -45,7 +46,9 @@ class PolicyEvaluator:
         path = self._folder / _FOLDER / f"{name}-{seeds[0]}-{seeds[-1]}.csv"
         with ProcessLock(self._folder / "locks" / f"{path.stem}.lock"):
             if path.exists():
-                return Evaluation.of(read_records(path))
+                kept = self._kept_records(path, name, seeds)
+                if kept is not None:
+                    return Evaluation.of(kept)
             records = self._run(name, policy, seeds)
             if not any(record.error for record in records):
                 path.parent.mkdir(parents=True, exist_ok=True)
@@ -65,6 +68,30 @@ class PolicyEvaluator:
                 f"{evaluation.errors[0]}"
             )
         return evaluation
+
+    def _kept_records(
+        self, path: Path, name: str, seeds: Sequence[int]
+    ) -> tuple[EpisodeRecord, ...] | None:
+        """Return the records of a file; None for a damaged file, which is set aside."""
+        found = salvage_record_file(path)
+        records = tuple(record for _, _, record in found.rows)
+        episodes = {(record.scenario, record.seed) for record in records}
+        if (
+            not found.damaged
+            and not found.torn
+            and len(records) == len(episodes) == len(seeds) * len(self._templates)
+            and all(record.policy == name and record.seed in seeds for record in records)
+        ):
+            return records
+        reason = found.damaged[0].reason if found.damaged else "episodes are missing in it"
+        aside = path.with_name(path.name + ".damaged")
+        path.replace(aside)
+        print(
+            f"{path} is damaged: {reason}; it is set aside as {aside.name}, and its episodes run "
+            "again",
+            file=sys.stderr,
+        )
+        return None
 
     def _run(
         self, name: str, policy: AwarenessPolicy, seeds: Sequence[int]

@@ -9,11 +9,11 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, ClassVar, Final
 
-import yaml
 from pydantic import ValidationError
 
 from nav_adapter import AwarenessPolicy, NavError
 from perception.anthropometry import BODY_RADIUS_M
+from perception.documents import parse_yaml, read_yaml
 
 from ...world.errors import SimError
 from .._optimizer import Range
@@ -139,7 +139,7 @@ class PolicySpace:
 def shipped_ranges() -> dict[str, PolicyRange]:
     """Return the ranges of ``ranges.yaml``."""
     text = (resources.files("sim_tests.search.tune") / "ranges.yaml").read_text("utf-8")
-    return _parse_ranges(text, "ranges.yaml")
+    return _parsed_ranges(parse_yaml(text, "ranges.yaml", SimError), "ranges.yaml")
 
 
 def read_ranges(path: str | Path) -> dict[str, PolicyRange]:
@@ -148,17 +148,10 @@ def read_ranges(path: str | Path) -> dict[str, PolicyRange]:
     Raises:
         SimError: an unusable file; the message names it and the error.
     """
-    try:
-        return _parse_ranges(Path(path).read_text(encoding="utf-8"), str(path))
-    except (OSError, UnicodeDecodeError) as cause:
-        raise SimError(f"cannot read {path}: {cause}") from cause
+    return _parsed_ranges(read_yaml(Path(path), SimError), str(path))
 
 
-def _parse_ranges(text: str, source: str) -> dict[str, PolicyRange]:
-    try:
-        data = yaml.safe_load(text)
-    except yaml.YAMLError as cause:
-        raise SimError(f"{source} is not valid YAML: {cause}") from cause
+def _parsed_ranges(data: Any, source: str) -> dict[str, PolicyRange]:
     if not isinstance(data, dict) or not data:
         raise SimError(
             f"{source} must hold places in a policy and their ranges, such as "

@@ -34,6 +34,7 @@ class TuneOptions:
     workers: int
     out: Path
     resume: bool
+    overwrite: bool
     as_json: bool
 
 
@@ -68,7 +69,14 @@ def tune_command(options: TuneOptions) -> int:
         print("\n".join(table_lines(tuning)))
         print("\n".join(_verdict(tuning)))
 
-    tune(settings, options.out, workers=options.workers, resume=options.resume, report=report)
+    tune(
+        settings,
+        options.out,
+        workers=options.workers,
+        resume=options.resume,
+        overwrite=options.overwrite,
+        report=report,
+    )
     if not options.as_json:
         print(f"Written to {options.out}")
     return 0

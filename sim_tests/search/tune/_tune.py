@@ -8,11 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, cast
 
-import yaml
-
 from nav_adapter import AwarenessPolicy
 
-from ...study.runs import ProcessLock, plan_jobs
+from ...study.runs import ProcessLock, plan_jobs, policy_of
 from ...world.errors import SimError
 from .._episode_runner import EpisodeRunner
 from .._files import templates_of, write_or_check_settings
@@ -25,6 +23,15 @@ from ._policy_space import PolicyRange, PolicySpace
 from ._settings import TuneSettings
 
 _SETTINGS_FILE: Final = "tune.json"
+_RESULTS: Final = (
+    "evaluations/*.csv",
+    "evaluations/*.damaged",
+    "trials.csv",
+    "importances.json",
+    "chosen.json",
+    "chosen/*.yaml",
+    "pareto.png",
+)
 # Evaluated beside the trials.
 _PRESETS: Final = ("blind", "conservative", "balanced", "assertive")
 # A trial in which the robot moved into a person is not chosen.
@@ -81,6 +88,7 @@ def tune(
     *,
     workers: int,
     resume: bool,
+    overwrite: bool = False,
     report: Callable[[Tuning], None] = lambda tuning: None,
 ) -> Tuning:
     """Search until all trials are finished, by this or other processes.
@@ -90,12 +98,13 @@ def tune(
         folder: made when missing; holds the study.
         workers: number of processes that run episodes.
         resume: continue the search in the folder.
+        overwrite: replace the search in the folder.
         report: called with the result while the study is open.
 
     Raises:
         SimError: settings that do not fit together, or a preset with an episode without a result.
     """
-    base = AwarenessPolicy.model_validate(yaml.safe_load(settings.policy))
+    base = policy_of(settings.policy)
     ranges = {key: PolicyRange.model_validate(each) for key, each in settings.ranges.items()}
     space = PolicySpace(base, ranges)
     optimizer = Optimizer(
@@ -115,7 +124,14 @@ def tune(
     )
     anchors = _anchors(settings.policy_name, base)
     write_or_check_settings(
-        settings, folder, _SETTINGS_FILE, "tuning", resume=resume, may_grow=["trials"]
+        settings,
+        folder,
+        _SETTINGS_FILE,
+        "tuning",
+        resume=resume,
+        overwrite=overwrite,
+        results=_RESULTS,
+        may_grow=["trials"],
     )
     with (
         SharedStudy(folder, "tune", optimizer, settings.trials) as study,

@@ -67,6 +67,7 @@ from awarenav.cli import POSITIVE, FilePath, OneOf, command, option, options
 @options.workers(1)
 @options.out_folder("tune")
 @options.resume()
+@options.overwrite()
 @options.as_json()
 def tune(**values: Any) -> int:
     """Search for policies that lose less time and keep the separation margin.

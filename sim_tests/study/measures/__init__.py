@@ -21,7 +21,12 @@ if TYPE_CHECKING:
         won_back,
     )
     from ._record import RECORD_COLUMNS, EpisodeRecord, record_row
-    from ._record_file import read_record_file, read_records, write_records
+    from ._record_file import (
+        read_record_file,
+        read_records,
+        salvage_record_file,
+        write_records,
+    )
     from ._repeatability import nondeterminism_notes
     from ._summary import BASELINE, Comparison, Summary, SummaryRow, summarise
     from ._summary_text import summary_text, table_text
@@ -51,6 +56,7 @@ __all__ = [
     "read_record_file",
     "read_records",
     "record_row",
+    "salvage_record_file",
     "summarise",
     "summary_text",
     "table_text",
@@ -98,6 +104,7 @@ __getattr__ = lazy_names(
         "._record_file": (
             "read_record_file",
             "read_records",
+            "salvage_record_file",
             "write_records",
         ),
         "._summary": (

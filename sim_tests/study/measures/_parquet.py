@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Final
 
+from awarenav.files import atomic_path
+
 from ...world.errors import SimError
 from ._record import COLUMN_KINDS, EpisodeRecord, check_columns, one_line, parse_row, rounded
 
@@ -35,12 +37,8 @@ def write_parquet(path: Path, records: tuple[EpisodeRecord, ...]) -> None:
     columns = {
         name: [_parquet_value(getattr(record, name)) for record in records] for name in COLUMN_KINDS
     }
-    partial = path.with_name(path.name + ".part")
-    try:
-        pq.write_table(pa.table(columns, schema=_SCHEMA), partial)
-        partial.replace(path)
-    except OSError as cause:
-        raise SimError(f"cannot write the episodes {path}: {cause}") from cause
+    with atomic_path(path, SimError) as part:
+        pq.write_table(pa.table(columns, schema=_SCHEMA), part)
 
 
 def read_parquet(path: Path) -> tuple[EpisodeRecord, ...]:

@@ -5,12 +5,16 @@ from __future__ import annotations
 import csv
 import io
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from awarenav.files import atomic_path
+from awarenav.line_files import DamagedLine
+
 from ...world.errors import SimError
+from ._ranges import check_ranges
 from ._record import RECORD_COLUMNS, EpisodeRecord, check_columns, parse_row, record_row
 
 _PARQUET_SUFFIX: Final = ".parquet"
@@ -29,6 +33,23 @@ class RecordFile:
 
     records: tuple[EpisodeRecord, ...]
     torn: str
+    whole_bytes: int
+
+
+@dataclass(frozen=True, slots=True)
+class SalvagedFile:
+    """The content of a table of episodes that may be damaged.
+
+    Attributes:
+        rows: number and content of the line, and the record, of each row that is not damaged.
+        damaged: the other lines.
+        torn: the file ends without a line end.
+        whole_bytes: length of the file up to its last line end.
+    """
+
+    rows: tuple[tuple[int, bytes, EpisodeRecord], ...]
+    damaged: tuple[DamagedLine, ...]
+    torn: bool
     whole_bytes: int
 
 
@@ -69,6 +90,37 @@ def read_record_file(path: Path | str) -> RecordFile:
     return RecordFile(tuple(records), torn, whole_bytes)
 
 
+def salvage_record_file(path: Path) -> SalvagedFile:
+    """Read ``episodes.csv`` line by line, leaving out the lines that are damaged.
+
+    A line is damaged if it is not a row, or has a number that no episode can have. A damaged header
+    is read as that of this version.
+
+    Raises:
+        SimError: the file cannot be read.
+    """
+    try:
+        *lines, torn = path.read_bytes().split(b"\n")
+    except OSError as cause:
+        raise SimError(f"cannot read the episodes {path}: {cause.strerror or cause}") from cause
+    columns: Sequence[str] = RECORD_COLUMNS
+    rows, damaged = [], []
+    for number, line in enumerate(lines, start=1):
+        source = f"{path}, line {number}"
+        try:
+            cells = next(csv.reader([line.decode("utf-8-sig")], strict=True), [])
+            if number == 1:
+                check_columns(cells, source)
+                columns = cells
+            elif cells:
+                record = check_ranges(parse_row(columns, cells, source), source)
+                rows.append((number, line, record))
+        except (UnicodeDecodeError, csv.Error, SimError) as cause:
+            damaged.append(DamagedLine(number, line, str(cause)))
+    whole_bytes = sum(len(line) + 1 for line in lines)
+    return SalvagedFile(tuple(rows), tuple(damaged), bool(torn), whole_bytes)
+
+
 def read_records(path: Path | str) -> tuple[EpisodeRecord, ...]:
     """Return the episodes of a CSV file, or of a file with the suffix ``.parquet``.
 
@@ -104,12 +156,9 @@ def write_records(path: Path | str, records: Iterable[EpisodeRecord]) -> None:
 
         write_parquet(path, tuple(records))
         return
-    partial = path.with_name(path.name + ".part")
-    try:
-        with partial.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(RECORD_COLUMNS)
-            writer.writerows(record_row(record) for record in records)
-        partial.replace(path)
-    except OSError as cause:
-        raise SimError(f"cannot write the episodes {path}: {cause.strerror or cause}") from cause
+    if not path.parent.is_dir():
+        raise SimError(f"cannot write the episodes {path}: there is no folder {path.parent}")
+    with atomic_path(path, SimError) as part, part.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(RECORD_COLUMNS)
+        writer.writerows(record_row(record) for record in records)

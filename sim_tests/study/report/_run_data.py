@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 from dataclasses import dataclass, fields
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import yaml
+from perception.documents import parse_json, parse_yaml, read_json, read_lines
 
 from ...world.errors import SimError
 from ..measures import EpisodeRecord, read_record_file
@@ -95,9 +94,9 @@ class RunData:
 def _scenario_identity(text: str) -> tuple[str, int]:
     """Return name and version of a scenario's YAML; an empty name for an unreadable one."""
     try:
-        content = yaml.load(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+        content = parse_yaml(text, "scenario", SimError)
         return str(content["name"]), int(content.get("version", 1))
-    except (yaml.YAMLError, AttributeError, KeyError, TypeError, ValueError):
+    except (AttributeError, KeyError, TypeError, ValueError):
         return "", 1
 
 
@@ -108,9 +107,9 @@ def _read_jobs(path: Path, missing: list[str]) -> tuple[Job, ...]:
         return ()
     jobs: list[Job] = []
     names = {field.name for field in fields(Job)}
-    for line in path.read_text("utf-8", errors="replace").splitlines():
+    for line in read_lines(path, SimError):
         try:
-            content = json.loads(line)
+            content = parse_json(line, "job", SimError)
             jobs.append(Job(**{key: content[key] for key in content if key in names}))
         except (ValueError, TypeError):
             # The number of a job is that of its line, so no later line can be used.
@@ -124,11 +123,11 @@ def _read_jobs(path: Path, missing: list[str]) -> tuple[Job, ...]:
 def _read_about(path: Path, missing: list[str]) -> dict[str, Any]:
     """Return the content of ``run.json``; note in ``missing`` why it is empty."""
     try:
-        content = json.loads(path.read_text("utf-8"))
-    except FileNotFoundError:
-        missing.append(f"There is no {path.name}: the command and the versions are not known.")
-        return {}
-    except (OSError, ValueError):
+        if not path.exists():
+            missing.append(f"There is no {path.name}: the command and the versions are not known.")
+            return {}
+        content = read_json(path, SimError)
+    except SimError:
         missing.append(f"{path.name} is unreadable: the command and the versions are not known.")
         return {}
     if not isinstance(content, dict):

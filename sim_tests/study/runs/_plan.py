@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from awarenav.errors import not_one_of
 from nav_adapter import AwarenessPolicy
 from perception.arrays import finite_number
+from perception.documents import parse_yaml
 
 from ...crossing.eyes import ORACLE, PerceptionKind
 from ...crossing.faults import Fault
@@ -138,8 +139,8 @@ def template_of(text: str) -> ScenarioTemplate:
 def policy_of(text: str) -> AwarenessPolicy:
     """Return the policy of a job; raise SimError for YAML that holds none."""
     try:
-        return AwarenessPolicy.model_validate(yaml.safe_load(text))
-    except (ValidationError, yaml.YAMLError) as cause:
+        return AwarenessPolicy.model_validate(parse_yaml(text, "it", SimError))
+    except (ValidationError, SimError) as cause:
         raise SimError(f"the policy of an episode is not valid: {cause}") from cause
 
 
@@ -149,8 +150,8 @@ def fault_of(text: str) -> Fault | None:
     if not text:
         return None
     try:
-        return Fault.model_validate(yaml.safe_load(text))
-    except (ValidationError, yaml.YAMLError) as cause:
+        return Fault.model_validate(parse_yaml(text, "it", SimError))
+    except (ValidationError, SimError) as cause:
         raise SimError(f"the fault of an episode is not valid: {cause}") from cause
 
 

@@ -40,14 +40,14 @@ def run_jobs(
 
     Args:
         jobs: the episodes, e.g. from :func:`plan_jobs`.
-        out_dir: folder, made when missing. A complete run in it is replaced.
+        out_dir: folder, made when missing.
         workers: number of processes; 1 runs in this process, None takes one per core.
         scheduler: address of a Dask scheduler (``"tcp://…"``), or ``"local"`` for a cluster of
             ``workers`` processes on this computer; None runs without Dask.
         time_limit_s: wall-clock limit of an episode; one that takes longer (a planner that hangs)
             is ended with an error. None for no limit; not with a scheduler.
         resume: continue the same run in ``out_dir``.
-        overwrite: replace an unfinished run in ``out_dir``, too.
+        overwrite: replace the run in ``out_dir``, which is refused otherwise.
         progress: show progress and the time left on standard error.
         about: command and settings, kept in ``run.json``.
 

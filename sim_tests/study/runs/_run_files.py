@@ -7,6 +7,8 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, Final
 
+from perception.documents import parse_json, read_json, read_lines
+
 from ...world.errors import SimError
 from ._job import Job
 
@@ -46,6 +48,11 @@ class RunFiles:
         return self.folder / "errors.log"
 
     @property
+    def damaged(self) -> tuple[Path, ...]:
+        """Lines of the table and of the plan that were damaged; absent if none was."""
+        return tuple(path.with_name(path.name + ".damaged") for path in (self.episodes, self.jobs))
+
+    @property
     def lock(self) -> Path:
         """The lock file of the process that runs episodes into the folder."""
         return self.folder / ".lock"
@@ -56,11 +63,10 @@ def job_line(job: Job) -> str:
     return json.dumps(asdict(job), ensure_ascii=False) + "\n"
 
 
-def parse_job(line: str, source: str) -> Job:
+def parse_job(line: str | bytes, source: str) -> Job:
     """Return the job of a line; raise SimError, naming the source, for a line that is none."""
     try:
-        data = json.loads(line)
-        return Job(**data)
+        return Job(**parse_json(line, source, SimError))
     except (ValueError, TypeError) as cause:
         raise SimError(
             f"{source} is not an episode: it must be an object with the keys "
@@ -71,20 +77,18 @@ def parse_job(line: str, source: str) -> Job:
 def read_jobs(folder: Path) -> tuple[Job, ...]:
     """Return the jobs of a run; raise SimError for a folder that holds none."""
     path = RunFiles(folder).jobs
-    try:
-        with path.open(encoding="utf-8") as file:
-            return tuple(
-                parse_job(line, f"{path}, line {number}")
-                for number, line in enumerate(file, start=1)
-            )
-    except OSError as cause:
-        raise SimError(f"{folder} is not the folder of a run: no {path.name} in it") from cause
+    if not path.is_file():
+        raise SimError(f"{folder} is not the folder of a run: no {path.name} in it")
+    return tuple(
+        parse_job(line, f"{path}, line {number}")
+        for number, line in enumerate(read_lines(path, SimError), start=1)
+    )
 
 
 def read_run(folder: Path) -> dict[str, Any]:
     """Return the content of ``run.json``; empty without one."""
     try:
-        content = json.loads(RunFiles(folder).run.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        content = read_json(RunFiles(folder).run, SimError)
+    except SimError:
         return {}
     return content if isinstance(content, dict) else {}

@@ -5,45 +5,44 @@ from __future__ import annotations
 import csv
 import io
 import json
-import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from contextlib import AbstractContextManager
-from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
+
+from awarenav.files import atomic_path, write_text
+from awarenav.line_files import DamagedLine, LineFile, set_aside
 
 from ...world.errors import SimError
-from ..measures import RECORD_COLUMNS, EpisodeRecord, read_record_file, record_row, write_records
+from ..measures import RECORD_COLUMNS, EpisodeRecord, record_row, salvage_record_file, write_records
 from ._job import Job
 from ._plan import JobKey, describe, job_key
 from ._process_lock import ProcessLock
-from ._run_files import JOB_FIELDS, RunFiles, job_line, parse_job, read_run
-
-# Windows opens files as text unless told otherwise; other systems have no such flag.
-_BINARY: Final = getattr(os, "O_BINARY", 0)
+from ._resumed_plan import ResumedPlan, read_plan
+from ._run_files import RunFiles, job_line, read_run
 
 
 class RunFolder(AbstractContextManager["RunFolder"]):
     """The folder of a run, open for writing; a row is in the file as soon as it is added.
 
-    A row is written by one system call. A process that is killed at any moment therefore leaves
-    whole rows and at most one unfinished row. Resuming cuts that row off and runs its episode
-    again.
+    A process that is killed at any moment leaves whole rows and at most one unfinished row.
+    Resuming cuts that row off and runs its episode again. A damaged line of ``episodes.csv`` or
+    ``jobs.jsonl`` is set aside in a file ``.damaged``, and its episode runs again, too.
 
     Args:
         path: the folder, made when missing.
         jobs: all episodes of the run.
         about: content of ``run.json`` beside the state: versions, command, settings.
         resume: continue the run that the folder holds.
-        overwrite: replace an unfinished run.
+        overwrite: replace the run that the folder holds.
 
     Attributes:
         done: records of the episodes that are finished, by the number of their job.
 
     Raises:
         SimError: the folder cannot be written; another process runs into it; it holds other
-            episodes than these (with ``resume``); or it holds an unfinished run (with neither
-            ``resume`` nor ``overwrite``).
+            episodes than these (with ``resume``); or it holds a run, finished or not, or another
+            program's ``episodes.csv`` (with neither ``resume`` nor ``overwrite``).
     """
 
     def __init__(
@@ -59,20 +58,21 @@ class RunFolder(AbstractContextManager["RunFolder"]):
         self._keys = {job_key(job): number for number, job in enumerate(jobs)}
         self._about = dict(about)
         self._total = len(jobs)
-        self._file = -1
+        self._table: LineFile | None = None
         self._process_lock: ProcessLock | None = None
         self.done: dict[int, EpisodeRecord] = {}
         try:
             path.mkdir(parents=True, exist_ok=True)
-            flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | _BINARY
-            self._file = os.open(self._files.episodes, flags, 0o666)
+            self._table = LineFile(self._files.episodes, SimError)
             self._lock()
             if resume:
-                self._check_plan(jobs)
-                self._continue()
+                plan = self._check_plan(jobs)
+                self._continue(plan.doubtful)
+                if plan.damaged:
+                    self._write_jobs(jobs)
             else:
                 if not overwrite:
-                    self._refuse_unfinished()
+                    self._refuse_occupied()
                 self._start(jobs)
         except OSError as cause:
             self.close()
@@ -93,12 +93,12 @@ class RunFolder(AbstractContextManager["RunFolder"]):
 
     def add(self, number: int, record: EpisodeRecord, traceback: str = "") -> None:
         """Write the row of a job, and the traceback of its error."""
-        self.done[number] = record
         self._append(record_row(record))
+        self.done[number] = record
         if traceback:
             head = f"== episode {number}: {describe(record_key(record))}\n"
-            with self._files.errors.open("a", encoding="utf-8") as file:
-                file.write(f"{head}{traceback.rstrip()}\n\n")
+            with LineFile(self._files.errors, SimError) as file:
+                file.add(f"{head}{traceback.rstrip()}\n\n")
 
     def finish(self) -> tuple[EpisodeRecord, ...]:
         """Write the rows in the order of the jobs and mark the run as complete.
@@ -122,31 +122,44 @@ class RunFolder(AbstractContextManager["RunFolder"]):
             raise SimError(f"another process is running episodes into {self._files.folder}")
 
     def _close_table(self) -> None:
-        if self._file >= 0:
-            os.close(self._file)
-            self._file = -1
+        if self._table is not None:
+            self._table.close()
+            self._table = None
 
-    def _refuse_unfinished(self) -> None:
-        about = read_run(self._files.folder)
-        if about.get("state") == "running":
-            done = read_record_file(self._files.episodes).records
-            if done:
-                raise SimError(
-                    f"{self._files.folder} holds an unfinished run, with {len(done)} of "
-                    f"{about.get('episodes', '?')} episodes done: go on with --resume "
-                    "(resume=True), or choose another folder or delete this one"
-                )
+    def _refuse_occupied(self) -> None:
+        """Refuse a finished run, an unfinished one with episodes, and another program's table."""
+        folder, about = self._files.folder, read_run(self._files.folder)
+        done = self._files.episodes.read_bytes().count(b"\n") - 1  # the header is no episode
+        if about.get("state") == "running" and done > 0:
+            raise SimError(
+                f"{folder} holds an unfinished run, with {done} of {about.get('episodes', '?')} "
+                "episodes done: go on with --resume (resume=True), replace it with --overwrite "
+                "(overwrite=True), or choose another --out"
+            )
+        if about.get("state") == "complete":
+            raise SimError(
+                f"{folder} holds a finished run of {about.get('episodes', '?')} episodes: replace "
+                "it with --overwrite (overwrite=True), choose another --out, or read its table "
+                "again with --resume (resume=True)"
+            )
+        if about.get("state") != "running" and done >= 0:
+            raise SimError(
+                f"{folder} holds a table {self._files.episodes.name} that is not of a run: there "
+                f"is no {self._files.run.name} beside it; choose another --out, or replace it "
+                "with --overwrite (overwrite=True)"
+            )
 
     def _start(self, jobs: Sequence[Job]) -> None:
         # The old table goes first, so that its rows can never be taken for those of the new jobs.
-        os.ftruncate(self._file, 0)
-        for path in (self._files.parquet, self._files.errors):
+        self._open_table.cut(0)
+        for path in (self._files.parquet, self._files.errors, *self._files.damaged):
             path.unlink(missing_ok=True)
         self._write_run("running")
-        _write_whole(self._files.jobs, (job_line(job) for job in jobs))
+        self._write_jobs(jobs)
         self._append(RECORD_COLUMNS)
 
-    def _check_plan(self, jobs: Sequence[Job]) -> None:
+    def _check_plan(self, jobs: Sequence[Job]) -> ResumedPlan:
+        """Return the plan in the folder after checking that it holds these jobs."""
         path, folder = self._files.jobs, self._files.folder
         if not path.exists():
             raise SimError(f"{folder} holds no run to resume: there is no {path.name} in it")
@@ -158,44 +171,71 @@ class RunFolder(AbstractContextManager["RunFolder"]):
                     f"the run in {folder} was begun with {name} {before}, and this is {version}:"
                     " their results do not belong into one table; run into another folder"
                 )
-        before_count = 0
-        with path.open(encoding="utf-8") as file:
-            for number, line in enumerate(file):
-                before_count += 1
-                if number < len(jobs) and line != job_line(jobs[number]):
-                    _refuse_other_plan(path, number, line, jobs[number])
-        if before_count != len(jobs):
+        plan = read_plan(path, jobs)
+        set_aside(path, plan.damaged, "their episodes run again", SimError)
+        count = about.get("episodes", len(jobs)) if plan.damaged else plan.lines
+        if count != len(jobs):
             raise SimError(
-                f"the run in {folder} has {before_count} episodes, and {len(jobs)} were asked "
+                f"the run in {folder} has {count} episodes, and {len(jobs)} were asked "
                 "for: resume with the arguments that began it, which run.json holds, or run into "
                 "another folder"
             )
+        return plan
 
-    def _continue(self) -> None:
+    def _continue(self, doubtful: Set[int]) -> None:
+        """Take over the rows of the table; set aside what is damaged, and rows of doubtful jobs."""
         path = self._files.episodes
-        found = read_record_file(path)
-        os.ftruncate(self._file, found.whole_bytes)
-        if found.whole_bytes == 0:
-            self._append(RECORD_COLUMNS)
-        for record in found.records:
-            number = self._keys.get(record_key(record))
+        found = salvage_record_file(path)
+        damaged = list(found.damaged)
+        versions: dict[JobKey, set[EpisodeRecord]] = {}
+        for _, _, record in found.rows:
+            versions.setdefault(record_key(record), set()).add(record)
+        for line_number, line, record in found.rows:
+            key = record_key(record)
+            number = self._keys.get(key)
             if number is None:
-                raise SimError(
-                    f"{path} holds an episode that {self._files.jobs.name} does not: "
-                    f"{describe(record_key(record))}"
-                )
-            self.done[number] = record
+                reason = f"no line of {self._files.jobs.name} has this episode: {describe(key)}"
+            elif number in doubtful:
+                reason = f"the line of its episode in {self._files.jobs.name} is damaged"
+            elif len(versions[key]) > 1:  # nothing says which of them is right
+                reason = f"another row has this episode: {describe(key)}"
+            else:
+                self.done[number] = record
+                continue
+            damaged.append(DamagedLine(line_number, line, reason))
+        set_aside(path, damaged, "their episodes run again", SimError)
+        if damaged:
+            self._close_table()
+            write_records(path, self.done.values())
+            self._table = LineFile(path, SimError)
+        else:
+            self._open_table.cut(found.whole_bytes)
+            if found.whole_bytes == 0:
+                self._append(RECORD_COLUMNS)
         self._write_run("running")
+
+    @property
+    def _open_table(self) -> LineFile:
+        if self._table is None:
+            raise SimError(f"the folder {self._files.folder} of a run is closed")
+        return self._table
 
     def _append(self, cells: Iterable[str]) -> None:
         line = io.StringIO()
         csv.writer(line, lineterminator="\n").writerow(cells)
-        os.write(self._file, line.getvalue().encode())
+        self._open_table.add(line.getvalue())
+
+    def _write_jobs(self, jobs: Iterable[Job]) -> None:
+        with (
+            atomic_path(self._files.jobs, SimError) as part,
+            part.open("w", encoding="utf-8") as file,
+        ):
+            file.writelines(job_line(job) for job in jobs)
 
     def _write_run(self, state: str) -> None:
         content = {"state": state, "episodes": self._total, **self._about}
         text = json.dumps(content, indent=2, ensure_ascii=False)
-        _write_whole(self._files.run, [text + "\n"])
+        write_text(self._files.run, text + "\n", SimError)
 
 
 def record_key(record: EpisodeRecord) -> JobKey:
@@ -208,25 +248,3 @@ def record_key(record: EpisodeRecord) -> JobKey:
         record.perception,
         record.fault,
     )
-
-
-def _refuse_other_plan(path: Path, number: int, line: str, job: Job) -> None:
-    """Raise SimError, naming the first field in which a line of ``path`` differs from a job."""
-    before, now = asdict(parse_job(line, f"{path}, line {number + 1}")), asdict(job)
-    name = next(each for each in JOB_FIELDS if before[each] != now[each])
-    values = ""
-    if "\n" not in f"{before[name]}{now[name]}":
-        values = f" ({before[name]!r}, now {now[name]!r})"
-    raise SimError(
-        f"the run in {path.parent} has other episodes than these: episode {number} has another "
-        f"{name}{values}; resume with the arguments that began it, which run.json holds, or run "
-        "into another folder"
-    )
-
-
-def _write_whole(path: Path, lines: Iterable[str]) -> None:
-    """Write a file that appears whole or not at all."""
-    partial = path.with_name(path.name + ".part")
-    with partial.open("w", encoding="utf-8") as file:
-        file.writelines(lines)
-    partial.replace(path)

@@ -54,9 +54,9 @@ def test_crossings_write_one_row_per_episode_with_paired_seeds(tmp_path, capsys)
         ("8", "balanced"),
     ]
     first = (out / "episodes.csv").read_bytes()
-    main([*arguments, "--resume"])
-    main(arguments)
-    assert (out / "episodes.csv").read_bytes() == first
+    for again in ("--resume", "--overwrite"):
+        assert main([*arguments, again]) == 0
+        assert (out / "episodes.csv").read_bytes() == first
 
 
 def test_crossings_that_fail_are_reported_and_the_others_are_written(tmp_path, capsys):

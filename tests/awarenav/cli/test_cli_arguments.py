@@ -13,7 +13,16 @@ from awarenav.judge import JudgeConfig
 
 # `render` names the people who appear by an option that elsewhere counts processes.
 OTHER_MEANING = {("render", "--workers")}
-SHARED = ("--seed", "--out", "--workers", "--resume", "--planner", "--policy", "--perception")
+SHARED = (
+    "--seed",
+    "--out",
+    "--workers",
+    "--resume",
+    "--overwrite",
+    "--planner",
+    "--policy",
+    "--perception",
+)
 
 
 def parsed(path, *words):
@@ -80,7 +89,10 @@ def test_options_that_exclude_each_other_are_refused_together(path, name, other,
 
 def test_exclusions_are_those_that_are_known():
     assert {(path[0], name, other) for path, name, other in EXCLUSIVE} == {
-        ("estimate", "--overwrite", "--resume"),
+        *(
+            (name, "--overwrite", "--resume")
+            for name in ("crossings", "estimate", "falsify", "render", "tune")
+        ),
         ("estimate", "--fov-deg", "--camera"),
         ("tracks", "--ids", "--config"),
         ("falsify", "--unsafe-no-floor", "--planner"),

@@ -120,5 +120,5 @@ def test_nested_commands_are_listed_in_a_useful_order(capsys):
 
 def test_options_that_exclude_each_other_are_named_in_the_help():
     text = options_of(COMMANDS["estimate",])["--overwrite"].help
-    assert text == "Replace the file --out. Not with --resume."
+    assert text == "Replace the work in --out. Not with --resume."
     assert app.name == "awarenav"

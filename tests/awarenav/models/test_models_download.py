@@ -11,7 +11,7 @@ from model_server import ModelServer
 
 from awarenav.errors import AwarenavError
 from awarenav.models import BrokenDownloadError, download, extract_member
-from awarenav.models._download import _NoDowngrade
+from awarenav.models._connection import _AllowedRedirects
 
 
 def test_download_appears_whole(server, tmp_path):
@@ -127,7 +127,7 @@ def test_redirects_are_followed_with_the_range(server, tmp_path):
 
 def test_redirect_that_drops_the_encryption_is_refused():
     request = urllib.request.Request("https://somewhere/a.onnx")
-    follow = _NoDowngrade().redirect_request
+    follow = _AllowedRedirects().redirect_request
     arguments = (request, io.BytesIO(), 302, "Found", http.client.HTTPMessage())
     with pytest.raises(AwarenavError, match="not encrypted"):
         follow(*arguments, "http://elsewhere/a.onnx")

@@ -8,6 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from full_disk import files_up_to
 
 from awarenav.cli import main
 from awarenav.records import read_records
@@ -166,3 +167,30 @@ def test_images_are_spread_evenly_over_the_scenes() -> None:
     assert set(scenes) == set(range(7))
     assert RenderConfig(frames=3, scenes=10).scene_count == 3
     assert RenderConfig(frames=400).scene_count == 20
+
+
+def test_a_damaged_line_of_truth_is_set_aside_and_its_image_rendered_again(
+    rendered: Path, tmp_path: Path
+) -> None:
+    whole = contents(rendered)
+    for name, data in whole.items():
+        (tmp_path / name).write_bytes(data)
+    lines = whole["truth.jsonl"].splitlines(keepends=True)
+    of_another_set = lines[3].replace(b"000003.png", b"000123.png")
+    (tmp_path / "truth.jsonl").write_bytes(
+        b"".join([*lines[:2], lines[2][:80] + of_another_set, *lines[4:]])
+    )
+    render(CONFIG, tmp_path, processes=1, progress=False)
+    (tmp_path / "truth.jsonl.damaged").unlink()
+    assert contents(tmp_path) == whole
+
+
+def test_a_full_disk_is_said_and_the_set_continues(rendered: Path, tmp_path: Path) -> None:
+    whole = contents(rendered)
+    largest = max(len(data) for data in whole.values())
+    with files_up_to(len(whole["truth.jsonl"]) // 2), pytest.raises(SimError, match="cannot write"):
+        render(CONFIG, tmp_path, processes=1, progress=False)
+    assert largest > len(whole["truth.jsonl"]) // 2
+    assert not list(tmp_path.glob("*.part"))
+    render(CONFIG, tmp_path, processes=1, progress=False)
+    assert contents(tmp_path) == whole

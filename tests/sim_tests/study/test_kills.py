@@ -1,0 +1,82 @@
+"""Every command that resumes is killed at random instants, and ends with the same files."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from paths import ROOT
+from test_overwrite import SCENARIO
+
+from awarenav.cli import main
+
+pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
+
+PROGRAM = Path(__file__).with_name("kill_commands.py")
+COMMANDS = {
+    "crossings": (
+        ["--episodes", "4", "--workers", "1", "--no-report"],
+        ["episodes.csv", "episodes.parquet", "jobs.jsonl"],
+    ),
+    "tune": (
+        ["--trials", "4", "--generation", "2", "--episodes", "1", "--held-out", "1"],
+        ["trials.csv", "chosen.json", "importances.json", "chosen/*.yaml", "evaluations/*.csv"],
+    ),
+    "falsify": (
+        ["--episodes", "8", "--generation", "4", "--worst", "2"],
+        ["episodes.csv", "summary.json", "worst_*.yaml", "policy.yaml", "falsify.png"],
+    ),
+    "render": (
+        ["--frames", "12", "--scenes", "3", "--size", "160x120", "--processes", "1"],
+        ["*.png", "truth.jsonl", "camera.yaml", "render.yaml"],
+    ),
+    "estimate": (["--threads", "1"], ["estimates.jsonl"]),
+}
+
+
+def kill(name, kills, tmp_path, *more):
+    """Kill a command; return what the program says."""
+    options, results = COMMANDS[name]
+    words = [name, *options, *more]
+    if name == "estimate":
+        pictures = tmp_path / "pictures"
+        made = ["render", "--frames", "8", "--size", "320x240", "--processes", "1"]
+        assert main([*made, "--out", str(pictures)]) == 0
+        words.append(str(pictures))
+    elif name != "render":
+        scenario = tmp_path / "short.yaml"
+        scenario.write_text(SCENARIO)
+        words += ["--scenario", str(scenario), "--perception", "truth"]
+    task = {
+        "words": words,
+        "out": "estimates.jsonl" if name == "estimate" else "out",
+        "results": results,
+        "kills": kills,
+        "seed": 20,
+        "folder": str(tmp_path),
+    }
+    found = subprocess.run(
+        [sys.executable, str(PROGRAM), json.dumps(task)],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path[1:]])},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert found.returncode == 0, found.stdout + found.stderr
+    return found.stdout
+
+
+def test_crossings_killed_twice_end_with_the_same_files(tmp_path):
+    assert kill("crossings", 2, tmp_path, "--policy", "blind").startswith("2 kills")
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("name", COMMANDS)
+def test_twenty_kills_at_random_instants_change_no_file(name, tmp_path):
+    said = kill(name, 20, tmp_path)
+    print(name, said)
+    assert said.startswith("20 kills")
