@@ -45,12 +45,14 @@ class SalvagedFile:
         damaged: the other lines.
         torn: the file ends without a line end.
         whole_bytes: length of the file up to its last line end.
+        appendable: its columns are those of this version, in their order.
     """
 
     rows: tuple[tuple[int, bytes, EpisodeRecord], ...]
     damaged: tuple[DamagedLine, ...]
     torn: bool
     whole_bytes: int
+    appendable: bool
 
 
 def read_record_file(path: Path | str) -> RecordFile:
@@ -118,7 +120,8 @@ def salvage_record_file(path: Path) -> SalvagedFile:
         except (UnicodeDecodeError, csv.Error, SimError) as cause:
             damaged.append(DamagedLine(number, line, str(cause)))
     whole_bytes = sum(len(line) + 1 for line in lines)
-    return SalvagedFile(tuple(rows), tuple(damaged), bool(torn), whole_bytes)
+    appendable = tuple(columns) == tuple(RECORD_COLUMNS)
+    return SalvagedFile(tuple(rows), tuple(damaged), bool(torn), whole_bytes, appendable)
 
 
 def read_records(path: Path | str) -> tuple[EpisodeRecord, ...]:

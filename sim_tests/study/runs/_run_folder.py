@@ -204,7 +204,7 @@ class RunFolder(AbstractContextManager["RunFolder"]):
                 continue
             damaged.append(DamagedLine(line_number, line, reason))
         set_aside(path, damaged, "their episodes run again", SimError)
-        if damaged:
+        if damaged or not found.appendable:
             self._close_table()
             write_records(path, self.done.values())
             self._table = LineFile(path, SimError)

@@ -59,6 +59,15 @@ def test_a_full_disk_ends_a_run_between_rows_and_it_is_resumed(whole, tmp_path):
     assert not (tmp_path / "episodes.csv.damaged").exists()
 
 
+def test_a_run_begun_before_the_last_column_existed_is_resumed(whole, run):
+    """Its table gets the columns of this version, and no row is set aside."""
+    narrow = b"".join(row.rstrip(b"\n").rpartition(b",")[0] + b"\n" for row in rows(whole)[:3])
+    (run / "episodes.csv").write_bytes(narrow)
+    run_jobs(JOBS, run, workers=1, resume=True)
+    assert table(run) == table(whole)
+    assert not (run / "episodes.csv.damaged").exists()
+
+
 DAMAGE = {
     "half a row, then the next": (lambda row, after: row[:60] + after, "cells"),
     "half a name, then the next": (lambda row, after: row[:3] + after, "has this episode"),
