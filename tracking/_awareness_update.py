@@ -83,9 +83,7 @@ def update_awareness(
     )
 
 
-def _choose(
-    mask: BoolArray, first: AwarenessBelief, second: AwarenessBelief
-) -> AwarenessBelief:
+def _choose(mask: BoolArray, first: AwarenessBelief, second: AwarenessBelief) -> AwarenessBelief:
     """Return the first belief where ``mask`` (N,) is True, the second elsewhere."""
     return AwarenessBelief(
         np.where(mask, first.mean, second.mean),

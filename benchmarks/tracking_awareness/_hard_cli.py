@@ -78,7 +78,9 @@ def missed_targets(rate_hz: float, scores: AwarenessScores) -> list[str]:
     missed = [] if scores.above_unseen == 0.0 else ["above_unseen"]
     if rate_hz >= JUDGED_FROM_HZ:
         missed += [
-            name for name, (low, high) in TARGETS.items() if not low <= getattr(scores, name) <= high
+            name
+            for name, (low, high) in TARGETS.items()
+            if not low <= getattr(scores, name) <= high
         ]
     return [f"{rate_hz:g} Hz: {name} misses its target" for name in missed]
 

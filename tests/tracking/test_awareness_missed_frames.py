@@ -36,7 +36,7 @@ periods = st.floats(0.02, 1.0) | st.just(math.inf)
 
 
 def bounds_of(
-    alphas: list[float | None | str],
+    alphas: list[float | str | None],
     rate_hz: float,
     std: float = 0.1,
     config: TrackerConfig | None = None,
