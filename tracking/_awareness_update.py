@@ -8,7 +8,7 @@ from perception.arrays import FloatArray
 
 from ._config import AwarenessFilterConfig
 from ._table import BoolArray, TrackTable
-from .awareness_filter import AwarenessBelief, drift, forget, measure
+from .awareness_filter import AwarenessBelief, drift, drift_unseen, forget, measure
 
 
 def belief_of(tracks: TrackTable) -> AwarenessBelief:
@@ -23,6 +23,7 @@ def update_awareness(
     previous_stamp_s: float,
     stamp_s: float,
     interval_s: float,
+    period_s: float,
     seen: BoolArray,
     ambiguous: BoolArray,
     evidence_means: FloatArray,
@@ -36,6 +37,7 @@ def update_awareness(
         previous_stamp_s: stamp of the frame before.
         stamp_s: stamp of the frame.
         interval_s: > 0, time that the frame stands for.
+        period_s: usual time between frames, before this one.
         seen: (N,) True for people in the frame.
         ambiguous: (N,) True for ambiguous matches: the belief drifts as if unseen and is then reset
             to the prior, since the measurement may be another person's.
@@ -49,14 +51,16 @@ def update_awareness(
     before = belief_of(tracks)
     belief, stamps = before, tracks.evidence_stamps_s
     if dt_s > 0.0:
-        unseen_s = max(config.unseen_time_constant_s, config.memory_s)
         no_face_s = max(config.no_face_time_constant_s, config.memory_s)
-        # A face in two frames in a row counts for the time between them, unless it is long.
-        continued = shows_face & (stamps == previous_stamp_s)
-        continued &= dt_s <= config.max_evidence_gap_s
-        constants_s = np.where(observed & ~shows_face, no_face_s, unseen_s)
-        constants_s = np.where(continued, config.evidence_time_constant_s, constants_s)
-        belief = drift(before, dt_s, constants_s, config)
+        # Two faces count for the time between them, missed frames included, unless it is long.
+        continued = shows_face & (stamp_s - stamps <= config.max_evidence_gap_s)
+        faceless = observed & ~shows_face
+        constants_s = np.where(continued, config.evidence_time_constant_s, no_face_s)
+        known = drift(before, dt_s, constants_s, config)
+        unknown = drift_unseen(before, previous_stamp_s, stamp_s, stamps, period_s, config)
+        belief = _choose(continued | faceless, known, unknown)
+        # A person without a face has not just been missed: that ends the grace.
+        stamps = np.where(faceless, np.nan, stamps)
     if shows_face.any():
         measured = measure(belief, evidence_means, evidence_variances, interval_s, config)
         # A tentative track may be clutter: its evidence must never shrink an obstacle.
@@ -65,23 +69,24 @@ def update_awareness(
         if dt_s <= 0.0:
             # A second measurement at the same stamp may only lower the bound.
             counts = shows_face & ((stamps != stamp_s) | (bound < belief.bound))
-        belief = AwarenessBelief(
-            np.where(counts, measured.mean, belief.mean),
-            np.where(counts, measured.variance, belief.variance),
-            np.where(counts, bound, belief.bound),
-        )
+        measured = AwarenessBelief(measured.mean, measured.variance, bound)
+        belief = _choose(counts, measured, belief)
         stamps = np.where(shows_face, stamp_s, stamps)
     if ambiguous.any():
-        fresh = forget(belief, config)
-        belief = AwarenessBelief(
-            np.where(ambiguous, fresh.mean, belief.mean),
-            np.where(ambiguous, fresh.variance, belief.variance),
-            np.where(ambiguous, fresh.bound, belief.bound),
-        )
+        belief = _choose(ambiguous, forget(belief, config), belief)
         stamps = np.where(ambiguous, np.nan, stamps)
     return tracks.replaced(
         awareness_means=np.asarray(belief.mean),
         awareness_variances=np.asarray(belief.variance),
         awareness_bounds=np.asarray(belief.bound),
         evidence_stamps_s=stamps,
+    )
+
+
+def _choose(mask: BoolArray, first: AwarenessBelief, second: AwarenessBelief) -> AwarenessBelief:
+    """Return the first belief where ``mask`` (N,) is True, the second elsewhere."""
+    return AwarenessBelief(
+        np.where(mask, first.mean, second.mean),
+        np.where(mask, first.variance, second.variance),
+        np.where(mask, first.bound, second.bound),
     )

@@ -30,10 +30,17 @@ class AwarenessFilterConfig(StrictConfig):
     enough for one turn of the head, about six units of logit(α)."""
 
     evidence_time_constant_s: float = Field(default=1.0, ge=_LEAST_S, le=_MOST_S)
-    """Time constant of the drift to the prior between two frames that show a face."""
+    """Time constant of the drift to the prior between two frames that show a face, and in the
+    first moment (``missed_frame_s``) in which no frame shows the person."""
 
     unseen_time_constant_s: float = Field(default=0.3, ge=_LEAST_S, le=_MOST_S)
     """Time constant of the drift to the prior while no frame shows the person."""
+
+    missed_frame_s: float = Field(default=0.1, ge=0.0, le=1.0)
+    """For this long after the last frame with a face, or for one usual frame interval up to
+    ``max_evidence_gap_s`` if that is longer, a frame without the person may just have missed them:
+    the belief drifts with ``evidence_time_constant_s``. 0 switches this off: a missed frame then
+    counts as unseen at once."""
 
     no_face_time_constant_s: float = Field(default=0.2, ge=_LEAST_S, le=_MOST_S)
     """Time constant of the drift to the prior while the person is seen without a usable face."""
@@ -52,8 +59,16 @@ class AwarenessFilterConfig(StrictConfig):
     min_evidence_std_logit: float = Field(default=0.3, ge=1e-4, le=100.0)
     """Smallest standard deviation of a measurement in logit(α)."""
 
+    typical_evidence_std: float = Field(default=0.1, ge=1e-3, le=0.5)
+    """Standard deviation of α that a measurement usually has; see ``reported_std_weight``."""
+
+    reported_std_weight: float = Field(default=0.6, ge=0.0, le=1.0)
+    """Weight w of a reported σ against the typical one: the filter uses σ^w · σ_typical^(1 − w).
+    Half is right if σ differs between measurements by as large a factor as it is wrong. 1 trusts
+    the reported σ; 0 ignores it."""
+
     max_evidence_std: float = Field(default=0.29, gt=0.0, le=0.5)
-    """An α with a larger standard deviation is no evidence. 1/√12 ≈ 0.29 is the standard deviation
+    """An α with a larger reported σ is no evidence. 1/√12 ≈ 0.29 is the standard deviation
     of the uniform distribution on [0, 1], which carries no information."""
 
     memory_s: float = Field(default=0.0, ge=0.0, le=10.0)

@@ -13,7 +13,7 @@ from perception.arrays import FloatArray
 
 from ._config import TrackerConfig
 from ._errors import TrackingError
-from .awareness_filter import evidence
+from .awareness_filter import evidence, trusted_std
 
 # Limits far beyond any place a robot drives; the squares of larger numbers may overflow.
 _MAX_POSITION_M: Final = 1e7
@@ -105,9 +105,10 @@ def measurements_of(
             f"{_MAX_VARIANCE_M2:g} m² on the floor plane, the pose's share included, "
             f"got {variances[index]:g} m²"
         )
+    stds = np.array([np.nan if one.awareness_std is None else one.awareness_std for one in checked])
     means, evidence_variances = evidence(
         np.array([np.nan if one.awareness is None else one.awareness for one in checked]),
-        np.array([np.nan if one.awareness_std is None else one.awareness_std for one in checked]),
+        trusted_std(stds, config.awareness),
         config.awareness,
     )
     return Measurements(

@@ -11,7 +11,7 @@ from ._step import TrackerState, predicted
 from ._table import BoolArray, TrackTable
 from ._track import PersonTrack, TrackStatus, trusted_track
 from ._track_management import coasted_too_long
-from .awareness_filter import drift, estimate
+from .awareness_filter import drift_unseen, estimate
 
 
 def snapshots(
@@ -32,9 +32,14 @@ def snapshots(
         if not len(tracks):
             return ()
         tracks = predicted(tracks, state.stamp_s, stamp_s, config)
-        awareness = config.awareness
-        unseen_s = max(awareness.unseen_time_constant_s, awareness.memory_s)
-        belief = drift(belief_of(tracks), dt_s, unseen_s, awareness)
+        belief = drift_unseen(
+            belief_of(tracks),
+            state.stamp_s,
+            stamp_s,
+            tracks.evidence_stamps_s,
+            state.period_s,
+            config.awareness,
+        )
     estimated = estimate(belief, config.awareness)
     last_seen_s = tracks.last_seen_s
     # The snapshots share these arrays.

@@ -101,6 +101,7 @@ def advance(
         previous,
         stamp,
         interval_s,
+        state.period_s,
         seen,
         ambiguous,
         means,

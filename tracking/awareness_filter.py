@@ -80,7 +80,7 @@ def prior(config: AwarenessFilterConfig) -> AwarenessBelief:
 
 
 def drift(
-    belief: AwarenessBelief, dt_s: float, time_constant_s: Value, config: AwarenessFilterConfig
+    belief: AwarenessBelief, dt_s: Value, time_constant_s: Value, config: AwarenessFilterConfig
 ) -> AwarenessBelief:
     """Return the belief after ``dt_s`` ≥ 0 without evidence.
 
@@ -88,7 +88,7 @@ def drift(
     P₀). The remembered bound falls to the lowest value of mean − z √variance during the step, and
     never rises.
     """
-    if dt_s <= 0.0:
+    if np.all(np.asarray(dt_s) <= 0.0):
         return belief
     prior_mean, prior_variance = logit(config.prior_awareness), config.prior_std_logit**2
     z = _quantile(config.lower_bound_confidence)
@@ -133,6 +133,61 @@ def evidence(
     std = np.maximum(0.5 * (above - below), config.min_evidence_std_logit)
     usable = awareness_std <= config.max_evidence_std
     return np.where(usable, 0.5 * (above + below), np.nan), np.where(usable, std * std, np.nan)
+
+
+def trusted_std(awareness_std: Value, config: AwarenessFilterConfig) -> FloatArray:
+    """Return the σ of α to use for a reported one: σ^w · σ_typical^(1 − w), for a reported σ ≥ 0.
+
+    The reported σ is itself an estimate. If the logarithms of the true σ and of its error are
+    normal, this is the most likely true σ, and w the first variance's share of their sum. NaN stays
+    NaN, and a σ above ``max_evidence_std`` becomes NaN: it says that there is no evidence.
+    """
+    reported = np.asarray(awareness_std, dtype=np.float64)
+    weight = config.reported_std_weight
+    trusted = reported**weight * config.typical_evidence_std ** (1.0 - weight)
+    return np.where(reported <= config.max_evidence_std, trusted, np.nan)
+
+
+def grace_s(period_s: float, config: AwarenessFilterConfig) -> float:
+    """Return the time after the last face in which a frame may just have missed the person.
+
+    ``period_s`` is the usual time between frames, infinite if unknown.
+    """
+    known_s = period_s if math.isfinite(period_s) else 0.0
+    if config.missed_frame_s <= 0.0:
+        return 0.0
+    return max(config.missed_frame_s, min(known_s, config.max_evidence_gap_s))
+
+
+def drift_unseen(
+    belief: AwarenessBelief,
+    from_s: float,
+    to_s: float,
+    evidence_stamps_s: FloatArray,
+    period_s: float,
+    config: AwarenessFilterConfig,
+) -> AwarenessBelief:
+    """Return the belief at ``to_s`` ≥ ``from_s`` if no frame in between shows the person.
+
+    A single missed frame costs little: until the last face is :func:`grace_s` ago the belief drifts
+    as between two faces, then with ``unseen_time_constant_s`` (or ``memory_s``, if longer). The
+    bound falls throughout, and the result does not depend on frames in between.
+
+    Args:
+        belief: (N,) at ``from_s``.
+        from_s: stamp of the belief.
+        to_s: stamp of the result.
+        evidence_stamps_s: (N,) stamps of the last face; NaN for none.
+        period_s: usual time between frames.
+        config: settings.
+    """
+    unseen_s = max(config.unseen_time_constant_s, config.memory_s)
+    slow_s = max(config.evidence_time_constant_s, unseen_s)
+    left_s = evidence_stamps_s + grace_s(period_s, config) - from_s
+    # fmax takes the 0 where there was no face.
+    slow_until_s = np.minimum(np.fmax(left_s, 0.0), to_s - from_s)
+    belief = drift(belief, slow_until_s, slow_s, config)
+    return drift(belief, to_s - from_s - slow_until_s, unseen_s, config)
 
 
 def measure(

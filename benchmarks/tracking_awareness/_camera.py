@@ -95,8 +95,8 @@ def measure(attention: Attention, rng: np.random.Generator) -> Measured:
     reported_std = REPORTED_STD_FACTOR * std * np.exp(rng.normal(0.0, 0.2, std.shape))
 
     missed = rng.random((frames, people)) < MISSES
-    unseen = missed | _spells(rng, stamps, people, UNSEEN_S)
-    no_face = unseen | _spells(rng, stamps, people, NO_FACE_S)
+    unseen = missed | spells(rng, stamps, people, UNSEEN_S)
+    no_face = unseen | spells(rng, stamps, people, NO_FACE_S)
     alpha, alpha_std = _awareness(heads, angles, reported_std, extra, ~no_face)
     chests, covariances = _measured_chests(rng, heads)
     measured, true = directions(heads, angles), directions(heads, attention.head_rad)
@@ -162,7 +162,7 @@ def _bias(rng: np.random.Generator, yaw_rad: FloatArray) -> FloatArray:
     return np.asarray((weights[0] * np.cos(phase) + weights[1] * np.sin(phase)).sum(axis=-1))
 
 
-def _spells(
+def spells(
     rng: np.random.Generator, stamps_s: FloatArray, people: int, kind: tuple[float, float, float]
 ) -> BoolArray:
     """Return (T, N), True within spells that come at random."""

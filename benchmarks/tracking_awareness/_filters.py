@@ -94,20 +94,30 @@ class LogitGaussian:
             np.full(shape[1], -math.inf),
         )
         lasting = _LastingBias(shape[1], self.bias_std_logit**2, self.bias_s)
-        means, variances = gaussian.evidence(measured.awareness, measured.awareness_std, config)
-        before = np.zeros(shape[1], dtype=bool)
+        stds = gaussian.trusted_std(measured.awareness_std, config)
+        means, variances = gaussian.evidence(measured.awareness, stds, config)
+        evident_s = np.full(shape[1], np.nan)
+        # As in the tracker, the time between frames is not known before there are two.
+        period_s = float(stamps_s[1] - stamps_s[0])
         for row, stamp_s in enumerate(stamps_s):
             dt_s = float(stamp_s - stamps_s[row - 1]) if row else 0.0
             shown = ~np.isnan(means[row])
+            continued = shown & (stamp_s - evident_s <= config.max_evidence_gap_s)
+            faceless = measured.seen[row] & ~shown
             constants_s = np.where(
-                shown | ~measured.seen[row],
-                config.unseen_time_constant_s,
-                config.no_face_time_constant_s,
+                continued, config.evidence_time_constant_s, config.no_face_time_constant_s
             )
-            if dt_s <= config.max_evidence_gap_s:
-                constants_s[shown & before] = config.evidence_time_constant_s
-            before = shown
-            belief = gaussian.drift(belief, dt_s, constants_s, config)
+            known = gaussian.drift(belief, dt_s, constants_s, config)
+            unknown = gaussian.drift_unseen(
+                belief,
+                float(stamp_s) - dt_s,
+                float(stamp_s),
+                evident_s,
+                period_s if row > 1 else math.inf,
+                config,
+            )
+            belief = _choose(continued | faceless, known, unknown)
+            evident_s = np.where(shown, stamp_s, np.where(faceless, np.nan, evident_s))
             mean = np.where(shown, means[row], 0.0)
             variance = np.where(shown, variances[row], 1.0)
             if self.bias_std_logit > 0.0:
@@ -168,6 +178,42 @@ class _LastingBias:
         self._shared = np.where(shown, covariance, self._shared)
         bound = corrected - Z * np.sqrt(remaining)
         return gaussian.AwarenessBelief(corrected, remaining, bound)
+
+
+@dataclass(frozen=True)
+class PlainLogit:
+    """A Kalman filter of logit(α) as a random walk, without a prior to return to: a simple peer.
+
+    The variance of a measurement is (σ / (α (1 − α)))², with the σ as reported.
+
+    Attributes:
+        density_ps: spectral density of the random walk in logit²/s.
+        clip: α is clipped to [clip, 1 − clip].
+    """
+
+    density_ps: float = 8.0
+    clip: float = 0.02
+
+    def __call__(self, stamps_s: FloatArray, measured: Measured) -> tuple[FloatArray, FloatArray]:
+        """Run over all frames."""
+        shape = measured.awareness.shape
+        alpha, lower = np.empty(shape), np.empty(shape)
+        mean, variance = np.full(shape[1], -3.0), np.full(shape[1], 4.0)
+        bound = np.zeros(shape[1])
+        for row in range(len(stamps_s)):
+            dt_s = float(stamps_s[row] - stamps_s[row - 1]) if row else 0.0
+            shown = ~np.isnan(measured.awareness[row])
+            variance = np.minimum(variance + self.density_ps * dt_s, 16.0)
+            clipped = np.clip(measured.awareness[row], self.clip, 1.0 - self.clip)
+            clipped = np.where(shown, clipped, 0.5)
+            std = np.where(shown, measured.awareness_std[row], 1.0) / (clipped * (1.0 - clipped))
+            gain = np.where(shown, variance / (variance + std * std), 0.0)
+            mean = mean + gain * (np.log(clipped / (1.0 - clipped)) - mean)
+            variance = variance * (1.0 - gain)
+            own = np.asarray(gaussian.sigmoid(mean - Z * np.sqrt(variance)))
+            bound = np.where(shown, own, np.minimum(own, bound))
+            alpha[row], lower[row] = gaussian.sigmoid(mean), bound
+        return alpha, lower
 
 
 @dataclass(frozen=True)

@@ -63,12 +63,18 @@ def score(
     evident: BoolArray,
     lower: FloatArray,
     threshold: float,
+    in_sight: BoolArray | None = None,
 ) -> AwarenessScores:
-    """Return the scores of a lower bound; stamps (T,), everything else (T, N)."""
+    """Return the scores of a lower bound; stamps (T,), everything else (T, N).
+
+    Recall and onset are about the frames ``in_sight``: by default those that show the person, so
+    that a missed frame does not count.
+    """
+    in_sight = seen if in_sight is None else in_sight
     above = lower > threshold
     long_unseen = time_unseen_s(stamps_s, seen) > UNSEEN_S
     covered = truth >= lower
-    onsets = onset_times_s(stamps_s, truth, seen, above)
+    onsets = onset_times_s(stamps_s, truth, in_sight, above)
     releases = release_times_s(stamps_s, truth, seen, above)
     return AwarenessScores(
         coverage=_share(covered, evident),
@@ -76,7 +82,7 @@ def score(
         false_share=_share(above, truth < UNAWARE),
         false_unseen=_share(above, long_unseen & (truth < UNAWARE)),
         above_unseen=_share(above, long_unseen),
-        recall=_share(above, seen & (truth >= AWARE)),
+        recall=_share(above, in_sight & (truth >= AWARE)),
         onset_s=float(np.percentile(onsets, 50, method="higher")) if len(onsets) else math.nan,
         onset_found=float(np.isfinite(onsets).mean()) if len(onsets) else math.nan,
         release_s=float(np.percentile(releases, 95)) if len(releases) else math.nan,
