@@ -66,6 +66,7 @@ def associate(
     positions_m: FloatArray,
     covariances_m2: FloatArray,
     confirmed: BoolArray,
+    people: IndexArray,
     measured_m: FloatArray,
     noises_m2: FloatArray,
     gates: Gates,
@@ -82,6 +83,7 @@ def associate(
         positions_m: (N, 2) predicted positions.
         covariances_m2: (N, 2, 2) of the predicted positions.
         confirmed: (N,) True for the tracks of the first round.
+        people: (N,) equal for tracks of one person, which do not make each other ambiguous.
         measured_m: (M, 2) measured positions, in the same frame.
         noises_m2: (M, 2, 2) of the measured positions, positive definite.
         gates: a match must pass both gates.
@@ -102,7 +104,7 @@ def associate(
         _solve(edges.where(~first & ~taken[edges.measurements]), gates.miss_cost, partner)
     tracks = np.flatnonzero(partner >= 0)
     measurements = partner[tracks]
-    ambiguous = _ambiguities(edges, partner, positions_m, measured_m, gates)
+    ambiguous = _ambiguities(edges, partner, positions_m, people, measured_m, gates)
     return Matches(tracks, measurements, ambiguous[tracks])
 
 
@@ -162,6 +164,7 @@ def _ambiguities(
     edges: _Edges,
     partner: IndexArray,
     positions_m: FloatArray,
+    people: IndexArray,
     measured_m: FloatArray,
     gates: Gates,
 ) -> BoolArray:
@@ -174,7 +177,8 @@ def _ambiguities(
     holder[edges.measurements[chosen]] = edges.tracks[chosen]
     limit = np.full(len(positions_m) + 1, -np.inf)  # the last row is that of no track
     limit[edges.tracks[chosen]] = edges.costs[chosen] + gates.ambiguity_margin
-    rival = edges.where(~chosen)
+    owner = holder[edges.measurements]
+    rival = edges.where(~chosen & ((owner < 0) | (people[edges.tracks] != people[owner])))
     reach2 = gates.ambiguity_distance_m**2
 
     # Rival measurements: the track could have matched another measurement.

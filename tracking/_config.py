@@ -146,6 +146,14 @@ class TrackerConfig(StrictConfig):
     """A tentative track unseen for longer than this is deleted, or after as many missed frames in a
     row as happen to 1 % of people by chance: two at the default ``detection_probability``."""
 
+    twin_distance_m: float = Field(default=0.5, ge=0.0, le=2.0)
+    """A track that was born no further than this from another may be its twin: a second track of
+    the same person, from a detector that reports people twice. 0 for no twins."""
+
+    twin_logit: float = Field(default=5.0, ge=1.0, le=1e3)
+    """A track counts as a twin, and is not reported, once it is exp(``twin_logit``) times likelier
+    to be one than another person, judged by the frames that show one of the two alone."""
+
     max_missed_s: float = Field(default=1.2, ge=_LEAST_S, le=_MOST_S)
     """A confirmed track is deleted after this time in which frames should have shown it and did
     not, which needs a view; or if it was last seen at an exit that the tracker has learned, and

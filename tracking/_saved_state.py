@@ -46,6 +46,10 @@ class _TracksRecord(StrictConfig):
     birth_stamps_s: list[float]
     birth_places_camera_m: list[_Two]
     last_places_camera_m: list[_Two]
+    host_ids: list[int]
+    twin_logits: list[float]
+    twin_visibilities: list[float]
+    twins: list[bool]
 
     @model_validator(mode="after")
     def _check_consistency(self) -> _TracksRecord:
@@ -56,6 +60,13 @@ class _TracksRecord(StrictConfig):
             raise ValueError(f"ids must be above 0 and increase, got {self.ids}")
         if any(not variance > 0.0 for variance in self.awareness_variances):
             raise ValueError("awareness_variances must be above 0")
+        known = {0, *self.ids}
+        for own, host, twin in zip(self.ids, self.host_ids, self.twins, strict=True):
+            if host == own or host not in known or (twin and host == 0):
+                raise ValueError(
+                    f"host_ids must hold the id of another track, or 0 without a twin, got {host} "
+                    f"for track {own}"
+                )
         return self
 
 
@@ -250,6 +261,10 @@ def state_of(record: _StateRecord, confirm_hits: int, name: str) -> TrackerState
         birth_stamps_s=_array(tracks.birth_stamps_s),
         birth_places_camera_m=_array(tracks.birth_places_camera_m).reshape(count, 2),
         last_places_camera_m=_array(tracks.last_places_camera_m).reshape(count, 2),
+        host_ids=np.array(tracks.host_ids, dtype=np.int64),
+        twin_logits=_array(tracks.twin_logits),
+        twin_visibilities=_array(tracks.twin_visibilities),
+        twins=np.array(tracks.twins, dtype=np.bool_),
     )
     events = record.exits
     exits = Exits(
@@ -307,6 +322,10 @@ def _plain_state(state: TrackerState) -> dict[str, Any]:
             "birth_stamps_s": tracks.birth_stamps_s.tolist(),
             "birth_places_camera_m": tracks.birth_places_camera_m.tolist(),
             "last_places_camera_m": tracks.last_places_camera_m.tolist(),
+            "host_ids": tracks.host_ids.tolist(),
+            "twin_logits": tracks.twin_logits.tolist(),
+            "twin_visibilities": tracks.twin_visibilities.tolist(),
+            "twins": tracks.twins.tolist(),
         },
     }
 

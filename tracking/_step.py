@@ -25,6 +25,7 @@ from ._track_management import (
     missed_time_s,
     record_hits,
 )
+from ._twins import same_person, with_hosts, with_lower_evidence, with_twins, without
 from ._views import View
 
 # Share of a new interval in the usual time between frames.
@@ -79,16 +80,17 @@ def advance(
     tracks = state.tracks
     measured = frame.measurements
     if len(tracks) and dt_s > 0.0:
-        tracks = tracks.take(~expired_before(tracks, stamp, period_s, config, has_view))
+        tracks = without(tracks, expired_before(tracks, stamp, period_s, config, has_view))
         tracks = predicted(tracks, previous, stamp, config)
     before = tracks
     tracks, source, ambiguous = _matched(tracks, frame, dt_s, period_s, config, gates)
+    tracks = with_twins(before, tracks, source, measured, dt_s, config)
     exits = state.exits.after_matches(before, tracks, stamp, period_s)
     unmatched = np.ones(len(measured), dtype=np.bool_)
     unmatched[source[source >= 0]] = False
     if unmatched.any():
         initiated = initiate(frame, unmatched, state.next_id, config)
-        tracks = tracks.append(initiated)
+        tracks = with_hosts(tracks.append(initiated), len(initiated), config)
         source = np.concatenate((source, np.flatnonzero(unmatched)))
         no_flags = np.zeros(len(initiated), dtype=np.bool_)
         ambiguous = np.concatenate((ambiguous, no_flags))  # a new track is never ambiguous
@@ -96,6 +98,7 @@ def advance(
     means, variances = np.full(len(tracks), np.nan), np.full(len(tracks), np.nan)
     means[seen] = measured.evidence_means[source[seen]]
     variances[seen] = measured.evidence_variances[source[seen]]
+    means, variances = with_lower_evidence(tracks, seen, means, variances)
     tracks = update_awareness(
         tracks,
         previous,
@@ -112,9 +115,9 @@ def advance(
     if not seen.all():
         gone = walked_out(tracks, exits, ~seen, frame.T_odom_camera)
         deleted = ~seen & due_for_deletion(tracks, stamp, period_s, gone, config, has_view)
-        vanished = deleted & tracks.confirmed & ~tracks.standing
+        vanished = deleted & tracks.confirmed & ~tracks.standing & ~tracks.twins
         exits = exits.with_events(tracks.last_places_camera_m[vanished], returned=False)
-        tracks = tracks.take(~deleted)
+        tracks = without(tracks, deleted)
     next_id = state.next_id + int(np.count_nonzero(unmatched))
     return TrackerState(tracks, next_id, stamp, interval_s, period_s, exits)
 
@@ -166,7 +169,8 @@ def _matched(
     matches = associate(
         tracks.states[:, :2],
         tracks.covariances[:, :2, :2],
-        tracks.confirmed,
+        tracks.confirmed & (tracks.twin_logits <= 1.0),
+        same_person(tracks),
         measured.positions_odom_m,
         measured.noises_m2,
         gates,

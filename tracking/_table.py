@@ -37,6 +37,10 @@ class TrackTable:
         birth_stamps_s: (N,) stamps of the first frames that showed the people.
         birth_places_camera_m: (N, 2) where they were then, relative to the camera (``_exits``).
         last_places_camera_m: (N, 2) the same for the latest frames that showed them.
+        host_ids: (N,) ids of the tracks whose twins these may be, 0 for none (``_twins``).
+        twin_logits: (N,) evidence that they are.
+        twin_visibilities: (N,) probability that they are not hidden, if they are people.
+        twins: (N,) True where the evidence has sufficed; such a track is not reported.
     """
 
     ids: IntArray
@@ -54,6 +58,10 @@ class TrackTable:
     birth_stamps_s: FloatArray
     birth_places_camera_m: FloatArray
     last_places_camera_m: FloatArray
+    host_ids: IntArray
+    twin_logits: FloatArray
+    twin_visibilities: FloatArray
+    twins: BoolArray
 
     @staticmethod
     def empty(confirm_hits: int) -> TrackTable:
@@ -76,6 +84,10 @@ class TrackTable:
             birth_stamps_s=no_numbers,
             birth_places_camera_m=np.empty((0, 2)),
             last_places_camera_m=np.empty((0, 2)),
+            host_ids=np.empty(0, dtype=np.int64),
+            twin_logits=no_numbers,
+            twin_visibilities=no_numbers,
+            twins=no_flags,
         )
 
     @property
