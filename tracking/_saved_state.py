@@ -49,6 +49,7 @@ class _TracksRecord(StrictConfig):
     host_ids: list[int]
     twin_logits: list[float]
     twin_visibilities: list[float]
+    twin_priors: list[float]
     twins: list[bool]
 
     @model_validator(mode="after")
@@ -264,6 +265,7 @@ def state_of(record: _StateRecord, confirm_hits: int, name: str) -> TrackerState
         host_ids=np.array(tracks.host_ids, dtype=np.int64),
         twin_logits=_array(tracks.twin_logits),
         twin_visibilities=_array(tracks.twin_visibilities),
+        twin_priors=_array(tracks.twin_priors),
         twins=np.array(tracks.twins, dtype=np.bool_),
     )
     events = record.exits
@@ -325,6 +327,7 @@ def _plain_state(state: TrackerState) -> dict[str, Any]:
             "host_ids": tracks.host_ids.tolist(),
             "twin_logits": tracks.twin_logits.tolist(),
             "twin_visibilities": tracks.twin_visibilities.tolist(),
+            "twin_priors": tracks.twin_priors.tolist(),
             "twins": tracks.twins.tolist(),
         },
     }

@@ -25,7 +25,7 @@ from ._track_management import (
     missed_time_s,
     record_hits,
 )
-from ._twins import same_person, with_hosts, with_lower_evidence, with_twins, without
+from ._twins import doubted, same_person, with_hosts, with_lower_evidence, with_twins, without
 from ._views import View
 
 # Share of a new interval in the usual time between frames.
@@ -113,7 +113,7 @@ def advance(
     missed_s = missed_time_s(tracks, ~seen, dt_s, frame.T_odom_camera, config, view)
     tracks = tracks.replaced(missed_s=missed_s)
     if not seen.all():
-        gone = walked_out(tracks, exits, ~seen, frame.T_odom_camera)
+        gone = walked_out(tracks, exits, ~seen, frame.T_odom_camera) | doubted(tracks)
         deleted = ~seen & due_for_deletion(tracks, stamp, period_s, gone, config, has_view)
         vanished = deleted & tracks.confirmed & ~tracks.standing & ~tracks.twins
         exits = exits.with_events(tracks.last_places_camera_m[vanished], returned=False)
@@ -169,7 +169,7 @@ def _matched(
     matches = associate(
         tracks.states[:, :2],
         tracks.covariances[:, :2, :2],
-        tracks.confirmed & (tracks.twin_logits <= 1.0),
+        tracks.confirmed & ~doubted(tracks),
         same_person(tracks),
         measured.positions_odom_m,
         measured.noises_m2,

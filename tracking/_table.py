@@ -40,6 +40,7 @@ class TrackTable:
         host_ids: (N,) ids of the tracks whose twins these may be, 0 for none (``_twins``).
         twin_logits: (N,) evidence that they are.
         twin_visibilities: (N,) probability that they are not hidden, if they are people.
+        twin_priors: (N,) evidence with which the next possible twin of this track starts.
         twins: (N,) True where the evidence has sufficed; such a track is not reported.
     """
 
@@ -61,6 +62,7 @@ class TrackTable:
     host_ids: IntArray
     twin_logits: FloatArray
     twin_visibilities: FloatArray
+    twin_priors: FloatArray
     twins: BoolArray
 
     @staticmethod
@@ -87,6 +89,7 @@ class TrackTable:
             host_ids=np.empty(0, dtype=np.int64),
             twin_logits=no_numbers,
             twin_visibilities=no_numbers,
+            twin_priors=no_numbers,
             twins=no_flags,
         )
 

@@ -65,6 +65,7 @@ def initiate(
         host_ids=np.zeros(count, dtype=np.int64),
         twin_logits=np.zeros(count),
         twin_visibilities=np.ones(count),
+        twin_priors=np.zeros(count),
         twins=np.zeros(count, dtype=np.bool_),
     )
 

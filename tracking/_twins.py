@@ -23,7 +23,7 @@ from ._measurement import Measurements
 from ._table import BoolArray, IndexArray, IntArray, TrackTable
 
 # Share of the frames with a person in which a detector reports a duplicate as well.
-_DUPLICATE_SHARE: Final = 0.28
+_DUPLICATE_SHARE: Final = 0.33
 # Share of frames in which a real person beside another is detected while not hidden, and how often
 # people become hidden and visible again.
 _PERSON_SHARE: Final = 0.65
@@ -34,12 +34,16 @@ _SHOWING_HZ: Final = 1.3
 _ALONE_IF_TWIN: Final = 0.01
 _ALONE_IF_PERSON: Final = 0.1
 # Chance per frame that two tracks of one person exchange their measurements.
-_LOG_EXCHANGE: Final = math.log(0.005)
+_LOG_EXCHANGE: Final = math.log(0.02)
 # Frames closer than this share their errors, and count in proportion.
 _INDEPENDENT_S: Final = 0.05
 # Bounds of the evidence: how soon it can turn.
-_LEAST_LOGIT: Final = -6.0
+_LEAST_LOGIT: Final = -5.0
 _MOST_LOGIT: Final = 3.0  # above twin_logit
+# The next twin of a person who has had one starts with its evidence, but at most this.
+_MOST_PRIOR: Final = 2.5
+# A track with this evidence chooses measurements after all others, and is not kept for long unseen.
+_DOUBTED_LOGIT: Final = 1.0
 # Two tracks are apart when they are further apart than a twin can be, by this many σ.
 _APART_SIGMAS: Final = 2.0
 _MOST_LOG_RATIO: Final = 20.0
@@ -99,6 +103,11 @@ def with_twins(
     return _merged(after, pairs, due) if due.any() else after
 
 
+def doubted(tracks: TrackTable) -> BoolArray:
+    """Return (N,) True for the tracks that are more probably twins than people."""
+    return np.asarray(tracks.twin_logits > _DOUBTED_LOGIT)
+
+
 def _evidence(
     tracks: TrackTable,
     pairs: _Pairs,
@@ -143,6 +152,7 @@ def _merged(tracks: TrackTable, pairs: _Pairs, due: BoolArray) -> TrackTable:
     """
     ids = tracks.ids
     hosts, twins = tracks.host_ids.copy(), tracks.twins.copy()
+    priors = tracks.twin_priors.copy()
     means, variances = tracks.awareness_means.copy(), tracks.awareness_variances.copy()
     bounds, stamps = tracks.awareness_bounds.copy(), tracks.evidence_stamps_s.copy()
     # The surest first; of two that may be twins of each other, the younger.
@@ -152,7 +162,7 @@ def _merged(tracks: TrackTable, pairs: _Pairs, due: BoolArray) -> TrackTable:
         twin, host = int(pairs.twins[index]), int(pairs.hosts[index])
         if twins[twin] or twins[host]:
             continue
-        twins[twin] = True
+        twins[twin], priors[host] = True, _MOST_PRIOR
         hosts[(hosts == ids[twin]) & (ids != ids[host])] = ids[host]
         if (bounds[twin], means[twin]) < (bounds[host], means[host]):
             means[host], variances[host] = means[twin], variances[twin]
@@ -160,6 +170,7 @@ def _merged(tracks: TrackTable, pairs: _Pairs, due: BoolArray) -> TrackTable:
     return tracks.replaced(
         host_ids=hosts,
         twins=twins,
+        twin_priors=priors,
         awareness_means=means,
         awareness_variances=variances,
         awareness_bounds=bounds,
@@ -193,7 +204,9 @@ def with_hosts(tracks: TrackTable, births: int, config: TrackerConfig) -> TrackT
     hosts[new] = tracks.ids[nearest]
     lone = hosts[nearest] == 0
     hosts[nearest[lone]] = tracks.ids[new[lone]]
-    return tracks.replaced(host_ids=hosts)
+    logits = tracks.twin_logits.copy()
+    logits[new] = tracks.twin_priors[nearest]
+    return tracks.replaced(host_ids=hosts, twin_logits=logits)
 
 
 def without(tracks: TrackTable, deleted: BoolArray) -> TrackTable:
@@ -205,6 +218,11 @@ def without(tracks: TrackTable, deleted: BoolArray) -> TrackTable:
         return tracks
     pairs = _pairs(tracks)
     b, a = pairs.twins, pairs.hosts
+    lost = deleted[b] & tracks.confirmed[b]
+    if lost.any():
+        priors = tracks.twin_priors.copy()
+        priors[a[lost]] = np.clip(tracks.twin_logits[b[lost]], 0.0, _MOST_PRIOR)
+        tracks = tracks.replaced(twin_priors=priors)
     orphans = deleted[a]
     if orphans.any():
         b, a = b[orphans], a[orphans]
