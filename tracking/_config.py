@@ -120,6 +120,11 @@ class TrackerConfig(StrictConfig):
     """A track is confirmed once the log-likelihood ratio of its detections to clutter exceeds this
     minus ln(time between frames / 1 s), …"""
 
+    weak_score: float = Field(default=0.25, ge=0.0, le=1.0)
+    """A detection with a score below this may continue a confirmed track that no other detection
+    continues. It never starts a track and is no evidence of awareness. The detectors' own
+    ``score_threshold`` is 0.25 as well: lower it to 0.1 for weak detections to reach the tracker."""
+
     miss_cost: float = Field(default=10.0, ge=-1e3, le=1e3)
     """Cost of leaving a track and a measurement unmatched, in units of d² + ln det S (S in m²):
     2 ln(P_D / (2π β (1 − P_D))), here for a detection probability P_D of 0.9 and a density β of

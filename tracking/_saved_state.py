@@ -122,6 +122,7 @@ class _FrameRecord(StrictConfig):
     noises_m2: list[tuple[_Two, _Two]]
     evidence_means: list[float | None]
     evidence_variances: list[float | None]
+    weak: list[bool]
 
     @model_validator(mode="after")
     def _check_consistency(self) -> _FrameRecord:
@@ -130,6 +131,7 @@ class _FrameRecord(StrictConfig):
             len(self.noises_m2),
             len(self.evidence_means),
             len(self.evidence_variances),
+            len(self.weak),
         }
         if len(lengths) > 1:
             raise ValueError("every column of a frame must have one entry per observation")
@@ -292,6 +294,7 @@ def frame_of(record: _FrameRecord, name: str) -> Frame:
             _array(record.noises_m2).reshape(count, 2, 2),
             _array(record.evidence_means, math.nan),
             _array(record.evidence_variances, math.nan),
+            np.array(record.weak, dtype=np.bool_),
         ),
     )
 
@@ -342,6 +345,7 @@ def _plain_frame(frame: Frame) -> dict[str, Any]:
         "noises_m2": measured.noises_m2.tolist(),
         "evidence_means": _finite_or_none(measured.evidence_means),
         "evidence_variances": _finite_or_none(measured.evidence_variances),
+        "weak": measured.weak.tolist(),
     }
 
 

@@ -45,7 +45,7 @@ _MOST_PRIOR: Final = 2.5
 # A track with this evidence chooses measurements after all others, and is not kept for long unseen.
 _DOUBTED_LOGIT: Final = 1.0
 # Two tracks are apart when they are further apart than a twin can be, by this many σ.
-_APART_SIGMAS: Final = 2.0
+_APART_SIGMAS: Final = 3.0
 _MOST_LOG_RATIO: Final = 20.0
 
 
@@ -95,7 +95,7 @@ def with_twins(
     apart &= distance_m > config.twin_distance_m + _APART_SIGMAS * std_m
     hosts[b[apart]], twins[b[apart]], logits[b[apart]] = 0, False, 0.0
     twins[b[logits[b] < 0.0]] = False
-    near = ~apart & (distance_m <= config.twin_distance_m)
+    near = distance_m <= config.twin_distance_m + std_m
     due = near & ~twins[b] & (logits[b] >= config.twin_logit) & after.confirmed[a]
     after = after.replaced(
         host_ids=hosts, twin_logits=logits, twins=twins, twin_visibilities=visible
@@ -257,13 +257,17 @@ def with_lower_evidence(
     return means, variances
 
 
-def same_person(tracks: TrackTable) -> IndexArray:
-    """Return (N,) the row of the person of each track: of its host for a twin, else its own."""
+def same_person(tracks: TrackTable) -> IndexArray | None:
+    """Return (N,) the row of the person of each track: of its host for a twin, else its own.
+
+    None if there are no twins.
+    """
+    if not tracks.twins.any():
+        return None
     rows = np.arange(len(tracks))
-    if tracks.twins.any():
-        pairs = _pairs(tracks)
-        hidden = tracks.twins[pairs.twins]
-        rows[pairs.twins[hidden]] = pairs.hosts[hidden]
+    pairs = _pairs(tracks)
+    hidden = tracks.twins[pairs.twins]
+    rows[pairs.twins[hidden]] = pairs.hosts[hidden]
     return rows
 
 
