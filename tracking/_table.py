@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -105,13 +106,14 @@ class TrackTable:
         """Return the tracks where ``keep`` (N,) is True."""
         if keep.all():
             return self
-        return TrackTable(*(getattr(self, name)[keep] for name in TRACK_COLUMNS))
+        return TrackTable(*(column[keep] for column in _COLUMNS_OF(self)))
 
     def replaced(self, **columns: NDArray[Any]) -> TrackTable:
         """Return the table with other columns; takes half the time of ``dataclasses.replace``."""
-        return TrackTable(
-            *(columns[name] if name in columns else getattr(self, name) for name in TRACK_COLUMNS)
-        )
+        values = list(_COLUMNS_OF(self))
+        for name, column in columns.items():
+            values[_INDEX[name]] = column
+        return TrackTable(*values)
 
     def append(self, other: TrackTable) -> TrackTable:
         """Return these tracks followed by the others, whose ids must be higher."""
@@ -120,8 +122,10 @@ class TrackTable:
         if not len(other):
             return self
         return TrackTable(
-            *(np.concatenate((getattr(self, name), getattr(other, name))) for name in TRACK_COLUMNS)
+            *map(np.concatenate, zip(_COLUMNS_OF(self), _COLUMNS_OF(other), strict=True))
         )
 
 
 TRACK_COLUMNS = tuple(TrackTable.__slots__)
+_COLUMNS_OF = attrgetter(*TRACK_COLUMNS)
+_INDEX = {name: index for index, name in enumerate(TRACK_COLUMNS)}

@@ -89,14 +89,17 @@ def with_twins(
     found = np.logaddexp(logits[b], exchanged) + weight * gain
     logits[b] = np.clip(found, _LEAST_LOGIT, config.twin_logit + _MOST_LOGIT)
     hosts, twins = after.host_ids.copy(), after.twins.copy()
-    distance_m, std_m = separations(after, b, a)
-    # Only frames that show both tell how far apart they are.
-    apart = shows_a & shows_b
-    apart &= distance_m > config.twin_distance_m + _APART_SIGMAS * std_m
-    hosts[b[apart]], twins[b[apart]], logits[b[apart]] = 0, False, 0.0
     twins[b[logits[b] < 0.0]] = False
-    near = distance_m <= config.twin_distance_m + std_m
-    due = near & ~twins[b] & (logits[b] >= config.twin_logit) & after.confirmed[a]
+    # Only frames that show both tell how far apart they are.
+    due = ~twins[b] & (logits[b] >= config.twin_logit) & after.confirmed[a]
+    near = np.flatnonzero((shows_a & shows_b) | due)
+    if near.size:
+        distance_m, std_m = separations(after, b[near], a[near])
+        due[near] &= distance_m <= config.twin_distance_m + std_m
+        apart = distance_m > config.twin_distance_m + _APART_SIGMAS * std_m
+        apart &= (shows_a & shows_b)[near]
+        far = b[near[apart]]
+        hosts[far], twins[far], logits[far] = 0, False, 0.0
     after = after.replaced(
         host_ids=hosts, twin_logits=logits, twins=twins, twin_visibilities=visible
     )
