@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 from typing import Any, Final, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .arrays import (
     FloatArray,
@@ -170,7 +171,7 @@ def _check_range(name: str, values: FloatArray, maximum: float) -> None:
 
 def _optional_rows(
     name: str, value: Any, shape: tuple[int, ...]
-) -> tuple[FloatArray, np.ndarray[Any, np.dtype[np.bool_]]]:
+) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Return a read-only copy of ``value`` and (N,) True for its rows that are not NaN."""
     try:
         array = np.array(value, dtype=np.float64, copy=True)
@@ -184,7 +185,7 @@ def _optional_rows(
     array.setflags(write=False)
     if np.isfinite(array).all():
         return array, np.ones(shape[0], dtype=np.bool_)
-    known = ~np.isnan(array).reshape(shape[0], -1).all(axis=1)
+    known = np.asarray(~np.isnan(array).reshape(shape[0], -1).all(axis=1))
     if not np.isfinite(array[known]).all():
         bad = known & ~np.isfinite(array).reshape(shape[0], -1).all(axis=1)
         row = int(np.argmax(bad))
@@ -194,7 +195,7 @@ def _optional_rows(
     return array, known
 
 
-def _list(values: FloatArray, known: np.ndarray[Any, np.dtype[np.bool_]]) -> list[Any]:
+def _list(values: FloatArray, known: NDArray[np.bool_]) -> list[Any]:
     """Return the rows of an array, floats or read-only arrays, with None for unknown ones."""
     rows: list[Any] = values.tolist() if values.ndim == 1 else list(values)
     if known.all():

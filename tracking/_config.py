@@ -122,8 +122,8 @@ class TrackerConfig(StrictConfig):
 
     weak_score: float = Field(default=0.25, ge=0.0, le=1.0)
     """A detection with a score below this may continue a confirmed track that no other detection
-    continues. It never starts a track and is no evidence of awareness. The detectors' own
-    ``score_threshold`` is 0.25 as well: lower it to 0.1 for weak detections to reach the tracker."""
+    continues. It never starts a track and is no evidence of awareness. The shipped detector reports
+    no scores below 0.25 unless its ``score_threshold`` is lowered."""
 
     miss_cost: float = Field(default=10.0, ge=-1e3, le=1e3)
     """Cost of leaving a track and a measurement unmatched, in units of d² + ln det S (S in m²):

@@ -20,7 +20,7 @@ from perception.arrays import FloatArray
 from ._config import TrackerConfig
 from ._kalman import inverse_2x2
 from ._measurement import Measurements
-from ._table import BoolArray, IndexArray, IntArray, TrackTable
+from ._table import BoolArray, IndexArray, TrackTable
 
 # Share of the frames with a person in which a detector reports a duplicate as well.
 _DUPLICATE_SHARE: Final = 0.33
@@ -107,8 +107,20 @@ def with_twins(
 
 
 def doubted(tracks: TrackTable) -> BoolArray:
-    """Return (N,) True for the tracks that are more probably twins than people."""
-    return np.asarray(tracks.twin_logits > _DOUBTED_LOGIT)
+    """Return (N,) True for the tracks that are more probably twins than people.
+
+    Of two tracks that may be twins of each other it is one at most: somebody is there.
+    """
+    flags = tracks.twin_logits > _DOUBTED_LOGIT
+    if not flags.any():
+        return flags
+    pairs = _pairs(tracks)
+    b, a = pairs.twins, pairs.hosts
+    mine, other = tracks.twin_logits[b], tracks.twin_logits[a]
+    surer = (mine > other) | ((mine == other) & (b > a))
+    mutual = tracks.host_ids[a] == tracks.ids[b]
+    flags[b] &= tracks.twins[b] | (~tracks.twins[a] & (surer | ~mutual))
+    return flags
 
 
 def _evidence(
@@ -232,7 +244,11 @@ def without(tracks: TrackTable, deleted: BoolArray) -> TrackTable:
         last_seen_s = tracks.last_seen_s
         deleted = deleted.copy()
         deleted[b] |= tracks.twins[b] & (last_seen_s[b] <= last_seen_s[a])
-        hosts, logits, twins = tracks.host_ids.copy(), tracks.twin_logits.copy(), tracks.twins.copy()
+        hosts, logits, twins = (
+            tracks.host_ids.copy(),
+            tracks.twin_logits.copy(),
+            tracks.twins.copy(),
+        )
         hosts[b], logits[b], twins[b] = 0, 0.0, False
         tracks = tracks.replaced(host_ids=hosts, twin_logits=logits, twins=twins)
     return tracks.take(~deleted)

@@ -15,9 +15,9 @@ MAX_UNSEEN_S = 1.2
 class Contender(Protocol):
     """A tracker under test, fed frame by frame.
 
-    ``begin`` makes a fresh tracker. ``make`` converts the measurements of a frame into the tracker's
-    own form, ``advance`` is the call of every frame: these two are timed. ``report`` reads its
-    result.
+    ``begin`` makes a fresh tracker. ``make`` converts the measurements of a frame into the
+    tracker's own form, ``advance`` is the call of every frame: these two are timed. ``report``
+    reads its result.
     """
 
     name: str

@@ -15,7 +15,7 @@ from ._measurements import SimulatedRecording
 def cost_ms(
     contenders: Sequence[Contender], recording: SimulatedRecording, repeats: int
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Return the median processor milliseconds per frame of each tracker: alone, and with its input.
+    """Return each tracker's median processor milliseconds per frame: alone, and with its input.
 
     The trackers take turns on whole recordings. For each frame the least time over the repeats
     counts, since other programs can only slow it down. Reading the result is not timed.
@@ -35,7 +35,9 @@ def cost_ms(
                 best = least[contender.name][:, frame]
                 best[:] = np.minimum(best, (ended - made, ended - began))
     # The first frames have no tracks yet.
-    median = {name: 1e3 * np.median(times[:, frames // 10 :], axis=1) for name, times in least.items()}
+    median = {
+        name: 1e3 * np.median(times[:, frames // 10 :], axis=1) for name, times in least.items()
+    }
     return (
         {name: float(alone) for name, (alone, _) in median.items()},
         {name: float(whole) for name, (_, whole) in median.items()},

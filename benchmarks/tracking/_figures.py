@@ -86,7 +86,9 @@ def missed_scores(
 def cost_metrics(people: int, cost_ms: Mapping[str, float]) -> list[MeasuredValue]:
     """Return ratios of our processor time to each peer's; bare times depend on the computer."""
     return [
-        MeasuredValue(f"cost_{people}_with_input_over_{peer}", cost_ms["ours"] / value, "x", "lower", 0.4)
+        MeasuredValue(
+            f"cost_{people}_with_input_over_{peer}", cost_ms["ours"] / value, "x", "lower", 0.4
+        )
         for peer, value in cost_ms.items()
         if peer != "ours" and "ours" in cost_ms
     ]

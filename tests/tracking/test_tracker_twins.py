@@ -131,9 +131,17 @@ def test_a_twin_that_walks_away_is_a_person_again() -> None:
     merged = follow(scene)[-1]
     assert [one.status for one in merged].count("confirmed") <= 1
     last = np.array([5.0, 2.5 * math.sin(0.3 * 20.0)])
-    leaving = [[last, last + (0.35 + 0.05 * step, 0.0)] for step in range(1, 31)]
+    leaving = [[last, last + np.array([0.35 + 0.05 * step, 0.0])] for step in range(1, 31)]
     counts = confirmed_counts(follow(scene + leaving))
     assert counts[-1] == 2
+
+
+def test_a_person_with_a_twin_is_kept_as_long_unseen_as_anybody() -> None:
+    coast_s = TrackerConfig().max_coast_s
+    for seed in range(3):
+        scene = twin_scene(seed)
+        unseen: Scene = [[] for _ in range(round((coast_s - 0.2) / PERIOD_S))]
+        assert (confirmed_counts(follow(scene + unseen))[20:] >= 1).all()
 
 
 def test_a_merged_person_is_as_aware_as_the_less_aware_box() -> None:
@@ -141,7 +149,9 @@ def test_a_merged_person_is_as_aware_as_the_less_aware_box() -> None:
     unaware = follow(twin_scene(2), awareness=(0.95, 0.05))
 
     def typical(frames: Sequence[tuple[PersonTrack, ...]]) -> float:
-        return float(np.mean([max(one.awareness_lower for one in tracks) for tracks in frames[200:]]))
+        return float(
+            np.mean([max(one.awareness_lower for one in tracks) for tracks in frames[200:]])
+        )
 
     assert typical(aware) > 0.5  # a twin does not make its person's matches ambiguous
     assert typical(unaware) < 0.6 * typical(aware)
