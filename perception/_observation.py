@@ -87,7 +87,7 @@ class PersonObservation:
         awareness_std: Any = None,
         boxes_xyxy_px: Any = None,
     ) -> tuple[PersonObservation, ...]:
-        """Return the N people of one frame, checked as one by one, in a tenth of the time.
+        """Return the N people of one frame, checked as one by one, in a seventh of the time.
 
         A row of NaN in ``gazes_camera`` or ``boxes_xyxy_px``, and a NaN in ``awareness`` and
         ``awareness_std``, stand for None. The arrays are copied; those of the observations are
