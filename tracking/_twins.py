@@ -43,7 +43,7 @@ _MOST_LOGIT: Final = 3.0  # above twin_logit
 # The next twin of a person who has had one starts with its evidence, but at most this.
 _MOST_PRIOR: Final = 2.5
 # A track with this evidence chooses measurements after all others, and is not kept for long unseen.
-_DOUBTED_LOGIT: Final = 1.0
+_DOUBTED_LOGIT: Final = 2.5
 # Two tracks are apart when they are further apart than a twin can be, by this many σ.
 _APART_SIGMAS: Final = 3.0
 _MOST_LOG_RATIO: Final = 20.0
