@@ -123,6 +123,26 @@ def covariance_matrix(
     return array
 
 
+def covariance_matrices(
+    name: str, value: Any, size: int, error: type[ValueError] = PerceptionError
+) -> FloatArray:
+    """Return read-only (N, size, size) covariances, checked as :func:`covariance_matrix` does."""
+    array = finite_array(name, value, ("N", size, size), error)
+    if not len(array):
+        return array
+    transposed = array.transpose(0, 2, 1)
+    if np.array_equal(array, transposed):
+        try:
+            np.linalg.cholesky(array)
+        except np.linalg.LinAlgError:
+            pass
+        else:
+            return array
+    for row, matrix in enumerate(array):
+        covariance_matrix(f"{name}[{row}]", matrix, size, error)
+    return array
+
+
 def _has_cholesky_factor(rows: list[list[float]]) -> bool:
     """Return True for an exactly symmetric, positive definite matrix.
 
@@ -192,6 +212,26 @@ def unit_vector(name: str, value: Any, error: type[ValueError] = PerceptionError
     unit = np.asarray(array / length)
     unit.setflags(write=False)
     return unit
+
+
+def unit_vectors(
+    name: str,
+    array: FloatArray,
+    known: NDArray[np.bool_],
+    error: type[ValueError] = PerceptionError,
+) -> FloatArray:
+    """Return (N, 3) unit vectors, read-only and checked as :func:`unit_vector` does.
+
+    Rows that are not ``known`` (N,) are left as they are.
+    """
+    lengths = np.sqrt((array * array).sum(axis=1))
+    wrong = known & (np.abs(lengths - 1.0) > 1e-3)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise error(f"{name}[{row}] must be a unit vector, got length {lengths[row]:g}")
+    units = np.asarray(array / np.where(known, lengths, 1.0)[:, None])
+    units.setflags(write=False)
+    return units
 
 
 def pixel_count(name: str, value: Any) -> int:

@@ -69,6 +69,7 @@ def associate(
     measured_m: FloatArray,
     noises_m2: FloatArray,
     gates: Gates,
+    people: IndexArray | None = None,
 ) -> Matches:
     """Match tracks to measurements one to one: confirmed tracks first, then the others.
 
@@ -85,6 +86,8 @@ def associate(
         measured_m: (M, 2) measured positions, in the same frame.
         noises_m2: (M, 2, 2) of the measured positions, positive definite.
         gates: a match must pass both gates.
+        people: (N,) equal for tracks of one person, which do not make each other ambiguous; None
+            where every track is another person.
     """
     if not len(positions_m) or not len(measured_m):
         return _NO_MATCHES
@@ -102,7 +105,7 @@ def associate(
         _solve(edges.where(~first & ~taken[edges.measurements]), gates.miss_cost, partner)
     tracks = np.flatnonzero(partner >= 0)
     measurements = partner[tracks]
-    ambiguous = _ambiguities(edges, partner, positions_m, measured_m, gates)
+    ambiguous = _ambiguities(edges, partner, positions_m, measured_m, gates, people)
     return Matches(tracks, measurements, ambiguous[tracks])
 
 
@@ -164,6 +167,7 @@ def _ambiguities(
     positions_m: FloatArray,
     measured_m: FloatArray,
     gates: Gates,
+    people: IndexArray | None,
 ) -> BoolArray:
     """Return (N,) True where a rival track or measurement fits about as well as the match."""
     ambiguous = np.zeros(len(positions_m), dtype=np.bool_)
@@ -174,7 +178,11 @@ def _ambiguities(
     holder[edges.measurements[chosen]] = edges.tracks[chosen]
     limit = np.full(len(positions_m) + 1, -np.inf)  # the last row is that of no track
     limit[edges.tracks[chosen]] = edges.costs[chosen] + gates.ambiguity_margin
-    rival = edges.where(~chosen)
+    rivals = ~chosen
+    if people is not None:
+        owner = holder[edges.measurements]
+        rivals &= (owner < 0) | (people[edges.tracks] != people[owner])
+    rival = edges.where(rivals)
     reach2 = gates.ambiguity_distance_m**2
 
     # Rival measurements: the track could have matched another measurement.

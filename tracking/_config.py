@@ -135,6 +135,11 @@ class TrackerConfig(StrictConfig):
     """A track is confirmed once the log-likelihood ratio of its detections to clutter exceeds this
     minus ln(time between frames / 1 s), …"""
 
+    weak_score: float = Field(default=0.25, ge=0.0, le=1.0)
+    """A detection with a score below this may continue a confirmed track that no other detection
+    continues. It never starts a track and is no evidence of awareness. The shipped detector reports
+    no scores below 0.25 unless its ``score_threshold`` is lowered."""
+
     miss_cost: float = Field(default=10.0, ge=-1e3, le=1e3)
     """Cost of leaving a track and a measurement unmatched, in units of d² + ln det S (S in m²):
     2 ln(P_D / (2π β (1 − P_D))), here for a detection probability P_D of 0.9 and a density β of
@@ -160,6 +165,14 @@ class TrackerConfig(StrictConfig):
     max_tentative_gap_s: float = Field(default=0.12, ge=0.0, le=_MOST_S)
     """A tentative track unseen for longer than this is deleted, or after as many missed frames in a
     row as happen to 1 % of people by chance: two at the default ``detection_probability``."""
+
+    twin_distance_m: float = Field(default=0.5, ge=0.0, le=2.0)
+    """A track that was born no further than this from another may be its twin: a second track of
+    the same person, from a detector that reports people twice. 0 for no twins."""
+
+    twin_logit: float = Field(default=5.0, ge=1.0, le=1e3)
+    """A track counts as a twin, and is not reported, once it is exp(``twin_logit``) times likelier
+    to be one than another person, judged by the frames that show one of the two alone."""
 
     max_missed_s: float = Field(default=1.2, ge=_LEAST_S, le=_MOST_S)
     """A confirmed track is deleted after this time in which frames should have shown it and did

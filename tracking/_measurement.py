@@ -13,6 +13,7 @@ from perception.arrays import FloatArray
 
 from ._config import TrackerConfig
 from ._errors import TrackingError
+from ._table import BoolArray
 from .awareness_filter import evidence, trusted_std
 
 # Limits far beyond any place a robot drives; the squares of larger numbers may overflow.
@@ -29,12 +30,14 @@ class Measurements:
         noises_m2: (M, 2, 2) of the positions, positive definite.
         evidence_means: (M,) of logit(α); NaN for "no evidence".
         evidence_variances: (M,) of logit(α); NaN for "no evidence".
+        weak: (M,) True for detections with a score below ``weak_score``.
     """
 
     positions_odom_m: FloatArray
     noises_m2: FloatArray
     evidence_means: FloatArray
     evidence_variances: FloatArray
+    weak: BoolArray
 
     def __len__(self) -> int:
         return len(self.positions_odom_m)
@@ -56,7 +59,9 @@ class Frame:
 
 
 _NO_EVIDENCE = np.empty(0)
-_NO_MEASUREMENTS = Measurements(np.empty((0, 2)), np.empty((0, 2, 2)), _NO_EVIDENCE, _NO_EVIDENCE)
+_NO_MEASUREMENTS = Measurements(
+    np.empty((0, 2)), np.empty((0, 2, 2)), _NO_EVIDENCE, _NO_EVIDENCE, np.empty(0, dtype=np.bool_)
+)
 
 
 def measurements_of(
@@ -116,6 +121,7 @@ def measurements_of(
         with_noise_floor(noises, config.position_noise_floor_m),
         means,
         evidence_variances,
+        np.array([one.score < config.weak_score for one in checked]),
     )
 
 

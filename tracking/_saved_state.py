@@ -46,6 +46,11 @@ class _TracksRecord(StrictConfig):
     birth_stamps_s: list[float]
     birth_places_camera_m: list[_Two]
     last_places_camera_m: list[_Two]
+    host_ids: list[int]
+    twin_logits: list[float]
+    twin_visibilities: list[float]
+    twin_priors: list[float]
+    twins: list[bool]
 
     @model_validator(mode="after")
     def _check_consistency(self) -> _TracksRecord:
@@ -56,6 +61,13 @@ class _TracksRecord(StrictConfig):
             raise ValueError(f"ids must be above 0 and increase, got {self.ids}")
         if any(not variance > 0.0 for variance in self.awareness_variances):
             raise ValueError("awareness_variances must be above 0")
+        known = {0, *self.ids}
+        for own, host, twin in zip(self.ids, self.host_ids, self.twins, strict=True):
+            if host == own or host not in known or (twin and host == 0):
+                raise ValueError(
+                    f"host_ids must hold the id of another track, or 0 without a twin, got {host} "
+                    f"for track {own}"
+                )
         return self
 
 
@@ -110,6 +122,7 @@ class _FrameRecord(StrictConfig):
     noises_m2: list[tuple[_Two, _Two]]
     evidence_means: list[float | None]
     evidence_variances: list[float | None]
+    weak: list[bool]
 
     @model_validator(mode="after")
     def _check_consistency(self) -> _FrameRecord:
@@ -118,6 +131,7 @@ class _FrameRecord(StrictConfig):
             len(self.noises_m2),
             len(self.evidence_means),
             len(self.evidence_variances),
+            len(self.weak),
         }
         if len(lengths) > 1:
             raise ValueError("every column of a frame must have one entry per observation")
@@ -250,6 +264,11 @@ def state_of(record: _StateRecord, confirm_hits: int, name: str) -> TrackerState
         birth_stamps_s=_array(tracks.birth_stamps_s),
         birth_places_camera_m=_array(tracks.birth_places_camera_m).reshape(count, 2),
         last_places_camera_m=_array(tracks.last_places_camera_m).reshape(count, 2),
+        host_ids=np.array(tracks.host_ids, dtype=np.int64),
+        twin_logits=_array(tracks.twin_logits),
+        twin_visibilities=_array(tracks.twin_visibilities),
+        twin_priors=_array(tracks.twin_priors),
+        twins=np.array(tracks.twins, dtype=np.bool_),
     )
     events = record.exits
     exits = Exits(
@@ -275,6 +294,7 @@ def frame_of(record: _FrameRecord, name: str) -> Frame:
             _array(record.noises_m2).reshape(count, 2, 2),
             _array(record.evidence_means, math.nan),
             _array(record.evidence_variances, math.nan),
+            np.array(record.weak, dtype=np.bool_),
         ),
     )
 
@@ -307,6 +327,11 @@ def _plain_state(state: TrackerState) -> dict[str, Any]:
             "birth_stamps_s": tracks.birth_stamps_s.tolist(),
             "birth_places_camera_m": tracks.birth_places_camera_m.tolist(),
             "last_places_camera_m": tracks.last_places_camera_m.tolist(),
+            "host_ids": tracks.host_ids.tolist(),
+            "twin_logits": tracks.twin_logits.tolist(),
+            "twin_visibilities": tracks.twin_visibilities.tolist(),
+            "twin_priors": tracks.twin_priors.tolist(),
+            "twins": tracks.twins.tolist(),
         },
     }
 
@@ -320,6 +345,7 @@ def _plain_frame(frame: Frame) -> dict[str, Any]:
         "noises_m2": measured.noises_m2.tolist(),
         "evidence_means": _finite_or_none(measured.evidence_means),
         "evidence_variances": _finite_or_none(measured.evidence_variances),
+        "weak": measured.weak.tolist(),
     }
 
 

@@ -11,6 +11,7 @@ from ._step import TrackerState, predicted
 from ._table import BoolArray, TrackTable
 from ._track import PersonTrack, TrackStatus, trusted_track
 from ._track_management import coasted_too_long
+from ._twins import reported
 from .awareness_filter import drift_unseen, estimate
 
 
@@ -26,11 +27,13 @@ def snapshots(
     if state.stamp_s is None or not len(tracks):
         return ()
     dt_s = stamp_s - state.stamp_s
-    belief = belief_of(tracks)
     if dt_s > 0.0:
         tracks = tracks.take(~_expired(tracks, stamp_s, state.period_s, config, has_view))
-        if not len(tracks):
-            return ()
+    tracks = tracks.take(reported(tracks))
+    if not len(tracks):
+        return ()
+    belief = belief_of(tracks)
+    if dt_s > 0.0:
         tracks = predicted(tracks, state.stamp_s, stamp_s, config)
         belief = drift_unseen(
             belief_of(tracks),

@@ -14,7 +14,7 @@ from ._config import TrackerConfig
 from ._existence import detection_logits, with_evidence
 from ._exits import Exits, floor_places, walked_out
 from ._kalman import correct
-from ._measurement import Frame
+from ._measurement import Frame, Measurements
 from ._motion import predict
 from ._table import BoolArray, IndexArray, TrackTable
 from ._track_management import (
@@ -25,6 +25,7 @@ from ._track_management import (
     missed_time_s,
     record_hits,
 )
+from ._twins import doubted, same_person, with_hosts, with_lower_evidence, with_twins, without
 from ._views import View
 
 # Share of a new interval in the usual time between frames.
@@ -79,30 +80,34 @@ def advance(
     tracks = state.tracks
     measured = frame.measurements
     if len(tracks) and dt_s > 0.0:
-        tracks = tracks.take(~expired_before(tracks, stamp, period_s, config, has_view))
+        tracks = without(tracks, expired_before(tracks, stamp, period_s, config, has_view))
         tracks = predicted(tracks, previous, stamp, config)
     before = tracks
     tracks, source, ambiguous = _matched(tracks, frame, dt_s, period_s, config, gates)
+    tracks = with_twins(before, tracks, source, measured, dt_s, config)
     exits = state.exits.after_matches(before, tracks, stamp, period_s)
-    unmatched = np.ones(len(measured), dtype=np.bool_)
+    unmatched = ~measured.weak
     unmatched[source[source >= 0]] = False
     if unmatched.any():
         initiated = initiate(frame, unmatched, state.next_id, config)
-        tracks = tracks.append(initiated)
+        tracks = with_hosts(tracks.append(initiated), len(initiated), config)
         source = np.concatenate((source, np.flatnonzero(unmatched)))
         no_flags = np.zeros(len(initiated), dtype=np.bool_)
         ambiguous = np.concatenate((ambiguous, no_flags))  # a new track is never ambiguous
     seen = source >= 0
+    looked_at = seen.copy()  # a weak detection may be something else: no evidence of awareness
+    looked_at[seen] = ~measured.weak[source[seen]]
     means, variances = np.full(len(tracks), np.nan), np.full(len(tracks), np.nan)
     means[seen] = measured.evidence_means[source[seen]]
     variances[seen] = measured.evidence_variances[source[seen]]
+    means, variances = with_lower_evidence(tracks, looked_at, means, variances)
     tracks = update_awareness(
         tracks,
         previous,
         stamp,
         interval_s,
         state.period_s,
-        seen,
+        looked_at,
         ambiguous,
         means,
         variances,
@@ -111,11 +116,11 @@ def advance(
     missed_s = missed_time_s(tracks, ~seen, dt_s, frame.T_odom_camera, config, view)
     tracks = tracks.replaced(missed_s=missed_s)
     if not seen.all():
-        gone = walked_out(tracks, exits, ~seen, frame.T_odom_camera)
+        gone = walked_out(tracks, exits, ~seen, frame.T_odom_camera) | doubted(tracks)
         deleted = ~seen & due_for_deletion(tracks, stamp, period_s, gone, config, has_view)
-        vanished = deleted & tracks.confirmed & ~tracks.standing
+        vanished = deleted & tracks.confirmed & ~tracks.standing & ~tracks.twins
         exits = exits.with_events(tracks.last_places_camera_m[vanished], returned=False)
-        tracks = tracks.take(~deleted)
+        tracks = without(tracks, deleted)
     next_id = state.next_id + int(np.count_nonzero(unmatched))
     return TrackerState(tracks, next_id, stamp, interval_s, period_s, exits)
 
@@ -164,15 +169,7 @@ def _matched(
     if math.isfinite(period_s):
         reach_m = _REACH_SIGMAS * config.initial_velocity_std_mps * period_s
         gates = replace(gates, distance_m=max(gates.distance_m, reach_m))
-    matches = associate(
-        tracks.states[:, :2],
-        tracks.covariances[:, :2, :2],
-        tracks.confirmed,
-        measured.positions_odom_m,
-        measured.noises_m2,
-        gates,
-    )
-    rows, columns = matches.tracks, matches.measurements
+    rows, columns, unclear = _matches(tracks, measured, gates)
     logits = detection_logits(
         tracks.states[rows, :2],
         tracks.covariances[rows, :2, :2],
@@ -183,9 +180,9 @@ def _matched(
     tracks = with_evidence(tracks, rows, logits, dt_s, config)
     if not rows.size:
         return tracks, source, ambiguous
-    source[rows], ambiguous[rows] = columns, matches.ambiguous
+    source[rows], ambiguous[rows] = columns, unclear
     # An ambiguous measurement has less weight and leaves more uncertainty.
-    factors = np.where(matches.ambiguous, config.ambiguous_noise_factor, 1.0)
+    factors = np.where(unclear, config.ambiguous_noise_factor, 1.0)
     states, covariances = tracks.states.copy(), tracks.covariances.copy()
     states[rows], covariances[rows] = correct(
         states[rows],
@@ -197,3 +194,41 @@ def _matched(
     places[rows] = floor_places(states[rows, :2], frame.T_odom_camera)
     tracks = tracks.replaced(states=states, covariances=covariances, last_places_camera_m=places)
     return record_hits(tracks, rows, frame.stamp_s, period_s, config), source, ambiguous
+
+
+def _matches(
+    tracks: TrackTable, measured: Measurements, gates: Gates
+) -> tuple[IndexArray, IndexArray, BoolArray]:
+    """Return (K,) rows of matched tracks, of their measurements, and which are ambiguous.
+
+    Weak detections are offered to the confirmed tracks that are left without a match, as in
+    ByteTrack (Zhang et al., ECCV 2022).
+    """
+    first, people = tracks.confirmed & ~doubted(tracks), same_person(tracks)
+    positions, covariances = tracks.states[:, :2], tracks.covariances[:, :2, :2]
+    places, noises = measured.positions_odom_m, measured.noises_m2
+    if not measured.weak.any():
+        found = associate(positions, covariances, first, places, noises, gates, people)
+        return found.tracks, found.measurements, found.ambiguous
+    offered = np.flatnonzero(~measured.weak)
+    found = associate(
+        positions, covariances, first, places[offered], noises[offered], gates, people
+    )
+    rows, columns = found.tracks, offered[found.measurements]
+    left = tracks.confirmed.copy()
+    left[rows] = False
+    rest, offered = np.flatnonzero(left), np.flatnonzero(measured.weak)
+    second = associate(
+        positions[rest],
+        covariances[rest],
+        first[rest],
+        places[offered],
+        noises[offered],
+        gates,
+        None if people is None else people[rest],
+    )
+    return (
+        np.concatenate((rows, rest[second.tracks])),
+        np.concatenate((columns, offered[second.measurements])),
+        np.concatenate((found.ambiguous, second.ambiguous)),
+    )

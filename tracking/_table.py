@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,11 @@ class TrackTable:
         birth_stamps_s: (N,) stamps of the first frames that showed the people.
         birth_places_camera_m: (N, 2) where they were then, relative to the camera (``_exits``).
         last_places_camera_m: (N, 2) the same for the latest frames that showed them.
+        host_ids: (N,) ids of the tracks whose twins these may be, 0 for none (``_twins``).
+        twin_logits: (N,) evidence that they are.
+        twin_visibilities: (N,) probability that they are not hidden, if they are people.
+        twin_priors: (N,) evidence with which the next possible twin of this track starts.
+        twins: (N,) True where the evidence has sufficed; such a track is not reported.
     """
 
     ids: IntArray
@@ -54,6 +60,11 @@ class TrackTable:
     birth_stamps_s: FloatArray
     birth_places_camera_m: FloatArray
     last_places_camera_m: FloatArray
+    host_ids: IntArray
+    twin_logits: FloatArray
+    twin_visibilities: FloatArray
+    twin_priors: FloatArray
+    twins: BoolArray
 
     @staticmethod
     def empty(confirm_hits: int) -> TrackTable:
@@ -76,6 +87,11 @@ class TrackTable:
             birth_stamps_s=no_numbers,
             birth_places_camera_m=np.empty((0, 2)),
             last_places_camera_m=np.empty((0, 2)),
+            host_ids=np.empty(0, dtype=np.int64),
+            twin_logits=no_numbers,
+            twin_visibilities=no_numbers,
+            twin_priors=no_numbers,
+            twins=no_flags,
         )
 
     @property
@@ -90,13 +106,14 @@ class TrackTable:
         """Return the tracks where ``keep`` (N,) is True."""
         if keep.all():
             return self
-        return TrackTable(*(getattr(self, name)[keep] for name in TRACK_COLUMNS))
+        return TrackTable(*(column[keep] for column in _COLUMNS_OF(self)))
 
     def replaced(self, **columns: NDArray[Any]) -> TrackTable:
         """Return the table with other columns; takes half the time of ``dataclasses.replace``."""
-        return TrackTable(
-            *(columns[name] if name in columns else getattr(self, name) for name in TRACK_COLUMNS)
-        )
+        values = list(_COLUMNS_OF(self))
+        for name, column in columns.items():
+            values[_INDEX[name]] = column
+        return TrackTable(*values)
 
     def append(self, other: TrackTable) -> TrackTable:
         """Return these tracks followed by the others, whose ids must be higher."""
@@ -105,8 +122,10 @@ class TrackTable:
         if not len(other):
             return self
         return TrackTable(
-            *(np.concatenate((getattr(self, name), getattr(other, name))) for name in TRACK_COLUMNS)
+            *map(np.concatenate, zip(_COLUMNS_OF(self), _COLUMNS_OF(other), strict=True))
         )
 
 
 TRACK_COLUMNS = tuple(TrackTable.__slots__)
+_COLUMNS_OF = attrgetter(*TRACK_COLUMNS)
+_INDEX = {name: index for index, name in enumerate(TRACK_COLUMNS)}

@@ -62,6 +62,11 @@ def initiate(
         birth_stamps_s=np.full(count, frame.stamp_s),
         birth_places_camera_m=places,
         last_places_camera_m=places,
+        host_ids=np.zeros(count, dtype=np.int64),
+        twin_logits=np.zeros(count),
+        twin_visibilities=np.ones(count),
+        twin_priors=np.zeros(count),
+        twins=np.zeros(count, dtype=np.bool_),
     )
 
 

@@ -43,6 +43,7 @@ PARTS = ("scores", "rates", "cost", "consistency")
 #: Recorded people lie beside the repository, if anywhere; see README.md.
 RECORDINGS = Path(__file__).resolve().parents[3] / "shared" / "data"
 RATE_SEEDS = 3
+COST_PEOPLE = (20, 100, 300)
 COST_FRAMES, COST_REPEATS = 150, 3
 STEPS_S = (0.03, 0.05, 0.1, 0.2, 0.4)
 CONSISTENCY_WALKERS, CONSISTENCY_FRAMES = 60, 60
@@ -270,15 +271,16 @@ def _cost(
     missed: list[str],
 ) -> None:
     """Compare the processor time of the trackers."""
-    print(f"\n{'processor time':16s}{'people':>6s}{'ms/frame':>10s}{'ours over it':>14s}")
-    for people in (20, 100):
+    print(f"\n{'processor time':16s}{'people':>6s}{'update, ms':>12s}{'with input':>12s}", end="")
+    print(f"{'ours over it':>14s}")
+    for people in COST_PEOPLE:
         rng = np.random.default_rng([options.seed, people])
         recording = record(people, COST_FRAMES, rng, OPEN)
         chosen = _affordable(options, makers, people)
-        cost = cost_ms([make() for make in chosen.values()], recording, COST_REPEATS)
+        alone, cost = cost_ms([make() for make in chosen.values()], recording, COST_REPEATS)
         for tracker, value in cost.items():
             ratio = f"{cost['ours'] / value:14.3f}" if "ours" in cost else f"{'-':>14s}"
-            print(f"{tracker:16s}{people:6d}{value:10.3f}{ratio}", flush=True)
+            print(f"{tracker:16s}{people:6d}{alone[tracker]:12.3f}{value:12.3f}{ratio}", flush=True)
         metrics += cost_metrics(people, cost)
         missed += missed_costs(people, cost)
 

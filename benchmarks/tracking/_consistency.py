@@ -12,7 +12,7 @@ from perception import PersonObservation
 from tracking import PersonTracker, TrackerConfig
 
 from ._measurements import SimulatedRecording
-from ._ours import T_ODOM_CAMERA, observation
+from ._ours import T_ODOM_CAMERA, observations
 from ._walkers import FloatArray
 
 NOISE_STD_M = 0.15
@@ -88,7 +88,9 @@ def _follow_one(
             innovation = z - expected.position_odom_m
             S = expected.covariance_odom[:2, :2] + R
             nis[frame - 1] = innovation @ np.linalg.solve(S, innovation)
-        (track,) = tracker.update([observation(z, stamp_s, NOISE_STD_M)], stamp_s, T_ODOM_CAMERA)
+        (track,) = tracker.update(
+            observations(z[None], stamp_s, NOISE_STD_M), stamp_s, T_ODOM_CAMERA
+        )
         error = state - np.concatenate([track.position_odom_m, track.velocity_odom_mps])
         nees[frame] = error @ np.linalg.solve(track.covariance_odom, error)
     return nees, nis
@@ -123,10 +125,10 @@ def on_walkers(recording: SimulatedRecording, config: TrackerConfig) -> dict[str
         tracker = PersonTracker(open_gates(config))
         for frame, state in enumerate(truth[:-ahead]):
             stamp_s = float(recording.stamps_s[frame])
-            seen: list[PersonObservation] = []
+            seen: tuple[PersonObservation, ...] = ()
             if recording.visible[frame, person]:
                 z = state[:2] + rng.normal(0.0, recording.noise_std_m, 2)
-                seen = [observation(z, stamp_s, recording.noise_std_m)]
+                seen = observations(z[None], stamp_s, recording.noise_std_m)
             tracks = tracker.update(seen, stamp_s, T_ODOM_CAMERA)
             if not tracks or frame < 20:
                 continue

@@ -15,14 +15,18 @@ MAX_UNSEEN_S = 1.2
 class Contender(Protocol):
     """A tracker under test, fed frame by frame.
 
-    ``begin`` makes a fresh tracker and converts the measurements into its own form. ``advance`` is
-    the call of every frame, and the only one that is timed. ``report`` reads its result.
+    ``begin`` makes a fresh tracker. ``make`` converts the measurements of a frame into the
+    tracker's own form, ``advance`` is the call of every frame: these two are timed. ``report``
+    reads its result.
     """
 
     name: str
 
     def begin(self, recording: SimulatedRecording) -> None:
         """Start over, on this recording."""
+
+    def make(self, frame: int) -> None:
+        """Make the input of the next frame."""
 
     def advance(self, frame: int) -> Any:
         """Take the next frame."""
@@ -34,4 +38,8 @@ class Contender(Protocol):
 def run(contender: Contender, recording: SimulatedRecording) -> list[TrackedFrame]:
     """Return the tracks of every frame of a recording."""
     contender.begin(recording)
-    return [contender.report(contender.advance(i)) for i in range(len(recording.stamps_s))]
+    tracked = []
+    for frame in range(len(recording.stamps_s)):
+        contender.make(frame)
+        tracked.append(contender.report(contender.advance(frame)))
+    return tracked

@@ -61,6 +61,9 @@ class Naive:
         self._Q = np.kron(block, np.eye(2))
         self._R = recording.noise_std_m**2 * np.eye(2)
 
+    def make(self, frame: int) -> None:
+        """Do nothing: the measurements are taken as they are, or were converted at the start."""
+
     def advance(self, frame: int) -> Any:
         """Take the next frame."""
         assert self._recording is not None

@@ -61,14 +61,15 @@ class Norfair:
                 vel_variance=(settings.velocity_std_mps * dt_s) ** 2,
             ),
         )
-        self._frames = [
-            [Detection(points=point[None]) for point in measured]
-            for measured in recording.measured_m
-        ]
+        self._detection, self._measured_m = Detection, recording.measured_m
+
+    def make(self, frame: int) -> None:
+        """Make the detections of the next frame."""
+        self._detections = [self._detection(points=p[None]) for p in self._measured_m[frame]]
 
     def advance(self, frame: int) -> Any:
         """Take the next frame."""
-        return self._tracker.update(self._frames[frame])
+        return self._tracker.update(self._detections)
 
     def report(self, result: Any) -> TrackedFrame:
         """Return the active objects."""

@@ -12,6 +12,7 @@ from tracking import PersonTracker, TrackerConfig
 from ._contender import MAX_UNSEEN_S
 from ._judges import TrackedFrame
 from ._measurements import SimulatedRecording
+from ._walkers import FloatArray
 
 #: A camera 8 m up that looks straight down: its x is odom's x, its y is against odom's y.
 T_ODOM_CAMERA = np.array(
@@ -23,19 +24,28 @@ T_ODOM_CAMERA = np.array(
     ]
 )
 _CHEST_M = 1.2
+_EYE = np.eye(3)
 
 
-def observation(place_m: Any, stamp_s: float, noise_std_m: float) -> PersonObservation:
-    """Return the observation of a person at x, y (odom, m) who looks at the camera overhead."""
-    x, y = place_m
-    return PersonObservation(
-        stamp_s=stamp_s,
-        position_camera_m=np.array([x, -y, T_ODOM_CAMERA[2, 3] - _CHEST_M]),
-        position_covariance_m2=noise_std_m**2 * np.eye(3),
-        gaze_camera=np.array([0.0, 0.0, -1.0]),
-        awareness=0.6,
-        awareness_std=0.08,
-        score=0.9,
+def observations(
+    places_m: FloatArray, stamp_s: float, noise_std_m: float
+) -> tuple[PersonObservation, ...]:
+    """Return observations of people at (M, 2), x and y in odom, who look at the camera overhead."""
+    count = len(places_m)
+    positions_m = np.full((count, 3), T_ODOM_CAMERA[2, 3] - _CHEST_M)
+    positions_m[:, 0], positions_m[:, 1] = places_m[:, 0], -places_m[:, 1]
+    covariances = np.zeros((count, 3, 3))
+    covariances[:] = noise_std_m**2 * _EYE
+    gazes = np.zeros((count, 3))
+    gazes[:, 2] = -1.0
+    return PersonObservation.batch(
+        stamp_s,
+        positions_m,
+        covariances,
+        np.full(count, 0.9),
+        gazes_camera=gazes,
+        awareness=np.full(count, 0.6),
+        awareness_std=np.full(count, 0.08),
     )
 
 
@@ -49,7 +59,8 @@ class Ours:
         self._config = config or TrackerConfig()
         self._tracker = PersonTracker(self._config)
         self._stamps_s: list[float] = []
-        self._frames: list[tuple[PersonObservation, ...]] = []
+        self._recording: SimulatedRecording | None = None
+        self._seen: tuple[PersonObservation, ...] = ()
 
     def begin(self, recording: SimulatedRecording) -> None:
         """Start over, on this recording."""
@@ -57,14 +68,18 @@ class Ours:
         kept_s = MAX_UNSEEN_S + 0.5 * float(np.diff(recording.stamps_s).mean())
         self._tracker = PersonTracker(self._config.model_copy(update={"max_coast_s": kept_s}))
         self._stamps_s = recording.stamps_s.tolist()
-        self._frames = [
-            tuple(observation(place, stamp_s, recording.noise_std_m) for place in measured)
-            for stamp_s, measured in zip(self._stamps_s, recording.measured_m, strict=True)
-        ]
+        self._recording = recording
+
+    def make(self, frame: int) -> None:
+        """Make the observations of the next frame."""
+        assert self._recording is not None
+        self._seen = observations(
+            self._recording.measured_m[frame], self._stamps_s[frame], self._recording.noise_std_m
+        )
 
     def advance(self, frame: int) -> Any:
         """Take the next frame."""
-        return self._tracker.update(self._frames[frame], self._stamps_s[frame], T_ODOM_CAMERA)
+        return self._tracker.update(self._seen, self._stamps_s[frame], T_ODOM_CAMERA)
 
     def report(self, result: Any) -> TrackedFrame:
         """Return confirmed and coasting tracks."""

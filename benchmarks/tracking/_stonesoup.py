@@ -123,6 +123,9 @@ class StoneSoup(ABC):
     ) -> Any:
         """Return the tracker made of these parts."""
 
+    def make(self, frame: int) -> None:  # noqa: B027 - no detections to make
+        """Do nothing: the measurements are taken as they are, or were converted at the start."""
+
     def advance(self, frame: int) -> Any:
         """Take the next frame."""
         return next(self._tracks)[1]
