@@ -161,9 +161,9 @@ class NavAdapter:
 
         Raises:
             NavError: for input of the wrong type or not finite, a position or standard deviation
-                beyond 1e12 m, a speed beyond 10 km/s, an id that occurs twice, a stamp that jumps,
-                or data from the future. After this or any other error the adapter is as it was
-                before the call, but for :attr:`refused_stamps`.
+                beyond 1e12 m, a speed beyond 10 km/s, an id that is negative or occurs twice, a
+                stamp that jumps, or data from the future. After this or any other error the adapter
+                is as it was before the call, but for :attr:`refused_stamps`.
         """
         now = finite_number("stamp_s", stamp_s, NavError)
         current = checked_tracks(tracks)

@@ -40,6 +40,11 @@ def checked_tracks(tracks: Iterable[PersonTrack]) -> tuple[PersonTrack, ...]:
     for index, track in enumerate(checked):
         if not isinstance(track, PersonTrack):
             raise NavError(f"tracks[{index}] must be a PersonTrack, got {type(track).__name__}")
+        if track.id < 0:
+            raise NavError(
+                f"tracks must have ids of at least 0, got {track.id}: negative ones are those of "
+                "the robot's stop polygon and of people whose id was exchanged"
+            )
         if track.id in ids:
             raise NavError(f"tracks must have distinct ids, got id {track.id} twice")
         ids.add(track.id)

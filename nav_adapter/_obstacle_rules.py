@@ -17,6 +17,8 @@ from ._policy import AwarenessPolicy
 
 # Below this speed the direction of a velocity is noise.
 _WALKING_MPS: Final = 0.1
+# The id of somebody whose own now belongs to another; −1 is that of the bridge's stop polygon.
+_FIRST_KEPT_ID: Final = -2
 # Tolerance for rounding where sums of frame periods are compared with a setting.
 _ROUNDING_S: Final = 1e-9
 
@@ -109,7 +111,7 @@ class ObstacleRules:
             memory = people[track_id]
             walking_mps = self.unaware_human_speed_mps
             if all(has_jumped(memory, track, walking_mps) for track in tracks):
-                kept[min(0, *kept, *people) - 1] = memory
+                kept[min(_FIRST_KEPT_ID + 1, *kept, *people) - 1] = memory
         return kept
 
     def after_silence(self, people: Mapping[int, PersonMemory]) -> dict[int, PersonMemory]:

@@ -11,8 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from nav_scenes import ROBOT, finite, person, robot_at
 
-from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, NavError
 from nav_adapter.policies import TimeBehaviour
+from nav_adapter.ros2 import STOP_POLYGON_ID
 from tracking import PersonTrack
 
 PERIOD_S = 0.05
@@ -93,7 +94,8 @@ def test_whoever_had_a_reused_id_is_kept_for_a_second() -> None:
     for k in range(40, 58):
         result = frame(adapter, k * PERIOD_S, somebody(1, FAR, 0.0))
         ids = [each.track_id for each in result.obstacles]
-        assert ids == [-1, 1]
+        assert ids == [-2, 1]
+        assert STOP_POLYGON_ID not in ids
         lost = result.obstacles[0]
         assert lost.center_odom_m == pytest.approx(NEAR)
         assert lost.awareness_lower == 0.0
@@ -101,14 +103,21 @@ def test_whoever_had_a_reused_id_is_kept_for_a_second() -> None:
     assert [each.track_id for each in result.obstacles] == [1]
 
 
+def test_negative_ids_are_refused() -> None:
+    """They are those of the stop polygon, and of people who are kept."""
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    with pytest.raises(NavError, match="ids of at least 0, got -1"):
+        frame(adapter, 0.0, somebody(-1, FAR, 0.0))
+
+
 def test_two_who_lose_one_id_after_the_other_are_both_kept() -> None:
     adapter = NavAdapter(AwarenessPolicy(), ROBOT)
     places = [(2.0, -2.0), (2.0, 2.0), (4.0, 0.0)]
     for k, place in enumerate(places):
         result = frame(adapter, k * PERIOD_S, somebody(1, place, 0.0))
-    assert [each.track_id for each in result.obstacles] == [-2, -1, 1]
+    assert [each.track_id for each in result.obstacles] == [-3, -2, 1]
     centers = {each.track_id: tuple(each.center_odom_m) for each in result.obstacles}
-    assert centers == {-1: places[0], -2: places[1], 1: places[2]}
+    assert centers == {-2: places[0], -3: places[1], 1: places[2]}
 
 
 @given(
