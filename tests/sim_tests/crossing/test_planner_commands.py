@@ -31,6 +31,10 @@ class Returns:
 class Tensor:
     """As much of a torch tensor as a command needs."""
 
+    def __repr__(self) -> str:
+        """Without the address, which differs between the processes of one test run."""
+        return "Tensor"
+
     def __init__(self, *values):
         self.values = values
         self.ndim = 1 if len(values) > 1 else 0
