@@ -42,7 +42,6 @@ STANDARD_SEEDS, STANDARD_FRAMES = 10, 500
 PARTS = ("scores", "rates", "cost", "consistency")
 #: Recorded people lie beside the repository, if anywhere; see README.md.
 RECORDINGS = Path(__file__).resolve().parents[3] / "shared" / "data"
-RATE_SEEDS = 3
 COST_PEOPLE = (20, 100, 300)
 COST_FRAMES, COST_REPEATS = 150, 3
 STEPS_S = (0.03, 0.05, 0.1, 0.2, 0.4)
@@ -257,7 +256,7 @@ def _rates(
     }
     if "norfair" in options.trackers and find_spec("norfair") is not None:
         makers["norfair"] = Norfair
-    seeds = range(options.seed, options.seed + min(options.seeds, RATE_SEEDS))
+    seeds = range(options.seed, options.seed + options.seeds)
     sets = {name: SETS[name] for name in options.sets}
     found, worse = rate_table(sets, makers, seeds, options.recordings)
     metrics += found

@@ -26,6 +26,8 @@ _FIELDS = ("mota", "idf1", "hota")
 #: Differences below this are chance: a tenth of a person for a tenth of the time.
 _TOLERANCE = 0.005
 _SEED = 31
+#: Recorded people are many; in a crowd of twelve one exchange of ids changes IDF1 by hundredths.
+_RECORDED_SEEDS = 3
 
 
 def rate_table(
@@ -76,7 +78,7 @@ def _recordings(
     source: str, sensor: SensorSettings, seeds: Sequence[int], folder: Path
 ) -> Iterator[SimulatedRecording]:
     """Yield the recordings of one row: every file, or one crowd, for each seed."""
-    for seed in seeds:
+    for seed in seeds if source == "simulated" else seeds[:_RECORDED_SEEDS]:
         if source == "simulated":
             rng = np.random.default_rng([seed, _SEED])
             yield record(WALKERS, round(WALKERS_S * sensor.rate_hz), rng, sensor)
