@@ -69,9 +69,10 @@ def test_crossings_that_fail_are_reported_and_the_others_are_written(tmp_path, c
     output = capsys.readouterr()
     assert "2 of 4 episodes failed; episode 0 (short, seed 0): RuntimeError" in output.err
     assert "errors.log has the tracebacks" in output.err
-    _, *body = rows(tmp_path / "out" / "episodes.csv")
+    header, *body = rows(tmp_path / "out" / "episodes.csv")
     assert [row[3] for row in body] == ["Raises", "SamplingPlanner"] * 2
-    assert [bool(row[-1]) for row in body] == [True, False] * 2
+    error = header.index("error")
+    assert [bool(row[error]) for row in body] == [True, False] * 2
 
 
 @pytest.mark.parametrize(
