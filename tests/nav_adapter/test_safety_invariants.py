@@ -107,6 +107,14 @@ def test_never_faster_than_speed_and_separation_straight_ahead(
         if (last[1] > 0.0) == bool(_ahead(track) > 0.0) and abs(_ahead(track)) > 0.1
     ]
     result = run(policy, robot, walk)[-1]
+    standing = policy.rules.standing
+    start = {}
+    if standing is not None:
+        # As if everybody stood.
+        start = {
+            "human_acceleration_mps2": standing.human_acceleration_mps2,
+            "start_delay_s": standing.start_delay_s,
+        }
     shown = {obstacle.track_id: obstacle for obstacle in result.obstacles}
     for track in ahead:
         # A looser bound than the adapter's: from the robot's centre.
@@ -117,6 +125,7 @@ def test_never_faster_than_speed_and_separation_straight_ahead(
             deceleration_mps2=robot.max_deceleration_mps2,
             reaction_time_s=robot.reaction_time_s,
             clearance_m=policy.margins.separation_clearance_m,
+            **start,
         )
         assert shown[track.id].awareness_lower <= track.awareness_lower
         assert result.speed_limit_mps <= bound + ROUNDING
@@ -160,7 +169,8 @@ def _assert_equal_to_the_model(
     alphas = [shown[track.id] if known else 0.0 for track in people]
     # With hysteresis the speed depends on more than the last lower bound.
     held = getattr(policy.speed, "shape", "") == "two_level"
-    expected = separation_model.limit_mps(policy, robot, state, people, alphas, 0.0)
+    known = known and not result.stale
+    expected = separation_model.limit_mps(policy, robot, state, people, alphas, 0.0, known=known)
     if not held:
         assert result.speed_limit_mps <= expected + 1e-6
     bound = separation_model.limit_mps(policy, robot, state, people, [1.0] * len(people), 0.0)
