@@ -105,7 +105,8 @@ def position_sigma_m(track: PersonTrack, stamp_s: float) -> float:
 def velocity_variance_m2ps2(track: PersonTrack) -> float:
     """Return the variance of the velocity along its most uncertain direction."""
     _, _, (_, _, u_u, u_v), (_, _, _, v_v) = track.covariance_odom.tolist()
-    return max(0.5 * (u_u + v_v) + math.hypot(0.5 * (u_u - v_v), u_v), 0.0)
+    largest: float = 0.5 * (u_u + v_v) + math.hypot(0.5 * (u_u - v_v), u_v)
+    return max(largest, 0.0)
 
 
 def has_jumped(before: PersonMemory, track: PersonTrack, walking_mps: float) -> bool:

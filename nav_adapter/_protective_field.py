@@ -46,7 +46,8 @@ class StraightPath:
         along = [x * ahead_x + y * ahead_y for x, y in self._corners]
         across = [y * ahead_x - x * ahead_y for x, y in self._corners]
         robot_x, robot_y = robot_state.position_odom_m.tolist()
-        x, y = position_odom_m[0] - robot_x, position_odom_m[1] - robot_y
+        x: float = position_odom_m[0] - robot_x
+        y: float = position_odom_m[1] - robot_y
         forward_m, left_m = travel_x * x + travel_y * y, travel_x * y - travel_y * x
         body_m = BODY_RADIUS_M + error_m
         reach_m = body_m + self._beside_m

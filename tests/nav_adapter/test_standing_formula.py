@@ -31,9 +31,11 @@ def test_published_figures_of_a_standing_person() -> None:
 
 
 @given(
-    speed=finite(0.0, 3.0), human=finite(0.0, 3.0), reaction=finite(0.0, 1.5), acceleration=finite(
-        0.2, 10.0
-    ), delay=finite(0.0, 1.0)
+    speed=finite(0.0, 3.0),
+    human=finite(0.0, 3.0),
+    reaction=finite(0.0, 1.5),
+    acceleration=finite(0.2, 10.0),
+    delay=finite(0.0, 1.0),
 )
 def test_the_way_is_the_integral_of_the_speed_since_the_start(
     speed: float, human: float, reaction: float, acceleration: float, delay: float
