@@ -51,7 +51,8 @@ def test_the_field_is_the_stopping_distance_and_a_supplement_for_everybody(
     elif found < ROBOT.max_speed_mps:
         assert found * 0.3 + found**2 / 2.0 + 0.1 == pytest.approx(field_m, abs=1e-9)
     else:
-        assert 1.5 * 0.3 + 1.5**2 / 2.0 + 0.1 <= field_m + 1e-9
+        # The whole field at 1.5 m/s.
+        assert field_m >= 1.675 - 1e-9
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
