@@ -137,7 +137,6 @@ class ObstacleRules:
                 history=((memory.visible_s, radius_m, ahead_m),),
                 inflation_held=False,
                 speed_held=False,
-                start_delay_s=math.inf,
             )
         return unaware
 

@@ -122,23 +122,44 @@ def test_time_without_a_look_counts_as_time_in_which_a_start_was_missed(unseen_s
     assert old == pytest.approx(float(expected), abs=1e-12)
 
 
-@pytest.mark.parametrize("how", ["unseen", "missing", "stale", "silence"])
+# Somebody so slow to set off that the rule is worth much even for old measurements.
+SLUGGISH = with_rule(
+    BLIND, StandingPeople(human_acceleration_mps2=0.5, start_delay_s=0.4, standing_below_mps=0.2)
+)
+
+
+@pytest.mark.parametrize("how", ["unseen", "missing", "late", "stale", "silent"])
 def test_without_a_fresh_measurement_nobody_stands(how: str) -> None:
-    adapter = NavAdapter(STANDING, ROBOT)
-    for stamp_s in (0.0, 0.1, 0.2, 0.3):
-        adapter.update([person(stamp_s)], robot_at(stamp_s), stamp_s)
+    """The limit is that of people who walk, to the bit, once the last frame is too old."""
+    limits = []
+    for policy in (SLUGGISH, BLIND):
+        adapter = NavAdapter(policy, ROBOT)
+        for stamp_s in np.arange(0.0, 1.05, 0.1).tolist():
+            seen_s = min(stamp_s, 0.3)
+            state = robot_at(stamp_s, speed_mps=0.5)
+            if how == "missing" and stamp_s > 0.35:
+                result = adapter.update([], state, stamp_s, perception_stamp_s=stamp_s)
+            elif how == "unseen":
+                predicted = person(stamp_s, unseen_s=stamp_s - seen_s)
+                result = adapter.update([predicted], state, stamp_s)
+            elif how == "late":
+                result = adapter.update([person(seen_s)], state, stamp_s)
+            elif how == "stale":
+                result = adapter.update(
+                    [person(stamp_s)], state, stamp_s, perception_stamp_s=seen_s
+                )
+            elif how == "silent" and stamp_s > 0.35:
+                result = adapter.watchdog(stamp_s)
+            else:
+                result = adapter.update([person(stamp_s)], state, stamp_s)
+            limits.append(result.speed_limit_mps)
+    standing, walking = np.array(limits).reshape(2, -1)
+    assert (standing[2:4] > walking[2:4] + 0.2).all()
+    # From here on the last frame is older than ``fresh_within_s``, or stale.
+    old = 6 if how != "stale" else 9
+    assert (standing[old:] == walking[old:]).all()
     if how == "missing":
-        result = adapter.update([], robot_at(0.4), 0.4)
-    elif how == "unseen":
-        result = adapter.update([person(0.6, unseen_s=0.3)], robot_at(0.6), 0.6)
-    elif how == "stale":
-        tracks = [person(0.9)]
-        result = adapter.update(tracks, robot_at(0.9), 0.9, perception_stamp_s=0.35)
-    else:
-        result = adapter.watchdog(0.9)
-    age_s = result.stamp_s - (0.9 if how == "stale" else 0.6 if how == "unseen" else 0.3)
-    walker = max_speed_mps(GAP_M, 1.6, **(BRAKING | {"reaction_time_s": 0.3 + age_s}))
-    assert result.speed_limit_mps <= float(walker) + 1e-12
+        assert (standing[4:] == walking[4:]).all()
 
 
 @pytest.mark.parametrize("alpha", [0.6, 0.7, 1.0])
@@ -161,6 +182,17 @@ def test_a_robot_at_its_limit_can_brake_when_the_start_is_noticed() -> None:
     later = adapter.update([moved], robot_at(0.4, position=(0.04, 0.0), speed_mps=speed), 0.4)
     assert later.speed_limit_mps < speed
     assert later.braking_suffices
+
+
+@pytest.mark.parametrize(("speed", "suffices"), [(1.04, True), (1.13, True), (1.15, False)])
+def test_braking_suffices_counts_with_the_way_of_a_person_who_stands(
+    speed: float, suffices: bool
+) -> None:
+    """A walker limits it to 1.052 m/s and a standing person to 1.141 m/s; the way is 2.3375 m."""
+    state = robot_at(speed_mps=speed)
+    assert settled_update((person(),), policy=STANDING, state=state).braking_suffices is suffices
+    walking = settled_update((person(),), policy=BLIND, state=state).braking_suffices
+    assert walking is (speed < 1.052)
 
 
 @settings(max_examples=30)

@@ -11,7 +11,7 @@ import pytest
 import separation_model
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from nav_policies import policies, robots
+from nav_policies import policies, robots, standing_rules
 from nav_scenes import crowds, finite, moved_person, moved_robot, numbers, robot_at
 from shapely.geometry import Point
 
@@ -23,6 +23,7 @@ from nav_adapter import (
     RobotState,
     max_speed_mps,
 )
+from nav_adapter.policies import StandingPeople
 from perception.anthropometry import BODY_RADIUS_M
 from tracking import PersonTrack
 
@@ -184,6 +185,27 @@ def _assert_equal_to_the_model(
 def test_the_limit_is_that_of_a_second_implementation(scene: Any) -> None:
     """By bisection, with shapely's geometry: ``separation_model``."""
     _assert_equal_to_the_model(scene)
+
+
+@settings(max_examples=60)
+@given(scene=scenes(), rule=standing_rules(), unseen_s=st.sampled_from([0.0, 0.0, 0.05]))
+def test_the_limit_is_that_of_a_second_implementation_for_people_who_stand(
+    scene: Any, rule: StandingPeople, unseen_s: float
+) -> None:
+    policy, robot, state, people = scene
+    rules = policy.rules.model_copy(update={"standing": rule, "zones": None, "near_cap": None})
+    calm = tuple(
+        replace(
+            track,
+            stamp_s=0.1 * track.stamp_s,
+            status="confirmed",
+            time_since_seen_s=unseen_s,
+            velocity_odom_mps=0.02 * track.velocity_odom_mps,
+            covariance_odom=1e-4 * track.covariance_odom,
+        )
+        for track in people
+    )
+    _assert_equal_to_the_model((policy.model_copy(update={"rules": rules}), robot, state, calm))
 
 
 @pytest.mark.full
