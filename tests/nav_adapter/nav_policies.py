@@ -78,8 +78,9 @@ def human_speeds(draw: st.DrawFn) -> InterpolatedHumanSpeed | TableHumanSpeed:
 
 
 @st.composite
-def standing_rules(draw: st.DrawFn) -> StandingPeople:
-    acceleration, delay = draw(finite(0.5, 6.0)), draw(finite(0.0, 0.6))
+def standing_rules(draw: st.DrawFn, lowest_mps2: float = 0.5) -> StandingPeople:
+    acceleration = draw(finite(lowest_mps2, 1.0) | finite(lowest_mps2, 6.0))
+    delay = draw(finite(0.0, 0.6))
     return StandingPeople(
         human_acceleration_mps2=acceleration,
         start_delay_s=delay,

@@ -188,11 +188,12 @@ def test_the_limit_is_that_of_a_second_implementation(scene: Any) -> None:
 
 
 @settings(max_examples=60)
-@given(scene=scenes(), rule=standing_rules(), unseen_s=st.sampled_from([0.0, 0.0, 0.05]))
+@given(scene=scenes(), rule=standing_rules(0.1), unseen_s=st.sampled_from([0.0, 0.0, 0.05]))
 def test_the_limit_is_that_of_a_second_implementation_for_people_who_stand(
     scene: Any, rule: StandingPeople, unseen_s: float
 ) -> None:
     policy, robot, state, people = scene
+    rule = rule.model_copy(update={"standing_below_mps": 0.2})
     rules = policy.rules.model_copy(update={"standing": rule, "zones": None, "near_cap": None})
     calm = tuple(
         replace(
