@@ -82,7 +82,8 @@ class NavAdapter:
     The speed limit is the smallest of all people and all rules: v_max of speed-and-separation
     monitoring with the human speed that the policy assumes, and the policy's other rules. The
     separation runs from the robot to the person's body circle (radius 0.30 m), not to the inflated
-    obstacle. People whom the robot cannot reach while it stops limit it less (``docs/safety.md``).
+    obstacle. People whom the robot cannot reach while it stops limit it less (``docs/safety.md``),
+    and so do people who stand if the policy bounds how fast they set off (``rules.standing``).
 
     Tentative people, people unseen for longer than ``fresh_within_s`` and, with stale data, all
     people count as unaware. For the speed limit, so do people at first sight, until frames have

@@ -16,8 +16,13 @@ from ._footprint import Footprint
 from ._memory import PersonMemory
 from ._obstacle_rules import ObstacleRules
 from ._policy import AwarenessPolicy
+from ._protective_field import StraightPath
 from ._robot import LATERAL_NOISE_MPS, RobotProfile, RobotState
-from ._separation import highest_speed_mps, protective_separation_m
+from ._separation import (
+    highest_speed_from_standing_mps,
+    highest_speed_mps,
+    protective_separation_m,
+)
 
 # Below this speed the robot counts as standing: it may start off either way, or turn on the spot.
 _STANDING_MPS: Final = 0.05
@@ -68,6 +73,12 @@ class SpeedGovernor:
         self._rules = rules
         self._footprint = Footprint(robot.footprint_m)
         self._turn_rad = math.radians(policy.rules.turn_within_stop_deg)
+        field = policy.rules.protective_field
+        self._path = None if field is None else StraightPath(robot.footprint_m, field.beside_m)
+        standing = policy.rules.standing
+        self._human_acceleration_mps2 = (
+            math.inf if standing is None else standing.human_acceleration_mps2
+        )
         self._people_turn_rad = math.radians(policy.rules.people_turn_deg)
 
     def limit(
@@ -79,16 +90,22 @@ class SpeedGovernor:
     ) -> GovernedSpeed:
         """Return the limit at ``now`` for a robot whose state is ``robot_age_s`` old."""
         maximum_mps = self._robot.max_speed_mps
+        if self._path is not None:
+            people = self._people_in(self._path, people, robot_state, now)
         if not people:
             return GovernedSpeed(maximum_mps, "robot maximum", True)
         gaps_m, shares = self._gaps(people, robot_state, now, robot_age_s)
         robot_x, robot_y = robot_state.position_odom_m.tolist()
         rows = [
-            (max(0.0, now - m.track.stamp_s), self._human_speed_mps(m, robot_x, robot_y))
+            (
+                max(0.0, now - m.track.stamp_s),
+                self._human_speed_mps(m, robot_x, robot_y),
+                m.start_delay_s,
+            )
             for m in people.values()
         ]
-        age_s, human_mps = np.array(rows).T.copy()
-        separation_mps = self._separation_limit_mps(gaps_m, shares, human_mps, age_s)
+        age_s, human_mps, delay_s = np.array(rows).T.copy()
+        separation_mps = self._separation_limit_mps(gaps_m, shares, human_mps, age_s, delay_s)
         limits = {
             "speed and separation": separation_mps,
             **self._rule_limits_mps(gaps_m, shares[1]),
@@ -101,11 +118,28 @@ class SpeedGovernor:
         speed_mps = robot_state.travel_mps
         # A robot within speed and separation has the whole reaction time left.
         suffices = speed_mps <= lowest[0][0] or self._braking_suffices(
-            gaps_m, shares, human_mps, age_s, speed_mps
+            gaps_m, shares, human_mps, age_s, delay_s, speed_mps
         )
         if limit_mps >= maximum_mps:
             return GovernedSpeed(maximum_mps, "robot maximum", suffices)
         return GovernedSpeed(limit_mps, f"track {list(people)[row]}: {rule}", suffices)
+
+    def _people_in(
+        self,
+        path: StraightPath,
+        people: Mapping[int, PersonMemory],
+        robot_state: RobotState,
+        now: float,
+    ) -> dict[int, PersonMemory]:
+        """Return the people in the path at their tracked or at their predicted position."""
+        return {
+            track_id: memory
+            for track_id, memory in people.items()
+            if any(
+                path.holds(position, robot_state, self._uncertainty_m(memory, now))
+                for position in (memory.track_position_odom_m, memory.position_odom_m)
+            )
+        }
 
     def _gaps(
         self,
@@ -162,10 +196,15 @@ class SpeedGovernor:
         return np.asarray(np.maximum(np.cos(beyond_rad), 0.0))
 
     def _separation_limit_mps(
-        self, gaps_m: FloatArray, shares: FloatArray, human_mps: FloatArray, age_s: FloatArray
+        self,
+        gaps_m: FloatArray,
+        shares: FloatArray,
+        human_mps: FloatArray,
+        age_s: FloatArray,
+        delay_s: FloatArray,
     ) -> FloatArray:
         """Return (N,), the higher limit of the two bounds for each person."""
-        limits_mps = highest_speed_mps(
+        arguments = (
             gaps_m,
             human_mps,
             self._robot.max_deceleration_mps2,
@@ -173,6 +212,12 @@ class SpeedGovernor:
             self._policy.margins.separation_clearance_m,
             shares,
         )
+        if np.isfinite(delay_s).any():
+            limits_mps = highest_speed_from_standing_mps(
+                *arguments, self._human_acceleration_mps2, delay_s
+            )
+        else:
+            limits_mps = highest_speed_mps(*arguments)
         return np.asarray(np.maximum(limits_mps[0], limits_mps[1]))
 
     def _rule_limits_mps(self, gaps_m: FloatArray, approach: FloatArray) -> dict[str, FloatArray]:
@@ -198,6 +243,7 @@ class SpeedGovernor:
         shares: FloatArray,
         human_mps: FloatArray,
         age_s: FloatArray,
+        delay_s: FloatArray,
         speed_mps: float,
     ) -> bool:
         """Return whether the robot stops in time if it brakes fully from now on.
@@ -213,6 +259,8 @@ class SpeedGovernor:
             reaction_time_s=age_s,
             clearance_m=self._policy.margins.separation_clearance_m,
             approach=shares,
+            human_acceleration_mps2=self._human_acceleration_mps2,
+            start_delay_s=delay_s,
         )
         return bool((needed_m <= gaps_m).any(axis=0).all())
 
@@ -223,11 +271,13 @@ class SpeedGovernor:
         person is not expected to step towards the robot, but may do so. Speed above that assumed
         for unaware people is added, since an attentive runner cannot stop as fast as an attentive
         walker. From a quarter above it on, awareness no longer counts: a running person is assumed
-        to run straight at the robot.
+        to run straight at the robot. With a protective field it is the assumption alone.
         """
         (x, y), (vx, vy) = memory.track_position_odom_m, memory.velocity_odom_mps
         x, y = x - robot_x, y - robot_y
         assumed_mps = self._rules.human_speed_mps(memory)
+        if self._path is not None:
+            return assumed_mps
         distance_m = max(math.hypot(x, y), 1e-9)
         closing_mps = -(vx * x + vy * y) / distance_m
         walking_mps, unaware_mps = math.hypot(vx, vy), self._rules.unaware_human_speed_mps

@@ -42,6 +42,8 @@ class PersonMemory(NamedTuple):
         history: latest sizes, newest last: (``visible_s`` until which it held, radius, ahead).
         inflation_held: whether the hysteresis of the inflation policy holds the person as aware.
         speed_held: the same for the speed policy.
+        start_delay_s: how long before the track's stamp this person may have begun to walk
+            unnoticed; infinite for anybody who does not count as standing.
     """
 
     track: PersonTrack
@@ -59,6 +61,7 @@ class PersonMemory(NamedTuple):
     history: tuple[tuple[float, float, float], ...]
     inflation_held: bool
     speed_held: bool
+    start_delay_s: float = math.inf
 
     def newly_seen_s(self, seen_stamp_s: float) -> float:
         """Return the time from the last sighting to this one, or 0 if it is not a new one."""
@@ -97,6 +100,13 @@ def position_sigma_m(track: PersonTrack, stamp_s: float) -> float:
     yy = y_y + dt * (y_v + v_y) + dt * dt * v_v
     xy = x_y + dt * (x_v + u_y) + dt * dt * u_v
     return math.sqrt(max(0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy), 0.0))
+
+
+def velocity_variance_m2ps2(track: PersonTrack) -> float:
+    """Return the variance of the velocity along its most uncertain direction."""
+    _, _, (_, _, u_u, u_v), (_, _, _, v_v) = track.covariance_odom.tolist()
+    largest: float = 0.5 * (u_u + v_v) + math.hypot(0.5 * (u_u - v_v), u_v)
+    return max(largest, 0.0)
 
 
 def has_jumped(before: PersonMemory, track: PersonTrack, walking_mps: float) -> bool:

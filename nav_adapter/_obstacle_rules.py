@@ -12,13 +12,22 @@ from perception.arrays import finite_number
 from tracking import PersonTrack
 
 from ._errors import NavError
-from ._memory import PersonMemory, Vector2, has_jumped, motion_at, position_sigma_m
+from ._memory import (
+    PersonMemory,
+    Vector2,
+    has_jumped,
+    motion_at,
+    position_sigma_m,
+    velocity_variance_m2ps2,
+)
 from ._policy import AwarenessPolicy
 
 # Below this speed the direction of a velocity is noise.
 _WALKING_MPS: Final = 0.1
 # The id of somebody whose own now belongs to another; −1 is that of the bridge's stop polygon.
 _FIRST_KEPT_ID: Final = -2
+# Walking speed of ISO 13855.
+_WALKER_MPS: Final = 1.6
 # Tolerance for rounding where sums of frame periods are compared with a setting.
 _ROUNDING_S: Final = 1e-9
 
@@ -51,10 +60,16 @@ class ObstacleRules:
         self._floor_m, self._sigmas = margins.floor_m, margins.uncertainty_sigmas
         ceiling_m = margins.maximum_radius_m
         self._ceiling_m = math.inf if ceiling_m is None else ceiling_m
+        standing = policy.rules.standing
+        self._start_delay_s = math.inf if standing is None else standing.start_delay_s
         self._elongates = policy.outline.unaware_ahead_s > 0.0
         _require_non_increasing(self._policy_radius_m, type(inflation).__name__, "m")
         _require_non_increasing(self._policy_human_speed_mps, type(speed).__name__, "m/s")
         self.unaware_human_speed_mps = self._policy_human_speed_mps(0.0)
+        # The way that explains a new place. People walk even where their speed does not count.
+        self._jump_mps = self.unaware_human_speed_mps
+        if policy.rules.protective_field is not None:
+            self._jump_mps = max(self._jump_mps, _WALKER_MPS)
         self._inflation_holds = _hysteresis_of(inflation)
         self._speed_holds = _hysteresis_of(speed)
 
@@ -77,8 +92,7 @@ class ObstacleRules:
         jumped = {
             track.id
             for track in tracks
-            if track.id in people
-            and has_jumped(people[track.id], track, self.unaware_human_speed_mps)
+            if track.id in people and has_jumped(people[track.id], track, self._jump_mps)
         }
         current = {
             track.id: self._tracked_person(
@@ -109,8 +123,7 @@ class ObstacleRules:
         kept = {track_id: memory for track_id, memory in people.items() if track_id not in jumped}
         for track_id in sorted(jumped):
             memory = people[track_id]
-            walking_mps = self.unaware_human_speed_mps
-            if all(has_jumped(memory, track, walking_mps) for track in tracks):
+            if all(has_jumped(memory, track, self._jump_mps) for track in tracks):
                 kept[min(_FIRST_KEPT_ID + 1, *kept, *people) - 1] = memory
         return kept
 
@@ -135,7 +148,7 @@ class ObstacleRules:
         At first sight, and until frames have shown the person for ``shrink_after_s``, it is that
         for unaware people.
         """
-        if memory.known_s < self._timing.shrink_after_s - _ROUNDING_S:
+        if self._is_first_sight(memory):
             return self.unaware_human_speed_mps
         return self._policy_human_speed_mps(1.0 if memory.speed_held else memory.awareness_lower)
 
@@ -169,13 +182,34 @@ class ObstacleRules:
         # uncertainty of the first sighting would never shrink with a slow camera.
         counts = not stale and track.status == "confirmed"
         visible_s = min(newly_seen_s, timing.fresh_within_s) if counts else 0.0
-        return self._known_person(
+        person = self._known_person(
             track,
             before._replace(known_s=known_s),
             lower,
             now,
             visible_s=visible_s,
             seen_stamp_s=seen_stamp_s,
+        )
+        if trusted and self._is_standing(person):
+            # Between the frame that showed the person and the track's stamp nobody looked.
+            unseen_s = max(track.stamp_s - seen_stamp_s, 0.0)
+            return person._replace(start_delay_s=self._start_delay_s + unseen_s)
+        return person
+
+    def _is_first_sight(self, memory: PersonMemory) -> bool:
+        """Return whether frames have shown a person for less than ``shrink_after_s``."""
+        return memory.known_s < self._timing.shrink_after_s - _ROUNDING_S
+
+    def _is_standing(self, memory: PersonMemory) -> bool:
+        """Return whether the bound on human acceleration holds for a freshly seen person."""
+        standing, track = self._policy.rules.standing, memory.track
+        return (
+            standing is not None
+            and track.status == "confirmed"
+            and not self._is_first_sight(memory)
+            and standing.is_standing(
+                math.hypot(*memory.velocity_odom_mps), velocity_variance_m2ps2(track)
+            )
         )
 
     def _new_person(

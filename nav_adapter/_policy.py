@@ -124,7 +124,8 @@ class AwarenessPolicy(StrictConfig):
         """Load a shipped policy.
 
         ``"balanced"`` is the default and ``"blind"`` ignores α. ``"conservative"`` is more careful
-        than the default, ``"assertive"`` less.
+        than the default, ``"assertive"`` less. ``"scanner"`` is today's AMR with a safety laser
+        scanner, for comparisons only.
 
         Raises:
             NavError: for a name that is not a preset.

@@ -11,6 +11,13 @@ robot) are given together as ``clearance_m``.
 
 S_r + S_s is the robot's stopping distance. If only part of it can lead towards the person, who may
 be beside or behind the robot, only the share ``approach`` counts: 1 straight ahead, 0 behind.
+
+Somebody who stands does not walk at v_h at once. With a bound a_h on human acceleration, such a
+person is assumed to have begun by the delay δ before anybody could notice it, and S_h is the way
+since then, or that of a walker if it is shorter:
+
+    S_h = min(v_h t, D(t + δ)),   t = T + v/a
+    D(s) = a_h s² / 2 while a_h s ≤ v_h, and v_h s − v_h² / 2a_h from then on
 """
 
 from __future__ import annotations
@@ -31,6 +38,8 @@ def protective_separation_m(
     reaction_time_s: ArrayLike,
     clearance_m: ArrayLike,
     approach: ArrayLike = 1.0,
+    human_acceleration_mps2: ArrayLike = np.inf,
+    start_delay_s: ArrayLike = 0.0,
 ) -> FloatArray:
     """Return S_p, the separation that a robot must keep at this speed.
 
@@ -41,16 +50,23 @@ def protective_separation_m(
         reaction_time_s: T ≥ 0.
         clearance_m: C + Z ≥ 0.
         approach: in [0, 1], the share of the stopping distance that can lead to the person.
+        human_acceleration_mps2: a_h > 0 of a standing person; infinite, the default, for a person
+            who may be walking at v_h already.
+        start_delay_s: δ ≥ 0, how long a standing person may have been walking unnoticed.
 
     Returns:
         S_p in metres, in the broadcast shape.
 
     Raises:
-        NavError: for a deceleration that is not positive.
+        NavError: for an acceleration or deceleration that is not positive, or a negative delay.
     """
     v, v_h, a, T, C, share = _checked(
         speed_mps, human_speed_mps, deceleration_mps2, reaction_time_s, clearance_m, approach
     )
+    start = _checked_start(human_acceleration_mps2, start_delay_s)
+    if start is not None:
+        walked_m = _walked_m(T + v / a, v_h, *start)
+        return np.asarray(walked_m + share * (v * T + v**2 / (2.0 * a)) + C)
     separation: FloatArray = v_h * (T + v / a) + share * (v * T + v**2 / (2.0 * a)) + C
     return separation
 
@@ -63,6 +79,8 @@ def max_speed_mps(
     reaction_time_s: ArrayLike,
     clearance_m: ArrayLike,
     approach: ArrayLike = 1.0,
+    human_acceleration_mps2: ArrayLike = np.inf,
+    start_delay_s: ArrayLike = 0.0,
 ) -> FloatArray:
     """Return the highest speed whose protective separation is at most the given separation.
 
@@ -77,19 +95,24 @@ def max_speed_mps(
         reaction_time_s: T ≥ 0.
         clearance_m: C + Z ≥ 0.
         approach: in [0, 1], the share of the stopping distance that can lead to the person.
+        human_acceleration_mps2: a_h > 0 of a standing person; infinite, the default, for a person
+            who may be walking at v_h already.
+        start_delay_s: δ ≥ 0, how long a standing person may have been walking unnoticed.
 
     Returns:
         v_max ≥ 0 in m/s, in the broadcast shape; infinite if neither comes nearer (``approach`` and
         v_h are both 0).
 
     Raises:
-        NavError: for a deceleration that is not positive.
+        NavError: for an acceleration or deceleration that is not positive, or a negative delay.
     """
-    return highest_speed_mps(
-        *_checked(
-            separation_m, human_speed_mps, deceleration_mps2, reaction_time_s, clearance_m, approach
-        )
+    checked = _checked(
+        separation_m, human_speed_mps, deceleration_mps2, reaction_time_s, clearance_m, approach
     )
+    start = _checked_start(human_acceleration_mps2, start_delay_s)
+    if start is None:
+        return highest_speed_mps(*checked)
+    return highest_speed_from_standing_mps(*checked, *start)
 
 
 def highest_speed_mps(
@@ -118,6 +141,71 @@ def highest_speed_mps(
         where=has_spare & (denominator > 0.0),
     )
     return speed
+
+
+def highest_speed_from_standing_mps(
+    separation_m: FloatArray,
+    v_h: FloatArray,
+    a: FloatArray | float,
+    T: FloatArray,
+    C: FloatArray | float,
+    share: FloatArray,
+    a_h: FloatArray | float,
+    delay_s: FloatArray,
+) -> FloatArray:
+    """Return :func:`max_speed_mps` of its arguments in their order, without checks.
+
+    Where a_h or the delay is infinite, it is :func:`highest_speed_mps` to the bit.
+    """
+    walker_mps = highest_speed_mps(separation_m, v_h, a, T, C, share)
+    bounded = np.isfinite(a_h) & np.isfinite(delay_s)
+    a_h, delay_s = np.where(bounded, a_h, 1.0), np.where(bounded, delay_s, 0.0)
+    speeding_up_s = v_h / a_h
+    # At v_h when the robot stands: like a walker who began half the time of speeding up later.
+    late_mps = highest_speed_mps(
+        separation_m, v_h, a, T, C + v_h * (delay_s - 0.5 * speeding_up_s), share
+    )
+    # Still speeding up then: the root of (a_h/a + share) v²/2a + (a_h s/a + share T) v = spare.
+    since_s = T + delay_s
+    spare = separation_m - C - 0.5 * a_h * since_s**2
+    # Written so that NaN becomes 0.
+    spare = np.where(spare > 0.0, spare, 0.0)
+    b = a_h * since_s / a + share * T
+    denominator = b + np.sqrt(b**2 + 2.0 * (a_h / a + share) / a * spare)
+    early_mps = np.divide(
+        2.0 * spare, denominator, out=np.zeros_like(denominator), where=denominator > 0.0
+    )
+    starter_mps = np.where(since_s + early_mps / a <= speeding_up_s, early_mps, late_mps)
+    # The shorter way is the higher speed.
+    return np.asarray(np.where(bounded, np.maximum(walker_mps, starter_mps), walker_mps))
+
+
+def _walked_m(
+    time_s: FloatArray, v_h: FloatArray, a_h: FloatArray, delay_s: FloatArray
+) -> FloatArray:
+    """Return S_h over ``time_s``: v_h t, or the way from standing if that is shorter."""
+    bounded = np.isfinite(a_h) & np.isfinite(delay_s)
+    a_h, since_s = np.where(bounded, a_h, 1.0), time_s + np.where(bounded, delay_s, 0.0)
+    speeding_up_s = np.minimum(since_s, v_h / a_h)
+    started_m = 0.5 * a_h * speeding_up_s**2 + v_h * (since_s - speeding_up_s)
+    return np.asarray(
+        np.where(bounded, np.minimum(v_h * time_s, started_m), v_h * time_s), dtype=np.float64
+    )
+
+
+def _checked_start(
+    human_acceleration_mps2: ArrayLike, start_delay_s: ArrayLike
+) -> tuple[FloatArray, FloatArray] | None:
+    """Return a_h and δ as arrays after a check, or None if no acceleration is bounded."""
+    a_h = np.asarray(human_acceleration_mps2, dtype=np.float64)
+    delay_s = np.asarray(start_delay_s, dtype=np.float64)
+    if not bool((a_h > 0.0).all()):
+        raise NavError(
+            f"human_acceleration_mps2 must be > 0 m/s², got {human_acceleration_mps2!r:.80}"
+        )
+    if not bool((delay_s >= 0.0).all()):
+        raise NavError(f"start_delay_s must be >= 0 s, got {start_delay_s!r:.80}")
+    return (a_h, delay_s) if bool(np.isfinite(a_h).any()) else None
 
 
 def _checked(

@@ -35,7 +35,7 @@ def settled_speed_limit_mps(
     separation_m: ArrayLike,
     awareness_lower: ArrayLike,
 ) -> FloatArray:
-    """Return the speed limit for a person straight ahead.
+    """Return the speed limit for a person straight ahead, who stands and has been seen for long.
 
     Args:
         policy: the policy.
@@ -48,12 +48,15 @@ def settled_speed_limit_mps(
         broadcast shape.
     """
     separation = np.asarray(separation_m, dtype=np.float64)
+    standing = policy.rules.standing
     limit = max_speed_mps(
         separation,
         settled_human_speed_mps(policy, awareness_lower),
         deceleration_mps2=robot.max_deceleration_mps2,
         reaction_time_s=robot.reaction_time_s,
         clearance_m=policy.margins.separation_clearance_m,
+        human_acceleration_mps2=np.inf if standing is None else standing.human_acceleration_mps2,
+        start_delay_s=0.0 if standing is None else standing.start_delay_s,
     )
     rules = policy.rules
     if rules.zones is not None:

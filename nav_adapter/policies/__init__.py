@@ -5,7 +5,7 @@ from __future__ import annotations
 from ._human_speed import InterpolatedHumanSpeed, SpeedPolicy
 from ._inflation import InflationPolicy, InterpolatedInflation, ObstacleOutline
 from ._margins import AlertRules, SafetyMargins, TimeBehaviour
-from ._speed_rules import DistanceZones, NearCap, SpeedRules
+from ._speed_rules import DistanceZones, NearCap, ProtectiveField, SpeedRules, StandingPeople
 from ._tables import TableHumanSpeed, TableInflation
 
 __all__ = [
@@ -16,9 +16,11 @@ __all__ = [
     "InterpolatedInflation",
     "NearCap",
     "ObstacleOutline",
+    "ProtectiveField",
     "SafetyMargins",
     "SpeedPolicy",
     "SpeedRules",
+    "StandingPeople",
     "TableHumanSpeed",
     "TableInflation",
     "TimeBehaviour",

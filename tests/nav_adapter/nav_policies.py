@@ -17,6 +17,7 @@ from nav_adapter.policies import (
     ObstacleOutline,
     SafetyMargins,
     SpeedRules,
+    StandingPeople,
     TableHumanSpeed,
     TableInflation,
     TimeBehaviour,
@@ -77,6 +78,17 @@ def human_speeds(draw: st.DrawFn) -> InterpolatedHumanSpeed | TableHumanSpeed:
 
 
 @st.composite
+def standing_rules(draw: st.DrawFn, lowest_mps2: float = 0.5) -> StandingPeople:
+    acceleration = draw(finite(lowest_mps2, 1.0) | finite(lowest_mps2, 6.0))
+    delay = draw(finite(0.0, 0.6))
+    return StandingPeople(
+        human_acceleration_mps2=acceleration,
+        start_delay_s=delay,
+        standing_below_mps=draw(finite(0.0, 1.0)) * acceleration * min(delay, 1.0 / acceleration),
+    )
+
+
+@st.composite
 def policies(draw: st.DrawFn) -> AwarenessPolicy:
     fresh, ahead = draw(finite(0.05, 0.3)), draw(finite(0.0, 1.0))
     stale = fresh + draw(finite(0.0, 1.0))
@@ -93,6 +105,7 @@ def policies(draw: st.DrawFn) -> AwarenessPolicy:
         ),
         rules=SpeedRules(
             turn_within_stop_deg=draw(finite(45.0, 180.0)),
+            standing=draw(st.none() | standing_rules()),
             zones=draw(st.sampled_from([None, zones])),
             near_cap=draw(st.sampled_from([None, cap])),
         ),

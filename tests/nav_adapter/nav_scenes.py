@@ -146,21 +146,22 @@ def covariances(draw: st.DrawFn) -> FloatArray:
 
 @st.composite
 def crowds(draw: st.DrawFn, stamp_s: float = 0.0, max_size: int = 4) -> tuple[PersonTrack, ...]:
-    """People of every status, some seen and some not, with distinct ids."""
+    """People of every status, some seen and some not, some standing, with distinct ids."""
     ids = draw(st.lists(st.integers(0, 30), max_size=max_size, unique=True))
+    calm = [draw(st.sampled_from([1.0, 0.05])) for _ in ids]
     return tuple(
         PersonTrack(
             id=track_id,
             stamp_s=stamp_s - draw(finite(0.0, 0.6)),
             status=draw(st.sampled_from(["tentative", "confirmed", "coasting"])),
             position_odom_m=draw(st.tuples(finite(-6, 6), finite(-6, 6))),
-            velocity_odom_mps=draw(st.tuples(finite(-2, 2), finite(-2, 2))),
-            covariance_odom=draw(covariances()),
+            velocity_odom_mps=share * np.array(draw(st.tuples(finite(-2, 2), finite(-2, 2)))),
+            covariance_odom=share**2 * draw(covariances()),
             awareness=0.5,
             awareness_std=0.1,
             awareness_lower=draw(finite(0, 1)),
             height_m=1.7,
             time_since_seen_s=draw(st.sampled_from([0.0, 0.05, 0.4])),
         )
-        for track_id in ids
+        for track_id, share in zip(ids, calm, strict=True)
     )

@@ -26,10 +26,15 @@ def limit_mps(
     tracks: Sequence[PersonTrack],
     awareness: Sequence[float],
     now: float,
+    *,
+    known: bool = True,
 ) -> float:
-    """Return the limit of speed and separation for people with these lower bounds of α."""
+    """Return the limit of speed and separation for people with these lower bounds of α.
+
+    ``known`` is False at first sight and with stale data, when nobody counts as standing.
+    """
     limits = [
-        _person_limit_mps(policy, robot, state, track, alpha, now)
+        _person_limit_mps(policy, robot, state, track, alpha, now, known)
         for track, alpha in zip(tracks, awareness, strict=True)
     ]
     return min([robot.max_speed_mps, *limits])
@@ -42,6 +47,7 @@ def _person_limit_mps(
     track: PersonTrack,
     alpha: float,
     now: float,
+    known: bool,
 ) -> float:
     forward, left = state.speed_mps, 0.0
     if state.velocity_base_mps is not None:
@@ -74,10 +80,40 @@ def _person_limit_mps(
         turn += abs(state.yaw_rate_radps) * state_age_s
         share = max(_share(place - state.position_odom_m, course, turn) for place in places)
     human_mps = _human_mps(policy, state, track, alpha)
+    unseen_s = None
+    if known and _stands(policy, track, now):
+        unseen_s = track.time_since_seen_s
+    age_s = now - track.stamp_s
     return max(
-        _fastest_mps(policy, robot, footprint_gap_m, human_mps, now - track.stamp_s, 1.0),
-        _fastest_mps(policy, robot, circle_gap_m, human_mps, now - track.stamp_s, share),
+        _fastest_mps(policy, robot, footprint_gap_m, human_mps, age_s, 1.0, unseen_s),
+        _fastest_mps(policy, robot, circle_gap_m, human_mps, age_s, share, unseen_s),
     )
+
+
+def _stands(policy: AwarenessPolicy, track: PersonTrack, now: float) -> bool:
+    """Whether a fresh measurement shows a confirmed person standing (assumption 8)."""
+    rule = policy.rules.standing
+    if rule is None or track.status != "confirmed":
+        return False
+    if now - (track.stamp_s - track.time_since_seen_s) > policy.timing.fresh_within_s:
+        return False
+    variance = max(np.linalg.eigvalsh(track.covariance_odom[2:, 2:])[-1], 0.0)
+    return math.hypot(*track.velocity_odom_mps, math.sqrt(variance)) <= rule.standing_below_mps
+
+
+def _walked_m(
+    policy: AwarenessPolicy, human_mps: float, time_s: float, unseen_s: float | None
+) -> float:
+    """The way of a person in this time; ``unseen_s`` is None for somebody who does not stand."""
+    rule = policy.rules.standing
+    if rule is None or unseen_s is None:
+        return human_mps * time_s
+    since_s = time_s + rule.start_delay_s + unseen_s
+    # The area under the speed over time: a triangle, less the tip above the speed assumed.
+    top_mps = rule.human_acceleration_mps2 * since_s
+    tip_mps = max(top_mps - human_mps, 0.0)
+    way_m = (top_mps**2 - tip_mps**2) / (2.0 * rule.human_acceleration_mps2)
+    return min(way_m, human_mps * time_s)
 
 
 def _share(offset_m: np.ndarray, course_rad: float, turn_rad: float) -> float:
@@ -127,13 +163,14 @@ def _fastest_mps(
     human_mps: float,
     track_age_s: float,
     share: float,
+    unseen_s: float | None,
 ) -> float:
     """The highest speed whose protective separation fits into the gap, by bisection."""
     a, T = robot.max_deceleration_mps2, robot.reaction_time_s + track_age_s
 
     def fits(v: float) -> bool:
         way_m = v * T + v * v / (2.0 * a)
-        walked_m = human_mps * (T + v / a)
+        walked_m = _walked_m(policy, human_mps, T + v / a, unseen_s)
         return walked_m + share * way_m + policy.margins.separation_clearance_m <= gap_m
 
     low, high = 0.0, 2.0 * robot.max_speed_mps

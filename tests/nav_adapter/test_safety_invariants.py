@@ -11,7 +11,7 @@ import pytest
 import separation_model
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from nav_policies import policies, robots
+from nav_policies import policies, robots, standing_rules
 from nav_scenes import crowds, finite, moved_person, moved_robot, numbers, robot_at
 from shapely.geometry import Point
 
@@ -23,6 +23,7 @@ from nav_adapter import (
     RobotState,
     max_speed_mps,
 )
+from nav_adapter.policies import StandingPeople
 from perception.anthropometry import BODY_RADIUS_M
 from tracking import PersonTrack
 
@@ -107,6 +108,14 @@ def test_never_faster_than_speed_and_separation_straight_ahead(
         if (last[1] > 0.0) == bool(_ahead(track) > 0.0) and abs(_ahead(track)) > 0.1
     ]
     result = run(policy, robot, walk)[-1]
+    standing = policy.rules.standing
+    start = {}
+    if standing is not None:
+        # As if everybody stood.
+        start = {
+            "human_acceleration_mps2": standing.human_acceleration_mps2,
+            "start_delay_s": standing.start_delay_s,
+        }
     shown = {obstacle.track_id: obstacle for obstacle in result.obstacles}
     for track in ahead:
         # A looser bound than the adapter's: from the robot's centre.
@@ -117,6 +126,7 @@ def test_never_faster_than_speed_and_separation_straight_ahead(
             deceleration_mps2=robot.max_deceleration_mps2,
             reaction_time_s=robot.reaction_time_s,
             clearance_m=policy.margins.separation_clearance_m,
+            **start,
         )
         assert shown[track.id].awareness_lower <= track.awareness_lower
         assert result.speed_limit_mps <= bound + ROUNDING
@@ -160,7 +170,8 @@ def _assert_equal_to_the_model(
     alphas = [shown[track.id] if known else 0.0 for track in people]
     # With hysteresis the speed depends on more than the last lower bound.
     held = getattr(policy.speed, "shape", "") == "two_level"
-    expected = separation_model.limit_mps(policy, robot, state, people, alphas, 0.0)
+    known = known and not result.stale
+    expected = separation_model.limit_mps(policy, robot, state, people, alphas, 0.0, known=known)
     if not held:
         assert result.speed_limit_mps <= expected + 1e-6
     bound = separation_model.limit_mps(policy, robot, state, people, [1.0] * len(people), 0.0)
@@ -174,6 +185,28 @@ def _assert_equal_to_the_model(
 def test_the_limit_is_that_of_a_second_implementation(scene: Any) -> None:
     """By bisection, with shapely's geometry: ``separation_model``."""
     _assert_equal_to_the_model(scene)
+
+
+@settings(max_examples=60)
+@given(scene=scenes(), rule=standing_rules(0.1), unseen_s=st.sampled_from([0.0, 0.0, 0.05]))
+def test_the_limit_is_that_of_a_second_implementation_for_people_who_stand(
+    scene: Any, rule: StandingPeople, unseen_s: float
+) -> None:
+    policy, robot, state, people = scene
+    rule = rule.model_copy(update={"standing_below_mps": 0.2})
+    rules = policy.rules.model_copy(update={"standing": rule, "zones": None, "near_cap": None})
+    calm = tuple(
+        replace(
+            track,
+            stamp_s=0.1 * track.stamp_s,
+            status="confirmed",
+            time_since_seen_s=unseen_s,
+            velocity_odom_mps=0.02 * track.velocity_odom_mps,
+            covariance_odom=1e-4 * track.covariance_odom,
+        )
+        for track in people
+    )
+    _assert_equal_to_the_model((policy.model_copy(update={"rules": rules}), robot, state, calm))
 
 
 @pytest.mark.full
