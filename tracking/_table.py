@@ -32,12 +32,15 @@ class TrackTable:
             first; −∞ where there were fewer.
         confirmed: (N,) whether enough frames have shown the person.
         standing: (N,) whether the person stood still when last seen.
-        missed_s: (N,) time since last seen in which frames should have shown the person.
+        seen_stamps_s: (N, S) stamps of the latest frames of each sensor that showed the person; −∞
+            for none. The latest of them ends ``hit_stamps_s``.
+        missed_s: (N, S) time since each sensor last saw the person in which its frames should have
+            shown them.
         existence_logits: (N,) log-likelihood ratio of a person to clutter, of the detections after
             the first; 0 at the first.
         birth_stamps_s: (N,) stamps of the first frames that showed the people.
-        birth_places_camera_m: (N, 2) where they were then, relative to the camera (``_exits``).
-        last_places_camera_m: (N, 2) the same for the latest frames that showed them.
+        birth_places_camera_m: (N, 2) where they were then, relative to the sensor (``_exits``).
+        last_places_camera_m: (N, 2) the same for the latest frames of the camera that showed them.
         host_ids: (N,) ids of the tracks whose twins these may be, 0 for none (``_twins``).
         twin_logits: (N,) evidence that they are.
         twin_visibilities: (N,) probability that they are not hidden, if they are people.
@@ -55,6 +58,7 @@ class TrackTable:
     hit_stamps_s: FloatArray
     confirmed: BoolArray
     standing: BoolArray
+    seen_stamps_s: FloatArray
     missed_s: FloatArray
     existence_logits: FloatArray
     birth_stamps_s: FloatArray
@@ -67,8 +71,8 @@ class TrackTable:
     twins: BoolArray
 
     @staticmethod
-    def empty(confirm_hits: int) -> TrackTable:
-        """Return a table without tracks."""
+    def empty(confirm_hits: int, sensors: int = 1) -> TrackTable:
+        """Return a table without tracks, for this number of sensors."""
         no_numbers = np.empty(0)
         no_flags = np.empty(0, dtype=np.bool_)
         return TrackTable(
@@ -82,7 +86,8 @@ class TrackTable:
             hit_stamps_s=np.empty((0, confirm_hits)),
             confirmed=no_flags,
             standing=no_flags,
-            missed_s=no_numbers,
+            seen_stamps_s=np.empty((0, sensors)),
+            missed_s=np.empty((0, sensors)),
             existence_logits=no_numbers,
             birth_stamps_s=no_numbers,
             birth_places_camera_m=np.empty((0, 2)),

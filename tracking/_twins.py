@@ -64,6 +64,7 @@ def with_twins(
     measured: Measurements,
     dt_s: float,
     config: TrackerConfig,
+    followed: BoolArray | None = None,
 ) -> TrackTable:
     """Return the tracks after the evidence of one frame about who is whose twin.
 
@@ -74,8 +75,13 @@ def with_twins(
         measured: the frame's measurements.
         dt_s: since the frame before; at 0, nothing changes.
         config: settings.
+        followed: (N,) True for the tracks that the frame's sensor has seen lately. Its frames say
+            nothing about the others. None for all.
     """
     pairs = _pairs(after)
+    if followed is not None:
+        known = followed[pairs.twins] & followed[pairs.hosts]
+        pairs = _Pairs(pairs.twins[known], pairs.hosts[known])
     if not pairs.twins.size or dt_s <= 0.0:
         return after
     b, a = pairs.twins, pairs.hosts
