@@ -28,7 +28,7 @@ _RANGED_S: Final = 1.0
 _MOST_RATIO: Final = 1.8
 _MOST_NEARER_SHARE: Final = 0.15
 _SLACK_M: Final = 0.3
-_NEARER_SIGMAS: Final = 3.0
+_SIGMAS: Final = 3.0
 # Price of a match by the ray alone, 2 ln(0.9 / 0.1): one person in ten has another size.
 _PRICE: Final = 2.0 * math.log(9.0)
 # Standard deviation, per axis and per share of the range, of the velocity that a wrong range gives.
@@ -88,8 +88,9 @@ def wide_match(
     if measures:
         true_m, assumed_m = along_m, range_m[:, None]
     least = true_m - np.maximum(_SLACK_M, _MOST_NEARER_SHARE * true_m)
-    near = assumed_m >= least - _NEARER_SIGMAS * np.sqrt(np.maximum(radial2, 0.0))
-    near &= (assumed_m <= _MOST_RATIO * true_m + _SLACK_M) & (true_m > 0.0)
+    noise_m = _SIGMAS * np.sqrt(np.maximum(radial2, 0.0))
+    near = (assumed_m >= least - noise_m) & (true_m > 0.0)
+    near &= assumed_m <= _MOST_RATIO * true_m + noise_m
     return Wide(rows, extra, near & rows[:, None], _PRICE)
 
 

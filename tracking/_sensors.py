@@ -58,9 +58,10 @@ class SensorConfig(StrictConfig):
     miss_cost: float = Field(default=10.0, ge=-1e3, le=1e3)
     """As in :class:`~tracking.TrackerConfig`; lower for a sensor with more clutter."""
 
-    alignment_std_rad: float = Field(default=0.01, ge=0.0, le=0.5)
-    """Standard deviation of the error of the sensor's yaw on the robot, which moves people sideways
-    in proportion to their range."""
+    alignment_std_rad: float = Field(default=0.015, ge=0.0, le=0.5)
+    """Standard deviation of the angle by which the calibrations of this sensor and of the camera
+    disagree. It moves people sideways in proportion to their range, and is added to the noise of
+    both."""
 
     @field_validator("view")
     @classmethod
@@ -165,16 +166,6 @@ def sensors_of(
         raise TrackingError(
             f"sensors must be a mapping of names to SensorConfig, got {type(others).__name__}"
         )
-    settings = {
-        CAMERA: SensorConfig(
-            view=view,
-            sees_faces=True,
-            measures_range=False,
-            detection_probability=config.detection_probability,
-            miss_cost=config.miss_cost,
-            alignment_std_rad=0.0,
-        )
-    }
     for name, one in others.items():
         if not isinstance(name, str) or not name or name == CAMERA:
             raise TrackingError(
@@ -185,7 +176,17 @@ def sensors_of(
             raise TrackingError(
                 f"sensors[{name!r}] must be a SensorConfig, got {type(one).__name__}"
             )
-        settings[name] = one
+    settings = {
+        CAMERA: SensorConfig(
+            view=view,
+            sees_faces=True,
+            measures_range=False,
+            detection_probability=config.detection_probability,
+            miss_cost=config.miss_cost,
+            alignment_std_rad=max((one.alignment_std_rad for one in others.values()), default=0.0),
+        ),
+        **others,
+    }
     found = []
     for index, (name, one) in enumerate(settings.items()):
         own = config

@@ -165,9 +165,10 @@ class PersonTracker:
         Raises:
             TrackingError: for an unknown sensor, for a stamp that is not finite, lies too far back
                 or ahead, or differs from that of an observation by more than
-                ``stamp_tolerance_s``, for a ``T_odom_camera`` that is not a rigid transform, for a ``pose_covariance_odom`` that
-                is not a covariance, and for anything in ``observations`` that is not a
-                :class:`~perception.PersonObservation` or lies out of bounds.
+                ``stamp_tolerance_s``, for a ``T_odom_camera`` that is not a rigid transform, for a
+                ``pose_covariance_odom`` that is not a covariance, and for anything in
+                ``observations`` that is not a :class:`~perception.PersonObservation` or lies out of
+                bounds.
         """
         source = self._sensors.named(sensor)
         stamp = finite_number("stamp_s", stamp_s, TrackingError)
