@@ -43,6 +43,10 @@ class TracksRecord(StrictConfig):
     twin_visibilities: list[float]
     twin_priors: list[float]
     twins: list[bool]
+    looked_s: list[float]
+    look_stamps_s: list[float | None]
+    look_approaches_mps: list[float]
+    look_standing: list[bool]
 
     @model_validator(mode="after")
     def _check_consistency(self) -> TracksRecord:

@@ -121,6 +121,10 @@ def state_of(
         twin_visibilities=_array(tracks.twin_visibilities),
         twin_priors=_array(tracks.twin_priors),
         twins=np.array(tracks.twins, dtype=np.bool_),
+        looked_s=_array(tracks.looked_s),
+        look_stamps_s=_array(tracks.look_stamps_s, math.nan),
+        look_approaches_mps=_array(tracks.look_approaches_mps),
+        look_standing=np.array(tracks.look_standing, dtype=np.bool_),
     )
     events = record.exits
     exits = Exits(
@@ -216,6 +220,10 @@ def _plain_state(state: TrackerState, sensors: Sensors) -> dict[str, Any]:
             "twin_visibilities": tracks.twin_visibilities.tolist(),
             "twin_priors": tracks.twin_priors.tolist(),
             "twins": tracks.twins.tolist(),
+            "looked_s": tracks.looked_s.tolist(),
+            "look_stamps_s": _finite_or_none(tracks.look_stamps_s),
+            "look_approaches_mps": tracks.look_approaches_mps.tolist(),
+            "look_standing": tracks.look_standing.tolist(),
         },
     }
 

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from ._awareness_update import belief_of
+from ._noticed import noticed
 from ._sensors import Sensors
 from ._step import TrackerState, predicted
 from ._table import BoolArray, TrackTable
@@ -67,7 +68,7 @@ def snapshots(state: TrackerState, stamp_s: float, sensors: Sensors) -> tuple[Pe
             np.asarray(estimated.awareness_lower).tolist(),
             [config.stature_m] * len(tracks),
             (stamp_s - tracks.last_seen_s).tolist(),
-            [0.0] * len(tracks),
+            noticed(tracks, stamp_s, faces, state.clocks, sensors).tolist(),
         )
     )
 

@@ -16,6 +16,7 @@ from ._exits import Exits, absence_s, walked_out
 from ._matching import Found, match_frame
 from ._measurement import Frame
 from ._motion import predict
+from ._noticed import with_noticed
 from ._sensors import Sensors, seen_lately
 from ._table import BoolArray, TrackTable
 from ._track_management import (
@@ -96,6 +97,7 @@ def advance(state: TrackerState, frame: Frame, sensors: Sensors) -> TrackerState
         tracks = with_hosts(tracks.append(initiated), len(initiated), config)
         found = found.with_births(np.flatnonzero(unmatched))
     tracks = _with_awareness(tracks, frame, found, faces, state, sensors)
+    tracks = with_noticed(before, tracks, frame, found, faces, state.clocks, sensors)
     seen = found.seen
     missed_s = missed_time_s(tracks, ~seen, dt_s, frame, config, sensor.view)
     tracks = tracks.replaced(missed_s=missed_s)

@@ -46,6 +46,10 @@ class TrackTable:
         twin_visibilities: (N,) probability that they are not hidden, if they are people.
         twin_priors: (N,) evidence with which the next possible twin of this track starts.
         twins: (N,) True where the evidence has sufficed; such a track is not reported.
+        looked_s: (N,) for how long the person has looked at the robot lately (``_noticed``).
+        look_stamps_s: (N,) of the latest look; NaN for none.
+        look_approaches_mps: (N,) least speed towards the robot since then, ≥ 0.
+        look_standing: (N,) whether the person has stood since then.
     """
 
     ids: IntArray
@@ -69,6 +73,10 @@ class TrackTable:
     twin_visibilities: FloatArray
     twin_priors: FloatArray
     twins: BoolArray
+    looked_s: FloatArray
+    look_stamps_s: FloatArray
+    look_approaches_mps: FloatArray
+    look_standing: BoolArray
 
     @staticmethod
     def empty(confirm_hits: int, sensors: int = 1) -> TrackTable:
@@ -97,6 +105,10 @@ class TrackTable:
             twin_visibilities=no_numbers,
             twin_priors=no_numbers,
             twins=no_flags,
+            looked_s=no_numbers,
+            look_stamps_s=no_numbers,
+            look_approaches_mps=no_numbers,
+            look_standing=no_flags,
         )
 
     @property

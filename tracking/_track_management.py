@@ -72,6 +72,10 @@ def initiate(
         twin_visibilities=np.ones(count),
         twin_priors=np.zeros(count),
         twins=np.zeros(count, dtype=np.bool_),
+        looked_s=np.zeros(count),
+        look_stamps_s=np.full(count, np.nan),
+        look_approaches_mps=np.zeros(count),
+        look_standing=np.zeros(count, dtype=np.bool_),
     )
 
 

@@ -176,6 +176,7 @@ def _merged(tracks: TrackTable, pairs: _Pairs, due: BoolArray) -> TrackTable:
     priors = tracks.twin_priors.copy()
     means, variances = tracks.awareness_means.copy(), tracks.awareness_variances.copy()
     bounds, stamps = tracks.awareness_bounds.copy(), tracks.evidence_stamps_s.copy()
+    looked_s = tracks.looked_s.copy()
     # The surest first; of two that may be twins of each other, the younger.
     order = np.flatnonzero(due)
     order = order[np.lexsort((-pairs.twins[order], -tracks.twin_logits[pairs.twins[order]]))]
@@ -184,6 +185,7 @@ def _merged(tracks: TrackTable, pairs: _Pairs, due: BoolArray) -> TrackTable:
         if twins[twin] or twins[host]:
             continue
         twins[twin], priors[host] = True, _MOST_PRIOR
+        looked_s[host] = min(looked_s[host], looked_s[twin])
         hosts[(hosts == ids[twin]) & (ids != ids[host])] = ids[host]
         if (bounds[twin], means[twin]) < (bounds[host], means[host]):
             means[host], variances[host] = means[twin], variances[twin]
@@ -196,6 +198,7 @@ def _merged(tracks: TrackTable, pairs: _Pairs, due: BoolArray) -> TrackTable:
         awareness_variances=variances,
         awareness_bounds=bounds,
         evidence_stamps_s=stamps,
+        looked_s=looked_s,
     )
 
 

@@ -51,7 +51,7 @@ def test_camera_and_scanner_are_consistent_and_better_than_the_camera() -> None:
     )
     rng = np.random.default_rng(11)
     nees, errors = [], {"camera": [], "both": []}
-    for _ in range(60):
+    for _ in range(40):
         fused = PersonTracker(
             config, sensors={LASER: SensorConfig(miss_cost=1e3, alignment_std_rad=0.0)}
         )
