@@ -14,13 +14,14 @@ from ._errors import TrackingError
 from ._sensors import SensorConfig
 from ._track import PersonTrack, TrackStatus
 from ._tracker import PersonTracker
-from ._views import CameraView, SurroundView, View
+from ._views import CameraView, ScannerView, SurroundView, View
 
 __all__ = [
     "AwarenessFilterConfig",
     "CameraView",
     "PersonTrack",
     "PersonTracker",
+    "ScannerView",
     "SensorConfig",
     "SurroundView",
     "TrackStatus",

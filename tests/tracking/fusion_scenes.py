@@ -10,7 +10,14 @@ import numpy as np
 from tracking_scenes import FloatArray, camera_at, observe
 
 from perception import Camera, PersonObservation
-from tracking import CameraView, PersonTrack, PersonTracker, SensorConfig, TrackerConfig
+from tracking import (
+    CameraView,
+    PersonTrack,
+    PersonTracker,
+    ScannerView,
+    SensorConfig,
+    TrackerConfig,
+)
 
 LASER = "laser"
 CAMERA_STD_M = (0.25, 0.06)  # along the ray and across it
@@ -19,16 +26,8 @@ LASER_STD_M = 0.05
 Event = tuple[float, list[PersonObservation], FloatArray, str]
 
 
-class AllAround:
-    """The view of a scanner without blind sectors, 8 m far."""
-
-    def visibility(self, positions_odom_m: FloatArray, T_odom_camera: FloatArray) -> FloatArray:
-        distance = np.hypot(*(positions_odom_m - T_odom_camera[:2, 3]).T)
-        return (distance <= 8.0).astype(float)
-
-
 def sensors(**changes: object) -> dict[str, SensorConfig]:
-    return {LASER: SensorConfig(**{"view": AllAround(), **changes})}
+    return {LASER: SensorConfig(**{"view": ScannerView(), **changes})}
 
 
 def both(config: TrackerConfig | None = None, **changes: object) -> PersonTracker:

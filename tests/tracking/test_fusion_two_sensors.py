@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from fusion_scenes import (
     LASER,
-    AllAround,
     Rig,
     both,
     everything,
@@ -25,6 +24,7 @@ from tracking import (
     AwarenessFilterConfig,
     CameraView,
     PersonTracker,
+    ScannerView,
     SensorConfig,
     TrackerConfig,
     TrackingError,
@@ -328,8 +328,8 @@ def test_unknown_and_wrong_sensors_are_refused_by_name() -> None:
         PersonTracker().update([], 0.0, laser_at(), sensor=["laser"])  # type: ignore[arg-type]
     with pytest.raises(TrackingError, match="names of their own, got 'camera'"):
         PersonTracker(sensors={"camera": SensorConfig()})
-    with pytest.raises(TrackingError, match=r"sensors\['laser'\] must be a SensorConfig, got Al"):
-        PersonTracker(sensors={LASER: AllAround()})  # type: ignore[dict-item]
+    with pytest.raises(TrackingError, match=r"sensors\['laser'\] must be a SensorConfig, got Sc"):
+        PersonTracker(sensors={LASER: ScannerView()})  # type: ignore[dict-item]
     with pytest.raises(TrackingError, match="mapping of names to SensorConfig, got list"):
         PersonTracker(sensors=[SensorConfig()])  # type: ignore[arg-type]
     with pytest.raises(TrackingError, match="view must have a method visibility"):
@@ -370,3 +370,17 @@ def test_a_state_is_refused_with_other_sensors() -> None:
     del state["latest"]["clocks"][LASER]
     with pytest.raises(TrackingError, match=r"clocks must be those of the sensors|per sensor"):
         PersonTracker.from_state(state)
+
+
+def test_the_view_of_a_scanner_has_a_range_and_a_field() -> None:
+    view = ScannerView(max_range_m=10.0, min_range_m=0.5, field_rad=math.radians(270.0))
+    turned = laser_at(1.0, 2.0, math.pi / 2)  # ahead is odom's y
+    places = np.array([[1.0, 6.0], [1.0, 11.0], [1.0, 12.5], [1.0, 2.3], [5.0, 2.0], [1.0, -1.0]])
+    np.testing.assert_allclose(view.visibility(places, turned), [1.0, 0.5, 0.0, 0.0, 1.0, 0.0])
+    upside_down = turned @ np.diag([1.0, -1.0, -1.0, 1.0])
+    np.testing.assert_allclose(view.visibility(places, upside_down), [1, 0.5, 0, 0, 1, 0])
+    assert ScannerView().visibility(np.array([[-3.0, 0.0]]), laser_at()).tolist() == [1.0]
+    with pytest.raises(TrackingError, match="field_rad must lie in"):
+        ScannerView(field_rad=7.0)
+    with pytest.raises(TrackingError, match="min_range_m must lie in"):
+        ScannerView(max_range_m=1.0, min_range_m=2.0)
