@@ -4,6 +4,9 @@ A camera infers the range of a person from the size that people are assumed to h
 or somebody seated up to 1.7 times too far away, along the ray on which it sees them. A scanner
 measures the range. Its measurement on the same ray is the same person, if it is no further away.
 
+Two tracks that a sensor each has for long, on one ray, are one person too: the one with the assumed
+range is deleted.
+
 People of the assumed size are more frequent, so a match by the ray alone costs more than a match by
 the place (a mixture of two Gaussians, of which the likelier counts).
 """
@@ -18,7 +21,7 @@ import numpy as np
 from ._association import Wide
 from ._clocks import FrameClock
 from ._exits import absence_s
-from ._measurement import Measurements
+from ._measurement import Frame, Measurements
 from ._sensors import Sensor, Sensors, seen_lately
 from ._table import BoolArray, TrackTable
 
@@ -31,6 +34,10 @@ _SLACK_M: Final = 0.3
 _SIGMAS: Final = 3.0
 # Price of a match by the ray alone, 2 ln(0.9 / 0.1): one person in ten has another size.
 _PRICE: Final = 2.0 * math.log(9.0)
+# Two tracks of one person: each unseen by the other's sensor for this long, and as near in bearing.
+_APART_S: Final = 1.0
+_SAME_RAY_M: Final = 0.3
+_IN_VIEW: Final = 0.5
 # Standard deviation, per axis and per share of the range, of the velocity that a wrong range gives.
 _VELOCITY_MPS: Final = 1.6
 
@@ -92,6 +99,55 @@ def wide_match(
     near = (assumed_m >= least - noise_m) & (true_m > 0.0)
     near &= assumed_m <= _MOST_RATIO * true_m + noise_m
     return Wide(rows, extra, near & rows[:, None], _PRICE)
+
+
+def duplicates(
+    tracks: TrackTable,
+    frame: Frame,
+    clocks: tuple[FrameClock, ...],
+    sensors: Sensors,
+) -> BoolArray:
+    """Return (N,) True for tracks with an assumed range whose person has another track.
+
+    The frame shows them, and no scan has for a second. On their ray, nearer or as near, the scanner
+    sees somebody whom no image has shown for a second, although they are in view. The camera would
+    show the nearer one of two people. What is kept is the nearer place.
+
+    Args:
+        tracks: N tracks after the frame.
+        frame: of any sensor; only one without measured ranges has duplicates.
+        clocks: of all sensors, this frame included.
+        sensors: all sensors.
+    """
+    none = np.zeros(len(tracks), dtype=np.bool_)
+    sensor, stamp = sensors.all[frame.sensor], frame.stamp_s
+    if not sensors.mixed or sensor.settings.measures_range:
+        return none
+    if sensors.config.size_error_share <= 0.0:
+        return none
+    seen = tracks.seen_stamps_s[:, sensor.index] == stamp
+    old = tracks.birth_stamps_s <= stamp - _APART_S
+    ranged = seen_lately(tracks, sensors.ranging, stamp, _APART_S)
+    imaged = seen_lately(tracks, ~sensors.ranging, stamp, _APART_S)
+    within_s = max(absence_s(clock.period_s) for clock in _known(clocks, sensors.ranging))
+    assumed = np.flatnonzero(seen & old & ~ranged)
+    measured = ~seen & old & ~imaged & tracks.confirmed
+    measured &= seen_lately(tracks, sensors.ranging, stamp, within_s)
+    others = np.flatnonzero(measured)
+    if not assumed.size or not others.size:
+        return none
+    if sensor.view is not None:
+        shown = sensor.view.visibility(tracks.states[others, :2], frame.T_odom_camera)
+        others = others[shown >= _IN_VIEW]
+    origin = frame.T_odom_camera[:2, 3]
+    far, near = tracks.states[assumed, :2] - origin, tracks.states[others, :2] - origin
+    far_m, near_m = np.hypot(*far.T)[:, None], np.hypot(*near.T)[None]
+    apart = np.abs(far[:, None, 0] * near[None, :, 1] - far[:, None, 1] * near[None, :, 0])
+    same = apart <= _SAME_RAY_M * far_m
+    same &= far @ near.T > 0.0
+    same &= (far_m >= near_m) & (far_m <= _MOST_RATIO * near_m + _SLACK_M)
+    none[assumed[same.any(axis=1)]] = True
+    return none
 
 
 def _known(clocks: tuple[FrameClock, ...], which: BoolArray) -> list[FrameClock]:

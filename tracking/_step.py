@@ -13,6 +13,7 @@ from ._awareness_update import forgotten, update_awareness
 from ._clocks import FrameClock
 from ._config import TrackerConfig
 from ._exits import Exits, absence_s, walked_out
+from ._fusion import duplicates
 from ._matching import Found, match_frame
 from ._measurement import Frame
 from ._motion import predict
@@ -108,6 +109,9 @@ def advance(state: TrackerState, frame: Frame, sensors: Sensors) -> TrackerState
         vanished &= tracks.seen_stamps_s[:, 0] == tracks.last_seen_s
         exits = exits.with_events(tracks.last_places_camera_m[vanished], returned=False)
         tracks = without(tracks, deleted)
+    double = duplicates(tracks, frame, state.clocks, sensors)
+    if double.any():
+        tracks = without(tracks, double)
     next_id = state.next_id + int(np.count_nonzero(unmatched))
     return replace(state, tracks=tracks, next_id=next_id, exits=exits)
 

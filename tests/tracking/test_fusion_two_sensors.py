@@ -116,6 +116,30 @@ def test_a_child_who_walks_is_one_track_beside_an_adult() -> None:
                 assert np.linalg.norm(error) <= 0.2
 
 
+def test_a_child_whom_scans_have_missed_for_long_does_not_stay_two_tracks() -> None:
+    # The camera alone starts a track 1.5 times too far away; then the scanner is back.
+    place = (3.0, 0.4)
+    rig = Rig([stands(*place)], ratios=[1.5], laser_sees=lambda _, now: not 2.0 < now < 3.7)
+    tracker, counts = both(), []
+    for stamp_s, people, T, sensor in rig.events(9.0):
+        tracks = tracker.update(people, stamp_s, T, sensor=sensor)
+        counts.append(len(tracks))
+        if stamp_s > 6.5:
+            (track,) = tracks
+            assert np.linalg.norm(track.position_odom_m - place) <= 0.2
+    assert max(counts) == 2
+
+
+def test_two_people_on_one_ray_stay_two_though_scans_miss_the_second() -> None:
+    people = [stands(3.0), stands(4.5, 0.1)]
+    rig = Rig(people, laser_sees=lambda person, _now: person == 0, seed=4)
+    tracker = both()
+    for stamp_s, seen, T, sensor in rig.events(8.0):
+        tracks = tracker.update(seen, stamp_s, T, sensor=sensor)
+        if stamp_s > 1.5:
+            assert len([track for track in tracks if track.status != "tentative"]) == 2
+
+
 def test_a_nearer_person_on_the_ray_of_a_known_one_is_somebody_else() -> None:
     # The scanner knows a person at 5 m. The camera now sees somebody at 2 m, whose legs are hidden.
     tracker = both()
