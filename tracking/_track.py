@@ -20,7 +20,7 @@ class PersonTrack:
         id: unique for the life of a tracker, never used again.
         stamp_s: time of the state.
         status: ``"tentative"`` (not confirmed yet), ``"confirmed"`` or ``"coasting"`` (not in the
-            latest frame).
+            latest frame, nor in that of another sensor that is not silent).
         position_odom_m: (2,).
         velocity_odom_mps: (2,).
         covariance_odom: (4, 4), order x, y, vx, vy.
