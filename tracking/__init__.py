@@ -11,15 +11,18 @@ run_path(str(_CLASH))["require_sole_owner"](__name__)
 
 from ._config import AwarenessFilterConfig, TrackerConfig
 from ._errors import TrackingError
+from ._sensors import SensorConfig
 from ._track import PersonTrack, TrackStatus
 from ._tracker import PersonTracker
-from ._views import CameraView, SurroundView, View
+from ._views import CameraView, ScannerView, SurroundView, View
 
 __all__ = [
     "AwarenessFilterConfig",
     "CameraView",
     "PersonTrack",
     "PersonTracker",
+    "ScannerView",
+    "SensorConfig",
     "SurroundView",
     "TrackStatus",
     "TrackerConfig",

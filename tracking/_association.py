@@ -39,11 +39,35 @@ class Matches:
         tracks: (K,) rows of tracks.
         measurements: (K,) rows of measurements.
         ambiguous: (K,) True where a rival match is about as likely.
+        wide: (K,) True where only a :class:`Wide` allows the match.
     """
 
     tracks: IndexArray
     measurements: IndexArray
     ambiguous: BoolArray
+    wide: BoolArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Wide:
+    """Matches of some tracks that are possible beyond the gates, at a price (``_fusion``).
+
+    Attributes:
+        rows: (N,) True for these tracks.
+        extra: (N, 4, 4) what is added to the covariances of their states.
+        near: (N, M) True where such a match is possible.
+        price: added to its cost.
+    """
+
+    rows: BoolArray
+    extra: FloatArray
+    near: BoolArray
+    price: float
+
+    def part(self, rows: IndexArray, measurements: IndexArray) -> Wide:
+        """Return the part for some tracks and some measurements."""
+        near = self.near[rows[:, None], measurements]
+        return Wide(self.rows[rows], self.extra[rows], near, self.price)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,13 +77,15 @@ class _Edges:
     tracks: IndexArray
     measurements: IndexArray
     costs: FloatArray
+    wide: BoolArray
 
     def where(self, mask: BoolArray) -> _Edges:
-        return _Edges(self.tracks[mask], self.measurements[mask], self.costs[mask])
+        return _Edges(self.tracks[mask], self.measurements[mask], self.costs[mask], self.wide[mask])
 
 
 _NO_ROWS: IndexArray = np.empty(0, dtype=np.intp)
-_NO_MATCHES = Matches(_NO_ROWS, _NO_ROWS, np.empty(0, dtype=np.bool_))
+_NO_FLAGS: BoolArray = np.empty(0, dtype=np.bool_)
+_NO_MATCHES = Matches(_NO_ROWS, _NO_ROWS, _NO_FLAGS, _NO_FLAGS)
 
 
 def associate(
@@ -70,6 +96,7 @@ def associate(
     noises_m2: FloatArray,
     gates: Gates,
     people: IndexArray | None = None,
+    wide: Wide | None = None,
 ) -> Matches:
     """Match tracks to measurements one to one: confirmed tracks first, then the others.
 
@@ -88,10 +115,11 @@ def associate(
         gates: a match must pass both gates.
         people: (N,) equal for tracks of one person, which do not make each other ambiguous; None
             where every track is another person.
+        wide: matches beyond the gates; None for none.
     """
     if not len(positions_m) or not len(measured_m):
         return _NO_MATCHES
-    edges = _edges(positions_m, covariances_m2, measured_m, noises_m2, gates)
+    edges = _edges(positions_m, covariances_m2, measured_m, noises_m2, gates, wide)
     if not edges.tracks.size:
         return _NO_MATCHES
     partner = np.full(len(positions_m), -1, dtype=np.intp)
@@ -106,7 +134,11 @@ def associate(
     tracks = np.flatnonzero(partner >= 0)
     measurements = partner[tracks]
     ambiguous = _ambiguities(edges, partner, positions_m, measured_m, gates, people)
-    return Matches(tracks, measurements, ambiguous[tracks])
+    beyond = np.zeros(len(positions_m), dtype=np.bool_)
+    if wide is not None:
+        chosen = edges.wide & (partner[edges.tracks] == edges.measurements)
+        beyond[edges.tracks[chosen]] = True
+    return Matches(tracks, measurements, ambiguous[tracks], beyond[tracks])
 
 
 def _edges(
@@ -115,20 +147,35 @@ def _edges(
     measured_m: FloatArray,
     noises_m2: FloatArray,
     gates: Gates,
+    wide: Wide | None,
 ) -> _Edges:
     """Return the matches that pass both gates, with their costs d² + ln det S."""
     offset_x = measured_m[None, :, 0] - positions_m[:, None, 0]
     offset_y = measured_m[None, :, 1] - positions_m[:, None, 1]
     near = offset_x * offset_x + offset_y * offset_y <= gates.distance_m**2
-    flat = np.flatnonzero(near)
+    flat = np.flatnonzero(near if wide is None else near | wide.near)
     tracks, measurements = np.divmod(flat, len(measured_m))
     x, y = offset_x.ravel()[flat], offset_y.ravel()[flat]
     spread = covariances_m2[tracks] + noises_m2[measurements]
     s_xx, s_xy, s_yy = spread[:, 0, 0], spread[:, 0, 1], spread[:, 1, 1]
     determinant = s_xx * s_yy - s_xy * s_xy
     distance2 = (s_yy * x * x - 2.0 * s_xy * x * y + s_xx * y * y) / determinant
-    edges = _Edges(tracks, measurements, distance2 + np.log(determinant))
+    costs = distance2 + np.log(determinant)
     inside = distance2 <= gates.mahalanobis2
+    beyond = np.zeros(len(flat), dtype=np.bool_)
+    if wide is not None:
+        inside &= near.ravel()[flat]
+        rows = np.flatnonzero(wide.near.ravel()[flat])
+        x, y = x[rows], y[rows]
+        spread = spread[rows] + wide.extra[tracks[rows], :2, :2]
+        s_xx, s_xy, s_yy = spread[:, 0, 0], spread[:, 0, 1], spread[:, 1, 1]
+        determinant = s_xx * s_yy - s_xy * s_xy
+        distance2 = (s_yy * x * x - 2.0 * s_xy * x * y + s_xx * y * y) / determinant
+        dearer = distance2 + np.log(determinant) + wide.price
+        possible = (distance2 <= gates.mahalanobis2) & ~inside[rows]
+        costs[rows[possible]] = dearer[possible]
+        beyond[rows[possible]] = inside[rows[possible]] = True
+    edges = _Edges(tracks, measurements, costs, beyond)
     return edges if inside.all() else edges.where(inside)
 
 

@@ -83,6 +83,22 @@ def update_awareness(
     )
 
 
+def forgotten(
+    tracks: TrackTable, ambiguous: BoolArray, config: AwarenessFilterConfig
+) -> TrackTable:
+    """Return the tracks with the prior awareness where a match was ``ambiguous`` (N,)."""
+    if not ambiguous.any():
+        return tracks
+    before = belief_of(tracks)
+    belief = _choose(ambiguous, forget(before, config), before)
+    return tracks.replaced(
+        awareness_means=np.asarray(belief.mean),
+        awareness_variances=np.asarray(belief.variance),
+        awareness_bounds=np.asarray(belief.bound),
+        evidence_stamps_s=np.where(ambiguous, np.nan, tracks.evidence_stamps_s),
+    )
+
+
 def _choose(mask: BoolArray, first: AwarenessBelief, second: AwarenessBelief) -> AwarenessBelief:
     """Return the first belief where ``mask`` (N,) is True, the second elsewhere."""
     return AwarenessBelief(

@@ -76,6 +76,10 @@ class AwarenessFilterConfig(StrictConfig):
     A face that looks away is evidence and ends the memory, and so does an ambiguous match. The
     default 0 is no memory; with a memory the robot relies on a look that is that old."""
 
+    noticed_memory_s: float = Field(default=0.0, ge=0.0, le=10.0)
+    """``PersonTrack.noticed`` lasts at most this long after the last look at the robot, while a
+    sensor other than the camera keeps seeing the person. 0 switches it off."""
+
     lower_bound_confidence: float = Field(default=0.9, ge=0.5, lt=1.0)
     """One-sided confidence of ``awareness_lower``."""
 
@@ -194,6 +198,11 @@ class TrackerConfig(StrictConfig):
 
     body_radius_m: float = Field(default=0.25, ge=1e-3, le=10.0)
     """Radius of a person as an occluder: a body hides the people behind it."""
+
+    size_error_share: float = Field(default=0.35, ge=0.0, le=1.0)
+    """Standard deviation of the range that a camera infers from the size of a person, as a share
+    of the range that another sensor measures. Children and people who sit are put up to 1.7 times
+    too far away. 0 takes the camera's ranges as they are."""
 
     max_lag_s: float = Field(default=0.5, ge=0.0, le=10.0)
     """A frame up to this much older than the latest is processed as if it had come in order. An

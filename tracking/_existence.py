@@ -55,6 +55,7 @@ def with_evidence(
     logits: FloatArray,
     dt_s: float,
     config: TrackerConfig,
+    sensor: int = 0,
 ) -> TrackTable:
     """Return the tracks with the evidence of one frame, ``dt_s`` after the frame before.
 
@@ -63,17 +64,21 @@ def with_evidence(
 
     Args:
         tracks: N tracks.
-        rows: (K,) tracks that the frame shows; each of the others was missed.
+        rows: (K,) tracks that the frame shows; each of the others that the sensor has seen before
+            was missed.
         logits: (K,) evidence of these detections.
-        dt_s: ≥ 0 since the frame before; 0 for a second frame with one stamp, which adds nothing.
+        dt_s: ≥ 0 since the sensor's frame before; 0 for a second frame with one stamp, which adds
+            nothing.
         config: settings.
+        sensor: index of the sensor.
     """
     if tracks.confirmed.all() or dt_s <= 0.0:
         return tracks
     weight = 1.0
     if config.detection_correlation_s > 0.0:
         weight = min(1.0, dt_s / config.detection_correlation_s)
-    gain = np.full(len(tracks), math.log1p(-config.detection_probability))
+    missed = math.log1p(-config.detection_probability)
+    gain = np.where(np.isfinite(tracks.seen_stamps_s[:, sensor]), missed, 0.0)
     gain[rows] = logits
     return tracks.replaced(existence_logits=tracks.existence_logits + weight * gain)
 

@@ -68,7 +68,7 @@ class Exits:
     def after_matches(
         self, before: TrackTable, after: TrackTable, stamp_s: float, period_s: float
     ) -> Exits:
-        """Return these events and those of a frame that continues tracks.
+        """Return these events and those of a frame of the camera that continues tracks.
 
         Args:
             before: N tracks before the frame.
@@ -78,14 +78,16 @@ class Exits:
         """
         count = len(before)
         exits = self if self.start_s == self.start_s else replace(self, start_s=stamp_s)
-        seen = after.last_seen_s[:count] == stamp_s
-        gap_s = stamp_s - before.last_seen_s
-        found = before.confirmed & seen & (gap_s >= absence_s(period_s))
+        seen = after.seen_stamps_s[:count, 0] == stamp_s
+        gap_s = stamp_s - before.seen_stamps_s[:, 0]
+        found = before.confirmed & seen & (gap_s >= absence_s(period_s)) & np.isfinite(gap_s)
         exits = exits.with_events(before.last_places_camera_m[found], returned=True)
         if stamp_s - exits.start_s <= _START_S:
             return exits
         appeared = after.confirmed[:count] & ~before.confirmed
         appeared &= before.birth_stamps_s > exits.start_s + _START_S
+        # Whom another sensor knew before may have come from anywhere.
+        appeared &= ~np.isfinite(before.seen_stamps_s[:, 1:]).any(axis=1)
         return exits.with_events(before.birth_places_camera_m[appeared], returned=False)
 
     def at(self, places_camera_m: FloatArray) -> BoolArray:

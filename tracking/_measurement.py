@@ -45,17 +45,19 @@ class Measurements:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """One frame: the camera's pose and the people it shows.
+    """One frame of a sensor: its pose and the people it shows.
 
     Attributes:
         stamp_s: time of the frame.
-        T_odom_camera: (4, 4) pose of the camera.
+        T_odom_camera: (4, 4) pose of the camera, or of the other sensor.
         measurements: of the people in the frame.
+        sensor: index of the sensor, 0 for the camera.
     """
 
     stamp_s: float
     T_odom_camera: FloatArray
     measurements: Measurements
+    sensor: int = 0
 
 
 _NO_EVIDENCE = np.empty(0)

@@ -6,32 +6,28 @@ import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.special import gammaincinv
 
-from ._association import Gates, associate
-from ._awareness_update import update_awareness
+from perception.arrays import FloatArray
+
+from ._awareness_update import forgotten, update_awareness
+from ._clocks import FrameClock
 from ._config import TrackerConfig
-from ._existence import detection_logits, with_evidence
-from ._exits import Exits, floor_places, walked_out
-from ._kalman import correct
-from ._measurement import Frame, Measurements
+from ._exits import Exits, absence_s, walked_out
+from ._fusion import duplicates
+from ._matching import Found, match_frame
+from ._measurement import Frame
 from ._motion import predict
-from ._table import BoolArray, IndexArray, TrackTable
+from ._noticed import with_noticed
+from ._sensors import Sensors, seen_lately
+from ._table import BoolArray, TrackTable
 from ._track_management import (
     damped_time_s,
     due_for_deletion,
     expired_before,
     initiate,
     missed_time_s,
-    record_hits,
 )
-from ._twins import doubted, same_person, with_hosts, with_lower_evidence, with_twins, without
-from ._views import View
-
-# Share of a new interval in the usual time between frames.
-_PERIOD_GAIN = 0.2
-# How far a person may walk between two frames, in standard deviations of a new track's velocity.
-_REACH_SIGMAS = 3.0
+from ._twins import doubted, with_hosts, with_lower_evidence, with_twins, without
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,99 +35,85 @@ class TrackerState:
     """Everything that frames change. A state is immutable: each frame makes a new one.
 
     Attributes:
-        tracks: at ``stamp_s``.
+        tracks: at ``stamp_s``, and their awareness at the stamp of ``faces``.
+        clocks: of each sensor's frames.
         next_id: of the next track.
-        stamp_s: of the latest frame, or None before the first.
-        interval_s: between the latest two stamps that differ; infinite before there are two.
-        period_s: usual time between frames, smoothed over pauses; infinite before there are two.
-        exits: where people have appeared and vanished.
+        stamp_s: of the latest frame of any sensor, or None before the first.
+        faces: clock of the frames of all sensors that see faces.
+        exits: where people have appeared before the camera and vanished.
+        origin_odom_m: x and y of the latest sensor without measured ranges, or None before it. Only
+            kept where other sensors measure ranges.
     """
 
     tracks: TrackTable
+    clocks: tuple[FrameClock, ...] = (FrameClock(),)
     next_id: int = 1
     stamp_s: float | None = None
-    interval_s: float = math.inf
-    period_s: float = math.inf
+    faces: FrameClock = field(default_factory=FrameClock)
     exits: Exits = field(default_factory=Exits.none)
+    origin_odom_m: tuple[float, float] | None = None
+
+    @property
+    def periods_s(self) -> FloatArray:
+        """(S,) usual time between frames of each sensor, 0 where it is unknown."""
+        periods = [clock.period_s for clock in self.clocks]
+        return np.array([one if math.isfinite(one) else 0.0 for one in periods])
 
 
-def gates_of(config: TrackerConfig) -> Gates:
-    """Return the gates that a config describes."""
-    return Gates(
-        # χ² with two degrees of freedom; scipy.stats would take most of the package's import time.
-        mahalanobis2=float(2.0 * gammaincinv(1.0, config.gate_probability)),
-        distance_m=config.gate_distance_m,
-        miss_cost=config.miss_cost,
-        ambiguity_margin=config.ambiguity_margin,
-        ambiguity_distance_m=config.ambiguity_distance_m,
-    )
+def nobody(config: TrackerConfig, sensors: Sensors, next_id: int = 1) -> TrackerState:
+    """Return the state before the first frame."""
+    table = TrackTable.empty(config.confirm_hits, len(sensors))
+    return TrackerState(table, (FrameClock(),) * len(sensors), next_id)
 
 
-def advance(
-    state: TrackerState, frame: Frame, config: TrackerConfig, gates: Gates, view: View | None
-) -> TrackerState:
+def advance(state: TrackerState, frame: Frame, sensors: Sensors) -> TrackerState:
     """Return the state after one more frame, whose stamp is not before the state's."""
-    stamp = frame.stamp_s
+    sensor = sensors.all[frame.sensor]
+    config, has_view = sensor.config, sensors.has_view
+    stamp, measured = frame.stamp_s, frame.measurements
     previous = stamp if state.stamp_s is None else state.stamp_s
-    dt_s = stamp - previous
-    interval_s = dt_s if dt_s > 0.0 else state.interval_s
-    period_s = smoothed_period_s(state.period_s, dt_s)
-    has_view = view is not None
+    dt_s = state.clocks[sensor.index].dt_s(stamp)
+    faces = state.faces
+    state = _with_clocks(state, frame, sensors)
+    period_s = state.clocks[sensor.index].period_s
     tracks = state.tracks
-    measured = frame.measurements
-    if len(tracks) and dt_s > 0.0:
-        tracks = without(tracks, expired_before(tracks, stamp, period_s, config, has_view))
+    if len(tracks) and stamp > previous:
+        expired = expired_before(tracks, stamp, state.periods_s, config, has_view)
+        tracks = without(tracks, expired)
         tracks = predicted(tracks, previous, stamp, config)
     before = tracks
-    tracks, source, ambiguous = _matched(tracks, frame, dt_s, period_s, config, gates)
-    tracks = with_twins(before, tracks, source, measured, dt_s, config)
-    exits = state.exits.after_matches(before, tracks, stamp, period_s)
+    tracks, found = match_frame(tracks, frame, dt_s, state.origin_odom_m, state.clocks, sensors)
+    followed = None
+    if len(sensors) > 1:
+        own = np.arange(len(sensors)) == sensor.index
+        followed = seen_lately(before, own, stamp, absence_s(period_s))
+    tracks = with_twins(before, tracks, found.source, measured, dt_s, config, followed)
+    exits = state.exits
+    if sensor.index == 0:
+        exits = exits.after_matches(before, tracks, stamp, period_s)
     unmatched = ~measured.weak
-    unmatched[source[source >= 0]] = False
+    unmatched[found.source[found.seen]] = False
     if unmatched.any():
-        initiated = initiate(frame, unmatched, state.next_id, config)
+        initiated = initiate(frame, unmatched, state.next_id, config, len(sensors))
         tracks = with_hosts(tracks.append(initiated), len(initiated), config)
-        source = np.concatenate((source, np.flatnonzero(unmatched)))
-        no_flags = np.zeros(len(initiated), dtype=np.bool_)
-        ambiguous = np.concatenate((ambiguous, no_flags))  # a new track is never ambiguous
-    seen = source >= 0
-    looked_at = seen.copy()  # a weak detection may be something else: no evidence of awareness
-    looked_at[seen] = ~measured.weak[source[seen]]
-    means, variances = np.full(len(tracks), np.nan), np.full(len(tracks), np.nan)
-    means[seen] = measured.evidence_means[source[seen]]
-    variances[seen] = measured.evidence_variances[source[seen]]
-    means, variances = with_lower_evidence(tracks, looked_at, means, variances)
-    tracks = update_awareness(
-        tracks,
-        previous,
-        stamp,
-        interval_s,
-        state.period_s,
-        looked_at,
-        ambiguous,
-        means,
-        variances,
-        config.awareness,
-    )
-    missed_s = missed_time_s(tracks, ~seen, dt_s, frame.T_odom_camera, config, view)
+        found = found.with_births(np.flatnonzero(unmatched))
+    tracks = _with_awareness(tracks, frame, found, faces, state, sensors)
+    tracks = with_noticed(before, tracks, frame, found, faces, state.clocks, sensors)
+    seen = found.seen
+    missed_s = missed_time_s(tracks, ~seen, dt_s, frame, config, sensor.view)
     tracks = tracks.replaced(missed_s=missed_s)
     if not seen.all():
-        gone = walked_out(tracks, exits, ~seen, frame.T_odom_camera) | doubted(tracks)
-        deleted = ~seen & due_for_deletion(tracks, stamp, period_s, gone, config, has_view)
+        deleted = ~seen & _deleted(replace(state, exits=exits), tracks, seen, frame, sensors)
         vanished = deleted & tracks.confirmed & ~tracks.standing & ~tracks.twins
+        # Only where the camera was the last to see somebody is there an exit of its view.
+        vanished &= tracks.seen_stamps_s[:, 0] == tracks.last_seen_s
         exits = exits.with_events(tracks.last_places_camera_m[vanished], returned=False)
         tracks = without(tracks, deleted)
+    double = duplicates(tracks, frame, state.clocks, sensors)
+    if double.any():
+        tracks = without(tracks, double)
     next_id = state.next_id + int(np.count_nonzero(unmatched))
-    return TrackerState(tracks, next_id, stamp, interval_s, period_s, exits)
-
-
-def smoothed_period_s(period_s: float, dt_s: float) -> float:
-    """Return the usual time between frames after one more interval; a pause counts as two."""
-    if dt_s <= 0.0:
-        return period_s
-    if not math.isfinite(period_s):
-        return dt_s
-    return period_s + _PERIOD_GAIN * (min(dt_s, 2.0 * period_s) - period_s)
+    return replace(state, tracks=tracks, next_id=next_id, exits=exits)
 
 
 def predicted(tracks: TrackTable, from_s: float, to_s: float, config: TrackerConfig) -> TrackTable:
@@ -149,86 +131,78 @@ def predicted(tracks: TrackTable, from_s: float, to_s: float, config: TrackerCon
     return tracks.replaced(states=states, covariances=covariances)
 
 
-def _matched(
+def _with_clocks(state: TrackerState, frame: Frame, sensors: Sensors) -> TrackerState:
+    """Return the state with the clocks, and the place of the camera, after a frame."""
+    sensor, stamp = sensors.all[frame.sensor], frame.stamp_s
+    clocks = list(state.clocks)
+    clocks[sensor.index] = clocks[sensor.index].after(stamp)
+    origin = state.origin_odom_m
+    if sensors.mixed and not sensor.settings.measures_range:
+        x_m, y_m = frame.T_odom_camera[:2, 3].tolist()
+        origin = (x_m, y_m)
+    faces = state.faces.after(stamp) if sensor.settings.sees_faces else state.faces
+    return replace(state, clocks=tuple(clocks), stamp_s=stamp, faces=faces, origin_odom_m=origin)
+
+
+def _with_awareness(
     tracks: TrackTable,
     frame: Frame,
-    dt_s: float,
-    period_s: float,
-    config: TrackerConfig,
-    gates: Gates,
-) -> tuple[TrackTable, IndexArray, BoolArray]:
-    """Match the frame's measurements to the tracks and correct the tracks with them.
+    found: Found,
+    faces: FrameClock,
+    state: TrackerState,
+    sensors: Sensors,
+) -> TrackTable:
+    """Return the tracks with their awareness after a frame.
 
-    Returns:
-        The corrected tracks; (N,) the row of each track's measurement, −1 for none; (N,) True for
-        ambiguous matches.
+    Args:
+        tracks: after the frame's measurements, new tracks included.
+        frame: of any sensor; one that sees no faces only takes awareness, where it is ambiguous.
+        found: which of them the frame shows.
+        faces: clock of the frames with faces before this one.
+        state: with the clocks after it.
+        sensors: all sensors.
     """
-    source = np.full(len(tracks), -1, dtype=np.intp)
-    ambiguous = np.zeros(len(tracks), dtype=np.bool_)
-    measured = frame.measurements
-    if math.isfinite(period_s):
-        reach_m = _REACH_SIGMAS * config.initial_velocity_std_mps * period_s
-        gates = replace(gates, distance_m=max(gates.distance_m, reach_m))
-    rows, columns, unclear = _matches(tracks, measured, gates)
-    logits = detection_logits(
-        tracks.states[rows, :2],
-        tracks.covariances[rows, :2, :2],
-        measured.positions_odom_m[columns],
-        measured.noises_m2[columns],
+    config = sensors.config.awareness
+    if not sensors.all[frame.sensor].settings.sees_faces:
+        return forgotten(tracks, found.ambiguous, config)
+    measured, stamp, seen = frame.measurements, frame.stamp_s, found.seen
+    looked_at = seen.copy()  # a weak detection may be something else: no evidence of awareness
+    looked_at[seen] = ~measured.weak[found.source[seen]]
+    means, variances = np.full(len(tracks), np.nan), np.full(len(tracks), np.nan)
+    means[seen] = measured.evidence_means[found.source[seen]]
+    variances[seen] = measured.evidence_variances[found.source[seen]]
+    if sensors.mixed:
+        # On the same ray, but not at that range: perhaps the face of somebody else.
+        means[found.beyond] = variances[found.beyond] = np.nan
+    means, variances = with_lower_evidence(tracks, looked_at, means, variances)
+    return update_awareness(
+        tracks,
+        stamp if faces.stamp_s is None else faces.stamp_s,
+        stamp,
+        state.faces.interval_s,
+        faces.period_s,
+        looked_at,
+        found.ambiguous,
+        means,
+        variances,
         config,
     )
-    tracks = with_evidence(tracks, rows, logits, dt_s, config)
-    if not rows.size:
-        return tracks, source, ambiguous
-    source[rows], ambiguous[rows] = columns, unclear
-    # An ambiguous measurement has less weight and leaves more uncertainty.
-    factors = np.where(unclear, config.ambiguous_noise_factor, 1.0)
-    states, covariances = tracks.states.copy(), tracks.covariances.copy()
-    states[rows], covariances[rows] = correct(
-        states[rows],
-        covariances[rows],
-        measured.positions_odom_m[columns],
-        measured.noises_m2[columns] * factors[:, None, None],
-    )
-    places = tracks.last_places_camera_m.copy()
-    places[rows] = floor_places(states[rows, :2], frame.T_odom_camera)
-    tracks = tracks.replaced(states=states, covariances=covariances, last_places_camera_m=places)
-    return record_hits(tracks, rows, frame.stamp_s, period_s, config), source, ambiguous
 
 
-def _matches(
-    tracks: TrackTable, measured: Measurements, gates: Gates
-) -> tuple[IndexArray, IndexArray, BoolArray]:
-    """Return (K,) rows of matched tracks, of their measurements, and which are ambiguous.
-
-    Weak detections are offered to the confirmed tracks that are left without a match, as in
-    ByteTrack (Zhang et al., ECCV 2022).
-    """
-    first, people = tracks.confirmed & ~doubted(tracks), same_person(tracks)
-    positions, covariances = tracks.states[:, :2], tracks.covariances[:, :2, :2]
-    places, noises = measured.positions_odom_m, measured.noises_m2
-    if not measured.weak.any():
-        found = associate(positions, covariances, first, places, noises, gates, people)
-        return found.tracks, found.measurements, found.ambiguous
-    offered = np.flatnonzero(~measured.weak)
-    found = associate(
-        positions, covariances, first, places[offered], noises[offered], gates, people
-    )
-    rows, columns = found.tracks, offered[found.measurements]
-    left = tracks.confirmed.copy()
-    left[rows] = False
-    rest, offered = np.flatnonzero(left), np.flatnonzero(measured.weak)
-    second = associate(
-        positions[rest],
-        covariances[rest],
-        first[rest],
-        places[offered],
-        noises[offered],
-        gates,
-        None if people is None else people[rest],
-    )
-    return (
-        np.concatenate((rows, rest[second.tracks])),
-        np.concatenate((columns, offered[second.measurements])),
-        np.concatenate((found.ambiguous, second.ambiguous)),
+def _deleted(
+    state: TrackerState, tracks: TrackTable, seen: BoolArray, frame: Frame, sensors: Sensors
+) -> BoolArray:
+    """Return (N,) True for tracks to delete if the frame, the state's latest, shows them not."""
+    gone = np.repeat(doubted(tracks)[:, None], len(sensors), axis=1)
+    if frame.sensor == 0:
+        gone[:, 0] |= walked_out(tracks, state.exits, ~seen, frame.T_odom_camera)
+    slack_s = state.periods_s
+    slack_s[frame.sensor] = 0.0
+    return due_for_deletion(
+        tracks,
+        frame.stamp_s - slack_s,
+        sensors.tentative_gaps_s(state.clocks),
+        gone,
+        sensors.config,
+        sensors.has_view,
     )

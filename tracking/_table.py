@@ -32,17 +32,24 @@ class TrackTable:
             first; −∞ where there were fewer.
         confirmed: (N,) whether enough frames have shown the person.
         standing: (N,) whether the person stood still when last seen.
-        missed_s: (N,) time since last seen in which frames should have shown the person.
+        seen_stamps_s: (N, S) stamps of the latest frames of each sensor that showed the person; −∞
+            for none. The latest of them ends ``hit_stamps_s``.
+        missed_s: (N, S) time since each sensor last saw the person in which its frames should have
+            shown them.
         existence_logits: (N,) log-likelihood ratio of a person to clutter, of the detections after
             the first; 0 at the first.
         birth_stamps_s: (N,) stamps of the first frames that showed the people.
-        birth_places_camera_m: (N, 2) where they were then, relative to the camera (``_exits``).
-        last_places_camera_m: (N, 2) the same for the latest frames that showed them.
+        birth_places_camera_m: (N, 2) where they were then, relative to the sensor (``_exits``).
+        last_places_camera_m: (N, 2) the same for the latest frames of the camera that showed them.
         host_ids: (N,) ids of the tracks whose twins these may be, 0 for none (``_twins``).
         twin_logits: (N,) evidence that they are.
         twin_visibilities: (N,) probability that they are not hidden, if they are people.
         twin_priors: (N,) evidence with which the next possible twin of this track starts.
         twins: (N,) True where the evidence has sufficed; such a track is not reported.
+        looked_s: (N,) for how long the person has looked at the robot lately (``_noticed``).
+        look_stamps_s: (N,) of the latest look; NaN for none.
+        look_approaches_mps: (N,) least speed towards the robot since then, ≥ 0.
+        look_standing: (N,) whether the person has stood since then.
     """
 
     ids: IntArray
@@ -55,6 +62,7 @@ class TrackTable:
     hit_stamps_s: FloatArray
     confirmed: BoolArray
     standing: BoolArray
+    seen_stamps_s: FloatArray
     missed_s: FloatArray
     existence_logits: FloatArray
     birth_stamps_s: FloatArray
@@ -65,10 +73,14 @@ class TrackTable:
     twin_visibilities: FloatArray
     twin_priors: FloatArray
     twins: BoolArray
+    looked_s: FloatArray
+    look_stamps_s: FloatArray
+    look_approaches_mps: FloatArray
+    look_standing: BoolArray
 
     @staticmethod
-    def empty(confirm_hits: int) -> TrackTable:
-        """Return a table without tracks."""
+    def empty(confirm_hits: int, sensors: int = 1) -> TrackTable:
+        """Return a table without tracks, for this number of sensors."""
         no_numbers = np.empty(0)
         no_flags = np.empty(0, dtype=np.bool_)
         return TrackTable(
@@ -82,7 +94,8 @@ class TrackTable:
             hit_stamps_s=np.empty((0, confirm_hits)),
             confirmed=no_flags,
             standing=no_flags,
-            missed_s=no_numbers,
+            seen_stamps_s=np.empty((0, sensors)),
+            missed_s=np.empty((0, sensors)),
             existence_logits=no_numbers,
             birth_stamps_s=no_numbers,
             birth_places_camera_m=np.empty((0, 2)),
@@ -92,6 +105,10 @@ class TrackTable:
             twin_visibilities=no_numbers,
             twin_priors=no_numbers,
             twins=no_flags,
+            looked_s=no_numbers,
+            look_stamps_s=no_numbers,
+            look_approaches_mps=no_numbers,
+            look_standing=no_flags,
         )
 
     @property

@@ -20,7 +20,7 @@ class PersonTrack:
         id: unique for the life of a tracker, never used again.
         stamp_s: time of the state.
         status: ``"tentative"`` (not confirmed yet), ``"confirmed"`` or ``"coasting"`` (not in the
-            latest frame).
+            latest frame, nor in that of another sensor that is not silent).
         position_odom_m: (2,).
         velocity_odom_mps: (2,).
         covariance_odom: (4, 4), order x, y, vx, vy.
@@ -28,7 +28,9 @@ class PersonTrack:
         awareness_std: its standard deviation, ≥ 0.
         awareness_lower: lower bound of α in [0, 1]; only this value may shrink an obstacle.
         height_m: the person's assumed stature, > 0.
-        time_since_seen_s: ≥ 0, time since a frame last showed this person.
+        time_since_seen_s: ≥ 0, time since a frame of any sensor last showed this person.
+        noticed: lower bound, in [0, 1], of the probability that this person has noticed the robot
+            by the looks of the last seconds; 0 unless ``noticed_memory_s`` is set.
     """
 
     id: int
@@ -42,6 +44,7 @@ class PersonTrack:
     awareness_lower: float
     height_m: float
     time_since_seen_s: float
+    noticed: float = 0.0
 
     def __post_init__(self) -> None:
         if self.status not in get_args(TrackStatus):
@@ -76,6 +79,7 @@ class PersonTrack:
                 "height_m", self.height_m, TrackingError, minimum=0.0, exclusive_minimum=True
             ),
             time_since_seen_s=number("time_since_seen_s", 0.0),
+            noticed=number("noticed", 0.0, 1.0),
         )
 
 

@@ -6,7 +6,6 @@ frame should have shown a person depends on the view and on the people who stand
 
 from __future__ import annotations
 
-import math
 from typing import Final
 
 import numpy as np
@@ -15,7 +14,7 @@ from perception.arrays import FloatArray
 
 from ._config import TrackerConfig
 from ._errors import TrackingError
-from ._existence import confirming_logit, tentative_gap_s
+from ._existence import confirming_logit
 from ._exits import floor_places
 from ._kalman import inverse_2x2
 from ._measurement import Frame
@@ -32,9 +31,12 @@ _MAX_SHARE_OF_ONE_FRAME: Final = 0.5
 
 
 def initiate(
-    frame: Frame, unmatched: BoolArray, first_id: int, config: TrackerConfig
+    frame: Frame, unmatched: BoolArray, first_id: int, config: TrackerConfig, sensors: int = 1
 ) -> TrackTable:
-    """Return new tracks at the unmatched measurements (M,), with the prior awareness."""
+    """Return new tracks at the unmatched measurements (M,), with the prior awareness.
+
+    ``sensors`` is the number of sensors that the tracker has.
+    """
     count = int(np.count_nonzero(unmatched))
     measured = frame.measurements
     states = np.zeros((count, 4))
@@ -44,6 +46,8 @@ def initiate(
     covariances[:, 2, 2] = covariances[:, 3, 3] = config.initial_velocity_std_mps**2
     hits = np.full((count, config.confirm_hits), -np.inf)
     hits[:, -1] = frame.stamp_s
+    seen_stamps = np.full((count, sensors), -np.inf)
+    seen_stamps[:, frame.sensor] = frame.stamp_s
     belief = prior(config.awareness)
     places = floor_places(states[:, :2], frame.T_odom_camera)
     return TrackTable(
@@ -57,7 +61,8 @@ def initiate(
         hit_stamps_s=hits,
         confirmed=np.full(count, config.confirm_hits <= 1),
         standing=np.zeros(count, dtype=np.bool_),
-        missed_s=np.zeros(count),
+        seen_stamps_s=seen_stamps,
+        missed_s=np.zeros((count, sensors)),
         existence_logits=np.zeros(count),
         birth_stamps_s=np.full(count, frame.stamp_s),
         birth_places_camera_m=places,
@@ -67,6 +72,10 @@ def initiate(
         twin_visibilities=np.ones(count),
         twin_priors=np.zeros(count),
         twins=np.zeros(count, dtype=np.bool_),
+        looked_s=np.zeros(count),
+        look_stamps_s=np.full(count, np.nan),
+        look_approaches_mps=np.zeros(count),
+        look_standing=np.zeros(count, dtype=np.bool_),
     )
 
 
@@ -76,8 +85,9 @@ def record_hits(
     stamp_s: float,
     period_s: float,
     config: TrackerConfig,
+    sensor: int = 0,
 ) -> TrackTable:
-    """Return the tracks after a frame at ``stamp_s`` that shows those of ``rows``.
+    """Return the tracks after a frame of a sensor at ``stamp_s`` that shows those of ``rows``.
 
     Confirms tracks with enough hits and finds out who stands. A second set of measurements with the
     same stamp is not another hit.
@@ -86,6 +96,8 @@ def record_hits(
     fresh = rows[hits[rows, -1] < stamp_s]
     hits[fresh, :-1] = hits[fresh, 1:]
     hits[fresh, -1] = stamp_s
+    seen_stamps = tracks.seen_stamps_s.copy()
+    seen_stamps[rows, sensor] = stamp_s
     confirmed = tracks.confirmed
     if not confirmed.all():
         window_s = config.confirm_window_s
@@ -97,7 +109,9 @@ def record_hits(
         confirmed = confirmed | (stamp_s - hits[:, 0] <= window_s)
     standing = tracks.standing.copy()
     standing[rows] = is_standing(tracks.states[rows], tracks.covariances[rows], config)
-    return tracks.replaced(hit_stamps_s=hits, confirmed=confirmed, standing=standing)
+    return tracks.replaced(
+        hit_stamps_s=hits, seen_stamps_s=seen_stamps, confirmed=confirmed, standing=standing
+    )
 
 
 def is_standing(states: FloatArray, covariances: FloatArray, config: TrackerConfig) -> BoolArray:
@@ -135,82 +149,108 @@ def damped_time_s(tracks: TrackTable, from_s: float, to_s: float) -> FloatArray 
 
 
 def coasted_too_long(
-    tracks: TrackTable, stamp_s: float, config: TrackerConfig, has_view: bool
+    tracks: TrackTable, stamps_s: FloatArray, config: TrackerConfig, has_view: BoolArray
 ) -> BoolArray:
-    """Return (N,) True for confirmed tracks that are unseen for too long, for whatever reason."""
-    gap_s = stamp_s - tracks.last_seen_s
-    if not has_view:
-        return tracks.confirmed & (gap_s > config.max_coast_s)
+    """Return (N,) True for confirmed tracks that all sensors have not seen for too long.
+
+    Args:
+        tracks: N tracks.
+        stamps_s: (S,) the stamp at which each sensor judges.
+        config: settings.
+        has_view: (S,) True for sensors whose view is known.
+    """
+    gaps_s = stamps_s - tracks.seen_stamps_s
     standing_s = max(config.max_standing_coast_s, config.max_coast_s)
-    limit_s = np.where(tracks.standing, standing_s, config.max_coast_s)
-    return tracks.confirmed & (gap_s > limit_s)
+    limits_s = np.where(tracks.standing[:, None] & has_view, standing_s, config.max_coast_s)
+    return np.asarray(tracks.confirmed & (gaps_s > limits_s).all(axis=1))
 
 
 def expired_before(
-    tracks: TrackTable, stamp_s: float, period_s: float, config: TrackerConfig, has_view: bool
+    tracks: TrackTable,
+    stamp_s: float,
+    periods_s: FloatArray,
+    config: TrackerConfig,
+    has_view: BoolArray,
 ) -> BoolArray:
     """Return (N,) True for tracks that a frame at ``stamp_s`` can no longer match.
 
     A tentative track gets a chance in this frame, however long the frame interval.
+
+    Args:
+        tracks: N tracks.
+        stamp_s: of the frame.
+        periods_s: (S,) usual time between frames of each sensor, 0 if unknown.
+        config: settings.
+        has_view: (S,) True for sensors whose view is known.
     """
     gap_s = stamp_s - tracks.last_seen_s
     unconfirmed = ~tracks.confirmed & (gap_s > max(config.max_coast_s, config.max_tentative_gap_s))
     # A track that the last frame has left alive gets a chance too.
-    return (
-        coasted_too_long(
-            tracks, stamp_s - (period_s if math.isfinite(period_s) else 0.0), config, has_view
-        )
-        | unconfirmed
-    )
+    return coasted_too_long(tracks, stamp_s - periods_s, config, has_view) | unconfirmed
 
 
 def due_for_deletion(
     tracks: TrackTable,
-    stamp_s: float,
-    period_s: float,
+    stamps_s: FloatArray,
+    tentative_gaps_s: FloatArray,
     gone: BoolArray,
     config: TrackerConfig,
-    has_view: bool,
+    has_view: BoolArray,
 ) -> BoolArray:
-    """Return (N,) True for tracks to delete if the frame at ``stamp_s`` does not show them.
+    """Return (N,) True for tracks to delete if the frame does not show them.
 
-    Those of ``gone`` (N,) have walked out of the view; ``max_missed_s`` suffices for them.
+    Each sensor judges by its own frames, and all must agree. So a track is never given up sooner
+    than it would be with one of the sensors alone. A sensor that has never seen a person agrees.
+
+    Args:
+        tracks: N tracks.
+        stamps_s: (S,) the stamp at which each sensor judges: that of the frame for its own sensor,
+            and for the others one usual interval less, since their next frame may show the person.
+        tentative_gaps_s: (S,) the time after which each sensor gives up a tentative track.
+        gone: (N, S) True for people who have walked out of a sensor's view; ``max_missed_s``
+            suffices for them.
+        config: settings.
+        has_view: (S,) True for sensors whose view is known.
     """
-    gap_s = tentative_gap_s(period_s, config)
-    unconfirmed = ~tracks.confirmed & (stamp_s - tracks.last_seen_s > gap_s)
-    missed = tracks.confirmed & (tracks.missed_s > config.max_missed_s)
-    missed |= gone & (stamp_s - tracks.last_seen_s > config.max_missed_s)
-    return coasted_too_long(tracks, stamp_s, config, has_view) | unconfirmed | missed
+    gaps_s = stamps_s - tracks.seen_stamps_s
+    unconfirmed = ~tracks.confirmed & (gaps_s > tentative_gaps_s).all(axis=1)
+    standing_s = max(config.max_standing_coast_s, config.max_coast_s)
+    limits_s = np.where(tracks.standing[:, None] & has_view, standing_s, config.max_coast_s)
+    lost = (gaps_s > limits_s) | (tracks.missed_s > config.max_missed_s)
+    lost |= gone & (gaps_s > config.max_missed_s)
+    return np.asarray(unconfirmed | (tracks.confirmed & lost.all(axis=1)))
 
 
 def missed_time_s(
     tracks: TrackTable,
     unseen: BoolArray,
     dt_s: float,
-    T_odom_camera: FloatArray,
+    frame: Frame,
     config: TrackerConfig,
     view: View | None,
 ) -> FloatArray:
-    """Return (N,), the updated time in which frames should have shown the tracks and did not.
+    """Return (N, S), the updated time in which frames should have shown the tracks and did not.
 
-    The time since the previous frame counts in proportion to how surely this frame should have
-    shown the person. Only people in this frame can hide others. Without a view the time is 0.
+    The time since the sensor's previous frame counts in proportion to how surely this frame should
+    have shown the person. Only people in this frame can hide others. Without a view it is 0.
 
     Args:
         tracks: at the frame's stamp.
         unseen: (N,) True for people who are not in the frame.
-        dt_s: since the previous frame.
-        T_odom_camera: (4, 4) of the frame.
+        dt_s: since the sensor's previous frame.
+        frame: whose sensor's column changes.
         config: settings.
-        view: where people can be seen.
+        view: where people can be seen by this sensor.
     """
-    missed_s = np.where(unseen, tracks.missed_s, 0.0)
+    missed_s: FloatArray = tracks.missed_s.copy()
+    missed_s[~unseen, frame.sensor] = 0.0
     candidates = unseen & tracks.confirmed
     if view is None or dt_s <= 0.0 or not candidates.any():
         return missed_s
     rows = np.flatnonzero(candidates)
-    visibility = _visibility(tracks, rows, ~unseen, T_odom_camera, config, view)
-    missed_s[rows] += visibility * min(dt_s, _MAX_SHARE_OF_ONE_FRAME * config.max_missed_s)
+    visibility = _visibility(tracks, rows, ~unseen, frame.T_odom_camera, config, view)
+    share_s = min(dt_s, _MAX_SHARE_OF_ONE_FRAME * config.max_missed_s)
+    missed_s[rows, frame.sensor] += visibility * share_s
     return missed_s
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +17,11 @@ from ._config import TrackerConfig
 from ._errors import TrackingError
 from ._history import History
 from ._measurement import Frame, measurements_of
-from ._saved_state import frame_of, record_of, state_of, to_plain
+from ._saved_records import record_of
+from ._saved_state import frame_of, sensors_in, state_of, to_plain
+from ._sensors import CAMERA, SensorConfig, sensors_of
 from ._snapshot import snapshots
-from ._step import TrackerState, advance, gates_of
-from ._table import TrackTable
+from ._step import TrackerState, advance, nobody
 from ._track import PersonTrack
 from ._views import View
 from .clock import JumpedClock
@@ -28,13 +30,17 @@ _LOG = logging.getLogger("tracking")
 
 
 class PersonTracker:
-    """Track people with a moving camera, at any frame rate.
+    """Track people with a moving camera and other sensors, at any frame rates.
 
     Each track has a constant-velocity Kalman filter on the floor plane (odom x and y) and a filter
     of awareness in logit(α). A track is tentative until ``confirm_hits`` frames within
     ``confirm_window_s`` have shown the person, and coasting while the latest frame does not. An id
     is never used again. Tentative tracks are returned too, with ``awareness_lower`` 0: the person
     may not exist, but navigation must treat them as one who has not seen the robot.
+
+    Other sensors of the robot, such as laser scanners, have names in ``sensors``. Each sensor has
+    its own view, frame rate and latency; a track is deleted when all sensors would delete it. A
+    sensor that sees no faces keeps identity, place and motion, and says nothing about awareness.
 
     A track is deleted sooner if frames should have shown the person. With a ``view``, a person whom
     nothing hides is deleted after ``max_missed_s``. A person out of view or behind another person
@@ -57,9 +63,16 @@ class PersonTracker:
     Args:
         config: settings; None for the defaults.
         view: where the camera can see people; None if unknown.
+        sensors: the settings of other sensors, by name; None for the camera alone.
     """
 
-    def __init__(self, config: TrackerConfig | None = None, *, view: View | None = None) -> None:
+    def __init__(
+        self,
+        config: TrackerConfig | None = None,
+        *,
+        view: View | None = None,
+        sensors: Mapping[str, SensorConfig] | None = None,
+    ) -> None:
         if config is None:
             config = TrackerConfig()
         if not isinstance(config, TrackerConfig):
@@ -70,14 +83,13 @@ class PersonTracker:
                 f"got {type(view).__name__}"
             )
         self._config = config
-        self._view = view
-        self._gates = gates_of(config)
+        self._sensors = sensors_of(config, view, sensors)
         self._refused_late_frames = 0
         self._refused_early_frames = 0
         self._clock_restarts = 0
-        self._jumped: JumpedClock | None = None
-        nobody = TrackerState(TrackTable.empty(config.confirm_hits))
-        self._history = History(self._advance, config.max_lag_s, nobody)
+        self._jumped: dict[str, JumpedClock] = {}
+        start = nobody(config, self._sensors)
+        self._history = History(self._advance, config.max_lag_s, start)
 
     @property
     def config(self) -> TrackerConfig:
@@ -86,11 +98,24 @@ class PersonTracker:
 
     @property
     def last_stamp_s(self) -> float | None:
-        """Stamp of the latest frame, or None before the first.
+        """Stamp of the latest frame of any sensor, or None before the first.
 
         Without tracks, it tells whether nobody is there or the camera has stopped.
         """
         return self._history.latest.stamp_s
+
+    @property
+    def silences_s(self) -> dict[str, float]:
+        """Time since the latest frame of each sensor, at the latest stamp; infinite before any.
+
+        A sensor that is lost has a silence that grows. The tracker goes on with the others.
+        """
+        state = self._history.latest
+        now_s = state.stamp_s
+        return {
+            name: math.inf if clock.stamp_s is None or now_s is None else now_s - clock.stamp_s
+            for name, clock in zip(self._sensors.names, state.clocks, strict=True)
+        }
 
     @property
     def refused_late_frames(self) -> int:
@@ -109,10 +134,9 @@ class PersonTracker:
 
     def reset(self) -> None:
         """Forget all tracks and the clock. Ids go on, and the counts stay."""
-        state = self._history.latest
-        nobody = TrackerState(TrackTable.empty(self._config.confirm_hits), state.next_id)
-        self._history = History(self._advance, self._config.max_lag_s, nobody)
-        self._jumped = None
+        start = nobody(self._config, self._sensors, self._history.latest.next_id)
+        self._history = History(self._advance, self._config.max_lag_s, start)
+        self._jumped = {}
 
     def update(
         self,
@@ -121,34 +145,42 @@ class PersonTracker:
         T_odom_camera: Any,
         *,
         pose_covariance_odom: Any = None,
+        sensor: str = CAMERA,
     ) -> tuple[PersonTrack, ...]:
         """Process one frame and return every track at the latest stamp, in the order of their ids.
 
         Args:
-            observations: of this frame; empty if it shows nobody.
+            observations: of this frame, in the frame of its sensor; empty if it shows nobody. The
+                awareness in observations of a sensor that sees no faces is ignored.
             stamp_s: time of the frame, at most ``max_lag_s`` before the latest one's. A second
                 frame with the same stamp is a second set of measurements at that time. At most
                 ``max_pause_s`` after the latest one's.
-            T_odom_camera: (4, 4) pose of the camera at ``stamp_s``.
+            T_odom_camera: (4, 4) pose of the camera, or of the other sensor, at ``stamp_s``.
             pose_covariance_odom: (3, 3) of the camera's x, y (m) and yaw (rad) in odom at
                 ``stamp_s``, or None if the pose is known well enough. All people in a frame share
                 the pose error; the tracker adds it to each of them as if it were independent.
+            sensor: name of the sensor that took the frame. Stamps of all sensors are times of one
+                clock, the robot's.
 
         Raises:
-            TrackingError: for a stamp that is not finite, lies too far back or ahead, or differs
-                from that of an observation by more than ``stamp_tolerance_s``, for a
-                ``T_odom_camera`` that is not a rigid transform, for a ``pose_covariance_odom`` that
-                is not a covariance, and for anything in ``observations`` that is not a
-                :class:`~perception.PersonObservation` or lies out of bounds.
+            TrackingError: for an unknown sensor, for a stamp that is not finite, lies too far back
+                or ahead, or differs from that of an observation by more than
+                ``stamp_tolerance_s``, for a ``T_odom_camera`` that is not a rigid transform, for a
+                ``pose_covariance_odom`` that is not a covariance, and for anything in
+                ``observations`` that is not a :class:`~perception.PersonObservation` or lies out of
+                bounds.
         """
+        source = self._sensors.named(sensor)
         stamp = finite_number("stamp_s", stamp_s, TrackingError)
         T = rigid_transform("T_odom_camera", T_odom_camera, TrackingError)
         pose = None
         if pose_covariance_odom is not None:
             pose = covariance_matrix("pose_covariance_odom", pose_covariance_odom, 3, TrackingError)
+        if source.pose_covariance is not None:
+            pose = source.pose_covariance if pose is None else pose + source.pose_covariance
         measurements = measurements_of(observations, stamp, T, pose, self._config)
-        self._check_clock(stamp)
-        self._history.insert(Frame(stamp, T, measurements))
+        self._check_clock(stamp, source.name)
+        self._history.insert(Frame(stamp, T, measurements, source.index))
         latest = self._history.latest
         return self._snapshots(stamp if latest.stamp_s is None else latest.stamp_s)
 
@@ -175,11 +207,11 @@ class PersonTracker:
     def state(self) -> dict[str, Any]:
         """Return the whole state of the tracker, config included, as plain JSON values.
 
-        A tracker made by :meth:`from_state` continues bit for bit. The view is not included.
+        A tracker made by :meth:`from_state` continues bit for bit. The views are not included.
         """
         history = self._history
         return to_plain(
-            self._config,
+            self._sensors,
             self._refused_late_frames,
             history.base,
             history.frames,
@@ -188,31 +220,42 @@ class PersonTracker:
         )
 
     @classmethod
-    def from_state(cls, state: dict[str, Any], *, view: View | None = None) -> PersonTracker:
+    def from_state(
+        cls,
+        state: dict[str, Any],
+        *,
+        view: View | None = None,
+        sensors: Mapping[str, SensorConfig] | None = None,
+    ) -> PersonTracker:
         """Make a tracker that continues from a state that :meth:`state` returned.
 
         Args:
             state: from :meth:`state`, or from its JSON.
             view: the view of the first tracker; it is not part of the state.
+            sensors: the other sensors of the first tracker, with their views; None for the settings
+                in the state, without views.
 
         Raises:
-            TrackingError: for a state that no tracker has written, or that has another version.
+            TrackingError: for a state that no tracker has written, that has another version, or
+                that has other sensors.
         """
         record = record_of(state)
-        tracker = cls(record.config, view=view)
+        tracker = cls(record.config, view=view, sensors=sensors_in(record, sensors))
         tracker._refused_late_frames = record.refused_late_frames
         tracker._refused_early_frames = record.clock.refused_early_frames
         tracker._clock_restarts = record.clock.restarts
-        jumped = record.clock.jumped
-        if jumped is not None:
-            tracker._jumped = JumpedClock(jumped.first_s, jumped.last_s, jumped.stamps)
-        hits = record.config.confirm_hits
+        for name, jumped in record.clock.jumped.items():
+            tracker._jumped[name] = JumpedClock(jumped.first_s, jumped.last_s, jumped.stamps)
+        names, hits = tracker._sensors.names, record.config.confirm_hits
         tracker._history = History(
             tracker._advance,
             record.config.max_lag_s,
-            state_of(record.base, hits, "base"),
-            [frame_of(frame, f"frames[{index}]") for index, frame in enumerate(record.frames)],
-            state_of(record.latest, hits, "latest"),
+            state_of(record.base, names, hits, "base"),
+            [
+                frame_of(frame, names, f"frames[{index}]")
+                for index, frame in enumerate(record.frames)
+            ],
+            state_of(record.latest, names, hits, "latest"),
         )
         return tracker
 
@@ -232,7 +275,13 @@ class PersonTracker:
             raise TrackingError(f"cannot write {path}: {cause.strerror or cause}") from cause
 
     @classmethod
-    def load(cls, path: str | Path, *, view: View | None = None) -> PersonTracker:
+    def load(
+        cls,
+        path: str | Path,
+        *,
+        view: View | None = None,
+        sensors: Mapping[str, SensorConfig] | None = None,
+    ) -> PersonTracker:
         """Make a tracker that continues from a file that :meth:`save` wrote.
 
         Raises:
@@ -241,12 +290,15 @@ class PersonTracker:
         path = Path(path)
         state = read_json(path, TrackingError)
         try:
-            return cls.from_state(state, view=view)
+            return cls.from_state(state, view=view, sensors=sensors)
         except TrackingError as cause:
             raise TrackingError(f"{path}: {cause}") from cause
 
-    def _check_clock(self, stamp_s: float) -> None:
-        """Refuse and count a stamp that jumps; start anew if the clock has been set."""
+    def _check_clock(self, stamp_s: float, sensor: str) -> None:
+        """Refuse and count a stamp that jumps; start anew if the clock has been set.
+
+        A frame in time, of any sensor, shows that the clock has not been set.
+        """
         last_s, config = self.last_stamp_s, self._config
         if last_s is None:
             return
@@ -258,10 +310,11 @@ class PersonTracker:
                 f"max_pause_s = {config.max_pause_s:g} s"
             )
         if message is None:
-            self._jumped = None
+            self._jumped = {}
             return
-        self._jumped = JumpedClock.following(self._jumped, stamp_s, config.max_pause_s)
-        if self._jumped.has_lasted(config.new_clock_after_s):
+        jumped = JumpedClock.following(self._jumped.get(sensor), stamp_s, config.max_pause_s)
+        self._jumped[sensor] = jumped
+        if jumped.has_lasted(config.new_clock_after_s):
             _LOG.warning(
                 "the clock has been set: frames at %.3f s after %.3f s; the tracker starts anew",
                 stamp_s,
@@ -277,7 +330,7 @@ class PersonTracker:
         raise TrackingError(message)
 
     def _advance(self, state: TrackerState, frame: Frame) -> TrackerState:
-        return advance(state, frame, self._config, self._gates, self._view)
+        return advance(state, frame, self._sensors)
 
     def _snapshots(self, stamp_s: float) -> tuple[PersonTrack, ...]:
-        return snapshots(self._history.latest, stamp_s, self._config, self._view is not None)
+        return snapshots(self._history.latest, stamp_s, self._sensors)

@@ -64,6 +64,7 @@ def with_twins(
     measured: Measurements,
     dt_s: float,
     config: TrackerConfig,
+    followed: BoolArray | None = None,
 ) -> TrackTable:
     """Return the tracks after the evidence of one frame about who is whose twin.
 
@@ -74,8 +75,13 @@ def with_twins(
         measured: the frame's measurements.
         dt_s: since the frame before; at 0, nothing changes.
         config: settings.
+        followed: (N,) True for the tracks that the frame's sensor has seen lately. Its frames say
+            nothing about the others. None for all.
     """
     pairs = _pairs(after)
+    if followed is not None:
+        known = followed[pairs.twins] & followed[pairs.hosts]
+        pairs = _Pairs(pairs.twins[known], pairs.hosts[known])
     if not pairs.twins.size or dt_s <= 0.0:
         return after
     b, a = pairs.twins, pairs.hosts
@@ -170,6 +176,7 @@ def _merged(tracks: TrackTable, pairs: _Pairs, due: BoolArray) -> TrackTable:
     priors = tracks.twin_priors.copy()
     means, variances = tracks.awareness_means.copy(), tracks.awareness_variances.copy()
     bounds, stamps = tracks.awareness_bounds.copy(), tracks.evidence_stamps_s.copy()
+    looked_s = tracks.looked_s.copy()
     # The surest first; of two that may be twins of each other, the younger.
     order = np.flatnonzero(due)
     order = order[np.lexsort((-pairs.twins[order], -tracks.twin_logits[pairs.twins[order]]))]
@@ -178,6 +185,7 @@ def _merged(tracks: TrackTable, pairs: _Pairs, due: BoolArray) -> TrackTable:
         if twins[twin] or twins[host]:
             continue
         twins[twin], priors[host] = True, _MOST_PRIOR
+        looked_s[host] = min(looked_s[host], looked_s[twin])
         hosts[(hosts == ids[twin]) & (ids != ids[host])] = ids[host]
         if (bounds[twin], means[twin]) < (bounds[host], means[host]):
             means[host], variances[host] = means[twin], variances[twin]
@@ -190,6 +198,7 @@ def _merged(tracks: TrackTable, pairs: _Pairs, due: BoolArray) -> TrackTable:
         awareness_variances=variances,
         awareness_bounds=bounds,
         evidence_stamps_s=stamps,
+        looked_s=looked_s,
     )
 
 

@@ -133,6 +133,60 @@ class CameraView:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class ScannerView:
+    """The view of a laser scanner whose frame has x ahead and y to the left, as in REP-103.
+
+    Visibility falls linearly from 1 to 0 over the last fifth of the range.
+
+    Attributes:
+        max_range_m: > 0, horizontal distance from which people are not recognised.
+        min_range_m: ≥ 0; nearer than this, visibility is 0.
+        field_rad: in (0, 2π], the angle over which the scanner scans, centred ahead.
+    """
+
+    max_range_m: float = 8.0
+    min_range_m: float = 0.1
+    field_rad: float = 2.0 * np.pi
+
+    def __post_init__(self) -> None:
+        def number(name: str, high: float, *, positive: bool) -> float:
+            return finite_number(
+                name,
+                getattr(self, name),
+                TrackingError,
+                minimum=0.0,
+                exclusive_minimum=positive,
+                maximum=high,
+            )
+
+        set_fields(
+            self,
+            max_range_m=number("max_range_m", float("inf"), positive=True),
+            min_range_m=number("min_range_m", self.max_range_m, positive=False),
+            field_rad=number("field_rad", 2.0 * np.pi, positive=True),
+        )
+
+    def visibility(self, positions_odom_m: Any, T_odom_camera: Any) -> FloatArray:
+        """Return (N,) in [0, 1] for people at ``positions_odom_m`` (N, 2).
+
+        ``T_odom_camera`` (4, 4) is the pose of the scanner.
+
+        Raises:
+            TrackingError: for positions that are not finite or not (N, 2), and for a
+                ``T_odom_camera`` that is not a rigid transform.
+        """
+        positions = finite_array("positions_odom_m", positions_odom_m, ("N", 2), TrackingError)
+        T = rigid_transform("T_odom_camera", T_odom_camera, TrackingError)
+        offset = positions - T[:2, 3]
+        ranges = np.hypot(offset[:, 0], offset[:, 1])
+        # A scanner that hangs upside down has its y axis to the right; the field is symmetrical.
+        x, y = (offset @ T[:2, :2]).T
+        inside = (np.abs(np.arctan2(y, x)) <= 0.5 * self.field_rad) & (ranges >= self.min_range_m)
+        from_range = (self.max_range_m - ranges) / (0.2 * self.max_range_m)
+        return np.where(inside, np.clip(from_range, 0.0, 1.0), 0.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class SurroundView:
     """The union of several views with one optical centre, for example of a fisheye camera.
 

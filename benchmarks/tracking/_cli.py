@@ -34,16 +34,19 @@ from ._norfair import Norfair
 from ._ours import Ours
 from ._rates import rate_table
 from ._stonesoup import StoneSoupGnn, StoneSoupJpda
+from ._two_sensors import two_sensor_cost_ms
 
 BASELINE = Path(__file__).with_name("baseline.json")
 SETS = {"open": OPEN, "occluded": OCCLUDED}
 #: The baseline holds for runs of this size only.
 STANDARD_SEEDS, STANDARD_FRAMES = 10, 500
-PARTS = ("scores", "rates", "cost", "consistency")
+PARTS = ("scores", "rates", "cost", "sensors", "consistency")
 #: Recorded people lie beside the repository, if anywhere; see README.md.
 RECORDINGS = Path(__file__).resolve().parents[3] / "shared" / "data"
 COST_PEOPLE = (20, 100, 300)
 COST_FRAMES, COST_REPEATS = 150, 3
+#: Wanted: an update with two sensors takes at most this much longer than with the camera alone.
+MOST_FOR_TWO_SENSORS = 1.5
 STEPS_S = (0.03, 0.05, 0.1, 0.2, 0.4)
 CONSISTENCY_WALKERS, CONSISTENCY_FRAMES = 60, 60
 _NEEDS = {"norfair": "norfair", "stonesoup-gnn": "stonesoup", "stonesoup-jpda": "stonesoup"}
@@ -64,7 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if judged and missing:
         parser.error(
             f"{' and '.join(missing)} not found; see benchmarks/tracking/requirements.txt "
-            "or leave out what they judge (--parts cost,consistency)"
+            "or leave out what they judge (--parts cost,sensors,consistency)"
         )
     makers = _makers(options.trackers, config)
     metrics: list[MeasuredValue] = []
@@ -75,6 +78,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _rates(options, config, metrics, missed)
     if "cost" in options.parts:
         _cost(options, makers, metrics, missed)
+    if "sensors" in options.parts:
+        _sensors(options, config, metrics, missed)
     if "consistency" in options.parts:
         _consistency(options, config, metrics, missed)
     return finish(metrics, missed, baseline if _is_standard(options) else {}, options.out)
@@ -134,7 +139,7 @@ def _parser() -> argparse.ArgumentParser:
         type=_subset(PARTS),
         default=list(PARTS),
         metavar="NAMES",
-        help="some of scores, rates, cost, consistency (default: all)",
+        help="some of scores, rates, cost, sensors, consistency (default: all)",
     )
     parser.add_argument(
         "--stonesoup-up-to",
@@ -282,6 +287,28 @@ def _cost(
             print(f"{tracker:16s}{people:6d}{alone[tracker]:12.3f}{value:12.3f}{ratio}", flush=True)
         metrics += cost_metrics(people, cost)
         missed += missed_costs(people, cost)
+
+
+def _sensors(
+    options: argparse.Namespace,
+    config: TrackerConfig,
+    metrics: list[MeasuredValue],
+    missed: list[str],
+) -> None:
+    """Compare the processor time of an update with one sensor and with two."""
+    print(f"\n{'processor time':20s}{'people':>6s}{'update, ms':>12s}{'over camera':>14s}")
+    rng = np.random.default_rng([options.seed, COST_PEOPLE[0]])
+    recording = record(COST_PEOPLE[0], COST_FRAMES, rng, OPEN)
+    cost = two_sensor_cost_ms(recording, config, COST_REPEATS)
+    for name, value in cost.items():
+        ratio = value / cost["camera"]
+        print(f"{name:20s}{COST_PEOPLE[0]:6d}{value:12.3f}{ratio:14.3f}", flush=True)
+        if ratio > MOST_FOR_TWO_SENSORS:
+            missed.append(f"an update with {name} takes {ratio:.2f} times as long")
+    both = cost["camera and scanner"] / cost["camera"]
+    metrics.append(
+        MeasuredValue(f"cost_{COST_PEOPLE[0]}_two_sensors_over_one", both, "x", "lower", 0.4)
+    )
 
 
 def _consistency(

@@ -1,0 +1,341 @@
+"""``PersonTrack.noticed``: what feeds it, how long it lasts, and what ends it at once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from fusion_scenes import (
+    LASER,
+    Rig,
+    both,
+    everything,
+    laser_at,
+    play,
+    seen_by_camera,
+    seen_by_laser,
+)
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tracking_scenes import FloatArray, camera_at, nearest
+
+from tracking import AwarenessFilterConfig, PersonTrack, PersonTracker, TrackerConfig
+
+MEMORY_S = 4.0
+REMEMBERS = TrackerConfig(awareness=AwarenessFilterConfig(noticed_memory_s=MEMORY_S))
+CAMERA_S, LASER_S = 0.1, 0.04
+
+
+class Scene:
+    """A robot with camera and scanner before one person; time goes on with :meth:`run`."""
+
+    def __init__(self, tracker: PersonTracker | None = None, *, seed: int = 0) -> None:
+        self.tracker = both(REMEMBERS) if tracker is None else tracker
+        self.rng = np.random.default_rng(seed)
+        self.tick = 0
+        self.place: FloatArray = np.array([3.0, 0.5])
+        self.tracks: tuple[PersonTrack, ...] = ()
+
+    @property
+    def now(self) -> float:
+        return 0.02 * self.tick
+
+    def run(
+        self,
+        duration_s: float,
+        *,
+        alpha: float | None = None,
+        camera: bool = True,
+        laser: bool = True,
+        velocity: tuple[float, float] = (0.0, 0.0),
+        others: tuple[tuple[float, float], ...] = (),
+        until: Callable[[PersonTrack], bool] | None = None,
+    ) -> PersonTrack:
+        """Advance; the camera sees the person or not, with α or without a usable face."""
+        for _ in range(round(duration_s / 0.02)):
+            self.tick += 1
+            self.place = self.place + 0.02 * np.asarray(velocity)
+            noise = 0.7 * self.rng.normal(size=(2, 2))
+            if self.tick % 5 == 0:
+                seen = [seen_by_camera(self.place, self.now, noise_m=noise[0], awareness=alpha)]
+                self.tracks = self.tracker.update(seen if camera else [], self.now, camera_at())
+            if self.tick % 2 == 0:
+                places = [self.place + 0.05 * noise[1], *others]
+                scan = [seen_by_laser(place, self.now) for place in places]
+                self.tracks = self.tracker.update(
+                    scan if laser else scan[1:], self.now, laser_at(), sensor=LASER
+                )
+            if until is not None and until(self.track):
+                break
+        return self.track
+
+    @property
+    def track(self) -> PersonTrack:
+        return nearest(self.tracks, self.place)
+
+
+def attentive(look_s: float = 0.6) -> Scene:
+    """Return a scene in which a standing person has looked at the robot and looks no more."""
+    scene = Scene()
+    scene.run(1.0)
+    assert scene.run(look_s, alpha=0.9).noticed >= 0.5
+    assert scene.run(0.3, camera=False).noticed >= 0.5
+    return scene
+
+
+def test_half_a_second_of_looking_gives_a_half() -> None:
+    scene = Scene()
+    scene.run(1.0)
+    values = [scene.run(0.1, alpha=0.9).noticed for _ in range(10)]
+    assert values == sorted(values)
+    assert 0.45 <= values[4] <= 0.52
+    assert values[9] > 0.7
+
+
+def test_glances_within_seconds_add_up_and_old_ones_fade() -> None:
+    scene = Scene()
+    scene.run(1.0)
+    for _ in range(4):
+        scene.run(0.2, alpha=0.9)
+        track = scene.run(0.2)
+    assert track.noticed > 0.5
+    faded = scene.run(2.5)
+    assert 0.1 < faded.noticed < track.noticed
+
+
+def test_it_lasts_for_the_memory_and_no_longer() -> None:
+    scene = Scene()
+    scene.run(1.0)
+    looked = scene.run(1.0, alpha=0.9)
+    kept = scene.run(MEMORY_S - 0.2, camera=False)
+    assert kept.noticed == pytest.approx(looked.noticed)
+    assert kept.awareness_lower == 0.0
+    assert scene.run(0.3, camera=False).noticed == 0.0
+    assert scene.run(0.3, camera=False).status == "confirmed"
+
+
+def test_a_new_look_after_the_memory_counts_from_the_start() -> None:
+    scene = attentive()
+    assert scene.run(MEMORY_S, camera=False).noticed == 0.0
+    scene.run(0.2)
+    assert 0.1 < scene.run(0.2, alpha=0.9).noticed < 0.4
+
+
+def test_it_is_off_by_default_and_then_changes_nothing() -> None:
+    rig = Rig([lambda _now: (3.0, 0.5)], faces=lambda _person, _now: 0.9)
+    off, on = both(), both(REMEMBERS)
+    for event in rig.events(2.0):
+        without, with_memory = play(off, [event]), play(on, [event])
+        assert [track.noticed for track in without] == [0.0] * len(without)
+        assert [row[:-1] for row in everything(without)] == [
+            row[:-1] for row in everything(with_memory)
+        ]
+    assert with_memory[0].noticed > 0.5
+
+
+def test_without_another_sensor_it_ends_with_the_look() -> None:
+    scene = Scene(PersonTracker(REMEMBERS))
+    for tick in range(20):
+        now = 0.1 * tick
+        seen = seen_by_camera((3.0, 0.5), now, awareness=0.9 if tick < 12 else None)
+        (track,) = scene.tracker.update([seen], now, camera_at())
+        if 8 < tick < 12:
+            assert track.noticed > 0.5
+    assert track.noticed == 0.0
+
+
+def test_a_face_that_looks_away_ends_it_at_once() -> None:
+    scene = attentive()
+    scene.run(0.1, alpha=0.05)
+    assert scene.track.noticed == 0.0
+    assert scene.run(1.0).noticed == 0.0
+
+
+def test_a_face_of_another_range_that_looks_away_ends_it_too() -> None:
+    scene = attentive()
+    seen = seen_by_camera(scene.place, scene.now, ratio=1.6, awareness=0.05)
+    (track,) = scene.tracker.update([seen], scene.now, camera_at())
+    assert track.noticed == 0.0
+
+
+def test_a_person_without_a_usable_face_ends_nothing() -> None:
+    assert attentive().run(0.5).noticed > 0.4
+
+
+@pytest.mark.parametrize(("speed_mps", "limit_s"), [(0.6, 0.6), (1.2, 0.36), (1.6, 0.32)])
+@pytest.mark.parametrize("direction", [math.pi, 0.5 * math.pi])
+def test_a_person_who_sets_off_ends_it(speed_mps: float, limit_s: float, direction: float) -> None:
+    scene = attentive()
+    start_s = scene.now
+    velocity = (speed_mps * math.cos(direction), speed_mps * math.sin(direction))
+    scene.run(2.0, camera=False, velocity=velocity, until=lambda track: track.noticed == 0.0)
+    assert scene.track.noticed == 0.0
+    assert scene.now - start_s <= limit_s
+    assert scene.run(1.0, camera=False).noticed == 0.0
+
+
+def test_a_walker_keeps_it_until_they_come_faster() -> None:
+    scene = Scene()
+    scene.place = np.array([6.0, -2.0])
+    slow = {"velocity": (-0.5, 0.2)}
+    scene.run(1.5, **slow)
+    assert scene.run(0.8, alpha=0.9, **slow).noticed > 0.5
+    assert scene.run(1.5, camera=False, **slow).noticed > 0.5
+    assert scene.run(0.8, camera=False, velocity=(-1.4, 0.5)).noticed == 0.0
+
+
+def test_a_walker_who_stops_and_sets_off_again_loses_it() -> None:
+    scene = Scene()
+    scene.place = np.array([6.0, -2.0])
+    scene.run(1.0, velocity=(-1.0, 0.3))
+    scene.run(0.8, alpha=0.9, velocity=(-1.0, 0.3))
+    assert scene.run(0.9, camera=False).noticed > 0.5
+    assert scene.run(0.6, camera=False, velocity=(-1.0, 0.3)).noticed == 0.0
+
+
+def test_a_gap_in_the_scans_ends_it_for_good() -> None:
+    scene = attentive()
+    # One scan may miss them, two in a row are a gap.
+    assert scene.run(0.04, camera=False, laser=False).noticed > 0.5
+    assert scene.run(0.04, camera=False).noticed > 0.5
+    assert scene.run(0.16, camera=False, laser=False).noticed == 0.0
+    assert scene.run(1.0, camera=False).noticed == 0.0
+
+
+def test_a_scanner_that_falls_silent_ends_it_also_in_predictions() -> None:
+    scene = attentive()
+    last_s = scene.tracker.last_stamp_s
+    assert last_s is not None
+    assert scene.tracker.predict(last_s + 0.05)[0].noticed > 0.5
+    assert scene.tracker.predict(last_s + 0.2)[0].noticed == 0.0
+    # No frame at all in between, and then the scanner goes on as if nothing had happened.
+    scene.tick += 15
+    assert scene.run(0.5, camera=False).noticed == 0.0
+
+
+def test_an_ambiguous_match_ends_it_and_takes_awareness() -> None:
+    scene = attentive()
+    before = scene.run(0.1, alpha=0.9)
+    assert before.awareness_lower > 0.2
+    scene.run(0.3, camera=False, others=((3.05, 0.62),))
+    assert scene.track.noticed == 0.0
+    assert scene.track.awareness_lower == 0.0
+
+
+def test_a_place_that_jumps_ends_it() -> None:
+    scene = attentive()
+    for jump_m, kept in ((0.1, True), (0.31, False)):
+        tracker = PersonTracker.from_state(scene.tracker.state())
+        place = scene.track.position_odom_m + np.array([0.0, jump_m])
+        seen = seen_by_laser(place, scene.now + 0.04)
+        (track,) = tracker.update([seen], scene.now + 0.04, laser_at(), sensor=LASER)
+        assert (track.noticed > 0.5) is kept
+
+
+def test_nobody_inherits_it_from_somebody_who_vanished() -> None:
+    scene = attentive()
+    known = scene.track.id
+    scene.run(4.0, camera=False, laser=False, others=((-3.0, 0.0),))
+    scene.place = np.array([3.0, 0.5])
+    track = scene.run(1.0, camera=False)
+    assert track.noticed == 0.0
+    assert track.id >= known
+
+
+@pytest.mark.parametrize("alpha", [None, 0.0, 0.1, 0.3, 0.5])
+def test_without_looks_nobody_has_noticed(alpha: float | None) -> None:
+    scene = Scene()
+    for _ in range(40):
+        assert scene.run(0.1, alpha=alpha).noticed == 0.0
+
+
+def test_a_tentative_person_has_not_noticed() -> None:
+    tracker = both(REMEMBERS)
+    for tick in range(3):
+        now = 0.05 * tick
+        (track,) = tracker.update(
+            [seen_by_camera((3.0, 0.0), now, awareness=1.0)], now, camera_at()
+        )
+        assert track.status == "confirmed" or track.noticed == 0.0
+
+
+ALPHAS = st.lists(st.sampled_from([None, None, 0.05, 0.45, 0.7, 0.95]), min_size=20, max_size=40)
+
+
+@settings(max_examples=8, deadline=None)
+@given(alphas=ALPHAS, extra=st.sets(st.integers(0, 39), max_size=8), seen_until=st.integers(10, 40))
+def test_more_looks_never_give_less(
+    alphas: list[float | None], extra: set[int], seen_until: int
+) -> None:
+    # The same people and frames, but some frames without a face have a look instead.
+    more = [0.95 if a is None and i in extra else a for i, a in enumerate(alphas)]
+    few, many = both(REMEMBERS), both(REMEMBERS)
+    rng = np.random.default_rng(seen_until)
+    for tick in range(60):
+        now = 0.1 * tick
+        noise, place = rng.normal(size=(3, 2)), (4.0 - 0.02 * tick, 0.5)
+        for tracker, looks in ((few, alphas), (many, more)):
+            alpha = looks[tick] if tick < min(len(looks), seen_until) else None
+            seen = [seen_by_camera(place, now, noise_m=noise[0], awareness=alpha)]
+            tracker.update(seen if tick < seen_until else [], now, camera_at())
+            for part in (1, 2):
+                at_s = now + 0.03 * part
+                scan = [seen_by_laser(place, at_s, noise_m=noise[part])]
+                tracks = tracker.update(scan, at_s, laser_at(), sensor=LASER)
+            if tracker is few:
+                least = {track.id: track.noticed for track in tracks}
+        assert {track.id for track in tracks} == set(least)
+        assert all(track.noticed >= least[track.id] - 1e-12 for track in tracks)
+
+
+def test_late_frames_and_a_restored_state_give_the_same() -> None:
+    faces = lambda person, now: 0.9 if now < 1.5 + person else None  # noqa: E731
+    people = [lambda _now: (3.0, 1.0), lambda now: (5.0 - 0.4 * now, -1.0)]
+    rig = Rig(people, faces=faces, camera_latency_s=0.3, camera_sees=lambda p: p[0] > 2.9)
+    events = rig.events(5.0)
+    late, in_order = both(REMEMBERS), both(REMEMBERS)
+    got = play(late, events)
+    assert everything(got) == everything(play(in_order, sorted(events, key=lambda e: e[0])))
+    restored = PersonTracker.from_state(late.state())
+    assert everything(restored.predict(5.1)) == everything(late.predict(5.1))
+
+
+@st.composite
+def any_frames(draw: st.DrawFn) -> list[tuple[float, str, list[tuple[float, float, float | None]]]]:
+    person = st.tuples(
+        st.floats(-6.0, 6.0), st.floats(-6.0, 6.0), st.sampled_from([None, 0.0, 0.5, 1.0])
+    )
+    frame = st.tuples(
+        st.sampled_from([0.0, 0.02, 0.1, 0.7, -0.2]),
+        st.sampled_from(["camera", LASER]),
+        st.lists(person, max_size=4),
+    )
+    return draw(st.lists(frame, max_size=25))
+
+
+@settings(max_examples=25, deadline=None)
+@given(frames=any_frames())
+def test_any_sequence_of_frames_gives_valid_tracks(frames) -> None:
+    tracker, now, ids = both(REMEMBERS), 10.0, set()
+    for dt_s, sensor, people in frames:
+        now = max(now + dt_s, (tracker.last_stamp_s or now) - 0.4)
+        camera = sensor == "camera"
+        seen = [
+            seen_by_camera((x, y), now, awareness=alpha) if camera else seen_by_laser((x, y), now)
+            for x, y, alpha in people
+            if math.hypot(x, y) > 0.1
+        ]
+        tracks = tracker.update(seen, now, camera_at() if camera else laser_at(), sensor=sensor)
+        assert [track.id for track in tracks] == sorted({track.id for track in tracks})
+        for track in tracks:
+            values = {name: getattr(track, name) for name in PersonTrack.__slots__}
+            PersonTrack(**values)  # checks every value
+            assert track.awareness_lower <= 1.0
+            if track.status == "tentative":
+                assert track.noticed == track.awareness_lower == 0.0
+        ids |= {track.id for track in tracks}
+    assert tracker.from_state(tracker.state()).state() == tracker.state()
+    now = tracker.last_stamp_s or now
+    assert {track.id for track in tracker.predict(now)} <= ids

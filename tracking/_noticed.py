@@ -1,0 +1,210 @@
+"""Whether a person has noticed the robot: a belief from the looks of the last seconds.
+
+α(t) tells whether somebody looks now; a person who has looked for half a second knows of the robot
+for some seconds more. The belief is a lower bound of the probability of that, 1 − exp(−looks / τ),
+where looks is the time in which the person has looked, each frame with a weight of how certain it
+is that α is at least a half. While frames show the person without a look, looks decays. A further
+look never lowers the belief.
+
+A look is no promise: people often look before they set off. So the belief is dropped, until there
+are new looks, by anything that makes it doubtful who this is or what they do:
+
+- a face that looks away;
+- an ambiguous match, or a place that jumps;
+- a gap in what the other sensors see, once no look is recent;
+- somebody who stood since the last look and moves, or who comes faster towards the robot than at
+  any time since then;
+- ``noticed_memory_s`` after the last look.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+from scipy.special import ndtr
+
+from perception.arrays import FloatArray
+
+from ._clocks import FrameClock
+from ._kalman import inverse_2x2
+from ._matching import Found
+from ._measurement import Frame
+from ._sensors import Sensors
+from ._table import BoolArray, TrackTable
+from .awareness_filter import grace_s
+
+# Half a second of certain looks gives a belief of a half.
+_LOOKING_S: Final = 0.5 / math.log(2.0)
+# Time constant with which looks decay while the person is seen without a look.
+_FORGETTING_S: Final = 3.0
+# A frame is a look if it is so certain, from 0 to 1, that α is at least a half: by 0.7 σ.
+_LOOK: Final = 0.5
+# A face looks away if α is below a half by one standard deviation.
+_AVERTED_SIGMAS: Final = -1.0
+# Two scans in a row without the person, or as long a silence, are a gap.
+_GAP_PERIODS: Final = 2.5
+# How much faster towards the robot than before: 2.5 σ of a velocity from scans.
+_FASTER_MPS: Final = 0.3
+# A person who stood has begun to move at this speed, if it is not 0 by 99.7 % (χ², two degrees).
+_STARTED_MPS: Final = 0.25
+_STARTED_CHI2: Final = 11.6
+# χ² with two degrees of freedom of a measurement beyond which it may be somebody else: 99.9 %.
+_JUMP_CHI2: Final = 13.8
+
+
+def with_noticed(
+    before: TrackTable,
+    after: TrackTable,
+    frame: Frame,
+    found: Found,
+    faces: FrameClock,
+    clocks: tuple[FrameClock, ...],
+    sensors: Sensors,
+) -> TrackTable:
+    """Return the tracks with the belief that they have noticed the robot after one frame.
+
+    Args:
+        before: N tracks, predicted to the frame.
+        after: the same with the frame's measurements, and new tracks.
+        frame: of any sensor.
+        found: which of them the frame shows.
+        faces: clock of the frames with faces before this one.
+        clocks: of all sensors, this frame included.
+        sensors: all sensors.
+    """
+    config = sensors.config.awareness
+    if config.noticed_memory_s <= 0.0 or not len(after):
+        return after
+    stamp, sees_faces = frame.stamp_s, sensors.all[frame.sensor].settings.sees_faces
+    looks, averted = _looks(after, frame, found, sensors)
+    if not (looks > 0.0).any() and not (after.looked_s > 0.0).any():
+        return after
+    looking = looks > 0.0
+    dropped = averted | found.ambiguous | _jumped(before, after, frame, found)
+    approach_mps = _approach_mps(after, frame)
+    ended = stamp - after.look_stamps_s > config.noticed_memory_s
+    ended |= _interrupted(before, after, frame, faces, clocks, sensors)
+    ended |= _set_off(after, approach_mps)
+    looked_s = np.where(dropped | (ended & ~looking), 0.0, after.looked_s)
+    # What they do from the last look on.
+    least_mps = np.minimum(after.look_approaches_mps, approach_mps)
+    stood = after.look_standing | after.standing
+    if not sees_faces:
+        return after.replaced(looked_s=looked_s, look_approaches_mps=least_mps, look_standing=stood)
+    dt_s = min(faces.dt_s(stamp), config.max_evidence_gap_s)
+    fades = found.seen & ~looking
+    looked_s = np.where(fades, math.exp(-dt_s / _FORGETTING_S), 1.0) * looked_s
+    looked_s += np.where(dropped, 0.0, looks * dt_s)
+    return after.replaced(
+        looked_s=looked_s,
+        look_stamps_s=np.where(looking, stamp, after.look_stamps_s),
+        look_approaches_mps=np.where(looking, approach_mps, least_mps),
+        look_standing=np.where(looking, after.standing, stood),
+    )
+
+
+def noticed(
+    tracks: TrackTable,
+    stamp_s: float,
+    faces: FrameClock,
+    clocks: tuple[FrameClock, ...],
+    sensors: Sensors,
+) -> FloatArray:
+    """Return (N,) in [0, 1]: the lower bound of the probability that people have noticed the robot.
+
+    It is 0 for tentative tracks, and where the latest look is no longer recent and no other sensor
+    sees the person.
+    """
+    config = sensors.config.awareness
+    if config.noticed_memory_s <= 0.0 or not (tracks.looked_s > 0.0).any():
+        return np.zeros(len(tracks))
+    age_s = stamp_s - tracks.look_stamps_s
+    counts = tracks.confirmed & (age_s <= config.noticed_memory_s)
+    held = _held(tracks, stamp_s, clocks, sensors)
+    counts &= held | (age_s <= grace_s(faces.period_s, config))
+    return np.where(counts, -np.expm1(-tracks.looked_s / _LOOKING_S), 0.0)
+
+
+def _looks(
+    tracks: TrackTable, frame: Frame, found: Found, sensors: Sensors
+) -> tuple[FloatArray, BoolArray]:
+    """Return (N,) in [0, 1], how certainly each looks at the robot, and (N,) who looks away."""
+    looks, averted = np.zeros(len(tracks)), np.zeros(len(tracks), dtype=np.bool_)
+    if not sensors.all[frame.sensor].settings.sees_faces:
+        return looks, averted
+    rows = np.flatnonzero(found.seen)
+    measured, columns = frame.measurements, found.source[rows]
+    # In standard deviations above α = 0.5, whose logit is 0.
+    sigmas = measured.evidence_means[columns] / np.sqrt(measured.evidence_variances[columns])
+    averted[rows] = sigmas <= _AVERTED_SIGMAS
+    sure = tracks.confirmed[rows] & ~found.beyond[rows] & ~measured.weak[columns]
+    certainty = np.maximum(2.0 * ndtr(sigmas) - 1.0, 0.0)
+    looks[rows] = np.where(sure & (certainty >= _LOOK), certainty, 0.0)
+    if tracks.twins.any():
+        # A frame that shows a person and their twin counts as the lower of both.
+        twins = np.flatnonzero(tracks.twins & found.seen)
+        hosts = np.searchsorted(tracks.ids, tracks.host_ids[twins])
+        np.minimum.at(looks, hosts, looks[twins])
+        np.logical_or.at(averted, hosts, averted[twins])
+    return looks, averted
+
+
+def _jumped(before: TrackTable, after: TrackTable, frame: Frame, found: Found) -> BoolArray:
+    """Return (N,) True for measurements far from where the person was expected."""
+    jumped = np.zeros(len(after), dtype=np.bool_)
+    count = len(before)
+    rows = np.flatnonzero(found.seen[:count] & ~found.beyond[:count])
+    if rows.size:
+        columns = found.source[rows]
+        spread = before.covariances[rows, :2, :2] + frame.measurements.noises_m2[columns]
+        offset = frame.measurements.positions_odom_m[columns] - before.states[rows, :2]
+        chi2 = (offset[:, None] @ inverse_2x2(spread) @ offset[:, :, None])[:, 0, 0]
+        jumped[rows] = chi2 > _JUMP_CHI2
+    return jumped
+
+
+def _held(
+    tracks: TrackTable, stamp_s: float, clocks: tuple[FrameClock, ...], sensors: Sensors
+) -> BoolArray:
+    """Return (N,) True for people whom a sensor without faces has seen without a gap."""
+    held = np.zeros(len(tracks), dtype=np.bool_)
+    for index in np.flatnonzero(~sensors.faces).tolist():
+        limit_s = _GAP_PERIODS * clocks[index].period_s
+        if math.isfinite(limit_s):
+            held |= stamp_s - tracks.seen_stamps_s[:, index] <= limit_s
+    return held
+
+
+def _interrupted(
+    before: TrackTable,
+    after: TrackTable,
+    frame: Frame,
+    faces: FrameClock,
+    clocks: tuple[FrameClock, ...],
+    sensors: Sensors,
+) -> BoolArray:
+    """Return (N,) True where no look is recent, and there was a gap before this frame."""
+    old = after.look_stamps_s < frame.stamp_s - grace_s(faces.period_s, sensors.config.awareness)
+    count = len(before)
+    # By the sightings before this frame: it must not close a gap.
+    old[:count] &= ~_held(before, frame.stamp_s, clocks, sensors)
+    return np.asarray(old)
+
+
+def _approach_mps(tracks: TrackTable, frame: Frame) -> FloatArray:
+    """Return (N,) speeds towards the robot, at least 0."""
+    offset = frame.T_odom_camera[:2, 3] - tracks.states[:, :2]
+    distance = np.maximum(np.hypot(offset[:, 0], offset[:, 1]), 1e-9)
+    return np.asarray(np.maximum((offset * tracks.states[:, 2:]).sum(axis=1) / distance, 0.0))
+
+
+def _set_off(tracks: TrackTable, approach_mps: FloatArray) -> BoolArray:
+    """Return (N,) True for people who have begun to move, or come faster than before."""
+    faster = approach_mps > tracks.look_approaches_mps + _FASTER_MPS
+    velocity = tracks.states[:, 2:]
+    inverse = inverse_2x2(tracks.covariances[:, 2:, 2:])
+    chi2 = (velocity[:, None] @ inverse @ velocity[:, :, None])[:, 0, 0]
+    moves = (np.hypot(velocity[:, 0], velocity[:, 1]) > _STARTED_MPS) & (chi2 > _STARTED_CHI2)
+    return np.asarray(faster | (tracks.look_standing & moves))
