@@ -90,12 +90,14 @@ class LaserScan:
     @property
     def angles_rad(self) -> FloatArray:
         """The angle (N,) of every ray."""
-        return self.angle_min_rad + self.angle_increment_rad * np.arange(len(self.ranges_m))
+        rays = np.arange(len(self.ranges_m), dtype=np.float64)
+        return np.asarray(self.angle_min_rad + self.angle_increment_rad * rays)
 
     @property
     def stamps_s(self) -> FloatArray:
         """The time (N,) of every ray."""
-        return self.stamp_s + self.time_increment_s * np.arange(len(self.ranges_m))
+        rays = np.arange(len(self.ranges_m), dtype=np.float64)
+        return np.asarray(self.stamp_s + self.time_increment_s * rays)
 
     @property
     def end_s(self) -> float:
