@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..arrays import FloatArray, finite_array, finite_number, rigid_transform, set_fields
 from ..errors import PerceptionError
 from ._scan import LaserScan
-from ._scanner import Scanner
+from ._scanner import BODY_MARGIN_M, Scanner
 
 # Below this turn an arc is computed as its series, which is exact to rounding.
 _STRAIGHT_RAD: Final = 1e-4
@@ -133,7 +133,9 @@ def scan_points(scan: LaserScan, scanner: Scanner, motion: RobotMotion) -> ScanP
     reach = np.where(known, free, np.nan)[:, None] * rays + offset
     measured = known & scan.measured
     if scanner.body_base_m is not None:
-        rows = np.flatnonzero(measured)
+        outermost = np.abs(scanner.body_base_m).max() + BODY_MARGIN_M
+        near = (np.abs(reach[:, 0]) <= outermost) & (np.abs(reach[:, 1]) <= outermost)
+        rows = np.flatnonzero(measured & near)
         measured[rows[scanner.is_body(reach[rows, :2])]] = False
     yaw, moved = motion.poses_base(scan.stamps_s)
     ends_base = _moved(reach, yaw, moved)

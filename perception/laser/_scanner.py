@@ -13,8 +13,8 @@ from ..arrays import FloatArray, finite_array, finite_number, rigid_transform, s
 from ..errors import PerceptionError
 from ._scan import LaserScan
 
-# Returns this near to the outline of the robot's body are its own: noise, bumpers, cables.
-_BODY_MARGIN_M: Final = 0.05
+#: Returns this near to the outline of the robot's body are its own: noise, bumpers, cables.
+BODY_MARGIN_M: Final = 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,7 +106,7 @@ class Scanner:
         squares = np.maximum((edges * edges).sum(axis=1), 1e-12)
         share = np.clip((to * edges).sum(axis=2) / squares, 0.0, 1.0)
         off = to - share[..., None] * edges
-        near = ((off * off).sum(axis=2) <= _BODY_MARGIN_M**2).any(axis=1)
+        near = ((off * off).sum(axis=2) <= BODY_MARGIN_M**2).any(axis=1)
         # A point is inside if a line from it crosses the outline an odd number of times.
         above, height = to[..., 1] >= 0.0, np.where(edges[:, 1] == 0.0, 1e-12, edges[:, 1])
         crosses = above != (to[..., 1] - edges[:, 1] >= 0.0)

@@ -17,6 +17,7 @@ from perception.networks import OnnxSettings
 from perception.shipped import (
     DETECTOR,
     HEAD,
+    LEGS,
     POSE,
     ShippedModel,
     load_shipped,
@@ -30,7 +31,7 @@ from perception.shipped import (
 )
 
 FOLDER = ROOT / "perception" / "models"
-NAMES = (DETECTOR, POSE, HEAD)
+NAMES = (DETECTOR, POSE, HEAD, LEGS)
 CARD = """# Something
 
 Does one thing. More about it.
