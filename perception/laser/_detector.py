@@ -29,15 +29,21 @@ _APART_M: Final = 0.3
 # logarithms.
 _CAME_LOG_ODDS: Final = 3.0
 _ALWAYS_LOG_ODDS: Final = -2.0
+# The same for a single narrow cluster: a post. Neither counts where two legs were seen.
+_POST_LOG_ODDS: Final = -5.0
 _CAME_SHARE: Final = 0.5
 # The same for a hypothesis this near to somebody found this recently.
 _RECENT_LOG_ODDS: Final = 1.5
 _RECENT_M: Final = 0.35
 _RECENT_S: Final = 0.3
 _MOST_RECENT: Final = 32
+# Two legs are remembered at this score, number of points each, and distance.
+_SURE_SCORE: Final = 0.8
+_SURE_POINTS: Final = 3
+_SURE_APART_M: Final = 0.16
 # What looks as much like a person as this in one scan is not learned as something that stands
 # still.
-_ALIKE_SCORE: Final = 0.4
+_ALIKE_SCORE: Final = 0.6
 # A cluster of which more than this share is known to stand still is no person.
 _STILL_SHARE: Final = 0.3
 # Size of a trolley, fewest points of it, and the share that must lie where the floor was free.
@@ -144,15 +150,20 @@ class LegDetector:
         )
         hypotheses = hypotheses_of(clusters, xy, points.ranges_m, points.angle_increment_rad)
         judged = np.array(self._classify(hypotheses.features), dtype=np.float64)
+        alike = judged[:, 0] >= _ALIKE_SCORE
         came = (known[clusters.rays] > 0).astype(np.float64)
         still = clusters.sums((known[clusters.rays] < 0).astype(np.float64))
         is_still = still > _STILL_SHARE * clusters.counts
         second = np.where(hypotheses.second < 0, hypotheses.first, hypotheses.second)
         judged[:, 0] *= ~(is_still[hypotheses.first] | is_still[second])
-        alike = judged[:, 0] >= _ALIKE_SCORE
         if config.learn:
+            narrow = (hypotheses.second < 0) & (clusters.widths_m[hypotheses.first] < _TWO_LEGS_M)
+            seen = self._memory.had_two_legs(hypotheses.centres_m, points.stamp_s)
             recent = self._recently(points.stamp_s)
-            judged[:, 0] = _with_memory(judged[:, 0], clusters, hypotheses, came, recent)
+            alike |= seen
+            always = np.where(narrow, _POST_LOG_ODDS, _ALWAYS_LOG_ODDS)
+            always[seen] = 0.0
+            judged[:, 0] = _with_memory(judged[:, 0], clusters, hypotheses, came, recent, always)
         chosen, places = _chosen(hypotheses, judged, config.score_threshold)
         candidates = [
             _candidate(points.stamp_s, clusters, hypotheses, judged[row], row, place)
@@ -172,6 +183,8 @@ class LegDetector:
             person[clusters.rays] = taken[clusters.cluster]
             self._memory.update(points, person, scanner)
             self._found.append((points.stamp_s, np.array(places).reshape(-1, 2)))
+            legs = _surely_two_legs(clusters, hypotheses, judged[:, 0], chosen)
+            self._memory.note_two_legs(hypotheses.centres_m[legs], points.stamp_s)
         origin = clusters.origin_m
         return tuple(
             candidate
@@ -191,6 +204,7 @@ def _with_memory(
     hypotheses: Hypotheses,
     came: FloatArray,
     recent_m: FloatArray,
+    always: FloatArray,
 ) -> FloatArray:
     """Return the scores (H,) with what is known about the place where each hypothesis stands."""
     points = clusters.sums(np.column_stack((came, np.ones(len(came)))))
@@ -198,11 +212,11 @@ def _with_memory(
     own = points[hypotheses.first] + np.where(pair[:, None], points[hypotheses.second], 0.0)
     has_come = own[:, 0] >= _CAME_SHARE * own[:, 1]
     safe = np.clip(score, 1e-6, 1.0 - 1e-6)
-    odds = np.log(safe / (1.0 - safe)) + np.where(has_come, _CAME_LOG_ODDS, _ALWAYS_LOG_ODDS)
+    odds = np.log(safe / (1.0 - safe)) + np.where(has_come, _CAME_LOG_ODDS, always)
     if len(recent_m):
         to = hypotheses.centres_m[:, None] - recent_m
         near = ((to * to).sum(axis=2) < _RECENT_M**2).any(axis=1)
-        odds += _RECENT_LOG_ODDS * near
+        odds += _RECENT_LOG_ODDS * (near & (has_come | (always > _POST_LOG_ODDS)))
     return np.asarray(np.where(score > 0.0, 1.0 / (1.0 + np.exp(-odds)), 0.0))
 
 
@@ -254,6 +268,21 @@ def _chosen(
         chosen.append(row)
         used |= own
     return chosen, [places[row] for row in chosen]
+
+
+def _surely_two_legs(
+    clusters: Clusters, hypotheses: Hypotheses, score: FloatArray, chosen: list[int]
+) -> list[int]:
+    """Return the chosen pairs of legs that are no post broken in two by noise."""
+    centres, counts = clusters.centres_m, clusters.counts
+    legs = []
+    for row in chosen:
+        one, other = int(hypotheses.first[row]), int(hypotheses.second[row])
+        if other < 0 or score[row] < _SURE_SCORE or min(counts[one], counts[other]) < _SURE_POINTS:
+            continue
+        if np.hypot(*(centres[one] - centres[other])) >= _SURE_APART_M:
+            legs.append(row)
+    return legs
 
 
 def _candidate(

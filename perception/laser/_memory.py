@@ -30,8 +30,13 @@ _STRIDES: Final = tuple(
 # Time between two updates, and the longest time that one update counts for.
 _PERIOD_S: Final = 0.2
 _MAX_PERIOD_S: Final = 0.4
-# Something that has been met for this long, and not less than it was free, stands still.
+# Something that has been met for this long stands still. Being passed takes back a part of it.
 _STATIC_S: Final = 1.5
+_FREE_FACTOR: Final = np.float32(0.5)
+# No more than this is counted, so that a person who was not recognised at first is soon again one.
+_MOST_S: Final = 3.0
+# Farther away too few rays meet somebody's legs to tell them from a post.
+_LEARN_M: Final = 6.0
 # Floor that was free for this long before anything was met in it or beside it was no structure;
 # what stands there later has come.
 _CAME_S: Final = 0.6
@@ -41,6 +46,11 @@ _CAME_CELLS: Final = 8
 _PERSON_FACTOR: Final = np.float32(2.0)
 # A return may fall into the cell beside that of its surface.
 _BESIDE: Final = np.array([row * _CELLS + column for row in (-1, 0, 1) for column in (-1, 0, 1)])
+# For so long, and this many cells to each side, it is remembered that somebody had two legs.
+_TWO_LEGS_S: Final = 5.0
+_NEAR_LEGS: Final = np.array(
+    [row * _CELLS + column for row in range(-2, 3) for column in range(-2, 3)]
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,7 +103,7 @@ class StaticMap:
 class OccupancyMemory:
     """Remembers for how long each cell of the floor was occupied and free.
 
-    A cell becomes static after 1.5 s of returns if it was not free for longer. Returns that may
+    A cell becomes static after 1.5 s of returns. Returns that may
     belong to a person are not counted and take back others, so that somebody who stands still is
     not forgotten. What stands
     where the floor was free before anything was met there has come: it is no structure.
@@ -102,19 +112,31 @@ class OccupancyMemory:
     def __init__(self) -> None:
         self._origin = np.zeros(2)
         self._occupied_s = np.zeros((_CELLS, _CELLS), dtype=np.float32)
-        self._free_s = np.zeros((_CELLS, _CELLS), dtype=np.float32)
         # How long a cell was free until anything, people too, was met in it or beside it.
         self._untouched_s = np.zeros((_CELLS, _CELLS), dtype=np.float32)
         self._touched = np.zeros((_CELLS, _CELLS), dtype=np.float32)
+        # When somebody was last seen on two legs near a cell.
+        self._two_legs_s = np.full((_CELLS, _CELLS), -np.inf)
         self._updated_s: dict[int, float] = {}
         self._placed = False
+
+    def note_two_legs(self, places_m: FloatArray, stamp_s: float) -> None:
+        """Remember where (K, 2) people were seen on two legs."""
+        cells, inside = self._cells(places_m)
+        near = np.clip(cells[inside, None] + _NEAR_LEGS, 0, self._two_legs_s.size - 1)
+        self._two_legs_s.ravel()[near.ravel()] = stamp_s
+
+    def had_two_legs(self, points_m: FloatArray, stamp_s: float) -> NDArray[np.bool_]:
+        """Return (N,) whether somebody was seen on two legs near points (N, 2) within 5 s."""
+        cells, inside = self._cells(points_m)
+        since = stamp_s - self._two_legs_s.ravel()[cells]
+        return np.asarray(inside & (since >= 0.0) & (since <= _TWO_LEGS_S))
 
     def is_static(self, points_m: FloatArray) -> NDArray[np.bool_]:
         """Return (N,) whether points (N, 2) in odom lie in cells that are static."""
         cells, inside = self._cells(points_m)
-        occupied, free = self._occupied_s.ravel()[cells], self._free_s.ravel()[cells]
         old = self._untouched_s.ravel()[cells] < _CAME_S
-        return np.asarray(inside & old & (occupied >= _STATIC_S) & (occupied > free))
+        return np.asarray(inside & old & (self._occupied_s.ravel()[cells] >= _STATIC_S))
 
     def has_come(self, points_m: FloatArray) -> NDArray[np.bool_]:
         """Return (N,) whether points (N, 2) in odom lie where the floor was free at first.
@@ -147,18 +169,19 @@ class OccupancyMemory:
         starts, ends = points.origins_odom_m[rows, :2], points.points_odom_m[rows, :2]
         self._follow(starts[0])
         hits, inside = self._cells(ends)
-        occupied, free = self._occupied_s.ravel(), self._free_s.ravel()
+        occupied = self._occupied_s.ravel()
         untouched, touched = self._untouched_s.ravel(), self._touched.ravel()
         freed = self._passed(starts, ends, points.ranges_m[rows])
-        before = free[hits]
         near = np.clip(hits[inside, None] + _BESIDE, 0, touched.size - 1)
         touched[near.ravel()] = 1.0
-        # Cells that several rays pass are counted once.
-        free[freed] += np.float32(dt)
-        free[hits] = before
+        # Cells that several rays pass are counted once; a return there counts more than passing.
+        before = occupied[hits]
+        occupied[freed] = np.maximum(occupied[freed] - _FREE_FACTOR * np.float32(dt), 0.0)
+        occupied[hits] = before
         untouched[freed] += np.float32(dt) * (1.0 - touched[freed])
-        met, people = hits[inside & ~person[rows]], hits[inside & person[rows]]
-        occupied[met] += np.float32(dt)
+        near = points.ranges_m[rows] <= _LEARN_M
+        met, people = hits[inside & near & ~person[rows]], hits[inside & person[rows]]
+        occupied[met] = np.minimum(occupied[met] + np.float32(dt), _MOST_S)
         occupied[people] = np.maximum(occupied[people] - _PERSON_FACTOR * np.float32(dt), 0.0)
         return True
 
@@ -199,13 +222,14 @@ class OccupancyMemory:
             return
         columns, rows = np.round(off / _CELL_M).astype(int).tolist()
         self._origin = self._origin + np.array([columns, rows]) * _CELL_M
-        for name in ("_occupied_s", "_free_s", "_untouched_s", "_touched"):
-            setattr(self, name, _shifted(getattr(self, name), rows, columns))
+        for name in ("_occupied_s", "_untouched_s", "_touched"):
+            setattr(self, name, _shifted(getattr(self, name), rows, columns, 0.0))
+        self._two_legs_s = _shifted(self._two_legs_s, rows, columns, -np.inf)
 
 
-def _shifted(grid: NDArray[np.float32], rows: int, columns: int) -> NDArray[np.float32]:
-    """Return the grid as seen from an origin that moved by rows and columns; new cells are 0."""
-    out = np.zeros_like(grid)
+def _shifted(grid: NDArray[Any], rows: int, columns: int, new: float) -> NDArray[Any]:
+    """Return the grid as seen from an origin that moved by rows and columns."""
+    out = np.full_like(grid, new)
     size = len(grid)
     if max(abs(rows), abs(columns)) >= size:
         return out

@@ -30,7 +30,7 @@ def test_the_judged_halls_and_people_are_in_no_training_scan() -> None:
 
 
 def test_people_in_a_held_out_hall_are_found_and_nothing_else() -> None:
-    figures = driven("staging_hall", 3, 6.0, 1)
+    figures = driven("staging_hall", 5, 5.0, 7)
     seen = found(figures)
     assert len(seen) > 100
     assert seen.mean() >= 0.95

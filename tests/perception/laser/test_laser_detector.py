@@ -143,6 +143,18 @@ def test_somebody_who_stood_there_from_the_start_is_kept() -> None:
     np.testing.assert_allclose(places(found), [[2.0, 0.5]], atol=0.1)
 
 
+def test_somebody_who_was_watched_from_afar_is_found_when_the_robot_comes() -> None:
+    """From 8 m legs look like posts; what was learned there must not hide the person nearby."""
+    detector = LegDetector()
+    person = two_legs(4.0, 0.2, 0.3)
+    found = ()
+    for tick in range(110):
+        x = -4.0 + max(0.0, 0.1 * (tick - 60))
+        scan = laser_scan(person, noise=0.015, seed=tick, stamp_s=0.1 * tick, origin=(x, 0.0))
+        found = detector.detect(points_of(scan, (x, 0.0, 0.0)))
+    np.testing.assert_allclose(places(found), [[4.0, 0.2]], atol=0.15)
+
+
 def test_what_comes_and_has_the_size_of_a_trolley_is_one() -> None:
     trolley = (2.5, 0.0, 0.4)
     detector = LegDetector(classifier=Says(0.0, 0.0))
