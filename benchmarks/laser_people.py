@@ -161,7 +161,13 @@ def drive(
     config: LegDetectorConfig,
     classifier: LegClassifier | None = None,
 ) -> None:
-    """Drive through a hall for a time and add what was found to the figures."""
+    """Drive through a hall for a time and add what was found to the figures.
+
+    The noise of the scanners is the configuration's.
+    """
+    specs = [
+        spec.model_copy(update={"noise_std_m": config.range_noise_m}) for spec in DIAGONAL_SCANNERS
+    ]
     rng = np.random.default_rng([seed, 60])
     with Warehouse(LAYOUTS[layout](), variant=variant) as warehouse:
         people = [Worker(warehouse, look=name) for name in workers]
@@ -176,9 +182,9 @@ def drive(
             Wanderer(boxes, rng, _PERSON_CLEARANCE_M, (0.6, 1.7), 1.0 if k % 4 == 3 else 0.4)
             for k in range(len(people))
         ]
-        scanners = [SimulatedScanner(scene, spec, rng) for spec in DIAGONAL_SCANNERS]
+        scanners = [SimulatedScanner(scene, spec, rng) for spec in specs]
         body = amr.profile.footprint_m
-        mountings = [spec.scanner(body) for spec in DIAGONAL_SCANNERS]
+        mountings = [spec.scanner(body) for spec in specs]
         detector, tracker = (
             LegDetector(config, classifier=classifier),
             PersonTracker(TrackerConfig()),
@@ -285,11 +291,12 @@ def main() -> None:
     parser.add_argument("--drives", type=int, default=2, help="drives per hall")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--threshold", type=float, default=LegDetectorConfig().score_threshold)
+    parser.add_argument("--noise", type=float, default=0.015, help="of a range, in metres")
     parser.add_argument("--network", type=Path, help="another network than the shipped one")
     chosen = parser.parse_args()
     classifier = None if chosen.network is None else OnnxLegClassifier(chosen.network)
     held_out = [name for name in worker_names() if name not in TRAINING_WORKERS]
-    config = LegDetectorConfig(score_threshold=chosen.threshold)
+    config = LegDetectorConfig(score_threshold=chosen.threshold, range_noise_m=chosen.noise)
     print("| hall | recall | error, cm | NEES / 2 | wrong per scan | ghosts per minute | ms |")
     print("| --- | --- | --- | --- | --- | --- | --- |")
     seen: dict[str, list[bool]] = defaultdict(list)
