@@ -20,6 +20,7 @@ from .errors import PerceptionError
 DETECTOR: Final = "person_detector"
 POSE: Final = "person_pose"
 HEAD: Final = "head_pose"
+LEGS: Final = "leg_classifier"
 
 _FOLDER: Final = Path(__file__).parent / "models"
 _MANIFEST: Final = "manifest.json"
@@ -176,6 +177,23 @@ def write_manifest(folder: Path, entries: Sequence[Mapping[str, str]]) -> Path:
     content = {"models": [asdict(model) for model in models]}
     _replace_file(manifest, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
     return manifest
+
+
+def update_manifest(folder: Path, entries: Sequence[Mapping[str, str]]) -> Path:
+    """Write some networks into the manifest of ``folder``, and keep its other ones.
+
+    Args:
+        folder: see :func:`write_manifest`; a folder without a manifest gets one.
+        entries: as :func:`write_manifest` takes them. An entry replaces that of the same name.
+
+    Raises:
+        PerceptionError: as :func:`write_manifest`.
+    """
+    known = shipped_models(folder) if (folder / _MANIFEST).exists() else ()
+    told = ("name", "licence", "input", "summary")
+    new = {entry["name"]: entry for entry in entries}
+    kept = {model.name: {key: str(getattr(model, key)) for key in told} for model in known}
+    return write_manifest(folder, list({**kept, **new}.values()))
 
 
 def _with_facts(card: Path, text: str, model: ShippedModel) -> str:

@@ -10,11 +10,13 @@ from ._camera import Camera
 from ._manifest import (
     DETECTOR,
     HEAD,
+    LEGS,
     POSE,
     ShippedModel,
     shipped_model,
     shipped_model_path,
     shipped_models,
+    update_manifest,
     verify_shipped_model,
     write_manifest,
 )
@@ -24,6 +26,7 @@ from .networks.heads import OnnxHeadPoseEstimator
 __all__ = [
     "DETECTOR",
     "HEAD",
+    "LEGS",
     "POSE",
     "ShippedModel",
     "detector_input_size",
@@ -34,6 +37,7 @@ __all__ = [
     "shipped_model_path",
     "shipped_models",
     "shipped_pose_estimator",
+    "update_manifest",
     "verify_shipped_model",
     "write_manifest",
 ]

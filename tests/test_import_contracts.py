@@ -25,7 +25,7 @@ PLANTED = {
         "sim_tests/world/_visibility.py",
         "from ..crossing import run_crossing",
     ),
-    "sim_tests.world: camera > warehouse > render | sightlines > hall": (
+    "sim_tests.world: scanner > camera > warehouse > render | sightlines > hall": (
         "sim_tests/world/hall/_props.py",
         "from ..camera import CameraRenderer",
     ),

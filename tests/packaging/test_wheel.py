@@ -89,7 +89,7 @@ def test_wheel_carries_the_networks_unaltered(wheel: Path) -> None:
             content = archive.read(f"perception/models/{model['name']}.onnx")
             assert hashlib.sha256(content).hexdigest() == model["sha256"]
             assert archive.read(f"perception/models/{model['name']}.md")
-    assert len(manifest["models"]) == 3
+    assert len(manifest["models"]) == 4
 
 
 @pytest.mark.slow

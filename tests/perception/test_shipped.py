@@ -17,6 +17,7 @@ from perception.networks import OnnxSettings
 from perception.shipped import (
     DETECTOR,
     HEAD,
+    LEGS,
     POSE,
     ShippedModel,
     load_shipped,
@@ -25,12 +26,13 @@ from perception.shipped import (
     shipped_model_path,
     shipped_models,
     shipped_pose_estimator,
+    update_manifest,
     verify_shipped_model,
     write_manifest,
 )
 
 FOLDER = ROOT / "perception" / "models"
-NAMES = (DETECTOR, POSE, HEAD)
+NAMES = (DETECTOR, POSE, HEAD, LEGS)
 CARD = """# Something
 
 Does one thing. More about it.
@@ -256,3 +258,16 @@ def test_nothing_is_written_for_a_missing_file(folder):
         write_manifest(folder, [ENTRY, ENTRY | {"name": "other"}])
     assert (folder / "thing.md").read_bytes() == before
     assert not (folder / "manifest.json").exists()
+
+
+def test_training_one_network_keeps_the_others_in_the_manifest(folder):
+    (folder / "other.onnx").write_bytes(b"other weights")
+    assert update_manifest(folder, [ENTRY]).is_file()
+    update_manifest(folder, [ENTRY | {"name": "other"}])
+    (folder / "thing.onnx").write_bytes(b"new weights")
+    update_manifest(folder, [ENTRY | {"summary": "Does it better."}])
+    thing, other = shipped_models(folder)
+    assert (thing.name, other.name) == ("thing", "other")
+    assert thing.summary == "Does it better."
+    assert thing.sha256 == hashlib.sha256(b"new weights").hexdigest()
+    assert other.sha256 == hashlib.sha256(b"other weights").hexdigest()

@@ -19,7 +19,7 @@ import torch
 from torch import nn
 
 from perception import OnnxPoseEstimator
-from perception.shipped import write_manifest
+from perception.shipped import update_manifest
 from sim_tests.actors.body import load_worker
 
 from ._calibrate import limb_scale
@@ -138,7 +138,7 @@ def _export(recipe: Recipe, check: Path, checkpoints: Path, out: Path) -> None:
     print(f"limb scale against perception.anthropometry: {scale:.3f}, noise {noise:.3f}")
     export_pose(pose, out / "person_pose.onnx", scale, noise)
     export_detector(detector, out / "person_detector.onnx")
-    print("written", write_manifest(out, _ENTRIES))
+    print("written", update_manifest(out, _ENTRIES))
 
 
 if __name__ == "__main__":

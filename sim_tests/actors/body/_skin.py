@@ -43,6 +43,9 @@ _MAX_SINK: Final = 3.0
 _BANDS: Final = (5, 2, 1)
 # Fewest samples per metre of image for each level but the coarsest.
 _MIN_SAMPLES_PER_M: Final = (120.0, 60.0)
+# Heights on a body at rest at which scanners see it, and weights of red, green and blue (BT.709).
+_LEG_HEIGHTS_M: Final = (0.12, 0.4)
+_LUMINANCE: Final = np.array([0.2126, 0.7152, 0.0722])
 # Skin, clothes, hair and hats reach at most this far beyond the keypoints.
 _REACH_M: Final = 0.30
 
@@ -111,6 +114,18 @@ def _submesh(skin: SkinMesh, triangles: NDArray[np.int64], sink_m: FloatArray) -
 @lru_cache(maxsize=64)
 def _pieces(look: str, level: int) -> tuple[SkinPiece, ...]:
     return skin_pieces(load_worker(look).levels[level], _BANDS[level])
+
+
+@lru_cache(maxsize=64)
+def _leg_reflectance(look: str) -> float:
+    level = load_worker(look).levels[DETAIL_LEVELS - 1]
+    low, high = _LEG_HEIGHTS_M
+    rows = (level.vertices_m[:, 2] > low) & (level.vertices_m[:, 2] < high)
+    height, width = level.texture_rgb.shape[:2]
+    column = np.clip(level.uv[rows, 0] * width, 0, width - 1).astype(int)
+    # The first row of a texture lies at v = 1.
+    row = np.clip((1.0 - level.uv[rows, 1]) * height, 0, height - 1).astype(int)
+    return float((level.texture_rgb[row, column] / 255.0 @ _LUMINANCE).mean())
 
 
 @lru_cache(maxsize=64)
@@ -205,6 +220,11 @@ class WorkerSkin:
             places = piece_transforms(asset.joints_m, pose, joints, shares, worker.links_odom)
             self._surfaces[detail] = PlacedSurface(triangles, places, pose.scale)
         return self._surfaces[detail]
+
+    @property
+    def leg_reflectance(self) -> float:
+        """The mean luminance in [0, 1] of the shipped clothes at the height of a scanner."""
+        return _leg_reflectance(self.worker.asset.name)
 
     def bounds_odom_m(self) -> FloatArray:
         """Return (2, 3) the low and high corner of a box that holds the worker now."""

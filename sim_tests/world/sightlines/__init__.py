@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from ._sight_lines import PlacedSurface, SightLines
+from ._sight_lines import Occluder, PlacedSurface, SightLines, scenery_triangles
 from ._triangles import TriangleSet
 
 __all__ = [
+    "Occluder",
     "PlacedSurface",
     "SightLines",
     "TriangleSet",
+    "scenery_triangles",
 ]

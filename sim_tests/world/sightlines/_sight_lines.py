@@ -46,6 +46,15 @@ class PlacedSurface:
         every_line = np.ones((1, len(ends_odom_m)), dtype=bool)
         return _blocked_by((self,), eye_odom_m, ends_odom_m, every_line)
 
+    def cut(self, normal_odom: FloatArray, offset_m: float) -> FloatArray:
+        """Return the segments (S, 2, 3) in odom in which the plane n · p = offset cuts it."""
+        rotations, origins = self.T_odom_piece[:, :3, :3], self.T_odom_piece[:, :3, 3]
+        normals = normal_odom @ rotations
+        offsets = (offset_m - origins @ normal_odom) / self.scale
+        segments, piece = self.triangles.cut(normals, offsets)
+        turned = (self.scale * segments) @ rotations[piece].transpose(0, 2, 1)
+        return np.asarray(turned + origins[piece, None])
+
 
 @runtime_checkable
 class Occluder(Protocol):
@@ -72,7 +81,7 @@ class SightLines:
     def __init__(
         self, layout: WarehouseLayout, variant: int = 0, actors: Iterable[object] = ()
     ) -> None:
-        self._scenery = _scenery_triangles(layout, variant)
+        self._scenery = scenery_triangles(layout, variant)
         self._occluders = [actor for actor in actors if isinstance(actor, Occluder)]
 
     def blocked(
@@ -225,7 +234,8 @@ def _near(points_m: FloatArray, radii_m: FloatArray, along_m: FloatArray) -> NDA
 
 
 @lru_cache(maxsize=8)  # many episodes use the same hall
-def _scenery_triangles(layout: WarehouseLayout, variant: int) -> TriangleSet:
+def scenery_triangles(layout: WarehouseLayout, variant: int) -> TriangleSet:
+    """Return the triangles of a hall's scenery in odom, as one rigid piece."""
     meshes = [chunk.mesh for chunk in scenery(layout, variant)]
     surfaces = [(mesh.vertices_m, mesh.indices.reshape(-1, 3)) for mesh in meshes]
     return TriangleSet(surfaces, together=True)

@@ -174,6 +174,8 @@ def test_the_times_of_runs_are_summed_per_thread() -> None:
         there = np.array(other.submit(spent).result())
     assert there[0].tolist() == [0.0, 0.0]
     assert here[-1].tolist() == [NETWORK_TIME.elapsed_s, NETWORK_TIME.processor_s]
+    model.run(feeds, timed=False)
+    assert here[-1].tolist() == [NETWORK_TIME.elapsed_s, NETWORK_TIME.processor_s]
 
 
 def test_settings_with_a_loaded_model_are_refused() -> None:

@@ -1,0 +1,49 @@
+"""2-D laser scans: the message, the mounting, and the people in them.
+
+The order of use, for every scan of every scanner::
+
+    scanner = Scanner.mounted(0.375, 0.26, 0.2, yaw_rad=math.radians(45))
+    detector = LegDetector()
+    scan = LaserScan(stamp_s, angle_min_rad, angle_increment_rad, ranges_m, 0.05, 20.0)
+    points = scan_points(scan, scanner, RobotMotion(stamp_s, T_odom_base))
+    candidates = detector.detect(points)
+
+With several scanners each scan is detected with its own number, ``detector.detect(points, 1)``, and
+:func:`merge_candidates` reports every person once.
+"""
+
+from __future__ import annotations
+
+from ._candidate import CandidateKind, PersonCandidate
+from ._classifier import LegClassifier, OnnxLegClassifier
+from ._clusters import Clusters, clusters_of
+from ._detector import LegDetector, LegDetectorConfig
+from ._hypotheses import CUTOUT, HYPOTHESIS_FEATURES, Hypotheses, hypotheses_of
+from ._memory import OccupancyMemory, StaticMap
+from ._merging import merge_candidates
+from ._points import RobotMotion, ScanPoints, scan_points
+from ._scan import LaserScan
+from ._scanner import Scanner
+
+__all__ = [
+    "CUTOUT",
+    "HYPOTHESIS_FEATURES",
+    "CandidateKind",
+    "Clusters",
+    "Hypotheses",
+    "LaserScan",
+    "LegClassifier",
+    "LegDetector",
+    "LegDetectorConfig",
+    "OccupancyMemory",
+    "OnnxLegClassifier",
+    "PersonCandidate",
+    "RobotMotion",
+    "ScanPoints",
+    "Scanner",
+    "StaticMap",
+    "clusters_of",
+    "hypotheses_of",
+    "merge_candidates",
+    "scan_points",
+]

@@ -1,0 +1,311 @@
+"""Detection of people in laser scans, by their legs or by the trolley that they push."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import FloatArray, finite_number, set_fields
+from ..errors import PerceptionError
+from ._candidate import CandidateKind, PersonCandidate
+from ._classifier import LegClassifier, OnnxLegClassifier
+from ._clusters import Clusters, clusters_of
+from ._hypotheses import Hypotheses, hypotheses_of
+from ._memory import OccupancyMemory, StaticMap
+from ._points import ScanPoints
+
+# A single cluster at least this wide is two legs that touch.
+_TWO_LEGS_M: Final = 0.24
+# A pair is preferred to a single leg of it with up to this much higher odds, as a logarithm.
+_PAIR_LOG_ODDS: Final = 1.5
+# Two people are not nearer to each other than this.
+_APART_M: Final = 0.3
+# A person is far more likely where the floor was free before than where something always stood. The
+# classifier has seen single scans with people all around, so its odds are changed by these factors'
+# logarithms.
+_CAME_LOG_ODDS: Final = 3.0
+_ALWAYS_LOG_ODDS: Final = -2.0
+# The same for a single narrow cluster: a post. Neither counts where two legs were seen.
+_POST_LOG_ODDS: Final = -5.0
+_CAME_SHARE: Final = 0.5
+# The same for a hypothesis this near to somebody found this recently.
+_RECENT_LOG_ODDS: Final = 1.5
+_RECENT_M: Final = 0.35
+_RECENT_S: Final = 0.3
+_MOST_RECENT: Final = 32
+# Two legs are remembered at this score, number of points each, and distance.
+_SURE_SCORE: Final = 0.8
+_SURE_POINTS: Final = 3
+_SURE_APART_M: Final = 0.16
+# What looks as much like a person as this in one scan is not learned as something that stands
+# still.
+_ALIKE_SCORE: Final = 0.6
+# A cluster of which more than this share is known to stand still is no person.
+_STILL_SHARE: Final = 0.3
+# Size of a trolley, fewest points of it, and the share that must lie where the floor was free.
+_TROLLEY_M: Final = (0.3, 1.6)
+_TROLLEY_POINTS: Final = 5
+_TROLLEY_CAME: Final = 0.8
+_TROLLEY_SCORE: Final = 0.5
+# It stands this far before the surfaces at its sides.
+_TROLLEY_BEFORE_M: Final = 0.3
+# A trolley this near to a person found by the legs is that person's.
+_TROLLEY_APART_M: Final = 1.2
+# Somebody who pushes it stands beside or behind it, within this standard deviation.
+_TROLLEY_STD_M: Final = 0.5
+_SURELY_M: Final = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class LegDetectorConfig:
+    """Settings of a :class:`LegDetector`.
+
+    Attributes:
+        score_threshold: candidates with a lower score are dropped.
+        range_noise_m: standard deviation of the scanner's ranges.
+        max_range_m: people farther away are not reported.
+        trolleys: report what has come and has the size of a trolley.
+        learn: learn what stands still.
+
+    Raises:
+        PerceptionError: for a value out of range.
+    """
+
+    score_threshold: float = 0.5
+    range_noise_m: float = 0.015
+    max_range_m: float = 10.0
+    trolleys: bool = True
+    learn: bool = True
+
+    def __post_init__(self) -> None:
+        for name, low, high in (
+            ("score_threshold", 0.0, 1.0),
+            ("range_noise_m", 0.0, 0.2),
+            ("max_range_m", 0.1, 100.0),
+        ):
+            value = finite_number(name, getattr(self, name), minimum=low, maximum=high)
+            set_fields(self, **{name: value})
+
+
+class LegDetector:
+    """Finds people in the scans of one robot, and learns what of the surroundings stands still.
+
+    All scanners of a robot share one detector. It needs the scans in the order of their time.
+
+    Args:
+        config: settings.
+        classifier: judges hypotheses; None for the shipped network.
+        static_map: map of what stands still; None without. What it holds is never a person.
+
+    Raises:
+        PerceptionError: for a missing or altered network.
+    """
+
+    def __init__(
+        self,
+        config: LegDetectorConfig | None = None,
+        *,
+        classifier: LegClassifier | None = None,
+        static_map: StaticMap | None = None,
+    ) -> None:
+        self.config = LegDetectorConfig() if config is None else config
+        if static_map is not None and not isinstance(static_map, StaticMap):
+            raise PerceptionError(
+                f"static_map must be a StaticMap, got {type(static_map).__name__}"
+            )
+        self._classify = OnnxLegClassifier() if classifier is None else classifier
+        self._map = static_map
+        self._memory = OccupancyMemory()
+        self._found: deque[tuple[float, FloatArray]] = deque(maxlen=_MOST_RECENT)
+
+    def detect(self, points: ScanPoints, scanner: int = 0) -> tuple[PersonCandidate, ...]:
+        """Return the people in a scan, the most certain first.
+
+        Args:
+            points: the scan's points in odom, from :func:`scan_points`.
+            scanner: number of the scanner, from 0.
+        """
+        config = self.config
+        xy = points.points_odom_m[:, :2]
+        usable = points.usable
+        rows = np.flatnonzero(usable)
+        known = np.zeros(len(usable), dtype=np.int64)
+        if self._map is not None:
+            known[rows[self._map.holds(xy[rows])]] = -1
+        if config.learn:
+            known[rows[self._memory.is_static(xy[rows])]] = -1
+            known[rows[self._memory.has_come(xy[rows])]] = 1
+        clusters = clusters_of(
+            xy,
+            points.ranges_m,
+            usable,
+            points.origins_odom_m[len(usable) // 2, :2],
+            points.angle_increment_rad,
+            config.range_noise_m,
+            known,
+        )
+        hypotheses = hypotheses_of(clusters, xy, points.ranges_m, points.angle_increment_rad)
+        judged = np.array(self._classify(hypotheses.features), dtype=np.float64)
+        alike = judged[:, 0] >= _ALIKE_SCORE
+        came = (known[clusters.rays] > 0).astype(np.float64)
+        still = clusters.sums((known[clusters.rays] < 0).astype(np.float64))
+        is_still = still > _STILL_SHARE * clusters.counts
+        second = np.where(hypotheses.second < 0, hypotheses.first, hypotheses.second)
+        judged[:, 0] *= ~(is_still[hypotheses.first] | is_still[second])
+        if config.learn:
+            narrow = (hypotheses.second < 0) & (clusters.widths_m[hypotheses.first] < _TWO_LEGS_M)
+            seen = self._memory.had_two_legs(hypotheses.centres_m, points.stamp_s)
+            recent = self._recently(points.stamp_s)
+            alike |= seen
+            always = np.where(narrow, _POST_LOG_ODDS, _ALWAYS_LOG_ODDS)
+            always[seen] = 0.0
+            judged[:, 0] = _with_memory(judged[:, 0], clusters, hypotheses, came, recent, always)
+        chosen, places = _chosen(hypotheses, judged, config.score_threshold)
+        candidates = [
+            _candidate(points.stamp_s, clusters, hypotheses, judged[row], row, place)
+            for row, place in zip(chosen, places, strict=True)
+        ]
+        taken = np.zeros(len(clusters.starts), dtype=bool)
+        taken[hypotheses.first[chosen]] = True
+        taken[second[chosen]] = True
+        if config.trolleys and config.learn:
+            for number in _trolleys(clusters, taken, came, np.array(places).reshape(-1, 2)):
+                taken[number] = True
+                candidates.append(_trolley(points.stamp_s, clusters, number))
+        if config.learn:
+            taken[hypotheses.first[alike]] = True
+            taken[second[alike]] = True
+            person = np.zeros(len(usable), dtype=bool)
+            person[clusters.rays] = taken[clusters.cluster]
+            self._memory.update(points, person, scanner)
+            self._found.append((points.stamp_s, np.array(places).reshape(-1, 2)))
+            legs = _surely_two_legs(clusters, hypotheses, judged[:, 0], chosen)
+            self._memory.note_two_legs(hypotheses.centres_m[legs], points.stamp_s)
+        origin = clusters.origin_m
+        return tuple(
+            candidate
+            for candidate in candidates
+            if np.hypot(*(candidate.position_odom_m - origin)) <= config.max_range_m
+        )
+
+    def _recently(self, now_s: float) -> FloatArray:
+        """Return (K, 2) the places where people were found just before."""
+        places = [found for stamp, found in self._found if 0.0 <= now_s - stamp <= _RECENT_S]
+        return np.concatenate(places) if places else np.zeros((0, 2))
+
+
+def _with_memory(
+    score: FloatArray,
+    clusters: Clusters,
+    hypotheses: Hypotheses,
+    came: FloatArray,
+    recent_m: FloatArray,
+    always: FloatArray,
+) -> FloatArray:
+    """Return the scores (H,) with what is known about the place where each hypothesis stands."""
+    points = clusters.sums(np.column_stack((came, np.ones(len(came)))))
+    pair = hypotheses.second >= 0
+    own = points[hypotheses.first] + np.where(pair[:, None], points[hypotheses.second], 0.0)
+    has_come = own[:, 0] >= _CAME_SHARE * own[:, 1]
+    safe = np.clip(score, 1e-6, 1.0 - 1e-6)
+    odds = np.log(safe / (1.0 - safe)) + np.where(has_come, _CAME_LOG_ODDS, always)
+    if len(recent_m):
+        to = hypotheses.centres_m[:, None] - recent_m
+        near = ((to * to).sum(axis=2) < _RECENT_M**2).any(axis=1)
+        odds += _RECENT_LOG_ODDS * (near & (has_come | (always > _POST_LOG_ODDS)))
+    return np.asarray(np.where(score > 0.0, 1.0 / (1.0 + np.exp(-odds)), 0.0))
+
+
+def _trolleys(
+    clusters: Clusters, taken: NDArray[np.bool_], came: FloatArray, people_m: FloatArray
+) -> list[int]:
+    """Return the clusters that have come, have a trolley's size and stand before all around."""
+    low, high = _TROLLEY_M
+    ends = clusters.starts + clusters.counts - 1
+    fits = ~taken & (clusters.counts >= _TROLLEY_POINTS)
+    fits &= (clusters.widths_m >= low) & (clusters.widths_m <= high)
+    fits &= clusters.steps_m[0, clusters.starts] > _TROLLEY_BEFORE_M
+    fits &= clusters.steps_m[1, ends] > _TROLLEY_BEFORE_M
+    fits &= clusters.sums(came) >= _TROLLEY_CAME * clusters.counts
+    found: list[int] = []
+    others = people_m
+    for number in np.flatnonzero(fits).tolist():
+        centre = clusters.centres_m[number]
+        if len(others) and np.linalg.norm(others - centre, axis=1).min() < _TROLLEY_APART_M:
+            continue
+        found.append(number)
+        others = np.concatenate([others, centre[None]])
+    return found
+
+
+def _chosen(
+    hypotheses: Hypotheses, judged: FloatArray, threshold: float
+) -> tuple[list[int], list[FloatArray]]:
+    """Return the best hypotheses that do not contradict each other, and the people's places."""
+    score = np.clip(judged[:, 0], 1e-6, 1.0 - 1e-6)
+    likely = np.flatnonzero(score >= threshold)
+    if not len(likely):
+        return [], []
+    pair = hypotheses.second >= 0
+    odds = np.log(score / (1.0 - score)) + _PAIR_LOG_ODDS * pair
+    order = likely[np.argsort(-odds[likely], kind="stable")]
+    rays = hypotheses.rays
+    left = np.column_stack((-rays[:, 1], rays[:, 0]))
+    places = hypotheses.centres_m + judged[:, 1:2] * rays + judged[:, 2:3] * left
+    chosen: list[int] = []
+    used: set[int] = set()
+    for row in order.tolist():
+        own = {int(hypotheses.first[row]), int(hypotheses.second[row])} - {-1}
+        if own & used:
+            continue
+        if any(np.hypot(*(places[row] - places[other])) < _APART_M for other in chosen):
+            used |= own  # the other leg of somebody found by one leg
+            continue
+        chosen.append(row)
+        used |= own
+    return chosen, [places[row] for row in chosen]
+
+
+def _surely_two_legs(
+    clusters: Clusters, hypotheses: Hypotheses, score: FloatArray, chosen: list[int]
+) -> list[int]:
+    """Return the chosen pairs of legs that are no post broken in two by noise."""
+    centres, counts = clusters.centres_m, clusters.counts
+    legs = []
+    for row in chosen:
+        one, other = int(hypotheses.first[row]), int(hypotheses.second[row])
+        if other < 0 or score[row] < _SURE_SCORE or min(counts[one], counts[other]) < _SURE_POINTS:
+            continue
+        if np.hypot(*(centres[one] - centres[other])) >= _SURE_APART_M:
+            legs.append(row)
+    return legs
+
+
+def _candidate(
+    stamp_s: float,
+    clusters: Clusters,
+    hypotheses: Hypotheses,
+    judged: FloatArray,
+    row: int,
+    place_m: FloatArray,
+) -> PersonCandidate:
+    rays = hypotheses.rays[row]
+    axes = np.array([rays, (-rays[1], rays[0])])
+    deviations = np.maximum(judged[3:5], _SURELY_M)
+    covariance = axes.T @ (deviations[:, None] ** 2 * axes)
+    single = hypotheses.second[row] < 0
+    narrow = clusters.widths_m[hypotheses.first[row]] < _TWO_LEGS_M
+    kind: CandidateKind = "one_leg" if single and narrow else "two_legs"
+    score = float(np.clip(judged[0], 0.0, 1.0))
+    return PersonCandidate(stamp_s, place_m, 0.5 * (covariance + covariance.T), score, kind)
+
+
+def _trolley(stamp_s: float, clusters: Clusters, number: int) -> PersonCandidate:
+    covariance = _TROLLEY_STD_M**2 * np.eye(2)
+    return PersonCandidate(
+        stamp_s, clusters.centres_m[number], covariance, _TROLLEY_SCORE, "trolley"
+    )

@@ -1,0 +1,253 @@
+"""What of the surroundings stands still: an occupancy memory in odom, or a map of the user's."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import FloatArray, finite_array, finite_number, set_fields
+from ..errors import PerceptionError
+from ._points import ScanPoints
+
+# Extent and cell of the memory, which follows the robot.
+_CELLS: Final = 400
+_CELL_M: Final = 0.1
+# The memory is moved once the robot is this far from its middle.
+_MOVED_M: Final = 8.0
+# Rays free the floor up to this distance from the scanner, and this far before what they meet.
+_FREE_M: Final = 8.0
+_BEFORE_M: Final = 0.15
+_STEPS_M: Final = np.arange(_CELL_M, _FREE_M, _CELL_M)
+# Stride of the rays, and the distances along them, at which cells are freed.
+_STRIDES: Final = tuple(
+    (stride, _STEPS_M[(low < _STEPS_M) & (high >= _STEPS_M)])
+    for stride, low, high in ((8, 0.0, 2.0), (4, 2.0, 4.0), (2, 4.0, _FREE_M))
+)
+# Time between two updates, and the longest time that one update counts for.
+_PERIOD_S: Final = 0.2
+_MAX_PERIOD_S: Final = 0.4
+# Something that has been met for this long stands still. Being passed takes back a part of it.
+_STATIC_S: Final = 1.5
+_FREE_FACTOR: Final = np.float32(0.5)
+# No more than this is counted, so that a person who was not recognised at first is soon again one.
+_MOST_S: Final = 3.0
+# Farther away too few rays meet somebody's legs to tell them from a post.
+_LEARN_M: Final = 6.0
+# Floor that was free for this long before anything was met in it or beside it was no structure;
+# what stands there later has come.
+_CAME_S: Final = 0.6
+# Of a cell and its neighbours, those that must have been free.
+_CAME_CELLS: Final = 8
+# A return of a person takes back this much of what was counted there.
+_PERSON_FACTOR: Final = np.float32(2.0)
+# A return may fall into the cell beside that of its surface.
+_BESIDE: Final = np.array([row * _CELLS + column for row in (-1, 0, 1) for column in (-1, 0, 1)])
+# For so long, and this many cells to each side, it is remembered that somebody had two legs.
+_TWO_LEGS_S: Final = 5.0
+_NEAR_LEGS: Final = np.array(
+    [row * _CELLS + column for row in range(-2, 3) for column in range(-2, 3)]
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StaticMap:
+    """A map of what stands still, in odom, for example a nav_msgs/OccupancyGrid.
+
+    Attributes:
+        occupied: (H, W) whether a cell is occupied; row 0 has the lowest y.
+        origin_odom_m: (2,) corner of cell (0, 0) with the lowest x and y.
+        resolution_m: side of a cell.
+        margin_m: points this near to an occupied cell belong to it; allow for the error of the
+            robot's place in the map.
+
+    Raises:
+        PerceptionError: for a map that is not two-dimensional, or a size that is not positive.
+    """
+
+    occupied: NDArray[np.bool_]
+    origin_odom_m: FloatArray
+    resolution_m: float
+    margin_m: float = 0.1
+
+    def __post_init__(self) -> None:
+        occupied: Any = np.array(self.occupied, dtype=bool, copy=True)
+        if occupied.ndim != 2 or not occupied.size:
+            raise PerceptionError(f"occupied must have shape (H, W), got {occupied.shape}")
+        side = finite_number("resolution_m", self.resolution_m, minimum=0.0, exclusive_minimum=True)
+        margin = finite_number("margin_m", self.margin_m, minimum=0.0)
+        grown = _grown(occupied, math.ceil(margin / side - 1e-9))
+        grown.setflags(write=False)
+        set_fields(
+            self,
+            occupied=grown,
+            origin_odom_m=finite_array("origin_odom_m", self.origin_odom_m, (2,)),
+            resolution_m=side,
+            margin_m=margin,
+        )
+
+    def holds(self, points_m: FloatArray) -> NDArray[np.bool_]:
+        """Return (N,) whether points (N, 2) in odom belong to it; False outside the map."""
+        cell = np.floor((points_m - self.origin_odom_m) / self.resolution_m)
+        column, row = np.nan_to_num(cell, nan=-1.0, posinf=-1.0, neginf=-1.0).astype(np.int64).T
+        height, width = self.occupied.shape
+        inside = (row >= 0) & (column >= 0) & (row < height) & (column < width)
+        return np.asarray(
+            inside & self.occupied[np.where(inside, row, 0), np.where(inside, column, 0)]
+        )
+
+
+class OccupancyMemory:
+    """Remembers for how long each cell of the floor was occupied and free.
+
+    A cell becomes static after 1.5 s of returns. Returns that may
+    belong to a person are not counted and take back others, so that somebody who stands still is
+    not forgotten. What stands
+    where the floor was free before anything was met there has come: it is no structure.
+    """
+
+    def __init__(self) -> None:
+        self._origin = np.zeros(2)
+        self._occupied_s = np.zeros((_CELLS, _CELLS), dtype=np.float32)
+        # How long a cell was free until anything, people too, was met in it or beside it.
+        self._untouched_s = np.zeros((_CELLS, _CELLS), dtype=np.float32)
+        self._touched = np.zeros((_CELLS, _CELLS), dtype=np.float32)
+        # When somebody was last seen on two legs near a cell.
+        self._two_legs_s = np.full((_CELLS, _CELLS), -np.inf)
+        self._updated_s: dict[int, float] = {}
+        self._placed = False
+
+    def note_two_legs(self, places_m: FloatArray, stamp_s: float) -> None:
+        """Remember where (K, 2) people were seen on two legs."""
+        cells, inside = self._cells(places_m)
+        near = np.clip(cells[inside, None] + _NEAR_LEGS, 0, self._two_legs_s.size - 1)
+        self._two_legs_s.ravel()[near.ravel()] = stamp_s
+
+    def had_two_legs(self, points_m: FloatArray, stamp_s: float) -> NDArray[np.bool_]:
+        """Return (N,) whether somebody was seen on two legs near points (N, 2) within 5 s."""
+        cells, inside = self._cells(points_m)
+        since = stamp_s - self._two_legs_s.ravel()[cells]
+        return np.asarray(inside & (since >= 0.0) & (since <= _TWO_LEGS_S))
+
+    def is_static(self, points_m: FloatArray) -> NDArray[np.bool_]:
+        """Return (N,) whether points (N, 2) in odom lie in cells that are static."""
+        cells, inside = self._cells(points_m)
+        old = self._untouched_s.ravel()[cells] < _CAME_S
+        return np.asarray(inside & old & (self._occupied_s.ravel()[cells] >= _STATIC_S))
+
+    def has_come(self, points_m: FloatArray) -> NDArray[np.bool_]:
+        """Return (N,) whether points (N, 2) in odom lie where the floor was free at first.
+
+        So must have been most cells around: beside a rack or in its openings nothing has come.
+        """
+        cells, inside = self._cells(points_m)
+        untouched = self._untouched_s.ravel()
+        around = np.clip(cells[:, None] + _BESIDE, 0, untouched.size - 1)
+        free = (untouched[around] >= _CAME_S).sum(axis=1)
+        return np.asarray(inside & (free >= _CAME_CELLS))
+
+    def update(self, points: ScanPoints, person: NDArray[np.bool_], scanner: int = 0) -> bool:
+        """Add a scan; return False where it comes too soon after the last one to be needed.
+
+        Args:
+            points: the scan.
+            person: (N,) which of its rays met a person.
+            scanner: number of the scanner; each has its own period.
+        """
+        last = self._updated_s.get(scanner, -math.inf)
+        since = points.stamp_s - last
+        if 0.0 <= since < _PERIOD_S:
+            return False
+        self._updated_s[scanner] = points.stamp_s
+        dt = _PERIOD_S if not 0.0 <= since <= _MAX_PERIOD_S else since
+        rows = np.flatnonzero(points.usable)
+        if not len(rows):
+            return True
+        starts, ends = points.origins_odom_m[rows, :2], points.points_odom_m[rows, :2]
+        self._follow(starts[0])
+        hits, inside = self._cells(ends)
+        occupied = self._occupied_s.ravel()
+        untouched, touched = self._untouched_s.ravel(), self._touched.ravel()
+        freed = self._passed(starts, ends, points.ranges_m[rows])
+        near = np.clip(hits[inside, None] + _BESIDE, 0, touched.size - 1)
+        touched[near.ravel()] = 1.0
+        # Cells that several rays pass are counted once; a return there counts more than passing.
+        before = occupied[hits]
+        occupied[freed] = np.maximum(occupied[freed] - _FREE_FACTOR * np.float32(dt), 0.0)
+        occupied[hits] = before
+        untouched[freed] += np.float32(dt) * (1.0 - touched[freed])
+        near = points.ranges_m[rows] <= _LEARN_M
+        met, people = hits[inside & near & ~person[rows]], hits[inside & person[rows]]
+        occupied[met] = np.minimum(occupied[met] + np.float32(dt), _MOST_S)
+        occupied[people] = np.maximum(occupied[people] - _PERSON_FACTOR * np.float32(dt), 0.0)
+        return True
+
+    def _passed(
+        self, starts_m: FloatArray, ends_m: FloatArray, ranges_m: FloatArray
+    ) -> NDArray[np.int64]:
+        """Return the cells that rays pass before they meet something."""
+        reach = np.minimum(ranges_m - _BEFORE_M, _FREE_M)
+        unit = (ends_m - starts_m) / ranges_m[:, None]
+        cells = []
+        # Near the scanner many rays pass the same cell: some of them are enough.
+        for stride, along in _STRIDES:
+            some = slice(None, None, stride)
+            ray, step = np.nonzero(along < reach[some, None])
+            cell, inside = self._cells(starts_m[some][ray] + along[step, None] * unit[some][ray])
+            cells.append(cell[inside])
+        return np.concatenate(cells)
+
+    def _cells(self, points_m: FloatArray) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Return the flat index (N,) of every point's cell, 0 outside, and which are inside."""
+        x, y = (points_m[:, axis] - self._origin[axis] for axis in (0, 1))
+        extent = _CELLS * _CELL_M
+        inside = np.asarray((x >= 0.0) & (y >= 0.0) & (x < extent) & (y < extent))
+        scale = 1.0 / _CELL_M
+        column = np.minimum((x * scale * inside).astype(np.int64), _CELLS - 1)
+        row = np.minimum((y * scale * inside).astype(np.int64), _CELLS - 1)
+        return row * _CELLS + column, inside
+
+    def _follow(self, place_m: FloatArray) -> None:
+        """Move the memory so that the robot stays in its middle."""
+        middle = self._origin + 0.5 * _CELLS * _CELL_M
+        if not self._placed:
+            self._origin = np.round(place_m / _CELL_M) * _CELL_M - 0.5 * _CELLS * _CELL_M
+            self._placed = True
+            return
+        off = place_m - middle
+        if float(np.abs(off).max()) <= _MOVED_M:
+            return
+        columns, rows = np.round(off / _CELL_M).astype(int).tolist()
+        self._origin = self._origin + np.array([columns, rows]) * _CELL_M
+        for name in ("_occupied_s", "_untouched_s", "_touched"):
+            setattr(self, name, _shifted(getattr(self, name), rows, columns, 0.0))
+        self._two_legs_s = _shifted(self._two_legs_s, rows, columns, -np.inf)
+
+
+def _shifted(grid: NDArray[Any], rows: int, columns: int, new: float) -> NDArray[Any]:
+    """Return the grid as seen from an origin that moved by rows and columns."""
+    out = np.full_like(grid, new)
+    size = len(grid)
+    if max(abs(rows), abs(columns)) >= size:
+        return out
+    into = tuple(slice(max(-step, 0), size - max(step, 0)) for step in (rows, columns))
+    source = tuple(slice(max(step, 0), size - max(-step, 0)) for step in (rows, columns))
+    out[into] = grid[source]
+    return out
+
+
+def _grown(occupied: NDArray[np.bool_], cells: int) -> NDArray[np.bool_]:
+    """Return the map with every occupied cell grown by this many cells to all sides."""
+    out = occupied
+    for axis in (0, 1):
+        grown = out.copy()
+        for step in range(1, cells + 1):
+            low, high = [slice(None)] * 2, [slice(None)] * 2
+            low[axis], high[axis] = slice(None, -step), slice(step, None)
+            grown[tuple(high)] |= out[tuple(low)]
+            grown[tuple(low)] |= out[tuple(high)]
+        out = grown
+    return out

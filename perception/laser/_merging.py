@@ -1,0 +1,73 @@
+"""One report of each person from the scans of several scanners."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from ..arrays import finite_number
+from ._candidate import CandidateKind, PersonCandidate
+
+# Candidates of two scanners this near are one person; each scanner sees another side of the legs.
+_SAME_M: Final = 0.45
+# A trolley this near to somebody's legs is that person's.
+_TROLLEY_M: Final = 1.2
+
+
+def merge_candidates(
+    groups: Iterable[Iterable[PersonCandidate]], *, same_within_m: float = _SAME_M
+) -> tuple[PersonCandidate, ...]:
+    """Return the people in scans of several scanners, each person once, most certain first.
+
+    A person whom two scanners see gets the weighted mean of both places, and the covariance of the
+    better one: what the scans get wrong about a body, they get wrong together. Candidates of one
+    scan are never merged.
+
+    Args:
+        groups: candidates of each scanner's last scan; their stamps should be near each other.
+        same_within_m: candidates of two scanners this near to each other are one person.
+
+    Raises:
+        PerceptionError: for a distance that is not positive.
+    """
+    near_m = finite_number("same_within_m", same_within_m, minimum=0.0, exclusive_minimum=True)
+    tagged = [(each, number) for number, group in enumerate(groups) for each in group]
+    tagged.sort(key=lambda pair: (pair[0].kind == "trolley", -pair[0].score))
+    merged: list[PersonCandidate] = []
+    sources: list[set[int]] = []
+    for candidate, number in tagged:
+        trolley = candidate.kind == "trolley"
+        best, nearest = -1, _TROLLEY_M if trolley else near_m
+        for row, other in enumerate(merged):
+            away = float(np.linalg.norm(other.position_odom_m - candidate.position_odom_m))
+            if number not in sources[row] and away < nearest:
+                best, nearest = row, away
+        if best < 0:
+            merged.append(candidate)
+            sources.append({number})
+        else:
+            sources[best].add(number)
+            if not trolley:
+                merged[best] = _fused(merged[best], candidate)
+    return tuple(merged)
+
+
+def _fused(one: PersonCandidate, other: PersonCandidate) -> PersonCandidate:
+    weights = [np.linalg.inv(each.covariance_m2) for each in (one, other)]
+    mean = np.linalg.solve(
+        weights[0] + weights[1],
+        weights[0] @ one.position_odom_m + weights[1] @ other.position_odom_m,
+    )
+    sizes = [float(np.trace(each.covariance_m2)) for each in (one, other)]
+    better = one if sizes[0] <= sizes[1] else other
+    kind: CandidateKind = "two_legs" if "two_legs" in (one.kind, other.kind) else one.kind
+    return replace(
+        one,
+        stamp_s=max(one.stamp_s, other.stamp_s),
+        position_odom_m=np.asarray(mean, dtype=np.float64),
+        covariance_m2=better.covariance_m2,
+        kind=kind,
+    )

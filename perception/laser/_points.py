@@ -1,0 +1,166 @@
+"""Points of a scan in the base and odom frames, corrected for the robot's motion in the scan."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import FloatArray, finite_array, finite_number, rigid_transform, set_fields
+from ..errors import PerceptionError
+from ._scan import LaserScan
+from ._scanner import BODY_MARGIN_M, Scanner
+
+# Below this turn an arc is computed as its series, which is exact to rounding.
+_STRAIGHT_RAD: Final = 1e-4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RobotMotion:
+    """The robot's pose at one instant and its velocity around it.
+
+    Attributes:
+        stamp_s: time of the pose.
+        T_odom_base: (4, 4) pose of the base frame.
+        velocity_base_mps: (2,) velocity of the base origin, in the base frame.
+        yaw_rate_radps: turn about the base frame's z axis, counter-clockwise positive.
+
+    Raises:
+        PerceptionError: for values that are not finite, or a pose that is not rigid.
+    """
+
+    stamp_s: float
+    T_odom_base: FloatArray
+    velocity_base_mps: FloatArray = (0.0, 0.0)  # type: ignore[assignment]
+    yaw_rate_radps: float = 0.0
+
+    def __post_init__(self) -> None:
+        set_fields(
+            self,
+            stamp_s=finite_number("stamp_s", self.stamp_s),
+            T_odom_base=rigid_transform("T_odom_base", self.T_odom_base),
+            velocity_base_mps=finite_array("velocity_base_mps", self.velocity_base_mps, (2,)),
+            yaw_rate_radps=finite_number("yaw_rate_radps", self.yaw_rate_radps),
+        )
+
+    @classmethod
+    def between(
+        cls, start_s: float, T_odom_start: Any, end_s: float, T_odom_end: Any
+    ) -> RobotMotion:
+        """Return the motion of constant speed and yaw rate from one pose to another.
+
+        Args:
+            start_s: time of the first pose, for example of the first ray.
+            T_odom_start: (4, 4) first pose of the base frame.
+            end_s: later time.
+            T_odom_end: (4, 4) pose at that time; less than half a turn away.
+
+        Raises:
+            PerceptionError: for times in the wrong order, or poses that are not rigid.
+        """
+        first = rigid_transform("T_odom_start", T_odom_start)
+        step = np.linalg.inv(first) @ rigid_transform("T_odom_end", T_odom_end)
+        start = finite_number("start_s", start_s)
+        dt = finite_number("end_s", end_s) - start
+        if dt <= 0.0:
+            raise PerceptionError(f"end_s must be later than start_s, got {start:g} and {end_s:g}")
+        yaw = math.atan2(step[1, 0], step[0, 0])
+        # The inverse of the arc in poses_base().
+        half = 0.5 * yaw
+        along = half / math.tan(half) if abs(yaw) > _STRAIGHT_RAD else 1.0 - yaw * yaw / 12.0
+        x, y = step[:2, 3].tolist()
+        velocity = np.array([along * x + half * y, along * y - half * x]) / dt
+        return cls(start, first, velocity, yaw / dt)
+
+    def poses_base(self, stamps_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return yaw (N,) and position (N, 2) of the base frame at other times.
+
+        Both are given in the base frame of :attr:`stamp_s`; the robot drives arcs of constant speed
+        and yaw rate.
+        """
+        dt = np.asarray(stamps_s, dtype=np.float64) - self.stamp_s
+        yaw = self.yaw_rate_radps * dt
+        small = np.abs(yaw) < _STRAIGHT_RAD
+        safe = np.where(small, 1.0, yaw)
+        along = np.where(small, 1.0 - yaw * yaw / 6.0, np.sin(safe) / safe)
+        aside = np.where(small, 0.5 * yaw, (1.0 - np.cos(safe)) / safe)
+        x, y = self.velocity_base_mps.tolist()
+        position = np.column_stack((along * x - aside * y, aside * x + along * y)) * dt[:, None]
+        return yaw, position
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ScanPoints:
+    """The N rays of a scan as points; those that measured nothing usable are NaN.
+
+    Attributes:
+        stamp_s: time of the middle of the scan.
+        points_base_m: (N, 3) where the base frame was at :attr:`RobotMotion.stamp_s`.
+        points_odom_m: (N, 3).
+        origins_odom_m: (N, 3) the scanner's place at the time of each ray.
+        ends_odom_m: (N, 3) end of the stretch over which each ray met nothing; NaN where unknown.
+        ranges_m: (N,) range of each point; NaN without.
+        usable: (N,) whether the ray is a point: measured, in the field of view, not on the robot.
+        angle_increment_rad: as the scan's.
+    """
+
+    stamp_s: float
+    points_base_m: FloatArray
+    points_odom_m: FloatArray
+    origins_odom_m: FloatArray
+    ends_odom_m: FloatArray
+    ranges_m: FloatArray
+    usable: NDArray[np.bool_]
+    angle_increment_rad: float
+
+
+def scan_points(scan: LaserScan, scanner: Scanner, motion: RobotMotion) -> ScanPoints:
+    """Return a scan's points in base and odom, each ray from where the robot was at its time.
+
+    Args:
+        scan: the scan.
+        scanner: its mounting.
+        motion: the robot's pose and velocity; a pose near the scan's own time is best.
+    """
+    angles, free = scan.angles_rad, scan.free_m
+    rays = np.column_stack((np.cos(angles), np.sin(angles), np.zeros(len(angles))))
+    mount, offset = scanner.T_base_scanner[:3, :3], scanner.T_base_scanner[:3, 3]
+    rays = rays @ mount.T
+    known = scanner.sees(scan) & (free > 0.0)
+    reach = np.where(known, free, np.nan)[:, None] * rays + offset
+    measured = known & scan.measured
+    if scanner.body_base_m is not None:
+        outermost = np.abs(scanner.body_base_m).max() + BODY_MARGIN_M
+        near = (np.abs(reach[:, 0]) <= outermost) & (np.abs(reach[:, 1]) <= outermost)
+        rows = np.flatnonzero(measured & near)
+        measured[rows[scanner.is_body(reach[rows, :2])]] = False
+    yaw, moved = motion.poses_base(scan.stamps_s)
+    ends_base = _moved(reach, yaw, moved)
+    origins_base = _moved(np.broadcast_to(offset, reach.shape), yaw, moved)
+    points_base = np.where(measured[:, None], ends_base, np.nan)
+    R, t = motion.T_odom_base[:3, :3], motion.T_odom_base[:3, 3]
+    ends_odom = ends_base @ R.T + t
+    arrays = (
+        points_base,
+        np.where(measured[:, None], ends_odom, np.nan),
+        origins_base @ R.T + t,
+        ends_odom,
+        np.where(measured, free, np.nan),
+        measured,
+    )
+    for array in arrays:
+        array.setflags(write=False)
+    middle_s = 0.5 * (scan.stamp_s + scan.end_s)
+    return ScanPoints(middle_s, *arrays, angle_increment_rad=scan.angle_increment_rad)
+
+
+def _moved(points_m: FloatArray, yaw: FloatArray, position_m: FloatArray) -> FloatArray:
+    """Return points (N, 3), each turned about z by its own yaw and shifted in x and y."""
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    x, y, z = points_m.T
+    return np.column_stack(
+        (cos * x - sin * y + position_m[:, 0], sin * x + cos * y + position_m[:, 1], z)
+    )

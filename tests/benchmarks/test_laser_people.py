@@ -1,0 +1,68 @@
+"""A short drive with held-out workers: people are found, racks and posts are not people."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benchmarks.laser_people import Figures, Wanderer, drive
+from perception.laser import LegDetectorConfig
+from sim_tests.actors.body import worker_names
+from sim_tests.world.hall import LAYOUTS
+from training.legs import TRAINING_HALLS, TRAINING_WORKERS
+
+HELD_OUT = [name for name in worker_names() if name not in TRAINING_WORKERS]
+
+
+def driven(hall: str, people: int, seconds: float, seed: int) -> Figures:
+    figures = Figures()
+    drive(hall, 0, HELD_OUT[:people], seconds, seed, figures, LegDetectorConfig())
+    return figures
+
+
+def found(figures: Figures) -> np.ndarray:
+    return np.concatenate([v for k, v in figures.seen.items() if k.startswith("range")])
+
+
+def test_the_judged_halls_and_people_are_in_no_training_scan() -> None:
+    assert len(HELD_OUT) >= 5
+    assert "staging_hall" in set(LAYOUTS) - set(TRAINING_HALLS)
+
+
+def test_people_in_a_held_out_hall_are_found_and_nothing_else() -> None:
+    figures = driven("staging_hall", 5, 5.0, 7)
+    seen = found(figures)
+    assert len(seen) > 100
+    assert seen.mean() >= 0.95
+    assert np.median(figures.errors_m) < 0.05
+    assert not figures.ghosts
+
+
+def test_an_empty_hall_has_no_people() -> None:
+    figures = driven("staging_hall", 0, 5.0, 2)
+    assert not figures.ghosts
+    assert figures.wrong < 0.02 * figures.scans
+
+
+@pytest.mark.full
+def test_every_hall_keeps_its_figures() -> None:
+    every, ghosts, seconds = [], 0, 0.0
+    for hall in LAYOUTS:
+        for people in (5, 0):
+            figures = driven(hall, people, 60.0, 5)
+            every += found(figures).tolist() if people else []
+            ghosts, seconds = ghosts + len(figures.ghosts), seconds + 60.0
+    assert np.mean(every) >= 0.96
+    assert ghosts <= seconds / 60.0
+
+
+def test_a_wanderer_keeps_clear_of_boxes_and_moves() -> None:
+    boxes = LAYOUTS["staging_hall"]().obstacle_boxes_odom
+    wanderer = Wanderer(boxes, np.random.default_rng(3), 0.35, (0.6, 1.7), 0.2)
+    places = []
+    for tick in range(500):
+        wanderer.advance(0.04 * tick, 0.04)
+        places.append(wanderer.place_m)
+    inside = (np.array(places)[:, None] > boxes[:, :2]) & (np.array(places)[:, None] < boxes[:, 2:])
+    assert not inside.all(axis=2).any()
+    assert np.linalg.norm(np.ptp(places, axis=0)) > 2.0

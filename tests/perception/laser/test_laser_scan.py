@@ -1,0 +1,170 @@
+"""Scans as ROS means them, mountings, and the correction of the robot's motion."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from perception import PerceptionError
+from perception.laser import LaserScan, RobotMotion, Scanner, scan_points
+
+STEP = math.radians(0.5)
+HOME = RobotMotion(0.0, np.eye(4))
+ANGLES = st.floats(-3.0, 3.0)
+
+
+def scan_of(ranges, **changes) -> LaserScan:
+    fields = {
+        "stamp_s": 0.0,
+        "angle_min_rad": -math.pi,
+        "angle_increment_rad": STEP,
+        "ranges_m": ranges,
+        "range_min_m": 0.1,
+        "range_max_m": 10.0,
+    }
+    return LaserScan(**{**fields, **changes})
+
+
+def pose(x: float, y: float, yaw: float) -> np.ndarray:
+    T = np.eye(4)
+    T[:2, :2] = [[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]]
+    T[:2, 3] = x, y
+    return T
+
+
+def test_special_ranges_mean_what_rep_117_says() -> None:
+    scan = scan_of([np.nan, np.inf, -np.inf, 0.05, 0.1, 10.0, 10.01, 3.0])
+    assert scan.measured.tolist() == [False] * 4 + [True, True, False, True]
+    assert scan.too_near.tolist() == [False, False, True] + [False] * 5
+    # Free as far as the range, to the limit without a return, unknown for the rest.
+    assert scan.free_m.tolist() == [0.0, 10.0, 0.0, 0.0, 0.1, 10.0, 0.0, 3.0]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"ranges_m": []}, "at least one range"),
+        ({"ranges_m": [[1.0]]}, r"shape \(N,\), got \(1, 1\)"),
+        ({"ranges_m": ["far"]}, "array of numbers"),
+        ({"angle_increment_rad": 0.0}, "must not be 0"),
+        ({"angle_increment_rad": 4.0}, "at most a full turn"),
+        ({"range_max_m": 0.1}, "must exceed range_min_m"),
+        ({"range_min_m": -1.0}, "range_min_m"),
+        ({"stamp_s": math.nan}, "stamp_s must be finite"),
+        ({"time_increment_s": -0.1}, "time_increment_s"),
+        ({"intensities": [1.0]}, "shape of ranges_m"),
+    ],
+)
+def test_a_scan_refuses_what_it_cannot_mean(changes, message) -> None:
+    with pytest.raises(PerceptionError, match=message):
+        scan_of([1.0, 2.0, 3.0], **{"ranges_m": [1.0, 2.0, 3.0], **changes})
+
+
+def test_a_scan_keeps_its_own_copy() -> None:
+    ranges = np.ones(4)
+    scan = scan_of(ranges)
+    ranges[:] = 7.0
+    assert scan.ranges_m.tolist() == [1.0] * 4
+    with pytest.raises(ValueError, match="read-only"):
+        scan.ranges_m[0] = 2.0
+
+
+def test_a_mounted_scanner_turns_and_lifts_its_points() -> None:
+    scanner = Scanner.mounted(0.3, -0.2, 0.25, yaw_rad=math.pi / 2)
+    points = scan_points(scan_of([2.0], angle_min_rad=0.0), scanner, HOME)
+    np.testing.assert_allclose(points.points_base_m, [[0.3, 1.8, 0.25]], atol=1e-12)
+    np.testing.assert_allclose(points.origins_odom_m, [[0.3, -0.2, 0.25]], atol=1e-12)
+
+
+def test_upside_down_the_rays_turn_clockwise() -> None:
+    scan = scan_of([1.0], angle_min_rad=math.pi / 2)
+    for upside_down, y in ((False, 1.0), (True, -1.0)):
+        scanner = Scanner.mounted(0.0, 0.0, 0.2, upside_down=upside_down)
+        points = scan_points(scan, scanner, HOME)
+        np.testing.assert_allclose(points.points_base_m, [[0.0, y, 0.2]], atol=1e-12)
+        assert np.linalg.det(scanner.T_base_scanner[:3, :3]) == pytest.approx(1.0)
+
+
+def test_rays_outside_the_view_and_on_the_body_are_no_points() -> None:
+    box = np.array([(-0.3, -0.3), (0.3, -0.3), (0.3, 0.3), (-0.3, 0.3)])
+    scanner = Scanner.mounted(0.0, 0.0, 0.2, field_of_view_rad=(-1.0, 1.0), body_base_m=box)
+    scan = scan_of([0.2, 0.34, 0.36, 5.0, 5.0], angle_min_rad=0.0, angle_increment_rad=0.3)
+    points = scan_points(scan, scanner, HOME)
+    # 0.36 m at 0.6 rad is 0.30 m ahead and so within 5 cm of the outline.
+    assert points.usable.tolist() == [False, False, False, True, False]
+    assert np.isnan(points.points_odom_m[0]).all()
+    # What the body returned is still free space; what is out of view is unknown.
+    assert np.isfinite(points.ends_odom_m).all(axis=1).tolist() == [True] * 4 + [False]
+
+
+def test_a_concave_body_does_not_swallow_its_notch() -> None:
+    shape = np.array([(-1, -1), (1, -1), (1, 1), (0.2, 1), (0.2, 0), (-0.2, 0), (-0.2, 1), (-1, 1)])
+    scanner = Scanner.mounted(0.0, 0.0, 0.2, body_base_m=shape)
+    inside = scanner.is_body(np.array([[0.0, 0.5], [0.5, 0.5], [0.0, -0.5], [0.0, 1.5]]))
+    assert inside.tolist() == [False, True, True, False]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"field_of_view_rad": (1.0, -1.0)}, "lowest and the highest"),
+        ({"body_base_m": np.zeros((2, 2))}, "3 or more corners"),
+        ({"x_m": math.inf}, "finite"),
+    ],
+)
+def test_a_mounting_refuses_what_it_cannot_be(arguments, message) -> None:
+    with pytest.raises(PerceptionError, match=message):
+        Scanner.mounted(**{"x_m": 0.0, "y_m": 0.0, "z_m": 0.2, **arguments})
+
+
+def test_a_wall_stays_straight_while_the_robot_drives_and_turns() -> None:
+    """A wall at x = 4 m, seen from a moving robot: exact after correction, bent without it."""
+    speed, yaw_rate, increment = 1.5, 1.2, 0.05 / 720
+    scanner = Scanner.mounted(0.4, 0.1, 0.2)
+    motion = RobotMotion(0.0, pose(0.3, -0.2, 0.1), np.array([speed, 0.0]), yaw_rate)
+    angles = -0.8 + STEP * np.arange(180)
+    ranges = []
+    for k, angle in enumerate(angles):
+        t = increment * k
+        turned = 0.1 + yaw_rate * t
+        # The closed form of a circular arc, independent of poses_base().
+        x = 0.3 + speed / yaw_rate * (math.sin(turned) - math.sin(0.1))
+        x += 0.4 * math.cos(turned) - 0.1 * math.sin(turned)
+        ranges.append((4.0 - x) / math.cos(turned + angle))
+    scan = scan_of(ranges, angle_min_rad=-0.8, time_increment_s=increment)
+    corrected = scan_points(scan, scanner, motion).points_odom_m
+    np.testing.assert_allclose(corrected[:, 0], 4.0, atol=1e-9)
+    frozen = scan_points(scan, scanner, RobotMotion(0.0, motion.T_odom_base)).points_odom_m
+    assert np.ptp(frozen[:, 0]) > 0.02
+
+
+@given(ANGLES, ANGLES, st.floats(-2.9, 2.9), ANGLES, ANGLES, st.floats(-3.0, 3.0))
+def test_motion_between_two_poses_meets_both(x, y, yaw, x0, y0, yaw0) -> None:
+    start = pose(x0, y0, yaw0)
+    end = start @ pose(x, y, yaw)
+    motion = RobotMotion.between(2.0, start, 2.5, end)
+    turned, moved = motion.poses_base(np.array([2.0, 2.5]))
+    np.testing.assert_allclose(turned, [0.0, yaw], atol=1e-9)
+    np.testing.assert_allclose(moved, [[0.0, 0.0], [x, y]], atol=1e-9)
+
+
+@given(ANGLES, ANGLES, ANGLES, st.floats(-1.0, 1.0), st.floats(-1.5, 1.5))
+def test_moving_the_world_moves_the_points(x, y, yaw, speed, yaw_rate) -> None:
+    ranges = np.linspace(1.0, 5.0, 90)
+    scan = scan_of(ranges, time_increment_s=0.0005)
+    scanner = Scanner.mounted(0.2, 0.1, 0.3, yaw_rad=0.7, upside_down=True)
+    velocity = np.array([speed, 0.0])
+    home = scan_points(scan, scanner, RobotMotion(0.01, np.eye(4), velocity, yaw_rate))
+    moved = scan_points(scan, scanner, RobotMotion(0.01, pose(x, y, yaw), velocity, yaw_rate))
+    R, t = pose(x, y, yaw)[:3, :3], pose(x, y, yaw)[:3, 3]
+    np.testing.assert_allclose(moved.points_odom_m, home.points_odom_m @ R.T + t, atol=1e-9)
+    np.testing.assert_allclose(moved.points_base_m, home.points_base_m, atol=1e-12)
+
+
+def test_poses_in_the_wrong_order_are_refused() -> None:
+    with pytest.raises(PerceptionError, match="later than start_s"):
+        RobotMotion.between(1.0, np.eye(4), 1.0, np.eye(4))

@@ -1,0 +1,262 @@
+"""Simulated scanners measure analytic walls and cylinders, and the triangles of lines of sight."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydantic import ValidationError
+from scipy.spatial.transform import Rotation
+
+from perception.laser import RobotMotion, scan_points
+from sim_tests.actors.body import Worker
+from sim_tests.actors.robot import Amr, AmrLook
+from sim_tests.world import Warehouse
+from sim_tests.world.hall import WarehouseLayout, box, tube
+from sim_tests.world.scanner import (
+    DIAGONAL_SCANNERS,
+    ScannerSpec,
+    ScanScene,
+    SimulatedScanner,
+    cast_rays,
+)
+from sim_tests.world.sightlines import PlacedSurface, SightLines, TriangleSet
+
+EXACT = {"noise_std_m": 0.0, "dropout_rate": 0.0, "dark_dropout_rate": 0.0}
+CENTRE = ScannerSpec(x_m=0.0, field_of_view_deg=(-180.0, 180.0), resolution_deg=0.25, **EXACT)
+LEVEL = RobotMotion(1.0, np.eye(4))
+
+
+class Thing:
+    """A mesh that stands still in odom."""
+
+    def __init__(self, mesh, reflectance: float = 1.0) -> None:
+        surface = (mesh.vertices_m, mesh.indices.reshape(-1, 3))
+        self.placed = PlacedSurface(TriangleSet([surface]), np.eye(4)[None])
+        low, high = mesh.vertices_m.min(axis=0), mesh.vertices_m.max(axis=0)
+        self.box, self.leg_reflectance = np.array([low, high]), reflectance
+
+    def reach_odom_m(self):
+        return self.box
+
+    def surface(self, detail):
+        return self.placed
+
+
+def scanner_of(*things, seed: int = 0, **spec) -> SimulatedScanner:
+    settings_of = CENTRE.model_copy(update=spec)
+    return SimulatedScanner(ScanScene(None, 0, things), settings_of, np.random.default_rng(seed))
+
+
+def tilted(roll: float, pitch: float) -> RobotMotion:
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_euler("xyz", [roll, pitch, 0.3]).as_matrix()
+    return RobotMotion(1.0, T)
+
+
+def test_a_wall_is_measured_exactly_and_only_where_it_stands() -> None:
+    scanner = scanner_of(Thing(box((4.0, 0.0, 0.5), (2.0, 6.0, 1.0))), scan_share=0.0)
+    scan = scanner.scan(LEVEL)
+    angles = scan.angles_rad
+    hit = np.isfinite(scan.ranges_m)
+    np.testing.assert_array_equal(hit, np.abs(angles) <= math.atan2(3.0, 3.0) + 1e-9)
+    np.testing.assert_allclose(scan.ranges_m[hit], 3.0 / np.cos(angles[hit]), atol=1e-9)
+    assert (scanner.hit_by == np.where(hit, 0, -1)).all()
+
+
+@pytest.mark.parametrize("place", [(2.0, 0.0), (-1.5, 0.01), (-1.5, -0.3), (0.4, 2.2)])
+def test_a_cylinder_is_measured_to_the_error_of_its_facets(place) -> None:
+    """A leg-sized cylinder, also behind the robot where the first and last rays meet."""
+    radius, sides = 0.06, 256
+    mesh = tube([(*place, z, radius, radius) for z in (1.0, 0.0)], sides)
+    scan = scanner_of(Thing(mesh), scan_share=0.0).scan(LEVEL)
+    angles, distance = scan.angles_rad, math.hypot(*place)
+    off = np.angle(np.exp(1j * (angles - math.atan2(place[1], place[0]))))
+    across = distance * np.sin(off)
+    ahead = distance * np.cos(off)
+    expected = np.where(
+        (np.abs(across) < radius) & (ahead > 0.0),
+        ahead - np.sqrt(np.maximum(radius**2 - across**2, 0.0)),
+        np.inf,
+    )
+    # Beside a facet's middle the mesh lies inside the circle by its sagitta; at the rim of the
+    # cylinder a ray may pass it altogether.
+    sagitta = radius * (1.0 - math.cos(math.pi / sides))
+    clear = np.abs(np.abs(across) - radius) > 0.002
+    assert np.isfinite(expected[clear]).sum() > 5
+    np.testing.assert_allclose(scan.ranges_m[clear], expected[clear], atol=20.0 * sagitta)
+
+
+def first_hit(origin, direction, corners) -> float:
+    """Return the distance to the first of triangles (T, 3, 3), by Möller and Trumbore's test."""
+    edge, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    across = np.cross(direction, other)
+    volume = (edge * across).sum(axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        to = origin - corners[:, 0]
+        u = (to * across).sum(axis=1) / volume
+        turned = np.cross(to, edge)
+        v = turned @ direction / volume
+        distance = (other * turned).sum(axis=1) / volume
+        met = (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & (distance > 0.0)
+    return float(distance[met].min(initial=np.inf))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_tilted_sweeps_agree_with_a_test_of_every_ray_and_triangle(seed) -> None:
+    rng = np.random.default_rng(seed)
+    corners = rng.normal(size=(150, 1, 3)) * 2.0 + 0.5 * rng.normal(size=(150, 3, 3))
+    rows = np.arange(450).reshape(-1, 3)
+    thing = Thing(box((0.0, 0.0, 0.0), (20.0, 20.0, 20.0)))
+    thing.placed = PlacedSurface(TriangleSet([(corners.reshape(-1, 3), rows)]), np.eye(4)[None])
+    scanner = scanner_of(thing, scan_share=0.0, range_min_m=0.0, resolution_deg=0.9)
+    motion = tilted(*rng.uniform(-0.4, 0.4, 2))
+    scan = scanner.scan(motion)
+    T = motion.T_odom_base @ scanner.mounting.T_base_scanner
+    rays = np.column_stack((np.cos(scan.angles_rad), np.sin(scan.angles_rad), 0 * scan.angles_rad))
+    expected = [first_hit(T[:3, 3], T[:3, :3] @ ray, corners) for ray in rays]
+    assert 50 < np.isfinite(expected).sum() < 350
+    np.testing.assert_allclose(scan.ranges_m, expected, atol=1e-7)
+
+
+@settings(max_examples=40)
+@given(
+    st.integers(0, 10_000),
+    st.floats(-4.0, 4.0),
+    st.sampled_from([0.01, -0.01, math.radians(0.7), math.tau / 500]),
+)
+def test_rays_with_places_and_turns_of_their_own_find_the_nearest_segment(
+    seed, start, step
+) -> None:
+    rng = np.random.default_rng(seed)
+    segments = rng.normal(size=(25, 1, 2)) * 3.0 + rng.normal(size=(25, 2, 2)) * 0.4
+    count = int(math.tau / abs(step)) if seed % 2 else 120
+    origins = 0.05 * rng.random((count, 2))
+    turns = np.linspace(0.0, 0.05, count)
+    ranges, hits = cast_rays(segments, start, step, origins, turns)
+    angles = start + step * np.arange(count) + turns
+    d = np.column_stack((np.cos(angles), np.sin(angles)))
+    to = segments[None, :, 0] - origins[:, None]
+    along = segments[:, 1] - segments[:, 0]
+    across = d[:, :1] * along[:, 1] - d[:, 1:] * along[:, 0]
+    distance = (to[..., 0] * along[:, 1] - to[..., 1] * along[:, 0]) / across
+    share = (to[..., 0] * d[:, 1:] - to[..., 1] * d[:, :1]) / across
+    distance[(distance <= 0.0) | (share < 0.0) | (share > 1.0)] = np.inf
+    np.testing.assert_allclose(ranges, distance.min(axis=1), atol=1e-7)
+    assert (hits == np.where(np.isfinite(ranges), distance.argmin(axis=1), -1)).all()
+
+
+def test_people_are_hit_where_lines_of_sight_are_blocked() -> None:
+    """Points just behind a hit are hidden, points just before it are not."""
+    with Warehouse(WarehouseLayout.staging_hall()) as warehouse:
+        worker = Worker(warehouse, 1.8)
+        worker.place((3.0, 0.4), 0.7, 0.35, 1.3)
+        scene = ScanScene(warehouse.layout, 0, warehouse.actors)
+        # Some seams lie at 0.2 m exactly, where a line of sight may slip through.
+        spec = CENTRE.model_copy(update={"scan_share": 0.0, "z_m": 0.2003})
+        scanner = SimulatedScanner(scene, spec, np.random.default_rng(0))
+        scan = scanner.scan(LEVEL)
+        sight = SightLines(warehouse.layout, 0, warehouse.actors)
+        eye = np.array([0.0, 0.0, 0.2003])
+        rows = np.flatnonzero(np.isfinite(scan.ranges_m))
+        rays = np.column_stack((np.cos(scan.angles_rad), np.sin(scan.angles_rad)))[rows]
+        detail = np.ones(len(rows), dtype=np.int64)
+        for off, hidden in ((-0.001, False), (0.001, True)):
+            ends = np.tile(eye, (len(rows), 1))
+            ends[:, :2] += (scan.ranges_m[rows] + off)[:, None] * rays
+            blocked = sight.blocked(eye, ends, detail)
+            # Rays that graze an edge may fall on either side of it.
+            assert (blocked == hidden).mean() > 0.995
+        on_legs = scanner.hit_by == scene.occluders.index(worker.skin)
+        assert on_legs.sum() > 10
+        points = scan_points(scan, scanner.mounting, LEVEL).points_odom_m[on_legs]
+        assert np.linalg.norm(points[:, :2] - (3.0, 0.4), axis=1).max() < 0.6
+
+
+def test_the_diagonal_scanners_see_all_around_and_not_their_robot() -> None:
+    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
+        amr = Amr(warehouse)
+        warehouse.add_actor(AmrLook.of(warehouse, amr))
+        scene = ScanScene(warehouse.layout, 0, warehouse.actors)
+        angles = []
+        for spec in DIAGONAL_SCANNERS:
+            scanner = SimulatedScanner(scene, spec, np.random.default_rng(0))
+            scan = scanner.scan(RobotMotion(0.0, amr.T_odom_base))
+            assert (scanner.hit_by == -1).all()
+            points = scan_points(scan, scanner.mounting, RobotMotion(0.0, amr.T_odom_base))
+            x, y = points.points_base_m[points.usable][:, :2].T
+            angles.append(np.arctan2(y, x))
+        sorted_angles = np.sort(np.concatenate(angles))
+        assert np.diff(sorted_angles, append=sorted_angles[0] + math.tau).max() < 0.05
+        inside = SimulatedScanner(
+            scene, CENTRE.model_copy(update={"x_m": 0.3}), np.random.default_rng(0)
+        )
+        scan = inside.scan(RobotMotion(0.0, amr.T_odom_base))
+        assert (inside.hit_by == 0).all()  # the robot's own body surrounds it
+        assert not (scan.ranges_m > 1.0).any()
+
+
+def test_a_moving_robot_sees_a_straight_wall_once_its_motion_is_corrected() -> None:
+    wall = Thing(box((4.0, 0.0, 0.5), (2.0, 8.0, 1.0)))
+    motion = RobotMotion(3.0, np.eye(4), np.array([1.4, 0.0]), 0.8)
+    scanner = scanner_of(wall, field_of_view_deg=(-45.0, 45.0), x_m=0.3)
+    scan = scanner.scan(motion)
+    assert scan.end_s == pytest.approx(3.0)
+    points = scan_points(scan, scanner.mounting, motion).points_odom_m
+    np.testing.assert_allclose(points[np.isfinite(points[:, 0]), 0], 3.0, atol=1e-9)
+    ignored = scan_points(scan, scanner.mounting, RobotMotion(3.0, np.eye(4))).points_odom_m
+    assert np.nanmax(np.abs(ignored[:, 0] - 3.0)) > 0.01
+
+
+def test_noise_dropouts_and_limits_are_those_of_the_settings() -> None:
+    room = box((0.0, 0.0, 0.5), (6.0, 6.0, 1.0))
+    exact = scanner_of(Thing(room), scan_share=0.0).scan(LEVEL).ranges_m
+    noisy = scanner_of(Thing(room), scan_share=0.0, noise_std_m=0.02, dropout_rate=0.1)
+    errors = np.concatenate([noisy.scan(LEVEL).ranges_m - exact for _ in range(20)])
+    lost = np.isposinf(errors)
+    assert lost.mean() == pytest.approx(0.1, abs=0.01)
+    assert errors[~lost].std() == pytest.approx(0.02, rel=0.03)
+    assert abs(errors[~lost].mean()) < 0.001
+    black = scanner_of(Thing(room, reflectance=0.0), scan_share=0.0, dark_dropout_rate=0.3)
+    assert np.isposinf(black.scan(LEVEL).ranges_m).mean() == pytest.approx(0.3, abs=0.05)
+    grey = scanner_of(Thing(room, reflectance=0.4), scan_share=0.0, dark_dropout_rate=0.3)
+    assert np.isfinite(grey.scan(LEVEL).ranges_m).all()
+    limited = scanner_of(Thing(room), scan_share=0.0, range_min_m=3.2, range_max_m=4.0)
+    ranges = limited.scan(LEVEL).ranges_m
+    np.testing.assert_array_equal(np.isneginf(ranges), exact < 3.2)
+    np.testing.assert_array_equal(np.isposinf(ranges), exact > 4.0)
+
+
+def test_the_same_seed_gives_the_same_sweeps() -> None:
+    room = Thing(box((0.0, 0.0, 0.5), (6.0, 6.0, 1.0)))
+
+    def sweeps(seed):
+        scanner = scanner_of(room, seed=seed, noise_std_m=0.02, dropout_rate=0.1)
+        return np.array([scanner.scan(LEVEL).ranges_m for _ in range(3)])
+
+    assert sweeps(1).tobytes() == sweeps(1).tobytes()
+    assert (sweeps(1) != sweeps(2)).mean() > 0.8
+
+
+def test_dark_trousers_are_darker_than_light_ones() -> None:
+    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
+        dark, light = (Worker(warehouse, look=look).skin for look in ("amina", "kofi"))
+        assert 0.0 <= dark.leg_reflectance < 0.2
+        assert 0.35 < light.leg_reflectance <= 1.0
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ({"field_of_view_deg": (90.0, -90.0)}, "lowest and the highest"),
+        ({"field_of_view_deg": (-200.0, 200.0)}, "at most 360"),
+        ({"range_min_m": 9.0, "range_max_m": 5.0}, "must exceed range_min_m"),
+        ({"rate": 25.0}, "rate"),
+    ],
+)
+def test_settings_that_no_scanner_has_are_refused(keys, message) -> None:
+    with pytest.raises(ValidationError, match=message):
+        ScannerSpec(**keys)
