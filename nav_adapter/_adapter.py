@@ -132,8 +132,8 @@ class NavAdapter:
     def reset(self) -> None:
         """Forget all people and the clock. The limit then rises from its last value."""
         latest = self._memory.constraints
-        limit_mps = None if latest is None else latest.speed_limit_mps
-        self._memory = _Memory(ceiling_mps=limit_mps)
+        ceiling_mps = self._memory.ceiling_mps if latest is None else latest.speed_limit_mps
+        self._memory = _Memory(ceiling_mps=ceiling_mps)
         self._clock = replace(self._clock, jumped=None, before_jump=None)
 
     def update(
@@ -202,8 +202,8 @@ class NavAdapter:
         tracks, robot_state, perceived_s = before.given
         memory = self._following(before, tracks, robot_state, now, perceived_s)
         assert memory.constraints is not None
-        if now - before.stamp_s <= _MAX_PAUSE_S:
-            # A stamp far ahead may be wrong, and must not make all later ones late.
+        if now - before.stamp_s <= self._policy.timing.stale_after_s:
+            # A stamp farther ahead may be wrong, and must not make all later ones late.
             self._memory = memory
         return memory.constraints
 
@@ -218,9 +218,9 @@ class NavAdapter:
         if last_s is None:
             return memory, clock
         pause_s = now - last_s
-        if 0.0 <= pause_s <= _MAX_PAUSE_S:
+        if 0.0 <= pause_s <= self._policy.timing.stale_after_s:
             return memory, replace(clock, jumped=None, before_jump=None)
-        if pause_s > _MAX_PAUSE_S and now - robot_state.stamp_s <= _MAX_PAUSE_S:
+        if pause_s >= 0.0 and min(pause_s, now - robot_state.stamp_s) <= _MAX_PAUSE_S:
             # A pause of the caller, as it seems.
             return memory, replace(clock, jumped=None, before_jump=memory)
         if pause_s < 0.0 and clock.before_jump is not None:
@@ -288,7 +288,8 @@ class NavAdapter:
                 self._policy.margins.uncertainty_sigmas,
                 alert_history,
             )
-        braked_mps = robot_state.travel_mps - self._robot.max_deceleration_mps2 * pause_s
+        braked_mps = _latest_travel_mps(before, robot_state)
+        braked_mps -= self._robot.max_deceleration_mps2 * pause_s
         constraints = NavConstraints(
             stamp_s=now,
             obstacles=obstacles_of(people, now, self._policy),
@@ -347,6 +348,18 @@ class NavAdapter:
         if sideways and not self._warned_of_drive:
             _LOG.warning("%s: the speed limit is 0", self._drive_problem(robot_state))
         self._warned_of_drive = sideways
+
+
+def _latest_travel_mps(before: _Memory, robot_state: RobotState) -> float:
+    """Return the robot's speed at the last update, as far as braking since then may have gone.
+
+    A state that repeats says nothing new: the robot has braked since its stamp.
+    """
+    if before.constraints is None or before.given is None:
+        return robot_state.travel_mps
+    if robot_state.stamp_s > before.given[1].stamp_s:
+        return robot_state.travel_mps
+    return min(robot_state.travel_mps, before.constraints.reachable_speed_limit_mps)
 
 
 def _goes_back(now: float, last_s: float) -> str:

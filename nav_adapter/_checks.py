@@ -8,7 +8,7 @@ from typing import Final
 from tracking import PersonTrack
 
 from ._errors import NavError
-from ._memory import PersonMemory
+from ._memory import PersonMemory, velocity_variance_m2ps2
 
 # Tolerated difference between the clocks of two computers, or of a camera and a control loop.
 _CLOCK_TOLERANCE_S: Final = 0.05
@@ -62,6 +62,12 @@ def refuse_absurd(people: Mapping[int, PersonMemory]) -> None:
             ("position_odom_m", place_m, _MOST_M, "m"),
             ("velocity_odom_mps", speed_mps, _MOST_MPS, "m/s"),
             ("the standard deviation of covariance_odom", person.sigma_m, _MOST_M, "m"),
+            (
+                "the velocity's variance in covariance_odom",
+                velocity_variance_m2ps2(person.track),
+                _MOST_MPS**2,
+                "m²/s²",
+            ),
         ):
             if not value <= most:
                 raise NavError(

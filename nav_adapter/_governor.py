@@ -153,7 +153,7 @@ class SpeedGovernor:
         Both are (2, N): by the bound from the footprint, and by that from the circumscribed circle.
         """
         count = len(people)
-        base_margin_m = BODY_RADIUS_M + robot_state.travel_mps * robot_age_s
+        base_margin_m = BODY_RADIUS_M + self._driven_m(robot_state, robot_age_s)
         margin_m = np.array([base_margin_m + self._uncertainty_m(m, now) for m in people.values()])
         # The nearer of predicted and tracked position counts: the person may have turned round.
         positions = np.array(
@@ -173,11 +173,21 @@ class SpeedGovernor:
         np.maximum(approach[:count], approach[count:], out=shares[1])
         return gaps_m, shares
 
+    def _driven_m(self, robot_state: RobotState, robot_age_s: float) -> float:
+        """Return how far the robot may have driven since its state, speeding up to its maximum."""
+        travel_mps = robot_state.travel_mps
+        fastest_mps = max(travel_mps, self._robot.max_speed_mps)
+        faster_m = 0.5 * self._robot.max_acceleration_mps2 * robot_age_s**2
+        return min(travel_mps * robot_age_s + faster_m, fastest_mps * robot_age_s)
+
     def _uncertainty_m(self, memory: PersonMemory, now: float) -> float:
         """Return by how much a person may be nearer than estimated."""
         margins = self._policy.margins
         sigmas = margins.uncertainty_sigmas
-        if now - memory.seen_stamp_s > self._policy.timing.fresh_within_s:
+        # The position is that of the track, which may be older than the latest sighting.
+        track_seen_s = memory.track.stamp_s - memory.track.time_since_seen_s
+        seen_s = min(memory.seen_stamp_s, track_seen_s)
+        if now - seen_s > self._policy.timing.fresh_within_s:
             sigmas = max(sigmas, margins.unseen_sigmas)
         return sigmas * memory.sigma_m
 
@@ -192,6 +202,11 @@ class SpeedGovernor:
         x, y = offset_odom_m.T
         angle_rad = np.abs(np.arctan2(travel_x * y - travel_y * x, travel_x * x + travel_y * y))
         turn_rad = self._turn_rad + abs(robot_state.yaw_rate_radps) * robot_age_s
+        if lateral_mps <= LATERAL_NOISE_MPS and self._robot.drive != "differential":
+            # What counts as noise may be motion.
+            turn_rad += math.atan2(lateral_mps, abs(robot_state.speed_mps))
+        if self._robot.max_acceleration_mps2 * robot_age_s >= robot_state.travel_mps:
+            turn_rad = math.pi  # the robot may drive anywhere by now
         beyond_rad = np.maximum(angle_rad - turn_rad, 0.0)
         return np.asarray(np.maximum(np.cos(beyond_rad), 0.0))
 

@@ -37,6 +37,7 @@ class PersonMemory(NamedTuple):
         sigma_m: standard deviation of the position along its most uncertain direction.
         visible_s: total time in which frames showed the person, as counted for shrinking.
         known_s: the same, with frames of a tentative track: time since the first sight.
+        was_confirmed: whether the track has ever been more than tentative.
         ahead_m: length by which the obstacle's polygon reaches ahead of its circle.
         direction_odom: unit vector of the person's latest walking direction.
         history: latest sizes, newest last: (``visible_s`` until which it held, radius, ahead).
@@ -56,6 +57,7 @@ class PersonMemory(NamedTuple):
     sigma_m: float
     visible_s: float
     known_s: float
+    was_confirmed: bool
     ahead_m: float
     direction_odom: Vector2
     history: tuple[tuple[float, float, float], ...]
@@ -73,9 +75,10 @@ class PersonMemory(NamedTuple):
 
         The tracker of this project reports a coasting person before it deletes the track. Another
         tracker may delete a track as soon as a detection fails, which is when the person is most
-        likely hidden and still there. A tentative track may be clutter and is not kept.
+        likely hidden and still there. A track that was never more than tentative may be clutter and
+        is not kept.
         """
-        return self.track.status != "tentative" and stamp_s - self.seen_stamp_s <= hold_s
+        return self.was_confirmed and stamp_s - self.seen_stamp_s <= hold_s
 
 
 def motion_at(track: PersonTrack, stamp_s: float) -> tuple[Vector2, Vector2, Vector2]:

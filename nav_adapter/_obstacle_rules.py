@@ -118,12 +118,22 @@ class ObstacleRules:
     ) -> dict[int, PersonMemory]:
         """Return the people, those under a new id whose own now belongs to somebody else.
 
-        Somebody whose place has another track is known by that one.
+        Somebody whose place has the track of another id that is new or has jumped is known by that
+        one; each track stands for one person.
         """
         kept = {track_id: memory for track_id, memory in people.items() if track_id not in jumped}
+        # Clutter, and people who are known by their own id, explain nobody's absence.
+        takers = [
+            track
+            for track in tracks
+            if track.status != "tentative" and (track.id in jumped or track.id not in people)
+        ]
         for track_id in sorted(jumped):
             memory = people[track_id]
-            if all(has_jumped(memory, track, self._jump_mps) for track in tracks):
+            near = [each for each in takers if not has_jumped(memory, each, self._jump_mps)]
+            if near:
+                takers.remove(near[0])
+            else:
                 kept[min(_FIRST_KEPT_ID + 1, *kept, *people) - 1] = memory
         return kept
 
@@ -134,6 +144,8 @@ class ObstacleRules:
             radius_m, ahead_m = self._target_m(memory.velocity_odom_mps, 0.0, memory.sigma_m)
             unaware[track_id] = memory._replace(
                 awareness_lower=0.0,
+                # The next sighting, which ends the pause, is the first.
+                known_s=-self._timing.fresh_within_s,
                 radius_m=max(memory.radius_m, radius_m),
                 ahead_m=max(memory.ahead_m, ahead_m),
                 history=((memory.visible_s, radius_m, ahead_m),),
@@ -230,6 +242,7 @@ class ObstacleRules:
             sigma_m=sigma_m,
             visible_s=0.0,
             known_s=0.0,
+            was_confirmed=track.status != "tentative",
             ahead_m=ahead_m,
             direction_odom=_walking_direction(velocity, (1.0, 0.0)),
             history=((0.0, radius_m, ahead_m),),
@@ -254,8 +267,12 @@ class ObstacleRules:
         track_position, position, velocity = motion_at(track, now)
         target = self._target_m(velocity, 1.0 if held else lower, sigma_m)
         total_visible_s = before.visible_s + visible_s
+        shown = target
+        if visible_s == 0.0:
+            # Without a new frame a smaller size is no evidence that it has held.
+            shown = max(target[0], before.history[-1][1]), max(target[1], before.history[-1][2])
         history = _extended_history(
-            before.history, (total_visible_s, *target), timing.shrink_after_s
+            before.history, (total_visible_s, *shown), timing.shrink_after_s
         )
         shrink_m = timing.shrink_rate_mps * visible_s
         radius_m, ahead_m = target
@@ -273,6 +290,7 @@ class ObstacleRules:
             sigma_m=sigma_m,
             visible_s=total_visible_s,
             known_s=before.known_s,
+            was_confirmed=before.was_confirmed or track.status != "tentative",
             ahead_m=max(ahead_m, before.ahead_m - shrink_m),
             direction_odom=_walking_direction(velocity, before.direction_odom),
             history=history,

@@ -65,7 +65,7 @@ def finite_array(
     """
     try:
         array = np.array(value, dtype=np.float64, copy=True)
-    except (TypeError, ValueError) as cause:
+    except (TypeError, ValueError, OverflowError) as cause:
         raise error(
             f"{name} must be an array of numbers of shape {_shape_text(shape)}, "
             f"got {type(value).__name__}: {value!r:.80}"
@@ -91,7 +91,7 @@ def finite_number(
     """Return ``value`` as a float after checking that it is finite and within the bounds."""
     try:
         number = float(value)
-    except (TypeError, ValueError) as cause:
+    except (TypeError, ValueError, OverflowError) as cause:
         raise error(
             f"{name} must be a number, got {type(value).__name__}: {value!r:.80}"
         ) from cause

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
+# Stamps may come slightly out of order.
+_DISORDER_S: Final = 0.5
 # Two stamps may agree by chance.
 _LEAST_STAMPS: Final = 3
 
@@ -25,7 +27,12 @@ class JumpedClock:
 
     @staticmethod
     def following(before: JumpedClock | None, stamp_s: float, max_pause_s: float) -> JumpedClock:
-        """Return the clock after one more refused stamp, which may begin another one."""
+        """Return the clock after one more refused stamp, which may begin another one.
+
+        A stamp that is slightly out of order neither counts nor ends the clock.
+        """
+        if before is not None and -_DISORDER_S <= stamp_s - before.last_s < 0.0:
+            return before
         if before is not None and 0.0 <= stamp_s - before.last_s <= max_pause_s:
             return JumpedClock(before.first_s, stamp_s, before.stamps + 1)
         return JumpedClock(stamp_s, stamp_s)

@@ -299,7 +299,13 @@ class AwarenessBridge:
             older = self._adapter.watchdog(now_s)
         except Exception:
             return _stopped(now_s, reason)
-        return replace(older, speed_limit_mps=0.0, limited_by=reason, stale=True)
+        return replace(
+            older,
+            speed_limit_mps=0.0,
+            reachable_speed_limit_mps=0.0,
+            limited_by=reason,
+            stale=True,
+        )
 
     def _send(
         self,

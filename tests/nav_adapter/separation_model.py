@@ -53,7 +53,8 @@ def _person_limit_mps(
     if state.velocity_base_mps is not None:
         left = float(state.velocity_base_mps[1])
     travel_mps, state_age_s = math.hypot(forward, left), now - state.stamp_s
-    margin_m = BODY_M + travel_mps * state_age_s + _position_margin_m(policy, track, now)
+    driven_m = _driven_m(robot, travel_mps, state_age_s)
+    margin_m = BODY_M + driven_m + _position_margin_m(policy, track, now)
     hull = translate(
         rotate(
             MultiPoint(robot.footprint_m).convex_hull,
@@ -78,6 +79,10 @@ def _person_limit_mps(
         course = state.heading_odom_rad + math.atan2(counted, forward)
         turn = math.radians(policy.rules.turn_within_stop_deg)
         turn += abs(state.yaw_rate_radps) * state_age_s
+        if counted == 0.0 and robot.drive != "differential":
+            turn += math.atan2(abs(left), abs(forward))
+        if robot.max_acceleration_mps2 * state_age_s >= travel_mps:
+            turn = math.pi
         share = max(_share(place - state.position_odom_m, course, turn) for place in places)
     human_mps = _human_mps(policy, state, track, alpha)
     unseen_s = None
@@ -114,6 +119,13 @@ def _walked_m(
     tip_mps = max(top_mps - human_mps, 0.0)
     way_m = (top_mps**2 - tip_mps**2) / (2.0 * rule.human_acceleration_mps2)
     return min(way_m, human_mps * time_s)
+
+
+def _driven_m(robot: RobotProfile, travel_mps: float, age_s: float) -> float:
+    """The way of a robot that speeds up since its state, step by step up to its top speed."""
+    top_mps = max(travel_mps, robot.max_speed_mps)
+    by_speed_m = travel_mps * age_s + robot.max_acceleration_mps2 * age_s * age_s / 2.0
+    return min(by_speed_m, top_mps * age_s)
 
 
 def _share(offset_m: np.ndarray, course_rad: float, turn_rad: float) -> float:
