@@ -84,10 +84,15 @@ def with_noticed(
     looking = looks > 0.0
     dropped = averted | found.ambiguous | _jumped(before, after, frame, found)
     approach_mps = _approach_mps(after, frame)
+    # After a gap nobody knows that it is the same person; a new look excuses motion alone.
+    grace, gap_s = grace_s(faces.period_s, config), config.max_evidence_gap_s
+    if math.isfinite(faces.period_s):
+        gap_s = max(gap_s, _GAP_PERIODS * faces.period_s)
+    recent_s = np.where(looking, gap_s, grace)
     ended = stamp - after.look_stamps_s > config.noticed_memory_s
-    ended |= _interrupted(before, after, frame, faces, clocks, sensors)
-    ended |= _set_off(after, approach_mps)
-    looked_s = np.where(dropped | (ended & ~looking), 0.0, after.looked_s)
+    ended |= _interrupted(before, after, stamp, recent_s, clocks, sensors)
+    ended |= _set_off(after, approach_mps) & ~looking
+    looked_s = np.where(dropped | ended, 0.0, after.looked_s)
     # What they do from the last look on.
     least_mps = np.minimum(after.look_approaches_mps, approach_mps)
     stood = after.look_standing | after.standing
@@ -96,7 +101,10 @@ def with_noticed(
     dt_s = min(faces.dt_s(stamp), config.max_evidence_gap_s)
     fades = found.seen & ~looking
     looked_s = np.where(fades, math.exp(-dt_s / _FORGETTING_S), 1.0) * looked_s
-    looked_s += np.where(dropped, 0.0, looks * dt_s)
+    # A look after a pause stands for one frame, not for the pause.
+    follows = stamp - after.look_stamps_s <= config.max_evidence_gap_s
+    stands_for_s = np.where(follows, dt_s, min(dt_s, faces.period_s))
+    looked_s += np.where(dropped, 0.0, looks * stands_for_s)
     return after.replaced(
         looked_s=looked_s,
         look_stamps_s=np.where(looking, stamp, after.look_stamps_s),
@@ -180,16 +188,16 @@ def _held(
 def _interrupted(
     before: TrackTable,
     after: TrackTable,
-    frame: Frame,
-    faces: FrameClock,
+    stamp_s: float,
+    recent_s: FloatArray,
     clocks: tuple[FrameClock, ...],
     sensors: Sensors,
 ) -> BoolArray:
-    """Return (N,) True where no look is recent, and there was a gap before this frame."""
-    old = after.look_stamps_s < frame.stamp_s - grace_s(faces.period_s, sensors.config.awareness)
+    """Return (N,) True where no look is ``recent_s`` (N,) old, and there was a gap before now."""
+    old = after.look_stamps_s < stamp_s - recent_s
     count = len(before)
     # By the sightings before this frame: it must not close a gap.
-    old[:count] &= ~_held(before, frame.stamp_s, clocks, sensors)
+    old[:count] &= ~_held(before, stamp_s, clocks, sensors)
     return np.asarray(old)
 
 

@@ -85,8 +85,8 @@ class FrameClockRecord(StrictConfig):
     """A :class:`FrameClock` as plain values; null for numbers that are not finite."""
 
     stamp_s: float | None
-    interval_s: float | None
-    period_s: float | None = Field(gt=0.0)
+    interval_s: float | None = Field(le=1e12)
+    period_s: float | None = Field(gt=0.0, le=1e12)
 
 
 class StateRecord(StrictConfig):

@@ -136,9 +136,9 @@ class Sensors:
         Raises:
             TrackingError: for a name that is not among them.
         """
-        if name not in self.names:
+        if not isinstance(name, str) or name not in self.names:
             raise TrackingError(
-                f"sensor must be one of {', '.join(map(repr, self.names))}, got {name!r}"
+                f"sensor must be one of {', '.join(map(repr, self.names))}, got {name!r:.80}"
             )
         return self.all[self.names.index(name)]
 

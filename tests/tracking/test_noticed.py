@@ -19,7 +19,7 @@ from fusion_scenes import (
 )
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tracking_scenes import FloatArray, camera_at, nearest
+from tracking_scenes import FloatArray, camera_at, nearest, observe
 
 from tracking import AwarenessFilterConfig, PersonTrack, PersonTracker, TrackerConfig
 
@@ -339,3 +339,16 @@ def test_any_sequence_of_frames_gives_valid_tracks(frames) -> None:
     assert tracker.from_state(tracker.state()).state() == tracker.state()
     now = tracker.last_stamp_s or now
     assert {track.id for track in tracker.predict(now)} <= ids
+
+
+@pytest.mark.parametrize("pause_s", [0.9, 2.9])
+def test_after_a_pause_of_all_sensors_one_glance_is_one_glance(pause_s: float) -> None:
+    """Nobody knows that it is the same person. The looks before the pause do not come back."""
+    settings = AwarenessFilterConfig(noticed_memory_s=4.0)
+    tracker = PersonTracker(TrackerConfig(awareness=settings))
+    for k in range(20):
+        tracker.update([observe((3.0, 0.0), 0.1 * k, awareness=0.97)], 0.1 * k, camera_at())
+    assert tracker.predict(1.95)[0].noticed > 0.8
+    now = 1.9 + pause_s
+    tracks = tracker.update([observe((3.3, 0.3), now, awareness=0.97)], now, camera_at())
+    assert max(track.noticed for track in tracks) < 0.2

@@ -47,6 +47,19 @@ def test_one_frame_with_a_wrong_stamp_costs_one_frame(jump_s: float) -> None:
     assert tracker.clock_restarts == 0
 
 
+def test_a_camera_that_sends_a_frame_now_and_then_is_believed() -> None:
+    """Every 12 s, longer apart than ``max_pause_s``."""
+    tracker, accepted = PersonTracker(), 0
+    for step in range(20):
+        try:
+            show(tracker, 12.0 * step)
+            accepted += 1
+        except TrackingError:
+            pass
+    assert tracker.clock_restarts >= 3
+    assert accepted >= 5
+
+
 @pytest.mark.parametrize("jump_s", [3600.0, -3600.0, 1e9, -2.0])
 def test_a_clock_that_has_been_set_costs_a_second(
     jump_s: float, caplog: pytest.LogCaptureFixture
