@@ -1,4 +1,4 @@
-"""Faults that a hostile reading found: sequences of updates that once gave too much."""
+"""Sequences of updates that once gave too much room or speed."""
 
 from __future__ import annotations
 
