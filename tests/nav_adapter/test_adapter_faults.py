@@ -1,4 +1,4 @@
-"""Sequences of updates that once gave too much room or speed."""
+"""Sequences of updates that once gave too little room or too much speed."""
 
 from __future__ import annotations
 
