@@ -1,4 +1,4 @@
-"""How well people are found in laser scans: ``python -m benchmarks.laser_people``.
+"""Recall and false people of the leg detector: ``python -m benchmarks.laser_people``.
 
 A robot with two diagonal scanners drives through the shipped halls. Held-out workers walk and stand
 around it. The figures are: recall per scan of people within 5 m in line of sight, errors of place,

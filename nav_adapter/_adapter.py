@@ -30,7 +30,7 @@ _MAX_PAUSE_S: Final = 10.0
 
 @dataclass(frozen=True, slots=True)
 class _Memory:
-    """What the adapter remembers of its last update.
+    """The adapter's memory of its last update.
 
     Attributes:
         people: by id.
@@ -126,7 +126,7 @@ class NavAdapter:
 
     @property
     def clock_restarts(self) -> int:
-        """How often the adapter has started anew because the clock had been set."""
+        """Number of times the adapter has started anew because the clock had been set."""
         return self._clock.restarts
 
     def reset(self) -> None:

@@ -193,7 +193,7 @@ class _Extent:
 
     @property
     def excess(self) -> str:
-        """Which limit is exceeded; empty for none."""
+        """Return the limit that is exceeded; empty for none."""
         if len(self._open) > MAX_DEPTH:
             return _too_deep("").strip()
         if self._values > MAX_YAML_VALUES:

@@ -167,7 +167,7 @@ def test_ordinary_documents_are_read_as_before():
 
 
 def test_no_other_module_parses_yaml_or_json():
-    """What a process of this program sends to another is no file."""
+    """Messages between processes of this program are no files."""
     own = {"sim_tests/study/runs/_seeded_crossing.py", "sim_tests/dataset/_render.py"}
     pattern = re.compile(r"yaml\.(\w*load\w*)\(|json\.loads?\(|model_validate_json\(|YAML\(")
     packages = ("perception", "tracking", "nav_adapter", "awarenav", "sim_tests", "training")

@@ -98,12 +98,8 @@ class AwarenessFilterConfig(StrictConfig):
         return self
 
 
-class TrackerConfig(StrictConfig):
-    """Settings of :class:`~tracking.PersonTracker`.
-
-    Raises:
-        TrackingError: for settings that are unknown, out of range or not finite.
-    """
+class TrackingConfig(StrictConfig):
+    """Base of configs whose constructor raises :class:`TrackingError`, as a saved state does."""
 
     if not TYPE_CHECKING:  # type checkers know the settings from the fields
 
@@ -111,7 +107,15 @@ class TrackerConfig(StrictConfig):
             try:
                 super().__init__(**settings)
             except ValidationError as cause:
-                raise TrackingError(f"TrackerConfig: {cause}") from cause
+                raise TrackingError(f"{type(self).__name__}: {cause}") from cause
+
+
+class TrackerConfig(TrackingConfig):
+    """Settings of :class:`~tracking.PersonTracker`.
+
+    Raises:
+        TrackingError: for settings that are unknown, out of range or not finite.
+    """
 
     acceleration_density_m2ps3: float = Field(default=0.05, ge=1e-9, le=1e4)
     """Spectral density q of the white acceleration in the motion model of a person."""

@@ -1,4 +1,4 @@
-"""Whether a person has noticed the robot: a belief from the looks of the last seconds.
+"""A belief that a person has noticed the robot, from the looks of the last seconds.
 
 α(t) tells whether somebody looks now; a person who has looked for half a second knows of the robot
 for some seconds more. The belief is a lower bound of the probability of that, 1 − exp(−looks / τ),

@@ -4,52 +4,43 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
-from pydantic import Field, ValidationError, field_validator
+from pydantic import Field, field_validator
 from scipy.special import gammaincinv
 
 from perception.arrays import FloatArray
 
 from ._association import Gates
 from ._clocks import FrameClock
-from ._config import TrackerConfig
+from ._config import TrackerConfig, TrackingConfig
 from ._errors import TrackingError
 from ._existence import tentative_gap_s
 from ._table import BoolArray, TrackTable
 from ._views import View
-from .config import StrictConfig
 
 #: The name of the sensor that every tracker has.
 CAMERA: Final = "camera"
 
 
-class SensorConfig(StrictConfig):
+class SensorConfig(TrackingConfig):
     """One sensor of a :class:`~tracking.PersonTracker`; the defaults are those of a laser scanner.
 
     Raises:
         TrackingError: for settings that are unknown, out of range or not finite.
     """
 
-    if not TYPE_CHECKING:  # type checkers know the settings from the fields
-
-        def __init__(self, **settings: Any) -> None:
-            try:
-                super().__init__(**settings)
-            except ValidationError as cause:
-                raise TrackingError(f"SensorConfig: {cause}") from cause
-
     view: Any = Field(default=None, exclude=True)
     """A :class:`~tracking.View` that tells where the sensor can see people; None if unknown. Not
     part of a saved state, nor of a YAML file."""
 
     sees_faces: bool = False
-    """Whether an observation says something about awareness. If not, the frames of this sensor
+    """True if an observation says something about awareness. If not, the frames of this sensor
     leave awareness as it is, except that an ambiguous match takes it."""
 
     measures_range: bool = True
-    """Whether ranges are measured. If not, they follow from the size that people are assumed to
+    """True if ranges are measured. If not, they follow from the size that people are assumed to
     have, and yield to a measured range of the same person."""
 
     detection_probability: float = Field(default=0.9, ge=0.01, le=0.999)
@@ -94,7 +85,7 @@ class Sensor:
 
     @property
     def view(self) -> View | None:
-        """Where the sensor can see people; None if unknown."""
+        """The view of the sensor; None if unknown."""
         view: View | None = self.settings.view
         return view
 

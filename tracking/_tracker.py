@@ -129,7 +129,7 @@ class PersonTracker:
 
     @property
     def clock_restarts(self) -> int:
-        """How often the tracker has started anew because the clock had been set."""
+        """Number of times the tracker has started anew because the clock had been set."""
         return self._clock_restarts
 
     def reset(self) -> None:

@@ -72,7 +72,7 @@ _ROUNDING_MPS: Final = 1e-9
 
 
 class StandingPeople(StrictConfig):
-    """How far a person gets who stands: a bound on human acceleration.
+    """A bound on human acceleration, for people who stand.
 
     Speed and separation assumes that such a person reaches the assumed human speed at
     ``human_acceleration_mps2``, having begun ``start_delay_s`` before the frame. The way is never

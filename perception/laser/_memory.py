@@ -1,4 +1,4 @@
-"""What of the surroundings stands still: an occupancy memory in odom, or a map of the user's."""
+"""The part of the surroundings that stands still: an occupancy memory in odom, or a given map."""
 
 from __future__ import annotations
 

@@ -106,13 +106,13 @@ class LaserScan:
 
     @property
     def measured(self) -> NDArray[np.bool_]:
-        """Whether (N,) each ray measured an object within the limits."""
+        """(N,) True for rays that measured an object within the limits."""
         inside = (self.ranges_m >= self.range_min_m) & (self.ranges_m <= self.range_max_m)
         return np.asarray(inside & np.isfinite(self.ranges_m))
 
     @property
     def too_near(self) -> NDArray[np.bool_]:
-        """Whether (N,) each ray met an object too near to measure (−inf)."""
+        """(N,) True for rays that met an object too near to measure (−inf)."""
         return np.asarray(np.isneginf(self.ranges_m))
 
     @property

@@ -96,7 +96,7 @@ def _person_limit_mps(
 
 
 def _stands(policy: AwarenessPolicy, track: PersonTrack, now: float) -> bool:
-    """Whether a fresh measurement shows a confirmed person standing (assumption 8)."""
+    """Return True if a fresh measurement shows a confirmed person standing (assumption 8)."""
     rule = policy.rules.standing
     if rule is None or track.status != "confirmed":
         return False

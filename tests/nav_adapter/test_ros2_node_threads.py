@@ -25,7 +25,7 @@ PATIENCE_S = 20.0
 
 
 class StandInNode:
-    """What the node calls of rclpy's Node."""
+    """The part of rclpy's Node that the node calls."""
 
     def __init__(self, name: str) -> None:
         self.sent: dict[str, list[Any]] = defaultdict(list)

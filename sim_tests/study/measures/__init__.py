@@ -27,9 +27,8 @@ if TYPE_CHECKING:
         salvage_record_file,
         write_records,
     )
-    from ._repeatability import nondeterminism_notes
     from ._summary import BASELINE, Comparison, Summary, SummaryRow, summarise
-    from ._summary_text import summary_text, table_text
+    from ._summary_text import nondeterminism_notes, summary_text, table_text
     from ._variants import Variant, labels
 
 __all__ = [
@@ -82,7 +81,6 @@ __getattr__ = lazy_names(
             "zero_of_n_upper",
         ),
         "._measure": ("measure",),
-        "._repeatability": ("nondeterminism_notes",),
         "._metrics": (
             "METRICS",
             "SHARES",
@@ -115,6 +113,7 @@ __getattr__ = lazy_names(
             "summarise",
         ),
         "._summary_text": (
+            "nondeterminism_notes",
             "summary_text",
             "table_text",
         ),

@@ -16,7 +16,7 @@ from ._run_files import JOB_FIELDS, job_line, parse_job
 
 @dataclass(frozen=True, slots=True)
 class ResumedPlan:
-    """What ``jobs.jsonl`` says about the jobs that are asked for.
+    """The content of ``jobs.jsonl``, compared with the jobs that are asked for.
 
     Attributes:
         lines: number of its lines.
