@@ -66,8 +66,12 @@ def settled_update(
     policy: AwarenessPolicy | None = None,
     robot: RobotProfile = ROBOT,
     state: RobotState | None = None,
+    perceived: bool = False,
 ) -> NavConstraints:
-    """Return the constraints at 0 s for people who have been seen for 0.4 s, walking as now."""
+    """Return the constraints at 0 s for people who have been seen for 0.4 s, walking as now.
+
+    With ``perceived``, perception is up to date in every update, whatever the tracks say.
+    """
     adapter = NavAdapter(AwarenessPolicy() if policy is None else policy, robot)
     now = robot_at() if state is None else state
     for ago_s in (0.4, 0.3, 0.2, 0.1, 0.0):
@@ -80,7 +84,8 @@ def settled_update(
             for track in tracks
         ]
         then = replace(now, stamp_s=now.stamp_s - ago_s)
-        constraints = adapter.update(earlier, then, -ago_s)
+        perceived_s = -ago_s if perceived else None
+        constraints = adapter.update(earlier, then, -ago_s, perception_stamp_s=perceived_s)
     return constraints
 
 

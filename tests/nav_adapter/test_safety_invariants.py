@@ -9,10 +9,18 @@ from typing import Any
 import numpy as np
 import pytest
 import separation_model
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from nav_policies import policies, robots, standing_rules
-from nav_scenes import crowds, finite, moved_person, moved_robot, numbers, robot_at
+from nav_scenes import (
+    crowds,
+    finite,
+    moved_person,
+    moved_robot,
+    numbers,
+    robot_at,
+    settled_update,
+)
 from shapely.geometry import Point
 
 from nav_adapter import (
@@ -151,21 +159,14 @@ def _assert_equal_to_the_model(
     scene: tuple[AwarenessPolicy, RobotProfile, RobotState, Any],
 ) -> None:
     policy, robot, state, people = scene
-    adapter = NavAdapter(policy, robot)
-    for ago_s in (0.4, 0.3, 0.2, 0.1, 0.0):
-        tracks = [
-            replace(
-                track,
-                stamp_s=track.stamp_s - ago_s,
-                position_odom_m=track.position_odom_m - ago_s * track.velocity_odom_mps,
-            )
-            for track in people
-        ]
-        then = replace(state, stamp_s=state.stamp_s - ago_s)
-        result = adapter.update(tracks, then, -ago_s, perception_stamp_s=-ago_s)
+    result = settled_update(people, policy=policy, robot=robot, state=state, perceived=True)
     shown = {obstacle.track_id: obstacle.awareness_lower for obstacle in result.obstacles}
     # Frames have shown each person for this time since the first update.
-    known_s = 0.0 if result.stale else 4 * min(0.1, policy.timing.fresh_within_s)
+    # Where the 0.1 s between updates count as silence, each sighting is the first.
+    stale_after_s = policy.timing.stale_after_s
+    assume(abs(stale_after_s - 0.1) > 1e-6)
+    silent = result.stale or stale_after_s < 0.1
+    known_s = 0.0 if silent else 4 * min(0.1, policy.timing.fresh_within_s)
     known = known_s > policy.timing.shrink_after_s - 1e-6
     alphas = [shown[track.id] if known else 0.0 for track in people]
     # With hysteresis the speed depends on more than the last lower bound.
