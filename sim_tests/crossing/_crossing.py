@@ -9,31 +9,21 @@ from typing import Final
 import numpy as np
 
 from nav_adapter import AwarenessPolicy, NavAdapter, RobotState
-from perception import AttentionCone, AwarenessPipeline, Camera
+from perception import AttentionCone, AwarenessPipeline
 from perception.arrays import FloatArray
-from tracking import CameraView, PersonTrack, PersonTracker, SurroundView, TrackerConfig
 
 from ..actors.behaviour import PersonOutcome
 from ..actors.robot import NOVA_CARTER
 from ..scenario import Scenario, ScenarioTemplate
-from ..world.camera import CameraTiming
 from ..world.errors import SimError
 from ..world.render import RendererName
 from ._command import check_planner, checked_command
 from ._metrics import SafetyMeter
 from ._result import CrossingFrame, CrossingResult
+from ._sensing import Sensing
 from ._stage import Stage
-from .eyes import (
-    ORACLE,
-    KeypointNoise,
-    MapView,
-    Sighting,
-    TimedEyes,
-    WorkerObservations,
-    make_eyes,
-    pixel_timing,
-)
-from .faults import Fault, FaultInjection
+from .eyes import KeypointNoise, Perception
+from .faults import Fault
 from .planner import LocalPlanner, SamplingPlanner, StraightOn
 
 Observer = Callable[[CrossingFrame, Stage], None]
@@ -42,10 +32,6 @@ Observer = Callable[[CrossingFrame, Stage], None]
 _GOAL_SPEED_MPS: Final = 0.2
 # Rate of the separation measurements; contacts are checked in every physics step.
 _MEASURED_HZ: Final = 20.0
-# Age of perception before the first image has arrived: older than any policy accepts.
-_NEVER_S: Final = 1.0e6
-# An image without a person is no evidence about people farther away than this.
-_DETECTION_RANGE_M: Final = 10.0
 
 
 def run_crossing(
@@ -71,7 +57,8 @@ def run_crossing(
         perception: ``"truth"``; ``"keypoints"``: true keypoints with noise through the pipeline;
             ``"pixels"``: rendered images through the shipped networks, at 10 images a second where
             the scenario gives no rate; or ``"oracle"``: the truth about everybody who is not hidden
-            by a rack.
+            by a rack. ``"keypoints+scanner"`` and ``"pixels+scanner"`` add the scenario's laser
+            scanners, and ``"scanner"`` has them alone.
         seed: the same seed gives the same result, bit for bit.
         noise: noise of the keypoint camera; None for the default.
         pipeline: pipeline for ``"pixels"`` instead of the shipped networks; its camera must be that
@@ -97,27 +84,24 @@ def run_crossing(
     offsets = jitter_rng.uniform(-jitter, jitter, len(scenario.workers))
     cone = AttentionCone()
     meter = SafetyMeter(NOVA_CARTER)
-    injection = FaultInjection(fault, seed)
+    senses = Perception.named(perception)
     with Stage(scenario, offsets, people_rng, renderer=renderer) as stage:
-        camera_model, timing = _camera_and_timing(scenario, perception)
-        eyes = make_eyes(
-            perception,
+        sensing = Sensing(
             stage,
-            camera_model,
+            senses,
+            policy,
             cone,
-            noise if noise is not None else KeypointNoise(),
-            camera_rng,
-            pipeline,
-            injection.T_camera_assumed,
+            seed,
+            noise=noise if noise is not None else KeypointNoise(),
+            camera_rng=camera_rng,
+            timing_rng=timing_rng,
+            pipeline=pipeline,
+            fault=fault,
         )
-        camera = injection.eyes(TimedEyes(eyes, timing, timing_rng), camera_model)
-        odometry = injection.odometry()
-        tracker = _make_tracker(perception, policy, stage, camera_model)
         adapter = NavAdapter(policy, NOVA_CARTER)
         goal = np.array([scenario.robot.goal_x_m, scenario.robot.goal_y_m])
         dt_s = 1.0 / scenario.control_hz
         frames: list[CrossingFrame] = []
-        newest_s = -_NEVER_S
         reached_s: float | None = None
         ticks_per_measurement = max(round(scenario.control_hz / _MEASURED_HZ), 1)
         margins: tuple[float, ...] = ()
@@ -128,13 +112,11 @@ def run_crossing(
             T_odom_camera = stage.amr.T_odom_camera
             truth = stage.truth(cone, T_odom_camera)
             state = stage.amr.state(t_s)
-            known = odometry.update(state, T_odom_camera)
-            sightings = camera.look(t_s, T_odom_camera, known.T_odom_camera, truth)
-            observed, newest_s, tracks = _update_tracker(tracker, sightings, newest_s)
-            if newest_s != t_s:
-                tracks = tracker.predict(t_s)
-            constraints = adapter.update(tracks, known.state, t_s, perception_stamp_s=newest_s)
-            returned = driver.plan(known.state, goal, constraints, dt_s)
+            sensed = sensing.step(t_s, truth)
+            constraints = adapter.update(
+                sensed.tracks, sensed.state, t_s, perception_stamp_s=sensed.stamp_s
+            )
+            returned = driver.plan(sensed.state, goal, constraints, dt_s)
             command = checked_command(driver, returned, t_s)
             stage.amr.command(*command)
             frame = CrossingFrame(
@@ -142,13 +124,14 @@ def run_crossing(
                 state,
                 T_odom_camera,
                 truth,
-                tuple(observation for observation, _ in observed),
-                tuple(worker for _, worker in observed),
-                tracks,
+                tuple(observation for observation, _ in sensed.observed),
+                tuple(worker for _, worker in sensed.observed),
+                sensed.tracks,
                 constraints,
                 command,
                 margins,
                 tuple(meter.separations_m),
+                sensed.scan_points_odom_m,
             )
             frames.append(frame)
             if observer is not None:
@@ -168,52 +151,6 @@ def run_crossing(
             reached_s,
             stage.outcomes,
         )
-
-
-def _update_tracker(
-    tracker: PersonTracker, sightings: tuple[Sighting, ...], newest_s: float
-) -> tuple[WorkerObservations, float, tuple[PersonTrack, ...]]:
-    """Update the tracker with the images that have arrived.
-
-    Returns:
-        The observations of the newest image if it is newer than ``newest_s`` (else none), the
-        newest stamp so far, and the tracks of the last update (none without an update).
-    """
-    observed: WorkerObservations = ()
-    tracks: tuple[PersonTrack, ...] = ()
-    for sighting in sightings:
-        if sighting.stamp_s == newest_s:
-            continue  # the same image again is no new evidence
-        if newest_s - sighting.stamp_s > tracker.config.max_lag_s:
-            continue  # too old for the tracker to go back to
-        observations = tuple(observation for observation, _ in sighting.observations)
-        tracks = tracker.update(observations, sighting.stamp_s, sighting.T_odom_camera)
-        if sighting.stamp_s > newest_s:
-            observed, newest_s = sighting.observations, sighting.stamp_s
-    return observed, newest_s, tracks
-
-
-def _camera_and_timing(scenario: Scenario, perception: str) -> tuple[Camera, CameraTiming]:
-    spec = scenario.camera
-    if perception == "pixels":
-        return spec.camera(spec.picture_scale), pixel_timing(spec.timing)
-    return spec.camera(), spec.timing
-
-
-def _make_tracker(
-    perception: str, policy: AwarenessPolicy, stage: Stage, camera: Camera
-) -> PersonTracker:
-    config = TrackerConfig(awareness=policy.filter)
-    if perception == "truth":  # no limits of range or field of view
-        return PersonTracker(config)
-    if perception == ORACLE:
-        return PersonTracker(config, view=MapView.of(stage.warehouse))
-    views = stage.scenario.camera.flat_views(camera)
-    flat = CameraView(camera, max_range_m=_DETECTION_RANGE_M)
-    view = SurroundView((flat,) * len(views), tuple(each.rotation_camera_view for each in views))
-    return PersonTracker(
-        config, view=MapView.of(stage.warehouse, flat if len(views) == 1 else view)
-    )
 
 
 def _default_planner(scenario: Scenario) -> LocalPlanner:

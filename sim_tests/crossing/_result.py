@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from nav_adapter import NavConstraints, RobotProfile, RobotState
 from perception import PersonObservation
@@ -35,6 +37,8 @@ class CrossingFrame:
             20 a second.
         separations_m: distance between the surfaces of each person and the robot, measured at the
             same time; a lower bound with centres more than 4 m apart.
+        scan_points_odom_m: (N, 2) points of the scans that arrived in this cycle, as the robot
+            places them.
     """
 
     t_s: float
@@ -48,6 +52,7 @@ class CrossingFrame:
     command: tuple[float, float]
     margins_m: tuple[float, ...]
     separations_m: tuple[float, ...] = ()
+    scan_points_odom_m: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
 
     __repr__ = short_repr
 
@@ -68,7 +73,8 @@ class CrossingResult:
         seed: seed of the episode.
         policy: name of the policy.
         planner: name of the planner's class.
-        perception: ``"truth"``, ``"keypoints"``, ``"pixels"`` or ``"oracle"``.
+        perception: ``"truth"``, ``"keypoints"``, ``"pixels"``, ``"keypoints+scanner"``,
+            ``"pixels+scanner"``, ``"scanner"`` or ``"oracle"``.
         success: the goal was reached, and the robot hit nobody by its own motion.
         contact: robot and a person touched.
         contact_by: ``"robot"`` if the robot moved into a person in any contact, ``"person"`` if

@@ -20,6 +20,7 @@ from ..actors.behaviour import PersonSpec, WorkerScript
 from ..world.camera import CameraTiming, SensorConfig
 from ..world.errors import SimError
 from ..world.hall import LAYOUTS, WarehouseLayout
+from ..world.scanner import DIAGONAL_SCANNERS, ScannerSpec
 from ._distributions import error_text
 from ._files import parse_yaml, read_file, require_version, shipped_text
 from ._parameters import find_parameters, with_numbers
@@ -160,6 +161,7 @@ class Scenario(StrictConfig):
         layout: the hall, a name of :data:`LAYOUTS` or a mapping of :class:`WarehouseLayout`.
         robot: the robot's task.
         camera: the robot's camera.
+        scanners: the robot's laser scanners; they are used where a crossing asks for them.
         workers: scripted people, who move the same whatever the robot does.
         people: people who look, react and walk by themselves; names are unique.
         replay_csv: table of recorded people to replay, see :func:`read_recordings`; relative
@@ -179,6 +181,7 @@ class Scenario(StrictConfig):
     layout: Annotated[WarehouseLayout, BeforeValidator(_layout)] = WarehouseLayout.crossing()
     robot: RobotTask
     camera: CameraSpec = CameraSpec()
+    scanners: tuple[ScannerSpec, ...] = DIAGONAL_SCANNERS
     workers: tuple[WorkerScript, ...] = ()
     people: tuple[PersonSpec, ...] = ()
     replay_csv: str | None = None

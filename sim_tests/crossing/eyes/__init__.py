@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from ._eyes import NOBODY, Eyes, Sighting, SurroundEyes, TimedEyes, WorkerObservations
 from ._keypoint_camera import KeypointCamera, KeypointNoise
-from ._make_eyes import ORACLE, PerceptionKind, make_eyes
+from ._make_eyes import make_eyes
 from ._map_view import MapView
 from ._pixel_eyes import PIXEL_RATE_HZ, PixelEyes, match_to_workers, pixel_timing
+from ._scanner_eyes import ScanChange, ScannerEyes, known_motion, scanner_sensors
+from ._sensors import ORACLE, Perception, PerceptionKind, SensorSet
 from ._true_eyes import TrueEyes
 
 __all__ = [
@@ -17,14 +19,20 @@ __all__ = [
     "KeypointCamera",
     "KeypointNoise",
     "MapView",
+    "Perception",
     "PerceptionKind",
     "PixelEyes",
+    "ScanChange",
+    "ScannerEyes",
+    "SensorSet",
     "Sighting",
     "SurroundEyes",
     "TimedEyes",
     "TrueEyes",
     "WorkerObservations",
+    "known_motion",
     "make_eyes",
     "match_to_workers",
     "pixel_timing",
+    "scanner_sensors",
 ]

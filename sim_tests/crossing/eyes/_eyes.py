@@ -84,17 +84,21 @@ def _in_view(truth: TrueView, view: FlatView) -> TrueView:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sighting:
-    """The observations of one image, as they arrive at the robot.
+    """The observations of one image or scan, as they arrive at the robot.
 
     Attributes:
-        stamp_s: time of the image.
-        T_odom_camera: (4, 4) pose of the camera at that time, as the robot knows it.
+        stamp_s: time of the image or scan.
+        T_odom_camera: (4, 4) pose of the camera or scanner then, as the robot knows it.
         observations: observations of people, each with the index of its worker.
+        sensor: the tracker's name of the sensor.
+        points_odom_m: (N, 2) points of a scan; None for an image.
     """
 
     stamp_s: float
     T_odom_camera: FloatArray
     observations: WorkerObservations
+    sensor: str = "camera"
+    points_odom_m: FloatArray | None = None
 
 
 class TimedEyes:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final, Literal, get_args
+from typing import get_args
 
 import numpy as np
 
@@ -19,11 +19,8 @@ from ._keypoint_camera import KeypointNoise
 from ._keypoint_eyes import KeypointEyes
 from ._map_view import MapView
 from ._pixel_eyes import PixelEyes
+from ._sensors import ORACLE, PerceptionKind
 from ._true_eyes import TrueEyes
-
-PerceptionKind = Literal["truth", "keypoints", "pixels"]
-#: One more, for comparison: the truth about everybody who is not hidden by a rack, all around.
-ORACLE: Final = "oracle"
 
 
 def make_eyes(

@@ -1,0 +1,194 @@
+"""The robot's senses in one crossing: camera, scanners and odometry with their faults, tracker."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from nav_adapter import AwarenessPolicy, RobotState
+from perception import AttentionCone, AwarenessPipeline, Camera
+from perception.arrays import FloatArray
+from perception.laser import RobotMotion
+from tracking import CameraView, PersonTrack, PersonTracker, SurroundView, TrackerConfig
+
+from ..world.camera import CameraTiming
+from ._stage import Stage, TrueView
+from .eyes import (
+    ORACLE,
+    KeypointNoise,
+    MapView,
+    Perception,
+    ScannerEyes,
+    Sighting,
+    TimedEyes,
+    WorkerObservations,
+    known_motion,
+    make_eyes,
+    pixel_timing,
+    scanner_sensors,
+)
+from .faults import Fault, FaultInjection, FaultyEyes
+
+# Age of perception before the first image has arrived: older than any policy accepts.
+_NEVER_S: Final = 1.0e6
+# An image without a person is no evidence about people farther away than this.
+_DETECTION_RANGE_M: Final = 10.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sensed:
+    """What the robot knows in one control cycle.
+
+    Attributes:
+        state: its own state.
+        tracks: tracks of the people.
+        stamp_s: stamp of the newest image or scan that has arrived.
+        observed: observations of the newest image if it arrived in this cycle, else none.
+        scan_points_odom_m: (N, 2) points of the scans that arrived in this cycle.
+    """
+
+    state: RobotState
+    tracks: tuple[PersonTrack, ...]
+    stamp_s: float
+    observed: WorkerObservations
+    scan_points_odom_m: FloatArray
+
+
+class Sensing:
+    """Camera, scanners, odometry and tracker of a robot on a stage.
+
+    Args:
+        stage: the stage of the crossing.
+        perception: how it perceives people.
+        policy: has the settings of the awareness filter.
+        cone: attention cone.
+        seed: of the episode.
+        noise: noise of the keypoint camera.
+        camera_rng: random generator of the camera's noise.
+        timing_rng: random generator of its losses and delays.
+        pipeline: pipeline for pixels; None for the shipped networks.
+        fault: a fault of the sensors; None for none.
+    """
+
+    def __init__(
+        self,
+        stage: Stage,
+        perception: Perception,
+        policy: AwarenessPolicy,
+        cone: AttentionCone,
+        seed: int,
+        *,
+        noise: KeypointNoise,
+        camera_rng: np.random.Generator,
+        timing_rng: np.random.Generator,
+        pipeline: AwarenessPipeline | None = None,
+        fault: Fault | None = None,
+    ) -> None:
+        self._stage = stage
+        injection = FaultInjection(fault, seed)
+        model, timing = _camera_and_timing(stage, perception.kind)
+        self._camera: FaultyEyes | None = None
+        if perception.kind:
+            eyes = make_eyes(
+                perception.kind,
+                stage,
+                model,
+                cone,
+                noise,
+                camera_rng,
+                pipeline,
+                injection.T_camera_assumed,
+            )
+            self._camera = injection.eyes(TimedEyes(eyes, timing, timing_rng), model)
+        self._odometry = injection.odometry()
+        self._scanners: ScannerEyes | None = None
+        if perception.has_scanners:
+            self._scanners = ScannerEyes(
+                stage.warehouse, stage.scenario.scanners, stage.amr.profile.footprint_m, seed
+            )
+        self._tracker = _make_tracker(perception, policy, stage, model)
+        self._newest_s: dict[str, float] = {}
+
+    def step(self, t_s: float, truth: tuple[TrueView, ...]) -> Sensed:
+        """Take the images and scans that are due; return what the robot knows then.
+
+        Args:
+            t_s: time; grows from call to call.
+            truth: the truth about each person.
+        """
+        amr = self._stage.amr
+        T_odom_camera, state = amr.T_odom_camera, amr.state(t_s)
+        known = self._odometry.update(state, T_odom_camera)
+        sightings: tuple[Sighting, ...] = ()
+        if self._scanners is not None:
+            velocity = np.array([state.speed_mps, 0.0])
+            motion = RobotMotion(t_s, amr.T_odom_base, velocity, state.yaw_rate_radps)
+            sightings = self._scanners.look(t_s, motion, known_motion(known.state))
+        if self._camera is not None:
+            sightings += self._camera.look(t_s, T_odom_camera, known.T_odom_camera, truth)
+        observed: WorkerObservations = ()
+        tracks: tuple[PersonTrack, ...] = ()
+        for sighting in sightings:
+            if not self._is_new(sighting):
+                continue
+            tracks = self._tracker.update(
+                tuple(observation for observation, _ in sighting.observations),
+                sighting.stamp_s,
+                sighting.T_odom_camera,
+                sensor=sighting.sensor,
+            )
+            if sighting.stamp_s > self._newest_s.get(sighting.sensor, -_NEVER_S):
+                self._newest_s[sighting.sensor] = sighting.stamp_s
+                if sighting.points_odom_m is None:
+                    observed = sighting.observations
+        newest_s = max(self._newest_s.values(), default=-_NEVER_S)
+        if self._tracker.last_stamp_s != t_s or not tracks:
+            tracks = self._tracker.predict(t_s)
+        points = [each.points_odom_m for each in sightings if each.points_odom_m is not None]
+        return Sensed(
+            known.state,
+            tracks,
+            newest_s,
+            observed,
+            np.concatenate(points) if points else np.zeros((0, 2)),
+        )
+
+    def _is_new(self, sighting: Sighting) -> bool:
+        """Return whether the tracker takes a sighting.
+
+        The same image again is no new evidence, and the tracker cannot go back to one too old.
+        """
+        if sighting.stamp_s == self._newest_s.get(sighting.sensor):
+            return False
+        newest_s = max(self._newest_s.values(), default=-_NEVER_S)
+        return newest_s - sighting.stamp_s <= self._tracker.config.max_lag_s
+
+
+def _camera_and_timing(stage: Stage, kind: str) -> tuple[Camera, CameraTiming]:
+    spec = stage.scenario.camera
+    if kind == "pixels":
+        return spec.camera(spec.picture_scale), pixel_timing(spec.timing)
+    return spec.camera(), spec.timing
+
+
+def _make_tracker(
+    perception: Perception, policy: AwarenessPolicy, stage: Stage, camera: Camera
+) -> PersonTracker:
+    config = TrackerConfig(awareness=policy.filter)
+    if perception.kind == "truth":  # no limits of range or field of view
+        return PersonTracker(config)
+    if perception.kind == ORACLE:
+        return PersonTracker(config, view=MapView.of(stage.warehouse))
+    views = stage.scenario.camera.flat_views(camera)
+    flat = CameraView(camera, max_range_m=_DETECTION_RANGE_M)
+    view = SurroundView((flat,) * len(views), tuple(each.rotation_camera_view for each in views))
+    sensors = None
+    if perception.has_scanners:
+        sensors = scanner_sensors(stage.warehouse, stage.scenario.scanners)
+    return PersonTracker(
+        config,
+        view=MapView.of(stage.warehouse, flat if len(views) == 1 else view),
+        sensors=sensors,
+    )

@@ -1,0 +1,204 @@
+"""The laser scanners of a robot in a crossing: simulated scans, and the people found in them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from nav_adapter import RobotState
+from perception import PersonObservation
+from perception.arrays import FloatArray
+from perception.laser import (
+    LaserScan,
+    LegDetector,
+    PersonCandidate,
+    RobotMotion,
+    Scanner,
+    StaticMap,
+    scan_points,
+)
+from tracking import ScannerView, SensorConfig
+
+from ...world import Warehouse
+from ...world.camera import FrameClock, FrameQueue
+from ...world.scanner import ScannerSpec, ScanScene, SimulatedScanner
+from ._eyes import NOBODY, Sighting
+from ._map_view import MapView
+
+#: A change of a scan on its way to the robot: the scan, its time of arrival and its scanner's
+#: number give the scan that arrives and its time; None for no scan.
+ScanChange = Callable[[LaserScan, float, int], tuple[LaserScan, float] | None]
+
+# Random streams of scanners are separate from all others of an episode.
+_STREAM: Final = 0x5CA7
+# People farther away are not recognised in scans.
+_RANGE_M: Final = 8.0
+_MAP_RESOLUTION_M: Final = 0.05
+# A scan shows legs; the tracker wants the chest. Its height does not matter on the floor plane.
+_CHEST_HEIGHT_M: Final = 1.3
+_CHEST_HEIGHT_STD_M: Final = 0.2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Taken:
+    """A scan on its way: its scanner, and the robot's motion as known when it was taken."""
+
+    scan: LaserScan
+    number: int
+    known: RobotMotion
+
+
+class ScannerEyes:
+    """The scanners of a robot, and its leg detector. Each scanner is a sensor of its own.
+
+    Args:
+        warehouse: what the scanners see; the robot knows the boxes of its hall.
+        specs: the scanners.
+        body_base_m: (M, 2) outline of the robot in the base frame.
+        seed: of the episode.
+        mountings: the mountings as the robot assumes them; None for the true ones.
+        change: a fault of the scans; None for none.
+    """
+
+    def __init__(
+        self,
+        warehouse: Warehouse,
+        specs: Sequence[ScannerSpec],
+        body_base_m: FloatArray,
+        seed: int,
+        *,
+        mountings: Sequence[Scanner] | None = None,
+        change: ScanChange | None = None,
+    ) -> None:
+        scene = ScanScene(warehouse.layout, warehouse.variant, warehouse.actors)
+        generators = np.random.default_rng([_STREAM, seed]).spawn(2 * len(specs))
+        self._scanners = [
+            SimulatedScanner(scene, spec, rng)
+            for spec, rng in zip(specs, generators[::2], strict=True)
+        ]
+        self._clocks = [
+            FrameClock(spec.timing, rng) for spec, rng in zip(specs, generators[1::2], strict=True)
+        ]
+        self._mountings = (
+            [spec.scanner(body_base_m) for spec in specs] if mountings is None else list(mountings)
+        )
+        self._change = change
+        self._queue: FrameQueue[_Taken] = FrameQueue()
+        self._detector = LegDetector(static_map=map_of(warehouse))
+        self._latest_s = [-math.inf] * len(specs)
+
+    def look(self, now_s: float, motion: RobotMotion, known: RobotMotion) -> tuple[Sighting, ...]:
+        """Take the scans that are due; return those that have arrived by now, in order of arrival.
+
+        Args:
+            now_s: time; grows from call to call.
+            motion: true motion of the robot now.
+            known: the same as the robot knows it.
+        """
+        for number, (clock, scanner) in enumerate(zip(self._clocks, self._scanners, strict=True)):
+            due, delivery_s = clock.tick(now_s)
+            if not due:
+                continue
+            scan = scanner.scan(motion)
+            if delivery_s is None:
+                continue
+            if self._change is not None:
+                changed = self._change(scan, delivery_s, number)
+                if changed is None:
+                    continue
+                scan, delivery_s = changed
+            self._queue.put(now_s, delivery_s, _Taken(scan, number, known))
+        return tuple(
+            self._sighting(taken) for taken in self._queue.take(now_s) if self._is_new(taken)
+        )
+
+    def _is_new(self, taken: _Taken) -> bool:
+        """Return whether a scan is later than those before it; the detector needs their order."""
+        if taken.scan.end_s <= self._latest_s[taken.number]:
+            return False
+        self._latest_s[taken.number] = taken.scan.end_s
+        return True
+
+    def _sighting(self, taken: _Taken) -> Sighting:
+        mounting = self._mountings[taken.number]
+        points = scan_points(taken.scan, mounting, taken.known)
+        found = self._detector.detect(points, taken.number)
+        T_odom_scanner = taken.known.T_odom_base @ mounting.T_base_scanner
+        return Sighting(
+            points.stamp_s,
+            T_odom_scanner,
+            tuple((each, NOBODY) for each in _observations(found, T_odom_scanner)),
+            sensor=sensor_name(taken.number),
+            points_odom_m=points.points_odom_m[points.usable, :2],
+        )
+
+
+def sensor_name(number: int) -> str:
+    """Return the tracker's name of a scanner, counted from 0."""
+    return f"scanner_{number + 1}"
+
+
+def scanner_sensors(warehouse: Warehouse, specs: Iterable[ScannerSpec]) -> dict[str, SensorConfig]:
+    """Return the scanners as sensors of a tracker whose robot knows the racks of its hall."""
+    sensors = {}
+    for number, spec in enumerate(specs):
+        low, high = np.radians(spec.field_of_view_deg).tolist()
+        # The view is symmetrical about the scanner's x axis.
+        field_rad = math.tau if high - low >= math.tau else max(2.0 * min(-low, high), 1e-3)
+        view = ScannerView(max_range_m=min(_RANGE_M, spec.range_max_m), field_rad=field_rad)
+        sensors[sensor_name(number)] = SensorConfig(view=MapView.of(warehouse, view))
+    return sensors
+
+
+def known_motion(state: RobotState) -> RobotMotion:
+    """Return the motion of a robot whose state is known."""
+    cos, sin = math.cos(state.heading_odom_rad), math.sin(state.heading_odom_rad)
+    T = np.eye(4)
+    T[:2, :2] = [[cos, -sin], [sin, cos]]
+    T[:2, 3] = state.position_odom_m
+    velocity = np.array([state.speed_mps, state.lateral_mps])
+    return RobotMotion(state.stamp_s, T, velocity, state.yaw_rate_radps)
+
+
+def map_of(warehouse: Warehouse) -> StaticMap:
+    """Return the map of a robot that knows the boxes of its hall."""
+    boxes = warehouse.obstacle_boxes_odom
+    low = boxes[:, :2].min(axis=0) - 1.0
+    columns, rows = (
+        np.ceil((boxes[:, 2:].max(axis=0) + 1.0 - low) / _MAP_RESOLUTION_M).astype(int).tolist()
+    )
+    occupied = np.zeros((rows, columns), dtype=bool)
+    for box in boxes:
+        first = np.floor((box[:2] - low) / _MAP_RESOLUTION_M).astype(int)
+        last = np.ceil((box[2:] - low) / _MAP_RESOLUTION_M).astype(int)
+        occupied[first[1] : last[1], first[0] : last[0]] = True
+    return StaticMap(occupied, low, _MAP_RESOLUTION_M)
+
+
+def _observations(
+    candidates: Iterable[PersonCandidate], T_odom_scanner: FloatArray
+) -> list[PersonObservation]:
+    """Return the candidates as observations in the scanner's frame; they have no awareness."""
+    rotation, origin = T_odom_scanner[:3, :3], T_odom_scanner[:3, 3]
+    observations = []
+    for each in candidates:
+        place = np.append(each.position_odom_m, _CHEST_HEIGHT_M)
+        covariance = np.diag([0.0, 0.0, _CHEST_HEIGHT_STD_M**2])
+        covariance[:2, :2] = each.covariance_m2
+        turned = rotation.T @ covariance @ rotation
+        observations.append(
+            PersonObservation(
+                stamp_s=each.stamp_s,
+                position_camera_m=(place - origin) @ rotation,
+                position_covariance_m2=0.5 * (turned + turned.T),
+                gaze_camera=None,
+                awareness=None,
+                awareness_std=None,
+                score=each.score,
+            )
+        )
+    return observations
