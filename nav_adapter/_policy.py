@@ -21,6 +21,7 @@ from .policies import (
     InflationPolicy,
     InterpolatedHumanSpeed,
     InterpolatedInflation,
+    NoticedPeople,
     ObstacleOutline,
     SafetyMargins,
     SpeedPolicy,
@@ -85,6 +86,8 @@ class AwarenessPolicy(StrictConfig):
             sets one.
         outline: the part of the obstacles' polygons beyond their circles; by default nothing.
         rules: assumed turns, and speed limits besides speed and separation.
+        noticed: what it counts that a person noticed the robot some seconds ago, or None for
+            nothing. It needs ``filter.noticed_memory_s`` and a laser scanner.
         alerts: rules for alerts, or None.
         margins: distances that hold for every α.
         timing: how fast obstacles may shrink and how long data may be trusted.
@@ -102,6 +105,7 @@ class AwarenessPolicy(StrictConfig):
     )
     outline: ObstacleOutline = ObstacleOutline()
     rules: SpeedRules = SpeedRules()
+    noticed: NoticedPeople | None = None
     alerts: AlertRules | None = AlertRules()
     margins: SafetyMargins = SafetyMargins()
     timing: TimeBehaviour = TimeBehaviour()
