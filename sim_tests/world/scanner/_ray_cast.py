@@ -53,25 +53,31 @@ def cast_rays(
     if not len(segments_m):
         return RayHits(ranges, hits)
     centre = 0.5 * (origins_m.min(axis=0) + origins_m.max(axis=0))
-    first, last, step = _rays_within(
-        segments_m - centre, angle_min_rad, angle_increment_rad, origins_m - centre, turns_rad
+    segments_m, origins_m = segments_m - centre, origins_m - centre
+    first, last, turn = _rays_within(
+        segments_m, angle_min_rad, angle_increment_rad, origins_m, turns_rad
     )
-    pairs = _pairs(first, last, count, step)
-    segment, ray = pairs
-    start = segments_m[segment, 0] - origins_m[ray]
-    along = segments_m[segment, 1] - segments_m[segment, 0]
+    segment, ray = _pairs(first, last, count, turn)
+    x, y = np.ascontiguousarray(segments_m[:, 0].T)
+    along_x, along_y = np.ascontiguousarray((segments_m[:, 1] - segments_m[:, 0]).T)
+    moment = x * along_y - y * along_x
     angles = angle_min_rad + angle_increment_rad * np.arange(count) + turns_rad
-    cos, sin = np.cos(angles)[ray], np.sin(angles)[ray]
-    across = cos * along[:, 1] - sin * along[:, 0]
-    parallel = across == 0.0
-    across = np.where(parallel, 1.0, across)
-    distance = (start[:, 0] * along[:, 1] - start[:, 1] * along[:, 0]) / across
-    share = (start[:, 0] * sin - start[:, 1] * cos) / across
-    met = ~parallel & (distance > 0.0) & (share >= -_SEAM) & (share <= 1.0 + _SEAM)
-    ray, segment, distance = ray[met], segment[met], distance[met]
+    cos, sin = np.cos(angles), np.sin(angles)
+    origin_x, origin_y = np.ascontiguousarray(origins_m.T)
+    aside = origin_x * sin - origin_y * cos
+    # For every pair: the ray's direction across the segment, the distance along the ray, and the
+    # share of the segment at which it is met.
+    along_x, along_y = along_x[segment], along_y[segment]
+    cos, sin = cos[ray], sin[ray]
+    across = cos * along_y - sin * along_x
+    across[across == 0.0] = np.nan  # a parallel ray meets nothing
+    share = (x[segment] * sin - y[segment] * cos - aside[ray]) / across
+    distance = (moment[segment] - (origin_x[ray] * along_y - origin_y[ray] * along_x)) / across
+    met = np.flatnonzero((distance > 0.0) & (np.abs(share - 0.5) <= 0.5 + _SEAM))
+    ray, distance = ray[met], distance[met]
     np.minimum.at(ranges, ray, distance)
-    nearest = distance == ranges[ray]
-    hits[ray[nearest]] = segment[nearest]
+    nearest = np.flatnonzero(distance == ranges[ray])
+    hits[ray[nearest]] = segment[met[nearest]]
     return RayHits(ranges, hits)
 
 

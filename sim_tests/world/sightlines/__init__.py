@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ._plane_cuts import cut_surfaces
 from ._sight_lines import Occluder, PlacedSurface, SightLines, scenery_triangles
 from ._triangles import TriangleSet
 
@@ -10,5 +11,6 @@ __all__ = [
     "PlacedSurface",
     "SightLines",
     "TriangleSet",
+    "cut_surfaces",
     "scenery_triangles",
 ]

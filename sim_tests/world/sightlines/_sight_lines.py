@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from perception.arrays import FloatArray
 
 from ..hall import WarehouseLayout, scenery
+from ._joined_sets import joined_sets
 from ._triangles import (
     CLUSTER,
     SIDES,
@@ -45,15 +46,6 @@ class PlacedSurface:
         """Return (K,) whether it lies between the eye (3,) and each of the points (K, 3)."""
         every_line = np.ones((1, len(ends_odom_m)), dtype=bool)
         return _blocked_by((self,), eye_odom_m, ends_odom_m, every_line)
-
-    def cut(self, normal_odom: FloatArray, offset_m: float) -> FloatArray:
-        """Return the segments (S, 2, 3) in odom in which the plane n · p = offset cuts it."""
-        rotations, origins = self.T_odom_piece[:, :3, :3], self.T_odom_piece[:, :3, 3]
-        normals = normal_odom @ rotations
-        offsets = (offset_m - origins @ normal_odom) / self.scale
-        segments, piece = self.triangles.cut(normals, offsets)
-        turned = (self.scale * segments) @ rotations[piece].transpose(0, 2, 1)
-        return np.asarray(turned + origins[piece, None])
 
 
 @runtime_checkable
@@ -138,7 +130,7 @@ def _blocked_by(
     """
     blocked = np.zeros(len(ends_odom_m), dtype=bool)
     sets = tuple(surface.triangles for surface in surfaces)
-    joined = _joined(sets)
+    joined = joined_sets(sets)
     poses = np.concatenate([surface.T_odom_piece for surface in surfaces])
     scales = np.repeat([surface.scale for surface in surfaces], joined.pieces)[:, None]
     # Most lines pass far from most pieces: only pairs that come near each other are tested.
@@ -179,45 +171,6 @@ def _blocked_by(
         begin, first = end, first + triangles.clusters
     blocked[line[pair[meet_triangles(edges, planes, eye[pair], along[pair])]]] = True
     return blocked
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _JoinedSets:
-    """The bounds of S sets of triangles, P pieces and C clusters, in common tables.
-
-    Attributes:
-        pieces: (S,) number of pieces of each set.
-        middles_m: (P, 3) centre of each piece's bounding sphere, in the piece's frame.
-        radii_m: (P,) its radius.
-        piece_boxes_m: (2, 3, P) bounding box of each piece.
-        starts: (P,) first cluster of each piece.
-        counts: (P,) number of its clusters.
-        boxes_m: (2, 3, C) bounding box of each cluster.
-    """
-
-    pieces: NDArray[np.int64]
-    middles_m: FloatArray
-    radii_m: FloatArray
-    piece_boxes_m: FloatArray
-    starts: NDArray[np.int64]
-    counts: NDArray[np.int64]
-    boxes_m: FloatArray
-
-
-@lru_cache(maxsize=128)  # the same few bodies are near each other for many frames
-def _joined(sets: tuple[TriangleSet, ...]) -> _JoinedSets:
-    piece_boxes = np.concatenate([triangles.piece_boxes_m for triangles in sets], axis=2)
-    counts = np.concatenate([triangles.counts for triangles in sets])
-    halves = 0.5 * (piece_boxes[1] - piece_boxes[0])
-    return _JoinedSets(
-        np.array([triangles.pieces for triangles in sets]),
-        (0.5 * (piece_boxes[0] + piece_boxes[1])).T,
-        np.sqrt((halves * halves).sum(axis=0)),
-        piece_boxes,
-        np.cumsum(counts) - counts,
-        counts,
-        np.concatenate([triangles.boxes_m for triangles in sets], axis=2),
-    )
 
 
 def _near(points_m: FloatArray, radii_m: FloatArray, along_m: FloatArray) -> NDArray[np.bool_]:

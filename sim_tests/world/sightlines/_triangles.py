@@ -45,7 +45,8 @@ class TriangleSet:
         piece_boxes_m: (2, 3, P) low and high corner of a box around each piece.
         edges: (C, 6, 48) Plücker coordinates of the first, second and third edges.
         planes: (C, 4, 16) planes of the triangles: −n and n · first corner.
-        corners_m: (C, 16, 3, 3) corners of the triangles; unused rows are 0.
+        corners_m: (C, 3, 3, 16) axis by axis and corner by corner, the corners of the triangles;
+            unused ones are 0.
     """
 
     def __init__(self, pieces: Sequence[Surface], *, together: bool = False) -> None:
@@ -70,7 +71,7 @@ class TriangleSet:
         packed = np.zeros((count, CLUSTER, 3, 3))
         for row, (_, part) in enumerate(clusters):
             packed[row, : len(part)] = part
-        self.corners_m = packed
+        self.corners_m = np.ascontiguousarray(packed.transpose(0, 3, 2, 1))
         first, second, third = packed[:, :, 0], packed[:, :, 1], packed[:, :, 2]
         self.edges = np.ascontiguousarray(
             np.concatenate(
@@ -92,38 +93,6 @@ class TriangleSet:
     def triangles(self) -> int:
         """The number of triangles."""
         return int(np.count_nonzero(self.planes[:, :3].any(axis=1)))
-
-    def cut(
-        self, normals: FloatArray, offsets_m: FloatArray
-    ) -> tuple[FloatArray, NDArray[np.int64]]:
-        """Return the segments (S, 2, 3) in which planes cut the triangles, and their pieces (S,).
-
-        Args:
-            normals: (P, 3) unit normal of the plane in the frame of every piece.
-            offsets_m: (P,) its distance from the piece's origin: n · p = offset.
-        """
-        normal, offset = normals[self._piece], offsets_m[self._piece]
-        middle = 0.5 * (self._boxes[:, 0] + self._boxes[:, 1])
-        half = 0.5 * (self._boxes[:, 1] - self._boxes[:, 0])
-        away = np.abs((middle * normal).sum(axis=1) - offset)
-        near = np.flatnonzero(away <= (half * np.abs(normal)).sum(axis=1))
-        corners = self.corners_m[near]
-        heights = (corners * normal[near, None, None]).sum(axis=3) - offset[near, None, None]
-        above = heights > 0.0
-        count = above.sum(axis=2)
-        cluster, triangle = np.nonzero((count == 1) | (count == 2))
-        heights, corners = heights[cluster, triangle], corners[cluster, triangle]
-        # One corner lies alone on its side of the plane; the plane cuts its two edges.
-        above = above[cluster, triangle]
-        alone = np.argmax(above == (count[cluster, triangle] == 1)[:, None], axis=1)
-        rows = np.arange(len(alone))
-        segments = np.empty((len(alone), 2, 3))
-        top, apex = heights[rows, alone], corners[rows, alone]
-        for end in (0, 1):
-            other = (alone + 1 + end) % 3
-            share = top / (top - heights[rows, other])
-            segments[:, end] = apex + share[:, None] * (corners[rows, other] - apex)
-        return segments, self._piece[near[cluster]]
 
     def blocks(self, eye_m: FloatArray, ends_m: FloatArray) -> NDArray[np.bool_]:
         """Return (K,) whether a triangle lies between the eye and each of K points.
