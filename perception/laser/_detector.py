@@ -20,10 +20,12 @@ from ._points import ScanPoints
 
 # A single cluster at least this wide is two legs that touch.
 _TWO_LEGS_M: Final = 0.24
-# A pair is preferred to a single leg of it with up to this much higher odds, as a logarithm.
-_PAIR_LOG_ODDS: Final = 1.5
-# Two people are not nearer to each other than this.
+# A pair is preferred to a single leg of it; its odds, as a logarithm, are raised by this.
+_PAIR_LOG_ODDS: Final = 10.0
+# Two people are not nearer to each other than this, and if one of them has one leg in view, than the
+# second.
 _APART_M: Final = 0.3
+_PART_APART_M: Final = 0.55
 # A person is far more likely where the floor was free before than where something always stood. The
 # classifier has seen single scans with people all around, so its odds are changed by these factors'
 # logarithms.
@@ -164,7 +166,7 @@ class LegDetector:
             always = np.where(narrow, _POST_LOG_ODDS, _ALWAYS_LOG_ODDS)
             always[seen] = 0.0
             judged[:, 0] = _with_memory(judged[:, 0], clusters, hypotheses, came, recent, always)
-        chosen, places = _chosen(hypotheses, judged, config.score_threshold)
+        chosen, places = _chosen(clusters, hypotheses, judged, config.score_threshold)
         candidates = [
             _candidate(points.stamp_s, clusters, hypotheses, judged[row], row, place)
             for row, place in zip(chosen, places, strict=True)
@@ -243,14 +245,14 @@ def _trolleys(
 
 
 def _chosen(
-    hypotheses: Hypotheses, judged: FloatArray, threshold: float
+    clusters: Clusters, hypotheses: Hypotheses, judged: FloatArray, threshold: float
 ) -> tuple[list[int], list[FloatArray]]:
     """Return the best hypotheses that do not contradict each other, and the people's places."""
     score = np.clip(judged[:, 0], 1e-6, 1.0 - 1e-6)
     likely = np.flatnonzero(score >= threshold)
     if not len(likely):
         return [], []
-    pair = hypotheses.second >= 0
+    pair, narrow = hypotheses.second >= 0, clusters.widths_m[hypotheses.first] < _TWO_LEGS_M
     odds = np.log(score / (1.0 - score)) + _PAIR_LOG_ODDS * pair
     order = likely[np.argsort(-odds[likely], kind="stable")]
     rays = hypotheses.rays
@@ -262,8 +264,11 @@ def _chosen(
         own = {int(hypotheses.first[row]), int(hypotheses.second[row])} - {-1}
         if own & used:
             continue
-        if any(np.hypot(*(places[row] - places[other])) < _APART_M for other in chosen):
-            used |= own  # the other leg of somebody found by one leg
+        # A narrow cluster beside somebody is a leg of theirs that was met in two parts.
+        part = not pair[row] and narrow[row]
+        apart_m = _PART_APART_M if part else _APART_M
+        if any(np.hypot(*(places[row] - places[other])) < apart_m for other in chosen):
+            used |= own
             continue
         chosen.append(row)
         used |= own
