@@ -41,8 +41,9 @@ _LOOKING_S: Final = 0.5 / math.log(2.0)
 _FORGETTING_S: Final = 3.0
 # A frame is a look if it is so certain, from 0 to 1, that α is at least a half: by 0.7 σ.
 _LOOK: Final = 0.5
-# A face looks away if α is below this by one standard deviation: more than 57° off the robot, with
-# the default cone. Somebody who passes the robot and looks ahead sees it from the corner of the eye.
+# A face looks away if α is at most this, and below a half by one standard deviation: with the
+# default cone it points more than 57° off the robot. A person who passes the robot and looks ahead
+# still has it in the corner of the eye.
 _AVERTED_AWARENESS: Final = 0.1
 _AVERTED_SIGMAS: Final = -1.0
 _AVERTED_LOGIT: Final = math.log(_AVERTED_AWARENESS / (1.0 - _AVERTED_AWARENESS))

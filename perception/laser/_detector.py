@@ -22,9 +22,9 @@ from ._points import ScanPoints
 _TWO_LEGS_M: Final = 0.24
 # A pair is preferred to a single leg of it; its odds, as a logarithm, are raised by this.
 _PAIR_LOG_ODDS: Final = 10.0
-# Two people are not nearer to each other than this, and if one of them has one leg in view, than the
-# second.
+# Two people are not nearer to each other than this.
 _APART_M: Final = 0.3
+# Nor than this, if of one of them no more than a leg is in view.
 _PART_APART_M: Final = 0.55
 # A person is far more likely where the floor was free before than where something always stood. The
 # classifier has seen single scans with people all around, so its odds are changed by these factors'
