@@ -9,7 +9,7 @@ look never lowers the belief.
 A look is no promise: people often look before they set off. So the belief is dropped, until there
 are new looks, by anything that makes it doubtful who this is or what they do:
 
-- a face that looks away, in more than one frame;
+- a face that looks away, in more than one frame, of somebody who does not walk away;
 - an ambiguous match, or a place that jumps;
 - a gap in what the other sensors see, once no look is recent;
 - somebody who stood since the last look and moves, or who comes faster towards the robot than on
@@ -49,6 +49,8 @@ _AVERTED_SIGMAS: Final = -1.0
 _AVERTED_LOGIT: Final = math.log(_AVERTED_AWARENESS / (1.0 - _AVERTED_AWARENESS))
 # One frame may be wrong about a face, and two are not both by chance.
 _AVERTED_S: Final = 0.09
+# Somebody walks away at this speed or faster.
+_RECEDING_MPS: Final = 0.3
 # Two scans in a row without the person, or as long a silence, are a gap.
 _GAP_PERIODS: Final = 2.5
 # How much faster towards the robot than before: 2.5 σ of a velocity from scans. Speed and
@@ -90,6 +92,9 @@ def with_noticed(
         return after
     looking = looks > 0.0
     dt_s = min(faces.dt_s(stamp), config.max_evidence_gap_s) if sees_faces else 0.0
+    towards = _towards(after, frame)
+    # Whoever walks away looks where they go, and has to turn round first.
+    averted &= (towards * after.states[:, 2:]).sum(axis=1) > -_RECEDING_MPS
     averted_s = np.where(looking, 0.0, after.averted_s + averted * dt_s)
     dropped = found.ambiguous | _jumped(before, after, frame, found) | (averted_s > _AVERTED_S)
     # After a gap nobody knows that it is the same person; a new look excuses motion alone.
@@ -99,7 +104,7 @@ def with_noticed(
     recent_s = np.where(looking, gap_s, grace)
     ended = stamp - after.look_stamps_s > config.noticed_memory_s
     ended |= _interrupted(before, after, stamp, recent_s, clocks, sensors)
-    ended |= _set_off(after, frame) & ~looking
+    ended |= _set_off(after, towards) & ~looking
     looked_s = np.where(dropped | ended, 0.0, after.looked_s)
     # What they do from the last look on.
     velocities = after.states[:, 2:]
@@ -214,14 +219,22 @@ def _interrupted(
     return np.asarray(old)
 
 
-def _set_off(tracks: TrackTable, frame: Frame) -> BoolArray:
-    """Return (N,) True for people who have begun to move, or come faster than before."""
+def _towards(tracks: TrackTable, frame: Frame) -> FloatArray:
+    """Return (N, 2) unit vectors from the people to the robot."""
     offset = frame.T_odom_camera[:2, 3] - tracks.states[:, :2]
     distance = np.maximum(np.hypot(offset[:, 0], offset[:, 1]), 1e-9)
+    return np.asarray(offset / distance[:, None])
+
+
+def _set_off(tracks: TrackTable, towards: FloatArray) -> BoolArray:
+    """Return (N,) True for people who have begun to move, or come faster than before.
+
+    ``towards`` (N, 2) are the unit vectors to the robot.
+    """
     velocity, before = tracks.states[:, 2:], tracks.look_velocities_mps
-    approach_mps = (offset * velocity).sum(axis=1) / distance
+    approach_mps = (towards * velocity).sum(axis=1)
     # On the same course the speed towards the robot changes while both move.
-    expected_mps = np.maximum((offset * before).sum(axis=1) / distance, 0.0)
+    expected_mps = np.maximum((towards * before).sum(axis=1), 0.0)
     slower = tracks.look_speeds_mps / np.maximum(np.hypot(before[:, 0], before[:, 1]), 1e-9)
     expected_mps *= np.minimum(slower, 1.0)
     faster = approach_mps > expected_mps + _FASTER_MPS
