@@ -84,7 +84,7 @@ def with_noticed(
         sensors: all sensors.
     """
     config = sensors.config.awareness
-    if config.noticed_memory_s <= 0.0 or not len(after):
+    if config.noticed_memory_s <= 0.0 or sensors.faces.all() or not len(after):
         return after
     stamp, sees_faces = frame.stamp_s, sensors.all[frame.sensor].settings.sees_faces
     looks, averted = _looks(after, frame, found, sensors)

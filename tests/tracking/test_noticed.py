@@ -135,8 +135,8 @@ def test_it_is_off_by_default_and_then_changes_nothing() -> None:
     assert with_memory[0].noticed > 0.5
 
 
-def test_without_another_sensor_it_ends_with_the_look() -> None:
-    scene = Scene(PersonTracker(REMEMBERS))
+def test_while_the_other_sensor_is_silent_it_ends_with_the_look() -> None:
+    scene = Scene()
     for tick in range(20):
         now = 0.1 * tick
         seen = seen_by_camera((3.0, 0.5), now, awareness=0.9 if tick < 12 else None)
@@ -144,6 +144,16 @@ def test_without_another_sensor_it_ends_with_the_look() -> None:
         if 8 < tick < 12:
             assert track.noticed > 0.5
     assert track.noticed == 0.0
+
+
+def test_a_camera_alone_has_no_memory() -> None:
+    tracker, plain = PersonTracker(REMEMBERS), PersonTracker()
+    for tick in range(20):
+        seen = seen_by_camera((3.0, 0.5), 0.1 * tick, awareness=0.9)
+        (track,) = tracker.update([seen], 0.1 * tick, camera_at())
+        (other,) = plain.update([seen], 0.1 * tick, camera_at())
+        assert track.noticed == 0.0
+        assert track.awareness_lower == other.awareness_lower
 
 
 def test_a_face_that_looks_away_ends_it_at_once() -> None:
@@ -372,7 +382,7 @@ def test_any_sequence_of_frames_gives_valid_tracks(frames) -> None:
 def test_after_a_pause_of_all_sensors_one_glance_is_one_glance(pause_s: float) -> None:
     """Nobody knows that it is the same person. The looks before the pause do not come back."""
     settings = AwarenessFilterConfig(noticed_memory_s=4.0)
-    tracker = PersonTracker(TrackerConfig(awareness=settings))
+    tracker = both(TrackerConfig(awareness=settings))
     for k in range(20):
         tracker.update([observe((3.0, 0.0), 0.1 * k, awareness=0.97)], 0.1 * k, camera_at())
     assert tracker.predict(1.95)[0].noticed > 0.8
