@@ -14,7 +14,16 @@ from types import FrameType
 from typing import Final, NoReturn
 
 from nav_adapter import NavError
-from nav_adapter.ros2 import PUBLISHED, READ, AwarenessBridge, Frames, RobotFile, Topic, renamed
+from nav_adapter.ros2 import (
+    PUBLISHED,
+    READ,
+    AwarenessBridge,
+    Frames,
+    RobotFile,
+    Topic,
+    renamed,
+    scanner_inputs,
+)
 from perception import AttentionCone, AwarenessPipeline, Camera, PersonDetector
 from perception.arrays import finite_number
 
@@ -26,6 +35,7 @@ from ._publisher import TopicPublisher
 
 # The last messages need so long to leave before the node is closed.
 _SEND_TIME_S: Final = 0.1
+_MOST_SCANNERS: Final = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,6 +54,9 @@ class BridgeOptions:
     compressed: bool
     camera_info: str
     camera: Path | None
+    no_camera: bool
+    scan: tuple[str, ...]
+    map: str | None
     odom: str
     odom_frame: str
     base_frame: str
@@ -65,7 +78,8 @@ def bridge_command(options: BridgeOptions) -> int:
     camera = None if options.camera is None else Camera.from_yaml(options.camera)
     published = _published_topics(options.topic, options.only)
     networks = choose_networks(options.detector, options.pose, options.head)
-    inputs = _inputs(options, with_info=camera is None, with_tf=robot.camera is None)
+    inputs = _inputs(options, robot)
+    scanners = scanner_inputs([topic.name for topic in inputs.scans], robot)
 
     from nav_adapter.ros2 import DdsNode, McapRecorder  # noqa: PLC0415 - needs the extra ros2
 
@@ -85,10 +99,12 @@ def bridge_command(options: BridgeOptions) -> int:
             viewer = RerunRecorder(options.rerun, pose_estimator, cone.half_angle_rad)
             stack.enter_context(viewer)
 
-        if SHIPPED in (options.detector, options.pose):
+        if SHIPPED in (options.detector, options.pose) and inputs.image is not None:
             _log("the shipped networks are made for the simulator; see --detector and --pose")
-        if camera is None:
-            _log(f"waiting for /{options.camera_info.strip('/')}")
+        if scanners:
+            _log("the shipped leg detector is made for simulated scans; see docs/laser.md")
+        if inputs.camera_info is not None:
+            _log(f"waiting for /{inputs.camera_info.name}")
         bridge = AwarenessBridge(
             policy,
             robot.profile(),
@@ -96,6 +112,8 @@ def bridge_command(options: BridgeOptions) -> int:
             frames=Frames(options.odom_frame, options.base_frame, options.camera_frame),
             T_base_camera=None if robot.camera is None else robot.camera.T_base_camera(),
             camera=camera,
+            with_camera=not options.no_camera,
+            scanners=scanners,
             percentage=options.percentage,
             warn=_log,
             wanted=publisher.wants,
@@ -103,9 +121,10 @@ def bridge_command(options: BridgeOptions) -> int:
         )
         loop = BridgeLoop(node, bridge, inputs, rate_hz, recorder=recorder, viewer=viewer)
         stack.callback(_close, loop)
+        read = [topic for topic in (inputs.image, *inputs.scans, inputs.odom) if topic is not None]
         _log(
-            f"domain {domain}: reading /{inputs.image.name} and /{inputs.odom.name}, publishing "
-            f"{', '.join('/' + topic.name for topic in published.values())}"
+            f"domain {domain}: reading {' and '.join('/' + topic.name for topic in read)}, "
+            f"publishing {', '.join('/' + topic.name for topic in published.values())}"
         )
         before = signal.signal(signal.SIGTERM, _interrupt)
         try:
@@ -181,14 +200,34 @@ def _published_topics(renames: Sequence[str], only: Sequence[str]) -> dict[str, 
     return {key: topic for key, topic in topics.items() if not only or key in only}
 
 
-def _inputs(options: BridgeOptions, *, with_info: bool, with_tf: bool) -> BridgeInputs:
+def _inputs(options: BridgeOptions, robot: RobotFile) -> BridgeInputs:
+    """Return the topics to read."""
+    scans = tuple(renamed(READ["scan"], name) for name in options.scan)
+    names = [topic.name for topic in scans]
+    if len(names) > _MOST_SCANNERS or len(set(names)) < len(names):
+        raise AwarenavError(
+            f"--scan must name up to {_MOST_SCANNERS} different topics, got {', '.join(names)}"
+        )
+    if options.no_camera and not scans:
+        raise AwarenavError("--no-camera needs a scanner: --scan TOPIC")
+    if options.no_camera and options.camera is not None:
+        raise AwarenavError("--no-camera and --camera exclude each other")
+    if options.map is not None and not scans:
+        raise AwarenavError("--map is for the scans: it needs --scan TOPIC")
     image = READ["compressed" if options.compressed else "image"]
+    with_info = options.camera is None and not options.no_camera
+    fixed = (options.no_camera or robot.camera is not None) and (
+        not scans or robot.scanners is not None
+    )
+    with_tf = not fixed or options.map is not None
     return BridgeInputs(
-        image=renamed(image, options.image),
+        image=None if options.no_camera else renamed(image, options.image),
         odom=renamed(READ["odom"], options.odom),
         camera_info=renamed(READ["camera_info"], options.camera_info) if with_info else None,
         tf=READ["tf"] if with_tf else None,
         tf_static=READ["tf_static"] if with_tf else None,
+        scans=scans,
+        map=None if options.map is None else renamed(READ["map"], options.map),
     )
 
 
