@@ -52,7 +52,7 @@ except ImportError:  # AwarenessNode says what is missing
 
 
 class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
-    """Reads camera, scanners and odometry, publishes the topics of :data:`~nav_adapter.ros2.PUBLISHED`.
+    """Reads camera, scanners and odometry; publishes :data:`~nav_adapter.ros2.PUBLISHED`.
 
     A topic whose message package is not installed (``people_msgs``, ``costmap_converter_msgs``,
     ``vision_msgs``) is left out with a warning; ``nav2_msgs`` is required.
