@@ -113,9 +113,10 @@ class AwarenessBridge:
         self._pose_reader = PoseReader(
             self._poses, self._clock, self.frames.odom, self._warn, with_map=bool(scanners)
         )
-        names = [each.name for each in scanners]
         self._watch = SensorWatch(
-            names, with_camera=with_camera, lost_after_s=policy.timing.stale_after_s
+            [each.name for each in scanners],
+            with_camera=with_camera,
+            lost_after_s=policy.timing.stale_after_s,
         )
         self._frames = self._perception_failures = 0
         # For all of the above but the perception, which is not held up by it.
@@ -123,8 +124,7 @@ class AwarenessBridge:
         # Keeps the messages of one publication together.
         self._sending = threading.Lock()
         self._scans: ScanReader | None = None
-        if scanners:
-            inputs = tuple(scanners)
+        if inputs := tuple(scanners):
             self._scans = ScanReader(
                 inputs,
                 ScanPerception(robot.footprint_m, inputs, make_detector),
@@ -239,12 +239,7 @@ class AwarenessBridge:
         return True
 
     def on_scan(self, number: int, message: LaserScan, now_s: float) -> bool:
-        """Process one scan; return True if it was used.
-
-        Args:
-            number: of the scanner, in the order of ``scanners``.
-            message: the scan.
-            now_s: the present time.
+        """Process one scan of a scanner, numbered from 0; return True if it was used.
 
         Raises:
             NavError: for a number that no scanner has.

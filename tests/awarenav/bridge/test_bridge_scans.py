@@ -136,6 +136,6 @@ def test_a_robot_file_with_a_wrong_scanner_is_refused(
 ) -> None:
     path = tmp_path / "robot.yaml"
     scanner = f"scanners:\n  - position_base_m: [0.3, 0.0, 0.2]\n    {bad}\n"
-    path.write_text(ROBOT.read_text() + scanner)
+    path.write_text(ROBOT.read_text().split("scanners:")[0] + scanner)
     assert main(["bridge", "--robot", str(path), "--scan", "scan"]) == 2
     assert bad.split(":", maxsplit=1)[0] in capsys.readouterr().err
