@@ -94,7 +94,7 @@ class BridgeLoop:
     ) -> None:
         """Run for ``seconds``, or until an exception; ``report`` gets a line every 2 s."""
         began = reported = due = time.monotonic()
-        frames_before = 0
+        before = 0
         while seconds is None or time.monotonic() - began < seconds:
             self._node.wait(min(due - time.monotonic(), _LONGEST_WAIT_S))
             self._take()
@@ -106,12 +106,18 @@ class BridgeLoop:
             now = time.monotonic()
             due = max(due + self._period_s, now)
             if now - reported >= _REPORT_PERIOD_S:
-                rate_hz = (self.frames - frames_before) / (now - reported)
+                total = self._processed
                 report(
-                    f"{rate_hz:4.1f} frames/s  {len(constraints.obstacles)} people  limit "
+                    f"{(total - before) / (now - reported):4.1f} frames/s  "
+                    f"{len(constraints.obstacles)} people  limit "
                     f"{constraints.speed_limit_mps:.2f} m/s ({constraints.limited_by})"
                 )
-                reported, frames_before = now, self.frames
+                reported, before = now, total
+
+    @property
+    def _processed(self) -> int:
+        """Number of images, or of scans if there is no camera."""
+        return self.frames if self._inputs.image is not None else self._bridge.counts["scans"]
 
     def close(self) -> bool:
         """End perception after the frames in hand; return False if that takes too long."""

@@ -18,6 +18,7 @@ _LOG: Final = "Recordings"
         "awarenav bridge --robot robot.yaml --detector yolox-tiny --pose rtmpose-m",
         "awarenav bridge --robot robot.yaml --scan scan_front --scan scan_rear",
         "awarenav bridge --robot robot.yaml --only speed_limit --record run.mcap",
+        "awarenav bridge --robot robot.yaml --scan scan --bag drive --record seen.mcap",
     ],
     exit_status={0: "Ended by Ctrl-C, SIGTERM or --seconds.", 2: "Bad input."},
     epilog="The environment variable CYCLONEDDS_URI chooses the network interface, as with "
@@ -96,6 +97,13 @@ _LOG: Final = "Recordings"
     group=_READ,
     metavar="TOPIC",
     help="nav_msgs/OccupancyGrid: what it holds is nobody's legs. Needs --scan.",
+)
+@option(
+    "--bag",
+    group=_READ,
+    type=FilePath(),
+    metavar="FILE",
+    help="Replay a recording (rosbag2 folder, .db3, .mcap, .bag) instead; nothing is published.",
 )
 @option("--odom", group=_READ, default="odom", metavar="TOPIC", help="nav_msgs/Odometry.")
 @option("--odom-frame", group=_READ, default="odom", metavar="FRAME", help="Fixed frame in tf.")
