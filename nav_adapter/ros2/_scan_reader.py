@@ -61,6 +61,8 @@ class ScanReader:
         self._last_s = [-math.inf] * len(inputs)
         self._warned_s = [-math.inf] * len(inputs)
         self._map: MapCells | None = None
+        # None until the first scan after a new map; each change is reported once.
+        self._map_used: bool | None = None
         self._read = self._refused = self._dropped = 0
 
     @property
@@ -113,7 +115,7 @@ class ScanReader:
         """
         cells = map_cells_of(message)
         with self._lock:
-            self._map = cells
+            self._map, self._map_used = cells, None
 
     def forget(self) -> None:
         """Forget the stamps of earlier scans."""
@@ -167,6 +169,11 @@ class ScanReader:
         try:
             T = self._poses.transforms.lookup(self._odom_frame, self._map.frame_id, stamp_s)
         except NavError as problem:
-            self._warn(f"the map is not used: {problem}")
+            if self._map_used is not False:
+                self._warn(f"the map is not used: {problem}")
+            self._map_used = False
             return None
+        if self._map_used is not True:
+            self._warn("the map is used")
+        self._map_used = True
         return self._map, T

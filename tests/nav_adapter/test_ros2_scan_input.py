@@ -215,6 +215,14 @@ def test_a_map_whose_place_is_unknown_is_not_used() -> None:
     assert len(nav.bridge.tracks) == 1
     assert len(nav.warnings) == 1
     assert "the map is not used: no transform between 'map' and 'odom'" in nav.warnings[0]
+    # Images in between do not repeat it; a place in tf does.
+    nav.bridge.refuse("something else")
+    nav.drive(START_S + 1.0, 0.2)
+    assert len(nav.warnings) == 2
+    move = TransformStamped(Header(frame_id="map"), "odom", Transform())
+    nav.bridge.on_transforms(TFMessage((move,)))
+    nav.drive(START_S + 1.2, 0.2)
+    assert nav.warnings[2:] == ["the map is used"]
 
 
 @settings(max_examples=40)
