@@ -91,6 +91,15 @@ class RobotMotion:
         position = np.column_stack((along * x - aside * y, aside * x + along * y)) * dt[:, None]
         return yaw, position
 
+    def pose_at(self, stamp_s: float) -> FloatArray:
+        """Return T_odom_base (4, 4) at another time, for example that of a scan's middle."""
+        yaw, position = self.poses_base(np.array([finite_number("stamp_s", stamp_s)]))
+        cos, sin = math.cos(yaw[0]), math.sin(yaw[0])
+        moved = np.eye(4)
+        moved[:2, :2] = [[cos, -sin], [sin, cos]]
+        moved[:2, 3] = position[0]
+        return np.asarray(self.T_odom_base @ moved)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScanPoints:
