@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal
@@ -28,7 +28,7 @@ from perception.laser import (
     merge_candidates,
     scan_points,
 )
-from sim_tests.actors.body import Worker
+from sim_tests.actors.body import SeatKind, Worker
 from sim_tests.actors.robot import Amr, AmrLook
 from sim_tests.crossing.eyes import KeypointCamera, KeypointNoise
 from sim_tests.world import Warehouse
@@ -59,6 +59,7 @@ class Case:
         position_m: (x, y) at the start; the robot starts at the origin and looks along x.
         heading_deg: of the body; −180 faces the robot.
         activity: of the body.
+        seat: under somebody seated.
         speed_mps: of a straight walk.
         drives: the robot drives along x at 1 m/s.
         duration_s: simulated time.
@@ -71,6 +72,7 @@ class Case:
     position_m: tuple[float, float]
     heading_deg: float
     activity: str = "none"
+    seat: SeatKind = "stool"
     speed_mps: float = 0.0
     drives: bool = False
     duration_s: float = 5.0
@@ -114,7 +116,7 @@ def encounter(
     rng = np.random.default_rng([case.seed, 21])
     layout = WarehouseLayout.open_floor()
     with Warehouse(layout) as warehouse:
-        worker = Worker(warehouse, case.stature_m, look=case.look)
+        worker = Worker(warehouse, case.stature_m, look=case.look, seat=case.seat)
         amr = Amr(warehouse)
         pose = [np.eye(4)]
         warehouse.add_actor(AmrLook(lambda: (pose[0], 0.0, 0.0)))
@@ -162,10 +164,11 @@ def encounter(
             yield Sample(t, start + walked * along, tracks, in_view)
 
 
-def cases(kind: Literal["child", "seated"]) -> Iterator[Case]:
-    """Yield the cases of the table."""
+def cases(kind: str) -> Iterator[Case]:
+    """Yield the cases of the table: a ``child``, somebody ``seated`` on a stool, or ``boxed``."""
     looks = ("jamila", "mateo", "linnea", "kofi", "ivan")
-    activity = "sitting" if kind == "seated" else "none"
+    seat: SeatKind = "box" if kind == "boxed" else "stool"
+    activity = "none" if kind == "child" else "sitting"
     number = 0
     for drives in (False, True):
         for distance in (1.5, 2.5, 3.5, 5.0):
@@ -180,6 +183,7 @@ def cases(kind: Literal["child", "seated"]) -> Iterator[Case]:
                     place,
                     heading,
                     activity,
+                    seat,
                     drives=drives,
                     duration_s=distance + 1.5 if drives else 4.0,
                     seed=number,
@@ -195,7 +199,15 @@ def cases(kind: Literal["child", "seated"]) -> Iterator[Case]:
             ):
                 name = f"child walking, robot {'driving' if drives else 'standing'}"
                 yield Case(
-                    name, 1.1, looks[number % 5], place, heading, "none", speed, drives, 4.0, number
+                    name,
+                    1.1,
+                    looks[number % 5],
+                    place,
+                    heading,
+                    speed_mps=speed,
+                    drives=drives,
+                    duration_s=4.0,
+                    seed=number,
                 )
                 number += 1
 
@@ -234,14 +246,15 @@ def _row(name: str, sensors: Sensors, samples: list[Sample]) -> str:
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.child_and_seated")
-    parser.add_argument("--kinds", nargs="*", default=["child", "seated"])
+    parser.add_argument("--kinds", nargs="*", default=["child", "seated", "boxed"])
     parser.add_argument("--sensors", nargs="*", default=["camera", "scanner", "both"])
     parser.add_argument("--network", type=Path, help="another network than the shipped one")
     parser.add_argument("--every", type=int, default=1, help="take every n-th case only")
     parser.add_argument("--verbose", action="store_true", help="a line for each case")
     chosen = parser.parse_args()
-    classifier: Callable[..., object] | None = None
-    classifier = None if chosen.network is None else OnnxLegClassifier(chosen.network)
+    classifier: LegClassifier | None = (
+        None if chosen.network is None else OnnxLegClassifier(chosen.network)
+    )
     print("| who | sensors | frames | one track | more | median, m | 95 %, m | within 0.2 m |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- |")
     for kind in chosen.kinds:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from perception.arrays import FloatArray
 from perception.laser import LaserScan, RobotMotion, Scanner, ScanPoints, scan_points
-from sim_tests.actors.body import Worker
+from sim_tests.actors.body import SeatKind, Worker
 from sim_tests.world import Warehouse, crosses_boxes
 from sim_tests.world.hall import LAYOUTS, PROP_PARTS, Prop, WarehouseLayout
 from sim_tests.world.scanner import ScannerSpec, ScanScene, SimulatedScanner
@@ -40,7 +40,8 @@ _ACTIVITIES: Final = ("none", "none", "none", "carry_box", "phone")
 # Shares of children and of people who sit, and how far ahead of themselves these need free floor.
 _CHILD_SHARE: Final = 0.15
 _CHILD_M: Final = (1.0, 1.4)
-_SEATED_SHARE: Final = 0.15
+_SEATED_SHARE: Final = 0.25
+_SEATS: Final[tuple[SeatKind, SeatKind]] = ("stool", "box")
 _SHANKS_AHEAD_M: Final = 0.4
 
 
@@ -130,7 +131,10 @@ def staged(
 ) -> Iterator[tuple[Warehouse, list[Worker], ScanScene]]:
     """Open a hall with workers of random statures, and the scene that scanners see."""
     with Warehouse(hall, variant=variant) as warehouse:
-        people = [Worker(warehouse, _stature_m(rng), look=look) for look in workers]
+        people = [
+            Worker(warehouse, _stature_m(rng), look=look, seat=_SEATS[int(rng.integers(2))])
+            for look in workers
+        ]
         yield warehouse, people, ScanScene(hall, variant, warehouse.actors)
 
 

@@ -14,7 +14,7 @@ from ._online_footsteps import OnlineFootsteps
 from ._planned_footsteps import plan_footsteps
 from ._pose import skin_points
 from ._postures import ACTIVITIES, BOX_SIZE_M, PHONE_SIZE_M, Activity, ActivityName
-from ._sitting import SEATED_EYE_HEIGHT_SHARE
+from ._sitting import SEATED_EYE_HEIGHT_SHARE, Seat, SeatKind
 from ._skeleton import MAX_STATURE_M, MIN_STATURE_M, skeleton
 from ._skin import WorkerSkin
 from ._worker import (
@@ -44,6 +44,8 @@ __all__ = [
     "Gait",
     "GaitPose",
     "OnlineFootsteps",
+    "Seat",
+    "SeatKind",
     "SkinMesh",
     "Worker",
     "WorkerAsset",

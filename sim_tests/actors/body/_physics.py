@@ -14,7 +14,7 @@ from ...world.bullet import pybullet
 from ._asset import JOINTS, PARENTS, Capsule
 from ._postures import BOX_SIZE_M, arm_postures
 from ._quaternions import IDENTITY, Quaternion, Vector, rotation_z, subtract
-from ._sitting import seat_size_m
+from ._sitting import Seat
 from ._skeleton import Skeleton
 
 _SPINE: Final = JOINTS.index("spine")
@@ -43,17 +43,18 @@ class WorkerBody:
     Args:
         warehouse: the world to stand in.
         skeleton: bones and capsules.
+        seat: what the person sits on when seated.
 
     Attributes:
         body: PyBullet's id of the multibody.
     """
 
-    def __init__(self, warehouse: Warehouse, skeleton: Skeleton) -> None:
+    def __init__(self, warehouse: Warehouse, skeleton: Skeleton, seat: Seat) -> None:
         self._client = warehouse.client
         self._hips_m = skeleton.hips_m
         # Made when it is first sat on.
         self._seat: SeatBody | None = None
-        self._make_seat = partial(SeatBody, warehouse, skeleton)
+        self._make_seat = partial(SeatBody, warehouse, seat.size_m)
         rows = (-1, *_LINKS)
         centres = {row: skeleton.joint_m(name) for row, name in enumerate(JOINTS)}
         centres |= {-1: skeleton.hips_m, _BOX: arm_postures(skeleton).box_m}
@@ -195,21 +196,21 @@ class WorkerBody:
 
 
 class SeatBody:
-    """The collision shape of the box that somebody sits on; a robot cannot move it.
+    """The collision shape of a seat, a box without legs; a robot cannot move it.
 
     Args:
         warehouse: the world to stand in.
-        skeleton: the body that it fits.
+        size_m: depth, width and height.
 
     Attributes:
         body: PyBullet's id.
     """
 
-    def __init__(self, warehouse: Warehouse, skeleton: Skeleton) -> None:
+    def __init__(self, warehouse: Warehouse, size_m: Vector) -> None:
         self._client = warehouse.client
         shape = pybullet.createCollisionShape(
             pybullet.GEOM_BOX,
-            halfExtents=[0.5 * side for side in seat_size_m(skeleton)],
+            halfExtents=[0.5 * side for side in size_m],
             physicsClientId=self._client,
         )
         self.body = int(

@@ -66,9 +66,10 @@ _ARMS_APART_RAD: Final = 0.025
 _ARMS_SWING_APART_RAD: Final = 0.04
 # A box is in the hands from this share of the way to it.
 _HELD_SHARE: Final = 0.98
-# Wrists on the thighs of a seated person: share of the thigh from the hip, height above its axis.
-_RESTING_SHARE: Final = 0.62
-_RESTING_ABOVE_M: Final = 0.11
+# Wrists on the thighs of a seated person: share of the thigh from the hip, and how much higher than
+# the radii of both: bones do not lie in the middle of a limb.
+_RESTING_SHARE: Final = 0.70
+_RESTING_ABOVE_M: Final = 0.066
 
 Arm = tuple[Quaternion, Quaternion, Quaternion]  # shoulder, elbow, wrist
 
@@ -233,11 +234,16 @@ def _resting_arm(bones: Skeleton, side: int) -> Arm:
     sign, size = SIGNS[side], bones.stature_m / _MEAN_STATURE_M
     hip = bones.joint_m(f"{SIDES[side]}_hip")
     thigh = math.hypot(*bones.legs[side].first_m)
-    wrist = add_scaled(hip, (_RESTING_SHARE * thigh, 0.2 * hip[1], _RESTING_ABOVE_M * size), 1.0)
+    radii = (
+        max(c.radius_m for c in bones.asset.capsules if JOINTS[c.joint] == f"{SIDES[side]}_{part}")
+        for part in ("hip", "wrist")
+    )
+    above = sum(radii) * bones.scale + _RESTING_ABOVE_M * size
+    wrist = add_scaled(hip, (_RESTING_SHARE * thigh, 0.2 * hip[1], above), 1.0)
     fingers = unit((math.cos(0.3), -sign * math.sin(0.3), -0.1))
     palm = unit(add_scaled((0.0, 0.0, -1.0), fingers, fingers[2]))
     turn = _hand_rotation(bones, side, (fingers, palm))
-    return _arm_to(bones, side, wrist, (0.0, -1.0, 0.4 * sign), turn)
+    return _arm_to(bones, side, wrist, (0.0, -1.0, -0.5 * sign), turn)
 
 
 def _reading_arm(bones: Skeleton) -> tuple[Arm, FloatArray]:

@@ -35,7 +35,7 @@ from ._quaternions import (
     rotation_z,
     subtract,
 )
-from ._sitting import seat_pose, seat_size_m, seated_pose
+from ._sitting import Seat, SeatKind, fitting_seat, seat_pose, seated_pose
 from ._skeleton import LEFT, RIGHT, SIDES, Skeleton, skeleton
 from ._skin import WorkerSkin
 
@@ -76,12 +76,14 @@ class Worker:
         stride_m: distance of a full gait cycle, see :class:`Gait`; None follows the speed.
         position_odom_m: (2,) first position; None waits outside the warehouse.
         heading_odom_rad: first heading.
+        seat: what the person sits on when seated.
 
     Attributes:
         body: PyBullet's id of the person.
         client: PyBullet's id of the world.
         skin: visual actor of the person.
         actor: number of the skin among the visual actors.
+        seat: what the person sits on when seated.
         held_object: visual actor of what the person holds or sits on.
         skeleton: the bones.
         gait: the gait.
@@ -99,6 +101,7 @@ class Worker:
         stride_m: float | None = None,
         position_odom_m: Any = None,
         heading_odom_rad: float = 0.0,
+        seat: SeatKind = "stool",
     ) -> None:
         if stature_m is None:
             stature_m = _DEFAULT_STATURE_M if look is None else load_worker(look).stature_m
@@ -120,7 +123,8 @@ class Worker:
         self._face = tuple(
             subtract(point, bones.joint_m(_NECK)) for point in (bones.nose_m, bones.eyes_m)
         )
-        self._body = WorkerBody(warehouse, bones)
+        self.seat: Seat = fitting_seat(bones, seat)
+        self._body = WorkerBody(warehouse, bones, self.seat)
         self.client: int = warehouse.client
         self.body: int = self._body.body
         self.place(position_odom_m, heading_odom_rad)
@@ -155,7 +159,7 @@ class Worker:
             eye_yaw_rad: of the eyes from the head, left positive, within ±35°.
             eye_pitch_rad: of the eyes from the head, up positive, within ±25°.
             activity: ``"none"``, ``"carry_box"``, ``"phone"``, or a change between two of them;
-                or ``"sitting"`` on a box, with the hips above the position.
+                or ``"sitting"`` on the seat, with the hips above the position.
             feet: gait pose in odom, as :func:`plan_footsteps` and :class:`OnlineFootsteps` give it;
                 None takes the straight walk of ``walked_m`` and ``speed_mps``. Unused while seated.
 
@@ -225,18 +229,13 @@ class Worker:
         if self.held is None:
             return None
         if self.held == "seat":
-            return seat_pose(self.skeleton, self._x_m, self._y_m, self._heading_rad)
+            return seat_pose(self.seat, self._x_m, self._y_m, self._heading_rad)
         links = self.links_odom
         if self.held == "phone":
             return np.asarray(links[1 + _RIGHT_WRIST] @ self._arms.T_hand_phone)
         T_thorax_box = np.eye(4)
         T_thorax_box[:3, 3] = self._arms.box_m
         return np.asarray(links[1] @ T_thorax_box)
-
-    @property
-    def seat_size_m(self) -> Vector:
-        """Depth, width and height of the box on which this person would sit."""
-        return seat_size_m(self.skeleton)
 
     @property
     def pose(self) -> BodyPose:
