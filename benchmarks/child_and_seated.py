@@ -25,6 +25,7 @@ from perception.laser import (
     OnnxLegClassifier,
     PersonCandidate,
     RobotMotion,
+    SeatedPeople,
     merge_candidates,
     scan_points,
 )
@@ -137,6 +138,7 @@ def encounter(
         heading = math.radians(case.heading_deg)
         start = np.array(case.position_m)
         along = np.array([math.cos(heading), math.sin(heading)])
+        seated = SeatedPeople()
         tracks: tuple[PersonTrack, ...] = ()
         in_view = False
         for tick in range(round(case.duration_s * _SCAN_HZ)):
@@ -151,11 +153,18 @@ def encounter(
             if sensors != "scanner" and tick % _SCANS_PER_IMAGE == 0:
                 T_odom_camera = pose[0] @ amr.T_base_camera
                 in_view = bool(eye.look(T_odom_camera, [worker]))
-                tracks = tracker.update(pipeline.process(image, t), t, T_odom_camera)
+                seen = pipeline.process(image, t)
+                seated.see(seen, T_odom_camera)
+                tracks = tracker.update(seen, t, T_odom_camera)
             if sensors != "camera":
                 motion = RobotMotion(t, pose[0], np.array([speed, 0.0]))
                 found = merge_candidates(
-                    detector.detect(scan_points(scanner.scan(motion), mounting, motion), number)
+                    seated.placed(
+                        detector.detect(
+                            scan_points(scanner.scan(motion), mounting, motion), number
+                        ),
+                        t,
+                    )
                     for number, (scanner, mounting) in enumerate(scanners)
                 )
                 tracks = tracker.update(

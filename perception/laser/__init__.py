@@ -9,7 +9,8 @@ The order of use, for every scan of every scanner::
     candidates = detector.detect(points)
 
 With several scanners each scan is detected with its own number, ``detector.detect(points, 1)``, and
-:func:`merge_candidates` reports every person once.
+:func:`merge_candidates` reports every person once. :class:`SeatedPeople` puts the candidates of
+people whom a camera saw sitting where their trunk is.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from ._merging import merge_candidates
 from ._points import RobotMotion, ScanPoints, scan_points
 from ._scan import LaserScan
 from ._scanner import Scanner
+from ._seated import SeatedPeople
 
 __all__ = [
     "CUTOUT",
@@ -41,6 +43,7 @@ __all__ = [
     "RobotMotion",
     "ScanPoints",
     "Scanner",
+    "SeatedPeople",
     "StaticMap",
     "clusters_of",
     "hypotheses_of",
