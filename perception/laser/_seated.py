@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any, Final
@@ -20,18 +21,22 @@ _ABOVE_M: Final = 1.0
 # Fewest images that show it, and the weight of the last one.
 _IMAGES: Final = 4
 _NEWEST: Final = 0.15
-# One person in two images, and a person's legs in two scans, are this near to each other.
+# One person in two images is this near to the same ray, and the legs of one person, of which a scan
+# may meet either, this near to each other.
 _SAME_M: Final = 0.35
+_LEGS_M: Final = 0.45
 # The assumed size is at most this much too large or too small.
 _RATIOS: Final = (0.85, 1.8)
-# Without images the posture holds for this long after the legs were met there last.
+# Without images the posture holds for this long after the legs were met last, where they were when
+# an image was at most this old.
 _REMEMBERED_S: Final = 2.0
+_RECENT_S: Final = 0.5
 # Everything that is met this near to the line from legs to trunk is the person or the seat.
 _BODY_M: Final = 0.35
 _STD_M: Final = 0.08
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class _Seated:
     """Somebody whom images show, from ankles to chest.
 
@@ -40,8 +45,10 @@ class _Seated:
         eye_m: (2,) place of the camera.
         ankles_m: (2,) place of the ankles by the camera.
         images: number of images.
-        stamp_s: time of the last image, or of the last scan that met the legs.
-        legs_m: (2,) place of the legs by the scanner; None until it met them.
+        image_s: time of the last image.
+        met_s: time of the last scan that met the legs.
+        legs_m: (2,) place of the legs by the scanner, in the last scan with a recent image; None
+            until it met them.
         ratio: by how much the camera puts them too far away.
     """
 
@@ -49,7 +56,8 @@ class _Seated:
     eye_m: FloatArray
     ankles_m: FloatArray
     images: int
-    stamp_s: float
+    image_s: float
+    met_s: float = -math.inf
     legs_m: FloatArray | None = None
     ratio: float = 1.0
 
@@ -68,6 +76,12 @@ class _Seated:
         across = abs(float(ray[0] * legs[1] - ray[1] * legs[0])) / far
         low, high = _RATIOS
         return far / near if across <= _SAME_M and low <= far / near <= high else None
+
+    def may_have(self, legs_m: FloatArray) -> bool:
+        """Return whether legs that a scan met may be this person's."""
+        if self.legs_m is None:
+            return self.ratio_to(legs_m) is not None
+        return bool(np.hypot(*(legs_m - self.legs_m)) <= _LEGS_M)
 
 
 class SeatedPeople:
@@ -92,6 +106,7 @@ class SeatedPeople:
             PerceptionError: for a pose that is no finite (4, 4) array.
         """
         T = finite_array("T_odom_camera", T_odom_camera, (4, 4))
+        others = list(self._people)
         for one in observations:
             if not isinstance(one, PersonObservation):
                 raise PerceptionError(
@@ -101,15 +116,16 @@ class SeatedPeople:
                 continue
             ankles = (T[:3, :3] @ one.legs_camera_m + T[:3, 3])[:2]
             offset = T[:3, :3] @ (one.position_camera_m - one.legs_camera_m)
-            known = self._known(ankles, T[:2, 3])
+            known = _nearest(others, ankles, T[:2, 3])
             if known is None:
                 self._people.append(_Seated(offset, T[:2, 3], ankles, 1, one.stamp_s))
                 continue
+            others.remove(known)
             weight = max(_NEWEST, 1.0 / (1.0 + known.images))
             known.offset_m = known.offset_m + weight * (offset - known.offset_m)
             known.eye_m, known.ankles_m = T[:2, 3], ankles
             known.images += 1
-            known.stamp_s = max(known.stamp_s, one.stamp_s)
+            known.image_s = max(known.image_s, one.stamp_s)
 
     def placed(
         self, candidates: Iterable[PersonCandidate], stamp_s: float
@@ -122,45 +138,46 @@ class SeatedPeople:
             candidates: of :meth:`LegDetector.detect`.
             stamp_s: time of the scan.
         """
-        self._people = [each for each in self._people if stamp_s - each.stamp_s <= _REMEMBERED_S]
+        self._people = [
+            each
+            for each in self._people
+            if stamp_s - max(each.image_s, each.met_s) <= _REMEMBERED_S
+        ]
         rest = list(candidates)
         found: list[PersonCandidate] = []
         for person in self._people:
             if not person.sits:
                 continue
-            own = [each for each in rest if _fits(person, each)]
+            own = [
+                (_order(person, each, each.legs_odom_m), number, each.legs_odom_m)
+                for number, each in enumerate(rest)
+                if each.legs_odom_m is not None and person.may_have(each.legs_odom_m)
+            ]
             if not own:
                 continue
-            best = min(own, key=lambda each: _order(person, each))
-            legs = best.legs_odom_m
-            assert legs is not None
-            person.ratio = person.ratio_to(legs) or person.ratio
-            person.legs_m, person.stamp_s = legs, max(person.stamp_s, stamp_s)
+            _, number, legs = min(own, key=lambda each: each[:2])
+            best = rest[number]
+            person.met_s = max(person.met_s, stamp_s)
+            if person.legs_m is None or stamp_s - person.image_s <= _RECENT_S:
+                person.ratio = person.ratio_to(legs) or person.ratio
+                person.legs_m = legs
             place = legs + person.offset_m[:2] / person.ratio
             rest = [each for each in rest if each is not best and not _between(each, legs, place)]
             found.append(replace(best, position_odom_m=place, covariance_m2=_STD_M**2 * np.eye(2)))
         return (*found, *rest)
 
-    def _known(self, ankles_m: FloatArray, eye_m: FloatArray) -> _Seated | None:
-        """Return whom a new image shows again."""
-        best, nearest = None, _SAME_M
-        for each in self._people:
-            ray, to = ankles_m - eye_m, each.ankles_m - eye_m
-            far = max(float(np.hypot(*ray)), 1e-6)
-            across = abs(float(ray[0] * to[1] - ray[1] * to[0])) / far
-            along = float(ray @ to) / far
-            if across < nearest and 0.6 * far < along < 1.6 * far:
-                best, nearest = each, across
-        return best
 
-
-def _fits(person: _Seated, candidate: PersonCandidate) -> bool:
-    legs = candidate.legs_odom_m
-    if legs is None:
-        return False
-    if person.legs_m is not None:
-        return bool(np.hypot(*(legs - person.legs_m)) <= _SAME_M)
-    return person.ratio_to(legs) is not None
+def _nearest(people: list[_Seated], ankles_m: FloatArray, eye_m: FloatArray) -> _Seated | None:
+    """Return who of these people has ankles on the ray of ankles in a new image."""
+    best, nearest = None, _SAME_M
+    for each in people:
+        ray, to = ankles_m - eye_m, each.ankles_m - eye_m
+        far = max(float(np.hypot(*ray)), 1e-6)
+        across = abs(float(ray[0] * to[1] - ray[1] * to[0])) / far
+        along = float(ray @ to) / far
+        if across < nearest and 0.6 * far < along < 1.6 * far:
+            best, nearest = each, across
+    return best
 
 
 def _between(candidate: PersonCandidate, legs_m: FloatArray, trunk_m: FloatArray) -> bool:
@@ -176,9 +193,8 @@ def _between(candidate: PersonCandidate, legs_m: FloatArray, trunk_m: FloatArray
     return False
 
 
-def _order(person: _Seated, candidate: PersonCandidate) -> tuple[bool, float]:
-    """Return the order of candidates: two legs first, then the nearest or the most certain."""
-    legs = candidate.legs_odom_m
-    if legs is None or person.legs_m is None:
+def _order(person: _Seated, candidate: PersonCandidate, legs_m: FloatArray) -> tuple[bool, float]:
+    """Return the order of candidates: two legs first, then the most certain or the nearest."""
+    if person.legs_m is None:
         return candidate.kind != "two_legs", -candidate.score
-    return candidate.kind != "two_legs", float(np.hypot(*(legs - person.legs_m)))
+    return candidate.kind != "two_legs", float(np.hypot(*(legs_m - person.legs_m)))
