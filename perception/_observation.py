@@ -36,6 +36,8 @@ class PersonObservation:
         awareness_std: standard deviation of α, ≥ 0; None if and only if ``awareness`` is None.
         score: confidence of the detection in [0, 1].
         box_xyxy_px: (4,) left, top, right, bottom in the image, or None without an image.
+        legs_camera_m: (3,) middle of the ankles, or of the knees if the feet are not in the image,
+            at the range of ``position_camera_m``; None if no leg was seen.
     """
 
     stamp_s: float
@@ -46,6 +48,7 @@ class PersonObservation:
     awareness_std: float | None
     score: float
     box_xyxy_px: FloatArray | None = None
+    legs_camera_m: FloatArray | None = None
 
     def __post_init__(self) -> None:
         if (self.awareness is None) != (self.awareness_std is None):
@@ -73,6 +76,9 @@ class PersonObservation:
             awareness_std=None if std is None else finite_number("awareness_std", std, minimum=0.0),
             score=finite_number("score", self.score, minimum=0.0, maximum=1.0),
             box_xyxy_px=None if box is None else finite_array("box_xyxy_px", box, (4,)),
+            legs_camera_m=None
+            if self.legs_camera_m is None
+            else finite_array("legs_camera_m", self.legs_camera_m, (3,)),
         )
 
     @staticmethod
@@ -141,7 +147,7 @@ class PersonObservation:
             boxes = _list(*_optional_rows("boxes_xyxy_px", boxes_xyxy_px, (count, 4)))
         made = tuple(map(object.__new__, [PersonObservation] * count))
         columns = ([stamp] * count, positions, covariances, gazes, alphas, stds, score.tolist())
-        for assign, column in zip(_SETTERS, (*columns, boxes), strict=True):
+        for assign, column in zip(_SETTERS, (*columns, boxes, [None] * count), strict=True):
             deque(map(assign, made, column), maxlen=0)
         return made
 

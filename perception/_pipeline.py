@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from . import layouts as kp
 from ._attention import AttentionCone
 from ._camera import Camera
 from ._floor import FloorPlane
@@ -19,8 +20,9 @@ from ._observation import PersonObservation
 from ._placement import place_people
 from ._pnp import PnpHeadPoseEstimator
 from ._protocols import HeadPoseEstimator, PersonDetector, PoseEstimator
-from .arrays import ImageRgb, finite_array, finite_number
+from .arrays import FloatArray, ImageRgb, finite_array, finite_number
 from .awareness import AwarenessEstimate, estimate_awareness
+from .body import BodyPlacement, place_bodies
 from .errors import PerceptionError
 from .evidence import judge_face
 from .networks import NETWORK_TIME, OnnxSettings
@@ -31,6 +33,12 @@ from .shipped import (
 )
 
 _CAMERA_CENTRE: Final = np.zeros((1, 3))
+# Hip of each leg, and the keypoints that tell where its shank is: the knee if the image ends above
+# the foot.
+_LEG_ROWS: Final = (
+    (kp.LEFT_HIP, kp.LEFT_ANKLE, kp.LEFT_KNEE),
+    (kp.RIGHT_HIP, kp.RIGHT_ANKLE, kp.RIGHT_KNEE),
+)
 #: Standard deviations of the eyes in the head, sideways and up and down: those of the simulated
 #: workers. Real people differ widely in how far they turn their eyes before they turn their head
 #: (Thumser and Stahl 2009, doi:10.1007/s00221-009-1803-8); replace them if you know better values.
@@ -184,6 +192,8 @@ class AwarenessPipeline:
         places = place_people(
             self.camera, detections, people, heads, floor, self._std_px, self._min_score
         )
+        # The same call as for the places, which is remembered.
+        bodies = place_bodies(self.camera, people, self._std_px, self._min_score)
         estimates = self._awareness(people, heads)
         observations = tuple(
             PersonObservation(
@@ -195,9 +205,10 @@ class AwarenessPipeline:
                 awareness_std=None if estimate is None else estimate.awareness_std,
                 score=detection.score,
                 box_xyxy_px=detection.box_xyxy_px,
+                legs_camera_m=_legs(person, body, place[0], self._min_score),
             )
-            for detection, place, head, estimate in zip(
-                detections, places, heads, estimates, strict=True
+            for detection, place, head, estimate, person, body in zip(
+                detections, places, heads, estimates, people, bodies, strict=True
             )
             if place is not None
         )
@@ -250,6 +261,29 @@ class AwarenessPipeline:
 def _check_count(name: str, got: int, wanted: int) -> None:
     if got != wanted:
         raise PerceptionError(f"{name} must return one result per person ({wanted}), got {got}")
+
+
+def _legs(
+    person: PersonKeypoints, body: BodyPlacement | None, position_m: FloatArray, min_score: float
+) -> FloatArray | None:
+    """Return the middle (3,) of the shanks, from the body moved along its ray to its place.
+
+    Each leg that is seen counts as far from the middle of the hips as its ankle, or its knee, is
+    from its own hip.
+    """
+    if body is None or not person.lifted:
+        return None
+    points = body.keypoints_camera_m
+    reaches = []
+    for hip, *rows in _LEG_ROWS:
+        seen = [row for row in rows if person.scores[row] >= min_score]
+        if seen:
+            reaches.append(points[seen[0]] - points[hip])
+    if not reaches:
+        return None
+    legs = body.hips_camera_m + np.mean(reaches, axis=0)
+    scale = float(np.linalg.norm(position_m) / np.linalg.norm(body.position_camera_m))
+    return np.asarray(scale * legs)
 
 
 def _checked_floor(floor: Any) -> FloorPlane | None:

@@ -11,6 +11,8 @@ The order of use, for every scan of every scanner::
 With several scanners each scan is detected with its own number, ``detector.detect(points, 1)``, and
 :func:`merge_candidates` reports every person once. :func:`observations_of` makes the observations
 that ``tracking.PersonTracker`` takes.
+:func:`merge_candidates` reports every person once. :class:`SeatedPeople` puts the candidates of
+people whom a camera saw sitting where their trunk is.
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ from ._observations import observations_of
 from ._points import RobotMotion, ScanPoints, scan_points
 from ._scan import LaserScan
 from ._scanner import Scanner
+from ._seated import SeatedPeople
 
 __all__ = [
     "CUTOUT",
@@ -43,6 +46,7 @@ __all__ = [
     "RobotMotion",
     "ScanPoints",
     "Scanner",
+    "SeatedPeople",
     "StaticMap",
     "clusters_of",
     "hypotheses_of",

@@ -60,6 +60,8 @@ _TROLLEY_APART_M: Final = 1.2
 # Somebody who pushes it stands beside or behind it, within this standard deviation.
 _TROLLEY_STD_M: Final = 0.5
 _SURELY_M: Final = 1e-3
+# The axis of a leg lies this far behind the middle of the points that were met.
+_LEG_RADIUS_M: Final = 0.045
 
 
 @dataclass(frozen=True, slots=True)
@@ -316,7 +318,8 @@ def _candidate(
     narrow = clusters.widths_m[hypotheses.first[row]] < _TWO_LEGS_M
     kind: CandidateKind = "one_leg" if single and narrow else "two_legs"
     score = float(np.clip(judged[0], 0.0, 1.0))
-    return PersonCandidate(stamp_s, place_m, 0.5 * (covariance + covariance.T), score, kind)
+    legs = hypotheses.centres_m[row] + _LEG_RADIUS_M * rays
+    return PersonCandidate(stamp_s, place_m, 0.5 * (covariance + covariance.T), score, kind, legs)
 
 
 def _trolley(stamp_s: float, clusters: Clusters, number: int) -> PersonCandidate:

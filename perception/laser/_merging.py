@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from ..arrays import finite_number
+from ..arrays import FloatArray, finite_number
 from ._candidate import CandidateKind, PersonCandidate
 
 # Candidates of two scanners this near are one person; each scanner sees another side of the legs.
@@ -70,4 +70,11 @@ def _fused(one: PersonCandidate, other: PersonCandidate) -> PersonCandidate:
         position_odom_m=np.asarray(mean, dtype=np.float64),
         covariance_m2=better.covariance_m2,
         kind=kind,
+        legs_odom_m=_middle(one.legs_odom_m, other.legs_odom_m),
     )
+
+
+def _middle(one: FloatArray | None, other: FloatArray | None) -> FloatArray | None:
+    if one is None or other is None:
+        return one if other is None else other
+    return np.asarray(0.5 * (one + other))

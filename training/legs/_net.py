@@ -17,7 +17,7 @@ from ._samples import Samples
 
 Weights = dict[str, NDArray[np.float64]]
 
-HIDDEN: Final = 64
+HIDDEN: Final = 80
 OUTPUTS: Final = 5
 # Limits of the logarithm of the standard deviations in metres.
 _LOG_STD: Final = (-4.5, -0.5)

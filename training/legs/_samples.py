@@ -15,6 +15,8 @@ from ._scenes import LabelledScan
 
 # A cluster belongs to a person who returned at least this share of its points.
 _SHARE: Final = 0.7
+# Somebody who sits may share the cluster with the seat, with at least this share of its points.
+_BESIDE_SEAT_SHARE: Final = 0.25
 
 
 class Samples(NamedTuple):
@@ -45,8 +47,11 @@ def samples_of(scans: Iterable[LabelledScan]) -> Samples:
         found = hypotheses_of(clusters, xy, points.ranges_m, increment)
         owner = np.full(len(clusters.starts), -1)
         for person in range(len(scan.people_m)):
-            share = clusters.sums((scan.person[clusters.rays] == person).astype(float))
-            owner[share >= _SHARE * clusters.counts] = person
+            met = scan.person[clusters.rays]
+            body = clusters.sums((met == person).astype(float))
+            seated = body + clusters.sums((met == -2 - person).astype(float))
+            enough = seated >= _SHARE * clusters.counts
+            owner[enough & (body >= _BESIDE_SEAT_SHARE * clusters.counts)] = person
         one = owner[found.first]
         other = np.where(found.second >= 0, owner[found.second], one)
         label = (one >= 0) & (one == other)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from perception.arrays import FloatArray
 from perception.laser import LaserScan, RobotMotion, Scanner, ScanPoints, scan_points
-from sim_tests.actors.body import Worker
+from sim_tests.actors.body import SeatKind, Worker
 from sim_tests.world import Warehouse, crosses_boxes
 from sim_tests.world.hall import LAYOUTS, PROP_PARTS, Prop, WarehouseLayout
 from sim_tests.world.scanner import ScannerSpec, ScanScene, SimulatedScanner
@@ -32,10 +32,17 @@ _TRIES: Final = 30
 _ROBOT_CLEARANCE_M: Final = 0.5
 _PERSON_CLEARANCE_M: Final = 0.28
 _PERSON_SPACING_M: Final = 0.55
+_MEAN_STATURE_M: Final = 1.72
 _RANGES_M: Final = (0.5, 8.5)
 # Share of the places behind something that are taken; there a part of the legs may show.
 _HIDDEN_SHARE: Final = 0.3
 _ACTIVITIES: Final = ("none", "none", "none", "carry_box", "phone")
+# Shares of children and of people who sit, and how far ahead of themselves these need free floor.
+_CHILD_SHARE: Final = 0.15
+_CHILD_M: Final = (1.0, 1.4)
+_SEATED_SHARE: Final = 0.25
+_SEATS: Final[tuple[SeatKind, SeatKind]] = ("stool", "box")
+_SHANKS_AHEAD_M: Final = 0.4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,7 +51,8 @@ class LabelledScan:
 
     Attributes:
         points: the scan.
-        person: (N,) number of the person that each ray met; −1 for everything else.
+        person: (N,) number k of the person that each ray met, −2 − k for the seat under that
+            person; −1 for everything else.
         people_m: (P, 2) positions of the people in odom.
         noise_m: standard deviation of the ranges.
     """
@@ -124,10 +132,17 @@ def staged(
     """Open a hall with workers of random statures, and the scene that scanners see."""
     with Warehouse(hall, variant=variant) as warehouse:
         people = [
-            Worker(warehouse, float(np.clip(rng.normal(1.72, 0.12), 1.42, 2.05)), look=look)
+            Worker(warehouse, _stature_m(rng), look=look, seat=_SEATS[int(rng.integers(2))])
             for look in workers
         ]
         yield warehouse, people, ScanScene(hall, variant, warehouse.actors)
+
+
+def _stature_m(rng: np.random.Generator) -> float:
+    """Return the stature of an adult or a child."""
+    if rng.random() < _CHILD_SHARE:
+        return float(rng.uniform(*_CHILD_M))
+    return float(np.clip(rng.normal(_MEAN_STATURE_M, 0.12), 1.42, 2.05))
 
 
 class RawScan(NamedTuple):
@@ -136,7 +151,7 @@ class RawScan(NamedTuple):
     Attributes:
         mount: (7,) place in odom x, y, z, yaw, 1 if upside down, angle between rays, noise.
         ranges_m: (N,).
-        person: (N,) number of the person that each ray met; −1 for everything else.
+        person: (N,) as in :class:`LabelledScan`.
         people_m: (P, 2) positions of the people in odom.
     """
 
@@ -157,6 +172,7 @@ def raw_scans(
     with staged(hall, variant, workers, rng) as (warehouse, people, scene):
         boxes = warehouse.obstacle_boxes_odom
         skins = [scene.occluders.index(worker.skin) for worker in people]
+        seats = [scene.occluders.index(worker.held_object) for worker in people]
         for _ in range(scans):
             place = _free_place(hall, boxes, rng)
             _place_people(people, hall, boxes, place, rng)
@@ -168,6 +184,7 @@ def raw_scans(
             person = np.full(len(scan), -1)
             for number, skin in enumerate(skins):
                 person[scanner.hit_by == skin] = number
+                person[scanner.hit_by == seats[number]] = -2 - number
             places = np.array([worker.position_odom_m for worker in people])
             yaw = math.radians(spec.yaw_deg)
             mount = [*place, spec.z_m, yaw, spec.upside_down]
@@ -208,11 +225,25 @@ def _place_people(
                 continue
             if rng.random() > _HIDDEN_SHARE and crosses_boxes(boxes, robot, [(x, y)])[0]:
                 continue
+            heading = float(rng.uniform(-math.pi, math.pi))
+            if rng.random() < _SEATED_SHARE:
+                size = worker.stature_m / _MEAN_STATURE_M
+                knees = (
+                    x + size * _SHANKS_AHEAD_M * math.cos(heading),
+                    y + size * _SHANKS_AHEAD_M * math.sin(heading),
+                )
+                if clearance_m(boxes, *knees) < _PERSON_CLEARANCE_M:
+                    continue
+                if any(math.dist(knees, other) < _PERSON_SPACING_M for other in taken):
+                    continue
+                taken += [(x, y), knees]
+                worker.place((x, y), heading, activity="sitting")
+                break
             taken.append((x, y))
             speed = 0.0 if rng.random() < 0.35 else float(rng.uniform(0.2, 2.0))
             worker.place(
                 (x, y),
-                float(rng.uniform(-math.pi, math.pi)),
+                heading,
                 float(rng.uniform(0.0, 3.0)),
                 speed,
                 activity=str(rng.choice(_ACTIVITIES)),

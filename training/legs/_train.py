@@ -45,8 +45,8 @@ class Recipe:
     """
 
     seed: int = 0
-    halls: int = 240
-    check_halls: int = 16
+    halls: int = 300
+    check_halls: int = 20
     scans: int = 50
     people: int = 5
     steps: int = 24000

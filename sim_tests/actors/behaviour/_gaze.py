@@ -13,7 +13,7 @@ import numpy as np
 
 from ...world.errors import SimError
 from ..body import MAX_EYE_PITCH_RAD, MAX_EYE_YAW_RAD, MAX_HEAD_PITCH_RAD, MAX_HEAD_YAW_RAD
-from ._person import EYE_HEIGHT_SHARE, RobotBody
+from ._person import RobotBody, eye_height_m
 from ._spec import Glances
 
 # The upper quartile of a standard normal distribution.
@@ -135,15 +135,23 @@ class Gaze:
         glances: the scenario's figures.
         stature_m: height of the body.
         rng: draws glances.
+        seated: the person sits.
 
     Attributes:
         noticed_s: time of the first look at the robot; None before.
         looking: whether a glance at the robot is on.
     """
 
-    def __init__(self, glances: Glances, stature_m: float, rng: np.random.Generator) -> None:
+    def __init__(
+        self,
+        glances: Glances,
+        stature_m: float,
+        rng: np.random.Generator,
+        *,
+        seated: bool = False,
+    ) -> None:
         self._glances = glances
-        self._eyes_m = EYE_HEIGHT_SHARE * stature_m
+        self._eyes_m = eye_height_m(stature_m, seated=seated)
         self._process = GlanceProcess(
             LogNormalDuration.fitted(glances.glance_median_s, glances.glance_quartiles_s),
             LogNormalDuration.fitted(glances.away_median_s, glances.away_quartiles_s),

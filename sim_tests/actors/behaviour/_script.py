@@ -20,7 +20,7 @@ from ..body import (
     ActivityName,
     worker_names,
 )
-from ._person import EYE_HEIGHT_SHARE, PersonMotion, Surroundings
+from ._person import PersonMotion, Surroundings, eye_height_m
 from ._planned_walk import HeadingKey, PlannedMotion, PlannedWalk, Waypoint, planned_walk
 
 # Hands change from one activity to the next in this time.
@@ -47,7 +47,7 @@ class GazeKey(StrictConfig):
 
 
 class ActivityKey(StrictConfig):
-    """Activity of the hands from a time on; the change takes 0.6 s."""
+    """Activity of the hands from a time on; the change takes 0.6 s. Or sitting, from the start."""
 
     error: ClassVar[type[ValueError]] = SimError
 
@@ -68,7 +68,8 @@ class WorkerScript(StrictConfig):
             the walk.
         gaze: keys of head and eyes; empty looks ahead.
         activities: keys of the hands in order of time, at least 0.6 s apart. The first one holds
-            before its time as well. Empty is none.
+            before its time as well. Empty is none. ``sitting`` is a posture of the whole body for
+            the whole script, of a worker who stays at one place with one heading.
     """
 
     error: ClassVar[type[ValueError]] = SimError
@@ -103,6 +104,28 @@ class WorkerScript(StrictConfig):
         if self.look is not None and self.look not in worker_names():
             raise ValueError(f"look must be one of {', '.join(worker_names())}, got {self.look!r}")
         return self
+
+    @model_validator(mode="after")
+    def _seated_people_stay(self) -> WorkerScript:
+        names = {key.activity for key in self.activities}
+        if "sitting" not in names:
+            return self
+        if len(names) > 1:
+            raise ValueError(
+                "a worker who sits stays seated: activities must all be 'sitting', got "
+                f"{', '.join(sorted(names))}"
+            )
+        if len({(point.x_m, point.y_m) for point in self.path}) > 1 or len(self.heading) > 1:
+            raise ValueError(
+                "a worker who sits stays at one place with one heading, got "
+                f"{len(self.path)} waypoints of path and {len(self.heading)} keys of heading"
+            )
+        return self
+
+    @property
+    def seated(self) -> bool:
+        """Whether the worker sits."""
+        return bool(self.activities) and self.activities[0].activity == "sitting"
 
     def walk(self) -> PlannedWalk:
         """Return the planned walk."""
@@ -210,7 +233,7 @@ class Scripted:
         to_robot = heading, 0.0
         if around.robot is not None:
             camera_x, camera_y, camera_z = around.robot.camera_m
-            up = camera_z - EYE_HEIGHT_SHARE * self.stature_m
+            up = camera_z - eye_height_m(self.stature_m, seated=self.script.seated)
             to_robot = (
                 math.atan2(camera_y - y, camera_x - x),
                 math.atan2(up, math.hypot(camera_x - x, camera_y - y)),

@@ -129,7 +129,8 @@ class PersonSpec(StrictConfig):
         backwards: walk backwards.
         pauses: stops on the way.
         turns_back_at_m: length of route after which the person walks back to the start; None never.
-        activity: activity of the hands.
+        activity: activity of the hands; or ``sitting``, at a route of one point. Seated people
+            look, but never move.
         glances: glances at the robot.
         reactions: shares of the reactions to it.
         social: social forces of racks, people and, once it has been noticed, the robot.
@@ -151,3 +152,17 @@ class PersonSpec(StrictConfig):
     glances: Glances = Glances()
     reactions: Reactions = Reactions()
     social: bool = True
+
+    @model_validator(mode="after")
+    def _seated_people_stay(self) -> PersonSpec:
+        if self.seated and len(self.route) > 1:
+            raise ValueError(
+                "a person with activity 'sitting' stays seated: route must have one point, got "
+                f"{len(self.route)}"
+            )
+        return self
+
+    @property
+    def seated(self) -> bool:
+        """Whether the person sits."""
+        return self.activity == "sitting"

@@ -87,7 +87,7 @@ class Walker:
                 f"route point {number} of {spec.name!r}", point.x_m, point.y_m
             )
         gaze_rng, reaction_rng = rng.spawn(2)
-        self._gaze = Gaze(spec.glances, spec.stature_m, gaze_rng)
+        self._gaze = Gaze(spec.glances, spec.stature_m, gaze_rng, seated=spec.seated)
         self._reactions = ReactionModel(spec.reactions, reaction_rng)
         self._detour = SlowRobotDetour()
         self._activity = Activity(spec.activity, spec.activity)
@@ -235,6 +235,8 @@ class Walker:
             self._heading += self._turning * (self._now_s - self._tick * DECISION_PERIOD_S)
             self._turning = 0.0
             self._gaze.startle(self._now_s)
+        if self.spec.seated:
+            return
         self._touch = (towards_x, towards_y, self._now_s)
         x, y, vx, vy = self._trajectory.state(self._now_s)
         back = max(vx * towards_x + vy * towards_y + _RECOIL_MPS, 0.0)
@@ -252,6 +254,9 @@ class Walker:
             self._walked_m += math.dist((x, y), self._trajectory.start)
             self._heading += self._turning * DECISION_PERIOD_S
         robot = self._look_at_robot(t_s, (x, y, self._heading), around)
+        if self.spec.seated:
+            self._trajectory.start_segment(t_s, (x, y, 0.0, 0.0), (0.0, 0.0), DECISION_PERIOD_S)
+            return
         on_route = self._follower.desired_velocity(t_s, x, y, math.hypot(vx, vy))
         if self._walked_to_end_m is None and self.arrived:
             self._walked_to_end_m = self._walked_m

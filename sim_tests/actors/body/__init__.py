@@ -1,7 +1,8 @@
 """The bodies of workers.
 
 The shipped assets (meshes, joints, keypoints), their skeletons, the gait and its footsteps, the
-postures of the arms, and :class:`Worker`, which places a body in the physics and the render world.
+postures of the arms, the seated posture, and :class:`Worker`, which places a body in the physics
+and the render world.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from ._online_footsteps import OnlineFootsteps
 from ._planned_footsteps import plan_footsteps
 from ._pose import skin_points
 from ._postures import ACTIVITIES, BOX_SIZE_M, PHONE_SIZE_M, Activity, ActivityName
+from ._sitting import SEATED_EYE_HEIGHT_SHARE, Seat, SeatKind
 from ._skeleton import MAX_STATURE_M, MIN_STATURE_M, skeleton
 from ._skin import WorkerSkin
 from ._worker import (
@@ -36,11 +38,14 @@ __all__ = [
     "MIN_STATURE_M",
     "PARENTS",
     "PHONE_SIZE_M",
+    "SEATED_EYE_HEIGHT_SHARE",
     "Activity",
     "ActivityName",
     "Gait",
     "GaitPose",
     "OnlineFootsteps",
+    "Seat",
+    "SeatKind",
     "SkinMesh",
     "Worker",
     "WorkerAsset",

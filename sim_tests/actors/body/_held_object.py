@@ -1,4 +1,4 @@
-"""Visual actor of the object in a worker's hands: a cardboard box or a phone."""
+"""Visual actor of what a worker holds or sits on: a cardboard box, a phone, a seat."""
 
 from __future__ import annotations
 
@@ -16,23 +16,34 @@ from ...world.hall import Mesh, box, merge
 from ...world.render import RenderView, Visuals
 from ...world.sightlines import PlacedSurface, TriangleSet
 from ._postures import BOX_SIZE_M, PHONE_SIZE_M
+from ._sitting import Seat
 
-# One texel per colour: cardboard, tape, phone, its screen.
+# One texel per colour: cardboard, tape, phone, its screen; wood for seats is cardboard's.
 _PALETTE: Final = np.array(
     [[[176, 136, 92], [206, 184, 142], [28, 28, 32], [150, 190, 220]]], dtype=np.uint8
 ).repeat(4, axis=0)
 _CARDBOARD_UV, _TAPE_UV, _PHONE_UV, _SCREEN_UV = ((0.125 + 0.25 * k, 0.5) for k in range(4))
+# Boards of a seat as shares of its height, how far those of a box stand out, and a stool's legs as
+# a share of its width.
+_BOARD_SHARE: Final = 0.12
+_BOARD_M: Final = 0.006
+_LEG_SHARE: Final = 0.1
 _TAPE_WIDTH_M: Final = 0.05
-# Radius of a sphere that holds either object.
+# Radius of a sphere that holds either object in the hands.
 _REACH_M: Final = 0.5 * float(np.linalg.norm(BOX_SIZE_M))
 
 
 class Holder(Protocol):
-    """A body that may hold an object; :class:`Worker` is one."""
+    """A body that may hold an object or sit on one; :class:`Worker` is one."""
 
     @property
     def held(self) -> str | None:
-        """The object in the hands; None for empty ones."""
+        """The object in the hands, or the seat; None for neither."""
+        ...
+
+    @property
+    def seat(self) -> Seat:
+        """What the body sits on when seated."""
         ...
 
     @property
@@ -51,7 +62,7 @@ class Holder(Protocol):
 
 
 class HeldObject:
-    """The visual actor of the object that a :class:`Worker` holds.
+    """The visual actor of the object that a :class:`Worker` holds or sits on.
 
     It is separate from the person's actor, so that a box hides the chest behind it.
 
@@ -75,7 +86,10 @@ class HeldObject:
         place = self._worker.T_odom_held
         if place is None:
             return np.array([self._worker.chest_odom_m] * 2)
-        return np.array([place[:3, 3] - _REACH_M, place[:3, 3] + _REACH_M])
+        reach = _REACH_M
+        if self._worker.held == "seat":
+            reach = 0.5 * float(np.linalg.norm(self._worker.seat.size_m)) + _BOARD_M
+        return np.array([place[:3, 3] - reach, place[:3, 3] + reach])
 
     def reach_odom_m(self) -> FloatArray:
         """Return the worker's reach; a point with empty hands."""
@@ -87,7 +101,7 @@ class HeldObject:
         held, place = self._worker.held, self._worker.T_odom_held
         if held is None or place is None:
             return None
-        return PlacedSurface(_triangles(held), place[None])
+        return PlacedSurface(_triangles(held, self._seat(held)), place[None])
 
     def build(self, visuals: Visuals) -> None:
         """Store the render world; each object is made when it is first held."""
@@ -105,7 +119,7 @@ class HeldObject:
         held = None if pixels_per_m is None else self._worker.held
         if held is not None and held not in self._bodies:
             self._bodies[held] = visuals.add_body(
-                visuals.shape(_mesh(held), texture=visuals.texture(_PALETTE))
+                visuals.shape(_mesh(held, self._seat(held)), texture=visuals.texture(_PALETTE))
             )
         elif held is not None and held != self._shown:
             visuals.reveal(self._bodies[held])
@@ -121,17 +135,41 @@ class HeldObject:
                 physicsClientId=visuals.client,
             )
 
+    def _seat(self, held: str) -> Seat | None:
+        return self._worker.seat if held == "seat" else None
 
-@lru_cache(maxsize=2)
-def _triangles(held: str) -> TriangleSet:
-    mesh = _mesh(held)
+
+@lru_cache(maxsize=64)
+def _triangles(held: str, seat: Seat | None) -> TriangleSet:
+    mesh = _mesh(held, seat)
     return TriangleSet([(mesh.vertices_m, mesh.indices.reshape(-1, 3))])
 
 
-def _mesh(held: str) -> Mesh:
+def _mesh(held: str, seat: Seat | None) -> Mesh:
     """Return the mesh of an object about its middle."""
     middle = (0.0, 0.0, 0.0)
-    if held == "box":
+    if seat is not None and seat.kind == "stool":
+        depth, width, height = seat.size_m
+        top, leg = _BOARD_SHARE * height, _LEG_SHARE * width
+        parts = [(box((0.0, 0.0, 0.5 * (height - top)), (depth, width, top)), _TAPE_UV)]
+        parts += [
+            (
+                box(
+                    (0.5 * x * (depth - leg), 0.5 * y * (width - leg), -0.5 * top),
+                    (leg, leg, height - top),
+                ),
+                _CARDBOARD_UV,
+            )
+            for x in (-1.0, 1.0)
+            for y in (-1.0, 1.0)
+        ]
+    elif seat is not None:
+        depth, width, height = seat.size_m
+        board = (depth + 2.0 * _BOARD_M, width + 2.0 * _BOARD_M, _BOARD_SHARE * height)
+        rim = 0.5 * (1.0 - _BOARD_SHARE) * height
+        parts = [(box(middle, seat.size_m), _CARDBOARD_UV)]
+        parts += [(box((0.0, 0.0, z), board), _TAPE_UV) for z in (-rim, rim)]
+    elif held == "box":
         length, _, height = BOX_SIZE_M
         tape = (length + 0.004, _TAPE_WIDTH_M, height + 0.004)
         parts = [(box(middle, BOX_SIZE_M), _CARDBOARD_UV), (box(middle, tape), _TAPE_UV)]

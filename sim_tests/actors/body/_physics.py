@@ -1,16 +1,20 @@
-"""The collision body of a worker: capsules on spherical joints, and the carried box."""
+"""The collision bodies of a worker: capsules on spherical joints, the carried box, the seat."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from typing import Final
+
+from perception.arrays import FloatArray
 
 from ...world import PERSON_GROUP, RAY_GROUP, ROBOT_GROUP, Warehouse
 from ...world.bullet import pybullet
 from ._asset import JOINTS, PARENTS, Capsule
 from ._postures import BOX_SIZE_M, arm_postures
-from ._quaternions import IDENTITY, Quaternion, Vector, subtract
+from ._quaternions import IDENTITY, Quaternion, Vector, rotation_z, subtract
+from ._sitting import Seat
 from ._skeleton import Skeleton
 
 _SPINE: Final = JOINTS.index("spine")
@@ -39,14 +43,18 @@ class WorkerBody:
     Args:
         warehouse: the world to stand in.
         skeleton: bones and capsules.
+        seat: what the person sits on when seated.
 
     Attributes:
         body: PyBullet's id of the multibody.
     """
 
-    def __init__(self, warehouse: Warehouse, skeleton: Skeleton) -> None:
+    def __init__(self, warehouse: Warehouse, skeleton: Skeleton, seat: Seat) -> None:
         self._client = warehouse.client
         self._hips_m = skeleton.hips_m
+        # Made when it is first sat on.
+        self._seat: SeatBody | None = None
+        self._make_seat = partial(SeatBody, warehouse, seat.size_m)
         rows = (-1, *_LINKS)
         centres = {row: skeleton.joint_m(name) for row, name in enumerate(JOINTS)}
         centres |= {-1: skeleton.hips_m, _BOX: arm_postures(skeleton).box_m}
@@ -120,6 +128,7 @@ class WorkerBody:
         pelvis_odom: Quaternion,
         joints: Sequence[Quaternion],
         with_box: bool,
+        T_odom_seat: FloatArray | None = None,
     ) -> None:
         """Set the pose.
 
@@ -129,8 +138,13 @@ class WorkerBody:
             joints: rotation of every joint in :data:`JOINTS`, in axes parallel to the body's at
                 rest.
             with_box: whether the box is in the hands.
+            T_odom_seat: (4, 4) pose of the seat's middle; None stands.
         """
         slide = (0.0 if with_box else _PARKED_M,)
+        if self._seat is None and T_odom_seat is not None:
+            self._seat = self._make_seat()
+        if self._seat is not None:
+            self._seat.place(T_odom_seat)
         pybullet.resetBasePositionAndOrientation(
             self.body, hips_odom_m, pelvis_odom, physicsClientId=self._client
         )
@@ -178,6 +192,49 @@ class WorkerBody:
                 halfExtents=[0.5 * side for side in BOX_SIZE_M],
                 physicsClientId=self._client,
             )
+        )
+
+
+class SeatBody:
+    """The collision shape of a seat, a box without legs; a robot cannot move it.
+
+    Args:
+        warehouse: the world to stand in.
+        size_m: depth, width and height.
+
+    Attributes:
+        body: PyBullet's id.
+    """
+
+    def __init__(self, warehouse: Warehouse, size_m: Vector) -> None:
+        self._client = warehouse.client
+        shape = pybullet.createCollisionShape(
+            pybullet.GEOM_BOX,
+            halfExtents=[0.5 * side for side in size_m],
+            physicsClientId=self._client,
+        )
+        self.body = int(
+            pybullet.createMultiBody(
+                baseMass=0.0,
+                baseCollisionShapeIndex=shape,
+                baseVisualShapeIndex=-1,
+                basePosition=(0.0, 0.0, _PARKED_M),
+                physicsClientId=self._client,
+            )
+        )
+        pybullet.setCollisionFilterGroupMask(
+            self.body, -1, PERSON_GROUP, ROBOT_GROUP | RAY_GROUP, physicsClientId=self._client
+        )
+
+    def place(self, T_odom_seat: FloatArray | None) -> None:
+        """Put the seat's middle and axes at a pose (4, 4); None takes it away."""
+        position, turn = [0.0, 0.0, _PARKED_M], list(IDENTITY)
+        if T_odom_seat is not None:
+            position = T_odom_seat[:3, 3].tolist()
+            yaw = math.atan2(T_odom_seat[1, 0], T_odom_seat[0, 0])
+            turn = list(rotation_z(yaw))
+        pybullet.resetBasePositionAndOrientation(
+            self.body, position, turn, physicsClientId=self._client
         )
 
 

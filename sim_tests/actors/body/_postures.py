@@ -1,4 +1,4 @@
-"""Postures of the arms: swinging, carrying a box, reading a phone."""
+"""Postures of the arms: swinging, carrying a box, reading a phone, resting on the thighs."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ from ._quaternions import (
 )
 from ._skeleton import LEFT, RIGHT, SIDES, SIGNS, Skeleton
 
-ActivityName = Literal["none", "carry_box", "phone"]
-#: Names of all activities of the hands.
+ActivityName = Literal["none", "carry_box", "phone", "sitting"]
+#: Names of all activities. People sit with their whole body, and stay seated.
 ACTIVITIES: Final = get_args(ActivityName)
 #: Depth, width and height of the carried box along its x, y and z.
 BOX_SIZE_M: Final = (0.30, 0.40, 0.28)
@@ -66,13 +66,19 @@ _ARMS_APART_RAD: Final = 0.025
 _ARMS_SWING_APART_RAD: Final = 0.04
 # A box is in the hands from this share of the way to it.
 _HELD_SHARE: Final = 0.98
+# Wrists on the thighs of a seated person: share of the thigh from the hip, and how much higher than
+# the radii of both: bones do not lie in the middle of a limb.
+_RESTING_SHARE: Final = 0.70
+_RESTING_ABOVE_M: Final = 0.066
 
 Arm = tuple[Quaternion, Quaternion, Quaternion]  # shoulder, elbow, wrist
 
 
 @dataclass(frozen=True, slots=True)
 class Activity:
-    """The activity of the hands, or the change from one to the next.
+    """The activity of the hands, or the change from one to the next; or sitting.
+
+    Nobody sits down or stands up: ``"sitting"`` has no other activity before it.
 
     Attributes:
         name: the activity, one of :data:`ACTIVITIES`.
@@ -91,10 +97,27 @@ class Activity:
                 raise SimError(f"activity must be one of {valid}, got {name!r}")
         if not 0.0 <= self.share <= 1.0:
             raise SimError(f"share of an activity must lie in [0, 1], got {self.share!r}")
+        if self.name != self.before and "sitting" in (self.name, self.before):
+            raise SimError(
+                "a person who sits stays seated: the activity before sitting must be 'sitting' as "
+                f"well, got {self.before!r} before {self.name!r}"
+            )
+
+    @classmethod
+    def of(cls, name: str) -> Activity:
+        """Return the activity of this name, with no other before it."""
+        return cls(name, name)
 
     @property
-    def held(self) -> Literal["box", "phone"] | None:
-        """The object in the hands; None for empty ones."""
+    def seated(self) -> bool:
+        """Whether the person sits."""
+        return self.name == "sitting"
+
+    @property
+    def held(self) -> Literal["box", "phone", "seat"] | None:
+        """The object in the hands, or the seat under the body; None for neither."""
+        if self.seated:
+            return "seat"
         doing = self.name if self.share >= 0.5 else self.before
         if doing == "phone":
             return "phone"
@@ -116,12 +139,14 @@ class ArmPostures:
     Attributes:
         carrying: left and right arm with the box in the hands.
         reading: right arm with the phone in the hand; the left one swings.
+        resting: left and right arm of a seated person, the hands on the thighs.
         box_m: middle of the box in the body frame at rest; it moves with the thorax.
         T_hand_phone: (4, 4) pose of the phone in the right hand's link, both at rest.
     """
 
     carrying: tuple[Arm, Arm]
     reading: Arm
+    resting: tuple[Arm, Arm]
     box_m: Vector
     T_hand_phone: FloatArray
 
@@ -141,6 +166,8 @@ class ArmPostures:
     def _arms_of(self, name: str, gait_pose: GaitPose) -> tuple[Arm, Arm]:
         if name == "carry_box":
             return self.carrying
+        if name == "sitting":
+            return self.resting
         swing, stride_ratio = gait_pose.arm_swing_rad, abs(gait_pose.stride_ratio)
         left = _swinging_arm(LEFT, 0.6 * swing if name == "phone" else swing, stride_ratio)
         return left, self.reading if name == "phone" else _swinging_arm(RIGHT, -swing, stride_ratio)
@@ -152,7 +179,8 @@ def arm_postures(bones: Skeleton) -> ArmPostures:
     box = _box_place(bones)
     carrying = (_carrying_arm(bones, LEFT, box), _carrying_arm(bones, RIGHT, box))
     reading, T_hand_phone = _reading_arm(bones)
-    return ArmPostures(carrying, reading, box, T_hand_phone)
+    resting = (_resting_arm(bones, LEFT), _resting_arm(bones, RIGHT))
+    return ArmPostures(carrying, reading, resting, box, T_hand_phone)
 
 
 def _swinging_arm(side: int, swing_rad: float, stride_ratio: float) -> Arm:
@@ -199,6 +227,23 @@ def _carrying_arm(bones: Skeleton, side: int, box_m: Vector) -> Arm:
         box_m[2] - 0.02 - _PALM_M * size * fingers[2],
     )
     return _arm_to(bones, side, wrist, (0.0, -1.0, -0.35 * sign), turn)
+
+
+def _resting_arm(bones: Skeleton, side: int) -> Arm:
+    """Return an arm with the palm on the level thigh, the fingers forward and a little inwards."""
+    sign, size = SIGNS[side], bones.stature_m / _MEAN_STATURE_M
+    hip = bones.joint_m(f"{SIDES[side]}_hip")
+    thigh = math.hypot(*bones.legs[side].first_m)
+    radii = (
+        max(c.radius_m for c in bones.asset.capsules if JOINTS[c.joint] == f"{SIDES[side]}_{part}")
+        for part in ("hip", "wrist")
+    )
+    above = sum(radii) * bones.scale + _RESTING_ABOVE_M * size
+    wrist = add_scaled(hip, (_RESTING_SHARE * thigh, 0.2 * hip[1], above), 1.0)
+    fingers = unit((math.cos(0.3), -sign * math.sin(0.3), -0.1))
+    palm = unit(add_scaled((0.0, 0.0, -1.0), fingers, fingers[2]))
+    turn = _hand_rotation(bones, side, (fingers, palm))
+    return _arm_to(bones, side, wrist, (0.0, -1.0, -0.5 * sign), turn)
 
 
 def _reading_arm(bones: Skeleton) -> tuple[Arm, FloatArray]:

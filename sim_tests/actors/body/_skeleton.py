@@ -29,8 +29,9 @@ from ._quaternions import (
     unit,
 )
 
-#: Range of statures that a body may be scaled to.
-MIN_STATURE_M: Final = 1.4
+#: Range of statures that a body may be scaled to: a child of four years to a tall adult. A child is
+#: an adult made smaller; its head is a sixth too small.
+MIN_STATURE_M: Final = 1.0
 MAX_STATURE_M: Final = 2.1
 #: Sides of the body in the order of every pair, their names, and the sign of their y.
 LEFT, RIGHT = 0, 1
@@ -169,7 +170,7 @@ class Skeleton:
         """Scale an asset to a stature; None keeps its own.
 
         Raises:
-            SimError: for a stature outside [1.4, 2.1] m.
+            SimError: for a stature outside [1.0, 2.1] m.
         """
         stature = finite_number(
             "stature_m",
@@ -215,7 +216,7 @@ def skeleton(look: str | None, stature_m: float) -> Skeleton:
         stature_m: standing height with shoes.
 
     Raises:
-        SimError: for a look that is not shipped, or a stature outside [1.4, 2.1] m.
+        SimError: for a look that is not shipped, or a stature outside [1.0, 2.1] m.
     """
     stature = finite_number(
         "stature_m", stature_m, SimError, minimum=MIN_STATURE_M, maximum=MAX_STATURE_M

@@ -19,7 +19,7 @@ from ._gait_pose import GaitPose
 from ._held_object import HeldObject
 from ._physics import WorkerBody
 from ._pose import BodyPose, SkinnedPoints, link_transforms
-from ._postures import ACTIVITIES, Activity, arm_postures
+from ._postures import Activity, arm_postures
 from ._quaternions import (
     Quaternion,
     Vector,
@@ -35,6 +35,7 @@ from ._quaternions import (
     rotation_z,
     subtract,
 )
+from ._sitting import Seat, SeatKind, fitting_seat, seat_pose, seated_pose
 from ._skeleton import LEFT, RIGHT, SIDES, Skeleton, skeleton
 from ._skin import WorkerSkin
 
@@ -69,18 +70,21 @@ class Worker:
 
     Args:
         warehouse: the world to stand in.
-        stature_m: standing height with shoes, in [1.4, 2.1]; None is that of ``look``, or 1.75 m.
+        stature_m: standing height with shoes, in [1.0, 2.1]; None is that of ``look``, or 1.75 m.
         look: name of a shipped worker (:func:`worker_names`), scaled to the stature; None is the
             one of nearest stature.
         stride_m: distance of a full gait cycle, see :class:`Gait`; None follows the speed.
         position_odom_m: (2,) first position; None waits outside the warehouse.
         heading_odom_rad: first heading.
+        seat: what the person sits on when seated.
 
     Attributes:
         body: PyBullet's id of the person.
         client: PyBullet's id of the world.
         skin: visual actor of the person.
         actor: number of the skin among the visual actors.
+        seat: what the person sits on when seated.
+        held_object: visual actor of what the person holds or sits on.
         skeleton: the bones.
         gait: the gait.
 
@@ -97,6 +101,7 @@ class Worker:
         stride_m: float | None = None,
         position_odom_m: Any = None,
         heading_odom_rad: float = 0.0,
+        seat: SeatKind = "stool",
     ) -> None:
         if stature_m is None:
             stature_m = _DEFAULT_STATURE_M if look is None else load_worker(look).stature_m
@@ -118,13 +123,15 @@ class Worker:
         self._face = tuple(
             subtract(point, bones.joint_m(_NECK)) for point in (bones.nose_m, bones.eyes_m)
         )
-        self._body = WorkerBody(warehouse, bones)
+        self.seat: Seat = fitting_seat(bones, seat)
+        self._body = WorkerBody(warehouse, bones, self.seat)
         self.client: int = warehouse.client
         self.body: int = self._body.body
         self.place(position_odom_m, heading_odom_rad)
         self.skin = WorkerSkin(self)
         self.actor: int = warehouse.add_actor(self.skin)
-        warehouse.add_actor(HeldObject(self))
+        self.held_object = HeldObject(self)
+        warehouse.add_actor(self.held_object)
 
     def place(
         self,
@@ -151,9 +158,10 @@ class Worker:
             head_pitch_rad: of the head, up positive, within ±40°.
             eye_yaw_rad: of the eyes from the head, left positive, within ±35°.
             eye_pitch_rad: of the eyes from the head, up positive, within ±25°.
-            activity: ``"none"``, ``"carry_box"``, ``"phone"``, or a change between two of them.
+            activity: ``"none"``, ``"carry_box"``, ``"phone"``, or a change between two of them;
+                or ``"sitting"`` on the seat, with the hips above the position.
             feet: gait pose in odom, as :func:`plan_footsteps` and :class:`OnlineFootsteps` give it;
-                None takes the straight walk of ``walked_m`` and ``speed_mps``.
+                None takes the straight walk of ``walked_m`` and ``speed_mps``. Unused while seated.
 
         Raises:
             SimError: for a value that is not finite or out of range; the person is not moved then.
@@ -170,8 +178,11 @@ class Worker:
             _checked_angle("eye_yaw_rad", eye_yaw_rad, MAX_EYE_YAW_RAD),
             _checked_angle("eye_pitch_rad", eye_pitch_rad, MAX_EYE_PITCH_RAD),
         )
-        doing = activity if isinstance(activity, Activity) else _checked_activity(activity)
-        gait_pose = self.gait.pose(walked, speed) if feet is None else feet
+        doing = activity if isinstance(activity, Activity) else Activity.of(activity)
+        if doing.seated:
+            feet, gait_pose = None, seated_pose(self.skeleton)
+        else:
+            gait_pose = self.gait.pose(walked, speed) if feet is None else feet
         self._x_m, self._y_m, self._heading_rad = x, y, heading
         self._activity, self._eyes = doing, eyes
         self._keypoints: FloatArray | None = None
@@ -180,7 +191,8 @@ class Worker:
         self._links: FloatArray | None = None
         self._head_rotation: FloatArray | None = None
         self._solve_joints(gait_pose, head, local=feet is None)
-        self._body.place(self._hips_odom_m, self._pelvis, self._joints, doing.held == "box")
+        seat = self.T_odom_held if doing.seated else None
+        self._body.place(self._hips_odom_m, self._pelvis, self._joints, doing.held == "box", seat)
 
     @property
     def asset(self) -> WorkerAsset:
@@ -203,19 +215,21 @@ class Worker:
         return self._heading_rad
 
     @property
-    def held(self) -> Literal["box", "phone"] | None:
-        """The object in the hands; None for empty ones."""
+    def held(self) -> Literal["box", "phone", "seat"] | None:
+        """The object in the hands, or the seat under the body; None for neither."""
         return self._activity.held
 
     @property
     def T_odom_held(self) -> FloatArray | None:  # noqa: N802
-        """(4, 4) pose of the held object, with its middle as origin; None with empty hands.
+        """(4, 4) pose of the held object or the seat, with its middle as origin; None for neither.
 
-        A box (:data:`BOX_SIZE_M`) has x forward and z up. A phone (:data:`PHONE_SIZE_M`) has its
-        screen towards −x and its long side along z.
+        A box (:data:`BOX_SIZE_M`) and a seat have x forward and z up. A phone
+        (:data:`PHONE_SIZE_M`) has its screen towards −x and its long side along z.
         """
         if self.held is None:
             return None
+        if self.held == "seat":
+            return seat_pose(self.seat, self._x_m, self._y_m, self._heading_rad)
         links = self.links_odom
         if self.held == "phone":
             return np.asarray(links[1 + _RIGHT_WRIST] @ self._arms.T_hand_phone)
@@ -371,13 +385,6 @@ class Worker:
 @lru_cache(maxsize=64)
 def _skinned_keypoints(asset: WorkerAsset) -> SkinnedPoints:
     return SkinnedPoints(asset.joints_m, asset.keypoints_m, asset.keypoint_weights)
-
-
-def _checked_activity(name: str) -> Activity:
-    if name not in ACTIVITIES:
-        valid = ", ".join(map(repr, ACTIVITIES))
-        raise SimError(f"activity must be one of {valid}, got {name!r}")
-    return Activity(name, name)
 
 
 def _checked_angle(name: str, value: float, limit_rad: float) -> float:

@@ -72,11 +72,27 @@ def test_soles_do_not_slide_sink_or_float(name: str, speed_mps: float) -> None:
     assert np.minimum(*lowest).max() < 0.005  # and always one sole on the floor
 
 
-@given(st.sampled_from(NAMES), st.floats(0.02, 2.0), st.floats(0.0, 1.0))
+@pytest.mark.parametrize("name", ["jamila", "bjorn"])
+@pytest.mark.parametrize("speed_mps", [0.3, 1.0, 1.6])
+def test_a_child_walks_like_an_adult_with_shorter_strides(name: str, speed_mps: float) -> None:
+    gait = Gait(skeleton(name, 1.1))
+    feet, _ = _walk(gait, speed_mps, 100, cycles=1.5)
+    shoes = [_shoe(gait, side, feet[:, row]) for row, side in enumerate(("left", "right"))]
+    for shoe in shoes:
+        assert _slip_m(shoe) < 0.03
+        assert shoe[..., 2].min() > -0.005
+    assert np.minimum(*(shoe[..., 2].min(axis=1) for shoe in shoes)).max() < 0.005
+    adult = Gait(skeleton(name, 1.75))
+    assert float(gait.stride_m(speed_mps) / adult.stride_m(speed_mps)) == pytest.approx(1.1 / 1.75)
+
+
+@given(st.sampled_from(NAMES), st.booleans(), st.floats(0.02, 2.0), st.floats(0.0, 1.0))
 @settings(max_examples=80, deadline=None)
-def test_legs_reach_their_feet_exactly(name: str, speed_mps: float, phase: float) -> None:
+def test_legs_reach_their_feet_exactly(
+    name: str, child: bool, speed_mps: float, phase: float
+) -> None:
     """At the hip height of the gait both ankles are within reach with unlocked knees."""
-    bones = skeleton(name, load_worker(name).stature_m)
+    bones = skeleton(name, 1.0 if child else load_worker(name).stature_m)
     gait = Gait(bones)
     gait_pose = gait.pose(phase * float(gait.stride_m(speed_mps)), speed_mps)
     assert 0.8 * gait.standing_height_m < gait_pose.hip_height_m <= gait.standing_height_m + 1e-9
