@@ -107,9 +107,7 @@ class LaserScan:
     @property
     def measured(self) -> NDArray[np.bool_]:
         """(N,) True for rays that measured an object within the limits."""
-        return np.asarray(
-            (self.ranges_m >= self.range_min_m) & (self.ranges_m <= self.range_max_m)
-        )
+        return np.asarray((self.ranges_m >= self.range_min_m) & (self.ranges_m <= self.range_max_m))
 
     @property
     def too_near(self) -> NDArray[np.bool_]:
