@@ -200,4 +200,4 @@ def cluster_features(clusters: Clusters) -> FloatArray:
     np.maximum(features[7:9], -_MAX_STEP_M, out=features[7:9])
     features[9] = unit_x * ray_x + unit_y * ray_y
     features[10] = counts / (np.abs(clusters.rays[ends] - clusters.rays[starts]) + 1.0)
-    return features.T
+    return np.asarray(features.T)
