@@ -52,12 +52,14 @@ _TROLLEY_M: Final = (0.3, 1.6)
 _TROLLEY_POINTS: Final = 5
 _TROLLEY_CAME: Final = 0.8
 _TROLLEY_SCORE: Final = 0.5
-# It stands this far before the surfaces at its sides.
-_TROLLEY_BEFORE_M: Final = 0.3
+# It stands this far before or behind the surfaces at its sides, if these have not come as well.
+_TROLLEY_APART_FROM_M: Final = 0.3
 # A trolley this near to a person found by the legs is that person's.
 _TROLLEY_APART_M: Final = 1.2
-# Somebody who pushes it stands beside or behind it, within this standard deviation.
-_TROLLEY_STD_M: Final = 0.5
+# Legs beside it would be seen, so somebody who pushes it stands behind it. This is the least that
+# they can be behind the surface that is seen, and the standard deviation of their place.
+_TROLLEY_BEHIND_M: Final = 0.3
+_TROLLEY_STD_M: Final = 0.6
 _SURELY_M: Final = 1e-3
 
 
@@ -253,8 +255,12 @@ def _trolleys(
     ends = clusters.starts + clusters.counts - 1
     fits = ~taken & (clusters.counts >= _TROLLEY_POINTS)
     fits &= (clusters.widths_m >= low) & (clusters.widths_m <= high)
-    fits &= clusters.steps_m[0, clusters.starts] > _TROLLEY_BEFORE_M
-    fits &= clusters.steps_m[1, ends] > _TROLLEY_BEFORE_M
+    moves = came >= _CAME_SHARE * clusters.counts
+    beside = np.array([clusters.steps_m[0, clusters.starts], clusters.steps_m[1, ends]])
+    apart = np.abs(beside) > _TROLLEY_APART_FROM_M
+    apart[0, 1:] |= moves[:-1]
+    apart[1, :-1] |= moves[1:]
+    fits &= apart[0] & apart[1]
     fits &= came >= _TROLLEY_CAME * clusters.counts
     found: list[int] = []
     others = people_m
@@ -325,14 +331,8 @@ def _candidate(
     row: int,
     place_m: FloatArray,
 ) -> PersonCandidate:
-    x, y = hypotheses.rays[row].tolist()
-    along, aside = (max(deviation, _SURELY_M) ** 2 for deviation in judged[3:5].tolist())
-    covariance = np.array(
-        [
-            (along * x * x + aside * y * y, (along - aside) * x * y),
-            ((along - aside) * x * y, along * y * y + aside * x * x),
-        ]
-    )
+    along, aside = (max(deviation, _SURELY_M) for deviation in judged[3:5].tolist())
+    covariance = _covariance(hypotheses.rays[row], along, aside)
     single = hypotheses.second[row] < 0
     narrow = clusters.widths_m[hypotheses.first[row]] < _TWO_LEGS_M
     kind: CandidateKind = "one_leg" if single and narrow else "two_legs"
@@ -341,7 +341,23 @@ def _candidate(
 
 
 def _trolley(stamp_s: float, clusters: Clusters, number: int) -> PersonCandidate:
+    centre = clusters.centres_m[number]
+    away = centre - clusters.origin_m
+    ray = away / max(math.hypot(*away.tolist()), 1e-6)
     covariance = _TROLLEY_STD_M**2 * np.eye(2)
     return PersonCandidate(
-        stamp_s, clusters.centres_m[number], covariance, _TROLLEY_SCORE, "trolley"
+        stamp_s, centre + _TROLLEY_BEHIND_M * ray, covariance, _TROLLEY_SCORE, "trolley"
+    )
+
+
+def _covariance(ray: FloatArray, along_std_m: float, aside_std_m: float) -> FloatArray:
+    """Return (2, 2) from standard deviations along a unit vector and across it."""
+    x, y = ray.tolist()
+    along, aside = along_std_m * along_std_m, aside_std_m * aside_std_m
+    mixed = (along - aside) * x * y
+    return np.array(
+        [
+            (along * x * x + aside * y * y, mixed),
+            (mixed, along * y * y + aside * x * x),
+        ]
     )
