@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.laser_people import Figures, Wanderer, drive
+from benchmarks.laser_people import Figures, drive
 from benchmarks.laser_trolley import TROLLEY_SIZE_M, Trolley
+from benchmarks.laser_wanderer import Wanderer
 from perception.laser import LegDetectorConfig
 from sim_tests.actors.body import worker_names
 from sim_tests.world.hall import LAYOUTS
@@ -42,7 +43,7 @@ def test_people_in_a_held_out_hall_are_found_and_nothing_else() -> None:
 
 
 def test_people_who_push_trolleys_are_found_by_their_legs() -> None:
-    figures = driven("open", 2, 6.0, 300, ("base", "castors"))
+    figures = driven("open", 2, 6.0, 1, ("base", "castors"))
     for kind in ("base", "castors"):
         seen = figures.seen[f"pushing, {kind}, legs in view"]
         assert len(seen) > 30
