@@ -18,7 +18,6 @@ from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
 
-from perception import PersonObservation
 from perception.arrays import FloatArray
 from perception.laser import (
     LegClassifier,
@@ -28,6 +27,7 @@ from perception.laser import (
     PersonCandidate,
     RobotMotion,
     merge_candidates,
+    observations_of,
     scan_points,
 )
 from sim_tests.actors.body import Worker, worker_names
@@ -52,7 +52,6 @@ _GHOST_M: Final = 0.8
 _SEEN_M: Final = 0.1
 # Wanderers do not avoid each other; those who walk through somebody are not counted.
 _APART_M: Final = 0.5
-_CHEST_M: Final = 1.3
 _ROBOT_MPS: Final = 1.0
 _ROBOT_CLEARANCE_M: Final = 0.55
 _PERSON_CLEARANCE_M: Final = 0.35
@@ -193,7 +192,7 @@ def drive(
                 origin = (motion.T_odom_base @ mounting.T_base_scanner)[:2, 3]
                 _count(figures, scanner, judged, real, origin, found)
             merged = merge_candidates(groups)
-            tracks = tracker.update([_observation(each, t) for each in merged], t, np.eye(4))
+            tracks = tracker.update(observations_of(merged, np.eye(4), t), t, np.eye(4))
             for track in tracks:
                 if track.status == "confirmed" and (
                     not len(real)
@@ -262,21 +261,6 @@ def _pose(robot: Wanderer) -> FloatArray:
     T[:2, :2] = [[cos, -sin], [sin, cos]]
     T[:2, 3] = robot.place_m
     return T
-
-
-def _observation(candidate: PersonCandidate, stamp_s: float) -> PersonObservation:
-    covariance = np.diag([0.0, 0.0, 0.04])
-    covariance[:2, :2] = candidate.covariance_m2
-    return PersonObservation(
-        stamp_s=stamp_s,
-        position_camera_m=np.append(candidate.position_odom_m, _CHEST_M),
-        position_covariance_m2=covariance,
-        gaze_camera=None,
-        awareness=None,
-        awareness_std=None,
-        score=candidate.score,
-        box_xyxy_px=None,
-    )
 
 
 def main() -> None:

@@ -182,14 +182,16 @@ class ObstacleRules:
             and track.status != "tentative"
             and now - seen_stamp_s <= timing.fresh_within_s
         )
-        lower = track.awareness_lower if trusted else 0.0
+        looks_lower = track.awareness_lower if trusted else 0.0
+        noticed_lower = self._noticed_lower(track) if trusted else 0.0
         if before is None or jumped:
-            return self._new_person(track, seen_stamp_s, lower, now)
+            return self._new_person(track, seen_stamp_s, looks_lower, now, noticed_lower)
         newly_seen_s = before.newly_seen_s(seen_stamp_s)
         known_s = before.known_s + (0.0 if stale else min(newly_seen_s, timing.fresh_within_s))
         if newly_seen_s == 0.0:
             # Without a new frame there is no new evidence, whatever the track says.
-            lower = min(lower, before.awareness_lower)
+            looks_lower = min(looks_lower, before.awareness_lower)
+            noticed_lower = min(noticed_lower, before.awareness_lower)
         # A late frame is no evidence of awareness, but it does show the position. Without it, the
         # uncertainty of the first sighting would never shrink with a slow camera.
         counts = not stale and track.status == "confirmed"
@@ -197,16 +199,24 @@ class ObstacleRules:
         person = self._known_person(
             track,
             before._replace(known_s=known_s),
-            lower,
+            looks_lower,
             now,
             visible_s=visible_s,
             seen_stamp_s=seen_stamp_s,
+            noticed_lower=noticed_lower,
         )
         if trusted and self._is_standing(person):
             # Between the frame that showed the person and the track's stamp nobody looked.
             unseen_s = max(track.stamp_s - seen_stamp_s, 0.0)
             return person._replace(start_delay_s=self._start_delay_s + unseen_s)
         return person
+
+    def _noticed_lower(self, track: PersonTrack) -> float:
+        """Return the lower bound of α that stands for having noticed the robot before."""
+        rule = self._policy.noticed
+        if rule is None or track.status != "confirmed" or track.noticed < rule.at_least:
+            return 0.0
+        return rule.counts_as_awareness
 
     def _is_first_sight(self, memory: PersonMemory) -> bool:
         """Return whether frames have shown a person for less than ``shrink_after_s``."""
@@ -225,7 +235,12 @@ class ObstacleRules:
         )
 
     def _new_person(
-        self, track: PersonTrack, seen_stamp_s: float, lower: float, now: float
+        self,
+        track: PersonTrack,
+        seen_stamp_s: float,
+        looks_lower: float,
+        now: float,
+        noticed_lower: float,
     ) -> PersonMemory:
         """Return a person at first sight, whose obstacle has the unaware size."""
         sigma_m = self._sigma_m(track, now)
@@ -237,7 +252,7 @@ class ObstacleRules:
             position_odom_m=position,
             velocity_odom_mps=velocity,
             seen_stamp_s=seen_stamp_s,
-            awareness_lower=lower,
+            awareness_lower=max(looks_lower, noticed_lower),
             radius_m=radius_m,
             sigma_m=sigma_m,
             visible_s=0.0,
@@ -246,24 +261,29 @@ class ObstacleRules:
             ahead_m=ahead_m,
             direction_odom=_walking_direction(velocity, (1.0, 0.0)),
             history=((0.0, radius_m, ahead_m),),
-            inflation_held=self._inflation_holds(lower, False),
-            speed_held=self._speed_holds(lower, False),
+            inflation_held=self._inflation_holds(looks_lower, False),
+            speed_held=self._speed_holds(looks_lower, False),
         )
 
     def _known_person(
         self,
         track: PersonTrack,
         before: PersonMemory,
-        lower: float,
+        looks_lower: float,
         now: float,
         *,
         visible_s: float,
         seen_stamp_s: float = -math.inf,
+        noticed_lower: float = 0.0,
     ) -> PersonMemory:
-        """Return a person known from before, now with the bound ``lower`` of α."""
+        """Return a person known from before, now with the bound ``looks_lower`` of α.
+
+        Only looks hold a person at the level of a policy with hysteresis; having noticed does not.
+        """
         timing = self._timing
         sigma_m = self._sigma_m(track, now)
-        held = self._inflation_holds(lower, before.inflation_held)
+        lower = max(looks_lower, noticed_lower)
+        held = self._inflation_holds(looks_lower, before.inflation_held)
         track_position, position, velocity = motion_at(track, now)
         target = self._target_m(velocity, 1.0 if held else lower, sigma_m)
         total_visible_s = before.visible_s + visible_s
@@ -295,7 +315,7 @@ class ObstacleRules:
             direction_odom=_walking_direction(velocity, before.direction_odom),
             history=history,
             inflation_held=held,
-            speed_held=self._speed_holds(lower, before.speed_held),
+            speed_held=self._speed_holds(looks_lower, before.speed_held),
         )
 
     def _target_m(self, velocity: Vector2, awareness: float, sigma_m: float) -> Vector2:

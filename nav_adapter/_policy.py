@@ -21,6 +21,7 @@ from .policies import (
     InflationPolicy,
     InterpolatedHumanSpeed,
     InterpolatedInflation,
+    NoticedPeople,
     ObstacleOutline,
     SafetyMargins,
     SpeedPolicy,
@@ -85,11 +86,15 @@ class AwarenessPolicy(StrictConfig):
             sets one.
         outline: the part of the obstacles' polygons beyond their circles; by default nothing.
         rules: assumed turns, and speed limits besides speed and separation.
+        noticed: what it counts that a person noticed the robot some seconds ago, or None for
+            nothing. It needs ``filter.noticed_memory_s`` and a laser scanner; with a camera alone it
+            changes nothing.
         alerts: rules for alerts, or None.
         margins: distances that hold for every α.
         timing: how fast obstacles may shrink and how long data may be trusted.
         filter: settings of the tracker's awareness filter. They belong to the policy because they
-            decide how soon a look at the robot counts and for how long.
+            decide how soon a look at the robot counts and for how long. A ``filter`` of your own
+            has no memory of who has noticed the robot unless it sets one.
     """
 
     error: ClassVar[type[ValueError]] = NavError
@@ -102,10 +107,11 @@ class AwarenessPolicy(StrictConfig):
     )
     outline: ObstacleOutline = ObstacleOutline()
     rules: SpeedRules = SpeedRules()
+    noticed: NoticedPeople | None = NoticedPeople()
     alerts: AlertRules | None = AlertRules()
     margins: SafetyMargins = SafetyMargins()
     timing: TimeBehaviour = TimeBehaviour()
-    filter: AwarenessFilterConfig = AwarenessFilterConfig()
+    filter: AwarenessFilterConfig = AwarenessFilterConfig(noticed_memory_s=4.0)
 
     @model_validator(mode="after")
     def _check_ceiling(self) -> AwarenessPolicy:

@@ -66,7 +66,9 @@ def judge_face(
     * The face is large enough. Below 12 pixels of width the gaze is very uncertain; below 5 pixels
       there is no evidence.
 
-    There is also no evidence if no keypoint of the head is seen and ``head.face_seen`` is None.
+    There is also no evidence if no keypoint of the head is seen and ``head.face_seen`` is None, or
+    if nose or eyes are missing from a head at the border of the image: what the border cuts off is
+    missing from the pose too, and so the pose may be far off.
 
     Args:
         camera: camera that saw the person.
@@ -77,6 +79,8 @@ def judge_face(
     depth = max(float(head.position_camera_m[2]), 0.05)
     width_px = _FACE_WIDTH_M * math.sqrt(camera.fx_px * camera.fy_px) / depth
     if width_px < _MIN_FACE_PX or head.position_camera_m[2] <= 0.0:
+        return None
+    if head.face_seen is None and _is_cut(camera, person, width_px, min_score):
         return None
     outside = _outside_image(camera, head, width_px)
     if head.face_seen is not None:
@@ -95,6 +99,16 @@ def judge_face(
         seen *= math.exp(-0.5 * (excess / _ERROR_SCALE) ** 2)
     extra = _WEAK_FACE_STD_RAD * (_WEAK_FACE_PX / width_px) ** _SIZE_POWER
     return FaceEvidence(seen, width_px, extra)
+
+
+def _is_cut(camera: Camera, person: PersonKeypoints, width_px: float, min_score: float) -> bool:
+    """Return whether a head of this width (px) without nose or an eye touches the border."""
+    shown = person.scores[kp.HEAD] >= min_score
+    if not person.face_evidence or shown[:3].all() or not shown.any():
+        return False
+    pixels = person.keypoints_px[kp.HEAD][shown]
+    far = np.array([camera.width_px, camera.height_px]) - pixels
+    return bool(np.minimum(pixels, far).min() < width_px)
 
 
 def _outside_image(camera: Camera, head: HeadPose, width_px: float) -> tuple[bool, bool, bool]:

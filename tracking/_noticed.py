@@ -9,11 +9,11 @@ look never lowers the belief.
 A look is no promise: people often look before they set off. So the belief is dropped, until there
 are new looks, by anything that makes it doubtful who this is or what they do:
 
-- a face that looks away;
+- a face that looks away, in more than one frame, of somebody who does not walk away;
 - an ambiguous match, or a place that jumps;
 - a gap in what the other sensors see, once no look is recent;
-- somebody who stood since the last look and moves, or who comes faster towards the robot than at
-  any time since then;
+- somebody who stood since the last look and moves, or who comes faster towards the robot than on
+  the course that they had then, at the least speed since then;
 - ``noticed_memory_s`` after the last look.
 """
 
@@ -41,12 +41,21 @@ _LOOKING_S: Final = 0.5 / math.log(2.0)
 _FORGETTING_S: Final = 3.0
 # A frame is a look if it is so certain, from 0 to 1, that α is at least a half: by 0.7 σ.
 _LOOK: Final = 0.5
-# A face looks away if α is below a half by one standard deviation.
+# A face looks away if α is at most this, and below a half by one standard deviation: with the
+# default cone it points more than 57° off the robot. A person who passes the robot and looks ahead
+# still has it in the corner of the eye.
+_AVERTED_AWARENESS: Final = 0.1
 _AVERTED_SIGMAS: Final = -1.0
+_AVERTED_LOGIT: Final = math.log(_AVERTED_AWARENESS / (1.0 - _AVERTED_AWARENESS))
+# One frame may be wrong about a face, and two are not both by chance.
+_AVERTED_S: Final = 0.09
+# Somebody walks away at this speed or faster.
+_RECEDING_MPS: Final = 0.3
 # Two scans in a row without the person, or as long a silence, are a gap.
 _GAP_PERIODS: Final = 2.5
-# How much faster towards the robot than before: 2.5 σ of a velocity from scans.
-_FASTER_MPS: Final = 0.3
+# How much faster towards the robot than before: 2.5 σ of a velocity from scans. Speed and
+# separation takes the measured speed towards the robot in any case.
+_FASTER_MPS: Final = 0.4
 # A person who stood has begun to move at this speed, if it is not 0 by 99.7 % (χ², two degrees).
 _STARTED_MPS: Final = 0.25
 _STARTED_CHI2: Final = 11.6
@@ -75,15 +84,19 @@ def with_noticed(
         sensors: all sensors.
     """
     config = sensors.config.awareness
-    if config.noticed_memory_s <= 0.0 or not len(after):
+    if config.noticed_memory_s <= 0.0 or sensors.faces.all() or not len(after):
         return after
     stamp, sees_faces = frame.stamp_s, sensors.all[frame.sensor].settings.sees_faces
     looks, averted = _looks(after, frame, found, sensors)
     if not (looks > 0.0).any() and not (after.looked_s > 0.0).any():
         return after
     looking = looks > 0.0
-    dropped = averted | found.ambiguous | _jumped(before, after, frame, found)
-    approach_mps = _approach_mps(after, frame)
+    dt_s = min(faces.dt_s(stamp), config.max_evidence_gap_s) if sees_faces else 0.0
+    towards = _towards(after, frame)
+    # Whoever walks away looks where they go, and has to turn round first.
+    averted &= (towards * after.states[:, 2:]).sum(axis=1) > -_RECEDING_MPS
+    averted_s = np.where(looking, 0.0, after.averted_s + averted * dt_s)
+    dropped = found.ambiguous | _jumped(before, after, frame, found) | (averted_s > _AVERTED_S)
     # After a gap nobody knows that it is the same person; a new look excuses motion alone.
     grace, gap_s = grace_s(faces.period_s, config), config.max_evidence_gap_s
     if math.isfinite(faces.period_s):
@@ -91,14 +104,15 @@ def with_noticed(
     recent_s = np.where(looking, gap_s, grace)
     ended = stamp - after.look_stamps_s > config.noticed_memory_s
     ended |= _interrupted(before, after, stamp, recent_s, clocks, sensors)
-    ended |= _set_off(after, approach_mps) & ~looking
+    ended |= _set_off(after, towards) & ~looking
     looked_s = np.where(dropped | ended, 0.0, after.looked_s)
     # What they do from the last look on.
-    least_mps = np.minimum(after.look_approaches_mps, approach_mps)
+    velocities = after.states[:, 2:]
+    speeds_mps = np.hypot(velocities[:, 0], velocities[:, 1])
+    least_mps = np.minimum(after.look_speeds_mps, speeds_mps)
     stood = after.look_standing | after.standing
     if not sees_faces:
-        return after.replaced(looked_s=looked_s, look_approaches_mps=least_mps, look_standing=stood)
-    dt_s = min(faces.dt_s(stamp), config.max_evidence_gap_s)
+        return after.replaced(looked_s=looked_s, look_speeds_mps=least_mps, look_standing=stood)
     fades = found.seen & ~looking
     looked_s = np.where(fades, math.exp(-dt_s / _FORGETTING_S), 1.0) * looked_s
     # A look after a pause stands for one frame, not for the pause.
@@ -108,8 +122,10 @@ def with_noticed(
     return after.replaced(
         looked_s=looked_s,
         look_stamps_s=np.where(looking, stamp, after.look_stamps_s),
-        look_approaches_mps=np.where(looking, approach_mps, least_mps),
+        look_velocities_mps=np.where(looking[:, None], velocities, after.look_velocities_mps),
+        look_speeds_mps=np.where(looking, speeds_mps, least_mps),
         look_standing=np.where(looking, after.standing, stood),
+        averted_s=averted_s,
     )
 
 
@@ -146,7 +162,9 @@ def _looks(
     measured, columns = frame.measurements, found.source[rows]
     # In standard deviations above α = 0.5, whose logit is 0.
     sigmas = measured.evidence_means[columns] / np.sqrt(measured.evidence_variances[columns])
-    averted[rows] = sigmas <= _AVERTED_SIGMAS
+    averted[rows] = (sigmas <= _AVERTED_SIGMAS) & (
+        measured.evidence_means[columns] <= _AVERTED_LOGIT
+    )
     sure = tracks.confirmed[rows] & ~found.beyond[rows] & ~measured.weak[columns]
     certainty = np.maximum(2.0 * ndtr(sigmas) - 1.0, 0.0)
     looks[rows] = np.where(sure & (certainty >= _LOOK), certainty, 0.0)
@@ -201,17 +219,25 @@ def _interrupted(
     return np.asarray(old)
 
 
-def _approach_mps(tracks: TrackTable, frame: Frame) -> FloatArray:
-    """Return (N,) speeds towards the robot, at least 0."""
+def _towards(tracks: TrackTable, frame: Frame) -> FloatArray:
+    """Return (N, 2) unit vectors from the people to the robot."""
     offset = frame.T_odom_camera[:2, 3] - tracks.states[:, :2]
     distance = np.maximum(np.hypot(offset[:, 0], offset[:, 1]), 1e-9)
-    return np.asarray(np.maximum((offset * tracks.states[:, 2:]).sum(axis=1) / distance, 0.0))
+    return np.asarray(offset / distance[:, None])
 
 
-def _set_off(tracks: TrackTable, approach_mps: FloatArray) -> BoolArray:
-    """Return (N,) True for people who have begun to move, or come faster than before."""
-    faster = approach_mps > tracks.look_approaches_mps + _FASTER_MPS
-    velocity = tracks.states[:, 2:]
+def _set_off(tracks: TrackTable, towards: FloatArray) -> BoolArray:
+    """Return (N,) True for people who have begun to move, or come faster than before.
+
+    ``towards`` (N, 2) are the unit vectors to the robot.
+    """
+    velocity, before = tracks.states[:, 2:], tracks.look_velocities_mps
+    approach_mps = (towards * velocity).sum(axis=1)
+    # On the same course the speed towards the robot changes while both move.
+    expected_mps = np.maximum((towards * before).sum(axis=1), 0.0)
+    slower = tracks.look_speeds_mps / np.maximum(np.hypot(before[:, 0], before[:, 1]), 1e-9)
+    expected_mps *= np.minimum(slower, 1.0)
+    faster = approach_mps > expected_mps + _FASTER_MPS
     inverse = inverse_2x2(tracks.covariances[:, 2:, 2:])
     chi2 = (velocity[:, None] @ inverse @ velocity[:, :, None])[:, 0, 0]
     moves = (np.hypot(velocity[:, 0], velocity[:, 1]) > _STARTED_MPS) & (chi2 > _STARTED_CHI2)

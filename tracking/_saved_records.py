@@ -45,8 +45,10 @@ class TracksRecord(StrictConfig):
     twins: list[bool]
     looked_s: list[float]
     look_stamps_s: list[float | None]
-    look_approaches_mps: list[float]
+    look_velocities_mps: list[_Two]
+    look_speeds_mps: list[float]
     look_standing: list[bool]
+    averted_s: list[float]
 
     @model_validator(mode="after")
     def _check_consistency(self) -> TracksRecord:

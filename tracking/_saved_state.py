@@ -123,8 +123,10 @@ def state_of(
         twins=np.array(tracks.twins, dtype=np.bool_),
         looked_s=_array(tracks.looked_s),
         look_stamps_s=_array(tracks.look_stamps_s, math.nan),
-        look_approaches_mps=_array(tracks.look_approaches_mps),
+        look_velocities_mps=_array(tracks.look_velocities_mps).reshape(count, 2),
+        look_speeds_mps=_array(tracks.look_speeds_mps),
         look_standing=np.array(tracks.look_standing, dtype=np.bool_),
+        averted_s=_array(tracks.averted_s),
     )
     events = record.exits
     exits = Exits(
@@ -222,8 +224,10 @@ def _plain_state(state: TrackerState, sensors: Sensors) -> dict[str, Any]:
             "twins": tracks.twins.tolist(),
             "looked_s": tracks.looked_s.tolist(),
             "look_stamps_s": _finite_or_none(tracks.look_stamps_s),
-            "look_approaches_mps": tracks.look_approaches_mps.tolist(),
+            "look_velocities_mps": tracks.look_velocities_mps.tolist(),
+            "look_speeds_mps": tracks.look_speeds_mps.tolist(),
             "look_standing": tracks.look_standing.tolist(),
+            "averted_s": tracks.averted_s.tolist(),
         },
     }
 

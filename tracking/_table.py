@@ -48,8 +48,10 @@ class TrackTable:
         twins: (N,) True where the evidence has sufficed; such a track is not reported.
         looked_s: (N,) for how long the person has looked at the robot lately (``_noticed``).
         look_stamps_s: (N,) of the latest look; NaN for none.
-        look_approaches_mps: (N,) least speed towards the robot since then, ≥ 0.
+        look_velocities_mps: (N, 2) velocity at that time.
+        look_speeds_mps: (N,) least speed since then.
         look_standing: (N,) whether the person has stood since then.
+        averted_s: (N,) for how long frames since then have shown a face that looks away.
     """
 
     ids: IntArray
@@ -75,8 +77,10 @@ class TrackTable:
     twins: BoolArray
     looked_s: FloatArray
     look_stamps_s: FloatArray
-    look_approaches_mps: FloatArray
+    look_velocities_mps: FloatArray
+    look_speeds_mps: FloatArray
     look_standing: BoolArray
+    averted_s: FloatArray
 
     @staticmethod
     def empty(confirm_hits: int, sensors: int = 1) -> TrackTable:
@@ -107,8 +111,10 @@ class TrackTable:
             twins=no_flags,
             looked_s=no_numbers,
             look_stamps_s=no_numbers,
-            look_approaches_mps=no_numbers,
+            look_velocities_mps=np.empty((0, 2)),
+            look_speeds_mps=no_numbers,
             look_standing=no_flags,
+            averted_s=no_numbers,
         )
 
     @property

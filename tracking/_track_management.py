@@ -74,8 +74,10 @@ def initiate(
         twins=np.zeros(count, dtype=np.bool_),
         looked_s=np.zeros(count),
         look_stamps_s=np.full(count, np.nan),
-        look_approaches_mps=np.zeros(count),
+        look_velocities_mps=np.zeros((count, 2)),
+        look_speeds_mps=np.zeros(count),
         look_standing=np.zeros(count, dtype=np.bool_),
+        averted_s=np.zeros(count),
     )
 
 

@@ -19,6 +19,8 @@ from ._types import POSITIVE, FilePath, FolderPath, OneOf, Whole
 REFERENCE_PLANNER: Final = "reference"
 #: The kinds of perception that the robot of a crossing can have.
 PERCEPTIONS: Final = ("truth", "keypoints", "pixels")
+#: The sensors that the robot of a crossing can have.
+SENSOR_SETS: Final = ("camera", "camera+scanner", "scanner")
 
 
 def _shipped(package: str, folder: str, *others: str) -> Callable[..., list[CompletionItem]]:
@@ -147,6 +149,28 @@ def perception(kinds: Sequence[str] = PERCEPTIONS, note: str = "") -> Decorator:
         type=OneOf(kinds),
         default="keypoints",
         help=f"How the robot perceives people.{note}",
+    )
+
+
+_SENSORS_HELP: Final = (
+    "Sensors of the robot: its camera, its laser scanners, or both. With scanners, --perception is "
+    "keypoints or pixels."
+)
+
+
+def sensors() -> Decorator:
+    """Add ``--sensors``: one set of sensors."""
+    return option("--sensors", type=OneOf(SENSOR_SETS), default="camera", help=_SENSORS_HELP)
+
+
+def sensor_sets() -> Decorator:
+    """Add ``--sensors``: one or more sets of sensors to compare."""
+    return option(
+        "--sensors",
+        many=True,
+        type=OneOf(SENSOR_SETS),
+        default=["camera"],
+        help=f"{_SENSORS_HELP} Several sets are compared.",
     )
 
 

@@ -5,7 +5,14 @@ from __future__ import annotations
 from ._human_speed import InterpolatedHumanSpeed, SpeedPolicy
 from ._inflation import InflationPolicy, InterpolatedInflation, ObstacleOutline
 from ._margins import AlertRules, SafetyMargins, TimeBehaviour
-from ._speed_rules import DistanceZones, NearCap, ProtectiveField, SpeedRules, StandingPeople
+from ._speed_rules import (
+    DistanceZones,
+    NearCap,
+    NoticedPeople,
+    ProtectiveField,
+    SpeedRules,
+    StandingPeople,
+)
 from ._tables import TableHumanSpeed, TableInflation
 
 __all__ = [
@@ -15,6 +22,7 @@ __all__ = [
     "InterpolatedHumanSpeed",
     "InterpolatedInflation",
     "NearCap",
+    "NoticedPeople",
     "ObstacleOutline",
     "ProtectiveField",
     "SafetyMargins",

@@ -116,6 +116,25 @@ class StandingPeople(StrictConfig):
         return speed_mps * speed_mps + velocity_variance_m2ps2 <= self.standing_below_mps**2
 
 
+class NoticedPeople(StrictConfig):
+    """What it counts that a person has noticed the robot, and does not look at it now.
+
+    ``PersonTrack.noticed`` is the belief that they know of the robot. While it is high enough, the
+    lower bound of α is at least ``counts_as_awareness``, for obstacle and speed limit. Hysteresis
+    of a policy is held by looks alone.
+
+    Attributes:
+        at_least: the belief from which it counts.
+        counts_as_awareness: in [0, 1]. Where there is a level for people who watch the robot, keep
+            it at ``aware_above``: who watches stands still, who has noticed may walk on.
+    """
+
+    error: ClassVar[type[ValueError]] = NavError
+
+    at_least: float = Field(default=0.5, gt=0.0, le=1.0)
+    counts_as_awareness: float = Field(default=0.6, ge=0.0, le=1.0)
+
+
 class ProtectiveField(StrictConfig):
     """A field like that of a safety laser scanner, for comparisons with today's robots.
 

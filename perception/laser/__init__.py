@@ -9,7 +9,8 @@ The order of use, for every scan of every scanner::
     candidates = detector.detect(points)
 
 With several scanners each scan is detected with its own number, ``detector.detect(points, 1)``, and
-:func:`merge_candidates` reports every person once.
+:func:`merge_candidates` reports every person once. :func:`observations_of` makes the observations
+that ``tracking.PersonTracker`` takes.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from ._detector import LegDetector, LegDetectorConfig
 from ._hypotheses import CUTOUT, HYPOTHESIS_FEATURES, Hypotheses, hypotheses_of
 from ._memory import OccupancyMemory, StaticMap
 from ._merging import merge_candidates
+from ._observations import observations_of
 from ._points import RobotMotion, ScanPoints, scan_points
 from ._scan import LaserScan
 from ._scanner import Scanner
@@ -45,5 +47,6 @@ __all__ = [
     "clusters_of",
     "hypotheses_of",
     "merge_candidates",
+    "observations_of",
     "scan_points",
 ]

@@ -21,10 +21,12 @@ from ._points import ScanPoints
 
 # A single cluster at least this wide is two legs that touch.
 _TWO_LEGS_M: Final = 0.24
-# A pair is preferred to a single leg of it with up to this much higher odds, as a logarithm.
-_PAIR_LOG_ODDS: Final = 1.5
+# A pair is preferred to a single leg of it; its odds, as a logarithm, are raised by this.
+_PAIR_LOG_ODDS: Final = 10.0
 # Two people are not nearer to each other than this.
 _APART_M: Final = 0.3
+# Nor than this, if of one of them no more than a leg is in view.
+_PART_APART_M: Final = 0.55
 # A person is far more likely where the floor was free before than where something always stood. The
 # classifier has seen single scans with people all around, so its odds are changed by these factors'
 # logarithms.
@@ -160,7 +162,7 @@ class LegDetector:
             always = np.where(narrow, _POST_LOG_ODDS, _ALWAYS_LOG_ODDS)
             always[seen] = 0.0
             judged[:, 0] = _with_memory(judged[:, 0], clusters, hypotheses, came, recent, always)
-        chosen, places = _chosen(hypotheses, judged, config.score_threshold)
+        chosen, places = _chosen(clusters, hypotheses, judged, config.score_threshold)
         candidates = [
             _candidate(points.stamp_s, clusters, hypotheses, judged[row], row, place)
             for row, place in zip(chosen, places, strict=True)
@@ -274,7 +276,7 @@ def _trolleys(
 
 
 def _chosen(
-    hypotheses: Hypotheses, judged: FloatArray, threshold: float
+    clusters: Clusters, hypotheses: Hypotheses, judged: FloatArray, threshold: float
 ) -> tuple[list[int], list[FloatArray]]:
     """Return the best hypotheses that do not contradict each other, and the people's places."""
     score = np.minimum(np.maximum(judged[:, 0], 1e-6), 1.0 - 1e-6)
@@ -282,6 +284,7 @@ def _chosen(
     if not len(likely):
         return [], []
     score, first, second = score[likely], hypotheses.first[likely], hypotheses.second[likely]
+    narrow = (clusters.widths_m[first] < _TWO_LEGS_M).tolist()
     odds = np.log(score / (1.0 - score)) + _PAIR_LOG_ODDS * (second >= 0)
     x, y = hypotheses.rays[likely].T
     away, aside = judged[likely, 1], judged[likely, 2]
@@ -301,8 +304,10 @@ def _chosen(
         if own & used:
             continue
         used |= own
-        # What is too near is the other leg of somebody found by one leg.
-        if all(math.dist(place, before) >= _APART_M for before in taken):
+        # What is too near is the other leg of somebody found by one leg. A narrow cluster beside
+        # somebody is a leg of theirs that was met in two parts.
+        apart_m = _PART_APART_M if other < 0 and narrow[row] else _APART_M
+        if all(math.dist(place, before) >= apart_m for before in taken):
             chosen.append(row)
             taken.append(place)
     return likely[chosen].tolist(), [places[row] for row in chosen]

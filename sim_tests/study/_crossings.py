@@ -12,7 +12,7 @@ from typing import Any, Final
 from awarenav.files import json_text
 from perception import AwarenessPipeline, Camera
 
-from ..crossing.eyes import PerceptionKind
+from ..crossing.eyes import PerceptionKind, SensorSet
 from ..world.errors import SimError
 from .measures import EpisodeRecord, nondeterminism_notes, summarise, table_text
 from .runs import RunFiles, plan_jobs, run_jobs
@@ -29,6 +29,7 @@ class CrossingsOptions:
     policy: tuple[str, ...]
     planner: tuple[str, ...]
     perception: PerceptionKind
+    sensors: tuple[SensorSet, ...]
     camera: str
     fault: tuple[str, ...]
     episodes: int
@@ -59,10 +60,11 @@ def crossings_command(options: CrossingsOptions) -> int:
         range(options.seed, options.seed + options.episodes),
         planners=options.planner,
         perception=options.perception,
+        sensors=options.sensors,
         camera=options.camera,
         faults=options.fault,
     )
-    if options.perception == "pixels":
+    if options.perception == "pixels" and set(options.sensors) != {"scanner"}:
         # Refuses missing networks before anything runs.
         AwarenessPipeline(Camera.from_fov(640, 480, 1.0))
     records = run_jobs(
@@ -129,6 +131,8 @@ def _about(options: CrossingsOptions) -> dict[str, Any]:
         "episodes": options.episodes,
         "seed": options.seed,
     }
+    if options.sensors != ("camera",):
+        settings["sensors"] = list(options.sensors)
     if options.camera:
         settings["camera"] = options.camera
     words = ["awarenav", "crossings"]

@@ -27,6 +27,7 @@ from awarenav.cli import NUMBER, POSITIVE, command, option, options
 @options.policies(["blind", "balanced"])
 @options.planners()
 @options.perception()
+@options.sensor_sets()
 @options.camera()
 @options.faults()
 @option("--episodes", type=POSITIVE, default=1, metavar="N", help="Number of seeds per scenario.")

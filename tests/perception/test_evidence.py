@@ -31,12 +31,11 @@ def head_at(yaw_deg=0.0, distance_m=2.0, std_rad=0.03, *, seen=None, error_px=0.
     return HeadPose(position, rotation, covariance, error_px, seen)
 
 
-def with_scores(*scores, face_evidence=True):
+def with_scores(*scores, face_evidence=True, at_px=(320.0, 240.0)):
     padded = np.zeros(17)
     padded[: len(scores)] = scores
-    return PersonKeypoints(
-        np.zeros((17, 2)), np.zeros((17, 3)), padded, "coco", face_evidence=face_evidence
-    )
+    pixels = np.tile(at_px, (17, 1))
+    return PersonKeypoints(pixels, np.zeros((17, 3)), padded, "coco", face_evidence=face_evidence)
 
 
 ALL = with_scores(1, 1, 1, 1, 1)
@@ -102,6 +101,17 @@ def moved(head, x_m):
         head.reprojection_error_px,
         head.face_seen,
     )
+
+
+@pytest.mark.parametrize("at_px", [(12.0, 240.0), (630.0, 240.0), (320.0, 3.0), (320.0, 470.0)])
+def test_a_head_at_the_border_is_no_evidence_if_a_part_of_its_face_is_missing(at_px):
+    """Whether the missing eye is cut off or turned away nobody knows, and the pose is wrong."""
+    for scores in ((1, 0, 1, 0, 1), (1, 0, 0, 0, 0), (0, 0, 0, 1, 1)):
+        person = with_scores(*scores, at_px=at_px)
+        assert judge_face(CAMERA, person, head_at(), 0.3) is None
+        assert judge_face(CAMERA, person, head_at(seen=0.9), 0.3).seen == 0.9  # sees it itself
+    whole = with_scores(1, 1, 1, 0, 0, at_px=at_px)
+    assert judge_face(CAMERA, whole, head_at(), 0.3).seen == 1.0
 
 
 @pytest.mark.parametrize("person", [with_scores(0, 0, 0, 1, 0), with_scores(1, 0, 0, 1, 0)])

@@ -135,8 +135,8 @@ def test_it_is_off_by_default_and_then_changes_nothing() -> None:
     assert with_memory[0].noticed > 0.5
 
 
-def test_without_another_sensor_it_ends_with_the_look() -> None:
-    scene = Scene(PersonTracker(REMEMBERS))
+def test_while_the_other_sensor_is_silent_it_ends_with_the_look() -> None:
+    scene = Scene()
     for tick in range(20):
         now = 0.1 * tick
         seen = seen_by_camera((3.0, 0.5), now, awareness=0.9 if tick < 12 else None)
@@ -144,6 +144,16 @@ def test_without_another_sensor_it_ends_with_the_look() -> None:
         if 8 < tick < 12:
             assert track.noticed > 0.5
     assert track.noticed == 0.0
+
+
+def test_a_camera_alone_has_no_memory() -> None:
+    tracker, plain = PersonTracker(REMEMBERS), PersonTracker()
+    for tick in range(20):
+        seen = seen_by_camera((3.0, 0.5), 0.1 * tick, awareness=0.9)
+        (track,) = tracker.update([seen], 0.1 * tick, camera_at())
+        (other,) = plain.update([seen], 0.1 * tick, camera_at())
+        assert track.noticed == 0.0
+        assert track.awareness_lower == other.awareness_lower
 
 
 def test_a_face_that_looks_away_ends_it_at_once() -> None:
@@ -155,9 +165,25 @@ def test_a_face_that_looks_away_ends_it_at_once() -> None:
 
 def test_a_face_of_another_range_that_looks_away_ends_it_too() -> None:
     scene = attentive()
-    seen = seen_by_camera(scene.place, scene.now, ratio=1.6, awareness=0.05)
-    (track,) = scene.tracker.update([seen], scene.now, camera_at())
+    now = scene.now + CAMERA_S
+    seen = seen_by_camera(scene.place, now, ratio=1.6, awareness=0.05)
+    (track,) = scene.tracker.update([seen], now, camera_at())
     assert track.noticed == 0.0
+
+
+@pytest.mark.parametrize(("alphas", "kept"), [((0.0,), True), ((0.0, 0.0), False)])
+def test_one_frame_of_a_fast_camera_does_not_end_it(alphas: tuple[float, ...], kept: bool) -> None:
+    scene = attentive()
+    for number, alpha in enumerate(alphas):
+        now = scene.now + 0.05 * (number + 1)
+        seen = seen_by_camera(scene.place, now, awareness=alpha)
+        (track,) = scene.tracker.update([seen], now, camera_at())
+    assert (track.noticed > 0.4) is kept
+
+
+def test_a_face_in_the_corner_of_whose_eye_the_robot_is_ends_nothing() -> None:
+    """A head 45 degrees off the robot has α = 0.42: no look, but the robot is in sight."""
+    assert attentive().run(0.5, alpha=0.42).noticed > 0.4
 
 
 def test_a_person_without_a_usable_face_ends_nothing() -> None:
@@ -184,6 +210,17 @@ def test_a_walker_keeps_it_until_they_come_faster() -> None:
     assert scene.run(0.8, alpha=0.9, **slow).noticed > 0.5
     assert scene.run(1.5, camera=False, **slow).noticed > 0.5
     assert scene.run(0.8, camera=False, velocity=(-1.4, 0.5)).noticed == 0.0
+
+
+@pytest.mark.parametrize(("turn_rad", "kept"), [(0.0, True), (0.9, False)])
+def test_a_walker_who_passes_keeps_it_on_their_course_alone(turn_rad: float, kept: bool) -> None:
+    """The speed towards the robot changes while they pass: not who walks on comes faster."""
+    scene, speed_mps = Scene(), 1.2
+    scene.place = np.array([3.0, -3.5])
+    scene.run(0.8, velocity=(0.0, speed_mps))
+    assert scene.run(0.8, alpha=0.9, velocity=(0.0, speed_mps)).noticed > 0.5
+    course = (-speed_mps * math.sin(turn_rad), speed_mps * math.cos(turn_rad))
+    assert (scene.run(1.0, camera=False, velocity=course).noticed > 0.5) is kept
 
 
 def test_a_walker_who_stops_and_sets_off_again_loses_it() -> None:
@@ -345,7 +382,7 @@ def test_any_sequence_of_frames_gives_valid_tracks(frames) -> None:
 def test_after_a_pause_of_all_sensors_one_glance_is_one_glance(pause_s: float) -> None:
     """Nobody knows that it is the same person. The looks before the pause do not come back."""
     settings = AwarenessFilterConfig(noticed_memory_s=4.0)
-    tracker = PersonTracker(TrackerConfig(awareness=settings))
+    tracker = both(TrackerConfig(awareness=settings))
     for k in range(20):
         tracker.update([observe((3.0, 0.0), 0.1 * k, awareness=0.97)], 0.1 * k, camera_at())
     assert tracker.predict(1.95)[0].noticed > 0.8

@@ -10,15 +10,14 @@ from typing import Final
 import numpy as np
 
 from nav_adapter import RobotState
-from perception import PersonObservation
 from perception.arrays import FloatArray
 from perception.laser import (
     LaserScan,
     LegDetector,
-    PersonCandidate,
     RobotMotion,
     Scanner,
     StaticMap,
+    observations_of,
     scan_points,
 )
 from tracking import ScannerView, SensorConfig
@@ -38,9 +37,6 @@ _STREAM: Final = 0x5CA7
 # People farther away are not recognised in scans.
 _RANGE_M: Final = 8.0
 _MAP_RESOLUTION_M: Final = 0.05
-# A scan shows legs; the tracker wants the chest. Its height does not matter on the floor plane.
-_CHEST_HEIGHT_M: Final = 1.3
-_CHEST_HEIGHT_STD_M: Final = 0.2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,7 +127,7 @@ class ScannerEyes:
         return Sighting(
             points.stamp_s,
             T_odom_scanner,
-            tuple((each, NOBODY) for each in _observations(found, T_odom_scanner)),
+            tuple((each, NOBODY) for each in observations_of(found, T_odom_scanner)),
             sensor=sensor_name(taken.number),
             points_odom_m=points.points_odom_m[points.usable, :2],
         )
@@ -177,28 +173,3 @@ def map_of(warehouse: Warehouse) -> StaticMap:
         last = np.ceil((box[2:] - low) / _MAP_RESOLUTION_M).astype(int)
         occupied[first[1] : last[1], first[0] : last[0]] = True
     return StaticMap(occupied, low, _MAP_RESOLUTION_M)
-
-
-def _observations(
-    candidates: Iterable[PersonCandidate], T_odom_scanner: FloatArray
-) -> list[PersonObservation]:
-    """Return the candidates as observations in the scanner's frame; they have no awareness."""
-    rotation, origin = T_odom_scanner[:3, :3], T_odom_scanner[:3, 3]
-    observations = []
-    for each in candidates:
-        place = np.append(each.position_odom_m, _CHEST_HEIGHT_M)
-        covariance = np.diag([0.0, 0.0, _CHEST_HEIGHT_STD_M**2])
-        covariance[:2, :2] = each.covariance_m2
-        turned = rotation.T @ covariance @ rotation
-        observations.append(
-            PersonObservation(
-                stamp_s=each.stamp_s,
-                position_camera_m=(place - origin) @ rotation,
-                position_covariance_m2=0.5 * (turned + turned.T),
-                gaze_camera=None,
-                awareness=None,
-                awareness_std=None,
-                score=each.score,
-            )
-        )
-    return observations

@@ -41,6 +41,15 @@ class Perception(NamedTuple):
             return self.kind
         return self.kind + _AND_SCANNER if self.kind else _SCANNER
 
+    @property
+    def options(self) -> str:
+        """The options of the command line, such as ``"--perception keypoints"``."""
+        if not self.has_scanners:
+            return f"--perception {self.kind}"
+        if not self.kind:
+            return "--sensors scanner"
+        return f"--perception {self.kind} --sensors camera+scanner"
+
     @classmethod
     def named(cls, name: str) -> Perception:
         """Return the perception of a name in tables.

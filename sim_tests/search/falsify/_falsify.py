@@ -39,7 +39,7 @@ class FalsifySettings:
         scenarios: YAML of the templates.
         episodes: least number of episodes in all.
         people: number of people of a scenario that are varied.
-        perception: ``"truth"``, ``"keypoints"`` or ``"pixels"``.
+        perception: as for :func:`sim_tests.run_crossing`.
         planner: ``"module:Class"``, empty for the reference planner.
         seed: seed of every episode, and of the search.
         generation: episodes per generation of CMA-ES.

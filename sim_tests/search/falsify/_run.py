@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...crossing.eyes import PerceptionKind
+from ...crossing.eyes import Perception, PerceptionKind, SensorSet
 from .._files import common_settings
 from ._falsify import Falsification, FalsifySettings, falsify
 from ._plot import draw_falsification
@@ -25,6 +25,7 @@ class FalsifyOptions:
     people: int
     worst: int
     perception: PerceptionKind
+    sensors: SensorSet
     camera: str
     planner: str
     unsafe_no_floor: bool
@@ -47,7 +48,7 @@ def falsify_command(options: FalsifyOptions) -> int:
         **common_settings(options.policy, options.scenario, options.camera),
         episodes=options.episodes,
         people=options.people,
-        perception=options.perception,
+        perception=Perception.of(options.perception, options.sensors).name,
         planner=options.planner,
         seed=options.seed,
         generation=options.generation,

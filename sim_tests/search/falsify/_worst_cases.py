@@ -13,6 +13,7 @@ import numpy as np
 from awarenav.files import write_text
 
 from ...crossing import CrossingResult
+from ...crossing.eyes import Perception
 from ...scenario import Scenario, ScenarioTemplate
 from ...study.measures import EpisodeRecord
 from ...study.runs import observed_episode
@@ -187,8 +188,10 @@ def _header(trial: EvaluatedTrial, settings: FalsifySettings, file: str) -> str:
         f"round {trial.round}, trial {trial.trial}.",
         f"Smallest separation margin at a moving robot {_metres(margin)}, smallest separation "
         f"{_metres(separation)}, contacts caused by the robot {trial.notes['robot_contacts']}.",
-        f"awarenav crossings --scenario {file} --policy {_POLICY_FILE} --perception "
-        f"{settings.perception}" + (f" --planner {planner}" if planner else "") + " "
+        f"awarenav crossings --scenario {file} --policy {_POLICY_FILE} "
+        f"{Perception.named(settings.perception).options}"
+        + (f" --planner {planner}" if planner else "")
+        + " "
         f"--seed {settings.seed} --episodes 1 --out replay",
     ]
     if settings.unsafe_no_floor:

@@ -49,6 +49,7 @@ from awarenav.cli import POSITIVE, command, option, options
 )
 @option("--worst", type=POSITIVE, default=10, metavar="N", help="Number of cases to write.")
 @options.perception()
+@options.sensors()
 @options.camera()
 @options.planner()
 @option(

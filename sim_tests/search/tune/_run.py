@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...crossing.eyes import PerceptionKind
+from ...crossing.eyes import Perception, PerceptionKind, SensorSet
 from .._files import common_settings
 from .._optimizer import SamplerName
 from ._evaluation import OBJECTIVES
@@ -28,6 +28,7 @@ class TuneOptions:
     generation: int
     sampler: SamplerName
     perception: PerceptionKind
+    sensors: SensorSet
     camera: str
     planner: str
     seed: int
@@ -53,7 +54,7 @@ def tune_command(options: TuneOptions) -> int:
         trials=options.trials,
         episodes=options.episodes,
         held_out=options.held_out,
-        perception=options.perception,
+        perception=Perception.of(options.perception, options.sensors).name,
         planner=options.planner,
         seed=options.seed,
         sampler=options.sampler,

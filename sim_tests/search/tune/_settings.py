@@ -21,7 +21,7 @@ class TuneSettings:
         trials: number of policies to try.
         episodes: number of tuning seeds, each run in every scenario.
         held_out: number of held-out seeds, each run in every scenario.
-        perception: ``"truth"``, ``"keypoints"`` or ``"pixels"``.
+        perception: as for :func:`sim_tests.run_crossing`.
         planner: ``"module:Class"``, empty for the reference planner.
         seed: the first tuning seed, and seed of the sampler.
         sampler: ``"tpe"`` or ``"nsga2"``.

@@ -61,6 +61,7 @@ from awarenav.cli import POSITIVE, FilePath, OneOf, command, option, options
     "of about 20).",
 )
 @options.perception()
+@options.sensors()
 @options.camera()
 @options.planner()
 @options.seed()

@@ -26,7 +26,8 @@ class EpisodeRecord:
         seed: of the episode.
         policy: name of the policy.
         planner: name of the planner.
-        perception: ``"truth"``, ``"keypoints"`` or ``"pixels"``.
+        perception: ``"truth"``, ``"keypoints"`` or ``"pixels"``, with ``"+scanner"`` if there are
+            scanners too, or ``"scanner"``.
         success: the goal was reached and the robot touched nobody by its own motion.
         contact: the robot and a person touched.
         contact_by: ``"robot"``, ``"person"`` or empty.

@@ -10,6 +10,7 @@ from perception import AttentionCone, AwarenessPipeline
 from perception.networks import OnnxSettings
 
 from ...crossing import CrossingResult, Observer
+from ...crossing.eyes import Perception
 from ...scenario import CameraSpec
 from ...world.errors import SimError
 from ..measures import EpisodeRecord, measure
@@ -48,7 +49,7 @@ def observed_episode(
 ) -> tuple[CrossingResult, EpisodeRecord]:
     """Run and measure one episode, watched by ``observer``; exceptions are raised."""
     template, fault = template_of(job.scenario), fault_of(job.fault)
-    scenario = template.for_seed(job.seed)
+    scenario, senses = template.for_seed(job.seed), Perception.named(job.perception)
     free = FreeRun(None, None, repeats=True)
     if job.planner or scenario.robot.straight_on_speed_mps is None:
         # Before the episode: what a planner imports only while it drives is then there.
@@ -61,7 +62,7 @@ def observed_episode(
         policy=policy_of(job.policy),
         perception=job.perception,
         fault=fault,
-        pipeline=_pipeline(scenario.camera) if job.perception == "pixels" else None,
+        pipeline=_pipeline(scenario.camera) if senses.kind == "pixels" else None,
     )
     record = measure(
         result,

@@ -21,7 +21,7 @@ class Job:
         policy_name: name of the policy in tables.
         policy: YAML of an :class:`AwarenessPolicy`.
         planner: ``"module:Class"``, empty for the reference planner.
-        perception: ``"truth"``, ``"keypoints"``, ``"pixels"`` or ``"oracle"``.
+        perception: as for :func:`sim_tests.run_crossing`.
         fault_name: name of the fault in tables, empty for none.
         fault: YAML of a :class:`Fault`, empty for none.
     """

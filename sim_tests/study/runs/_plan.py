@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Final, NamedTuple, get_args
+from typing import Final, NamedTuple
 
 import yaml
 from pydantic import ValidationError
 
-from awarenav.errors import not_one_of
 from nav_adapter import AwarenessPolicy
 from perception.arrays import finite_number
 from perception.documents import parse_yaml
 
-from ...crossing.eyes import ORACLE, PerceptionKind
+from ...crossing.eyes import ORACLE, Perception
 from ...crossing.faults import Fault
 from ...scenario import ScenarioTemplate, shipped_templates
 from ...world.errors import SimError
@@ -44,10 +43,13 @@ def plan_jobs(
     *,
     planners: Sequence[str] = ("",),
     perception: str = "keypoints",
+    sensors: Sequence[str] = ("camera",),
     faults: Sequence[str | Fault] = ("",),
     camera: str = "",
 ) -> tuple[Job, ...]:
-    """Return the jobs of every scenario, seed, fault, planner and policy, nested in that order.
+    """Return the jobs of every scenario, seed, fault, planner, policy and set of sensors.
+
+    They are nested in that order.
 
     Args:
         scenarios: templates, shipped names, YAML files, or ``"all"`` for the shipped scenarios that
@@ -58,6 +60,8 @@ def plan_jobs(
         seeds: seeds of the episodes, the same for all combinations.
         planners: ``"module:Class"``, or empty for the reference planner.
         perception: ``"truth"``, ``"keypoints"`` or ``"pixels"``.
+        sensors: ``"camera"``, ``"camera+scanner"`` or ``"scanner"``, which has no use for the
+            perception; one set or several to compare.
         faults: faults, shipped names, YAML files, or ``"none"`` or empty for no fault.
         camera: a shipped name or a YAML file that replaces the camera of every scenario; empty
             keeps each scenario's own.
@@ -66,10 +70,9 @@ def plan_jobs(
         SimError: an unknown or unusable argument, or two episodes with the same key.
         NavError: an unknown preset or unusable policy file.
     """
-    if perception not in get_args(PerceptionKind):
-        raise SimError(not_one_of("perception", perception, get_args(PerceptionKind)))
+    perceptions = [Perception.of(perception, each).name for each in sensors]
     templates = _expanded(scenarios, camera)
-    policy_texts = [_named_policy(each, perception) for each in policies]
+    policy_texts = [text for each in policies for text in _named_policy(each, perceptions)]
     fault_texts = [_named_fault(each) for each in faults]
     checked_seeds = [_checked_seed(seed) for seed in seeds]
     for planner in planners:
@@ -184,17 +187,19 @@ def _expanded(scenarios: Iterable[str | ScenarioTemplate], camera: str) -> list[
 
 
 def _named_policy(
-    policy: str | tuple[str, AwarenessPolicy], perception: str
-) -> tuple[str, str, str]:
-    """Return the name, the YAML and the perception of a policy."""
+    policy: str | tuple[str, AwarenessPolicy], perceptions: Sequence[str]
+) -> list[tuple[str, str, str]]:
+    """Return the name and the YAML of a policy with each perception; the oracle has its own."""
+    if policy == ORACLE:
+        return [(ORACLE, policy_text(AwarenessPolicy.preset("balanced")), ORACLE)]
     if not isinstance(policy, str):
         name, own_policy = policy
-        return name, policy_text(own_policy), perception
-    if policy == ORACLE:
-        return ORACLE, policy_text(AwarenessPolicy.preset("balanced")), ORACLE
-    if policy.endswith((".yaml", ".yml")):
-        return Path(policy).stem, policy_text(AwarenessPolicy.from_yaml(policy)), perception
-    return policy, policy_text(AwarenessPolicy.preset(policy)), perception
+    elif policy.endswith((".yaml", ".yml")):
+        name, own_policy = Path(policy).stem, AwarenessPolicy.from_yaml(policy)
+    else:
+        name, own_policy = policy, AwarenessPolicy.preset(policy)
+    text = policy_text(own_policy)
+    return [(name, text, perception) for perception in perceptions]
 
 
 def _named_fault(fault: str | Fault) -> tuple[str, str]:

@@ -52,6 +52,7 @@ class SuitePlan:
             range(first, first + episodes),
             planners=[option("planner")],
             perception=option("perception"),
+            sensors=[option("sensors")],
             faults=[option("fault")],
             camera=option("camera"),
         )

@@ -19,6 +19,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         ("planner", "MODULE:CLASS", "", "your planner (default: the reference planner)"),
         ("policy", "NAME|FILE", "balanced", "preset or policy YAML file (default: balanced)"),
         ("perception", "KIND", "keypoints", "truth, keypoints or pixels (default: keypoints)"),
+        ("sensors", "SET", "camera", "camera, camera+scanner or scanner (default: camera)"),
         ("camera", "NAME|FILE", "", "forward, surround or YAML file (default: the scenarios')"),
         ("fault", "NAME|FILE", "none", "shipped fault or YAML file (default: none)"),
         ("episodes", "N", "3", "seeds per scenario (default: 3)"),
