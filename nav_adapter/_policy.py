@@ -87,8 +87,8 @@ class AwarenessPolicy(StrictConfig):
         outline: the part of the obstacles' polygons beyond their circles; by default nothing.
         rules: assumed turns, and speed limits besides speed and separation.
         noticed: what it counts that a person noticed the robot some seconds ago, or None for
-            nothing. It needs ``filter.noticed_memory_s`` and a laser scanner; with a camera alone it
-            changes nothing.
+            nothing. It needs ``filter.noticed_memory_s`` and a laser scanner: with a camera alone
+            it changes nothing.
         alerts: rules for alerts, or None.
         margins: distances that hold for every α.
         timing: how fast obstacles may shrink and how long data may be trusted.

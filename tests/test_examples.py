@@ -71,6 +71,23 @@ def test_the_plug_in_example_shows_the_radius_shrink_for_an_aware_person():
     assert limits[-1] > limits[12]
 
 
+def test_the_two_sensor_example_keeps_the_person_whom_the_robot_passes():
+    out = printed("camera_and_scanner.py")
+    times = re.split(r"^ ?(?=[ \d]?\d\.\d s)", out, flags=re.M)[1:]
+    people = [re.findall(r"person (\d+) .*least ([0-9.]+)", text) for text in times]
+    # The same two people throughout, also when only the scanner sees them.
+    assert {tuple(track for track, _ in seen) for seen in people} == {("1", "2")}
+    aware = [float(seen[0][1]) for seen in people]
+    assert max(aware) > 0.7
+    assert all(float(seen[1][1]) == 0.0 for seen in people)
+    silent = ["camera is silent" in text for text in times]
+    assert sum(silent) > 3
+    assert not any(alpha > 0.0 for alpha, gone in zip(aware, silent, strict=True) if gone)
+    limits = [float(text) for text in re.findall(r"limit ([0-9.]+) m/s", out)]
+    assert max(limits[:10]) > 1.0
+    assert 0.0 < max(limits[-5:]) < 0.5
+
+
 @pytest.mark.parametrize(
     "page",
     [

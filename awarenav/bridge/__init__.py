@@ -9,11 +9,14 @@ from ..lazy import lazy_names
 if TYPE_CHECKING:
     from ._loop import BridgeInputs, BridgeLoop
     from ._publisher import TopicPublisher
+    from ._replay import BagReplay, ReplayPublisher
     from ._rerun import RerunRecorder, cone_lines
 
 __all__ = [
+    "BagReplay",
     "BridgeInputs",
     "BridgeLoop",
+    "ReplayPublisher",
     "RerunRecorder",
     "TopicPublisher",
     "cone_lines",
@@ -24,6 +27,7 @@ __getattr__ = lazy_names(
     {
         "._loop": ("BridgeInputs", "BridgeLoop"),
         "._publisher": ("TopicPublisher",),
+        "._replay": ("BagReplay", "ReplayPublisher"),
         "._rerun": ("RerunRecorder", "cone_lines"),
     },
 )

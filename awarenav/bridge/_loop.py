@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Protocol, TypeVar, cast
 
 from nav_adapter import NavConstraints, NavError
-from nav_adapter.ros2 import AwarenessBridge, PerceptionThread, Topic
+from nav_adapter.ros2 import AwarenessBridge, PerceptionThread, ScanThread, Topic
 from nav_adapter.ros2.messages import Message
-from nav_adapter.ros2.messages.nav_msgs import Odometry
-from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, Image
+from nav_adapter.ros2.messages.nav_msgs import OccupancyGrid, Odometry
+from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, Image, LaserScan
 from nav_adapter.ros2.messages.tf2_msgs import TFMessage
 
 if TYPE_CHECKING:
@@ -36,17 +36,19 @@ class BridgeViewer(Protocol):
 
 @dataclass(frozen=True)
 class BridgeInputs:
-    """The topics that the bridge reads; None for an input that comes from a file."""
+    """The topics that the bridge reads; None for an input that is not there, or is in a file."""
 
-    image: Topic
+    image: Topic | None
     odom: Topic
     camera_info: Topic | None = None
     tf: Topic | None = None
     tf_static: Topic | None = None
+    scans: tuple[Topic, ...] = ()
+    map: Topic | None = None
 
 
 class BridgeLoop:
-    """Publishes at a fixed rate, whatever perception takes, which has a thread of its own.
+    """Publishes at a fixed rate, whatever perception takes, which has threads of its own.
 
     A late publication is made up for by one that follows at once; more are left out.
 
@@ -58,7 +60,7 @@ class BridgeLoop:
         bridge: processes the messages.
         inputs: the topics to read.
         rate_hz: rate of publishing.
-        recorder: records odometry and tf as received.
+        recorder: records odometry, tf and scans as received.
         viewer: shows the state of the bridge.
     """
 
@@ -76,22 +78,23 @@ class BridgeLoop:
         self._period_s = 1.0 / rate_hz
         self._recorder, self._viewer = recorder, viewer
         self.frames = 0
-        for topic in (inputs.image, inputs.camera_info):
+        for topic in (inputs.image, inputs.camera_info, *inputs.scans):
             if topic is not None:
                 node.subscribe(topic)
         # Poses are read before each image and each publication. On busy cores, waking for each of
         # them would cost the networks more time than reading them.
-        for topic in (inputs.odom, inputs.tf, inputs.tf_static):
+        for topic in (inputs.odom, inputs.tf, inputs.tf_static, inputs.map):
             if topic is not None:
                 node.subscribe(topic, wakes=False)
         self._perception = PerceptionThread(bridge, time.time, on_frame=self._on_frame)
+        self._scans = ScanThread(bridge, time.time) if inputs.scans else None
 
     def run(
         self, seconds: float | None = None, *, report: Callable[[str], None] = lambda text: None
     ) -> None:
         """Run for ``seconds``, or until an exception; ``report`` gets a line every 2 s."""
         began = reported = due = time.monotonic()
-        frames_before = 0
+        before = 0
         while seconds is None or time.monotonic() - began < seconds:
             self._node.wait(min(due - time.monotonic(), _LONGEST_WAIT_S))
             self._take()
@@ -103,16 +106,23 @@ class BridgeLoop:
             now = time.monotonic()
             due = max(due + self._period_s, now)
             if now - reported >= _REPORT_PERIOD_S:
-                rate_hz = (self.frames - frames_before) / (now - reported)
+                total = self._processed
                 report(
-                    f"{rate_hz:4.1f} frames/s  {len(constraints.obstacles)} people  limit "
+                    f"{(total - before) / (now - reported):4.1f} frames/s  "
+                    f"{len(constraints.obstacles)} people  limit "
                     f"{constraints.speed_limit_mps:.2f} m/s ({constraints.limited_by})"
                 )
-                reported, frames_before = now, self.frames
+                reported, before = now, total
+
+    @property
+    def _processed(self) -> int:
+        """Number of images, or of scans if there is no camera."""
+        return self.frames if self._inputs.image is not None else self._bridge.counts["scans"]
 
     def close(self) -> bool:
-        """End perception after the frame in hand; return False if that takes too long."""
-        return self._perception.close()
+        """End perception after the frames in hand; return False if that takes too long."""
+        ended = self._scans is None or self._scans.close()
+        return self._perception.close() and ended
 
     def _take(self) -> None:
         """Pass the received messages on, an image after the poses that came before it."""
@@ -128,8 +138,22 @@ class BridgeLoop:
             for cdr in self._node.take_cdr(inputs.camera_info)[-1:]:
                 if bridge.camera is None:
                     self._perception.calibrate(self._decoder(inputs.camera_info, cdr, CameraInfo))
-        for cdr in self._node.take_cdr(inputs.image)[-1:]:
-            self._perception.submit(self._decoder(inputs.image, cdr, Image))
+        if inputs.image is not None:
+            for cdr in self._node.take_cdr(inputs.image)[-1:]:
+                self._perception.submit(self._decoder(inputs.image, cdr, Image))
+        if self._scans is not None:
+            self._take_scans(self._scans)
+
+    def _take_scans(self, thread: ScanThread) -> None:
+        """Pass the received map and scans on."""
+        if self._inputs.map is not None:
+            for cdr in self._node.take_cdr(self._inputs.map)[-1:]:
+                thread.submit_map(self._decoder(self._inputs.map, cdr, OccupancyGrid))
+        for number, topic in enumerate(self._inputs.scans):
+            for cdr in self._node.take_cdr(topic):
+                thread.submit(number, self._decoder(topic, cdr, LaserScan))
+                if self._recorder is not None:
+                    self._recorder.write(topic, cdr, time.time())
 
     def _messages(self, topic: Topic | None, kind: type[_Message]) -> list[_Message]:
         """Return and record the messages of a topic; one that cannot be decoded is refused."""

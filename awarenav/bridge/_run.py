@@ -6,15 +6,25 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
-from typing import Final, NoReturn
+from typing import TYPE_CHECKING, Final, NoReturn
 
 from nav_adapter import NavError
-from nav_adapter.ros2 import PUBLISHED, READ, AwarenessBridge, Frames, RobotFile, Topic, renamed
+from nav_adapter.ros2 import (
+    PUBLISHED,
+    READ,
+    AwarenessBridge,
+    Frames,
+    RobotFile,
+    Topic,
+    renamed,
+    scanner_inputs,
+)
+from nav_adapter.ros2.messages import ros_type
 from perception import AttentionCone, AwarenessPipeline, Camera, PersonDetector
 from perception.arrays import finite_number
 
@@ -23,9 +33,14 @@ from ..estimate import SHIPPED, Networks, RecordingPoseEstimator, choose_network
 from ..policies import read_policy
 from ._loop import BridgeInputs, BridgeLoop
 from ._publisher import TopicPublisher
+from ._replay import BagReplay, ReplayPublisher
+
+if TYPE_CHECKING:
+    from ..estimate import BagMessages
 
 # The last messages need so long to leave before the node is closed.
 _SEND_TIME_S: Final = 0.1
+_MOST_SCANNERS: Final = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,6 +59,9 @@ class BridgeOptions:
     compressed: bool
     camera_info: str
     camera: Path | None
+    no_camera: bool
+    scan: tuple[str, ...]
+    map: str | None
     odom: str
     odom_frame: str
     base_frame: str
@@ -51,6 +69,7 @@ class BridgeOptions:
     topic: tuple[str, ...]
     only: tuple[str, ...]
     percentage: bool
+    bag: Path | None
     record: Path | None
     rerun: Path | None
 
@@ -65,19 +84,16 @@ def bridge_command(options: BridgeOptions) -> int:
     camera = None if options.camera is None else Camera.from_yaml(options.camera)
     published = _published_topics(options.topic, options.only)
     networks = choose_networks(options.detector, options.pose, options.head)
-    inputs = _inputs(options, with_info=camera is None, with_tf=robot.camera is None)
+    inputs = _inputs(options, robot)
+    scanners = scanner_inputs([topic.name for topic in inputs.scans], robot)
 
     from nav_adapter.ros2 import DdsNode, McapRecorder  # noqa: PLC0415 - needs the extra ros2
 
-    node = DdsNode(domain)
+    cone, pose_estimator = AttentionCone(), RecordingPoseEstimator(networks.pose_estimator)
     with ExitStack() as stack:
-        stack.callback(node.close)
         recorder = None
         if options.record is not None:
             recorder = stack.enter_context(McapRecorder(options.record))
-        publisher = TopicPublisher(node, published, recorder)
-        pose_estimator = RecordingPoseEstimator(networks.pose_estimator)
-        cone = AttentionCone()
         viewer = None
         if options.rerun is not None:
             from ._rerun import RerunRecorder  # noqa: PLC0415 - needs the extra viz
@@ -85,39 +101,90 @@ def bridge_command(options: BridgeOptions) -> int:
             viewer = RerunRecorder(options.rerun, pose_estimator, cone.half_angle_rad)
             stack.enter_context(viewer)
 
-        if SHIPPED in (options.detector, options.pose):
+        if SHIPPED in (options.detector, options.pose) and inputs.image is not None:
             _log("the shipped networks are made for the simulator; see --detector and --pose")
-        if camera is None:
-            _log(f"waiting for /{options.camera_info.strip('/')}")
-        bridge = AwarenessBridge(
-            policy,
-            robot.profile(),
-            publisher.publish,
-            frames=Frames(options.odom_frame, options.base_frame, options.camera_frame),
-            T_base_camera=None if robot.camera is None else robot.camera.T_base_camera(),
-            camera=camera,
-            percentage=options.percentage,
-            warn=_log,
-            wanted=publisher.wants,
-            make_pipeline=_pipeline_maker(networks, pose_estimator, cone),
-        )
+        if scanners:
+            _log("the shipped leg detector is made for simulated scans; see docs/laser.md")
+
+        def bridge_to(publisher: TopicPublisher | ReplayPublisher) -> AwarenessBridge:
+            return AwarenessBridge(
+                policy,
+                robot.profile(),
+                publisher.publish,
+                frames=Frames(options.odom_frame, options.base_frame, options.camera_frame),
+                T_base_camera=None if robot.camera is None else robot.camera.T_base_camera(),
+                camera=camera,
+                with_camera=not options.no_camera,
+                scanners=scanners,
+                percentage=options.percentage,
+                warn=_log,
+                wanted=publisher.wants,
+                make_pipeline=_pipeline_maker(networks, pose_estimator, cone),
+            )
+
+        if options.bag is not None:
+            replayed = ReplayPublisher(published, recorder)
+            messages = _recorded(options.bag, inputs)
+            stack.callback(messages.close)
+            bridge = bridge_to(replayed)
+            replay = BagReplay(messages, bridge, inputs, rate_hz, replayed, viewer=viewer)
+            _log(f"replayed {replay.run(seconds, report=_log):.1f} s: {_summary(bridge)}")
+            return 0
+        node = DdsNode(domain)
+        stack.callback(node.close)
+        publisher = TopicPublisher(node, published, recorder)
+        bridge = bridge_to(publisher)
         loop = BridgeLoop(node, bridge, inputs, rate_hz, recorder=recorder, viewer=viewer)
         stack.callback(_close, loop)
-        _log(
-            f"domain {domain}: reading /{inputs.image.name} and /{inputs.odom.name}, publishing "
-            f"{', '.join('/' + topic.name for topic in published.values())}"
-        )
-        before = signal.signal(signal.SIGTERM, _interrupt)
-        try:
-            loop.run(seconds, report=_log)
-        except KeyboardInterrupt:
-            pass  # the usual end of a bridge
-        finally:
-            signal.signal(signal.SIGTERM, before)
-            bridge.stop(time.time(), "awarenav bridge has ended")
-            time.sleep(_SEND_TIME_S)
-        _log(f"ended after {loop.frames} frames; a stop was published")
+        _announce(domain, inputs, published)
+        _run_until_interrupted(loop, bridge, seconds)
+        scans = f" and {bridge.counts['scans']} scans" if inputs.scans else ""
+        _log(f"ended after {loop.frames} frames{scans}; a stop was published")
     return 0
+
+
+def _announce(domain: int, inputs: BridgeInputs, published: Mapping[str, Topic]) -> None:
+    if inputs.camera_info is not None:
+        _log(f"waiting for /{inputs.camera_info.name}")
+    read = [topic for topic in (inputs.image, *inputs.scans, inputs.odom) if topic is not None]
+    _log(
+        f"domain {domain}: reading {' and '.join('/' + topic.name for topic in read)}, "
+        f"publishing {', '.join('/' + topic.name for topic in published.values())}"
+    )
+
+
+def _run_until_interrupted(
+    loop: BridgeLoop, bridge: AwarenessBridge, seconds: float | None
+) -> None:
+    """Run the loop, and end with a stop."""
+    before = signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        loop.run(seconds, report=_log)
+    except KeyboardInterrupt:
+        pass  # the usual end of a bridge
+    finally:
+        signal.signal(signal.SIGTERM, before)
+        bridge.stop(time.time(), "awarenav bridge has ended")
+        time.sleep(_SEND_TIME_S)
+
+
+def _recorded(path: Path, inputs: BridgeInputs) -> BagMessages:
+    """Return the messages of the inputs in a recording."""
+    from ..estimate import BagMessages  # noqa: PLC0415 - needs the extra rosbag
+
+    topics = (inputs.image, inputs.camera_info, inputs.odom, inputs.map, *inputs.scans)
+    optional = (inputs.tf, inputs.tf_static)
+    required, others = (
+        {f"/{topic.name}": ros_type(topic.message) for topic in group if topic is not None}
+        for group in (topics, optional)
+    )
+    return BagMessages(path, required, others)
+
+
+def _summary(bridge: AwarenessBridge) -> str:
+    counts = bridge.counts
+    names = [name for name in ("frames", "scans", "scans_refused") if name in counts]
+    return ", ".join(f"{counts[name]} {name.replace('_', ' ')}" for name in names)
 
 
 def _close(loop: BridgeLoop) -> None:
@@ -181,14 +248,34 @@ def _published_topics(renames: Sequence[str], only: Sequence[str]) -> dict[str, 
     return {key: topic for key, topic in topics.items() if not only or key in only}
 
 
-def _inputs(options: BridgeOptions, *, with_info: bool, with_tf: bool) -> BridgeInputs:
+def _inputs(options: BridgeOptions, robot: RobotFile) -> BridgeInputs:
+    """Return the topics to read."""
+    scans = tuple(renamed(READ["scan"], name) for name in options.scan)
+    names = [topic.name for topic in scans]
+    if len(names) > _MOST_SCANNERS or len(set(names)) < len(names):
+        raise AwarenavError(
+            f"--scan must name up to {_MOST_SCANNERS} different topics, got {', '.join(names)}"
+        )
+    if options.no_camera and not scans:
+        raise AwarenavError("--no-camera needs a scanner: --scan TOPIC")
+    if options.no_camera and options.camera is not None:
+        raise AwarenavError("--no-camera and --camera exclude each other")
+    if options.map is not None and not scans:
+        raise AwarenavError("--map is for the scans: it needs --scan TOPIC")
     image = READ["compressed" if options.compressed else "image"]
+    with_info = options.camera is None and not options.no_camera
+    fixed = (options.no_camera or robot.camera is not None) and (
+        not scans or robot.scanners is not None
+    )
+    with_tf = not fixed or options.map is not None
     return BridgeInputs(
-        image=renamed(image, options.image),
+        image=None if options.no_camera else renamed(image, options.image),
         odom=renamed(READ["odom"], options.odom),
         camera_info=renamed(READ["camera_info"], options.camera_info) if with_info else None,
         tf=READ["tf"] if with_tf else None,
         tf_static=READ["tf_static"] if with_tf else None,
+        scans=scans,
+        map=None if options.map is None else renamed(READ["map"], options.map),
     )
 
 

@@ -16,7 +16,9 @@ _LOG: Final = "Recordings"
     "bridge",
     examples=[
         "awarenav bridge --robot robot.yaml --detector yolox-tiny --pose rtmpose-m",
+        "awarenav bridge --robot robot.yaml --scan scan_front --scan scan_rear",
         "awarenav bridge --robot robot.yaml --only speed_limit --record run.mcap",
+        "awarenav bridge --robot robot.yaml --scan scan --bag drive --record seen.mcap",
     ],
     exit_status={0: "Ended by Ctrl-C, SIGTERM or --seconds.", 2: "Bad input."},
     epilog="The environment variable CYCLONEDDS_URI chooses the network interface, as with "
@@ -27,7 +29,7 @@ _LOG: Final = "Recordings"
     type=FilePath(),
     required=True,
     metavar="FILE",
-    help="Footprint, speeds, braking and camera mount (YAML, as docs/nav2/robot.yaml).",
+    help="Footprint, speeds, braking and mounts of the sensors (YAML, as docs/nav2/robot.yaml).",
 )
 @options.policy()
 @option(
@@ -77,6 +79,32 @@ _LOG: Final = "Recordings"
     metavar="FILE",
     help="Calibration (ROS camera_info YAML) instead of the topic.",
 )
+@option(
+    "--scan",
+    group=_READ,
+    many=True,
+    metavar="TOPIC...",
+    help="sensor_msgs/LaserScan of one or two laser scanners; repeat the option for the second.",
+)
+@option(
+    "--no-camera",
+    group=_READ,
+    is_flag=True,
+    help="Scanners alone: everybody counts as unaware.",
+)
+@option(
+    "--map",
+    group=_READ,
+    metavar="TOPIC",
+    help="nav_msgs/OccupancyGrid: what it holds is nobody's legs. Needs --scan.",
+)
+@option(
+    "--bag",
+    group=_READ,
+    type=FilePath(),
+    metavar="FILE",
+    help="Replay a recording (rosbag2 folder, .db3, .mcap, .bag) instead; nothing is published.",
+)
 @option("--odom", group=_READ, default="odom", metavar="TOPIC", help="nav_msgs/Odometry.")
 @option("--odom-frame", group=_READ, default="odom", metavar="FRAME", help="Fixed frame in tf.")
 @option("--base-frame", group=_READ, default="base_link", metavar="FRAME", help="Robot's frame.")
@@ -115,7 +143,7 @@ _LOG: Final = "Recordings"
     group=_LOG,
     type=FilePath(),
     metavar="FILE.mcap",
-    help="Record what is published, and odometry and tf as read, for Foxglove.",
+    help="Record what is published, and odometry, tf and scans as read, for Foxglove.",
 )
 @option(
     "--rerun",
@@ -128,9 +156,9 @@ _LOG: Final = "Recordings"
 def bridge(**values: Any) -> int:
     """Find and track people in a ROS 2 camera; publish obstacles and a speed limit for Nav2.
 
-    Reads images, calibration and odometry. Publishes what Nav2, its collision monitor, TEB and RViz
-    read. Needs no ROS. While an input is missing or late, the bridge publishes a stop and the
-    reason. docs/nav2.md has the parameters to set in Nav2.
+    Reads images, calibration, scans and odometry. Publishes what Nav2, its collision monitor, TEB
+    and RViz read. Needs no ROS. While an input is missing or late, the bridge publishes a stop and
+    the reason. docs/nav2.md has the parameters to set in Nav2.
     """
     from ._run import BridgeOptions, bridge_command  # noqa: PLC0415 - help needs no perception
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from ..lazy import lazy_names
 
 if TYPE_CHECKING:
+    from ._bag import BagMessages
     from ._camera import CameraChoice, fixed_camera_pose, scaled_camera
     from ._estimator import (
         FrameEstimate,
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 __all__ = [
     "SHIPPED",
     "BackgroundWorker",
+    "BagMessages",
     "CameraChoice",
     "EstimateOptions",
     "FrameEstimate",
@@ -59,6 +61,7 @@ __all__ = [
 __getattr__ = lazy_names(
     __name__,
     {
+        "._bag": ("BagMessages",),
         "._camera": ("CameraChoice", "fixed_camera_pose", "scaled_camera"),
         "._estimator": (
             "FrameEstimate",

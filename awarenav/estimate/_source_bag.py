@@ -1,4 +1,4 @@
-"""Image topics of ROS 1 and ROS 2 recordings; no other module imports ``rosbags``."""
+"""Image topics of ROS 1 and ROS 2 recordings."""
 
 from __future__ import annotations
 
@@ -14,19 +14,10 @@ from nav_adapter.ros2 import camera_of, picture_of
 from nav_adapter.ros2.messages.sensor_msgs import CameraInfo
 from perception import Camera
 from perception.arrays import ImageRgb
-from perception.documents import read_yaml
 
-from ..errors import AwarenavError, MissingExtraError
+from ..errors import AwarenavError
+from ._bag import open_bag
 from ._source import SourceFrame
-
-try:
-    from rosbags.highlevel import AnyReader
-    from rosbags.typesys import Stores, get_typestore
-except ImportError as cause:  # pragma: no cover - depends on the installation
-    raise MissingExtraError(
-        "reading recordings needs the package rosbags, which is not installed; it is the extra "
-        "'rosbag': pip install 'awarenav[rosbag]'"
-    ) from cause
 
 _IMAGE: Final = "sensor_msgs/msg/Image"
 _COMPRESSED: Final = "sensor_msgs/msg/CompressedImage"
@@ -49,14 +40,7 @@ class BagSource:
 
     def __init__(self, path: Path, topic: str | None = None) -> None:
         self._path = path
-        if (metadata := path / "metadata.yaml").is_file():
-            read_yaml(metadata, AwarenavError)  # refuses what would harm the library
-        try:
-            self._reader = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
-            self._reader.open()
-        # The library also raises errors of its storage layers.
-        except Exception as cause:
-            raise AwarenavError(f"cannot read the recording {path}: {cause}") from cause
+        self._reader = open_bag(path)
         try:
             self._topic = self._chosen_topic(topic)
             self.camera = self._read_camera()

@@ -21,7 +21,10 @@ from ._outgoing import Frames, outgoing
 from ._people import circle_objects, detections, people, teb_obstacles
 from ._perception_thread import PerceptionThread
 from ._polygons import STOP_POLYGON_ID, collision_polygons, stop_zone
-from ._robot_file import CameraMount, RobotFile
+from ._robot_file import CameraMount, RobotFile, ScannerMount
+from ._scan_perception import ScannerInput, scanner_inputs
+from ._scan_thread import ScanThread
+from ._scans import laser_scan_of, map_cells_of
 from ._speed_limit import SLOWEST_MPS, speed_limit
 from ._topics import PUBLISHED, READ, Topic, renamed
 from ._transforms import TransformBuffer
@@ -44,6 +47,9 @@ __all__ = [
     "PerceivedFrame",
     "PerceptionThread",
     "RobotFile",
+    "ScanThread",
+    "ScannerInput",
+    "ScannerMount",
     "Topic",
     "TransformBuffer",
     "alerts",
@@ -53,12 +59,15 @@ __all__ = [
     "decode",
     "detections",
     "encode",
+    "laser_scan_of",
+    "map_cells_of",
     "markers",
     "occupancy_grid",
     "outgoing",
     "people",
     "picture_of",
     "renamed",
+    "scanner_inputs",
     "speed_limit",
     "stop_zone",
     "teb_obstacles",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from .._alert import Alert
 from .._constraints import NavConstraints
@@ -13,7 +13,11 @@ _NAME = "awarenav"
 
 
 def alerts(
-    constraints: NavConstraints, *, frame_id: str = "", details: Mapping[str, str] | None = None
+    constraints: NavConstraints,
+    *,
+    frame_id: str = "",
+    details: Mapping[str, str] | None = None,
+    sensors: DiagnosticStatus | None = None,
 ) -> DiagnosticArray:
     """Return ``diagnostic_msgs/DiagnosticArray``: the state of the limit and one status per alert.
 
@@ -27,11 +31,30 @@ def alerts(
         constraints: the alerts and the limit.
         frame_id: of the header; diagnostics do not use it.
         details: more values of the first status, by name.
+        sensors: the second status, from :func:`sensor_status`; None to leave it out.
     """
+    states = (_limit(constraints, details or {}), *(() if sensors is None else (sensors,)))
     return DiagnosticArray(
         header(constraints.stamp_s, frame_id),
-        (_limit(constraints, details or {}), *(_alert(each) for each in constraints.alerts)),
+        (*states, *(_alert(each) for each in constraints.alerts)),
     )
+
+
+def sensor_status(ages_s: Mapping[str, float], lost: Sequence[str]) -> DiagnosticStatus:
+    """Return the status ``"awarenav: sensors"``: which sensors are lost.
+
+    Its level is OK if none is, WARN if some are, and ERROR if all are.
+
+    Args:
+        ages_s: age of the latest frame of every sensor; infinite before the first.
+        lost: names of those that are lost.
+    """
+    level, text = DiagnosticStatus.OK, "all sensors are at work"
+    if lost:
+        level = DiagnosticStatus.WARN if len(lost) < len(ages_s) else DiagnosticStatus.ERROR
+        text = f"lost: {', '.join(lost)}"
+    values = {f"{name}_age_s": f"{age_s:.3f}" for name, age_s in ages_s.items()}
+    return _status(level, "sensors", text, **values)
 
 
 def _limit(constraints: NavConstraints, details: Mapping[str, str]) -> DiagnosticStatus:

@@ -1,17 +1,15 @@
-"""The bridge from camera and odometry messages to constraints, without a transport."""
+"""The bridge from sensor and odometry messages to constraints, without a transport."""
 
 from __future__ import annotations
 
 import logging
-import math
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-
-import numpy as np
 
 from perception import AwarenessPipeline, Camera, PerceptionError
 from perception.arrays import FloatArray
+from perception.laser import LegDetector
 from tracking import PersonTrack, TrackerConfig, TrackingError
 
 from .._adapter import NavAdapter
@@ -19,25 +17,29 @@ from .._constraints import NavConstraints
 from .._errors import NavError
 from .._policy import AwarenessPolicy
 from .._robot import RobotProfile, RobotState
-from ._clock import CLOCK_TOLERANCE_S, BridgeClock, InputKind
+from ._alerts import sensor_status
+from ._clock import BridgeClock
+from ._guard import guarded_update, stopped
 from ._image_perception import ImagePerception, PerceivedFrame
 from ._outgoing import Frames, outgoing
-from ._transforms import TransformBuffer
-from .conversions import pose_matrix, to_seconds
+from ._pose_reader import PoseReader
+from ._poses import RobotPoses
+from ._scan_perception import ScannerInput, ScanPerception
+from ._scan_reader import ScanReader
+from ._sensor_watch import CAMERA, SensorWatch
+from ._shared_tracker import SharedTracker
+from .conversions import to_seconds
 from .messages import Message
-from .messages.geometry_msgs import TransformStamped
-from .messages.nav_msgs import Odometry
-from .messages.sensor_msgs import CameraInfo, CompressedImage, Image
+from .messages.diagnostic_msgs import DiagnosticStatus
+from .messages.nav_msgs import OccupancyGrid, Odometry
+from .messages.sensor_msgs import CameraInfo, CompressedImage, Image, LaserScan
 from .messages.tf2_msgs import TFMessage
 
 _LOG = logging.getLogger("nav_adapter")
 
-# No robot drives so fast: a higher speed is an error of the sender.
-_FASTEST_MPS = 100.0
-
 
 class AwarenessBridge:
-    """Turns camera and odometry messages of a ROS graph into constraints for its planners.
+    """Turns camera, scanner and odometry messages of a ROS graph into constraints for its planners.
 
     Pass on messages as they come (``on_…``) and call :meth:`tick` at a fixed rate, with or without
     new images: each tick publishes every topic. If input is missing, late or refused, the bridge
@@ -46,7 +48,13 @@ class AwarenessBridge:
 
     Perception may have a thread of its own, as :class:`PerceptionThread` gives it one: while
     :meth:`on_image` and :meth:`on_camera_info` run, :meth:`tick` and the other methods go on with
-    the last frame's people, who grow older, as in :meth:`NavAdapter.watchdog`.
+    the last frame's people, who grow older, as in :meth:`NavAdapter.watchdog`. :meth:`on_scan` may
+    have another one (:class:`ScanThread`).
+
+    With scanners, the robot stands until every sensor has been heard. If the camera is lost for
+    longer than ``stale_after_s``, everybody counts as unaware, and the robot goes on only while
+    scanners see all of the camera's field. If scanners are lost, the camera goes on as if it were
+    alone. Each loss and return is a warning and a status of the alerts.
 
     Messages whose stamp lies more than 0.05 s ahead of ``now_s`` are refused and counted in
     :attr:`counts`. The clock of ``now_s`` may be stepped back: by up to 0.05 s, time stands still
@@ -62,6 +70,9 @@ class AwarenessBridge:
         make_pipeline: makes perception for a camera, once it is known; by default with the shipped
             networks.
         camera: calibration; None to read it from camera_info. With it, the pipeline is made here.
+        with_camera: False for scanners alone; everybody then counts as unaware.
+        scanners: the laser scanners.
+        make_detector: makes the leg detector, if there are scanners.
         percentage: as in :func:`speed_limit`.
         warn: called with each problem; a repeated text is passed on only once.
         wanted: called with the key of a topic in every tick; unwanted messages are not made.
@@ -77,30 +88,54 @@ class AwarenessBridge:
         T_base_camera: FloatArray | None = None,
         make_pipeline: Callable[[Camera], AwarenessPipeline] = AwarenessPipeline,
         camera: Camera | None = None,
+        with_camera: bool = True,
+        scanners: Sequence[ScannerInput] = (),
+        make_detector: Callable[[], LegDetector] = LegDetector,
         percentage: bool = False,
         warn: Callable[[str], None] = lambda text: None,
         wanted: Callable[[str], bool] = lambda key: True,
     ) -> None:
         self.frames = frames or Frames()
         self._policy, self._robot, self._publish = policy, robot, publish
-        self._T_base_camera = T_base_camera
+        self._T_base_camera, self._with_camera = T_base_camera, with_camera
         self._percentage = percentage
         self._wanted = wanted
         self._warn_user, self._warned = warn, ""
-        self._ahead: set[InputKind] = set()
-        self._perception = ImagePerception(
-            make_pipeline, TrackerConfig(awareness=policy.filter), camera
-        )
+        if not with_camera and not scanners:
+            raise NavError("with_camera must be True, or scanners must name one or two, got none")
+        config = TrackerConfig(awareness=policy.filter)
+        self._tracker = SharedTracker(config, len(scanners))
+        self._perception = ImagePerception(make_pipeline, self._tracker, camera)
         self._adapter = NavAdapter(policy, robot)
-        self._transforms = TransformBuffer()
-        self._state: RobotState | None = None
+        self._poses = RobotPoses(self.frames, T_base_camera)
         self._frame: PerceivedFrame | None = None
         self._clock = BridgeClock()
+        self._pose_reader = PoseReader(
+            self._poses, self._clock, self.frames.odom, self._warn, with_map=bool(scanners)
+        )
+        self._watch = SensorWatch(
+            [each.name for each in scanners],
+            with_camera=with_camera,
+            lost_after_s=policy.timing.stale_after_s,
+        )
         self._frames = self._perception_failures = 0
         # For all of the above but the perception, which is not held up by it.
         self._lock = threading.RLock()
         # Keeps the messages of one publication together.
         self._sending = threading.Lock()
+        self._scans: ScanReader | None = None
+        if inputs := tuple(scanners):
+            self._scans = ScanReader(
+                inputs,
+                ScanPerception(robot.footprint_m, inputs, make_detector),
+                self._tracker,
+                self._poses,
+                self._clock,
+                self._watch,
+                self._lock,
+                self._warn,
+                self.frames.odom,
+            )
 
     @property
     def frame(self) -> PerceivedFrame | None:
@@ -109,9 +144,8 @@ class AwarenessBridge:
 
     @property
     def tracks(self) -> tuple[PersonTrack, ...]:
-        """Tracks of the latest frame."""
-        frame = self._frame
-        return () if frame is None else frame.tracks
+        """Tracks after the latest frame of any sensor."""
+        return self._tracker.tracks
 
     @property
     def counts(self) -> dict[str, int]:
@@ -119,20 +153,26 @@ class AwarenessBridge:
 
         ``frames`` that were processed; ``odometry_from_future``, ``transforms_from_future`` and
         ``images_from_future``, which were refused; ``perception_failures``: images that ended in an
-        error of the program; ``clock_restarts``.
+        error of the program; ``clock_restarts``. With scanners also ``scans_from_future``, and
+        ``scans`` that were processed, ``scans_refused`` for any reason, ``scans_dropped``, and
+        ``frames_refused_by_tracker``, of any sensor.
         """
         with self._lock:
+            refused = dict(self._clock.refused)
+            if self._scans is None:
+                del refused["scans"]
             return {
                 "frames": self._frames,
-                **{f"{kind}_from_future": count for kind, count in self._clock.refused.items()},
+                **{f"{kind}_from_future": count for kind, count in refused.items()},
                 "perception_failures": self._perception_failures,
                 "clock_restarts": self._clock.restarts,
+                **({} if self._scans is None else self._scans.counts),
             }
 
     @property
     def robot_state(self) -> RobotState | None:
         """The latest state of the robot, or None."""
-        return self._state
+        return self._poses.state
 
     @property
     def camera(self) -> Camera | None:
@@ -141,6 +181,8 @@ class AwarenessBridge:
 
     def on_camera_info(self, message: CameraInfo) -> None:
         """Make the pipeline from the first calibration; later ones are ignored."""
+        if not self._with_camera:
+            return
         try:
             self._perception.calibrate(message)
         except (NavError, PerceptionError) as problem:
@@ -157,9 +199,7 @@ class AwarenessBridge:
             static: whether they hold at all times; their stamps are then not looked at.
         """
         with self._lock:
-            for each in message.transforms:
-                if static or not self._is_future_transform(each, now_s):
-                    self._store_transform(each, static)
+            self._pose_reader.read_transforms(message, now_s, static=static)
 
     def on_odometry(self, message: Odometry, now_s: float | None = None) -> None:
         """Store the robot's state, and its pose as a transform.
@@ -169,7 +209,7 @@ class AwarenessBridge:
             now_s: the present time; None to check the stamp in the next :meth:`tick` only.
         """
         with self._lock:
-            self._store_odometry(message, now_s)
+            self._pose_reader.read_odometry(message, now_s)
 
     def on_image(self, message: Image | CompressedImage, now_s: float) -> bool:
         """Process one image; return True if it was used."""
@@ -182,9 +222,7 @@ class AwarenessBridge:
                 if refusal is not None:
                     raise NavError(f"the image's {refusal}")
                 restarts = self._clock.restarts
-                T_odom_camera = self._camera_pose(
-                    self.frames.camera or message.header.frame_id, stamp_s
-                )
+                T_odom_camera = self._poses.T_odom_camera(message.header.frame_id, stamp_s)
             frame = self._perception.process(
                 message, stamp_s, T_odom_camera, lambda: self._clock.restarts == restarts
             )
@@ -197,7 +235,34 @@ class AwarenessBridge:
             self._frame = frame
             self._frames += 1
             self._warned = ""
+            self._watch.saw_image(stamp_s, *self._camera_on_base(message.header.frame_id, stamp_s))
         return True
+
+    def on_scan(self, number: int, message: LaserScan, now_s: float) -> bool:
+        """Process one scan of a scanner, numbered from 0; return True if it was used.
+
+        Raises:
+            NavError: for a number that no scanner has.
+        """
+        return self._scan_reader().read(number, message, now_s)
+
+    def on_map(self, message: OccupancyGrid) -> None:
+        """Use a map of what stands still: what it holds is nobody's legs.
+
+        It is used while tf tells where the map is in odom.
+        """
+        try:
+            self._scan_reader().set_map(message)
+        except NavError as problem:
+            self._warn(f"map: {problem}")
+
+    def refuse_scan(self, number: int, problem: str, now_s: float) -> None:
+        """Count and report a scan that could not be decoded."""
+        self._scan_reader().refuse(number, problem, now_s)
+
+    def scan_dropped(self) -> None:
+        """Count a scan that was dropped, because others came faster than they are processed."""
+        self._scan_reader().dropped()
 
     def tick(self, now_s: float) -> NavConstraints:
         """Publish every topic at ``now_s`` and return the constraints."""
@@ -208,15 +273,18 @@ class AwarenessBridge:
                 if self._clock.restarts != restarts:
                     self._restart()
                 if time_s is None:
-                    constraints = _stopped(now_s, "the clock went backward")
+                    constraints = stopped(now_s, "the clock went backward")
                 else:
-                    self._drop_future(time_s)
+                    self._pose_reader.drop_future(time_s)
                     constraints = self._constraints(time_s)
-                tracks, state = self.tracks, self._state
+                tracks, state = self.tracks, self._poses.state
                 details = {name: str(count) for name, count in self.counts.items()}
                 if self._frame is not None:
                     details["frame_age_s"] = f"{constraints.stamp_s - self._frame.stamp_s:.3f}"
-            self._send(constraints, tracks, state, details, self._wanted)
+                sensors, news = self._sensors(constraints.stamp_s)
+            for line in news:
+                self._warn_user(line)
+            self._send(constraints, tracks, state, details, self._wanted, sensors)
         return constraints
 
     def refuse(self, problem: str) -> None:
@@ -235,77 +303,32 @@ class AwarenessBridge:
 
     def stop(self, now_s: float, reason: str) -> NavConstraints:
         """Publish a stop, before the caller ends."""
-        constraints = _stopped(now_s, reason)
+        constraints = stopped(now_s, reason)
         with self._sending:
             self._send(constraints, (), None, {}, lambda key: True)
         return constraints
 
-    def _store_odometry(self, message: Odometry, now_s: float | None) -> None:
-        if message.header.frame_id.lstrip("/") != self.frames.odom:
-            self._warn(
-                f"odometry must be in frame {self.frames.odom!r}, got "
-                f"{message.header.frame_id!r}: ignored"
-            )
-            return
-        position, rotation = message.pose.pose.position, message.pose.pose.orientation
-        stamp_s = to_seconds(message.header.stamp)
-        if self._is_future("odometry", stamp_s, now_s):
-            return
-        try:
-            T = pose_matrix((position.x, position.y, position.z), rotation)
-            linear = message.twist.twist.linear
-            speed_mps = math.hypot(linear.x, linear.y)
-            # Written so that NaN is refused too.
-            if not speed_mps <= _FASTEST_MPS:
-                raise NavError(f"speed_mps must be within {_FASTEST_MPS:g} m/s, got {speed_mps:g}")
-            state = RobotState(
-                stamp_s,
-                T[:2, 3],
-                math.atan2(T[1, 0], T[0, 0]),
-                linear.x,
-                message.twist.twist.angular.z,
-                np.array([linear.x, linear.y]),
-            )
-            child = message.child_frame_id or self.frames.base
-            self._transforms.add(self.frames.odom, child, stamp_s, T)
-        except NavError as problem:
-            self._warn(f"odometry: {problem}")
-            return
-        if self._state is None or stamp_s >= self._state.stamp_s:
-            self._state = state
-
     def _constraints(self, now_s: float) -> NavConstraints:
-        state, frame = self._state, self._frame
-        if state is None:
-            return _stopped(now_s, "no odometry yet")
-        if self._perception.camera is None:
-            return _stopped(now_s, "no camera_info yet")
-        if frame is None:
-            return _stopped(now_s, "no camera frame yet")
-        try:
-            return self._adapter.update(
-                frame.tracks, state, now_s, perception_stamp_s=frame.stamp_s
-            )
-        except NavError as problem:
-            self._warn(str(problem))
-            reason = f"refused: {problem}"
-        except Exception as problem:
-            # Publishing must go on, whatever is wrong with these data.
-            reason = f"the adapter failed: {type(problem).__name__}: {problem}"
-            if self._warn(reason):
-                _LOG.error("the adapter failed", exc_info=problem)
-        try:
-            # A stop that keeps the people of the last good data, grown older.
-            older = self._adapter.watchdog(now_s)
-        except Exception:
-            return _stopped(now_s, reason)
-        return replace(
-            older,
-            speed_limit_mps=0.0,
-            reachable_speed_limit_mps=0.0,
-            limited_by=reason,
-            stale=True,
-        )
+        state, seen_s = self._poses.state, self._watch.stamp_s
+        missing = self._missing()
+        if missing or state is None or seen_s is None:
+            return stopped(now_s, missing or "no sensor sees what is ahead")
+        tracks = self.tracks
+        if self._scans is not None and CAMERA in self._watch.lost(now_s):
+            # As the camera alone would have it, whatever the tracker remembers.
+            tracks = tuple(replace(each, awareness_lower=0.0, noticed=0.0) for each in tracks)
+        return guarded_update(self._adapter, tracks, state, now_s, seen_s, self._warn)
+
+    def _missing(self) -> str:
+        """Return what has not come yet; empty if nothing is missing."""
+        if self._poses.state is None:
+            return "no odometry yet"
+        if self._with_camera and self._perception.camera is None:
+            return "no camera_info yet"
+        missing = self._watch.missing
+        if missing is None:
+            return ""
+        return f"no {missing} {'frame' if missing == CAMERA else 'scan'} yet"
 
     def _send(
         self,
@@ -314,6 +337,7 @@ class AwarenessBridge:
         state: RobotState | None,
         details: dict[str, str],
         wanted: Callable[[str], bool],
+        sensors: DiagnosticStatus | None = None,
     ) -> None:
         for key, message in outgoing(
             constraints,
@@ -324,59 +348,43 @@ class AwarenessBridge:
             percentage=self._percentage,
             wanted=wanted,
             details=details,
+            sensors=sensors,
         ):
             self._publish(key, message)
-
-    def _is_future(self, kind: InputKind, stamp_s: float, now_s: float | None) -> bool:
-        """Return whether a message is from the future; it is then counted."""
-        refusal = None if now_s is None else self._clock.refusal(kind, stamp_s, now_s)
-        # A sender that is always ahead must not flood the terminal: the diagnostics have the count.
-        if refusal is not None and kind not in self._ahead:
-            self._ahead.add(kind)
-            self._warn(f"{kind}: the {refusal}: refused and counted, without further warnings")
-        return refusal is not None
-
-    def _is_future_transform(self, message: TransformStamped, now_s: float | None) -> bool:
-        stamp_s = to_seconds(message.header.stamp)
-        if message.child_frame_id.lstrip("/") == self.frames.odom and now_s is not None:
-            # Localisation stamps map -> odom ahead on purpose, and it is not needed here.
-            return stamp_s > self._clock.read(now_s) + CLOCK_TOLERANCE_S
-        return self._is_future("transforms", stamp_s, now_s)
-
-    def _drop_future(self, now_s: float) -> None:
-        """Forget what is from the future and would shut out good messages until then."""
-        state = self._state
-        if state is not None and self._is_future("odometry", state.stamp_s, now_s):
-            self._state = None
-        self._transforms.forget(after_s=now_s + CLOCK_TOLERANCE_S)
 
     def _restart(self) -> None:
         """Forget all that has a stamp of the clock before it was set."""
         self._adapter = NavAdapter(self._policy, self._robot)
-        self._perception.forget_tracks()
-        self._frame, self._state = None, None
-        self._transforms.forget()
-        self._ahead.clear()
+        self._tracker.forget()
+        self._frame = None
+        self._pose_reader.forget()
+        self._watch.forget()
+        if self._scans is not None:
+            self._scans.forget()
         self._warn("the clock has been set back: all tracks and moving transforms are deleted")
 
-    def _camera_pose(self, frame: str, stamp_s: float) -> FloatArray:
-        if self._T_base_camera is None:
-            return self._transforms.lookup(self.frames.odom, frame, stamp_s)
-        T_odom_base = self._transforms.lookup(self.frames.odom, self.frames.base, stamp_s)
-        return np.asarray(T_odom_base @ self._T_base_camera, dtype=np.float64)
-
-    def _store_transform(self, message: TransformStamped, static: bool) -> None:
-        translation, rotation = message.transform.translation, message.transform.rotation
+    def _camera_on_base(self, frame: str, stamp_s: float) -> tuple[Camera, FloatArray | None]:
+        """Return the camera, and its pose in the base frame; None if that is not known."""
+        camera = self._perception.camera
+        assert camera is not None
+        if self._T_base_camera is not None:
+            return camera, self._T_base_camera
         try:
-            self._transforms.add(
-                message.header.frame_id,
-                message.child_frame_id,
-                to_seconds(message.header.stamp),
-                pose_matrix((translation.x, translation.y, translation.z), rotation),
-                static=static,
-            )
-        except NavError as problem:
-            self._warn(f"tf: {problem}")
+            return camera, self._poses.in_base(self.frames.camera or frame, stamp_s)
+        except NavError:
+            return camera, None
+
+    def _sensors(self, now_s: float) -> tuple[DiagnosticStatus | None, list[str]]:
+        """Return the status of the sensors, and a line for each loss and return."""
+        if self._scans is None:
+            return None, []
+        status = sensor_status(self._watch.ages_s(now_s), self._watch.lost(now_s))
+        return status, self._watch.news(now_s)
+
+    def _scan_reader(self) -> ScanReader:
+        if self._scans is None:
+            raise NavError("the bridge was made without scanners")
+        return self._scans
 
     def _warn(self, text: str) -> bool:
         """Pass on a problem; return False for the one that was passed on last."""
@@ -386,7 +394,3 @@ class AwarenessBridge:
             self._warned = text
         self._warn_user(text)
         return True
-
-
-def _stopped(now_s: float, reason: str) -> NavConstraints:
-    return NavConstraints(now_s, (), 0.0, reason, True)

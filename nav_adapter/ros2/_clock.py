@@ -13,7 +13,7 @@ _NEW_CLOCK_AFTER_S: Final = 1.0
 # Readings follow one another at this distance at most: the slowest rate of publishing is 1 Hz.
 _MAX_PAUSE_S: Final = 2.0
 
-InputKind = Literal["odometry", "transforms", "images"]
+InputKind = Literal["odometry", "transforms", "images", "scans"]
 
 
 class BridgeClock:
@@ -30,7 +30,12 @@ class BridgeClock:
 
     def __init__(self) -> None:
         self.restarts = 0
-        self.refused: dict[InputKind, int] = {"odometry": 0, "transforms": 0, "images": 0}
+        self.refused: dict[InputKind, int] = {
+            "odometry": 0,
+            "transforms": 0,
+            "images": 0,
+            "scans": 0,
+        }
         self._last_s: float | None = None
         self._jumped: JumpedClock | None = None
 

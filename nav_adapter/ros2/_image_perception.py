@@ -1,4 +1,4 @@
-"""Networks and tracker of the bridge: from an image to tracks."""
+"""The networks of the bridge: from an image to tracks."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from perception import AwarenessPipeline, Camera, FloorPlane, PersonObservation
 from perception.arrays import FloatArray
-from tracking import CameraView, PersonTrack, PersonTracker, TrackerConfig
+from tracking import PersonTrack
 
 from ._images import camera_of, picture_of
+from ._shared_tracker import SharedTracker
 from .messages.sensor_msgs import CameraInfo, CompressedImage, Image
 
 # Uncertainty of the height and the tilt of a camera on a driving robot.
@@ -28,7 +29,7 @@ class PerceivedFrame:
 
     Attributes:
         stamp_s: of the image.
-        tracks: all tracks at that time.
+        tracks: all tracks at that time, or at that of a later scan.
         image: (H, W, 3) uint8 RGB.
         observations: one per person seen.
         T_odom_camera: (4, 4) pose of the camera.
@@ -42,25 +43,24 @@ class PerceivedFrame:
 
 
 class ImagePerception:
-    """The pipeline and the tracker, from the first calibration on.
+    """The pipeline, from the first calibration on.
 
     One thread at a time is in :meth:`process` or :meth:`calibrate`; others wait.
 
     Args:
         make_pipeline: makes the pipeline for a camera.
-        config: of the tracker.
+        tracker: takes the people of each image.
         camera: calibration; None until :meth:`calibrate`.
     """
 
     def __init__(
         self,
         make_pipeline: Callable[[Camera], AwarenessPipeline],
-        config: TrackerConfig,
+        tracker: SharedTracker,
         camera: Camera | None,
     ) -> None:
-        self._make_pipeline, self._config = make_pipeline, config
+        self._make_pipeline, self._tracker = make_pipeline, tracker
         self._busy = threading.Lock()
-        self._reset_wanted = False
         self._camera: Camera | None = None
         if camera is not None:
             self._start(camera)
@@ -71,7 +71,7 @@ class ImagePerception:
         return self._camera
 
     def calibrate(self, message: CameraInfo) -> None:
-        """Make pipeline and tracker from the first calibration; later ones are ignored.
+        """Make the pipeline from the first calibration; later ones are ignored.
 
         Raises:
             NavError, PerceptionError: for a calibration or networks that cannot be used.
@@ -79,10 +79,6 @@ class ImagePerception:
         with self._busy:
             if self._camera is None:
                 self._start(camera_of(message))
-
-    def forget_tracks(self) -> None:
-        """Delete all tracks before the next frame; from any thread, without waiting."""
-        self._reset_wanted = True
 
     def process(
         self,
@@ -99,19 +95,14 @@ class ImagePerception:
         with self._busy:
             image = picture_of(message)
             observations = self._pipeline.process(image, stamp_s, floor=_floor(T_odom_camera))
-            # The tracker is reset before the question: tracks that another thread wants deleted
-            # from here on are deleted before the next frame.
-            if self._reset_wanted:
-                self._reset_wanted = False
-                self._tracker.reset()
-            if not is_current():
-                return None
-            tracks = self._tracker.update(observations, stamp_s, T_odom_camera)
+            tracks = self._tracker.update(observations, stamp_s, T_odom_camera, is_current)
+        if tracks is None:
+            return None
         return PerceivedFrame(stamp_s, tracks, image, observations, T_odom_camera)
 
     def _start(self, camera: Camera) -> None:
         self._pipeline = self._make_pipeline(camera)
-        self._tracker = PersonTracker(self._config, view=CameraView(camera))
+        self._tracker.use_camera(camera)
         self._camera = camera
 
 

@@ -16,6 +16,7 @@ from ._people import circle_objects, detections, people, teb_obstacles
 from ._polygons import collision_polygons, stop_zone
 from ._speed_limit import speed_limit
 from .messages import Message
+from .messages.diagnostic_msgs import DiagnosticStatus
 
 
 @dataclass(frozen=True)
@@ -44,11 +45,12 @@ def outgoing(
     grid_m: float = 10.0,
     wanted: Callable[[str], bool] = lambda key: True,
     details: Mapping[str, str] | None = None,
+    sensors: DiagnosticStatus | None = None,
 ) -> Iterator[tuple[str, Message]]:
     """Yield topic key (:data:`~nav_adapter.ros2.PUBLISHED`) and message, urgent ones first.
 
     Without ``robot_state`` there is no grid, since it is centred on the robot. A message is made
-    only if ``wanted`` returns True for its key. ``details`` are for :func:`alerts`.
+    only if ``wanted`` returns True for its key. ``details`` and ``sensors`` are for :func:`alerts`.
     """
     odom, base = frames.odom, frames.base
     if wanted("speed_limit"):
@@ -59,7 +61,7 @@ def outgoing(
         ):
             yield "collision_polygons", polygon
     if wanted("alerts"):
-        yield "alerts", alerts(constraints, details=details)
+        yield "alerts", alerts(constraints, details=details, sensors=sensors)
     if wanted("stop_zone"):
         moving = robot_state
         forward, left = (moving.speed_mps, moving.lateral_mps) if moving else (0.0, 0.0)

@@ -1,4 +1,4 @@
-"""The robot file of the bridge: profile and camera mount in one YAML file."""
+"""The robot file of the bridge: profile and mounts of its sensors in one YAML file."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ import math
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from perception.arrays import FloatArray
+from perception.laser import Scanner
 from tracking.config import StrictConfig
 
 from .._errors import NavError
@@ -57,6 +58,48 @@ class CameraMount(StrictConfig):
         return T
 
 
+class ScannerMount(StrictConfig):
+    """Position and direction of a level laser scanner.
+
+    Attributes:
+        position_base_m: x, y, z of its centre in the base frame, metres; the base frame lies on the
+            floor.
+        yaw_deg: direction of its x axis, to the left of straight ahead.
+        upside_down: its z axis points down.
+        field_of_view_deg: lowest and highest angle about its z axis that is used; None for all.
+    """
+
+    error: ClassVar[type[ValueError]] = NavError
+
+    position_base_m: _Position
+    yaw_deg: float = Field(default=0.0, ge=-180.0, le=180.0)
+    upside_down: bool = False
+    field_of_view_deg: _Corner | None = None
+
+    @field_validator("field_of_view_deg")
+    @classmethod
+    def _check_order(cls, view: list[float] | None) -> list[float] | None:
+        if view is not None and not -360.0 <= view[0] < view[1] <= 360.0:
+            raise ValueError(
+                "field_of_view_deg must be the lowest and the highest angle, within -360 to 360, "
+                f"got {view}"
+            )
+        return view
+
+    @property
+    def field_of_view_rad(self) -> tuple[float, float]:
+        """Lowest and highest angle."""
+        low, high = self.field_of_view_deg or (-360.0, 360.0)
+        return math.radians(low), math.radians(high)
+
+    def T_base_scanner(self) -> FloatArray:  # noqa: N802 - frames in names
+        """(4, 4) pose of the scanner in the base frame."""
+        x_m, y_m, z_m = self.position_base_m
+        yaw_rad = math.radians(self.yaw_deg)
+        mounted = Scanner.mounted(x_m, y_m, z_m, yaw_rad, upside_down=self.upside_down)
+        return mounted.T_base_scanner
+
+
 class RobotFile(StrictConfig):
     """The file that ``awarenav bridge --robot`` reads.
 
@@ -69,6 +112,8 @@ class RobotFile(StrictConfig):
         drive: ``differential``, or ``holonomic`` for a robot that can move sideways. Without it
             the odometry tells. A ``differential`` robot whose odometry moves sideways is stopped.
         camera: mount of the camera; without it the pose is read from tf.
+        scanners: mounts of the laser scanners, in the order of their topics; without it the poses
+            are read from tf.
     """
 
     error: ClassVar[type[ValueError]] = NavError
@@ -80,6 +125,7 @@ class RobotFile(StrictConfig):
     reaction_time_s: float = Field(ge=0.0)
     drive: Literal["differential", "holonomic"] | None = None
     camera: CameraMount | None = None
+    scanners: list[ScannerMount] | None = Field(default=None, min_length=1, max_length=2)
 
     def profile(self) -> RobotProfile:
         """Return the robot's profile.

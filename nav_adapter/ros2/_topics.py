@@ -14,7 +14,7 @@ from .messages.geometry_msgs import PolygonInstanceStamped, PolygonStamped
 from .messages.nav2_msgs import CircleObject, SpeedLimit
 from .messages.nav_msgs import OccupancyGrid, Odometry
 from .messages.people_msgs import People
-from .messages.sensor_msgs import CameraInfo, CompressedImage, Image
+from .messages.sensor_msgs import CameraInfo, CompressedImage, Image, LaserScan
 from .messages.tf2_msgs import TFMessage
 from .messages.vision_msgs import Detection3DArray
 from .messages.visualization_msgs import MarkerArray
@@ -67,6 +67,9 @@ READ: Final = MappingProxyType(
             "camera/image_raw/compressed", CompressedImage, reliable=False, depth=1
         ),
         "camera_info": Topic("camera/camera_info", CameraInfo, reliable=False, depth=1),
+        "scan": Topic("scan", LaserScan, reliable=False),
+        "scan_2": Topic("scan_2", LaserScan, reliable=False),
+        "map": Topic("map", OccupancyGrid, transient_local=True, depth=1),
         "odom": Topic("odom", Odometry, reliable=False, depth=50),
         "tf": Topic("tf", TFMessage, reliable=False, depth=100),
         "tf_static": Topic("tf_static", TFMessage, transient_local=True, depth=100),

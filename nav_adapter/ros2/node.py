@@ -1,8 +1,9 @@
 """The bridge as an rclpy node, for computers with ROS 2: the same topics, with ROS's clock.
 
 Run it with ``python -m nav_adapter.ros2.node --ros-args -p robot_file:=robot.yaml``. The executor's
-thread publishes at a fixed rate; perception has a thread of its own. Parameters:
-``robot_file`` (required), ``policy`` (``balanced``), ``rate_hz`` (20.0), ``compressed`` (false),
+thread publishes at a fixed rate; perception has threads of its own. Parameters:
+``robot_file`` (required), ``policy`` (``balanced``), ``rate_hz`` (20.0), ``scanners`` (number of
+laser scanners, 0 to 2), ``use_camera`` (true), ``use_map`` (false), ``compressed`` (false),
 ``percentage`` (false), ``detector_file`` and ``pose_file`` (ONNX; by default the shipped networks,
 which are trained for the simulator), ``odom_frame``, ``base_frame``, ``camera_frame``. Topics are
 renamed by ROS's remapping. The module can be imported without ROS; the node then raises an error
@@ -13,6 +14,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -30,11 +32,13 @@ from ._bridge import AwarenessBridge
 from ._outgoing import Frames
 from ._perception_thread import PerceptionThread
 from ._robot_file import RobotFile
+from ._scan_perception import scanner_inputs
+from ._scan_thread import ScanThread
 from ._topics import PUBLISHED, READ, Topic
 from .conversions import from_ros, ros_class, to_ros
 from .messages import Message, ros_type
-from .messages.nav_msgs import Odometry
-from .messages.sensor_msgs import CameraInfo, CompressedImage, Image
+from .messages.nav_msgs import OccupancyGrid, Odometry
+from .messages.sensor_msgs import CameraInfo, CompressedImage, Image, LaserScan
 from .messages.tf2_msgs import TFMessage
 
 try:
@@ -48,7 +52,7 @@ except ImportError:  # AwarenessNode says what is missing
 
 
 class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
-    """Reads camera and odometry, publishes the topics of :data:`~nav_adapter.ros2.PUBLISHED`.
+    """Reads camera, scanners and odometry; publishes :data:`~nav_adapter.ros2.PUBLISHED`.
 
     A topic whose message package is not installed (``people_msgs``, ``costmap_converter_msgs``,
     ``vision_msgs``) is left out with a warning; ``nav2_msgs`` is required.
@@ -66,6 +70,8 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
         super().__init__("awarenav")
         robot = RobotFile.from_yaml(self._parameter("robot_file", ""))
         policy = self._parameter("policy", "balanced")
+        use_camera = self._parameter("use_camera", True)
+        scans = self._scan_topics(self._parameter("scanners", 0))
         self._publishers_by_key: dict[str, Any] = {}
         for key, topic in PUBLISHED.items():
             self._advertise(key, topic)
@@ -85,24 +91,35 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
             make_pipeline=_pipelines(
                 self._parameter("detector_file", ""), self._parameter("pose_file", "")
             ),
+            with_camera=use_camera,
+            scanners=scanner_inputs([topic.name for topic in scans], robot),
             warn=self.get_logger().warning,
             wanted=self._wanted,
         )
         self._perception = PerceptionThread(self._bridge, self._now_s)
         self._subscribe(READ["odom"], self._odometry)
-        self._subscribe(READ["camera_info"], self._calibration)
-        if robot.camera is None:
-            self._subscribe(READ["tf"], lambda m: self._transforms(m, False))
-            self._subscribe(READ["tf_static"], lambda m: self._transforms(m, True))
-        if self._parameter("compressed", False):
-            self._subscribe(READ["compressed"], lambda m: self._image(CompressedImage, m))
-        else:
-            self._subscribe(READ["image"], lambda m: self._image(Image, m))
+        use_map = bool(scans) and self._parameter("use_map", False)
+        in_tf = (use_camera and robot.camera is None) or (scans and robot.scanners is None)
+        if in_tf or use_map:
+            self._subscribe_tf()
+        if use_camera:
+            self._subscribe(READ["camera_info"], self._calibration)
+            compressed = self._parameter("compressed", False)
+            kind: Any = CompressedImage if compressed else Image
+            image = READ["compressed" if compressed else "image"]
+            self._subscribe(image, lambda m: self._image(kind, m))
+        self._scans = ScanThread(self._bridge, self._now_s) if scans else None
+        for number, topic in enumerate(scans):
+            self._subscribe(topic, partial(self._scan, number))
+        if use_map:
+            self._subscribe(READ["map"], self._map)
         self.create_timer(1.0 / self._parameter("rate_hz", 20.0), self._tick)
 
     def stop(self) -> None:
         """Publish a stop and end perception, before the node ends."""
         self._bridge.stop(self._now_s(), "the awarenav node has ended")
+        if self._scans is not None:
+            self._scans.close()
         self._perception.close()
 
     def _tick(self) -> None:
@@ -114,6 +131,14 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
     def _calibration(self, message: Any) -> None:
         if self._bridge.camera is None:
             self._perception.calibrate(lambda: from_ros(CameraInfo, message))
+
+    def _scan(self, number: int, message: Any) -> None:
+        assert self._scans is not None
+        self._scans.submit(number, lambda: from_ros(LaserScan, message))
+
+    def _map(self, message: Any) -> None:
+        assert self._scans is not None
+        self._scans.submit_map(lambda: from_ros(OccupancyGrid, message))
 
     def _odometry(self, message: Any) -> None:
         self._bridge.on_odometry(from_ros(Odometry, message), self._now_s())
@@ -141,6 +166,16 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
             self.get_logger().warning(f"{ros_type(topic.message)}: {problem}; not published")
             return
         self._publishers_by_key[key] = self.create_publisher(kind, topic.name, _qos(topic))
+
+    def _scan_topics(self, count: Any) -> tuple[Topic, ...]:
+        known = (READ["scan"], READ["scan_2"])
+        if count not in range(len(known) + 1):
+            raise NavError(f"scanners must be 0, 1 or 2, got {count!r}")
+        return known[:count]
+
+    def _subscribe_tf(self) -> None:
+        self._subscribe(READ["tf"], lambda m: self._transforms(m, False))
+        self._subscribe(READ["tf_static"], lambda m: self._transforms(m, True))
 
     def _subscribe(self, topic: Topic, callback: Any) -> None:
         self.create_subscription(ros_class(topic.message), topic.name, callback, _qos(topic))

@@ -118,14 +118,24 @@ class LegDetector:
         static_map: StaticMap | None = None,
     ) -> None:
         self.config = LegDetectorConfig() if config is None else config
+        self._map: StaticMap | None = None
+        self.static_map = static_map
+        self._classify = OnnxLegClassifier() if classifier is None else classifier
+        self._memory = OccupancyMemory()
+        self._found: deque[tuple[float, FloatArray]] = deque(maxlen=_MOST_RECENT)
+
+    @property
+    def static_map(self) -> StaticMap | None:
+        """The map of what stands still; set it anew when the robot's place in the map changes."""
+        return self._map
+
+    @static_map.setter
+    def static_map(self, static_map: StaticMap | None) -> None:
         if static_map is not None and not isinstance(static_map, StaticMap):
             raise PerceptionError(
                 f"static_map must be a StaticMap, got {type(static_map).__name__}"
             )
-        self._classify = OnnxLegClassifier() if classifier is None else classifier
         self._map = static_map
-        self._memory = OccupancyMemory()
-        self._found: deque[tuple[float, FloatArray]] = deque(maxlen=_MOST_RECENT)
 
     def detect(self, points: ScanPoints, scanner: int = 0) -> tuple[PersonCandidate, ...]:
         """Return the people in a scan, the most certain first.

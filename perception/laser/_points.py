@@ -85,6 +85,15 @@ class RobotMotion:
         arc = self._arc(np.asarray(stamps_s, dtype=np.float64) - self.stamp_s)
         return arc.yaw, np.column_stack((arc.x, arc.y))
 
+    def pose_at(self, stamp_s: float) -> FloatArray:
+        """Return T_odom_base (4, 4) at another time, for example that of a scan's middle."""
+        yaw, position = self.poses_base(np.array([finite_number("stamp_s", stamp_s)]))
+        cos, sin = math.cos(yaw[0]), math.sin(yaw[0])
+        moved = np.eye(4)
+        moved[:2, :2] = [[cos, -sin], [sin, cos]]
+        moved[:2, 3] = position[0]
+        return np.asarray(self.T_odom_base @ moved)
+
     def _arc(self, dt_s: FloatArray) -> _Arc:
         yaw = self.yaw_rate_radps * dt_s
         cos, sin = np.cos(yaw), np.sin(yaw)

@@ -13,6 +13,7 @@ from awarenav.files import json_text
 from perception import AwarenessPipeline, Camera
 
 from ..crossing import CrossingResult, run_crossing
+from ..crossing.eyes import Perception
 from ..scenario import Scenario
 from ._cases import case_values
 from ._encounter import run_encounter
@@ -31,22 +32,26 @@ class ComparisonRow:
 def compare_policies(
     seed: int = 0, perception: str = "keypoints", progress: bool = False
 ) -> tuple[ComparisonRow, ...]:
-    """Run the same crossing without people, blind, and aware with two kinds of worker.
+    """Run the same crossing without people, as today, blind, and aware with two kinds of worker.
 
-    The worker walks the same path in every run. Only the gaze and the robot's policy differ.
+    The worker walks the same path in every run. Only the gaze and the robot's policy differ. The
+    robot has a camera and laser scanners; today's robot has the scanners alone.
     """
+    both = Perception.of(perception, "camera+scanner").name
+    alone = Perception.of(perception, "scanner").name
     attentive = Scenario.shipped("crossing_attentive")
     distracted = Scenario.shipped("crossing_distracted")
     runs = (
-        ("nobody there", attentive.without_people(), "balanced"),
-        ("awareness-blind", attentive, "blind"),
-        ("aware, attentive worker", attentive, "balanced"),
-        ("aware, distracted worker", distracted, "balanced"),
+        ("nobody there", attentive.without_people(), "balanced", both),
+        ("today's AMR", attentive, "scanner", alone),
+        ("awareness-blind", attentive, "blind", both),
+        ("aware, attentive worker", attentive, "balanced", both),
+        ("aware, distracted worker", distracted, "balanced", both),
     )
     rows = []
     with tqdm(runs, desc="crossings", unit="run", disable=not progress, file=sys.stderr) as bar:
-        for label, scenario, policy in bar:
-            result = run_crossing(scenario, policy=policy, perception=perception, seed=seed)
+        for label, scenario, policy, senses in bar:
+            result = run_crossing(scenario, policy=policy, perception=senses, seed=seed)
             rows.append(ComparisonRow(label, result))
     return tuple(rows)
 
@@ -80,7 +85,7 @@ def delay_won_back(rows: tuple[ComparisonRow, ...]) -> float | None:
 
     None if one of the robots does not reach the goal, or the blind one has no delay.
     """
-    free, blind, aware = (row.result.time_to_goal_s for row in rows[:3])
+    free, _, blind, aware = (row.result.time_to_goal_s for row in rows[:4])
     if free is None or blind is None or aware is None or blind <= free:
         return None
     return (blind - aware) / (blind - free)

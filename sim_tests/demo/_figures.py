@@ -16,8 +16,10 @@ from perception.arrays import FloatArray, ImageRgb
 from ..crossing import CrossingFrame, CrossingResult
 from ._cases import CAMERA_PERIOD_S, CASES, EncounterCase
 
-_COLOURS: Final = ("#8a8f98", "#b3261e", "#2e7d4f", "#d9822b")
-_STYLES: Final = ("-", "-", "-", "--")
+_COLOURS: Final = ("#8a8f98", "#1f4e79", "#b3261e", "#2e7d4f", "#d9822b")
+_STYLES: Final = ("-", ":", "-", "-", "--")
+# Policies that ignore awareness: their bound says nothing about what the robot does.
+_WITHOUT_AWARENESS: Final = ("blind", "scanner")
 _TRUTH_COLOUR: Final = "#1f4e79"
 _PERCEPTION_COLOUR: Final = "#d9822b"
 _BOUND_COLOUR: Final = "#7fb77e"
@@ -188,9 +190,10 @@ def plot_comparison(path: Path, rows: Sequence[tuple[str, CrossingResult]]) -> N
         time = "" if result.time_to_goal_s is None else f": {result.time_to_goal_s:.1f} s"
         panels[0].plot(along, speed, style, color=colour, label=f"{label}{time}")
         if result.frames[0].truth:
-            bound = [_lowest_bound(frame) for frame in result.frames]
             radius = [_largest_radius(frame) for frame in result.frames]
-            panels[1].plot(along, bound, style, color=colour)
+            if result.policy not in _WITHOUT_AWARENESS:
+                bound = [_lowest_bound(frame) for frame in result.frames]
+                panels[1].plot(along, bound, style, color=colour)
             panels[2].plot(along, radius, style, color=colour)
     for axes, name in zip(
         panels,
@@ -200,7 +203,7 @@ def plot_comparison(path: Path, rows: Sequence[tuple[str, CrossingResult]]) -> N
         axes.set_title(name, fontsize=10, loc="left")
         axes.grid(alpha=0.25)
         axes.set_ylim(bottom=0.0)
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
     panels[1].set_ylim(0.0, 1.0)
     panels[2].set_xlabel("robot's way along the aisle (m); gaps: nobody tracked")
     figure.savefig(path, dpi=110)

@@ -8,17 +8,20 @@ import threading
 import time
 from collections import defaultdict
 from collections.abc import Callable
+from pathlib import Path
 from types import ModuleType, SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 
 pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
 
 from paths import ROOT
+from scan_scenes import scan_message
 from test_ros2_bridge import INFO, image, odometry
 
-from nav_adapter.ros2 import PUBLISHED, READ, node
+from nav_adapter import NavError
+from nav_adapter.ros2 import PUBLISHED, READ, RobotFile, ScannerMount, node
 from nav_adapter.ros2.conversions import to_ros
 
 PATIENCE_S = 20.0
@@ -27,12 +30,14 @@ PATIENCE_S = 20.0
 class StandInNode:
     """The part of rclpy's Node that the node calls."""
 
+    parameters: ClassVar[dict[str, Any]] = {}
+
     def __init__(self, name: str) -> None:
         self.sent: dict[str, list[Any]] = defaultdict(list)
         self.callbacks: dict[str, Callable[[Any], None]] = {}
 
     def declare_parameter(self, name: str, default: Any) -> Any:
-        given = {"robot_file": str(ROOT / "docs" / "nav2" / "robot.yaml")}
+        given = {"robot_file": str(ROOT / "docs" / "nav2" / "robot.yaml"), **self.parameters}
         return SimpleNamespace(value=given.get(name, default))
 
     def get_logger(self) -> Any:
@@ -87,6 +92,70 @@ def node_module(monkeypatch: pytest.MonkeyPatch) -> Any:
     made.ros_class = lambda kind: SimpleNamespace
     made.to_ros = lambda message: to_ros(message, lambda kind: SimpleNamespace)
     return made
+
+
+@pytest.fixture
+def two_scanners(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Parameters for two scanners without a camera."""
+    path = tmp_path / "robot.yaml"
+    mounts = [
+        ScannerMount(position_base_m=[x, 0.0, 0.2], yaw_deg=yaw)
+        for x, yaw in ((0.3, 0.0), (-0.3, 180.0))
+    ]
+    docs = RobotFile.from_yaml(ROOT / "docs" / "nav2" / "robot.yaml")
+    docs.model_copy(update={"scanners": mounts}).to_yaml(path)
+    given = {"robot_file": str(path), "scanners": 2, "use_camera": False}
+    monkeypatch.setattr(StandInNode, "parameters", given)
+
+
+def test_the_node_reads_scanners_without_a_camera(node_module: Any, two_scanners: None) -> None:
+    ros_node = node_module.AwarenessNode()
+    assert set(ros_node.callbacks) == {"odom", "scan", "scan_2"}
+
+    def hear(key: str, message: Any) -> None:
+        ros_node.callbacks[READ[key].name](to_ros(message, lambda kind: SimpleNamespace))
+
+    try:
+        limits = ros_node.sent[PUBLISHED["speed_limit"].name]
+        ros_node.timer()
+        end = time.monotonic() + PATIENCE_S
+        while ros_node._bridge.counts["scans"] < 10 and time.monotonic() < end:
+            now = time.time()
+            hear("odom", odometry(now, speed=0.0))
+            hear("scan", scan_message(now))
+            hear("scan_2", scan_message(now))
+            time.sleep(0.02)
+        ros_node.timer()
+        assert limits[-1].speed_limit > limits[0].speed_limit
+    finally:
+        ros_node.stop()
+    assert limits[-1].speed_limit == limits[0].speed_limit
+
+
+@pytest.mark.parametrize(
+    ("parameters", "text"),
+    [
+        ({"scanners": 3}, "scanners must be 0, 1 or 2, got 3"),
+        ({"use_camera": False}, "scanners must name one or two"),
+    ],
+)
+def test_the_node_refuses_sensors_that_make_no_sense(
+    node_module: Any, monkeypatch: pytest.MonkeyPatch, parameters: dict, text: str
+) -> None:
+    monkeypatch.setattr(StandInNode, "parameters", parameters)
+    with pytest.raises(NavError, match=text):
+        node_module.AwarenessNode()
+
+
+def test_the_node_reads_a_map_and_tf_beside_fixed_mounts(
+    node_module: Any, two_scanners: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(StandInNode.parameters, "use_map", True)
+    ros_node = node_module.AwarenessNode()
+    try:
+        assert set(ros_node.callbacks) == {"odom", "scan", "scan_2", "map", "tf", "tf_static"}
+    finally:
+        ros_node.stop()
 
 
 def test_the_node_publishes_while_perception_is_busy(node_module: Any) -> None:

@@ -4,7 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .._message import Bool, Float64, Float64x9, Float64x12, Message, String, UInt8, UInt8s, UInt32
+from .._message import (
+    Bool,
+    Float32,
+    Float64,
+    Float64x9,
+    Float64x12,
+    Message,
+    String,
+    UInt8,
+    UInt8s,
+    UInt32,
+)
 from .std_msgs import Header
 
 
@@ -56,3 +67,19 @@ class CameraInfo(Message):
     binning_x: UInt32 = 0
     binning_y: UInt32 = 0
     roi: RegionOfInterest = RegionOfInterest()
+
+
+@dataclass(frozen=True)
+class LaserScan(Message):
+    """One sweep of a laser scanner. The header's stamp is the time of the first ray."""
+
+    header: Header = Header()
+    angle_min: Float32 = 0.0
+    angle_max: Float32 = 0.0
+    angle_increment: Float32 = 0.0
+    time_increment: Float32 = 0.0
+    scan_time: Float32 = 0.0
+    range_min: Float32 = 0.0
+    range_max: Float32 = 0.0
+    ranges: tuple[Float32, ...] = ()
+    intensities: tuple[Float32, ...] = ()

@@ -101,7 +101,7 @@ def test_bad_input_is_one_line_and_exit_status_2(arguments, message, tmp_path, c
 def test_demo_writes_its_tables_pictures_and_video(tmp_path, capsys):
     assert main(["demo", "--out", str(tmp_path), "--no-video"]) == 0
     text = capsys.readouterr().out
-    for line in ("awareness-blind", "aware, attentive worker", "aware, distracted worker"):
+    for line in ("today's AMR", "awareness-blind", "aware, attentive", "aware, distracted worker"):
         assert line in text
     header, *body = rows(tmp_path / "encounter.csv")
     assert header == ENCOUNTER_COLUMNS
@@ -110,9 +110,10 @@ def test_demo_writes_its_tables_pictures_and_video(tmp_path, capsys):
     for picture in ("encounter.png", "crossings.png"):
         assert (tmp_path / picture).read_bytes().startswith(b"\x89PNG")
     _, *episodes = rows(tmp_path / "episodes.csv")
-    assert [(row[0], row[2]) for row in episodes] == [
-        ("crossing_attentive_without_people", "balanced"),
-        ("crossing_attentive", "blind"),
-        ("crossing_attentive", "balanced"),
-        ("crossing_distracted", "balanced"),
+    assert [(row[0], row[2], row[4]) for row in episodes] == [
+        ("crossing_attentive_without_people", "balanced", "keypoints+scanner"),
+        ("crossing_attentive", "scanner", "scanner"),
+        ("crossing_attentive", "blind", "keypoints+scanner"),
+        ("crossing_attentive", "balanced", "keypoints+scanner"),
+        ("crossing_distracted", "balanced", "keypoints+scanner"),
     ]

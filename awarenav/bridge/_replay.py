@@ -1,0 +1,153 @@
+"""The bridge on a recording: the same work on recorded time, with nothing sent."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final
+
+from nav_adapter import NavError
+from nav_adapter.ros2 import AwarenessBridge, Topic
+from nav_adapter.ros2.conversions import from_ros
+from nav_adapter.ros2.messages import Message
+from nav_adapter.ros2.messages.nav_msgs import OccupancyGrid, Odometry
+from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, CompressedImage, Image, LaserScan
+from nav_adapter.ros2.messages.tf2_msgs import TFMessage
+
+from ._loop import BridgeInputs, BridgeViewer
+
+if TYPE_CHECKING:
+    from nav_adapter.ros2 import McapRecorder
+
+_REPORT_PERIOD_S: Final = 2.0
+
+
+class ReplayPublisher:
+    """Records what the bridge would publish, at recorded times.
+
+    Args:
+        topics: the topics that are published, by key.
+        recorder: takes the messages; None to make none.
+
+    Attributes:
+        now_s: the time of the recording.
+    """
+
+    def __init__(self, topics: Mapping[str, Topic], recorder: McapRecorder | None) -> None:
+        self._topics, self._recorder = topics, recorder
+        self.now_s = 0.0
+
+    def wants(self, key: str) -> bool:
+        """Return whether messages of this topic are recorded."""
+        return self._recorder is not None and key in self._topics
+
+    def publish(self, key: str, message: Message) -> None:
+        """Record a message, unless its topic is left out."""
+        if self._recorder is not None and key in self._topics:
+            from nav_adapter.ros2 import encode  # noqa: PLC0415 - needs the extra ros2
+
+            self._recorder.write(self._topics[key], encode(message), self.now_s)
+
+
+class BagReplay:
+    """Passes recorded messages to a bridge, and publishes at a fixed rate of recorded time.
+
+    Perception takes no time: its people count from the image's or the scan's arrival on.
+
+    Args:
+        messages: topic, time of recording (s) and message, in order.
+        bridge: processes them.
+        inputs: the topics that it reads.
+        rate_hz: rate of publishing.
+        publisher: is told the time.
+        viewer: shows the state of the bridge.
+
+    Attributes:
+        now_s: the time of the recording; None before its first message.
+    """
+
+    def __init__(
+        self,
+        messages: Iterable[tuple[str, float, Any]],
+        bridge: AwarenessBridge,
+        inputs: BridgeInputs,
+        rate_hz: float,
+        publisher: ReplayPublisher,
+        *,
+        viewer: BridgeViewer | None = None,
+    ) -> None:
+        self._messages, self._bridge, self._publisher = messages, bridge, publisher
+        self._period_s, self._viewer = 1.0 / rate_hz, viewer
+        self.now_s: float | None = None
+        self._readers = self._readers_of(inputs)
+
+    def run(
+        self, seconds: float | None = None, *, report: Callable[[str], None] = lambda text: None
+    ) -> float:
+        """Replay all, or ``seconds`` of it; ``report`` gets a line every 2 s of recorded time.
+
+        Return the time that was replayed, s.
+        """
+        began_s, ticks, reported_s = 0.0, 0, 0.0
+        for name, recorded_s, message in self._messages:
+            if self.now_s is None:
+                began_s = reported_s = recorded_s
+            # Times of the recorder may go back a little; a tick is never repeated.
+            while began_s + self._period_s * ticks <= recorded_s:
+                tick_s = began_s + self._period_s * ticks
+                if seconds is not None and tick_s - began_s >= seconds:
+                    return tick_s - began_s
+                self._tick(tick_s, report if tick_s - reported_s >= _REPORT_PERIOD_S else None)
+                reported_s = tick_s if tick_s - reported_s >= _REPORT_PERIOD_S else reported_s
+                ticks += 1
+            self.now_s = recorded_s
+            try:
+                self._readers[name](message, recorded_s)
+            # A message of ROS 1 may have other fields.
+            except (NavError, AttributeError, TypeError, ValueError) as problem:
+                self._bridge.refuse(f"{name}: {problem}")
+        return 0.0 if self.now_s is None else self.now_s - began_s
+
+    def _tick(self, now_s: float, report: Callable[[str], None] | None) -> None:
+        self.now_s = self._publisher.now_s = now_s
+        constraints = self._bridge.tick(now_s)
+        if self._viewer is not None:
+            self._viewer.draw(self._bridge, constraints)
+        if report is not None:
+            report(
+                f"{now_s:.1f} s  {len(constraints.obstacles)} people  limit "
+                f"{constraints.speed_limit_mps:.2f} m/s ({constraints.limited_by})"
+            )
+
+    def _readers_of(self, inputs: BridgeInputs) -> dict[str, Callable[[Any, float], None]]:
+        """Return by topic what is done with a message and its time."""
+        bridge = self._bridge
+
+        def image(message: Any, now_s: float) -> None:
+            made: Image | CompressedImage
+            if hasattr(message, "format"):
+                made = from_ros(CompressedImage, message)
+            else:
+                made = from_ros(Image, message)
+            if bridge.on_image(made, now_s) and self._viewer is not None:
+                self._viewer.draw_frame(bridge)
+
+        def scan(number: int, message: Any, now_s: float) -> None:
+            bridge.on_scan(number, from_ros(LaserScan, message), now_s)
+
+        readers: dict[str, Callable[[Any, float], None]] = {
+            f"/{inputs.odom.name}": lambda m, t: bridge.on_odometry(from_ros(Odometry, m), t)
+        }
+        optional: tuple[tuple[Topic | None, Callable[[Any, float], None]], ...] = (
+            (inputs.image, image),
+            (inputs.camera_info, lambda m, t: bridge.on_camera_info(from_ros(CameraInfo, m))),
+            (inputs.tf, lambda m, t: bridge.on_transforms(from_ros(TFMessage, m), t)),
+            (
+                inputs.tf_static,
+                lambda m, t: bridge.on_transforms(from_ros(TFMessage, m), static=True),
+            ),
+            (inputs.map, lambda m, t: bridge.on_map(from_ros(OccupancyGrid, m))),
+            *((topic, partial(scan, number)) for number, topic in enumerate(inputs.scans)),
+        )
+        readers |= {f"/{topic.name}": read for topic, read in optional if topic is not None}
+        return readers

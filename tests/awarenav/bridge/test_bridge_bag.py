@@ -1,0 +1,149 @@
+"""``awarenav bridge --bag``: the bridge on a recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from paths import ROOT
+
+pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
+pytest.importorskip("mcap", reason="the extra ros2 is not installed")
+pytest.importorskip("rosbags", reason="the extra rosbag is not installed")
+
+from rosbags.highlevel import AnyReader
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+from scan_scenes import scan_message
+
+from awarenav.cli import main
+from nav_adapter.ros2 import RobotFile, encode
+from nav_adapter.ros2.conversions import to_time
+from nav_adapter.ros2.messages import Message, ros_type
+from nav_adapter.ros2.messages.geometry_msgs import (
+    Transform,
+    TransformStamped,
+    Twist,
+    TwistWithCovariance,
+    Vector3,
+)
+from nav_adapter.ros2.messages.nav_msgs import Odometry
+from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, Image
+from nav_adapter.ros2.messages.std_msgs import Header
+from nav_adapter.ros2.messages.tf2_msgs import TFMessage
+
+STORE = get_typestore(Stores.ROS2_HUMBLE)
+START_S, SECONDS, PERSON = 1000.0, 3.0, (2.5, 1.2)
+
+
+def messages(*, camera: bool = False):
+    """Yield topic, time of recording and message of a standing robot with one scanner."""
+    move = Transform(Vector3(0.3, 0.0, 0.2))
+    mounted = TransformStamped(Header(frame_id="base_link"), "scanner", move)
+    yield "/tf_static", START_S, TFMessage((mounted,))
+    for tick in range(round(SECONDS / 0.04)):
+        now = START_S + 0.04 * tick
+        twist = TwistWithCovariance(Twist(Vector3(0.0, 0.0, 0.0)))
+        yield "/odom", now, Odometry(Header(to_time(now), "odom"), "base_link", twist=twist)
+        yield "/scan", now + 0.01, scan_message(now, [PERSON])
+        if camera:
+            header = Header(to_time(now), "camera")
+            k = (50.0, 0.0, 32.0, 0.0, 50.0, 24.0, 0.0, 0.0, 1.0)
+            yield "/camera/camera_info", now, CameraInfo(header, 48, 64, k=k)
+            picture = Image(header, 48, 64, "rgb8", 0, 192, bytes(48 * 192))
+            yield "/camera/image_raw", now + 0.01, picture
+
+
+def recorded(path: Path, found) -> Path:
+    connections: dict[str, object] = {}
+    with Writer(path, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        for topic, now_s, message in found:
+            assert isinstance(message, Message)
+            if topic not in connections:
+                kind = ros_type(type(message))
+                connections[topic] = writer.add_connection(topic, kind, typestore=STORE)
+            writer.write(connections[topic], round(1e9 * now_s), encode(message))
+    return path
+
+
+@pytest.fixture
+def robot_file(tmp_path: Path) -> Path:
+    """The robot of the docs, whose scanners are in tf."""
+    path = tmp_path / "robot.yaml"
+    docs = RobotFile.from_yaml(ROOT / "docs" / "nav2" / "robot.yaml")
+    docs.model_copy(update={"scanners": None}).to_yaml(path)
+    return path
+
+
+def published(path: Path) -> list[tuple[float, str, object]]:
+    with AnyReader([path]) as reader:
+        return [
+            (stamp_ns * 1e-9, connection.topic, reader.deserialize(raw, connection.msgtype))
+            for connection, stamp_ns, raw in reader.messages()
+        ]
+
+
+def test_a_recording_gives_the_people_and_limits_of_its_time(
+    tmp_path: Path, robot_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bag = recorded(tmp_path / "bag", messages())
+    arguments = ["bridge", "--robot", str(robot_file), "--scan", "scan", "--no-camera"]
+    outputs = []
+    for name in ("one.mcap", "two.mcap"):
+        out = tmp_path / name
+        only = ["--only", "speed_limit", "--only", "people", "--record", str(out)]
+        assert main([*arguments, "--bag", str(bag), *only]) == 0
+        outputs.append(out)
+    said = capsys.readouterr().err
+    assert "replayed 3.0 s: 0 frames, 75 scans, 0 scans refused" in said
+    found = published(outputs[0])
+    limits = [(at, each.speed_limit) for at, topic, each in found if topic == "/speed_limit"]
+    stamps = [at for at, _ in limits]
+    np.testing.assert_allclose(stamps, START_S + 0.05 * np.arange(60), atol=1e-6)
+    assert limits[0][1] == 0.01
+    assert 0.1 < limits[-1][1] < 1.4
+    (person,) = [each for _, topic, each in found if topic == "/people"][-1].people
+    assert np.hypot(person.position.x - PERSON[0], person.position.y - PERSON[1]) < 0.1
+    # The same recording gives the same, byte for byte.
+    assert outputs[0].read_bytes() == outputs[1].read_bytes()
+
+
+def test_a_recording_with_a_camera_is_replayed_as_far_as_is_asked(
+    tmp_path: Path, robot_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bag = recorded(tmp_path / "bag", messages(camera=True))
+    arguments = ["--robot", str(robot_file), "--bag", str(bag), "--seconds", "1"]
+    assert main(["bridge", *arguments, "--scan", "scan"]) == 0
+    said = capsys.readouterr().err
+    assert "replayed 1.0 s: 25 frames, 25 scans, 0 scans refused" in said
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["--no-camera", "--scan", "scan_2"], "no topic /scan_2 of type sensor_msgs/msg/LaserScan"),
+        (["--scan", "odom", "--no-camera"], "no topic /odom of type sensor_msgs/msg/LaserScan"),
+        (["--scan", "scan"], "no topic /camera/image_raw of type sensor_msgs/msg/Image"),
+    ],
+)
+def test_a_topic_that_the_recording_lacks_is_refused(
+    tmp_path: Path,
+    robot_file: Path,
+    arguments: list[str],
+    text: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    bag = recorded(tmp_path / "bag", messages())
+    assert main(["bridge", "--robot", str(robot_file), "--bag", str(bag), *arguments]) == 2
+    said = capsys.readouterr().err
+    assert text in said
+    assert "it has /odom (nav_msgs/msg/Odometry)" in said
+
+
+def test_what_is_no_recording_is_refused(
+    robot_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given = ["--robot", str(robot_file), "--bag", str(robot_file)]
+    assert main(["bridge", *given]) == 2
+    assert "cannot read the recording" in capsys.readouterr().err

@@ -1,0 +1,244 @@
+"""Scans and maps of the bridge: poses, the robot's motion, and what is refused."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
+
+from scan_scenes import RAYS, planar, scan_message
+from test_ros2_bridge import START_S, Listener, odometry
+from two_sensor_scenes import FRONT, MOUNT, PERIOD_S, PERSON, Robot
+
+from nav_adapter import NavError
+from nav_adapter.ros2 import ScannerInput, ScannerMount, decode, encode
+from nav_adapter.ros2.conversions import to_time, yaw_quaternion
+from nav_adapter.ros2.messages.geometry_msgs import (
+    Point,
+    Pose,
+    Quaternion,
+    Transform,
+    TransformStamped,
+    Twist,
+    TwistWithCovariance,
+    Vector3,
+)
+from nav_adapter.ros2.messages.nav_msgs import MapMetaData, OccupancyGrid
+from nav_adapter.ros2.messages.sensor_msgs import LaserScan
+from nav_adapter.ros2.messages.std_msgs import Header
+from nav_adapter.ros2.messages.tf2_msgs import TFMessage
+from perception.laser import LegDetector
+
+DETECTOR = LegDetector()
+
+
+@pytest.mark.parametrize("upside_down", [False, True], ids=["upright", "upside down"])
+def test_the_place_of_a_scanner_comes_from_tf(upside_down: bool) -> None:
+    mount = ScannerMount(position_base_m=[0.2, -0.1, 0.2], yaw_deg=30.0, upside_down=upside_down)
+    T = mount.T_base_scanner()
+    nav = Listener(scanners=[ScannerInput("scan")], with_camera=False)
+    nav.bridge.on_odometry(odometry(START_S, x=1.0, yaw=0.5, speed=0.0))
+    T_odom_scanner = planar(1.0, 0.0, 0.5) @ T
+    place = (3.5, 1.5)
+    assert not nav.bridge.on_scan(0, scan_message(START_S, [place], T_odom_scanner), START_S)
+    assert "no transform between 'scanner' and 'base_link'" in nav.warnings[-1]
+    turn = yaw_quaternion(math.radians(30.0))
+    if upside_down:  # half a turn about the scanner's own x axis
+        turn = Quaternion(turn.w, turn.z, 0.0, 0.0)
+    move = Transform(Vector3(0.2, -0.1, 0.2), turn)
+    mounted = TransformStamped(Header(frame_id="base_link"), "scanner", move)
+    nav.bridge.on_transforms(TFMessage((mounted,)), static=True)
+    for tick in range(1, 20):
+        now = START_S + PERIOD_S * tick
+        nav.bridge.on_odometry(odometry(now, x=1.0, yaw=0.5, speed=0.0), now)
+        assert nav.bridge.on_scan(0, scan_message(now, [place], T_odom_scanner), now)
+    (track,) = nav.bridge.tracks
+    assert np.linalg.norm(track.position_odom_m - place) < 0.1
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.07], ids=["odometry in time", "odometry late"])
+def test_people_stand_still_while_the_robot_drives_and_turns(late_s: float) -> None:
+    speed, yaw_rate = 1.0, 0.8
+    mount = MOUNT.T_base_scanner()
+
+    def pose(stamp_s: float) -> np.ndarray:
+        yaw = yaw_rate * (stamp_s - START_S)
+        along = speed / yaw_rate
+        return planar(along * math.sin(yaw) - 1.0, along * (1.0 - math.cos(yaw)), yaw)
+
+    def moving(stamp_s: float):
+        T, yaw = pose(stamp_s), yaw_rate * (stamp_s - START_S)
+        twist = Twist(Vector3(speed, 0.0, 0.0), Vector3(0.0, 0.0, yaw_rate))
+        still = odometry(stamp_s, yaw=yaw)
+        place = replace(still.pose, pose=Pose(Point(T[0, 3], T[1, 3], 0.0), yaw_quaternion(yaw)))
+        return replace(still, pose=place, twist=TwistWithCovariance(twist))
+
+    nav = Listener(scanners=[FRONT], with_camera=False)
+    step_s = 0.04 / RAYS
+    for tick in range(8):
+        nav.bridge.on_odometry(moving(START_S + 0.02 * tick))
+    errors, sent_s = [], START_S + 0.14
+    for tick in range(5, 40):
+        first_s = START_S + PERIOD_S * tick
+        now = first_s + 0.04
+        while sent_s + 0.02 <= now - late_s:
+            sent_s += 0.02
+            nav.bridge.on_odometry(moving(sent_s), now)
+        poses = [pose(first_s + step_s * ray) @ mount for ray in range(RAYS)]
+        message = scan_message(first_s, [PERSON], poses=poses, time_increment_s=step_s)
+        assert nav.bridge.on_scan(0, message, now)
+        if tick > 15:
+            (track,) = nav.bridge.tracks
+            errors.append(np.linalg.norm(track.position_odom_m - PERSON))
+    # It is 7 mm; 56 mm if the sweep counts as one instant, 168 mm if late odometry stands still.
+    assert max(errors) < 0.02
+
+
+NOW = START_S + 1.0
+GOOD = scan_message(NOW)
+
+
+@pytest.mark.parametrize(
+    ("message", "text"),
+    [
+        (replace(GOOD, angle_increment=math.nan), "angle_increment_rad"),
+        (replace(GOOD, ranges=()), "at least one range"),
+        (replace(GOOD, range_max=0.0), "range_max_m must exceed range_min_m"),
+        (scan_message(NOW + 3600.0), "3600.000 s ahead of this computer's clock"),
+        (scan_message(NOW - 0.1), "0.060 s before that of the last one"),
+        (scan_message(NOW - PERIOD_S), "0.000 s before that of the last one"),
+        (scan_message(NOW - 900.0), "before that of the last one"),
+        (replace(GOOD, time_increment=1e-3), "ahead of this computer's clock"),
+        (scan_message(NOW, low_rad=math.radians(140.0), rays=9), "must hold rays"),
+    ],
+)
+def test_a_scan_that_cannot_be_used_is_counted_and_costs_nothing_else(message, text) -> None:
+    mount = MOUNT.model_copy(update={"field_of_view_deg": [-135.5, 135.5]})
+    nav = Listener(scanners=[replace(FRONT, mount=mount)], with_camera=False)
+    for tick in range(25):
+        now = START_S + PERIOD_S * tick
+        nav.bridge.on_odometry(odometry(now, speed=0.0), now)
+        assert nav.bridge.on_scan(0, scan_message(now, [PERSON]), now)
+    before = nav.bridge.tracks
+    nav.bridge.on_odometry(odometry(NOW, speed=0.0), NOW)
+    for _ in range(5):
+        assert not nav.bridge.on_scan(0, message, NOW)
+    assert nav.bridge.tracks is before
+    assert nav.bridge.counts["scans_refused"] == 5
+    (warning,) = nav.warnings
+    assert warning.startswith("scan_front: scan refused and counted: ")
+    assert text in warning
+    assert nav.bridge.on_scan(0, scan_message(NOW, [PERSON]), NOW)
+    assert [each.id for each in nav.bridge.tracks] == [each.id for each in before]
+
+
+def test_a_scan_without_a_pose_for_its_time_is_refused() -> None:
+    nav = Listener(scanners=[FRONT], with_camera=False)
+    assert not nav.bridge.on_scan(0, scan_message(START_S), START_S)
+    assert "no odometry yet" in nav.warnings[-1]
+    nav.bridge.on_odometry(odometry(START_S))
+    assert not nav.bridge.on_scan(0, scan_message(START_S + 0.2), START_S + 20.0)
+    assert nav.bridge.counts["scans_refused"] == 2
+    # The reason is reported again after a while only.
+    assert len(nav.warnings) == 2
+    assert "known until" in nav.warnings[-1]
+
+
+def test_a_scanner_that_is_not_level_is_refused() -> None:
+    nav = Listener(scanners=[ScannerInput("scan")], with_camera=False)
+    nav.bridge.on_odometry(odometry(START_S))
+    tilt = Quaternion(0.0, math.sin(math.radians(10.0)), 0.0, math.cos(math.radians(10.0)))
+    move = Transform(Vector3(0.3, 0.0, 0.2), tilt)
+    mounted = TransformStamped(Header(frame_id="base_link"), "scanner", move)
+    nav.bridge.on_transforms(TFMessage((mounted,)), static=True)
+    assert not nav.bridge.on_scan(0, scan_message(START_S), START_S)
+    assert "level within 10 degrees, got a tilt of 20.0" in nav.warnings[-1]
+
+
+def test_a_clock_that_was_set_back_starts_scans_anew() -> None:
+    nav = Robot(FRONT, people=[PERSON])
+    nav.drive(START_S, 1.0)
+    (before,) = nav.bridge.tracks
+    constraints = nav.drive(START_S - 500.0, 3.0)
+    assert constraints[0].limited_by == "the clock went backward"
+    assert not constraints[-1].stale
+    (after,) = nav.bridge.tracks
+    assert after.id > before.id
+    assert after.stamp_s == pytest.approx(constraints[-1].stamp_s)
+
+
+def test_what_the_map_holds_is_nobody_until_the_map_moves_in_odom() -> None:
+    """The map is turned and shifted in odom by localisation, which stamps it ahead."""
+    T_odom_map = planar(1.0, -2.0, 0.7)
+    in_map = np.linalg.inv(T_odom_map) @ [*PERSON, 0.0, 1.0]
+    data = np.zeros((200, 200), np.int8)
+    column, row = np.floor((in_map[:2] + 10.0) / 0.1).astype(int)
+    data[row - 3 : row + 4, column - 3 : column + 4] = 100
+    corner = Pose(Point(-10.0, -10.0, 0.0), Quaternion(w=1.0))
+    info = MapMetaData(resolution=0.1, width=200, height=200, origin=corner)
+    given = OccupancyGrid(Header(frame_id="map"), info, data.tobytes())
+
+    def localise(T: np.ndarray, now_s: float) -> None:
+        inverse = np.linalg.inv(T)
+        yaw = math.atan2(inverse[1, 0], inverse[0, 0])
+        move = Transform(Vector3(inverse[0, 3], inverse[1, 3], 0.0), yaw_quaternion(yaw))
+        stamped = Header(to_time(now_s + 1.0), "map")
+        message = TransformStamped(stamped, "odom", move)
+        nav.bridge.on_transforms(TFMessage((message,)), now_s)
+
+    nav = Robot(FRONT, people=[PERSON], with_camera=False)
+    nav.silent.add("camera")
+    nav.bridge.on_map(given)
+    localise(T_odom_map, START_S)
+    nav.drive(START_S, 2.0)
+    assert nav.bridge.tracks == ()
+    localise(planar(1.0, -3.0, 0.7), START_S + 2.0)
+    nav.drive(START_S + 2.0, 2.0)
+    (track,) = nav.bridge.tracks
+    assert np.linalg.norm(track.position_odom_m - PERSON) < 0.1
+    nav.bridge.on_map(replace(given, data=b""))
+    assert nav.warnings[-1].startswith("map: a map must have width")
+
+
+def test_a_map_whose_place_is_unknown_is_not_used() -> None:
+    nav = Robot(FRONT, people=[PERSON], with_camera=False)
+    nav.silent.add("camera")
+    info = MapMetaData(resolution=0.1, width=1, height=1)
+    nav.bridge.on_map(OccupancyGrid(Header(frame_id="map"), info, b"\x64"))
+    nav.drive(START_S, 1.0)
+    assert len(nav.bridge.tracks) == 1
+    assert len(nav.warnings) == 1
+    assert "the map is not used: no transform between 'map' and 'odom'" in nav.warnings[0]
+    # Images in between do not repeat it; a place in tf does.
+    nav.bridge.refuse("something else")
+    nav.drive(START_S + 1.0, 0.2)
+    assert len(nav.warnings) == 2
+    move = TransformStamped(Header(frame_id="map"), "odom", Transform())
+    nav.bridge.on_transforms(TFMessage((move,)))
+    nav.drive(START_S + 1.2, 0.2)
+    assert nav.warnings[2:] == ["the map is used"]
+
+
+@settings(max_examples=40)
+@given(st.lists(st.tuples(st.integers(4, 2400), st.integers(0, 255)), min_size=1, max_size=6))
+def test_damaged_scans_never_crash_the_bridge(damage: list[tuple[int, int]]) -> None:
+    data = bytearray(encode(scan_message(START_S, [PERSON])))
+    for place, value in damage:
+        data[4 + place % (len(data) - 4)] = value
+    nav = Listener(scanners=[FRONT], with_camera=False, make_detector=lambda: DETECTOR)
+    nav.bridge.on_odometry(odometry(START_S, speed=0.0))
+    try:
+        message = decode(LaserScan, bytes(data))
+    except NavError:
+        return
+    nav.bridge.on_scan(0, message, START_S)
+    nav.bridge.tick(START_S)
+    for messages in nav.heard.values():
+        for sent in messages:
+            encode(sent)

@@ -1,0 +1,103 @@
+"""The watch over the sensors: what is lost, and whether the rest sees what the camera saw."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scan_scenes import planar
+
+from nav_adapter.ros2 import CameraMount
+from nav_adapter.ros2._sensor_watch import SensorWatch
+from perception import Camera
+
+CAMERA = Camera.from_fov(640, 480, math.radians(90.0))
+AHEAD = CameraMount(position_base_m=[0.2, 0.0, 1.4]).T_base_camera()
+
+
+def looking(yaw_deg: float = 0.0, pitch_deg: float = 0.0) -> SensorWatch:
+    """Return a watch over two scanners and a camera that has sent one image at 0 s."""
+    watch = SensorWatch(("one", "two"), with_camera=True, lost_after_s=0.5)
+    mount = CameraMount(position_base_m=[0, 0, 1.4], yaw_deg=yaw_deg, pitch_down_deg=pitch_deg)
+    watch.saw_image(0.0, CAMERA, mount.T_base_camera())
+    return watch
+
+
+def scanned(watch: SensorWatch, number: int, stamp_s: float, yaw_deg: float, field_deg: float):
+    T = planar(0.3, 0.2, math.radians(yaw_deg))
+    watch.saw_scan(number, stamp_s, T, math.radians(field_deg))
+
+
+@given(st.floats(-180.0, 180.0), st.floats(-180.0, 180.0), st.floats(1.0, 360.0))
+def test_one_scanner_replaces_the_camera_if_it_sees_all_of_its_field(yaw, other, field) -> None:
+    watch = looking(yaw)
+    scanned(watch, 0, 5.0, other, field)
+    off = abs(math.remainder(math.radians(other - yaw), math.tau))
+    slack = 0.5 * math.radians(field) - off - math.radians(45.0)
+    if field >= 359.9 or slack > 1e-3:
+        assert watch.stamp_s == 5.0
+    elif slack < -math.radians(1.0):
+        assert watch.stamp_s == 0.0
+
+
+@pytest.mark.parametrize(("pitch_deg", "covered"), [(0.0, True), (30.0, False), (85.0, False)])
+def test_a_camera_that_looks_down_sees_more_directions(pitch_deg: float, covered: bool) -> None:
+    watch = looking(pitch_deg=pitch_deg)
+    scanned(watch, 0, 5.0, 0.0, 92.0)
+    assert (watch.stamp_s == 5.0) is covered
+    scanned(watch, 0, 5.0, 0.0, 360.0)
+    assert watch.stamp_s == 5.0
+
+
+def test_two_scanners_together_are_as_old_as_the_older() -> None:
+    watch = looking()
+    scanned(watch, 0, 7.0, 40.0, 90.0)
+    assert watch.stamp_s == 0.0
+    scanned(watch, 1, 6.0, -40.0, 90.0)
+    assert watch.stamp_s == 6.0
+    # One that sees everything needs no second.
+    scanned(watch, 0, 7.0, 40.0, 350.0)
+    assert watch.stamp_s == 7.0
+    # A late scan makes nothing older.
+    scanned(watch, 0, 6.5, 40.0, 350.0)
+    assert watch.stamp_s == 7.0
+    # The camera itself is always enough.
+    watch.saw_image(9.0, CAMERA, AHEAD)
+    assert watch.stamp_s == 9.0
+
+
+def test_without_a_camera_scanners_must_see_ahead() -> None:
+    watch = SensorWatch(("one", "two"), with_camera=False, lost_after_s=0.5)
+    scanned(watch, 0, 1.0, 180.0, 230.0)
+    assert watch.stamp_s is None
+    scanned(watch, 1, 1.5, 0.0, 130.0)
+    assert watch.stamp_s == 1.5
+
+
+def test_losses_and_returns_are_told_once() -> None:
+    watch = looking()
+    assert watch.missing == "one"
+    scanned(watch, 0, 0.0, 0.0, 270.0)
+    scanned(watch, 1, 0.0, 180.0, 270.0)
+    assert watch.missing is None
+    assert watch.news(0.4) == []
+    watch.saw_image(0.5, CAMERA, AHEAD)
+    scanned(watch, 1, 0.5, 180.0, 270.0)
+    assert watch.lost(0.6) == ("one",)
+    assert watch.news(0.6) == ["one has been silent for 0.6 s: camera and two go on"]
+    assert watch.news(0.7) == []
+    assert watch.news(1.2) == [
+        "camera has been silent for 0.7 s: the robot stops",
+        "two has been silent for 0.7 s: the robot stops",
+    ]
+    scanned(watch, 0, 1.3, 0.0, 270.0)
+    assert watch.news(1.3) == ["one is back"]
+    assert watch.ages_s(1.3) == pytest.approx({"camera": 0.8, "one": 0.0, "two": 0.8})
+    watch.forget()
+    assert watch.missing == "camera"
+    assert watch.news(2.0) == []
+    assert watch.stamp_s is None
+    assert np.isinf(list(watch.ages_s(2.0).values())).all()
