@@ -11,9 +11,10 @@ import argparse
 import math
 import time
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -31,11 +32,16 @@ from perception.laser import (
 )
 from sim_tests.actors.body import Worker, worker_names
 from sim_tests.actors.robot import Amr, AmrLook
-from sim_tests.world import Warehouse, crosses_boxes
+from sim_tests.world import Warehouse
 from sim_tests.world.hall import LAYOUTS
 from sim_tests.world.scanner import DIAGONAL_SCANNERS, ScanScene, SimulatedScanner
 from tracking import PersonTracker, TrackerConfig
 from training.legs import TRAINING_WORKERS
+
+from .laser_trolley import TROLLEY_AHEAD_M, TROLLEY_KINDS, Trolley, TrolleyKind
+from .laser_wanderer import Wanderer
+
+_T = TypeVar("_T")
 
 _RATE_HZ: Final = 25.0
 _RANGE_M: Final = 5.0
@@ -49,85 +55,34 @@ _APART_M: Final = 0.5
 _ROBOT_MPS: Final = 1.0
 _ROBOT_CLEARANCE_M: Final = 0.55
 _PERSON_CLEARANCE_M: Final = 0.35
+# Somebody and a trolley turn about the middle of both.
+_TROLLEY_CLEARANCE_M: Final = 0.95
+_TROLLEY_MIDDLE_M: Final = 0.6
+# Halls so large that people come near the robot only if their ways are chosen around it.
+_LARGE_HALLS: Final = ("aisles",)
+# A candidate of a trolley this near to somebody is that person.
+_TROLLEY_MATCH_M: Final = 1.2
+# Drives: people alone, the first two of them with trolleys, and an empty hall.
+_PARTS: Final = ("people", "trolleys", "nobody")
 
 
-class Wanderer:
-    """Somebody or something that moves between random free places, and stands in between.
+class _Judged(NamedTuple):
+    """The truth about somebody in one scan; ``actors`` are the numbers of body and trolley."""
 
-    Args:
-        boxes: (N, 4) what it keeps clear of.
-        rng: chooses the way.
-        clearance_m: distance from the boxes.
-        speeds_mps: lowest and highest speed.
-        stands: share of stops; 1 never moves.
-    """
-
-    def __init__(
-        self,
-        boxes: FloatArray,
-        rng: np.random.Generator,
-        clearance_m: float,
-        speeds_mps: tuple[float, float],
-        stands: float,
-    ) -> None:
-        self._boxes, self._rng, self._clearance_m = boxes, rng, clearance_m
-        self._speeds, self._stands = speeds_mps, stands
-        self.place_m = self._free()
-        self.heading_rad = float(rng.uniform(-math.pi, math.pi))
-        self.speed_mps, self.walked_m, self.yaw_rate_radps = 0.0, 0.0, 0.0
-        self._goal, self._until_s = self.place_m, float(rng.uniform(0.0, 4.0))
-
-    def advance(self, t_s: float, dt_s: float) -> None:
-        """Move on by one step of time."""
-        to = self._goal - self.place_m
-        distance = float(np.linalg.norm(to))
-        if t_s < self._until_s or self._stands >= 1.0:
-            self.speed_mps = self.yaw_rate_radps = 0.0
-            return
-        if distance < 0.1:
-            self._goal = self._next()
-            if self._rng.random() < self._stands:
-                self._until_s = t_s + float(self._rng.uniform(1.0, 6.0))
-            self._speed = float(self._rng.uniform(*self._speeds))
-            return
-        wanted = math.atan2(to[1], to[0])
-        turn = math.remainder(wanted - self.heading_rad, math.tau)
-        step = min(max(turn, -1.5 * dt_s), 1.5 * dt_s)
-        self.yaw_rate_radps = step / dt_s
-        self.heading_rad += step
-        self.speed_mps = self._speed if abs(turn) < 0.3 else 0.0
-        along = np.array([math.cos(self.heading_rad), math.sin(self.heading_rad)])
-        self.place_m = self.place_m + self.speed_mps * dt_s * along
-        self.walked_m += self.speed_mps * dt_s
-
-    def _next(self) -> FloatArray:
-        for _ in range(200):
-            place = self._free()
-            offset = place - self.place_m
-            sides = np.array([[0.0, 0.0], [-offset[1], offset[0]], [offset[1], -offset[0]]])
-            sides *= self._clearance_m / max(float(np.linalg.norm(offset)), 1e-6)
-            if np.linalg.norm(offset) < 8.0 and not any(
-                crosses_boxes(self._boxes, self.place_m + side, [place + side])[0] for side in sides
-            ):
-                return place
-        return self.place_m
-
-    def _free(self) -> FloatArray:
-        low, high = self._boxes[:, :2].min(axis=0), self._boxes[:, 2:].max(axis=0)
-        while True:
-            place = self._rng.uniform(low, high)
-            away = np.maximum(self._boxes[:, :2] - place, place - self._boxes[:, 2:])
-            if np.linalg.norm(np.maximum(away, 0.0), axis=1).min() > self._clearance_m:
-                return np.asarray(place)
+    place_m: FloatArray
+    walks: bool
+    worker: str
+    actors: Sequence[int]
+    trolley: str
 
 
 class Figures:
-    """Counts over all scans of one hall."""
+    """Counts over all scans of one hall, by kind of sighting."""
 
     def __init__(self) -> None:
         self.seen: dict[str, list[bool]] = defaultdict(list)
-        self.errors_m: list[float] = []
-        self.normalised: list[float] = []
+        self.errors_m: dict[str, list[float]] = defaultdict(list)
+        self.normalised: dict[str, list[float]] = defaultdict(list)
         self.ghosts: set[int] = set()
         self.ghost_scans = 0
         self.time_ms: list[float] = []
@@ -137,17 +92,22 @@ class Figures:
 
     def row(self, name: str) -> str:
         """Return the figures as a row of a Markdown table."""
-        every = [
-            found for kind, each in self.seen.items() if kind.startswith("range") for found in each
-        ]
+        every = _of_people(self.seen)
         recall = f"{100.0 * np.mean(every):.2f} % of {len(every)}" if every else "–"
-        error = f"{100.0 * np.median(self.errors_m):.1f}" if self.errors_m else "–"
+        errors = _of_people(self.errors_m)
+        error = f"{100.0 * np.median(errors):.1f}" if errors else "–"
         ghosts = 60.0 * len(self.ghosts) / max(self.duration_s, 1e-9)
-        sigma = f"{np.mean(self.normalised):.2f}" if self.normalised else "–"
+        normalised = _of_people(self.normalised)
+        sigma = f"{np.mean(normalised):.2f}" if normalised else "–"
         return (
             f"| {name} | {recall} | {error} | {sigma} | {self.wrong / max(self.scans, 1):.3f} | "
             f"{ghosts:.2f} | {np.median(self.time_ms):.2f} |"
         )
+
+
+def _of_people(by_kind: Mapping[str, Sequence[_T]]) -> list[_T]:
+    """Return what was counted of people without trolleys, everybody once."""
+    return [each for kind, every in by_kind.items() if kind.startswith("range") for each in every]
 
 
 def drive(
@@ -159,10 +119,11 @@ def drive(
     figures: Figures,
     config: LegDetectorConfig,
     classifier: LegClassifier | None = None,
+    trolleys: Sequence[TrolleyKind] = (),
 ) -> None:
     """Drive through a hall for a time and add what was found to the figures.
 
-    The noise of the scanners is the configuration's.
+    The noise of the scanners is the configuration's. The first people push the trolleys.
     """
     specs = [
         spec.model_copy(update={"noise_std_m": config.range_noise_m}) for spec in DIAGONAL_SCANNERS
@@ -173,14 +134,28 @@ def drive(
         amr = Amr(warehouse)
         pose = [np.eye(4)]
         warehouse.add_actor(AmrLook(lambda: (pose[0], 0.0, 0.0)))
-        scene = ScanScene(warehouse.layout, variant, warehouse.actors)
-        skins = [scene.occluders.index(worker.skin) for worker in people]
         boxes = warehouse.obstacle_boxes_odom
         robot = Wanderer(boxes, rng, _ROBOT_CLEARANCE_M, (0.3, _ROBOT_MPS), 0.2)
         walks = [
-            Wanderer(boxes, rng, _PERSON_CLEARANCE_M, (0.6, 1.7), 1.0 if k % 4 == 3 else 0.4)
+            Wanderer(
+                boxes,
+                rng,
+                _TROLLEY_CLEARANCE_M if k < len(trolleys) else _PERSON_CLEARANCE_M,
+                (0.6, 1.7),
+                1.0 if k % 4 == 3 else 0.4,
+                (lambda: robot.place_m) if layout in _LARGE_HALLS else None,
+            )
             for k in range(len(people))
         ]
+        pushed = [
+            Trolley(kind, partial(_ahead, walk, TROLLEY_AHEAD_M - _TROLLEY_MIDDLE_M))
+            for kind, walk in zip(trolleys, walks, strict=False)
+        ]
+        scene = ScanScene(warehouse.layout, variant, (*warehouse.actors, *pushed))
+        loads = [*trolleys, *("" for _ in walks[len(trolleys) :])]
+        seen_as = [[scene.occluders.index(worker.skin)] for worker in people]
+        for own, trolley in zip(seen_as, pushed, strict=False):
+            own.append(scene.occluders.index(trolley))
         scanners = [SimulatedScanner(scene, spec, rng) for spec in specs]
         body = amr.profile.footprint_m
         mountings = [spec.scanner(body) for spec in specs]
@@ -193,11 +168,14 @@ def drive(
             robot.advance(t, 1.0 / _RATE_HZ)
             for walk, worker in zip(walks, people, strict=True):
                 walk.advance(t, 1.0 / _RATE_HZ)
-                worker.place(walk.place_m, walk.heading_rad, walk.walked_m, walk.speed_mps)
+                back_m = _TROLLEY_MIDDLE_M if walk in walks[: len(pushed)] else 0.0
+                x, y, heading = _ahead(walk, -back_m)
+                worker.place((x, y), heading, walk.walked_m, walk.speed_mps)
             pose[0] = _pose(robot)
             velocity = np.array([robot.speed_mps, 0.0])
             motion = RobotMotion(t, pose[0], velocity, robot.yaw_rate_radps)
-            places = np.array([walk.place_m for walk in walks]).reshape(-1, 2)
+            places = np.array([worker.position_odom_m for worker in people]).reshape(-1, 2)
+            real = np.concatenate([places, *(each.middle_odom_m[None] for each in pushed)])
             groups = []
             for number, (scanner, mounting) in enumerate(zip(scanners, mountings, strict=True)):
                 scan = scanner.scan(motion)
@@ -205,14 +183,20 @@ def drive(
                 found = detector.detect(scan_points(scan, mounting, motion), number)
                 figures.time_ms.append(1e3 * (time.perf_counter() - start))
                 groups.append(found)
+                judged = [
+                    _Judged(place, walk.speed_mps > 0.0, name, actors, trolley)
+                    for place, walk, name, actors, trolley in zip(
+                        places, walks, workers, seen_as, loads, strict=True
+                    )
+                ]
                 origin = (motion.T_odom_base @ mounting.T_base_scanner)[:2, 3]
-                _count(figures, scanner, skins, places, walks, workers, origin, found)
+                _count(figures, scanner, judged, real, origin, found)
             merged = merge_candidates(groups)
             tracks = tracker.update(observations_of(merged, np.eye(4), t), t, np.eye(4))
             for track in tracks:
                 if track.status == "confirmed" and (
-                    not len(places)
-                    or np.linalg.norm(places - track.position_odom_m, axis=1).min() > _GHOST_M
+                    not len(real)
+                    or np.linalg.norm(real - track.position_odom_m, axis=1).min() > _GHOST_M
                 ):
                     figures.ghost_scans += 1
                     figures.ghosts.add(1000 * seed + track.id)
@@ -222,41 +206,53 @@ def drive(
 def _count(
     figures: Figures,
     scanner: SimulatedScanner,
-    skins: Sequence[int],
-    places: FloatArray,
-    walks: Sequence[Wanderer],
-    workers: Sequence[str],
+    people: Sequence[_Judged],
+    real_m: FloatArray,
     origin: FloatArray,
     found: Sequence[PersonCandidate],
 ) -> None:
     step = math.radians(scanner.spec.resolution_deg)
     at = np.array([each.position_odom_m for each in found]).reshape(-1, 2)
+    places = np.array([person.place_m for person in people]).reshape(-1, 2)
     figures.scans += 1
     figures.wrong += sum(
-        not len(places) or np.linalg.norm(places - place, axis=1).min() > _GHOST_M for place in at
+        not len(real_m) or np.linalg.norm(real_m - place, axis=1).min() > _GHOST_M for place in at
     )
-    for number, skin in enumerate(skins):
-        distance = float(np.linalg.norm(places[number] - origin))
-        apart = np.linalg.norm(np.delete(places, number, axis=0) - places[number], axis=1)
-        if len(apart) and apart.min() < _APART_M:
+    for number, person in enumerate(people):
+        distance = float(np.linalg.norm(person.place_m - origin))
+        apart = np.linalg.norm(np.delete(places, number, axis=0) - person.place_m, axis=1)
+        if distance > _RANGE_M or (len(apart) and apart.min() < _APART_M):
             continue
-        if (
-            distance > _RANGE_M
-            or np.count_nonzero(scanner.hit_by == skin) * step * distance < _SEEN_M
-        ):
+        widths = [
+            np.count_nonzero(scanner.hit_by == actor) * step * distance for actor in person.actors
+        ]
+        if max(widths) < _SEEN_M:
             continue
-        away = np.linalg.norm(at - places[number], axis=1)
-        hit = bool(len(at) and away.min() <= _MATCH_M)
-        figures.seen[f"range {math.floor(distance)}–{math.floor(distance) + 1} m"].append(hit)
-        figures.seen["walking" if walks[number].speed_mps > 0.0 else "standing"].append(hit)
-        figures.seen[f"worker {workers[number]}"].append(hit)
+        hidden = widths[0] < _SEEN_M  # behind the trolley
+        away = np.linalg.norm(at - person.place_m, axis=1)
+        hit = bool(len(at) and away.min() <= (_TROLLEY_MATCH_M if hidden else _MATCH_M))
+        kinds = [f"pushing, {person.trolley}, legs {'hidden' if hidden else 'in view'}"]
+        if not person.trolley:
+            kinds = [
+                f"range {math.floor(distance)}–{math.floor(distance) + 1} m",
+                "walking" if person.walks else "standing",
+                f"worker {person.worker}",
+            ]
+        for kind in kinds:
+            figures.seen[kind].append(hit)
         if hit:
             each = found[int(away.argmin())]
-            error = each.position_odom_m - places[number]
-            figures.errors_m.append(float(np.linalg.norm(error)))
-            figures.normalised.append(
-                0.5 * float(error @ np.linalg.solve(each.covariance_m2, error))
-            )
+            error = each.position_odom_m - person.place_m
+            normalised = 0.5 * float(error @ np.linalg.solve(each.covariance_m2, error))
+            figures.errors_m[kinds[0]].append(float(np.linalg.norm(error)))
+            figures.normalised[kinds[0]].append(normalised)
+
+
+def _ahead(walk: Wanderer, distance_m: float) -> tuple[float, float, float]:
+    """Return x, y and heading of the place at a distance ahead of somebody."""
+    x, y = walk.place_m.tolist()
+    heading = walk.heading_rad
+    return x + distance_m * math.cos(heading), y + distance_m * math.sin(heading), heading
 
 
 def _pose(robot: Wanderer) -> FloatArray:
@@ -268,9 +264,10 @@ def _pose(robot: Wanderer) -> FloatArray:
 
 
 def main() -> None:
-    """Print the table of all halls, with and without people."""
+    """Print the table of all halls, with people, with trolleys and empty."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.laser_people", description=__doc__)
     parser.add_argument("--halls", nargs="*", default=list(LAYOUTS), choices=list(LAYOUTS))
+    parser.add_argument("--parts", nargs="*", default=_PARTS, choices=_PARTS)
     parser.add_argument("--seconds", type=float, default=60.0, help="per hall and drive")
     parser.add_argument("--drives", type=int, default=2, help="drives per hall")
     parser.add_argument("--seed", type=int, default=0)
@@ -283,27 +280,41 @@ def main() -> None:
     config = LegDetectorConfig(score_threshold=chosen.threshold, range_noise_m=chosen.noise)
     print("| hall | recall | error, cm | NEES / 2 | wrong per scan | ghosts per minute | ms |")
     print("| --- | --- | --- | --- | --- | --- | --- |")
-    seen: dict[str, list[bool]] = defaultdict(list)
-    for people in (len(held_out), 0):
+    every = Figures()
+    parts: dict[str, tuple[Sequence[str], Sequence[TrolleyKind]]] = {
+        "people": (held_out, ()),
+        "trolleys": (held_out, TROLLEY_KINDS),
+        "nobody": ((), ()),
+    }
+    for part in chosen.parts:
         for hall in chosen.halls:
             figures = Figures()
             for drive_number in range(chosen.drives):
                 seed = 100 * chosen.seed + drive_number
+                workers, trolleys = parts[part]
                 drive(
                     hall,
                     seed % 8,
-                    held_out[:people],
+                    workers,
                     chosen.seconds,
                     seed,
                     figures,
                     config,
                     classifier,
+                    trolleys,
                 )
-            for kind, each in figures.seen.items():
-                seen[kind] += each
-            print(figures.row(f"{hall}, {people} people"), flush=True)
-    for kind in sorted(seen):
-        print(f"{kind}: {100.0 * np.mean(seen[kind]):.2f} % of {len(seen[kind])}")
+            for kind, found in figures.seen.items():
+                every.seen[kind] += found
+                every.errors_m[kind] += figures.errors_m[kind]
+                every.normalised[kind] += figures.normalised[kind]
+            print(figures.row(f"{hall}, {part}"), flush=True)
+    for kind in sorted(every.seen):
+        line = f"{kind}: {100.0 * np.mean(every.seen[kind]):.2f} % of {len(every.seen[kind])}"
+        if every.errors_m[kind]:
+            median, high = np.percentile(every.errors_m[kind], (50.0, 90.0))
+            line += f", error {median:.3f} m, 90 % within {high:.3f} m"
+            line += f", NEES / 2 {np.mean(every.normalised[kind]):.2f}"
+        print(line)
 
 
 if __name__ == "__main__":

@@ -10,9 +10,8 @@ The order of use, for every scan of every scanner::
 
 With several scanners each scan is detected with its own number, ``detector.detect(points, 1)``, and
 :func:`merge_candidates` reports every person once. :func:`observations_of` makes the observations
-that ``tracking.PersonTracker`` takes.
-:func:`merge_candidates` reports every person once. :class:`SeatedPeople` puts the candidates of
-people whom a camera saw sitting where their trunk is.
+that ``tracking.PersonTracker`` takes. :class:`SeatedPeople` puts the candidates of people whom a
+camera saw sitting where their trunk is.
 """
 
 from __future__ import annotations

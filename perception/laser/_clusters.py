@@ -40,6 +40,7 @@ class Clusters:
         starts: (C,) first point.
         counts: (C,) number of points.
         centres_m: (C, 2) mean of the points.
+        spreads_m2: (3, C) xx, yy and xy of the covariance of the points.
         widths_m: (C,) distance from the first to the last point, plus one distance between rays.
         origin_m: (2,) place of the scanner.
         turn: 1 if the rays turn counter-clockwise, −1 otherwise.
@@ -53,6 +54,7 @@ class Clusters:
     starts: NDArray[np.int64]
     counts: NDArray[np.int64]
     centres_m: FloatArray
+    spreads_m2: FloatArray
     widths_m: FloatArray
     origin_m: FloatArray
     turn: int
@@ -92,54 +94,60 @@ def clusters_of(
             apart. None for all 0.
     """
     rays = np.flatnonzero(seen)
-    points, ranges = points_m[rays], ranges_m[rays]
-    away = points - origin_m
+    # All points are handled axis by axis, (2, M).
+    away = np.take(points_m.T, rays, axis=1) - origin_m[:, None]
+    ranges = ranges_m[rays]
     turn = 1
     if len(rays) > 1:
-        turns = away[:-1, 0] * away[1:, 1] - away[:-1, 1] * away[1:, 0]
+        turns = away[0, :-1] * away[1, 1:] - away[1, :-1] * away[0, 1:]
         if np.count_nonzero(turns < 0.0) > np.count_nonzero(turns > 0.0):
-            rays, points, ranges, turn = rays[::-1], points[::-1], ranges[::-1], -1
-    spacings = ranges * abs(increment_rad)
+            rays, away, ranges, turn = rays[::-1], away[:, ::-1], ranges[::-1], -1
     # Where the first and the last ray are neighbours, the scan is cut open at its widest jump.
-    ahead = np.roll(points, -1, axis=0) - points
-    gaps = np.sqrt((ahead * ahead).sum(axis=1))
     if len(rays) > 1 and abs(increment_rad) * (len(points_m) + 1) >= 2.0 * math.pi:
-        shift = -(int(gaps.argmax()) + 1)
-        rays, points, ranges = (
-            np.roll(rays, shift),
-            np.roll(points, shift, axis=0),
-            np.roll(ranges, shift),
-        )
-        spacings, gaps = np.roll(spacings, shift), np.roll(gaps, shift)
-    between = np.minimum(np.abs(np.diff(rays)), _MAX_LOST_RAYS + 1)
-    limit = _JUMP_RAYS * between * np.maximum(spacings[:-1], spacings[1:])
-    breaks = gaps[:-1] > _JUMP_M + _JUMP_SIGMAS * noise_m + limit
+        ahead = np.roll(away, -1, axis=1) - away
+        shift = -(int((ahead * ahead).sum(axis=0).argmax()) + 1)
+        rays, ranges = np.roll(rays, shift), np.roll(ranges, shift)
+        away = np.roll(away, shift, axis=1)
+    spacings = ranges * abs(increment_rad)
+    between = np.abs(rays[1:] - rays[:-1])
+    limit = np.minimum(between, _MAX_LOST_RAYS + 1) * np.maximum(spacings[:-1], spacings[1:])
+    limit *= _JUMP_RAYS
+    limit += _JUMP_M + _JUMP_SIGMAS * noise_m
+    ahead = away[:, 1:] - away[:, :-1]
+    ahead *= ahead
+    first = np.ones(len(rays), dtype=bool)
+    np.greater(ahead[0] + ahead[1], limit * limit, out=first[1:])
     if known is not None:
         kind = known[rays]
-        breaks |= kind[:-1] * kind[1:] < 0
+        first[1:] |= kind[:-1] * kind[1:] < 0
     steps = np.full((2, len(rays)), _NOTHING_M)
     if len(rays):
         # A ray without a return between two points is free space beside both.
-        skipped = np.abs(np.diff(rays)) > _MAX_LOST_RAYS + 1
-        beside = np.where(skipped, _NOTHING_M, 0.0)
+        beside = np.where(between > _MAX_LOST_RAYS + 1, _NOTHING_M, 0.0)
         steps[0, 1:] = np.maximum(ranges[:-1], beside) - ranges[1:]
         steps[1, :-1] = np.maximum(ranges[1:], beside) - ranges[:-1]
-    first = np.concatenate([np.ones(min(len(rays), 1), dtype=bool), breaks])
     starts = np.flatnonzero(first)
-    counts = np.diff(starts, append=len(points))
-    ends = starts + counts - 1
-    sums = np.add.reduceat(points, starts, axis=0) if len(starts) else np.zeros((0, 2))
-    across = points[ends] - points[starts]
+    counts = np.diff(starts, append=len(rays))
+    values = np.empty((5, len(rays)))
+    values[:2] = away
+    np.multiply(away, away, out=values[2:4])
+    np.multiply(away[0], away[1], out=values[4])
+    means = np.add.reduceat(values, starts, axis=1) if len(starts) else np.zeros((5, 0))
+    means /= np.maximum(counts, 1)
+    x, y = means[:2]
+    means[2:] -= x * x, y * y, x * y
+    across = away[:, starts + counts - 1] - away[:, starts]
     return Clusters(
-        points,
+        (away + origin_m[:, None]).T,
         ranges,
         rays,
         spacings,
         steps,
         starts,
         counts,
-        sums / np.maximum(counts, 1)[:, None],
-        np.sqrt((across * across).sum(axis=1)) + spacings[starts],
+        (means[:2] + origin_m[:, None]).T,
+        means[2:],
+        np.sqrt((across * across).sum(axis=0)) + spacings[starts],
         np.asarray(origin_m, dtype=np.float64),
         turn,
     )
@@ -159,40 +167,37 @@ def cluster_features(clusters: Clusters) -> FloatArray:
         return np.zeros((0, CLUSTER_FEATURES))
     starts, counts = clusters.starts, clusters.counts
     ends = starts + counts - 1
-    points, cluster = clusters.points_m, clusters.cluster
-    away = clusters.centres_m - clusters.origin_m
-    ranges = np.maximum(np.sqrt((away * away).sum(axis=1)), 1e-6)
-    ray = away / ranges[:, None]
-    off = points - clusters.centres_m[cluster]
-    x, y = off.T
-    moments = clusters.sums(np.column_stack((x * x, y * y, x * y))) / counts[:, None]
-    middle = 0.5 * (moments[:, 0] + moments[:, 1])
-    spread = np.sqrt((0.5 * (moments[:, 0] - moments[:, 1])) ** 2 + moments[:, 2] ** 2)
-    chord = points[ends] - points[starts]
-    length = np.sqrt((chord * chord).sum(axis=1))
+    points = clusters.points_m.T
+    x, y = (clusters.centres_m - clusters.origin_m).T
+    ranges = np.maximum(np.sqrt(x * x + y * y), 1e-6)
+    ray_x, ray_y = x / ranges, y / ranges
+    xx, yy, xy = clusters.spreads_m2
+    middle, half = 0.5 * (xx + yy), 0.5 * (xx - yy)
+    spread = np.sqrt(half * half + xy * xy)
+    first = points[:, starts]
+    chord_x, chord_y = points[:, ends] - first
+    length = np.sqrt(chord_x * chord_x + chord_y * chord_y)
     # A cluster of one point has a chord across its ray.
-    aside = np.column_stack((-ray[:, 1], ray[:, 0]))
-    unit = np.where(length[:, None] > 1e-6, chord / np.maximum(length, 1e-6)[:, None], aside)
-    normal = np.column_stack((-unit[:, 1], unit[:, 0]))  # away from the scanner is to the left
-    to_chord = points - points[starts][cluster]
-    bulge = (to_chord * normal[cluster]).sum(axis=1)
-    bulges = clusters.sums(np.column_stack((bulge, bulge * bulge))) / counts[:, None]
-    steps = np.clip(
-        (clusters.steps_m[0, starts], clusters.steps_m[1, ends]), -_MAX_STEP_M, _MAX_STEP_M
-    )
-    rays = np.abs(clusters.rays[ends] - clusters.rays[starts]) + 1.0
-    return np.column_stack(
-        (
-            np.log(counts),
-            0.1 * ranges,
-            10.0 * clusters.widths_m,
-            10.0 * np.sqrt(middle + spread),
-            10.0 * np.sqrt(np.maximum(middle - spread, 0.0)),
-            10.0 * bulges[:, 0],
-            10.0 * np.sqrt(np.maximum(bulges[:, 1] - bulges[:, 0] ** 2, 0.0)),
-            steps[0],
-            steps[1],
-            (unit * ray).sum(axis=1),
-            counts / rays,
-        )
-    )
+    short = length <= 1e-6
+    safe = np.maximum(length, 1e-6)
+    unit_x = np.where(short, -ray_y, chord_x / safe)
+    unit_y = np.where(short, ray_x, chord_y / safe)
+    # Distances from the chord; away from the scanner is to its left.
+    to_x, to_y = clusters.centres_m.T - first
+    bulge = unit_x * to_y - unit_y * to_x
+    depth = unit_y * unit_y * xx + unit_x * unit_x * yy - 2.0 * (unit_x * unit_y) * xy
+    features = np.empty((CLUSTER_FEATURES, count))
+    features[0] = np.log(counts)
+    features[1] = 0.1 * ranges
+    features[2] = 10.0 * clusters.widths_m
+    features[3] = 10.0 * np.sqrt(np.maximum(middle + spread, 0.0))
+    features[4] = 10.0 * np.sqrt(np.maximum(middle - spread, 0.0))
+    features[5] = 10.0 * bulge
+    features[6] = 10.0 * np.sqrt(np.maximum(depth, 0.0))
+    features[7] = clusters.steps_m[0, starts]
+    features[8] = clusters.steps_m[1, ends]
+    np.minimum(features[7:9], _MAX_STEP_M, out=features[7:9])
+    np.maximum(features[7:9], -_MAX_STEP_M, out=features[7:9])
+    features[9] = unit_x * ray_x + unit_y * ray_y
+    features[10] = counts / (np.abs(clusters.rays[ends] - clusters.rays[starts]) + 1.0)
+    return np.asarray(features.T)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass
 from typing import Final
@@ -53,12 +54,14 @@ _TROLLEY_M: Final = (0.3, 1.6)
 _TROLLEY_POINTS: Final = 5
 _TROLLEY_CAME: Final = 0.8
 _TROLLEY_SCORE: Final = 0.5
-# It stands this far before the surfaces at its sides.
-_TROLLEY_BEFORE_M: Final = 0.3
+# It stands this far before or behind the surfaces at its sides, if these have not come as well.
+_TROLLEY_APART_FROM_M: Final = 0.3
 # A trolley this near to a person found by the legs is that person's.
 _TROLLEY_APART_M: Final = 1.2
-# Somebody who pushes it stands beside or behind it, within this standard deviation.
-_TROLLEY_STD_M: Final = 0.5
+# Legs beside it would be seen, so somebody who pushes it stands behind it. This is the least that
+# they can be behind the surface that is seen, and the standard deviation of their place.
+_TROLLEY_BEHIND_M: Final = 0.3
+_TROLLEY_STD_M: Final = 0.6
 _SURELY_M: Final = 1e-3
 # The axis of a leg lies this far behind the middle of the points that were met.
 _LEG_RADIUS_M: Final = 0.045
@@ -143,16 +146,9 @@ class LegDetector:
             points: the scan's points in odom, from :func:`scan_points`.
             scanner: number of the scanner, from 0.
         """
-        config = self.config
+        config, usable = self.config, points.usable
         xy = points.points_odom_m[:, :2]
-        usable = points.usable
-        rows = np.flatnonzero(usable)
-        known = np.zeros(len(usable), dtype=np.int64)
-        if self._map is not None:
-            known[rows[self._map.holds(xy[rows])]] = -1
-        if config.learn:
-            known[rows[self._memory.is_static(xy[rows])]] = -1
-            known[rows[self._memory.has_come(xy[rows])]] = 1
+        known = self._known(xy, usable)
         clusters = clusters_of(
             xy,
             points.ranges_m,
@@ -164,14 +160,14 @@ class LegDetector:
         )
         hypotheses = hypotheses_of(clusters, xy, points.ranges_m, points.angle_increment_rad)
         judged = np.array(self._classify(hypotheses.features), dtype=np.float64)
+        first = hypotheses.first
+        second = np.where(hypotheses.second < 0, first, hypotheses.second)
         alike = judged[:, 0] >= _ALIKE_SCORE
-        came = (known[clusters.rays] > 0).astype(np.float64)
-        still = clusters.sums((known[clusters.rays] < 0).astype(np.float64))
+        came, still = _known_points(clusters, known)
         is_still = still > _STILL_SHARE * clusters.counts
-        second = np.where(hypotheses.second < 0, hypotheses.first, hypotheses.second)
-        judged[:, 0] *= ~(is_still[hypotheses.first] | is_still[second])
+        judged[is_still[first] | is_still[second], 0] = 0.0
         if config.learn:
-            narrow = (hypotheses.second < 0) & (clusters.widths_m[hypotheses.first] < _TWO_LEGS_M)
+            narrow = (hypotheses.second < 0) & (clusters.widths_m[first] < _TWO_LEGS_M)
             seen = self._memory.had_two_legs(hypotheses.centres_m, points.stamp_s)
             recent = self._recently(points.stamp_s)
             alike |= seen
@@ -184,32 +180,59 @@ class LegDetector:
             for row, place in zip(chosen, places, strict=True)
         ]
         taken = np.zeros(len(clusters.starts), dtype=bool)
-        taken[hypotheses.first[chosen]] = True
+        taken[first[chosen]] = True
         taken[second[chosen]] = True
-        if config.trolleys and config.learn:
-            for number in _trolleys(clusters, taken, came, np.array(places).reshape(-1, 2)):
-                taken[number] = True
-                candidates.append(_trolley(points.stamp_s, clusters, number))
         if config.learn:
-            taken[hypotheses.first[alike]] = True
-            taken[second[alike]] = True
-            person = np.zeros(len(usable), dtype=bool)
-            person[clusters.rays] = taken[clusters.cluster]
-            self._memory.update(points, person, scanner)
-            self._found.append((points.stamp_s, np.array(places).reshape(-1, 2)))
+            people_m = np.array(places).reshape(-1, 2)
+            if config.trolleys:
+                for number in _trolleys(clusters, taken, came, people_m):
+                    taken[number] = True
+                    candidates.append(_trolley(points.stamp_s, clusters, number))
+            self._found.append((points.stamp_s, people_m))
             legs = _surely_two_legs(clusters, hypotheses, judged[:, 0], chosen)
-            self._memory.note_two_legs(hypotheses.centres_m[legs], points.stamp_s)
-        origin = clusters.origin_m
+            if self._memory.is_due(points.stamp_s, scanner):
+                taken[first[alike]] = True
+                taken[second[alike]] = True
+                person = np.zeros(len(usable), dtype=bool)
+                person[clusters.rays] = taken[clusters.cluster]
+                self._memory.update(points, person, scanner)
+            if legs:
+                self._memory.note_two_legs(hypotheses.centres_m[legs], points.stamp_s)
+        x, y = clusters.origin_m.tolist()
         return tuple(
             candidate
             for candidate in candidates
-            if np.hypot(*(candidate.position_odom_m - origin)) <= config.max_range_m
+            if math.dist(candidate.position_odom_m.tolist(), (x, y)) <= config.max_range_m
         )
+
+    def _known(self, points_m: FloatArray, usable: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """Return (N,) −1 for points that stand still, 1 for those that have come, 0 otherwise."""
+        known = np.zeros(len(usable), dtype=np.int64)
+        rows = np.flatnonzero(usable)
+        own = np.take(points_m.T, rows, axis=1).T
+        found = known[rows]
+        if self.config.learn:
+            found = self._memory.known(own)
+        if self._map is not None:
+            found[self._map.holds(own) & (found == 0)] = -1
+        known[rows] = found
+        return known
 
     def _recently(self, now_s: float) -> FloatArray:
         """Return (K, 2) the places where people were found just before."""
         places = [found for stamp, found in self._found if 0.0 <= now_s - stamp <= _RECENT_S]
         return np.concatenate(places) if places else np.zeros((0, 2))
+
+
+def _known_points(clusters: Clusters, known: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
+    """Return how many points (C,) of each cluster have come, and how many stand still."""
+    kind = known[clusters.rays]
+    if not kind.size:
+        return np.zeros(0), np.zeros(0)
+    counted = np.add.reduceat(
+        np.array([kind > 0, kind < 0], dtype=np.float64), clusters.starts, axis=1
+    )
+    return counted[0], counted[1]
 
 
 def _with_memory(
@@ -220,12 +243,16 @@ def _with_memory(
     recent_m: FloatArray,
     always: FloatArray,
 ) -> FloatArray:
-    """Return the scores (H,) with what is known about the place where each hypothesis stands."""
-    points = clusters.sums(np.column_stack((came, np.ones(len(came)))))
-    pair = hypotheses.second >= 0
-    own = points[hypotheses.first] + np.where(pair[:, None], points[hypotheses.second], 0.0)
-    has_come = own[:, 0] >= _CAME_SHARE * own[:, 1]
-    safe = np.clip(score, 1e-6, 1.0 - 1e-6)
+    """Return the scores (H,) with what is known about the place where each hypothesis stands.
+
+    ``came`` (C,) counts the points of each cluster that lie where the floor was free.
+    """
+    first, second = hypotheses.first, hypotheses.second
+    pair = second >= 0
+    all_came, all_points = came[first], clusters.counts[first]
+    all_came = all_came + pair * came[second]
+    has_come = all_came >= _CAME_SHARE * (all_points + pair * clusters.counts[second])
+    safe = np.minimum(np.maximum(score, 1e-6), 1.0 - 1e-6)
     odds = np.log(safe / (1.0 - safe)) + np.where(has_come, _CAME_LOG_ODDS, always)
     if len(recent_m):
         to = hypotheses.centres_m[:, None] - recent_m
@@ -242,9 +269,13 @@ def _trolleys(
     ends = clusters.starts + clusters.counts - 1
     fits = ~taken & (clusters.counts >= _TROLLEY_POINTS)
     fits &= (clusters.widths_m >= low) & (clusters.widths_m <= high)
-    fits &= clusters.steps_m[0, clusters.starts] > _TROLLEY_BEFORE_M
-    fits &= clusters.steps_m[1, ends] > _TROLLEY_BEFORE_M
-    fits &= clusters.sums(came) >= _TROLLEY_CAME * clusters.counts
+    moves = came >= _CAME_SHARE * clusters.counts
+    beside = np.array([clusters.steps_m[0, clusters.starts], clusters.steps_m[1, ends]])
+    apart = np.abs(beside) > _TROLLEY_APART_FROM_M
+    apart[0, 1:] |= moves[:-1]
+    apart[1, :-1] |= moves[1:]
+    fits &= apart[0] & apart[1]
+    fits &= came >= _TROLLEY_CAME * clusters.counts
     found: list[int] = []
     others = people_m
     for number in np.flatnonzero(fits).tolist():
@@ -260,31 +291,38 @@ def _chosen(
     clusters: Clusters, hypotheses: Hypotheses, judged: FloatArray, threshold: float
 ) -> tuple[list[int], list[FloatArray]]:
     """Return the best hypotheses that do not contradict each other, and the people's places."""
-    score = np.clip(judged[:, 0], 1e-6, 1.0 - 1e-6)
+    score = np.minimum(np.maximum(judged[:, 0], 1e-6), 1.0 - 1e-6)
     likely = np.flatnonzero(score >= threshold)
     if not len(likely):
         return [], []
-    pair, narrow = hypotheses.second >= 0, clusters.widths_m[hypotheses.first] < _TWO_LEGS_M
-    odds = np.log(score / (1.0 - score)) + _PAIR_LOG_ODDS * pair
-    order = likely[np.argsort(-odds[likely], kind="stable")]
-    rays = hypotheses.rays
-    left = np.column_stack((-rays[:, 1], rays[:, 0]))
-    places = hypotheses.centres_m + judged[:, 1:2] * rays + judged[:, 2:3] * left
+    score, first, second = score[likely], hypotheses.first[likely], hypotheses.second[likely]
+    narrow = (clusters.widths_m[first] < _TWO_LEGS_M).tolist()
+    odds = np.log(score / (1.0 - score)) + _PAIR_LOG_ODDS * (second >= 0)
+    x, y = hypotheses.rays[likely].T
+    away, aside = judged[likely, 1], judged[likely, 2]
+    places = hypotheses.centres_m[likely].copy()
+    places[:, 0] += away * x
+    places[:, 0] -= aside * y
+    places[:, 1] += away * y
+    places[:, 1] += aside * x
     chosen: list[int] = []
+    taken: list[list[float]] = []
     used: set[int] = set()
-    for row in order.tolist():
-        own = {int(hypotheses.first[row]), int(hypotheses.second[row])} - {-1}
+    rows = zip(first.tolist(), second.tolist(), places.tolist(), strict=True)
+    each = list(rows)
+    for row in np.argsort(-odds, kind="stable").tolist():
+        one, other, place = each[row]
+        own = {one} if other < 0 else {one, other}
         if own & used:
             continue
-        # A narrow cluster beside somebody is a leg of theirs that was met in two parts.
-        part = not pair[row] and narrow[row]
-        apart_m = _PART_APART_M if part else _APART_M
-        if any(np.hypot(*(places[row] - places[other])) < apart_m for other in chosen):
-            used |= own
-            continue
-        chosen.append(row)
         used |= own
-    return chosen, [places[row] for row in chosen]
+        # What is too near is the other leg of somebody found by one leg. A narrow cluster beside
+        # somebody is a leg of theirs that was met in two parts.
+        apart_m = _PART_APART_M if other < 0 and narrow[row] else _APART_M
+        if all(math.dist(place, before) >= apart_m for before in taken):
+            chosen.append(row)
+            taken.append(place)
+    return likely[chosen].tolist(), [places[row] for row in chosen]
 
 
 def _surely_two_legs(
@@ -297,7 +335,7 @@ def _surely_two_legs(
         one, other = int(hypotheses.first[row]), int(hypotheses.second[row])
         if other < 0 or score[row] < _SURE_SCORE or min(counts[one], counts[other]) < _SURE_POINTS:
             continue
-        if np.hypot(*(centres[one] - centres[other])) >= _SURE_APART_M:
+        if math.dist(centres[one].tolist(), centres[other].tolist()) >= _SURE_APART_M:
             legs.append(row)
     return legs
 
@@ -310,20 +348,34 @@ def _candidate(
     row: int,
     place_m: FloatArray,
 ) -> PersonCandidate:
-    rays = hypotheses.rays[row]
-    axes = np.array([rays, (-rays[1], rays[0])])
-    deviations = np.maximum(judged[3:5], _SURELY_M)
-    covariance = axes.T @ (deviations[:, None] ** 2 * axes)
+    along, aside = (max(deviation, _SURELY_M) for deviation in judged[3:5].tolist())
+    covariance = _covariance(hypotheses.rays[row], along, aside)
     single = hypotheses.second[row] < 0
     narrow = clusters.widths_m[hypotheses.first[row]] < _TWO_LEGS_M
     kind: CandidateKind = "one_leg" if single and narrow else "two_legs"
-    score = float(np.clip(judged[0], 0.0, 1.0))
+    score = min(max(float(judged[0]), 0.0), 1.0)
     legs = hypotheses.centres_m[row] + _LEG_RADIUS_M * rays
-    return PersonCandidate(stamp_s, place_m, 0.5 * (covariance + covariance.T), score, kind, legs)
+    return PersonCandidate(stamp_s, place_m, covariance, score, kind, legs)
 
 
 def _trolley(stamp_s: float, clusters: Clusters, number: int) -> PersonCandidate:
+    centre = clusters.centres_m[number]
+    away = centre - clusters.origin_m
+    ray = away / max(math.hypot(*away.tolist()), 1e-6)
     covariance = _TROLLEY_STD_M**2 * np.eye(2)
     return PersonCandidate(
-        stamp_s, clusters.centres_m[number], covariance, _TROLLEY_SCORE, "trolley"
+        stamp_s, centre + _TROLLEY_BEHIND_M * ray, covariance, _TROLLEY_SCORE, "trolley"
+    )
+
+
+def _covariance(ray: FloatArray, along_std_m: float, aside_std_m: float) -> FloatArray:
+    """Return (2, 2) from standard deviations along a unit vector and across it."""
+    x, y = ray.tolist()
+    along, aside = along_std_m * along_std_m, aside_std_m * aside_std_m
+    mixed = (along - aside) * x * y
+    return np.array(
+        [
+            (along * x * x + aside * y * y, mixed),
+            (mixed, along * y * y + aside * x * x),
+        ]
     )

@@ -33,6 +33,7 @@ _MAX_AROUND_M: Final = 3.0
 # Width of a cutout, and the depth before and behind the hypothesis that it shows.
 _CUTOUT_M: Final = 1.4
 _CUTOUT_DEPTH_M: Final = 0.7
+_CUTOUT_OFFSETS_M: Final = np.linspace(-0.5 * _CUTOUT_M, 0.5 * _CUTOUT_M, CUTOUT)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,59 +68,57 @@ def hypotheses_of(
     """
     returned = np.isfinite(ranges_m)
     step = abs(increment_rad)
-    points_m, spacings_m = points_m[returned], ranges_m[returned] * step
+    every = np.compress(returned, points_m.T, axis=1)
     features = cluster_features(clusters)
     first, second = _singles_and_pairs(clusters)
     pair = second >= 0
     left = np.where(pair, second, first)
-    centres, counts = clusters.centres_m, clusters.counts
-    middle = 0.5 * (centres[first] + centres[left])
-    away = middle - clusters.origin_m
-    ranges = np.maximum(np.sqrt((away * away).sum(axis=1)), 1e-6)
-    rays = away / ranges[:, None]
-    apart = centres[left] - centres[first]
-    along = (apart * rays).sum(axis=1)
-    across = rays[:, 0] * apart[:, 1] - rays[:, 1] * apart[:, 0]
-    out = np.zeros((len(first), HYPOTHESIS_FEATURES))
+    counts = clusters.counts
+    first_x, first_y = np.take(clusters.centres_m.T, first, axis=1)
+    left_x, left_y = np.take(clusters.centres_m.T, left, axis=1)
+    middle = np.empty((2, len(first)))
+    middle[0], middle[1] = 0.5 * (first_x + left_x), 0.5 * (first_y + left_y)
+    away = middle - clusters.origin_m[:, None]
+    ranges = np.maximum(np.sqrt((away * away).sum(axis=0)), 1e-6)
+    rays = away / ranges
+    apart_x, apart_y = left_x - first_x, left_y - first_y
+    out = np.zeros((len(first), HYPOTHESIS_FEATURES), dtype=np.float32)
     out[:, :CLUSTER_FEATURES] = features[first]
     out[pair, CLUSTER_FEATURES : 2 * CLUSTER_FEATURES] = features[second[pair]]
-    own = clusters.sums(clusters.spacings_m)
     rest = out[:, 2 * CLUSTER_FEATURES :]
     rest[:, 0] = pair
-    rest[:, 1] = 10.0 * np.sqrt((apart * apart).sum(axis=1))
-    rest[:, 2] = 10.0 * along
-    rest[:, 3] = 10.0 * across
-    rest[:, 4] = np.log(counts[first] + np.where(pair, counts[left], 0))
+    rest[:, 1] = 10.0 * np.sqrt(apart_x * apart_x + apart_y * apart_y)
+    rest[:, 2] = 10.0 * (apart_x * rays[0] + apart_y * rays[1])
+    rest[:, 3] = 10.0 * (rays[0] * apart_y - rays[1] * apart_x)
+    rest[:, 4] = np.log(counts[first] + pair * counts[left])
     rest[:, 5] = 0.1 * _MAX_LEG_M / np.maximum(ranges * step, 0.005)
-    length = own[first] + np.where(pair, own[left], 0.0)
-    for row, around in enumerate(_around(points_m, spacings_m, middle)):
-        rest[:, 6 + row] = np.clip(around - length, 0.0, _MAX_AROUND_M)
-    ray = 0.5 * (_middle_rays(clusters)[first] + _middle_rays(clusters)[left])
+    own = clusters.sums(clusters.spacings_m)
+    length = own[first] + pair * own[left]
+    around = _around(every, ranges_m[returned] * step, middle)
+    for row, near in enumerate(around):
+        rest[:, 6 + row] = np.minimum(np.maximum(near - length, 0.0), _MAX_AROUND_M)
+    ends = clusters.starts + counts - 1
+    middle_ray = 0.5 * (clusters.rays[clusters.starts] + clusters.rays[ends])
+    ray = 0.5 * (middle_ray[first] + middle_ray[left])
     rest[:, 8:] = _cutouts(ranges_m, ray, ranges, clusters.turn * step)
-    return Hypotheses(first, second, middle, rays, out.astype(np.float32))
+    return Hypotheses(first, second, middle.T, rays.T, out)
 
 
 def _around(
     points_m: FloatArray, spacings_m: FloatArray, centres_m: FloatArray
 ) -> list[NDArray[np.float32]]:
-    """Return the length (H,) of the surfaces within each distance of centres (H, 2)."""
-    if not len(centres_m) or not len(points_m):
-        return [np.zeros(len(centres_m), dtype=np.float32) for _ in _AROUND_M]
+    """Return the length (H,) of the surfaces (2, N) within each distance of centres (2, H)."""
+    if not centres_m.size or not points_m.size:
+        return [np.zeros(centres_m.shape[1], dtype=np.float32) for _ in _AROUND_M]
     # Half the precision and one matrix product: this is the largest table of a scan.
-    origin = centres_m.mean(axis=0)
+    origin = centres_m.mean(axis=1)[:, None]
     points = (points_m - origin).astype(np.float32)
     centres = (centres_m - origin).astype(np.float32)
     lengths = spacings_m.astype(np.float32)
-    squares = centres @ (-2.0 * points.T)
-    squares += (points * points).sum(axis=1)
-    squares += (centres * centres).sum(axis=1)[:, None]
+    squares = centres.T @ (-2.0 * points)
+    squares += (points * points).sum(axis=0)
+    squares += (centres * centres).sum(axis=0)[:, None]
     return [(squares < radius * radius).astype(np.float32) @ lengths for radius in _AROUND_M]
-
-
-def _middle_rays(clusters: Clusters) -> FloatArray:
-    """Return (C,) the row of the middle ray of each cluster."""
-    ends = clusters.starts + clusters.counts - 1
-    return np.asarray(0.5 * (clusters.rays[clusters.starts] + clusters.rays[ends]))
 
 
 def _cutouts(
@@ -130,17 +129,19 @@ def _cutouts(
     They show a width of 1.4 m at the hypothesis, and 0.7 m before and behind it, in units of 0.7 m.
     A ray without a return shows nothing as far as that.
     """
-    offsets = np.linspace(-0.5 * _CUTOUT_M, 0.5 * _CUTOUT_M, CUTOUT)
-    ray = rows[:, None] + offsets / (np.maximum(middle_m, 0.1)[:, None] * step_rad)
+    rays = _CUTOUT_OFFSETS_M / (np.maximum(middle_m, 0.1)[:, None] * step_rad)
+    rays += rows[:, None]
+    rays += 0.5
     count = len(ranges_m)
-    ray = np.floor(ray + 0.5).astype(np.int64)
+    ray = np.floor(rays, out=rays).astype(np.int64)
     if abs(step_rad) * (count + 1) >= 2.0 * np.pi:
         ray %= count
-    inside = (ray >= 0) & (ray < count)
-    depth = ranges_m[np.where(inside, ray, 0)] - middle_m[:, None]
-    depth = np.where(inside & np.isfinite(depth), depth, _CUTOUT_DEPTH_M)
-    scale = 1.0 / _CUTOUT_DEPTH_M
-    return np.asarray(np.minimum(np.maximum(depth * scale, -1.0), 1.0))
+    # Beside the scan is one ray more, without a return.
+    np.minimum(np.maximum(ray, -1, out=ray), count, out=ray)
+    depth = np.append(ranges_m, np.nan)[ray]
+    depth -= middle_m[:, None]
+    depth *= 1.0 / _CUTOUT_DEPTH_M
+    return np.asarray(np.maximum(np.fmin(depth, 1.0), -1.0))
 
 
 def _singles_and_pairs(clusters: Clusters) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -150,12 +151,15 @@ def _singles_and_pairs(clusters: Clusters) -> tuple[NDArray[np.int64], NDArray[n
     fits = near & (widths <= _MAX_WIDTH_M)
     single = np.flatnonzero(fits & (counts >= _MIN_POINTS))
     legs = np.flatnonzero(fits & (widths <= _MAX_LEG_M))
-    firsts, seconds = [single], [np.full(len(single), -1)]
-    for step in range(1, _NEIGHBOURS + 1):
-        one, other = legs[:-step], legs[step:]
-        apart = centres[other] - centres[one]
-        chosen = (apart * apart).sum(axis=1) <= _MAX_STEP_M**2
-        chosen &= counts[one] + counts[other] > _MIN_POINTS
-        firsts.append(one[chosen])
-        seconds.append(other[chosen])
-    return np.concatenate(firsts), np.concatenate(seconds)
+    # Every leg with each of the next few.
+    one = np.broadcast_to(np.arange(len(legs)), (_NEIGHBOURS, len(legs)))
+    other = one + np.arange(1, _NEIGHBOURS + 1)[:, None]
+    inside = other < len(legs)
+    one, other = legs[one[inside]], legs[other[inside]]
+    apart = centres[other] - centres[one]
+    chosen = apart[:, 0] * apart[:, 0] + apart[:, 1] * apart[:, 1] <= _MAX_STEP_M**2
+    chosen &= counts[one] + counts[other] > _MIN_POINTS
+    return (
+        np.concatenate([single, one[chosen]]),
+        np.concatenate([np.full(len(single), -1), other[chosen]]),
+    )

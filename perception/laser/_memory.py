@@ -91,13 +91,11 @@ class StaticMap:
 
     def holds(self, points_m: FloatArray) -> NDArray[np.bool_]:
         """Return (N,) whether points (N, 2) in odom belong to it; False outside the map."""
-        cell = np.floor((points_m - self.origin_odom_m) / self.resolution_m)
-        column, row = np.nan_to_num(cell, nan=-1.0, posinf=-1.0, neginf=-1.0).astype(np.int64).T
         height, width = self.occupied.shape
-        inside = (row >= 0) & (column >= 0) & (row < height) & (column < width)
-        return np.asarray(
-            inside & self.occupied[np.where(inside, row, 0), np.where(inside, column, 0)]
-        )
+        cell = (points_m.T - self.origin_odom_m[:, None]) / self.resolution_m
+        inside = (cell[0] >= 0.0) & (cell[1] >= 0.0) & (cell[0] < width) & (cell[1] < height)
+        column, row = np.where(inside, cell, 0.0).astype(np.int64)
+        return np.asarray(inside & self.occupied[row, column])
 
 
 class OccupancyMemory:
@@ -132,22 +130,35 @@ class OccupancyMemory:
         since = stamp_s - self._two_legs_s.ravel()[cells]
         return np.asarray(inside & (since >= 0.0) & (since <= _TWO_LEGS_S))
 
+    def known(self, points_m: FloatArray) -> NDArray[np.int64]:
+        """Return (N,) −1 for points (N, 2) that are static, 1 for what has come, 0 otherwise."""
+        cells, inside = self._cells(points_m)
+        untouched = self._untouched_s.ravel()
+        free = untouched[cells] >= _CAME_S
+        known = np.zeros(len(cells), dtype=np.int64)
+        known[inside & ~free & (self._occupied_s.ravel()[cells] >= _STATIC_S)] = -1
+        # All cells around but one must have been free: of any two, at least one.
+        free |= untouched.take(cells + 1, mode="clip") >= _CAME_S
+        maybe = np.flatnonzero(inside & free)
+        around = untouched.take(cells[maybe, None] + _BESIDE, mode="clip")
+        known[maybe[np.count_nonzero(around >= _CAME_S, axis=1) >= _CAME_CELLS]] = 1
+        return known
+
     def is_static(self, points_m: FloatArray) -> NDArray[np.bool_]:
         """Return (N,) whether points (N, 2) in odom lie in cells that are static."""
-        cells, inside = self._cells(points_m)
-        old = self._untouched_s.ravel()[cells] < _CAME_S
-        return np.asarray(inside & old & (self._occupied_s.ravel()[cells] >= _STATIC_S))
+        return np.asarray(self.known(points_m) < 0)
 
     def has_come(self, points_m: FloatArray) -> NDArray[np.bool_]:
         """Return (N,) whether points (N, 2) in odom lie where the floor was free at first.
 
         So must have been most cells around: beside a rack or in its openings nothing has come.
         """
-        cells, inside = self._cells(points_m)
-        untouched = self._untouched_s.ravel()
-        around = np.clip(cells[:, None] + _BESIDE, 0, untouched.size - 1)
-        free = (untouched[around] >= _CAME_S).sum(axis=1)
-        return np.asarray(inside & (free >= _CAME_CELLS))
+        return np.asarray(self.known(points_m) > 0)
+
+    def is_due(self, stamp_s: float, scanner: int = 0) -> bool:
+        """Return whether a scan of this time is needed; :meth:`update` takes no other."""
+        since = stamp_s - self._updated_s.get(scanner, -math.inf)
+        return not 0.0 <= since < _PERIOD_S
 
     def update(self, points: ScanPoints, person: NDArray[np.bool_], scanner: int = 0) -> bool:
         """Add a scan; return False where it comes too soon after the last one to be needed.
@@ -157,10 +168,9 @@ class OccupancyMemory:
             person: (N,) which of its rays met a person.
             scanner: number of the scanner; each has its own period.
         """
-        last = self._updated_s.get(scanner, -math.inf)
-        since = points.stamp_s - last
-        if 0.0 <= since < _PERIOD_S:
+        if not self.is_due(points.stamp_s, scanner):
             return False
+        since = points.stamp_s - self._updated_s.get(scanner, -math.inf)
         self._updated_s[scanner] = points.stamp_s
         dt = _PERIOD_S if not 0.0 <= since <= _MAX_PERIOD_S else since
         rows = np.flatnonzero(points.usable)
@@ -187,17 +197,25 @@ class OccupancyMemory:
 
     def _passed(
         self, starts_m: FloatArray, ends_m: FloatArray, ranges_m: FloatArray
-    ) -> NDArray[np.int64]:
+    ) -> NDArray[np.int32]:
         """Return the cells that rays pass before they meet something."""
         reach = np.minimum(ranges_m - _BEFORE_M, _FREE_M)
-        unit = (ends_m - starts_m) / ranges_m[:, None]
+        scale = 1.0 / _CELL_M
+        first = (starts_m - self._origin) * scale
+        unit = (ends_m - starts_m) * (scale / ranges_m)[:, None]
+        far = _FREE_M * scale
+        inside = ((first >= far) & (first < _CELLS - far)).all(axis=1)
+        reach = np.where(inside, np.minimum(ranges_m - _BEFORE_M, _FREE_M), 0.0)
         cells = []
         # Near the scanner many rays pass the same cell: some of them are enough.
         for stride, along in _STRIDES:
-            some = slice(None, None, stride)
-            ray, step = np.nonzero(along < reach[some, None])
-            cell, inside = self._cells(starts_m[some][ray] + along[step, None] * unit[some][ray])
-            cells.append(cell[inside])
+            x, y = (
+                (first[::stride, axis, None] + along * unit[::stride, axis, None]).astype(np.int32)
+                for axis in (0, 1)
+            )
+            y *= _CELLS
+            y += x
+            cells.append(y[along < reach[::stride, None]])
         return np.concatenate(cells)
 
     def _cells(self, points_m: FloatArray) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
@@ -205,9 +223,11 @@ class OccupancyMemory:
         x, y = (points_m[:, axis] - self._origin[axis] for axis in (0, 1))
         extent = _CELLS * _CELL_M
         inside = np.asarray((x >= 0.0) & (y >= 0.0) & (x < extent) & (y < extent))
+        if not inside.all():
+            x, y = np.where(inside, x, 0.0), np.where(inside, y, 0.0)
         scale = 1.0 / _CELL_M
-        column = np.minimum((x * scale * inside).astype(np.int64), _CELLS - 1)
-        row = np.minimum((y * scale * inside).astype(np.int64), _CELLS - 1)
+        column = np.minimum((x * scale).astype(np.int64), _CELLS - 1)
+        row = np.minimum((y * scale).astype(np.int64), _CELLS - 1)
         return row * _CELLS + column, inside
 
     def _follow(self, place_m: FloatArray) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import Final
@@ -37,37 +38,41 @@ def merge_candidates(
     tagged = [(each, number) for number, group in enumerate(groups) for each in group]
     tagged.sort(key=lambda pair: (pair[0].kind == "trolley", -pair[0].score))
     merged: list[PersonCandidate] = []
+    places: list[list[float]] = []
     sources: list[set[int]] = []
     for candidate, number in tagged:
+        place = candidate.position_odom_m.tolist()
         trolley = candidate.kind == "trolley"
         best, nearest = -1, _TROLLEY_M if trolley else near_m
-        for row, other in enumerate(merged):
-            away = float(np.linalg.norm(other.position_odom_m - candidate.position_odom_m))
+        for row, other in enumerate(places):
+            away = math.dist(other, place)
             if number not in sources[row] and away < nearest:
                 best, nearest = row, away
         if best < 0:
             merged.append(candidate)
+            places.append(place)
             sources.append({number})
         else:
             sources[best].add(number)
             if not trolley:
                 merged[best] = _fused(merged[best], candidate)
+                places[best] = merged[best].position_odom_m.tolist()
     return tuple(merged)
 
 
 def _fused(one: PersonCandidate, other: PersonCandidate) -> PersonCandidate:
-    weights = [np.linalg.inv(each.covariance_m2) for each in (one, other)]
-    mean = np.linalg.solve(
-        weights[0] + weights[1],
-        weights[0] @ one.position_odom_m + weights[1] @ other.position_odom_m,
-    )
-    sizes = [float(np.trace(each.covariance_m2)) for each in (one, other)]
+    weights = [_inverse(each.covariance_m2) for each in (one, other)]
+    (a, b), (c, d) = (weights[0] + weights[1]).tolist()
+    x, y = (weights[0] @ one.position_odom_m + weights[1] @ other.position_odom_m).tolist()
+    scale = 1.0 / (a * d - b * c)
+    mean = scale * (d * x - b * y), scale * (a * y - c * x)
+    sizes = [float(each.covariance_m2[0, 0] + each.covariance_m2[1, 1]) for each in (one, other)]
     better = one if sizes[0] <= sizes[1] else other
     kind: CandidateKind = "two_legs" if "two_legs" in (one.kind, other.kind) else one.kind
     return replace(
         one,
         stamp_s=max(one.stamp_s, other.stamp_s),
-        position_odom_m=np.asarray(mean, dtype=np.float64),
+        position_odom_m=np.array(mean),
         covariance_m2=better.covariance_m2,
         kind=kind,
         legs_odom_m=_middle(one.legs_odom_m, other.legs_odom_m),
@@ -78,3 +83,8 @@ def _middle(one: FloatArray | None, other: FloatArray | None) -> FloatArray | No
     if one is None or other is None:
         return one if other is None else other
     return np.asarray(0.5 * (one + other))
+
+
+def _inverse(matrix: FloatArray) -> FloatArray:
+    (a, b), (c, d) = matrix.tolist()
+    return np.asarray(np.array([(d, -b), (-c, a)]) / (a * d - b * c))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Final
+from functools import lru_cache
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,15 +82,8 @@ class RobotMotion:
         Both are given in the base frame of :attr:`stamp_s`; the robot drives arcs of constant speed
         and yaw rate.
         """
-        dt = np.asarray(stamps_s, dtype=np.float64) - self.stamp_s
-        yaw = self.yaw_rate_radps * dt
-        small = np.abs(yaw) < _STRAIGHT_RAD
-        safe = np.where(small, 1.0, yaw)
-        along = np.where(small, 1.0 - yaw * yaw / 6.0, np.sin(safe) / safe)
-        aside = np.where(small, 0.5 * yaw, (1.0 - np.cos(safe)) / safe)
-        x, y = self.velocity_base_mps.tolist()
-        position = np.column_stack((along * x - aside * y, aside * x + along * y)) * dt[:, None]
-        return yaw, position
+        arc = self._arc(np.asarray(stamps_s, dtype=np.float64) - self.stamp_s)
+        return arc.yaw, np.column_stack((arc.x, arc.y))
 
     def pose_at(self, stamp_s: float) -> FloatArray:
         """Return T_odom_base (4, 4) at another time, for example that of a scan's middle."""
@@ -99,6 +93,30 @@ class RobotMotion:
         moved[:2, :2] = [[cos, -sin], [sin, cos]]
         moved[:2, 3] = position[0]
         return np.asarray(self.T_odom_base @ moved)
+
+    def _arc(self, dt_s: FloatArray) -> _Arc:
+        yaw = self.yaw_rate_radps * dt_s
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        small = np.abs(yaw) < _STRAIGHT_RAD
+        safe = np.where(small, 1.0, yaw)
+        along = np.where(small, 1.0 - yaw * yaw / 6.0, sin / safe)
+        aside = np.where(small, 0.5 * yaw, (1.0 - cos) / safe)
+        x, y = self.velocity_base_mps.tolist()
+        return _Arc(yaw, cos, sin, (along * x - aside * y) * dt_s, (aside * x + along * y) * dt_s)
+
+
+class _Arc(NamedTuple):
+    """Turns (N,) of the base frame with their cosines and sines, and its places (N,)."""
+
+    yaw: FloatArray
+    cos: FloatArray
+    sin: FloatArray
+    x: FloatArray
+    y: FloatArray
+
+    def moved(self, x: FloatArray | float, y: FloatArray | float) -> tuple[FloatArray, FloatArray]:
+        """Return x and y (N,) of points, each turned and shifted by its own row."""
+        return self.cos * x - self.sin * y + self.x, self.sin * x + self.cos * y + self.y
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -134,42 +152,45 @@ def scan_points(scan: LaserScan, scanner: Scanner, motion: RobotMotion) -> ScanP
         scanner: its mounting.
         motion: the robot's pose and velocity; a pose near the scan's own time is best.
     """
-    angles, free = scan.angles_rad, scan.free_m
-    rays = np.column_stack((np.cos(angles), np.sin(angles), np.zeros(len(angles))))
-    mount, offset = scanner.T_base_scanner[:3, :3], scanner.T_base_scanner[:3, 3]
-    rays = rays @ mount.T
-    known = scanner.sees(scan) & (free > 0.0)
-    reach = np.where(known, free, np.nan)[:, None] * rays + offset
+    count = len(scan)
+    rays, covered = _beams(scanner, scan.angle_min_rad, scan.angle_increment_rad, count)
+    offset = scanner.T_base_scanner[:3, 3]
+    free = scan.free_m
+    known = covered & (free > 0.0)
+    # All points are computed axis by axis, (3, N).
+    reach = rays * np.where(known, free, np.nan) + offset[:, None]
     measured = known & scan.measured
     if scanner.body_base_m is not None:
         outermost = np.abs(scanner.body_base_m).max() + BODY_MARGIN_M
-        near = (np.abs(reach[:, 0]) <= outermost) & (np.abs(reach[:, 1]) <= outermost)
+        near = (np.abs(reach[0]) <= outermost) & (np.abs(reach[1]) <= outermost)
         rows = np.flatnonzero(measured & near)
-        measured[rows[scanner.is_body(reach[rows, :2])]] = False
-    yaw, moved = motion.poses_base(scan.stamps_s)
-    ends_base = _moved(reach, yaw, moved)
-    origins_base = _moved(np.broadcast_to(offset, reach.shape), yaw, moved)
-    points_base = np.where(measured[:, None], ends_base, np.nan)
-    R, t = motion.T_odom_base[:3, :3], motion.T_odom_base[:3, 3]
-    ends_odom = ends_base @ R.T + t
-    arrays = (
-        points_base,
-        np.where(measured[:, None], ends_odom, np.nan),
-        origins_base @ R.T + t,
-        ends_odom,
-        np.where(measured, free, np.nan),
-        measured,
-    )
+        if rows.size:
+            measured[rows[scanner.is_body(reach[:2, rows].T)]] = False
+    arc = motion._arc(scan.stamps_s - motion.stamp_s)
+    origins = np.empty_like(reach)
+    x, y, z = offset.tolist()
+    origins[0], origins[1] = arc.moved(x, y)
+    origins[2] = z
+    reach[0], reach[1] = arc.moved(reach[0], reach[1])
+    R, t = motion.T_odom_base[:3, :3], motion.T_odom_base[:3, 3:]
+    ends_odom = R @ reach + t
+    unmeasured = ~measured
+    points_odom = ends_odom.copy()
+    points_odom[:, unmeasured] = np.nan
+    reach[:, unmeasured] = np.nan
+    free[unmeasured] = np.nan
+    arrays = (reach.T, points_odom.T, (R @ origins + t).T, ends_odom.T, free, measured)
     for array in arrays:
         array.setflags(write=False)
     middle_s = 0.5 * (scan.stamp_s + scan.end_s)
     return ScanPoints(middle_s, *arrays, angle_increment_rad=scan.angle_increment_rad)
 
 
-def _moved(points_m: FloatArray, yaw: FloatArray, position_m: FloatArray) -> FloatArray:
-    """Return points (N, 3), each turned about z by its own yaw and shifted in x and y."""
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    x, y, z = points_m.T
-    return np.column_stack(
-        (cos * x - sin * y + position_m[:, 0], sin * x + cos * y + position_m[:, 1], z)
-    )
+@lru_cache(maxsize=16)  # the scanners of a robot, scan after scan
+def _beams(
+    scanner: Scanner, angle_min_rad: float, angle_increment_rad: float, count: int
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Return the directions (3, N) of rays in base, and which (N,) lie in the field of view."""
+    angles = angle_min_rad + angle_increment_rad * np.arange(count, dtype=np.float64)
+    rays = np.stack((np.cos(angles), np.sin(angles), np.zeros(count)))
+    return scanner.T_base_scanner[:3, :3] @ rays, scanner.covers(angles)

@@ -107,8 +107,7 @@ class LaserScan:
     @property
     def measured(self) -> NDArray[np.bool_]:
         """(N,) True for rays that measured an object within the limits."""
-        inside = (self.ranges_m >= self.range_min_m) & (self.ranges_m <= self.range_max_m)
-        return np.asarray(inside & np.isfinite(self.ranges_m))
+        return np.asarray((self.ranges_m >= self.range_min_m) & (self.ranges_m <= self.range_max_m))
 
     @property
     def too_near(self) -> NDArray[np.bool_]:
@@ -122,7 +121,7 @@ class LaserScan:
         It is the range where there is one, ``range_max_m`` for +inf, and 0 where nothing is known.
         """
         free = np.where(self.measured, self.ranges_m, 0.0)
-        free[np.isposinf(self.ranges_m)] = self.range_max_m
+        free[self.ranges_m == np.inf] = self.range_max_m
         return np.asarray(free)
 
 

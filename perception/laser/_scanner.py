@@ -91,10 +91,13 @@ class Scanner:
 
     def sees(self, scan: LaserScan) -> NDArray[np.bool_]:
         """Return (N,) whether each ray lies in the field of view."""
+        return self.covers(scan.angles_rad)
+
+    def covers(self, angles_rad: FloatArray) -> NDArray[np.bool_]:
+        """Return (N,) whether each angle about the scanner's z axis lies in the field of view."""
         low, high = self.field_of_view_rad
-        angles = scan.angles_rad
         slack = 1e-6  # the rounding of angles that come as 32-bit numbers
-        return np.asarray((angles >= low - slack) & (angles <= high + slack))
+        return np.asarray((angles_rad >= low - slack) & (angles_rad <= high + slack))
 
     def is_body(self, points_base_m: FloatArray) -> NDArray[np.bool_]:
         """Return (N,) whether points (N, 2) lie on the robot's own body."""

@@ -7,6 +7,7 @@ angle, so a sweep needs far fewer tests than one search per ray.
 
 from __future__ import annotations
 
+import math
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -53,17 +54,23 @@ def cast_rays(
     if not len(segments_m):
         return RayHits(ranges, hits)
     centre = 0.5 * (origins_m.min(axis=0) + origins_m.max(axis=0))
-    segments_m, origins_m = segments_m - centre, origins_m - centre
-    first, last, turn = _rays_within(
-        segments_m, angle_min_rad, angle_increment_rad, origins_m, turns_rad
+    x, y, end_x, end_y = np.ascontiguousarray((segments_m - centre).reshape(-1, 4).T)
+    origin_x, origin_y = np.ascontiguousarray((origins_m - centre).T)
+    along_x, along_y = end_x - x, end_y - y
+    # Rays start beside the middle and are turned, so a segment is met by some rays beyond its ends.
+    aside_m = math.sqrt(float((origin_x * origin_x + origin_y * origin_y).max()))
+    near_m = _distances(x, y, along_x, along_y)
+    slack = np.arcsin(np.minimum(aside_m / np.maximum(near_m, 1e-12), 1.0))
+    slack += float(np.abs(turns_rad).max(initial=0.0))
+    slack[near_m <= aside_m + _AT_ORIGIN_M] = np.pi
+    ends = np.arctan2(y, x), np.arctan2(end_y, end_x)
+    turn = 2.0 * np.pi / abs(angle_increment_rad)
+    segment, ray = _pairs(
+        *_rays_within(*ends, slack, angle_min_rad, angle_increment_rad), count, turn
     )
-    segment, ray = _pairs(first, last, count, turn)
-    x, y = np.ascontiguousarray(segments_m[:, 0].T)
-    along_x, along_y = np.ascontiguousarray((segments_m[:, 1] - segments_m[:, 0]).T)
     moment = x * along_y - y * along_x
     angles = angle_min_rad + angle_increment_rad * np.arange(count) + turns_rad
     cos, sin = np.cos(angles), np.sin(angles)
-    origin_x, origin_y = np.ascontiguousarray(origins_m.T)
     aside = origin_x * sin - origin_y * cos
     # For every pair: the ray's direction across the segment, the distance along the ray, and the
     # share of the segment at which it is met.
@@ -81,41 +88,34 @@ def cast_rays(
     return RayHits(ranges, hits)
 
 
+def _distances(
+    x: FloatArray, y: FloatArray, along_x: FloatArray, along_y: FloatArray
+) -> FloatArray:
+    """Return the distance (S,) from 0 to segments that start at x, y."""
+    squares = np.maximum(along_x * along_x + along_y * along_y, 1e-18)
+    share = np.minimum(np.maximum(-(x * along_x + y * along_y) / squares, 0.0), 1.0)
+    near_x, near_y = x + share * along_x, y + share * along_y
+    return np.sqrt(near_x * near_x + near_y * near_y)
+
+
 def _rays_within(
-    segments_m: FloatArray,
+    start_rad: FloatArray,
+    end_rad: FloatArray,
+    slack_rad: FloatArray,
     angle_min_rad: float,
     increment_rad: float,
-    origins_m: FloatArray,
-    turns_rad: FloatArray,
-) -> tuple[NDArray[np.int64], NDArray[np.int64], float]:
-    """Return the first and last ray that may meet each segment, and the rays in a full turn.
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the first and last ray that may meet each segment between two angles.
 
     Rays count on beyond the sweep: a ray k and k plus a full turn are the same direction.
     """
-    ends = np.arctan2(segments_m[..., 1], segments_m[..., 0])
-    width = (ends[:, 1] - ends[:, 0] + np.pi) % (2.0 * np.pi) - np.pi
-    low = np.where(width >= 0.0, ends[:, 0], ends[:, 1])
-    width = np.abs(width)
-    # Rays start beside the middle and are turned, so a segment is met by some rays beyond its ends.
-    aside = float(np.sqrt((origins_m * origins_m).sum(axis=1).max()))
-    along = segments_m[:, 1] - segments_m[:, 0]
-    squares = np.maximum((along * along).sum(axis=1), 1e-18)
-    share = np.clip(-(segments_m[:, 0] * along).sum(axis=1) / squares, 0.0, 1.0)
-    near = np.linalg.norm(segments_m[:, 0] + share[:, None] * along, axis=1)
-    ratio = np.clip(aside / np.maximum(near, 1e-12), 0.0, 1.0)
-    slack = np.arcsin(ratio) + float(np.abs(turns_rad).max(initial=0.0))
-    anywhere = near <= aside + _AT_ORIGIN_M
-    low = np.where(anywhere, -np.pi, low - slack)
-    width = np.where(anywhere, 2.0 * np.pi, np.minimum(width + 2.0 * slack, 2.0 * np.pi))
-    turn = 2.0 * np.pi / abs(increment_rad)
+    width = (end_rad - start_rad + np.pi) % (2.0 * np.pi) - np.pi
+    low = np.where(width >= 0.0, start_rad, end_rad) - slack_rad
+    width = np.minimum(np.abs(width) + 2.0 * slack_rad, 2.0 * np.pi)
     begin = low if increment_rad > 0.0 else low + width
-    first = ((begin - angle_min_rad) / increment_rad) % turn
-    rays = width / abs(increment_rad)
-    return (
-        np.ceil(first - 1e-6).astype(np.int64),
-        np.floor(first + rays + 1e-6).astype(np.int64),
-        turn,
-    )
+    first = ((begin - angle_min_rad) / increment_rad) % (2.0 * np.pi / abs(increment_rad))
+    last = first + width / abs(increment_rad)
+    return np.ceil(first - 1e-6).astype(np.int64), np.floor(last + 1e-6).astype(np.int64)
 
 
 def _pairs(

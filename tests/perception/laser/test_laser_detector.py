@@ -170,6 +170,32 @@ def test_what_comes_and_has_the_size_of_a_trolley_is_one() -> None:
     assert watched(quiet, [trolley], 2.0, 3.0) == ()
 
 
+def test_a_trolley_half_hidden_by_a_nearer_post_is_one_too() -> None:
+    post, trolley = (1.5, 0.22, 0.08), (3.0, 0.1, 0.4)
+    detector = LegDetector(classifier=Says(0.0, 0.0))
+    assert watched(detector, [post], 0.0, 2.0) == ()
+    (found,) = watched(detector, [post, trolley], 2.0, 3.0)
+    assert found.kind == "trolley"
+    assert np.linalg.norm(found.position_odom_m - trolley[:2]) < 0.5
+
+
+def test_somebody_behind_a_trolley_is_placed_behind_what_is_seen_of_it() -> None:
+    """The least distance at which somebody may push it: farther away would cost clearance."""
+    x, y, radius = 2.0, 1.5, 0.4
+    detector = LegDetector(classifier=Says(0.0, 0.0))
+    watched(detector, [], 0.0, 2.0)
+    (found,) = watched(detector, [(x, y, radius)], 2.0, 3.0)
+    ray = np.array([x, y]) / math.hypot(x, y)
+    near = math.hypot(x, y) - radius
+    behind = found.position_odom_m @ ray - near
+    assert 0.3 < behind < 0.3 + 0.5 * radius
+    assert abs(ray[0] * found.position_odom_m[1] - ray[1] * found.position_odom_m[0]) < 0.05
+    # Its surface lies within one and a half standard deviations, somebody 1 m behind it as well.
+    std = math.sqrt(ray @ found.covariance_m2 @ ray)
+    assert behind <= 1.5 * std
+    assert 1.0 - behind <= 1.5 * std
+
+
 @pytest.mark.parametrize("ranges", [[np.nan] * 9, [np.inf] * 9, [-np.inf] * 9])
 def test_a_scan_of_nothing_is_nobody(ranges) -> None:
     scan = LaserScan(0.0, 0.0, 0.01, ranges, 0.05, 20.0)
