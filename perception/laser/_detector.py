@@ -354,7 +354,7 @@ def _candidate(
     narrow = clusters.widths_m[hypotheses.first[row]] < _TWO_LEGS_M
     kind: CandidateKind = "one_leg" if single and narrow else "two_legs"
     score = min(max(float(judged[0]), 0.0), 1.0)
-    legs = hypotheses.centres_m[row] + _LEG_RADIUS_M * rays
+    legs = hypotheses.centres_m[row] + _LEG_RADIUS_M * hypotheses.rays[row]
     return PersonCandidate(stamp_s, place_m, covariance, score, kind, legs)
 
 
