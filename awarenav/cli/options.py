@@ -223,14 +223,15 @@ def scenarios(which: str) -> Decorator:
 
 
 def faults() -> Decorator:
-    """Add ``--fault``: faults of camera, odometry and detections."""
+    """Add ``--fault``: faults of camera, scanners, odometry and detections."""
     return option(
         "--fault",
         many=True,
         default=["none"],
         metavar="NAME|FILE...",
         shell_complete=_COMPLETE_FAULTS,
-        help="Faults: shipped ones, YAML files, or 'none'; every combination runs with each.",
+        help="Faults: shipped ones, YAML files, several joined by '+', or 'none'; every "
+        "combination runs with each.",
     )
 
 

@@ -65,7 +65,7 @@ def run_crossing(
             of the images.
         observer: called after every control cycle with the frame and the stage, for example to
             render.
-        fault: a fault of camera, detections or odometry; frames keep the truth about the robot.
+        fault: a fault of sensors, detections or odometry; frames keep the truth about the robot.
         renderer: renderer of the images: ``"tiny"``, ``"gl"``, or ``"auto"`` for the fastest
             available. Their pixels are nearly, but not exactly, the same.
 

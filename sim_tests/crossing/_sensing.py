@@ -35,6 +35,8 @@ from .faults import Fault, FaultInjection, FaultyEyes
 _NEVER_S: Final = 1.0e6
 # An image without a person is no evidence about people farther away than this.
 _DETECTION_RANGE_M: Final = 10.0
+# Images and scans with stamps farther ahead are refused, as the bridge on a robot refuses them.
+_AHEAD_S: Final = 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,8 +107,14 @@ class Sensing:
         self._odometry = injection.odometry()
         self._scanners: ScannerEyes | None = None
         if perception.has_scanners:
+            specs, body = stage.scenario.scanners, stage.amr.profile.footprint_m
             self._scanners = ScannerEyes(
-                stage.warehouse, stage.scenario.scanners, stage.amr.profile.footprint_m, seed
+                stage.warehouse,
+                specs,
+                body,
+                seed,
+                mountings=injection.mountings(specs, body),
+                change=injection.scan_change(specs),
             )
         self._tracker = _make_tracker(perception, policy, stage, model)
         self._newest_s: dict[str, float] = {}
@@ -131,7 +139,7 @@ class Sensing:
         observed: WorkerObservations = ()
         tracks: tuple[PersonTrack, ...] = ()
         for sighting in sightings:
-            if not self._is_new(sighting):
+            if not self._is_new(sighting, t_s):
                 continue
             tracks = self._tracker.update(
                 tuple(observation for observation, _ in sighting.observations),
@@ -144,8 +152,10 @@ class Sensing:
                 if sighting.points_odom_m is None:
                     observed = sighting.observations
         newest_s = max(self._newest_s.values(), default=-_NEVER_S)
-        if self._tracker.last_stamp_s != t_s or not tracks:
-            tracks = self._tracker.predict(t_s)
+        latest_s = self._tracker.last_stamp_s
+        if latest_s != t_s or not tracks:
+            # A sensor's clock may be a little ahead.
+            tracks = self._tracker.predict(t_s if latest_s is None else max(t_s, latest_s))
         points = [each.points_odom_m for each in sightings if each.points_odom_m is not None]
         return Sensed(
             known.state,
@@ -155,11 +165,14 @@ class Sensing:
             np.concatenate(points) if points else np.zeros((0, 2)),
         )
 
-    def _is_new(self, sighting: Sighting) -> bool:
+    def _is_new(self, sighting: Sighting, t_s: float) -> bool:
         """Return whether the tracker takes a sighting.
 
-        The same image again is no new evidence, and the tracker cannot go back to one too old.
+        The same image again is no new evidence, the tracker cannot go back to one too old, and a
+        stamp from the future is wrong.
         """
+        if sighting.stamp_s > t_s + _AHEAD_S:
+            return False
         if sighting.stamp_s == self._newest_s.get(sighting.sensor):
             return False
         newest_s = max(self._newest_s.values(), default=-_NEVER_S)

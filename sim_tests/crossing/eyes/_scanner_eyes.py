@@ -28,9 +28,9 @@ from ...world.scanner import ScannerSpec, ScanScene, SimulatedScanner
 from ._eyes import NOBODY, Sighting
 from ._map_view import MapView
 
-#: A change of a scan on its way to the robot: the scan, its time of arrival and its scanner's
-#: number give the scan that arrives and its time; None for no scan.
-ScanChange = Callable[[LaserScan, float, int], tuple[LaserScan, float] | None]
+#: A change of a scan on its way to the robot: the scan, its time of arrival, its scanner's number
+#: and the robot's true motion give the scan that arrives and its time; None for no scan.
+ScanChange = Callable[[LaserScan, float, int, RobotMotion], tuple[LaserScan, float] | None]
 
 # Random streams of scanners are separate from all others of an episode.
 _STREAM: Final = 0x5CA7
@@ -103,7 +103,7 @@ class ScannerEyes:
             if delivery_s is None:
                 continue
             if self._change is not None:
-                changed = self._change(scan, delivery_s, number)
+                changed = self._change(scan, delivery_s, number, motion)
                 if changed is None:
                     continue
                 scan, delivery_s = changed

@@ -1,19 +1,26 @@
-"""Faults of camera, odometry and detections as data, and their injection into an episode."""
+"""Faults of camera, odometry, detections and scanners as data, and their injection."""
 
 from __future__ import annotations
 
 from ._detections import FaultyDetections
-from ._fault import Bursts, Fault, Ghosts, Outage, shipped_faults
+from ._fault import Bursts, Fault, Ghosts, shipped_faults
 from ._frames import FaultyEyes
 from ._injection import FaultInjection
+from ._outage import Outage
+from ._scanner_fault import Appearances, BlindSector, ScannerFault
+from ._scans import FaultyScans
 
 __all__ = [
+    "Appearances",
+    "BlindSector",
     "Bursts",
     "Fault",
     "FaultInjection",
     "FaultyDetections",
     "FaultyEyes",
+    "FaultyScans",
     "Ghosts",
     "Outage",
+    "ScannerFault",
     "shipped_faults",
 ]

@@ -1,50 +1,24 @@
-"""Faults of camera, detections and odometry as data."""
+"""Faults of camera, detections, odometry and scanners as data."""
 
 from __future__ import annotations
 
+from functools import reduce
 from importlib import resources
-from typing import ClassVar
+from pathlib import Path
+from typing import Any, ClassVar, Final
 
 import yaml
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from awarenav.errors import not_one_of
 from perception.documents import parse_yaml
 from tracking.config import StrictConfig
 
 from ...world.errors import SimError
+from ._outage import Outage
+from ._scanner_fault import ScannerFault
 
-
-class Outage(StrictConfig):
-    """A repeated outage; the default has none.
-
-    In each episode the first outage begins at a random time within the first ``every_s``, uniformly
-    distributed, so that over many episodes every instant of an encounter is hit.
-
-    Attributes:
-        for_s: duration of each outage; 0 for none.
-        every_s: time from the beginning of one to that of the next, longer than ``for_s``.
-        fresh_stamps: the last message is repeated as if it were new, which no receiver can tell;
-            False repeats it with its old stamp.
-    """
-
-    error: ClassVar[type[ValueError]] = SimError
-
-    for_s: float = Field(default=0.0, ge=0.0, le=600.0)
-    every_s: float = Field(default=10.0, gt=0.0, le=3600.0)
-    fresh_stamps: bool = True
-
-    @model_validator(mode="after")
-    def _ends_before_the_next(self) -> Outage:
-        if self.for_s >= self.every_s:
-            raise ValueError(
-                f"for_s must be shorter than every_s, got {self.for_s:g} s of {self.every_s:g} s"
-            )
-        return self
-
-    def holds(self, t_s: float, first_s: float) -> bool:
-        """Return whether there is an outage at ``t_s`` if the first one begins at ``first_s``."""
-        return t_s >= first_s and (t_s - first_s) % self.every_s < self.for_s
+_JOINT: Final = "+"
 
 
 class Bursts(StrictConfig):
@@ -79,10 +53,10 @@ class Ghosts(StrictConfig):
 
 
 class Fault(StrictConfig):
-    """A fault of camera, detections or odometry; the default changes nothing, bit for bit.
+    """A fault of camera, detections, odometry or scanners; the default changes nothing at all.
 
-    Camera and odometry follow the scenario; the fault is added to them. It draws from random
-    streams of its own, so that everything else in an episode stays the same.
+    Sensors and odometry follow the scenario; the fault is added to them. It draws from random
+    streams of its own, so that everything else in an episode stays the same, bit for bit.
 
     Attributes:
         name: name in tables.
@@ -103,6 +77,7 @@ class Fault(StrictConfig):
         awareness_bias: added to every observed α; the sum is clipped to [0, 1].
         awareness_std_factor: factor on the standard deviation of every observed α; below 1 is
             over-confident.
+        scanner: fault of the laser scanners.
     """
 
     error: ClassVar[type[ValueError]] = SimError
@@ -122,6 +97,7 @@ class Fault(StrictConfig):
     lost_odometry: Outage = Outage(fresh_stamps=False)
     awareness_bias: float = Field(default=0.0, ge=-1.0, le=1.0)
     awareness_std_factor: float = Field(default=1.0, ge=0.0, le=100.0)
+    scanner: ScannerFault = ScannerFault()
 
     @classmethod
     def shipped(cls, name: str) -> Fault:
@@ -133,8 +109,35 @@ class Fault(StrictConfig):
 
     @classmethod
     def of(cls, name: str) -> Fault:
-        """Load a shipped fault, or one from a ``.yaml`` or ``.yml`` file."""
-        return cls.from_yaml(name) if name.endswith((".yaml", ".yml")) else cls.shipped(name)
+        """Load a shipped fault, one from a ``.yaml`` or ``.yml`` file, or several at once.
+
+        Args:
+            name: a name or a file; several are joined by ``+``, as in ``ghosts+scanner_late``.
+
+        Raises:
+            SimError: for an unknown name, and for two faults that set the same thing.
+        """
+        if name.endswith((".yaml", ".yml")) and (Path(name).exists() or _JOINT not in name):
+            return cls.from_yaml(name)
+        if _JOINT in name:
+            return reduce(cls.joined_with, map(cls.of, name.split(_JOINT)))
+        return cls.shipped(name)
+
+    def joined_with(self, other: Fault) -> Fault:
+        """Return both faults at once.
+
+        Raises:
+            SimError: where both set the same thing: nobody knows which of them counts.
+        """
+        own, others = (
+            each.model_dump(exclude_defaults=True, exclude={"name", "description"})
+            for each in (self, other)
+        )
+        name = f"{self.name}{_JOINT}{other.name}"
+        description = " ".join(each for each in (self.description, other.description) if each)
+        return Fault.model_validate(
+            {"name": name, "description": description, **_joined(own, others, name)}
+        )
 
     def to_text(self) -> str:
         """Return the fault as YAML, without default values."""
@@ -147,3 +150,22 @@ def shipped_faults() -> tuple[str, ...]:
     folder = resources.files("sim_tests.crossing.faults")
     names = (entry.name for entry in folder.iterdir() if entry.name.endswith(".yaml"))
     return tuple(sorted(name.removesuffix(".yaml") for name in names))
+
+
+def _joined(first: dict[str, Any], second: dict[str, Any], name: str) -> dict[str, Any]:
+    """Return the settings of both; those of the scanners are joined one by one."""
+    both = {**first, **second}
+    for key in first.keys() & second.keys():
+        if key != "scanner":
+            raise SimError(f"the faults of {name!r} must set different things, both set {key!r}")
+        scanners = first[key], second[key]
+        if scanners[0].get("only") != scanners[1].get("only"):
+            raise SimError(f"the faults of {name!r} must have the same 'only'")
+        twice = set.intersection(*(set(each) - {"only"} for each in scanners))
+        if twice:
+            raise SimError(
+                f"the faults of {name!r} must set different things, both set "
+                f"{', '.join(sorted(twice))!r} of the scanners"
+            )
+        both[key] = {**scanners[0], **scanners[1]}
+    return both

@@ -1,19 +1,24 @@
-"""The parts of a fault in one episode: eyes, odometry, and the assumed mounting of the camera."""
+"""The parts of a fault in one episode: eyes, odometry, scans, and the assumed mountings."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 
 from perception import Camera
 from perception.arrays import FloatArray
+from perception.laser import Scanner
 
-from ..eyes import TimedEyes
+from ...world.scanner import ScannerSpec
+from ..eyes import ScanChange, TimedEyes
 from ._fault import Fault
 from ._frames import FaultyEyes
 from ._odometry import FaultyOdometry
+from ._scanner_fault import ScannerFault
+from ._scans import FaultyScans
 
 # Random streams of faults are separate from all others of an episode.
 _STREAM: Final = 0xFA017
@@ -33,7 +38,9 @@ class FaultInjection:
 
     def __init__(self, fault: Fault | None, seed: int) -> None:
         self._fault = Fault() if fault is None else fault
-        self._eyes_rng, self._odometry_rng = np.random.default_rng([_STREAM, seed]).spawn(2)
+        self._eyes_rng, self._odometry_rng, self._scans_rng = np.random.default_rng(
+            [_STREAM, seed]
+        ).spawn(3)
         self.T_camera_assumed = _mounting_error(self._fault)
 
     def eyes(self, eyes: TimedEyes, camera: Camera) -> FaultyEyes:
@@ -43,6 +50,31 @@ class FaultInjection:
     def odometry(self) -> FaultyOdometry:
         """Return the robot's odometry with the fault."""
         return FaultyOdometry(self._fault, self.T_camera_assumed, self._odometry_rng)
+
+    def scan_change(self, specs: Sequence[ScannerSpec]) -> ScanChange | None:
+        """Return the change of scans on their way; None without one."""
+        if self._fault.scanner == ScannerFault():
+            return None
+        return FaultyScans(self._fault, specs, self._scans_rng).change
+
+    def mountings(
+        self, specs: Sequence[ScannerSpec], body_base_m: FloatArray
+    ) -> tuple[Scanner, ...]:
+        """Return the mountings of the scanners as the robot assumes them.
+
+        Args:
+            specs: the scanners.
+            body_base_m: (M, 2) outline of the robot in the base frame.
+        """
+        fault = self._fault.scanner
+        return tuple(
+            spec.model_copy(
+                update={"yaw_deg": spec.yaw_deg + fault.yaw_error_deg}
+                if fault.yaw_error_deg != 0.0 and fault.only in (None, number)
+                else {}
+            ).scanner(body_base_m)
+            for number, spec in enumerate(specs, start=1)
+        )
 
 
 def _mounting_error(fault: Fault) -> FloatArray | None:

@@ -1,0 +1,43 @@
+"""Repeated outages of a sensor as data."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from pydantic import Field, model_validator
+
+from tracking.config import StrictConfig
+
+from ...world.errors import SimError
+
+
+class Outage(StrictConfig):
+    """A repeated outage; the default has none.
+
+    In each episode the first outage begins at a random time within the first ``every_s``, uniformly
+    distributed, so that over many episodes every instant of an encounter is hit.
+
+    Attributes:
+        for_s: duration of each outage; 0 for none.
+        every_s: time from the beginning of one to that of the next, longer than ``for_s``.
+        fresh_stamps: the last message is repeated as if it were new, which no receiver can tell;
+            False repeats it with its old stamp.
+    """
+
+    error: ClassVar[type[ValueError]] = SimError
+
+    for_s: float = Field(default=0.0, ge=0.0, le=600.0)
+    every_s: float = Field(default=10.0, gt=0.0, le=3600.0)
+    fresh_stamps: bool = True
+
+    @model_validator(mode="after")
+    def _ends_before_the_next(self) -> Outage:
+        if self.for_s >= self.every_s:
+            raise ValueError(
+                f"for_s must be shorter than every_s, got {self.for_s:g} s of {self.every_s:g} s"
+            )
+        return self
+
+    def holds(self, t_s: float, first_s: float) -> bool:
+        """Return whether there is an outage at ``t_s`` if the first one begins at ``first_s``."""
+        return t_s >= first_s and (t_s - first_s) % self.every_s < self.for_s
