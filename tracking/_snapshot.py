@@ -13,7 +13,7 @@ from ._sensors import Sensors
 from ._step import TrackerState, predicted
 from ._table import BoolArray, TrackTable
 from ._track import PersonTrack, TrackStatus, trusted_track
-from ._track_management import coasted_too_long
+from ._track_management import coasted_too_long, shown_empty
 from ._twins import reported
 from .awareness_filter import drift_unseen, estimate
 
@@ -69,6 +69,7 @@ def snapshots(state: TrackerState, stamp_s: float, sensors: Sensors) -> tuple[Pe
             [config.stature_m] * len(tracks),
             (stamp_s - tracks.last_seen_s).tolist(),
             noticed(tracks, stamp_s, faces, state.clocks, sensors).tolist(),
+            shown_empty(tracks, state.periods_s, config).tolist(),
         )
     )
 
