@@ -83,7 +83,7 @@ class TimeBehaviour(StrictConfig):
     shrink_after_s: float = Field(default=0.2, ge=0.0, le=5.0)
     fresh_within_s: float = Field(default=0.25, gt=0.0, le=1.0)
     hold_s: float = Field(default=1.0, ge=0.0, le=10.0)
-    lost_rise_mps2: float | None = Field(default=0.5, gt=0.0, le=10.0)
+    lost_rise_mps2: float | None = Field(default=0.7, gt=0.0, le=10.0)
     stale_after_s: float = Field(default=0.5, gt=0.0, le=5.0)
     stop_after_s: float = Field(default=1.5, gt=0.0, le=10.0)
     new_clock_after_s: float = Field(default=1.0, ge=0.0, le=60.0)
