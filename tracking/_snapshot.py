@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from ._awareness_update import belief_of
+from ._faces import face_period_s
 from ._noticed import noticed
 from ._sensors import Sensors
 from ._step import TrackerState, predicted
@@ -47,7 +48,7 @@ def snapshots(state: TrackerState, stamp_s: float, sensors: Sensors) -> tuple[Pe
             faces.stamp_s,
             stamp_s,
             tracks.evidence_stamps_s,
-            faces.period_s,
+            face_period_s(tracks, faces, state.clocks, sensors),
             config.awareness,
         )
     estimated = estimate(belief, config.awareness)
@@ -68,8 +69,8 @@ def snapshots(state: TrackerState, stamp_s: float, sensors: Sensors) -> tuple[Pe
             np.asarray(estimated.awareness_lower).tolist(),
             [config.stature_m] * len(tracks),
             (stamp_s - tracks.last_seen_s).tolist(),
-            noticed(tracks, stamp_s, faces, state.clocks, sensors).tolist(),
             shown_empty(tracks, state.periods_s, config).tolist(),
+            noticed(tracks, stamp_s, faces, state.clocks, sensors).tolist(),
         )
     )
 
