@@ -75,6 +75,18 @@ class History:
             )
         return None
 
+    def copy(self) -> History:
+        """Return a history that goes on by itself; it shares the states."""
+        copied = self.restored(self._base, (), None)
+        copied._frames, copied._states = list(self._frames), list(self._states)
+        return copied
+
+    def restored(
+        self, base: TrackerState, frames: Sequence[Frame], latest: TrackerState | None
+    ) -> History:
+        """Return another history of the same tracker."""
+        return History(self._advance, self._max_lag_s, base, frames, latest)
+
     def insert(self, frame: Frame) -> None:
         """Insert a frame in the order of stamps and compute the states from there on again.
 
