@@ -226,6 +226,8 @@ class NavAdapter:
             return memory, clock
         pause_s = now - last_s
         if 0.0 <= pause_s <= self._policy.timing.stale_after_s:
+            if self._has_caught_up(now):
+                memory = replace(memory, people=self._rules.after_silence(memory.people))
             return memory, replace(clock, jumped=None, before_jump=None)
         if pause_s >= 0.0 and min(pause_s, now - robot_state.stamp_s) <= _MAX_PAUSE_S:
             # A pause of the caller, as it seems.
@@ -247,6 +249,18 @@ class NavAdapter:
             f"stamp_s jumps ahead, got {now:.6f} s after {last_s:.6f} s, with a robot_state of "
             f"{robot_state.stamp_s:.6f} s (at most {_MAX_PAUSE_S:g} s)"
         )
+
+    def _has_caught_up(self, now: float) -> bool:
+        """Return whether a clock that was set back a little has just caught up.
+
+        The tracker cannot tell the frames since then from late ones. Their people may still have
+        the awareness that they had before.
+        """
+        jumped, timing = self._clock.jumped, self._policy.timing
+        if jumped is None or jumped.stamps < 2:
+            return False
+        follows = 0.0 <= now - jumped.last_s <= timing.stale_after_s
+        return follows and now - jumped.first_s > 0.5 * timing.fresh_within_s
 
     def _following(
         self,
