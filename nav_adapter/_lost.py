@@ -73,11 +73,12 @@ class LostPeople:
             people: who are there now.
             now: stamp of the update.
         """
-        missing = {track_id: person for track_id, person in lost.items() if track_id not in people}
         if self._rise_mps2 is None or before_s is None:
             return {}
-        for track_id, memory in before.items():
-            if track_id in people or not memory.was_confirmed or memory.track.place_empty:
+        missing = {track_id: person for track_id, person in lost.items() if track_id not in people}
+        for track_id in [each for each in before if each not in people]:
+            memory = before[track_id]
+            if not memory.was_confirmed or memory.track.place_empty:
                 continue
             # After a pause in the updates they have been lost for some time.
             since_s = min(max(memory.seen_stamp_s + self._hold_s, before_s), now)

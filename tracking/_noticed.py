@@ -88,9 +88,8 @@ def with_noticed(
     dropped = averted | found.ambiguous | _jumped(before, after, frame, found)
     approach_mps = _approach_mps(after, frame)
     # After a gap nobody knows that it is the same person; a new look excuses motion alone.
-    period_s = np.asarray(face_period_s(after, faces, clocks, sensors))
-    known_s = np.where(np.isfinite(period_s), period_s, 0.0)
-    gap_s = np.maximum(config.max_evidence_gap_s, _GAP_PERIODS * known_s)
+    period_s = face_period_s(after, faces, clocks, sensors)
+    gap_s = _longest_gap_s(period_s, config.max_evidence_gap_s)
     recent_s = np.where(looking, gap_s, grace_s(period_s, config))
     ended = stamp - after.look_stamps_s > config.noticed_memory_s
     ended |= _interrupted(before, after, stamp, recent_s, clocks, sensors)
@@ -108,7 +107,8 @@ def with_noticed(
     since_s = stamp - after.look_stamps_s
     follows = since_s <= config.max_evidence_gap_s
     # Of two cameras, only the time since the last look of either.
-    stands_for_s = np.where(follows, np.fmin(dt_s, since_s), np.minimum(dt_s, period_s))
+    usual_s = np.minimum(dt_s, period_s) if sensors.several_faces else min(dt_s, faces.period_s)
+    stands_for_s = np.where(follows, np.fmin(dt_s, since_s), usual_s)
     looked_s += np.where(dropped, 0.0, looks * stands_for_s)
     return after.replaced(
         looked_s=looked_s,
@@ -116,6 +116,14 @@ def with_noticed(
         look_approaches_mps=np.where(looking, approach_mps, least_mps),
         look_standing=np.where(looking, after.standing, stood),
     )
+
+
+def _longest_gap_s(period_s: float | FloatArray, least_s: float) -> float | FloatArray:
+    """Return the longest time between two looks of one spell, given the time between faces."""
+    if isinstance(period_s, np.ndarray):
+        known_s = np.where(np.isfinite(period_s), period_s, 0.0)
+        return np.maximum(least_s, _GAP_PERIODS * known_s)
+    return max(least_s, _GAP_PERIODS * period_s) if math.isfinite(period_s) else least_s
 
 
 def noticed(

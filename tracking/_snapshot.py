@@ -69,7 +69,7 @@ def snapshots(state: TrackerState, stamp_s: float, sensors: Sensors) -> tuple[Pe
             np.asarray(estimated.awareness_lower).tolist(),
             [config.stature_m] * len(tracks),
             (stamp_s - tracks.last_seen_s).tolist(),
-            shown_empty(tracks, state.periods_s, config).tolist(),
+            _places_empty(state, tracks, sensors),
             noticed(tracks, stamp_s, faces, state.clocks, sensors).tolist(),
         )
     )
@@ -83,6 +83,12 @@ def _expired(state: TrackerState, stamp_s: float, sensors: Sensors) -> BoolArray
     unconfirmed = ~tracks.confirmed & (gaps_s > kept_s).all(axis=1)
     stamps_s = np.full(len(sensors), stamp_s)
     return unconfirmed | coasted_too_long(tracks, stamps_s, config, sensors.has_view)
+
+
+def _places_empty(state: TrackerState, tracks: TrackTable, sensors: Sensors) -> list[bool]:
+    if not tracks.missed_s.any():
+        return [False] * len(tracks)
+    return shown_empty(tracks, state.periods_s, sensors.config).tolist()
 
 
 def _current(state: TrackerState, tracks: TrackTable) -> BoolArray:

@@ -266,8 +266,6 @@ def shown_empty(tracks: TrackTable, periods_s: FloatArray, config: TrackerConfig
         periods_s: (S,) usual time between frames of each sensor, 0 if unknown.
         config: settings.
     """
-    if not tracks.missed_s.any():
-        return np.zeros(len(tracks), dtype=np.bool_)
     last = tracks.seen_stamps_s.argmax(axis=1)
     share_s = np.minimum(1.5 * periods_s, _MAX_SHARE_OF_ONE_FRAME * config.max_missed_s)
     missed_s = tracks.missed_s[np.arange(len(tracks)), last] + share_s[last]

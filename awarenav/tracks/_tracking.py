@@ -85,7 +85,8 @@ def _accepted_frames(
     if all(earlier.stamp_s <= later.stamp_s for earlier, later in itertools.pairwise(frames)):
         return frames, 0, 0, 0
     trial = tracker()
-    accepted, late = [], 0
+    accepted: list[RecordedFrame] = []
+    late = 0
     for frame in frames:
         last_s = trial.last_stamp_s
         is_late = last_s is not None and frame.stamp_s < last_s
