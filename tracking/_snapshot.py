@@ -88,7 +88,8 @@ def _expired(state: TrackerState, stamp_s: float, sensors: Sensors) -> BoolArray
 def _places_empty(state: TrackerState, tracks: TrackTable, sensors: Sensors) -> list[bool]:
     if not tracks.missed_s.any():
         return [False] * len(tracks)
-    return shown_empty(tracks, state.periods_s, sensors.config).tolist()
+    empty: list[bool] = shown_empty(tracks, state.periods_s, sensors.config).tolist()
+    return empty
 
 
 def _current(state: TrackerState, tracks: TrackTable) -> BoolArray:
