@@ -97,7 +97,8 @@ class Admission:
             return Entry(history)
         message = history.lateness_error(stamp_s)
         if message is not None and leap is not None and _returns(leap, stamp_s, sensor):
-            return Entry(leap.before, undone=leap)
+            # The ids that the wrong frame gave are not used again.
+            return Entry(leap.before.with_ids_from(history.latest.next_id), undone=leap)
         ahead_s = stamp_s - last_s
         period_s = _known(history.latest.clocks[sensor.index].period_s)
         leaps = ahead_s > max(config.max_lag_s, _LEAP_PERIODS * period_s)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Final
 
 from ._errors import TrackingError
@@ -79,6 +80,16 @@ class History:
         """Return a history that goes on by itself; it shares the states."""
         copied = self.restored(self._base, (), None)
         copied._frames, copied._states = list(self._frames), list(self._states)
+        return copied
+
+    def with_ids_from(self, next_id: int) -> History:
+        """Return a copy whose new tracks have this id or higher ones."""
+        copied = self.copy()
+        latest = replace(self.latest, next_id=max(self.latest.next_id, next_id))
+        if copied._states:
+            copied._states[-1] = latest
+        else:
+            copied._base = latest
         return copied
 
     def restored(

@@ -49,9 +49,10 @@ class PersonTracker:
     a person first seen after it can get another id, or turn out to be a known person.
 
     A frame that is later than the last by more than ``max_pause_s`` is refused as well, since one
-    wrong stamp would end all tracks. If the refused frames follow one another for
-    ``new_clock_after_s``, the clock has been set: the tracker starts anew, as after :meth:`reset`,
-    counts it in :attr:`clock_restarts` and logs a warning.
+    wrong stamp would end all tracks. One that is ahead by less is taken, and taken back if the next
+    frame of any sensor goes on from before it: the latest stamp then goes back. If the refused
+    frames follow one another for ``new_clock_after_s``, the clock has been set: the tracker starts
+    anew, as after :meth:`reset`, counts it in :attr:`clock_restarts` and logs a warning.
 
     The tracker is deterministic. A refused input raises :class:`~tracking.TrackingError` and leaves
     the tracks as they were; :attr:`refused_late_frames` and :attr:`refused_early_frames` count

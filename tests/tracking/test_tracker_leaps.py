@@ -48,6 +48,17 @@ def test_one_frame_ahead_costs_one_frame_and_no_track(ahead_s: float) -> None:
     assert [track.id for track in show(tracker, now + PERIOD_S)] == [1]
 
 
+def test_ids_of_a_frame_that_is_taken_back_are_not_used_again() -> None:
+    tracker = PersonTracker()
+    for step in range(20):
+        show(tracker, step * PERIOD_S)
+    wrong = {track.id for track in show(tracker, 19 * PERIOD_S + 5.0)}
+    assert wrong == {2}
+    now = 20 * PERIOD_S
+    seen = [observe(place, now) for place in (PLACE_M, (6.0, 2.0))]
+    assert [track.id for track in tracker.update(seen, now, CAMERA)] == [1, 3]
+
+
 @pytest.mark.parametrize("wrong", ["camera", LASER])
 @pytest.mark.parametrize("right", ["camera", LASER])
 def test_a_frame_of_any_sensor_in_time_shows_it(wrong: str, right: str) -> None:
