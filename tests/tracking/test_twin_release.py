@@ -7,7 +7,13 @@ import pytest
 from test_tracker_twins import NOISE_M, twin_scene
 from tracking_scenes import CAMERA, PERIOD_S, FloatArray, observe
 
-from tracking import AwarenessFilterConfig, PersonTrack, PersonTracker, TrackerConfig
+from tracking import (
+    AwarenessFilterConfig,
+    PersonTrack,
+    PersonTracker,
+    SensorConfig,
+    TrackerConfig,
+)
 from tracking._table import TrackTable
 from tracking._twins import without
 
@@ -19,7 +25,9 @@ class Attentive:
     """A tracker of people who look at the robot, at 20 Hz."""
 
     def __init__(self, seed: int) -> None:
-        self.tracker, self.now, self.scene = PersonTracker(REMEMBERS), 0.0, iter(twin_scene(seed))
+        # A scanner, so that noticing counts; it is silent.
+        self.tracker = PersonTracker(REMEMBERS, sensors={"laser": SensorConfig()})
+        self.now, self.scene = 0.0, iter(twin_scene(seed))
         self.tracks: tuple[PersonTrack, ...] = ()
         self.places: list[FloatArray] = []
 

@@ -49,7 +49,11 @@ def run(
     faces = SensorConfig(
         sees_faces=True, measures_range=False, alignment_std_rad=0.0, detection_probability=0.9
     )
-    tracker = PersonTracker(REMEMBERS, sensors=None if rear is None else {REAR: faces})
+    # A scanner, so that noticing counts; it is silent.
+    sensors = {"laser": SensorConfig(alignment_std_rad=0.0)}
+    if rear is not None:
+        sensors[REAR] = faces
+    tracker = PersonTracker(REMEMBERS, sensors=sensors)
     results = []
     for step in range(steps):
         now = step * period_s
@@ -83,6 +87,7 @@ def test_two_cameras_are_worth_as_much_as_one(front: Sees, rear: Sees, rate_hz: 
         # Two cameras confirm a person up to two frames sooner, from when on looks count.
         assert looked_s(ours) == pytest.approx(looked_s(single), abs=2.1 * period_s)
     assert two[-1].awareness_lower > 0.6
+    assert looked_s(two[-1]) > 0.3
 
 
 @pytest.mark.parametrize("lag_s", [0.0, 1e-4, 1e-3, 0.01, 0.033])
