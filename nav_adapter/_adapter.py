@@ -17,6 +17,7 @@ from ._checks import age_of_s, checked_tracks, refuse_absurd
 from ._constraints import NavConstraints
 from ._errors import NavError
 from ._governor import GovernedSpeed, SpeedGovernor
+from ._lost import LostPeople, LostPerson
 from ._memory import PersonMemory
 from ._obstacle_rules import ObstacleRules
 from ._obstacles import obstacles_of
@@ -38,6 +39,7 @@ class _Memory:
         constraints: the latest, or None before the first update.
         given: the latest tracks, state of the robot, and stamp of perception.
         ceiling_mps: ceiling of the limit during the recovery after stale data, or None.
+        lost: people who were dropped and still limit the speed, by id.
     """
 
     people: Mapping[int, PersonMemory] = field(default_factory=dict)
@@ -45,6 +47,7 @@ class _Memory:
     constraints: NavConstraints | None = None
     given: tuple[tuple[PersonTrack, ...], RobotState, float] | None = None
     ceiling_mps: float | None = None
+    lost: Mapping[int, LostPerson] = field(default_factory=dict)
 
     @property
     def stamp_s(self) -> float | None:
@@ -85,6 +88,9 @@ class NavAdapter:
     obstacle. People whom the robot cannot reach while it stops limit it less (``docs/safety.md``),
     and so do people who stand if the policy bounds how fast they set off (``rules.standing``).
 
+    When a person is dropped whom no sensor has shown to be gone, the limit that they set rises
+    slowly (``lost_rise_mps2``).
+
     Tentative people, people unseen for longer than ``fresh_within_s`` and, with stale data, all
     people count as unaware. For the speed limit, so do people at first sight, until frames have
     shown them for ``shrink_after_s``. An id at a place that the person could not have reached is
@@ -115,6 +121,7 @@ class NavAdapter:
         self._robot = robot
         self._rules = ObstacleRules(policy)
         self._governor = SpeedGovernor(policy, robot, self._rules)
+        self._lost = LostPeople(policy, robot, self._rules, self._governor)
         self._memory = _Memory()
         self._clock = _Clock()
         self._warned_of_drive = False
@@ -219,6 +226,8 @@ class NavAdapter:
             return memory, clock
         pause_s = now - last_s
         if 0.0 <= pause_s <= self._policy.timing.stale_after_s:
+            if self._has_caught_up(now):
+                memory = replace(memory, people=self._rules.after_silence(memory.people))
             return memory, replace(clock, jumped=None, before_jump=None)
         if pause_s >= 0.0 and min(pause_s, now - robot_state.stamp_s) <= _MAX_PAUSE_S:
             # A pause of the caller, as it seems.
@@ -240,6 +249,18 @@ class NavAdapter:
             f"stamp_s jumps ahead, got {now:.6f} s after {last_s:.6f} s, with a robot_state of "
             f"{robot_state.stamp_s:.6f} s (at most {_MAX_PAUSE_S:g} s)"
         )
+
+    def _has_caught_up(self, now: float) -> bool:
+        """Return whether a clock that was set back a little has just caught up.
+
+        The tracker cannot tell the frames since then from late ones. Their people may still have
+        the awareness that they had before.
+        """
+        jumped, timing = self._clock.jumped, self._policy.timing
+        if jumped is None or jumped.stamps < 2:
+            return False
+        follows = 0.0 <= now - jumped.last_s <= timing.stale_after_s
+        return follows and now - jumped.first_s > 0.5 * timing.fresh_within_s
 
     def _following(
         self,
@@ -268,7 +289,9 @@ class NavAdapter:
             people = self._rules.after_silence(people)
         people = self._rules.updated(people, current, now, stale)
         refuse_absurd(people)
+        lost = self._lost.missing(before.lost, before.people, before.stamp_s, people, now)
         limit = self._governor.limit(people, robot_state, now, robot_age_s)
+        limit, lost = self._lost.limited(limit, lost, robot_state, now, robot_age_s)
         for name, age_s in (("perception", perception_age_s), ("robot state", robot_age_s)):
             if age_s > timing.stop_after_s:
                 reason = f"stale data: {name} is {age_s:.2f} s old"
@@ -301,7 +324,7 @@ class NavAdapter:
             braking_suffices=limit.braking_suffices,
         )
         given = current, robot_state, perceived_s
-        return _Memory(people, alert_history, constraints, given, ceiling_mps)
+        return _Memory(people, alert_history, constraints, given, ceiling_mps, lost)
 
     def _limit_recovery(
         self,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 
@@ -30,6 +30,10 @@ _STANDING_MPS: Final = 0.05
 # brisk walker, who may turn to the robot. A person faster than that speed by the second share runs.
 _BRISK_SHARE: Final = 0.75
 _RUNNING_SHARE: Final = 0.25
+
+
+# Gaps and shares of the stopping distance (2, N); human speeds, ages and start delays (N,).
+_Terms: TypeAlias = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +98,48 @@ class SpeedGovernor:
             people = self._people_in(self._path, people, robot_state, now)
         if not people:
             return GovernedSpeed(maximum_mps, "robot maximum", True)
+        limits, terms = self._limits_mps(people, robot_state, now, robot_age_s)
+        lowest = []
+        for rule, limit in limits.items():
+            row = int(limit.argmin())
+            lowest.append((float(limit[row]), row, rule))
+        limit_mps, row, rule = min(lowest, key=lambda entry: entry[0])
+        speed_mps = robot_state.travel_mps
+        # A robot within speed and separation has the whole reaction time left.
+        suffices = speed_mps <= lowest[0][0] or self._braking_suffices(*terms, speed_mps)
+        if limit_mps >= maximum_mps:
+            return GovernedSpeed(maximum_mps, "robot maximum", suffices)
+        return GovernedSpeed(limit_mps, f"track {list(people)[row]}: {rule}", suffices)
+
+    def limits_mps(
+        self,
+        people: Mapping[int, PersonMemory],
+        robot_state: RobotState,
+        now: float,
+        robot_age_s: float,
+    ) -> list[float]:
+        """Return the limit that each person sets alone, in their order."""
+        maximum_mps, inside = self._robot.max_speed_mps, people
+        if self._path is not None:
+            inside = self._people_in(self._path, people, robot_state, now)
+        if not inside:
+            return [maximum_mps] * len(people)
+        limits, _ = self._limits_mps(inside, robot_state, now, robot_age_s)
+        lowest_mps = np.minimum(np.stack(list(limits.values())).min(axis=0), maximum_mps)
+        found = dict(zip(inside, lowest_mps.tolist(), strict=True))
+        return [found.get(track_id, maximum_mps) for track_id in people]
+
+    def _limits_mps(
+        self,
+        people: Mapping[int, PersonMemory],
+        robot_state: RobotState,
+        now: float,
+        robot_age_s: float,
+    ) -> tuple[dict[str, FloatArray], _Terms]:
+        """Return the limits (N,) for each person by the name of the rule, and their terms.
+
+        Speed and separation comes first.
+        """
         gaps_m, shares = self._gaps(people, robot_state, now, robot_age_s)
         robot_x, robot_y = robot_state.position_odom_m.tolist()
         rows = [
@@ -105,24 +151,12 @@ class SpeedGovernor:
             for m in people.values()
         ]
         age_s, human_mps, delay_s = np.array(rows).T.copy()
-        separation_mps = self._separation_limit_mps(gaps_m, shares, human_mps, age_s, delay_s)
+        terms = gaps_m, shares, human_mps, age_s, delay_s
         limits = {
-            "speed and separation": separation_mps,
+            "speed and separation": self._separation_limit_mps(*terms),
             **self._rule_limits_mps(gaps_m, shares[1]),
         }
-        lowest = []
-        for rule, limit in limits.items():
-            row = int(limit.argmin())
-            lowest.append((float(limit[row]), row, rule))
-        limit_mps, row, rule = min(lowest, key=lambda entry: entry[0])
-        speed_mps = robot_state.travel_mps
-        # A robot within speed and separation has the whole reaction time left.
-        suffices = speed_mps <= lowest[0][0] or self._braking_suffices(
-            gaps_m, shares, human_mps, age_s, delay_s, speed_mps
-        )
-        if limit_mps >= maximum_mps:
-            return GovernedSpeed(maximum_mps, "robot maximum", suffices)
-        return GovernedSpeed(limit_mps, f"track {list(people)[row]}: {rule}", suffices)
+        return limits, terms
 
     def _people_in(
         self,

@@ -104,10 +104,7 @@ class ObstacleRules:
             people = self._without_owner(people, jumped, tracks)
         for track_id, memory in people.items():
             if track_id not in current and memory.is_kept(now, self._timing.hold_s):
-                # Missing from the input: unaware, and walking on.
-                current[track_id] = self._known_person(
-                    memory.track, memory, 0.0, now, visible_s=0.0
-                )
+                current[track_id] = self.missing_person(memory, now)
         return dict(sorted(current.items()))
 
     def _without_owner(
@@ -153,6 +150,10 @@ class ObstacleRules:
                 speed_held=False,
             )
         return unaware
+
+    def missing_person(self, memory: PersonMemory, now: float) -> PersonMemory:
+        """Return a person who is missing from the input: unaware, and walking on."""
+        return self._known_person(memory.track, memory, 0.0, now, visible_s=0.0)
 
     def human_speed_mps(self, memory: PersonMemory) -> float:
         """Return the speed that the policy assumes for a person.

@@ -22,8 +22,8 @@ def update_awareness(
     tracks: TrackTable,
     previous_stamp_s: float,
     stamp_s: float,
-    interval_s: float,
-    period_s: float,
+    interval_s: float | FloatArray,
+    period_s: float | FloatArray,
     seen: BoolArray,
     ambiguous: BoolArray,
     evidence_means: FloatArray,
@@ -36,8 +36,8 @@ def update_awareness(
         tracks: with beliefs at ``previous_stamp_s``.
         previous_stamp_s: stamp of the frame before.
         stamp_s: stamp of the frame.
-        interval_s: > 0, time that the frame stands for.
-        period_s: usual time between frames, before this one.
+        interval_s: > 0, time that the frame stands for; one number or (N,).
+        period_s: usual time between frames, before this one; one number or (N,).
         seen: (N,) True for people in the frame.
         ambiguous: (N,) True for ambiguous matches: the belief drifts as if unseen and is then reset
             to the prior, since the measurement may be another person's.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Final
 
 from ._errors import TrackingError
@@ -74,6 +75,28 @@ class History:
                 "come since then"
             )
         return None
+
+    def copy(self) -> History:
+        """Return a history that goes on by itself; it shares the states."""
+        copied = self.restored(self._base, (), None)
+        copied._frames, copied._states = list(self._frames), list(self._states)
+        return copied
+
+    def with_ids_from(self, next_id: int) -> History:
+        """Return a copy whose new tracks have this id or higher ones."""
+        copied = self.copy()
+        latest = replace(self.latest, next_id=max(self.latest.next_id, next_id))
+        if copied._states:
+            copied._states[-1] = latest
+        else:
+            copied._base = latest
+        return copied
+
+    def restored(
+        self, base: TrackerState, frames: Sequence[Frame], latest: TrackerState | None
+    ) -> History:
+        """Return another history of the same tracker."""
+        return History(self._advance, self._max_lag_s, base, frames, latest)
 
     def insert(self, frame: Frame) -> None:
         """Insert a frame in the order of stamps and compute the states from there on again.

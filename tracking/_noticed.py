@@ -28,6 +28,7 @@ from scipy.special import ndtr
 from perception.arrays import FloatArray
 
 from ._clocks import FrameClock
+from ._faces import face_period_s
 from ._kalman import inverse_2x2
 from ._matching import Found
 from ._measurement import Frame
@@ -69,6 +70,7 @@ def with_noticed(
     frame: Frame,
     found: Found,
     faces: FrameClock,
+    dt_s: float,
     clocks: tuple[FrameClock, ...],
     sensors: Sensors,
 ) -> TrackTable:
@@ -80,6 +82,7 @@ def with_noticed(
         frame: of any sensor.
         found: which of them the frame shows.
         faces: clock of the frames with faces before this one.
+        dt_s: since the frame before of the same sensor.
         clocks: of all sensors, this frame included.
         sensors: all sensors.
     """
@@ -91,17 +94,16 @@ def with_noticed(
     if not (looks > 0.0).any() and not (after.looked_s > 0.0).any():
         return after
     looking = looks > 0.0
-    dt_s = min(faces.dt_s(stamp), config.max_evidence_gap_s) if sees_faces else 0.0
+    dt_s = min(dt_s, config.max_evidence_gap_s) if sees_faces else 0.0
     towards = _towards(after, frame)
     # Whoever walks away looks where they go, and has to turn round first.
     averted &= (towards * after.states[:, 2:]).sum(axis=1) > -_RECEDING_MPS
     averted_s = np.where(looking, 0.0, after.averted_s + averted * dt_s)
     dropped = found.ambiguous | _jumped(before, after, frame, found) | (averted_s > _AVERTED_S)
     # After a gap nobody knows that it is the same person; a new look excuses motion alone.
-    grace, gap_s = grace_s(faces.period_s, config), config.max_evidence_gap_s
-    if math.isfinite(faces.period_s):
-        gap_s = max(gap_s, _GAP_PERIODS * faces.period_s)
-    recent_s = np.where(looking, gap_s, grace)
+    period_s = face_period_s(after, faces, clocks, sensors)
+    gap_s = _longest_gap_s(period_s, config.max_evidence_gap_s)
+    recent_s = np.where(looking, gap_s, grace_s(period_s, config))
     ended = stamp - after.look_stamps_s > config.noticed_memory_s
     ended |= _interrupted(before, after, stamp, recent_s, clocks, sensors)
     ended |= _set_off(after, towards) & ~looking
@@ -116,8 +118,11 @@ def with_noticed(
     fades = found.seen & ~looking
     looked_s = np.where(fades, math.exp(-dt_s / _FORGETTING_S), 1.0) * looked_s
     # A look after a pause stands for one frame, not for the pause.
-    follows = stamp - after.look_stamps_s <= config.max_evidence_gap_s
-    stands_for_s = np.where(follows, dt_s, min(dt_s, faces.period_s))
+    since_s = stamp - after.look_stamps_s
+    follows = since_s <= config.max_evidence_gap_s
+    # Of two cameras, only the time since the last look of either.
+    usual_s = np.minimum(dt_s, period_s) if sensors.several_faces else min(dt_s, faces.period_s)
+    stands_for_s = np.where(follows, np.fmin(dt_s, since_s), usual_s)
     looked_s += np.where(dropped, 0.0, looks * stands_for_s)
     return after.replaced(
         looked_s=looked_s,
@@ -127,6 +132,14 @@ def with_noticed(
         look_standing=np.where(looking, after.standing, stood),
         averted_s=averted_s,
     )
+
+
+def _longest_gap_s(period_s: float | FloatArray, least_s: float) -> float | FloatArray:
+    """Return the longest time between two looks of one spell, given the time between faces."""
+    if isinstance(period_s, np.ndarray):
+        known_s = np.where(np.isfinite(period_s), period_s, 0.0)
+        return np.maximum(least_s, _GAP_PERIODS * known_s)
+    return max(least_s, _GAP_PERIODS * period_s) if math.isfinite(period_s) else least_s
 
 
 def noticed(
@@ -147,7 +160,7 @@ def noticed(
     age_s = stamp_s - tracks.look_stamps_s
     counts = tracks.confirmed & (age_s <= config.noticed_memory_s)
     held = _held(tracks, stamp_s, clocks, sensors)
-    counts &= held | (age_s <= grace_s(faces.period_s, config))
+    counts &= held | (age_s <= grace_s(face_period_s(tracks, faces, clocks, sensors), config))
     return np.where(counts, -np.expm1(-tracks.looked_s / _LOOKING_S), 0.0)
 
 

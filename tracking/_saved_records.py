@@ -160,29 +160,15 @@ class JumpedClockRecord(StrictConfig):
     stamps: int = Field(ge=1)
 
 
-class ClockRecord(StrictConfig):
-    """Jumps of the clock."""
+class HistoryRecord(StrictConfig):
+    """:class:`History` as plain values."""
 
-    refused_early_frames: int = Field(ge=0)
-    restarts: int = Field(ge=0)
-    jumped: dict[str, JumpedClockRecord]
-
-
-class TrackerRecord(StrictConfig):
-    """A tracker without its views, but with the frames that may still be replayed."""
-
-    format: Literal["awarenav-tracker"]
-    version: Literal[2]
-    config: TrackerConfig
-    sensors: dict[str, SensorConfig]
-    refused_late_frames: int = Field(ge=0)
-    clock: ClockRecord
     base: StateRecord
     frames: list[FrameRecord]
     latest: StateRecord
 
     @model_validator(mode="after")
-    def _check_consistency(self) -> TrackerRecord:
+    def _check_order(self) -> HistoryRecord:
         stamps = [frame.stamp_s for frame in self.frames]
         if self.base.stamp_s is not None:
             stamps.insert(0, self.base.stamp_s)
@@ -192,11 +178,61 @@ class TrackerRecord(StrictConfig):
             raise ValueError(
                 f"latest.stamp_s must be that of the last frame, got {self.latest.stamp_s}"
             )
-        names = [CAMERA, *self.sensors]
-        for state in (self.base, self.latest):
-            if list(state.clocks) != names:
+        return self
+
+
+class LeapRecord(StrictConfig):
+    """:class:`~tracking._admission.Leap` as plain values."""
+
+    sensor: str
+    stamp_s: float
+    before: HistoryRecord
+
+
+class ClockRecord(StrictConfig):
+    """Jumps of the clock. A state of before there were leaps has none."""
+
+    refused_early_frames: int = Field(ge=0)
+    restarts: int = Field(ge=0)
+    jumped: dict[str, JumpedClockRecord]
+    refused_frames: dict[str, int] = Field(default_factory=dict)
+    ahead: dict[str, JumpedClockRecord] = Field(default_factory=dict)
+    leap: LeapRecord | None = None
+
+
+class TrackerRecord(HistoryRecord):
+    """A tracker without its views, but with the frames that may still be replayed."""
+
+    format: Literal["awarenav-tracker"]
+    version: Literal[2]
+    config: TrackerConfig
+    sensors: dict[str, SensorConfig]
+    sensor_order: list[str] = Field(default_factory=list)
+    """Names of the sensors in the order of the columns; those of ``sensors`` if it is empty."""
+
+    refused_late_frames: int = Field(ge=0)
+    clock: ClockRecord
+
+    @model_validator(mode="after")
+    def _check_consistency(self) -> TrackerRecord:
+        names = {CAMERA, *self.sensors}
+        if self.sensor_order and sorted(self.sensor_order) != sorted(names):
+            raise ValueError(
+                f"sensor_order must have each of {', '.join(sorted(names))} once, "
+                f"got {', '.join(self.sensor_order)}"
+            )
+        clock = self.clock
+        if not {*clock.jumped, *clock.refused_frames, *clock.ahead} <= names:
+            raise ValueError(f"clock must name only the sensors {', '.join(sorted(names))}")
+        histories: list[HistoryRecord] = [self]
+        if clock.leap is not None:
+            histories.append(clock.leap.before)
+            if clock.leap.sensor not in names or clock.leap.before.latest.stamp_s is None:
+                raise ValueError("clock.leap must be of one of the sensors, and after a frame")
+        for state in [each for one in histories for each in (one.base, one.latest)]:
+            if set(state.clocks) != names:
                 raise ValueError(
-                    f"clocks must be those of the sensors {', '.join(names)}, "
+                    f"clocks must be those of the sensors {', '.join(sorted(names))}, "
                     f"got {', '.join(state.clocks)}"
                 )
             if any(len(row) != self.config.confirm_hits for row in state.tracks.hit_stamps_s):
@@ -205,6 +241,11 @@ class TrackerRecord(StrictConfig):
                     "track"
                 )
         return self
+
+    @property
+    def names(self) -> list[str]:
+        """Names of all sensors in the order of the columns."""
+        return self.sensor_order or [CAMERA, *self.sensors]
 
 
 def record_of(state: Any) -> TrackerRecord:

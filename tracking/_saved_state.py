@@ -11,38 +11,31 @@ import numpy as np
 
 from perception.arrays import FloatArray, covariance_matrix, rigid_transform
 
+from ._admission import Admission, Leap
 from ._clocks import FrameClock
 from ._errors import TrackingError
 from ._exits import Exits
+from ._history import History
 from ._measurement import Frame, Measurements
 from ._saved_records import (
     FORMAT,
     VERSION,
     FrameClockRecord,
     FrameRecord,
+    HistoryRecord,
+    JumpedClockRecord,
     StateRecord,
     TrackerRecord,
 )
-from ._sensors import SensorConfig, Sensors
+from ._sensors import CAMERA, SensorConfig, Sensors
 from ._step import TrackerState
 from ._table import TrackTable
 from .clock import JumpedClock
 
 
-def to_plain(
-    sensors: Sensors,
-    refused_late_frames: int,
-    base: TrackerState,
-    frames: Sequence[Frame],
-    latest: TrackerState,
-    *,
-    clock: tuple[int, int, dict[str, JumpedClock]],
-) -> dict[str, Any]:
-    """Return a tracker as plain JSON values.
-
-    ``clock`` has the numbers of early frames and of restarts, and the clocks that may be new.
-    """
-    early_frames, restarts, jumped = clock
+def to_plain(sensors: Sensors, history: History, admission: Admission) -> dict[str, Any]:
+    """Return a tracker as plain JSON values."""
+    leap = admission.leap
     return {
         "format": FORMAT,
         "version": VERSION,
@@ -50,28 +43,36 @@ def to_plain(
         "sensors": {
             sensor.name: sensor.settings.model_dump(mode="json") for sensor in sensors.all[1:]
         },
-        "refused_late_frames": refused_late_frames,
+        "sensor_order": list(sensors.names),
+        "refused_late_frames": admission.late_frames,
         "clock": {
-            "refused_early_frames": early_frames,
-            "restarts": restarts,
-            "jumped": {name: asdict(one) for name, one in jumped.items()},
+            "refused_early_frames": admission.early_frames,
+            "restarts": admission.restarts,
+            "jumped": _plain_jumps(admission.jumped),
+            "refused_frames": dict(admission.refused),
+            "ahead": _plain_jumps(admission.ahead),
+            "leap": None
+            if leap is None
+            else {
+                "sensor": leap.sensor,
+                "stamp_s": leap.stamp_s,
+                "before": _plain_history(leap.before, sensors),
+            },
         },
-        "base": _plain_state(base, sensors),
-        "frames": [_plain_frame(frame, sensors) for frame in frames],
-        "latest": _plain_state(latest, sensors),
+        **_plain_history(history, sensors),
     }
 
 
 def sensors_in(
     record: TrackerRecord, given: Mapping[str, SensorConfig] | None
 ) -> dict[str, SensorConfig]:
-    """Return the sensors of a record, with the views of those that are ``given``.
+    """Return the sensors of a record in its order, with the views of those that are ``given``.
 
     Raises:
         TrackingError: if other sensors are given than the record has.
     """
     if given is None:
-        return record.sensors
+        given = record.sensors
     differing = [
         name
         for name in dict.fromkeys((*record.sensors, *given))
@@ -79,12 +80,54 @@ def sensors_in(
         or name not in record.sensors
         or given[name].model_dump() != record.sensors[name].model_dump()
     ]
-    if differing or list(given) != list(record.sensors):
+    if differing:
         raise TrackingError(
             f"sensors must be those of the saved tracker, {list(record.sensors)}, with their "
-            f"settings and in their order; got {list(given)}, and these differ: {differing}"
+            f"settings; got {list(given)}, and these differ: {differing}"
         )
-    return dict(given)
+    if record.names[0] != CAMERA:
+        raise TrackingError(f"sensor_order must begin with {CAMERA!r}, got {record.names}")
+    return {name: given[name] for name in record.names[1:]}
+
+
+def history_of(record: TrackerRecord, empty: History, sensors: Sensors) -> History:
+    """Return the history that a record describes, for the tracker of an ``empty`` one."""
+    return _history_of(record, "", record.config.confirm_hits, empty, sensors)
+
+
+def restore_admission(
+    admission: Admission, record: TrackerRecord, empty: History, sensors: Sensors
+) -> None:
+    """Set what a tracker knows of its clocks to what a record describes."""
+    clock, leap = record.clock, record.clock.leap
+    admission.late_frames = record.refused_late_frames
+    admission.early_frames = clock.refused_early_frames
+    admission.restarts = clock.restarts
+    admission.refused.update(clock.refused_frames)
+    admission.jumped, admission.ahead = _jumps(clock.jumped), _jumps(clock.ahead)
+    if leap is not None:
+        hits = record.config.confirm_hits
+        before = _history_of(leap.before, "clock.leap.before.", hits, empty, sensors)
+        admission.leap = Leap(before, leap.sensor, leap.stamp_s)
+
+
+def _jumps(records: Mapping[str, JumpedClockRecord]) -> dict[str, JumpedClock]:
+    return {name: JumpedClock(one.first_s, one.last_s, one.stamps) for name, one in records.items()}
+
+
+def _plain_jumps(jumps: Mapping[str, JumpedClock]) -> dict[str, Any]:
+    return {name: asdict(one) for name, one in jumps.items()}
+
+
+def _history_of(
+    record: HistoryRecord, name: str, confirm_hits: int, empty: History, sensors: Sensors
+) -> History:
+    names = sensors.names
+    return empty.restored(
+        state_of(record.base, names, confirm_hits, f"{name}base"),
+        [frame_of(one, names, f"{name}frames[{i}]") for i, one in enumerate(record.frames)],
+        state_of(record.latest, names, confirm_hits, f"{name}latest"),
+    )
 
 
 def state_of(
@@ -181,6 +224,14 @@ def _plain_clock(clock: FrameClock) -> dict[str, Any]:
         "stamp_s": clock.stamp_s,
         "interval_s": clock.interval_s if math.isfinite(clock.interval_s) else None,
         "period_s": clock.period_s if math.isfinite(clock.period_s) else None,
+    }
+
+
+def _plain_history(history: History, sensors: Sensors) -> dict[str, Any]:
+    return {
+        "base": _plain_state(history.base, sensors),
+        "frames": [_plain_frame(frame, sensors) for frame in history.frames],
+        "latest": _plain_state(history.latest, sensors),
     }
 
 

@@ -106,6 +106,7 @@ class Sensors:
         config: the tracker's settings.
         has_view: (S,) True where the view is known.
         faces: (S,) True for sensors that see faces.
+        several_faces: whether more than one does.
         ranging: (S,) True for sensors that measure ranges.
         mixed: whether some measure ranges and others do not.
     """
@@ -115,6 +116,7 @@ class Sensors:
     config: TrackerConfig
     has_view: BoolArray
     faces: BoolArray
+    several_faces: bool
     ranging: BoolArray
     mixed: bool
 
@@ -188,13 +190,15 @@ def sensors_of(
             }
             own = config.model_copy(update=changes)
         found.append(Sensor(name, index, one, own, gates_of(own)))
+    faces = _flags(one.sees_faces for one in settings.values())
     ranging = _flags(one.measures_range for one in settings.values())
     return Sensors(
         all=tuple(found),
         names=tuple(settings),
         config=config,
         has_view=_flags(one.view is not None for one in settings.values()),
-        faces=_flags(one.sees_faces for one in settings.values()),
+        faces=faces,
+        several_faces=int(np.count_nonzero(faces)) > 1,
         ranging=ranging,
         mixed=bool(ranging.any() and not ranging.all()),
     )

@@ -8,12 +8,13 @@ from typing import Final
 import numpy as np
 
 from ._awareness_update import belief_of
+from ._faces import face_period_s
 from ._noticed import noticed
 from ._sensors import Sensors
 from ._step import TrackerState, predicted
 from ._table import BoolArray, TrackTable
 from ._track import PersonTrack, TrackStatus, trusted_track
-from ._track_management import coasted_too_long
+from ._track_management import coasted_too_long, shown_empty
 from ._twins import reported
 from .awareness_filter import drift_unseen, estimate
 
@@ -47,7 +48,7 @@ def snapshots(state: TrackerState, stamp_s: float, sensors: Sensors) -> tuple[Pe
             faces.stamp_s,
             stamp_s,
             tracks.evidence_stamps_s,
-            faces.period_s,
+            face_period_s(tracks, faces, state.clocks, sensors),
             config.awareness,
         )
     estimated = estimate(belief, config.awareness)
@@ -68,6 +69,7 @@ def snapshots(state: TrackerState, stamp_s: float, sensors: Sensors) -> tuple[Pe
             np.asarray(estimated.awareness_lower).tolist(),
             [config.stature_m] * len(tracks),
             (stamp_s - tracks.last_seen_s).tolist(),
+            _places_empty(state, tracks, sensors),
             noticed(tracks, stamp_s, faces, state.clocks, sensors).tolist(),
         )
     )
@@ -81,6 +83,13 @@ def _expired(state: TrackerState, stamp_s: float, sensors: Sensors) -> BoolArray
     unconfirmed = ~tracks.confirmed & (gaps_s > kept_s).all(axis=1)
     stamps_s = np.full(len(sensors), stamp_s)
     return unconfirmed | coasted_too_long(tracks, stamps_s, config, sensors.has_view)
+
+
+def _places_empty(state: TrackerState, tracks: TrackTable, sensors: Sensors) -> list[bool]:
+    if not tracks.missed_s.any():
+        return [False] * len(tracks)
+    empty: list[bool] = shown_empty(tracks, state.periods_s, sensors.config).tolist()
+    return empty
 
 
 def _current(state: TrackerState, tracks: TrackTable) -> BoolArray:

@@ -13,6 +13,7 @@ from ._awareness_update import forgotten, update_awareness
 from ._clocks import FrameClock
 from ._config import TrackerConfig
 from ._exits import Exits, absence_s, walked_out
+from ._faces import evidence_interval_s, face_period_s
 from ._fusion import duplicates
 from ._matching import Found, match_frame
 from ._measurement import Frame
@@ -73,13 +74,13 @@ def advance(state: TrackerState, frame: Frame, sensors: Sensors) -> TrackerState
     stamp, measured = frame.stamp_s, frame.measurements
     previous = stamp if state.stamp_s is None else state.stamp_s
     dt_s = state.clocks[sensor.index].dt_s(stamp)
-    faces = state.faces
+    earlier, faces = state, state.faces
     state = _with_clocks(state, frame, sensors)
     period_s = state.clocks[sensor.index].period_s
     tracks = state.tracks
     if len(tracks) and stamp > previous:
         expired = expired_before(tracks, stamp, state.periods_s, config, has_view)
-        tracks = without(tracks, expired)
+        tracks = without(tracks, expired, config)
         tracks = predicted(tracks, previous, stamp, config)
     before = tracks
     tracks, found = match_frame(tracks, frame, dt_s, state.origin_odom_m, state.clocks, sensors)
@@ -97,8 +98,8 @@ def advance(state: TrackerState, frame: Frame, sensors: Sensors) -> TrackerState
         initiated = initiate(frame, unmatched, state.next_id, config, len(sensors))
         tracks = with_hosts(tracks.append(initiated), len(initiated), config)
         found = found.with_births(np.flatnonzero(unmatched))
-    tracks = _with_awareness(tracks, frame, found, faces, state, sensors)
-    tracks = with_noticed(before, tracks, frame, found, faces, state.clocks, sensors)
+    tracks = _with_awareness(tracks, frame, found, earlier, state, sensors)
+    tracks = with_noticed(before, tracks, frame, found, faces, dt_s, state.clocks, sensors)
     seen = found.seen
     missed_s = missed_time_s(tracks, ~seen, dt_s, frame, config, sensor.view)
     tracks = tracks.replaced(missed_s=missed_s)
@@ -108,10 +109,10 @@ def advance(state: TrackerState, frame: Frame, sensors: Sensors) -> TrackerState
         # Only where the camera was the last to see somebody is there an exit of its view.
         vanished &= tracks.seen_stamps_s[:, 0] == tracks.last_seen_s
         exits = exits.with_events(tracks.last_places_camera_m[vanished], returned=False)
-        tracks = without(tracks, deleted)
+        tracks = without(tracks, deleted, config)
     double = duplicates(tracks, frame, state.clocks, sensors)
     if double.any():
-        tracks = without(tracks, double)
+        tracks = without(tracks, double, config)
     next_id = state.next_id + int(np.count_nonzero(unmatched))
     return replace(state, tracks=tracks, next_id=next_id, exits=exits)
 
@@ -148,7 +149,7 @@ def _with_awareness(
     tracks: TrackTable,
     frame: Frame,
     found: Found,
-    faces: FrameClock,
+    earlier: TrackerState,
     state: TrackerState,
     sensors: Sensors,
 ) -> TrackTable:
@@ -158,11 +159,11 @@ def _with_awareness(
         tracks: after the frame's measurements, new tracks included.
         frame: of any sensor; one that sees no faces only takes awareness, where it is ambiguous.
         found: which of them the frame shows.
-        faces: clock of the frames with faces before this one.
+        earlier: with the clocks before this frame.
         state: with the clocks after it.
         sensors: all sensors.
     """
-    config = sensors.config.awareness
+    config, faces = sensors.config.awareness, earlier.faces
     if not sensors.all[frame.sensor].settings.sees_faces:
         return forgotten(tracks, found.ambiguous, config)
     measured, stamp, seen = frame.measurements, frame.stamp_s, found.seen
@@ -179,8 +180,8 @@ def _with_awareness(
         tracks,
         stamp if faces.stamp_s is None else faces.stamp_s,
         stamp,
-        state.faces.interval_s,
-        faces.period_s,
+        evidence_interval_s(tracks, stamp, state.clocks[frame.sensor], sensors),
+        face_period_s(tracks, faces, earlier.clocks, sensors),
         looked_at,
         found.ambiguous,
         means,

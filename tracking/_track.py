@@ -29,6 +29,9 @@ class PersonTrack:
         awareness_lower: lower bound of α in [0, 1]; only this value may shrink an obstacle.
         height_m: the person's assumed stature, > 0.
         time_since_seen_s: ≥ 0, time since a frame of any sensor last showed this person.
+        place_empty: whether the sensor that last saw this person has shown the place empty for so
+            long that its next frame ends the track. If a track ends without it, the person was out
+            of sight and may still be there.
         noticed: lower bound, in [0, 1], of the probability that this person has noticed the robot
             by the looks of the last seconds; 0 unless ``noticed_memory_s`` is set.
     """
@@ -44,6 +47,7 @@ class PersonTrack:
     awareness_lower: float
     height_m: float
     time_since_seen_s: float
+    place_empty: bool = False
     noticed: float = 0.0
 
     def __post_init__(self) -> None:
@@ -79,6 +83,7 @@ class PersonTrack:
                 "height_m", self.height_m, TrackingError, minimum=0.0, exclusive_minimum=True
             ),
             time_since_seen_s=number("time_since_seen_s", 0.0),
+            place_empty=bool(self.place_empty),
             noticed=number("noticed", 0.0, 1.0),
         )
 

@@ -256,6 +256,24 @@ def missed_time_s(
     return missed_s
 
 
+def shown_empty(tracks: TrackTable, periods_s: FloatArray, config: TrackerConfig) -> BoolArray:
+    """Return (N,) True where the next frame without the person would end the track.
+
+    Only the sensor that saw the person last counts: another one may never have been able to see
+    them, for a reason that its view does not know. Frames may come as much as a half later than
+    usual.
+
+    Args:
+        tracks: N tracks.
+        periods_s: (S,) usual time between frames of each sensor, 0 if unknown.
+        config: settings.
+    """
+    last = tracks.seen_stamps_s.argmax(axis=1)
+    share_s = np.minimum(1.5 * periods_s, _MAX_SHARE_OF_ONE_FRAME * config.max_missed_s)
+    missed_s = tracks.missed_s[np.arange(len(tracks)), last] + share_s[last]
+    return np.asarray(tracks.confirmed & (missed_s > config.max_missed_s))
+
+
 def _visibility(
     tracks: TrackTable,
     rows: IndexArray,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import logging
 import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -13,20 +12,18 @@ from perception import PersonObservation
 from perception.arrays import covariance_matrix, finite_number, rigid_transform
 from perception.documents import read_json
 
+from ._admission import Admission
 from ._config import TrackerConfig
 from ._errors import TrackingError
 from ._history import History
 from ._measurement import Frame, measurements_of
 from ._saved_records import record_of
-from ._saved_state import frame_of, sensors_in, state_of, to_plain
+from ._saved_state import history_of, restore_admission, sensors_in, to_plain
 from ._sensors import CAMERA, SensorConfig, sensors_of
 from ._snapshot import snapshots
 from ._step import TrackerState, advance, nobody
 from ._track import PersonTrack
 from ._views import View
-from .clock import JumpedClock
-
-_LOG = logging.getLogger("tracking")
 
 
 class PersonTracker:
@@ -52,9 +49,10 @@ class PersonTracker:
     a person first seen after it can get another id, or turn out to be a known person.
 
     A frame that is later than the last by more than ``max_pause_s`` is refused as well, since one
-    wrong stamp would end all tracks. If the refused frames follow one another for
-    ``new_clock_after_s``, the clock has been set: the tracker starts anew, as after :meth:`reset`,
-    counts it in :attr:`clock_restarts` and logs a warning.
+    wrong stamp would end all tracks. One that is ahead by less is taken, and taken back if the next
+    frame of any sensor goes on from before it: the latest stamp then goes back. If the refused
+    frames follow one another for ``new_clock_after_s``, the clock has been set: the tracker starts
+    anew, as after :meth:`reset`, counts it in :attr:`clock_restarts` and logs a warning.
 
     The tracker is deterministic. A refused input raises :class:`~tracking.TrackingError` and leaves
     the tracks as they were; :attr:`refused_late_frames` and :attr:`refused_early_frames` count
@@ -84,10 +82,7 @@ class PersonTracker:
             )
         self._config = config
         self._sensors = sensors_of(config, view, sensors)
-        self._refused_late_frames = 0
-        self._refused_early_frames = 0
-        self._clock_restarts = 0
-        self._jumped: dict[str, JumpedClock] = {}
+        self._admission = Admission(config, self._sensors)
         start = nobody(config, self._sensors)
         self._history = History(self._advance, config.max_lag_s, start)
 
@@ -120,23 +115,32 @@ class PersonTracker:
     @property
     def refused_late_frames(self) -> int:
         """Number of frames that were refused because they came too late."""
-        return self._refused_late_frames
+        return self._admission.late_frames
 
     @property
     def refused_early_frames(self) -> int:
-        """Number of frames that were refused because their stamp jumped ahead."""
-        return self._refused_early_frames
+        """Number of frames that were refused, or taken back, since their stamp jumped ahead."""
+        return self._admission.early_frames
+
+    @property
+    def refused_frames(self) -> dict[str, int]:
+        """Number of frames that were refused for their stamp, of each sensor.
+
+        If it grows for one sensor only, that sensor's clock differs from the others', or its frames
+        come later than ``max_lag_s``.
+        """
+        return dict(self._admission.refused)
 
     @property
     def clock_restarts(self) -> int:
         """Number of times the tracker has started anew because the clock had been set."""
-        return self._clock_restarts
+        return self._admission.restarts
 
     def reset(self) -> None:
         """Forget all tracks and the clock. Ids go on, and the counts stay."""
         start = nobody(self._config, self._sensors, self._history.latest.next_id)
         self._history = History(self._advance, self._config.max_lag_s, start)
-        self._jumped = {}
+        self._admission.forget()
 
     def update(
         self,
@@ -179,8 +183,14 @@ class PersonTracker:
         if source.pose_covariance is not None:
             pose = source.pose_covariance if pose is None else pose + source.pose_covariance
         measurements = measurements_of(observations, stamp, T, pose, self._config)
-        self._check_clock(stamp, source.name)
-        self._history.insert(Frame(stamp, T, measurements, source.index))
+        entry = self._admission.entry(self._history, stamp, source)
+        if entry.history is None:
+            self.reset()
+            self._admission.restarts += 1
+        history = self._history if entry.history is None else entry.history
+        history.insert(Frame(stamp, T, measurements, source.index))
+        self._history = history
+        self._admission.taken(entry, source)
         latest = self._history.latest
         return self._snapshots(stamp if latest.stamp_s is None else latest.stamp_s)
 
@@ -209,15 +219,7 @@ class PersonTracker:
 
         A tracker made by :meth:`from_state` continues bit for bit. The views are not included.
         """
-        history = self._history
-        return to_plain(
-            self._sensors,
-            self._refused_late_frames,
-            history.base,
-            history.frames,
-            history.latest,
-            clock=(self._refused_early_frames, self._clock_restarts, self._jumped),
-        )
+        return to_plain(self._sensors, self._history, self._admission)
 
     @classmethod
     def from_state(
@@ -241,22 +243,8 @@ class PersonTracker:
         """
         record = record_of(state)
         tracker = cls(record.config, view=view, sensors=sensors_in(record, sensors))
-        tracker._refused_late_frames = record.refused_late_frames
-        tracker._refused_early_frames = record.clock.refused_early_frames
-        tracker._clock_restarts = record.clock.restarts
-        for name, jumped in record.clock.jumped.items():
-            tracker._jumped[name] = JumpedClock(jumped.first_s, jumped.last_s, jumped.stamps)
-        names, hits = tracker._sensors.names, record.config.confirm_hits
-        tracker._history = History(
-            tracker._advance,
-            record.config.max_lag_s,
-            state_of(record.base, names, hits, "base"),
-            [
-                frame_of(frame, names, f"frames[{index}]")
-                for index, frame in enumerate(record.frames)
-            ],
-            state_of(record.latest, names, hits, "latest"),
-        )
+        tracker._history = history_of(record, tracker._history, tracker._sensors)
+        restore_admission(tracker._admission, record, tracker._history, tracker._sensors)
         return tracker
 
     def save(self, path: str | Path) -> None:
@@ -293,41 +281,6 @@ class PersonTracker:
             return cls.from_state(state, view=view, sensors=sensors)
         except TrackingError as cause:
             raise TrackingError(f"{path}: {cause}") from cause
-
-    def _check_clock(self, stamp_s: float, sensor: str) -> None:
-        """Refuse and count a stamp that jumps; start anew if the clock has been set.
-
-        A frame in time, of any sensor, shows that the clock has not been set.
-        """
-        last_s, config = self.last_stamp_s, self._config
-        if last_s is None:
-            return
-        message = self._history.lateness_error(stamp_s)
-        early = stamp_s - last_s > config.max_pause_s
-        if early:
-            message = (
-                f"stamp_s = {stamp_s!r} s jumps ahead: the last frame was at {last_s!r} s, and "
-                f"max_pause_s = {config.max_pause_s:g} s"
-            )
-        if message is None:
-            self._jumped = {}
-            return
-        jumped = JumpedClock.following(self._jumped.get(sensor), stamp_s, config.max_pause_s)
-        self._jumped[sensor] = jumped
-        if jumped.has_lasted(config.new_clock_after_s):
-            _LOG.warning(
-                "the clock has been set: frames at %.3f s after %.3f s; the tracker starts anew",
-                stamp_s,
-                last_s,
-            )
-            self.reset()
-            self._clock_restarts += 1
-            return
-        if early:
-            self._refused_early_frames += 1
-        else:
-            self._refused_late_frames += 1
-        raise TrackingError(message)
 
     def _advance(self, state: TrackerState, frame: Frame) -> TrackerState:
         return advance(state, frame, self._sensors)

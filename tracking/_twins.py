@@ -17,6 +17,7 @@ import numpy as np
 
 from perception.arrays import FloatArray
 
+from ._awareness_update import forgotten
 from ._config import TrackerConfig
 from ._kalman import inverse_2x2
 from ._measurement import Measurements
@@ -106,9 +107,11 @@ def with_twins(
         apart &= (shows_a & shows_b)[near]
         far = b[near[apart]]
         hosts[far], twins[far], logits[far] = 0, False, 0.0
+    released = after.twins & ~twins
     after = after.replaced(
         host_ids=hosts, twin_logits=logits, twins=twins, twin_visibilities=visible
     )
+    after = _as_strangers(after, released, config)
     return _merged(after, pairs, due) if due.any() else after
 
 
@@ -233,7 +236,18 @@ def with_hosts(tracks: TrackTable, births: int, config: TrackerConfig) -> TrackT
     return tracks.replaced(host_ids=hosts, twin_logits=logits)
 
 
-def without(tracks: TrackTable, deleted: BoolArray) -> TrackTable:
+def _as_strangers(tracks: TrackTable, released: BoolArray, config: TrackerConfig) -> TrackTable:
+    """Return the tracks after those ``released`` (N,) have ceased to be twins: as unaware people.
+
+    Of the faces that the frames showed of two boxes, nobody knows whose they were.
+    """
+    if not released.any():
+        return tracks
+    tracks = forgotten(tracks, released, config.awareness)
+    return tracks.replaced(looked_s=np.where(released, 0.0, tracks.looked_s))
+
+
+def without(tracks: TrackTable, deleted: BoolArray, config: TrackerConfig) -> TrackTable:
     """Return the tracks that are not ``deleted`` (N,).
 
     A twin goes with its host, unless it was seen later; then it is the person from now on.
@@ -259,7 +273,9 @@ def without(tracks: TrackTable, deleted: BoolArray) -> TrackTable:
             tracks.twins.copy(),
         )
         hosts[b], logits[b], twins[b] = 0, 0.0, False
+        released = tracks.twins & ~twins
         tracks = tracks.replaced(host_ids=hosts, twin_logits=logits, twins=twins)
+        tracks = _as_strangers(tracks, released, config)
     return tracks.take(~deleted)
 
 

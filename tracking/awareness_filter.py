@@ -148,14 +148,17 @@ def trusted_std(awareness_std: Value, config: AwarenessFilterConfig) -> FloatArr
     return np.where(reported <= config.max_evidence_std, trusted, np.nan)
 
 
-def grace_s(period_s: float, config: AwarenessFilterConfig) -> float:
+def grace_s(period_s: Value, config: AwarenessFilterConfig) -> Value:
     """Return the time after the last face in which a frame may just have missed the person.
 
     ``period_s`` is the usual time between frames, infinite if unknown.
     """
-    known_s = period_s if math.isfinite(period_s) else 0.0
     if config.missed_frame_s <= 0.0:
         return 0.0
+    if isinstance(period_s, np.ndarray):
+        known = np.where(np.isfinite(period_s), period_s, 0.0)
+        return np.maximum(config.missed_frame_s, np.minimum(known, config.max_evidence_gap_s))
+    known_s = period_s if math.isfinite(period_s) else 0.0
     return max(config.missed_frame_s, min(known_s, config.max_evidence_gap_s))
 
 
@@ -164,7 +167,7 @@ def drift_unseen(
     from_s: float,
     to_s: float,
     evidence_stamps_s: FloatArray,
-    period_s: float,
+    period_s: Value,
     config: AwarenessFilterConfig,
 ) -> AwarenessBelief:
     """Return the belief at ``to_s`` ≥ ``from_s`` if no frame in between shows the person.
@@ -194,7 +197,7 @@ def measure(
     belief: AwarenessBelief,
     mean: Value,
     variance: Value,
-    interval_s: float,
+    interval_s: Value,
     config: AwarenessFilterConfig,
 ) -> AwarenessBelief:
     """Return the belief after one measurement of logit(α), which also sets the remembered bound.
@@ -207,7 +210,9 @@ def measure(
             variance is increased in proportion, so that the information per second has a limit.
         config: settings.
     """
-    effective = variance * max(1.0, config.evidence_correlation_s / interval_s)
+    factor = config.evidence_correlation_s / interval_s
+    many = isinstance(factor, np.ndarray)
+    effective = variance * (np.maximum(1.0, factor) if many else max(1.0, factor))
     gain = belief.variance / (belief.variance + effective)
     corrected = belief.mean + gain * (mean - belief.mean)
     remaining = belief.variance * (1.0 - gain)

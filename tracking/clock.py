@@ -35,10 +35,11 @@ class JumpedClock:
         Steps up to ``max_pause_s`` follow one another, and longer ones that are alike: some cameras
         send a frame now and then.
 
-        A stamp that is slightly out of order neither counts nor ends the clock.
+        A stamp that is slightly out of order neither counts nor ends the clock. It may be its
+        first one.
         """
         if before is not None and -_DISORDER_S <= stamp_s - before.last_s < 0.0:
-            return before
+            return JumpedClock(min(before.first_s, stamp_s), before.last_s, before.stamps)
         if before is not None and 0.0 <= stamp_s - before.last_s <= before._longest_s(max_pause_s):
             return JumpedClock(before.first_s, stamp_s, before.stamps + 1)
         return JumpedClock(stamp_s, stamp_s)

@@ -51,7 +51,7 @@ def track_recording(
             view=None if camera is None else CameraView(camera),
         )
 
-    accepted, late, refused = _accepted_frames(recording, tracker)
+    accepted, late, refused, ahead = _accepted_frames(recording, tracker)
     working = tracker()
     builder = HistoryBuilder()
     for frame in tqdm(accepted, "tracks", unit="frame", file=sys.stderr, disable=None):
@@ -68,25 +68,28 @@ def track_recording(
         builder.histories(),
         np.array([frame.stamp_s for frame in accepted]),
         np.array([camera_pose(frame.T_odom_camera) for frame in accepted]).reshape(-1, 3),
-        tuple(_remarks(recording, late, refused)),
+        tuple(_remarks(recording, late, refused, ahead)),
         "tracks",
     )
 
 
 def _accepted_frames(
     recording: Recording, tracker: Callable[[], PersonTracker]
-) -> tuple[list[RecordedFrame], int, int]:
-    """Return the frames that a tracker accepts, by stamp, and the numbers of late and refused ones.
+) -> tuple[list[RecordedFrame], int, int, int]:
+    """Return the frames that a tracker accepts, by stamp, and the numbers of others.
 
+    These are frames put back in time, refused as late, and taken back since they were far ahead.
     Only a tracker that gets the frames in the order of the file can tell.
     """
     frames = list(recording.frames)
     if all(earlier.stamp_s <= later.stamp_s for earlier, later in itertools.pairwise(frames)):
-        return frames, 0, 0
+        return frames, 0, 0, 0
     trial = tracker()
-    accepted, late = [], 0
+    accepted: list[RecordedFrame] = []
+    late = 0
     for frame in frames:
-        is_late = trial.last_stamp_s is not None and frame.stamp_s < trial.last_stamp_s
+        last_s = trial.last_stamp_s
+        is_late = last_s is not None and frame.stamp_s < last_s
         refused_before = trial.refused_late_frames
         try:
             _update(trial, frame, recording)
@@ -94,10 +97,14 @@ def _accepted_frames(
             if trial.refused_late_frames == refused_before:
                 raise
             continue
+        if last_s is not None and trial.last_stamp_s is not None and trial.last_stamp_s < last_s:
+            # The frame shows that the one before was wrong.
+            accepted = [one for one in accepted if one.stamp_s < last_s]
+            is_late = False
         accepted.append(frame)
         late += is_late
     accepted.sort(key=lambda frame: frame.stamp_s)
-    return accepted, late, trial.refused_late_frames
+    return accepted, late, trial.refused_late_frames, trial.refused_early_frames
 
 
 def _update(
@@ -166,7 +173,7 @@ def _sample(
     )
 
 
-def _remarks(recording: Recording, late: int, refused: int) -> Iterator[str]:
+def _remarks(recording: Recording, late: int, refused: int, ahead: int) -> Iterator[str]:
     if recording.without_covariance:
         yield (
             f"{counted(recording.without_covariance, 'observation')} without "
@@ -175,5 +182,7 @@ def _remarks(recording: Recording, late: int, refused: int) -> Iterator[str]:
         )
     if late:
         yield f"{counted(late, 'late frame')} put back in time by the tracker"
+    if ahead:
+        yield f"{counted(ahead, 'frame')} far ahead of those that follow: not used"
     if refused:
         yield f"{counted(refused, 'late frame')} refused by the tracker and not used"

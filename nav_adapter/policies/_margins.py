@@ -69,6 +69,8 @@ class TimeBehaviour(StrictConfig):
             period plus the delay of perception.
         hold_s: a confirmed person who disappears from the input is kept, as unaware and with
             constant velocity, until this time after the last sighting.
+        lost_rise_mps2: when such a person is dropped, or one whom the tracker has given up out of
+            sight, the limit that they set rises no faster than this. None: it rises at once.
         stale_after_s: if perception or the robot's state is older, everyone counts as unaware.
         stop_after_s: if either is older than this, the speed limit is 0.
         new_clock_after_s: when stamps that jump go on for this time, the clock has been set, and
@@ -81,6 +83,7 @@ class TimeBehaviour(StrictConfig):
     shrink_after_s: float = Field(default=0.2, ge=0.0, le=5.0)
     fresh_within_s: float = Field(default=0.25, gt=0.0, le=1.0)
     hold_s: float = Field(default=1.0, ge=0.0, le=10.0)
+    lost_rise_mps2: float | None = Field(default=0.7, gt=0.0, le=10.0)
     stale_after_s: float = Field(default=0.5, gt=0.0, le=5.0)
     stop_after_s: float = Field(default=1.5, gt=0.0, le=10.0)
     new_clock_after_s: float = Field(default=1.0, ge=0.0, le=60.0)

@@ -119,6 +119,7 @@ def policies(draw: st.DrawFn) -> AwarenessPolicy:
         timing=TimeBehaviour(
             shrink_rate_mps=draw(finite(0.1, 2.0)),
             shrink_after_s=draw(finite(0.0, 0.5)),
+            lost_rise_mps2=draw(st.none() | finite(0.1, 2.0)),
             fresh_within_s=fresh,
             stale_after_s=stale,
             stop_after_s=stale + draw(finite(0.0, 1.0)),

@@ -106,6 +106,16 @@ def test_frames_that_come_too_late_are_counted_and_change_nothing(tmp_path):
     assert len(run.camera_stamps_s) == len(without)
 
 
+def test_a_frame_far_ahead_is_counted_and_changes_nothing(tmp_path):
+    records = lines(WALKERS, frames=30)
+    without = [record for k, record in enumerate(records) if k != 12]
+    wrong = [*records[:12], {**records[12], "stamp_s": records[12]["stamp_s"] + 4.0}]
+    run = track_recording(recorded(tmp_path, [*wrong, *records[13:]]))
+    assert drawn(run) == drawn(track_recording(recorded(tmp_path, without, "without.jsonl")))
+    assert "1 frame far ahead of those that follow: not used" in run.remarks
+    assert len(run.camera_stamps_s) == len(without)
+
+
 def test_settings_and_field_of_view_reach_the_tracker(tmp_path):
     gone = lines([standing(4.0, 0.0)], frames=60, hidden=lambda k, who: k > 10)
     recording = recorded(tmp_path, gone)

@@ -1,0 +1,254 @@
+"""Lost people: when they are dropped out of sight, the limit rises slowly."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from nav_scenes import ROBOT, finite, numbers, person, robot_at
+
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints
+from nav_adapter.policies import TimeBehaviour
+from perception import Camera, PersonObservation
+from tracking import CameraView, PersonTrack, PersonTracker, TrackerConfig
+
+PERIOD_S = 0.05
+POLICY = AwarenessPolicy()
+RISE_MPS2 = 0.7
+MAXIMUM_MPS = ROBOT.max_speed_mps
+# On the robot's mast, looking along odom x: optical z forward, x right, y down.
+T_ODOM_CAMERA = np.array(
+    [[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 1.4], [0.0, 0.0, 0.0, 1.0]]
+)
+
+
+def with_rise(rise_mps2: float | None, **timing: float) -> AwarenessPolicy:
+    return AwarenessPolicy(timing=TimeBehaviour(lost_rise_mps2=rise_mps2, **timing))
+
+
+def lose(
+    adapter: NavAdapter, seconds: float, *, coasting_s: float = 3.0, place_empty: bool = False
+) -> list[NavConstraints]:
+    """Show somebody 2 m ahead for 1 s, report them as coasting, then no more."""
+    results = []
+    for step in range(round((1.0 + coasting_s + seconds) / PERIOD_S)):
+        now = step * PERIOD_S
+        unseen_s = max(0.0, now - 1.0)
+        track = person(
+            now,
+            position=(2.0, 0.0),
+            status="coasting" if unseen_s else "confirmed",
+            sigma_m=0.05 + 0.1 * unseen_s,
+            unseen_s=unseen_s,
+        )
+        tracks = (replace(track, place_empty=place_empty),) if unseen_s <= coasting_s else ()
+        results.append(adapter.update(tracks, robot_at(now), now, perception_stamp_s=now))
+    return results
+
+
+def test_the_limit_rises_from_where_it_was_at_the_rate_of_the_policy() -> None:
+    results = lose(NavAdapter(POLICY, ROBOT), 3.0)
+    after = [each for each in results if each.stamp_s > 4.0 + 1e-6]
+    assert all(each.obstacles == () for each in after)
+    last = results[-len(after) - 1]
+    assert last.speed_limit_mps < 0.5
+    for before, each in pairwise([last, *after]):
+        rise_mps = each.speed_limit_mps - before.speed_limit_mps
+        if each.speed_limit_mps < MAXIMUM_MPS:
+            assert rise_mps == pytest.approx(RISE_MPS2 * PERIOD_S, abs=1e-6)
+            assert each.limited_by == "track 1: lost"
+        else:
+            assert rise_mps <= RISE_MPS2 * PERIOD_S + 1e-6
+    assert after[-1].speed_limit_mps == MAXIMUM_MPS
+    assert after[-1].limited_by == "robot maximum"
+
+
+def test_without_the_rule_the_limit_jumps() -> None:
+    results = lose(NavAdapter(with_rise(None), ROBOT), 0.5)
+    limits = [each.speed_limit_mps for each in results]
+    assert max(after - before for before, after in pairwise(limits)) > 1.0
+    assert limits[-1] == MAXIMUM_MPS
+
+
+def test_somebody_whose_place_is_shown_empty_is_gone_at_once() -> None:
+    seen = lose(NavAdapter(POLICY, ROBOT), 0.5, place_empty=True)
+    plain = lose(NavAdapter(with_rise(None), ROBOT), 0.5)
+    assert [numbers(one) for one in seen] == [numbers(one) for one in plain]
+
+
+def test_a_foreign_tracker_that_drops_people_at_once_has_them_held_and_then_lost() -> None:
+    results = lose(NavAdapter(POLICY, ROBOT), 4.0, coasting_s=0.0)
+    limits = [each.speed_limit_mps for each in results]
+    assert {each.obstacles == () for each in results if 1.0 < each.stamp_s < 1.95} == {False}
+    assert max(b - a for a, b in pairwise(limits)) <= RISE_MPS2 * PERIOD_S + 1e-6
+    assert results[-1].limited_by == "robot maximum"
+
+
+def test_a_robot_that_drives_away_from_a_lost_person_is_free_of_them() -> None:
+    """Never slower than if the person were still held."""
+    lost, held = NavAdapter(POLICY, ROBOT), NavAdapter(with_rise(0.7, hold_s=10.0), ROBOT)
+    freed = False
+    for step in range(80):
+        now = step * PERIOD_S
+        tracks = (person(now, position=(2.0, 0.0)),) if step < 10 else ()
+        away = robot_at(now, position=(-1.2 * now, 0.0), heading_rad=np.pi, speed_mps=1.2)
+        limits = [
+            each.update(tracks, away, now, perception_stamp_s=now).speed_limit_mps
+            for each in (lost, held)
+        ]
+        assert limits[0] >= limits[1]
+        freed |= step > 10 and limits[0] == MAXIMUM_MPS
+    assert freed
+
+
+def test_somebody_who_is_back_is_not_lost_any_more() -> None:
+    adapter, twin = NavAdapter(POLICY, ROBOT), NavAdapter(with_rise(None), ROBOT)
+    lose(adapter, 0.2), lose(twin, 0.2)
+    back = person(4.2, position=(4.0, 0.0))
+    one, other = (each.update((back,), robot_at(4.2), 4.2) for each in (adapter, twin))
+    assert numbers(one) == numbers(other)
+    assert adapter._memory.lost == {}
+
+
+def test_a_track_that_was_never_more_than_tentative_is_not_lost() -> None:
+    adapter = NavAdapter(POLICY, ROBOT)
+    for step in range(4):
+        now = step * PERIOD_S
+        adapter.update((person(now, status="tentative"),), robot_at(now), now)
+    assert adapter.update((), robot_at(0.3), 0.3).speed_limit_mps == MAXIMUM_MPS
+
+
+def test_after_a_pause_in_the_updates_lost_people_are_forgotten() -> None:
+    adapter, twin = NavAdapter(POLICY, ROBOT), NavAdapter(with_rise(None), ROBOT)
+    for each in (adapter, twin):
+        lose(each, 0.0)
+    one, other = (each.update((), robot_at(30.0), 30.0) for each in (adapter, twin))
+    assert numbers(one) == numbers(other)
+
+
+def test_the_lost_are_not_kept_for_longer_than_the_limit_rises() -> None:
+    adapter = NavAdapter(POLICY, ROBOT)
+    for step in range(400):
+        now = step * 0.1
+        adapter.update((person(now, track_id=step),), robot_at(now), now)
+        assert len(adapter._memory.lost) <= 10.0 * MAXIMUM_MPS / RISE_MPS2 + 1.0
+    for late_s in (1.1, 4.0):
+        adapter.update((), robot_at(now + late_s), now + late_s)
+    assert adapter._memory.lost == {}
+
+
+def test_the_scanner_of_today_forgets_at_once() -> None:
+    assert AwarenessPolicy.preset("scanner").timing.lost_rise_mps2 is None
+    for name in ("blind", "conservative", "balanced", "assertive"):
+        assert AwarenessPolicy.preset(name).timing.lost_rise_mps2 == RISE_MPS2
+
+
+@given(
+    walk=st.lists(
+        st.tuples(st.sampled_from([0.05, 0.1, 0.3]), st.sets(st.integers(1, 3)), st.booleans()),
+        min_size=1,
+        max_size=40,
+    ),
+    places=st.lists(st.tuples(finite(0.8, 5.0), finite(-2.0, 2.0)), min_size=3, max_size=3),
+)
+def test_losing_people_is_between_holding_and_forgetting_them(
+    walk: list[tuple[float, set[int], bool]], places: list[tuple[float, float]]
+) -> None:
+    """Whoever comes and goes, where nobody moves: unaware people who stand before the robot."""
+    rules = {"lost": POLICY, "forgotten": with_rise(None), "held": with_rise(0.7, hold_s=10.0)}
+    adapters = {name: NavAdapter(policy, ROBOT) for name, policy in rules.items()}
+    now, before_mps = 0.0, MAXIMUM_MPS
+    for dt, there, seen_late in walk:
+        now += dt
+        unseen_s = 0.3 if seen_late else 0.0
+        tracks = [
+            person(now, track_id=k, position=places[k - 1], sigma_m=0.1, unseen_s=unseen_s)
+            for k in sorted(there)
+        ]
+        limits = {
+            name: each.update(tracks, robot_at(now), now, perception_stamp_s=now).speed_limit_mps
+            for name, each in adapters.items()
+        }
+        assert limits["held"] - 1e-9 <= limits["lost"] <= limits["forgotten"] + 1e-9
+        if not there:
+            assert limits["lost"] - before_mps <= RISE_MPS2 * dt + 1e-6
+        before_mps = limits["lost"]
+
+
+def observed(now: float, place_m: tuple[float, float]) -> PersonObservation:
+    """Return somebody at (x, y) in odom, seen by the camera."""
+    x, y = place_m
+    return PersonObservation(
+        stamp_s=now,
+        position_camera_m=np.array([-y, 0.2, x]),
+        position_covariance_m2=np.diag([0.03, 0.03, 0.08]) ** 2,
+        gaze_camera=None,
+        awareness=None,
+        awareness_std=None,
+        score=0.9,
+    )
+
+
+def follow(place_of: Callable[[float], tuple[float, float] | None]) -> list[NavConstraints]:
+    """Return the constraints at 10 Hz for 8 s, with the real tracker, which knows its view."""
+    view = CameraView(Camera.from_fov(640, 480, math.radians(60.0)))
+    tracker = PersonTracker(TrackerConfig(awareness=POLICY.filter), view=view)
+    adapter, results = NavAdapter(POLICY, ROBOT), []
+    for step in range(80):
+        now = 0.1 * step
+        place = place_of(now)
+        seen = [] if place is None else [observed(now, place)]
+        tracks = tracker.update(seen, now, T_ODOM_CAMERA)
+        results.append(adapter.update(tracks, robot_at(now), now, perception_stamp_s=now))
+    return results
+
+
+def largest_rise_mps(results: list[NavConstraints]) -> float:
+    limits = [each.speed_limit_mps for each in results[20:]]
+    return max(after - before for before, after in pairwise(limits))
+
+
+def test_somebody_who_walks_out_of_the_view_beside_the_robot_is_lost() -> None:
+    def place(now: float) -> tuple[float, float] | None:
+        y = -1.0 + 0.8 * now
+        return (2.0, y) if y < 1.1 else None  # tan 30° of 2 m
+
+    results = follow(place)
+    lost = [each for each in results if each.limited_by == "track 1: lost"]
+    assert len(lost) >= 10
+    assert lost[0].obstacles == ()
+    assert largest_rise_mps(results) <= RISE_MPS2 * 0.1 + 1e-6
+    assert results[-1].speed_limit_mps == MAXIMUM_MPS
+
+
+def test_somebody_who_vanishes_in_full_view_was_never_there() -> None:
+    results = follow(lambda now: (2.5, 0.0) if now < 3.0 else None)
+    assert not any(each.limited_by.endswith(": lost") for each in results)
+    assert largest_rise_mps(results) > 1.0
+    assert results[-1].speed_limit_mps == MAXIMUM_MPS
+
+
+@pytest.mark.parametrize("period_s", [0.03, 0.1, 0.2, 0.5])
+def test_the_tracker_tells_before_it_ends_a_track_whose_place_is_empty(period_s: float) -> None:
+    view = CameraView(Camera.from_fov(640, 480, math.radians(60.0)))
+    tracker = PersonTracker(view=view)
+    latest: tuple[PersonTrack, ...] = ()
+    for step in range(round(10.0 / period_s)):
+        now = period_s * step
+        seen = [observed(now, (3.0, 0.0))] if now < 5.0 else []
+        tracks = tracker.update(seen, now, T_ODOM_CAMERA)
+        assert not any(track.place_empty for track in tracks if track.status != "coasting")
+        if latest and not tracks:
+            assert [track.place_empty for track in latest] == [True]
+            assert now - 5.0 < 2.6
+            return
+        if tracks and 5.0 <= now <= 5.0 + 0.4 * 1.2 and period_s < 0.4:
+            assert not tracks[0].place_empty
+        latest = tracks
+    pytest.fail("the track never ended")
