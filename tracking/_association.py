@@ -40,12 +40,15 @@ class Matches:
         measurements: (K,) rows of measurements.
         ambiguous: (K,) True where a rival match is about as likely.
         wide: (K,) True where only a :class:`Wide` allows the match.
+        rivals: (P, 2) rows of tracks: the match of the first is ambiguous, and the second is the
+            other track that it may be; −1 where it may be nobody known.
     """
 
     tracks: IndexArray
     measurements: IndexArray
     ambiguous: BoolArray
     wide: BoolArray
+    rivals: IndexArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,7 +88,8 @@ class _Edges:
 
 _NO_ROWS: IndexArray = np.empty(0, dtype=np.intp)
 _NO_FLAGS: BoolArray = np.empty(0, dtype=np.bool_)
-_NO_MATCHES = Matches(_NO_ROWS, _NO_ROWS, _NO_FLAGS, _NO_FLAGS)
+_NO_RIVALS: IndexArray = np.empty((0, 2), dtype=np.intp)
+_NO_MATCHES = Matches(_NO_ROWS, _NO_ROWS, _NO_FLAGS, _NO_FLAGS, _NO_RIVALS)
 
 
 def associate(
@@ -133,12 +137,14 @@ def associate(
         _solve(edges.where(~first & ~taken[edges.measurements]), gates.miss_cost, partner)
     tracks = np.flatnonzero(partner >= 0)
     measurements = partner[tracks]
-    ambiguous = _ambiguities(edges, partner, positions_m, measured_m, gates, people)
+    rivals = _rivals(edges, partner, positions_m, measured_m, gates, people)
+    ambiguous = np.zeros(len(positions_m), dtype=np.bool_)
+    ambiguous[rivals[:, 0]] = True
     beyond = np.zeros(len(positions_m), dtype=np.bool_)
     if wide is not None:
         chosen = edges.wide & (partner[edges.tracks] == edges.measurements)
         beyond[edges.tracks[chosen]] = True
-    return Matches(tracks, measurements, ambiguous[tracks], beyond[tracks])
+    return Matches(tracks, measurements, ambiguous[tracks], beyond[tracks], rivals)
 
 
 def _edges(
@@ -208,19 +214,18 @@ def _solve(edges: _Edges, miss_cost: float, partner: IndexArray) -> None:
     partner[rows[chosen_rows[real]]] = columns[chosen_columns[real]]
 
 
-def _ambiguities(
+def _rivals(
     edges: _Edges,
     partner: IndexArray,
     positions_m: FloatArray,
     measured_m: FloatArray,
     gates: Gates,
     people: IndexArray | None,
-) -> BoolArray:
-    """Return (N,) True where a rival track or measurement fits about as well as the match."""
-    ambiguous = np.zeros(len(positions_m), dtype=np.bool_)
+) -> IndexArray:
+    """Return :attr:`Matches.rivals`: a rival track or measurement fits about as well."""
     chosen = partner[edges.tracks] == edges.measurements
     if chosen.all():
-        return ambiguous
+        return _NO_RIVALS
     holder = np.full(len(measured_m), -1, dtype=np.intp)
     holder[edges.measurements[chosen]] = edges.tracks[chosen]
     limit = np.full(len(positions_m) + 1, -np.inf)  # the last row is that of no track
@@ -235,13 +240,13 @@ def _ambiguities(
     # Rival measurements: the track could have matched another measurement.
     offset = measured_m[rival.measurements] - measured_m[partner[rival.tracks]]
     fits = (rival.costs <= limit[rival.tracks]) & (_squares(offset) <= reach2)
-    ambiguous[rival.tracks[fits]] = True
+    first = rival.tracks[fits], holder[rival.measurements[fits]]
     # Rival tracks: the measurement could have matched another track.
     owner = holder[rival.measurements]
     offset = positions_m[rival.tracks] - positions_m[owner]
     fits = (rival.costs <= limit[owner]) & (_squares(offset) <= reach2)
-    ambiguous[owner[fits]] = True
-    return ambiguous
+    second = owner[fits], rival.tracks[fits]
+    return np.column_stack([np.concatenate(pair) for pair in zip(first, second, strict=True)])
 
 
 def _squares(offsets: FloatArray) -> FloatArray:

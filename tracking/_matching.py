@@ -34,11 +34,13 @@ class Found:
         source: (N,) the row of each track's measurement, −1 for none.
         ambiguous: (N,) True for matches that may be another person's.
         beyond: (N,) True for matches by the ray alone, whose range disagrees.
+        rivals: (P, 2) as in :class:`~tracking._association.Matches`.
     """
 
     source: IndexArray
     ambiguous: BoolArray
     beyond: BoolArray
+    rivals: IndexArray
 
     @property
     def seen(self) -> BoolArray:
@@ -52,6 +54,7 @@ class Found:
             np.concatenate((self.source, measurements)),
             np.concatenate((self.ambiguous, certain)),
             np.concatenate((self.beyond, certain)),
+            self.rivals,
         )
 
 
@@ -98,7 +101,7 @@ def match_frame(
     )
     tracks = with_evidence(tracks, rows, logits, dt_s, config, frame.sensor)
     if not rows.size:
-        return tracks, Found(source, ambiguous, beyond)
+        return tracks, Found(source, ambiguous, beyond, found.rivals)
     source[rows], ambiguous[rows] = columns, found.ambiguous
     # An ambiguous measurement has less weight and leaves more uncertainty.
     factors = np.where(found.ambiguous, config.ambiguous_noise_factor, 1.0)
@@ -119,7 +122,7 @@ def match_frame(
         places[rows] = floor_places(states[rows, :2], frame.T_odom_camera)
         tracks = tracks.replaced(last_places_camera_m=places)
     tracks = record_hits(tracks, rows, frame.stamp_s, period_s, config, frame.sensor)
-    return tracks, Found(source, ambiguous, beyond)
+    return tracks, Found(source, ambiguous, beyond, found.rivals)
 
 
 def _without_assumed_range(
@@ -178,4 +181,5 @@ def _matches(
         np.concatenate((columns, offered[second.measurements])),
         np.concatenate((found.ambiguous, second.ambiguous)),
         np.concatenate((found.wide, second.wide)),
+        np.concatenate((found.rivals, np.where(second.rivals < 0, -1, rest[second.rivals]))),
     )

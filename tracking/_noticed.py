@@ -10,7 +10,7 @@ A look is no promise: people often look before they set off. So the belief is dr
 are new looks, by anything that makes it doubtful who this is or what they do:
 
 - a face that looks away, in more than one frame, of somebody who does not walk away;
-- an ambiguous match, or a place that jumps;
+- an ambiguous match, unless the rival has noticed the robot as well, or a place that jumps;
 - a gap in what the other sensors see, once no look is recent;
 - somebody who stood since the last look and moves, or who comes faster towards the robot than on
   the course that they had then, at the least speed since then;
@@ -99,7 +99,8 @@ def with_noticed(
     # Whoever walks away looks where they go, and has to turn round first.
     averted &= (towards * after.states[:, 2:]).sum(axis=1) > -_RECEDING_MPS
     averted_s = np.where(looking, 0.0, after.averted_s + averted * dt_s)
-    dropped = found.ambiguous | _jumped(before, after, frame, found) | (averted_s > _AVERTED_S)
+    dropped = _jumped(before, after, frame, found) | (averted_s > _AVERTED_S)
+    after = _with_doubt(after, found)
     # After a gap nobody knows that it is the same person; a new look excuses motion alone.
     period_s = face_period_s(after, faces, clocks, sensors)
     gap_s = _longest_gap_s(period_s, config.max_evidence_gap_s)
@@ -123,7 +124,7 @@ def with_noticed(
     # Of two cameras, only the time since the last look of either.
     usual_s = np.minimum(dt_s, period_s) if sensors.several_faces else min(dt_s, faces.period_s)
     stands_for_s = np.where(follows, np.fmin(dt_s, since_s), usual_s)
-    looked_s += np.where(dropped, 0.0, looks * stands_for_s)
+    looked_s += np.where(dropped | found.ambiguous, 0.0, looks * stands_for_s)
     return after.replaced(
         looked_s=looked_s,
         look_stamps_s=np.where(looking, stamp, after.look_stamps_s),
@@ -132,6 +133,24 @@ def with_noticed(
         look_standing=np.where(looking, after.standing, stood),
         averted_s=averted_s,
     )
+
+
+def _with_doubt(tracks: TrackTable, found: Found) -> TrackTable:
+    """Return the tracks where an ambiguous match leaves no more belief than its rival has.
+
+    If two people may have been exchanged, what holds for both holds for each of them still.
+    """
+    if not found.ambiguous.any():
+        return tracks
+    looked_s, stamps = tracks.looked_s.copy(), tracks.look_stamps_s.copy()
+    known = np.zeros(len(tracks), dtype=np.bool_)
+    doubtful, rivals = found.rivals.T
+    known[doubtful] = True
+    nobody = rivals < 0
+    np.minimum.at(looked_s, doubtful, np.where(nobody, 0.0, tracks.looked_s[rivals]))
+    np.fmin.at(stamps, doubtful, tracks.look_stamps_s[np.where(nobody, doubtful, rivals)])
+    looked_s[found.ambiguous & ~known] = 0.0
+    return tracks.replaced(looked_s=looked_s, look_stamps_s=stamps)
 
 
 def _longest_gap_s(period_s: float | FloatArray, least_s: float) -> float | FloatArray:
