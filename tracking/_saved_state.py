@@ -12,9 +12,11 @@ import numpy as np
 from perception.arrays import FloatArray, covariance_matrix, rigid_transform
 
 from ._clocks import FrameClock
+from ._config import TrackerConfig
 from ._errors import TrackingError
 from ._exits import Exits
 from ._measurement import Frame, Measurements
+from ._places import places_of, plain_places
 from ._saved_records import (
     FORMAT,
     VERSION,
@@ -88,9 +90,10 @@ def sensors_in(
 
 
 def state_of(
-    record: StateRecord, names: Sequence[str], confirm_hits: int, name: str
+    record: StateRecord, names: Sequence[str], config: TrackerConfig, name: str
 ) -> TrackerState:
     """Return the state that a record describes; ``name`` is for messages."""
+    confirm_hits, window_s = config.confirm_hits, config.standing_window_s
     tracks = record.tracks
     for index, covariance in enumerate(tracks.covariances):
         covariance_matrix(f"{name}.tracks.covariances[{index}]", covariance, 4, TrackingError)
@@ -125,6 +128,7 @@ def state_of(
         look_stamps_s=_array(tracks.look_stamps_s, math.nan),
         look_approaches_mps=_array(tracks.look_approaches_mps),
         look_standing=np.array(tracks.look_standing, dtype=np.bool_),
+        places=places_of(tracks.places or (), count, window_s),
     )
     events = record.exits
     exits = Exits(
@@ -224,6 +228,7 @@ def _plain_state(state: TrackerState, sensors: Sensors) -> dict[str, Any]:
             "look_stamps_s": _finite_or_none(tracks.look_stamps_s),
             "look_approaches_mps": tracks.look_approaches_mps.tolist(),
             "look_standing": tracks.look_standing.tolist(),
+            "places": plain_places(tracks.places),
         },
     }
 

@@ -50,6 +50,8 @@ class TrackTable:
         look_stamps_s: (N,) of the latest look; NaN for none.
         look_approaches_mps: (N,) least speed towards the robot since then, ≥ 0.
         look_standing: (N,) whether the person has stood since then.
+        places: (N, K, 4) latest measured places (``_stillness``), oldest first; K is 0 where nobody
+            asks for them.
     """
 
     ids: IntArray
@@ -77,10 +79,11 @@ class TrackTable:
     look_stamps_s: FloatArray
     look_approaches_mps: FloatArray
     look_standing: BoolArray
+    places: FloatArray
 
     @staticmethod
-    def empty(confirm_hits: int, sensors: int = 1) -> TrackTable:
-        """Return a table without tracks, for this number of sensors."""
+    def empty(confirm_hits: int, sensors: int = 1, places: int = 0) -> TrackTable:
+        """Return a table without tracks, for these numbers of sensors and of places."""
         no_numbers = np.empty(0)
         no_flags = np.empty(0, dtype=np.bool_)
         return TrackTable(
@@ -109,6 +112,7 @@ class TrackTable:
             look_stamps_s=no_numbers,
             look_approaches_mps=no_numbers,
             look_standing=no_flags,
+            places=np.empty((0, places, 4)),
         )
 
     @property

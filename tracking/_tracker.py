@@ -246,16 +246,16 @@ class PersonTracker:
         tracker._clock_restarts = record.clock.restarts
         for name, jumped in record.clock.jumped.items():
             tracker._jumped[name] = JumpedClock(jumped.first_s, jumped.last_s, jumped.stamps)
-        names, hits = tracker._sensors.names, record.config.confirm_hits
+        names = tracker._sensors.names
         tracker._history = History(
             tracker._advance,
             record.config.max_lag_s,
-            state_of(record.base, names, hits, "base"),
+            state_of(record.base, names, record.config, "base"),
             [
                 frame_of(frame, names, f"frames[{index}]")
                 for index, frame in enumerate(record.frames)
             ],
-            state_of(record.latest, names, hits, "latest"),
+            state_of(record.latest, names, record.config, "latest"),
         )
         return tracker
 
