@@ -169,7 +169,8 @@ def _lasting_errors(
     """Return (N,) ≥ 1, by how much errors that last raise variances, and (N,) the sway, in metres.
 
     Noise that is independent from scan to scan averages out over each part of the window. What
-    remains lasts longer. A part farther from the mean place than three standard deviations is sway.
+    remains lasts longer. A part farther from the mean place than one standard deviation is sway, or
+    an error that drifts.
     """
     number = np.where(weight > 0.0, (age_s - _RECENT_S) / (window_s - _RECENT_S) * _PARTS, -1.0)
     part = np.minimum(np.floor(number), _PARTS - 1)
@@ -181,5 +182,5 @@ def _lasting_errors(
     squared = (mean_m * mean_m).sum(axis=2)
     ratio = np.where(filled, 0.5 * squared * safe, 0.0).sum(axis=1)
     spread = ratio / np.maximum(filled.sum(axis=1), 1)
-    beyond_m = np.where(filled, np.sqrt(squared) - _SIGMAS / np.sqrt(safe), 0.0)
+    beyond_m = np.where(filled, np.sqrt(squared) - 1.0 / np.sqrt(safe), 0.0)
     return np.maximum(spread, 1.0), np.maximum(beyond_m.max(axis=1), 0.0)
