@@ -26,7 +26,7 @@ from perception.arrays import FloatArray
 from ._matching import Found
 from ._measurement import Frame
 from ._sensors import Sensors
-from ._table import TrackTable
+from ._table import BoolArray, TrackTable
 
 # Younger places show where the person is, older ones where they stood.
 _RECENT_S: Final = 0.2
@@ -132,7 +132,7 @@ def _bounds(places: FloatArray, window_s: float) -> tuple[FloatArray, FloatArray
 
 
 def _offsets(
-    places: FloatArray, age_s: FloatArray, older: FloatArray, window_s: float
+    places: FloatArray, age_s: FloatArray, older: BoolArray, window_s: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return places (N, K, 2) from where the person stood, their weights (N, K) and a variance.
 

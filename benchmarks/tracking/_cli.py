@@ -347,7 +347,13 @@ def _consistency(
 
 def _starts(options: argparse.Namespace, missed: list[str]) -> None:
     """Measure how soon starts are noticed, and print what that is worth."""
-    from ._starts import RATES_HZ, measure_starts, start_lines, worth_lines
+    # Needs the simulator.
+    from ._starts import (  # noqa: PLC0415
+        RATES_HZ,
+        measure_starts,
+        start_lines,
+        worth_lines,
+    )
 
     print(f"\n{'start delay, s':24s}{'10 %':>6s}{'50 %':>7s}{'75 %':>7s}{'90 %':>7s}", end="")
     print("   known  too short, of frames in motion")

@@ -237,8 +237,7 @@ def _track_of(tracks: tuple[PersonTrack, ...], place_m: FloatArray) -> PersonTra
     near = [
         track
         for track in tracks
-        if track.status == "confirmed"
-        and np.linalg.norm(track.position_odom_m - place_m) < _NEAR_M
+        if track.status == "confirmed" and np.linalg.norm(track.position_odom_m - place_m) < _NEAR_M
     ]
     return min(near, key=lambda track: track.moved_m, default=None)
 

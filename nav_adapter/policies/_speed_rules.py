@@ -89,9 +89,9 @@ class StandingPeople(StrictConfig):
         standing_below_mps: a person stands whose track is no faster, √(speed² + largest variance of
             the velocity). At most the speed reached in ``start_delay_s``, so that somebody who just
             counts as standing is covered.
-        delay_from_tracks: True takes for each person the time since which they can have been walking
-            by ``PersonTrack.moved_m``, and at least ``start_delay_s``. A person without ``moved_m``
-            then counts as walking. False takes ``start_delay_s`` for everybody.
+        delay_from_tracks: True takes for each person the time since which they can have been
+            walking by ``PersonTrack.moved_m``, and at least ``start_delay_s``. A person without
+            ``moved_m`` then counts as walking. False takes ``start_delay_s`` for everybody.
     """
 
     error: ClassVar[type[ValueError]] = NavError

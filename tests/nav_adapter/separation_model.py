@@ -115,7 +115,8 @@ def _begun_s(policy: AwarenessPolicy, track: PersonTrack) -> float | None:
     if math.isinf(track.moved_m):
         return None
     # The way of somebody who speeds up evenly is ½ a t².
-    return max(least_s, track.moved_age_s + (2 * track.moved_m / rule.human_acceleration_mps2) ** 0.5)
+    speeding_up_s = (2.0 * track.moved_m / rule.human_acceleration_mps2) ** 0.5
+    return max(least_s, track.moved_age_s + speeding_up_s)
 
 
 def _walked_m(

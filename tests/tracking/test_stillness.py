@@ -284,9 +284,7 @@ def test_a_camera_beside_the_scanners_takes_nothing_away() -> None:
         tracks = update(tracker, frame)
         if tick % 5 == 0 and tracks:
             place = PLACE + rng.normal(0.0, 0.1, 2)
-            image = observe(
-                place, frame[0], T_odom_camera=camera_at(), covariance_odom_m2=0.1**2
-            )
+            image = observe(place, frame[0], T_odom_camera=camera_at(), covariance_odom_m2=0.1**2)
             tracker.update([image], frame[0], camera_at(), sensor="eye")
     assert tracker.predict(frame[0])[0].moved_m == pytest.approx(alone.moved_m)
 
