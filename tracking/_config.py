@@ -13,8 +13,6 @@ from .config import StrictConfig
 _LEAST_S: Final = 1e-4
 _MOST_S: Final = 1e5
 _MOST_M: Final = 1e4
-# A shorter time does not show where somebody stood.
-_LEAST_WINDOW_S: Final = 0.5
 
 
 class AwarenessFilterConfig(StrictConfig):
@@ -202,9 +200,9 @@ class TrackerConfig(TrackingConfig):
     standing_time_constant_s: float = Field(default=1.0, ge=_LEAST_S, le=_MOST_S)
     """Time constant with which the velocity of an unseen standing person decays."""
 
-    standing_window_s: float = Field(default=0.0, ge=0.0, le=5.0)
-    """``PersonTrack.moved_m`` compares where a person is with where they stood for this long: at
-    least 0.5 s, and 1 s is a good choice. 0 switches it off."""
+    standing_window_s: float | None = Field(default=None, ge=0.5, le=5.0)
+    """``PersonTrack.moved_m`` compares where a person is with where they stood for this long; 1 s
+    is a good choice. None switches it off."""
 
     body_radius_m: float = Field(default=0.25, ge=1e-3, le=10.0)
     """Radius of a person as an occluder: a body hides the people behind it."""
@@ -233,12 +231,3 @@ class TrackerConfig(TrackingConfig):
 
     awareness: AwarenessFilterConfig = Field(default_factory=AwarenessFilterConfig)
     """Settings of the awareness filter."""
-
-    @model_validator(mode="after")
-    def _check_standing_window(self) -> TrackerConfig:
-        if 0.0 < self.standing_window_s < _LEAST_WINDOW_S:
-            raise ValueError(
-                f"standing_window_s must be 0 or at least {_LEAST_WINDOW_S:g} s, "
-                f"got {self.standing_window_s:g} s"
-            )
-        return self

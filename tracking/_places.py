@@ -18,12 +18,12 @@ NUMBERS: Final = 4
 PlainPlace = tuple[float, float, float, int]
 
 
-def slots_of(window_s: float) -> int:
+def slots_of(window_s: float | None) -> int:
     """Return how many places are kept of each person."""
-    return SLOTS if window_s > 0.0 else 0
+    return 0 if window_s is None else SLOTS
 
 
-def no_places(count: int, window_s: float) -> FloatArray:
+def no_places(count: int, window_s: float | None) -> FloatArray:
     """Return the places (count, K, 4) of new tracks."""
     places = np.zeros((count, slots_of(window_s), NUMBERS))
     places[:, :, 0] = -np.inf
@@ -38,10 +38,12 @@ def plain_places(places: FloatArray) -> list[list[PlainPlace]]:
     ]
 
 
-def places_of(plain: Sequence[Sequence[PlainPlace]], count: int, window_s: float) -> FloatArray:
+def places_of(
+    plain: Sequence[Sequence[PlainPlace]], count: int, window_s: float | None
+) -> FloatArray:
     """Return the places (count, K, 4) that :func:`plain_places` made plain."""
     places = no_places(count, window_s)
     for row, each in enumerate(plain):
-        if each:
+        if each and window_s is not None:
             places[row, -len(each) :] = each
     return places

@@ -85,19 +85,19 @@ def with_places(tracks: TrackTable, frame: Frame, found: Found, sensors: Sensors
     return tracks.replaced(places=places)
 
 
-def moved(tracks: TrackTable, window_s: float) -> tuple[FloatArray, FloatArray]:
+def moved(tracks: TrackTable, window_s: float | None) -> tuple[FloatArray, FloatArray]:
     """Return how far people may have moved from where they stood, and until when.
 
     Args:
         tracks: N tracks.
-        window_s: how far back places count.
+        window_s: how far back places count; None for nobody stands.
 
     Returns:
         (N,) metres, infinite for people who do not stand or of whom too little is known, and (N,)
         the stamps that these distances hold for; 0 where the distance is infinite.
     """
     moved_m, stamps_s = np.full(len(tracks), np.inf), np.zeros(len(tracks))
-    if not tracks.places.shape[1]:
+    if window_s is None:
         return moved_m, stamps_s
     rows = np.flatnonzero(tracks.confirmed & (tracks.places[:, -1, 0] > -np.inf))
     if rows.size:

@@ -30,11 +30,13 @@ def two_sensor_cost_ms(
     alone = [frame for frame in both if frame[2] == "camera"]
     memory = AwarenessFilterConfig(**{**config.awareness.model_dump(), "noticed_memory_s": 4.0})
     noticing = config.model_copy(update={"awareness": memory})
+    standing = config.model_copy(update={"standing_window_s": 1.0})
     scanner = {"laser": SensorConfig()}
     makers: dict[str, tuple[Callable[[], PersonTracker], list[_FrameOf]]] = {
         "camera": (lambda: PersonTracker(config), alone),
         "camera and scanner": (lambda: PersonTracker(config, sensors=scanner), both),
         "… and noticed": (lambda: PersonTracker(noticing, sensors=scanner), both),
+        "… and moved": (lambda: PersonTracker(standing, sensors=scanner), both),
     }
     least = {name: np.full(len(frames), np.inf) for name, (_, frames) in makers.items()}
     for _ in range(repeats):
