@@ -20,6 +20,7 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from perception.arrays import FloatArray
 
@@ -27,6 +28,8 @@ from ._matching import Found
 from ._measurement import Frame
 from ._sensors import Sensors
 from ._table import BoolArray, TrackTable
+
+ComplexArray = NDArray[np.complex128]
 
 # Younger places show where the person is, older ones where they stood.
 _RECENT_S: Final = 0.2
@@ -41,7 +44,9 @@ _LEAST_STD_M: Final = 0.004
 # The older places are divided into so many equal times, to find errors that last and sway.
 _PARTS: Final = 8
 # Whoever may have moved farther does not stand.
-_MOST_MOVED_M: Final = 0.07
+_MOST_MOVED_M: Final = 0.06
+# A repeated place is looked for among so many of the latest.
+_MOST_REPEATED: Final = 16
 # A longer time without a place, and somebody may have gone and come back.
 _HOLE_S: Final = 0.25
 # Acceleration for which the number of latest places is chosen.
@@ -68,20 +73,22 @@ def with_places(tracks: TrackTable, frame: Frame, found: Found, sensors: Sensors
     rows = rows[~frame.measurements.weak[found.source[rows]]]
     if not rows.size and not doubtful.any():
         return tracks
-    places = tracks.places.copy()
-    places[doubtful, :, 0] = -np.inf
+    old, stamp = tracks.places, frame.stamp_s
     measured = frame.measurements.positions_odom_m[found.source[rows]]
-    known = places[rows]
-    repeated = (known[:, :, 1:3] == measured[:, None]).all(axis=2)
-    repeated &= (known[:, :, 3] == frame.sensor) & (known[:, :, 0] > -np.inf)
+    latest = old[rows, -_MOST_REPEATED:]
+    repeated = (latest[:, :, 1:3] == measured[:, None]).all(axis=2)
+    repeated &= (latest[:, :, 3] == frame.sensor) & (latest[:, :, 0] > -np.inf)
     fresh = ~repeated.any(axis=1)
     rows, measured = rows[fresh], measured[fresh]
-    gone = frame.stamp_s - places[rows, -1, 0] > _HOLE_S
-    places[rows[gone], :, 0] = -np.inf
-    places[rows, :-1] = places[rows, 1:]
-    places[rows, -1, 0] = frame.stamp_s
+    rest = np.ones(len(old), dtype=np.bool_)
+    rest[rows] = False
+    places = np.empty_like(old)
+    places[:, :-1] = old[:, 1:]
+    places[rest] = old[rest]
+    places[rows[stamp - old[rows, -1, 0] > _HOLE_S], :, 0] = -np.inf
+    places[rows, -1, 0], places[rows, -1, 3] = stamp, frame.sensor
     places[rows, -1, 1:3] = measured
-    places[rows, -1, 3] = frame.sensor
+    places[doubtful, :, 0] = -np.inf
     return tracks.replaced(places=places)
 
 
@@ -111,60 +118,64 @@ def moved(tracks: TrackTable, window_s: float | None) -> tuple[FloatArray, Float
 def _bounds(places: FloatArray, window_s: float) -> tuple[FloatArray, FloatArray]:
     """Return the bounds (N,) and the ages (N,) of the latest places they are for, of (N, K, 4)."""
     age_s = places[:, -1:, 0] - places[:, :, 0]
+    used = min(int((age_s <= window_s).any(axis=0).argmax()), age_s.shape[1] - _MOST_RECENT)
+    places, age_s = places[:, used:], age_s[:, used:]
     older = (age_s >= _RECENT_S) & (age_s <= window_s)
-    offset_m, weight, floor_m2 = _offsets(places, age_s, older, window_s)
+    offset_m, weight, origin_m2 = _offsets(places, age_s, older, window_s)
     spread, excess_m = _lasting_errors(offset_m, weight * older, age_s, window_s)
     # The latest first.
     latest = slice(-1, -_MOST_RECENT - 1, -1)
-    weight = np.cumsum((weight * (age_s < _RECENT_S))[:, latest], axis=1)
-    weighted = (weight > 0.0) & np.isfinite(floor_m2)[:, None]
-    share = np.diff(weight, prepend=0.0, axis=1)
-    safe = np.where(weight > 0.0, weight, 1.0)
-    mean_m = np.cumsum(share[:, :, None] * offset_m[:, latest], axis=1) / safe[:, :, None]
+    share = (weight * (age_s < _RECENT_S))[:, latest]
+    total = np.cumsum(share, axis=1)
+    known = (total > 0.0) & np.isfinite(origin_m2)[:, None]
+    safe = np.where(total > 0.0, total, 1.0)
+    mean_m = np.cumsum(share * offset_m[:, latest], axis=1) / safe
     ages = np.cumsum(share * np.where(share > 0.0, age_s[:, latest], 0.0), axis=1) / safe
-    known_m2 = np.where(np.isfinite(floor_m2), floor_m2, 0.0)[:, None]
-    error_m = _SIGMAS * np.sqrt(spread[:, None] * (1.0 / safe + known_m2))
-    delay_s = np.where(weighted, ages + np.sqrt(2.0 * error_m / _TYPICAL_MPS2), np.inf)
+    variance_m2 = 1.0 / safe + np.where(np.isfinite(origin_m2), origin_m2, 0.0)[:, None]
+    error_m = _SIGMAS * np.sqrt(spread[:, None] * variance_m2)
+    delay_s = np.where(known, ages + np.sqrt(2.0 * error_m / _TYPICAL_MPS2), np.inf)
     best = delay_s.argmin(axis=1)
     each = np.arange(len(places))
-    bound_m = np.hypot(*mean_m[each, best].T) + error_m[each, best] + excess_m
-    return np.where(weighted[each, best], bound_m, np.inf), ages[each, best]
+    bound_m = np.abs(mean_m[each, best]) + error_m[each, best] + excess_m
+    return np.where(known[each, best], bound_m, np.inf), ages[each, best]
 
 
 def _offsets(
     places: FloatArray, age_s: FloatArray, older: BoolArray, window_s: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return places (N, K, 2) from where the person stood, their weights (N, K) and a variance.
+) -> tuple[ComplexArray, FloatArray, FloatArray]:
+    """Return places x + iy (N, K) from where the person stood, their weights (N, K), a variance.
 
     Each sensor has its own older places as origin, and weights of one over its variance per axis; 0
     for sensors with too few. The variance (N,) is that of the origins; infinite without any.
     """
-    offset_m, weight = np.zeros_like(places[:, :, 1:3]), np.zeros_like(age_s)
+    place_m = places[:, :, 1] + 1j * places[:, :, 2]
+    offset_m, weight = np.zeros_like(place_m), np.zeros_like(age_s)
     origin_m2 = np.full(len(places), -np.inf)
+    filled = np.isfinite(places[:, :, 0])
     for sensor in np.unique(places[:, :, 3]):
-        own = (places[:, :, 3] == sensor) & np.isfinite(places[:, :, 0])
-        base = own & older
+        own = filled & (places[:, :, 3] == sensor)
+        base = (own & older).astype(np.float64)
         count = base.sum(axis=1)
-        spans = np.where(base, age_s, 0.0).max(axis=1) >= _LEAST_SPAN * window_s
+        spans = np.where(base > 0.0, age_s, 0.0).max(axis=1) >= _LEAST_SPAN * window_s
         enough = (count >= _LEAST_PLACES) & spans
         if not enough.any():
             continue
-        at_least_two = np.maximum(count, 2)
-        origin = (base[:, :, None] * places[:, :, 1:3]).sum(axis=1) / at_least_two[:, None]
-        off = places[:, :, 1:3] - origin[:, None]
-        squares = (base * (off * off).sum(axis=2)).sum(axis=1)
-        variance = np.maximum(squares / (2.0 * (at_least_two - 1)), _LEAST_STD_M**2)
+        at_least_two = np.maximum(count, 2.0)
+        origin_m = np.einsum("nk,nk->n", base, place_m) / at_least_two
+        off_m = place_m - origin_m[:, None]
+        squares = np.einsum("nk,nk->n", base, off_m.real**2 + off_m.imag**2)
+        variance = np.maximum(squares / (2.0 * (at_least_two - 1.0)), _LEAST_STD_M**2)
         # A scatter of few places may come out too small.
         variance *= 1.0 + 1.0 / np.sqrt(at_least_two)
         mine = own & enough[:, None]
-        offset_m[mine] = off[mine]
+        offset_m = np.where(mine, off_m, offset_m)
         weight += mine / variance[:, None]
         origin_m2 = np.where(enough, np.maximum(origin_m2, variance / at_least_two), origin_m2)
     return offset_m, weight, np.where(origin_m2 > -np.inf, origin_m2, np.inf)
 
 
 def _lasting_errors(
-    offset_m: FloatArray, weight: FloatArray, age_s: FloatArray, window_s: float
+    offset_m: ComplexArray, weight: FloatArray, age_s: FloatArray, window_s: float
 ) -> tuple[FloatArray, FloatArray]:
     """Return (N,) ≥ 1, by how much errors that last raise variances, and (N,) the sway, in metres.
 
@@ -172,15 +183,19 @@ def _lasting_errors(
     remains lasts longer. A part farther from the mean place than one standard deviation is sway, or
     an error that drifts.
     """
-    number = np.where(weight > 0.0, (age_s - _RECENT_S) / (window_s - _RECENT_S) * _PARTS, -1.0)
-    part = np.minimum(np.floor(number), _PARTS - 1)
-    inside = (part[:, None] == np.arange(_PARTS)[:, None]) * weight[:, None]
-    total = inside.sum(axis=2)
+    count = len(offset_m)
+    row, column = np.nonzero(weight > 0.0)
+    number = (age_s[row, column] - _RECENT_S) / (window_s - _RECENT_S) * _PARTS
+    part = row * _PARTS + np.minimum(number.astype(np.intp), _PARTS - 1)
+    weights, off_m = weight[row, column], offset_m[row, column]
+    total, x_m, y_m = (
+        np.bincount(part, values, count * _PARTS).reshape(count, _PARTS)
+        for values in (weights, weights * off_m.real, weights * off_m.imag)
+    )
     filled = total > 0.0
     safe = np.where(filled, total, 1.0)
-    mean_m = inside @ offset_m / safe[:, :, None]
-    squared = (mean_m * mean_m).sum(axis=2)
-    ratio = np.where(filled, 0.5 * squared * safe, 0.0).sum(axis=1)
+    mean_m = np.hypot(x_m, y_m) / safe
+    ratio = np.where(filled, 0.5 * mean_m * mean_m * safe, 0.0).sum(axis=1)
     spread = ratio / np.maximum(filled.sum(axis=1), 1)
-    beyond_m = np.where(filled, np.sqrt(squared) - 1.0 / np.sqrt(safe), 0.0)
-    return np.maximum(spread, 1.0), np.maximum(beyond_m.max(axis=1), 0.0)
+    beyond_m = np.where(filled, mean_m - 1.0 / np.sqrt(safe), 0.0).max(axis=1)
+    return np.maximum(spread, 1.0), np.maximum(beyond_m, 0.0)
