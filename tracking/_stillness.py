@@ -137,6 +137,11 @@ def _bounds(places: FloatArray, window_s: float) -> tuple[FloatArray, FloatArray
     best = delay_s.argmin(axis=1)
     each = np.arange(len(places))
     bound_m = np.abs(mean_m[each, best]) + error_m[each, best] + excess_m
+    # A single place far off is perhaps the first of a start, or of somebody else.
+    single = share > 0.0
+    noise_m = _SIGMAS * np.sqrt(spread[:, None] / np.where(single, share, 1.0))
+    single_m = np.where(single, np.abs(offset_m[:, latest]) - noise_m, 0.0).max(axis=1)
+    bound_m = np.maximum(bound_m, single_m)
     return np.where(known[each, best], bound_m, np.inf), ages[each, best]
 
 

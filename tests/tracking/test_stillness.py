@@ -139,7 +139,7 @@ def test_nobody_has_come_farther_than_the_bound_nor_begun_earlier(case: str) -> 
     assert bounded > 100
     assert farther <= 0.001 * moving
     assert earlier <= 0.001 * moving
-    assert known > (0.7 if case in ("driving", "losses", "coarse") else 0.9) * still
+    assert known > (0.6 if case in ("driving", "losses", "coarse") else 0.9) * still
     if case == "fine":
         assert np.median(delays) < 0.15
     if case == "calm":
@@ -239,13 +239,15 @@ def test_an_ambiguous_match_ends_it() -> None:
 def test_an_id_that_goes_to_somebody_else_has_no_bound() -> None:
     """Somebody steps before a standing person and takes the track; the scatter tells."""
     tracker, track = standing()
-    rng = np.random.default_rng(1)
+    rng, taken = np.random.default_rng(1), 0
     for tick in range(1, 30):
         stamp_s = track.stamp_s + 0.0125 * tick
-        other = PLACE + np.array([-0.25, 0.05]) + rng.normal(0.0, 0.008, 2)
+        other = PLACE + np.array([-0.2, 0.05]) + rng.normal(0.0, 0.008, 2)
         after = nearest(update(tracker, (stamp_s, [seen(other, stamp_s)], FRONT)), other)
         if after.id == track.id:
+            taken += 1
             assert after.moved_m == math.inf
+    assert taken > 10
 
 
 def test_somebody_who_sways_gets_a_longer_bound_or_none() -> None:
