@@ -21,6 +21,7 @@ from ._memory import (
     velocity_variance_m2ps2,
 )
 from ._policy import AwarenessPolicy
+from .policies import StandingPeople
 
 # Below this speed the direction of a velocity is noise.
 _WALKING_MPS: Final = 0.1
@@ -60,8 +61,6 @@ class ObstacleRules:
         self._floor_m, self._sigmas = margins.floor_m, margins.uncertainty_sigmas
         ceiling_m = margins.maximum_radius_m
         self._ceiling_m = math.inf if ceiling_m is None else ceiling_m
-        standing = policy.rules.standing
-        self._start_delay_s = math.inf if standing is None else standing.start_delay_s
         self._elongates = policy.outline.unaware_ahead_s > 0.0
         _require_non_increasing(self._policy_radius_m, type(inflation).__name__, "m")
         _require_non_increasing(self._policy_human_speed_mps, type(speed).__name__, "m/s")
@@ -206,10 +205,12 @@ class ObstacleRules:
             seen_stamp_s=seen_stamp_s,
             noticed_lower=noticed_lower,
         )
-        if trusted and self._is_standing(person):
+        standing = self._policy.rules.standing
+        if standing is not None and trusted and self._is_standing(standing, person):
             # Between the frame that showed the person and the track's stamp nobody looked.
             unseen_s = max(track.stamp_s - seen_stamp_s, 0.0)
-            return person._replace(start_delay_s=self._start_delay_s + unseen_s)
+            delay_s = standing.delay_s(unseen_s, track.moved_m, track.moved_age_s)
+            return person._replace(start_delay_s=delay_s)
         return person
 
     def _noticed_lower(self, track: PersonTrack) -> float:
@@ -223,12 +224,11 @@ class ObstacleRules:
         """Return whether frames have shown a person for less than ``shrink_after_s``."""
         return memory.known_s < self._timing.shrink_after_s - _ROUNDING_S
 
-    def _is_standing(self, memory: PersonMemory) -> bool:
+    def _is_standing(self, standing: StandingPeople, memory: PersonMemory) -> bool:
         """Return whether the bound on human acceleration holds for a freshly seen person."""
-        standing, track = self._policy.rules.standing, memory.track
+        track = memory.track
         return (
-            standing is not None
-            and track.status == "confirmed"
+            track.status == "confirmed"
             and not self._is_first_sight(memory)
             and standing.is_standing(
                 math.hypot(*memory.velocity_odom_mps), velocity_variance_m2ps2(track)

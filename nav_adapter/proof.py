@@ -197,8 +197,8 @@ def check_robot(
         robot: the robot.
         human_speed_mps: the largest human speed.
         clearance_m: C + Z.
-        standing: the rule for people who stand, and then the check is for these; None for people
-            who walk.
+        standing: the rule for people who stand, and then the check is for these, at the delay
+            ``start_delay_s``; None for people who walk.
 
     Raises:
         NavError: for a human speed or a clearance that is negative or not finite.

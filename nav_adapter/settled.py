@@ -45,7 +45,7 @@ def settled_speed_limit_mps(
 
     Returns:
         The smallest limit of all rules in m/s, as :class:`~nav_adapter.NavAdapter` gives it, in the
-        broadcast shape.
+        broadcast shape. With ``delay_from_tracks`` it is the limit at the least delay.
     """
     separation = np.asarray(separation_m, dtype=np.float64)
     standing = policy.rules.standing

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, Final, Literal, TypeAlias
+from typing import Annotated, Any, Final, Literal, TypeAlias
 
 from pydantic import Field, ValidationError, model_validator
 
 from ._config import TrackerConfig
 from ._errors import TrackingError
 from ._exits import MAX_EVENTS
+from ._places import SLOTS, PlainPlace
 from ._sensors import CAMERA, SensorConfig
 from .config import StrictConfig
 
@@ -49,10 +50,12 @@ class TracksRecord(StrictConfig):
     look_speeds_mps: list[float]
     look_standing: list[bool]
     averted_s: list[float]
+    places: list[Annotated[list[PlainPlace], Field(max_length=SLOTS)]] | None = None
 
     @model_validator(mode="after")
     def _check_consistency(self) -> TracksRecord:
-        lengths = {name: len(getattr(self, name)) for name in type(self).model_fields}
+        columns = {name: getattr(self, name) for name in type(self).model_fields}
+        lengths = {name: len(column) for name, column in columns.items() if column is not None}
         if len(set(lengths.values())) > 1:
             raise ValueError(f"every column must have one entry per track, got {lengths}")
         if any(a >= b for a, b in zip([0, *self.ids], self.ids, strict=False)):

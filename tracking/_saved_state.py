@@ -13,10 +13,12 @@ from perception.arrays import FloatArray, covariance_matrix, rigid_transform
 
 from ._admission import Admission, Leap
 from ._clocks import FrameClock
+from ._config import TrackerConfig
 from ._errors import TrackingError
 from ._exits import Exits
 from ._history import History
 from ._measurement import Frame, Measurements
+from ._places import places_of, plain_places
 from ._saved_records import (
     FORMAT,
     VERSION,
@@ -92,7 +94,7 @@ def sensors_in(
 
 def history_of(record: TrackerRecord, empty: History, sensors: Sensors) -> History:
     """Return the history that a record describes, for the tracker of an ``empty`` one."""
-    return _history_of(record, "", record.config.confirm_hits, empty, sensors)
+    return _history_of(record, "", record.config, empty, sensors)
 
 
 def restore_admission(
@@ -106,8 +108,7 @@ def restore_admission(
     admission.refused.update(clock.refused_frames)
     admission.jumped, admission.ahead = _jumps(clock.jumped), _jumps(clock.ahead)
     if leap is not None:
-        hits = record.config.confirm_hits
-        before = _history_of(leap.before, "clock.leap.before.", hits, empty, sensors)
+        before = _history_of(leap.before, "clock.leap.before.", record.config, empty, sensors)
         admission.leap = Leap(before, leap.sensor, leap.stamp_s)
 
 
@@ -120,20 +121,21 @@ def _plain_jumps(jumps: Mapping[str, JumpedClock]) -> dict[str, Any]:
 
 
 def _history_of(
-    record: HistoryRecord, name: str, confirm_hits: int, empty: History, sensors: Sensors
+    record: HistoryRecord, name: str, config: TrackerConfig, empty: History, sensors: Sensors
 ) -> History:
     names = sensors.names
     return empty.restored(
-        state_of(record.base, names, confirm_hits, f"{name}base"),
+        state_of(record.base, names, config, f"{name}base"),
         [frame_of(one, names, f"{name}frames[{i}]") for i, one in enumerate(record.frames)],
-        state_of(record.latest, names, confirm_hits, f"{name}latest"),
+        state_of(record.latest, names, config, f"{name}latest"),
     )
 
 
 def state_of(
-    record: StateRecord, names: Sequence[str], confirm_hits: int, name: str
+    record: StateRecord, names: Sequence[str], config: TrackerConfig, name: str
 ) -> TrackerState:
     """Return the state that a record describes; ``name`` is for messages."""
+    confirm_hits, window_s = config.confirm_hits, config.standing_window_s
     tracks = record.tracks
     for index, covariance in enumerate(tracks.covariances):
         covariance_matrix(f"{name}.tracks.covariances[{index}]", covariance, 4, TrackingError)
@@ -170,6 +172,7 @@ def state_of(
         look_speeds_mps=_array(tracks.look_speeds_mps),
         look_standing=np.array(tracks.look_standing, dtype=np.bool_),
         averted_s=_array(tracks.averted_s),
+        places=places_of(tracks.places or (), count, window_s),
     )
     events = record.exits
     exits = Exits(
@@ -279,6 +282,7 @@ def _plain_state(state: TrackerState, sensors: Sensors) -> dict[str, Any]:
             "look_speeds_mps": tracks.look_speeds_mps.tolist(),
             "look_standing": tracks.look_standing.tolist(),
             "averted_s": tracks.averted_s.tolist(),
+            "places": plain_places(tracks.places),
         },
     }
 

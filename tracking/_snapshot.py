@@ -12,6 +12,7 @@ from ._faces import face_period_s
 from ._noticed import noticed
 from ._sensors import Sensors
 from ._step import TrackerState, predicted
+from ._stillness import moved
 from ._table import BoolArray, TrackTable
 from ._track import PersonTrack, TrackStatus, trusted_track
 from ._track_management import coasted_too_long, shown_empty
@@ -52,6 +53,8 @@ def snapshots(state: TrackerState, stamp_s: float, sensors: Sensors) -> tuple[Pe
             config.awareness,
         )
     estimated = estimate(belief, config.awareness)
+    moved_m, moved_stamps_s = moved(tracks, config.standing_window_s)
+    moved_ages_s = np.where(np.isfinite(moved_m), stamp_s - moved_stamps_s, 0.0)
     # The snapshots share these arrays.
     tracks.states.setflags(write=False)
     tracks.covariances.setflags(write=False)
@@ -71,6 +74,8 @@ def snapshots(state: TrackerState, stamp_s: float, sensors: Sensors) -> tuple[Pe
             (stamp_s - tracks.last_seen_s).tolist(),
             _places_empty(state, tracks, sensors),
             noticed(tracks, stamp_s, faces, state.clocks, sensors).tolist(),
+            moved_m.tolist(),
+            moved_ages_s.tolist(),
         )
     )
 

@@ -19,7 +19,9 @@ from ._matching import Found, match_frame
 from ._measurement import Frame
 from ._motion import predict
 from ._noticed import with_noticed
+from ._places import slots_of
 from ._sensors import Sensors, seen_lately
+from ._stillness import with_places
 from ._table import BoolArray, TrackTable
 from ._track_management import (
     damped_time_s,
@@ -63,7 +65,8 @@ class TrackerState:
 
 def nobody(config: TrackerConfig, sensors: Sensors, next_id: int = 1) -> TrackerState:
     """Return the state before the first frame."""
-    table = TrackTable.empty(config.confirm_hits, len(sensors))
+    slots = slots_of(config.standing_window_s)
+    table = TrackTable.empty(config.confirm_hits, len(sensors), slots)
     return TrackerState(table, (FrameClock(),) * len(sensors), next_id)
 
 
@@ -100,6 +103,7 @@ def advance(state: TrackerState, frame: Frame, sensors: Sensors) -> TrackerState
         found = found.with_births(np.flatnonzero(unmatched))
     tracks = _with_awareness(tracks, frame, found, earlier, state, sensors)
     tracks = with_noticed(before, tracks, frame, found, faces, dt_s, state.clocks, sensors)
+    tracks = with_places(tracks, frame, found, sensors)
     seen = found.seen
     missed_s = missed_time_s(tracks, ~seen, dt_s, frame, config, sensor.view)
     tracks = tracks.replaced(missed_s=missed_s)

@@ -52,6 +52,8 @@ class TrackTable:
         look_speeds_mps: (N,) least speed since then.
         look_standing: (N,) whether the person has stood since then.
         averted_s: (N,) for how long frames since then have shown a face that looks away.
+        places: (N, K, 4) latest measured places (``_stillness``), oldest first; K is 0 where nobody
+            asks for them.
     """
 
     ids: IntArray
@@ -81,10 +83,11 @@ class TrackTable:
     look_speeds_mps: FloatArray
     look_standing: BoolArray
     averted_s: FloatArray
+    places: FloatArray
 
     @staticmethod
-    def empty(confirm_hits: int, sensors: int = 1) -> TrackTable:
-        """Return a table without tracks, for this number of sensors."""
+    def empty(confirm_hits: int, sensors: int = 1, places: int = 0) -> TrackTable:
+        """Return a table without tracks, for these numbers of sensors and of places."""
         no_numbers = np.empty(0)
         no_flags = np.empty(0, dtype=np.bool_)
         return TrackTable(
@@ -115,6 +118,7 @@ class TrackTable:
             look_speeds_mps=no_numbers,
             look_standing=no_flags,
             averted_s=no_numbers,
+            places=np.empty((0, places, 4)),
         )
 
     @property

@@ -18,6 +18,7 @@ from ._existence import confirming_logit
 from ._exits import floor_places
 from ._kalman import inverse_2x2
 from ._measurement import Frame
+from ._places import no_places
 from ._table import BoolArray, IndexArray, TrackTable
 from ._views import View
 from .awareness_filter import prior
@@ -78,6 +79,7 @@ def initiate(
         look_speeds_mps=np.zeros(count),
         look_standing=np.zeros(count, dtype=np.bool_),
         averted_s=np.zeros(count),
+        places=no_places(count, config.standing_window_s),
     )
 
 

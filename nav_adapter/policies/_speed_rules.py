@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import ClassVar, Final
 
 import numpy as np
@@ -88,6 +89,9 @@ class StandingPeople(StrictConfig):
         standing_below_mps: a person stands whose track is no faster, √(speed² + largest variance of
             the velocity). At most the speed reached in ``start_delay_s``, so that somebody who just
             counts as standing is covered.
+        delay_from_tracks: True takes for each person the time since which they can have been
+            walking by ``PersonTrack.moved_m``, and at least ``start_delay_s``. A person without
+            ``moved_m`` then counts as walking. False takes ``start_delay_s`` for everybody.
     """
 
     error: ClassVar[type[ValueError]] = NavError
@@ -95,6 +99,7 @@ class StandingPeople(StrictConfig):
     human_acceleration_mps2: float = Field(default=2.0, ge=0.1, le=20.0)
     start_delay_s: float = Field(default=0.25, ge=0.0, le=2.0)
     standing_below_mps: float = Field(default=0.2, ge=0.0, le=2.0)
+    delay_from_tracks: bool = False
 
     @model_validator(mode="after")
     def _check_reached_speed(self) -> StandingPeople:
@@ -105,6 +110,24 @@ class StandingPeople(StrictConfig):
                 f"{reached_mps:g} m/s, got {self.standing_below_mps:g} m/s"
             )
         return self
+
+    def delay_s(self, unseen_s: float, moved_m: float, moved_age_s: float) -> float:
+        """Return how long before a track's stamp its person may have begun to walk.
+
+        A person who has come by at most d with accelerations of at most a has been speeding up for
+        √(2 d / a) at most, or is no faster than one who has. It is infinite for a person of whom
+        ``moved_m`` says nothing, if the delay is from tracks.
+
+        Args:
+            unseen_s: time between the frame that showed the person and the stamp.
+            moved_m: as :class:`~tracking.PersonTrack` has it.
+            moved_age_s: the same.
+        """
+        least_s = self.start_delay_s + unseen_s
+        if not self.delay_from_tracks:
+            return least_s
+        moving_s = math.sqrt(2.0 * moved_m / self.human_acceleration_mps2)
+        return max(least_s, moved_age_s + moving_s)
 
     def is_standing(self, speed_mps: float, velocity_variance_m2ps2: float) -> bool:
         """Return whether a track of this speed stands; False for NaN.

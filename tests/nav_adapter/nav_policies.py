@@ -85,6 +85,7 @@ def standing_rules(draw: st.DrawFn, lowest_mps2: float = 0.5) -> StandingPeople:
         human_acceleration_mps2=acceleration,
         start_delay_s=delay,
         standing_below_mps=draw(finite(0.0, 1.0)) * acceleration * min(delay, 1.0 / acceleration),
+        delay_from_tracks=draw(st.booleans()),
     )
 
 

@@ -85,13 +85,13 @@ def _person_limit_mps(
             turn = math.pi
         share = max(_share(place - state.position_odom_m, course, turn) for place in places)
     human_mps = _human_mps(policy, state, track, alpha)
-    unseen_s = None
+    begun_s = None
     if known and _stands(policy, track, now):
-        unseen_s = track.time_since_seen_s
+        begun_s = _begun_s(policy, track)
     age_s = now - track.stamp_s
     return max(
-        _fastest_mps(policy, robot, footprint_gap_m, human_mps, age_s, 1.0, unseen_s),
-        _fastest_mps(policy, robot, circle_gap_m, human_mps, age_s, share, unseen_s),
+        _fastest_mps(policy, robot, footprint_gap_m, human_mps, age_s, 1.0, begun_s),
+        _fastest_mps(policy, robot, circle_gap_m, human_mps, age_s, share, begun_s),
     )
 
 
@@ -106,14 +106,27 @@ def _stands(policy: AwarenessPolicy, track: PersonTrack, now: float) -> bool:
     return math.hypot(*track.velocity_odom_mps, math.sqrt(variance)) <= rule.standing_below_mps
 
 
-def _walked_m(
-    policy: AwarenessPolicy, human_mps: float, time_s: float, unseen_s: float | None
-) -> float:
-    """The way of a person in this time; ``unseen_s`` is None for somebody who does not stand."""
+def _begun_s(policy: AwarenessPolicy, track: PersonTrack) -> float | None:
+    """The time since which somebody who stands may walk; None if nobody can say (assumption 8)."""
     rule = policy.rules.standing
-    if rule is None or unseen_s is None:
+    least_s = rule.start_delay_s + track.time_since_seen_s
+    if not rule.delay_from_tracks:
+        return least_s
+    if math.isinf(track.moved_m):
+        return None
+    # The way of somebody who speeds up evenly is ½ a t².
+    speeding_up_s = (2.0 * track.moved_m / rule.human_acceleration_mps2) ** 0.5
+    return max(least_s, track.moved_age_s + speeding_up_s)
+
+
+def _walked_m(
+    policy: AwarenessPolicy, human_mps: float, time_s: float, begun_s: float | None
+) -> float:
+    """The way of a person in this time; ``begun_s`` is None for somebody who does not stand."""
+    rule = policy.rules.standing
+    if rule is None or begun_s is None:
         return human_mps * time_s
-    since_s = time_s + rule.start_delay_s + unseen_s
+    since_s = time_s + begun_s
     # The area under the speed over time: a triangle, less the tip above the speed assumed.
     top_mps = rule.human_acceleration_mps2 * since_s
     tip_mps = max(top_mps - human_mps, 0.0)
@@ -175,14 +188,14 @@ def _fastest_mps(
     human_mps: float,
     track_age_s: float,
     share: float,
-    unseen_s: float | None,
+    begun_s: float | None,
 ) -> float:
     """The highest speed whose protective separation fits into the gap, by bisection."""
     a, T = robot.max_deceleration_mps2, robot.reaction_time_s + track_age_s
 
     def fits(v: float) -> bool:
         way_m = v * T + v * v / (2.0 * a)
-        walked_m = _walked_m(policy, human_mps, T + v / a, unseen_s)
+        walked_m = _walked_m(policy, human_mps, T + v / a, begun_s)
         return walked_m + share * way_m + policy.margins.separation_clearance_m <= gap_m
 
     low, high = 0.0, 2.0 * robot.max_speed_mps
