@@ -262,6 +262,39 @@ def test_an_ambiguous_match_ends_it_and_takes_awareness() -> None:
     assert scene.track.awareness_lower == 0.0
 
 
+@pytest.mark.parametrize(("alpha", "kept"), [(0.9, True), (None, False)])
+def test_of_two_who_may_be_exchanged_each_keeps_what_both_have(
+    alpha: float | None, kept: bool
+) -> None:
+    """Two people come so close that scans cannot tell them apart; nobody looks any more."""
+    tracker = both(REMEMBERS)
+    places = np.array([[3.0, 0.4], [3.0, -0.4]])
+    for tick in range(1, 170):
+        now = 0.02 * tick
+        if 75 < tick < 165:  # slowly towards each other, to 0.1 m
+            places = places + 0.02 * np.array([[0.0, -0.2], [0.0, 0.2]])
+        if tick % 5 == 0 and tick <= 75:
+            scores = (0.9, alpha)
+            seen = [
+                seen_by_camera(place, now, awareness=score)
+                for place, score in zip(places, scores, strict=True)
+            ]
+            tracker.update(seen, now, camera_at())
+        if tick % 2 == 0:
+            scan = [seen_by_laser(place, now) for place in places]
+            tracks = tracker.update(scan, now, laser_at(), sensor=LASER)
+        if tick == 76:
+            first = {track.id: track.noticed for track in tracks}
+    # Each is matched surely at first, then ambiguously.
+    assert max(first.values()) > 0.5
+    assert (min(first.values()) > 0.5) is kept
+    held = [track.noticed for track in tracks if track.id in first]
+    assert len(held) == 2
+    assert (min(held) > 0.4) is kept
+    assert (max(held) > 0.4) is kept
+    assert all(track.awareness_lower == 0.0 for track in tracks)
+
+
 def test_a_place_that_jumps_ends_it() -> None:
     scene = attentive()
     for jump_m, kept in ((0.1, True), (0.31, False)):
