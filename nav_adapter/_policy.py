@@ -6,7 +6,7 @@ import difflib
 from collections.abc import Callable, Mapping
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Final
 
 from pydantic import GetCoreSchemaHandler, model_validator
 from pydantic_core import CoreSchema, core_schema
@@ -76,6 +76,10 @@ class _ShippedOrCustom:
         )
 
 
+# Long enough for a mean place, short enough to follow the drift of odom.
+_STANDING_WINDOW_S: Final = 1.0
+
+
 class AwarenessPolicy(StrictConfig):
     """All settings between a person's awareness and the planner's constraints.
 
@@ -124,6 +128,12 @@ class AwarenessPolicy(StrictConfig):
                     f"{unaware_m:g} m, got {ceiling_m:g} m"
                 )
         return self
+
+    @property
+    def standing_window_s(self) -> float | None:
+        """The setting of this name that a tracker needs for ``rules.standing``; None for off."""
+        standing = self.rules.standing
+        return _STANDING_WINDOW_S if standing is not None and standing.delay_from_tracks else None
 
     @classmethod
     def preset(cls, name: str) -> AwarenessPolicy:

@@ -24,6 +24,7 @@ _BACKGROUND_COLOUR: Final = (246, 245, 242)
 _RACK_COLOUR: Final = (176, 182, 190)
 _ROBOT_COLOUR: Final = (38, 84, 140)
 _PATH_COLOUR: Final = (120, 120, 126)
+_SCAN_COLOUR: Final = (150, 40, 120)
 _CONE_LENGTH_M: Final = 0.4
 # Radius of the disc that marks a person on the map.
 _PERSON_RADIUS_M: Final = 0.22
@@ -139,6 +140,7 @@ class TopView:
             outline = self._pixels(np.asarray(obstacle.polygon.exterior.coords)[:, :2])
             _fill(image, outline, colour, 0.22)
             cv2.polylines(image, [_fixed_point(outline)], True, colour, 1, cv2.LINE_AA, _SHIFT)
+        _mark(image, self._pixels(frame.scan_points_odom_m), _SCAN_COLOUR)
         for worker, view in zip(stage.workers, frame.truth, strict=True):
             eyes = worker.eyes_odom_m[:2]
             gaze = (frame.T_odom_camera[:3, :3] @ view.gaze_camera)[:2]
@@ -191,6 +193,15 @@ def _cone_rim(apex: FloatArray, gaze: FloatArray, half_angle_rad: float) -> Floa
 
 def _drawable(points_px: FloatArray) -> bool:
     return bool(np.isfinite(points_px).all() and np.abs(points_px).max() < _FAR_PX)
+
+
+def _mark(image: ImageRgb, points_px: FloatArray, colour: tuple[int, int, int]) -> None:
+    """Draw each point (N, 2) as a square of two pixels, where it is in the image."""
+    cells = np.round(points_px).astype(int)
+    for shift in ((0, 0), (1, 0), (0, 1), (1, 1)):
+        x, y = (cells + shift).T
+        inside = (x >= 0) & (y >= 0) & (x < image.shape[1]) & (y < image.shape[0])
+        image[y[inside], x[inside]] = colour
 
 
 def _fill(image: ImageRgb, points_px: FloatArray, colour: Any, opacity: float) -> None:

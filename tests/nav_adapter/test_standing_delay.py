@@ -150,3 +150,11 @@ def test_the_rule_survives_a_file(tmp_path: Any) -> None:
     policy.to_yaml(tmp_path / "mine.yaml")
     assert AwarenessPolicy.from_yaml(tmp_path / "mine.yaml") == policy
     assert not StandingPeople().delay_from_tracks
+
+
+def test_a_policy_says_what_its_tracker_needs() -> None:
+    policy = AwarenessPolicy()
+    assert policy.standing_window_s is None
+    own = StandingPeople(start_delay_s=0.2, delay_from_tracks=True)
+    rules = policy.rules.model_copy(update={"standing": own})
+    assert policy.model_copy(update={"rules": rules}).standing_window_s == 1.0
