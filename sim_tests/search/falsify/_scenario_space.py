@@ -58,8 +58,8 @@ class ScenarioSpace:
         for kind, row in varied:
             for name, parameter in _PARAMETERS[kind](self._median[kind][row]).items():
                 self.parameters[f"{kind}.{row}.{name}"] = parameter
-        people = [self._median[kind][row] for kind, row in varied if kind == "people"]
-        self._joint = joint_parameters(people)
+        reactive = [self._median[kind][row] for kind, row in varied if kind == "people"]
+        self._joint = joint_parameters(reactive)
         self.parameters |= self._joint
         for path, distribution in self._distributions.items():
             if path not in self.parameters:
