@@ -156,6 +156,8 @@ class SpeedGovernor:
             "speed and separation": self._separation_limit_mps(*terms),
             **self._rule_limits_mps(gaps_m, shares[1]),
         }
+        if self._policy.rules.start_reserve is not None:
+            limits["start reserve"] = self._start_limit_mps(gaps_m, people, robot_state, age_s)
         return limits, terms
 
     def _people_in(
@@ -269,6 +271,31 @@ class SpeedGovernor:
             limits_mps = highest_speed_mps(*arguments)
         return np.asarray(np.maximum(limits_mps[0], limits_mps[1]))
 
+    def _start_limit_mps(
+        self,
+        gaps_m: FloatArray,
+        people: Mapping[int, PersonMemory],
+        robot_state: RobotState,
+        age_s: FloatArray,
+    ) -> FloatArray:
+        """Return (N,), the limit with which the robot stands before anybody who sets off now."""
+        reserve = self._policy.rules.start_reserve
+        assert reserve is not None
+        positions = np.array([m.track_position_odom_m for m in people.values()])
+        shares = np.ones_like(gaps_m)
+        shares[1] = _ahead(positions - robot_state.position_odom_m, robot_state)
+        limits_mps = highest_speed_from_standing_mps(
+            gaps_m,
+            np.full(len(people), self._rules.unaware_human_speed_mps),
+            self._robot.max_deceleration_mps2,
+            self._robot.reaction_time_s + age_s,
+            0.0,
+            shares,
+            reserve.human_acceleration_mps2,
+            np.full(len(people), reserve.start_delay_s),
+        )
+        return np.asarray(np.maximum(limits_mps[0], limits_mps[1]))
+
     def _rule_limits_mps(self, gaps_m: FloatArray, approach: FloatArray) -> dict[str, FloatArray]:
         """Return the limits (N,) of the policy's other rules, by the name of the rule."""
         rules, (footprint_gap_m, circle_gap_m) = self._policy.rules, gaps_m
@@ -354,3 +381,12 @@ class SpeedGovernor:
         if math.atan2(across_mps, closing_mps) <= turn_rad:
             return walking_mps
         return closing_mps * math.cos(turn_rad) + across_mps * math.sin(turn_rad)
+
+
+def _ahead(offset_odom_m: FloatArray, robot_state: RobotState) -> FloatArray:
+    """Return (N,), the cosine of each point's angle off the course, at least 0; 1 at a stand."""
+    if robot_state.travel_mps < _STANDING_MPS:
+        return np.ones(len(offset_odom_m))
+    along = offset_odom_m @ np.asarray(robot_state.travel_direction_odom)
+    distance = np.maximum(np.hypot(offset_odom_m[:, 0], offset_odom_m[:, 1]), 1e-9)
+    return np.asarray(np.clip(along / distance, 0.0, 1.0))

@@ -50,8 +50,8 @@ _AVERTED_SIGMAS: Final = -1.0
 _AVERTED_LOGIT: Final = math.log(_AVERTED_AWARENESS / (1.0 - _AVERTED_AWARENESS))
 # One frame may be wrong about a face, and two are not both by chance.
 _AVERTED_S: Final = 0.09
-# Somebody walks away at this speed or faster.
-_RECEDING_MPS: Final = 0.3
+# Somebody walks at this speed or faster: three standard deviations of a velocity from scans.
+_WALKING_MPS: Final = 0.4
 # Two scans in a row without the person, or as long a silence, are a gap.
 _GAP_PERIODS: Final = 2.5
 # How much faster towards the robot than before: 2.5 σ of a velocity from scans. Speed and
@@ -97,7 +97,8 @@ def with_noticed(
     dt_s = min(dt_s, config.max_evidence_gap_s) if sees_faces else 0.0
     towards = _towards(after, frame)
     # Whoever walks away looks where they go, and has to turn round first.
-    averted &= (towards * after.states[:, 2:]).sum(axis=1) > -_RECEDING_MPS
+    away = (towards * after.states[:, 2:]).sum(axis=1) < 0.0
+    averted &= ~(away & (np.hypot(after.states[:, 2], after.states[:, 3]) >= _WALKING_MPS))
     averted_s = np.where(looking, 0.0, after.averted_s + averted * dt_s)
     dropped = _jumped(before, after, frame, found) | (averted_s > _AVERTED_S)
     after = _with_doubt(after, found)

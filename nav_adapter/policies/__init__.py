@@ -12,6 +12,7 @@ from ._speed_rules import (
     ProtectiveField,
     SpeedRules,
     StandingPeople,
+    StartReserve,
 )
 from ._tables import TableHumanSpeed, TableInflation
 
@@ -29,6 +30,7 @@ __all__ = [
     "SpeedPolicy",
     "SpeedRules",
     "StandingPeople",
+    "StartReserve",
     "TableHumanSpeed",
     "TableInflation",
     "TimeBehaviour",

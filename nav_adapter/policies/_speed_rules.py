@@ -139,6 +139,26 @@ class StandingPeople(StrictConfig):
         return speed_mps * speed_mps + velocity_variance_m2ps2 <= self.standing_below_mps**2
 
 
+class StartReserve(StrictConfig):
+    """A reserve for people who set off, however aware they are.
+
+    Of aware people speed and separation assumes little or no motion, and a look is no promise. With
+    this rule the robot is never faster than it can stop before somebody reaches it who sets off
+    now: at ``human_acceleration_mps2`` up to the speed assumed for unaware people, noticed after
+    ``start_delay_s``. It counts no clearance, and a robot that keeps its course: nobody is touched,
+    but the separation may be used up. It only lowers the limit.
+
+    Attributes:
+        human_acceleration_mps2: as in :class:`StandingPeople`.
+        start_delay_s: time until the track shows a start.
+    """
+
+    error: ClassVar[type[ValueError]] = NavError
+
+    human_acceleration_mps2: float = Field(default=2.0, ge=0.1, le=20.0)
+    start_delay_s: float = Field(default=0.2, ge=0.0, le=2.0)
+
+
 class NoticedPeople(StrictConfig):
     """What it counts that a person has noticed the robot, and does not look at it now.
 
@@ -190,6 +210,7 @@ class SpeedRules(StrictConfig):
         protective_field: a field like that of a safety laser scanner, for the baseline ``scanner``,
             or None.
         standing: how far people get who stand, or None for people who walk at once.
+        start_reserve: a reserve for people who set off, however aware they are, or None.
         zones: a limit over distance, or None.
         near_cap: a limit near people, or None.
     """
@@ -200,5 +221,6 @@ class SpeedRules(StrictConfig):
     people_turn_deg: float = Field(default=45.0, ge=0.0, le=180.0)
     protective_field: ProtectiveField | None = None
     standing: StandingPeople | None = None
+    start_reserve: StartReserve | None = None
     zones: DistanceZones | None = None
     near_cap: NearCap | None = None

@@ -14,7 +14,7 @@ from ._person import (
 )
 from ._replayed import Replayed, read_recordings, replayed_people
 from ._script import Scripted, WorkerScript
-from ._spec import Glances, PersonSpec, Reactions
+from ._spec import Glances, Lapse, PersonSpec, Reactions
 from ._walker import DECISION_PERIOD_S, Walker
 
 __all__ = [
@@ -22,6 +22,7 @@ __all__ = [
     "DECISION_PERIOD_S",
     "WALKER_RADIUS_M",
     "Glances",
+    "Lapse",
     "MovingBody",
     "PersonBehaviour",
     "PersonMotion",

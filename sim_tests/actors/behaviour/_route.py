@@ -173,6 +173,12 @@ class RouteFollower:
         limit = min(math.sqrt(2.0 * _BRAKING_MPS2 * left_m), _APPROACH_HZ * left_m)
         return DesiredVelocity(ux, uy, min(self._speed_mps, limit))
 
+    def go(self, t_s: float) -> None:
+        """Start or go on at ``t_s``, where the start or the end of a stop would come later."""
+        self._start_s = min(self._start_s, t_s)
+        if self._resumes_s is not None and self.arrived_s is None:
+            self._resumes_s = min(self._resumes_s, t_s)
+
     def _update(self, t_s: float, x: float, y: float, speed_mps: float) -> bool:
         """Update progress, stops and times; return whether the person is walking."""
         if t_s < self._start_s - 1e-9:

@@ -115,6 +115,25 @@ class Reactions(StrictConfig):
         return self
 
 
+class Lapse(StrictConfig):
+    """The end of a person's attention, some time after the first look at the robot.
+
+    From then on the person walks as if no robot were there, until it touches them.
+
+    Attributes:
+        after_look_s: time from the first look at the robot to the lapse.
+        looks_away: the person does not look at the robot any more.
+        halts: the person stands from the first look on, and sets off at the lapse, also where
+            ``start_s`` or a pause would come later.
+    """
+
+    error: ClassVar[type[ValueError]] = SimError
+
+    after_look_s: float = Field(default=2.0, ge=0.0)
+    looks_away: bool = True
+    halts: bool = False
+
+
 class PersonSpec(StrictConfig):
     """A person who walks a route, glances at the robot and reacts to it.
 
@@ -133,6 +152,7 @@ class PersonSpec(StrictConfig):
             look, but never move.
         glances: glances at the robot.
         reactions: shares of the reactions to it.
+        lapse: when the person forgets the robot after a look at it; None never.
         social: social forces of racks, people and, once it has been noticed, the robot.
     """
 
@@ -151,6 +171,7 @@ class PersonSpec(StrictConfig):
     activity: ActivityName = "none"
     glances: Glances = Glances()
     reactions: Reactions = Reactions()
+    lapse: Lapse | None = None
     social: bool = True
 
     @model_validator(mode="after")

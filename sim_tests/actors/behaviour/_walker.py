@@ -9,6 +9,7 @@ import numpy as np
 
 from ...world.errors import SimError
 from ..body import Activity, Gait, OnlineFootsteps, skeleton
+from ._attention_span import AttentionSpan
 from ._avoidance import SlowRobotDetour, limit_approach
 from ._gaze import Gaze
 from ._obstacles import Obstacles
@@ -88,6 +89,7 @@ class Walker:
             )
         gaze_rng, reaction_rng = rng.spawn(2)
         self._gaze = Gaze(spec.glances, spec.stature_m, gaze_rng, seated=spec.seated)
+        self._span = AttentionSpan(spec.lapse)
         self._reactions = ReactionModel(spec.reactions, reaction_rng)
         self._detour = SlowRobotDetour()
         self._activity = Activity(spec.activity, spec.activity)
@@ -257,10 +259,12 @@ class Walker:
         if self.spec.seated:
             self._trajectory.start_segment(t_s, (x, y, 0.0, 0.0), (0.0, 0.0), DECISION_PERIOD_S)
             return
-        on_route = self._follower.desired_velocity(t_s, x, y, math.hypot(vx, vy))
+        if self._span.sets_off:
+            self._follower.go(t_s)
+        on_route = self._span.held(self._follower.desired_velocity(t_s, x, y, math.hypot(vx, vy)))
         if self._walked_to_end_m is None and self.arrived:
             self._walked_to_end_m = self._walked_m
-        walking = self._follower.walking
+        walking = self._follower.walking and not self._span.halted
         desired = self._reactions.react(
             t_s, DECISION_PERIOD_S, (x, y), on_route, robot, standing=not walking
         )
@@ -283,7 +287,11 @@ class Walker:
         visible = (
             self._gaze.in_field_of_view(DECISION_PERIOD_S, place, robot) and around.sees_robot()
         )
-        self._gaze.update(t_s, DECISION_PERIOD_S, place, robot, visible)
+        self._span.update(t_s, self._gaze.noticed_s, self._touch is not None)
+        watched = visible and not self._span.looks_away
+        self._gaze.update(t_s, DECISION_PERIOD_S, place, robot, watched)
+        if self._span.lapsed:
+            return None
         felt = self._touch is not None and t_s - self._touch[2] <= _TOUCHING_S
         if (visible and self._gaze.noticed_s is not None) or felt:
             self._known_robot = (robot, t_s)

@@ -20,13 +20,18 @@ _ASIDE_M: Final = 0.8
 _LONGEST_PAUSE_S: Final = 3.0
 # A shorter pause is none.
 _SHORTEST_PAUSE_S: Final = 0.15
+# A person with this value or more never forgets the robot.
+_NEVER_LAPSES_S: Final = 6.0
+# A person who stands in the scenario takes no shorter way than this after a lapse.
+_SHORTEST_WAY_M: Final = 0.3
+_LONGEST_WAY_M: Final = 3.0
 # A person with this value or more never gives up looking.
 _LOOKS_ON_S: Final = 10.0
 _REACTIONS: Final = ("walk_on", "wait", "hurry", "pass_behind", "claim")
 
 
 def person_parameters(person: Mapping[str, Any]) -> dict[str, Parameter]:
-    """Return the parameters of a person: start, speed, route, a pause, gaze and reaction."""
+    """Return the parameters of a person: start, speed, route, a pause, gaze, reaction, lapse."""
     start_s, speed_mps = float(person["start_s"]), float(person["speed_mps"])
     walks = len(person["route"]) > 1
     parameters = {
@@ -52,6 +57,7 @@ def person_parameters(person: Mapping[str, Any]) -> dict[str, Parameter]:
             ),
             "away_yaw_deg": Parameter.of(-80.0, 80.0, glances["away_yaw_deg"]),
         }
+        parameters |= _lapse_parameters(person)
         if not glances["watches"]:
             parameters |= {
                 "glance_median_s": Parameter.of(0.3, 3.0, glances["glance_median_s"]),
@@ -82,6 +88,7 @@ def changed_person(person: Mapping[str, Any], values: Mapping[str, float]) -> di
         stop = {"at_m": values["pause_at"] * length_m, "for_s": values["pause_s"]}
         changed["pauses"] = sorted([*person["pauses"], stop], key=lambda pause: pause["at_m"])
     _change_glances(changed["glances"], values)
+    _add_lapse(changed, values)
     if "reaction" in values:
         possible = _possible_reactions(person)
         row = int(values["reaction"] * (len(possible) + 1))
@@ -93,6 +100,42 @@ def changed_person(person: Mapping[str, Any], values: Mapping[str, float]) -> di
 def person_path(person: Mapping[str, Any]) -> FloatArray:
     """Return the (N, 2) corners of the route."""
     return np.array([[point["x_m"], point["y_m"]] for point in person["route"]], dtype=np.float64)
+
+
+def _lapse_parameters(person: Mapping[str, Any]) -> dict[str, Parameter]:
+    """Return the parameters of somebody who forgets the robot after a look, or sets off then.
+
+    A person who stands in the scenario sets off in any direction.
+    """
+    parameters = {
+        "lapse_after_s": Parameter.of(0.0, _NEVER_LAPSES_S, _NEVER_LAPSES_S),
+        "lapse_looks_away": Parameter.of(0.0, 1.0, 0.0),
+        "lapse_halts": Parameter.of(0.0, 1.0, 0.0),
+    }
+    if len(person["route"]) == 1:
+        parameters |= {
+            "sets_off_x_m": Parameter.of(-_LONGEST_WAY_M, _LONGEST_WAY_M, 0.0),
+            "sets_off_y_m": Parameter.of(-_LONGEST_WAY_M, _LONGEST_WAY_M, 0.0),
+            "sets_off_mps": Parameter.of(_SLOWEST_MPS, FASTEST_WALK_MPS, person["speed_mps"]),
+        }
+    return parameters
+
+
+def _add_lapse(person: dict[str, Any], values: Mapping[str, float]) -> None:
+    after_s = values.get("lapse_after_s", _NEVER_LAPSES_S)
+    if after_s >= _NEVER_LAPSES_S:
+        return
+    way = np.array([values.get("sets_off_x_m", 0.0), values.get("sets_off_y_m", 0.0)])
+    sets_off = bool(np.hypot(*way) >= _SHORTEST_WAY_M)
+    if sets_off:
+        x, y = (person_path(person)[0] + way).tolist()
+        person["route"] = [*person["route"], {"x_m": x, "y_m": y}]
+        person["speed_mps"] = values["sets_off_mps"]
+    person["lapse"] = {
+        "after_look_s": after_s,
+        "looks_away": values["lapse_looks_away"] >= 0.5,
+        "halts": sets_off or values["lapse_halts"] >= 0.5,
+    }
 
 
 def _change_glances(glances: dict[str, Any], values: Mapping[str, float]) -> None:

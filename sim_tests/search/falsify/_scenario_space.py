@@ -8,9 +8,12 @@ from typing import Any, Final
 import numpy as np
 from pydantic import ValidationError
 
+from perception.arrays import FloatArray
+
 from ...scenario import Choice, Distribution, Integers, Scenario, ScenarioTemplate
 from ...world.errors import SimError
 from .._optimizer import Range
+from ._joint_parameters import add_joint, is_joint_possible, joint_parameters
 from ._person_parameters import changed_person, person_parameters, person_path
 from ._script_parameters import changed_script, is_human, script_parameters, script_path
 from ._variation import RACK_CLEARANCE_M, ROBOT_CLEARANCE_M, Parameter, clearance_m
@@ -27,9 +30,10 @@ class ScenarioSpace:
     """The variations of a scenario that humans could act out.
 
     A variation changes the scenario's own distributions and the parameters of its first people
-    (:func:`person_parameters`, :func:`script_parameters`). A variation that leads through a rack,
-    begins at the robot or exceeds human speed or acceleration is drawn back towards the scenario as
-    written, as far as needed. Every point of the space is therefore a scenario.
+    (:func:`person_parameters`, :func:`script_parameters`), and may add a companion or a parked
+    pallet, or exchange two people's ways (:func:`joint_parameters`). A variation that leads through
+    a rack, begins at the robot or exceeds human speed or acceleration is drawn back towards the
+    scenario as written, as far as needed. Every point of the space is therefore a scenario.
 
     Args:
         template: the scenario.
@@ -54,6 +58,9 @@ class ScenarioSpace:
         for kind, row in varied:
             for name, parameter in _PARAMETERS[kind](self._median[kind][row]).items():
                 self.parameters[f"{kind}.{row}.{name}"] = parameter
+        reactive = [self._median[kind][row] for kind, row in varied if kind == "people"]
+        self._joint = joint_parameters(reactive)
+        self.parameters |= self._joint
         for path, distribution in self._distributions.items():
             if path not in self.parameters:
                 self.parameters[path] = _distribution_parameter(distribution)
@@ -71,13 +78,12 @@ class ScenarioSpace:
     def scenario(self, values: Mapping[str, float]) -> Scenario:
         """Return the possible variation nearest to these values; its name is the template's."""
         for share in _SHARES:
-            data = self._varied(
-                {
-                    name: each.neutral + share * (values[name] - each.neutral)
-                    for name, each in self.parameters.items()
-                }
-            )
-            if share == 0.0 or self._is_possible(data):
+            shared = {
+                name: each.neutral + share * (values[name] - each.neutral)
+                for name, each in self.parameters.items()
+            }
+            data = self._varied(shared)
+            if share == 0.0 or self._is_possible(data, shared):
                 try:
                     return Scenario.model_validate(data)
                 except ValidationError as cause:
@@ -101,10 +107,15 @@ class ScenarioSpace:
             }
             change = changed_script if kind == "workers" else changed_person
             data[kind][row] = change(data[kind][row], own_values)
+        add_joint(data, {name: values[name] for name in self._joint})
         return data
 
-    def _is_possible(self, data: Mapping[str, Any]) -> bool:
+    def _is_possible(self, data: Mapping[str, Any], values: Mapping[str, float]) -> bool:
         robot = np.array([data["robot"]["start_x_m"], data["robot"]["start_y_m"]])
+        if not is_joint_possible(data, values, self._boxes) or not self._is_companion_possible(
+            data, robot
+        ):
+            return False
         for kind, row in self._varied_people:
             changed, original = data[kind][row], self._median[kind][row]
             path_of = script_path if kind == "workers" else person_path
@@ -124,6 +135,16 @@ class ScenarioSpace:
                 if distance_m < min(limit_m, original_m) - 1e-9:
                     return False
             if kind == "workers" and not is_human(changed, original):
+                return False
+        return True
+
+    def _is_companion_possible(self, data: Mapping[str, Any], robot: FloatArray) -> bool:
+        """Return whether people who were added keep clear of racks and of the robot's start."""
+        for person in data["people"][len(self._median["people"]) :]:
+            path = person_path(person)
+            if clearance_m(path, self._boxes) < RACK_CLEARANCE_M - 1e-9:
+                return False
+            if float(np.linalg.norm(path[0] - robot)) < ROBOT_CLEARANCE_M:
                 return False
         return True
 

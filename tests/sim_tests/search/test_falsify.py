@@ -21,6 +21,7 @@ from sim_tests.search.falsify import (
     score,
     worst_trials,
 )
+from sim_tests.search.falsify._joint_parameters import COMPANION
 from sim_tests.search.falsify._person_parameters import person_path
 from sim_tests.search.falsify._script_parameters import peak_speed_and_acceleration, script_path
 from sim_tests.search.falsify._variation import RACK_CLEARANCE_M, bent_path, clearance_m
@@ -49,9 +50,20 @@ def test_people_keep_to_human_limits_and_outside_racks(name, seed):
     space = _SPACES[name]
     median = space.template.median()
     scenario = space.scenario(_values(space, seed))
-    assert scenario.model_copy(update={"people": ()}) == median.model_copy(update={"people": ()})
+    hall = scenario.layout
+    # At most one pallet is parked, and one companion added.
+    assert hall.props[: len(median.layout.props)] == median.layout.props
+    assert len(hall.props) <= len(median.layout.props) + 1
+    assert hall.model_copy(update={"props": median.layout.props}) == median.layout
+    same = {"people": (), "layout": hall}
+    assert scenario.model_copy(update=same) == median.model_copy(update=same)
     boxes = median.layout.obstacle_boxes_odom
-    for person, written in zip(scenario.people, median.people, strict=True):
+    added = scenario.people[len(median.people) :]
+    assert [person.name for person in added] in ([], [COMPANION])
+    for person in added:
+        assert person.speed_mps <= 2.0
+        assert clearance_m(person_path(person.model_dump()), boxes) >= RACK_CLEARANCE_M - 1e-9
+    for person, written in zip(scenario.people, median.people, strict=False):
         assert (
             person.speed_mps <= max(2.0, space.parameters["people.0.speed_mps"].range.high) + 1e-9
         )
