@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ._route import DesiredVelocity
+from ._route import DesiredVelocity, RouteFollower
 from ._spec import Lapse
 
 
@@ -26,11 +26,6 @@ class AttentionSpan:
         """Whether the person does not look at the robot any more."""
         return self.lapsed and self._lapse is not None and self._lapse.looks_away
 
-    @property
-    def sets_off(self) -> bool:
-        """Whether the person starts or goes on now, whatever start and pauses say."""
-        return self.lapsed and self._lapse is not None and self._lapse.halts
-
     def update(self, t_s: float, noticed_s: float | None, touched: bool) -> None:
         """Update the attention.
 
@@ -45,6 +40,14 @@ class AttentionSpan:
         self.halted = self._lapse.halts and not over and not touched
         self.lapsed = over and not touched
 
-    def held(self, wanted: DesiredVelocity) -> DesiredVelocity:
-        """Return the velocity of a person who wants this one: 0 while halted."""
+    def lead(
+        self, follower: RouteFollower, t_s: float, x: float, y: float, speed_mps: float
+    ) -> DesiredVelocity:
+        """Return the velocity along a route of a person at (x, y) with this speed; 0 if halted.
+
+        Somebody who halted sets off at the lapse, whatever start and pauses say.
+        """
+        if self.lapsed and self._lapse is not None and self._lapse.halts:
+            follower.go(t_s)
+        wanted = follower.desired_velocity(t_s, x, y, speed_mps)
         return DesiredVelocity(wanted.ux, wanted.uy, 0.0) if self.halted else wanted

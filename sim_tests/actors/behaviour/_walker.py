@@ -254,9 +254,7 @@ class Walker:
             self._walked_m += math.dist((x, y), self._trajectory.start)
             self._heading += self._turning * DECISION_PERIOD_S
         robot = self._look_at_robot(t_s, (x, y, self._heading), around)
-        if self._span.sets_off:
-            self._follower.go(t_s)
-        on_route = self._span.held(self._follower.desired_velocity(t_s, x, y, math.hypot(vx, vy)))
+        on_route = self._span.lead(self._follower, t_s, x, y, math.hypot(vx, vy))
         if self._walked_to_end_m is None and self.arrived:
             self._walked_to_end_m = self._walked_m
         walking = self._follower.walking and not self._span.halted
