@@ -26,6 +26,7 @@ from .policies import (
     SafetyMargins,
     SpeedPolicy,
     SpeedRules,
+    StartReserve,
     TableHumanSpeed,
     TableInflation,
     TimeBehaviour,
@@ -110,7 +111,7 @@ class AwarenessPolicy(StrictConfig):
         InterpolatedHumanSpeed(watching_above=0.8, watching_human_speed_mps=0.05)
     )
     outline: ObstacleOutline = ObstacleOutline()
-    rules: SpeedRules = SpeedRules()
+    rules: SpeedRules = SpeedRules(start_reserve=StartReserve())
     noticed: NoticedPeople | None = NoticedPeople()
     alerts: AlertRules | None = AlertRules()
     margins: SafetyMargins = SafetyMargins()

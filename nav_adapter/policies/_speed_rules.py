@@ -144,19 +144,20 @@ class StartReserve(StrictConfig):
 
     Of aware people speed and separation assumes little or no motion, and a look is no promise. With
     this rule the robot is never faster than it can stop before somebody reaches it who sets off
-    now: at ``human_acceleration_mps2`` up to the speed assumed for unaware people, noticed after
-    ``start_delay_s``. It counts no clearance, and a robot that keeps its course: nobody is touched,
-    but the separation may be used up. It only lowers the limit.
+    now: at ``human_acceleration_mps2`` up to the speed assumed for unaware people. The robot's
+    reaction time covers the time until the track shows it. The rule counts no clearance, and a
+    robot that keeps its course: nobody is touched, but the separation may be used up. It only
+    lowers the limit.
 
     Attributes:
         human_acceleration_mps2: as in :class:`StandingPeople`.
-        start_delay_s: time until the track shows a start.
+        start_delay_s: time until the track shows a start, beyond the robot's reaction time.
     """
 
     error: ClassVar[type[ValueError]] = NavError
 
     human_acceleration_mps2: float = Field(default=2.0, ge=0.1, le=20.0)
-    start_delay_s: float = Field(default=0.2, ge=0.0, le=2.0)
+    start_delay_s: float = Field(default=0.0, ge=0.0, le=2.0)
 
 
 class NoticedPeople(StrictConfig):

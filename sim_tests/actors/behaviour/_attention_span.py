@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from ._route import DesiredVelocity
+from ._person import RobotBody
+from ._route import DesiredVelocity, RouteFollower
 from ._spec import Lapse
 
 
@@ -21,30 +22,34 @@ class AttentionSpan:
         self._lapse = lapse
         self.halted = self.lapsed = False
 
-    @property
-    def looks_away(self) -> bool:
-        """Whether the person does not look at the robot any more."""
-        return self.lapsed and self._lapse is not None and self._lapse.looks_away
-
-    @property
-    def sets_off(self) -> bool:
-        """Whether the person starts or goes on now, whatever start and pauses say."""
-        return self.lapsed and self._lapse is not None and self._lapse.halts
-
-    def update(self, t_s: float, noticed_s: float | None, touched: bool) -> None:
-        """Update the attention.
+    def sees(self, t_s: float, noticed_s: float | None, touched: bool, visible: bool) -> bool:
+        """Update the attention; return whether the person may look at the robot.
 
         Args:
             t_s: now.
             noticed_s: time of the first look at the robot; None before.
             touched: whether the robot has touched the person, who then remembers it.
+            visible: whether the robot is in the field of view with a free line of sight.
         """
         if self._lapse is None or noticed_s is None:
-            return
+            return visible
         over = t_s - noticed_s >= self._lapse.after_look_s - 1e-9
         self.halted = self._lapse.halts and not over and not touched
         self.lapsed = over and not touched
+        return visible and not (self.lapsed and self._lapse.looks_away)
 
-    def held(self, wanted: DesiredVelocity) -> DesiredVelocity:
-        """Return the velocity of a person who wants this one: 0 while halted."""
+    def known(self, robot: RobotBody | None) -> RobotBody | None:
+        """Return the robot as the person reacts to it: None once it is forgotten."""
+        return None if self.lapsed else robot
+
+    def lead(
+        self, follower: RouteFollower, t_s: float, x: float, y: float, speed_mps: float
+    ) -> DesiredVelocity:
+        """Return the velocity along a route of a person at (x, y) with this speed; 0 if halted.
+
+        Somebody who halted sets off at the lapse, whatever start and pauses say.
+        """
+        if self.lapsed and self._lapse is not None and self._lapse.halts:
+            follower.go(t_s)
+        wanted = follower.desired_velocity(t_s, x, y, speed_mps)
         return DesiredVelocity(wanted.ux, wanted.uy, 0.0) if self.halted else wanted

@@ -255,13 +255,11 @@ class Walker:
         if not first:
             self._walked_m += math.dist((x, y), self._trajectory.start)
             self._heading += self._turning * DECISION_PERIOD_S
-        robot = self._look_at_robot(t_s, (x, y, self._heading), around)
+        robot = self._span.known(self._look_at_robot(t_s, (x, y, self._heading), around))
         if self.spec.seated:
             self._trajectory.start_segment(t_s, (x, y, 0.0, 0.0), (0.0, 0.0), DECISION_PERIOD_S)
             return
-        if self._span.sets_off:
-            self._follower.go(t_s)
-        on_route = self._span.held(self._follower.desired_velocity(t_s, x, y, math.hypot(vx, vy)))
+        on_route = self._span.lead(self._follower, t_s, x, y, math.hypot(vx, vy))
         if self._walked_to_end_m is None and self.arrived:
             self._walked_to_end_m = self._walked_m
         walking = self._follower.walking and not self._span.halted
@@ -287,11 +285,8 @@ class Walker:
         visible = (
             self._gaze.in_field_of_view(DECISION_PERIOD_S, place, robot) and around.sees_robot()
         )
-        self._span.update(t_s, self._gaze.noticed_s, self._touch is not None)
-        watched = visible and not self._span.looks_away
-        self._gaze.update(t_s, DECISION_PERIOD_S, place, robot, watched)
-        if self._span.lapsed:
-            return None
+        visible = self._span.sees(t_s, self._gaze.noticed_s, self._touch is not None, visible)
+        self._gaze.update(t_s, DECISION_PERIOD_S, place, robot, visible)
         felt = self._touch is not None and t_s - self._touch[2] <= _TOUCHING_S
         if (visible and self._gaze.noticed_s is not None) or felt:
             self._known_robot = (robot, t_s)

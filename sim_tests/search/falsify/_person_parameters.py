@@ -57,7 +57,8 @@ def person_parameters(person: Mapping[str, Any]) -> dict[str, Parameter]:
             ),
             "away_yaw_deg": Parameter.of(-80.0, 80.0, glances["away_yaw_deg"]),
         }
-        parameters |= _lapse_parameters(person)
+        if person["activity"] != "sitting":  # seated people look, but never move
+            parameters |= _lapse_parameters(person)
         if not glances["watches"]:
             parameters |= {
                 "glance_median_s": Parameter.of(0.3, 3.0, glances["glance_median_s"]),
