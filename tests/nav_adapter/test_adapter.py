@@ -23,6 +23,7 @@ from nav_scenes import (
 )
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, NavError, max_speed_mps
+from nav_adapter.policies import SpeedRules
 from perception.anthropometry import BODY_RADIUS_M
 from tracking import PersonTrack
 
@@ -35,9 +36,19 @@ def at(tracks: tuple[PersonTrack, ...], stamp_s: float) -> tuple[PersonTrack, ..
     return tuple(replace(track, stamp_s=track.stamp_s + stamp_s) for track in tracks)
 
 
-def settled(alpha: float, *, position: tuple[float, float], seconds: float = 2.0) -> NavConstraints:
+# Without the reserve for people who set off, which test_start_reserve.py tests.
+NO_RESERVE = AwarenessPolicy(rules=SpeedRules())
+
+
+def settled(
+    alpha: float,
+    *,
+    position: tuple[float, float],
+    seconds: float = 2.0,
+    policy: AwarenessPolicy = NO_RESERVE,
+) -> NavConstraints:
     """Return the constraints after a person with this α has stood in view for a while."""
-    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    adapter = NavAdapter(policy, ROBOT)
     for step in range(round(seconds / 0.05) + 1):
         now = 0.05 * step
         result = adapter.update(

@@ -11,10 +11,11 @@ from nav_policies import policies, robots
 from nav_scenes import ROBOT, crowds, numbers, person, robot_at, settled_update
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile
-from nav_adapter.policies import NoticedPeople
+from nav_adapter.policies import NoticedPeople, SpeedRules
 from tracking import PersonTrack
 
-BALANCED = AwarenessPolicy.preset("balanced").model_copy(update={"noticed": None})
+# Without the reserve for people who set off, which would hide the differences.
+BALANCED = AwarenessPolicy(noticed=None, rules=SpeedRules())
 RULE = NoticedPeople(at_least=0.5, counts_as_awareness=0.6)
 
 

@@ -12,7 +12,8 @@ from nav_adapter import AwarenessPolicy, max_speed_mps
 from nav_adapter.policies import SpeedRules
 from perception.anthropometry import BODY_RADIUS_M
 
-POLICY = AwarenessPolicy()
+# Without the reserve for people who set off: these are tests of speed and separation.
+POLICY = AwarenessPolicy(rules=SpeedRules())
 UNAWARE_MPS = POLICY.speed.human_speed_mps(0.0)
 AWARE_MPS = POLICY.speed.human_speed_mps(1.0)
 # The person's distance straight ahead, and the front end of the footprint.

@@ -1,7 +1,7 @@
 """Somebody who watches the robot come, turns away and walks into its way without a look.
 
 A random search over lapses found it. The robot stops in time only if it is slow near people whose
-look it trusts; that is what ``near_cap`` is for.
+look it trusts; that is what ``rules.start_reserve`` is for.
 """
 
 from __future__ import annotations
@@ -38,22 +38,17 @@ SETS_OFF = Scenario.model_validate(
 )
 
 
-def with_near_cap() -> AwarenessPolicy:
-    """Return ``balanced`` with at most 0.8 m/s within 2 m of anybody."""
+def without_reserve() -> AwarenessPolicy:
+    """Return ``balanced`` as it was when the search found this case."""
     data = AwarenessPolicy.preset("balanced").model_dump(mode="json")
-    data["rules"]["near_cap"] = {"within_m": 2.0, "speed_mps": 0.8}
+    data["rules"]["start_reserve"] = None
     return AwarenessPolicy.model_validate(data)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("policy", ["blind", "conservative", "near_cap"])
+@pytest.mark.parametrize("policy", ["blind", "conservative", "balanced"])
 def test_the_robot_does_not_touch_somebody_who_watched_it_and_sets_off(policy):
-    result = run_crossing(
-        SETS_OFF,
-        policy=with_near_cap() if policy == "near_cap" else policy,
-        perception="keypoints+scanner",
-        seed=0,
-    )
+    result = run_crossing(SETS_OFF, policy=policy, perception="keypoints+scanner", seed=0)
     assert not [contact for contact in result.contacts if contact.by == "robot"]
     # The case is there: the person looked at the robot, walked, and came near.
     (person,) = result.people
@@ -61,3 +56,11 @@ def test_the_robot_does_not_touch_somebody_who_watched_it_and_sets_off(policy):
     assert person.length_m > 1.5
     assert result.min_separation_m < 1.0
     assert max(frame.robot_state.speed_mps for frame in result.frames) > 0.5
+
+
+@pytest.mark.slow
+def test_without_the_reserve_it_does():
+    result = run_crossing(
+        SETS_OFF, policy=without_reserve(), perception="keypoints+scanner", seed=0
+    )
+    assert [contact for contact in result.contacts if contact.by == "robot"]
