@@ -8,6 +8,8 @@ from typing import Final, NamedTuple
 from tracking import PersonTrack
 
 Vector2 = tuple[float, float]
+#: Sizes: (visible time until which it held, radius, length ahead).
+History = tuple[tuple[float, float, float], ...]
 
 # Standard deviations by which two positions of one person may differ. 4 are exceeded once in
 # 3000 frames, which costs a moment of speed.
@@ -18,6 +20,8 @@ _SAME_PLACE_M: Final = 0.05
 # Stamps closer than this are equal: the stamp of a sighting is a difference of floats, computed
 # anew for every frame.
 _SAME_STAMP_S = 1e-6
+# Tolerance for rounding where sums of frame periods are compared with a setting.
+_ROUNDING_S: Final = 1e-9
 
 
 class PersonMemory(NamedTuple):
@@ -60,7 +64,7 @@ class PersonMemory(NamedTuple):
     was_confirmed: bool
     ahead_m: float
     direction_odom: Vector2
-    history: tuple[tuple[float, float, float], ...]
+    history: History
     inflation_held: bool
     speed_held: bool
     start_delay_s: float = math.inf
@@ -131,3 +135,24 @@ def has_jumped(before: PersonMemory, track: PersonTrack, walking_mps: float) -> 
         return False
     sigma_m = math.hypot(position_sigma_m(old, stamp_s), position_sigma_m(track, stamp_s))
     return apart_m > way_m + _EXPLAINED_SIGMAS * sigma_m
+
+
+def extended_history(
+    before: History, newest: tuple[float, float, float], within_s: float
+) -> History:
+    """Return the sizes of the last ``within_s`` that exceed the newest, and the newest.
+
+    The size at one sighting holds until the next, so that the first sighting after an absence is no
+    evidence for the time in between.
+    """
+    visible_s, radius_m, ahead_m = newest
+    if len(before) == 1 and radius_m >= before[0][1] and ahead_m >= before[0][2]:
+        return (newest,)
+    extended = (*before[:-1], (visible_s, *before[-1][1:]))
+    larger = (
+        entry
+        for entry in extended
+        if visible_s - entry[0] < within_s - _ROUNDING_S
+        and (entry[1] > radius_m or entry[2] > ahead_m)
+    )
+    return (*larger, newest)

@@ -15,6 +15,7 @@ from ._errors import NavError
 from ._memory import (
     PersonMemory,
     Vector2,
+    extended_history,
     has_jumped,
     motion_at,
     position_sigma_m,
@@ -31,8 +32,6 @@ _FIRST_KEPT_ID: Final = -2
 _WALKER_MPS: Final = 1.6
 # Tolerance for rounding where sums of frame periods are compared with a setting.
 _ROUNDING_S: Final = 1e-9
-
-_History = tuple[tuple[float, float, float], ...]
 
 
 class ObstacleRules:
@@ -292,9 +291,7 @@ class ObstacleRules:
         if visible_s == 0.0:
             # Without a new frame a smaller size is no evidence that it has held.
             shown = max(target[0], before.history[-1][1]), max(target[1], before.history[-1][2])
-        history = _extended_history(
-            before.history, (total_visible_s, *shown), timing.shrink_after_s
-        )
+        history = extended_history(before.history, (total_visible_s, *shown), timing.shrink_after_s)
         shrink_m = timing.shrink_rate_mps * visible_s
         radius_m, ahead_m = target
         if len(history) > 1:
@@ -355,27 +352,6 @@ class ObstacleRules:
 def _is_finite_float(value: float) -> bool:
     """Return whether a value needs no further check; a custom policy may return anything."""
     return type(value) is float and math.isfinite(value)
-
-
-def _extended_history(
-    before: _History, newest: tuple[float, float, float], within_s: float
-) -> _History:
-    """Return the sizes of the last ``within_s`` that exceed the newest, and the newest.
-
-    The size at one sighting holds until the next, so that the first sighting after an absence is no
-    evidence for the time in between.
-    """
-    visible_s, radius_m, ahead_m = newest
-    if len(before) == 1 and radius_m >= before[0][1] and ahead_m >= before[0][2]:
-        return (newest,)
-    extended = (*before[:-1], (visible_s, *before[-1][1:]))
-    larger = (
-        entry
-        for entry in extended
-        if visible_s - entry[0] < within_s - _ROUNDING_S
-        and (entry[1] > radius_m or entry[2] > ahead_m)
-    )
-    return (*larger, newest)
 
 
 def _walking_direction(velocity: Vector2, before: Vector2) -> Vector2:

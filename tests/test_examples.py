@@ -84,7 +84,8 @@ def test_the_two_sensor_example_keeps_the_person_whom_the_robot_passes():
     assert sum(silent) > 3
     assert not any(alpha > 0.0 for alpha, gone in zip(aware, silent, strict=True) if gone)
     limits = [float(text) for text in re.findall(r"limit ([0-9.]+) m/s", out)]
-    assert max(limits[:10]) > 1.0
+    # As fast as the reserve for somebody who sets off allows.
+    assert max(limits[:10]) > 0.9
     assert 0.0 < max(limits[-5:]) < 0.5
 
 

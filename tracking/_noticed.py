@@ -12,6 +12,7 @@ are new looks, by anything that makes it doubtful who this is or what they do:
 - a face that looks away, in more than one frame, of somebody who does not walk away;
 - an ambiguous match, unless the rival has noticed the robot as well, or a place that jumps;
 - a gap in what the other sensors see, once no look is recent;
+- cameras that have fallen silent: nobody would see a face that looks away;
 - somebody who stood since the last look and moves, or who comes faster towards the robot than on
   the course that they had then, at the least speed since then;
 - ``noticed_memory_s`` after the last look.
@@ -52,6 +53,8 @@ _AVERTED_LOGIT: Final = math.log(_AVERTED_AWARENESS / (1.0 - _AVERTED_AWARENESS)
 _AVERTED_S: Final = 0.09
 # Somebody walks at this speed or faster: three standard deviations of a velocity from scans.
 _WALKING_MPS: Final = 0.4
+# Cameras that are silent for longer than this see no face that looks away.
+_BLIND_S: Final = 0.5
 # Two scans in a row without the person, or as long a silence, are a gap.
 _GAP_PERIODS: Final = 2.5
 # How much faster towards the robot than before: 2.5 σ of a velocity from scans. Speed and
@@ -107,6 +110,7 @@ def with_noticed(
     gap_s = _longest_gap_s(period_s, config.max_evidence_gap_s)
     recent_s = np.where(looking, gap_s, grace_s(period_s, config))
     ended = stamp - after.look_stamps_s > config.noticed_memory_s
+    ended |= _is_blind(stamp, faces)
     ended |= _interrupted(before, after, stamp, recent_s, clocks, sensors)
     ended |= _set_off(after, towards) & ~looking
     looked_s = np.where(dropped | ended, 0.0, after.looked_s)
@@ -134,6 +138,14 @@ def with_noticed(
         look_standing=np.where(looking, after.standing, stood),
         averted_s=averted_s,
     )
+
+
+def _is_blind(stamp_s: float, faces: FrameClock) -> bool:
+    """Return whether no camera has sent a frame for so long that nobody would see a face."""
+    if faces.stamp_s is None:
+        return True
+    usual_s = faces.period_s if math.isfinite(faces.period_s) else 0.0
+    return stamp_s - faces.stamp_s > max(_BLIND_S, _GAP_PERIODS * usual_s)
 
 
 def _with_doubt(tracks: TrackTable, found: Found) -> TrackTable:
@@ -176,6 +188,8 @@ def noticed(
     """
     config = sensors.config.awareness
     if config.noticed_memory_s <= 0.0 or not (tracks.looked_s > 0.0).any():
+        return np.zeros(len(tracks))
+    if _is_blind(stamp_s, faces):
         return np.zeros(len(tracks))
     age_s = stamp_s - tracks.look_stamps_s
     counts = tracks.confirmed & (age_s <= config.noticed_memory_s)

@@ -273,13 +273,13 @@ def test_of_two_who_may_be_exchanged_each_keeps_what_both_have(
         now = 0.02 * tick
         if 75 < tick < 165:  # slowly towards each other, to 0.1 m
             places = places + 0.02 * np.array([[0.0, -0.2], [0.0, 0.2]])
-        if tick % 5 == 0 and tick <= 75:
+        if tick % 5 == 0:
             scores = (0.9, alpha)
             seen = [
                 seen_by_camera(place, now, awareness=score)
                 for place, score in zip(places, scores, strict=True)
             ]
-            tracker.update(seen, now, camera_at())
+            tracker.update(seen if tick <= 75 else [], now, camera_at())
         if tick % 2 == 0:
             scan = [seen_by_laser(place, now) for place in places]
             tracks = tracker.update(scan, now, laser_at(), sensor=LASER)
@@ -293,6 +293,17 @@ def test_of_two_who_may_be_exchanged_each_keeps_what_both_have(
     assert (min(held) > 0.4) is kept
     assert (max(held) > 0.4) is kept
     assert all(track.awareness_lower == 0.0 for track in tracks)
+
+
+def test_without_images_nobody_has_noticed() -> None:
+    """A camera that is silent would not see a face that looks away."""
+    scene = attentive()
+    for tick in range(1, 40):
+        now = scene.now + 0.04 * tick
+        seen = [seen_by_laser(scene.place, now)]
+        (track,) = scene.tracker.update(seen, now, laser_at(), sensor=LASER)
+        assert (track.noticed > 0.0) is (0.04 * tick < 0.45) or 0.45 <= 0.04 * tick <= 0.6
+    assert track.noticed == 0.0
 
 
 def test_a_place_that_jumps_ends_it() -> None:

@@ -30,6 +30,7 @@ from sim_tests.actors.body import (
 from sim_tests.world import Warehouse
 from sim_tests.world.bullet import pybullet
 from sim_tests.world.hall import WarehouseLayout
+from sim_tests.world.sightlines import cut_surfaces
 
 NO_BOXES = np.empty((0, 4))
 HEADING_RAD = 0.7
@@ -103,7 +104,7 @@ def test_the_seat_stands_on_the_floor_under_the_hips(hall: Warehouse, kind: str)
     assert 0.05 < hips[0, 2] - height < 0.2
     surface = worker.held_object.surface(0)
     assert surface is not None
-    floor = surface.cut(np.array([0.0, 0.0, 1.0]), 0.01)
+    floor, _ = cut_surfaces([surface], np.array([0.0, 0.0, 1.0]), 0.01)
     corners = in_body(np.column_stack([floor[:, 0, :2], np.zeros(len(floor))]))
     assert np.abs(corners[:, 1]).max() == pytest.approx(0.5 * width, abs=0.01)
 
@@ -111,10 +112,12 @@ def test_the_seat_stands_on_the_floor_under_the_hips(hall: Warehouse, kind: str)
 def test_at_a_scanners_height_there_are_two_shanks_before_four_legs(hall: Warehouse) -> None:
     worker = seated(hall, "giulia")
     normal = np.array([0.0, 0.0, 1.0])
-    shanks = in_body(worker.skin.surface(1).cut(normal, 0.2).reshape(-1, 3))
+    skin = worker.skin.surface(1)
+    assert skin is not None
+    shanks = in_body(cut_surfaces([skin], normal, 0.2)[0].reshape(-1, 3))
     surface = worker.held_object.surface(1)
     assert surface is not None
-    legs = in_body(surface.cut(normal, 0.2).reshape(-1, 3))
+    legs = in_body(cut_surfaces([surface], normal, 0.2)[0].reshape(-1, 3))
     assert shanks[:, 0].min() > 0.25
     assert 0.3 < shanks[:, 0].mean() < 0.5
     assert np.all(np.abs(shanks[:, 1]) > 0.02)
