@@ -282,8 +282,14 @@ class SpeedGovernor:
         reserve = self._policy.rules.start_reserve
         assert reserve is not None
         positions = np.array([m.track_position_odom_m for m in people.values()])
+        offset = positions - robot_state.position_odom_m
         shares = np.ones_like(gaps_m)
-        shares[1] = _ahead(positions - robot_state.position_odom_m, robot_state)
+        shares[1] = _ahead(offset, robot_state)
+        # Whoever comes already has been speeding up for as long as that takes.
+        velocity = np.array([m.velocity_odom_mps for m in people.values()])
+        distance = np.maximum(np.hypot(offset[:, 0], offset[:, 1]), 1e-9)
+        closing_mps = np.maximum(-(velocity * offset).sum(axis=1) / distance, 0.0)
+        delay_s = reserve.start_delay_s + closing_mps / reserve.human_acceleration_mps2
         limits_mps = highest_speed_from_standing_mps(
             gaps_m,
             np.full(len(people), self._rules.unaware_human_speed_mps),
@@ -292,7 +298,7 @@ class SpeedGovernor:
             0.0,
             shares,
             reserve.human_acceleration_mps2,
-            np.full(len(people), reserve.start_delay_s),
+            delay_s,
         )
         return np.asarray(np.maximum(limits_mps[0], limits_mps[1]))
 

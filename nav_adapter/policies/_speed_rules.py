@@ -144,8 +144,9 @@ class StartReserve(StrictConfig):
 
     Of aware people speed and separation assumes little or no motion, and a look is no promise. With
     this rule the robot is never faster than it can stop before somebody reaches it who sets off
-    now: at ``human_acceleration_mps2`` up to the speed assumed for unaware people. The robot's
-    reaction time covers the time until the track shows it. The rule counts no clearance, and a
+    now: at ``human_acceleration_mps2`` up to the speed assumed for unaware people, from the speed
+    at which the track comes nearer already. The robot's reaction time covers the time until the
+    track shows a start. The rule counts no clearance, and a
     robot that keeps its course: nobody is touched, but the separation may be used up. It only
     lowers the limit.
 
