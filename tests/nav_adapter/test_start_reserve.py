@@ -68,6 +68,29 @@ def test_nobody_ahead_who_sets_off_is_touched() -> None:
     assert touched > 20
 
 
+@given(ahead=finite(1.5, 4.5), coming=finite(0.0, 1.2))
+def test_somebody_who_comes_and_goes_on_speeding_up_is_not_touched(
+    ahead: float, coming: float
+) -> None:
+    track = person(position=(ahead, 0.0), velocity=(-coming, 0.0), awareness_lower=1.0)
+    limit = limit_mps(track)
+    assert limit <= limit_mps(replace(track, velocity_odom_mps=np.zeros(2))) + 1e-12
+    gap = gap_at_standstill_m(
+        ahead - float(ROBOT.footprint_m[:, 0].max()) - BODY_RADIUS_M,
+        limit,
+        limit,
+        WALKER_MPS,
+        acceleration_mps2=ROBOT.max_acceleration_mps2,
+        deceleration_mps2=ROBOT.max_deceleration_mps2,
+        reaction_time_s=ROBOT.reaction_time_s,
+        human_acceleration_mps2=RESERVE.human_acceleration_mps2,
+        # From a stand to the present speed; the way until now is behind them.
+        start_delay_s=coming / RESERVE.human_acceleration_mps2,
+    )
+    already_m = coming**2 / (2.0 * RESERVE.human_acceleration_mps2)
+    assert limit == 0.0 or float(gap) + already_m >= -1e-9
+
+
 @given(angle=finite(0.0, math.pi), away=finite(1.0, 4.0), speed=finite(0.1, 1.5))
 def test_people_beside_the_course_limit_less_than_people_ahead(
     angle: float, away: float, speed: float
