@@ -64,3 +64,48 @@ def test_without_the_reserve_it_does():
         SETS_OFF, policy=without_reserve(), perception="keypoints+scanner", seed=0
     )
     assert [contact for contact in result.contacts if contact.by == "robot"]
+
+
+#: Starts at almost 3 m/s², still looks, and is at 1.3 m/s while the track says 0.6 m/s.
+STARTS_FAST = Scenario.model_validate(
+    {
+        "name": "starts_fast",
+        "duration_s": 7.0,
+        "layout": "open",
+        "robot": {"goal_x_m": 10.0, "lane_half_width_m": 0.9527603998748455},
+        "camera": {"horizontal_fov_deg": 120.0, "timing": {"rate_hz": 15.0}},
+        "people": [
+            {
+                "name": "p",
+                "route": [
+                    {"x_m": 5.486146876809022, "y_m": 1.5553610861363154},
+                    {"x_m": 3.964144007150362, "y_m": -0.7469190334528479},
+                ],
+                "speed_mps": 1.9742981171664247,
+                "heading_deg": -156.08928605157666,
+                "glances": {
+                    "watches": True,
+                    "first_glance_delay_s": 0.1246794061291931,
+                    "notices_within_m": 15.0,
+                    "gives_up_after_s": 0.9830687460776963,
+                    "away_yaw_deg": 8.896565417761892,
+                },
+                "reactions": {"walk_on": 1.0},
+                "lapse": {"after_look_s": 2.8271981135289925, "looks_away": False, "halts": True},
+            }
+        ],
+    }
+)
+
+
+@pytest.mark.slow
+def test_of_a_start_that_the_track_follows_late_the_robot_stands_in_time():
+    """The reserve counts the speed of the track as a start already made."""
+    results = [
+        run_crossing(STARTS_FAST, policy=policy, perception="keypoints+scanner", seed=538)
+        for policy in ("balanced", without_reserve())
+    ]
+    kept, bare = results
+    assert not [each for each in kept.contacts if each.by == "robot"]
+    assert kept.min_margin_m > -0.15
+    assert bare.min_margin_m < -0.3
