@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
+from functools import partial
 from typing import TypeAlias
 
-from .._errors import NavError
 from ._bridge import AwarenessBridge
+from ._message_thread import MessageThread
 from .messages.sensor_msgs import CameraInfo, CompressedImage, Image
 
 AnyImage: TypeAlias = Image | CompressedImage
 
 
-class PerceptionThread:
+class PerceptionThread(MessageThread):
     """Passes calibrations and images to a bridge, in a thread of its own.
 
     Only the newest image waits while another one is processed, and only the newest calibration; a
@@ -36,13 +36,10 @@ class PerceptionThread:
         *,
         on_frame: Callable[[], None] = lambda: None,
     ) -> None:
-        self._bridge, self._clock, self._on_frame = bridge, clock, on_frame
+        super().__init__(bridge, "perception")
+        self._clock, self._on_frame = clock, on_frame
         self._calibration: Callable[[], CameraInfo] | None = None
         self._image: Callable[[], AnyImage] | None = None
-        self._closing = False
-        self._changed = threading.Condition()
-        # A network that hangs must not keep the process from ending.
-        self._thread = threading.Thread(target=self._run, name="perception", daemon=True)
         self._thread.start()
 
     def calibrate(self, message: Callable[[], CameraInfo]) -> None:
@@ -57,30 +54,15 @@ class PerceptionThread:
             self._image = message
             self._changed.notify()
 
-    def close(self, timeout_s: float = 5.0) -> bool:
-        """End the thread after the message in hand; return False if that takes too long."""
-        with self._changed:
-            self._closing = True
-            self._changed.notify()
-        self._thread.join(timeout_s)
-        return not self._thread.is_alive()
+    def _is_waiting(self) -> bool:
+        return self._calibration is not None or self._image is not None
 
-    def _run(self) -> None:
-        while True:
-            with self._changed:
-                self._changed.wait_for(lambda: self._closing or self._calibration or self._image)
-                if self._closing:
-                    return
-                calibration, self._calibration = self._calibration, None
-                image = None
-                if calibration is None:
-                    image, self._image = self._image, None
-            try:
-                self._pass_on(calibration, image)
-            except NavError as problem:
-                self._bridge.refuse(str(problem))
-            except Exception as problem:
-                self._bridge.perception_failed(problem)
+    def _take(self) -> Callable[[], None]:
+        calibration, self._calibration = self._calibration, None
+        image = None
+        if calibration is None:
+            image, self._image = self._image, None
+        return partial(self._pass_on, calibration, image)
 
     def _pass_on(
         self, calibration: Callable[[], CameraInfo] | None, image: Callable[[], AnyImage] | None

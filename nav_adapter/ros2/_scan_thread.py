@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import threading
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 from typing import Final
 
 from .._errors import NavError
 from ._bridge import AwarenessBridge
+from ._message_thread import MessageThread
 from .messages.nav_msgs import OccupancyGrid
 from .messages.sensor_msgs import LaserScan
 
@@ -16,7 +17,7 @@ from .messages.sensor_msgs import LaserScan
 _WAITING: Final = 8
 
 
-class ScanThread:
+class ScanThread(MessageThread):
     """Passes scans and maps to a bridge, in a thread of its own, in the order in which they came.
 
     If scans come faster than they are processed, the oldest are dropped and counted. Messages are
@@ -29,12 +30,10 @@ class ScanThread:
     """
 
     def __init__(self, bridge: AwarenessBridge, clock: Callable[[], float]) -> None:
-        self._bridge, self._clock = bridge, clock
+        super().__init__(bridge, "scans")
+        self._clock = clock
         self._scans: deque[tuple[int, Callable[[], LaserScan]]] = deque()
         self._map: Callable[[], OccupancyGrid] | None = None
-        self._closing = False
-        self._changed = threading.Condition()
-        self._thread = threading.Thread(target=self._run, name="scans", daemon=True)
         self._thread.start()
 
     def submit(self, number: int, message: Callable[[], LaserScan]) -> None:
@@ -54,31 +53,17 @@ class ScanThread:
             self._map = message
             self._changed.notify()
 
-    def close(self, timeout_s: float = 5.0) -> bool:
-        """End the thread after the message in hand; return False if that takes too long."""
-        with self._changed:
-            self._closing = True
-            self._changed.notify()
-        self._thread.join(timeout_s)
-        return not self._thread.is_alive()
+    def _is_waiting(self) -> bool:
+        return self._map is not None or bool(self._scans)
 
-    def _run(self) -> None:
-        while True:
-            with self._changed:
-                self._changed.wait_for(lambda: self._closing or self._map or self._scans)
-                if self._closing:
-                    return
-                new_map, self._map = self._map, None
-                scan = self._scans.popleft() if new_map is None else None
-            try:
-                if new_map is not None:
-                    self._bridge.on_map(new_map())
-                if scan is not None:
-                    self._pass_on(*scan)
-            except NavError as problem:
-                self._bridge.refuse(str(problem))
-            except Exception as problem:
-                self._bridge.perception_failed(problem)
+    def _take(self) -> Callable[[], None]:
+        new_map, self._map = self._map, None
+        if new_map is not None:
+            return partial(self._pass_on_map, new_map)
+        return partial(self._pass_on, *self._scans.popleft())
+
+    def _pass_on_map(self, message: Callable[[], OccupancyGrid]) -> None:
+        self._bridge.on_map(message())
 
     def _pass_on(self, number: int, message: Callable[[], LaserScan]) -> None:
         try:
