@@ -1,4 +1,4 @@
-"""Which frames a tracker takes, judged by their stamps, and which one it takes back later.
+"""Admission of frames to a tracker, judged by their stamps; one may be taken back later.
 
 Four things can be wrong with a stamp. A single one is late: it is refused. A single one is far
 ahead: it is refused, or, if it may be the end of a pause, taken until a frame in time shows that it
@@ -42,7 +42,7 @@ class Leap:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Entry:
-    """How a frame is taken.
+    """The way in which a frame is taken.
 
     Attributes:
         history: to which it belongs; None for a new one, since the clock has been set.

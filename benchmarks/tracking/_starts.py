@@ -1,4 +1,4 @@
-"""How soon a start of somebody who stood is noticed: simulated legs, scanners, detector, tracker.
+"""Delays until a start is noticed of somebody who stood: simulated legs, detector and tracker.
 
 A robot with two diagonal scanners stands, or drives at 0.5 to 1.2 m/s. Somebody stands 0.75 to 5 m
 away and sets off at 1, 2 or 3 m/s² up to 1 to 1.6 m/s, two in five straight towards the robot. The

@@ -162,7 +162,7 @@ class StartReserve(StrictConfig):
 
 
 class NoticedPeople(StrictConfig):
-    """What it counts that a person has noticed the robot, and does not look at it now.
+    """A rule for people who have noticed the robot, and do not look at it now.
 
     ``PersonTrack.noticed`` is the belief that they know of the robot. While it is high enough, the
     lower bound of α is at least ``counts_as_awareness``, for obstacle and speed limit. Hysteresis

@@ -1,4 +1,4 @@
-"""Where the robot and its sensors are: odometry, tf and fixed mounts."""
+"""Poses of the robot and its sensors: odometry, tf and fixed mounts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which sensors are at work, and whether those at work see enough to drive on."""
+"""A watch over the sensors at work, and whether they see enough to drive on."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ _AHEAD_S: Final = 0.05
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sensed:
-    """What the robot knows in one control cycle.
+    """The knowledge of the robot in one control cycle.
 
     Attributes:
         state: its own state.

@@ -37,7 +37,7 @@ def limit_mps(
     return settled_update((track,), policy=policy, state=state).speed_limit_mps
 
 
-def gap_m(separation_m: float, limit: float, acceleration_mps2: float = 2.0) -> float:
+def gap_m(separation_m: float, limit: float, start_delay_s: float = 0.0) -> float:
     """Return how far somebody who sets off now is away when the robot has stopped."""
     gap = gap_at_standstill_m(
         separation_m,
@@ -47,7 +47,8 @@ def gap_m(separation_m: float, limit: float, acceleration_mps2: float = 2.0) -> 
         acceleration_mps2=ROBOT.max_acceleration_mps2,
         deceleration_mps2=ROBOT.max_deceleration_mps2,
         reaction_time_s=ROBOT.reaction_time_s,
-        human_acceleration_mps2=acceleration_mps2,
+        human_acceleration_mps2=RESERVE.human_acceleration_mps2,
+        start_delay_s=start_delay_s,
     )
     return float(gap)
 
@@ -75,20 +76,11 @@ def test_somebody_who_comes_and_goes_on_speeding_up_is_not_touched(
     track = person(position=(ahead, 0.0), velocity=(-coming, 0.0), awareness_lower=1.0)
     limit = limit_mps(track)
     assert limit <= limit_mps(replace(track, velocity_odom_mps=np.zeros(2))) + 1e-12
-    gap = gap_at_standstill_m(
-        ahead - float(ROBOT.footprint_m[:, 0].max()) - BODY_RADIUS_M,
-        limit,
-        limit,
-        WALKER_MPS,
-        acceleration_mps2=ROBOT.max_acceleration_mps2,
-        deceleration_mps2=ROBOT.max_deceleration_mps2,
-        reaction_time_s=ROBOT.reaction_time_s,
-        human_acceleration_mps2=RESERVE.human_acceleration_mps2,
-        # From a stand to the present speed; the way until now is behind them.
-        start_delay_s=coming / RESERVE.human_acceleration_mps2,
-    )
+    # From a stand to the present speed; the way until now is behind them.
+    begun_s = coming / RESERVE.human_acceleration_mps2
+    separation_m = ahead - float(ROBOT.footprint_m[:, 0].max()) - BODY_RADIUS_M
     already_m = coming**2 / (2.0 * RESERVE.human_acceleration_mps2)
-    assert limit == 0.0 or float(gap) + already_m >= -1e-9
+    assert limit == 0.0 or gap_m(separation_m, limit, begun_s) + already_m >= -1e-9
 
 
 @given(angle=finite(0.0, math.pi), away=finite(1.0, 4.0), speed=finite(0.1, 1.5))

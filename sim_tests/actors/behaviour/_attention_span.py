@@ -8,7 +8,7 @@ from ._spec import Lapse
 
 
 class AttentionSpan:
-    """Whether a person stands and looks, or has forgotten the robot.
+    """Tells whether a person stands and looks, or has forgotten the robot.
 
     Args:
         lapse: when and how the attention ends; None never.

@@ -43,7 +43,7 @@ class Holder(Protocol):
 
     @property
     def seat(self) -> Seat:
-        """What the body sits on when seated."""
+        """The seat that the body takes when seated."""
         ...
 
     @property

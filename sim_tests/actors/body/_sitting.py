@@ -34,7 +34,7 @@ _TOE_OUT_RAD: Final = math.radians(8.0)
 
 @dataclass(frozen=True, slots=True)
 class Seat:
-    """What somebody sits on; it stands on the floor.
+    """A seat, which stands on the floor.
 
     Attributes:
         kind: a stool with four legs, or a closed box, which hides the legs behind it.

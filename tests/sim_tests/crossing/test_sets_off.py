@@ -6,35 +6,43 @@ look it trusts; that is what ``rules.start_reserve`` is for.
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from nav_adapter import AwarenessPolicy
 from sim_tests import Scenario, run_crossing
 
-SETS_OFF = Scenario.model_validate(
+
+def scene(name: str, lane_half_width_m: float, person: dict[str, Any]) -> Scenario:
+    """Return a robot that drives along its lane on an open floor, and a person beside it."""
+    return Scenario.model_validate(
+        {
+            "name": name,
+            "duration_s": 7.0,
+            "layout": "open",
+            "robot": {"goal_x_m": 10.0, "lane_half_width_m": lane_half_width_m},
+            "camera": {"horizontal_fov_deg": 120.0, "timing": {"rate_hz": 15.0}},
+            "people": [{"name": "worker", "reactions": {"walk_on": 1.0}, **person}],
+        }
+    )
+
+
+SETS_OFF = scene(
+    "sets_off",
+    0.72,
     {
-        "name": "sets_off",
-        "duration_s": 7.0,
-        "layout": "open",
-        "robot": {"goal_x_m": 10.0, "lane_half_width_m": 0.72},
-        "camera": {"horizontal_fov_deg": 120.0, "timing": {"rate_hz": 15.0}},
-        "people": [
-            {
-                "name": "worker",
-                "route": [{"x_m": 3.99, "y_m": -0.72}, {"x_m": 2.56, "y_m": 0.61}],
-                "speed_mps": 1.43,
-                "heading_deg": -161.0,
-                "social": False,
-                "glances": {
-                    "watches": True,
-                    "first_glance_delay_s": 0.15,
-                    "notices_within_m": 15.0,
-                },
-                "reactions": {"walk_on": 1.0},
-                "lapse": {"after_look_s": 2.24, "looks_away": True, "halts": True},
-            }
-        ],
-    }
+        "route": [{"x_m": 3.99, "y_m": -0.72}, {"x_m": 2.56, "y_m": 0.61}],
+        "speed_mps": 1.43,
+        "heading_deg": -161.0,
+        "social": False,
+        "glances": {
+            "watches": True,
+            "first_glance_delay_s": 0.15,
+            "notices_within_m": 15.0,
+        },
+        "lapse": {"after_look_s": 2.24, "looks_away": True, "halts": True},
+    },
 )
 
 
@@ -67,34 +75,25 @@ def test_without_the_reserve_it_does():
 
 
 #: Starts at almost 3 m/s², still looks, and is at 1.3 m/s while the track says 0.6 m/s.
-STARTS_FAST = Scenario.model_validate(
+STARTS_FAST = scene(
+    "starts_fast",
+    0.9527603998748455,
     {
-        "name": "starts_fast",
-        "duration_s": 7.0,
-        "layout": "open",
-        "robot": {"goal_x_m": 10.0, "lane_half_width_m": 0.9527603998748455},
-        "camera": {"horizontal_fov_deg": 120.0, "timing": {"rate_hz": 15.0}},
-        "people": [
-            {
-                "name": "p",
-                "route": [
-                    {"x_m": 5.486146876809022, "y_m": 1.5553610861363154},
-                    {"x_m": 3.964144007150362, "y_m": -0.7469190334528479},
-                ],
-                "speed_mps": 1.9742981171664247,
-                "heading_deg": -156.08928605157666,
-                "glances": {
-                    "watches": True,
-                    "first_glance_delay_s": 0.1246794061291931,
-                    "notices_within_m": 15.0,
-                    "gives_up_after_s": 0.9830687460776963,
-                    "away_yaw_deg": 8.896565417761892,
-                },
-                "reactions": {"walk_on": 1.0},
-                "lapse": {"after_look_s": 2.8271981135289925, "looks_away": False, "halts": True},
-            }
+        "route": [
+            {"x_m": 5.486146876809022, "y_m": 1.5553610861363154},
+            {"x_m": 3.964144007150362, "y_m": -0.7469190334528479},
         ],
-    }
+        "speed_mps": 1.9742981171664247,
+        "heading_deg": -156.08928605157666,
+        "glances": {
+            "watches": True,
+            "first_glance_delay_s": 0.1246794061291931,
+            "notices_within_m": 15.0,
+            "gives_up_after_s": 0.9830687460776963,
+            "away_yaw_deg": 8.896565417761892,
+        },
+        "lapse": {"after_look_s": 2.8271981135289925, "looks_away": False, "halts": True},
+    },
 )
 
 
