@@ -14,6 +14,7 @@ from perception.laser import RobotMotion
 from tracking import CameraView, PersonTrack, PersonTracker, SurroundView, TrackerConfig
 
 from ..world.camera import CameraTiming
+from ..world.errors import SimError
 from ._stage import Stage, TrueView
 from .eyes import (
     ORACLE,
@@ -72,6 +73,9 @@ class Sensing:
         timing_rng: random generator of its losses and delays.
         pipeline: pipeline for pixels; None for the shipped networks.
         fault: a fault of the sensors; None for none.
+
+    Raises:
+        SimError: for a perception with scanners and a scenario without any.
     """
 
     def __init__(
@@ -108,6 +112,11 @@ class Sensing:
         self._scanners: ScannerEyes | None = None
         if perception.has_scanners:
             specs, body = stage.scenario.scanners, stage.amr.profile.footprint_m
+            if not specs:
+                raise SimError(
+                    f"perception {perception.name!r} needs laser scanners, but the scenario "
+                    f"{stage.scenario.name!r} has none (scanners: [])"
+                )
             self._scanners = ScannerEyes(
                 stage.warehouse,
                 specs,
