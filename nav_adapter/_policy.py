@@ -116,7 +116,7 @@ class AwarenessPolicy(StrictConfig):
     alerts: AlertRules | None = AlertRules()
     margins: SafetyMargins = SafetyMargins()
     timing: TimeBehaviour = TimeBehaviour()
-    filter: AwarenessFilterConfig = AwarenessFilterConfig(noticed_memory_s=4.0)
+    filter: AwarenessFilterConfig = AwarenessFilterConfig(noticed_memory_s=5.0)
 
     @model_validator(mode="after")
     def _check_ceiling(self) -> AwarenessPolicy:

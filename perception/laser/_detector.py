@@ -26,7 +26,7 @@ _PAIR_LOG_ODDS: Final = 10.0
 # Two people are not nearer to each other than this.
 _APART_M: Final = 0.3
 # Nor than this, if of one of them no more than a leg is in view.
-_PART_APART_M: Final = 0.55
+_PART_APART_M: Final = 0.68
 # A person is far more likely where the floor was free before than where something always stood. The
 # classifier has seen single scans with people all around, so its odds are changed by these factors'
 # logarithms.
