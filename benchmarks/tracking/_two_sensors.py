@@ -30,7 +30,7 @@ def two_sensor_cost_ms(
     """
     both = _frames(recording)
     alone = [frame for frame in both if frame[2] == "camera"]
-    memory = AwarenessFilterConfig(**{**config.awareness.model_dump(), "noticed_memory_s": 4.0})
+    memory = AwarenessFilterConfig(**{**config.awareness.model_dump(), "noticed_memory_s": 5.0})
     noticing = config.model_copy(update={"awareness": memory})
     standing = config.model_copy(update={"standing_window_s": 1.0})
     scanner = {"laser": SensorConfig()}
