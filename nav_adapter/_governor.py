@@ -283,12 +283,12 @@ class SpeedGovernor:
         assert reserve is not None
         positions = np.array([m.track_position_odom_m for m in people.values()])
         offset = positions - robot_state.position_odom_m
+        distance_m = np.maximum(np.hypot(offset[:, 0], offset[:, 1]), 1e-9)
         shares = np.ones_like(gaps_m)
-        shares[1] = _ahead(offset, robot_state)
+        shares[1] = _ahead(offset, distance_m, robot_state)
         # Whoever comes already has been speeding up for as long as that takes.
         velocity = np.array([m.velocity_odom_mps for m in people.values()])
-        distance = np.maximum(np.hypot(offset[:, 0], offset[:, 1]), 1e-9)
-        closing_mps = np.maximum(-(velocity * offset).sum(axis=1) / distance, 0.0)
+        closing_mps = np.maximum(-(velocity * offset).sum(axis=1) / distance_m, 0.0)
         delay_s = reserve.start_delay_s + closing_mps / reserve.human_acceleration_mps2
         limits_mps = highest_speed_from_standing_mps(
             gaps_m,
@@ -389,10 +389,11 @@ class SpeedGovernor:
         return closing_mps * math.cos(turn_rad) + across_mps * math.sin(turn_rad)
 
 
-def _ahead(offset_odom_m: FloatArray, robot_state: RobotState) -> FloatArray:
+def _ahead(
+    offset_odom_m: FloatArray, distance_m: FloatArray, robot_state: RobotState
+) -> FloatArray:
     """Return (N,), the cosine of each point's angle off the course, at least 0; 1 at a stand."""
     if robot_state.travel_mps < _STANDING_MPS:
         return np.ones(len(offset_odom_m))
     along = offset_odom_m @ np.asarray(robot_state.travel_direction_odom)
-    distance = np.maximum(np.hypot(offset_odom_m[:, 0], offset_odom_m[:, 1]), 1e-9)
-    return np.asarray(np.clip(along / distance, 0.0, 1.0))
+    return np.asarray(np.clip(along / distance_m, 0.0, 1.0))

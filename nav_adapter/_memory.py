@@ -21,7 +21,7 @@ _SAME_PLACE_M: Final = 0.05
 # anew for every frame.
 _SAME_STAMP_S = 1e-6
 # Tolerance for rounding where sums of frame periods are compared with a setting.
-_ROUNDING_S: Final = 1e-9
+ROUNDING_S: Final = 1e-9
 
 
 class PersonMemory(NamedTuple):
@@ -152,7 +152,7 @@ def extended_history(
     larger = (
         entry
         for entry in extended
-        if visible_s - entry[0] < within_s - _ROUNDING_S
+        if visible_s - entry[0] < within_s - ROUNDING_S
         and (entry[1] > radius_m or entry[2] > ahead_m)
     )
     return (*larger, newest)

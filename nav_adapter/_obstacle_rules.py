@@ -13,6 +13,7 @@ from tracking import PersonTrack
 
 from ._errors import NavError
 from ._memory import (
+    ROUNDING_S,
     PersonMemory,
     Vector2,
     extended_history,
@@ -30,8 +31,6 @@ _WALKING_MPS: Final = 0.1
 _FIRST_KEPT_ID: Final = -2
 # Walking speed of ISO 13855.
 _WALKER_MPS: Final = 1.6
-# Tolerance for rounding where sums of frame periods are compared with a setting.
-_ROUNDING_S: Final = 1e-9
 
 
 class ObstacleRules:
@@ -221,7 +220,7 @@ class ObstacleRules:
 
     def _is_first_sight(self, memory: PersonMemory) -> bool:
         """Return whether frames have shown a person for less than ``shrink_after_s``."""
-        return memory.known_s < self._timing.shrink_after_s - _ROUNDING_S
+        return memory.known_s < self._timing.shrink_after_s - ROUNDING_S
 
     def _is_standing(self, standing: StandingPeople, memory: PersonMemory) -> bool:
         """Return whether the bound on human acceleration holds for a freshly seen person."""

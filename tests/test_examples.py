@@ -87,6 +87,8 @@ def test_the_two_sensor_example_keeps_the_person_whom_the_robot_passes():
     # As fast as the reserve for somebody who sets off allows.
     assert max(limits[:10]) > 0.9
     assert 0.0 < max(limits[-5:]) < 0.7
+    gone = silent.index(True)
+    assert limits[gone] < 0.5 * limits[gone - 1]
 
 
 @pytest.mark.parametrize(

@@ -146,9 +146,8 @@ class StartReserve(StrictConfig):
     this rule the robot is never faster than it can stop before somebody reaches it who sets off
     now: at ``human_acceleration_mps2`` up to the speed assumed for unaware people, from the speed
     at which the track comes nearer already. The robot's reaction time covers the time until the
-    track shows a start. The rule counts no clearance, and a
-    robot that keeps its course: nobody is touched, but the separation may be used up. It only
-    lowers the limit.
+    track shows a start. The rule counts no clearance, and a robot that keeps its course: nobody is
+    touched, but the separation may be used up. It only lowers the limit.
 
     Attributes:
         human_acceleration_mps2: as in :class:`StandingPeople`.
