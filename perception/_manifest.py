@@ -12,7 +12,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Final
+from typing import Any, Final, Literal, get_args
 
 from .documents import read_json
 from .errors import PerceptionError
@@ -21,6 +21,13 @@ DETECTOR: Final = "person_detector"
 POSE: Final = "person_pose"
 HEAD: Final = "head_pose"
 LEGS: Final = "leg_classifier"
+
+#: What a network has seen in training. Networks of renders or simulated scans have never seen a
+#: real person.
+TrainingDomain = Literal["renders", "photographs", "simulated scans"]
+TRAINING_DOMAINS: Final[tuple[TrainingDomain, ...]] = get_args(TrainingDomain)
+#: Key of the training domain in the metadata of an ONNX file.
+TRAINING_DOMAIN_KEY: Final = "training_domain"
 
 _FOLDER: Final = Path(__file__).parent / "models"
 _MANIFEST: Final = "manifest.json"
@@ -41,6 +48,7 @@ class ShippedModel:
         licence: SPDX identifier.
         input: shape and colour order, in words.
         summary: purpose, in a sentence.
+        training_domain: what it has seen in training, one of :data:`TRAINING_DOMAINS`.
     """
 
     name: str
@@ -49,6 +57,7 @@ class ShippedModel:
     licence: str
     input: str
     summary: str
+    training_domain: TrainingDomain
 
     def __post_init__(self) -> None:
         texts = (self.name, self.sha256, self.licence, self.input, self.summary)
@@ -59,6 +68,11 @@ class ShippedModel:
         if not _SHA256.fullmatch(self.sha256):
             raise PerceptionError(
                 f"sha256 must be 64 lower-case hexadecimal digits, got {self.sha256!r}"
+            )
+        if self.training_domain not in TRAINING_DOMAINS:
+            raise PerceptionError(
+                f"training_domain must be one of {', '.join(map(repr, TRAINING_DOMAINS))}, "
+                f"got {self.training_domain!r}"
             )
         if type(self.size_bytes) is not int or self.size_bytes < 1:
             raise PerceptionError(f"size_bytes must be at least 1, got {self.size_bytes!r}")
@@ -146,10 +160,10 @@ def write_manifest(folder: Path, entries: Sequence[Mapping[str, str]]) -> Path:
 
     Args:
         folder: folder with ``name.onnx`` of each entry. In a card ``name.md``, if there is one, the
-            lines that begin with ``- sha256:``, ``- size_bytes:``, ``- licence:`` and ``- input:``
-            are replaced; each must occur once.
-        entries: ``name``, ``licence``, ``input`` and ``summary`` of each network; size and SHA-256
-            are computed from the file.
+            lines that begin with ``- sha256:``, ``- size_bytes:``, ``- licence:``, ``- input:`` and
+            ``- training_domain:`` are replaced; each must occur once.
+        entries: ``name``, ``licence``, ``input``, ``summary`` and ``training_domain`` of each
+            network; size and SHA-256 are computed from the file.
 
     Returns:
         The path of the manifest. Each file is replaced as a whole, the manifest last.
@@ -167,7 +181,8 @@ def write_manifest(folder: Path, entries: Sequence[Mapping[str, str]]) -> Path:
             text = card.read_text(encoding="utf-8") if card.exists() else None
         except OSError as cause:
             raise PerceptionError(f"cannot read {cause.filename}: {cause.strerror}") from cause
-        model = ShippedModel(**entry, sha256=sha256, size_bytes=size_bytes)
+        facts: dict[str, Any] = {**entry, "sha256": sha256, "size_bytes": size_bytes}
+        model = ShippedModel(**facts)
         models.append(model)
         if text is not None:
             cards[card] = _with_facts(card, text, model)
@@ -190,7 +205,7 @@ def update_manifest(folder: Path, entries: Sequence[Mapping[str, str]]) -> Path:
         PerceptionError: as :func:`write_manifest`.
     """
     known = shipped_models(folder) if (folder / _MANIFEST).exists() else ()
-    told = ("name", "licence", "input", "summary")
+    told = ("name", "licence", "input", "summary", "training_domain")
     new = {entry["name"]: entry for entry in entries}
     kept = {model.name: {key: str(getattr(model, key)) for key in told} for model in known}
     return write_manifest(folder, list({**kept, **new}.values()))
@@ -198,7 +213,7 @@ def update_manifest(folder: Path, entries: Sequence[Mapping[str, str]]) -> Path:
 
 def _with_facts(card: Path, text: str, model: ShippedModel) -> str:
     """Return the text of a card with the facts of the manifest's entry."""
-    for fact in ("sha256", "size_bytes", "licence", "input"):
+    for fact in ("sha256", "size_bytes", "licence", "input", "training_domain"):
         # A backslash in the replacement must not start a group reference.
         line = f"- {fact}: {getattr(model, fact)}".replace("\\", r"\\")
         text, count = re.subn(rf"^- {fact}: .*$", line, text, flags=re.MULTILINE)

@@ -1,4 +1,4 @@
-"""The shipped networks: loading them, with a check of their SHA-256, and their manifest."""
+"""The shipped networks: loading them, their manifest, and what networks have seen in training."""
 
 from __future__ import annotations
 
@@ -12,7 +12,9 @@ from ._manifest import (
     HEAD,
     LEGS,
     POSE,
+    TRAINING_DOMAINS,
     ShippedModel,
+    TrainingDomain,
     shipped_model,
     shipped_model_path,
     shipped_models,
@@ -20,6 +22,7 @@ from ._manifest import (
     verify_shipped_model,
     write_manifest,
 )
+from ._training_domain import simulator_networks, simulator_networks_warning
 from .networks import OnnxModel, OnnxPersonDetector, OnnxPoseEstimator, OnnxSettings
 from .networks.heads import OnnxHeadPoseEstimator
 
@@ -28,7 +31,9 @@ __all__ = [
     "HEAD",
     "LEGS",
     "POSE",
+    "TRAINING_DOMAINS",
     "ShippedModel",
+    "TrainingDomain",
     "detector_input_size",
     "load_shipped",
     "shipped_detector",
@@ -37,6 +42,8 @@ __all__ = [
     "shipped_model_path",
     "shipped_models",
     "shipped_pose_estimator",
+    "simulator_networks",
+    "simulator_networks_warning",
     "update_manifest",
     "verify_shipped_model",
     "write_manifest",

@@ -27,9 +27,16 @@ from nav_adapter.ros2 import (
 from nav_adapter.ros2.messages import ros_type
 from perception import AttentionCone, AwarenessPipeline, Camera, PersonDetector
 from perception.arrays import finite_number
+from perception.shipped import simulator_networks_warning
 
 from ..errors import AwarenavError
-from ..estimate import SHIPPED, Networks, RecordingPoseEstimator, choose_networks
+from ..estimate import (
+    NetworkChoice,
+    Networks,
+    RecordingPoseEstimator,
+    admit_networks,
+    choose_networks,
+)
 from ..policies import read_policy
 from ._loop import BridgeInputs, BridgeLoop
 from ._publisher import TopicPublisher
@@ -52,9 +59,11 @@ class BridgeOptions:
     domain: int | None
     rate: float
     seconds: float | None
+    networks: Path | None
     detector: str
     pose: str
     head: str
+    allow_simulator_networks: bool
     image: str
     compressed: bool
     camera_info: str
@@ -83,8 +92,8 @@ def bridge_command(options: BridgeOptions) -> int:
     policy = read_policy(options.policy)
     camera = None if options.camera is None else Camera.from_yaml(options.camera)
     published = _published_topics(options.topic, options.only)
-    networks = choose_networks(options.detector, options.pose, options.head)
     inputs = _inputs(options, robot)
+    networks, unfit = _networks(options)
     scanners = scanner_inputs([topic.name for topic in inputs.scans], robot)
 
     from nav_adapter.ros2 import DdsNode, McapRecorder  # noqa: PLC0415 - needs the extra ros2
@@ -101,8 +110,8 @@ def bridge_command(options: BridgeOptions) -> int:
             viewer = RerunRecorder(options.rerun, pose_estimator, cone.half_angle_rad)
             stack.enter_context(viewer)
 
-        if SHIPPED in (options.detector, options.pose) and inputs.image is not None:
-            _log("the shipped networks are made for the simulator; see --detector and --pose")
+        if unfit:
+            _log(f"{simulator_networks_warning(unfit)}: trust no awareness that comes from them")
         if scanners:
             _log("the shipped leg detector is made for simulated scans; see docs/laser.md")
 
@@ -141,6 +150,19 @@ def bridge_command(options: BridgeOptions) -> int:
         scans = f" and {bridge.counts['scans']} scans" if inputs.scans else ""
         _log(f"ended after {loop.frames} frames{scans}; a stop was published")
     return 0
+
+
+def _networks(options: BridgeOptions) -> tuple[Networks, tuple[str, ...]]:
+    """Return the networks, and the roles of those that have seen renders only."""
+    choice = NetworkChoice.of_options(
+        options.networks, options.detector, options.pose, options.head
+    )
+    networks = choose_networks(**choice.model_dump())
+    if options.no_camera:
+        return networks, ()
+    return networks, admit_networks(
+        networks, rendered=False, allowed=options.allow_simulator_networks
+    )
 
 
 def _announce(domain: int, inputs: BridgeInputs, published: Mapping[str, Topic]) -> None:

@@ -15,10 +15,10 @@ _LOG: Final = "Recordings"
 @command(
     "bridge",
     examples=[
+        "awarenav bridge --robot robot.yaml --networks robot_networks.yaml --scan scan",
         "awarenav bridge --robot robot.yaml --detector yolox-tiny --pose rtmpose-m",
-        "awarenav bridge --robot robot.yaml --scan scan_front --scan scan_rear",
-        "awarenav bridge --robot robot.yaml --only speed_limit --record run.mcap",
-        "awarenav bridge --robot robot.yaml --scan scan --bag drive --record seen.mcap",
+        "awarenav bridge --robot robot.yaml --no-camera --scan scan_front --scan scan_rear",
+        "awarenav bridge --robot robot.yaml --no-camera --scan scan --bag drive --record seen.mcap",
     ],
     exit_status={0: "Ended by Ctrl-C, SIGTERM or --seconds.", 2: "Bad input."},
     epilog="The environment variable CYCLONEDDS_URI chooses the network interface, as with "
@@ -48,14 +48,42 @@ _LOG: Final = "Recordings"
 )
 @option("--seconds", type=NUMBER, metavar="S", help="End after this time.")
 @option(
+    "--networks",
+    group=_NETWORKS,
+    type=FilePath(),
+    metavar="FILE",
+    help="Detector, pose and head from a file, as `awarenav models fetch robot` writes it.",
+)
+@option(
     "--detector",
     group=_NETWORKS,
+    excludes="--networks",
     default="shipped",
     metavar="NAME|FILE",
     help="Person detector.",
 )
-@option("--pose", group=_NETWORKS, default="shipped", metavar="NAME|FILE", help="Pose network.")
-@option("--head", group=_NETWORKS, default="auto", metavar="NAME|FILE", help="Head pose.")
+@option(
+    "--pose",
+    group=_NETWORKS,
+    excludes="--networks",
+    default="shipped",
+    metavar="NAME|FILE",
+    help="Pose network.",
+)
+@option(
+    "--head",
+    group=_NETWORKS,
+    excludes="--networks",
+    default="auto",
+    metavar="NAME|FILE",
+    help="Head pose.",
+)
+@option(
+    "--allow-simulator-networks",
+    group=_NETWORKS,
+    is_flag=True,
+    help="Let networks that have seen renders only, such as the shipped ones, see a camera.",
+)
 @option(
     "--image", group=_READ, default="camera/image_raw", metavar="TOPIC", help="sensor_msgs/Image."
 )

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
         ids_of_tracks,
     )
     from ._images import as_rgb, read_image
-    from ._networks import SHIPPED, choose_networks
+    from ._networks import NetworkChoice, admit_networks, choose_networks
     from ._open_source import open_source
     from ._overlay import draw_overlay
     from ._overlay_writer import OverlayWriter, fit_image
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from ._threads import BackgroundWorker, FramePrefetcher
 
 __all__ = [
-    "SHIPPED",
     "BackgroundWorker",
     "BagMessages",
     "CameraChoice",
@@ -38,12 +37,14 @@ __all__ = [
     "FramePrefetcher",
     "ImageFiles",
     "ImageSource",
+    "NetworkChoice",
     "Networks",
     "OverlayWriter",
     "PeopleEstimator",
     "RecordingPoseEstimator",
     "SourceFrame",
     "VideoSource",
+    "admit_networks",
     "as_rgb",
     "choose_networks",
     "draw_overlay",
@@ -71,7 +72,7 @@ __getattr__ = lazy_names(
             "ids_of_tracks",
         ),
         "._images": ("as_rgb", "read_image"),
-        "._networks": ("SHIPPED", "choose_networks"),
+        "._networks": ("NetworkChoice", "admit_networks", "choose_networks"),
         "._open_source": ("open_source",),
         "._overlay": ("draw_overlay",),
         "._overlay_writer": ("OverlayWriter", "fit_image"),

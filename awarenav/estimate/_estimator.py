@@ -23,6 +23,7 @@ from perception import (
     PoseEstimator,
 )
 from perception.arrays import FloatArray
+from perception.shipped import TrainingDomain
 from tracking import CameraView, PersonTrack, PersonTracker, TrackerConfig
 
 from ._camera import CameraChoice, fixed_camera_pose
@@ -42,7 +43,8 @@ class Networks:
     """The detector and estimators of a pipeline.
 
     ``detector`` may be a function that makes the detector for a camera. ``head_pose_estimator``
-    None is the pipeline's default.
+    None is the pipeline's default. ``training_domains`` says what each has seen in training, by its
+    role; a role that is missing or None is not known.
     """
 
     detector: PersonDetector | Callable[[Camera], PersonDetector]
@@ -50,6 +52,7 @@ class Networks:
     head_pose_estimator: HeadPoseEstimator | None = None
     #: More settings of :class:`~perception.AwarenessPipeline` by name.
     settings: dict[str, Any] = field(default_factory=dict)
+    training_domains: dict[str, TrainingDomain | None] = field(default_factory=dict)
 
 
 class RecordingPoseEstimator:
@@ -98,6 +101,7 @@ class FrameEstimate:
         keypoints: of each observation; None where they are not known.
         tracks: all tracks; None without a tracker.
         track_ids: of each observation, the id of its track; None without a tracker.
+        unfit: roles of the networks that have seen renders only, unless the image is one.
     """
 
     frame: SourceFrame
@@ -107,6 +111,7 @@ class FrameEstimate:
     keypoints: tuple[PersonKeypoints | None, ...]
     tracks: tuple[PersonTrack, ...] | None
     track_ids: tuple[int | None, ...]
+    unfit: tuple[str, ...] = ()
 
 
 class PeopleEstimator:
@@ -119,6 +124,7 @@ class PeopleEstimator:
             without a pose; it gives the floor.
         track: tracks people from frame to frame. Images without a pose then count as those of a
             fixed camera.
+        unfit: roles of the networks that are not made for such images; every estimate has them.
     """
 
     def __init__(
@@ -128,13 +134,14 @@ class PeopleEstimator:
         *,
         fixed_pose_odom_camera: FloatArray | None = None,
         track: bool = False,
+        unfit: tuple[str, ...] = (),
     ) -> None:
         self._networks = networks
         self._cameras = cameras
         self._fixed_pose = fixed_pose_odom_camera
         self._pose_estimator = RecordingPoseEstimator(networks.pose_estimator)
         self._pipelines: dict[Camera, AwarenessPipeline] = {}
-        self._track = track
+        self._track, self._unfit = track, unfit
         self._tracker: PersonTracker | None = None
 
     def estimate(self, frame: SourceFrame) -> FrameEstimate:
@@ -169,6 +176,7 @@ class PeopleEstimator:
             tuple(self._pose_estimator.keypoints_of(each) for each in observations),
             tracks,
             track_ids,
+            self._unfit,
         )
 
     def _process(self, camera: Camera, frame: SourceFrame) -> tuple[PersonObservation, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Final
+from typing import ClassVar, Final
 
 from perception import (
     Camera,
@@ -20,11 +20,18 @@ from perception import (
 from perception.networks import MediaPipePoseEstimator, OnnxModel, OnnxSettings
 from perception.shipped import (
     DETECTOR,
+    HEAD,
+    POSE,
+    TrainingDomain,
     shipped_detector,
     shipped_head_pose_estimator,
+    shipped_model,
     shipped_pose_estimator,
+    simulator_networks,
+    simulator_networks_warning,
     verify_shipped_model,
 )
+from tracking.config import StrictConfig
 
 from ..errors import AwarenavError
 from ..models import ModelStore
@@ -32,8 +39,37 @@ from ._estimator import Networks
 
 #: The name of the networks that come with the package.
 SHIPPED: Final = "shipped"
+#: The option that lets networks of renders see other pictures.
+ALLOW_SIMULATOR_NETWORKS: Final = "--allow-simulator-networks"
 _MEDIAPIPE: Final = "mediapipe"
 _HEADS: Final = ("auto", "network", "pnp", "fused")
+
+
+class NetworkChoice(StrictConfig):
+    """The networks by name, as ``--networks`` reads them from a file.
+
+    Attributes:
+        detector: as :func:`choose_networks` takes it; so are the others.
+        pose: pose network.
+        head: head pose.
+    """
+
+    error: ClassVar[type[ValueError]] = AwarenavError
+
+    detector: str = SHIPPED
+    pose: str = SHIPPED
+    head: str = _HEADS[0]
+
+    @classmethod
+    def of_options(cls, file: Path | None, detector: str, pose: str, head: str) -> NetworkChoice:
+        """Return the file's choice, or without a file that of the three options.
+
+        Raises:
+            AwarenavError: for a file that cannot be read.
+        """
+        if file is not None:
+            return cls.from_yaml(file)
+        return cls(detector=detector, pose=pose, head=head)
 
 
 def choose_networks(
@@ -53,8 +89,7 @@ def choose_networks(
         pose: ``"shipped"``, ``"mediapipe"`` (needs the extra), or an ONNX file.
         head: ``"network"`` (the shipped one), ``"pnp"`` (the paper's method), ``"fused"`` (both,
             weighted by their uncertainties), an ONNX file, or ``"auto"``: the shipped network with
-            the shipped pose network, else PnP. The shipped networks are made for the simulator, so
-            they are used on real images only on request.
+            the shipped pose network, else PnP.
         min_score: people with a lower detection score are dropped.
         threads: of each network; None leaves the number to onnxruntime.
         provider: ``"cpu"``, ``"cuda"`` or ``"tensorrt"``.
@@ -66,49 +101,88 @@ def choose_networks(
     if head == "auto":
         head = "network" if pose == SHIPPED else "pnp"
     settings = OnnxSettings(providers=(provider,), intra_op_threads=threads)
+    domains: dict[str, TrainingDomain | None] = {}
     return Networks(
-        _detector(detector, min_score, settings), _pose(pose, settings), _head(head, settings)
+        _detector(detector, min_score, settings, domains),
+        _pose(pose, settings, domains),
+        _head(head, settings, domains),
+        training_domains=domains,
     )
 
 
+def admit_networks(networks: Networks, *, rendered: bool, allowed: bool) -> tuple[str, ...]:
+    """Return the roles of networks that see such pictures for the first time.
+
+    Args:
+        networks: to be used.
+        rendered: the pictures are renders of this package.
+        allowed: networks of renders may see other pictures.
+
+    Raises:
+        AwarenavError: if they see such pictures and may not.
+    """
+    roles = () if rendered else simulator_networks(networks.training_domains)
+    if roles and not allowed:
+        raise AwarenavError(
+            f"{simulator_networks_warning(roles)}: `awarenav models fetch robot` brings others "
+            f"for --networks robot_networks.yaml (or add {ALLOW_SIMULATOR_NETWORKS})"
+        )
+    return roles
+
+
 def _detector(
-    name: str, min_score: float, settings: OnnxSettings
+    name: str,
+    min_score: float,
+    settings: OnnxSettings,
+    domains: dict[str, TrainingDomain | None],
 ) -> PersonDetector | Callable[[Camera], PersonDetector]:
     if name == SHIPPED:
         verify_shipped_model(DETECTOR)  # now, not at the first frame
+        domains["detector"] = shipped_model(DETECTOR).training_domain
         return lambda camera: shipped_detector(settings, camera, score_threshold=min_score)
-    model = _onnx_model("--detector", name, (SHIPPED,), settings)
+    model, domains["detector"] = _onnx_model("--detector", name, (SHIPPED,), settings)
     return OnnxPersonDetector(model, score_threshold=min_score)
 
 
-def _pose(name: str, settings: OnnxSettings) -> PoseEstimator:
+def _pose(
+    name: str, settings: OnnxSettings, domains: dict[str, TrainingDomain | None]
+) -> PoseEstimator:
     if name == SHIPPED:
+        domains["pose"] = shipped_model(POSE).training_domain
         return shipped_pose_estimator(settings)
     if name == _MEDIAPIPE:
+        domains["pose"] = "photographs"
         mediapipe: PoseEstimator = MediaPipePoseEstimator()
         return mediapipe
-    return OnnxPoseEstimator(_onnx_model("--pose", name, (SHIPPED, _MEDIAPIPE), settings))
+    model, domains["pose"] = _onnx_model("--pose", name, (SHIPPED, _MEDIAPIPE), settings)
+    return OnnxPoseEstimator(model)
 
 
-def _head(name: str, settings: OnnxSettings) -> HeadPoseEstimator:
+def _head(
+    name: str, settings: OnnxSettings, domains: dict[str, TrainingDomain | None]
+) -> HeadPoseEstimator:
     if name == "pnp":
-        return PnpHeadPoseEstimator()
-    if name == "network":
-        return shipped_head_pose_estimator(settings)
-    if name == "fused":
-        return FusedHeadPoseEstimator(shipped_head_pose_estimator(settings), PnpHeadPoseEstimator())
-    return OnnxHeadPoseEstimator(_onnx_model("--head", name, _HEADS, settings))
+        return PnpHeadPoseEstimator()  # no network
+    if name in ("network", "fused"):
+        domains["head"] = shipped_model(HEAD).training_domain
+        shipped = shipped_head_pose_estimator(settings)
+        if name == "network":
+            return shipped
+        return FusedHeadPoseEstimator(shipped, PnpHeadPoseEstimator())
+    model, domains["head"] = _onnx_model("--head", name, _HEADS, settings)
+    return OnnxHeadPoseEstimator(model)
 
 
 def _onnx_model(
     option: str, name: str, names: tuple[str, ...], settings: OnnxSettings
-) -> OnnxModel:
+) -> tuple[OnnxModel, TrainingDomain | None]:
     """Load an ONNX file, or a network that ``awarenav models fetch`` has downloaded."""
     if Path(name).is_file():
-        return OnnxModel(name, settings=settings)
+        model = OnnxModel(name, settings=settings)
+        return model, model.training_domain
     store = ModelStore()
-    if name in {model.name for model in store.catalogue.models}:
-        return store.load(name, settings)
+    if name in {each.name for each in store.catalogue.models}:
+        return store.load(name, settings), store.catalogue[name].training_domain
     raise AwarenavError(
         f"{option} must be {', '.join(map(repr, names))}, an ONNX file, or a network that "
         f"'awarenav models list' names; there is no file {name!r}"

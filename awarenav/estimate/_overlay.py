@@ -272,10 +272,12 @@ def _fill_box(image: ImageRgb, box: _Box, colour: Colour) -> None:
 
 
 def _draw_caption(image: ImageRgb, estimate: FrameEstimate, font: Font) -> None:
-    """Write the stamp and the number of people into the lower left corner."""
+    """Write stamp, number of people and unfit networks into the lower left corner."""
     count = len(estimate.observations)
     people = "nobody" if not count else "1 person" if count == 1 else f"{count} people"
     text = f"{estimate.frame.stamp_s:.2f} s · {people}"
+    if estimate.unfit:
+        text += " · made for renders, do not trust"
     gap = font.height_px // 3
     top = image.shape[0] - font.height_px - gap
     darken_box(image, (0, top - gap // 2, font.width_px(text) + 3 * gap, image.shape[0]), 0.55)

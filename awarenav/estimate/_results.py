@@ -49,6 +49,8 @@ def estimate_record(estimate: FrameEstimate, settings: str) -> Record:
         ],
         "settings": settings,
     }
+    if estimate.unfit:
+        record["simulator_networks"] = list(estimate.unfit)
     if estimate.tracks is not None:
         record["tracks"] = [track_record(track) for track in estimate.tracks]
     return record

@@ -14,11 +14,12 @@ from tqdm import tqdm
 
 from perception import AttentionCone, Camera
 from perception.arrays import FloatArray
+from perception.shipped import simulator_networks_warning
 
 from ..errors import AwarenavError, counted
 from ._camera import CameraChoice, fixed_camera_pose
 from ._estimator import FrameEstimate, Networks, PeopleEstimator
-from ._networks import choose_networks
+from ._networks import NetworkChoice, admit_networks, choose_networks
 from ._open_source import open_source
 from ._overlay_writer import OverlayWriter
 from ._results import ResultsFile, estimate_record, settings_hash
@@ -31,11 +32,8 @@ _FAILURES_BEFORE_ABORT: Final = 10
 _MOST_PROBLEMS_LOGGED: Final = 5
 # Frames per second of a video that is made from images without a rate.
 _SLIDESHOW_HZ: Final = 5.0
-# The options that change the estimates.
+# The options that change the estimates, beside the choice of networks.
 _SETTINGS: Final = (
-    "detector",
-    "pose",
-    "head",
     "min_score",
     "camera",
     "fov_deg",
@@ -58,9 +56,11 @@ class EstimateOptions:
     every: int
     frames: int | None
     topic: str | None
+    networks: Path | None
     detector: str
     pose: str
     head: str
+    allow_simulator_networks: bool
     min_score: float
     threads: int | None
     provider: str
@@ -116,22 +116,31 @@ def estimate_command(options: EstimateOptions, networks: Networks | None = None)
         until_prefetched = stack.enter_context(contextlib.ExitStack())
         until_prefetched.callback(source.close)
         cameras = CameraChoice(_calibration(options, source), options.fov_deg, _log)
-        estimator = PeopleEstimator(
-            choose_networks(
-                options.detector,
-                options.pose,
-                options.head,
+        choice = NetworkChoice.of_options(
+            options.networks, options.detector, options.pose, options.head
+        )
+        if networks is None:
+            networks = choose_networks(
+                **choice.model_dump(),
                 min_score=options.min_score,
                 threads=options.threads,
                 provider=options.provider,
             )
-            if networks is None
-            else networks,
+        unfit = admit_networks(
+            networks, rendered=source.rendered, allowed=options.allow_simulator_networks
+        )
+        if unfit:
+            _log(f"{simulator_networks_warning(unfit)}: trust none of the results")
+        estimator = PeopleEstimator(
+            networks,
             cameras,
             fixed_pose_odom_camera=pose,
             track=options.tracks,
+            unfit=unfit,
         )
-        settings = settings_hash({name: getattr(options, name) for name in _SETTINGS})
+        settings = settings_hash(
+            {name: getattr(options, name) for name in _SETTINGS} | choice.model_dump()
+        )
         overlay = _overlay(options, source)
         results = stack.enter_context(
             ResultsFile(options.out, settings, resume=options.resume, overwrite=options.overwrite)

@@ -37,12 +37,14 @@ class ImageSource(Protocol):
         count: number of frames, if known; the number that a video states may be wrong.
         rate_hz: frames per second, if the source has a rate.
         live: whether frames come in real time; a frame that is not taken in time is lost.
+        rendered: whether all frames are renders of this package.
     """
 
     camera: Camera | None
     count: int | None
     rate_hz: float | None
     live: bool
+    rendered: bool
 
     def frames(self) -> Iterator[SourceFrame]:
         """Yield the frames; one that cannot be read has a ``problem`` and no image.

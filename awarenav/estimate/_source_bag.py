@@ -54,6 +54,7 @@ class BagSource:
         if self.count is not None and self.count > 1 and duration_s > 0.0:
             self.rate_hz = (self.count - 1) / duration_s
         self.live = False
+        self.rendered = False
 
     def frames(self) -> Iterator[SourceFrame]:
         """Yield the images of the topic, numbered from 000000."""

@@ -17,6 +17,7 @@ from ._source import SourceFrame
 
 _CAMERA: Final = "camera.yaml"
 _TRUTH: Final = "truth.jsonl"
+_RENDER: Final = "render.yaml"
 # Images of `awarenav render` that are not frames.
 _NOT_FRAMES: Final = ("contact_sheet.png",)
 
@@ -26,7 +27,8 @@ class ImageFiles:
 
     ``camera.yaml`` beside them is their camera. ``truth.jsonl`` beside them gives the stamp and the
     camera pose of each image; what it says about people is not read. Without it, the stamps are 0,
-    1, 2 … times ``interval_s``.
+    1, 2 … times ``interval_s``. If ``render.yaml`` is there as well, as ``awarenav render`` leaves
+    it, the images in ``truth.jsonl`` are renders.
 
     Args:
         path: of the file or folder.
@@ -57,6 +59,9 @@ class ImageFiles:
         self.count: int | None = len(self._files)
         self.rate_hz: float | None = None
         self.live = False
+        self.rendered = (folder / _RENDER).exists() and all(
+            each.name in self._known for each in self._files
+        )
 
     def frames(self) -> Iterator[SourceFrame]:
         """Yield every image; one that cannot be read has a ``problem``."""

@@ -47,6 +47,7 @@ class VideoSource:
         self._name = name
         self._capture = capture
         self.live = live
+        self.rendered = False
         self.camera: Camera | None = None
         count = capture.get(cv2.CAP_PROP_FRAME_COUNT)
         self.count: int | None = int(count) if not live and 0 < count < 1e9 else None

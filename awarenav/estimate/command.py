@@ -13,9 +13,9 @@ _CAMERA: Final = "Camera"
 @command(
     "estimate",
     examples=[
-        "awarenav estimate photo.jpg --overlay drawn.jpg",
+        "awarenav estimate photo.jpg --networks robot_networks.yaml --overlay drawn.jpg",
         "awarenav estimate video.mp4 --detector yolox-tiny --pose rtmpose-m",
-        "awarenav estimate 0 --fov-deg 70 --tracks --overlay drawn.mp4",
+        "awarenav estimate 0 --networks robot_networks.yaml --fov-deg 70 --tracks",
     ],
     exit_status={
         0: "Success.",
@@ -44,8 +44,16 @@ _CAMERA: Final = "Camera"
 @option("--frames", type=POSITIVE, metavar="N", help="Stop after N frames.")
 @option("--topic", metavar="NAME", help="Image topic of a recording that has several.")
 @option(
+    "--networks",
+    group=_NETWORKS,
+    type=FilePath(),
+    metavar="FILE",
+    help="Detector, pose and head from a file, as `awarenav models fetch robot` writes it.",
+)
+@option(
     "--detector",
     group=_NETWORKS,
+    excludes="--networks",
     default="shipped",
     metavar="NAME|FILE",
     help="Person detector: 'shipped' (made for the simulator), a network that `awarenav models` "
@@ -54,6 +62,7 @@ _CAMERA: Final = "Camera"
 @option(
     "--pose",
     group=_NETWORKS,
+    excludes="--networks",
     default="shipped",
     metavar="NAME|FILE",
     help="Pose network: 'shipped' (made for the simulator), a network that `awarenav models` "
@@ -62,11 +71,19 @@ _CAMERA: Final = "Camera"
 @option(
     "--head",
     group=_NETWORKS,
+    excludes="--networks",
     default="auto",
     metavar="NAME|FILE",
     help="Head pose: 'network' (the shipped one, made for the simulator), 'pnp' (from the "
     "keypoints), 'fused' (both), an ONNX file, or 'auto': 'network' with the shipped pose "
     "network, else 'pnp'.",
+)
+@option(
+    "--allow-simulator-networks",
+    group=_NETWORKS,
+    is_flag=True,
+    help="Let networks that have seen renders only, such as the shipped ones, see other images. "
+    "All results say so.",
 )
 @option(
     "--min-score",

@@ -7,6 +7,7 @@ from typing import ClassVar, Final, Literal
 
 from pydantic import Field, field_validator, model_validator
 
+from perception.shipped import TrainingDomain
 from tracking.config import StrictConfig
 
 from ..errors import AwarenavError, not_one_of
@@ -33,6 +34,8 @@ class RealModel(StrictConfig):
     licence: str
     publisher: str
     purpose: str
+    #: What it has seen in training.
+    training_domain: TrainingDomain = "photographs"
     note: str | None = None
 
     @property
@@ -63,12 +66,30 @@ class NamedModel(StrictConfig):
     why: str
 
 
+class NetworkSet(StrictConfig):
+    """Networks that work together: all that a robot needs."""
+
+    name: str = Field(pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$")
+    #: Names of networks of the catalogue.
+    detector: str
+    pose: str
+    #: As ``--head`` of ``awarenav estimate``.
+    head: str
+    purpose: str
+
+    @property
+    def file(self) -> str:
+        """Name of the file for ``--networks``."""
+        return f"{self.name}_networks.yaml"
+
+
 class Catalogue(StrictConfig):
     """All networks for a real robot, with unique names."""
 
     error: ClassVar[type[ValueError]] = AwarenavError
 
     models: tuple[RealModel, ...]
+    sets: tuple[NetworkSet, ...] = ()
     elsewhere: tuple[NamedModel, ...] = ()
 
     @field_validator("models")
@@ -78,6 +99,19 @@ class Catalogue(StrictConfig):
         if len(set(names)) < len(names):
             raise ValueError(f"names must be unique, got {', '.join(names)}")
         return value
+
+    @model_validator(mode="after")
+    def _sets_of_known_networks(self) -> Catalogue:
+        roles = {model.name: model.role for model in self.models}
+        for each in self.sets:
+            if (roles.get(each.detector), roles.get(each.pose)) != ("detector", "pose"):
+                raise ValueError(
+                    f"set {each.name}: detector and pose must name networks of these roles, got "
+                    f"{each.detector} and {each.pose}"
+                )
+            if each.name in roles:
+                raise ValueError(f"{each.name} is a network and a set")
+        return self
 
     @classmethod
     def shipped(cls) -> Catalogue:

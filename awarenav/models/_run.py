@@ -9,13 +9,15 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
+import yaml
+
 from perception import PerceptionError
 from perception.shipped import shipped_models, verify_shipped_model
 
 from ..errors import AwarenavError
-from ..files import json_text
-from ._catalogue import RealModel
-from ._store import ModelStore
+from ..files import json_text, write_text
+from ._catalogue import NetworkSet, RealModel
+from ._store import ModelStore, default_folder
 
 _WIDTH: Final = 100
 
@@ -30,11 +32,12 @@ def list_command(folder: Path | None, *, as_json: bool) -> int:
     if as_json:
         print(json_text(_listing(store)), end="")
         return 0
-    print("Shipped, made for the simulator:\n")
+    print("Shipped, for the simulator; they have seen no real person:\n")
     shipped = shipped_models()
     for model in shipped:
         print(f"  {model.name:16s}{model.size_bytes / 1e6:6.1f} MB  {model.licence}")
         print(_indented(f"{model.summary} Input {model.input}."))
+        print(f"    trained on {model.training_domain}")
         print(f"    sha256 {model.sha256}  {_shipped_state(model.name)}\n")
     if not shipped:
         print("  none in this build\n")
@@ -44,8 +47,13 @@ def list_command(folder: Path | None, *, as_json: bool) -> int:
         print(_indented(f"{real.publisher}: {real.purpose}."))
         if real.note is not None:
             print(_indented(f"Note: {real.note}."))
+        print(f"    trained on {real.training_domain}")
         print(f"    {real.url}")
         print(f"    sha256 {_hash_text(store, real)}  {_real_state(store, real)}\n")
+    print("Sets, all that a robot needs:\n")
+    for each in store.catalogue.sets:
+        print(f"  {each.name:16s}{each.detector}, {each.pose}, head from {each.head}")
+        print(_indented(f"{each.purpose}.") + "\n")
     print("Named here, but not fetched:\n")
     for other in store.catalogue.elsewhere:
         print(f"  {other.name}  {other.licence}  {other.role}")
@@ -64,6 +72,7 @@ def _listing(store: ModelStore) -> dict[str, Any]:
             {**model.model_dump(mode="json"), "state": _real_state(store, model)}
             for model in store.catalogue.models
         ],
+        "sets": [each.model_dump(mode="json") for each in store.catalogue.sets],
         "named_only": [each.model_dump(mode="json") for each in store.catalogue.elsewhere],
     }
 
@@ -94,15 +103,23 @@ def verify_command(folder: Path | None, *, as_json: bool) -> int:
 
 
 def fetch_command(names: Sequence[str], sha256: str | None, folder: Path | None) -> int:
-    """Download networks; return the exit status.
+    """Download networks, by their names or those of sets; return the exit status.
+
+    The networks of a set are named in a file in the current folder, for ``--networks``.
 
     Raises:
-        AwarenavError: for an unknown name, and for a download that fails or cannot be verified.
+        AwarenavError: for an unknown name, for a download that fails or cannot be verified, and for
+            a file of a set that has other contents.
     """
-    if sha256 is not None and len(names) > 1:
-        raise AwarenavError(f"--sha256 is for a single name, got {len(names)}")
     store = ModelStore(folder)
-    wanted = [store.catalogue[name] for name in dict.fromkeys(names)]
+    sets = [each for each in store.catalogue.sets if each.name in names]
+    members = {each.name: (each.detector, each.pose) for each in sets}
+    singles = [single for name in names for single in members.get(name, (name,))]
+    if sha256 is not None and len(singles) > 1:
+        raise AwarenavError(f"--sha256 is for a single name, got {len(singles)}")
+    wanted = [store.catalogue[name] for name in dict.fromkeys(singles)]
+    for each in sets:
+        _check_set_file(store, each)
     for model in wanted:
         trusted = sha256 or store.expected_sha256(model.name)
         path, downloaded = store.fetch(model.name, sha256=sha256)
@@ -120,7 +137,28 @@ def fetch_command(names: Sequence[str], sha256: str | None, folder: Path | None)
                 ),
                 file=sys.stderr,
             )
+    for each in sets:
+        write_text(Path(each.file), _set_text(store, each))
+        print(f"{each.name}: written to {each.file}, for --networks of estimate and bridge")
     return 0
+
+
+def _set_text(store: ModelStore, chosen: NetworkSet) -> str:
+    """Return the file that ``--networks`` reads; it has names, or paths in another folder."""
+    at_home = store.folder == default_folder()
+    detector, pose = (
+        name if at_home else str((store.folder / store.catalogue[name].file).resolve())
+        for name in (chosen.detector, chosen.pose)
+    )
+    named = {"detector": detector, "pose": pose, "head": chosen.head}
+    return f"# awarenav models fetch {chosen.name}\n{yaml.safe_dump(named, sort_keys=False)}"
+
+
+def _check_set_file(store: ModelStore, chosen: NetworkSet) -> None:
+    """Refuse to replace a file that somebody has changed."""
+    path = Path(chosen.file)
+    if path.exists() and path.read_text(encoding="utf-8") != _set_text(store, chosen):
+        raise AwarenavError(f"{path} is there with other contents; move it away")
 
 
 def _shipped_state(name: str) -> str:

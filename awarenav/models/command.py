@@ -76,10 +76,16 @@ def verify(out: Path | None, *, as_json: bool) -> int:
 @command(
     "fetch",
     short_help="Download networks for a real robot.",
-    examples=["awarenav models fetch yolox-tiny rtmpose-m"],
+    examples=["awarenav models fetch robot", "awarenav models fetch yolox-tiny rtmpose-m"],
     exit_status={0: "Success.", 2: "Bad input, or a download failed; run it again to continue."},
 )
-@argument("names", nargs=-1, required=True, metavar="NAME...", help="Names of `models list`.")
+@argument(
+    "names",
+    nargs=-1,
+    required=True,
+    metavar="NAME...",
+    help="Names of `models list`: of networks, or of a set of them.",
+)
 @option(
     "--sha256",
     callback=_hexadecimal,
@@ -89,6 +95,9 @@ def verify(out: Path | None, *, as_json: bool) -> int:
 @_models_folder()
 def fetch(names: tuple[str, ...], sha256: str | None, out: Path | None) -> int:
     """Download networks by the names that `awarenav models list` shows.
+
+    A set such as 'robot' is all that a robot needs. It is written to robot_networks.yaml in the
+    current folder, which --networks of `awarenav estimate` and `awarenav bridge` takes.
 
     A file appears when it is complete and its sha256 is verified. If the catalogue has no sha256 of
     a network, the first download is trusted: its sha256 is kept in models.lock.json, and later

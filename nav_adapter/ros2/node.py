@@ -4,10 +4,11 @@ Run it with ``python -m nav_adapter.ros2.node --ros-args -p robot_file:=robot.ya
 thread publishes at a fixed rate; perception has threads of its own. Parameters:
 ``robot_file`` (required), ``policy`` (``balanced``), ``rate_hz`` (20.0), ``scanners`` (number of
 laser scanners, 0 to 2), ``use_camera`` (true), ``use_map`` (false), ``compressed`` (false),
-``percentage`` (false), ``detector_file`` and ``pose_file`` (ONNX; by default the shipped networks,
-which are trained for the simulator), ``odom_frame``, ``base_frame``, ``camera_frame``. Topics are
-renamed by ROS's remapping. The module can be imported without ROS; the node then raises an error
-that says what is missing.
+``percentage`` (false), ``detector_file`` and ``pose_file`` (ONNX; by default the shipped networks),
+``allow_simulator_networks`` (false; the shipped networks have seen renders only, and are refused
+without it), ``odom_frame``, ``base_frame``, ``camera_frame``. Topics are renamed by ROS's
+remapping. The module can be imported without ROS; the node then raises an error that says what is
+missing.
 """
 
 from __future__ import annotations
@@ -24,6 +25,14 @@ from perception import (
     OnnxPersonDetector,
     OnnxPoseEstimator,
     PerceptionError,
+)
+from perception.networks import OnnxModel
+from perception.shipped import (
+    DETECTOR,
+    POSE,
+    load_shipped,
+    simulator_networks,
+    simulator_networks_warning,
 )
 
 from .._errors import NavError
@@ -89,7 +98,9 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
             T_base_camera=None if robot.camera is None else robot.camera.T_base_camera(),
             percentage=self._parameter("percentage", False),
             make_pipeline=_pipelines(
-                self._parameter("detector_file", ""), self._parameter("pose_file", "")
+                self._parameter("detector_file", ""),
+                self._parameter("pose_file", ""),
+                allowed=self._parameter("allow_simulator_networks", False) or not use_camera,
             ),
             with_camera=use_camera,
             scanners=scanner_inputs([topic.name for topic in scans], robot),
@@ -209,10 +220,28 @@ def main() -> int:
     return 0
 
 
-def _pipelines(detector_file: str, pose_file: str) -> Callable[[Camera], AwarenessPipeline]:
-    """Return a function that makes a pipeline with these networks, which are loaded here."""
-    detector = OnnxPersonDetector(detector_file) if detector_file else None
-    pose = OnnxPoseEstimator(pose_file) if pose_file else None
+def _pipelines(
+    detector_file: str, pose_file: str, *, allowed: bool
+) -> Callable[[Camera], AwarenessPipeline]:
+    """Return a function that makes a pipeline with these networks, which are loaded here.
+
+    Networks of renders must be ``allowed``.
+    """
+    models = {
+        role: OnnxModel(file) if file else load_shipped(shipped)
+        for role, file, shipped in (
+            ("detector", detector_file, DETECTOR),
+            ("pose", pose_file, POSE),
+        )
+    }
+    unfit = simulator_networks({role: model.training_domain for role, model in models.items()})
+    if unfit and not allowed:
+        raise NavError(
+            f"{simulator_networks_warning(unfit)}: set detector_file and pose_file to others, as "
+            "`awarenav models fetch robot` brings them, or allow_simulator_networks to true"
+        )
+    detector = OnnxPersonDetector(models["detector"]) if detector_file else None
+    pose = OnnxPoseEstimator(models["pose"]) if pose_file else None
     return lambda camera: AwarenessPipeline(camera, detector, pose)
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._manifest import shipped_model, shipped_model_path, verify_shipped_model
+from .._training_domain import training_domain_of
 from ..errors import PerceptionError
 
 # The newer Linux wheels of ONNX Runtime report processes, sessions and models to their maker from
@@ -129,6 +130,13 @@ class OnnxModel:
             bytes that are loaded. It does not cover weights in separate files, so networks with
             such files are then refused.
 
+    Attributes:
+        path: of the file; None if the content was given.
+        inputs, outputs: in the order of the graph.
+        metadata: of the file.
+        training_domain: what the network has seen in training, one of
+            :data:`~perception.shipped.TRAINING_DOMAINS`; None if the file does not say it.
+
     Raises:
         PerceptionError: for a file that is missing, cannot be read, has another SHA-256 or is not
             a network that ONNX Runtime can load, and for a provider that is not present.
@@ -149,6 +157,7 @@ class OnnxModel:
         self.inputs = tuple(_tensor(entry) for entry in self._session.get_inputs())
         self.outputs = tuple(_tensor(entry) for entry in self._session.get_outputs())
         self.metadata: dict[str, str] = dict(self._session.get_modelmeta().custom_metadata_map)
+        self.training_domain = training_domain_of(content, self.metadata)
         self._names = [tensor.name for tensor in self.outputs]
 
     @classmethod

@@ -26,6 +26,7 @@ _ENTRY: Final = {
     "input": "(H, 79) features of clusters in a laser scan, see perception.laser",
     "summary": "Judges clusters and pairs of clusters in laser scans: a person, and where. Made "
     "for the simulator.",
+    "training_domain": "simulated scans",
 }
 
 

@@ -126,5 +126,6 @@ def export(weights: Weights, deviation_factors: NDArray[Any], path: Path) -> Non
     )
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", _OPSET)])
     model.ir_version = 8
+    helper.set_model_props(model, {"training_domain": "simulated scans"})
     onnx.checker.check_model(model)
     path.write_bytes(model.SerializeToString())

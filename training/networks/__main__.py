@@ -48,6 +48,7 @@ _ENTRIES: Final = (
         "licence": "Apache-2.0",
         "input": "(1, 3, 256, 320) RGB / 255, centred letterbox 114",
         "summary": "Finds people; YOLOv8's layout. Made for the simulator.",
+        "training_domain": "renders",
     },
     {
         "name": "person_pose",
@@ -55,6 +56,7 @@ _ENTRIES: Final = (
         "input": "(N, 3, 192, 144) RGB, ImageNet mean and standard deviation, box padding 1.25",
         "summary": "COCO's 17 keypoints in the image and in depth; RTMW3D's layout. Made for the "
         "simulator.",
+        "training_domain": "renders",
     },
     {
         "name": "head_pose",
@@ -62,6 +64,7 @@ _ENTRIES: Final = (
         "input": "(N, 3, 64, 64) RGB, mean 120, standard deviation 60, square head crop",
         "summary": "Rotation, keypoints, visibility and place of a head, each with its "
         "uncertainty. Made for the simulator.",
+        "training_domain": "renders",
     },
 )
 

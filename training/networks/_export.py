@@ -131,9 +131,10 @@ def _export(
     model = onnx.load(str(part))
     # The order of entries and the producer's version must not change the file from run to run.
     model.producer_name, model.producer_version = "awarenav", ""
-    for key in sorted(metadata):
+    told = {**metadata, "training_domain": "renders"}
+    for key in sorted(told):
         entry = model.metadata_props.add()
-        entry.key, entry.value = key, metadata[key]
+        entry.key, entry.value = key, told[key]
     _halve(model)
     onnx.checker.check_model(model)
     part.write_bytes(model.SerializeToString(deterministic=True))
