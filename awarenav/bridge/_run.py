@@ -93,8 +93,8 @@ def bridge_command(options: BridgeOptions) -> int:
     camera = None if options.camera is None else Camera.from_yaml(options.camera)
     published = _published_topics(options.topic, options.only)
     inputs = _inputs(options, robot)
-    networks, unfit = _networks(options)
     scanners = scanner_inputs([topic.name for topic in inputs.scans], robot)
+    networks, unfit = _networks(options)
 
     from nav_adapter.ros2 import DdsNode, McapRecorder  # noqa: PLC0415 - needs the extra ros2
 

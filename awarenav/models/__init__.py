@@ -8,7 +8,7 @@ from ..lazy import lazy_names
 
 if TYPE_CHECKING:
     from ._archive import extract_member
-    from ._catalogue import Catalogue, RealModel
+    from ._catalogue import Catalogue, NetworkSet, RealModel
     from ._download import BrokenDownloadError, download
     from ._store import LockedModel, ModelStore, default_folder
 
@@ -17,6 +17,7 @@ __all__ = [
     "Catalogue",
     "LockedModel",
     "ModelStore",
+    "NetworkSet",
     "RealModel",
     "default_folder",
     "download",
@@ -27,7 +28,7 @@ __getattr__ = lazy_names(
     __name__,
     {
         "._archive": ("extract_member",),
-        "._catalogue": ("Catalogue", "RealModel"),
+        "._catalogue": ("Catalogue", "NetworkSet", "RealModel"),
         "._download": ("BrokenDownloadError", "download"),
         "._store": ("LockedModel", "ModelStore", "default_folder"),
     },

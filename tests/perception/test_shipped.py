@@ -41,6 +41,7 @@ Does one thing. More about it.
 - size_bytes: not exported yet
 - licence: Apache-2.0
 - input: 1×3×8×8
+- training_domain: renders
 
 ## Limits
 """
@@ -187,6 +188,7 @@ def test_a_missing_manifest_is_refused(tmp_path):
         ({"sha256": "G" * 64}, "64 lower-case hexadecimal"),
         ({"size_bytes": 0}, "size_bytes must be"),
         ({"size_bytes": "7"}, "size_bytes must be"),
+        ({"training_domain": "dreams"}, "training_domain must be one of 'renders'"),
     ],
 )
 def test_entries_with_invalid_fields_are_refused(change, message):
@@ -197,6 +199,7 @@ def test_entries_with_invalid_fields_are_refused(change, message):
         "licence": "Apache-2.0",
         "input": "1×3×8×8",
         "summary": "Does.",
+        "training_domain": "renders",
     }
     ShippedModel(**good)
     with pytest.raises(PerceptionError, match=message):
@@ -210,6 +213,7 @@ ENTRY = {
     "licence": "Apache-2.0",
     "input": "1×3×8×8",
     "summary": "Does one thing.",
+    "training_domain": "renders",
 }
 
 
@@ -217,7 +221,7 @@ def test_the_manifest_and_the_card_are_written_from_the_file(folder):
     digest = hashlib.sha256(b"weights").hexdigest()
     write_manifest(folder, [ENTRY])
     assert shipped_models(folder) == (
-        ShippedModel("thing", digest, 7, "Apache-2.0", "1×3×8×8", "Does one thing."),
+        ShippedModel("thing", digest, 7, "Apache-2.0", "1×3×8×8", "Does one thing.", "renders"),
     )
     card = (folder / "thing.md").read_text(encoding="utf-8")
     assert f"- sha256: {digest}\n- size_bytes: 7\n- licence: Apache-2.0\n- input: 1×3×8×8" in card

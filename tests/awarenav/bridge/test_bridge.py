@@ -79,7 +79,8 @@ def robot(domain: int) -> Iterator[DdsNode]:
 
 
 def command(domain: int, *arguments: str) -> list[str]:
-    return [sys.executable, "-m", "awarenav", "bridge", "--domain", str(domain), *arguments]
+    program = [sys.executable, "-m", "awarenav", "bridge", "--allow-simulator-networks"]
+    return [*program, "--domain", str(domain), *arguments]
 
 
 def drive(
@@ -270,7 +271,8 @@ def test_the_loop_waits_while_messages_come_that_it_does_not_need(domain: int) -
 def test_bad_input_is_refused_in_a_line(
     arguments: list[str], text: str, domain: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["bridge", "--domain", str(domain), *arguments]) == 2
+    given = ["--domain", str(domain), "--allow-simulator-networks", *arguments]
+    assert main(["bridge", *given]) == 2
     said = capsys.readouterr().err
     assert text in said
     assert said.splitlines()[-1].startswith("awarenav bridge: ")
@@ -289,6 +291,7 @@ def test_the_bridge_ends_after_its_seconds_without_a_robot(
 ) -> None:
     recording = tmp_path / "quiet.mcap"
     arguments = ["--robot", str(ROBOT), "--domain", str(domain), "--seconds", "0.3"]
+    arguments.append("--allow-simulator-networks")
     only = ["--only", "speed_limit", "--topic", "speed_limit=/robot_1/limit"]
     assert main(["bridge", *arguments, *only, "--record", str(recording)]) == 0
     assert "/robot_1/limit" in capsys.readouterr().err

@@ -114,8 +114,12 @@ def test_a_recording_with_a_camera_is_replayed_as_far_as_is_asked(
 ) -> None:
     bag = recorded(tmp_path / "bag", messages(camera=True))
     arguments = ["--robot", str(robot_file), "--bag", str(bag), "--seconds", "1"]
+    assert main(["bridge", *arguments, "--scan", "scan"]) == 2
+    assert "detector, pose and head networks have seen renders only" in capsys.readouterr().err
+    arguments.append("--allow-simulator-networks")
     assert main(["bridge", *arguments, "--scan", "scan"]) == 0
     said = capsys.readouterr().err
+    assert "trust no awareness" in said
     assert "replayed 1.0 s: 25 frames, 25 scans, 0 scans refused" in said
 
 
@@ -135,7 +139,8 @@ def test_a_topic_that_the_recording_lacks_is_refused(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     bag = recorded(tmp_path / "bag", messages())
-    assert main(["bridge", "--robot", str(robot_file), "--bag", str(bag), *arguments]) == 2
+    given = ["--robot", str(robot_file), "--bag", str(bag), "--allow-simulator-networks"]
+    assert main(["bridge", *given, *arguments]) == 2
     said = capsys.readouterr().err
     assert text in said
     assert "it has /odom (nav_msgs/msg/Odometry)" in said
@@ -144,6 +149,6 @@ def test_a_topic_that_the_recording_lacks_is_refused(
 def test_what_is_no_recording_is_refused(
     robot_file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    given = ["--robot", str(robot_file), "--bag", str(robot_file)]
+    given = ["--robot", str(robot_file), "--bag", str(robot_file), "--allow-simulator-networks"]
     assert main(["bridge", *given]) == 2
     assert "cannot read the recording" in capsys.readouterr().err

@@ -82,6 +82,9 @@ def test_options_that_exclude_each_other_are_refused_together(path, name, other,
     for each in (other, name):
         words += [each] if both[each].is_flag else [each, "1"]
     required = ["x" for each in COMMANDS[path].params if isinstance(each, click.Argument)]
+    for each in COMMANDS[path].params:
+        if isinstance(each, click.Option) and each.required:
+            required += [each.opts[0], "x"]
     assert main([*path, *required, *words]) == 2
     error = capsys.readouterr().err
     assert f"awarenav {' '.join(path)}: {name} and {other} exclude each other" in error

@@ -192,6 +192,7 @@ class Counting:
     """A source of numbered images that may wait for a sign, or fail."""
 
     camera = rate_hz = None
+    rendered = False
 
     def __init__(self, count, *, live=False, error=None):
         self.count = count

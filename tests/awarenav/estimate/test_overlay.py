@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import av
@@ -62,6 +63,16 @@ def test_the_overlay_is_a_new_image_and_the_old_one_is_unchanged():
     assert drawn.shape == GREY.shape
     assert drawn.dtype == np.uint8
     assert np.mean((drawn != GREY).any(axis=2)) > 0.02
+
+
+def test_the_caption_names_networks_that_are_not_made_for_the_image():
+    good = estimate(observed())
+    unfit = replace(good, unfit=("detector",))
+    wide = [
+        np.flatnonzero((draw_overlay(each, CONE)[-1] != GREY[-1]).any(axis=1)).max()
+        for each in (good, unfit)
+    ]
+    assert wide[1] > 1.5 * wide[0]
 
 
 @pytest.mark.parametrize("alpha", [0.0, 0.3, 0.5, 1.0, None])

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import shutil
+from pathlib import Path
 
 import pytest
 from model_files import CONTENT, OTHER, model, names, sha256
@@ -8,7 +9,8 @@ from paths import SHARED
 
 from awarenav.cli import main
 from awarenav.errors import AwarenavError
-from awarenav.models import Catalogue, download
+from awarenav.estimate import NetworkChoice
+from awarenav.models import Catalogue, NetworkSet, download
 
 MODELS = SHARED / "models"
 
@@ -56,12 +58,16 @@ def test_catalogue_entries_that_are_refused(server, change):
 
 @pytest.fixture
 def catalogue(server, monkeypatch, tmp_path):
-    """The command's catalogue, with one network on loopback."""
+    """The command's catalogue, with two networks and a set of both on loopback."""
     server.serve("a.onnx", CONTENT)
     shipped = Catalogue.shipped()
-    local = shipped.model_copy(
-        update={"models": (model(server, "a.onnx", sha256=sha256(CONTENT), note="a test"),)}
+    server.serve("b.onnx", OTHER)
+    networks = (
+        model(server, "a.onnx", sha256=sha256(CONTENT), note="a test"),
+        model(server, "b.onnx", name="small", role="pose", sha256=sha256(OTHER)),
     )
+    both = NetworkSet(name="robot", detector="tiny", pose="small", head="pnp", purpose="tests")
+    local = shipped.model_copy(update={"models": networks, "sets": (both,)})
     monkeypatch.setattr(Catalogue, "shipped", classmethod(lambda _: local))
     monkeypatch.setenv("AWARENAV_MODELS", str(tmp_path / "models"))
     return local
@@ -70,7 +76,10 @@ def catalogue(server, monkeypatch, tmp_path):
 def test_command_lists_fetches_and_verifies(catalogue, server, tmp_path, capsys):
     assert main(["models", "list"]) == 0
     listing = capsys.readouterr().out
-    assert "made for the simulator" in listing
+    assert "Shipped, for the simulator; they have seen no real person" in listing
+    assert listing.count("trained on renders") == 3
+    assert listing.count("trained on photographs") == 2
+    assert "robot           tiny, small, head from pnp" in listing
     assert server.url("a.onnx") in listing
     assert "not fetched" in listing
     assert "AGPL-3.0" in listing
@@ -93,10 +102,47 @@ def test_command_lists_fetches_and_verifies(catalogue, server, tmp_path, capsys)
     assert main(["models", "verify"]) == 1  # fetched once, and gone
 
 
+def test_a_set_is_fetched_and_named_in_a_file_for_the_networks_option(
+    catalogue, tmp_path, capsys, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    for _ in range(2):
+        assert main(["models", "fetch", "robot"]) == 0
+    assert "robot: written to robot_networks.yaml" in capsys.readouterr().out
+    chosen = NetworkChoice.from_yaml("robot_networks.yaml")
+    assert chosen == NetworkChoice(detector="tiny", pose="small", head="pnp")
+    assert (tmp_path / "models" / "tiny.onnx").read_bytes() == CONTENT
+    assert (tmp_path / "models" / "small.onnx").read_bytes() == OTHER
+    # Somebody's own file is not replaced; in another folder the networks are named by their paths.
+    assert main(["models", "fetch", "robot", "--out", "other"]) == 2
+    assert "other contents" in capsys.readouterr().err
+    Path("robot_networks.yaml").unlink()
+    assert main(["models", "fetch", "robot", "--out", "other"]) == 0
+    chosen = NetworkChoice.from_yaml("robot_networks.yaml")
+    assert (chosen.detector, chosen.pose) == tuple(
+        str(tmp_path / "other" / name) for name in ("tiny.onnx", "small.onnx")
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"detector": "small"}, "must name networks of these roles"),
+        ({"pose": "nothing"}, "must name networks of these roles"),
+        ({"name": "tiny"}, "is a network and a set"),
+    ],
+)
+def test_sets_that_make_no_sense_are_refused(catalogue, change, message):
+    good = catalogue.sets[0].model_dump()
+    with pytest.raises(ValueError, match=message):
+        Catalogue(models=catalogue.models, sets=(NetworkSet(**(good | change)),))
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (["fetch", "tny"], "did you mean 'tiny'"),
+        (["fetch", "robot", "--sha256", "0" * 64], "single name"),
         (["fetch", "yolov8"], "AGPL-3.0"),
         (["fetch", "tiny", "other", "--sha256", "0" * 64], "single name"),
         (["fetch", "tiny", "--sha256", "0" * 64], "the catalogue says"),

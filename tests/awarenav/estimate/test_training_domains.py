@@ -1,0 +1,134 @@
+"""Networks that have seen renders only are refused on other images, unless they are asked for."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import cv2
+import numpy as np
+import onnx
+import pytest
+from numbered_images import CAMERA, numbered
+from paths import ROOT
+
+from awarenav.cli import main
+from awarenav.errors import AwarenavError
+from awarenav.estimate import NetworkChoice, admit_networks, choose_networks
+from perception.networks import OnnxModel
+from perception.shipped import DETECTOR, POSE, shipped_model_path, shipped_models
+
+ALL = ("detector", "pose", "head")
+
+
+@pytest.fixture
+def photograph(tmp_path: Path) -> Path:
+    path = tmp_path / "photograph.png"
+    assert cv2.imwrite(str(path), numbered(10))
+    CAMERA.to_yaml(tmp_path / "camera.yaml")
+    return path
+
+
+def told(path: Path, domain: str | None) -> Path:
+    """A copy of the shipped detector whose metadata name a domain."""
+    model = onnx.load(str(shipped_model_path(DETECTOR)))
+    # Only the shipped detector itself may leave the size of its images free.
+    height, width = model.graph.input[0].type.tensor_type.shape.dim[2:]
+    height.dim_value, width.dim_value = 256, 320
+    if domain is not None:
+        onnx.helper.set_model_props(model, {"training_domain": domain})
+    onnx.save(model, str(path))
+    return path
+
+
+def test_every_shipped_network_and_its_card_name_the_training_domain():
+    for model in shipped_models():
+        assert model.training_domain in ("renders", "simulated scans")
+        assert OnnxModel.shipped(model.name).training_domain == model.training_domain
+        card = (ROOT / "perception" / "models" / f"{model.name}.md").read_text(encoding="utf-8")
+        assert f"\n- training_domain: {model.training_domain}\n" in card
+
+
+@pytest.mark.parametrize(
+    ("domain", "known"),
+    [("renders", "renders"), ("photographs", "photographs"), ("dreams", None), (None, None)],
+)
+def test_the_metadata_of_a_file_name_the_training_domain(tmp_path, domain, known):
+    assert OnnxModel(told(tmp_path / "a.onnx", domain)).training_domain == known
+
+
+def test_a_copy_of_a_shipped_network_is_recognised(tmp_path):
+    copy = shutil.copy(shipped_model_path(POSE), tmp_path / "renamed.onnx")
+    assert OnnxModel(copy).training_domain == "renders"
+    assert OnnxModel(Path(copy).read_bytes()).training_domain == "renders"
+
+
+@pytest.mark.parametrize(
+    ("pose", "head", "roles"),
+    [
+        ("shipped", "auto", ("pose", "head")),
+        ("shipped", "pnp", ("pose",)),
+        ("shipped", "fused", ("pose", "head")),
+    ],
+)
+def test_one_network_of_three_is_enough_to_be_refused(tmp_path, pose, head, roles):
+    detector = told(tmp_path / "a.onnx", "photographs")
+    networks = choose_networks(str(detector), pose, head)
+    assert networks.training_domains["detector"] == "photographs"
+    assert admit_networks(networks, rendered=True, allowed=False) == ()
+    assert admit_networks(networks, rendered=False, allowed=True) == roles
+    with pytest.raises(AwarenavError, match="renders only") as refusal:
+        admit_networks(networks, rendered=False, allowed=False)
+    assert all(role in str(refusal.value) for role in roles)
+    assert "detector" not in str(refusal.value)
+    assert "awarenav models fetch robot" in str(refusal.value)
+
+
+def test_a_photograph_is_refused_in_one_line_and_nothing_is_written(photograph, capsys):
+    out = photograph.with_name("out.jsonl")
+    assert main(["estimate", str(photograph), "--out", str(out)]) == 2
+    said = capsys.readouterr().err
+    assert len(said.splitlines()) == 1
+    assert "the detector, pose and head networks have seen renders only" in said
+    assert not out.exists()
+
+
+def test_asked_for_they_are_named_on_stderr_and_in_every_line(photograph, capsys):
+    out = photograph.with_name("out.jsonl")
+    given = [str(photograph), "--out", str(out), "--allow-simulator-networks"]
+    assert main(["estimate", *given]) == 0
+    assert "renders only" in capsys.readouterr().err
+    (line,) = map(json.loads, out.read_text().splitlines())
+    assert tuple(line["simulator_networks"]) == ALL
+
+
+def test_renders_of_this_package_are_admitted_and_others_beside_them_are_not(tmp_path, capsys):
+    folder = tmp_path / "set"
+    assert main(["render", "--frames", "2", "--scenes", "1", "--out", str(folder)]) == 0
+    out = tmp_path / "out.jsonl"
+    assert main(["estimate", str(folder), "--out", str(out)]) == 0
+    assert "renders only" not in capsys.readouterr().err
+    assert all(
+        "simulator_networks" not in json.loads(line) for line in out.read_text().splitlines()
+    )
+    assert cv2.imwrite(str(folder / "holiday.png"), np.zeros((64, 64, 3), np.uint8))
+    assert main(["estimate", str(folder), "--out", str(out), "--overwrite"]) == 2
+    (folder / "holiday.png").unlink()
+    (folder / "render.yaml").unlink()
+    assert main(["estimate", str(folder), "--out", str(out), "--overwrite"]) == 2
+
+
+def test_a_file_names_the_networks(photograph, capsys):
+    file = photograph.with_name("networks.yaml")
+    detector = told(photograph.with_name("a.onnx"), "photographs")
+    file.write_text(f"detector: {detector}\nhead: pnp\n")
+    assert NetworkChoice.from_yaml(file) == NetworkChoice(detector=str(detector), head="pnp")
+    given = ["estimate", str(photograph), "--networks", str(file)]
+    assert main([*given, "--out", str(photograph.with_name("a.jsonl"))]) == 2
+    assert "the pose network has seen renders only" in capsys.readouterr().err
+    assert main([*given, "--pose", "mediapipe"]) == 2
+    assert "--pose and --networks exclude each other" in capsys.readouterr().err
+    file.write_text("poze: shipped\n")
+    assert main(given) == 2
+    assert "did you mean 'pose'" in capsys.readouterr().err
