@@ -6,7 +6,6 @@ from typing import Any, Final
 
 from ..cli import NUMBER, FilePath, Whole, command, option, options
 
-_NETWORKS: Final = "Networks (`awarenav estimate --help` explains them)"
 _READ: Final = "Topics to read"
 _WRITE: Final = "Topics to publish"
 _LOG: Final = "Recordings"
@@ -47,43 +46,8 @@ _LOG: Final = "Recordings"
     help="Rate of publishing, however long perception takes for an image.",
 )
 @option("--seconds", type=NUMBER, metavar="S", help="End after this time.")
-@option(
-    "--networks",
-    group=_NETWORKS,
-    type=FilePath(),
-    metavar="FILE",
-    help="Detector, pose and head from a file, as `awarenav models fetch robot` writes it.",
-)
-@option(
-    "--detector",
-    group=_NETWORKS,
-    excludes="--networks",
-    default="shipped",
-    metavar="NAME|FILE",
-    help="Person detector.",
-)
-@option(
-    "--pose",
-    group=_NETWORKS,
-    excludes="--networks",
-    default="shipped",
-    metavar="NAME|FILE",
-    help="Pose network.",
-)
-@option(
-    "--head",
-    group=_NETWORKS,
-    excludes="--networks",
-    default="auto",
-    metavar="NAME|FILE",
-    help="Head pose.",
-)
-@option(
-    "--allow-simulator-networks",
-    group=_NETWORKS,
-    is_flag=True,
-    help="Let networks that have seen renders only, such as the shipped ones, see a camera.",
-)
+@options.networks
+@options.allow_simulator_networks()
 @option(
     "--image", group=_READ, default="camera/image_raw", metavar="TOPIC", help="sensor_msgs/Image."
 )

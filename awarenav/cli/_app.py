@@ -49,6 +49,10 @@ _COMMANDS: Final[dict[str, dict[str, _Entry]]] = {
             "awarenav.models.command:models",
             "List, verify and download networks.",
         ),
+        "doctor": _Entry(
+            "awarenav.doctor.command:doctor",
+            "Say what is wrong with an installation and a camera.",
+        ),
         "policy": _Entry(
             "awarenav.policies.command:policy",
             "Show the radii and speed limits of a policy.",

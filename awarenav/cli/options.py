@@ -266,6 +266,65 @@ def _without_reference(context: click.Context, parameter: click.Parameter, value
     return "" if value == REFERENCE_PLANNER else value
 
 
+_NETWORKS: Final = "Networks"
+_NETWORK_OPTIONS: Final = (
+    option(
+        "--networks",
+        group=_NETWORKS,
+        type=FilePath(),
+        metavar="FILE",
+        help="Detector, pose and head from a file, as `awarenav models fetch robot` writes it.",
+    ),
+    option(
+        "--detector",
+        group=_NETWORKS,
+        excludes="--networks",
+        default="shipped",
+        metavar="NAME|FILE",
+        help="Person detector: 'shipped' (made for the simulator), a network that `awarenav "
+        "models` lists, or an ONNX file (YOLOv8, YOLO11, YOLOX, RTMDet).",
+    ),
+    option(
+        "--pose",
+        group=_NETWORKS,
+        excludes="--networks",
+        default="shipped",
+        metavar="NAME|FILE",
+        help="Pose network: 'shipped' (made for the simulator), a network that `awarenav models` "
+        "lists, an ONNX file (RTMPose, RTMW, RTMW3D), or 'mediapipe' (needs the extra "
+        "'mediapipe').",
+    ),
+    option(
+        "--head",
+        group=_NETWORKS,
+        excludes="--networks",
+        default="auto",
+        metavar="NAME|FILE",
+        help="Head pose: 'network' (the shipped one, made for the simulator), 'pnp' (from the "
+        "keypoints), 'fused' (both), an ONNX file, or 'auto': 'network' with the shipped pose "
+        "network, else 'pnp'.",
+    ),
+)
+
+
+def networks(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Add ``--networks``, ``--detector``, ``--pose`` and ``--head``: who perceives people."""
+    for add in reversed(_NETWORK_OPTIONS):
+        function = add(function)
+    return function
+
+
+def allow_simulator_networks() -> Decorator:
+    """Add ``--allow-simulator-networks``: networks of renders may see other images."""
+    return option(
+        "--allow-simulator-networks",
+        group=_NETWORKS,
+        is_flag=True,
+        help="Let networks that have seen renders only, such as the shipped ones, see other "
+        "images. All results say so.",
+    )
+
+
 def as_json(what: str = "the table") -> Decorator:
     """Add ``--json``: print the result as JSON."""
     return option("--json", "as_json", is_flag=True, help=f"Print {what} as JSON.")

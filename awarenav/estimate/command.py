@@ -43,48 +43,8 @@ _CAMERA: Final = "Camera"
 @option("--every", type=POSITIVE, default=1, metavar="N", help="Use every N-th frame only.")
 @option("--frames", type=POSITIVE, metavar="N", help="Stop after N frames.")
 @option("--topic", metavar="NAME", help="Image topic of a recording that has several.")
-@option(
-    "--networks",
-    group=_NETWORKS,
-    type=FilePath(),
-    metavar="FILE",
-    help="Detector, pose and head from a file, as `awarenav models fetch robot` writes it.",
-)
-@option(
-    "--detector",
-    group=_NETWORKS,
-    excludes="--networks",
-    default="shipped",
-    metavar="NAME|FILE",
-    help="Person detector: 'shipped' (made for the simulator), a network that `awarenav models` "
-    "lists, or an ONNX file (YOLOv8, YOLO11, YOLOX, RTMDet).",
-)
-@option(
-    "--pose",
-    group=_NETWORKS,
-    excludes="--networks",
-    default="shipped",
-    metavar="NAME|FILE",
-    help="Pose network: 'shipped' (made for the simulator), a network that `awarenav models` "
-    "lists, an ONNX file (RTMPose, RTMW, RTMW3D), or 'mediapipe' (needs the extra 'mediapipe').",
-)
-@option(
-    "--head",
-    group=_NETWORKS,
-    excludes="--networks",
-    default="auto",
-    metavar="NAME|FILE",
-    help="Head pose: 'network' (the shipped one, made for the simulator), 'pnp' (from the "
-    "keypoints), 'fused' (both), an ONNX file, or 'auto': 'network' with the shipped pose "
-    "network, else 'pnp'.",
-)
-@option(
-    "--allow-simulator-networks",
-    group=_NETWORKS,
-    is_flag=True,
-    help="Let networks that have seen renders only, such as the shipped ones, see other images. "
-    "All results say so.",
-)
+@options.networks
+@options.allow_simulator_networks()
 @option(
     "--min-score",
     group=_NETWORKS,

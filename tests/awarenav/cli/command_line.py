@@ -13,7 +13,7 @@ from awarenav.cli import app
 
 #: The commands under the headings of the list.
 GROUPS = {
-    "On a robot": ["estimate", "judge", "tracks", "bridge", "models", "policy"],
+    "On a robot": ["estimate", "judge", "tracks", "bridge", "models", "doctor", "policy"],
     "Simulation": [
         *("demo", "crossings", "replay", "compare", "report", "scenario", "render", "tune"),
         "falsify",

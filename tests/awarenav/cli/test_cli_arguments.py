@@ -96,7 +96,12 @@ def test_exclusions_are_those_that_are_known():
             (name, "--overwrite", "--resume")
             for name in ("crossings", "estimate", "falsify", "render", "tune")
         ),
-        ("estimate", "--fov-deg", "--camera"),
+        *((name, "--fov-deg", "--camera") for name in ("doctor", "estimate")),
+        *(
+            (name, option, "--networks")
+            for name in ("bridge", "doctor", "estimate")
+            for option in ("--detector", "--pose", "--head")
+        ),
         ("tracks", "--ids", "--config"),
         ("falsify", "--unsafe-no-floor", "--planner"),
     }

@@ -47,6 +47,7 @@ def test_every_command_with_json_is_tested_here():
     tested = {
         ("compare",),
         ("crossings",),
+        ("doctor",),
         ("judge",),
         ("models", "list"),
         ("models", "verify"),
@@ -68,6 +69,11 @@ def test_models_print_json(capfd, tmp_path):
     assert {"shipped", "real_robot", "named_only"} < set(listed)
     states = printed(capfd, "models", "verify", "--out", tmp_path)
     assert set(states) == {each["name"] for each in listed["shipped"]}
+
+
+def test_doctor_prints_json(capfd):
+    subjects = [each["subject"] for each in printed(capfd, "doctor")]
+    assert {"packages", "shipped networks", "extras"} <= set(subjects)
 
 
 def test_scenario_list_prints_json(capfd):

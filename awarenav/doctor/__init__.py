@@ -1,0 +1,35 @@
+"""What is wrong with an installation and a camera: ``awarenav doctor``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..lazy import lazy_names
+
+if TYPE_CHECKING:
+    from ._findings import Finding, Severity, by_importance
+    from ._installation import installation_findings
+    from ._pictures import PictureFigures, picture_figures, picture_findings
+    from ._run import DoctorOptions, doctor_command
+
+__all__ = [
+    "DoctorOptions",
+    "Finding",
+    "PictureFigures",
+    "Severity",
+    "by_importance",
+    "doctor_command",
+    "installation_findings",
+    "picture_figures",
+    "picture_findings",
+]
+
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "._findings": ("Finding", "Severity", "by_importance"),
+        "._installation": ("installation_findings",),
+        "._pictures": ("PictureFigures", "picture_figures", "picture_findings"),
+        "._run": ("DoctorOptions", "doctor_command"),
+    },
+)

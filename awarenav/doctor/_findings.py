@@ -1,0 +1,77 @@
+"""What the doctor finds, and the order in which it says it."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final, Literal
+
+Severity = Literal["error", "warning", "fine"]
+#: Subjects, the most important first: what makes results wrong, then what makes them poor.
+SUBJECTS: Final = (
+    "packages",
+    "shipped networks",
+    "networks",
+    "images",
+    "calibration",
+    "frame rate",
+    "exposure",
+    "sharpness",
+    "resolution",
+    "people",
+    "fetched networks",
+    "extras",
+)
+_SEVERITIES: Final = ("error", "warning", "fine")
+_WIDTH: Final = 100
+_INDENT: Final = 27
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One finding.
+
+    Attributes:
+        severity: ``"error"``: results cannot be trusted or do not come; ``"warning"``: they are
+            worse than need be; ``"fine"``.
+        subject: one of :data:`SUBJECTS`.
+        text: what was found.
+        remedy: what mends it; empty if nothing is wrong.
+    """
+
+    severity: Severity
+    subject: str
+    text: str
+    remedy: str = ""
+
+
+def by_importance(findings: Iterable[Finding]) -> list[Finding]:
+    """Return errors before warnings before the rest, each in the order of the subjects."""
+    return sorted(
+        findings,
+        key=lambda each: (_SEVERITIES.index(each.severity), SUBJECTS.index(each.subject)),
+    )
+
+
+def findings_text(findings: Iterable[Finding]) -> str:
+    """Return the findings as lines, each with its remedy below."""
+    lines = []
+    for each in findings:
+        word = each.severity if each.severity == "fine" else each.severity.upper()
+        head = f"{word:9s}{each.subject:18s}"
+        lines.append(_filled(each.text, head))
+        if each.remedy:
+            lines.append(_filled(f"→ {each.remedy}", " " * _INDENT))
+    return "\n".join(lines)
+
+
+def _filled(text: str, head: str) -> str:
+    return textwrap.fill(
+        text,
+        _WIDTH,
+        initial_indent=head,
+        subsequent_indent=" " * _INDENT,
+        break_on_hyphens=False,
+        break_long_words=False,
+    )

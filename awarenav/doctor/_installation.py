@@ -1,0 +1,124 @@
+"""Findings about an installation: packages, networks and extras."""
+
+from __future__ import annotations
+
+import platform
+from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
+from typing import Final
+
+import onnxruntime  # type: ignore[import-untyped]
+
+from perception import PerceptionError
+from perception.shipped import shipped_models, verify_shipped_model
+
+from .. import __version__
+from ..errors import AwarenavError
+from ..models import ModelStore
+from ._findings import Finding
+
+# Packages that both provide the module cv2: whichever was installed last overwrote the other.
+_OPENCV: Final = (
+    "opencv-python",
+    "opencv-python-headless",
+    "opencv-contrib-python",
+    "opencv-contrib-python-headless",
+)
+# A module of each extra, and what needs it.
+_EXTRAS: Final = (
+    ("sim", "pybullet", "crossings"),
+    ("ros2", "cyclonedds", "the bridge"),
+    ("rosbag", "rosbags", "recordings"),
+    ("plot", "matplotlib", "plots"),
+    ("mediapipe", "mediapipe", "MediaPipe's pose network"),
+)
+
+
+def installation_findings() -> list[Finding]:
+    """Return the findings about packages, shipped and fetched networks, and extras."""
+    return [*_packages(), *_shipped(), *_fetched(), _extras()]
+
+
+def _packages() -> list[Finding]:
+    providers = ", ".join(
+        name.removesuffix("ExecutionProvider") for name in onnxruntime.get_available_providers()
+    )
+    found = [
+        Finding(
+            "fine",
+            "packages",
+            f"awarenav {__version__}, Python {platform.python_version()}, onnxruntime "
+            f"{onnxruntime.__version__} ({providers})",
+        )
+    ]
+    several = [name for name in _OPENCV if _is_installed(name)]
+    if len(several) > 1:
+        found.append(
+            Finding(
+                "warning",
+                "packages",
+                f"{' and '.join(several)} overwrite each other's files",
+                f"pip uninstall {' '.join(several)}, then pip install opencv-python-headless",
+            )
+        )
+    return found
+
+
+def _is_installed(package: str) -> bool:
+    try:
+        version(package)
+    except PackageNotFoundError:
+        return False
+    return True
+
+
+def _shipped() -> list[Finding]:
+    try:
+        names = [model.name for model in shipped_models()]
+        for name in names:
+            verify_shipped_model(name)
+    except PerceptionError as error:
+        return [
+            Finding(
+                "error",
+                "shipped networks",
+                str(error),
+                "pip install --force-reinstall --no-deps awarenav",
+            )
+        ]
+    return [Finding("fine", "shipped networks", f"{', '.join(names)}: unaltered, for renders only")]
+
+
+def _fetched() -> list[Finding]:
+    try:
+        store = ModelStore()
+        here = [each.name for each in store.catalogue.models if store.is_fetched(each.name)]
+    except AwarenavError as error:
+        return [Finding("error", "fetched networks", str(error))]
+    found = []
+    for name in here:
+        try:
+            store.path(name)
+        except AwarenavError as error:
+            remedy = f"awarenav models fetch {name}"
+            found.append(Finding("error", "fetched networks", str(error), remedy))
+    if found:
+        return found
+    if here:
+        return [Finding("fine", "fetched networks", f"{', '.join(here)}: unaltered")]
+    return [
+        Finding(
+            "warning",
+            "fetched networks",
+            "none, so that there is no network for photographs",
+            "awarenav models fetch robot",
+        )
+    ]
+
+
+def _extras() -> Finding:
+    words = [
+        f"{extra} {'is there' if find_spec(module) else f'is not installed ({use})'}"
+        for extra, module, use in _EXTRAS
+    ]
+    return Finding("fine", "extras", "; ".join(words))

@@ -1,0 +1,285 @@
+"""The work of ``awarenav doctor``."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from perception import AttentionCone, Camera
+from perception.shipped import simulator_networks, simulator_networks_warning
+
+from ..errors import AwarenavError, counted
+from ..estimate import (
+    CameraChoice,
+    FrameEstimate,
+    ImageSource,
+    NetworkChoice,
+    OverlayWriter,
+    PeopleEstimator,
+    SourceFrame,
+    choose_networks,
+    open_source,
+)
+from ..files import json_text
+from ._findings import Finding, Severity, by_importance, findings_text
+from ._installation import installation_findings
+from ._pictures import PictureFigures, picture_figures, picture_findings
+
+# Rates of the method's paper, and below which a frame is too old to prove awareness when the next
+# one comes (`timing.fresh_within_s` of the policies).
+_WANTED_HZ: Final = 20.0
+_LEAST_HZ: Final = 4.0
+# The first frames warm up caches and networks.
+_WARM_UP: Final = 2
+# Width of a face, the pixels across it below which awareness is uncertain, and the range up to
+# which a robot should see them.
+_FACE_M: Final = 0.15
+_FACE_PX: Final = 20.0
+_FACE_RANGE_M: Final = 3.0
+# A principal point farther from the middle, as a share of the width, is unusual.
+_OFF_CENTRE: Final = 0.1
+_REMEDY_NETWORKS: Final = "awarenav models fetch robot, then --networks robot_networks.yaml"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DoctorOptions:
+    """The options of ``awarenav doctor``."""
+
+    source: str | None
+    out: Path
+    frames: int
+    topic: str | None
+    networks: Path | None
+    detector: str
+    pose: str
+    head: str
+    camera: Path | None
+    fov_deg: float | None
+    as_json: bool
+
+
+@dataclass(slots=True)
+class _Examined:
+    """What was seen in a source."""
+
+    stamps_s: list[float] = field(default_factory=list)
+    figures: list[PictureFigures] = field(default_factory=list)
+    times_s: list[float] = field(default_factory=list)
+    people: list[int] = field(default_factory=list)
+    without_evidence: int = 0
+    problems: list[str] = field(default_factory=list)
+    best: FrameEstimate | None = None
+
+
+def doctor_command(options: DoctorOptions) -> int:
+    """Print the findings; return the exit status: 1 if there are errors.
+
+    Raises:
+        AwarenavError: for a source, networks or options that cannot be used.
+        PerceptionError: for a network or calibration that cannot be used.
+    """
+    findings = installation_findings()
+    if options.source is not None:
+        findings += _source_findings(options)
+    ordered = by_importance(findings)
+    errors = sum(each.severity == "error" for each in ordered)
+    if options.as_json:
+        print(json_text([asdict(each) for each in ordered]), end="")
+    else:
+        warnings = sum(each.severity == "warning" for each in ordered)
+        print(findings_text(ordered))
+        print(f"\n{counted(errors, 'error')}, {counted(warnings, 'warning')}")
+    return 1 if errors else 0
+
+
+def _source_findings(options: DoctorOptions) -> list[Finding]:
+    assert options.source is not None
+    with contextlib.closing(open_source(options.source, topic=options.topic)) as source:
+        choice = NetworkChoice.of_options(
+            options.networks, options.detector, options.pose, options.head
+        )
+        networks = choose_networks(**choice.model_dump())
+        unfit = () if source.rendered else simulator_networks(networks.training_domains)
+        calibration = source.camera
+        if options.camera is not None:
+            calibration = Camera.from_yaml(options.camera)
+        elif options.fov_deg is not None:
+            calibration = None
+        cameras = CameraChoice(calibration, options.fov_deg, lambda _: None)
+        estimator = PeopleEstimator(networks, cameras, unfit=unfit)
+        seen = _examine(source, estimator, options.frames)
+        findings = [_domain_finding(unfit, networks.training_domains, rendered=source.rendered)]
+        if seen.problems:
+            text = f"{counted(len(seen.problems), 'image')} of {options.frames}: {seen.problems[0]}"
+            severity: Severity = "warning" if seen.figures else "error"
+            findings.append(Finding(severity, "images", text))
+        if seen.best is None:
+            return findings
+        findings += [
+            _calibration_finding(calibration, options.fov_deg),
+            *_rate_findings(source, seen),
+            *picture_findings(seen.figures),
+            _resolution_finding(seen.best.camera),
+            _people_finding(seen),
+        ]
+        if str(options.out) != "none":
+            _draw(options.out, seen.best)
+            findings.append(Finding("fine", "people", f"test picture: {options.out}"))
+        return findings
+
+
+def _examine(source: ImageSource, estimator: PeopleEstimator, most: int) -> _Examined:
+    """Look at some images, evenly chosen where all are there."""
+    seen, before = _Examined(), None
+    for frame in _chosen(source, most):
+        if frame.image_rgb is None:
+            seen.problems.append(frame.problem)
+            continue
+        began = time.perf_counter()
+        try:
+            estimate = estimator.estimate(frame)
+        except AwarenavError as error:
+            seen.problems.append(f"frame {frame.name}: {error}")
+            continue
+        seen.times_s.append(time.perf_counter() - began)
+        seen.stamps_s.append(frame.stamp_s)
+        seen.figures.append(picture_figures(frame.image_rgb, before))
+        before = frame.image_rgb
+        people = estimate.observations
+        if seen.best is None or len(people) > len(seen.best.observations):
+            seen.best = estimate
+        seen.people.append(len(people))
+        seen.without_evidence += sum(each.awareness is None for each in people)
+    return seen
+
+
+def _chosen(source: ImageSource, most: int) -> Iterator[SourceFrame]:
+    """Yield the first frames of a film; of single images, some from all over."""
+    count = source.count
+    step = 1 if count is None or source.rate_hz is not None else max(count // most, 1)
+    taken = 0
+    for number, frame in enumerate(source.frames()):
+        if taken >= most:
+            return
+        if number % step == 0:
+            taken += 1
+            yield frame
+
+
+def _domain_finding(
+    unfit: tuple[str, ...], domains: Mapping[str, str | None], *, rendered: bool
+) -> Finding:
+    if unfit:
+        text = simulator_networks_warning(unfit)
+        return Finding("error", "networks", text, _REMEDY_NETWORKS)
+    told = ", ".join(f"{role} {domain or 'not known'}" for role, domain in domains.items())
+    kind = "renders" if rendered else "pictures that no renderer of this package made"
+    if None in domains.values():
+        return Finding(
+            "warning",
+            "networks",
+            f"trained on: {told}; the images are {kind}",
+            "a network says it under 'training_domain' in its metadata",
+        )
+    return Finding("fine", "networks", f"trained on: {told}; the images are {kind}")
+
+
+def _calibration_finding(camera: Camera | None, fov_deg: float | None) -> Finding:
+    if camera is None and fov_deg is None:
+        return Finding(
+            "error",
+            "calibration",
+            "there is none; a horizontal field of view of 60 degrees is assumed, and distances are "
+            "wrong by as much as that is",
+            "--camera camera.yaml (ROS camera_calibration makes it), or at least --fov-deg",
+        )
+    if camera is None:
+        return Finding(
+            "warning",
+            "calibration",
+            f"a horizontal field of view of {fov_deg:g} degrees, without lens distortion",
+            "--camera camera.yaml (ROS camera_calibration makes it)",
+        )
+    across = math.degrees(2.0 * math.atan(0.5 * camera.width_px / camera.fx_px))
+    off = abs(camera.cx_px - 0.5 * camera.width_px) / camera.width_px
+    text = f"{camera.width_px} × {camera.height_px} pixels, {across:.0f} degrees across"
+    if off > _OFF_CENTRE:
+        return Finding(
+            "warning",
+            "calibration",
+            f"{text}; its principal point lies {100.0 * off:.0f} % of the width off the middle",
+            "was the picture cropped after the calibration?",
+        )
+    return Finding("fine", "calibration", text)
+
+
+def _rate_findings(source: ImageSource, seen: _Examined) -> list[Finding]:
+    """Return the findings about the rate of the images, and of perception."""
+    found = []
+    steps_s = np.diff(seen.stamps_s)
+    if (source.live or source.rate_hz is not None) and len(steps_s) and np.median(steps_s) > 0.0:
+        found.append(_rate_finding(1.0 / float(np.median(steps_s)), "the images come at"))
+        if (steps_s <= 0.0).any():
+            text = "stamps stand still or go back"
+            found.append(Finding("error", "frame rate", text, "look at the driver's clock"))
+    warm = seen.times_s[_WARM_UP:] or seen.times_s
+    rate = _rate_finding(1.0 / float(np.median(warm)), "perception manages")
+    return [*found, rate]
+
+
+def _rate_finding(rate_hz: float, words: str) -> Finding:
+    text = f"{words} {rate_hz:.1f} images per second"
+    if rate_hz < _LEAST_HZ:
+        return Finding(
+            "error",
+            "frame rate",
+            f"{text}: nobody counts as aware below {_LEAST_HZ:g}",
+            "smaller networks, a smaller picture, or another computer",
+        )
+    if rate_hz < _WANTED_HZ:
+        return Finding(
+            "warning",
+            "frame rate",
+            f"{text}; the method's paper has {_WANTED_HZ:g}",
+            "smaller networks (rtmdet-nano, rtmpose-s), or a GPU (--provider of estimate)",
+        )
+    return Finding("fine", "frame rate", text)
+
+
+def _resolution_finding(camera: Camera) -> Finding:
+    range_m = camera.fx_px * _FACE_M / _FACE_PX
+    text = f"faces have {_FACE_PX:g} pixels up to {range_m:.1f} m, and less beyond"
+    if range_m < _FACE_RANGE_M:
+        remedy = "a larger picture, or a narrower lens: awareness is uncertain beyond"
+        return Finding("warning", "resolution", text, remedy)
+    return Finding("fine", "resolution", text)
+
+
+def _people_finding(seen: _Examined) -> Finding:
+    total, images = sum(seen.people), len(seen.people)
+    if not total:
+        return Finding(
+            "warning",
+            "people",
+            f"nobody in {counted(images, 'image')}",
+            "stand before the camera, 2 to 5 m away, and run it again",
+        )
+    blind = seen.without_evidence
+    with_people = sum(number > 0 for number in seen.people)
+    text = (
+        f"{counted(total, 'person', 'people')} in {with_people} of {counted(images, 'image')}, "
+        f"{blind} of them without evidence of awareness"
+    )
+    return Finding("fine", "people", text)
+
+
+def _draw(path: Path, estimate: FrameEstimate) -> None:
+    with OverlayWriter(path, 1.0, AttentionCone(), single=True) as writer:
+        writer.add(estimate)

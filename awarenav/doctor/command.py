@@ -1,0 +1,66 @@
+"""The command ``awarenav doctor``."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from ..cli import NUMBER, POSITIVE, FilePath, argument, command, option, options
+
+_CAMERA: Final = "Camera"
+
+
+@command(
+    "doctor",
+    examples=[
+        "awarenav doctor",
+        "awarenav doctor 0 --networks robot_networks.yaml --camera camera.yaml",
+        "awarenav doctor photographs/",
+    ],
+    exit_status={
+        0: "No errors.",
+        1: "There are errors; the first of them is the most important.",
+        2: "Bad input.",
+    },
+)
+@argument(
+    "source",
+    required=False,
+    help="Images as `awarenav estimate` reads them: a camera's number (0), a stream, a video, a "
+    "folder, an image or a recording. Without it only the installation is examined.",
+)
+@option(
+    "--out",
+    type=FilePath(),
+    default="doctor.png",
+    metavar="FILE.png|none",
+    help="A test picture: the image with the most people, and what is estimated of them.",
+)
+@option("--frames", type=POSITIVE, default=20, metavar="N", help="Number of images to look at.")
+@option("--topic", metavar="NAME", help="Image topic of a recording that has several.")
+@options.networks
+@option(
+    "--camera",
+    group=_CAMERA,
+    type=FilePath(),
+    show_default="camera.yaml beside the images, or camera_info of the recording",
+    metavar="FILE",
+    help="Calibration (ROS camera_info YAML).",
+)
+@option(
+    "--fov-deg",
+    group=_CAMERA,
+    type=NUMBER,
+    excludes="--camera",
+    metavar="DEG",
+    help="Horizontal field of view, instead of a calibration.",
+)
+@options.as_json("the findings")
+def doctor(**values: Any) -> int:
+    """Say what is wrong with the installation and the camera, the most important first.
+
+    Looks at packages and networks; and with SOURCE at what the networks were trained on, the
+    calibration, the frame rate reached, exposure, sharpness, and the people found.
+    """
+    from ._run import DoctorOptions, doctor_command  # noqa: PLC0415 - help needs no networks
+
+    return doctor_command(DoctorOptions(**values))

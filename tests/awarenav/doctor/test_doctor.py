@@ -1,0 +1,197 @@
+"""What ``awarenav doctor`` says of installations and cameras with one thing wrong at a time."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from paths import SHARED
+
+from awarenav.cli import main
+from awarenav.doctor import Finding, by_importance, picture_figures, picture_findings
+from awarenav.models import ModelStore
+from perception import _manifest
+from perception.shipped import shipped_models
+
+PHOTOGRAPHS = SHARED / "images"
+RNG = np.random.default_rng(0)
+# Edges of all directions and contrasts.
+SCENE = cv2.resize(RNG.integers(20, 230, (24, 32, 3), np.uint8), (640, 480), interpolation=0)
+
+
+@pytest.fixture(scope="module")
+def renders(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("renders")
+    assert main(["render", "--frames", "6", "--scenes", "1", "--out", str(folder)]) == 0
+    return folder
+
+
+def findings(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict[str, list[Finding]]:
+    """The findings by subject; the exit status must fit them."""
+    status = main(["doctor", *map(str, arguments), "--json"])
+    found = [Finding(**each) for each in json.loads(capsys.readouterr().out)]
+    assert found == by_importance(found)
+    assert status == int(any(each.severity == "error" for each in found))
+    by_subject: dict[str, list[Finding]] = {}
+    for each in found:
+        by_subject.setdefault(each.subject, []).append(each)
+    return by_subject
+
+
+def severities(found: dict[str, list[Finding]], subject: str) -> set[str]:
+    return {each.severity for each in found.get(subject, ())}
+
+
+def test_an_installation_without_a_camera(capsys, tmp_path, monkeypatch):
+    monkeypatch.setenv("AWARENAV_MODELS", str(tmp_path))
+    found = findings(capsys)
+    assert severities(found, "packages") <= {"fine", "warning"}
+    assert severities(found, "shipped networks") == {"fine"}
+    assert found["fetched networks"][0].remedy == "awarenav models fetch robot"
+    assert "networks" not in found
+
+
+def test_altered_networks_are_errors(capsys, tmp_path, monkeypatch):
+    folder = Path(shutil.copytree(_manifest._FOLDER, tmp_path / "models"))
+    (folder / shipped_models()[0].file).write_bytes(b"other")
+    monkeypatch.setattr(_manifest, "_FOLDER", folder)
+    monkeypatch.setenv("AWARENAV_MODELS", str(tmp_path / "fetched"))
+    (tmp_path / "fetched").mkdir()
+    (tmp_path / "fetched" / "yolox-nano.onnx").write_bytes(b"other")
+    assert ModelStore().is_fetched("yolox-nano")
+    found = findings(capsys)
+    assert severities(found, "shipped networks") == {"error"}
+    assert severities(found, "fetched networks") == {"error"}
+    assert "yolox-nano" in found["fetched networks"][0].remedy
+
+
+def test_a_set_of_renders_has_no_errors_and_a_test_picture(capsys, renders, tmp_path):
+    picture = tmp_path / "new" / "seen.png"
+    found = findings(capsys, renders, "--out", picture)
+    for subject in ("networks", "calibration", "exposure", "sharpness", "people"):
+        assert severities(found, subject) == {"fine"}, subject
+    assert "the images are renders" in found["networks"][0].text
+    drawn = cv2.imread(str(picture))
+    assert drawn.shape == (480, 640, 3)
+    assert min(int(np.abs(drawn.astype(int) - each).max()) for each in images(renders)) > 50
+
+
+def images(folder: Path) -> list[np.ndarray]:
+    return [cv2.imread(str(path)) for path in sorted(folder.glob("0*.png"))]
+
+
+def copied(renders: Path, folder: Path, change) -> Path:
+    """A folder of changed images without any file beside them."""
+    folder.mkdir()
+    for number, image in enumerate(images(renders)):
+        assert cv2.imwrite(str(folder / f"{number}.png"), change(image))
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("change", "subject", "severity"),
+    [
+        (lambda image: cv2.GaussianBlur(image, (0, 0), 4.0), "sharpness", "warning"),
+        (lambda image: np.minimum(image.astype(int) * 4 + 60, 255), "exposure", "warning"),
+        (lambda image: image // 15, "exposure", "warning"),
+        (lambda image: np.full_like(image, 90), "images", "error"),
+    ],
+    ids=["blurred", "burnt out", "dark", "lens cap"],
+)
+def test_pictures_of_a_bad_camera(capsys, renders, tmp_path, change, subject, severity):
+    folder = copied(renders, tmp_path / "set", change)
+    found = findings(capsys, folder, "--out", "none", "--fov-deg", 60)
+    assert severities(found, subject) == {severity}
+    assert severities(found, "networks") == {"error"}
+    assert severities(found, "calibration") == {"warning"}
+
+
+def test_without_a_calibration_distances_are_wrong(capsys, renders, tmp_path):
+    folder = copied(renders, tmp_path / "set", lambda image: image)
+    found = findings(capsys, folder, "--out", "none")
+    assert severities(found, "calibration") == {"error"}
+    # In the order of importance, what sees the wrong thing comes before what measures it wrongly.
+    assert list(found)[:2] == ["networks", "calibration"]
+
+
+def test_a_camera_that_is_frozen(capsys, renders, tmp_path):
+    folder = copied(renders, tmp_path / "set", lambda image: image)
+    first = (folder / "0.png").read_bytes()
+    for path in folder.glob("*.png"):
+        path.write_bytes(first)
+    found = findings(capsys, folder, "--out", "none")
+    assert severities(found, "images") == {"error"}
+    assert "frozen" in found["images"][0].text
+    (folder / "3.png").write_bytes(b"damaged")
+    found = findings(capsys, folder, "--out", "none")
+    assert severities(found, "images") == {"error", "warning"}
+
+
+def test_a_wide_lens_on_a_small_picture(capsys, renders, tmp_path):
+    folder = copied(renders, tmp_path / "set", lambda image: image)
+    found = findings(capsys, folder, "--out", "none", "--fov-deg", 120)
+    assert severities(found, "resolution") == {"warning"}
+    assert "up to 1.4 m" in found["resolution"][0].text
+
+
+@pytest.mark.skipif(not PHOTOGRAPHS.is_dir(), reason="no photographs beside the checkout")
+def test_photographs_need_other_networks(capsys, tmp_path):
+    detector = SHARED / "models" / "rtmdet_nano_person_320_mmpose.onnx"
+    picture = tmp_path / "seen.png"
+    found = findings(capsys, PHOTOGRAPHS, "--out", picture, "--frames", 4)
+    assert severities(found, "networks") == {"error"}
+    assert "detector, pose and head" in found["networks"][0].text
+    assert picture.exists()
+    found = findings(capsys, PHOTOGRAPHS, "--out", "none", "--frames", 2, "--detector", detector)
+    assert "the pose and head networks" in found["networks"][0].text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["nowhere"], "no such file or folder: nowhere"),
+        (["nowhere", "--fov-deg", "60", "--camera", "a.yaml"], "exclude each other"),
+        (["nowhere", "--frames", "0"], "--frames"),
+    ],
+)
+def test_bad_input_is_refused(capsys, arguments, message):
+    assert main(["doctor", *arguments]) == 2
+    assert message in capsys.readouterr().err
+
+
+# --- figures ------------------------------------------------------------------------------------
+
+
+@settings(deadline=None, max_examples=20)
+@given(st.floats(1.0, 6.0), st.floats(0.3, 1.0))
+def test_the_width_of_edges_grows_with_blur_and_not_with_contrast(sigma_px, contrast):
+    faint = (SCENE * contrast).astype(np.uint8)
+    sharp, blurred, more = (
+        picture_figures(cv2.GaussianBlur(faint, (0, 0), each) if each else faint).edge_px
+        for each in (0.0, sigma_px, 1.5 * sigma_px)
+    )
+    assert sharp < 3.0
+    assert sharp < blurred < more
+    full = picture_figures(cv2.GaussianBlur(SCENE, (0, 0), sigma_px)).edge_px
+    assert blurred == pytest.approx(full, rel=0.15)
+
+
+def test_a_repeated_picture_is_told_from_one_with_noise():
+    noisy = SCENE.copy()
+    noisy[0, 0, 0] += 1
+    assert picture_figures(SCENE, SCENE.copy()).repeats
+    assert not picture_figures(noisy, SCENE).repeats
+    assert not picture_figures(SCENE).repeats
+    fresh, again = picture_figures(noisy, SCENE), picture_figures(SCENE, SCENE)
+    (some,) = [
+        each
+        for each in picture_findings([picture_figures(SCENE), fresh, again, fresh])
+        if each.subject == "images"
+    ]
+    assert (some.severity, some.text) == ("warning", "1 of 4 repeat the one before")
