@@ -99,7 +99,7 @@ def copied(renders: Path, folder: Path, change) -> Path:
     [
         (lambda image: cv2.GaussianBlur(image, (0, 0), 4.0), "sharpness", "warning"),
         (lambda image: np.minimum(image.astype(int) * 4 + 60, 255), "exposure", "warning"),
-        (lambda image: image // 15, "exposure", "warning"),
+        (lambda image: np.maximum(image.astype(int) - 85, 0), "exposure", "warning"),
         (lambda image: np.full_like(image, 90), "images", "error"),
     ],
     ids=["blurred", "burnt out", "dark", "lens cap"],
