@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Final
 
@@ -32,15 +32,18 @@ class DepthCue:
             cues with such a part are correlated, in proportion to it.
         outlier_probability: probability in (0, 1) that the cue is unrelated to the range: feet
             that stand on something, the head of another person, a false skeleton.
+        unusual_std: in place of ``stature_std`` for somebody whose stature is not that of an
+            adult who stands: a child, somebody bent or seated.
     """
 
     log_range: float
     log_std: float
     stature_std: float
     outlier_probability: float
+    unusual_std: float = 0.0
 
 
-def combine_cues(cues: Sequence[DepthCue]) -> tuple[float, float]:
+def combine_cues(cues: Sequence[DepthCue], unusual_probability: float = 0.0) -> tuple[float, float]:
     """Return the logarithm of the range and its standard deviation.
 
     Any subset of the cues may be the inliers. Within a subset the cues are combined by generalised
@@ -52,15 +55,33 @@ def combine_cues(cues: Sequence[DepthCue]) -> tuple[float, float]:
 
     Args:
         cues: one to five cues.
+        unusual_probability: that the person's stature is unusual. Cues that rest on the stature are
+            then all wrong in the same way, so that one cue that does not can outvote them.
     """
     if len(cues) == 1:
         return cues[0].log_range, cues[0].log_std
-    terms = [_terms(cue) for cue in cues]
+    hypotheses = [([_terms(cue) for cue in cues], math.log1p(-unusual_probability))]
+    if unusual_probability > 0.0:
+        unusual = [
+            _terms(
+                replace(
+                    cue,
+                    log_std=math.hypot(_own_std(cue), cue.unusual_std),
+                    stature_std=cue.unusual_std,
+                )
+            )
+            for cue in cues
+        ]
+        hypotheses.append((unusual, math.log(unusual_probability)))
+    terms = hypotheses[0][0]
     # If every cue is an outlier, only the prior density of the range is left to integrate.
     middle = _median([cue.log_range for cue in cues])
     all_outliers = sum(as_outlier for *_, as_outlier in terms) - math.log(_UNIFORM_DENSITY)
     found = [(middle, _ALL_OUTLIERS_LOG_STD**2, all_outliers)]
-    found += [_least_squares(terms, inliers) for inliers in _SUBSETS[len(cues)]]
+    for terms, prior in hypotheses:
+        for inliers in _SUBSETS[len(cues)]:
+            mean, variance, fit = _least_squares(terms, inliers)
+            found.append((mean, variance, fit + prior))
     found.sort()
     highest = max(fit for *_, fit in found)
     weights = [math.exp(fit - highest) for *_, fit in found]
@@ -77,6 +98,11 @@ def combine_cues(cues: Sequence[DepthCue]) -> tuple[float, float]:
         for (mean, variance, _), weight in zip(found, weights, strict=True)
     )
     return centre, math.sqrt(spread / total)
+
+
+def _own_std(cue: DepthCue) -> float:
+    """Return the standard deviation of a cue but for the person's stature."""
+    return math.sqrt(max(cue.log_std**2 - cue.stature_std**2, 1e-8))
 
 
 def _terms(cue: DepthCue) -> tuple[float, ...]:

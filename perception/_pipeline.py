@@ -12,6 +12,7 @@ import numpy as np
 from . import layouts as kp
 from ._attention import AttentionCone
 from ._camera import Camera
+from ._depth_image import checked_depth
 from ._floor import FloorPlane
 from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
@@ -152,7 +153,13 @@ class AwarenessPipeline:
         return self._timings
 
     def process(
-        self, image_rgb: ImageRgb, stamp_s: float, floor: FloorPlane | None = None
+        self,
+        image_rgb: ImageRgb,
+        stamp_s: float,
+        floor: FloorPlane | None = None,
+        *,
+        depth_m: Any | None = None,
+        depth_stamp_s: float | None = None,
     ) -> tuple[PersonObservation, ...]:
         """Return one observation per detected person.
 
@@ -164,15 +171,26 @@ class AwarenessPipeline:
             stamp_s: time of the frame.
             floor: the floor in the camera frame of this image, for a camera that moves relative to
                 the floor; default the constructor's.
+            depth_m: (H, W) depth along the optical axis, aligned with the image to a few pixels: of
+                an RGB-D or stereo camera. Floating-point metres, or uint16 millimetres; 0, NaN and
+                infinity are holes. It improves the range of people, of children and seated people
+                above all.
+            depth_stamp_s: time of the depth image, within 0.05 s; default that of the image.
 
         Raises:
-            PerceptionError: for an image of another size or type, a non-finite stamp, and an
-                estimator that does not return one result per person.
+            PerceptionError: for an image of another size or type, a non-finite stamp, a depth image
+                of another size, type, unit or time, and an estimator that does not return one
+                result per person.
         """
         began, run_before_s = perf_counter(), NETWORK_TIME.elapsed_s
         stamp_s = finite_number("stamp_s", stamp_s)
         floor = self._floor if floor is None else _checked_floor(floor)
         self._check_image(image_rgb)
+        if depth_m is not None:
+            shape = self.camera.height_px, self.camera.width_px
+            depth_m = checked_depth(depth_m, shape, stamp_s, depth_stamp_s)
+        elif depth_stamp_s is not None:
+            raise PerceptionError("depth_stamp_s needs depth_m, got None")
         ready = perf_counter()
         detections = tuple(self._detector.detect(image_rgb))
         detected = perf_counter()
@@ -190,7 +208,7 @@ class AwarenessPipeline:
         _check_count("head_pose_estimator", len(heads), len(people))
         headed = perf_counter()
         places = place_people(
-            self.camera, detections, people, heads, floor, self._std_px, self._min_score
+            self.camera, detections, people, heads, floor, self._std_px, self._min_score, depth_m
         )
         # The same call as for the places, which is remembered.
         bodies = place_bodies(self.camera, people, self._std_px, self._min_score)

@@ -12,6 +12,7 @@ import numpy as np
 from . import layouts as kp
 from ._camera import Camera
 from ._depth_cues import DepthCue, combine_cues
+from ._depth_image import chest_depths
 from ._detection import PersonDetection
 from ._floor import FloorPlane
 from ._head_pose import HeadPose
@@ -26,6 +27,13 @@ Placement = tuple[FloatArray, FloatArray]
 # Probability that each cue is an outlier. "Bottom" is the lower edge of the box.
 _BODY_OUTLIER, _BOX_OUTLIER, _HEAD_OUTLIER = 0.03, 0.05, 0.05
 _FEET_OUTLIER, _BOTTOM_OUTLIER = 0.10, 0.30
+# A surface on the chest's place is that of something else only if it hides the chest, which its
+# keypoints then seldom survive.
+_CHEST_OUTLIER: Final = 0.005
+# Probability that somebody is no adult who stands, and the standard deviation (logarithm) of
+# their size then: a child of 1.05 m has 0.6 of the height of an adult.
+_UNUSUAL_STATURE: Final = 0.05
+_UNUSUAL_STD: Final = 0.35
 # Head sizes vary by about 4 % between adults; their correlation with the stature is about 0.4.
 _HEAD_STATURE_STD: Final = 0.4 * 0.04
 # Standard deviations of the depth of head or foot relative to the chest: from a lifted skeleton,
@@ -71,13 +79,14 @@ def place_people(
     floor: FloorPlane | None,
     keypoint_std_px: float,
     min_score: float,
+    depth_m: FloatArray | None = None,
 ) -> tuple[Placement | None, ...]:
     """Return the placement of each person's centre line at chest height; None if unknown.
 
     The skeleton (limb lengths and all seen keypoints), or the box if that is more accurate, gives
     the direction and a first range. Further cues for the range are the head's range, if its
-    estimator measures one, and the feet on a known floor. :func:`combine_cues` combines all cues;
-    any of them may be an outlier.
+    estimator measures one, the feet on a known floor, and a depth image (H, W), NaN in its holes.
+    :func:`combine_cues` combines all cues; any of them may be an outlier.
     """
     if not people:
         return ()
@@ -86,6 +95,9 @@ def place_people(
     feet: Sequence[_Feet | None] = [None] * len(people)
     if floor is not None:
         feet = _feet_on_floor(floor, camera, detections, people, keypoint_std_px, min_score)
+    chests: Sequence[tuple[float, float] | None] = [None] * len(people)
+    if depth_m is not None:
+        chests = chest_depths(depth_m, detections, people, min_score)
     placed: list[Placement | None] = [None] * len(people)
     to_correct: list[tuple[int, Placement, list[DepthCue]]] = []
     for row, (body_placement, by_box) in enumerate(zip(bodies, box_placements, strict=True)):
@@ -96,11 +108,15 @@ def place_people(
         range_cues = _range_cues(
             camera, detections[row], people[row], body, start, heads[row], floor, feet[row]
         )
+        if (chest := chests[row]) is not None:
+            range_cues.append(_chest_cue(start[0], *chest))
         if len(range_cues) > 1:
             to_correct.append((row, start, range_cues))
     if to_correct:
         rows, starts, cues = zip(*to_correct, strict=True)
-        for row, corrected in zip(rows, _with_corrected_range(starts, cues), strict=True):
+        unusual = 0.0 if depth_m is None else _UNUSUAL_STATURE
+        corrected_places = _with_corrected_range(starts, cues, unusual)
+        for row, corrected in zip(rows, corrected_places, strict=True):
             placed[row] = corrected
     return tuple(placed)
 
@@ -155,7 +171,8 @@ def _range_cues(
     along = math.sqrt(max(float(position @ covariance @ position), 1e-9)) / squared
     stature = STATURE_RELATIVE_STD if body is None else body.scale_relative_std
     outlier = _BOX_OUTLIER if body is None else _BODY_OUTLIER
-    cues = [DepthCue(0.0, along, min(stature, STATURE_RELATIVE_STD, 0.99 * along), outlier)]
+    stature = min(stature, STATURE_RELATIVE_STD, 0.99 * along)
+    cues = [DepthCue(0.0, along, stature, outlier, _UNUSUAL_STD)]
     if (cue := _head_cue(position, person, body, head, floor)) is not None:
         cues.append(cue)
     if floor is not None:
@@ -170,13 +187,19 @@ def _range_cues(
     return cues
 
 
+def _chest_cue(position: FloatArray, depth_m: float, std_m: float) -> DepthCue:
+    """Return the cue of the chest's depth in a depth image."""
+    expected = max(float(position[2]), 1e-3)
+    return DepthCue(math.log(depth_m / expected), std_m / depth_m, 0.0, _CHEST_OUTLIER)
+
+
 def _with_corrected_range(
-    starts: Sequence[Placement], cues: Sequence[Sequence[DepthCue]]
+    starts: Sequence[Placement], cues: Sequence[Sequence[DepthCue]], unusual: float
 ) -> list[Placement]:
     """Return the placements with the range of all cues together."""
     position = np.array([start[0] for start in starts])
     covariance = np.array([start[1] for start in starts])
-    log_range, log_std = np.array([combine_cues(range_cues) for range_cues in cues]).T
+    log_range, log_std = np.array([combine_cues(range_cues, unusual) for range_cues in cues]).T
     ratio = np.exp(log_range)[:, None]
     squared = (position * position).sum(axis=1)[:, None, None]
     across = ratio[..., None] * (_IDENTITY - position[:, :, None] * position[:, None] / squared)
@@ -210,7 +233,11 @@ def _head_cue(
         return None
     std = math.hypot(head.range_relative_std, offset / expected)
     return DepthCue(
-        math.log(measured / expected), std, min(_HEAD_STATURE_STD, 0.5 * std), _HEAD_OUTLIER
+        math.log(measured / expected),
+        std,
+        min(_HEAD_STATURE_STD, 0.5 * std),
+        _HEAD_OUTLIER,
+        _UNUSUAL_STD,
     )
 
 

@@ -109,6 +109,19 @@ def test_the_standard_deviation_is_calibrated_over_a_population():
     assert 0.93 <= np.mean(np.array(normalised) < 1.96) <= 0.99
 
 
+@pytest.mark.parametrize("log_ratio", [-0.5, -0.3, 0.3])
+def test_one_cue_without_stature_outvotes_two_that_share_an_unusual_one(log_ratio):
+    tall = [DepthCue(0.0, 0.05, 0.049, 0.03, 0.35), DepthCue(0.0, 0.05, 0.016, 0.05, 0.35)]
+    measured = DepthCue(log_ratio, 0.02, 0.0, 0.005)
+    assert combine_cues([*tall, measured])[0] == pytest.approx(0.0, abs=0.02)
+    mean, std = combine_cues([*tall, measured], 0.05)
+    assert mean == pytest.approx(log_ratio, abs=0.02)
+    assert std < 0.5 * abs(log_ratio)
+    # Somebody of usual stature is placed as before.
+    near = [*tall, DepthCue(0.02, 0.02, 0.0, 0.005)]
+    assert combine_cues(near, 0.05)[0] == pytest.approx(combine_cues(near)[0], abs=0.005)
+
+
 # --- placement ----------------------------------------------------------------------------------
 
 

@@ -1,0 +1,157 @@
+"""Depth images: their check, and the depth of each person's chest in them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from . import layouts as kp
+from ._detection import PersonDetection
+from ._keypoints import PersonKeypoints
+from .arrays import FloatArray, finite_number
+from .errors import PerceptionError
+
+# A walking person moves 8 cm in this time, no more than a depth image is uncertain by.
+_MOST_APART_S: Final = 0.05
+# Depths outside these limits are holes; sensors report them so, or as 0, NaN or infinity.
+_LEAST_M, _MOST_M = 0.15, 100.0
+# Metres read as millimetres, and millimetres read as metres, give medians beyond these.
+_LEAST_MEDIAN_MM: Final = 100.0
+_MOST_MEDIAN_M: Final = 100.0
+# The chest is sampled on a strip about the line from the neck to the hips: shares of its length
+# from the neck (below lies what people carry), and half its width as a share of the length. It is
+# narrower than a chest seen from the side, so that the two images need not fit to the pixel.
+_ALONG: Final = np.linspace(0.10, 0.60, 13)
+_ACROSS: Final = np.linspace(-0.15, 0.15, 7)
+# The same strip in the box of a person whose trunk is not seen.
+_BOX_NECK, _BOX_HIPS = 0.17, 0.50
+# Surfaces this near to each other belong to one body. So much of what was measured on the strip,
+# and at least so many samples, must be one surface.
+_SURFACE_M: Final = 0.30
+_SURFACE_SHARE: Final = 0.6
+_FEWEST: Final = 8
+# The centre line lies this far behind the chest's surface: half the chest's depth from in front
+# (Drillis and Contini; with clothes), up to half its breadth from the side.
+_BEHIND_M, _BEHIND_STD_M = 0.12, 0.05
+# Error of a depth camera as a share of the depth; that of stereo grows to this at about 4 m.
+_RELATIVE_STD: Final = 0.015
+
+
+def checked_depth(
+    depth_m: Any, shape: tuple[int, int], stamp_s: float, depth_stamp_s: Any
+) -> FloatArray:
+    """Return a depth image in metres, (H, W) float64 with NaN in its holes.
+
+    Args:
+        depth_m: (H, W) along the optical axis: floating-point metres, or uint16 millimetres.
+        shape: height and width of the image that it is aligned with.
+        stamp_s: time of that image.
+        depth_stamp_s: time of the depth image; None for the same.
+
+    Raises:
+        PerceptionError: for another type, shape, unit or time; the message says what was given.
+    """
+    if not isinstance(depth_m, np.ndarray):
+        raise PerceptionError(
+            f"depth_m must be an array of shape {shape}, got {type(depth_m).__name__}"
+        )
+    in_mm = depth_m.dtype == np.uint16
+    if depth_m.shape != shape or not (in_mm or depth_m.dtype.kind == "f"):
+        raise PerceptionError(
+            f"depth_m must be of the image's shape {shape}, in metres (floating point) or in "
+            f"millimetres (uint16), got {depth_m.dtype} of shape {depth_m.shape}"
+        )
+    if depth_stamp_s is not None:
+        apart_s = finite_number("depth_stamp_s", depth_stamp_s) - stamp_s
+        if abs(apart_s) > _MOST_APART_S:
+            raise PerceptionError(
+                f"the depth image must be of the image's time to {_MOST_APART_S:g} s, got one "
+                f"{apart_s:+.3f} s from it"
+            )
+    depth = depth_m.astype(np.float64)
+    measured = depth[np.isfinite(depth) & (depth > 0.0)]
+    if measured.size:
+        median = float(np.median(measured))
+        if in_mm and median < _LEAST_MEDIAN_MM:
+            raise PerceptionError(
+                f"depth_m of type uint16 must be in millimetres; its median is {median:g}, which "
+                "looks like another unit"
+            )
+        if not in_mm and median > _MOST_MEDIAN_M:
+            raise PerceptionError(
+                f"depth_m of floating point must be in metres; its median is {median:g}, which "
+                "looks like millimetres"
+            )
+    if in_mm:
+        depth *= 1e-3
+    with np.errstate(invalid="ignore"):
+        depth[~((depth >= _LEAST_M) & (depth <= _MOST_M))] = np.nan
+    return depth
+
+
+def chest_depths(
+    depth_m: FloatArray,
+    detections: Sequence[PersonDetection],
+    people: Sequence[PersonKeypoints],
+    min_score: float,
+) -> list[tuple[float, float] | None]:
+    """Return the depth of each person's centre line and its standard deviation, in metres.
+
+    It is that of the largest surface on the upper trunk; None where the depth image has too many
+    holes there, or several surfaces and none of them large.
+
+    Args:
+        depth_m: (H, W) of :func:`checked_depth`.
+        detections: one per person.
+        people: their keypoints.
+        min_score: keypoints with a lower score count as not seen.
+    """
+    return [
+        _chest_depth(depth_m, *_trunk(detection, person, min_score))
+        for detection, person in zip(detections, people, strict=True)
+    ]
+
+
+def _trunk(
+    detection: PersonDetection, person: PersonKeypoints, min_score: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return the neck (2,) and the middle of the hips (2,) in pixels."""
+    ends = []
+    for rows in (kp.SHOULDERS, kp.HIPS):
+        seen = person.scores[rows] >= min_score
+        if seen.any():
+            ends.append(person.keypoints_px[rows][seen].mean(axis=0))
+    if len(ends) == 2:
+        return ends[0], ends[1]
+    left, top, right, bottom = detection.box_xyxy_px.tolist()
+    middle, height = 0.5 * (left + right), bottom - top
+    return (
+        np.array([middle, top + _BOX_NECK * height]),
+        np.array([middle, top + _BOX_HIPS * height]),
+    )
+
+
+def _chest_depth(
+    depth_m: FloatArray, neck_px: FloatArray, hips_px: FloatArray
+) -> tuple[float, float] | None:
+    down = hips_px - neck_px
+    aside = np.array([-down[1], down[0]])
+    at = neck_px + _ALONG[:, None, None] * down + _ACROSS[:, None] * aside
+    columns, rows = np.rint(at.reshape(-1, 2)).astype(np.int64).T
+    height, width = depth_m.shape
+    inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
+    found = depth_m[rows[inside], columns[inside]]
+    found = np.sort(found[np.isfinite(found)])
+    if len(found) < _FEWEST:
+        return None
+    # The window of this length that holds the most samples.
+    counts = np.searchsorted(found, found + _SURFACE_M, side="right") - np.arange(len(found))
+    first = int(counts.argmax())
+    count = int(counts[first])
+    if count < max(_FEWEST, _SURFACE_SHARE * len(found)):
+        return None
+    surface_m = float(np.median(found[first : first + count]))
+    return surface_m + _BEHIND_M, math.hypot(_BEHIND_STD_M, _RELATIVE_STD * surface_m)
