@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, fields
-from typing import Any, Final, cast
+from typing import Any, Final, Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,19 @@ from .arrays import (
     unit_vectors,
 )
 from .errors import PerceptionError
+
+#: Why there is no evidence of awareness.
+AwarenessReason = Literal[
+    "skeleton of another person",
+    "keypoints outside the box",
+    "no body has such limbs",
+    "head of another person",
+    "no head pose",
+    "face too small",
+    "face cut by the border",
+    "no keypoint of the head",
+]
+AWARENESS_REASONS: Final[tuple[AwarenessReason, ...]] = get_args(AwarenessReason)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,6 +51,8 @@ class PersonObservation:
         box_xyxy_px: (4,) left, top, right, bottom in the image, or None without an image.
         legs_camera_m: (3,) middle of the ankles, or of the knees if the feet are not in the image,
             at the range of ``position_camera_m``; None if no leg was seen.
+        awareness_reason: why ``awareness`` is None, one of :data:`AWARENESS_REASONS`; None if it is
+            not, or nobody says why.
     """
 
     stamp_s: float
@@ -49,12 +64,21 @@ class PersonObservation:
     score: float
     box_xyxy_px: FloatArray | None = None
     legs_camera_m: FloatArray | None = None
+    awareness_reason: AwarenessReason | None = None
 
     def __post_init__(self) -> None:
         if (self.awareness is None) != (self.awareness_std is None):
             raise PerceptionError(
                 "awareness and awareness_std must both be given or both be None, got "
                 f"awareness={self.awareness}, awareness_std={self.awareness_std}"
+            )
+        if self.awareness_reason is not None and (
+            self.awareness is not None or self.awareness_reason not in AWARENESS_REASONS
+        ):
+            raise PerceptionError(
+                f"awareness_reason must be one of {', '.join(map(repr, AWARENESS_REASONS))}, and "
+                f"None with an awareness, got {self.awareness_reason!r} with "
+                f"awareness={self.awareness}"
             )
         gaze, alpha, std, box = (
             self.gaze_camera,
@@ -147,7 +171,9 @@ class PersonObservation:
             boxes = _list(*_optional_rows("boxes_xyxy_px", boxes_xyxy_px, (count, 4)))
         made = tuple(map(object.__new__, [PersonObservation] * count))
         columns = ([stamp] * count, positions, covariances, gazes, alphas, stds, score.tolist())
-        for assign, column in zip(_SETTERS, (*columns, boxes, [None] * count), strict=True):
+        for assign, column in zip(
+            _SETTERS, (*columns, boxes, [None] * count, [None] * count), strict=True
+        ):
             deque(map(assign, made, column), maxlen=0)
         return made
 

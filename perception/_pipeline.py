@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any, Final
@@ -17,7 +18,7 @@ from ._floor import FloorPlane
 from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
 from ._metric_scale import DEFAULT_MIN_SCORE
-from ._observation import PersonObservation
+from ._observation import AwarenessReason, PersonObservation
 from ._placement import place_people
 from ._pnp import PnpHeadPoseEstimator
 from ._protocols import HeadPoseEstimator, PersonDetector, PoseEstimator
@@ -25,8 +26,9 @@ from .arrays import FloatArray, ImageRgb, finite_array, finite_number
 from .awareness import AwarenessEstimate, estimate_awareness
 from .body import BodyPlacement, place_bodies
 from .errors import PerceptionError
-from .evidence import judge_face
+from .evidence import FaceEvidence, judge_face
 from .networks import NETWORK_TIME, OnnxSettings
+from .ownership import disowned_keypoints, without_disowned
 from .shipped import (
     shipped_detector,
     shipped_head_pose_estimator,
@@ -203,6 +205,8 @@ class AwarenessPipeline:
             return ()
         people = tuple(self._pose_estimator.estimate(image_rgb, detections))
         _check_count("pose_estimator", len(people), len(detections))
+        disowned = disowned_keypoints(self.camera, detections, people, self._min_score)
+        people = tuple(map(without_disowned, people, disowned))
         posed = perf_counter()
         heads = tuple(self._head_pose_estimator.estimate(image_rgb, self.camera, people))
         _check_count("head_pose_estimator", len(heads), len(people))
@@ -212,7 +216,7 @@ class AwarenessPipeline:
         )
         # The same call as for the places, which is remembered.
         bodies = place_bodies(self.camera, people, self._std_px, self._min_score)
-        estimates = self._awareness(people, heads)
+        estimates, reasons = self._awareness(people, heads, disowned)
         observations = tuple(
             PersonObservation(
                 stamp_s=stamp_s,
@@ -224,9 +228,10 @@ class AwarenessPipeline:
                 score=detection.score,
                 box_xyxy_px=detection.box_xyxy_px,
                 legs_camera_m=_legs(person, body, place[0], self._min_score),
+                awareness_reason=reason,
             )
-            for detection, place, head, estimate, person, body in zip(
-                detections, places, heads, estimates, people, bodies, strict=True
+            for detection, place, head, estimate, reason, person, body in zip(
+                detections, places, heads, estimates, reasons, people, bodies, strict=True
             )
             if place is not None
         )
@@ -241,16 +246,29 @@ class AwarenessPipeline:
         return observations
 
     def _awareness(
-        self, people: tuple[PersonKeypoints, ...], heads: tuple[HeadPose | None, ...]
-    ) -> list[AwarenessEstimate | None]:
-        """Return the awareness of each person, or None where there is no evidence."""
+        self,
+        people: tuple[PersonKeypoints, ...],
+        heads: tuple[HeadPose | None, ...],
+        reasons: Sequence[AwarenessReason | None],
+    ) -> tuple[list[AwarenessEstimate | None], list[AwarenessReason | None]]:
+        """Return the awareness of each person, or None and why there is no evidence.
+
+        There is none of somebody whose keypoints or head are not their own, for a reason.
+        """
         estimates: list[AwarenessEstimate | None] = [None] * len(people)
-        faces = [
-            (row, head, evidence)
-            for row, (person, head) in enumerate(zip(people, heads, strict=True))
-            if head is not None
-            and (evidence := judge_face(self.camera, person, head, self._min_score)) is not None
-        ]
+        missing = list(reasons)
+        faces = []
+        for row, (person, head) in enumerate(zip(people, heads, strict=True)):
+            if missing[row] is not None:
+                continue
+            if head is None:
+                missing[row] = "no head pose"
+                continue
+            evidence = judge_face(self.camera, person, head, self._min_score)
+            if isinstance(evidence, FaceEvidence):
+                faces.append((row, head, evidence))
+            else:
+                missing[row] = evidence
         face_estimates = estimate_awareness(
             self.cone,
             [head for _, head, _ in faces],
@@ -261,7 +279,7 @@ class AwarenessPipeline:
         )
         for (row, *_), estimate in zip(faces, face_estimates, strict=True):
             estimates[row] = estimate
-        return estimates
+        return estimates, missing
 
     def _check_image(self, image_rgb: Any) -> None:
         wanted = (self.camera.height_px, self.camera.width_px, 3)

@@ -12,6 +12,7 @@ from . import layouts as kp
 from ._camera import Camera
 from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
+from ._observation import AwarenessReason
 from .anthropometry import HEAD_TEMPLATE_M
 
 # Ear to ear.
@@ -51,8 +52,8 @@ class FaceEvidence:
 
 def judge_face(
     camera: Camera, person: PersonKeypoints, head: HeadPose, min_score: float
-) -> FaceEvidence | None:
-    """Return the evidence of a face for a head pose, or None if there is too little of it.
+) -> FaceEvidence | AwarenessReason:
+    """Return the evidence of a face for a head pose, or why there is too little of it.
 
     Three things count:
 
@@ -79,14 +80,14 @@ def judge_face(
     depth = max(float(head.position_camera_m[2]), 0.05)
     width_px = _FACE_WIDTH_M * math.sqrt(camera.fx_px * camera.fy_px) / depth
     if width_px < _MIN_FACE_PX or head.position_camera_m[2] <= 0.0:
-        return None
+        return "face too small"
     if head.face_seen is None and _is_cut(camera, person, width_px, min_score):
-        return None
+        return "face cut by the border"
     outside = _outside_image(camera, head, width_px)
     if head.face_seen is not None:
         seen = max(head.face_seen, _UNKNOWN) if sum(outside) > 1 else head.face_seen
     elif not (person.scores[kp.HEAD] >= min_score).any():
-        return None
+        return "no keypoint of the head"
     elif person.face_evidence:
         scale = max(min_score, _MIN_SCORE_SCALE)
         shown = np.clip((person.scores[:3] - 0.5 * scale) / scale, 0.0, 1.0)

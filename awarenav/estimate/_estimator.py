@@ -23,6 +23,7 @@ from perception import (
     PoseEstimator,
 )
 from perception.arrays import FloatArray
+from perception.ownership import DISOWNED, without_disowned
 from perception.shipped import TrainingDomain
 from tracking import CameraView, PersonTrack, PersonTracker, TrackerConfig
 
@@ -173,11 +174,19 @@ class PeopleEstimator:
             camera,
             pose,
             observations,
-            tuple(self._pose_estimator.keypoints_of(each) for each in observations),
+            tuple(self._keypoints_of(each) for each in observations),
             tracks,
             track_ids,
             self._unfit,
         )
+
+    def _keypoints_of(self, observation: PersonObservation) -> PersonKeypoints | None:
+        """Return the keypoints of an observation; None where they are not the person's."""
+        keypoints = self._pose_estimator.keypoints_of(observation)
+        reason = observation.awareness_reason
+        if keypoints is None or reason not in DISOWNED:
+            return keypoints
+        return without_disowned(keypoints, reason) if reason == DISOWNED[-1] else None
 
     def _process(self, camera: Camera, frame: SourceFrame) -> tuple[PersonObservation, ...]:
         pipeline = self._pipelines.get(camera)

@@ -68,6 +68,7 @@ def _person_record(
         "gaze_camera": None if gaze is None else _rounded_list(gaze),
         "awareness": _rounded(observation.awareness),
         "awareness_std": _rounded(observation.awareness_std),
+        "awareness_reason": observation.awareness_reason,
         "score": _rounded(observation.score),
         "keypoints": {} if keypoints is None else _keypoint_records(keypoints),
     }

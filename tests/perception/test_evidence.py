@@ -20,6 +20,7 @@ CONE = AttentionCone()
 ROBOT = np.zeros((1, 3))
 FACING = np.stack([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]], axis=1)
 NO_EYES = (0.0, 0.0)
+NO_HEAD = "no keypoint of the head"
 
 
 def head_at(yaw_deg=0.0, distance_m=2.0, std_rad=0.03, *, seen=None, error_px=0.0, pitch_deg=0.0):
@@ -55,7 +56,7 @@ def awareness(head, *, seen=1.0, eyes=NO_EYES, extra=0.0, points=ROBOT):
 
 def awareness_with_evidence(head, person=ALL, eyes=NO_EYES):
     evidence = judge_face(CAMERA, person, head, 0.3)
-    if evidence is None:
+    if isinstance(evidence, str):
         return None
     return awareness(head, seen=evidence.seen, extra=evidence.extra_std_rad, eyes=eyes)
 
@@ -80,8 +81,8 @@ def test_two_of_nose_and_eyes_make_a_face(scores, low, high):
 
 
 def test_a_head_without_seen_keypoints_gives_no_evidence():
-    assert judge_face(CAMERA, with_scores(0, 0, 0, 0, 0), head_at(), 0.3) is None
-    assert judge_face(CAMERA, with_scores(0.2, 0.2, 0.1, 0.2, 0.0), head_at(), 0.3) is None
+    assert judge_face(CAMERA, with_scores(0, 0, 0, 0, 0), head_at(), 0.3) == NO_HEAD
+    assert judge_face(CAMERA, with_scores(0.2, 0.2, 0.1, 0.2, 0.0), head_at(), 0.3) == NO_HEAD
 
 
 @given(st.lists(st.floats(0.3, 1.0), min_size=5, max_size=5), st.integers(0, 4))
@@ -108,7 +109,7 @@ def test_a_head_at_the_border_is_no_evidence_if_a_part_of_its_face_is_missing(at
     """Whether the missing eye is cut off or turned away nobody knows, and the pose is wrong."""
     for scores in ((1, 0, 1, 0, 1), (1, 0, 0, 0, 0), (0, 0, 0, 1, 1)):
         person = with_scores(*scores, at_px=at_px)
-        assert judge_face(CAMERA, person, head_at(), 0.3) is None
+        assert judge_face(CAMERA, person, head_at(), 0.3) == "face cut by the border"
         assert judge_face(CAMERA, person, head_at(seen=0.9), 0.3).seen == 0.9  # sees it itself
     whole = with_scores(1, 1, 1, 0, 0, at_px=at_px)
     assert judge_face(CAMERA, whole, head_at(), 0.3).seen == 1.0
@@ -165,7 +166,7 @@ def test_a_smaller_face_has_a_larger_standard_deviation():
     assert extra == sorted(extra)
     assert extra[1] < math.radians(1.0)
     far = head_at(distance_m=0.156 * CAMERA.fx_px / 4.0)
-    assert judge_face(CAMERA, ALL, far, 0.3) is None
+    assert judge_face(CAMERA, ALL, far, 0.3) == "face too small"
 
 
 def test_the_back_of_a_head_has_awareness_0_with_certainty():

@@ -25,7 +25,7 @@ from awarenav.estimate.command import estimate as command
 from awarenav.judge import judge_files
 from awarenav.records import read_records
 from awarenav.video import VideoWriter
-from perception import Camera, PerceptionError
+from perception import Camera, PerceptionError, PersonDetection
 
 
 def folder(path: Path, count: int, camera: Camera | None = CAMERA) -> Path:
@@ -184,6 +184,26 @@ def test_a_run_in_which_nothing_works_ends_early_and_says_why(tmp_path):
     assert len(reader.seen) == 10
     with pytest.raises(AwarenavError, match=r"nothing could be estimated: .*NaN"):
         estimate(reader, source, "--out", tmp_path / "b.jsonl", "--frames", 2)
+
+
+class TwoBoxes(NumberReader):
+    """The one person of each image, found twice: both boxes get the same keypoints."""
+
+    def detect(self, image_rgb):
+        (person,) = super().detect(image_rgb)
+        beside = PersonDetection(person.box_xyxy_px + np.array([9.0, 0.0, 9.0, 0.0]), 0.4)
+        return beside, person
+
+
+def test_keypoints_are_written_for_one_person_only(tmp_path):
+    out = tmp_path / "out.jsonl"
+    assert estimate(TwoBoxes(), folder(tmp_path / "set", 2), "--out", out) == 0
+    for record in read_records(out):
+        beside, person = record["people"]
+        assert (beside["awareness"], beside["keypoints"]) == (None, {})
+        assert beside["awareness_reason"] == "skeleton of another person"
+        assert person["awareness"] > 0.5
+        assert person["awareness_reason"] is None
 
 
 def test_people_in_the_truth_beside_the_images_are_not_read(tmp_path):

@@ -1,0 +1,210 @@
+"""Whose keypoints: one skeleton for each detection, and only one that a body could have."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import layouts as kp
+from ._camera import Camera
+from ._detection import PersonDetection
+from ._keypoints import PersonKeypoints
+from ._observation import AwarenessReason
+from .arrays import FloatArray
+
+#: The reasons that this module gives; the last one is about the head alone.
+DISOWNED: Final[tuple[AwarenessReason, ...]] = (
+    "skeleton of another person",
+    "keypoints outside the box",
+    "no body has such limbs",
+    "head of another person",
+)
+
+#: (17,) which keypoints are seen.
+Seen = NDArray[np.bool_]
+
+# Two skeletons are one if the median distance between their points is below this share of the size
+# of the smaller one, and if they share so many points.
+_SAME_SHARE: Final = 0.06
+_FEWEST_COMMON: Final = 5
+# Two heads are one if the median distance of their points is below this, at the body's own scale,
+# and if they share so many points.
+_SAME_HEAD_M: Final = 0.06
+_FEWEST_OF_HEAD: Final = 2
+# More than this share of the keypoints must lie in the box, padded by this share of its size: arms
+# and feet often reach beyond a box.
+_INSIDE_SHARE: Final = 0.6
+_PADDING: Final = 0.2
+# Lengths (m) of an adult's segments, shoulders to hips, and their ends: the largest of them in
+# pixels per metre is foreshortened least.
+_SEGMENTS: Final = (
+    (0.50, (5, 6), (11, 12)),
+    (0.36, (5,), (6,)),
+    (0.28, (5,), (7,)),
+    (0.28, (6,), (8,)),
+    (0.25, (7,), (9,)),
+    (0.25, (8,), (10,)),
+    (0.42, (11,), (13,)),
+    (0.42, (12,), (14,)),
+    (0.42, (13,), (15,)),
+    (0.42, (14,), (16,)),
+)
+_LENGTHS_M: Final = np.array([length for length, *_ in _SEGMENTS])
+# (segments, 17) end minus start of each, and 1 where one uses a keypoint.
+_ENDS: Final = np.array(
+    [
+        [(row in end) / len(end) - (row in start) / len(start) for row in range(17)]
+        for _, start, end in _SEGMENTS
+    ]
+)
+_USES: Final = (_ENDS != 0.0).astype(np.int64)
+# No limb is so many times longer than the next one says, and no head is farther from the shoulders.
+_LONGEST_RATIO: Final = 2.0
+_NECK_M: Final = 0.55
+# From the middle of the shoulders to that of nose, eyes and ears, away from the hips.
+_HEAD_ABOVE_M: Final = 0.22
+_UP_CAMERA: Final = np.array([0.0, -1.0, 0.0])
+
+
+def disowned_keypoints(
+    camera: Camera,
+    detections: Sequence[PersonDetection],
+    people: Sequence[PersonKeypoints],
+    min_score: float,
+) -> list[AwarenessReason | None]:
+    """Return for each person why the keypoints are not theirs, or None.
+
+    Of two detections with one skeleton, that keeps it whose box fits it better; a skeleton fits a
+    box by the overlap of the box with that of the seen keypoints, times the detection's score.
+    Of two skeletons with one head, that keeps it on whose neck it sits better.
+
+    Args:
+        camera: camera of the image. Limbs are compared by their angles, which a wide lens leaves as
+            they are.
+        detections: one per person.
+        people: their keypoints.
+        min_score: keypoints with a lower score count as not seen.
+    """
+    reasons: list[AwarenessReason | None] = [None] * len(people)
+    points = [person.keypoints_px[kp.BODY] for person in people]
+    seen = [person.scores[kp.BODY] >= min_score for person in people]
+    rays = _unit_rays(camera, points)
+    for row, (own, shown, detection) in enumerate(zip(points, seen, detections, strict=True)):
+        if shown.any():
+            reasons[row] = _implausible(own, rays[row], shown, detection.box_xyxy_px)
+    rows = [row for row, reason in enumerate(reasons) if reason is None and seen[row].any()]
+    fits = {row: _fit(points[row][seen[row]], detections[row]) for row in rows}
+    # The best fit keeps what it has; those after it must differ from all before.
+    kept: list[int] = []
+    for row in sorted(rows, key=lambda each: -fits[each]):
+        if any(_are_one(points, seen, row, other) for other in kept):
+            reasons[row] = "skeleton of another person"
+            continue
+        for other in kept:
+            if _have_one_head(rays, seen, row, other):
+                off_m = [_head_off_m(rays[each], seen[each]) for each in (row, other)]
+                reasons[row if off_m[0] >= off_m[1] else other] = "head of another person"
+        kept.append(row)
+    return reasons
+
+
+def without_disowned(person: PersonKeypoints, reason: AwarenessReason | None) -> PersonKeypoints:
+    """Return the keypoints with score 0 where they are not the person's."""
+    if reason is None:
+        return person
+    scores = person.scores.copy()
+    scores[kp.HEAD if reason == DISOWNED[-1] else slice(None)] = 0.0
+    return PersonKeypoints(
+        person.keypoints_px,
+        person.keypoints_root_m,
+        scores,
+        person.layout,
+        person.lifted,
+        person.face_evidence,
+        person.scale_relative_std,
+    )
+
+
+def _unit_rays(camera: Camera, points: Sequence[FloatArray]) -> FloatArray:
+    """Return unit vectors (P, 17, 3) towards the points (17, 2) of each person."""
+    rays = np.ones((len(points), 17, 3))
+    if len(points):
+        rays[..., :2] = camera.normalise(np.reshape(points, (-1, 2))).reshape(-1, 17, 2)
+    return np.asarray(rays / np.sqrt((rays * rays).sum(axis=2, keepdims=True)))
+
+
+def _implausible(
+    points: FloatArray, rays: FloatArray, seen: Seen, box: FloatArray
+) -> AwarenessReason | None:
+    """Return why no person in this box has these points (17, 2), of which some are seen."""
+    pad = _PADDING * (box[2:] - box[:2])
+    low, high = box[:2] - pad, box[2:] + pad
+    shown = points[seen]
+    inside = ((shown >= low) & (shown <= high)).all(axis=1)
+    if inside.mean() < _INSIDE_SHARE:
+        return "keypoints outside the box"
+    scales = sorted(_scales(rays, seen))
+    if len(scales) >= 3 and scales[-1] > _LONGEST_RATIO * scales[-2]:
+        return "no body has such limbs"
+    head, shoulders = seen[kp.HEAD], seen[kp.SHOULDERS]
+    if len(scales) >= 2 and head.any() and shoulders.all():
+        neck = rays[kp.SHOULDERS].mean(axis=0)
+        away = float(np.linalg.norm(rays[kp.HEAD][head].mean(axis=0) - neck))
+        if away > _NECK_M * scales[-1]:
+            return "no body has such limbs"
+    return None
+
+
+def _scales(rays: FloatArray, seen: Seen) -> list[float]:
+    """Return radians per metre by each segment whose ends are seen."""
+    ends = _ENDS @ rays
+    angles = np.sqrt((ends * ends).sum(axis=1)) / _LENGTHS_M
+    return [float(angles[row]) for row in np.flatnonzero(_USES @ ~seen == 0)]
+
+
+def _head_off_m(rays: FloatArray, seen: Seen) -> float:
+    """Return how far the head is from where the trunk has it; infinite if nobody knows."""
+    head = seen[kp.HEAD]
+    scales = _scales(rays, seen)
+    if not (head.any() and seen[kp.SHOULDERS].all() and scales):
+        return np.inf
+    neck = rays[kp.SHOULDERS].mean(axis=0)
+    up = neck - rays[kp.HIPS].mean(axis=0) if seen[kp.HIPS].all() else _UP_CAMERA
+    expected = neck + _HEAD_ABOVE_M * max(scales) * up / max(float(np.linalg.norm(up)), 1e-9)
+    return float(np.linalg.norm(rays[kp.HEAD][head].mean(axis=0) - expected)) / max(scales)
+
+
+def _fit(shown: FloatArray, detection: PersonDetection) -> float:
+    """Return how well seen points fit a detection: their boxes' overlap times its score."""
+    box = detection.box_xyxy_px
+    low, high = shown.min(axis=0), shown.max(axis=0)
+    common = np.minimum(high, box[2:]) - np.maximum(low, box[:2])
+    overlap = float(np.prod(np.maximum(common, 0.0)))
+    union = float(np.prod(high - low) + np.prod(box[2:] - box[:2])) - overlap
+    return overlap / max(union, 1e-9) * detection.score
+
+
+def _are_one(points: Sequence[FloatArray], seen: Sequence[Seen], row: int, other: int) -> bool:
+    """Return whether two people have one skeleton."""
+    common = seen[row] & seen[other]
+    away = np.sqrt(((points[row] - points[other]) ** 2).sum(axis=1))
+    sizes = [
+        float(np.sqrt(np.prod(np.ptp(points[each][seen[each]], axis=0) + 1e-9)))
+        for each in (row, other)
+    ]
+    return bool(
+        common.sum() >= _FEWEST_COMMON and np.median(away[common]) < _SAME_SHARE * min(sizes)
+    )
+
+
+def _have_one_head(rays: FloatArray, seen: Sequence[Seen], row: int, other: int) -> bool:
+    """Return whether the heads of two people lie in one place."""
+    common = (seen[row] & seen[other])[kp.HEAD]
+    scales = _scales(rays[row], seen[row]) + _scales(rays[other], seen[other])
+    if common.sum() < _FEWEST_OF_HEAD or not scales:
+        return False
+    away = np.linalg.norm(rays[row, kp.HEAD] - rays[other, kp.HEAD], axis=1)[common]
+    return bool(np.median(away) < _SAME_HEAD_M * max(scales))
