@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Sequence
 from typing import Final
 
@@ -29,6 +31,8 @@ Seen = NDArray[np.bool_]
 # Two skeletons are one if the median distance between their points is below this share of the size
 # of the smaller one, and if they share so many points.
 _SAME_SHARE: Final = 0.06
+# The same for two skeletons with one head.
+_ALIKE_SHARE: Final = 0.25
 _FEWEST_COMMON: Final = 5
 # Two heads are one if the median distance of their points is below this, at the body's own scale,
 # and if they share so many points.
@@ -100,13 +104,16 @@ def disowned_keypoints(
     # The best fit keeps what it has; those after it must differ from all before.
     kept: list[int] = []
     for row in sorted(rows, key=lambda each: -fits[each]):
-        if any(_are_one(points, seen, row, other) for other in kept):
+        heads = [_have_one_head(rays, seen, row, other) for other in kept]
+        if any(
+            _apart(points, seen, row, other) < (_ALIKE_SHARE if one_head else _SAME_SHARE)
+            for other, one_head in zip(kept, heads, strict=True)
+        ):
             reasons[row] = "skeleton of another person"
             continue
-        for other in kept:
-            if _have_one_head(rays, seen, row, other):
-                off_m = [_head_off_m(rays[each], seen[each]) for each in (row, other)]
-                reasons[row if off_m[0] >= off_m[1] else other] = "head of another person"
+        for other in itertools.compress(kept, heads):
+            off_m = [_head_off_m(rays[each], seen[each]) for each in (row, other)]
+            reasons[row if off_m[0] >= off_m[1] else other] = "head of another person"
         kept.append(row)
     return reasons
 
@@ -187,17 +194,17 @@ def _fit(shown: FloatArray, detection: PersonDetection) -> float:
     return overlap / max(union, 1e-9) * detection.score
 
 
-def _are_one(points: Sequence[FloatArray], seen: Sequence[Seen], row: int, other: int) -> bool:
-    """Return whether two people have one skeleton."""
+def _apart(points: Sequence[FloatArray], seen: Sequence[Seen], row: int, other: int) -> float:
+    """Return the median distance of the points of two people, as a share of the smaller size.
+
+    It is infinite if too few points are seen of both.
+    """
     common = seen[row] & seen[other]
-    away = np.sqrt(((points[row] - points[other]) ** 2).sum(axis=1))
-    sizes = [
-        float(np.sqrt(np.prod(np.ptp(points[each][seen[each]], axis=0) + 1e-9)))
-        for each in (row, other)
-    ]
-    return bool(
-        common.sum() >= _FEWEST_COMMON and np.median(away[common]) < _SAME_SHARE * min(sizes)
-    )
+    if common.sum() < _FEWEST_COMMON:
+        return math.inf
+    away = np.sqrt(((points[row] - points[other])[common] ** 2).sum(axis=1))
+    extents = [np.ptp(points[each][seen[each]], axis=0) for each in (row, other)]
+    return float(np.median(away) / max(min(math.sqrt(w * h) for w, h in extents), 1e-9))
 
 
 def _have_one_head(rays: FloatArray, seen: Sequence[Seen], row: int, other: int) -> bool:
