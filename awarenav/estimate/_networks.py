@@ -39,10 +39,9 @@ from ._estimator import Networks
 
 #: The name of the networks that come with the package.
 SHIPPED: Final = "shipped"
-#: The option that lets networks of renders see other pictures.
-ALLOW_SIMULATOR_NETWORKS: Final = "--allow-simulator-networks"
 _MEDIAPIPE: Final = "mediapipe"
-_HEADS: Final = ("auto", "network", "pnp", "fused")
+_WITHOUT_NETWORK: Final = "pnp"
+_HEADS: Final = ("auto", "network", _WITHOUT_NETWORK, "fused")
 
 
 class NetworkChoice(StrictConfig):
@@ -99,15 +98,15 @@ def choose_networks(
         AwarenavError: for a word that is neither a valid name nor a file.
     """
     if head == "auto":
-        head = "network" if pose == SHIPPED else "pnp"
+        head = "network" if pose == SHIPPED else _WITHOUT_NETWORK
     settings = OnnxSettings(providers=(provider,), intra_op_threads=threads)
-    domains: dict[str, TrainingDomain | None] = {}
-    return Networks(
-        _detector(detector, min_score, settings, domains),
-        _pose(pose, settings, domains),
-        _head(head, settings, domains),
-        training_domains=domains,
-    )
+    detector_used, detector_domain = _detector(detector, min_score, settings)
+    pose_used, pose_domain = _pose(pose, settings)
+    head_used, head_domain = _head(head, settings)
+    domains = {"detector": detector_domain, "pose": pose_domain}
+    if head != _WITHOUT_NETWORK:
+        domains["head"] = head_domain
+    return Networks(detector_used, pose_used, head_used, training_domains=domains)
 
 
 def admit_networks(networks: Networks, *, rendered: bool, allowed: bool) -> tuple[str, ...]:
@@ -125,52 +124,44 @@ def admit_networks(networks: Networks, *, rendered: bool, allowed: bool) -> tupl
     if roles and not allowed:
         raise AwarenavError(
             f"{simulator_networks_warning(roles)}: `awarenav models fetch robot` brings others "
-            f"for --networks robot_networks.yaml (or add {ALLOW_SIMULATOR_NETWORKS})"
+            "for --networks robot_networks.yaml (or add --allow-simulator-networks)"
         )
     return roles
 
 
 def _detector(
-    name: str,
-    min_score: float,
-    settings: OnnxSettings,
-    domains: dict[str, TrainingDomain | None],
-) -> PersonDetector | Callable[[Camera], PersonDetector]:
+    name: str, min_score: float, settings: OnnxSettings
+) -> tuple[PersonDetector | Callable[[Camera], PersonDetector], TrainingDomain | None]:
     if name == SHIPPED:
         verify_shipped_model(DETECTOR)  # now, not at the first frame
-        domains["detector"] = shipped_model(DETECTOR).training_domain
-        return lambda camera: shipped_detector(settings, camera, score_threshold=min_score)
-    model, domains["detector"] = _onnx_model("--detector", name, (SHIPPED,), settings)
-    return OnnxPersonDetector(model, score_threshold=min_score)
+        return (
+            lambda camera: shipped_detector(settings, camera, score_threshold=min_score),
+            shipped_model(DETECTOR).training_domain,
+        )
+    model, domain = _onnx_model("--detector", name, (SHIPPED,), settings)
+    return OnnxPersonDetector(model, score_threshold=min_score), domain
 
 
-def _pose(
-    name: str, settings: OnnxSettings, domains: dict[str, TrainingDomain | None]
-) -> PoseEstimator:
+def _pose(name: str, settings: OnnxSettings) -> tuple[PoseEstimator, TrainingDomain | None]:
     if name == SHIPPED:
-        domains["pose"] = shipped_model(POSE).training_domain
-        return shipped_pose_estimator(settings)
+        return shipped_pose_estimator(settings), shipped_model(POSE).training_domain
     if name == _MEDIAPIPE:
-        domains["pose"] = "photographs"
-        mediapipe: PoseEstimator = MediaPipePoseEstimator()
-        return mediapipe
-    model, domains["pose"] = _onnx_model("--pose", name, (SHIPPED, _MEDIAPIPE), settings)
-    return OnnxPoseEstimator(model)
+        return MediaPipePoseEstimator(), "photographs"
+    model, domain = _onnx_model("--pose", name, (SHIPPED, _MEDIAPIPE), settings)
+    return OnnxPoseEstimator(model), domain
 
 
-def _head(
-    name: str, settings: OnnxSettings, domains: dict[str, TrainingDomain | None]
-) -> HeadPoseEstimator:
-    if name == "pnp":
-        return PnpHeadPoseEstimator()  # no network
+def _head(name: str, settings: OnnxSettings) -> tuple[HeadPoseEstimator, TrainingDomain | None]:
+    if name == _WITHOUT_NETWORK:
+        return PnpHeadPoseEstimator(), None
     if name in ("network", "fused"):
-        domains["head"] = shipped_model(HEAD).training_domain
         shipped = shipped_head_pose_estimator(settings)
+        domain = shipped_model(HEAD).training_domain
         if name == "network":
-            return shipped
-        return FusedHeadPoseEstimator(shipped, PnpHeadPoseEstimator())
-    model, domains["head"] = _onnx_model("--head", name, _HEADS, settings)
-    return OnnxHeadPoseEstimator(model)
+            return shipped, domain
+        return FusedHeadPoseEstimator(shipped, PnpHeadPoseEstimator()), domain
+    model, own_domain = _onnx_model("--head", name, _HEADS, settings)
+    return OnnxHeadPoseEstimator(model), own_domain
 
 
 def _onnx_model(

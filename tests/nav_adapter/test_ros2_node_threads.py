@@ -137,6 +137,7 @@ def test_the_node_reads_scanners_without_a_camera(node_module: Any, two_scanners
     [
         ({"scanners": 3}, "scanners must be 0, 1 or 2, got 3"),
         ({"use_camera": False}, "scanners must name one or two"),
+        ({}, "the detector and pose networks have seen renders only"),
     ],
 )
 def test_the_node_refuses_sensors_that_make_no_sense(
@@ -160,7 +161,7 @@ def test_the_node_reads_a_map_and_tf_beside_fixed_mounts(
 
 def test_the_node_publishes_while_perception_is_busy(node_module: Any) -> None:
     network = SlowNetwork()
-    node_module._pipelines = lambda *files: lambda camera: network
+    node_module._pipelines = lambda *files, allowed: lambda camera: network
     ros_node = node_module.AwarenessNode()
 
     def hear(key: str, message: Any) -> None:
