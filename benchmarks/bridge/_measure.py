@@ -99,7 +99,7 @@ def _bridge(folder: Path, domain: int, compressed: bool) -> Iterator[subprocess.
     arguments = ["--robot", str(file), "--domain", str(domain)]
     if compressed:
         arguments += ["--compressed", "--image", "camera/image_raw/compressed"]
-    command = [sys.executable, "-m", "awarenav", "bridge", *arguments]
+    command = [sys.executable, "-m", "awarenav", "bridge", "--allow-simulator-networks", *arguments]
     with (folder / "bridge.log").open("w") as log:
         process = subprocess.Popen(command, stderr=log, text=True)
         try:

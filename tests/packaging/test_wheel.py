@@ -117,7 +117,8 @@ def test_core_installs_and_runs_without_the_simulator(
     for arguments in (
         ("models", "verify"),
         ("models", "list", "--json"),
-        ("estimate", tmp_path / "images", "--out", estimates),
+        ("doctor",),
+        ("estimate", tmp_path / "images", "--out", estimates, "--allow-simulator-networks"),
         ("judge", estimates, estimates),
         ("tracks", estimates),
         ("policy", "show", "balanced"),
