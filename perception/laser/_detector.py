@@ -160,20 +160,18 @@ class LegDetector:
         )
         hypotheses = hypotheses_of(clusters, xy, points.ranges_m, points.angle_increment_rad)
         judged = np.array(self._classify(hypotheses.features), dtype=np.float64)
-        first = hypotheses.first
-        second = np.where(hypotheses.second < 0, first, hypotheses.second)
+        first, left = hypotheses.first, hypotheses.left
         alike = judged[:, 0] >= _ALIKE_SCORE
-        came, still = _known_points(clusters, known)
-        is_still = still > _STILL_SHARE * clusters.counts
-        judged[is_still[first] | is_still[second], 0] = 0.0
+        is_still = clusters.still > _STILL_SHARE * clusters.counts
+        np.putmask(judged[:, 0], is_still[first] | is_still[left], 0.0)
         if config.learn:
             narrow = (hypotheses.second < 0) & (clusters.widths_m[first] < _TWO_LEGS_M)
             seen = self._memory.had_two_legs(hypotheses.centres_m, points.stamp_s)
             recent = self._recently(points.stamp_s)
             alike |= seen
             always = np.where(narrow, _POST_LOG_ODDS, _ALWAYS_LOG_ODDS)
-            always[seen] = 0.0
-            judged[:, 0] = _with_memory(judged[:, 0], clusters, hypotheses, came, recent, always)
+            np.putmask(always, seen, 0.0)
+            judged[:, 0] = _with_memory(judged[:, 0], clusters, hypotheses, recent, always)
         chosen, places = _chosen(clusters, hypotheses, judged, config.score_threshold)
         candidates = [
             _candidate(points.stamp_s, clusters, hypotheses, judged[row], row, place)
@@ -181,18 +179,18 @@ class LegDetector:
         ]
         taken = np.zeros(len(clusters.starts), dtype=bool)
         taken[first[chosen]] = True
-        taken[second[chosen]] = True
+        taken[left[chosen]] = True
         if config.learn:
             people_m = np.array(places).reshape(-1, 2)
             if config.trolleys:
-                for number in _trolleys(clusters, taken, came, people_m):
+                for number in _trolleys(clusters, taken, people_m):
                     taken[number] = True
                     candidates.append(_trolley(points.stamp_s, clusters, number))
             self._found.append((points.stamp_s, people_m))
             legs = _surely_two_legs(clusters, hypotheses, judged[:, 0], chosen)
             if self._memory.is_due(points.stamp_s, scanner):
                 taken[first[alike]] = True
-                taken[second[alike]] = True
+                taken[left[alike]] = True
                 person = np.zeros(len(usable), dtype=bool)
                 person[clusters.rays] = taken[clusters.cluster]
                 self._memory.update(points, person, scanner)
@@ -208,11 +206,9 @@ class LegDetector:
     def _known(self, points_m: FloatArray, usable: NDArray[np.bool_]) -> NDArray[np.int64]:
         """Return (N,) −1 for points that stand still, 1 for those that have come, 0 otherwise."""
         known = np.zeros(len(usable), dtype=np.int64)
-        rows = np.flatnonzero(usable)
-        own = np.take(points_m.T, rows, axis=1).T
-        found = known[rows]
-        if self.config.learn:
-            found = self._memory.known(own)
+        rows = usable.nonzero()[0]
+        own = points_m.T.take(rows, axis=1).T
+        found = self._memory.known(own) if self.config.learn else known[rows]
         if self._map is not None:
             found[self._map.holds(own) & (found == 0)] = -1
         known[rows] = found
@@ -224,34 +220,20 @@ class LegDetector:
         return np.concatenate(places) if places else np.zeros((0, 2))
 
 
-def _known_points(clusters: Clusters, known: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
-    """Return how many points (C,) of each cluster have come, and how many stand still."""
-    kind = known[clusters.rays]
-    if not kind.size:
-        return np.zeros(0), np.zeros(0)
-    counted = np.add.reduceat(
-        np.array([kind > 0, kind < 0], dtype=np.float64), clusters.starts, axis=1
-    )
-    return counted[0], counted[1]
-
-
 def _with_memory(
     score: FloatArray,
     clusters: Clusters,
     hypotheses: Hypotheses,
-    came: FloatArray,
     recent_m: FloatArray,
     always: FloatArray,
 ) -> FloatArray:
-    """Return the scores (H,) with what is known about the place where each hypothesis stands.
-
-    ``came`` (C,) counts the points of each cluster that lie where the floor was free.
-    """
-    first, second = hypotheses.first, hypotheses.second
-    pair = second >= 0
-    all_came, all_points = came[first], clusters.counts[first]
-    all_came = all_came + pair * came[second]
-    has_come = all_came >= _CAME_SHARE * (all_points + pair * clusters.counts[second])
+    """Return the scores (H,) with what is known about the place where each hypothesis stands."""
+    first, left = hypotheses.first, hypotheses.left
+    pair = hypotheses.second >= 0
+    came, counts = clusters.came, clusters.counts
+    has_come = came[first] + pair * came[left] >= _CAME_SHARE * (
+        counts[first] + pair * counts[left]
+    )
     safe = np.minimum(np.maximum(score, 1e-6), 1.0 - 1e-6)
     odds = np.log(safe / (1.0 - safe)) + np.where(has_come, _CAME_LOG_ODDS, always)
     if len(recent_m):
@@ -262,23 +244,23 @@ def _with_memory(
 
 
 def _trolleys(
-    clusters: Clusters, taken: NDArray[np.bool_], came: FloatArray, people_m: FloatArray
+    clusters: Clusters, taken: NDArray[np.bool_], people_m: FloatArray
 ) -> list[int]:
     """Return the clusters that have come, have a trolley's size and stand before all around."""
     low, high = _TROLLEY_M
-    ends = clusters.starts + clusters.counts - 1
-    fits = ~taken & (clusters.counts >= _TROLLEY_POINTS)
+    fits = (clusters.came >= _TROLLEY_CAME * clusters.counts) & ~taken
+    fits &= clusters.counts >= _TROLLEY_POINTS
     fits &= (clusters.widths_m >= low) & (clusters.widths_m <= high)
-    moves = came >= _CAME_SHARE * clusters.counts
-    beside = np.array([clusters.steps_m[0, clusters.starts], clusters.steps_m[1, ends]])
-    apart = np.abs(beside) > _TROLLEY_APART_FROM_M
+    if not fits.any():
+        return []
+    moves = clusters.came >= _CAME_SHARE * clusters.counts
+    apart = np.abs(clusters.steps_m) > _TROLLEY_APART_FROM_M
     apart[0, 1:] |= moves[:-1]
     apart[1, :-1] |= moves[1:]
     fits &= apart[0] & apart[1]
-    fits &= came >= _TROLLEY_CAME * clusters.counts
     found: list[int] = []
     others = people_m
-    for number in np.flatnonzero(fits).tolist():
+    for number in fits.nonzero()[0].tolist():
         centre = clusters.centres_m[number]
         if len(others) and np.linalg.norm(others - centre, axis=1).min() < _TROLLEY_APART_M:
             continue
@@ -292,7 +274,7 @@ def _chosen(
 ) -> tuple[list[int], list[FloatArray]]:
     """Return the best hypotheses that do not contradict each other, and the people's places."""
     score = np.minimum(np.maximum(judged[:, 0], 1e-6), 1.0 - 1e-6)
-    likely = np.flatnonzero(score >= threshold)
+    likely = (score >= threshold).nonzero()[0]
     if not len(likely):
         return [], []
     score, first, second = score[likely], hypotheses.first[likely], hypotheses.second[likely]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -43,6 +44,7 @@ class Hypotheses:
     Attributes:
         first: (H,) cluster at the right, seen from the scanner.
         second: (H,) cluster at the left; −1 for a single cluster.
+        left: (H,) the same, but the first cluster for a single one.
         centres_m: (H, 2) middle of the clusters.
         rays: (H, 2) unit vector from the scanner to the centre.
         features: (H, 79), float32, as :data:`HYPOTHESIS_FEATURES` says.
@@ -50,6 +52,7 @@ class Hypotheses:
 
     first: NDArray[np.int64]
     second: NDArray[np.int64]
+    left: NDArray[np.int64]
     centres_m: FloatArray
     rays: FloatArray
     features: NDArray[np.float32]
@@ -66,59 +69,72 @@ def hypotheses_of(
         ranges_m: (N,) their ranges; NaN without a return.
         increment_rad: angle between rays.
     """
-    returned = np.isfinite(ranges_m)
     step = abs(increment_rad)
-    every = np.compress(returned, points_m.T, axis=1)
-    features = cluster_features(clusters)
-    first, second = _singles_and_pairs(clusters)
-    pair = second >= 0
-    left = np.where(pair, second, first)
-    counts = clusters.counts
-    first_x, first_y = np.take(clusters.centres_m.T, first, axis=1)
-    left_x, left_y = np.take(clusters.centres_m.T, left, axis=1)
-    middle = np.empty((2, len(first)))
-    middle[0], middle[1] = 0.5 * (first_x + left_x), 0.5 * (first_y + left_y)
+    returned = np.isfinite(ranges_m).nonzero()[0]
+    # Single clusters come first, then the pairs; ``left`` of a single one is the cluster itself.
+    single, one, other = _singles_and_pairs(clusters)
+    first, left = np.concatenate([single, one]), np.concatenate([single, other])
+    second = left.copy()
+    second[: len(single)] = -1
+    pairs = slice(len(single), None)
+    centres = clusters.centres_m.T
+    right_m, left_m = centres.take(first, axis=1), centres.take(left, axis=1)
+    middle = right_m + left_m
+    middle *= 0.5
     away = middle - clusters.origin_m[:, None]
-    ranges = np.maximum(np.sqrt((away * away).sum(axis=0)), 1e-6)
+    squares = away * away
+    ranges = np.maximum(np.sqrt(squares[0] + squares[1]), 1e-6)
     rays = away / ranges
-    apart_x, apart_y = left_x - first_x, left_y - first_y
+    apart = left_m - right_m
+    squares = apart * apart
+    features = cluster_features(clusters)
     out = np.zeros((len(first), HYPOTHESIS_FEATURES), dtype=np.float32)
-    out[:, :CLUSTER_FEATURES] = features[first]
-    out[pair, CLUSTER_FEATURES : 2 * CLUSTER_FEATURES] = features[second[pair]]
-    rest = out[:, 2 * CLUSTER_FEATURES :]
-    rest[:, 0] = pair
-    rest[:, 1] = 10.0 * np.sqrt(apart_x * apart_x + apart_y * apart_y)
-    rest[:, 2] = 10.0 * (apart_x * rays[0] + apart_y * rays[1])
-    rest[:, 3] = 10.0 * (rays[0] * apart_y - rays[1] * apart_x)
-    rest[:, 4] = np.log(counts[first] + pair * counts[left])
-    rest[:, 5] = 0.1 * _MAX_LEG_M / np.maximum(ranges * step, 0.005)
-    own = clusters.sums(clusters.spacings_m)
-    length = own[first] + pair * own[left]
-    around = _around(every, ranges_m[returned] * step, middle)
-    for row, near in enumerate(around):
-        rest[:, 6 + row] = np.minimum(np.maximum(near - length, 0.0), _MAX_AROUND_M)
-    ends = clusters.starts + counts - 1
-    middle_ray = 0.5 * (clusters.rays[clusters.starts] + clusters.rays[ends])
+    out[:, :CLUSTER_FEATURES] = features.take(first, axis=1).T
+    out[pairs, CLUSTER_FEATURES : 2 * CLUSTER_FEATURES] = features.take(other, axis=1).T
+    pair = np.zeros((8, len(first)))
+    pair[0, pairs] = 1.0
+    np.sqrt(squares[0] + squares[1], out=pair[1])
+    pair[2] = apart[0] * rays[0] + apart[1] * rays[1]
+    pair[3] = rays[0] * apart[1] - rays[1] * apart[0]
+    pair[1:4] *= 10.0
+    counts = clusters.counts[first]
+    counts[pairs] += clusters.counts[other]
+    np.log(counts, out=pair[4])
+    np.divide(0.1 * _MAX_LEG_M, np.maximum(ranges * step, 0.005), out=pair[5])
+    length = clusters.lengths_m[first]
+    length[pairs] += clusters.lengths_m[other]
+    around = pair[6:]
+    _around(points_m.T.take(returned, axis=1), ranges_m[returned] * step, middle, around)
+    around -= length
+    np.minimum(np.maximum(around, 0.0, out=around), _MAX_AROUND_M, out=around)
+    out[:, 2 * CLUSTER_FEATURES : -CUTOUT] = pair.T
+    middle_ray = 0.5 * (clusters.rays[clusters.starts] + clusters.rays[clusters.ends])
     ray = 0.5 * (middle_ray[first] + middle_ray[left])
-    rest[:, 8:] = _cutouts(ranges_m, ray, ranges, clusters.turn * step)
-    return Hypotheses(first, second, middle.T, rays.T, out)
+    out[:, -CUTOUT:] = _cutouts(ranges_m, ray, ranges, clusters.turn * step)
+    return Hypotheses(first, second, left, middle.T, rays.T, out)
 
 
 def _around(
-    points_m: FloatArray, spacings_m: FloatArray, centres_m: FloatArray
-) -> list[NDArray[np.float32]]:
-    """Return the length (H,) of the surfaces (2, N) within each distance of centres (2, H)."""
+    points_m: FloatArray, spacings_m: FloatArray, centres_m: FloatArray, out: FloatArray
+) -> None:
+    """Put the length of the surfaces (2, N) within each distance of centres (2, H) into ``out``.
+
+    ``out`` (2, H) holds zeros.
+    """
     if not centres_m.size or not points_m.size:
-        return [np.zeros(centres_m.shape[1], dtype=np.float32) for _ in _AROUND_M]
+        return
     # Half the precision and one matrix product: this is the largest table of a scan.
-    origin = centres_m.mean(axis=1)[:, None]
+    origin = (np.add.reduce(centres_m, axis=1) / centres_m.shape[1])[:, None]
     points = (points_m - origin).astype(np.float32)
     centres = (centres_m - origin).astype(np.float32)
     lengths = spacings_m.astype(np.float32)
     squares = centres.T @ (-2.0 * points)
-    squares += (points * points).sum(axis=0)
-    squares += (centres * centres).sum(axis=0)[:, None]
-    return [(squares < radius * radius).astype(np.float32) @ lengths for radius in _AROUND_M]
+    points *= points
+    squares += points[0] + points[1]
+    centres *= centres
+    squares += (centres[0] + centres[1])[:, None]
+    for row, radius in enumerate(_AROUND_M):
+        out[row] = (squares < radius * radius).astype(np.float32) @ lengths
 
 
 def _cutouts(
@@ -144,22 +160,28 @@ def _cutouts(
     return np.asarray(np.maximum(np.fmin(depth, 1.0), -1.0))
 
 
-def _singles_and_pairs(clusters: Clusters) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    widths, counts, centres = clusters.widths_m, clusters.counts, clusters.centres_m
-    away = centres - clusters.origin_m
-    near = (away * away).sum(axis=1) <= _MAX_RANGE_M**2
-    fits = near & (widths <= _MAX_WIDTH_M)
-    single = np.flatnonzero(fits & (counts >= _MIN_POINTS))
-    legs = np.flatnonzero(fits & (widths <= _MAX_LEG_M))
+def _singles_and_pairs(
+    clusters: Clusters,
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Return the single clusters (S,), and the right and the left one (P,) of each pair."""
+    widths, counts, centres = clusters.widths_m, clusters.counts, clusters.centres_m.T
+    away = centres - clusters.origin_m[:, None]
+    away *= away
+    fits = (away[0] + away[1] <= _MAX_RANGE_M**2) & (widths <= _MAX_WIDTH_M)
+    single = (fits & (counts >= _MIN_POINTS)).nonzero()[0]
+    legs = (fits & (widths <= _MAX_LEG_M)).nonzero()[0]
     # Every leg with each of the next few.
-    one = np.broadcast_to(np.arange(len(legs)), (_NEIGHBOURS, len(legs)))
-    other = one + np.arange(1, _NEIGHBOURS + 1)[:, None]
-    inside = other < len(legs)
-    one, other = legs[one[inside]], legs[other[inside]]
-    apart = centres[other] - centres[one]
-    chosen = apart[:, 0] * apart[:, 0] + apart[:, 1] * apart[:, 1] <= _MAX_STEP_M**2
+    one, other = legs[_neighbours(len(legs))]
+    apart = centres.take(other, axis=1) - centres.take(one, axis=1)
+    apart *= apart
+    chosen = apart[0] + apart[1] <= _MAX_STEP_M**2
     chosen &= counts[one] + counts[other] > _MIN_POINTS
-    return (
-        np.concatenate([single, one[chosen]]),
-        np.concatenate([np.full(len(single), -1), other[chosen]]),
-    )
+    return single, one[chosen], other[chosen]
+
+
+@lru_cache(maxsize=256)
+def _neighbours(count: int) -> NDArray[np.int64]:
+    """Return (2, P) the pairs of each of a row of things with each of the next few."""
+    steps = [np.arange(max(count - step, 0)) for step in range(1, _NEIGHBOURS + 1)]
+    others = [one + step for step, one in enumerate(steps, 1)]
+    return np.stack([np.concatenate(steps), np.concatenate(others)])

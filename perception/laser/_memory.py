@@ -121,25 +121,27 @@ class OccupancyMemory:
     def note_two_legs(self, places_m: FloatArray, stamp_s: float) -> None:
         """Remember where (K, 2) people were seen on two legs."""
         cells, inside = self._cells(places_m)
-        near = np.clip(cells[inside, None] + _NEAR_LEGS, 0, self._two_legs_s.size - 1)
-        self._two_legs_s.ravel()[near.ravel()] = stamp_s
+        self._two_legs_s.put(cells[inside, None] + _NEAR_LEGS, stamp_s, mode="clip")
 
     def had_two_legs(self, points_m: FloatArray, stamp_s: float) -> NDArray[np.bool_]:
         """Return (N,) whether somebody was seen on two legs near points (N, 2) within 5 s."""
         cells, inside = self._cells(points_m)
-        since = stamp_s - self._two_legs_s.ravel()[cells]
+        since = stamp_s - self._two_legs_s.take(cells)
         return np.asarray(inside & (since >= 0.0) & (since <= _TWO_LEGS_S))
 
     def known(self, points_m: FloatArray) -> NDArray[np.int64]:
         """Return (N,) −1 for points (N, 2) that are static, 1 for what has come, 0 otherwise."""
         cells, inside = self._cells(points_m)
         untouched = self._untouched_s.ravel()
-        free = untouched[cells] >= _CAME_S
+        free = untouched.take(cells) >= _CAME_S
         known = np.zeros(len(cells), dtype=np.int64)
-        known[inside & ~free & (self._occupied_s.ravel()[cells] >= _STATIC_S)] = -1
+        static = self._occupied_s.take(cells) >= _STATIC_S
+        static &= ~free & inside
+        np.putmask(known, static, -1)
         # All cells around but one must have been free: of any two, at least one.
         free |= untouched.take(cells + 1, mode="clip") >= _CAME_S
-        maybe = np.flatnonzero(inside & free)
+        free &= inside
+        maybe = free.nonzero()[0]
         around = untouched.take(cells[maybe, None] + _BESIDE, mode="clip")
         known[maybe[np.count_nonzero(around >= _CAME_S, axis=1) >= _CAME_CELLS]] = 1
         return known
@@ -173,7 +175,7 @@ class OccupancyMemory:
         since = points.stamp_s - self._updated_s.get(scanner, -math.inf)
         self._updated_s[scanner] = points.stamp_s
         dt = _PERIOD_S if not 0.0 <= since <= _MAX_PERIOD_S else since
-        rows = np.flatnonzero(points.usable)
+        rows = points.usable.nonzero()[0]
         if not len(rows):
             return True
         starts, ends = points.origins_odom_m[rows, :2], points.points_odom_m[rows, :2]
@@ -182,8 +184,7 @@ class OccupancyMemory:
         occupied = self._occupied_s.ravel()
         untouched, touched = self._untouched_s.ravel(), self._touched.ravel()
         freed = self._passed(starts, ends, points.ranges_m[rows])
-        near = np.clip(hits[inside, None] + _BESIDE, 0, touched.size - 1)
-        touched[near.ravel()] = 1.0
+        touched.put(hits[inside, None] + _BESIDE, 1.0, mode="clip")
         # Cells that several rays pass are counted once; a return there counts more than passing.
         before = occupied[hits]
         occupied[freed] = np.maximum(occupied[freed] - _FREE_FACTOR * np.float32(dt), 0.0)
@@ -209,26 +210,28 @@ class OccupancyMemory:
         cells = []
         # Near the scanner many rays pass the same cell: some of them are enough.
         for stride, along in _STRIDES:
+            rays = stride * (reach[::stride] > along[0]).nonzero()[0]
             x, y = (
-                (first[::stride, axis, None] + along * unit[::stride, axis, None]).astype(np.int32)
+                (first[rays, axis, None] + along * unit[rays, axis, None]).astype(np.int32)
                 for axis in (0, 1)
             )
             y *= _CELLS
             y += x
-            cells.append(y[along < reach[::stride, None]])
+            cells.append(y[along < reach[rays, None]])
         return np.concatenate(cells)
 
     def _cells(self, points_m: FloatArray) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """Return the flat index (N,) of every point's cell, 0 outside, and which are inside."""
-        x, y = (points_m[:, axis] - self._origin[axis] for axis in (0, 1))
-        extent = _CELLS * _CELL_M
-        inside = np.asarray((x >= 0.0) & (y >= 0.0) & (x < extent) & (y < extent))
+        off = points_m.T - self._origin[:, None]
+        both = (off >= 0.0) & (off < _CELLS * _CELL_M)
+        inside = both[0] & both[1]
         if not inside.all():
-            x, y = np.where(inside, x, 0.0), np.where(inside, y, 0.0)
-        scale = 1.0 / _CELL_M
-        column = np.minimum((x * scale).astype(np.int64), _CELLS - 1)
-        row = np.minimum((y * scale).astype(np.int64), _CELLS - 1)
-        return row * _CELLS + column, inside
+            off = np.where(inside, off, 0.0)
+        off *= 1.0 / _CELL_M
+        cells = off.astype(np.int64)
+        np.minimum(cells, _CELLS - 1, out=cells)
+        cells[1] *= _CELLS
+        return cells[0] + cells[1], inside
 
     def _follow(self, place_m: FloatArray) -> None:
         """Move the memory so that the robot stays in its middle."""

@@ -97,10 +97,12 @@ class RobotMotion:
     def _arc(self, dt_s: FloatArray) -> _Arc:
         yaw = self.yaw_rate_radps * dt_s
         cos, sin = np.cos(yaw), np.sin(yaw)
+        along, aside = 1.0 - yaw * yaw / 6.0, 0.5 * yaw
         small = np.abs(yaw) < _STRAIGHT_RAD
-        safe = np.where(small, 1.0, yaw)
-        along = np.where(small, 1.0 - yaw * yaw / 6.0, sin / safe)
-        aside = np.where(small, 0.5 * yaw, (1.0 - cos) / safe)
+        if not small.all():
+            safe = np.where(small, 1.0, yaw)
+            along = np.where(small, along, sin / safe)
+            aside = np.where(small, aside, (1.0 - cos) / safe)
         x, y = self.velocity_base_mps.tolist()
         return _Arc(yaw, cos, sin, (along * x - aside * y) * dt_s, (aside * x + along * y) * dt_s)
 
@@ -152,20 +154,21 @@ def scan_points(scan: LaserScan, scanner: Scanner, motion: RobotMotion) -> ScanP
         scanner: its mounting.
         motion: the robot's pose and velocity; a pose near the scan's own time is best.
     """
-    count = len(scan)
-    rays, covered = _beams(scanner, scan.angle_min_rad, scan.angle_increment_rad, count)
+    beams = _beams(scanner, scan.angle_min_rad, scan.angle_increment_rad, len(scan))
     offset = scanner.T_base_scanner[:3, 3]
-    free = scan.free_m
-    known = covered & (free > 0.0)
+    measured = scan.measured
+    free = scan.free_of(measured)
+    known = beams.covered & (free > 0.0)
+    measured &= known
     # All points are computed axis by axis, (3, N).
-    reach = rays * np.where(known, free, np.nan) + offset[:, None]
-    measured = known & scan.measured
-    if scanner.body_base_m is not None:
-        outermost = np.abs(scanner.body_base_m).max() + BODY_MARGIN_M
-        near = (np.abs(reach[0]) <= outermost) & (np.abs(reach[1]) <= outermost)
-        rows = np.flatnonzero(measured & near)
-        if rows.size:
-            measured[rows[scanner.is_body(reach[:2, rows].T)]] = False
+    reach = beams.rays * np.where(known, free, np.nan)
+    reach += offset[:, None]
+    rows = (measured & (free <= beams.body_within_m)).nonzero()[0]
+    if rows.size:
+        points = reach[:2].take(rows, axis=1)
+        near = (np.abs(points) <= beams.outermost_m).all(axis=0).nonzero()[0]
+        if near.size:
+            measured[rows[near][scanner.is_body(points[:, near].T)]] = False
     arc = motion._arc(scan.stamps_s - motion.stamp_s)
     origins = np.empty_like(reach)
     x, y, z = offset.tolist()
@@ -173,24 +176,49 @@ def scan_points(scan: LaserScan, scanner: Scanner, motion: RobotMotion) -> ScanP
     origins[2] = z
     reach[0], reach[1] = arc.moved(reach[0], reach[1])
     R, t = motion.T_odom_base[:3, :3], motion.T_odom_base[:3, 3:]
-    ends_odom = R @ reach + t
+    ends_odom = R @ reach
+    ends_odom += t
+    origins_odom = R @ origins
+    origins_odom += t
+    points_odom = np.where(measured, ends_odom, np.nan)
     unmeasured = ~measured
-    points_odom = ends_odom.copy()
-    points_odom[:, unmeasured] = np.nan
-    reach[:, unmeasured] = np.nan
-    free[unmeasured] = np.nan
-    arrays = (reach.T, points_odom.T, (R @ origins + t).T, ends_odom.T, free, measured)
+    np.copyto(reach, np.nan, where=unmeasured)
+    np.putmask(free, unmeasured, np.nan)
+    arrays = (reach.T, points_odom.T, origins_odom.T, ends_odom.T, free, measured)
     for array in arrays:
         array.setflags(write=False)
     middle_s = 0.5 * (scan.stamp_s + scan.end_s)
     return ScanPoints(middle_s, *arrays, angle_increment_rad=scan.angle_increment_rad)
 
 
+class _Beams(NamedTuple):
+    """The rays of a mounted scanner.
+
+    Attributes:
+        rays: (3, N) directions in base.
+        covered: (N,) which lie in the field of view.
+        body_within_m: no return farther away is the robot's own body; −1 without an outline.
+        outermost_m: no coordinate in base of a return from the robot's own body is larger.
+    """
+
+    rays: FloatArray
+    covered: NDArray[np.bool_]
+    body_within_m: float
+    outermost_m: float
+
+
 @lru_cache(maxsize=16)  # the scanners of a robot, scan after scan
 def _beams(
     scanner: Scanner, angle_min_rad: float, angle_increment_rad: float, count: int
-) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Return the directions (3, N) of rays in base, and which (N,) lie in the field of view."""
+) -> _Beams:
     angles = angle_min_rad + angle_increment_rad * np.arange(count, dtype=np.float64)
-    rays = np.stack((np.cos(angles), np.sin(angles), np.zeros(count)))
-    return scanner.T_base_scanner[:3, :3] @ rays, scanner.covers(angles)
+    rays = scanner.T_base_scanner[:3, :3] @ np.stack((np.cos(angles), np.sin(angles), np.zeros(count)))
+    within_m, outermost_m = -1.0, 0.0
+    if scanner.body_base_m is not None:
+        outermost_m = float(np.abs(scanner.body_base_m).max()) + BODY_MARGIN_M
+        away = scanner.body_base_m - scanner.T_base_scanner[:2, 3]
+        # A tilted ray is longer than its part in the plane of the outline.
+        level = float(np.hypot(rays[0], rays[1]).min(initial=1.0))
+        farthest = float(np.hypot(*away.T).max()) + BODY_MARGIN_M
+        within_m = farthest / max(level, 1e-9) + BODY_MARGIN_M
+    return _Beams(rays, scanner.covers(angles), within_m, outermost_m)

@@ -120,9 +120,13 @@ class LaserScan:
 
         It is the range where there is one, ``range_max_m`` for +inf, and 0 where nothing is known.
         """
-        free = np.where(self.measured, self.ranges_m, 0.0)
-        free[self.ranges_m == np.inf] = self.range_max_m
-        return np.asarray(free)
+        return self.free_of(self.measured)
+
+    def free_of(self, measured: NDArray[np.bool_]) -> FloatArray:
+        """Return :attr:`free_m` (N,) for rays of which :attr:`measured` is known."""
+        free = np.where(measured, self.ranges_m, 0.0)
+        np.putmask(free, self.ranges_m == np.inf, self.range_max_m)
+        return free
 
 
 def _numbers(name: str, value: Any) -> FloatArray:
