@@ -173,10 +173,7 @@ class LegDetector:
             np.putmask(always, seen, 0.0)
             judged[:, 0] = _with_memory(judged[:, 0], clusters, hypotheses, recent, always)
         chosen, places = _chosen(clusters, hypotheses, judged, config.score_threshold)
-        candidates = [
-            _candidate(points.stamp_s, clusters, hypotheses, judged[row], row, place)
-            for row, place in zip(chosen, places, strict=True)
-        ]
+        candidates = _candidates(points.stamp_s, clusters, hypotheses, judged, chosen, places)
         taken = np.zeros(len(clusters.starts), dtype=bool)
         taken[first[chosen]] = True
         taken[left[chosen]] = True
@@ -322,22 +319,29 @@ def _surely_two_legs(
     return legs
 
 
-def _candidate(
+def _candidates(
     stamp_s: float,
     clusters: Clusters,
     hypotheses: Hypotheses,
     judged: FloatArray,
-    row: int,
-    place_m: FloatArray,
-) -> PersonCandidate:
-    along, aside = (max(deviation, _SURELY_M) for deviation in judged[3:5].tolist())
-    covariance = _covariance(hypotheses.rays[row], along, aside)
-    single = hypotheses.second[row] < 0
-    narrow = clusters.widths_m[hypotheses.first[row]] < _TWO_LEGS_M
-    kind: CandidateKind = "one_leg" if single and narrow else "two_legs"
-    score = min(max(float(judged[0]), 0.0), 1.0)
-    legs = hypotheses.centres_m[row] + _LEG_RADIUS_M * hypotheses.rays[row]
-    return PersonCandidate(stamp_s, place_m, covariance, score, kind, legs)
+    chosen: list[int],
+    places_m: list[FloatArray],
+) -> list[PersonCandidate]:
+    """Return the candidates of the chosen hypotheses."""
+    if not chosen:
+        return []
+    rays = hypotheses.rays[chosen]
+    legs = hypotheses.centres_m[chosen] + _LEG_RADIUS_M * rays
+    one_leg = hypotheses.second[chosen] < 0
+    one_leg &= clusters.widths_m[hypotheses.first[chosen]] < _TWO_LEGS_M
+    kinds: list[CandidateKind] = ["one_leg" if one else "two_legs" for one in one_leg.tolist()]
+    candidates = []
+    rows = zip(judged[chosen].tolist(), rays.tolist(), places_m, kinds, legs, strict=True)
+    for (score, _, _, along, aside), ray, place, kind, leg in rows:
+        covariance = _covariance(ray, max(along, _SURELY_M), max(aside, _SURELY_M))
+        score = min(max(score, 0.0), 1.0)
+        candidates.append(PersonCandidate(stamp_s, place, covariance, score, kind, leg))
+    return candidates
 
 
 def _trolley(stamp_s: float, clusters: Clusters, number: int) -> PersonCandidate:
@@ -350,9 +354,9 @@ def _trolley(stamp_s: float, clusters: Clusters, number: int) -> PersonCandidate
     )
 
 
-def _covariance(ray: FloatArray, along_std_m: float, aside_std_m: float) -> FloatArray:
+def _covariance(ray: list[float], along_std_m: float, aside_std_m: float) -> FloatArray:
     """Return (2, 2) from standard deviations along a unit vector and across it."""
-    x, y = ray.tolist()
+    x, y = ray
     along, aside = along_std_m * along_std_m, aside_std_m * aside_std_m
     mixed = (along - aside) * x * y
     return np.array(

@@ -143,7 +143,7 @@ class OccupancyMemory:
         free &= inside
         maybe = free.nonzero()[0]
         around = untouched.take(cells[maybe, None] + _BESIDE, mode="clip")
-        known[maybe[np.count_nonzero(around >= _CAME_S, axis=1) >= _CAME_CELLS]] = 1
+        known[maybe[(around >= _CAME_S).sum(axis=1) >= _CAME_CELLS]] = 1
         return known
 
     def is_static(self, points_m: FloatArray) -> NDArray[np.bool_]:

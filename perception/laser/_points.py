@@ -180,8 +180,9 @@ def scan_points(scan: LaserScan, scanner: Scanner, motion: RobotMotion) -> ScanP
     ends_odom += t
     origins_odom = R @ origins
     origins_odom += t
-    points_odom = np.where(measured, ends_odom, np.nan)
+    points_odom = ends_odom.copy()
     unmeasured = ~measured
+    np.copyto(points_odom, np.nan, where=unmeasured)
     np.copyto(reach, np.nan, where=unmeasured)
     np.putmask(free, unmeasured, np.nan)
     arrays = (reach.T, points_odom.T, origins_odom.T, ends_odom.T, free, measured)
