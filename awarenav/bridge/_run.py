@@ -27,6 +27,7 @@ from nav_adapter.ros2 import (
 from nav_adapter.ros2.messages import ros_type
 from perception import AttentionCone, AwarenessPipeline, Camera, PersonDetector
 from perception.arrays import finite_number
+from perception.laser import MapCells
 from perception.shipped import simulator_networks_warning
 
 from ..errors import AwarenavError
@@ -71,6 +72,7 @@ class BridgeOptions:
     no_camera: bool
     scan: tuple[str, ...]
     map: str | None
+    map_frame: str
     odom: str
     odom_frame: str
     base_frame: str
@@ -93,6 +95,7 @@ def bridge_command(options: BridgeOptions) -> int:
     camera = None if options.camera is None else Camera.from_yaml(options.camera)
     published = _published_topics(options.topic, options.only)
     inputs = _inputs(options, robot)
+    map_cells = _map_cells(options)
     scanners = scanner_inputs([topic.name for topic in inputs.scans], robot)
     networks, unfit = _networks(options)
 
@@ -116,7 +119,7 @@ def bridge_command(options: BridgeOptions) -> int:
             _log("the shipped leg detector is made for simulated scans; see docs/laser.md")
 
         def bridge_to(publisher: TopicPublisher | ReplayPublisher) -> AwarenessBridge:
-            return AwarenessBridge(
+            bridge = AwarenessBridge(
                 policy,
                 robot.profile(),
                 publisher.publish,
@@ -130,6 +133,9 @@ def bridge_command(options: BridgeOptions) -> int:
                 wanted=publisher.wants,
                 make_pipeline=_pipeline_maker(networks, pose_estimator, cone),
             )
+            if map_cells is not None:
+                bridge.use_map(map_cells)
+            return bridge
 
         if options.bag is not None:
             replayed = ReplayPublisher(published, recorder)
@@ -270,6 +276,18 @@ def _published_topics(renames: Sequence[str], only: Sequence[str]) -> dict[str, 
     return {key: topic for key, topic in topics.items() if not only or key in only}
 
 
+def _is_file(map_option: str | None) -> bool:
+    """Return whether the option names a file; no topic has a dot in its name."""
+    return map_option is not None and map_option.endswith((".yaml", ".yml"))
+
+
+def _map_cells(options: BridgeOptions) -> MapCells | None:
+    """Return the map in a file, None without one."""
+    if options.map is None or not _is_file(options.map):
+        return None
+    return MapCells.from_yaml(options.map, options.map_frame)
+
+
 def _inputs(options: BridgeOptions, robot: RobotFile) -> BridgeInputs:
     """Return the topics to read."""
     scans = tuple(renamed(READ["scan"], name) for name in options.scan)
@@ -284,12 +302,13 @@ def _inputs(options: BridgeOptions, robot: RobotFile) -> BridgeInputs:
         raise AwarenavError("--no-camera and --camera exclude each other")
     if options.map is not None and not scans:
         raise AwarenavError("--map is for the scans: it needs --scan TOPIC")
+    fixed_map = _is_file(options.map) and options.map_frame == options.odom_frame
     image = READ["compressed" if options.compressed else "image"]
     with_info = options.camera is None and not options.no_camera
     fixed = (options.no_camera or robot.camera is not None) and (
         not scans or robot.scanners is not None
     )
-    with_tf = not fixed or options.map is not None
+    with_tf = not fixed or (options.map is not None and not fixed_map)
     return BridgeInputs(
         image=None if options.no_camera else renamed(image, options.image),
         odom=renamed(READ["odom"], options.odom),
@@ -297,7 +316,9 @@ def _inputs(options: BridgeOptions, robot: RobotFile) -> BridgeInputs:
         tf=READ["tf"] if with_tf else None,
         tf_static=READ["tf_static"] if with_tf else None,
         scans=scans,
-        map=None if options.map is None else renamed(READ["map"], options.map),
+        map=None
+        if options.map is None or _is_file(options.map)
+        else renamed(READ["map"], options.map),
     )
 
 

@@ -87,8 +87,16 @@ _LOG: Final = "Recordings"
 @option(
     "--map",
     group=_READ,
-    metavar="TOPIC",
-    help="nav_msgs/OccupancyGrid: what it holds is nobody's legs. Needs --scan.",
+    metavar="TOPIC|FILE.yaml",
+    help="nav_msgs/OccupancyGrid, or a map file of map_server: what it holds is nobody's legs. "
+    "Needs --scan.",
+)
+@option(
+    "--map-frame",
+    group=_READ,
+    default="map",
+    metavar="FRAME",
+    help="Frame in tf of the map in a file; the fixed frame itself needs no tf.",
 )
 @option(
     "--bag",

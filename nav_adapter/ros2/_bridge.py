@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from perception import AwarenessPipeline, Camera, PerceptionError
 from perception.arrays import FloatArray
-from perception.laser import LegDetector
+from perception.laser import LegDetector, MapCells
 from tracking import PersonTrack, TrackerConfig, TrackingError
 
 from .._adapter import NavAdapter
@@ -255,6 +255,14 @@ class AwarenessBridge:
             self._scan_reader().set_map(message)
         except NavError as problem:
             self._warn(f"map: {problem}")
+
+    def use_map(self, cells: MapCells) -> None:
+        """Use a map of what stands still that was read from a file, as :meth:`on_map` does.
+
+        Raises:
+            NavError: for a bridge without scanners.
+        """
+        self._scan_reader().use_map(cells)
 
     def refuse_scan(self, number: int, problem: str, now_s: float) -> None:
         """Count and report a scan that could not be decoded."""

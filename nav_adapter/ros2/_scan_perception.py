@@ -15,6 +15,7 @@ from perception.arrays import FloatArray
 from perception.laser import (
     LaserScan,
     LegDetector,
+    MapCells,
     PersonCandidate,
     RobotMotion,
     Scanner,
@@ -26,7 +27,6 @@ from tracking import ScannerView
 
 from .._errors import NavError
 from ._robot_file import RobotFile, ScannerMount
-from ._scans import MapCells
 
 # Scans of two scanners this near in time show the same legs and trolleys.
 _TOGETHER_S: Final = 0.1

@@ -9,13 +9,14 @@ from typing import Final
 
 from perception import PerceptionError
 from perception.arrays import FloatArray
+from perception.laser import MapCells
 from tracking import TrackingError
 
 from .._errors import NavError
 from ._clock import BridgeClock
 from ._poses import RobotPoses
 from ._scan_perception import PerceivedScan, ScannerInput, ScanPerception
-from ._scans import MapCells, laser_scan_of, map_cells_of
+from ._scans import laser_scan_of, map_cells_of
 from ._sensor_watch import SensorWatch
 from ._shared_tracker import SharedTracker
 from .messages.nav_msgs import OccupancyGrid
@@ -113,7 +114,10 @@ class ScanReader:
         Raises:
             NavError: for a map that cannot be used.
         """
-        cells = map_cells_of(message)
+        self.use_map(map_cells_of(message))
+
+    def use_map(self, cells: MapCells) -> None:
+        """Use a map of what stands still, from now on."""
         with self._lock:
             self._map, self._map_used = cells, None
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 
 from perception import PerceptionError
-from perception.arrays import FloatArray, finite_number
-from perception.laser import LaserScan, StaticMap
+from perception.arrays import finite_number
+from perception.laser import LaserScan, MapCells
 
 from .._errors import NavError
 from .conversions import pose_matrix
@@ -60,39 +59,6 @@ def laser_scan_of(message: Any) -> LaserScan:
     return scan
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class MapCells:
-    """The occupied cells of a map, in the map's frame.
-
-    Attributes:
-        frame_id: name of the frame.
-        cells_m: (K, 2) middles of the cells.
-        resolution_m: side of a cell.
-    """
-
-    frame_id: str
-    cells_m: FloatArray
-    resolution_m: float
-
-    def near(self, T_odom_map: FloatArray, centre_odom_m: FloatArray, reach_m: float) -> StaticMap:
-        """Return the part of the map around a place, in odom.
-
-        Args:
-            T_odom_map: (4, 4) pose of the map.
-            centre_odom_m: (2,) the place.
-            reach_m: half the side of the part.
-        """
-        side_m = self.resolution_m
-        origin = np.asarray(centre_odom_m) - reach_m
-        places = self.cells_m @ T_odom_map[:2, :2].T + T_odom_map[:2, 3]
-        cells = np.floor((places - origin) / side_m)
-        extent = max(1, math.ceil(2.0 * reach_m / side_m))
-        column, row = cells[((cells >= 0.0) & (cells < extent)).all(axis=1)].astype(np.int64).T
-        occupied = np.zeros((extent, extent), dtype=bool)
-        occupied[row, column] = True
-        return StaticMap(occupied, origin, side_m)
-
-
 def map_cells_of(message: OccupancyGrid) -> MapCells:
     """Return the cells of a map that are occupied by 65 per cent or more.
 
@@ -114,4 +80,4 @@ def map_cells_of(message: OccupancyGrid) -> MapCells:
     data = np.frombuffer(message.data, np.int8).reshape(info.height, info.width)
     row, column = np.nonzero((data >= _OCCUPIED[0]) & (data <= _OCCUPIED[1]))
     cells = (np.column_stack((column, row)) + 0.5) * side_m
-    return MapCells(message.header.frame_id, cells @ T[:2, :2].T + T[:2, 3], side_m)
+    return MapCells(cells @ T[:2, :2].T + T[:2, 3], side_m, message.header.frame_id)

@@ -21,13 +21,14 @@ from ._classifier import LegClassifier, OnnxLegClassifier
 from ._clusters import Clusters, clusters_of
 from ._detector import LegDetector, LegDetectorConfig
 from ._hypotheses import CUTOUT, HYPOTHESIS_FEATURES, Hypotheses, hypotheses_of
-from ._memory import OccupancyMemory, StaticMap
+from ._memory import OccupancyMemory
 from ._merging import merge_candidates
 from ._observations import observations_of
 from ._points import RobotMotion, ScanPoints, scan_points
 from ._scan import LaserScan
 from ._scanner import Scanner
 from ._seated import SeatedPeople
+from ._static_map import MapCells, StaticMap
 
 __all__ = [
     "CUTOUT",
@@ -39,6 +40,7 @@ __all__ = [
     "LegClassifier",
     "LegDetector",
     "LegDetectorConfig",
+    "MapCells",
     "OccupancyMemory",
     "OnnxLegClassifier",
     "PersonCandidate",

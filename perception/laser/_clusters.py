@@ -162,7 +162,9 @@ def clusters_of(
         (means[:2] + origin_m[:, None]).T,
         spreads,
         np.sqrt(across[0] + across[1]) + spacings[starts],
-        *sums[5:],
+        sums[5],
+        sums[6],
+        sums[7],
         np.asarray(origin_m, dtype=np.float64),
         turn,
     )

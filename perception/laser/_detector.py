@@ -16,8 +16,9 @@ from ._candidate import CandidateKind, PersonCandidate
 from ._classifier import LegClassifier, OnnxLegClassifier
 from ._clusters import Clusters, clusters_of
 from ._hypotheses import Hypotheses, hypotheses_of
-from ._memory import OccupancyMemory, StaticMap
+from ._memory import OccupancyMemory
 from ._points import ScanPoints
+from ._static_map import StaticMap
 
 # A single cluster at least this wide is two legs that touch.
 _TWO_LEGS_M: Final = 0.24
@@ -240,9 +241,7 @@ def _with_memory(
     return np.asarray(np.where(score > 0.0, 1.0 / (1.0 + np.exp(-odds)), 0.0))
 
 
-def _trolleys(
-    clusters: Clusters, taken: NDArray[np.bool_], people_m: FloatArray
-) -> list[int]:
+def _trolleys(clusters: Clusters, taken: NDArray[np.bool_], people_m: FloatArray) -> list[int]:
     """Return the clusters that have come, have a trolley's size and stand before all around."""
     low, high = _TROLLEY_M
     fits = (clusters.came >= _TROLLEY_CAME * clusters.counts) & ~taken
@@ -339,8 +338,8 @@ def _candidates(
     rows = zip(judged[chosen].tolist(), rays.tolist(), places_m, kinds, legs, strict=True)
     for (score, _, _, along, aside), ray, place, kind, leg in rows:
         covariance = _covariance(ray, max(along, _SURELY_M), max(aside, _SURELY_M))
-        score = min(max(score, 0.0), 1.0)
-        candidates.append(PersonCandidate(stamp_s, place, covariance, score, kind, leg))
+        person = min(max(score, 0.0), 1.0)
+        candidates.append(PersonCandidate(stamp_s, place, covariance, person, kind, leg))
     return candidates
 
 

@@ -1,16 +1,14 @@
-"""The part of the surroundings that stands still: an occupancy memory in odom, or a given map."""
+"""The part of the surroundings that stands still, learned: an occupancy memory in odom."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import FloatArray, finite_array, finite_number, set_fields
-from ..errors import PerceptionError
+from ..arrays import FloatArray
 from ._points import ScanPoints
 
 # Extent and cell of the memory, which follows the robot.
@@ -51,51 +49,6 @@ _TWO_LEGS_S: Final = 5.0
 _NEAR_LEGS: Final = np.array(
     [row * _CELLS + column for row in range(-2, 3) for column in range(-2, 3)]
 )
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class StaticMap:
-    """A map of what stands still, in odom, for example a nav_msgs/OccupancyGrid.
-
-    Attributes:
-        occupied: (H, W) whether a cell is occupied; row 0 has the lowest y.
-        origin_odom_m: (2,) corner of cell (0, 0) with the lowest x and y.
-        resolution_m: side of a cell.
-        margin_m: points this near to an occupied cell belong to it; allow for the error of the
-            robot's place in the map.
-
-    Raises:
-        PerceptionError: for a map that is not two-dimensional, or a size that is not positive.
-    """
-
-    occupied: NDArray[np.bool_]
-    origin_odom_m: FloatArray
-    resolution_m: float
-    margin_m: float = 0.1
-
-    def __post_init__(self) -> None:
-        occupied: Any = np.array(self.occupied, dtype=bool, copy=True)
-        if occupied.ndim != 2 or not occupied.size:
-            raise PerceptionError(f"occupied must have shape (H, W), got {occupied.shape}")
-        side = finite_number("resolution_m", self.resolution_m, minimum=0.0, exclusive_minimum=True)
-        margin = finite_number("margin_m", self.margin_m, minimum=0.0)
-        grown = _grown(occupied, math.ceil(margin / side - 1e-9))
-        grown.setflags(write=False)
-        set_fields(
-            self,
-            occupied=grown,
-            origin_odom_m=finite_array("origin_odom_m", self.origin_odom_m, (2,)),
-            resolution_m=side,
-            margin_m=margin,
-        )
-
-    def holds(self, points_m: FloatArray) -> NDArray[np.bool_]:
-        """Return (N,) whether points (N, 2) in odom belong to it; False outside the map."""
-        height, width = self.occupied.shape
-        cell = (points_m.T - self.origin_odom_m[:, None]) / self.resolution_m
-        inside = (cell[0] >= 0.0) & (cell[1] >= 0.0) & (cell[0] < width) & (cell[1] < height)
-        column, row = np.where(inside, cell, 0.0).astype(np.int64)
-        return np.asarray(inside & self.occupied[row, column])
 
 
 class OccupancyMemory:
@@ -259,18 +212,4 @@ def _shifted(grid: NDArray[Any], rows: int, columns: int, new: float) -> NDArray
     into = tuple(slice(max(-step, 0), size - max(step, 0)) for step in (rows, columns))
     source = tuple(slice(max(step, 0), size - max(-step, 0)) for step in (rows, columns))
     out[into] = grid[source]
-    return out
-
-
-def _grown(occupied: NDArray[np.bool_], cells: int) -> NDArray[np.bool_]:
-    """Return the map with every occupied cell grown by this many cells to all sides."""
-    out = occupied
-    for axis in (0, 1):
-        grown = out.copy()
-        for step in range(1, cells + 1):
-            low, high = [slice(None)] * 2, [slice(None)] * 2
-            low[axis], high[axis] = slice(None, -step), slice(step, None)
-            grown[tuple(high)] |= out[tuple(low)]
-            grown[tuple(low)] |= out[tuple(high)]
-        out = grown
     return out

@@ -213,7 +213,9 @@ def _beams(
     scanner: Scanner, angle_min_rad: float, angle_increment_rad: float, count: int
 ) -> _Beams:
     angles = angle_min_rad + angle_increment_rad * np.arange(count, dtype=np.float64)
-    rays = scanner.T_base_scanner[:3, :3] @ np.stack((np.cos(angles), np.sin(angles), np.zeros(count)))
+    rays = scanner.T_base_scanner[:3, :3] @ np.stack(
+        (np.cos(angles), np.sin(angles), np.zeros(count))
+    )
     within_m, outermost_m = -1.0, 0.0
     if scanner.body_base_m is not None:
         outermost_m = float(np.abs(scanner.body_base_m).max()) + BODY_MARGIN_M

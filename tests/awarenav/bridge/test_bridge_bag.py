@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from paths import ROOT
@@ -107,6 +108,37 @@ def test_a_recording_gives_the_people_and_limits_of_its_time(
     assert np.hypot(person.position.x - PERSON[0], person.position.y - PERSON[1]) < 0.1
     # The same recording gives the same, byte for byte.
     assert outputs[0].read_bytes() == outputs[1].read_bytes()
+
+
+def test_what_a_map_file_holds_is_nobody(
+    tmp_path: Path, robot_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bag = recorded(tmp_path / "bag", messages())
+    pixels = np.full((40, 60), 254, np.uint8)  # 6 x 4 m from the origin
+    column, row = (round(each / 0.1) for each in PERSON)
+    pixels[40 - row - 3 : 40 - row + 3, column - 3 : column + 3] = 0
+    cv2.imwrite(str(tmp_path / "hall.pgm"), pixels)
+    hall = tmp_path / "hall.yaml"
+    hall.write_text(
+        "image: hall.pgm\nresolution: 0.1\norigin: [0.0, 0.0, 0.0]\nnegate: 0\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    )
+    arguments = ["bridge", "--robot", str(robot_file), "--scan", "scan", "--no-camera"]
+    arguments += ["--bag", str(bag), "--only", "people", "--map", str(hall)]
+
+    def people(*more: str) -> int:
+        out = tmp_path / f"{len(more)}.mcap"
+        assert main([*arguments, "--record", str(out), *more]) == 0
+        return max(len(each.people) for _, topic, each in published(out) if topic == "/people")
+
+    assert people("--map-frame", "odom") == 0
+    assert "the map is used" in capsys.readouterr().err
+    # Nothing in the recording tells where the frame of a localisation is.
+    assert people() == 1
+    assert "the map is not used: no transform between 'map'" in capsys.readouterr().err
+    (tmp_path / "hall.pgm").unlink()
+    assert main(arguments) == 2
+    assert "cannot read the map's image" in capsys.readouterr().err
 
 
 def test_a_recording_with_a_camera_is_replayed_as_far_as_is_asked(

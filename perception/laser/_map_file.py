@@ -1,0 +1,165 @@
+"""Map files of ROS's map_server: a YAML file, and the image that it names."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import FloatArray, finite_array, finite_number
+from ..documents import read_yaml
+from ..errors import PerceptionError
+
+_REQUIRED: Final = (
+    "image",
+    "resolution",
+    "origin",
+    "negate",
+    "occupied_thresh",
+    "free_thresh",
+)
+_MODES: Final = ("trinary", "scale", "raw")
+# Cells of an OccupancyGrid that count as occupied, in per cent.
+_OCCUPIED: Final = (65, 100)
+# Side of a cell, as for maps that come as messages.
+_SIDE_M: Final = (0.005, 1.0)
+_MAX_IMAGE_BYTES: Final = 256 << 20
+_MAX_CELLS: Final = 100_000_000
+# The head of a binary PGM file: width, height and the value of white; "#" begins a comment.
+_PGM_HEAD: Final = re.compile(
+    rb"P5(?:\s|#[^\n]*\n)+(\d+)(?:\s|#[^\n]*\n)+(\d+)(?:\s|#[^\n]*\n)+(\d+)\s"
+)
+
+
+class MapImage(NamedTuple):
+    """A map as its file has it.
+
+    Attributes:
+        occupied: (H, W) whether a cell is occupied; row 0 has the lowest y of the map.
+        origin: x and y of the lower left corner in metres, and the map's yaw in radians.
+        resolution_m: side of a cell.
+    """
+
+    occupied: NDArray[np.bool_]
+    origin: tuple[float, float, float]
+    resolution_m: float
+
+
+def read_map_file(path: Path) -> MapImage:
+    """Return the map of a file, as ``nav2_map_server`` reads it.
+
+    Raises:
+        PerceptionError: the message names the file, says what it has and what is valid.
+    """
+    data = read_yaml(path)
+    if not isinstance(data, dict):
+        raise PerceptionError(f"{path} must hold the keys {', '.join(_REQUIRED)}")
+    for key in data:
+        if key not in (*_REQUIRED, "mode"):
+            near = difflib.get_close_matches(str(key), (*_REQUIRED, "mode"), n=1)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            valid = ", ".join((*_REQUIRED, "mode"))
+            raise PerceptionError(f"{path} has the unknown key {key!r}, valid are {valid}{hint}")
+    missing = [key for key in _REQUIRED if key not in data]
+    if missing:
+        raise PerceptionError(f"{path} lacks the key {missing[0]!r} of a map_server file")
+    try:
+        side_m = _between("resolution", data["resolution"], *_SIDE_M)
+        x, y, yaw = finite_array("origin", data["origin"], (3,)).tolist()
+        occupied = _between("occupied_thresh", data["occupied_thresh"], 0.0, 1.0)
+        free = _between("free_thresh", data["free_thresh"], 0.0, 1.0)
+        if free >= occupied:
+            raise PerceptionError(
+                f"free_thresh must be below occupied_thresh, got {free:g} and {occupied:g}"
+            )
+        negate = data["negate"]
+        if negate not in (0, 1):  # False and True as well
+            raise PerceptionError(f"negate must be 0 or 1, got {negate!r}")
+        mode = data.get("mode", _MODES[0])
+        if mode not in _MODES:
+            raise PerceptionError(f"mode must be one of {', '.join(_MODES)}, got {mode!r}")
+        image = data["image"]
+        if not isinstance(image, str) or not image:
+            raise PerceptionError(f"image must be the path of an image, got {image!r}")
+    except PerceptionError as cause:
+        raise PerceptionError(f"{path}: {cause}") from cause
+    shade, opaque = _shades(path.parent / image, mode)
+    percent = _percent(shade, opaque, mode, bool(negate), occupied, free)
+    cells = (percent >= _OCCUPIED[0]) & (percent <= _OCCUPIED[1])
+    # The first row of an image is the highest of the map.
+    return MapImage(cells[::-1], (x, y, yaw), side_m)
+
+
+def _between(name: str, value: Any, low: float, high: float) -> float:
+    if isinstance(value, bool | str):  # float() takes both
+        raise PerceptionError(f"{name} must be a number, got {value!r}")
+    return finite_number(name, value, minimum=low, maximum=high)
+
+
+def _shades(path: Path, mode: str) -> tuple[FloatArray, NDArray[np.bool_] | None]:
+    """Return the brightness (H, W) of an image in [0, 1], and which pixels are opaque.
+
+    In ``trinary`` mode an alpha channel counts as a colour, as for ``nav2_map_server``. Without an
+    alpha channel the second value is None.
+    """
+    try:
+        with path.open("rb") as file:
+            data = file.read(_MAX_IMAGE_BYTES + 1)
+    except (OSError, ValueError) as cause:  # ValueError: a path with a zero byte
+        reason = getattr(cause, "strerror", None) or cause
+        raise PerceptionError(f"cannot read the map's image {path}: {reason}") from cause
+    if len(data) > _MAX_IMAGE_BYTES:
+        limit = _MAX_IMAGE_BYTES >> 20
+        raise PerceptionError(f"the map's image {path} is too large: at most {limit} MiB are read")
+    head = _PGM_HEAD.match(data)
+    if head is not None and int(head[3]) not in (255, 65535):
+        raise PerceptionError(
+            f"the map's image {path} must have 255 or 65535 for white, got {int(head[3])}"
+        )
+    try:
+        image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
+    except cv2.error:
+        image = None
+    if image is None or image.dtype not in (np.uint8, np.uint16):
+        raise PerceptionError(
+            f"the map's image {path} is damaged, or no PGM, PNG or BMP of 8 or 16 bits"
+        )
+    if image.shape[0] * image.shape[1] > _MAX_CELLS:
+        raise PerceptionError(
+            f"the map's image {path} must have at most {_MAX_CELLS} pixels, got "
+            f"{image.shape[1]} x {image.shape[0]}"
+        )
+    white = 255.0 if image.dtype == np.uint8 else 65535.0
+    channels = image.reshape(*image.shape[:2], -1)
+    alpha = channels[..., 3] if channels.shape[2] == 4 else None
+    counted = channels if mode == "trinary" else channels[..., :3]
+    shade = np.asarray(counted.sum(axis=2, dtype=np.float64) / (white * counted.shape[2]))
+    return shade, None if alpha is None else np.asarray(alpha == white)
+
+
+def _percent(
+    shade: FloatArray,
+    opaque: NDArray[np.bool_] | None,
+    mode: str,
+    negate: bool,
+    occupied: float,
+    free: float,
+) -> FloatArray:
+    """Return the occupancy (H, W) in per cent as an OccupancyGrid has it, −1 for unknown cells."""
+    if mode == "raw":
+        value = np.round(255.0 * shade)
+        return np.where(value <= 100.0, value, -1.0)
+    share = shade if negate else 1.0 - shade
+    percent = np.full(share.shape, -1.0)
+    if mode == "scale":
+        percent = np.rint((share - free) / (occupied - free) * 100.0)
+    percent[share < free] = 0.0
+    percent[share > occupied] = 100.0
+    if mode == "scale" and opaque is not None:
+        percent[~opaque] = -1.0
+    return percent

@@ -1,0 +1,182 @@
+"""The part of the surroundings that stands still, as a given map."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import FloatArray, finite_array, finite_number, rigid_transform, set_fields
+from ..errors import PerceptionError
+from ._map_file import MapImage, read_map_file
+
+# The z axis of a level pose differs from that of odom by no more than its rounding.
+_LEVEL: Final = 1e-6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StaticMap:
+    """A map of what stands still, in odom, for example a nav_msgs/OccupancyGrid.
+
+    Attributes:
+        occupied: (H, W) whether a cell is occupied; row 0 has the lowest y.
+        origin_odom_m: (2,) corner of cell (0, 0) with the lowest x and y.
+        resolution_m: side of a cell.
+        margin_m: points this near to an occupied cell belong to it; allow for the error of the
+            robot's place in the map.
+
+    Raises:
+        PerceptionError: for a map that is not two-dimensional, or a size that is not positive.
+    """
+
+    occupied: NDArray[np.bool_]
+    origin_odom_m: FloatArray
+    resolution_m: float
+    margin_m: float = 0.1
+
+    def __post_init__(self) -> None:
+        occupied: Any = np.array(self.occupied, dtype=bool, copy=True)
+        if occupied.ndim != 2 or not occupied.size:
+            raise PerceptionError(f"occupied must have shape (H, W), got {occupied.shape}")
+        side = finite_number("resolution_m", self.resolution_m, minimum=0.0, exclusive_minimum=True)
+        margin = finite_number("margin_m", self.margin_m, minimum=0.0)
+        grown = _grown(occupied, math.ceil(margin / side - 1e-9))
+        grown.setflags(write=False)
+        set_fields(
+            self,
+            occupied=grown,
+            origin_odom_m=finite_array("origin_odom_m", self.origin_odom_m, (2,)),
+            resolution_m=side,
+            margin_m=margin,
+        )
+
+    @classmethod
+    def from_yaml(
+        cls, path: str | Path, T_odom_map: Any = None, *, margin_m: float = 0.1
+    ) -> StaticMap:
+        """Return the map of a file that ROS's map_server reads (:meth:`MapCells.from_yaml`).
+
+        Args:
+            path: the YAML file; the image lies where it says.
+            T_odom_map: (4, 4) pose of the map's frame, turned about z only; None where it is odom.
+                A map that is turned, by this or by its own origin, is drawn anew into cells of the
+                same size.
+            margin_m: see :class:`StaticMap`.
+
+        Raises:
+            PerceptionError: for a file that cannot be used, or a pose that is not level.
+        """
+        margin = finite_number("margin_m", margin_m, minimum=0.0)
+        T = rigid_transform("T_odom_map", np.eye(4) if T_odom_map is None else T_odom_map)
+        if abs(T[2, 2] - 1.0) > _LEVEL:
+            raise PerceptionError(
+                "T_odom_map must be turned about z only, got a z axis of "
+                f"({T[0, 2]:g}, {T[1, 2]:g}, {T[2, 2]:g})"
+            )
+        given = read_map_file(Path(path))
+        x, y, yaw = given.origin
+        if yaw == 0.0 and np.array_equal(T[:2, :2], np.eye(2)):
+            corner = np.array([x, y]) + T[:2, 3]
+            return cls(given.occupied, corner, given.resolution_m, margin)
+        places = _cells_of(given) @ T[:2, :2].T + T[:2, 3]
+        return _drawn(places, given.resolution_m, margin)
+
+    def holds(self, points_m: FloatArray) -> NDArray[np.bool_]:
+        """Return (N,) whether points (N, 2) in odom belong to it; False outside the map."""
+        height, width = self.occupied.shape
+        cell = (points_m.T - self.origin_odom_m[:, None]) / self.resolution_m
+        inside = (cell[0] >= 0.0) & (cell[1] >= 0.0) & (cell[0] < width) & (cell[1] < height)
+        column, row = np.where(inside, cell, 0.0).astype(np.int64)
+        return np.asarray(inside & self.occupied[row, column])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MapCells:
+    """The occupied cells of a map, in the map's frame.
+
+    Attributes:
+        cells_m: (K, 2) middles of the cells.
+        resolution_m: side of a cell.
+        frame_id: name of the frame.
+    """
+
+    cells_m: FloatArray
+    resolution_m: float
+    frame_id: str = "map"
+
+    @classmethod
+    def from_yaml(cls, path: str | Path, frame_id: str = "map") -> MapCells:
+        """Return the occupied cells of a map in the format of ROS's map_server.
+
+        The YAML file has ``image`` (PGM, PNG or BMP; a path from the file's folder), ``resolution``
+        in metres, ``origin`` (x, y and yaw of the lower left corner), ``negate``,
+        ``occupied_thresh``, ``free_thresh`` and perhaps ``mode``: ``trinary``, ``scale`` or
+        ``raw``. Cells count as occupied from 65 per cent on, as those of an OccupancyGrid.
+
+        Args:
+            path: the YAML file.
+            frame_id: name of the map's frame; map_server calls it ``"map"``.
+
+        Raises:
+            PerceptionError: for a file that cannot be read, unknown or missing keys, values out of
+                range, or a damaged image.
+        """
+        given = read_map_file(Path(path))
+        return cls(_cells_of(given), given.resolution_m, frame_id)
+
+    def near(self, T_odom_map: FloatArray, centre_odom_m: FloatArray, reach_m: float) -> StaticMap:
+        """Return the part of the map around a place, in odom.
+
+        Args:
+            T_odom_map: (4, 4) pose of the map.
+            centre_odom_m: (2,) the place.
+            reach_m: half the side of the part.
+        """
+        side_m = self.resolution_m
+        origin = np.asarray(centre_odom_m) - reach_m
+        places = self.cells_m @ T_odom_map[:2, :2].T + T_odom_map[:2, 3]
+        cells = np.floor((places - origin) / side_m)
+        extent = max(1, math.ceil(2.0 * reach_m / side_m))
+        column, row = cells[((cells >= 0.0) & (cells < extent)).all(axis=1)].astype(np.int64).T
+        occupied = np.zeros((extent, extent), dtype=bool)
+        occupied[row, column] = True
+        return StaticMap(occupied, origin, side_m)
+
+
+def _cells_of(given: MapImage) -> FloatArray:
+    """Return the middles (K, 2) of the occupied cells, in the map's frame."""
+    x, y, yaw = given.origin
+    row, column = given.occupied.nonzero()
+    cells = (np.column_stack((column, row)) + 0.5) * given.resolution_m
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    return np.asarray(cells @ np.array([[cos, sin], [-sin, cos]]) + (x, y))
+
+
+def _drawn(places_m: FloatArray, side_m: float, margin_m: float) -> StaticMap:
+    """Return a map that holds these places (K, 2), with a border for the margin."""
+    if not len(places_m):
+        return StaticMap(np.zeros((1, 1), dtype=bool), np.zeros(2), side_m, margin_m)
+    border = math.ceil(margin_m / side_m) + 1
+    origin = places_m.min(axis=0) - (border + 0.5) * side_m
+    column, row = ((places_m - origin) / side_m).astype(np.int64).T
+    occupied = np.zeros((row.max() + border + 1, column.max() + border + 1), dtype=bool)
+    occupied[row, column] = True
+    return StaticMap(occupied, origin, side_m, margin_m)
+
+
+def _grown(occupied: NDArray[np.bool_], cells: int) -> NDArray[np.bool_]:
+    """Return the map with every occupied cell grown by this many cells to all sides."""
+    out = occupied
+    for axis in (0, 1):
+        grown = out.copy()
+        for step in range(1, cells + 1):
+            low, high = [slice(None)] * 2, [slice(None)] * 2
+            low[axis], high[axis] = slice(None, -step), slice(step, None)
+            grown[tuple(high)] |= out[tuple(low)]
+            grown[tuple(low)] |= out[tuple(high)]
+        out = grown
+    return out

@@ -1,0 +1,240 @@
+"""Maps in the format of map_server: what counts as occupied, where it lies, and what is refused."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from laser_scenes import laser_scan, points_of
+
+from perception import PerceptionError
+from perception.laser import LegDetector, LegDetectorConfig, MapCells, StaticMap
+
+KEYS = {
+    "image": "hall.pgm",
+    "resolution": 0.1,
+    "origin": "[-1.0, -2.0, 0.0]",
+    "negate": 0,
+    "occupied_thresh": 0.65,
+    "free_thresh": 0.196,
+}
+
+
+def written(folder: Path, pixels: np.ndarray | bytes, name: str = "hall.pgm", **keys) -> Path:
+    """Write a map and return its YAML file; a key with the value None is left out."""
+    image = pixels if isinstance(pixels, bytes) else cv2.imencode(name[-4:], pixels)[1].tobytes()
+    (folder / name).write_bytes(image)
+    lines = {**KEYS, "image": name, **keys}
+    path = folder / "hall.yaml"
+    path.write_text("".join(f"{k}: {v}\n" for k, v in lines.items() if v is not None))
+    return path
+
+
+def middles(pixels: np.ndarray, side: float = 0.1) -> np.ndarray:
+    """Return the place (K, 2) of each marked pixel, from the lower left corner of the image."""
+    row, column = np.nonzero(pixels)
+    return np.column_stack((column + 0.5, len(pixels) - row - 0.5)) * side
+
+
+def test_the_lowest_row_of_the_image_lies_at_the_origin(tmp_path: Path) -> None:
+    pixels = np.full((4, 6), 254, np.uint8)
+    pixels[3, 0] = pixels[0, 5] = 0  # lower left, upper right
+    held = StaticMap.from_yaml(written(tmp_path, pixels), margin_m=0.0)
+    assert held.occupied.shape == (4, 6)
+    assert np.argwhere(held.occupied).tolist() == [[0, 0], [3, 5]]
+    assert held.origin_odom_m.tolist() == [-1.0, -2.0]
+    places = np.array([[-0.95, -1.95], [-0.45, -1.65], [-0.95, -1.65]])
+    assert held.holds(places).tolist() == [True, True, False]
+
+
+@pytest.mark.parametrize(
+    ("keys", "occupied"),
+    [
+        # Black counts as occupied from a share of 0.65 on: 255 · 0.35 = 89.25.
+        ({}, [0, 89]),
+        ({"mode": "trinary"}, [0, 89]),
+        ({"negate": 1}, [166, 205, 206, 254, 255]),
+        ({"negate": "true", "occupied_thresh": 0.9}, [254, 255]),
+        # 65 per cent of the way from 0.196 to 0.65 is a share of 0.491, a brightness of 129.8.
+        ({"mode": "scale"}, [0, 89, 90, 100, 129]),
+        # The brightness itself, from 0 to 100, is the occupancy.
+        ({"mode": "raw"}, [89, 90, 100]),
+        ({"mode": "raw", "negate": 1}, [89, 90, 100]),
+    ],
+)
+def test_brightness_counts_as_the_mode_says(keys, occupied, tmp_path: Path) -> None:
+    values = np.array([[0, 89, 90, 100, 129, 131, 166, 205, 206, 254, 255]], np.uint8)
+    for name in ("hall.pgm", "hall.png", "hall.bmp"):
+        cells = MapCells.from_yaml(written(tmp_path, values, name, **keys))
+        columns = np.floor((cells.cells_m[:, 0] + 1.0) / 0.1).astype(int)
+        assert values[0, columns].tolist() == occupied, name
+    deep = written(tmp_path, values.astype(np.uint16) * 257, "deep.png", **keys)
+    assert len(MapCells.from_yaml(deep).cells_m) == len(occupied)
+
+
+def test_transparent_pixels_are_unknown_in_scale_mode_and_darker_in_trinary_mode(
+    tmp_path: Path,
+) -> None:
+    pixels = np.zeros((1, 3, 4), np.uint8)
+    pixels[0, :, 3] = [255, 128, 255]
+    pixels[0, 2, :3] = 110  # opaque: a mean of 146, transparent: 82
+    scale = MapCells.from_yaml(written(tmp_path, pixels, "a.png", mode="scale"))
+    np.testing.assert_allclose(scale.cells_m[:, 0], [-0.95, -0.75])
+    trinary = MapCells.from_yaml(written(tmp_path, pixels, "a.png"))
+    np.testing.assert_allclose(trinary.cells_m[:, 0], [-0.95, -0.85])
+    pixels[0, 2, 3] = 0
+    trinary = MapCells.from_yaml(written(tmp_path, pixels, "a.png"))
+    assert len(trinary.cells_m) == 3
+
+
+def test_colours_count_by_their_mean(tmp_path: Path) -> None:
+    pixels = np.array([[[0, 0, 255], [0, 0, 0], [255, 255, 255], [30, 60, 200]]], np.uint8)
+    cells = MapCells.from_yaml(written(tmp_path, pixels, "colours.png"))
+    np.testing.assert_allclose(cells.cells_m[:, 0], [-0.95, -0.85])
+
+
+@settings(max_examples=40)
+@given(
+    st.integers(0, 10_000),
+    st.tuples(st.floats(-20.0, 20.0), st.floats(-20.0, 20.0), st.floats(-3.1, 3.1)),
+    st.floats(-3.1, 3.1),
+)
+def test_a_turned_map_holds_its_cells_wherever_it_lies(
+    tmp_path_factory, seed: int, origin: tuple[float, float, float], yaw: float
+) -> None:
+    """The yaw of the file's origin and the pose of the map in odom compose."""
+    rng = np.random.default_rng(seed)
+    walls = rng.random((9, 14)) < 0.1
+    path = written(
+        tmp_path_factory.mktemp("map"),
+        np.where(walls, 0, 254).astype(np.uint8),
+        origin=list(origin),
+    )
+    T = np.eye(4)
+    T[:2, :2] = [[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]]
+    T[:2, 3] = 3.0, -4.0
+    turn = origin[2]
+    rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+
+    def in_odom(places: np.ndarray) -> np.ndarray:
+        return (places @ rotation.T + origin[:2]) @ T[:2, :2].T + T[:2, 3]
+
+    held = StaticMap.from_yaml(path, T, margin_m=0.1)
+    places = middles(walls)
+    assert held.holds(in_odom(places)).all()
+    # Every point of an occupied cell belongs to it, though its cells are drawn anew.
+    for corner in (-0.049, 0.049):
+        assert held.holds(in_odom(places + np.array([corner, -corner]))).all()
+    free = middles(~walls)
+    if len(places):
+        away = np.linalg.norm(free[:, None] - places, axis=2).min(axis=1)
+        free = free[away > 0.1 * (1.0 + 2.5 * math.sqrt(2.0))]
+    assert not held.holds(in_odom(free)).any()
+
+
+def test_a_map_that_is_only_shifted_keeps_its_cells(tmp_path: Path) -> None:
+    pixels = (np.random.default_rng(4).random((7, 9)) * 255).astype(np.uint8)
+    path = written(tmp_path, pixels)
+    T = np.eye(4)
+    T[:2, 3] = 5.0, 6.0
+    here, there = StaticMap.from_yaml(path), StaticMap.from_yaml(path, T)
+    assert np.array_equal(here.occupied, there.occupied)
+    np.testing.assert_allclose(there.origin_odom_m - here.origin_odom_m, [5.0, 6.0])
+
+
+def test_an_empty_map_holds_nothing(tmp_path: Path) -> None:
+    path = written(tmp_path, np.full((3, 3), 255, np.uint8), origin="[0, 0, 1.0]")
+    assert not StaticMap.from_yaml(path).holds(np.zeros((1, 2))).any()
+    assert MapCells.from_yaml(path).cells_m.shape == (0, 2)
+
+
+def test_a_post_on_the_map_is_nobody(tmp_path: Path) -> None:
+    """Two posts a step apart look like legs; the one map that has them says otherwise."""
+    posts = [(2.0, 0.1, 0.06), (2.0, -0.1, 0.06)]
+    points = points_of(laser_scan(posts))
+    once = LegDetectorConfig(learn=False)
+    assert len(LegDetector(once).detect(points)) == 1
+    pixels = np.full((40, 50), 254, np.uint8)
+    for x, y, _ in posts:
+        row, column = len(pixels) - 1 - round((y + 2.0) / 0.1 - 0.5), round((x + 1.0) / 0.1 - 0.5)
+        pixels[row - 1 : row + 2, column - 1 : column + 2] = 0
+    known = StaticMap.from_yaml(written(tmp_path, pixels))
+    assert LegDetector(once, static_map=known).detect(points) == ()
+
+
+WHITE = np.full((2, 2), 255, np.uint8)
+
+
+@pytest.mark.parametrize(
+    ("keys", "text"),
+    [
+        ({"resolution": None}, "lacks the key 'resolution'"),
+        ({"negate": None}, "lacks the key 'negate'"),
+        ({"occupied_tresh": 0.6}, "unknown key 'occupied_tresh'.*did you mean 'occupied_thresh'"),
+        ({"mode": "binary"}, "mode must be one of trinary, scale, raw, got 'binary'"),
+        ({"resolution": 0.0}, r"resolution must lie in \[0.005, 1\]"),
+        ({"resolution": "fine"}, "resolution must be a number"),
+        ({"origin": "[0, 0]"}, r"origin must have shape \(3,\)"),
+        ({"origin": "[0, 0, .nan]"}, "origin must be finite"),
+        ({"origin": "{x: 1}"}, "origin must be an array of numbers"),
+        ({"negate": 2}, "negate must be 0 or 1"),
+        ({"negate": "[1]"}, "negate must be 0 or 1"),
+        ({"occupied_thresh": 1.1}, "occupied_thresh must lie in"),
+        ({"occupied_thresh": 0.1}, "free_thresh must be below occupied_thresh, got 0.196 and 0.1"),
+        ({"free_thresh": ".nan"}, "free_thresh must be finite"),
+        ({"image": "gone.pgm"}, "cannot read the map's image .*gone.pgm: No such file"),
+        ({"image": "[]"}, "image must be the path"),
+        ({"image": '"a\\0b"'}, "cannot read the map's image"),
+    ],
+)
+def test_a_map_file_that_makes_no_sense_is_refused(keys, text: str, tmp_path: Path) -> None:
+    path = written(tmp_path, WHITE, **{"image": "hall.pgm", **keys})
+    with pytest.raises(PerceptionError, match=text) as raised:
+        MapCells.from_yaml(path)
+    assert str(tmp_path) in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("image", "text"),
+    [
+        (b"", "damaged, or no PGM"),
+        (b"no image", "damaged, or no PGM"),
+        (b"P5 3 1 255\n\x00\x32", "damaged, or no PGM"),
+        (b"P5 9999999 9999999 255\n", "damaged, or no PGM"),
+        (b"P5 # made by hand\n 3 1\n100\n\x00\x32\x64", "255 or 65535 for white, got 100"),
+    ],
+)
+def test_a_damaged_image_is_refused(image: bytes, text: str, tmp_path: Path) -> None:
+    with pytest.raises(PerceptionError, match=text):
+        StaticMap.from_yaml(written(tmp_path, image))
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.binary(max_size=40), st.integers(0, 60), st.sampled_from([".pgm", ".png", ".bmp"]))
+def test_damage_to_an_image_never_crashes(
+    tmp_path_factory, noise: bytes, at: int, kind: str
+) -> None:
+    data = bytearray(cv2.imencode(kind, np.full((5, 7), 100, np.uint8))[1].tobytes())
+    data[at : at + len(noise)] = noise
+    path = written(tmp_path_factory.mktemp("map"), bytes(data), "hall" + kind)
+    try:
+        found = MapCells.from_yaml(path)
+    except PerceptionError:
+        return
+    assert np.isfinite(found.cells_m).all()
+
+
+def test_a_file_that_is_no_map_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "list.yaml"
+    path.write_text("[1, 2]\n")
+    with pytest.raises(PerceptionError, match=r"list\.yaml must hold the keys image, resolution"):
+        StaticMap.from_yaml(path)
+    tilted = np.eye(4)
+    tilted[1:3, 1:3] = [[0.8, -0.6], [0.6, 0.8]]
+    with pytest.raises(PerceptionError, match="turned about z only"):
+        StaticMap.from_yaml(written(tmp_path, WHITE), tilted)
