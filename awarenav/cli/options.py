@@ -231,7 +231,7 @@ def faults() -> Decorator:
         metavar="NAME|FILE...",
         shell_complete=_COMPLETE_FAULTS,
         help="Faults: shipped ones, YAML files, several joined by '+', or 'none'; every "
-        "combination runs with each.",
+        "combination runs with each. 'scanner_*' stands for all shipped ones that fit.",
     )
 
 

@@ -15,7 +15,7 @@ from perception import AwarenessPipeline, Camera
 from ..crossing.eyes import PerceptionKind, SensorSet
 from ..world.errors import SimError
 from .measures import EpisodeRecord, nondeterminism_notes, summarise, table_text
-from .runs import RunFiles, plan_jobs, run_jobs
+from .runs import RunFiles, plan_jobs, run_jobs, sample_jobs
 
 # The name of the reference planner on the command line.
 _REFERENCE: Final = "reference"
@@ -33,6 +33,7 @@ class CrossingsOptions:
     camera: str
     fault: tuple[str, ...]
     episodes: int
+    sample: int | None
     seed: int
     workers: int | None
     scheduler: str | None
@@ -67,6 +68,8 @@ def crossings_command(options: CrossingsOptions) -> int:
     if options.perception == "pixels" and set(options.sensors) != {"scanner"}:
         # Refuses missing networks before anything runs.
         AwarenessPipeline(Camera.from_fov(640, 480, 1.0))
+    if options.sample is not None:
+        jobs = sample_jobs(jobs, options.sample, options.seed)
     records = run_jobs(
         jobs,
         options.out,
@@ -133,6 +136,8 @@ def _about(options: CrossingsOptions) -> dict[str, Any]:
     }
     if options.sensors != ("camera",):
         settings["sensors"] = list(options.sensors)
+    if options.sample is not None:
+        settings["sample"] = options.sample
     if options.camera:
         settings["camera"] = options.camera
     words = ["awarenav", "crossings"]

@@ -13,6 +13,7 @@ from awarenav.cli import NUMBER, POSITIVE, command, option, options
         "awarenav crossings --scenario blind_corner --policy blind balanced",
         "awarenav crossings --policy mine.yaml blind --episodes 20 --out run",
         "awarenav crossings --planner my_planners:Dwa reference --fault none ghosts",
+        "awarenav crossings --fault 'scanner_*' --sensors camera+scanner --sample 50",
     ],
     exit_status={
         0: "Success.",
@@ -31,6 +32,14 @@ from awarenav.cli import NUMBER, POSITIVE, command, option, options
 @options.camera()
 @options.faults()
 @option("--episodes", type=POSITIVE, default=1, metavar="N", help="Number of seeds per scenario.")
+@option(
+    "--sample",
+    type=POSITIVE,
+    show_default="all",
+    metavar="N",
+    help="Run only N of all these episodes, drawn at random by --seed: each fault once before any "
+    "twice, scenarios and policies equally often.",
+)
 @options.seed(" It is that of the first episode; the next ones count up.")
 @options.workers()
 @option(

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from ._process_lock import ProcessLock
     from ._run import run_jobs
     from ._run_files import RunFiles, read_jobs, read_run
+    from ._sample import sample_jobs
 
 __all__ = [
     "Job",
@@ -48,6 +49,7 @@ __all__ = [
     "run_episode",
     "run_here",
     "run_jobs",
+    "sample_jobs",
     "template_of",
     "tidy",
 ]
@@ -88,5 +90,6 @@ __getattr__ = lazy_names(
             "read_jobs",
             "read_run",
         ),
+        "._sample": ("sample_jobs",),
     },
 )

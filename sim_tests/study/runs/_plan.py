@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import fnmatch
+import itertools
+import re
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -15,7 +18,7 @@ from perception.arrays import finite_number
 from perception.documents import parse_yaml
 
 from ...crossing.eyes import ORACLE, Perception
-from ...crossing.faults import Fault
+from ...crossing.faults import Fault, shipped_faults
 from ...scenario import ScenarioTemplate, shipped_templates
 from ...world.errors import SimError
 from ._job import Job
@@ -23,6 +26,7 @@ from ._planner_choice import planner_label, refuse_unusable_planner
 
 # The name that stands for "without a fault".
 _NO_FAULT: Final = "none"
+_PATTERN: Final = re.compile(r"[*?\[]")
 
 
 class JobKey(NamedTuple):
@@ -62,7 +66,9 @@ def plan_jobs(
         perception: ``"truth"``, ``"keypoints"`` or ``"pixels"``.
         sensors: ``"camera"``, ``"camera+scanner"`` or ``"scanner"``, which has no use for the
             perception; one set or several to compare.
-        faults: faults, shipped names, YAML files, or ``"none"`` or empty for no fault.
+        faults: faults, shipped names, YAML files, or ``"none"`` or empty for no fault. ``*``, ``?``
+            and ``[…]`` in a name stand for all shipped names that fit, as in a shell; in names that
+            are joined by ``+`` for every combination.
         camera: a shipped name or a YAML file that replaces the camera of every scenario; empty
             keeps each scenario's own.
 
@@ -73,7 +79,7 @@ def plan_jobs(
     perceptions = [Perception.of(perception, each).name for each in sensors]
     templates = _expanded(scenarios, camera)
     policy_texts = [text for each in policies for text in _named_policy(each, perceptions)]
-    fault_texts = [_named_fault(each) for each in faults]
+    fault_texts = [_named_fault(each) for given in faults for each in _matching_faults(given)]
     checked_seeds = [_checked_seed(seed) for seed in seeds]
     for planner in planners:
         if templates:
@@ -200,6 +206,19 @@ def _named_policy(
         name, own_policy = policy, AwarenessPolicy.preset(policy)
     text = policy_text(own_policy)
     return [(name, text, perception) for perception in perceptions]
+
+
+def _matching_faults(given: str | Fault) -> list[str | Fault]:
+    """Return the shipped faults that a pattern stands for; anything else as it is."""
+    if not isinstance(given, str) or not _PATTERN.search(given) or Path(given).exists():
+        return [given]
+    parts = [fnmatch.filter(shipped_faults(), part) for part in given.split("+")]
+    names: list[str | Fault] = ["+".join(each) for each in itertools.product(*parts)]
+    if not names:
+        raise SimError(
+            f"no shipped fault fits the pattern {given!r}; they are {', '.join(shipped_faults())}"
+        )
+    return names
 
 
 def _named_fault(fault: str | Fault) -> tuple[str, str]:
