@@ -134,7 +134,7 @@ def bridge_command(options: BridgeOptions) -> int:
                 make_pipeline=_pipeline_maker(networks, pose_estimator, cone),
             )
             if map_cells is not None:
-                bridge.use_map(map_cells)
+                bridge.on_map(map_cells)
             return bridge
 
         if options.bag is not None:

@@ -246,8 +246,8 @@ class AwarenessBridge:
         """
         return self._scan_reader().read(number, message, now_s)
 
-    def on_map(self, message: OccupancyGrid) -> None:
-        """Use a map of what stands still: what it holds is nobody's legs.
+    def on_map(self, message: OccupancyGrid | MapCells) -> None:
+        """Use a map of what stands still, also one from a file: what it holds is nobody's legs.
 
         It is used while tf tells where the map is in odom.
         """
@@ -255,14 +255,6 @@ class AwarenessBridge:
             self._scan_reader().set_map(message)
         except NavError as problem:
             self._warn(f"map: {problem}")
-
-    def use_map(self, cells: MapCells) -> None:
-        """Use a map of what stands still that was read from a file, as :meth:`on_map` does.
-
-        Raises:
-            NavError: for a bridge without scanners.
-        """
-        self._scan_reader().use_map(cells)
 
     def refuse_scan(self, number: int, problem: str, now_s: float) -> None:
         """Count and report a scan that could not be decoded."""

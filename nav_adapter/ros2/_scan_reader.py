@@ -108,16 +108,13 @@ class ScanReader:
         with self._lock:
             self._dropped += 1
 
-    def set_map(self, message: OccupancyGrid) -> None:
-        """Use a map of what stands still, from now on.
+    def set_map(self, message: OccupancyGrid | MapCells) -> None:
+        """Use a map of what stands still, a message or from a file, from now on.
 
         Raises:
             NavError: for a map that cannot be used.
         """
-        self.use_map(map_cells_of(message))
-
-    def use_map(self, cells: MapCells) -> None:
-        """Use a map of what stands still, from now on."""
+        cells = message if isinstance(message, MapCells) else map_cells_of(message)
         with self._lock:
             self._map, self._map_used = cells, None
 
