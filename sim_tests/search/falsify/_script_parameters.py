@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
@@ -20,12 +21,29 @@ _ASIDE_M: Final = 0.8
 _SHORTEST_PAUSE_S: Final = 0.15
 # Least time between two activities of the hands.
 _CHANGE_S: Final = 0.6
+# A worker with this value or more stays where the script ends.
+_STAYS_S: Final = 6.0
+# The way that a worker sets off on then; a shorter one is none.
+_SHORTEST_WAY_M: Final = 0.3
+_LONGEST_WAY_M: Final = 3.0
+_SLOWEST_MPS: Final = 0.5
+_WALK_MPS: Final = 1.34
+# A worker with this value or more looks where the script says.
+_LOOKS_ON_S: Final = 15.0
+# Time in which head or body turns.
+_TURN_S: Final = 0.4
+# Two keys are at least this far apart.
+_KEY_S: Final = 0.1
 # Step at which speed and acceleration are sampled.
 _SAMPLE_S: Final = 0.02
 
 
 def script_parameters(script: Mapping[str, Any]) -> dict[str, Parameter]:
-    """Return the parameters of a worker: start, pace, path, a pause and the time of the gaze."""
+    """Return the parameters of a worker.
+
+    They are start, pace, path, a pause, setting off again after the end of the script, the time of
+    the gaze and, where the script looks at the robot, looking away for good.
+    """
     parameters = {
         "aside_first_m": Parameter.of(-_ASIDE_M, _ASIDE_M, 0.0),
         "aside_last_m": Parameter.of(-_ASIDE_M, _ASIDE_M, 0.0),
@@ -40,6 +58,18 @@ def script_parameters(script: Mapping[str, Any]) -> dict[str, Parameter]:
         }
     if len(script["gaze"]) > 1:
         parameters["gaze_later_s"] = Parameter.of(-3.0, 3.0, 0.0)
+    if not any(key["activity"] == "sitting" for key in script["activities"]):
+        parameters |= {
+            "sets_off_after_s": Parameter.of(0.0, _STAYS_S, _STAYS_S),
+            "sets_off_x_m": Parameter.of(-_LONGEST_WAY_M, _LONGEST_WAY_M, 0.0),
+            "sets_off_y_m": Parameter.of(-_LONGEST_WAY_M, _LONGEST_WAY_M, 0.0),
+            "sets_off_mps": Parameter.of(_SLOWEST_MPS, FASTEST_WALK_MPS, _WALK_MPS),
+        }
+    if any(key["look"] == "robot" for key in script["gaze"]):
+        parameters |= {
+            "looks_away_after_s": Parameter.of(0.0, _LOOKS_ON_S, _LOOKS_ON_S),
+            "away_yaw_deg": Parameter.of(-80.0, 80.0, 0.0),
+        }
     return parameters
 
 
@@ -73,13 +103,60 @@ def changed_script(script: Mapping[str, Any], values: Mapping[str, float]) -> di
         row = int(np.argmin(np.abs(rows[:, 0] - halt_s)))
         keys.insert(row + 1, [keys[row][0] + pause_s, *keys[row][1:]])
     gaze_s = values.get("gaze_later_s", 0.0)
-    return {
+    changed = {
         **script,
         "path": [{"t_s": float(t), "x_m": float(x), "y_m": float(y)} for t, x, y in keys],
         "heading": _retimed(script["heading"], when),
         "gaze": _retimed(script["gaze"], lambda t_s: when(t_s) + gaze_s),
         "activities": _spaced(_retimed(script["activities"], when)),
     }
+    _set_off(changed, values)
+    _look_away(changed, values)
+    return changed
+
+
+def _set_off(script: dict[str, Any], values: Mapping[str, float]) -> None:
+    """Let the worker walk on some time after the end of the path."""
+    after_s = values.get("sets_off_after_s", _STAYS_S)
+    way = values.get("sets_off_x_m", 0.0), values.get("sets_off_y_m", 0.0)
+    length_m = math.hypot(*way)
+    if after_s >= _STAYS_S or length_m < _SHORTEST_WAY_M:
+        return
+    here = script["path"][-1]
+    begin_s = here["t_s"] + max(after_s, _KEY_S)
+    # A cubic from rest to rest: its largest speed is 1.5 times the mean, its largest acceleration
+    # 6 times way over time squared.
+    lasts_s = max(
+        1.5 * length_m / values["sets_off_mps"],
+        math.sqrt(6.0 * length_m / LARGEST_ACCELERATION_MPS2) + _SAMPLE_S,
+    )
+    there = {"x_m": here["x_m"] + way[0], "y_m": here["y_m"] + way[1]}
+    script["path"] = [
+        *script["path"],
+        {**here, "t_s": begin_s},
+        {**there, "t_s": begin_s + lasts_s},
+        {**there, "t_s": begin_s + lasts_s + _KEY_S},
+    ]
+    keys = [key for key in script["heading"] if key["t_s"] <= begin_s - _KEY_S]
+    if keys:  # else the body faces along the walk
+        now = keys[-1]["heading_deg"]
+        turn = math.remainder(math.degrees(math.atan2(way[1], way[0])) - now, 360.0)
+        keys.append({"t_s": begin_s, "heading_deg": now})
+        keys.append({"t_s": begin_s + _TURN_S, "heading_deg": now + turn})
+        script["heading"] = keys
+
+
+def _look_away(script: dict[str, Any], values: Mapping[str, float]) -> None:
+    """Let the worker look elsewhere for good from some time after the start of the path."""
+    after_s = values.get("looks_away_after_s", _LOOKS_ON_S)
+    if after_s >= _LOOKS_ON_S:
+        return
+    at_s = script["path"][0]["t_s"] + after_s
+    kept = [key for key in script["gaze"] if key["t_s"] <= at_s - _KEY_S]
+    if kept:
+        kept.append({**kept[-1], "t_s": at_s})
+    away = {"t_s": at_s + _TURN_S, "look": "ahead", "yaw_deg": values["away_yaw_deg"]}
+    script["gaze"] = [*kept, away]
 
 
 def peak_speed_and_acceleration(script: Mapping[str, Any]) -> tuple[float, float]:

@@ -103,6 +103,56 @@ def test_a_pause_in_a_script_delays_everything_after_it_and_nothing_before():
     assert len(script_path(worker.model_dump())) == len(written.path) + 2
 
 
+def test_a_scripted_worker_sets_off_after_the_end_of_the_script():
+    space = _SPACES["crossing_attentive"]
+    changed = {
+        "workers.0.sets_off_after_s": 1.5,
+        "workers.0.sets_off_x_m": -0.6,
+        "workers.0.sets_off_y_m": -1.1,
+        "workers.0.sets_off_mps": 1.8,
+    }
+    (written,) = space.template.median().workers
+    (worker,) = space.scenario({**space.neutral, **changed}).workers
+    end = written.path[-1]
+    assert worker.path[: len(written.path)] == written.path
+    for late_s in (0.0, 0.7, 1.5):
+        here = worker.motion(end.t_s + late_s).position_odom_m
+        np.testing.assert_allclose(here, [end.x_m, end.y_m], atol=1e-3)
+    after = worker.motion(end.t_s + 1.5 + 5.0).position_odom_m
+    np.testing.assert_allclose(after, [end.x_m - 0.6, end.y_m - 1.1], atol=1e-3)
+    # As fast as was asked for, but no faster than people accelerate.
+    times = np.arange(end.t_s + 1.5, end.t_s + 6.5, 0.01)
+    walked = np.array([worker.motion(t).position_odom_m for t in times.tolist()])
+    speeds = np.linalg.norm(np.diff(walked, axis=0), axis=1) / 0.01
+    length_m = math.hypot(0.6, 1.1)
+    lasts_s = max(1.5 * length_m / 1.8, math.sqrt(6.0 * length_m / 3.0) + 0.02)
+    assert speeds.max() == pytest.approx(1.5 * length_m / lasts_s, rel=0.01)
+    # The body turns to where it walks.
+    heading = worker.motion(times[0] + 0.6).heading_odom_rad
+    assert math.remainder(heading - math.atan2(-1.1, -0.6), math.tau) == pytest.approx(0.0, abs=0.1)
+
+
+def test_a_scripted_worker_forgets_the_robot_at_a_time():
+    space = _SPACES["crossing_attentive"]
+    changed = {"workers.0.looks_away_after_s": 3.0, "workers.0.away_yaw_deg": -60.0}
+    (worker,) = space.scenario({**space.neutral, **changed}).workers
+    begin = worker.path[0].t_s
+    for t_s, azimuth in ((0.0, 0.3), (2.9, 0.3), (3.4, -math.pi / 3), (20.0, -math.pi / 3)):
+        looks = worker.gaze_angles(begin + t_s, 0.0, (0.3, -0.1))
+        assert looks[0] == pytest.approx(azimuth), t_s
+    at_once = {**changed, "workers.0.looks_away_after_s": 0.0}
+    (worker,) = space.scenario({**space.neutral, **at_once}).workers
+    assert worker.gaze_angles(begin, 0.0, (0.3, -0.1))[0] == pytest.approx(-math.pi / 3)
+
+
+def test_only_who_looks_at_the_robot_can_forget_it():
+    unaware = ScenarioSpace(ScenarioTemplate.shipped("crossing_distracted")).parameters
+    assert "workers.0.sets_off_after_s" in unaware
+    assert "workers.0.looks_away_after_s" not in unaware
+    for name in _NAMES:
+        assert not [key for key in _SPACES[name].parameters if key.startswith("workers.")]
+
+
 @pytest.mark.parametrize(
     ("name", "people", "message"), [("crossing_from_left", 0, "no people to vary")]
 )
