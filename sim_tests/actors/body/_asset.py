@@ -8,7 +8,7 @@ on the floor below the midpoint of the hips. Joint rotations are written in axes
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from importlib import resources
 from pathlib import Path
 from typing import Final
@@ -57,7 +57,7 @@ class SkinMesh:
         triangles: (T, 3) rows of vertices, counter-clockwise as seen from outside.
         weights: (V, 16) in [0, 1]: the share of each joint's rotation that a vertex follows. It is
             1 beyond the joint and between 0 and 1 where the skin bends.
-        texture_rgb: (H, W, 3) uint8.
+        texture_file: image of the texture.
     """
 
     vertices_m: FloatArray
@@ -65,7 +65,14 @@ class SkinMesh:
     uv: FloatArray
     triangles: NDArray[np.int64]
     weights: FloatArray
-    texture_rgb: NDArray[np.uint8]
+    texture_file: Path
+
+    @cached_property
+    def texture_rgb(self) -> NDArray[np.uint8]:
+        """(H, W, 3) texture; read when it is first asked for, since most episodes draw nothing."""
+        data = np.frombuffer(self.texture_file.read_bytes(), np.uint8)
+        bgr = cv2.imdecode(data, cv2.IMREAD_COLOR)
+        return np.ascontiguousarray(np.asarray(bgr, dtype=np.uint8)[..., ::-1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,20 +130,11 @@ def load_worker(name: str) -> WorkerAsset:
     Raises:
         SimError: for a name that is not shipped or a file that does not exist.
     """
-    if name.endswith(".npz"):
-        folder, stem = Path(name).parent, Path(name).stem
-        if not Path(name).is_file():
-            raise SimError(f"there is no worker {name!r}")
-    else:
-        folder, stem = Path(str(resources.files("sim_tests.actors.body"))) / "workers", name
-        if name not in worker_names():
-            raise SimError(
-                f"worker must be one of {', '.join(worker_names())} or an .npz file, got {name!r}"
-            )
-    with (folder / f"{stem}.npz").open("rb") as file, np.load(file, allow_pickle=False) as data:
+    path = _file_of(name)
+    with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
         arrays = {key: data[key] for key in data.files}
     levels = tuple(
-        _skin_mesh(arrays, level, _texture_rgb(folder / f"{stem}_lod{level}.jpg"))
+        _skin_mesh(arrays, level, path.with_name(f"{path.stem}_lod{level}.jpg"))
         for level in range(DETAIL_LEVELS)
     )
     capsules = tuple(
@@ -157,9 +155,30 @@ def load_worker(name: str) -> WorkerAsset:
     )
 
 
-def _skin_mesh(
-    arrays: dict[str, NDArray[np.generic]], level: int, rgb: NDArray[np.uint8]
-) -> SkinMesh:
+@lru_cache(maxsize=64)
+def worker_stature_m(name: str) -> float:
+    """Return the stature of a worker, without reading the rest.
+
+    Raises:
+        SimError: as :func:`load_worker`.
+    """
+    with _file_of(name).open("rb") as file, np.load(file, allow_pickle=False) as data:
+        return float(data["stature_m"])
+
+
+def _file_of(name: str) -> Path:
+    if name.endswith(".npz"):
+        if not Path(name).is_file():
+            raise SimError(f"there is no worker {name!r}")
+        return Path(name)
+    if name not in worker_names():
+        raise SimError(
+            f"worker must be one of {', '.join(worker_names())} or an .npz file, got {name!r}"
+        )
+    return Path(str(resources.files("sim_tests.actors.body"))) / "workers" / f"{name}.npz"
+
+
+def _skin_mesh(arrays: dict[str, NDArray[np.generic]], level: int, texture: Path) -> SkinMesh:
     """Undo the quantisation of one level of detail."""
 
     def dequantised(key: str, scale: float) -> FloatArray:
@@ -173,13 +192,8 @@ def _skin_mesh(
         uv=dequantised("uv", 1.0 / 65535.0),
         triangles=arrays[f"lod{level}_triangles"].astype(np.int64),
         weights=dequantised("weights", 1.0 / 255.0),
-        texture_rgb=rgb,
+        texture_file=texture,
     )
-
-
-def _texture_rgb(file: Path) -> NDArray[np.uint8]:
-    bgr = cv2.imdecode(np.frombuffer(file.read_bytes(), np.uint8), cv2.IMREAD_COLOR)
-    return np.ascontiguousarray(np.asarray(bgr, dtype=np.uint8)[..., ::-1])
 
 
 def _read_only_copy(array: NDArray[np.generic]) -> FloatArray:

@@ -14,7 +14,7 @@ from perception import layouts as kp
 from perception.arrays import FloatArray, finite_number
 
 from ...world.errors import SimError
-from ._asset import JOINTS, WorkerAsset, load_worker, worker_names
+from ._asset import JOINTS, WorkerAsset, load_worker, worker_names, worker_stature_m
 from ._quaternions import (
     Quaternion,
     Vector,
@@ -232,7 +232,7 @@ def nearest_look(stature_m: float) -> str:
 
     def order(name: str) -> tuple[float, str]:
         # To the centimetre, so that rounding errors do not choose between two looks.
-        return round(abs(load_worker(name).stature_m - stature_m), 2), name
+        return round(abs(worker_stature_m(name) - stature_m), 2), name
 
     return min(worker_names(), key=order)
 

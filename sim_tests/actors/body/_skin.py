@@ -195,8 +195,7 @@ class WorkerSkin:
         self, worker: PosedBody, textures: Sequence[NDArray[np.uint8]] | None = None
     ) -> None:
         self.worker = worker
-        shipped = tuple(level.texture_rgb for level in worker.asset.levels)
-        self._textures = shipped if textures is None else tuple(textures)
+        self._textures = None if textures is None else tuple(textures)
         self._visuals: Visuals | None = None
         self._levels: dict[int, _Level] = {}
         self._shown: set[int] = set()
@@ -266,7 +265,8 @@ class WorkerSkin:
     def _make(self, visuals: Visuals, level: int) -> _Level:
         asset, scale = self.worker.asset, self.worker.pose.scale
         pieces = _pieces(asset.name, level)
-        texture = visuals.texture(self._textures[level])
+        shipped, own = self.worker.asset.levels, self._textures
+        texture = visuals.texture(shipped[level].texture_rgb if own is None else own[level])
         bodies = tuple(
             visuals.add_body(visuals.shape(_scaled(piece.mesh, scale), texture=texture))
             for piece in pieces

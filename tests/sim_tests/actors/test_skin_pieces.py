@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -41,7 +42,7 @@ def leg(rings: int = 61, sides: int = 16) -> SkinMesh:
         np.random.default_rng(0).random((len(vertices), 2)),
         np.array(triangles),
         weights,
-        np.zeros((4, 4, 3), np.uint8),
+        Path("no texture is drawn"),
     )
 
 
