@@ -2,7 +2,7 @@
 
 A robot with two diagonal scanners drives through the shipped halls. Held-out workers walk and stand
 around it. The figures are: recall per scan of people within 5 m in line of sight, errors of place,
-confirmed tracks where nobody is, and the time of a scan.
+confirmed tracks where nobody is, and the processor time of a scan.
 """
 
 from __future__ import annotations
@@ -179,9 +179,9 @@ def drive(
             groups = []
             for number, (scanner, mounting) in enumerate(zip(scanners, mountings, strict=True)):
                 scan = scanner.scan(motion)
-                start = time.perf_counter()
+                start = time.thread_time()  # of one thread, so a busy core does not count
                 found = detector.detect(scan_points(scan, mounting, motion), number)
-                figures.time_ms.append(1e3 * (time.perf_counter() - start))
+                figures.time_ms.append(1e3 * (time.thread_time() - start))
                 groups.append(found)
                 judged = [
                     _Judged(place, walk.speed_mps > 0.0, name, actors, trolley)
