@@ -26,6 +26,7 @@ from ._calibrate import limb_scale
 from ._detector_net import DetectorNet
 from ._detector_train import train_detector
 from ._export import export_detector, export_head, export_pose
+from ._fit import AUTO, torch_device
 from ._head_data import HeadData
 from ._head_net import HeadNet
 from ._head_train import calibration, predictions, train_head
@@ -37,7 +38,7 @@ from ._shards import make_shards
 _ROOT: Final = Path(__file__).parents[2]
 _MODELS: Final = _ROOT / "perception" / "models"
 _STAGES: Final = ("data", "head", "pose", "detector", "export")
-_TRAINERS: Final[dict[str, Callable[[Recipe, Path, Path, Path], nn.Module]]] = {
+_TRAINERS: Final[dict[str, Callable[[Recipe, Path, Path, Path, str], nn.Module]]] = {
     "head": train_head,
     "pose": train_pose,
     "detector": train_detector,
@@ -84,6 +85,9 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=_MODELS, help="folder of the networks")
     parser.add_argument("--seed", type=int, default=0, help="default: %(default)s")
     parser.add_argument("--processes", type=int, default=2, help="processes that render")
+    parser.add_argument(
+        "--device", default=AUTO, help="auto, cpu, cuda or cuda:N (default: %(default)s)"
+    )
     parser.add_argument("--quick", action="store_true", help="a tiny run that checks every stage")
     chosen = parser.parse_args()
     unknown = [stage for stage in chosen.stages if stage not in _STAGES]
@@ -94,23 +98,34 @@ def main() -> None:
     recipe = recipe.quick() if chosen.quick else recipe
     if chosen.quick and chosen.out == _MODELS:
         parser.error("--quick needs --out: its networks are useless and must not ship")
+    try:
+        torch_device(chosen.device)
+    except ValueError as cause:
+        parser.error(str(cause))
     cv2.setNumThreads(1)
     work: Path = chosen.work
     shards, check = work / "shards", work / "shards_check"
     if "data" in stages:
-        make_shards(recipe, _crowd(recipe, work / "crowd"), shards, chosen.processes)
+        make_shards(
+            recipe, _crowd(recipe, work / "crowd", chosen.processes), shards, chosen.processes
+        )
         held_out = recipe.held_out()
-        make_shards(held_out, _crowd(held_out, work / "crowd_check"), check, chosen.processes)
+        make_shards(
+            held_out,
+            _crowd(held_out, work / "crowd_check", chosen.processes),
+            check,
+            chosen.processes,
+        )
     for name, train in _TRAINERS.items():
         if name in stages:
-            train(recipe, shards, check, work / "checkpoints")
+            train(recipe, shards, check, work / "checkpoints", chosen.device)
     if "export" in stages:
         _export(recipe, check, work / "checkpoints", chosen.out)
 
 
-def _crowd(recipe: Recipe, folder: Path) -> tuple[str, ...]:
+def _crowd(recipe: Recipe, folder: Path, processes: int) -> tuple[str, ...]:
     """Return the files of the random workers; make those that are missing."""
-    command = ["-m", "training.workers", "--random", str(recipe.crowd), "--jobs", "2"]
+    command = ["-m", "training.workers", "--random", str(recipe.crowd), "--jobs", str(processes)]
     command += ["--seed", str(recipe.seed), "--out", str(folder)]
     subprocess.run([sys.executable, *command], cwd=_ROOT, check=True)
     return tuple(str(path) for path in sorted(folder.glob("*.npz")))
@@ -127,7 +142,9 @@ def _export(recipe: Recipe, check: Path, checkpoints: Path, out: Path) -> None:
     assert isinstance(head, HeadNet)
     assert isinstance(pose, PoseNet)
     assert isinstance(detector, DetectorNet)
-    factors = calibration(predictions(head, HeadData(check, recipe.seed)))
+    held_out = HeadData(check, recipe.seed, recipe.check_backgrounds)
+    # Half of the crops are degraded: a robot's camera is between the two.
+    factors = calibration(predictions(head, held_out, degraded=True))
     print("factors on the standard deviations:", factors)
     export_head(head, out / "head_pose.onnx", factors)
 

@@ -1,4 +1,8 @@
-"""Random changes of images, so that networks do not overfit to this renderer."""
+"""Random changes of images, so that networks do not overfit to this renderer.
+
+Images are (H, W, 3), or (H, W, 4) with the foreground as their alpha, which is 255 outside the
+image: what lies there is never replaced by a background.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perception.networks.heads import OUTSIDE_GREY
+
+from ._degradation import Degradation, degrade, rolling_shutter
 
 
 def with_surroundings(
@@ -30,7 +36,7 @@ def with_surroundings(
             pads[2 * axis + side] = margin_px
             kind = cv2.BORDER_CONSTANT if is_end else cv2.BORDER_REPLICATE
             patch = np.asarray(
-                cv2.copyMakeBorder(patch, *pads, kind, value=(outside,) * 3), dtype=np.uint8
+                cv2.copyMakeBorder(patch, *pads, kind, value=_outside(outside)), dtype=np.uint8
             )
     return patch, (origin[0] - margin_px, origin[1] - margin_px)
 
@@ -60,11 +66,15 @@ def warp(
         matrix,
         (size[0] * k, size[1] * k),
         flags=cv2.INTER_LINEAR,
-        borderValue=(outside,) * 3,
+        borderValue=_outside(outside),
     )
     if k > 1:
         out = cv2.resize(out, size, interpolation=cv2.INTER_AREA)
     return np.asarray(out, dtype=np.uint8)
+
+
+def _outside(grey: int) -> tuple[int, int, int, int]:
+    return grey, grey, grey, 255
 
 
 def similarity(
@@ -87,23 +97,97 @@ def similarity(
     return np.column_stack([turn, middle - turn @ centre])
 
 
-def degraded(image: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint8]:
-    """Return the image with random blur, motion blur or compression, or unchanged."""
-    kind = rng.random()
-    if kind < 0.15:
-        return np.asarray(cv2.GaussianBlur(image, (0, 0), rng.uniform(0.4, 1.2)), dtype=np.uint8)
-    if kind < 0.22:
-        kernel = np.zeros((5, 5), np.float32)
-        length = int(rng.integers(2, 5))
-        kernel[2, 2 - length // 2 : 2 - length // 2 + length] = 1.0 / length
-        kernel = kernel if rng.random() < 0.6 else kernel.T.copy()
-        return np.asarray(cv2.filter2D(image, -1, kernel), dtype=np.uint8)
-    if kind < 0.32:
-        quality = [cv2.IMWRITE_JPEG_QUALITY, int(rng.integers(30, 90))]
-        return np.asarray(
-            cv2.imdecode(cv2.imencode(".jpg", image, quality)[1], cv2.IMREAD_COLOR), dtype=np.uint8
-        )
-    return image
+def photographed_layers(
+    layers: NDArray[np.uint8],
+    degradation: Degradation,
+    rng: np.random.Generator,
+    background: NDArray[np.uint8] | None,
+    scale: float = 1.0,
+) -> NDArray[np.uint8]:
+    """Return the picture (H, W, 3) that a camera takes of a foreground before a background.
+
+    Args:
+        layers: (H, W, 4).
+        degradation: effects of the camera.
+        rng: random generator.
+        background: (h, w, 3) of any size, a random part of which fills the picture; None keeps the
+            rendered one.
+        scale: see :func:`._degradation.degrade`.
+    """
+    rgb = layers[..., :3]
+    if background is not None:
+        rgb = before_background(layers, random_part(background, layers.shape[:2], rng), rng)
+    return degrade(np.ascontiguousarray(rgb), degradation, rng, scale)
+
+
+def before_background(
+    layers: NDArray[np.uint8], background: NDArray[np.uint8], rng: np.random.Generator
+) -> NDArray[np.uint8]:
+    """Return the foreground of ``layers`` (H, W, 4) before another background (H, W, 3).
+
+    The foreground gets a light of its own. Its rim, half a pixel of which shows the old
+    background, is left out.
+    """
+    light = np.float32(np.exp(rng.normal(0.0, 0.3))) * np.exp(rng.normal(0.0, 0.06, 3))
+    front = layers[..., :3].astype(np.float32) * light.astype(np.float32)
+    alpha = layers[..., 3:].astype(np.float32)
+    alpha = np.clip((alpha - 128.0) / 127.0, 0.0, 1.0)
+    out = background + (front - background) * alpha
+    return np.asarray(np.clip(out, 0.0, 255.0), dtype=np.uint8)
+
+
+def random_part(
+    image: NDArray[np.uint8], size_hw: tuple[int, ...], rng: np.random.Generator
+) -> NDArray[np.uint8]:
+    """Return a random part of an image, often mirrored, enlarged or reduced to (H, W)."""
+    height, width = image.shape[:2]
+    share = rng.uniform(0.35, 1.0)
+    h = max(4, int(share * height * rng.uniform(0.7, 1.0)))
+    w = max(4, int(share * width * rng.uniform(0.7, 1.0)))
+    y, x = int(rng.integers(0, height - h + 1)), int(rng.integers(0, width - w + 1))
+    part = image[y : y + h, x : x + w]
+    if rng.random() < 0.5:
+        part = part[:, ::-1]
+    if rng.random() < 0.15:
+        part = part[::-1]
+    return np.asarray(
+        cv2.resize(part, (size_hw[1], size_hw[0]), interpolation=cv2.INTER_LINEAR), dtype=np.uint8
+    )
+
+
+def reduced(
+    image: NDArray[np.uint8], factor: float
+) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
+    """Return an image with at most ``factor`` of its pixels along a side, and the factors (x, y).
+
+    A factor of 1 or more leaves it as it is. Continuous coordinates scale by the factors exactly.
+    """
+    if factor >= 1.0:
+        return image, np.ones(2)
+    height, width = image.shape[:2]
+    size = max(1, round(width * factor)), max(1, round(height * factor))
+    small = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+    return small, np.array([size[0] / width, size[1] / height])
+
+
+def sheared(
+    matrix: NDArray[np.float64], degradation: Degradation, middle_row: float
+) -> NDArray[np.float64]:
+    """Return an affine map (2, 3) followed by the degradation's rolling shutter."""
+    shutter = rolling_shutter(degradation.shutter_shear, middle_row)
+    out = shutter[:, :2] @ matrix
+    out[:, 2] += shutter[:, 2]
+    return np.asarray(out)
+
+
+def moved(points: NDArray[Any], matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return points (…, 2) under an affine map (2, 3)."""
+    return np.asarray(points @ matrix[:, :2].T + matrix[:, 2])
+
+
+def box_around(points: NDArray[Any]) -> NDArray[np.float64]:
+    """Return the boxes (…, 4) around groups of points (…, K, 2)."""
+    return np.concatenate([points.min(axis=-2), points.max(axis=-2)], axis=-1)
 
 
 def covered(

@@ -30,7 +30,9 @@ def stacked(samples: Sequence[Mapping[str, Any]]) -> Batch:
 
 
 def photographed(images: Tensor, generator: torch.Generator, strength: float = 1.0) -> Tensor:
-    """Return images with random exposure, contrast, colour cast, faded colour and noise.
+    """Return images with random brightness, contrast, colour cast and faded colour.
+
+    A scene's and a screen's variety; noise and exposure are the camera's (``_degradation``).
 
     Args:
         images: (N, 3, H, W) in 0–255.
@@ -49,8 +51,6 @@ def photographed(images: Tensor, generator: torch.Generator, strength: float = 1
     out = out * (1.0 - fade) + fade * out.mean(1, keepdim=True)
     gamma = torch.exp(uniform(-0.35, 0.35, 1, 1, 1))
     out = 255.0 * (out.clamp(1.0, 255.0) / 255.0) ** gamma
-    noise = uniform(-8.0, 12.0, 1, 1, 1).clamp(min=0.0)
-    out = out + noise * torch.randn(out.shape, generator=generator)
     return torch.lerp(images.float(), out.clamp(0.0, 255.0), strength)
 
 

@@ -128,7 +128,7 @@ def degrade(
         raise ValueError(f"scale must be finite and greater than 0, got {scale!r}")
     out = image
     if degradation.changes_light:
-        light = np.asarray(to_linear(image), dtype=np.float32) * np.float32(degradation.light)
+        light = (_light_of_codes() * np.float32(degradation.light))[image]
         light = _blurred(light, degradation, scale)
         light = _noisy(light, degradation, rng, scale)
         factors = degradation.gain * 2.0**degradation.exposure_ev
@@ -186,6 +186,12 @@ def _motion_kernel(length_px: float, direction_rad: float) -> NDArray[np.float32
     return out
 
 
+@lru_cache(maxsize=1)
+def _light_of_codes() -> NDArray[np.float32]:
+    """Return the linear light of every sRGB code, in single precision."""
+    return np.asarray(to_linear(np.arange(256, dtype=np.uint8)), dtype=np.float32)
+
+
 def _blurred(
     light: NDArray[np.float32], degradation: Degradation, scale: float
 ) -> NDArray[np.float32]:
@@ -216,9 +222,7 @@ def _noisy(
         variance += light / np.float32(white_e)
     noise = rng.standard_normal(light.shape, dtype=np.float32)
     if degradation.grain_px >= _LEAST_BLUR_PX:
-        noise = np.asarray(
-            cv2.GaussianBlur(noise, (0, 0), degradation.grain_px), dtype=np.float32
-        )
+        noise = np.asarray(cv2.GaussianBlur(noise, (0, 0), degradation.grain_px), dtype=np.float32)
     return light + noise * np.sqrt(variance) * np.float32(min(scale, 1.0))
 
 

@@ -13,10 +13,20 @@ from numpy.typing import NDArray
 from perception import Camera
 from perception.shipped import detector_input_size
 
-from ._augment import covered, degraded, similarity, warp
+from ._augment import (
+    box_around,
+    covered,
+    moved,
+    photographed_layers,
+    sheared,
+    similarity,
+    warp,
+)
+from ._backgrounds import Backgrounds
 from ._batch import Batch, stacked_images
+from ._degradation import Degradation, random_degradation
 from ._detector_net import HEIGHT, WIDTH
-from ._samples import picture
+from ._samples import DIRECTIONS, layered_picture
 from ._shard_file import read_shards
 
 #: Number to which the people of an image are padded in a batch.
@@ -24,50 +34,73 @@ MAX_PEOPLE: Final = 8
 # People who show less than this (pixels of a 640 × 480 image, keypoints) are ignored.
 _MIN_PIXELS: Final = 350
 _MIN_KEYPOINTS: Final = 4
+# Share of images with a random background, and of images of a background alone.
+_BACKGROUND_SHARE: Final = 0.5
+_EMPTY_SHARE: Final = 0.05
+
+
+@dataclass
+class Frame:
+    """A whole image as rendered.
+
+    Attributes:
+        layers: (H, W, 4).
+        outlines: (N, 32, 2) of the people, from the image's corner.
+        wanted: (N,) whether a person is to be found.
+        scale: pixels of the network's input in use per pixel of the image.
+    """
+
+    layers: NDArray[np.uint8]
+    outlines: NDArray[np.float64]
+    wanted: NDArray[np.bool_]
+    scale: float
 
 
 @dataclass
 class FrameSample:
-    """An image, boxes (N, 4) from its corner, and flags (N,) of the boxes to be found.
-
-    ``scale`` converts the image's pixels to those of the network in use.
-    """
+    """An input image, boxes (N, 4) from its corner, and flags (N,) of the boxes to be found."""
 
     image: NDArray[np.uint8]
     boxes: NDArray[np.float64]
     wanted: NDArray[np.bool_]
-    scale: float = 1.0
 
 
 class DetectorData:
-    """All whole images of some shards, in memory."""
+    """All whole images of some shards, in memory.
 
-    def __init__(self, folder: Path, seed: int, first: int = 0, last: int | None = None) -> None:
+    Args:
+        folder: of the shards.
+        seed: of all distortions.
+        backgrounds: number of random backgrounds.
+    """
+
+    def __init__(self, folder: Path, seed: int, backgrounds: int = 1) -> None:
         self._seed = seed
-        self.frames: list[FrameSample] = []
-        for shard in read_shards(folder, first, last):
+        self.backgrounds = Backgrounds(backgrounds, seed)
+        self.frames: list[Frame] = []
+        for shard in read_shards(folder):
             for frame in shard.frames:
-                boxes = [person.box_xyxy_px for person in frame.people]
+                outlines = [person.outline_px for person in frame.people]
                 wanted = [
                     person.pixels >= _MIN_PIXELS and person.visible.sum() >= _MIN_KEYPOINTS
                     for person in frame.people
                 ]
-                image = picture(frame.png)
+                layers = layered_picture(frame.png)
                 self.frames.append(
-                    FrameSample(
-                        image,
-                        np.array(boxes, dtype=np.float64).reshape(-1, 4),
+                    Frame(
+                        layers,
+                        np.array(outlines, dtype=np.float64).reshape(-1, DIRECTIONS, 2),
                         np.array(wanted, dtype=bool),
-                        _scale_in_use(image, frame.focal_px),
+                        _scale_in_use(layers, frame.focal_px),
                     )
                 )
         # Images of wide lenses get a much larger input in use, so they are not judged whole.
-        self._whole = [f for f in self.frames if f.scale <= 1.4 * _fit_scale(f.image)]
+        self._whole = [f for f in self.frames if f.scale <= 1.4 * _fit_scale(f.layers)]
 
     def batch(self, step: int, count: int = 16) -> Batch:
         """Return ``count`` random, distorted images; the same step gives the same images."""
         rng = np.random.default_rng([self._seed, 42, step])
-        return _stacked([self._distorted(rng) for _ in range(count)])
+        return _stacked([self.distorted(rng) for _ in range(count)])
 
     @property
     def stills(self) -> int:
@@ -76,31 +109,41 @@ class DetectorData:
 
     def still(self, start: int, stop: int) -> Batch:
         """Return images ``start`` to ``stop``, whole and letterboxed, not distorted."""
+        rng = np.random.default_rng(0)  # an undistorted image draws nothing
         return _stacked(
             [
-                _placed(frame, _fit_scale(frame.image), np.zeros(2))
+                _placed(frame, _fit_scale(frame.layers), np.zeros(2), rng)
                 for frame in self._whole[start:stop]
             ]
         )
 
-    def _distorted(self, rng: np.random.Generator) -> FrameSample:
+    def distorted(self, rng: np.random.Generator) -> FrameSample:
+        """Return a random image as a random camera takes it."""
+        degradation = random_degradation(rng)
+        if rng.random() < _EMPTY_SHARE:
+            layers = np.zeros((HEIGHT, WIDTH, 4), np.uint8)
+            image = photographed_layers(layers, degradation, rng, self.backgrounds.random(rng), 0.5)
+            return FrameSample(image, np.zeros((0, 4)), np.zeros(0, bool))
         frame = self.frames[int(rng.integers(len(self.frames)))]
-        scale = frame.scale * float(np.exp(np.clip(rng.normal(-0.05, 0.3), -1.0, 0.6)))
+        scale = frame.scale * float(np.exp(np.clip(rng.normal(0.0, 0.4), -1.1, 1.1)))
         size = np.array([WIDTH, HEIGHT]) / scale
-        slack = np.abs(size - frame.image.shape[1::-1])
+        slack = np.abs(size - frame.layers.shape[1::-1])
+        turn = rng.normal(0.0, 3.0) if rng.random() < 0.8 else rng.normal(0.0, 14.0)
         sample = _placed(
             frame,
             scale,
             rng.uniform(-0.5, 0.5, 2) * slack,
+            rng,
             flip=bool(rng.random() < 0.5),
-            angle=np.radians(rng.normal(0.0, 2.0)),
+            angle=np.radians(turn),
+            degradation=degradation,
+            background=self.backgrounds.sometimes(rng, _BACKGROUND_SHARE),
         )
         for _ in range(int(rng.integers(0, 3))):
             if rng.random() < 0.35:
-                other = self.frames[int(rng.integers(len(self.frames)))].image
-                image, box = covered(sample.image, rng, other[::4, ::4])
+                other = self.frames[int(rng.integers(len(self.frames)))].layers
+                image, box = covered(sample.image, rng, other[::4, ::4, :3])
                 sample = _hidden(FrameSample(image, sample.boxes, sample.wanted), box)
-        sample.image = degraded(sample.image, rng)
         return sample
 
 
@@ -116,23 +159,30 @@ def _scale_in_use(image: NDArray[np.uint8], focal_px: float) -> float:
 
 
 def _placed(
-    frame: FrameSample,
+    frame: Frame,
     scale: float,
     shift: NDArray[np.float64],
+    rng: np.random.Generator,
     *,
     flip: bool = False,
     angle: float = 0.0,
+    degradation: Degradation | None = None,
+    background: NDArray[np.uint8] | None = None,
 ) -> FrameSample:
-    """Return the sample scaled, shifted, turned and mirrored into the network's input."""
-    middle = 0.5 * np.array(frame.image.shape[1::-1]) + shift
+    """Return the image scaled, shifted, turned, mirrored, sheared and photographed.
+
+    Boxes are taken anew from the outlines, so they stay tight.
+    """
+    effects = Degradation() if degradation is None else degradation
+    middle = 0.5 * np.array(frame.layers.shape[1::-1]) + shift
     matrix = similarity(middle, scale, angle, (WIDTH, HEIGHT), flip=flip)
-    image = warp(frame.image, matrix, (WIDTH, HEIGHT))
-    if not len(frame.boxes):
-        return FrameSample(image, frame.boxes, frame.wanted)
-    x1, y1, x2, y2 = frame.boxes.T
-    corners = np.stack([x1, y1, x2, y1, x2, y2, x1, y2], axis=1).reshape(-1, 4, 2)
-    corners = corners @ matrix[:, :2].T + matrix[:, 2]
-    low, high = corners.min(axis=1), corners.max(axis=1)
+    matrix = sheared(matrix, effects, 0.5 * HEIGHT)
+    layers = warp(frame.layers, matrix, (WIDTH, HEIGHT))
+    image = photographed_layers(layers, effects, rng, background, scale)
+    if not len(frame.outlines):
+        return FrameSample(image, np.zeros((0, 4)), frame.wanted)
+    boxes = box_around(moved(frame.outlines, matrix))
+    low, high = boxes[:, :2], boxes[:, 2:]
     area = np.prod(high - low, axis=1)
     low, high = np.clip(low, 0, [WIDTH, HEIGHT]), np.clip(high, 0, [WIDTH, HEIGHT])
     size = high - low

@@ -13,17 +13,20 @@ from torch.nn import functional as F  # noqa: N812
 from ._batch import Batch, output_on_photographed
 from ._detector_data import DetectorData
 from ._detector_net import GRID, DetectorNet, cells
-from ._fit import fit
+from ._fit import AUTO, fit
 from ._recipe import Recipe
 
 _CANDIDATES: Final = 10
 _ALPHA, _BETA = 0.5, 6.0
 
 
-def train_detector(recipe: Recipe, shards: Path, held_out: Path, folder: Path) -> nn.Module:
+def train_detector(
+    recipe: Recipe, shards: Path, held_out: Path, folder: Path, device: str = AUTO
+) -> nn.Module:
     """Train the detector on the shards; figures on held-out people go to the log."""
     torch.manual_seed(recipe.seed + 2)
-    data, check = DetectorData(shards, recipe.seed), DetectorData(held_out, recipe.seed)
+    data = DetectorData(shards, recipe.seed, recipe.backgrounds)
+    check = DetectorData(held_out, recipe.seed, recipe.check_backgrounds)
     print(f"{len(data.frames)} images for training, {check.stills} held out", flush=True)
     return fit(
         "detector",
@@ -32,6 +35,7 @@ def train_detector(recipe: Recipe, shards: Path, held_out: Path, folder: Path) -
         detector_loss,
         steps=recipe.detector_steps,
         folder=folder,
+        device=device,
         learning_rate=2e-3,
         judge=lambda net: judge_detector(net, check),
     )

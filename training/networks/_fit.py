@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import json
 import math
+import os
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -19,6 +20,28 @@ from ._batch import Batch
 # Steps between two checkpoints, and batches that are prepared ahead.
 _CHECKPOINT_STEPS: Final = 500
 _AHEAD: Final = 4
+#: The device that PyTorch finds: the first GPU, or the processor.
+AUTO: Final = "auto"
+
+
+def torch_device(name: str) -> torch.device:
+    """Return the device of a name such as ``cpu``, ``cuda`` or ``cuda:1``; ``auto`` finds one.
+
+    Raises:
+        ValueError: for a name that PyTorch does not know, and for a GPU that it does not have.
+    """
+    if name == AUTO:
+        return torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    try:
+        device = torch.device(name)
+    except RuntimeError as cause:
+        raise ValueError(f"device must be auto, cpu, cuda or cuda:N, got {name!r}") from cause
+    if device.type == "cuda" and (device.index or 0) >= torch.cuda.device_count():
+        raise ValueError(
+            f"device {name} is not here: this build of PyTorch finds "
+            f"{torch.cuda.device_count()} GPUs"
+        )
+    return device
 
 
 def fit(
@@ -32,7 +55,8 @@ def fit(
     learning_rate: float = 2e-3,
     weight_decay: float = 0.02,
     judge: Callable[[nn.Module], dict[str, float]] | None = None,
-    helpers: int = 2,
+    device: str = AUTO,
+    helpers: int | None = None,
 ) -> nn.Module:
     """Train, or continue from the last checkpoint; return the averaged network.
 
@@ -47,12 +71,17 @@ def fit(
         learning_rate: highest learning rate.
         weight_decay: weight decay of AdamW.
         judge: returns figures on held-out data, called at every fourth checkpoint.
-        helpers: threads that prepare batches.
+        device: see :func:`torch_device`.
+        helpers: threads that prepare batches; None is two beside a processor, and all but one core
+            beside a GPU.
     """
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{name}.pt"
-    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    net = net.to(device, memory_format=torch.channels_last)
+    place = torch_device(device)
+    if helpers is None:
+        helpers = 2 if place.type == "cpu" else max(2, (os.cpu_count() or 2) - 1)
+    ahead = max(_AHEAD, 2 * helpers)
+    net = net.to(place, memory_format=torch.channels_last)
     average = copy.deepcopy(net).eval()
     decay = [p for p in net.parameters() if p.ndim > 1]
     rest = [p for p in net.parameters() if p.ndim <= 1]
@@ -62,7 +91,7 @@ def fit(
     )
     first = 0
     if path.exists():
-        saved = torch.load(path, map_location=device, weights_only=True)
+        saved = torch.load(path, map_location=place, weights_only=True)
         net.load_state_dict(saved["net"])
         average.load_state_dict(saved["average"])
         optimiser.load_state_dict(saved["optimiser"])
@@ -72,12 +101,12 @@ def fit(
     started = time.perf_counter()
     with ThreadPoolExecutor(helpers) as pool, log:
         queue: list[Future[Batch]] = [
-            pool.submit(batch_of, step) for step in range(first, min(first + _AHEAD, steps))
+            pool.submit(batch_of, step) for step in range(first, min(first + ahead, steps))
         ]
         for step in range(first, steps):
-            batch = {key: value.to(device) for key, value in queue.pop(0).result().items()}
-            if step + _AHEAD < steps:
-                queue.append(pool.submit(batch_of, step + _AHEAD))
+            batch = {key: value.to(place) for key, value in queue.pop(0).result().items()}
+            if step + ahead < steps:
+                queue.append(pool.submit(batch_of, step + ahead))
             done = step / steps
             warm = min(1.0, (step + 1) / min(300.0, 0.1 * steps + 1.0))
             for group in optimiser.param_groups:

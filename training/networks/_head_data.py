@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -11,38 +12,62 @@ from numpy.typing import NDArray
 
 from perception.networks.heads import ray_axes, ray_stretch
 
-from ._augment import covered, degraded, inside_of, warp, with_surroundings
+from ._augment import (
+    covered,
+    inside_of,
+    moved,
+    photographed_layers,
+    random_part,
+    reduced,
+    sheared,
+    warp,
+    with_surroundings,
+)
+from ._backgrounds import Backgrounds
 from ._batch import Batch, stacked
+from ._degradation import degrade, random_degradation
 from ._head_sample import LEAST_SEEN, SIZE, HeadSample, cropped
-from ._samples import HEAD_SIDE_M, ImageSample, Patch, PersonTruth, picture
+from ._samples import HEAD_SIDE_M, ImageSample, Patch, PersonTruth, layered_picture
 from ._shard_file import read_shards
 
 #: Part of an image kept around a head, as a share of the crop's side.
 _REACH: Final = 0.95
 #: Share of crops without a head.
-_NEGATIVES: Final = 0.05
+_NEGATIVES: Final = 0.06
+_BACKGROUND_SHARE: Final = 0.4
+#: Share of the held-out crops of :meth:`HeadData.still` that a camera degrades on request.
+DEGRADED_SHARE: Final = 0.5
 #: Share of the training after which crops are distorted less.
 LATE: Final = 0.75
 _MIN_SIDE_PX: Final = 10.0
 _MIN_COARSE_PX: Final = 18.0
+# Larger heads are stored with fewer pixels: twice as many as the network's input has.
+_MOST_SIDE_PX: Final = 2.0 * SIZE
 
 
 class HeadData:
-    """All heads of some shards, in memory."""
+    """All heads of some shards, in memory.
 
-    def __init__(self, folder: Path, seed: int, first: int = 0, last: int | None = None) -> None:
+    Args:
+        folder: of the shards.
+        seed: of all distortions.
+        backgrounds: number of random backgrounds.
+    """
+
+    def __init__(self, folder: Path, seed: int, backgrounds: int = 1) -> None:
         self._seed = seed
+        self.backgrounds = Backgrounds(backgrounds, seed + 2)
         self.heads: list[HeadSample] = []
         self.others: list[NDArray[np.uint8]] = []
         rng = np.random.default_rng([seed, 21])
-        for shard in read_shards(folder, first, last):
+        for shard in read_shards(folder):
             for patch in [*shard.heads, *shard.people]:
                 self._add(_of_patch(patch))
             for frame in shard.frames:
-                image = picture(frame.png)
+                image = layered_picture(frame.png)
                 for person in frame.people:
                     self._add(_of_frame(frame, image, person))
-                self.others += list(_elsewhere(frame, image, rng))
+                self.others += list(_elsewhere(frame, image[..., :3], rng))
 
     def _add(self, sample: HeadSample | None) -> None:
         if sample is not None:
@@ -55,24 +80,44 @@ class HeadData:
         """
         rng = np.random.default_rng([self._seed, 22, step])
         strength = 1.0 if done < LATE else 0.5
-        return stacked([self._distorted(rng, strength) for _ in range(count)])
+        return stacked([self.distorted(rng, strength) for _ in range(count)])
 
-    def still(self, start: int, stop: int, jitter: float = 0.05, spread: float = 0.07) -> Batch:
-        """Return crops ``start`` to ``stop``, placed as in use, not distorted."""
+    def still(
+        self,
+        start: int,
+        stop: int,
+        jitter: float = 0.05,
+        spread: float = 0.07,
+        *,
+        degraded: bool = False,
+    ) -> Batch:
+        """Return crops ``start`` to ``stop``, placed as in use.
+
+        They are as rendered, or with ``degraded`` half of them as random cameras take them before
+        random backgrounds.
+        """
         rng = np.random.default_rng([self._seed, 23, start])
+        effects = np.random.default_rng([self._seed, 24, start])
         return stacked(
             [
                 cropped(
-                    head, rng.normal(0, jitter, 2), np.exp(rng.normal(0, spread)), 0.0, flip=False
+                    self._photographed(head, effects, 1.0)
+                    if degraded and effects.random() < DEGRADED_SHARE
+                    else head,
+                    rng.normal(0, jitter, 2),
+                    np.exp(rng.normal(0, spread)),
+                    0.0,
+                    flip=False,
                 )
                 for head in self.heads[start:stop]
             ]
         )
 
-    def _distorted(self, rng: np.random.Generator, strength: float) -> dict[str, Any]:
+    def distorted(self, rng: np.random.Generator, strength: float = 1.0) -> dict[str, Any]:
+        """Return a random crop as a random camera takes it; ``strength`` below 1 is gentler."""
         if rng.random() < _NEGATIVES:
             return self._nobody(rng)
-        head = self.heads[int(rng.integers(len(self.heads)))]
+        head = self._photographed(self.heads[int(rng.integers(len(self.heads)))], rng, strength)
         angle = np.radians(rng.normal(0.0, 12.0)) if rng.random() < 0.5 else 0.0
         # First guesses lie this far off the head; the second pass is nearer.
         wide = 1.0 if rng.random() < 0.5 * strength else 0.4
@@ -86,18 +131,36 @@ class HeadData:
         if rng.random() < 0.16 * strength:
             other = self.others[int(rng.integers(len(self.others)))]
             _hide(sample, rng, other)
-        sample["image"] = degraded(sample["image"], rng)
         return sample
+
+    def _photographed(
+        self, head: HeadSample, rng: np.random.Generator, strength: float
+    ) -> HeadSample:
+        """Return the head before a random background, sheared and degraded by a camera."""
+        # Half of a crop's side is the head itself.
+        size_px = 0.5 * head.side_px / head.scale
+        degradation = random_degradation(rng, strength, size_px)
+        image, keypoints = head.image, head.keypoints
+        if degradation.shutter_shear:
+            matrix = sheared(np.eye(2, 3), degradation, float(head.centre[1]))
+            image = warp(image, matrix, (image.shape[1], image.shape[0]))
+            keypoints = moved(keypoints, matrix)
+        background = self.backgrounds.sometimes(rng, strength * _BACKGROUND_SHARE)
+        image = photographed_layers(image, degradation, rng, background, head.scale)
+        return replace(head, image=image, keypoints=keypoints)
 
     def _nobody(self, rng: np.random.Generator) -> dict[str, Any]:
         """Return a crop without a head."""
-        other = self.others[int(rng.integers(len(self.others)))]
-        height, width = other.shape[:2]
-        image = warp(other, np.array([[64 / width, 0, 0], [0, 64 / height, 0.0]]), (SIZE, SIZE))
-        if rng.random() < 0.5:
-            image = np.ascontiguousarray(image[:, ::-1])
+        if rng.random() < 0.4 or not self.others:
+            image = random_part(self.backgrounds.random(rng), (SIZE, SIZE), rng)
+        else:
+            other = self.others[int(rng.integers(len(self.others)))]
+            height, width = other.shape[:2]
+            image = warp(other, np.array([[64 / width, 0, 0], [0, 64 / height, 0.0]]), (SIZE, SIZE))
+            if rng.random() < 0.5:
+                image = np.ascontiguousarray(image[:, ::-1])
         return {
-            "image": degraded(image, rng),
+            "image": degrade(image, random_degradation(rng, size_px=0.5 * SIZE), rng),
             "rotation": np.eye(3),
             "keypoints": np.full((5, 2), 0.5),
             "visible": np.zeros(5, bool),
@@ -110,7 +173,11 @@ class HeadData:
 
 def _of_patch(patch: Patch) -> HeadSample | None:
     return _sample(
-        picture(patch.png), patch.origin_px, patch.size_px, patch.intrinsics_px, patch.person
+        layered_picture(patch.png),
+        patch.origin_px,
+        patch.size_px,
+        patch.intrinsics_px,
+        patch.person,
     )
 
 
@@ -151,16 +218,24 @@ def _sample(
     cut_origin = (left + origin[0], top + origin[1])
     cut, cut_origin = with_surroundings(cut, cut_origin, size, max(4, int(0.3 * side)))
     corner = np.array(cut_origin, dtype=np.float64)
+    # Both sides by the same factor, so that pixels stay square.
+    factor = _MOST_SIDE_PX / side
+    if factor < 1.0:
+        whole = (np.array(cut.shape[1::-1]) * factor).astype(int) / factor
+        cut = cut[: int(whole[1]), : int(whole[0])]
+    cut, scales = reduced(cut, factor)
+    scale = float(scales.mean())
     return HeadSample(
         image=cut,
-        centre=centre - corner,
-        side_px=float(side),
-        keypoints=person.keypoints_px[:5] + 0.5 - corner,
+        centre=(centre - corner) * scales,
+        side_px=float(side) * scale,
+        keypoints=(person.keypoints_px[:5] + 0.5 - corner) * scales,
         visible=person.visible[:5],
-        focal_px=focal,
-        principal_point=np.array([cx, cy]) + 0.5 - corner,
+        focal_px=focal * scale,
+        principal_point=(np.array([cx, cy]) + 0.5 - corner) * scales,
         rotation_camera_head=person.rotation_camera_head.astype(np.float64),
         seen=person.head_seen,
+        scale=scale,
     )
 
 

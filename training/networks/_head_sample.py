@@ -25,7 +25,9 @@ LEAST_SEEN: Final = 0.35
 class HeadSample:
     """A head at the camera's own resolution; pixels count from the corner of ``image``.
 
-    ``side_px`` is the side of a crop for a camera turned to the head.
+    ``image`` is (H, W, 4), or (H, W, 3) once it is photographed. ``side_px`` is the side of a crop
+    for a camera turned to the head. ``scale`` is 1 or the pixels per pixel of the camera of a large
+    head that is stored smaller.
     """
 
     image: NDArray[np.uint8]
@@ -37,6 +39,7 @@ class HeadSample:
     principal_point: NDArray[np.float64]
     rotation_camera_head: NDArray[np.float64]
     seen: float
+    scale: float = 1.0
 
 
 def cropped(
@@ -75,7 +78,7 @@ def cropped(
         rotation = _MIRROR @ rotation @ _MIRROR_HEAD
         keypoints, visible = keypoints[_SWAP], visible[_SWAP]
     return {
-        "image": image,
+        "image": image[..., :3],
         "rotation": rotation,
         "keypoints": keypoints,
         "visible": visible & inside_of(keypoints, np.array([0.0, 0.0, 1.0, 1.0])),

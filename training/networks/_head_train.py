@@ -12,7 +12,7 @@ from torch.nn import functional as F  # noqa: N812
 
 from ._batch import Batch, output_on_photographed
 from ._blocks import cross_entropy, soft_labels
-from ._fit import fit
+from ._fit import AUTO, fit
 from ._head_data import LATE, HeadData
 from ._head_net import BINS, SPAN, HeadNet, averaged, head_rotation, keypoint_means, spread_factor
 from ._recipe import Recipe
@@ -21,10 +21,13 @@ MEAN, STD = 120.0, 60.0
 _DEGREES_OF_FREEDOM = 5.0
 
 
-def train_head(recipe: Recipe, shards: Path, held_out: Path, folder: Path) -> nn.Module:
+def train_head(
+    recipe: Recipe, shards: Path, held_out: Path, folder: Path, device: str = AUTO
+) -> nn.Module:
     """Train the head network on the shards; figures on held-out people go to the log."""
     torch.manual_seed(recipe.seed)
-    data, check = HeadData(shards, recipe.seed), HeadData(held_out, recipe.seed)
+    data = HeadData(shards, recipe.seed, recipe.backgrounds)
+    check = HeadData(held_out, recipe.seed, recipe.check_backgrounds)
     print(f"{len(data.heads)} heads for training, {len(check.heads)} held out", flush=True)
     return fit(
         "head",
@@ -33,6 +36,7 @@ def train_head(recipe: Recipe, shards: Path, held_out: Path, folder: Path) -> nn
         head_loss,
         steps=recipe.head_steps,
         folder=folder,
+        device=device,
         learning_rate=2.5e-3,
         judge=lambda net: judge_head(net, check),
     )
@@ -126,14 +130,16 @@ def _laplace(error: Tensor, log_scale: Tensor) -> Tensor:
     return log_scale + error * torch.exp(-log_scale)
 
 
-def predictions(net: nn.Module, data: HeadData, step: int = 256) -> dict[str, Any]:
-    """Return the errors of every head in ``data``, cropped as in use."""
+def predictions(
+    net: nn.Module, data: HeadData, step: int = 256, *, degraded: bool = False
+) -> dict[str, Any]:
+    """Return the errors of every head in ``data``, cropped as in use; see :meth:`HeadData.still`."""
     net.eval()
     parts: dict[str, list[Any]] = {}
     device = next(net.parameters()).device
     with torch.no_grad():
         for start in range(0, len(data.heads), step):
-            batch = data.still(start, min(start + step, len(data.heads)))
+            batch = data.still(start, min(start + step, len(data.heads)), degraded=degraded)
             out = averaged(net, normalised(batch["image"]).to(device))
             out = {key: value.float().cpu() for key, value in out.items()}
             rotation = head_rotation(out["rotation_6d"])
@@ -160,19 +166,23 @@ def predictions(net: nn.Module, data: HeadData, step: int = 256) -> dict[str, An
 
 
 def judge_head(net: nn.Module, data: HeadData) -> dict[str, float]:
-    """Return figures on held-out heads."""
+    """Return figures on held-out heads: as rendered, and the direction with degradations too."""
     found = predictions(net, data)
     good = found["weight"] > 0.5
+    real = predictions(net, data, degraded=True)
+    hard = real["gaze_deg"][real["weight"] > 0.5]
     gaze = found["gaze_deg"][good]
     shown = found["shown"] & good[:, None]
     return {
         "gaze_median_deg": float(np.median(gaze)),
         "gaze_p90_deg": float(np.percentile(gaze, 90)),
+        "degraded_median_deg": float(np.median(hard)),
+        "degraded_p90_deg": float(np.percentile(hard, 90)),
         "beyond_90": float((gaze > 90).mean()),
         "keypoint_median": float(np.median(found["keypoint"][shown])),
         "side_median": float(np.median(np.abs(found["log_side"][good]))),
         "visible_right": float(found["visible"][good].mean()),
-        "rotation_factor": calibration(found)["rotation"],
+        "rotation_factor": calibration(real)["rotation"],
     }
 
 

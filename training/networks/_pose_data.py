@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ._augment import covered, degraded, inside_of, similarity, warp, with_surroundings
+from ._augment import (
+    box_around,
+    covered,
+    inside_of,
+    moved,
+    photographed_layers,
+    reduced,
+    sheared,
+    similarity,
+    warp,
+    with_surroundings,
+)
+from ._backgrounds import Backgrounds
 from ._batch import Batch, stacked
+from ._degradation import random_degradation
 from ._pose_net import HEIGHT, WIDTH
-from ._samples import PersonTruth, picture
+from ._samples import PersonTruth, layered_picture
 from ._shard_file import read_shards
 
 _SWAP: Final = [0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 16, 15]
@@ -20,30 +33,55 @@ _PADDING: Final = 1.25
 _MIN_BOX_PX: Final = 12.0
 # Person crops are black outside the image, as OpenMMLab's are.
 _OUTSIDE: Final = 0
+_BACKGROUND_SHARE: Final = 0.45
+# Larger people are stored with fewer pixels: half more than the network's input has.
+_MOST_PX: Final = 1.5 * HEIGHT
 
 
 @dataclass
 class PersonSample:
-    """A person at the camera's own resolution; pixels count from the corner of ``image``."""
+    """A person; pixels count from the corner of ``image``.
+
+    Attributes:
+        image: (H, W, 4), or (H, W, 3) once it is photographed.
+        outline: (32, 2).
+        keypoints: (17, 2).
+        keypoints_root_m: (17, 3).
+        visible: (17,).
+        scale: pixels of the image per pixel of the camera, ≤ 1.
+    """
 
     image: NDArray[np.uint8]
-    box: NDArray[np.float64]
+    outline: NDArray[np.float64]
     keypoints: NDArray[np.float64]
     keypoints_root_m: NDArray[np.float64]
     visible: NDArray[np.bool_]
+    scale: float = 1.0
+
+    @property
+    def box(self) -> NDArray[np.float64]:
+        """The box (4,) around the visible pixels."""
+        return box_around(self.outline)
 
 
 class PoseData:
-    """All people of some shards, in memory."""
+    """All people of some shards, in memory.
 
-    def __init__(self, folder: Path, seed: int, first: int = 0, last: int | None = None) -> None:
+    Args:
+        folder: of the shards.
+        seed: of all distortions.
+        backgrounds: number of random backgrounds.
+    """
+
+    def __init__(self, folder: Path, seed: int, backgrounds: int = 1) -> None:
         self._seed = seed
+        self.backgrounds = Backgrounds(backgrounds, seed + 1)
         self.people: list[PersonSample] = []
-        for shard in read_shards(folder, first, last):
+        for shard in read_shards(folder):
             for patch in shard.people:
-                self._add(picture(patch.png), patch.origin_px, patch.size_px, patch.person)
+                self._add(layered_picture(patch.png), patch.origin_px, patch.size_px, patch.person)
             for frame in shard.frames:
-                image = picture(frame.png)
+                image = layered_picture(frame.png)
                 size = (image.shape[1], image.shape[0])
                 for person in frame.people:
                     self._add(image, (0, 0), size, person)
@@ -69,20 +107,22 @@ class PoseData:
         corner = (int(low[0]) + origin[0], int(low[1]) + origin[1])
         cut, corner = with_surroundings(cut, corner, size, int(0.12 * extent.max()) + 2, _OUTSIDE)
         at = np.array(corner, dtype=np.float64)
+        cut, scale = reduced(cut, _MOST_PX / max(extent[0], extent[1]))
         self.people.append(
             PersonSample(
                 cut,
-                box - [*at, *at],
-                person.keypoints_px.astype(np.float64) + 0.5 - at,
+                (person.outline_px.astype(np.float64) - at) * scale,
+                (person.keypoints_px.astype(np.float64) + 0.5 - at) * scale,
                 person.keypoints_root_m.astype(np.float64),
                 person.visible,
+                float(scale.min()),
             )
         )
 
     def batch(self, step: int, count: int = 32) -> Batch:
         """Return ``count`` random, distorted crops; the same step gives the same crops."""
         rng = np.random.default_rng([self._seed, 32, step])
-        return stacked([self._distorted(rng) for _ in range(count)])
+        return stacked([self.distorted(rng) for _ in range(count)])
 
     def still(self, start: int, stop: int) -> Batch:
         """Return crops ``start`` to ``stop``, cut as in use, not distorted."""
@@ -90,10 +130,11 @@ class PoseData:
             [_crop(p, np.zeros(2), 1.0, 0.0, flip=False) for p in self.people[start:stop]]
         )
 
-    def _distorted(self, rng: np.random.Generator) -> dict[str, Any]:
+    def distorted(self, rng: np.random.Generator) -> dict[str, Any]:
+        """Return a random crop of a random person as a random camera takes it."""
         person = self.people[int(rng.integers(len(self.people)))]
         sample = _crop(
-            person,
+            self._photographed(person, rng),
             np.clip(rng.normal(0.0, 0.035, 2), -0.12, 0.12),
             float(np.exp(np.clip(rng.normal(0.0, 0.09), -0.22, 0.22))),
             np.radians(rng.normal(0.0, 7.0)) if rng.random() < 0.5 else 0.0,
@@ -101,10 +142,23 @@ class PoseData:
         )
         if rng.random() < 0.3:
             other = self.people[int(rng.integers(len(self.people)))].image
-            sample["image"], box = covered(sample["image"], rng, other)
+            sample["image"], box = covered(sample["image"], rng, other[..., :3])
             sample["visible"] = sample["visible"] & ~inside_of(sample["keypoints"], box)
-        sample["image"] = degraded(sample["image"], rng)
         return sample
+
+    def _photographed(self, person: PersonSample, rng: np.random.Generator) -> PersonSample:
+        """Return the person before a random background, sheared and degraded by a camera."""
+        extent = person.box[2:] - person.box[:2]
+        degradation = random_degradation(rng, size_px=0.25 * extent.max() / person.scale)
+        image, outline, keypoints = person.image, person.outline, person.keypoints
+        if degradation.shutter_shear:
+            middle_row = 0.5 * (person.box[1] + person.box[3])
+            matrix = sheared(np.eye(2, 3), degradation, middle_row)
+            image = warp(image, matrix, (image.shape[1], image.shape[0]), outside=_OUTSIDE)
+            outline, keypoints = moved(outline, matrix), moved(keypoints, matrix)
+        background = self.backgrounds.sometimes(rng, _BACKGROUND_SHARE)
+        image = photographed_layers(image, degradation, rng, background, person.scale)
+        return replace(person, image=image, outline=outline, keypoints=keypoints)
 
 
 def _crop(
@@ -116,8 +170,8 @@ def _crop(
     height = width * HEIGHT / WIDTH
     middle = 0.5 * (person.box[:2] + person.box[2:]) + shift * [width, height]
     matrix = similarity(middle, WIDTH / width, angle, (WIDTH, HEIGHT), flip=flip)
-    image = warp(person.image, matrix, (WIDTH, HEIGHT), outside=_OUTSIDE)
-    keypoints = person.keypoints @ matrix[:, :2].T + matrix[:, 2]
+    image = warp(person.image, matrix, (WIDTH, HEIGHT), outside=_OUTSIDE)[..., :3]
+    keypoints = moved(person.keypoints, matrix)
     depth, visible = person.keypoints_root_m[:, 2], person.visible
     if flip:
         keypoints, depth, visible = keypoints[_SWAP], depth[_SWAP], visible[_SWAP]

@@ -12,7 +12,7 @@ from torch.nn import functional as F  # noqa: N812
 
 from ._batch import Batch, output_on_photographed
 from ._blocks import cross_entropy, soft_labels
-from ._fit import fit
+from ._fit import AUTO, fit
 from ._pose_data import PoseData
 from ._pose_net import BINS_X, BINS_Y, BINS_Z, SPLIT, PoseNet, z_bins, z_metres
 from ._recipe import Recipe
@@ -23,10 +23,13 @@ _SIGMA_XY_BINS: Final = 3.0
 _SIGMA_Z_BINS: Final = 2.5
 
 
-def train_pose(recipe: Recipe, shards: Path, held_out: Path, folder: Path) -> nn.Module:
+def train_pose(
+    recipe: Recipe, shards: Path, held_out: Path, folder: Path, device: str = AUTO
+) -> nn.Module:
     """Train the pose network on the shards; figures on held-out people go to the log."""
     torch.manual_seed(recipe.seed + 1)
-    data, check = PoseData(shards, recipe.seed), PoseData(held_out, recipe.seed)
+    data = PoseData(shards, recipe.seed, recipe.backgrounds)
+    check = PoseData(held_out, recipe.seed, recipe.check_backgrounds)
     print(f"{len(data.people)} people for training, {len(check.people)} held out", flush=True)
     return fit(
         "pose",
@@ -35,6 +38,7 @@ def train_pose(recipe: Recipe, shards: Path, held_out: Path, folder: Path) -> nn
         pose_loss,
         steps=recipe.pose_steps,
         folder=folder,
+        device=device,
         learning_rate=2e-3,
         judge=lambda net: judge_pose(net, check),
     )

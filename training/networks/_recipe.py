@@ -21,20 +21,24 @@ class Recipe:
         head_patches: exact crops of heads per scene.
         layouts: halls for training.
         variants: first and last variant of goods and colours for training.
+        backgrounds: random pictures that stand in for the halls, made for each network anew.
+        check_backgrounds: the same for held-out figures.
         detector_steps: optimiser steps.
         pose_steps: optimiser steps.
         head_steps: optimiser steps.
     """
 
     seed: int = 0
-    crowd: int = 40
+    crowd: int = 48
     scenes: int = 110
     frames: int = 28
     person_patches: int = 70
     head_patches: int = 240
     layouts: tuple[str, ...] = ("open", "blind_corner", "aisles")
     variants: tuple[int, int] = (8, 200)
-    detector_steps: int = 2600
+    backgrounds: int = 400
+    check_backgrounds: int = 40
+    detector_steps: int = 9000
     pose_steps: int = 5500
     head_steps: int = 26000
 
@@ -60,6 +64,8 @@ class Recipe:
             frames=3,
             person_patches=4,
             head_patches=6,
+            backgrounds=3,
+            check_backgrounds=2,
             detector_steps=2,
             pose_steps=2,
             head_steps=2,

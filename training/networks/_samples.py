@@ -30,6 +30,8 @@ class PersonTruth:
         head_seen: visible share of the head.
         pixels: number of pixels that show this person.
         depth_m: depth of the head's centre.
+        outline_px: (32, 2) the visible pixels' outermost points in 32 directions, from the image's
+            corner. The box of a picture that is turned or sheared follows from them.
     """
 
     box_xyxy_px: Array
@@ -42,11 +44,12 @@ class PersonTruth:
     head_seen: float
     pixels: int
     depth_m: float
+    outline_px: Array
 
 
 @dataclass(frozen=True)
 class ImageSample:
-    """A whole image (PNG) and the people in it."""
+    """A whole image (PNG with the foreground as its alpha) and the people in it."""
 
     png: bytes
     people: tuple[PersonTruth, ...]
@@ -58,7 +61,7 @@ class Patch:
     """A part of an image (PNG) that shows a person.
 
     Attributes:
-        png: the part.
+        png: the part, with the foreground as its alpha.
         origin_px: first column and row of the part in the whole image.
         size_px: width and height of the whole image.
         intrinsics_px: fx (= fy), cx, cy.
@@ -72,7 +75,40 @@ class Patch:
     person: PersonTruth
 
 
+#: Number of directions of an outline.
+DIRECTIONS: Final = 32
+
+
+def outline(mask: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Return the outermost points (32, 2) of a mask's pixels in 32 directions.
+
+    They count from the image's corner. The first direction is along the columns, so the mask's own
+    box follows exactly; the box of a turned mask is right to 0.2 % of its size.
+    """
+    rows, columns = np.nonzero(mask)
+    pixels = np.stack([columns, rows], axis=1).astype(np.int32)
+    hull = np.asarray(cv2.convexHull(pixels)).reshape(-1, 2).astype(np.float64)
+    corners = (hull[:, None] + [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]).reshape(-1, 2)
+    angles = np.arange(DIRECTIONS) * (2.0 * np.pi / DIRECTIONS)
+    reach = corners @ np.stack([np.cos(angles), np.sin(angles)])
+    return np.asarray(corners[reach.argmax(axis=0)])
+
+
+def packed(rgb: NDArray[np.uint8], foreground: NDArray[np.bool_]) -> bytes:
+    """Return an image (H, W, 3) as PNG, with the foreground (H, W) as its alpha."""
+    bgra = np.dstack([rgb[..., ::-1], np.where(foreground, 255, 0).astype(np.uint8)])
+    good, data = cv2.imencode(".png", bgra, [cv2.IMWRITE_PNG_COMPRESSION, 1])
+    if not good:
+        raise RuntimeError("an image could not be encoded as PNG")
+    return bytes(data)
+
+
 def picture(png: bytes) -> NDArray[np.uint8]:
     """Return the image (H, W, 3), RGB."""
-    bgr = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)
-    return np.ascontiguousarray(np.asarray(bgr, dtype=np.uint8)[..., ::-1])
+    return np.ascontiguousarray(layered_picture(png)[..., :3])
+
+
+def layered_picture(png: bytes) -> NDArray[np.uint8]:
+    """Return the image (H, W, 4): RGB, and 255 where the foreground is, people and things."""
+    bgra = np.asarray(cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_UNCHANGED), np.uint8)
+    return np.ascontiguousarray(bgra[..., [2, 1, 0, 3]])

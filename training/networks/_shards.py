@@ -20,24 +20,27 @@ from tqdm import tqdm
 from perception.anthropometry import HEAD_CENTRE_HEAD_M, HEAD_TEMPLATE_M
 from perception.layouts import LEFT_HIP, RIGHT_HIP
 from perception.networks.heads import ray_axes
-from sim_tests.actors.body import Worker
-from sim_tests.dataset import RenderConfig, RenderScene, random_pose
+from sim_tests.dataset import RenderConfig
 from sim_tests.world import keypoints_in_front
 
 from ._recipe import Recipe
-from ._samples import HEAD_SIDE_M, ImageSample, Patch, PersonTruth
+from ._samples import HEAD_SIDE_M, ImageSample, Patch, PersonTruth, outline, packed
+from ._scenes import Person, TrainingScene
 from ._shard_file import Shard, shard_path, write_shard
 
 _BODY: Final = 17
 _SIZES: Final = ((640, 480), (640, 480), (640, 480), (848, 480), (800, 600))
-_FIELDS_DEG: Final = (55.0, 72.0)
-# Robots also use wide lenses, which stretch people at the side.
-_WIDE_SHARE: Final = 0.25
-_WIDE_SIZES: Final = ((640, 480), (800, 600), (960, 600))
-_WIDE_FIELDS_DEG: Final = (80.0, 122.0)
+_FIELDS_DEG: Final = (45.0, 75.0)
+# Robots also use wide lenses, which stretch people at the side. Crops of heads are cut from their
+# whole resolution.
+_WIDE_SHARE: Final = 0.28
+_WIDE_SIZES: Final = ((800, 600), (960, 600), (1280, 800))
+_WIDE_FIELDS_DEG: Final = (80.0, 120.0)
 # Share of whole images without people.
 _EMPTY_SHARE: Final = 0.12
 _MIN_PIXELS: Final = 60
+#: The greatest distance of a person.
+MAX_RANGE_M: Final = 10.0
 _SQUARE: Final = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [-1.0, 1.0, 0.0], [1.0, 1.0, 0.0]])
 #: Radius of the disk about a head in which its pixels are counted.
 _HEAD_RADIUS_M: Final = 0.08
@@ -65,11 +68,11 @@ def make_shards(recipe: Recipe, workers: tuple[str, ...], folder: Path, processe
 def _make_shard(recipe: Recipe, workers: tuple[str, ...], folder: Path, scene: int) -> None:
     cv2.setNumThreads(1)
     rng = np.random.default_rng([recipe.seed, 11, scene])
-    with RenderScene(_config(recipe, workers, rng), scene) as hall:
+    with TrainingScene(_config(recipe, workers, rng), scene, rng) as here:
         shard = Shard(
-            tuple(_frame(hall, rng) for _ in range(recipe.frames)),
-            tuple(_patches(hall, rng, recipe.person_patches, whole=True)),
-            tuple(_patches(hall, rng, recipe.head_patches, whole=False)),
+            tuple(_frame(here, rng) for _ in range(recipe.frames)),
+            tuple(_patches(here, rng, recipe.person_patches, whole=True)),
+            tuple(_patches(here, rng, recipe.head_patches, whole=False)),
         )
     write_shard(shard_path(folder, scene), shard)
 
@@ -87,7 +90,7 @@ def _config(recipe: Recipe, workers: tuple[str, ...], rng: np.random.Generator) 
         height_px=height,
         horizontal_fov_deg=float(rng.uniform(*(_WIDE_FIELDS_DEG if wide else _FIELDS_DEG))),
         min_range_m=1.0,
-        max_range_m=8.5,
+        max_range_m=MAX_RANGE_M,
         seed=recipe.seed + 1_000_003,
         workers=workers,
         layouts=recipe.layouts,
@@ -95,48 +98,49 @@ def _config(recipe: Recipe, workers: tuple[str, ...], rng: np.random.Generator) 
     )
 
 
-def _frame(hall: RenderScene, rng: np.random.Generator) -> ImageSample:
+def _frame(here: TrainingScene, rng: np.random.Generator) -> ImageSample:
     """Return a whole image with its truth."""
-    camera = hall.camera
-    T_odom_camera = hall.arrange(rng)
+    camera = here.hall.camera
+    T_odom_camera = here.arrange(rng)
     if rng.random() < _EMPTY_SHARE:
-        hall.clear()
-    view = hall.renderer.render(camera, T_odom_camera)
+        here.clear()
+    view = here.hall.renderer.render(camera, T_odom_camera)
     people = []
-    for worker in hall.workers:
-        truth = _truth(hall, worker, T_odom_camera, view, (0, 0))
+    for person in here.people:
+        truth = _truth(here, person, T_odom_camera, view, (0, 0))
         if truth is not None:
             people.append(truth)
-    return ImageSample(_packed(view.rgb), tuple(people), camera.fx_px)
+    return ImageSample(packed(view.rgb, view.actors >= 0), tuple(people), camera.fx_px)
 
 
 def _patches(
-    hall: RenderScene, rng: np.random.Generator, wanted: int, *, whole: bool
+    here: TrainingScene, rng: np.random.Generator, wanted: int, *, whole: bool
 ) -> Iterator[Patch]:
     """Yield crops of people, or of heads in four poses each."""
-    camera = hall.camera
+    camera = here.hall.camera
     size = np.array([camera.width_px, camera.height_px])
     made = 0
     while made < wanted:
-        T_odom_camera = hall.arrange(rng)
-        # Workers who take no part stand outside the hall.
-        here = [w for w in hall.workers if w.position_odom_m[0] > hall.warehouse.layout.x_min_m]
-        for worker in here:
+        T_odom_camera = here.arrange(rng)
+        for person in here.people:
             for pose in range(1 if whole else 4):
                 if pose:
-                    x, y = worker.position_odom_m.tolist()
-                    random_pose(worker, (x, y), T_odom_camera[:3, 3], rng)
-                box = _rectangle(camera, T_odom_camera, worker, whole=whole)
+                    here.repose(person, T_odom_camera, rng)
+                box = _rectangle(camera, T_odom_camera, person, whole=whole)
+                if not np.isfinite(box).all():
+                    continue
                 low = np.clip(np.floor(box[:2]), 0, size).astype(int)
                 high = np.clip(np.ceil(box[2:]), 0, size).astype(int)
                 if (high - low).min() < 6:
                     continue
-                view = hall.renderer.render(camera, T_odom_camera, [*low.tolist(), *high.tolist()])
-                truth = _truth(hall, worker, T_odom_camera, view, (int(low[0]), int(low[1])))
+                view = here.hall.renderer.render(
+                    camera, T_odom_camera, [*low.tolist(), *high.tolist()]
+                )
+                truth = _truth(here, person, T_odom_camera, view, (int(low[0]), int(low[1])))
                 if truth is None:
                     continue
                 yield Patch(
-                    _packed(view.rgb),
+                    packed(view.rgb, view.actors >= 0),
                     (int(low[0]), int(low[1])),
                     (camera.width_px, camera.height_px),
                     (camera.fx_px, camera.cx_px, camera.cy_px),
@@ -145,7 +149,7 @@ def _patches(
                 made += 1
 
 
-def _rectangle(camera: Any, T_odom_camera: Any, worker: Worker, *, whole: bool) -> Any:
+def _rectangle(camera: Any, T_odom_camera: Any, worker: Person, *, whole: bool) -> Any:
     """Return the rectangle to render: the body with all surroundings that a crop may show."""
     if whole:
         pixels = camera.project(_in_camera(T_odom_camera, worker.keypoints_odom_m))
@@ -162,21 +166,21 @@ def _rectangle(camera: Any, T_odom_camera: Any, worker: Worker, *, whole: bool) 
 
 
 def _truth(
-    hall: RenderScene, worker: Worker, T_odom_camera: Any, view: Any, origin: tuple[int, int]
+    here: TrainingScene, worker: Person, T_odom_camera: Any, view: Any, origin: tuple[int, int]
 ) -> PersonTruth | None:
     """Return the truth in pixels of the whole image; None for a person who is not visible."""
     mask = view.actors == worker.actor
     seen = int(np.count_nonzero(mask))
     if seen < _MIN_PIXELS // 4:
         return None
-    camera = hall.camera
+    camera = here.hall.camera
     points = _in_camera(T_odom_camera, worker.keypoints_odom_m[:_BODY])
     if points[:, 2].min() < 0.2:
         return None
     pixels = camera.project(points)
     visible = keypoints_in_front(points, pixels - origin, view.depth_m)
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    box = np.array([columns[0], rows[0], columns[-1] + 1, rows[-1] + 1]) + np.tile(origin, 2)
+    outermost = outline(mask) + origin
+    box = np.concatenate([outermost.min(axis=0), outermost.max(axis=0)])
     rotation = T_odom_camera[:3, :3].T @ worker.rotation_odom_head
     centre = points[0] + rotation @ HEAD_CENTRE_HEAD_M
     pixel = camera.project(centre[None])[0]
@@ -191,6 +195,7 @@ def _truth(
         head_seen=_head_seen(mask, pixel - origin, _HEAD_RADIUS_M * camera.fx_px / centre[2]),
         pixels=seen,
         depth_m=float(centre[2]),
+        outline_px=outermost.astype(np.float32),
     )
 
 
@@ -205,17 +210,10 @@ def _head_seen(mask: Any, pixel: Any, radius_px: float) -> float:
     return float(mask[rows[good], columns[good]].sum() / len(good))
 
 
-def _head_centre(T_odom_camera: Any, worker: Worker) -> Any:
+def _head_centre(T_odom_camera: Any, worker: Person) -> Any:
     centre = worker.keypoints_odom_m[0] + worker.rotation_odom_head @ HEAD_CENTRE_HEAD_M
     return _in_camera(T_odom_camera, centre[None])[0]
 
 
 def _in_camera(T_odom_camera: Any, points_odom_m: Any) -> Any:
     return (points_odom_m - T_odom_camera[:3, 3]) @ T_odom_camera[:3, :3]
-
-
-def _packed(rgb: Any) -> bytes:
-    good, data = cv2.imencode(".png", rgb[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 1])
-    if not good:
-        raise RuntimeError("an image could not be encoded as PNG")
-    return bytes(data)

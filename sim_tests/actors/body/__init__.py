@@ -12,7 +12,7 @@ from ._gait import Gait
 from ._gait_pose import GaitPose
 from ._online_footsteps import OnlineFootsteps
 from ._planned_footsteps import plan_footsteps
-from ._pose import skin_points
+from ._pose import BodyPose, link_transforms, skin_points
 from ._postures import ACTIVITIES, BOX_SIZE_M, PHONE_SIZE_M, Activity, ActivityName
 from ._sitting import SEATED_EYE_HEIGHT_SHARE, Seat, SeatKind
 from ._skeleton import MAX_STATURE_M, MIN_STATURE_M, skeleton
@@ -41,6 +41,7 @@ __all__ = [
     "SEATED_EYE_HEIGHT_SHARE",
     "Activity",
     "ActivityName",
+    "BodyPose",
     "Gait",
     "GaitPose",
     "OnlineFootsteps",
@@ -50,6 +51,7 @@ __all__ = [
     "Worker",
     "WorkerAsset",
     "WorkerSkin",
+    "link_transforms",
     "load_worker",
     "plan_footsteps",
     "skeleton",
