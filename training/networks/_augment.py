@@ -46,16 +46,16 @@ def warp(
     out_from_image: NDArray[np.float64],
     size: tuple[int, int],
     oversampling: int = 1,
-    outside: int = OUTSIDE_GREY,
+    outside: int | None = OUTSIDE_GREY,
 ) -> NDArray[np.uint8]:
     """Return an affine crop in continuous coordinates: (0, 0) is the corner of either image.
 
     Args:
-        image: (H, W, 3).
+        image: (H, W, 3) or (H, W, 4).
         out_from_image: (2, 3).
         size: width and height of the result.
         oversampling: samples per pixel and side, averaged.
-        outside: grey level outside the image.
+        outside: grey level outside the image; None repeats its edge.
     """
     k = oversampling
     matrix = out_from_image * k
@@ -66,7 +66,8 @@ def warp(
         matrix,
         (size[0] * k, size[1] * k),
         flags=cv2.INTER_LINEAR,
-        borderValue=_outside(outside),
+        borderMode=cv2.BORDER_REPLICATE if outside is None else cv2.BORDER_CONSTANT,
+        borderValue=_outside(outside or 0),
     )
     if k > 1:
         out = cv2.resize(out, size, interpolation=cv2.INTER_AREA)
@@ -170,14 +171,35 @@ def reduced(
     return small, np.array([size[0] / width, size[1] / height])
 
 
+def composed(outer: NDArray[np.float64], inner: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the affine map (2, 3) that applies ``inner`` first and then ``outer``."""
+    return np.column_stack([outer[:, :2] @ inner[:, :2], moved(inner[:, 2], outer)])
+
+
 def sheared(
-    matrix: NDArray[np.float64], degradation: Degradation, middle_row: float
-) -> NDArray[np.float64]:
-    """Return an affine map (2, 3) followed by the degradation's rolling shutter."""
-    shutter = rolling_shutter(degradation.shutter_shear, middle_row)
-    out = shutter[:, :2] @ matrix
-    out[:, 2] += shutter[:, 2]
-    return np.asarray(out)
+    image: NDArray[np.uint8], shear: float, middle_row: float
+) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
+    """Return an image under a rolling shutter, its edges repeated, and the map (2, 3) of points."""
+    matrix = rolling_shutter(shear, middle_row)
+    return warp(image, matrix, (image.shape[1], image.shape[0]), outside=None), matrix
+
+
+def emptied_outside(
+    image: NDArray[np.uint8], inside: NDArray[np.float64], grey: int = OUTSIDE_GREY
+) -> NDArray[np.uint8]:
+    """Return an image with grey outside a polygon (K, 2), where the camera's picture ends.
+
+    What lies there was added after the camera, so it has no noise and no light.
+    """
+    mask = np.zeros(image.shape[:2], np.uint8)
+    # OpenCV's polygons include the pixels on their edge.
+    corners = np.round(inside - 0.5 + 0.49 * np.sign(inside.mean(axis=0) - inside))
+    cv2.fillConvexPoly(mask, corners.astype(np.int32), (1,))
+    if mask.all():
+        return image
+    out = image.copy()
+    out[mask == 0] = grey
+    return out
 
 
 def moved(points: NDArray[Any], matrix: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -204,9 +226,10 @@ def covered(
         image = image.copy()
         if rng.random() < 0.6:
             source = cv2.resize(other, (x2 - x1, y2 - y1), interpolation=cv2.INTER_AREA)
-            image[y1:y2, x1:x2] = source[:, :: -1 if rng.random() < 0.5 else 1]
+            image[y1:y2, x1:x2, :3] = source[:, :: -1 if rng.random() < 0.5 else 1]
         else:
-            image[y1:y2, x1:x2] = rng.integers(0, 256, 3)
+            image[y1:y2, x1:x2, :3] = rng.integers(0, 256, 3)
+        image[y1:y2, x1:x2, 3:] = 255  # part of the foreground
     return image, box
 
 

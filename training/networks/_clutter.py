@@ -160,7 +160,7 @@ def _primitive(rng: np.random.Generator, size_m: float) -> Mesh:
     lump = ellipsoid((0.0, 0.0, 0.0), (0.5 * extent).tolist())
     if kind < 0.85:
         return lump
-    # Waves of a few random directions over the surface; equal points move alike, so it stays closed.
+    # Waves of random directions over the surface; equal points move alike, so it stays closed.
     waves = rng.normal(0.0, 4.0 / size_m, (5, 3))
     phases = rng.uniform(0.0, math.tau, 5)
     height = np.sin(lump.vertices_m @ waves.T + phases).sum(axis=1) * 0.08

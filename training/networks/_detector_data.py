@@ -15,16 +15,17 @@ from perception.shipped import detector_input_size
 
 from ._augment import (
     box_around,
+    composed,
     covered,
+    emptied_outside,
     moved,
     photographed_layers,
-    sheared,
     similarity,
     warp,
 )
 from ._backgrounds import Backgrounds
 from ._batch import Batch, stacked_images
-from ._degradation import Degradation, random_degradation
+from ._degradation import random_degradation, rolling_shutter
 from ._detector_net import HEIGHT, WIDTH
 from ._samples import DIRECTIONS, layered_picture
 from ._shard_file import read_shards
@@ -58,7 +59,7 @@ class Frame:
 
 @dataclass
 class FrameSample:
-    """An input image, boxes (N, 4) from its corner, and flags (N,) of the boxes to be found."""
+    """An input image or its layers, boxes (N, 4), and which of them (N,) are to be found."""
 
     image: NDArray[np.uint8]
     boxes: NDArray[np.float64]
@@ -109,13 +110,12 @@ class DetectorData:
 
     def still(self, start: int, stop: int) -> Batch:
         """Return images ``start`` to ``stop``, whole and letterboxed, not distorted."""
-        rng = np.random.default_rng(0)  # an undistorted image draws nothing
-        return _stacked(
-            [
-                _placed(frame, _fit_scale(frame.layers), np.zeros(2), rng)
-                for frame in self._whole[start:stop]
-            ]
-        )
+        samples = []
+        for frame in self._whole[start:stop]:
+            sample, inside = _placed(frame, _fit_scale(frame.layers), np.zeros(2))
+            sample.image = emptied_outside(np.ascontiguousarray(sample.image[..., :3]), inside)
+            samples.append(sample)
+        return _stacked(samples)
 
     def distorted(self, rng: np.random.Generator) -> FrameSample:
         """Return a random image as a random camera takes it."""
@@ -129,22 +129,21 @@ class DetectorData:
         size = np.array([WIDTH, HEIGHT]) / scale
         slack = np.abs(size - frame.layers.shape[1::-1])
         turn = rng.normal(0.0, 3.0) if rng.random() < 0.8 else rng.normal(0.0, 14.0)
-        sample = _placed(
+        sample, inside = _placed(
             frame,
             scale,
             rng.uniform(-0.5, 0.5, 2) * slack,
-            rng,
             flip=bool(rng.random() < 0.5),
             angle=np.radians(turn),
-            degradation=degradation,
-            background=self.backgrounds.sometimes(rng, _BACKGROUND_SHARE),
+            shear=degradation.shutter_shear,
         )
         for _ in range(int(rng.integers(0, 3))):
             if rng.random() < 0.35:
-                other = self.frames[int(rng.integers(len(self.frames)))].layers
-                image, box = covered(sample.image, rng, other[::4, ::4, :3])
-                sample = _hidden(FrameSample(image, sample.boxes, sample.wanted), box)
-        return sample
+                layers, box = covered(sample.image, rng, self.backgrounds.random(rng))
+                sample = _hidden(FrameSample(layers, sample.boxes, sample.wanted), box)
+        background = self.backgrounds.sometimes(rng, _BACKGROUND_SHARE)
+        image = photographed_layers(sample.image, degradation, rng, background, scale)
+        return FrameSample(emptied_outside(image, inside), sample.boxes, sample.wanted)
 
 
 def _fit_scale(image: NDArray[np.uint8]) -> float:
@@ -162,25 +161,26 @@ def _placed(
     frame: Frame,
     scale: float,
     shift: NDArray[np.float64],
-    rng: np.random.Generator,
     *,
     flip: bool = False,
     angle: float = 0.0,
-    degradation: Degradation | None = None,
-    background: NDArray[np.uint8] | None = None,
-) -> FrameSample:
-    """Return the image scaled, shifted, turned, mirrored, sheared and photographed.
+    shear: float = 0.0,
+) -> tuple[FrameSample, NDArray[np.float64]]:
+    """Return the layers sheared by a rolling shutter, then scaled, shifted, turned and mirrored.
 
     Boxes are taken anew from the outlines, so they stay tight.
+
+    Returns:
+        The sample, and the corners (4, 2) of the picture in it.
     """
-    effects = Degradation() if degradation is None else degradation
-    middle = 0.5 * np.array(frame.layers.shape[1::-1]) + shift
-    matrix = similarity(middle, scale, angle, (WIDTH, HEIGHT), flip=flip)
-    matrix = sheared(matrix, effects, 0.5 * HEIGHT)
-    layers = warp(frame.layers, matrix, (WIDTH, HEIGHT))
-    image = photographed_layers(layers, effects, rng, background, scale)
+    height, width = frame.layers.shape[:2]
+    middle = 0.5 * np.array([width, height]) + shift
+    placed = similarity(middle, scale, angle, (WIDTH, HEIGHT), flip=flip)
+    inside = moved(np.array([[0, 0], [width, 0], [width, height], [0, height]]), placed)
+    matrix = composed(placed, rolling_shutter(shear, 0.5 * height))
+    layers = warp(frame.layers, matrix, (WIDTH, HEIGHT), outside=None)
     if not len(frame.outlines):
-        return FrameSample(image, np.zeros((0, 4)), frame.wanted)
+        return FrameSample(layers, np.zeros((0, 4)), frame.wanted), inside
     boxes = box_around(moved(frame.outlines, matrix))
     low, high = boxes[:, :2], boxes[:, 2:]
     area = np.prod(high - low, axis=1)
@@ -189,7 +189,8 @@ def _placed(
     left = np.prod(size, axis=1) / np.maximum(area, 1e-9)
     keep = (size.min(axis=1) > 2.0) & (left > 0.05)
     wanted = frame.wanted & (left > 0.25) & (size.min(axis=1) > 5.0)
-    return FrameSample(image, np.concatenate([low, high], axis=1)[keep], wanted[keep])
+    sample = FrameSample(layers, np.concatenate([low, high], axis=1)[keep], wanted[keep])
+    return sample, inside
 
 
 def _hidden(frame: FrameSample, cover: NDArray[np.float64]) -> FrameSample:

@@ -78,17 +78,11 @@ def fit(
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{name}.pt"
     place = torch_device(device)
-    if helpers is None:
-        helpers = 2 if place.type == "cpu" else max(2, (os.cpu_count() or 2) - 1)
+    helpers = _helpers(place) if helpers is None else helpers
     ahead = max(_AHEAD, 2 * helpers)
     net = net.to(place, memory_format=torch.channels_last)
     average = copy.deepcopy(net).eval()
-    decay = [p for p in net.parameters() if p.ndim > 1]
-    rest = [p for p in net.parameters() if p.ndim <= 1]
-    optimiser = torch.optim.AdamW(
-        [{"params": decay, "weight_decay": weight_decay}, {"params": rest, "weight_decay": 0.0}],
-        lr=learning_rate,
-    )
+    optimiser = _optimiser(net, learning_rate, weight_decay)
     first = 0
     if path.exists():
         saved = torch.load(path, map_location=place, weights_only=True)
@@ -139,6 +133,21 @@ def fit(
                 print(name, text, flush=True)
                 _save(path, net, average, optimiser, step + 1)
     return average
+
+
+def _optimiser(net: nn.Module, learning_rate: float, weight_decay: float) -> torch.optim.AdamW:
+    """Return AdamW with weight decay on matrices and kernels only."""
+    decay = [p for p in net.parameters() if p.ndim > 1]
+    rest = [p for p in net.parameters() if p.ndim <= 1]
+    return torch.optim.AdamW(
+        [{"params": decay, "weight_decay": weight_decay}, {"params": rest, "weight_decay": 0.0}],
+        lr=learning_rate,
+    )
+
+
+def _helpers(place: torch.device) -> int:
+    """Return the threads that prepare batches beside a device that trains."""
+    return 2 if place.type == "cpu" else max(2, (os.cpu_count() or 2) - 1)
 
 
 def _update_average(average: nn.Module, net: nn.Module, keep: float) -> None:

@@ -14,6 +14,7 @@ from perception.networks.heads import ray_axes, ray_stretch
 
 from ._augment import (
     covered,
+    emptied_outside,
     inside_of,
     moved,
     photographed_layers,
@@ -142,11 +143,12 @@ class HeadData:
         degradation = random_degradation(rng, strength, size_px)
         image, keypoints = head.image, head.keypoints
         if degradation.shutter_shear:
-            matrix = sheared(np.eye(2, 3), degradation, float(head.centre[1]))
-            image = warp(image, matrix, (image.shape[1], image.shape[0]))
+            image, matrix = sheared(image, degradation.shutter_shear, float(head.centre[1]))
             keypoints = moved(keypoints, matrix)
         background = self.backgrounds.sometimes(rng, strength * _BACKGROUND_SHARE)
         image = photographed_layers(image, degradation, rng, background, head.scale)
+        if head.inside is not None:
+            image = emptied_outside(image, head.inside)
         return replace(head, image=image, keypoints=keypoints)
 
     def _nobody(self, rng: np.random.Generator) -> dict[str, Any]:
@@ -236,6 +238,7 @@ def _sample(
         rotation_camera_head=person.rotation_camera_head.astype(np.float64),
         seen=person.head_seen,
         scale=scale,
+        inside=(np.array([[0, 0], [size[0], 0], size, [0, size[1]]]) - corner) * scales,
     )
 
 

@@ -27,7 +27,8 @@ class HeadSample:
 
     ``image`` is (H, W, 4), or (H, W, 3) once it is photographed. ``side_px`` is the side of a crop
     for a camera turned to the head. ``scale`` is 1 or the pixels per pixel of the camera of a large
-    head that is stored smaller.
+    head that is stored smaller. ``inside`` (4, 2) are the corners of the camera's picture; None has
+    none in reach.
     """
 
     image: NDArray[np.uint8]
@@ -40,6 +41,7 @@ class HeadSample:
     rotation_camera_head: NDArray[np.float64]
     seen: float
     scale: float = 1.0
+    inside: NDArray[np.float64] | None = None
 
 
 def cropped(

@@ -133,7 +133,7 @@ def _laplace(error: Tensor, log_scale: Tensor) -> Tensor:
 def predictions(
     net: nn.Module, data: HeadData, step: int = 256, *, degraded: bool = False
 ) -> dict[str, Any]:
-    """Return the errors of every head in ``data``, cropped as in use; see :meth:`HeadData.still`."""
+    """Return the errors of every head, cropped as in use; see :meth:`HeadData.still`."""
     net.eval()
     parts: dict[str, list[Any]] = {}
     device = next(net.parameters()).device

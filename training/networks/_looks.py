@@ -38,6 +38,8 @@ _PART_OF_JOINT: Final = {
 # Chance that a part of the clothes gets a pattern.
 _PATTERN_SHARE: Final = 0.75
 _PATTERN_PX: Final = 256
+# Range of the mean level of head and hands.
+_SKIN_MEANS: Final = (58.0, 190.0)
 
 
 def random_look(look: str, rng: np.random.Generator) -> tuple[Image, ...]:
@@ -58,7 +60,7 @@ def random_look(look: str, rng: np.random.Generator) -> tuple[Image, ...]:
         parts = parts_of_texture(look, level)
         rgb = mesh.texture_rgb.astype(np.float32)
         naked = (parts == HEAD) | (parts == HANDS)
-        toned = 255.0 * (rgb / 255.0) ** skin[0] * skin[1]
+        toned = _toned(rgb, naked, *skin)
         if makeup is not None:
             toned *= 1.0 + strength * (_enlarged(makeup, rgb.shape) / 127.5 - 1.0)
         out = np.where(naked[..., None], toned, rgb)
@@ -103,6 +105,18 @@ def _tone(rng: np.random.Generator) -> tuple[float, NDArray[np.float32]]:
     gamma = float(np.exp(rng.normal(0.0, 0.25)))
     factors = np.exp(rng.normal(0.0, 0.08, 3) + rng.normal(0.0, 0.18))
     return gamma, np.asarray(factors, dtype=np.float32)
+
+
+def _toned(
+    rgb: NDArray[np.float32],
+    naked: NDArray[np.bool_],
+    gamma: float,
+    factors: NDArray[np.float32],
+) -> NDArray[np.float32]:
+    """Return other tones, but none so dark or light that a face loses its features."""
+    out = 255.0 * (rgb / 255.0) ** gamma * factors
+    mean = float(out[naked].mean()) if naked.any() else _SKIN_MEANS[0]
+    return np.asarray(out * (float(np.clip(mean, *_SKIN_MEANS)) / max(mean, 1.0)), np.float32)
 
 
 def _enlarged(pattern: Image, shape: tuple[int, ...]) -> NDArray[np.float32]:

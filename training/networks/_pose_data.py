@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ._augment import (
     box_around,
     covered,
+    emptied_outside,
     inside_of,
     moved,
     photographed_layers,
@@ -48,6 +49,7 @@ class PersonSample:
         keypoints: (17, 2).
         keypoints_root_m: (17, 3).
         visible: (17,).
+        inside: (4, 2) corners of the camera's picture.
         scale: pixels of the image per pixel of the camera, ≤ 1.
     """
 
@@ -56,6 +58,7 @@ class PersonSample:
     keypoints: NDArray[np.float64]
     keypoints_root_m: NDArray[np.float64]
     visible: NDArray[np.bool_]
+    inside: NDArray[np.float64]
     scale: float = 1.0
 
     @property
@@ -115,6 +118,7 @@ class PoseData:
                 (person.keypoints_px.astype(np.float64) + 0.5 - at) * scale,
                 person.keypoints_root_m.astype(np.float64),
                 person.visible,
+                (np.array([[0, 0], [size[0], 0], size, [0, size[1]]]) - at) * scale,
                 float(scale.min()),
             )
         )
@@ -153,11 +157,11 @@ class PoseData:
         image, outline, keypoints = person.image, person.outline, person.keypoints
         if degradation.shutter_shear:
             middle_row = 0.5 * (person.box[1] + person.box[3])
-            matrix = sheared(np.eye(2, 3), degradation, middle_row)
-            image = warp(image, matrix, (image.shape[1], image.shape[0]), outside=_OUTSIDE)
+            image, matrix = sheared(image, degradation.shutter_shear, middle_row)
             outline, keypoints = moved(outline, matrix), moved(keypoints, matrix)
         background = self.backgrounds.sometimes(rng, _BACKGROUND_SHARE)
         image = photographed_layers(image, degradation, rng, background, person.scale)
+        image = emptied_outside(image, person.inside, _OUTSIDE)
         return replace(person, image=image, outline=outline, keypoints=keypoints)
 
 
