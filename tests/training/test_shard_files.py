@@ -27,6 +27,7 @@ def person(rng):
         head_seen=float(rng.random()),
         pixels=int(rng.integers(1000)),
         depth_m=float(rng.random()),
+        outline_px=rng.random((32, 2), np.float32),
     )
 
 

@@ -212,6 +212,21 @@ def box_around(points: NDArray[Any]) -> NDArray[np.float64]:
     return np.concatenate([points.min(axis=-2), points.max(axis=-2)], axis=-1)
 
 
+def within_rectangle(
+    outline: NDArray[np.float64], low: NDArray[Any], high: NDArray[Any]
+) -> NDArray[np.float64] | None:
+    """Return the part of a convex outline (K, 2) in a rectangle as a polygon; None for no part."""
+    if (outline >= low).all() and (outline <= high).all():
+        return outline
+    (x1, y1), (x2, y2) = low, high
+    rectangle = np.array([[x1, y1], [x2, y1], [x2, y2], [x1, y2]], dtype=np.float32)
+    hull = cv2.convexHull(outline.astype(np.float32))
+    area, part = cv2.intersectConvexConvex(hull, rectangle)
+    if area <= 0.0 or part is None:
+        return None
+    return np.asarray(part, dtype=np.float64).reshape(-1, 2)
+
+
 def covered(
     image: NDArray[np.uint8], rng: np.random.Generator, other: NDArray[np.uint8]
 ) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:

@@ -22,6 +22,7 @@ from ._augment import (
     photographed_layers,
     similarity,
     warp,
+    within_rectangle,
 )
 from ._backgrounds import Backgrounds
 from ._batch import Batch, stacked_images
@@ -177,20 +178,29 @@ def _placed(
     middle = 0.5 * np.array([width, height]) + shift
     placed = similarity(middle, scale, angle, (WIDTH, HEIGHT), flip=flip)
     inside = moved(np.array([[0, 0], [width, 0], [width, height], [0, height]]), placed)
-    matrix = composed(placed, rolling_shutter(shear, 0.5 * height))
-    layers = warp(frame.layers, matrix, (WIDTH, HEIGHT), outside=None)
-    if not len(frame.outlines):
-        return FrameSample(layers, np.zeros((0, 4)), frame.wanted), inside
-    boxes = box_around(moved(frame.outlines, matrix))
-    low, high = boxes[:, :2], boxes[:, 2:]
-    area = np.prod(high - low, axis=1)
-    low, high = np.clip(low, 0, [WIDTH, HEIGHT]), np.clip(high, 0, [WIDTH, HEIGHT])
-    size = high - low
-    left = np.prod(size, axis=1) / np.maximum(area, 1e-9)
-    keep = (size.min(axis=1) > 2.0) & (left > 0.05)
-    wanted = frame.wanted & (left > 0.25) & (size.min(axis=1) > 5.0)
-    sample = FrameSample(layers, np.concatenate([low, high], axis=1)[keep], wanted[keep])
-    return sample, inside
+    shutter = rolling_shutter(shear, 0.5 * height)
+    layers = warp(frame.layers, composed(placed, shutter), (WIDTH, HEIGHT), outside=None)
+    boxes, wanted = [], []
+    for outline, is_wanted in zip(frame.outlines, frame.wanted.tolist(), strict=True):
+        # A person whom the shutter moves beyond the picture's edge ends there.
+        seen = within_rectangle(moved(outline, shutter), np.zeros(2), np.array([width, height]))
+        if seen is None:
+            continue
+        whole = moved(seen, placed)
+        part = within_rectangle(whole, np.zeros(2), np.array([WIDTH, HEIGHT]))
+        if part is None:
+            continue
+        (size, left) = np.ptp(part, axis=0), _area(part) / max(_area(whole), 1e-9)
+        if size.min() > 2.0 and left > 0.05:
+            boxes.append(box_around(part))
+            wanted.append(is_wanted and left > 0.25 and size.min() > 5.0)
+    found = np.array(boxes, dtype=np.float64).reshape(-1, 4)
+    return FrameSample(layers, found, np.array(wanted, dtype=bool)), inside
+
+
+def _area(outline: NDArray[np.float64]) -> float:
+    """Return the area of a box around points (K, 2)."""
+    return float(np.prod(np.ptp(outline, axis=0)))
 
 
 def _hidden(frame: FrameSample, cover: NDArray[np.float64]) -> FrameSample:

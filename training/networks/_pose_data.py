@@ -21,6 +21,7 @@ from ._augment import (
     similarity,
     warp,
     with_surroundings,
+    within_rectangle,
 )
 from ._backgrounds import Backgrounds
 from ._batch import Batch, stacked
@@ -158,7 +159,10 @@ class PoseData:
         if degradation.shutter_shear:
             middle_row = 0.5 * (person.box[1] + person.box[3])
             image, matrix = sheared(image, degradation.shutter_shear, middle_row)
-            outline, keypoints = moved(outline, matrix), moved(keypoints, matrix)
+            low, high = person.inside.min(axis=0), person.inside.max(axis=0)
+            left = within_rectangle(moved(outline, matrix), low, high)
+            outline = outline if left is None else left
+            keypoints = moved(keypoints, matrix)
         background = self.backgrounds.sometimes(rng, _BACKGROUND_SHARE)
         image = photographed_layers(image, degradation, rng, background, person.scale)
         image = emptied_outside(image, person.inside, _OUTSIDE)

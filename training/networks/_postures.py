@@ -104,8 +104,11 @@ def _legs_and_trunk(
         ]
     elif name == "kneeling":
         tilt, spine = rng.uniform(-5.0, 30.0), rng.uniform(-5.0, 35.0)
-        down = (rng.uniform(-12.0, 25.0), rng.uniform(85.0, 115.0), rng.uniform(-60.0, 0.0))
-        other = down if rng.random() < 0.5 else (rng.uniform(80.0, 100.0), 90.0, 0.0)
+        # The shank lies on the floor, the foot stretched; or the other foot stands on it.
+        lift = rng.uniform(-12.0, 25.0)
+        down = (lift, 90.0 + lift + rng.uniform(0.0, 6.0), rng.uniform(-88.0, -62.0))
+        thigh = rng.uniform(98.0, 112.0)
+        other = down if rng.random() < 0.5 else (thigh, thigh, 0.0)
         legs = [down, other] if rng.random() < 0.5 else [other, down]
     else:
         tilt, spine = rng.uniform(-12.0, 12.0), rng.uniform(-12.0, 35.0)

@@ -79,6 +79,9 @@ def random_background(rng: np.random.Generator, size_hw: tuple[int, int]) -> Ima
         strength = rng.uniform(0.2, 0.8)
         shaded = out.astype(np.float32) * (1.0 - strength * light[..., None])
         out = np.asarray(np.clip(shaded, 0, 255), dtype=np.uint8)
+    # From night to snow.
+    levels = 255.0 * (np.arange(256) / 255.0) ** float(np.exp(rng.uniform(-1.4, 0.7)))
+    out = np.asarray(levels.astype(np.uint8)[out], dtype=np.uint8)
     if rng.random() < 0.8:  # real scenery has less colour
         grey = out.mean(axis=2, keepdims=True)
         out = np.asarray(grey + (out - grey) * rng.uniform(0.15, 1.0), dtype=np.uint8)
@@ -120,7 +123,7 @@ def _along(rng: np.random.Generator, size_hw: tuple[int, int]) -> Floats:
 
 
 def _stripes(rng: np.random.Generator, size_hw: tuple[int, int]) -> Floats:
-    period = np.float32(np.exp(rng.uniform(np.log(4.0), np.log(0.5 * max(size_hw)))))
+    period = np.float32(np.exp(rng.uniform(np.log(4.0), np.log(max(0.5 * max(size_hw), 4.1)))))
     phase = _along(rng, size_hw) / period % 1.0
     if rng.random() < 0.5:
         return np.asarray(0.5 + 0.5 * np.cos(2.0 * math.pi * phase), dtype=np.float32)
