@@ -155,7 +155,7 @@ def head_of(person, rng=None, *, range_std=0.05, stature_m=1.74, factor=None):
 
 def place(shown, detection, head=None, floor=None):
     (placed,) = place_people(CAMERA, (detection,), (shown,), (head,), floor, 1.0, 0.3)
-    return placed
+    return placed.position_camera_m, placed.covariance_m2
 
 
 def test_more_cues_lower_the_error_and_agree_with_the_covariance():
