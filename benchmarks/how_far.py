@@ -16,7 +16,7 @@ from typing import Any, Final, Literal, get_args
 
 import numpy as np
 
-from perception import AwarenessPipeline, Camera, FloorPlane, PersonKeypoints, PersonObservation
+from perception import AwarenessPipeline, Camera, FloorPlane, PersonDetection, PersonKeypoints, PersonObservation
 from perception.arrays import FloatArray
 from sim_tests.actors.body import Worker
 from sim_tests.crossing.eyes import KeypointCamera, KeypointNoise
@@ -35,6 +35,8 @@ T_ODOM_CAMERA: Final = np.array([[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 1.2], [
 STATURES_M: Final = (1.0, 1.1, 1.25, 1.4, 1.6, 1.75, 1.9)
 #: 95 % of a normal error of three dimensions lie within this squared Mahalanobis distance.
 BOUND_95: Final = 7.81
+#: The same on the floor plane.
+BOUND_2D_95: Final = 5.99
 
 _LOOKS: Final = ("jamila", "mateo", "linnea", "kofi", "ivan")
 _BLANK: Final = np.zeros((CAMERA.height_px, CAMERA.width_px, 3), np.uint8)
@@ -157,12 +159,25 @@ class _Shelf:
 
 
 class _BoxOnly(KeypointCamera):
-    """A keypoint camera without keypoints."""
+    """A keypoint camera without keypoints, whose boxes end at the border that cuts the person."""
+
+    def look(self, T_odom_camera: FloatArray, workers: Any) -> tuple[int, ...]:
+        points = (workers[0].keypoints_odom_m - T_odom_camera[:3, 3]) @ T_odom_camera[:3, :3]
+        self._is_cut = bool((CAMERA.project(points)[:, 1] > CAMERA.height_px).any())
+        return super().look(T_odom_camera, workers)
+
+    def detect(self, image_rgb: Any) -> tuple[PersonDetection, ...]:
+        found = super().detect(image_rgb)
+        if not self._is_cut:
+            return found
+        lower = float(CAMERA.height_px)
+        boxes = [np.array([*one.box_xyxy_px[:3], lower]) for one in found]
+        return tuple(PersonDetection(box, one.score) for box, one in zip(boxes, found, strict=True))
 
     def estimate(self, image_rgb: Any, detections: Any) -> tuple[PersonKeypoints, ...]:
         return tuple(
             replace(person, scores=np.zeros(len(person.scores)))
-            for person in super().estimate(image_rgb, detections)
+            for person in super().estimate(image_rgb, super().detect(image_rgb))
         )
 
 
@@ -275,7 +290,83 @@ def _result(person: PersonObservation, truth_m: FloatArray) -> Result:
     )
 
 
-def _rows(far: HowFar, count: int, seed: int) -> Iterator[str]:
+@dataclass(frozen=True, slots=True)
+class Tracked:
+    """Errors of a track: while the scanner sees the person, and after it is lost.
+
+    Attributes:
+        ranged: from the second second on.
+        lost: from one second after the last scan.
+    """
+
+    ranged: list[Result]
+    lost: list[Result]
+
+
+def tracked(far: HowFar, case: Case, scanner: bool = True) -> Tracked:
+    """Track somebody who walks across before a camera and a scanner, and then before the camera."""
+    rng = np.random.default_rng([case.seed, 23])
+    tracker = PersonTracker(sensors={"laser": SensorConfig(view=ScannerView())})
+    found = Tracked([], [])
+    step = rng.choice([-1.0, 1.0]) * 0.4 / _CAMERA_HZ
+    for tick in range(round((_RANGED_S + _LOST_S) * _CAMERA_HZ)):
+        now_s = tick / _CAMERA_HZ
+        x_m, y_m = case.place_m
+        place = np.array([x_m, y_m + step * tick])
+        moving = replace(case, place_m=(x_m, float(place[1])), seed=case.seed * 1000 + tick)
+        one = far.observed(moving, "none")
+        seen = [] if one is None else [replace(one[0], stamp_s=now_s)]
+        tracks = tracker.update(seen, now_s, T_ODOM_CAMERA)
+        if one is not None:
+            place = (T_ODOM_CAMERA[:3, :3] @ one[1])[:2] + T_ODOM_CAMERA[:2, 3]
+        if scanner and now_s < _RANGED_S:
+            legs = PersonObservation(
+                stamp_s=now_s,
+                position_camera_m=[*(place + rng.normal(0.0, _LASER_STD_M, 2)), 0.2],
+                position_covariance_m2=_LASER_STD_M**2 * np.eye(3),
+                gaze_camera=None,
+                awareness=None,
+                awareness_std=None,
+                score=0.9,
+            )
+            tracks = tracker.update([legs], now_s, np.eye(4), sensor="laser")
+        kept = found.ranged if now_s < _RANGED_S else found.lost
+        if now_s % _RANGED_S < 1.0 or not tracks:
+            continue
+        track = min(tracks, key=lambda each: float(np.hypot(*(each.position_odom_m - place))))
+        error, spread = track.position_odom_m - place, track.covariance_odom[:2, :2]
+        range_m = float(np.hypot(*track.position_odom_m))
+        kept.append(
+            Result(
+                range_m / float(np.hypot(*place)) - 1.0,
+                float(error @ np.linalg.solve(spread, error)),
+                math.sqrt(track.position_odom_m @ spread @ track.position_odom_m) / range_m**2,
+            )
+        )
+    return found
+
+
+def _tracked_rows(far: HowFar, count: int, seed: int) -> Iterator[str]:
+    for posture in get_args(Posture):
+        people = [
+            case
+            for one in STATURES_M
+            for case in cases(one, posture, "whole", count=count, seed=seed)
+        ]
+        with_scans = [tracked(far, case) for case in people]
+        alone = [tracked(far, case, scanner=False) for case in people]
+        cells = [
+            _cell([one for part in group for one in part], BOUND_2D_95)
+            for group in (
+                [each.lost for each in alone],
+                [each.ranged for each in with_scans],
+                [each.lost for each in with_scans],
+            )
+        ]
+        yield f"| {posture} | " + " | ".join(cells) + " |"
+
+
+def _rows(far: HowFar, count: int, seed: int, chosen: list[Cues]) -> Iterator[str]:
     kinds: list[tuple[Posture, Cut, bool]] = [
         *((posture, "whole", True) for posture in get_args(Posture)),
         *((posture, cut, True) for posture in ("standing", "seated") for cut in ("shelf", "border")),
@@ -290,7 +381,7 @@ def _rows(far: HowFar, count: int, seed: int) -> Iterator[str]:
             if not skeleton and name != "all":
                 continue
             cells = []
-            for cues in get_args(Cues):
+            for cues in chosen:
                 people = [
                     case
                     for one in statures
@@ -301,9 +392,9 @@ def _rows(far: HowFar, count: int, seed: int) -> Iterator[str]:
             yield f"| {who} | {name} | " + " | ".join(cells) + " |"
 
 
-def _cell(results: list[Result]) -> str:
+def _cell(results: list[Result], bound: float = BOUND_95) -> str:
     off = np.abs([one.range_error for one in results])
-    inside = np.mean([one.mahalanobis2 <= BOUND_95 for one in results])
+    inside = np.mean([one.mahalanobis2 <= bound for one in results])
     std = np.median([one.range_std for one in results])
     return (
         f"{100 * np.median(off):.0f} %, {100 * np.quantile(off, 0.9):.0f} % | "
@@ -316,13 +407,20 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.how_far")
     parser.add_argument("--count", type=int, default=24, help="people of each stature and kind")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--tracks", type=int, default=2, help="walks of each stature and posture")
+    parser.add_argument("--cues", nargs="*", default=list(get_args(Cues)))
     chosen = parser.parse_args()
     print("Error of the range: median, 90 %; its reported σ; share within the 95 % bound.\n")
     print("| who | stature | camera alone | σ | in | floor | σ | in | depth | σ | in |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
     with Warehouse(WarehouseLayout.open_floor()) as warehouse:
-        for row in _rows(HowFar(warehouse), chosen.count, chosen.seed):
+        for row in _rows(HowFar(warehouse), chosen.count, chosen.seed, chosen.cues):
             print(row, flush=True)
+        if chosen.tracks:
+            print("\n| track | camera alone | σ | in | with scans | σ | in | then lost | σ | in |")
+            print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
+            for row in _tracked_rows(HowFar(warehouse), chosen.tracks, chosen.seed):
+                print(row, flush=True)
 
 
 if __name__ == "__main__":

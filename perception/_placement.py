@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from . import layouts as kp
 from ._camera import Camera
@@ -19,6 +20,7 @@ from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
 from .anthropometry import (
     HEAD_CENTRE_HEAD_M,
+    MEAN_STATURE_M,
     STATURE_RELATIVE_STD,
     UNUSUAL_SIZE_LOG_OFFSET,
     UNUSUAL_SIZE_LOG_STD,
@@ -42,6 +44,14 @@ _FEET_OUTLIER, _BOTTOM_OUTLIER = 0.10, 0.30
 # A surface on the chest's place is that of something else only if it hides the chest, which its
 # keypoints then seldom survive.
 _CHEST_OUTLIER: Final = 0.005
+# In a box without a skeleton it may be that of what is behind the person.
+_BOX_CHEST_OUTLIER: Final = 0.2
+# Below a knee the shank is about vertical, for people who stand, walk or sit: from the knee to the
+# sole, its standard deviation, and the probability that they kneel, crouch or lift both feet.
+_KNEE_M, _KNEE_STD_M, _KNEE_OUTLIER = 0.285 * MEAN_STATURE_M, 0.06, 0.10
+# The same from hips and from shoulders, of people who stand.
+_HIPS_M, _HIPS_STD_M, _HIPS_OUTLIER = 0.53 * MEAN_STATURE_M, 0.08, 0.35
+_NECK_M, _NECK_STD_M, _NECK_OUTLIER = 0.82 * MEAN_STATURE_M, 0.10, 0.40
 # Feet that stand on something, or whose view something blocks, seem farther away than they are.
 _FEET_OUTLIER_FARTHER: Final = 0.9
 _UNUSUAL: Final = (UNUSUAL_SIZE_LOG_STD, UNUSUAL_SIZE_LOG_OFFSET)
@@ -127,7 +137,8 @@ def place_people(
         feet = _feet_on_floor(floor, camera, detections, people, keypoint_std_px, min_score)
     chests: Sequence[tuple[float, float] | None] = [None] * len(people)
     if depth_m is not None:
-        chests = chest_depths(depth_m, detections, people, min_score)
+        trunks = [None if body is None else _trunk_px(camera, body) for body in bodies]
+        chests = chest_depths(depth_m, detections, people, trunks, min_score)
     rows: list[int] = []
     starts: list[Placement] = []
     found: list[CombinedRange] = []
@@ -145,11 +156,11 @@ def place_people(
             heads[row],
             floor,
             feet[row],
-            hidden_feet=bool((people[row].scores[kp.BODY] >= min_score).any()),
+            min_score,
         )
         by_size = range_cues[0]
         if (chest := chests[row]) is not None:
-            range_cues.append(_chest_cue(start[0], *chest))
+            range_cues.append(_chest_cue(start[0], *chest, bodies[row] is not None))
         rows.append(row)
         starts.append(start)
         found.append(combined_range(range_cues, UNUSUAL_SIZE_PROBABILITY))
@@ -206,13 +217,9 @@ def _range_cues(
     head: HeadPose | None,
     floor: FloorPlane | None,
     feet: _Feet | None,
-    hidden_feet: bool,
+    min_score: float,
 ) -> list[DepthCue]:
-    """Return the cues of body or box, head and feet for the range, relative to the start's.
-
-    With ``hidden_feet`` the feet of a person whose ankles are not seen are behind something or
-    outside the image. Then the lower edge of the box does not show them.
-    """
+    """Return the cues of body or box, head and feet for the range, relative to the start's."""
     position, covariance = start
     x, y, z = position.tolist()
     squared = x * x + y * y + z * z
@@ -224,24 +231,35 @@ def _range_cues(
     if (cue := _head_cue(position, person, body, head, floor)) is not None:
         cues.append(cue)
     if floor is not None:
-        cue = None
+        seen = person.scores[kp.BODY] >= min_score
         if body is not None and feet is not None:
-            cue = _feet_cue(person, body, feet)
-        elif not hidden_feet or _are_seen(feet):
+            cue = _feet_cue(person, body, feet) or _legs_cue(body, seen, floor)
+        elif seen.any() and not seen[kp.ANKLES].any():
+            # The feet are behind something or outside the image, and so is not the lower edge.
+            cue = None
+        else:
             cue = _bottom_cue(camera, detection, position, floor)
         if cue is not None:
             cues.append(cue)
     return cues
 
 
-def _are_seen(feet: _Feet | None) -> bool:
-    return feet is not None and not all(map(math.isnan, feet.depth_m))
+def _trunk_px(camera: Camera, body: BodyPlacement) -> FloatArray:
+    """Return the neck and the middle of the hips (2, 2) of a placed body in pixels."""
+    points = body.keypoints_camera_m
+    return camera.project(
+        np.array([points[kp.SHOULDERS].mean(axis=0), points[kp.HIPS].mean(axis=0)])
+    )
 
 
-def _chest_cue(position: FloatArray, depth_m: float, std_m: float) -> DepthCue:
+def _chest_cue(position: FloatArray, depth_m: float, std_m: float, has_body: bool) -> DepthCue:
     """Return the cue of the chest's depth in a depth image."""
-    expected = max(float(position[2]), 1e-3)
-    return DepthCue(math.log(depth_m / expected), std_m / depth_m, 0.0, _CHEST_OUTLIER)
+    value = math.log(depth_m / max(float(position[2]), 1e-3))
+    if has_body:
+        return DepthCue(value, std_m / depth_m, 0.0, _CHEST_OUTLIER)
+    return DepthCue(
+        value, std_m / depth_m, 0.0, _BOX_CHEST_OUTLIER, outlier_farther=_FEET_OUTLIER_FARTHER
+    )
 
 
 def _with_range(starts: Sequence[Placement], found: Sequence[CombinedRange]) -> list[Placement]:
@@ -335,6 +353,32 @@ def _feet_cue(person: PersonKeypoints, body: BodyPlacement, feet: _Feet) -> Dept
     if len(ankles) > 1 and ankles[1][0] - value < _SAME_FLOOR_STDS * error:
         value = 0.5 * (value + ankles[1][0])
     return DepthCue(value, error, 0.0, _FEET_OUTLIER, outlier_farther=_FEET_OUTLIER_FARTHER)
+
+
+def _legs_cue(
+    body: BodyPlacement, seen: NDArray[np.bool_], floor: FloorPlane
+) -> DepthCue | None:
+    """Return the cue of people whose feet are not seen, from how high the lowest seen joint is.
+
+    A body that is scaled about the camera keeps its pixels. Its soles reach the floor at one scale.
+    """
+    for rows, above, std, outlier in (
+        ((kp.LEFT_KNEE, kp.RIGHT_KNEE), _KNEE_M, _KNEE_STD_M, _KNEE_OUTLIER),
+        (kp.HIPS, _HIPS_M, _HIPS_STD_M, _HIPS_OUTLIER),
+        (kp.SHOULDERS, _NECK_M, _NECK_STD_M, _NECK_OUTLIER),
+    ):
+        shown = [row for row in np.arange(17)[np.array(rows) if isinstance(rows, tuple) else rows]
+                 if seen[row]]
+        if shown:
+            up_m = float((body.keypoints_camera_m[shown] @ floor.normal_camera).min())
+            down_m = above - up_m
+            if down_m <= 0.1:
+                return None
+            range_m = float(np.linalg.norm(body.position_camera_m))
+            tilted = floor.tilt_std_rad * range_m / down_m
+            error = math.hypot(std / down_m, floor.height_std_m / floor.height_m, tilted)
+            return DepthCue(math.log(floor.height_m / down_m), error, 0.0, outlier)
+    return None
 
 
 def _bottom_cue(
