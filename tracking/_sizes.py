@@ -24,6 +24,11 @@ from ._table import BoolArray, IndexArray, TrackTable
 # Lasting error of a size against a measured range: a scanner sees legs, and limbs are not in
 # proportion.
 _RANGED_STD: Final = 0.03
+# Added where the match is by the ray alone, which may be the image of somebody else: it takes half a
+# dozen frames to be believed.
+_BY_RAY_STD: Final = 0.2
+# A track's size counts once its standard deviation is below this share of what the measurement has.
+_KNOWN_SHARE: Final = 0.5
 # The ray of somebody nearer than this is not well known.
 _LEAST_RANGE_M: Final = 0.1
 
@@ -67,7 +72,8 @@ def sized(
         return None
     offsets = measured.positions_odom_m - origin_m
     variances = np.repeat(measured.lasting_stds[None] ** 2, len(tracks), axis=0)
-    known = np.isfinite(measured.size_logs) & (tracks.size_variances[:, None] < variances)
+    known = tracks.size_variances[:, None] < _KNOWN_SHARE**2 * variances
+    known &= np.isfinite(measured.size_logs)
     logs = np.where(known, measured.size_logs - tracks.size_logs[:, None], 0.0)
     variances = np.where(known, tracks.size_variances[:, None], variances)
     scales = np.exp(logs)
@@ -133,17 +139,17 @@ def lasting_after(
     own = np.einsum("ki,kij,kj->k", ray, covariances[:, :2, :2], ray)
     other = np.einsum("ki,kij,kj->k", ray, noises_m2, ray)
     gain = own / (own + other)
-    stds = tracks.lasting_stds.copy()
+    stds = np.array(tracks.lasting_stds)
     stds[rows] += gain * (found.stds[rows, columns] - stds[rows])
-    return stds
+    return np.asarray(stds)
 
 
 def with_sizes(
     tracks: TrackTable,
     measured: Measurements,
     source: IndexArray,
-    taken: BoolArray,
-    doubtful: BoolArray,
+    certain: BoolArray,
+    beyond: BoolArray,
     ranged: BoolArray,
     origin_m: tuple[float, float] | None,
 ) -> TrackTable:
@@ -155,23 +161,19 @@ def with_sizes(
         tracks: after the frame.
         measured: as the sensor gives it.
         source: (N,) row of each track's measurement, −1 for none.
-        taken: (N,) True for tracks whose match is certain.
-        doubtful: (N,) True for tracks that may have become another person's.
+        certain: (N,) True for tracks with a measurement that is surely theirs.
+        beyond: (N,) True for matches by the ray alone.
         ranged: (N,) True for tracks whose range was measured lately.
         origin_m: of the sensor.
     """
     logs, variances = tracks.size_logs, tracks.size_variances
-    if doubtful.any():
-        logs = np.where(doubtful, 0.0, logs)
-        variances = np.where(doubtful, np.inf, variances)
-        tracks = tracks.replaced(size_logs=logs, size_variances=variances)
-    rows = np.flatnonzero(taken & (source >= 0))
+    rows = np.flatnonzero(certain)
     rows = rows[np.isfinite(measured.size_logs[source[rows]])]
     if origin_m is None or not rows.size:
         return tracks
     columns = source[rows]
     value, lasting = measured.size_logs[columns], measured.lasting_stds[columns] ** 2
-    own = measured.size_variances[columns]
+    own = measured.size_variances[columns] + np.where(beyond[rows], _BY_RAY_STD**2, 0.0)
     offset = tracks.states[rows, :2] - origin_m
     range_m = np.maximum(np.hypot(offset[:, 0], offset[:, 1]), _LEAST_RANGE_M)
     placed = measured.positions_odom_m[columns] - origin_m
@@ -193,6 +195,16 @@ def with_sizes(
     return tracks.replaced(size_logs=logs, size_variances=variances)
 
 
+def with_sizes_forgotten(tracks: TrackTable, ambiguous: BoolArray) -> TrackTable:
+    """Return the tracks, without the sizes of those (N,) that may have become another person's."""
+    if not ambiguous.any():
+        return tracks
+    return tracks.replaced(
+        size_logs=np.where(ambiguous, 0.0, tracks.size_logs),
+        size_variances=np.where(ambiguous, np.inf, tracks.size_variances),
+    )
+
+
 def with_lasting(
     tracks: TrackTable, origin_m: tuple[float, float] | None, velocity_mps: tuple[float, float]
 ) -> FloatArray:
@@ -210,7 +222,7 @@ def _lever(
     tracks: TrackTable, origin_m: tuple[float, float], velocity_mps: tuple[float, float]
 ) -> FloatArray:
     """Return (N, 4), by how much a state moves per share of the range."""
-    return tracks.states - np.array([*origin_m, *velocity_mps])
+    return np.asarray(tracks.states - np.array([*origin_m, *velocity_mps]))
 
 
 def _rays(offsets_m: FloatArray) -> FloatArray:

@@ -22,7 +22,7 @@ from ._motion import predict
 from ._noticed import with_noticed
 from ._places import slots_of
 from ._sensors import Sensors, seen_lately
-from ._sizes import with_sizes
+from ._sizes import with_sizes, with_sizes_forgotten
 from ._stillness import with_places
 from ._table import BoolArray, TrackTable
 from ._track_management import (
@@ -117,12 +117,13 @@ def advance(state: TrackerState, frame: Frame, sensors: Sensors) -> TrackerState
         initiated = initiate(frame, unmatched, state.next_id, config, len(sensors))
         tracks = with_hosts(tracks.append(initiated), len(initiated), config)
         found = found.with_births(np.flatnonzero(unmatched))
+    tracks = with_sizes_forgotten(tracks, found.ambiguous)
     if not sensor.settings.measures_range:
-        certain = found.seen & ~found.ambiguous & ~found.beyond
+        certain = found.seen & ~found.ambiguous
         certain[found.seen] &= ~measured.weak[found.source[found.seen]]
         ranged = seen_lately(tracks, sensors.ranging, stamp, RANGED_S)
         tracks = with_sizes(
-            tracks, given, found.source, certain, found.ambiguous, ranged, state.origin_odom_m
+            tracks, given, found.source, certain, found.beyond, ranged, state.origin_odom_m
         )
     tracks = _with_awareness(tracks, frame, found, earlier, state, sensors)
     tracks = with_noticed(before, tracks, frame, found, faces, dt_s, state.clocks, sensors)
