@@ -128,7 +128,9 @@ class PersonObservation:
             ),
             size_range_relative_std=None
             if self.size_range_relative_std is None
-            else finite_number("size_range_relative_std", self.size_range_relative_std, minimum=0.0),
+            else finite_number(
+                "size_range_relative_std", self.size_range_relative_std, minimum=0.0
+            ),
         )
 
     @staticmethod

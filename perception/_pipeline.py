@@ -227,9 +227,7 @@ class AwarenessPipeline:
                 awareness_std=None if estimate is None else estimate.awareness_std,
                 score=detection.score,
                 box_xyxy_px=detection.box_xyxy_px,
-                legs_camera_m=_legs(
-                    person, body, place.position_camera_m, self._min_score
-                ),
+                legs_camera_m=_legs(person, body, place.position_camera_m, self._min_score),
                 awareness_reason=reason,
                 range_lasting_relative_std=place.lasting_relative_std,
                 size_range_m=place.size_range_m,

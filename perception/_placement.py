@@ -355,9 +355,7 @@ def _feet_cue(person: PersonKeypoints, body: BodyPlacement, feet: _Feet) -> Dept
     return DepthCue(value, error, 0.0, _FEET_OUTLIER, outlier_farther=_FEET_OUTLIER_FARTHER)
 
 
-def _legs_cue(
-    body: BodyPlacement, seen: NDArray[np.bool_], floor: FloorPlane
-) -> DepthCue | None:
+def _legs_cue(body: BodyPlacement, seen: NDArray[np.bool_], floor: FloorPlane) -> DepthCue | None:
     """Return the cue of people whose feet are not seen, from how high the lowest seen joint is.
 
     A body that is scaled about the camera keeps its pixels. Its soles reach the floor at one scale.
@@ -367,8 +365,11 @@ def _legs_cue(
         (kp.HIPS, _HIPS_M, _HIPS_STD_M, _HIPS_OUTLIER),
         (kp.SHOULDERS, _NECK_M, _NECK_STD_M, _NECK_OUTLIER),
     ):
-        shown = [row for row in np.arange(17)[np.array(rows) if isinstance(rows, tuple) else rows]
-                 if seen[row]]
+        shown = [
+            row
+            for row in np.arange(17)[np.array(rows) if isinstance(rows, tuple) else rows]
+            if seen[row]
+        ]
         if shown:
             up_m = float((body.keypoints_camera_m[shown] @ floor.normal_camera).min())
             down_m = above - up_m

@@ -21,8 +21,8 @@ from .arrays import FloatArray
 _TORSO_M: Final = LIMBS[0].length_m
 #: Distance of the chest below the shoulders, as a fraction of the torso.
 CHEST_FRACTION: Final = 0.3
-# A box gives only a rough range: arms reach out, and shelves hide legs. Children and people who bend
-# or sit come on top of it (``_placement``).
+# A box gives only a rough range: arms reach out, and shelves hide legs. Children and people who
+# bend or sit come on top of it (``_placement``).
 _BOX_RELATIVE_STD: Final = 0.25
 # Of a box that the border cuts, the width counts: a standing adult is 3.3 times as high as wide,
 # from in front and from the side, arms down or not, within a third.

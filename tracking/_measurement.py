@@ -91,9 +91,9 @@ def measurements_of(
     """Return the observations of the frame at ``stamp_s`` as measurements.
 
     A position covariance is rotated with the camera, R Σ Rᵀ, and its x–y block is kept. The part
-    that lasts from frame to frame is taken out, since the filter takes errors for independent. A pose
-    covariance (3, 3) of the camera's x, y and yaw adds J Σ Jᵀ with J = [I, (t_y − p_y, p_x − t_x)]:
-    an error in yaw moves a person in proportion to their range.
+    that lasts from frame to frame is taken out, since the filter takes errors for independent.
+    A pose covariance (3, 3) of the camera's x, y and yaw adds J Σ Jᵀ with J = [I, (t_y − p_y,
+    p_x − t_x)]: an error in yaw moves a person in proportion to their range.
 
     Raises:
         TrackingError: naming an observation that is not a ``PersonObservation``, has another stamp

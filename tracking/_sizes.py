@@ -2,8 +2,8 @@
 
 A camera infers a range from the size that people are assumed to have. The error of a child is the
 same in every frame, so that no number of frames averages it out: the filter has the other errors,
-and each track has its lasting one beside it (the consider parameter of Schmidt's filter), as a share
-of the range. It is added to what is reported.
+and each track has its lasting one beside it, as a share of the range (a consider parameter, as in
+Schmidt's filter). It is added to what is reported.
 
 What a scanner, a depth image or feet on the floor say of the size holds for the track. Later images
 of the same person that show the size alone are placed with it.
@@ -24,8 +24,8 @@ from ._table import BoolArray, IndexArray, TrackTable
 # Lasting error of a size against a measured range: a scanner sees legs, and limbs are not in
 # proportion.
 _RANGED_STD: Final = 0.03
-# Added where the match is by the ray alone, which may be the image of somebody else: it takes half a
-# dozen frames to be believed.
+# Added where the match is by the ray alone, which may be the image of somebody else: it takes half
+# a dozen frames to be believed.
 _BY_RAY_STD: Final = 0.2
 # A track's size counts once its standard deviation is below this share of what the measurement has.
 _KNOWN_SHARE: Final = 0.5
@@ -106,9 +106,7 @@ def without_lasting(
     positions, noises = measured.positions_odom_m.copy(), measured.noises_m2.copy()
     positions[columns] = found.positions_odom_m[rows, columns]
     noises[columns] *= (found.scales[rows, columns] ** 2)[:, None, None]
-    noises[columns] += np.where(
-        worse[:, None, None] < 0.0, found.extra[rows, columns], 0.0
-    )
+    noises[columns] += np.where(worse[:, None, None] < 0.0, found.extra[rows, columns], 0.0)
     changed = replace(measured, positions_odom_m=positions, noises_m2=noises)
     return covariances, replace(frame, measurements=changed)
 
@@ -180,7 +178,7 @@ def with_sizes(
     placed_m = np.maximum(np.hypot(placed[:, 0], placed[:, 1]), _LEAST_RANGE_M)
     ray = _rays(offset)
     spread = np.einsum("ki,kij,kj->k", ray, tracks.covariances[rows, :2, :2], ray) / range_m**2
-    by_range = ranged[rows] & (_RANGED_STD**2 < lasting)
+    by_range = ranged[rows] & (lasting > _RANGED_STD**2)
     value = np.where(by_range, value + np.log(placed_m / range_m), value)
     lasting = np.where(by_range, _RANGED_STD**2, lasting)
     own = np.where(by_range, own + spread, own)

@@ -17,7 +17,7 @@ from ._exits import Exits, absence_s, walked_out
 from ._faces import evidence_interval_s, face_period_s
 from ._fusion import RANGED_S, duplicates
 from ._matching import Found, match_frame
-from ._measurement import Frame
+from ._measurement import Frame, Measurements
 from ._motion import predict
 from ._noticed import with_noticed
 from ._places import slots_of
@@ -117,14 +117,7 @@ def advance(state: TrackerState, frame: Frame, sensors: Sensors) -> TrackerState
         initiated = initiate(frame, unmatched, state.next_id, config, len(sensors))
         tracks = with_hosts(tracks.append(initiated), len(initiated), config)
         found = found.with_births(np.flatnonzero(unmatched))
-    tracks = with_sizes_forgotten(tracks, found.ambiguous)
-    if not sensor.settings.measures_range:
-        certain = found.seen & ~found.ambiguous
-        certain[found.seen] &= ~measured.weak[found.source[found.seen]]
-        ranged = seen_lately(tracks, sensors.ranging, stamp, RANGED_S)
-        tracks = with_sizes(
-            tracks, given, found.source, certain, found.beyond, ranged, state.origin_odom_m
-        )
+    tracks = _with_sizes(tracks, frame, given, found, state, sensors)
     tracks = _with_awareness(tracks, frame, found, earlier, state, sensors)
     tracks = with_noticed(before, tracks, frame, found, faces, dt_s, state.clocks, sensors)
     tracks = with_places(tracks, frame, found, sensors)
@@ -180,6 +173,26 @@ def _with_clocks(state: TrackerState, frame: Frame, sensors: Sensors) -> Tracker
         faces=faces,
         origin_odom_m=origin,
         origin_velocity_mps=velocity,
+    )
+
+
+def _with_sizes(
+    tracks: TrackTable,
+    frame: Frame,
+    given: Measurements,
+    found: Found,
+    state: TrackerState,
+    sensors: Sensors,
+) -> TrackTable:
+    """Return the tracks with what a frame, whose measurements were ``given``, says of sizes."""
+    tracks = with_sizes_forgotten(tracks, found.ambiguous)
+    if sensors.all[frame.sensor].settings.measures_range:
+        return tracks
+    certain = found.seen & ~found.ambiguous
+    certain[found.seen] &= ~given.weak[found.source[found.seen]]
+    ranged = seen_lately(tracks, sensors.ranging, frame.stamp_s, RANGED_S)
+    return with_sizes(
+        tracks, given, found.source, certain, found.beyond, ranged, state.origin_odom_m
     )
 
 

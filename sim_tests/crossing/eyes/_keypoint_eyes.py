@@ -16,8 +16,8 @@ from ._keypoint_camera import KeypointCamera, KeypointNoise
 class KeypointEyes:
     """Eyes with a keypoint camera and the awareness pipeline.
 
-    The pipeline gets the keypoints, their stamp and the floor, which a robot knows from its own pose
-    and the mounting of its camera.
+    The pipeline gets the keypoints, their stamp and the floor, which a robot knows from its own
+    pose and the mounting of its camera.
 
     Args:
         stage: the stage of the crossing.

@@ -1,29 +1,27 @@
-"""Range of people of any size: ``python -m benchmarks.how_far``.
-
-Simulated people of 1.0 to 1.9 m stand, sit or bend before a camera, whole, behind a shelf that hides
-their legs, or cut off by the lower border of the image. Keypoints of their bodies pass through the
-awareness pipeline: alone, with the floor, and with a depth image. Then somebody walks before a robot
-with a camera and a scanner, and goes on before the camera alone.
-"""
+"""People of any size before a simulated camera, and what the pipeline says of their place."""
 
 from __future__ import annotations
 
-import argparse
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any, Final, Literal, get_args
+from typing import Any, Final, Literal
 
 import numpy as np
 
-from perception import AwarenessPipeline, Camera, FloorPlane, PersonDetection, PersonKeypoints, PersonObservation
+from perception import (
+    AwarenessPipeline,
+    Camera,
+    FloorPlane,
+    PersonDetection,
+    PersonKeypoints,
+    PersonObservation,
+)
 from perception.arrays import FloatArray
 from sim_tests.actors.body import Worker
 from sim_tests.crossing.eyes import KeypointCamera, KeypointNoise
 from sim_tests.world import Warehouse
 from sim_tests.world.camera import CameraRenderer
-from sim_tests.world.hall import WarehouseLayout
-from tracking import PersonTracker, ScannerView, SensorConfig
 
 Posture = Literal["standing", "seated", "bent"]
 Cut = Literal["whole", "shelf", "border"]
@@ -34,9 +32,6 @@ CAMERA: Final = Camera.from_fov(640, 480, math.radians(60.0))
 T_ODOM_CAMERA: Final = np.array([[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 1.2], [0, 0, 0, 1.0]])
 STATURES_M: Final = (1.0, 1.1, 1.25, 1.4, 1.6, 1.75, 1.9)
 #: 95 % of a normal error of three dimensions lie within this squared Mahalanobis distance.
-BOUND_95: Final = 7.81
-#: The same on the floor plane.
-BOUND_2D_95: Final = 5.99
 
 _LOOKS: Final = ("jamila", "mateo", "linnea", "kofi", "ivan")
 _BLANK: Final = np.zeros((CAMERA.height_px, CAMERA.width_px, 3), np.uint8)
@@ -44,9 +39,6 @@ _BLANK: Final = np.zeros((CAMERA.height_px, CAMERA.width_px, 3), np.uint8)
 _FLOOR_HEIGHT_STD_M, _FLOOR_TILT_STD_RAD = 0.02, 0.01
 _BENT_RAD: Final = (0.35, 1.2)
 _SHELF_SHARE: Final = (0.45, 0.6)  # of the stature, or above the hips of somebody seated
-_CAMERA_HZ: Final = 20.0
-_LASER_STD_M: Final = 0.05
-_RANGED_S, _LOST_S = 2.0, 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -288,140 +280,3 @@ def _result(person: PersonObservation, truth_m: FloatArray) -> Result:
         float(error @ np.linalg.solve(covariance, error)),
         math.sqrt(place @ covariance @ place) / range_m**2,
     )
-
-
-@dataclass(frozen=True, slots=True)
-class Tracked:
-    """Errors of a track: while the scanner sees the person, and after it is lost.
-
-    Attributes:
-        ranged: from the second second on.
-        lost: from one second after the last scan.
-    """
-
-    ranged: list[Result]
-    lost: list[Result]
-
-
-def tracked(far: HowFar, case: Case, scanner: bool = True) -> Tracked:
-    """Track somebody who walks across before a camera and a scanner, and then before the camera."""
-    rng = np.random.default_rng([case.seed, 23])
-    tracker = PersonTracker(sensors={"laser": SensorConfig(view=ScannerView())})
-    found = Tracked([], [])
-    step = rng.choice([-1.0, 1.0]) * 0.4 / _CAMERA_HZ
-    for tick in range(round((_RANGED_S + _LOST_S) * _CAMERA_HZ)):
-        now_s = tick / _CAMERA_HZ
-        x_m, y_m = case.place_m
-        place = np.array([x_m, y_m + step * tick])
-        moving = replace(case, place_m=(x_m, float(place[1])), seed=case.seed * 1000 + tick)
-        one = far.observed(moving, "none")
-        seen = [] if one is None else [replace(one[0], stamp_s=now_s)]
-        tracks = tracker.update(seen, now_s, T_ODOM_CAMERA)
-        if one is not None:
-            place = (T_ODOM_CAMERA[:3, :3] @ one[1])[:2] + T_ODOM_CAMERA[:2, 3]
-        if scanner and now_s < _RANGED_S:
-            legs = PersonObservation(
-                stamp_s=now_s,
-                position_camera_m=[*(place + rng.normal(0.0, _LASER_STD_M, 2)), 0.2],
-                position_covariance_m2=_LASER_STD_M**2 * np.eye(3),
-                gaze_camera=None,
-                awareness=None,
-                awareness_std=None,
-                score=0.9,
-            )
-            tracks = tracker.update([legs], now_s, np.eye(4), sensor="laser")
-        kept = found.ranged if now_s < _RANGED_S else found.lost
-        if now_s % _RANGED_S < 1.0 or not tracks:
-            continue
-        track = min(tracks, key=lambda each: float(np.hypot(*(each.position_odom_m - place))))
-        error, spread = track.position_odom_m - place, track.covariance_odom[:2, :2]
-        range_m = float(np.hypot(*track.position_odom_m))
-        kept.append(
-            Result(
-                range_m / float(np.hypot(*place)) - 1.0,
-                float(error @ np.linalg.solve(spread, error)),
-                math.sqrt(track.position_odom_m @ spread @ track.position_odom_m) / range_m**2,
-            )
-        )
-    return found
-
-
-def _tracked_rows(far: HowFar, count: int, seed: int) -> Iterator[str]:
-    for posture in get_args(Posture):
-        people = [
-            case
-            for one in STATURES_M
-            for case in cases(one, posture, "whole", count=count, seed=seed)
-        ]
-        with_scans = [tracked(far, case) for case in people]
-        alone = [tracked(far, case, scanner=False) for case in people]
-        cells = [
-            _cell([one for part in group for one in part], BOUND_2D_95)
-            for group in (
-                [each.lost for each in alone],
-                [each.ranged for each in with_scans],
-                [each.lost for each in with_scans],
-            )
-        ]
-        yield f"| {posture} | " + " | ".join(cells) + " |"
-
-
-def _rows(far: HowFar, count: int, seed: int, chosen: list[Cues]) -> Iterator[str]:
-    kinds: list[tuple[Posture, Cut, bool]] = [
-        *((posture, "whole", True) for posture in get_args(Posture)),
-        *((posture, cut, True) for posture in ("standing", "seated") for cut in ("shelf", "border")),
-        ("standing", "whole", False),
-        ("seated", "whole", False),
-        ("standing", "shelf", False),
-        ("standing", "border", False),
-    ]
-    for posture, cut, skeleton in kinds:
-        groups = [(f"{one:g} m", (one,)) for one in STATURES_M] if cut == "whole" else []
-        for name, statures in [*groups, ("all", STATURES_M)]:
-            if not skeleton and name != "all":
-                continue
-            cells = []
-            for cues in chosen:
-                people = [
-                    case
-                    for one in statures
-                    for case in cases(one, posture, cut, skeleton=skeleton, count=count, seed=seed)
-                ]
-                cells.append(_cell(far.results(people, cues)))
-            who = f"{posture}, {cut}" + ("" if skeleton else ", box alone")
-            yield f"| {who} | {name} | " + " | ".join(cells) + " |"
-
-
-def _cell(results: list[Result], bound: float = BOUND_95) -> str:
-    off = np.abs([one.range_error for one in results])
-    inside = np.mean([one.mahalanobis2 <= bound for one in results])
-    std = np.median([one.range_std for one in results])
-    return (
-        f"{100 * np.median(off):.0f} %, {100 * np.quantile(off, 0.9):.0f} % | "
-        f"{100 * std:.0f} % | {100 * inside:.0f} %"
-    )
-
-
-def main() -> None:
-    """Print the table."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.how_far")
-    parser.add_argument("--count", type=int, default=24, help="people of each stature and kind")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--tracks", type=int, default=2, help="walks of each stature and posture")
-    parser.add_argument("--cues", nargs="*", default=list(get_args(Cues)))
-    chosen = parser.parse_args()
-    print("Error of the range: median, 90 %; its reported σ; share within the 95 % bound.\n")
-    print("| who | stature | camera alone | σ | in | floor | σ | in | depth | σ | in |")
-    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
-    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
-        for row in _rows(HowFar(warehouse), chosen.count, chosen.seed, chosen.cues):
-            print(row, flush=True)
-        if chosen.tracks:
-            print("\n| track | camera alone | σ | in | with scans | σ | in | then lost | σ | in |")
-            print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
-            for row in _tracked_rows(HowFar(warehouse), chosen.tracks, chosen.seed):
-                print(row, flush=True)
-
-
-if __name__ == "__main__":
-    main()
