@@ -19,7 +19,7 @@ PLACE_M = np.array([3.0, 0.4])
 
 
 def seen(
-    place_m, stamp_s, *, ratio=1.0, lasting=SIZE_STD, size_ratio=None, noise=0.0, T=None, awareness=None
+    place_m, stamp_s, *, ratio=1.0, lasting=SIZE_STD, size_ratio=None, noise=0.0, T=None
 ):  # fmt: skip
     """Return an image's observation of a place that is seen ``ratio`` times too far away.
 
@@ -35,8 +35,8 @@ def seen(
         position_camera_m=position,
         position_covariance_m2=covariance,
         gaze_camera=None,
-        awareness=awareness,
-        awareness_std=None if awareness is None else 0.1,
+        awareness=None,
+        awareness_std=None,
         score=0.9,
         range_lasting_relative_std=lasting,
         size_range_m=range_m * (ratio if size_ratio is None else size_ratio) * math.exp(noise),
@@ -140,7 +140,7 @@ def test_an_ambiguous_match_forgets_the_size():
 
 
 def test_a_robot_that_drives_makes_the_velocity_of_people_of_unknown_size_less_certain():
-    """A range that is wrong by a share moves a person who stands by it as the robot comes nearer."""
+    """A range that is wrong by a share moves a person who stands as the robot comes nearer."""
 
     def velocity_std(speed_mps):
         tracker = PersonTracker()
