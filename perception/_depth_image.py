@@ -96,6 +96,7 @@ def chest_depths(
     depth_m: FloatArray,
     detections: Sequence[PersonDetection],
     people: Sequence[PersonKeypoints],
+    trunks_px: Sequence[FloatArray | None],
     min_score: float,
 ) -> list[tuple[float, float] | None]:
     """Return the depth of each person's centre line and its standard deviation, in metres.
@@ -107,23 +108,30 @@ def chest_depths(
         depth_m: (H, W) of :func:`checked_depth`.
         detections: one per person.
         people: their keypoints.
+        trunks_px: (2, 2) neck and middle of the hips where the placed bodies have them, for ends
+            that are not seen; None for people without a placed body.
         min_score: keypoints with a lower score count as not seen.
     """
     return [
-        _chest_depth(depth_m, *_trunk(detection, person, min_score))
-        for detection, person in zip(detections, people, strict=True)
+        _chest_depth(depth_m, *_trunk(detection, person, trunk_px, min_score))
+        for detection, person, trunk_px in zip(detections, people, trunks_px, strict=True)
     ]
 
 
 def _trunk(
-    detection: PersonDetection, person: PersonKeypoints, min_score: float
+    detection: PersonDetection,
+    person: PersonKeypoints,
+    trunk_px: FloatArray | None,
+    min_score: float,
 ) -> tuple[FloatArray, FloatArray]:
     """Return the neck (2,) and the middle of the hips (2,) in pixels."""
     ends = []
-    for rows in (kp.SHOULDERS, kp.HIPS):
+    for end, rows in enumerate((kp.SHOULDERS, kp.HIPS)):
         seen = person.scores[rows] >= min_score
         if seen.any():
             ends.append(person.keypoints_px[rows][seen].mean(axis=0))
+        elif trunk_px is not None:
+            ends.append(trunk_px[end])
     if len(ends) == 2:
         return ends[0], ends[1]
     left, top, right, bottom = detection.box_xyxy_px.tolist()

@@ -26,9 +26,10 @@ _METRIC_UNIT_LIMIT: Final = 0.15
 # Relative standard deviation of the person's size in a skeleton in metres.
 _METRIC_UNIT_STD: Final = 0.03
 # Relative standard deviations to add if no limb is seen, and for the foreshortening in a flat
-# skeleton.
+# skeleton: 3–5 % for people who stand, 6–16 % for those who sit or bend, the more the less of them
+# is seen.
 _UNSEEN_RELATIVE_STD: Final = 0.10
-_FLAT_RELATIVE_STD: Final = 0.08
+_FLAT_RELATIVE_STD: Final = 0.125
 
 _LOG_LENGTHS: Final[FloatArray] = np.log([limb.length_m for limb in LIMBS])
 _INFORMATION: Final = tuple(limb.relative_std**-2 for limb in LIMBS)

@@ -53,6 +53,13 @@ class PersonObservation:
             at the range of ``position_camera_m``; None if no leg was seen.
         awareness_reason: why ``awareness`` is None, one of :data:`AWARENESS_REASONS`; None if it is
             not, or nobody says why.
+        range_lasting_relative_std: the part of the range's relative standard deviation that is the
+            same in every frame of this person, because their size is not known; in
+            ``position_covariance_m2`` it is σ² p pᵀ. 0 for a measured range.
+        size_range_m: range at which an adult who stands would have the size of this person in the
+            image, before other cues; None if no size was assumed.
+        size_range_relative_std: its relative standard deviation, that of the person's size left
+            out; None if and only if ``size_range_m`` is None.
     """
 
     stamp_s: float
@@ -65,6 +72,9 @@ class PersonObservation:
     box_xyxy_px: FloatArray | None = None
     legs_camera_m: FloatArray | None = None
     awareness_reason: AwarenessReason | None = None
+    range_lasting_relative_std: float = 0.0
+    size_range_m: float | None = None
+    size_range_relative_std: float | None = None
 
     def __post_init__(self) -> None:
         if (self.awareness is None) != (self.awareness_std is None):
@@ -79,6 +89,11 @@ class PersonObservation:
                 f"awareness_reason must be one of {', '.join(map(repr, AWARENESS_REASONS))}, and "
                 f"None with an awareness, got {self.awareness_reason!r} with "
                 f"awareness={self.awareness}"
+            )
+        if (self.size_range_m is None) != (self.size_range_relative_std is None):
+            raise PerceptionError(
+                "size_range_m and size_range_relative_std must both be given or both be None, got "
+                f"{self.size_range_m} and {self.size_range_relative_std}"
             )
         gaze, alpha, std, box = (
             self.gaze_camera,
@@ -103,6 +118,19 @@ class PersonObservation:
             legs_camera_m=None
             if self.legs_camera_m is None
             else finite_array("legs_camera_m", self.legs_camera_m, (3,)),
+            range_lasting_relative_std=finite_number(
+                "range_lasting_relative_std", self.range_lasting_relative_std, minimum=0.0
+            ),
+            size_range_m=None
+            if self.size_range_m is None
+            else finite_number(
+                "size_range_m", self.size_range_m, minimum=0.0, exclusive_minimum=True
+            ),
+            size_range_relative_std=None
+            if self.size_range_relative_std is None
+            else finite_number(
+                "size_range_relative_std", self.size_range_relative_std, minimum=0.0
+            ),
         )
 
     @staticmethod
@@ -171,9 +199,8 @@ class PersonObservation:
             boxes = _list(*_optional_rows("boxes_xyxy_px", boxes_xyxy_px, (count, 4)))
         made = tuple(map(object.__new__, [PersonObservation] * count))
         columns = ([stamp] * count, positions, covariances, gazes, alphas, stds, score.tolist())
-        for assign, column in zip(
-            _SETTERS, (*columns, boxes, [None] * count, [None] * count), strict=True
-        ):
+        rest = ([field.default] * count for field in fields(PersonObservation)[8:])
+        for assign, column in zip(_SETTERS, (*columns, boxes, *rest), strict=True):
             deque(map(assign, made, column), maxlen=0)
         return made
 

@@ -220,15 +220,18 @@ class AwarenessPipeline:
         observations = tuple(
             PersonObservation(
                 stamp_s=stamp_s,
-                position_camera_m=place[0],
-                position_covariance_m2=place[1],
+                position_camera_m=place.position_camera_m,
+                position_covariance_m2=place.covariance_m2,
                 gaze_camera=None if head is None or estimate is None else head.gaze_camera,
                 awareness=None if estimate is None else estimate.awareness,
                 awareness_std=None if estimate is None else estimate.awareness_std,
                 score=detection.score,
                 box_xyxy_px=detection.box_xyxy_px,
-                legs_camera_m=_legs(person, body, place[0], self._min_score),
+                legs_camera_m=_legs(person, body, place.position_camera_m, self._min_score),
                 awareness_reason=reason,
+                range_lasting_relative_std=place.lasting_relative_std,
+                size_range_m=place.size_range_m,
+                size_range_relative_std=place.size_range_relative_std,
             )
             for detection, place, head, estimate, reason, person, body in zip(
                 detections, places, heads, estimates, reasons, people, bodies, strict=True

@@ -8,18 +8,32 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from . import layouts as kp
 from ._camera import Camera
-from ._depth_cues import DepthCue, combine_cues
+from ._depth_cues import CombinedRange, DepthCue, combined_range
 from ._depth_image import chest_depths
 from ._detection import PersonDetection
 from ._floor import FloorPlane
 from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
-from .anthropometry import HEAD_CENTRE_HEAD_M, STATURE_RELATIVE_STD
+from .anthropometry import (
+    HEAD_CENTRE_HEAD_M,
+    MEAN_STATURE_M,
+    STATURE_RELATIVE_STD,
+    UNUSUAL_SIZE_LOG_OFFSET,
+    UNUSUAL_SIZE_LOG_STD,
+    UNUSUAL_SIZE_PROBABILITY,
+)
 from .arrays import FloatArray
-from .body import BOX_LEAST_TRACE_M2, BodyPlacement, place_bodies, place_boxes
+from .body import (
+    BOX_LEAST_TRACE_M2,
+    BodyPlacement,
+    cut_by_border,
+    place_bodies,
+    place_boxes,
+)
 
 #: Position (3,) and covariance (3, 3) in the camera frame.
 Placement = tuple[FloatArray, FloatArray]
@@ -30,10 +44,17 @@ _FEET_OUTLIER, _BOTTOM_OUTLIER = 0.10, 0.30
 # A surface on the chest's place is that of something else only if it hides the chest, which its
 # keypoints then seldom survive.
 _CHEST_OUTLIER: Final = 0.005
-# Probability that somebody is no adult who stands, and the standard deviation (logarithm) of
-# their size then: a child of 1.05 m has 0.6 of the height of an adult.
-_UNUSUAL_STATURE: Final = 0.05
-_UNUSUAL_STD: Final = 0.35
+# In a box without a skeleton it may be that of what is behind the person.
+_BOX_CHEST_OUTLIER: Final = 0.2
+# Below a knee the shank is about vertical, for people who stand, walk or sit: from the knee to the
+# sole, its standard deviation, and the probability that they kneel, crouch or lift both feet.
+_KNEE_M, _KNEE_STD_M, _KNEE_OUTLIER = 0.285 * MEAN_STATURE_M, 0.06, 0.10
+# The same from hips and from shoulders, of people who stand.
+_HIPS_M, _HIPS_STD_M, _HIPS_OUTLIER = 0.53 * MEAN_STATURE_M, 0.08, 0.35
+_NECK_M, _NECK_STD_M, _NECK_OUTLIER = 0.82 * MEAN_STATURE_M, 0.10, 0.40
+# Feet that stand on something, or whose view something blocks, seem farther away than they are.
+_FEET_OUTLIER_FARTHER: Final = 0.9
+_UNUSUAL: Final = (UNUSUAL_SIZE_LOG_STD, UNUSUAL_SIZE_LOG_OFFSET)
 # Head sizes vary by about 4 % between adults; their correlation with the stature is about 0.4.
 _HEAD_STATURE_STD: Final = 0.4 * 0.04
 # Standard deviations of the depth of head or foot relative to the chest: from a lifted skeleton,
@@ -51,11 +72,29 @@ _BOTTOM_STD_M: Final = 0.02
 _TOE_AHEAD_M, _TOE_AHEAD_STD_M = 0.10, 0.15
 # Noise of ankle labels and of the lower edge of a box, as a fraction of the box's height.
 _ANKLE_LABEL_STD, _BOTTOM_LABEL_STD = 0.012, 0.02
-# A box counts as cut off by the lower border if it ends within this fraction of the image's height.
-_BORDER: Final = 0.03
 _SAME_FLOOR_STDS: Final = 1.5
 _UP_LEVEL_CAMERA: Final = np.array([0.0, -1.0, 0.0])
 _IDENTITY: Final = np.eye(3)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PersonPlace:
+    """Where a person is, by all cues.
+
+    Attributes:
+        position_camera_m: (3,) centre line of the body at chest height.
+        covariance_m2: (3, 3) of the position.
+        lasting_relative_std: the part of the range's relative standard deviation that is the same
+            in every image of this person.
+        size_range_m: range by the size of the skeleton alone; None for a person without one.
+        size_range_relative_std: its relative standard deviation, the stature's part left out.
+    """
+
+    position_camera_m: FloatArray
+    covariance_m2: FloatArray
+    lasting_relative_std: float
+    size_range_m: float | None
+    size_range_relative_std: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,13 +119,14 @@ def place_people(
     keypoint_std_px: float,
     min_score: float,
     depth_m: FloatArray | None = None,
-) -> tuple[Placement | None, ...]:
-    """Return the placement of each person's centre line at chest height; None if unknown.
+) -> tuple[PersonPlace | None, ...]:
+    """Return the place of each person's centre line at chest height; None if unknown.
 
     The skeleton (limb lengths and all seen keypoints), or the box if that is more accurate, gives
     the direction and a first range. Further cues for the range are the head's range, if its
     estimator measures one, the feet on a known floor, and a depth image (H, W), NaN in its holes.
-    :func:`combine_cues` combines all cues; any of them may be an outlier.
+    :func:`combined_range` combines all cues; any of them may be an outlier, and the person may be
+    no adult who stands.
     """
     if not people:
         return ()
@@ -97,27 +137,41 @@ def place_people(
         feet = _feet_on_floor(floor, camera, detections, people, keypoint_std_px, min_score)
     chests: Sequence[tuple[float, float] | None] = [None] * len(people)
     if depth_m is not None:
-        chests = chest_depths(depth_m, detections, people, min_score)
-    placed: list[Placement | None] = [None] * len(people)
-    to_correct: list[tuple[int, Placement, list[DepthCue]]] = []
+        trunks = [None if body is None else _trunk_px(camera, body) for body in bodies]
+        chests = chest_depths(depth_m, detections, people, trunks, min_score)
+    rows: list[int] = []
+    starts: list[Placement] = []
+    found: list[CombinedRange] = []
+    sizes: list[tuple[float, float] | None] = []
     for row, (body_placement, by_box) in enumerate(zip(bodies, box_placements, strict=True)):
         body, start = _first_placement(body_placement, by_box)
         if start is None:
             continue
-        placed[row] = start
         range_cues = _range_cues(
-            camera, detections[row], people[row], body, start, heads[row], floor, feet[row]
+            camera,
+            detections[row],
+            people[row],
+            body,
+            start,
+            heads[row],
+            floor,
+            feet[row],
+            min_score,
         )
+        by_size = range_cues[0]
         if (chest := chests[row]) is not None:
-            range_cues.append(_chest_cue(start[0], *chest))
-        if len(range_cues) > 1:
-            to_correct.append((row, start, range_cues))
-    if to_correct:
-        rows, starts, cues = zip(*to_correct, strict=True)
-        unusual = 0.0 if depth_m is None else _UNUSUAL_STATURE
-        corrected_places = _with_corrected_range(starts, cues, unusual)
-        for row, corrected in zip(rows, corrected_places, strict=True):
-            placed[row] = corrected
+            range_cues.append(_chest_cue(start[0], *chest, bodies[row] is not None))
+        rows.append(row)
+        starts.append(start)
+        found.append(combined_range(range_cues, UNUSUAL_SIZE_PROBABILITY))
+        own = math.sqrt(by_size.log_std**2 - by_size.stature_std**2)
+        sizes.append(None if body is None else (float(np.linalg.norm(start[0])), own))
+    placed: list[PersonPlace | None] = [None] * len(people)
+    if starts:
+        for row, place, one, size in zip(
+            rows, _with_range(starts, found), found, sizes, strict=True
+        ):
+            placed[row] = PersonPlace(*place, one.lasting_std, *(size or (None, None)))
     return tuple(placed)
 
 
@@ -163,6 +217,7 @@ def _range_cues(
     head: HeadPose | None,
     floor: FloorPlane | None,
     feet: _Feet | None,
+    min_score: float,
 ) -> list[DepthCue]:
     """Return the cues of body or box, head and feet for the range, relative to the start's."""
     position, covariance = start
@@ -172,34 +227,46 @@ def _range_cues(
     stature = STATURE_RELATIVE_STD if body is None else body.scale_relative_std
     outlier = _BOX_OUTLIER if body is None else _BODY_OUTLIER
     stature = min(stature, STATURE_RELATIVE_STD, 0.99 * along)
-    cues = [DepthCue(0.0, along, stature, outlier, _UNUSUAL_STD)]
+    cues = [DepthCue(0.0, along, stature, outlier, *_UNUSUAL)]
     if (cue := _head_cue(position, person, body, head, floor)) is not None:
         cues.append(cue)
     if floor is not None:
-        # If a body's ankles are not seen, they are behind something or outside the image. Then the
-        # lower edge of its box does not show its feet.
-        if body is None or feet is None:
-            cue = _bottom_cue(camera, detection, position, floor)
+        seen = person.scores[kp.BODY] >= min_score
+        if body is not None and feet is not None:
+            cue = _feet_cue(person, body, feet) or _legs_cue(body, seen, floor)
+        elif seen.any() and not seen[kp.ANKLES].any():
+            # The feet are behind something or outside the image, and so is not the lower edge.
+            cue = None
         else:
-            cue = _feet_cue(person, body, feet)
+            cue = _bottom_cue(camera, detection, position, floor)
         if cue is not None:
             cues.append(cue)
     return cues
 
 
-def _chest_cue(position: FloatArray, depth_m: float, std_m: float) -> DepthCue:
+def _trunk_px(camera: Camera, body: BodyPlacement) -> FloatArray:
+    """Return the neck and the middle of the hips (2, 2) of a placed body in pixels."""
+    points = body.keypoints_camera_m
+    return camera.project(
+        np.array([points[kp.SHOULDERS].mean(axis=0), points[kp.HIPS].mean(axis=0)])
+    )
+
+
+def _chest_cue(position: FloatArray, depth_m: float, std_m: float, has_body: bool) -> DepthCue:
     """Return the cue of the chest's depth in a depth image."""
-    expected = max(float(position[2]), 1e-3)
-    return DepthCue(math.log(depth_m / expected), std_m / depth_m, 0.0, _CHEST_OUTLIER)
+    value = math.log(depth_m / max(float(position[2]), 1e-3))
+    if has_body:
+        return DepthCue(value, std_m / depth_m, 0.0, _CHEST_OUTLIER)
+    return DepthCue(
+        value, std_m / depth_m, 0.0, _BOX_CHEST_OUTLIER, outlier_farther=_FEET_OUTLIER_FARTHER
+    )
 
 
-def _with_corrected_range(
-    starts: Sequence[Placement], cues: Sequence[Sequence[DepthCue]], unusual: float
-) -> list[Placement]:
+def _with_range(starts: Sequence[Placement], found: Sequence[CombinedRange]) -> list[Placement]:
     """Return the placements with the range of all cues together."""
     position = np.array([start[0] for start in starts])
     covariance = np.array([start[1] for start in starts])
-    log_range, log_std = np.array([combine_cues(range_cues, unusual) for range_cues in cues]).T
+    log_range, log_std = np.array([(one.log_range, one.log_std) for one in found]).T
     ratio = np.exp(log_range)[:, None]
     squared = (position * position).sum(axis=1)[:, None, None]
     across = ratio[..., None] * (_IDENTITY - position[:, :, None] * position[:, None] / squared)
@@ -237,7 +304,7 @@ def _head_cue(
         std,
         min(_HEAD_STATURE_STD, 0.5 * std),
         _HEAD_OUTLIER,
-        _UNUSUAL_STD,
+        *_UNUSUAL,
     )
 
 
@@ -285,7 +352,34 @@ def _feet_cue(person: PersonKeypoints, body: BodyPlacement, feet: _Feet) -> Dept
     # A raised foot seems farther away than it is, so the nearer one is the planted foot.
     if len(ankles) > 1 and ankles[1][0] - value < _SAME_FLOOR_STDS * error:
         value = 0.5 * (value + ankles[1][0])
-    return DepthCue(value, error, 0.0, _FEET_OUTLIER)
+    return DepthCue(value, error, 0.0, _FEET_OUTLIER, outlier_farther=_FEET_OUTLIER_FARTHER)
+
+
+def _legs_cue(body: BodyPlacement, seen: NDArray[np.bool_], floor: FloorPlane) -> DepthCue | None:
+    """Return the cue of people whose feet are not seen, from how high the lowest seen joint is.
+
+    A body that is scaled about the camera keeps its pixels. Its soles reach the floor at one scale.
+    """
+    for rows, above, std, outlier in (
+        ((kp.LEFT_KNEE, kp.RIGHT_KNEE), _KNEE_M, _KNEE_STD_M, _KNEE_OUTLIER),
+        (kp.HIPS, _HIPS_M, _HIPS_STD_M, _HIPS_OUTLIER),
+        (kp.SHOULDERS, _NECK_M, _NECK_STD_M, _NECK_OUTLIER),
+    ):
+        shown = [
+            row
+            for row in np.arange(17)[np.array(rows) if isinstance(rows, tuple) else rows]
+            if seen[row]
+        ]
+        if shown:
+            up_m = float((body.keypoints_camera_m[shown] @ floor.normal_camera).min())
+            down_m = above - up_m
+            if down_m <= 0.1:
+                return None
+            range_m = float(np.linalg.norm(body.position_camera_m))
+            tilted = floor.tilt_std_rad * range_m / down_m
+            error = math.hypot(std / down_m, floor.height_std_m / floor.height_m, tilted)
+            return DepthCue(math.log(floor.height_m / down_m), error, 0.0, outlier)
+    return None
 
 
 def _bottom_cue(
@@ -293,7 +387,7 @@ def _bottom_cue(
 ) -> DepthCue | None:
     """Return the cue of the box's lower edge, as shoes on the floor; None if it is cut off."""
     left, top, right, bottom = detection.box_xyxy_px.tolist()
-    if bottom > (1.0 - _BORDER) * camera.height_px or position[2] <= _TOE_AHEAD_M:
+    if position[2] <= _TOE_AHEAD_M or cut_by_border(camera, detection.box_xyxy_px[None])[1][0]:
         return None
     ray = camera.normalise([[0.5 * (left + right), bottom]])
     ray_std = _BOTTOM_LABEL_STD * (bottom - top) / camera.fy_px

@@ -21,8 +21,17 @@ from .arrays import FloatArray
 _TORSO_M: Final = LIMBS[0].length_m
 #: Distance of the chest below the shoulders, as a fraction of the torso.
 CHEST_FRACTION: Final = 0.3
-# A box gives only a rough range: people stoop, sit and are cut off by the border.
-_BOX_DEPTH_RELATIVE_STD: Final = 0.25
+# A box gives only a rough range: arms reach out, and shelves hide legs. Children and people who
+# bend or sit come on top of it (``_placement``).
+_BOX_RELATIVE_STD: Final = 0.25
+# Of a box that the border cuts, the width counts: a standing adult is 3.3 times as high as wide,
+# from in front and from the side, arms down or not, within a third.
+_HEIGHT_PER_WIDTH, _HEIGHT_PER_WIDTH_LOG_STD = 3.3, 0.35
+# Otherwise it only limits what else hides of the height.
+_LEAST_HEIGHT_PER_WIDTH: Final = 2.5
+# A box counts as cut by the upper or lower border if it ends within this share of the image's
+# height.
+_BORDER: Final = 0.03
 _MIN_POINTS: Final = 3
 # Rows of a whole-body layout that count: not the many points of face and hands.
 _BODY_AND_FEET: Final = 23
@@ -40,7 +49,6 @@ _ACROSS: Final = np.diag([1.0, 1.0, 0.0])
 # The chest of a standing person in units of the box, from its top left corner: a little below the
 # shoulders, which lie at 0.82 of the stature (Drillis and Contini).
 _CHEST_IN_BOX: Final = np.array([0.5, 0.27])
-_BOX_VARIANCE: Final = _BOX_DEPTH_RELATIVE_STD**2 + STATURE_RELATIVE_STD**2
 _BOX_LATERAL_M2: Final = (0.15 * MEAN_STATURE_M) ** 2 * _IDENTITY
 #: Lower bound on the trace of the covariance of a placement by a box.
 BOX_LEAST_TRACE_M2: Final = 3.0 * (0.15 * MEAN_STATURE_M) ** 2
@@ -261,9 +269,9 @@ def _trunks(
 def place_box(camera: Camera, box_xyxy_px: FloatArray) -> tuple[FloatArray, FloatArray] | None:
     """Estimate a position from a box, as that of a standing adult.
 
-    It is for people whose keypoints cannot place the body. A person who is cut off by the image's
-    border seems farther away than they are; the error is limited by taking the larger of height
-    and 2.5 × width as the height.
+    It is for people whose keypoints cannot place the body. Of a box that ends at the upper or lower
+    border of the image only a part of the height is seen: it is taken from the width, if that
+    gives more. Any other box counts as at least 2.5 times as high as wide.
 
     Returns:
         Position (3,) and covariance (3, 3) in the camera frame; None for a box without extent.
@@ -275,14 +283,31 @@ def place_boxes(
     camera: Camera, boxes_xyxy_px: Sequence[FloatArray]
 ) -> list[tuple[FloatArray, FloatArray] | None]:
     """Estimate positions from several boxes at once, each as :func:`place_box` does."""
-    corners = camera.normalise(np.reshape(boxes_xyxy_px, (-1, 2)))
-    edges = corners.reshape(-1, 4)
+    pixels = np.reshape(boxes_xyxy_px, (-1, 2))
+    edges = camera.normalise(pixels).reshape(-1, 4)
     low, extent = edges[:, :2], edges[:, 2:] - edges[:, :2]
     boxes = extent.min(axis=1) > 0.0
-    height = np.maximum(np.maximum(extent[:, 1], 2.5 * extent[:, 0]), 1e-9)
+    over, under = cut_by_border(camera, pixels.reshape(-1, 4))
+    cut = over | under
+    per_width = np.where(cut, _HEIGHT_PER_WIDTH, _LEAST_HEIGHT_PER_WIDTH)
+    height = np.maximum(np.maximum(extent[:, 1], per_width * extent[:, 0]), 1e-9)
     position = np.ones((len(edges), 3))
-    position[:, :2] = low + extent * _CHEST_IN_BOX
+    position[:, :2] = low + np.stack([extent[:, 0], height], axis=1) * _CHEST_IN_BOX
+    # Where the head is outside the image, the chest may be anywhere in it.
+    middle = low[:, 1] + 0.5 * extent[:, 1]
+    position[:, 1] = np.where(over, middle, position[:, 1])
     position *= (MEAN_STATURE_M / height)[:, None]
-    covariance = _BOX_VARIANCE * (position[:, :, None] * position[:, None]) + _BOX_LATERAL_M2
+    relative = np.where(cut, _HEIGHT_PER_WIDTH_LOG_STD, _BOX_RELATIVE_STD)
+    variance = relative * relative + STATURE_RELATIVE_STD**2
+    covariance = variance[:, None, None] * (position[:, :, None] * position[:, None])
+    covariance += _BOX_LATERAL_M2
     placed = zip(position, covariance, strict=True)
     return [pair if box else None for pair, box in zip(placed, boxes.tolist(), strict=True)]
+
+
+def cut_by_border(
+    camera: Camera, boxes_xyxy_px: FloatArray
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return (N,) True for boxes (N, 4) that end at the upper, and at the lower border."""
+    margin = _BORDER * camera.height_px
+    return boxes_xyxy_px[:, 1] < margin, boxes_xyxy_px[:, 3] > camera.height_px - margin

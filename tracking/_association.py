@@ -9,6 +9,7 @@ from scipy.optimize import linear_sum_assignment
 
 from perception.arrays import FloatArray
 
+from ._sizes import Sized
 from ._table import BoolArray, IndexArray
 
 
@@ -101,6 +102,7 @@ def associate(
     gates: Gates,
     people: IndexArray | None = None,
     wide: Wide | None = None,
+    sizes: Sized | None = None,
 ) -> Matches:
     """Match tracks to measurements one to one: confirmed tracks first, then the others.
 
@@ -120,10 +122,11 @@ def associate(
         people: (N,) equal for tracks of one person, which do not make each other ambiguous; None
             where every track is another person.
         wide: matches beyond the gates; None for none.
+        sizes: the measurements as each track takes them; None where that is as they are.
     """
     if not len(positions_m) or not len(measured_m):
         return _NO_MATCHES
-    edges = _edges(positions_m, covariances_m2, measured_m, noises_m2, gates, wide)
+    edges = _edges(positions_m, covariances_m2, measured_m, noises_m2, gates, wide, sizes)
     if not edges.tracks.size:
         return _NO_MATCHES
     partner = np.full(len(positions_m), -1, dtype=np.intp)
@@ -154,15 +157,21 @@ def _edges(
     noises_m2: FloatArray,
     gates: Gates,
     wide: Wide | None,
+    sizes: Sized | None,
 ) -> _Edges:
     """Return the matches that pass both gates, with their costs d² + ln det S."""
-    offset_x = measured_m[None, :, 0] - positions_m[:, None, 0]
-    offset_y = measured_m[None, :, 1] - positions_m[:, None, 1]
+    places_m = measured_m[None] if sizes is None else sizes.positions_odom_m
+    offset_x = places_m[..., 0] - positions_m[:, None, 0]
+    offset_y = places_m[..., 1] - positions_m[:, None, 1]
     near = offset_x * offset_x + offset_y * offset_y <= gates.distance_m**2
     flat = np.flatnonzero(near if wide is None else near | wide.near)
     tracks, measurements = np.divmod(flat, len(measured_m))
     x, y = offset_x.ravel()[flat], offset_y.ravel()[flat]
     spread = covariances_m2[tracks] + noises_m2[measurements]
+    if sizes is not None:
+        scale2 = sizes.scales[tracks, measurements] ** 2 - 1.0
+        spread += scale2[:, None, None] * noises_m2[measurements]
+        spread += sizes.extra[tracks, measurements]
     s_xx, s_xy, s_yy = spread[:, 0, 0], spread[:, 0, 1], spread[:, 1, 1]
     determinant = s_xx * s_yy - s_xy * s_xy
     distance2 = (s_yy * x * x - 2.0 * s_xy * x * y + s_xx * y * y) / determinant

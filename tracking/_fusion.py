@@ -25,8 +25,8 @@ from ._measurement import Frame, Measurements
 from ._sensors import Sensor, Sensors, seen_lately
 from ._table import BoolArray, TrackTable
 
-# A track keeps the range that was measured for this long.
-_RANGED_S: Final = 1.0
+#: A track keeps the range that was measured for this long.
+RANGED_S: Final = 1.0
 # How much further away than measured a person may be put, and how much nearer: tall people.
 _MOST_RATIO: Final = 1.8
 _MOST_NEARER_SHARE: Final = 0.15
@@ -70,7 +70,7 @@ def wide_match(
         return None
     if not len(tracks) or not len(measured):
         return None
-    rows = seen_lately(tracks, sensors.ranging, stamp_s, _RANGED_S)
+    rows = seen_lately(tracks, sensors.ranging, stamp_s, RANGED_S)
     measures = sensor.settings.measures_range
     if measures:
         within_s = max(absence_s(clock.period_s) for clock in _known(clocks, ~sensors.ranging))

@@ -18,6 +18,7 @@ from ._fusion import wide_match
 from ._kalman import correct
 from ._measurement import Frame, Measurements
 from ._sensors import Sensor, Sensors
+from ._sizes import Sized, lasting_after, sized, without_lasting
 from ._table import BoolArray, IndexArray, TrackTable
 from ._track_management import record_hits
 from ._twins import doubted, same_person
@@ -63,16 +64,20 @@ def match_frame(
     frame: Frame,
     dt_s: float,
     origin_m: tuple[float, float] | None,
+    velocity_mps: tuple[float, float],
     clocks: tuple[FrameClock, ...],
     sensors: Sensors,
-) -> tuple[TrackTable, Found]:
+) -> tuple[TrackTable, Found, Frame]:
     """Match the frame's measurements to the tracks and correct the tracks with them.
+
+    The frame is returned with its measurements as the matched tracks take them (``_sizes``).
 
     Args:
         tracks: N tracks, predicted to the frame.
         frame: its measurements.
         dt_s: since the frame before of the same sensor.
         origin_m: where the sensor without measured ranges stands or stood last; None if unknown.
+        velocity_mps: of that sensor.
         clocks: of all sensors, this frame included.
         sensors: all sensors.
     """
@@ -86,9 +91,15 @@ def match_frame(
         reach_m = _REACH_SIGMAS * config.initial_velocity_std_mps * period_s
         gates = replace(gates, distance_m=max(gates.distance_m, reach_m))
     wide = wide_match(tracks, measured, origin_m, sensor, sensors, clocks, frame.stamp_s)
-    found = _matches(tracks, measured, gates, wide)
+    sizes = sized(tracks, measured, origin_m)
+    found = _matches(tracks, measured, gates, wide, sizes)
     rows, columns = found.tracks, found.measurements
     covariances = tracks.covariances[rows]
+    if sizes is not None and origin_m is not None:
+        covariances, frame = without_lasting(
+            tracks, frame, sizes, rows, columns, velocity_mps, origin_m
+        )
+        measured = frame.measurements
     spreads = covariances[:, :2, :2]
     if wide is not None:
         spreads = spreads + found.wide[:, None, None] * wide.extra[rows, :2, :2]
@@ -101,7 +112,7 @@ def match_frame(
     )
     tracks = with_evidence(tracks, rows, logits, dt_s, config, frame.sensor)
     if not rows.size:
-        return tracks, Found(source, ambiguous, beyond, found.rivals)
+        return tracks, Found(source, ambiguous, beyond, found.rivals), frame
     source[rows], ambiguous[rows] = columns, found.ambiguous
     # An ambiguous measurement has less weight and leaves more uncertainty.
     factors = np.where(found.ambiguous, config.ambiguous_noise_factor, 1.0)
@@ -112,6 +123,9 @@ def match_frame(
         if sensor.settings.measures_range:
             # A place that jumps along the ray may be another person's.
             ambiguous |= beyond
+    if sizes is not None and origin_m is not None:
+        lasting = lasting_after(tracks, sizes, rows, columns, covariances, noises, origin_m)
+        tracks = tracks.replaced(lasting_stds=lasting)
     states, new_covariances = tracks.states.copy(), tracks.covariances.copy()
     states[rows], new_covariances[rows] = correct(
         states[rows], covariances, measured.positions_odom_m[columns], noises
@@ -122,7 +136,7 @@ def match_frame(
         places[rows] = floor_places(states[rows, :2], frame.T_odom_camera)
         tracks = tracks.replaced(last_places_camera_m=places)
     tracks = record_hits(tracks, rows, frame.stamp_s, period_s, config, frame.sensor)
-    return tracks, Found(source, ambiguous, beyond, found.rivals)
+    return tracks, Found(source, ambiguous, beyond, found.rivals), frame
 
 
 def _without_assumed_range(
@@ -138,7 +152,11 @@ def _without_assumed_range(
 
 
 def _matches(
-    tracks: TrackTable, measured: Measurements, gates: Gates, wide: Wide | None
+    tracks: TrackTable,
+    measured: Measurements,
+    gates: Gates,
+    wide: Wide | None,
+    sizes: Sized | None,
 ) -> Matches:
     """Return the matches of a frame.
 
@@ -149,7 +167,7 @@ def _matches(
     positions, covariances = tracks.states[:, :2], tracks.covariances[:, :2, :2]
     places, noises = measured.positions_odom_m, measured.noises_m2
     if not measured.weak.any():
-        return associate(positions, covariances, first, places, noises, gates, people, wide)
+        return associate(positions, covariances, first, places, noises, gates, people, wide, sizes)
     offered = np.flatnonzero(~measured.weak)
     everybody = np.arange(len(tracks))
     found = associate(
@@ -161,6 +179,7 @@ def _matches(
         gates,
         people,
         None if wide is None else wide.part(everybody, offered),
+        None if sizes is None else sizes.part(everybody, offered),
     )
     columns = offered[found.measurements]
     left = tracks.confirmed.copy()
@@ -175,6 +194,7 @@ def _matches(
         gates,
         None if people is None else people[rest],
         None if wide is None else wide.part(rest, offered),
+        None if sizes is None else sizes.part(rest, offered),
     )
     return Matches(
         np.concatenate((found.tracks, rest[second.tracks])),

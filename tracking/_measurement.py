@@ -19,6 +19,7 @@ from .awareness_filter import evidence, trusted_std
 # Limits far beyond any place a robot drives; the squares of larger numbers may overflow.
 _MAX_POSITION_M: Final = 1e7
 _MAX_VARIANCE_M2: Final = 1e6
+_LEAST_RANGE_M: Final = 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,6 +32,10 @@ class Measurements:
         evidence_means: (M,) of logit(α); NaN for "no evidence".
         evidence_variances: (M,) of logit(α); NaN for "no evidence".
         weak: (M,) True for detections with a score below ``weak_score``.
+        lasting_stds: (M,) part of the range's relative standard deviation that lasts; it is not in
+            ``noises_m2`` (``_sizes``).
+        size_logs: (M,) ln of the range by an adult's size over the range; NaN where unknown.
+        size_variances: (M,) of it, but for the size of the person; NaN where unknown.
     """
 
     positions_odom_m: FloatArray
@@ -38,6 +43,9 @@ class Measurements:
     evidence_means: FloatArray
     evidence_variances: FloatArray
     weak: BoolArray
+    lasting_stds: FloatArray
+    size_logs: FloatArray
+    size_variances: FloatArray
 
     def __len__(self) -> int:
         return len(self.positions_odom_m)
@@ -62,7 +70,14 @@ class Frame:
 
 _NO_EVIDENCE = np.empty(0)
 _NO_MEASUREMENTS = Measurements(
-    np.empty((0, 2)), np.empty((0, 2, 2)), _NO_EVIDENCE, _NO_EVIDENCE, np.empty(0, dtype=np.bool_)
+    np.empty((0, 2)),
+    np.empty((0, 2, 2)),
+    _NO_EVIDENCE,
+    _NO_EVIDENCE,
+    np.empty(0, dtype=np.bool_),
+    _NO_EVIDENCE,
+    _NO_EVIDENCE,
+    _NO_EVIDENCE,
 )
 
 
@@ -75,9 +90,10 @@ def measurements_of(
 ) -> Measurements:
     """Return the observations of the frame at ``stamp_s`` as measurements.
 
-    A position covariance is rotated with the camera, R Σ Rᵀ, and its x–y block is kept. A pose
-    covariance (3, 3) of the camera's x, y and yaw adds J Σ Jᵀ with J = [I, (t_y − p_y, p_x − t_x)]:
-    an error in yaw moves a person in proportion to their range.
+    A position covariance is rotated with the camera, R Σ Rᵀ, and its x–y block is kept. The part
+    that lasts from frame to frame is taken out, since the filter takes errors for independent.
+    A pose covariance (3, 3) of the camera's x, y and yaw adds J Σ Jᵀ with J = [I, (t_y − p_y,
+    p_x − t_x)]: an error in yaw moves a person in proportion to their range.
 
     Raises:
         TrackingError: naming an observation that is not a ``PersonObservation``, has another stamp
@@ -93,6 +109,10 @@ def measurements_of(
         offsets = places @ to_floor.T
         positions = offsets + origin
         noises = to_floor @ spreads @ to_floor.T
+        lasting = np.array([one.range_lasting_relative_std for one in checked])
+        if lasting.any():
+            moved = lasting[:, None] * offsets
+            noises = noises - moved[:, :, None] * moved[:, None, :]
         if pose_covariance_odom is not None:
             noises = noises + _pose_noise(offsets, pose_covariance_odom)
         variances = noises[:, 0, 0] + noises[:, 1, 1]
@@ -124,7 +144,22 @@ def measurements_of(
         means,
         evidence_variances,
         np.array([one.score < config.weak_score for one in checked]),
+        lasting,
+        *_sizes(checked, places),
     )
+
+
+def _sizes(
+    checked: tuple[PersonObservation, ...], places_m: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return ``size_logs`` and ``size_variances`` of the observations."""
+    if all(one.size_range_m is None for one in checked):
+        unknown = np.full(len(checked), np.nan)
+        return unknown, unknown
+    pairs = [(one.size_range_m, one.size_range_relative_std) for one in checked]
+    ranges_m, stds = np.array(pairs, dtype=np.float64).T
+    placed_m = np.maximum(np.sqrt((places_m * places_m).sum(axis=1)), _LEAST_RANGE_M)
+    return np.log(ranges_m / placed_m), stds * stds
 
 
 def _checked_observations(

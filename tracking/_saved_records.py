@@ -50,6 +50,9 @@ class TracksRecord(StrictConfig):
     look_speeds_mps: list[float]
     look_standing: list[bool]
     averted_s: list[float]
+    lasting_stds: list[Annotated[float, Field(ge=0.0, le=1e3)]] | None = None
+    size_logs: list[float] | None = None
+    size_variances: list[Annotated[float, Field(gt=0.0)] | None] | None = None
     places: list[Annotated[list[PlainPlace], Field(max_length=SLOTS)]] | None = None
 
     @model_validator(mode="after")
@@ -101,6 +104,7 @@ class StateRecord(StrictConfig):
     clocks: dict[str, FrameClockRecord]
     faces: FrameClockRecord
     origin_odom_m: _Two | None
+    origin_velocity_mps: _Two = (0.0, 0.0)
     exits: ExitsRecord
     next_id: int = Field(ge=1, lt=2**63)
     tracks: TracksRecord
@@ -140,6 +144,9 @@ class FrameRecord(StrictConfig):
     evidence_means: list[float | None]
     evidence_variances: list[float | None]
     weak: list[bool]
+    lasting_stds: list[Annotated[float, Field(ge=0.0, le=1e3)]] | None = None
+    size_logs: list[float | None] | None = None
+    size_variances: list[float | None] | None = None
 
     @model_validator(mode="after")
     def _check_consistency(self) -> FrameRecord:
@@ -149,6 +156,11 @@ class FrameRecord(StrictConfig):
             len(self.evidence_means),
             len(self.evidence_variances),
             len(self.weak),
+            *(
+                len(column)
+                for column in (self.lasting_stds, self.size_logs, self.size_variances)
+                if column is not None
+            ),
         }
         if len(lengths) > 1:
             raise ValueError("every column of a frame must have one entry per observation")

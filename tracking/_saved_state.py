@@ -172,6 +172,9 @@ def state_of(
         look_speeds_mps=_array(tracks.look_speeds_mps),
         look_standing=np.array(tracks.look_standing, dtype=np.bool_),
         averted_s=_array(tracks.averted_s),
+        lasting_stds=_array(tracks.lasting_stds or [0.0] * count),
+        size_logs=_array(tracks.size_logs or [0.0] * count),
+        size_variances=_array(tracks.size_variances or [None] * count, math.inf),
         places=places_of(tracks.places or (), count, window_s),
     )
     events = record.exits
@@ -188,6 +191,7 @@ def state_of(
         _clock(record.faces),
         exits,
         record.origin_odom_m,
+        record.origin_velocity_mps,
     )
 
 
@@ -217,6 +221,9 @@ def frame_of(record: FrameRecord, names: Sequence[str], name: str) -> Frame:
             _array(record.evidence_means, math.nan),
             _array(record.evidence_variances, math.nan),
             np.array(record.weak, dtype=np.bool_),
+            _array(record.lasting_stds or [0.0] * count),
+            _array(record.size_logs or [None] * count),
+            _array(record.size_variances or [None] * count),
         ),
         list(names).index(record.sensor),
     )
@@ -248,6 +255,7 @@ def _plain_state(state: TrackerState, sensors: Sensors) -> dict[str, Any]:
         },
         "faces": _plain_clock(state.faces),
         "origin_odom_m": state.origin_odom_m,
+        "origin_velocity_mps": state.origin_velocity_mps,
         "exits": {
             "places_camera_m": state.exits.places_camera_m.tolist(),
             "returned": state.exits.returned.tolist(),
@@ -282,6 +290,9 @@ def _plain_state(state: TrackerState, sensors: Sensors) -> dict[str, Any]:
             "look_speeds_mps": tracks.look_speeds_mps.tolist(),
             "look_standing": tracks.look_standing.tolist(),
             "averted_s": tracks.averted_s.tolist(),
+            "lasting_stds": tracks.lasting_stds.tolist(),
+            "size_logs": tracks.size_logs.tolist(),
+            "size_variances": _finite_or_none(tracks.size_variances),
             "places": plain_places(tracks.places),
         },
     }
@@ -298,6 +309,9 @@ def _plain_frame(frame: Frame, sensors: Sensors) -> dict[str, Any]:
         "evidence_means": _finite_or_none(measured.evidence_means),
         "evidence_variances": _finite_or_none(measured.evidence_variances),
         "weak": measured.weak.tolist(),
+        "lasting_stds": measured.lasting_stds.tolist(),
+        "size_logs": _finite_or_none(measured.size_logs),
+        "size_variances": _finite_or_none(measured.size_variances),
     }
 
 

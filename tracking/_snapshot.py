@@ -11,6 +11,7 @@ from ._awareness_update import belief_of
 from ._faces import face_period_s
 from ._noticed import noticed
 from ._sensors import Sensors
+from ._sizes import with_lasting
 from ._step import TrackerState, predicted
 from ._stillness import moved
 from ._table import BoolArray, TrackTable
@@ -55,9 +56,10 @@ def snapshots(state: TrackerState, stamp_s: float, sensors: Sensors) -> tuple[Pe
     estimated = estimate(belief, config.awareness)
     moved_m, moved_stamps_s = moved(tracks, config.standing_window_s)
     moved_ages_s = np.where(np.isfinite(moved_m), stamp_s - moved_stamps_s, 0.0)
+    covariances = with_lasting(tracks, state.origin_odom_m, state.origin_velocity_mps)
     # The snapshots share these arrays.
     tracks.states.setflags(write=False)
-    tracks.covariances.setflags(write=False)
+    covariances.setflags(write=False)
     return tuple(
         map(
             trusted_track,
@@ -66,7 +68,7 @@ def snapshots(state: TrackerState, stamp_s: float, sensors: Sensors) -> tuple[Pe
             _statuses(tracks.confirmed.tolist(), current.tolist()),
             tracks.states[:, :2],
             tracks.states[:, 2:],
-            tracks.covariances,
+            covariances,
             np.asarray(estimated.awareness).tolist(),
             np.asarray(estimated.awareness_std).tolist(),
             np.asarray(estimated.awareness_lower).tolist(),

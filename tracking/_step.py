@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import Final
 
 import numpy as np
 
@@ -14,13 +15,14 @@ from ._clocks import FrameClock
 from ._config import TrackerConfig
 from ._exits import Exits, absence_s, walked_out
 from ._faces import evidence_interval_s, face_period_s
-from ._fusion import duplicates
+from ._fusion import RANGED_S, duplicates
 from ._matching import Found, match_frame
-from ._measurement import Frame
+from ._measurement import Frame, Measurements
 from ._motion import predict
 from ._noticed import with_noticed
 from ._places import slots_of
 from ._sensors import Sensors, seen_lately
+from ._sizes import with_sizes, with_sizes_forgotten
 from ._stillness import with_places
 from ._table import BoolArray, TrackTable
 from ._track_management import (
@@ -31,6 +33,9 @@ from ._track_management import (
     missed_time_s,
 )
 from ._twins import doubted, with_hosts, with_lower_evidence, with_twins, without
+
+# Of two frames nearer to each other, the camera's velocity is not known.
+_LEAST_STEP_S: Final = 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,8 +49,8 @@ class TrackerState:
         stamp_s: of the latest frame of any sensor, or None before the first.
         faces: clock of the frames of all sensors that see faces.
         exits: where people have appeared before the camera and vanished.
-        origin_odom_m: x and y of the latest sensor without measured ranges, or None before it. Only
-            kept where other sensors measure ranges.
+        origin_odom_m: x and y of the latest sensor without measured ranges, or None before it.
+        origin_velocity_mps: of that sensor, from its latest two frames.
     """
 
     tracks: TrackTable
@@ -55,6 +60,7 @@ class TrackerState:
     faces: FrameClock = field(default_factory=FrameClock)
     exits: Exits = field(default_factory=Exits.none)
     origin_odom_m: tuple[float, float] | None = None
+    origin_velocity_mps: tuple[float, float] = (0.0, 0.0)
 
     @property
     def periods_s(self) -> FloatArray:
@@ -86,7 +92,17 @@ def advance(state: TrackerState, frame: Frame, sensors: Sensors) -> TrackerState
         tracks = without(tracks, expired, config)
         tracks = predicted(tracks, previous, stamp, config)
     before = tracks
-    tracks, found = match_frame(tracks, frame, dt_s, state.origin_odom_m, state.clocks, sensors)
+    given = measured
+    tracks, found, frame = match_frame(
+        tracks,
+        frame,
+        dt_s,
+        state.origin_odom_m,
+        state.origin_velocity_mps,
+        state.clocks,
+        sensors,
+    )
+    measured = frame.measurements
     followed = None
     if len(sensors) > 1:
         own = np.arange(len(sensors)) == sensor.index
@@ -101,6 +117,7 @@ def advance(state: TrackerState, frame: Frame, sensors: Sensors) -> TrackerState
         initiated = initiate(frame, unmatched, state.next_id, config, len(sensors))
         tracks = with_hosts(tracks.append(initiated), len(initiated), config)
         found = found.with_births(np.flatnonzero(unmatched))
+    tracks = _with_sizes(tracks, frame, given, found, state, sensors)
     tracks = _with_awareness(tracks, frame, found, earlier, state, sensors)
     tracks = with_noticed(before, tracks, frame, found, faces, dt_s, state.clocks, sensors)
     tracks = with_places(tracks, frame, found, sensors)
@@ -139,14 +156,44 @@ def predicted(tracks: TrackTable, from_s: float, to_s: float, config: TrackerCon
 def _with_clocks(state: TrackerState, frame: Frame, sensors: Sensors) -> TrackerState:
     """Return the state with the clocks, and the place of the camera, after a frame."""
     sensor, stamp = sensors.all[frame.sensor], frame.stamp_s
-    clocks = list(state.clocks)
+    clocks, last_s = list(state.clocks), state.clocks[sensor.index].stamp_s
     clocks[sensor.index] = clocks[sensor.index].after(stamp)
-    origin = state.origin_odom_m
-    if sensors.mixed and not sensor.settings.measures_range:
+    origin, velocity = state.origin_odom_m, state.origin_velocity_mps
+    if not sensor.settings.measures_range:
         x_m, y_m = frame.T_odom_camera[:2, 3].tolist()
+        if origin is not None and last_s is not None and stamp - last_s >= _LEAST_STEP_S:
+            dt_s = stamp - last_s
+            velocity = ((x_m - origin[0]) / dt_s, (y_m - origin[1]) / dt_s)
         origin = (x_m, y_m)
     faces = state.faces.after(stamp) if sensor.settings.sees_faces else state.faces
-    return replace(state, clocks=tuple(clocks), stamp_s=stamp, faces=faces, origin_odom_m=origin)
+    return replace(
+        state,
+        clocks=tuple(clocks),
+        stamp_s=stamp,
+        faces=faces,
+        origin_odom_m=origin,
+        origin_velocity_mps=velocity,
+    )
+
+
+def _with_sizes(
+    tracks: TrackTable,
+    frame: Frame,
+    given: Measurements,
+    found: Found,
+    state: TrackerState,
+    sensors: Sensors,
+) -> TrackTable:
+    """Return the tracks with what a frame, whose measurements were ``given``, says of sizes."""
+    tracks = with_sizes_forgotten(tracks, found.ambiguous)
+    if sensors.all[frame.sensor].settings.measures_range:
+        return tracks
+    certain = found.seen & ~found.ambiguous
+    certain[found.seen] &= ~given.weak[found.source[found.seen]]
+    ranged = seen_lately(tracks, sensors.ranging, frame.stamp_s, RANGED_S)
+    return with_sizes(
+        tracks, given, found.source, certain, found.beyond, ranged, state.origin_odom_m
+    )
 
 
 def _with_awareness(

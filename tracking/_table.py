@@ -52,6 +52,10 @@ class TrackTable:
         look_speeds_mps: (N,) least speed since then.
         look_standing: (N,) whether the person has stood since then.
         averted_s: (N,) for how long frames since then have shown a face that looks away.
+        lasting_stds: (N,) relative standard deviation of the range from the camera that lasts; it
+            is not in ``covariances`` (``_sizes``).
+        size_logs: (N,) ln of the range at which an adult would look as large, over the range.
+        size_variances: (N,) of it; ∞ where nothing is known of the person's size.
         places: (N, K, 4) latest measured places (``_stillness``), oldest first; K is 0 where nobody
             asks for them.
     """
@@ -83,6 +87,9 @@ class TrackTable:
     look_speeds_mps: FloatArray
     look_standing: BoolArray
     averted_s: FloatArray
+    lasting_stds: FloatArray
+    size_logs: FloatArray
+    size_variances: FloatArray
     places: FloatArray
 
     @staticmethod
@@ -118,6 +125,9 @@ class TrackTable:
             look_speeds_mps=no_numbers,
             look_standing=no_flags,
             averted_s=no_numbers,
+            lasting_stds=no_numbers,
+            size_logs=no_numbers,
+            size_variances=no_numbers,
             places=np.empty((0, places, 4)),
         )
 

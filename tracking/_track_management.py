@@ -79,6 +79,9 @@ def initiate(
         look_speeds_mps=np.zeros(count),
         look_standing=np.zeros(count, dtype=np.bool_),
         averted_s=np.zeros(count),
+        lasting_stds=measured.lasting_stds[unmatched],
+        size_logs=np.zeros(count),
+        size_variances=np.full(count, np.inf),
         places=no_places(count, config.standing_window_s),
     )
 

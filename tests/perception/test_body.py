@@ -138,3 +138,18 @@ def test_the_box_of_a_standing_adult_gives_a_rough_position():
     error = position - person.chest_camera_m
     assert error @ np.linalg.solve(covariance, error) < 7.81
     assert place_box(CAMERA, np.array([100.0, 100.0, 100.0, 100.0])) is None
+
+
+@pytest.mark.parametrize("shown", [0.35, 0.5, 0.7, 0.9])
+def test_a_box_that_the_border_cuts_is_no_small_person_far_away(shown):
+    """The lower border ends the picture of an adult 0.55 m wide, 1.5 m away."""
+    width, height = 0.55 / 1.5 * CAMERA.fx_px, 1.74 / 1.5 * CAMERA.fy_px
+    lower = float(CAMERA.height_px)
+    top = lower - shown * height
+    position, covariance = place_box(CAMERA, np.array([600.0, top, 600.0 + width, lower]))
+    assert position[2] == pytest.approx(1.5, rel=0.2)
+    # The same box in the middle of the image may be a whole one, and is farther away.
+    inside, _ = place_box(CAMERA, np.array([600.0, top - 60.0, 600.0 + width, lower - 60.0]))
+    assert inside[2] >= position[2]
+    error = position - np.array([0.0, position[1], 1.5])
+    assert error[2] ** 2 < 3.84 * covariance[2, 2]

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from synthetic_people import person_at
 
 from perception import Camera, FloorPlane, HeadPose, PersonDetection, PersonKeypoints
-from perception._depth_cues import DepthCue, combine_cues
+from perception._depth_cues import DepthCue, combine_cues, combined_range
 from perception._placement import place_people
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
@@ -155,7 +155,7 @@ def head_of(person, rng=None, *, range_std=0.05, stature_m=1.74, factor=None):
 
 def place(shown, detection, head=None, floor=None):
     (placed,) = place_people(CAMERA, (detection,), (shown,), (head,), floor, 1.0, 0.3)
-    return placed
+    return placed.position_camera_m, placed.covariance_m2
 
 
 def test_more_cues_lower_the_error_and_agree_with_the_covariance():
@@ -268,3 +268,102 @@ def test_flat_skeletons_have_wider_ranges():
     assert covariance[2, 2] > 1.5 * lifted[2, 2]
     error = position - person.chest_camera_m
     assert error @ np.linalg.solve(covariance, error) < 7.81
+
+
+# --- people of any size -------------------------------------------------------------------------
+
+
+def test_a_single_cue_has_the_standard_deviation_of_the_mixture():
+    """Drawn from the mixture, errors about the adult have the deviation that is reported."""
+    rng = np.random.default_rng(8)
+    unusual = rng.random(200_000) < 0.2
+    size = np.where(unusual, 0.3 + 0.2 * rng.normal(size=200_000), 0.05 * rng.normal(size=200_000))
+    drawn = size + 0.04 * rng.normal(size=200_000)
+    one = combined_range([DepthCue(0.0, math.hypot(0.05, 0.04), 0.05, 0.03, 0.2, 0.3)], 0.2)
+    assert one.log_range == 0.0
+    assert one.log_std == pytest.approx(math.sqrt(np.mean(drawn**2)), rel=0.01)
+    assert one.lasting_std == pytest.approx(math.sqrt(np.mean(size**2)), rel=0.01)
+
+
+@given(st.lists(cue, min_size=2, max_size=4), st.floats(0.0, 0.3))
+def test_the_lasting_part_is_a_part(cues, unusual):
+    together = combined_range(cues, unusual)
+    assert 0.0 <= together.lasting_std <= together.log_std
+    assert (together.log_range, together.log_std) == combine_cues(cues, unusual)
+
+
+@given(st.floats(0.2, 0.8))
+def test_feet_that_seem_nearer_are_believed_and_feet_that_seem_farther_are_not(off):
+    body = DepthCue(0.0, 0.06, 0.05, 0.03, 0.2, 0.3)
+    nearer, farther = (
+        combined_range([body, DepthCue(value, 0.04, 0.0, 0.1, outlier_farther=0.9)], 0.2)
+        for value in (-off, off + 0.2)
+    )
+    assert nearer.log_range == pytest.approx(-off, abs=0.05)
+    assert abs(farther.log_range) < 0.05
+    assert farther.log_std > 0.1 * off
+
+
+STATURES_M = (1.0, 1.15, 1.3, 1.5, 1.74, 1.9)
+
+
+def errors_of(rng, floor, count=30, stature_m=None, **options):
+    """Return relative range errors and squared Mahalanobis distances of people at 3 to 6 m."""
+    off, inside = [], []
+    for number in range(count):
+        stature = stature_m or STATURES_M[number % len(STATURES_M)]
+        person, shown, detection = seen_person(
+            rng,
+            stature_m=stature,
+            depth=rng.uniform(3.0, 6.0),
+            yaw=rng.uniform(-3.1, 3.1),
+            **options,
+        )
+        position, covariance = place(shown, detection, None, floor)
+        error = position - person.chest_camera_m
+        off.append(np.linalg.norm(position) / np.linalg.norm(person.chest_camera_m) - 1.0)
+        inside.append(error @ np.linalg.solve(covariance, error) < 7.81)
+    return np.array(off), np.array(inside)
+
+
+def test_without_further_cues_the_covariance_covers_children():
+    off, inside = errors_of(np.random.default_rng(9), None, count=60)
+    assert off.max() > 0.7
+    assert inside.mean() >= 0.95
+    adults, _ = errors_of(np.random.default_rng(9), None, stature_m=1.74)
+    assert np.median(np.abs(adults)) <= 0.04
+
+
+@pytest.mark.parametrize("stature_m", STATURES_M)
+def test_feet_on_a_known_floor_place_people_of_any_stature(stature_m):
+    off, inside = errors_of(np.random.default_rng(10), FLOOR, stature_m=stature_m)
+    assert np.median(np.abs(off)) <= 0.08
+    assert inside.mean() >= 0.9
+
+
+@pytest.mark.parametrize("stature_m", [1.1, 1.4, 1.74])
+def test_knees_place_people_whose_feet_are_hidden(stature_m):
+    rng, off = np.random.default_rng(11), []
+    for _ in range(20):
+        person, shown, detection = seen_person(rng, stature_m=stature_m, depth=4.0)
+        scores = np.array(shown.scores)
+        scores[15:17] = 0.0
+        hidden = PersonKeypoints(shown.keypoints_px, shown.keypoints_root_m, scores, "coco")
+        box = np.array(detection.box_xyxy_px)
+        box[3] = shown.keypoints_px[13:15, 1].mean()
+        position, _ = place(hidden, PersonDetection(box, 0.9), None, FLOOR)
+        off.append(np.linalg.norm(position) / np.linalg.norm(person.chest_camera_m) - 1.0)
+    assert np.median(np.abs(off)) <= 0.08
+
+
+def test_the_lower_edge_of_a_box_counts_only_where_feet_may_be_in_it():
+    """A skeleton without ankles and without limbs to be placed by: the box ends above the feet."""
+    rng = np.random.default_rng(12)
+    _, shown, detection = seen_person(rng, depth=4.0)
+    scores = np.zeros(17)
+    scores[:2] = 1.0
+    two = PersonKeypoints(shown.keypoints_px, shown.keypoints_root_m, scores, "coco")
+    box = np.array(detection.box_xyxy_px)
+    box[3] = 0.5 * (box[1] + box[3])
+    cut = PersonDetection(box, 0.9)
+    np.testing.assert_array_equal(place(two, cut, None, FLOOR)[0], place(two, cut)[0])

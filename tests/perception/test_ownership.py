@@ -206,8 +206,9 @@ def test_only_one_of_two_boxes_has_the_awareness_of_a_skeleton():
     assert first.awareness_reason is None
     assert (second.awareness, second.awareness_std, second.gaze_camera) == (None, None, None)
     assert second.awareness_reason == SKELETON
-    # They are placed by the box, with the uncertainty of that.
-    spread = [np.trace(each.position_covariance_m2) for each in (first, second)]
+    # They are placed by the box, with the uncertainty of that across the ray. Along the ray, that
+    # of the stature is in both.
+    spread = [each.position_covariance_m2[0, 0] for each in (first, second)]
     assert spread[1] > 5.0 * spread[0]
     assert second.position_camera_m[0] > first.position_camera_m[0]
 
