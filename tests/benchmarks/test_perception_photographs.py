@@ -1,0 +1,100 @@
+"""Judging on photographs: matching, figures, bad folders, and the shipped networks as they are."""
+
+from __future__ import annotations
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+from paths import SHARED
+
+from benchmarks.perception_photographs import (
+    LABELS,
+    PhotographResult,
+    aware_lines,
+    figures,
+    judge_folder,
+    main,
+    matched,
+    read_labels,
+    sheet,
+)
+from perception import PersonObservation
+
+DEV = SHARED / "images" / "dev"
+
+
+def seen(box, alpha=None, score=0.8):
+    return PersonObservation(
+        stamp_s=0.0,
+        position_camera_m=np.array([0.0, 0.0, 3.0]),
+        position_covariance_m2=np.eye(3),
+        gaze_camera=None if alpha is None else np.array([0.0, 0.0, -1.0]),
+        awareness=alpha,
+        awareness_std=None if alpha is None else 0.1,
+        score=score,
+        box_xyxy_px=np.array(box, dtype=float),
+    )
+
+
+def test_each_box_matches_once_and_the_most_people_count():
+    truth = np.array([[0.0, 0.0, 10.0, 20.0], [6.0, 0.0, 16.0, 20.0]])
+    found = np.array([[3.0, 0.0, 13.0, 20.0], [0.0, 0.0, 10.0, 20.0], [50.0, 0.0, 60.0, 20.0]])
+    assert matched(truth, found) == ((0, 1), (1, 0))
+    assert matched(truth, np.zeros((0, 4))) == ()
+    assert matched(np.zeros((0, 4)), found) == ()
+    assert matched(truth[:1], found[:1], min_iou=0.6) == ()
+
+
+def test_figures_count_people_pictures_and_false_positives():
+    truth = np.array([[0.0, 0.0, 10.0, 20.0], [50.0, 0.0, 60.0, 20.0]])
+    results = [
+        PhotographResult("a.jpg", truth, (seen([0, 0, 10, 20]), seen([90, 0, 99, 9])), ((0, 0),)),
+        PhotographResult("b.jpg", np.zeros((0, 4)), (seen([1, 1, 9, 9], 0.7),), ()),
+    ]
+    assert figures(results) == {
+        "people": 2,
+        "pictures": 2,
+        "recall": 0.5,
+        "false_per_picture": 1.0,
+    }
+    (line,) = aware_lines(results)
+    assert line == "b.jpg: α = 0.70 ± 0.10, score 0.80, no labelled person at 1, 1, 9, 9"
+
+
+def test_bad_folders_are_refused(tmp_path, capsys):
+    with pytest.raises(ValueError, match=f"must hold photographs and {LABELS}"):
+        read_labels(tmp_path)
+    label = {"a.jpg": {"size": [9, 9], "people_xyxy_px": [[5, 5, 1, 1]]}}
+    (tmp_path / LABELS).write_text(json.dumps(label), encoding="utf-8")
+    with pytest.raises(ValueError, match=r"boxes of a\.jpg must be x0, y0, x1, y1"):
+        read_labels(tmp_path)
+    label["a.jpg"]["people_xyxy_px"] = [[1, 1, 5, 5]]
+    (tmp_path / LABELS).write_text(json.dumps(label), encoding="utf-8")
+    with pytest.raises(SystemExit):
+        main([str(tmp_path)])
+    assert "a.jpg must be a photograph that OpenCV reads" in capsys.readouterr().err
+
+
+def test_a_picture_of_noise_has_nobody_and_gets_a_sheet(tmp_path, capsys):
+    noise = np.random.default_rng(0).integers(100, 156, (120, 160, 3), np.uint8)
+    cv2.imwrite(str(tmp_path / "n.png"), noise)
+    label = {"n.png": {"size": [160, 120], "people_xyxy_px": [[10, 10, 50, 110]]}}
+    (tmp_path / LABELS).write_text(json.dumps(label), encoding="utf-8")
+    main([str(tmp_path), "--sheet", str(tmp_path / "sheet.png")])
+    text = capsys.readouterr().out
+    assert "1 people in 1 photographs: recall 0.00" in text
+    assert "nobody" in text
+    assert cv2.imread(str(tmp_path / "sheet.png")).shape == (480, 1920, 3)
+
+
+@pytest.mark.skipif(not DEV.is_dir(), reason="the photographs of ../shared are not here")
+def test_the_shipped_networks_on_photographs_are_measured_as_they_are():
+    """The networks know renders: the test holds the measurement together, not their quality."""
+    results = judge_folder(DEV)
+    found = figures(results)
+    assert (found["people"], found["pictures"]) == (19, 14)
+    assert 0.2 < found["recall"] <= 1.0
+    assert 0.0 <= found["false_per_picture"] < 3.0
+    assert sheet(DEV, results).shape == (1920, 1920, 3)
