@@ -212,11 +212,11 @@ def _overlap(boxes: Sequence[FloatArray]) -> bool:
 
 
 def _common(first: FloatArray, second: FloatArray) -> float:
-    a, b, c, d = first.tolist()
-    e, f, g, h = second.tolist()
-    return max(min(c, g) - max(a, e), 0.0) * max(min(d, h) - max(b, f), 0.0)
+    low, high = np.maximum(first[:2], second[:2]), np.minimum(first[2:], second[2:])
+    across, down = (high - low).tolist()
+    return float(max(across, 0.0) * max(down, 0.0))
 
 
 def _area(box: FloatArray) -> float:
     left, top, right, bottom = box.tolist()
-    return max(right - left, 0.0) * max(bottom - top, 0.0)
+    return float(max(right - left, 0.0) * max(bottom - top, 0.0))

@@ -14,7 +14,8 @@ from ...arrays import ImageRgb, finite_number
 from ...errors import PerceptionError
 from .._image import rgb_image
 from .._image_input import input_batch, input_dtype, input_size, run_on_images
-from .._model import ModelSource, OnnxModel, OnnxSettings, as_onnx_model
+from .._model import ModelSource, OnnxModel, as_onnx_model
+from .._settings import OnnxSettings
 from ._decoders import Floats
 from ._layouts import DetectorLayout, TrialRun, metadata_size, recognise
 from ._letterbox import Letterbox, LetterboxGeometry
