@@ -17,9 +17,10 @@ from .arrays import FloatArray, ImageRgb
 _SAMPLES: Final = 60
 _CELL_SAMPLES: Final = 5
 # A cell has changed if it differs by more than so many grey levels, and so many times the median of
-# all cells: noise, light and a camera that moves change all of them.
+# all cells: noise and light change all of them. With a larger median the camera moves.
 _LEAST_CHANGE: Final = 4.0
 _TIMES_MEDIAN: Final = 3.0
+_CAMERA_MOVES: Final = 6.0
 # A change in so many cells is no noise. If more than this share of all cells changes by a lot, the
 # scene is another one.
 _FEWEST_CELLS: Final = 2
@@ -42,16 +43,18 @@ class SceneChanges:
     def found_in(self, image_rgb: ImageRgb, boxes_px: Sequence[FloatArray]) -> bool:
         """Return whether an image shows another scene, or something new outside the boxes (4,).
 
-        Changes are compared with the median over the image. So a camera that moves over a textured
-        scene hides small changes, and shows none where nothing but the camera moves.
+        Changes are compared with the median over the image. If that is large, because the camera
+        moves or its noise is strong, only another scene counts.
         """
         changes = self.cells(image_rgb)
         if changes is None:
             return True
         if np.count_nonzero(changes > _LARGE_CHANGE) > _SCENE_SHARE * changes.size:
             return True
-        level = max(_LEAST_CHANGE, _TIMES_MEDIAN * float(np.median(changes)))
-        changed = changes > level
+        median = float(np.median(changes))
+        if median > _CAMERA_MOVES:
+            return False
+        changed = changes > max(_LEAST_CHANGE, _TIMES_MEDIAN * median)
         side = self._step * _CELL_SAMPLES
         for box in boxes_px:
             left, top, right, bottom = (box / side).tolist()
