@@ -71,7 +71,7 @@ class CarriedBoxes:
 
     Args:
         detector: finds people.
-        every_s: longest time between two looks, in (0, 0.2].
+        every_s: longest time between two looks, in [0, 0.2]; it may be set anew.
         min_score: keypoints with a lower score count as not seen.
     """
 
@@ -118,6 +118,11 @@ class CarriedBoxes:
         if not detections:
             self._people = []
         return detections
+
+    @property
+    def looked(self) -> bool:
+        """True if the detector has looked at the last image."""
+        return not self._carrying
 
     def follow(
         self,

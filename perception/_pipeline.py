@@ -17,6 +17,7 @@ from ._carried_boxes import MAX_DETECT_EVERY_S, CarriedBoxes
 from ._depth_image import checked_depth
 from ._detection import PersonDetection
 from ._floor import FloorPlane
+from ._frame_budget import FrameBudget
 from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
 from ._metric_scale import DEFAULT_MIN_SCORE
@@ -107,6 +108,8 @@ class AwarenessPipeline:
             image. The detector also looks where something has changed outside the boxes, where
             people overlap, and at once where the pose network finds a person no more. Images must
             then follow each other; a jump in time needs the detector.
+        frame_budget_s: time for a frame, in place of ``detect_every_s``: the detector looks at
+            every image while frames take less than that, else less often, down to every 0.2 s.
 
     Raises:
         PerceptionError: for an invalid value, or a shipped network that cannot be loaded.
@@ -127,6 +130,7 @@ class AwarenessPipeline:
         eye_in_head_std_rad: Any = DEFAULT_EYE_IN_HEAD_STD_RAD,
         onnx_settings: OnnxSettings | None = None,
         detect_every_s: float = 0.0,
+        frame_budget_s: float | None = None,
     ) -> None:
         if not isinstance(camera, Camera):
             raise PerceptionError(f"camera must be a Camera, got {type(camera).__name__}")
@@ -158,8 +162,15 @@ class AwarenessPipeline:
         detect_every_s = finite_number(
             "detect_every_s", detect_every_s, minimum=0.0, maximum=MAX_DETECT_EVERY_S
         )
+        self._budget: FrameBudget | None = None
+        if frame_budget_s is not None:
+            if detect_every_s > 0.0:
+                raise PerceptionError("give detect_every_s or frame_budget_s, got both")
+            self._budget = FrameBudget(
+                finite_number("frame_budget_s", frame_budget_s, minimum=0.0, exclusive_minimum=True)
+            )
         self._carrier: CarriedBoxes | None = None
-        if detect_every_s > 0.0:
+        if detect_every_s > 0.0 or self._budget is not None:
             self._carrier = CarriedBoxes(detector, detect_every_s, self._min_score)
         self._timings = StageTimings()
 
@@ -211,10 +222,12 @@ class AwarenessPipeline:
         detections = self._detections(image_rgb, stamp_s)
         detected = perf_counter()
         if not detections:
-            self._timings = StageTimings(
-                detected - ready,
-                rest_s=ready - began,
-                networks_s=NETWORK_TIME.elapsed_s - run_before_s,
+            self._note(
+                StageTimings(
+                    detected - ready,
+                    rest_s=ready - began,
+                    networks_s=NETWORK_TIME.elapsed_s - run_before_s,
+                )
             )
             return ()
         people, disowned = self._keypoints(image_rgb, detections)
@@ -251,14 +264,24 @@ class AwarenessPipeline:
             if place is not None
         )
         rest = ready - began + perf_counter() - headed
-        self._timings = StageTimings(
-            detected - ready,
-            posed - detected,
-            headed - posed,
-            rest,
-            NETWORK_TIME.elapsed_s - run_before_s,
+        self._note(
+            StageTimings(
+                detected - ready,
+                posed - detected,
+                headed - posed,
+                rest,
+                NETWORK_TIME.elapsed_s - run_before_s,
+            )
         )
         return observations
+
+    def _note(self, timings: StageTimings) -> None:
+        """Keep the times of a frame, and choose when the detector looks next."""
+        self._timings = timings
+        if self._budget is not None and self._carrier is not None:
+            looked = timings.detector_s if self._carrier.looked else None
+            self._budget.record(looked, timings.total_s - timings.detector_s)
+            self._carrier.every_s = self._budget.every_s
 
     def _detections(self, image_rgb: ImageRgb, stamp_s: float) -> tuple[PersonDetection, ...]:
         if self._carrier is None:

@@ -68,6 +68,7 @@ class BridgeOptions:
     provider: str
     provider_options: str
     detect_every_s: float
+    frame_budget_s: float | None
     image: str
     compressed: bool
     camera_info: str
@@ -167,6 +168,7 @@ def _networks(options: BridgeOptions) -> tuple[Networks, tuple[str, ...]]:
         provider=options.provider,
         provider_options=options.provider_options.split(),
         detect_every_s=options.detect_every_s,
+        frame_budget_s=options.frame_budget_s,
     )
     if options.no_camera:
         return networks, ()

@@ -86,6 +86,7 @@ def choose_networks(
     provider: str = "cpu",
     provider_options: Sequence[str] = (),
     detect_every_s: float = 0.0,
+    frame_budget_s: float | None = None,
 ) -> Networks:
     """Load the networks.
 
@@ -101,6 +102,7 @@ def choose_networks(
         provider: one of :data:`~perception.networks.PROVIDERS`.
         provider_options: its options, as ``KEY=VALUE``.
         detect_every_s: as :class:`~perception.AwarenessPipeline` takes it.
+        frame_budget_s: the same.
 
     Raises:
         PerceptionError: for a file that is missing, damaged or of an unknown layout.
@@ -119,7 +121,7 @@ def choose_networks(
         detector_used,
         pose_used,
         head_used,
-        {"detect_every_s": detect_every_s} if detect_every_s else {},
+        {"detect_every_s": detect_every_s, "frame_budget_s": frame_budget_s},
         training_domains=domains,
     )
 

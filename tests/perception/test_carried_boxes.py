@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from synthetic_people import person_at
 
 from perception import AwarenessPipeline, Camera, PerceptionError, PersonDetection, PersonKeypoints
+from perception._frame_budget import FrameBudget
 from perception._scene_changes import SceneChanges
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
@@ -174,9 +175,7 @@ def test_without_anybody_the_detector_still_looks():
 
 def test_people_who_overlap_are_detected_in_every_image():
     # They cross between 0.6 and 1.4 s.
-    world = World(
-        lambda t_s: (-1.0 + 1.0 * t_s, 3.5, 0.0), lambda t_s: (1.0 - 1.0 * t_s, 4.5, 0.0)
-    )
+    world = World(lambda t_s: (-1.0 + 1.0 * t_s, 3.5, 0.0), lambda t_s: (1.0 - 1.0 * t_s, 4.5, 0.0))
     world.run(pipeline(world, 0.2), 41)
     during = [t_s for t_s in world.looks if 0.75 <= t_s <= 1.25]
     assert len(during) == 11
@@ -257,3 +256,83 @@ def test_a_person_sized_change_counts_unless_it_is_in_a_box(size):
 
 def test_without_a_reference_everything_is_new():
     assert SceneChanges().found_in(np.zeros((48, 64, 3), np.uint8), [])
+
+
+class SlowWorld(World):
+    """A world whose detector and pose network take a given time of an injected clock."""
+
+    detector_s, pose_s, clock_s = 0.0, 0.0, 0.0
+
+    def detect(self, image_rgb):
+        self.clock_s += self.detector_s
+        return super().detect(image_rgb)
+
+    def estimate(self, image_rgb, detections):
+        self.clock_s += self.pose_s
+        return super().estimate(image_rgb, detections)
+
+    def run_on_clock(self, pipe, seconds):
+        """Process frames as a live camera gives them; return the period of each in seconds."""
+        periods = []
+        end_s = self.t_s + seconds
+        while self.t_s < end_s:
+            before_s = self.clock_s
+            pipe.process(self.image(), self.t_s)
+            periods.append(max(self.clock_s - before_s, 1.0 / RATE_HZ))
+            self.t_s += periods[-1]
+        return periods
+
+
+@pytest.mark.parametrize("slow", [1.0, 2.0, 3.0])
+def test_a_budget_holds_20_frames_per_second_on_cores_three_times_slower(slow, monkeypatch):
+    world = SlowWorld(stander)
+    # Of one image on the faster core; every image would take 69 ms on the slowest.
+    world.detector_s, world.pose_s = 0.013 * slow, 0.010 * slow
+    monkeypatch.setattr("perception._pipeline.perf_counter", lambda: world.clock_s)
+    pipe = AwarenessPipeline(CAMERA, world, world, frame_budget_s=0.05)
+    world.run_on_clock(pipe, 1.0)
+    world.looks.clear()
+    periods = world.run_on_clock(pipe, 2.0)
+    if slow == 1.0:
+        assert len(world.looks) == len(periods)
+    if slow == 3.0:
+        # Images with a look take 69 ms and the others 30; a camera's queue of one evens it out.
+        assert 0.1 < max(np.diff(world.looks)) <= 0.2 + 1e-6
+        busy_s = len(world.looks) * world.detector_s + len(periods) * world.pose_s
+        assert busy_s / len(periods) < 0.05
+
+
+def test_a_budget_lets_the_detector_look_more_often_again(monkeypatch):
+    world = SlowWorld(stander)
+    world.detector_s, world.pose_s = 0.05, 0.03
+    monkeypatch.setattr("perception._pipeline.perf_counter", lambda: world.clock_s)
+    pipe = AwarenessPipeline(CAMERA, world, world, frame_budget_s=0.05)
+    world.run_on_clock(pipe, 1.5)
+    assert pipe._carrier.every_s > 0.1
+    world.detector_s, world.pose_s = 0.01, 0.01
+    world.run_on_clock(pipe, 6.0)
+    assert pipe._carrier.every_s == 0.0
+
+
+def test_a_budget_between_two_intervals_does_not_swing():
+    for rest_ms in np.arange(1.0, 60.0, 1.0):
+        budget = FrameBudget(0.05)
+        chosen = []
+        for _ in range(300):
+            budget.record(0.02, 1e-3 * rest_ms)
+            chosen.append(budget.every_s)
+        assert len(set(chosen[150:])) == 1
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"frame_budget_s": 0.0}, "frame_budget_s"),
+        ({"frame_budget_s": math.nan}, "frame_budget_s"),
+        ({"frame_budget_s": 0.05, "detect_every_s": 0.1}, "got both"),
+    ],
+)
+def test_a_budget_that_cannot_be_is_refused(options, words):
+    world = World(stander)
+    with pytest.raises(PerceptionError, match=words):
+        AwarenessPipeline(CAMERA, world, world, **options)
