@@ -5,7 +5,7 @@ from __future__ import annotations
 from ._image import rgb_image
 from ._model import NETWORK_TIME, OnnxModel
 from ._pixels import PixelFormat
-from ._settings import PROVIDERS, OnnxSettings, parse_provider_options
+from ._settings import PROVIDERS, OnnxSettings, Provider, parse_provider_options
 from .detectors import OnnxPersonDetector
 from .poses import MediaPipePoseEstimator, OnnxPoseEstimator
 
@@ -18,6 +18,7 @@ __all__ = [
     "OnnxPoseEstimator",
     "OnnxSettings",
     "PixelFormat",
+    "Provider",
     "parse_provider_options",
     "rgb_image",
 ]
