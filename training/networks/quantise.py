@@ -100,7 +100,7 @@ def quantise(source: Path, feeds: Sequence[Feeds], out: Path, *, full_range: boo
         source: the ONNX file.
         feeds: inputs from which the ranges of the activations come.
         out: file to write.
-        full_range: weights have 8 bits and not 7. Processors without VNNI (x86 before 2019) add
+        full_range: weights have 8 bits and not 7. Processors without VNNI (older x86) add
             pairs of products in 16 bits, which 8 bits overflow without a message.
     """
     with tempfile.TemporaryDirectory() as folder:
