@@ -221,21 +221,25 @@ class AwarenessPipeline:
         ready = perf_counter()
         detections = self._detections(image_rgb, stamp_s)
         detected = perf_counter()
+        people, disowned = self._keypoints(image_rgb, detections)
+        again_s = 0.0
+        if self._carrier is not None and not self._carrier.follow(detections, people, disowned):
+            lost = perf_counter()
+            detections = self._carrier.detect(image_rgb)
+            again_s = perf_counter() - lost
+            people, disowned = self._keypoints(image_rgb, detections)
+            self._carrier.follow(detections, people, disowned)
+        posed = perf_counter()
         if not detections:
             self._note(
                 StageTimings(
-                    detected - ready,
+                    detected - ready + again_s,
+                    posed - detected - again_s,
                     rest_s=ready - began,
                     networks_s=NETWORK_TIME.elapsed_s - run_before_s,
                 )
             )
             return ()
-        people, disowned = self._keypoints(image_rgb, detections)
-        if self._carrier is not None and not self._carrier.follow(detections, people, disowned):
-            detections = self._carrier.detect(image_rgb)
-            people, disowned = self._keypoints(image_rgb, detections)
-            self._carrier.follow(detections, people, disowned)
-        posed = perf_counter()
         heads = tuple(self._head_pose_estimator.estimate(image_rgb, self.camera, people))
         _check_count("head_pose_estimator", len(heads), len(people))
         headed = perf_counter()
@@ -266,8 +270,8 @@ class AwarenessPipeline:
         rest = ready - began + perf_counter() - headed
         self._note(
             StageTimings(
-                detected - ready,
-                posed - detected,
+                detected - ready + again_s,
+                posed - detected - again_s,
                 headed - posed,
                 rest,
                 NETWORK_TIME.elapsed_s - run_before_s,

@@ -8,7 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from synthetic_people import person_at
 
-from perception import AwarenessPipeline, Camera, PerceptionError, PersonDetection, PersonKeypoints
+from perception import (
+    AwarenessPipeline,
+    Camera,
+    PerceptionError,
+    PersonDetection,
+    PersonKeypoints,
+    PnpHeadPoseEstimator,
+)
 from perception._frame_budget import FrameBudget
 from perception._scene_changes import SceneChanges
 
@@ -165,6 +172,19 @@ def test_nobody_is_reported_who_is_gone():
     seen = world.run(pipeline(world, 0.2), 14)
     assert [len(people) for people in seen] == [2 if i / RATE_HZ < 0.32 else 1 for i in range(14)]
     assert all(people[0].awareness is not None for people in seen)
+
+
+def test_the_only_person_is_not_reported_when_they_are_gone():
+    world = World(lambda t_s: (-1.2, 4.0, 0.0) if t_s < 0.32 else None)
+
+    class Heads(PnpHeadPoseEstimator):
+        def estimate(self, image_rgb, camera, people):
+            assert people, "heads of nobody"
+            return super().estimate(image_rgb, camera, people)
+
+    pipe = AwarenessPipeline(CAMERA, world, world, Heads(), detect_every_s=0.2)
+    seen = world.run(pipe, 10)
+    assert [len(people) for people in seen] == [1] * 7 + [0] * 3
 
 
 def test_without_anybody_the_detector_still_looks():
