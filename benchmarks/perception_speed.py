@@ -29,12 +29,19 @@ from awarenav.errors import AwarenavError
 from awarenav.records import read_records
 from benchmarks._harness import bad_input, count, make_parser, parse
 from perception import AwarenessPipeline, Camera, PersonDetection, PersonDetector
-from perception.networks import NETWORK_TIME, OnnxPersonDetector, OnnxPoseEstimator, OnnxSettings
+from perception.networks import (
+    NETWORK_TIME,
+    PROVIDERS,
+    OnnxModel,
+    OnnxPersonDetector,
+    OnnxPoseEstimator,
+    OnnxSettings,
+    Provider,
+    parse_provider_options,
+)
 from perception.networks.heads import OnnxHeadPoseEstimator
 from perception.shipped import DETECTOR, HEAD, POSE, shipped_model_path
 
-ONE_THREAD = OnnxSettings(intra_op_threads=1)
-TWO_THREADS = OnnxSettings(intra_op_threads=2)
 REPEATS = 7
 BASELINE = Path(__file__).with_name("perception_baseline.json")
 LIMIT_MS = 2.0  # wanted outside the networks, two people
@@ -145,16 +152,20 @@ def peers() -> Any | None:
     return rtmlib
 
 
-def measure(models: Path, frame_count: int) -> list[MeasuredValue]:
+def measure(
+    models: Path, frame_count: int, providers: tuple[Provider, ...] = ("cpu",)
+) -> list[MeasuredValue]:
     """Return every figure that the installed packages and files allow."""
     cv2.setNumThreads(1)
+    one_thread = OnnxSettings(providers, intra_op_threads=1)
+    print(providers_in_use(one_thread))
     skipped = []
     try:
         camera, frames = clip(frame_count)
     except ImportError as error:
         print(f"nothing measured: the clip needs the extra 'sim' ({error})", file=sys.stderr)
         return []
-    metrics = pipeline_metrics(camera, frames)
+    metrics = pipeline_metrics(camera, frames, providers)
     rtmlib = peers()
     if rtmlib is None:
         skipped.append("the comparison: rtmlib is not installed (benchmarks/requirements.txt)")
@@ -172,13 +183,26 @@ def measure(models: Path, frame_count: int) -> list[MeasuredValue]:
     return metrics
 
 
-def pipeline_metrics(camera: Camera, frames: Sequence[RenderedFrame]) -> list[MeasuredValue]:
+def providers_in_use(settings: OnnxSettings) -> str:
+    """Return which execution providers run each shipped network, and with which options."""
+    texts = [f"onnxruntime {ort.__version__}"]
+    for name in (DETECTOR, POSE, HEAD):
+        model = OnnxModel(shipped_model_path(name), settings=settings)
+        options = model.provider_options
+        used = (each + (f" {options[each]}" if each in options else "") for each in model.providers)
+        texts.append(f"{name}: {', '.join(used)}")
+    return "\n".join(texts)
+
+
+def pipeline_metrics(
+    camera: Camera, frames: Sequence[RenderedFrame], providers: tuple[Provider, ...] = ("cpu",)
+) -> list[MeasuredValue]:
     """Return the figures of the whole pipeline with the shipped networks."""
-    pipeline, process = shipped_pipeline(camera, ONE_THREAD)
+    pipeline, process = shipped_pipeline(camera, OnnxSettings(providers, intra_op_threads=1))
     outside = outside_ms(process, frames)
     # Of the last frame; every frame runs the same networks.
     inside = 1e3 * pipeline.last_timings.networks_s
-    _, process = shipped_pipeline(camera, TWO_THREADS)
+    _, process = shipped_pipeline(camera, OnnxSettings(providers, intra_op_threads=2))
     times = []
     for _ in range(REPEATS):
         began = time.perf_counter()
@@ -218,7 +242,7 @@ def detector_metrics(
     name: str, path: Path, peer: Any, size: tuple[int, int], frames: Sequence[RenderedFrame]
 ) -> list[MeasuredValue]:
     """Return the figures of one detector, ours and the peer's."""
-    detector = OnnxPersonDetector(path, settings=ONE_THREAD)
+    detector = OnnxPersonDetector(path, settings=OnnxSettings(intra_op_threads=1))
     other = peer_tool(peer, path, size)
     bgr = {id(frame): frame.image_rgb[..., ::-1].copy() for frame in frames}
     return compared(
@@ -231,7 +255,7 @@ def detector_metrics(
 def pose_metrics(rtmlib: Any, frames: Sequence[RenderedFrame]) -> list[MeasuredValue]:
     """Return the figures of the shipped pose network, ours and the peer's."""
     path = shipped_model_path(POSE)
-    estimator = OnnxPoseEstimator(path, settings=ONE_THREAD)
+    estimator = OnnxPoseEstimator(path, settings=OnnxSettings(intra_op_threads=1))
     other = peer_tool(rtmlib.RTMPose3d, path, (144, 192))
     return compared(
         "pose_two_people",
@@ -282,9 +306,16 @@ def main() -> int:
     parser.add_argument(
         "--frames", type=count, default=12, metavar="N", help="images of the clip (default: 12)"
     )
+    parser.add_argument(
+        "--provider", default="cpu", choices=sorted(PROVIDERS), help="runs the pipeline's networks"
+    )
+    parser.add_argument(
+        "--provider-options", default="", metavar="'KEY=VALUE ...'", help="options of the provider"
+    )
     options, baseline = parse(parser, None)
     try:
-        metrics = measure(options.models, options.frames)
+        chosen = parse_provider_options(options.provider_options.split())
+        metrics = measure(options.models, options.frames, ((options.provider, chosen),))
     except AwarenavError as error:
         return bad_input(parser, error)
     text, good = report(metrics, baseline)

@@ -13,8 +13,11 @@ import numpy as np
 from . import layouts as kp
 from ._attention import AttentionCone
 from ._camera import Camera
+from ._carried_boxes import MAX_DETECT_EVERY_S, CarriedBoxes
 from ._depth_image import checked_depth
+from ._detection import PersonDetection
 from ._floor import FloorPlane
+from ._frame_budget import FrameBudget
 from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
 from ._metric_scale import DEFAULT_MIN_SCORE
@@ -100,6 +103,13 @@ class AwarenessPipeline:
             sideways and up and down, or one number for both. They are part of α's standard
             deviation.
         onnx_settings: providers and threads of the shipped networks.
+        detect_every_s: longest time between two looks of the detector, in [0, 0.2]; 0 is every
+            image. In between, boxes follow the keypoints, which like the heads come from every
+            image. The detector also looks where something has changed outside the boxes, where
+            people overlap, and at once where the pose network finds a person no more. Images must
+            then follow each other; a jump in time needs the detector.
+        frame_budget_s: time for a frame, in place of ``detect_every_s``: the detector looks at
+            every image while frames take less than that, else less often, down to every 0.2 s.
 
     Raises:
         PerceptionError: for an invalid value, or a shipped network that cannot be loaded.
@@ -119,6 +129,8 @@ class AwarenessPipeline:
         floor: FloorPlane | None = None,
         eye_in_head_std_rad: Any = DEFAULT_EYE_IN_HEAD_STD_RAD,
         onnx_settings: OnnxSettings | None = None,
+        detect_every_s: float = 0.0,
+        frame_budget_s: float | None = None,
     ) -> None:
         if not isinstance(camera, Camera):
             raise PerceptionError(f"camera must be a Camera, got {type(camera).__name__}")
@@ -147,6 +159,19 @@ class AwarenessPipeline:
         self._detector: PersonDetector = detector
         self._pose_estimator: PoseEstimator = pose_estimator
         self._head_pose_estimator: HeadPoseEstimator = head_pose_estimator
+        detect_every_s = finite_number(
+            "detect_every_s", detect_every_s, minimum=0.0, maximum=MAX_DETECT_EVERY_S
+        )
+        self._budget: FrameBudget | None = None
+        if frame_budget_s is not None:
+            if detect_every_s > 0.0:
+                raise PerceptionError("give detect_every_s or frame_budget_s, got both")
+            self._budget = FrameBudget(
+                finite_number("frame_budget_s", frame_budget_s, minimum=0.0, exclusive_minimum=True)
+            )
+        self._carrier: CarriedBoxes | None = None
+        if detect_every_s > 0.0 or self._budget is not None:
+            self._carrier = CarriedBoxes(detector, detect_every_s, self._min_score)
         self._timings = StageTimings()
 
     @property
@@ -194,20 +219,27 @@ class AwarenessPipeline:
         elif depth_stamp_s is not None:
             raise PerceptionError("depth_stamp_s needs depth_m, got None")
         ready = perf_counter()
-        detections = tuple(self._detector.detect(image_rgb))
+        detections = self._detections(image_rgb, stamp_s)
         detected = perf_counter()
+        people, disowned = self._keypoints(image_rgb, detections)
+        again_s = 0.0
+        if self._carrier is not None and not self._carrier.follow(detections, people, disowned):
+            lost = perf_counter()
+            detections = self._carrier.detect(image_rgb)
+            again_s = perf_counter() - lost
+            people, disowned = self._keypoints(image_rgb, detections)
+            self._carrier.follow(detections, people, disowned)
+        posed = perf_counter()
         if not detections:
-            self._timings = StageTimings(
-                detected - ready,
-                rest_s=ready - began,
-                networks_s=NETWORK_TIME.elapsed_s - run_before_s,
+            self._note(
+                StageTimings(
+                    detected - ready + again_s,
+                    posed - detected - again_s,
+                    rest_s=ready - began,
+                    networks_s=NETWORK_TIME.elapsed_s - run_before_s,
+                )
             )
             return ()
-        people = tuple(self._pose_estimator.estimate(image_rgb, detections))
-        _check_count("pose_estimator", len(people), len(detections))
-        disowned = disowned_keypoints(self.camera, detections, people, self._min_score)
-        people = tuple(map(without_disowned, people, disowned))
-        posed = perf_counter()
         heads = tuple(self._head_pose_estimator.estimate(image_rgb, self.camera, people))
         _check_count("head_pose_estimator", len(heads), len(people))
         headed = perf_counter()
@@ -239,14 +271,40 @@ class AwarenessPipeline:
             if place is not None
         )
         rest = ready - began + perf_counter() - headed
-        self._timings = StageTimings(
-            detected - ready,
-            posed - detected,
-            headed - posed,
-            rest,
-            NETWORK_TIME.elapsed_s - run_before_s,
+        self._note(
+            StageTimings(
+                detected - ready + again_s,
+                posed - detected - again_s,
+                headed - posed,
+                rest,
+                NETWORK_TIME.elapsed_s - run_before_s,
+            )
         )
         return observations
+
+    def _note(self, timings: StageTimings) -> None:
+        """Keep the times of a frame, and choose when the detector looks next."""
+        self._timings = timings
+        if self._budget is not None and self._carrier is not None:
+            looked = timings.detector_s if self._carrier.looked else None
+            self._budget.record(looked, timings.total_s - timings.detector_s)
+            self._carrier.every_s = self._budget.every_s
+
+    def _detections(self, image_rgb: ImageRgb, stamp_s: float) -> tuple[PersonDetection, ...]:
+        if self._carrier is None:
+            return tuple(self._detector.detect(image_rgb))
+        return self._carrier.detections(image_rgb, stamp_s)
+
+    def _keypoints(
+        self, image_rgb: ImageRgb, detections: tuple[PersonDetection, ...]
+    ) -> tuple[tuple[PersonKeypoints, ...], list[AwarenessReason | None]]:
+        """Return the keypoints of each detection, and why they are not the person's or None."""
+        if not detections:
+            return (), []
+        people = tuple(self._pose_estimator.estimate(image_rgb, detections))
+        _check_count("pose_estimator", len(people), len(detections))
+        disowned = disowned_keypoints(self.camera, detections, people, self._min_score)
+        return tuple(map(without_disowned, people, disowned)), disowned
 
     def _awareness(
         self,

@@ -25,7 +25,7 @@ DISOWNED: Final[tuple[AwarenessReason, ...]] = (
     "head of another person",
 )
 
-#: (17,) which keypoints are seen.
+#: (17,) or (P, 17) which keypoints are seen.
 Seen = NDArray[np.bool_]
 
 # Two skeletons are one if the median distance between their points is below this share of the size
@@ -92,19 +92,23 @@ def disowned_keypoints(
         people: their keypoints.
         min_score: keypoints with a lower score count as not seen.
     """
-    reasons: list[AwarenessReason | None] = [None] * len(people)
-    points = [person.keypoints_px[kp.BODY] for person in people]
-    seen = [person.scores[kp.BODY] >= min_score for person in people]
+    if not people:
+        return []
+    points = np.array([person.keypoints_px[kp.BODY] for person in people])
+    seen = np.array([person.scores[kp.BODY] for person in people]) >= min_score
+    boxes = np.array([detection.box_xyxy_px for detection in detections])
     rays = _unit_rays(camera, points)
-    for row, (own, shown, detection) in enumerate(zip(points, seen, detections, strict=True)):
-        if shown.any():
-            reasons[row] = _implausible(own, rays[row], shown, detection.box_xyxy_px)
-    rows = [row for row, reason in enumerate(reasons) if reason is None and seen[row].any()]
+    scales = _scales(rays, seen)
+    reasons = _implausible(points, rays, seen, boxes, scales)
+    rows = [row for row in range(len(people)) if seen[row].any()]
+    rows = [row for row in rows if reasons[row] is None]
+    if len(rows) < 2:
+        return reasons
     fits = {row: _fit(points[row][seen[row]], detections[row]) for row in rows}
     # The best fit keeps what it has; those after it must differ from all before.
     kept: list[int] = []
     for row in sorted(rows, key=lambda each: -fits[each]):
-        heads = [_have_one_head(rays, seen, row, other) for other in kept]
+        heads = [_have_one_head(rays, seen, scales, row, other) for other in kept]
         if any(
             _apart(points, seen, row, other) < (_ALIKE_SHARE if one_head else _SAME_SHARE)
             for other, one_head in zip(kept, heads, strict=True)
@@ -112,7 +116,7 @@ def disowned_keypoints(
             reasons[row] = "skeleton of another person"
             continue
         for other in itertools.compress(kept, heads):
-            off_m = [_head_off_m(rays[each], seen[each]) for each in (row, other)]
+            off_m = [_head_off_m(rays[each], seen[each], scales[each]) for each in (row, other)]
             reasons[row if off_m[0] >= off_m[1] else other] = "head of another person"
         kept.append(row)
     return reasons
@@ -135,47 +139,62 @@ def without_disowned(person: PersonKeypoints, reason: AwarenessReason | None) ->
     )
 
 
-def _unit_rays(camera: Camera, points: Sequence[FloatArray]) -> FloatArray:
-    """Return unit vectors (P, 17, 3) towards the points (17, 2) of each person."""
+def _unit_rays(camera: Camera, points: FloatArray) -> FloatArray:
+    """Return unit vectors (P, 17, 3) towards the points (P, 17, 2) of each person."""
     rays = np.ones((len(points), 17, 3))
-    if len(points):
-        rays[..., :2] = camera.normalise(np.reshape(points, (-1, 2))).reshape(-1, 17, 2)
+    rays[..., :2] = camera.normalise(points.reshape(-1, 2)).reshape(-1, 17, 2)
     return np.asarray(rays / np.sqrt((rays * rays).sum(axis=2, keepdims=True)))
 
 
 def _implausible(
-    points: FloatArray, rays: FloatArray, seen: Seen, box: FloatArray
-) -> AwarenessReason | None:
-    """Return why no person in this box has these points (17, 2), of which some are seen."""
-    pad = _PADDING * (box[2:] - box[:2])
-    low, high = box[:2] - pad, box[2:] + pad
-    shown = points[seen]
-    inside = ((shown >= low) & (shown <= high)).all(axis=1)
-    if inside.mean() < _INSIDE_SHARE:
-        return "keypoints outside the box"
-    scales = sorted(_scales(rays, seen))
-    if len(scales) >= 3 and scales[-1] > _LONGEST_RATIO * scales[-2]:
-        return "no body has such limbs"
-    head, shoulders = seen[kp.HEAD], seen[kp.SHOULDERS]
-    if len(scales) >= 2 and head.any() and shoulders.all():
-        neck = rays[kp.SHOULDERS].mean(axis=0)
-        away = float(np.linalg.norm(rays[kp.HEAD][head].mean(axis=0) - neck))
-        if away > _NECK_M * scales[-1]:
-            return "no body has such limbs"
-    return None
+    points: FloatArray,
+    rays: FloatArray,
+    seen: Seen,
+    boxes: FloatArray,
+    scales: Sequence[Sequence[float]],
+) -> list[AwarenessReason | None]:
+    """Return for each box (P, 4) why no person in it has these points (P, 17, 2), or None.
+
+    There is no reason for somebody of whom no point is seen.
+    """
+    pad = _PADDING * (boxes[:, 2:] - boxes[:, :2])
+    low, high = (boxes[:, :2] - pad)[:, None], (boxes[:, 2:] + pad)[:, None]
+    inside = ((points >= low) & (points <= high)).all(axis=2) & seen
+    shares = inside.sum(axis=1) / np.maximum(seen.sum(axis=1), 1)
+    heads = seen[:, kp.HEAD]
+    count = heads.sum(axis=1)
+    head = (rays[:, kp.HEAD] * heads[..., None]).sum(axis=1) / np.maximum(count, 1)[:, None]
+    off = head - rays[:, kp.SHOULDERS].mean(axis=1)
+    away = np.sqrt((off * off).sum(axis=1))
+    shown = (count > 0) & seen[:, kp.SHOULDERS].all(axis=1)
+    reasons: list[AwarenessReason | None] = [None] * len(points)
+    for row, (share, has_neck, neck_to_head, unsorted) in enumerate(
+        zip(shares.tolist(), shown.tolist(), away.tolist(), scales, strict=True)
+    ):
+        ordered = sorted(unsorted)
+        if share < _INSIDE_SHARE and seen[row].any():
+            reasons[row] = "keypoints outside the box"
+        elif (len(ordered) >= 3 and ordered[-1] > _LONGEST_RATIO * ordered[-2]) or (
+            len(ordered) >= 2 and has_neck and neck_to_head > _NECK_M * ordered[-1]
+        ):
+            reasons[row] = "no body has such limbs"
+    return reasons
 
 
-def _scales(rays: FloatArray, seen: Seen) -> list[float]:
-    """Return radians per metre by each segment whose ends are seen."""
+def _scales(rays: FloatArray, seen: Seen) -> list[list[float]]:
+    """Return radians per metre by each segment whose ends are seen, for each person."""
     ends = _ENDS @ rays
-    angles = np.sqrt((ends * ends).sum(axis=1)) / _LENGTHS_M
-    return [float(angles[row]) for row in np.flatnonzero(_USES @ ~seen == 0)]
+    angles = np.sqrt((ends * ends).sum(axis=2)) / _LENGTHS_M
+    complete = ~seen @ _USES.T == 0
+    return [
+        list(itertools.compress(*row))
+        for row in zip(angles.tolist(), complete.tolist(), strict=True)
+    ]
 
 
-def _head_off_m(rays: FloatArray, seen: Seen) -> float:
+def _head_off_m(rays: FloatArray, seen: Seen, scales: Sequence[float]) -> float:
     """Return how far the head is from where the trunk has it; infinite if nobody knows."""
     head = seen[kp.HEAD]
-    scales = _scales(rays, seen)
     if not (head.any() and seen[kp.SHOULDERS].all() and scales):
         return np.inf
     neck = rays[kp.SHOULDERS].mean(axis=0)
@@ -186,32 +205,45 @@ def _head_off_m(rays: FloatArray, seen: Seen) -> float:
 
 def _fit(shown: FloatArray, detection: PersonDetection) -> float:
     """Return how well seen points fit a detection: their boxes' overlap times its score."""
-    box = detection.box_xyxy_px
-    low, high = shown.min(axis=0), shown.max(axis=0)
-    common = np.minimum(high, box[2:]) - np.maximum(low, box[:2])
-    overlap = float(np.prod(np.maximum(common, 0.0)))
-    union = float(np.prod(high - low) + np.prod(box[2:] - box[:2])) - overlap
-    return overlap / max(union, 1e-9) * detection.score
+    left, top, right, bottom = detection.box_xyxy_px.tolist()
+    u, v = shown.min(axis=0).tolist()
+    u_max, v_max = shown.max(axis=0).tolist()
+    across, down = min(u_max, right) - max(u, left), min(v_max, bottom) - max(v, top)
+    overlap = max(across, 0.0) * max(down, 0.0)
+    union = (u_max - u) * (v_max - v) + (right - left) * (bottom - top) - overlap
+    return float(overlap / max(union, 1e-9) * detection.score)
 
 
-def _apart(points: Sequence[FloatArray], seen: Sequence[Seen], row: int, other: int) -> float:
+def _apart(points: FloatArray, seen: Seen, row: int, other: int) -> float:
     """Return the median distance of the points of two people, as a share of the smaller size.
 
     It is infinite if too few points are seen of both.
     """
     common = seen[row] & seen[other]
-    if common.sum() < _FEWEST_COMMON:
+    if np.count_nonzero(common) < _FEWEST_COMMON:
         return math.inf
     away = np.sqrt(((points[row] - points[other])[common] ** 2).sum(axis=1))
-    extents = [np.ptp(points[each][seen[each]], axis=0) for each in (row, other)]
-    return float(np.median(away) / max(min(math.sqrt(w * h) for w, h in extents), 1e-9))
+    extents = []
+    for each in (row, other):
+        shown = points[each][seen[each]]
+        extents.append((shown.max(axis=0) - shown.min(axis=0)).tolist())
+    return _median(away) / max(min(math.sqrt(w * h) for w, h in extents), 1e-9)
 
 
-def _have_one_head(rays: FloatArray, seen: Sequence[Seen], row: int, other: int) -> bool:
+def _have_one_head(
+    rays: FloatArray, seen: Seen, scales: Sequence[Sequence[float]], row: int, other: int
+) -> bool:
     """Return whether the heads of two people lie in one place."""
     common = (seen[row] & seen[other])[kp.HEAD]
-    scales = _scales(rays[row], seen[row]) + _scales(rays[other], seen[other])
-    if common.sum() < _FEWEST_OF_HEAD or not scales:
+    both = [*scales[row], *scales[other]]
+    if np.count_nonzero(common) < _FEWEST_OF_HEAD or not both:
         return False
-    away = np.linalg.norm(rays[row, kp.HEAD] - rays[other, kp.HEAD], axis=1)[common]
-    return bool(np.median(away) < _SAME_HEAD_M * max(scales))
+    apart = (rays[row, kp.HEAD] - rays[other, kp.HEAD])[common]
+    return _median(np.sqrt((apart * apart).sum(axis=1))) < _SAME_HEAD_M * max(both)
+
+
+def _median(values: FloatArray) -> float:
+    """Return the median of a few values; ``np.median`` takes ten times as long."""
+    ordered = sorted(values.tolist())
+    last = len(ordered) - 1
+    return float(0.5 * (ordered[last // 2] + ordered[(last + 1) // 2]))

@@ -65,6 +65,11 @@ class BridgeOptions:
     pose: str
     head: str
     allow_simulator_networks: bool
+    threads: int | None
+    provider: str
+    provider_options: str
+    detect_every_s: float
+    frame_budget_s: float | None
     image: str
     compressed: bool
     camera_info: str
@@ -163,7 +168,14 @@ def _networks(options: BridgeOptions) -> tuple[Networks, tuple[str, ...]]:
     choice = NetworkChoice.of_options(
         options.networks, options.detector, options.pose, options.head
     )
-    networks = choose_networks(**choice.model_dump())
+    networks = choose_networks(
+        **choice.model_dump(),
+        threads=options.threads,
+        provider=options.provider,
+        provider_options=options.provider_options.split(),
+        detect_every_s=options.detect_every_s,
+        frame_budget_s=options.frame_budget_s,
+    )
     if options.no_camera:
         return networks, ()
     return networks, admit_networks(
@@ -230,7 +242,12 @@ def _pipeline_maker(
         if not isinstance(detector, PersonDetector):
             detector = detector(camera)
         return AwarenessPipeline(
-            camera, detector, pose_estimator, networks.head_pose_estimator, cone
+            camera,
+            detector,
+            pose_estimator,
+            networks.head_pose_estimator,
+            cone,
+            **networks.settings,
         )
 
     return make

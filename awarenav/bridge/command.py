@@ -48,6 +48,7 @@ _LOG: Final = "Recordings"
 @option("--seconds", type=NUMBER, metavar="S", help="End after this time.")
 @options.networks
 @options.allow_simulator_networks()
+@options.running
 @option(
     "--image", group=_READ, default="camera/image_raw", metavar="TOPIC", help="sensor_msgs/Image."
 )

@@ -13,7 +13,7 @@ from click.core import ParameterSource
 from click.shell_completion import CompletionItem
 
 from ._command import Decorator, option
-from ._types import POSITIVE, FilePath, FolderPath, OneOf, Whole
+from ._types import POSITIVE, FilePath, FolderPath, Number, OneOf, Whole
 
 #: The command line's name of the reference planner.
 REFERENCE_PLANNER: Final = "reference"
@@ -310,6 +310,59 @@ _NETWORK_OPTIONS: Final = (
 def networks(function: Callable[..., Any]) -> Callable[..., Any]:
     """Add ``--networks``, ``--detector``, ``--pose`` and ``--head``: who perceives people."""
     for add in reversed(_NETWORK_OPTIONS):
+        function = add(function)
+    return function
+
+
+_RUNNING_OPTIONS: Final = (
+    option(
+        "--threads",
+        group=_NETWORKS,
+        type=POSITIVE,
+        show_default="onnxruntime's own choice",
+        metavar="N",
+        help="Threads of each network.",
+    ),
+    option(
+        "--provider",
+        group=_NETWORKS,
+        type=OneOf(["cpu", "cuda", "tensorrt", "openvino", "coreml"]),
+        default="cpu",
+        help="Execution provider of onnxruntime that runs the networks.",
+    ),
+    option(
+        "--provider-options",
+        group=_NETWORKS,
+        default="",
+        show_default="none",
+        metavar="'KEY=VALUE ...'",
+        help="Options of that provider, separated by spaces, as 'trt_fp16_enable=True "
+        "trt_engine_cache_enable=True trt_engine_cache_path=DIR'.",
+    ),
+    option(
+        "--detect-every-s",
+        group=_NETWORKS,
+        type=Number(0.0, 0.2),
+        default=0.0,
+        metavar="S",
+        help="Longest time between two looks of the detector; boxes follow the keypoints in "
+        "between. 0 looks at every image.",
+    ),
+    option(
+        "--frame-budget-s",
+        group=_NETWORKS,
+        type=Number(0.001, 10.0),
+        excludes="--detect-every-s",
+        show_default="none",
+        metavar="S",
+        help="Time for a frame: the detector looks as often as it allows, at least every 0.2 s.",
+    ),
+)
+
+
+def running(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options of threads, providers and the time between looks of the detector."""
+    for add in reversed(_RUNNING_OPTIONS):
         function = add(function)
     return function
 

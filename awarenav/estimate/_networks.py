@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import ClassVar, Final
 
@@ -17,7 +17,12 @@ from perception import (
     PnpHeadPoseEstimator,
     PoseEstimator,
 )
-from perception.networks import MediaPipePoseEstimator, OnnxModel, OnnxSettings
+from perception.networks import (
+    MediaPipePoseEstimator,
+    OnnxModel,
+    OnnxSettings,
+    parse_provider_options,
+)
 from perception.shipped import (
     DETECTOR,
     HEAD,
@@ -79,6 +84,9 @@ def choose_networks(
     min_score: float = 0.25,
     threads: int | None = None,
     provider: str = "cpu",
+    provider_options: Sequence[str] = (),
+    detect_every_s: float = 0.0,
+    frame_budget_s: float | None = None,
 ) -> Networks:
     """Load the networks.
 
@@ -91,7 +99,10 @@ def choose_networks(
             the shipped pose network, else PnP.
         min_score: people with a lower detection score are dropped.
         threads: of each network; None leaves the number to onnxruntime.
-        provider: ``"cpu"``, ``"cuda"`` or ``"tensorrt"``.
+        provider: one of :data:`~perception.networks.PROVIDERS`.
+        provider_options: its options, as ``KEY=VALUE``.
+        detect_every_s: as :class:`~perception.AwarenessPipeline` takes it.
+        frame_budget_s: the same.
 
     Raises:
         PerceptionError: for a file that is missing, damaged or of an unknown layout.
@@ -99,14 +110,20 @@ def choose_networks(
     """
     if head == "auto":
         head = "network" if pose == SHIPPED else _WITHOUT_NETWORK
-    settings = OnnxSettings(providers=(provider,), intra_op_threads=threads)
+    settings = OnnxSettings(((provider, parse_provider_options(provider_options)),), threads)
     detector_used, detector_domain = _detector(detector, min_score, settings)
     pose_used, pose_domain = _pose(pose, settings)
     head_used, head_domain = _head(head, settings)
     domains = {"detector": detector_domain, "pose": pose_domain}
     if head != _WITHOUT_NETWORK:
         domains["head"] = head_domain
-    return Networks(detector_used, pose_used, head_used, training_domains=domains)
+    return Networks(
+        detector_used,
+        pose_used,
+        head_used,
+        {"detect_every_s": detect_every_s, "frame_budget_s": frame_budget_s},
+        training_domains=domains,
+    )
 
 
 def admit_networks(networks: Networks, *, rendered: bool, allowed: bool) -> tuple[str, ...]:

@@ -35,6 +35,7 @@ _SLIDESHOW_HZ: Final = 5.0
 # The options that change the estimates, beside the choice of networks.
 _SETTINGS: Final = (
     "min_score",
+    "detect_every_s",
     "camera",
     "fov_deg",
     "camera_height_m",
@@ -64,6 +65,9 @@ class EstimateOptions:
     min_score: float
     threads: int | None
     provider: str
+    provider_options: str = ""
+    detect_every_s: float = 0.0
+    frame_budget_s: float | None = None
     camera: Path | None
     fov_deg: float | None
     camera_height_m: float | None
@@ -125,6 +129,9 @@ def estimate_command(options: EstimateOptions, networks: Networks | None = None)
                 min_score=options.min_score,
                 threads=options.threads,
                 provider=options.provider,
+                provider_options=options.provider_options.split(),
+                detect_every_s=options.detect_every_s,
+                frame_budget_s=options.frame_budget_s,
             )
         unfit = admit_networks(
             networks, rendered=source.rendered, allowed=options.allow_simulator_networks
@@ -240,6 +247,11 @@ def _check(options: EstimateOptions) -> None:
     if options.resume and options.tracks:
         raise AwarenavError(
             "--resume cannot continue --tracks: the state of the tracker is not in the file"
+        )
+    if options.resume and (options.detect_every_s or options.frame_budget_s is not None):
+        raise AwarenavError(
+            "--resume cannot continue --detect-every-s or --frame-budget-s: the boxes of the last "
+            "image are not in the file"
         )
     if options.resume and draws_video:
         raise AwarenavError("--resume cannot continue a video; draw into a folder (--overlay DIR)")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from ..cli import NUMBER, POSITIVE, SHARE, FilePath, OneOf, argument, command, option, options
+from ..cli import NUMBER, POSITIVE, SHARE, FilePath, argument, command, option, options
 
 _NETWORKS: Final = "Networks"
 _CAMERA: Final = "Camera"
@@ -53,21 +53,7 @@ _CAMERA: Final = "Camera"
     metavar="P",
     help="Drop people whose detection score, from 0 to 1, is below this.",
 )
-@option(
-    "--threads",
-    group=_NETWORKS,
-    type=POSITIVE,
-    show_default="onnxruntime's own choice",
-    metavar="N",
-    help="Threads of each network.",
-)
-@option(
-    "--provider",
-    group=_NETWORKS,
-    type=OneOf(["cpu", "cuda", "tensorrt"]),
-    default="cpu",
-    help="Processor that runs the networks.",
-)
+@options.running
 @option(
     "--camera",
     group=_CAMERA,

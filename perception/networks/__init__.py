@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from ._image import rgb_image
-from ._model import NETWORK_TIME, OnnxModel, OnnxSettings
+from ._model import NETWORK_TIME, OnnxModel
 from ._pixels import PixelFormat
+from ._settings import PROVIDERS, OnnxSettings, Provider, parse_provider_options
 from .detectors import OnnxPersonDetector
 from .poses import MediaPipePoseEstimator, OnnxPoseEstimator
 
 __all__ = [
     "NETWORK_TIME",
+    "PROVIDERS",
     "MediaPipePoseEstimator",
     "OnnxModel",
     "OnnxPersonDetector",
     "OnnxPoseEstimator",
     "OnnxSettings",
     "PixelFormat",
+    "Provider",
+    "parse_provider_options",
     "rgb_image",
 ]

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from .._manifest import shipped_model, shipped_model_path, verify_shipped_model
 from .._training_domain import training_domain_of
 from ..errors import PerceptionError
+from ._settings import PROVIDERS, OnnxSettings, short_name
 
 # The newer Linux wheels of ONNX Runtime report processes, sessions and models to their maker from
 # the import on (microsoft/onnxruntime#27379) and store an identifier on disk. This turns both off,
@@ -25,11 +26,6 @@ os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
 
 import onnxruntime as ort  # type: ignore[import-untyped]
 
-_PROVIDERS: Final[dict[str, str]] = {
-    "cpu": "CPUExecutionProvider",
-    "cuda": "CUDAExecutionProvider",
-    "tensorrt": "TensorrtExecutionProvider",
-}
 _DTYPES: Final[dict[str, str]] = {
     "float": "float32",
     "float16": "float16",
@@ -65,43 +61,6 @@ NETWORK_TIME = NetworkTime()
 
 
 @dataclass(frozen=True, slots=True)
-class OnnxSettings:
-    """Settings with which ONNX Runtime runs a network.
-
-    Attributes:
-        providers: one or more of ``"cpu"``, ``"cuda"`` and ``"tensorrt"``, in order of preference.
-            A provider that is not present is refused. The CPU runs the operators that the other
-            providers do not support.
-        intra_op_threads: threads per operator, ≥ 1; None for ONNX Runtime's default, one per
-            physical core.
-        allow_spinning: True lets idle threads wait in a busy loop. This saves some microseconds
-            per run but takes whole cores from the robot's other programs.
-    """
-
-    providers: tuple[str, ...] = ("cpu",)
-    intra_op_threads: int | None = None
-    allow_spinning: bool = False
-
-    def __post_init__(self) -> None:
-        # tuple("cpu") would be three letters.
-        given: Any = self.providers
-        names = (given,) if isinstance(given, str) else tuple(given)
-        if not names or any(name not in _PROVIDERS for name in names):
-            raise PerceptionError(
-                f"providers must be one or more of {', '.join(map(repr, _PROVIDERS))}, "
-                f"got {self.providers!r}"
-            )
-        threads = self.intra_op_threads
-        if threads is not None and (
-            isinstance(threads, bool) or not isinstance(threads, int) or threads < 1
-        ):
-            raise PerceptionError(
-                f"intra_op_threads must be a whole number of at least 1 or None, got {threads!r}"
-            )
-        object.__setattr__(self, "providers", names)
-
-
-@dataclass(frozen=True, slots=True)
 class OnnxTensor:
     """An input or output of a network.
 
@@ -125,7 +84,7 @@ class OnnxModel:
 
     Args:
         path_or_bytes: the file, or its content.
-        settings: providers and threads.
+        settings: providers with their options, and threads.
         sha256: expected SHA-256 of the content, 64 hexadecimal digits. It is checked on the same
             bytes that are loaded. It does not cover weights in separate files, so networks with
             such files are then refused.
@@ -200,8 +159,13 @@ class OnnxModel:
     @property
     def providers(self) -> tuple[str, ...]:
         """Providers in use, in order of preference, with the names of :class:`OnnxSettings`."""
-        short = {long: name for name, long in _PROVIDERS.items()}
-        return tuple(short.get(name, name) for name in self._session.get_providers())
+        return tuple(map(short_name, self._session.get_providers()))
+
+    @property
+    def provider_options(self) -> dict[str, dict[str, str]]:
+        """Options of each provider in use that differ from none, as ONNX Runtime reports them."""
+        found: dict[str, dict[str, str]] = self._session.get_provider_options()
+        return {short_name(name): options for name, options in found.items() if options}
 
     def run(self, feeds: Mapping[str, NDArray[Any]], *, timed: bool = True) -> list[NDArray[Any]]:
         """Run the network on its named inputs and return the outputs in the order of ``outputs``.
@@ -241,22 +205,24 @@ class OnnxModel:
             )
 
     def _load(self, content: bytes, *, sealed: bool) -> Any:
-        wanted = [_PROVIDERS[name] for name in self.settings.providers]
+        names = self.settings.provider_names
         present = ort.get_available_providers()
-        if missing := [name for name in self.settings.providers if _PROVIDERS[name] not in present]:
-            here = [name for name, long in _PROVIDERS.items() if long in present]
+        if missing := [name for name in names if PROVIDERS[name] not in present]:
+            here = [short_name(name) for name in present if short_name(name) in PROVIDERS]
             raise PerceptionError(
                 f"provider {missing[0]!r} is not present in this onnxruntime {ort.__version__}, "
-                f"which has {', '.join(map(repr, here))}; onnxruntime-gpu has the others"
+                f"which has {', '.join(map(repr, here))}; onnxruntime-gpu has CUDA and TensorRT, "
+                "onnxruntime-openvino OpenVINO, and the wheel for macOS Core ML"
             )
+        wanted = [(PROVIDERS[name], self.settings.provider_options(name)) for name in names]
         options = ort.SessionOptions()
         options.log_severity_level = _LOG_ERRORS_ONLY
         if self.settings.intra_op_threads is not None:
             options.intra_op_num_threads = self.settings.intra_op_threads
         spinning = "1" if self.settings.allow_spinning else "0"
         options.add_session_config_entry("session.intra_op.allow_spinning", spinning)
-        if _PROVIDERS["cpu"] not in wanted:
-            wanted.append(_PROVIDERS["cpu"])
+        if "cpu" not in names:
+            wanted.append((PROVIDERS["cpu"], {}))
         # Some exporters write the weights into files next to the graph. ONNX Runtime finds them
         # only when it loads the graph by its path.
         source = content if self.path is None or sealed else str(self.path)
@@ -264,12 +230,13 @@ class OnnxModel:
             # Without enable_fallback=0, ONNX Runtime prints a failure of the GPU and uses the CPU.
             session = ort.InferenceSession(source, options, providers=wanted, enable_fallback=0)
         except Exception as cause:  # onnxruntime's errors share no base of their own
+            given = "".join(f", {name} with {chosen}" for name, chosen in wanted if chosen)
             raise PerceptionError(
                 f"{self.name} is not an ONNX network that onnxruntime {ort.__version__} can load "
-                f"({len(content)} bytes): {_first_line(cause)}"
+                f"({len(content)} bytes{given}): {_first_line(cause)}"
             ) from cause
         used = session.get_providers()
-        if idle := [name for name in self.settings.providers if _PROVIDERS[name] not in used]:
+        if idle := [name for name in names if PROVIDERS[name] not in used]:
             raise PerceptionError(
                 f"provider {idle[0]!r} is built into this onnxruntime {ort.__version__} but could "
                 "not start: its driver or libraries are missing or of another version"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from typing import Any, Final
 
@@ -14,7 +15,8 @@ from ...arrays import ImageRgb, finite_number
 from ...errors import PerceptionError
 from .._image import rgb_image
 from .._image_input import input_batch, input_dtype, input_size, run_on_images
-from .._model import ModelSource, OnnxModel, OnnxSettings, as_onnx_model
+from .._model import ModelSource, OnnxModel, as_onnx_model
+from .._settings import OnnxSettings
 from ._decoders import Floats
 from ._layouts import DetectorLayout, TrialRun, metadata_size, recognise
 from ._letterbox import Letterbox, LetterboxGeometry
@@ -112,8 +114,14 @@ class OnnxPersonDetector:
             with np.errstate(all="ignore"):
                 boxes, scores = self._layout.decoder.decode(outputs, self._score_threshold)
                 sizes = boxes[:, 2:] - boxes[:, :2]
-        good = np.isfinite(boxes).all(axis=1) & np.isfinite(scores) & (sizes > 0.0).all(axis=1)
-        return self._detections(boxes[good], scores[good], geometry)
+                # One sum shows that all numbers are finite, but for those too large to add.
+                finite = math.isfinite(float(boxes.sum()) + float(scores.sum()))
+        if not len(boxes):
+            return ()
+        if not (finite and sizes.min() > 0.0):
+            good = np.isfinite(boxes).all(axis=1) & np.isfinite(scores) & (sizes > 0.0).all(axis=1)
+            boxes, scores = boxes[good], scores[good]
+        return self._detections(boxes, scores, geometry)
 
     def _detections(
         self, boxes: Floats, scores: Floats, geometry: LetterboxGeometry
@@ -122,9 +130,11 @@ class OnnxPersonDetector:
         if not len(kept):
             return ()
         clipped = geometry.to_image(boxes[kept])
-        large = np.flatnonzero((clipped[:, 2:] - clipped[:, :2]).min(axis=1) >= _MIN_SIDE_PX)
+        sides = (clipped[:, 2:] - clipped[:, :2]).min(axis=1)
         return tuple(
-            PersonDetection(clipped[row], min(float(scores[kept[row]]), 1.0)) for row in large
+            PersonDetection(box, min(score, 1.0))
+            for box, score, side in zip(clipped, scores[kept].tolist(), sides.tolist(), strict=True)
+            if side >= _MIN_SIDE_PX
         )
 
     def _without_overlaps(self, boxes: Floats, scores: Floats) -> NDArray[np.intp]:

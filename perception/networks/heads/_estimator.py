@@ -17,7 +17,8 @@ from ...arrays import FloatArray, ImageRgb, finite_number
 from ...errors import PerceptionError
 from .._image import rgb_image
 from .._image_input import run_on_images
-from .._model import ModelSource, OnnxModel, OnnxSettings, as_onnx_model
+from .._model import ModelSource, OnnxModel, as_onnx_model
+from .._settings import OnnxSettings
 from ._crops import HeadCrops
 from ._layouts import recognise
 from ._locate import locate_heads

@@ -15,8 +15,9 @@ from ...errors import PerceptionError
 from ...layouts import keypoint_layout
 from .._image import rgb_image
 from .._image_input import input_batch, input_dtype, input_size, run_on_images
-from .._model import ModelSource, OnnxSettings, as_onnx_model
+from .._model import ModelSource, as_onnx_model
 from .._pixels import IMAGENET_MEAN_RGB, IMAGENET_STD_RGB, PixelFormat
+from .._settings import OnnxSettings
 from ._crops import BOX_PADDING, PersonCrops
 from ._layouts import PoseLayout, metadata_number, recognise
 from ._lift import lift_keypoints

@@ -13,7 +13,14 @@ import pytest
 from onnx_graphs import fixed, red_point_pose
 
 from perception import PerceptionError
-from perception.networks import NETWORK_TIME, OnnxModel, OnnxPoseEstimator, OnnxSettings
+from perception.networks import (
+    NETWORK_TIME,
+    PROVIDERS,
+    OnnxModel,
+    OnnxPoseEstimator,
+    OnnxSettings,
+    parse_provider_options,
+)
 
 ROWS = np.arange(12.0).reshape(1, 2, 6)
 
@@ -111,7 +118,13 @@ def test_weights_in_a_separate_file_are_loaded_only_without_a_sha256(tmp_path: P
 @pytest.mark.parametrize(
     ("settings", "words"),
     [
-        ({"providers": ()}, "providers must be one or more of 'cpu', 'cuda', 'tensorrt', got"),
+        ({"providers": ()}, "providers must be one or more of 'cpu', 'cuda', 'tensorrt', 'openv"),
+        ({"providers": ("cpu", "cpu")}, "each once"),
+        ({"providers": ("cpu", ("CPUExecutionProvider", {}))}, "each once"),
+        ({"providers": (("gpu", {}),)}, "got .*'gpu'"),
+        ({"providers": (("cpu", 7),)}, "a pair of name and options, got"),
+        ({"providers": (("cpu", {}, {}),)}, "a pair of name and options, got"),
+        ({"providers": 7}, "got 7"),
         ({"providers": ("gpu",)}, "'gpu'"),
         ({"providers": "gpu"}, "got 'gpu'"),
         ({"intra_op_threads": 0}, "at least 1 or None, got 0"),
@@ -122,6 +135,60 @@ def test_weights_in_a_separate_file_are_loaded_only_without_a_sha256(tmp_path: P
 def test_invalid_settings_are_refused(settings: dict[str, object], words: str) -> None:
     with pytest.raises(PerceptionError, match=words):
         OnnxSettings(**settings)  # type: ignore[arg-type]
+
+
+def test_a_provider_takes_options_and_either_of_its_names() -> None:
+    shapes = {"trt_profile_max_shapes": "images:1x3x256x320", "trt_fp16_enable": True}
+    settings = OnnxSettings(("cpu", ("TensorrtExecutionProvider", shapes)))  # type: ignore[arg-type]
+    assert settings.provider_names == ("cpu", "tensorrt")
+    assert settings.provider_options("cpu") == {}
+    assert settings.provider_options("tensorrt") == {
+        "trt_profile_max_shapes": "images:1x3x256x320",
+        "trt_fp16_enable": "True",
+    }
+    assert {settings: 1}[OnnxSettings(settings.providers)] == 1
+    assert OnnxModel(content(), settings=OnnxSettings((("cpu", {"any": 1}),))).providers == ("cpu",)
+
+
+@pytest.mark.parametrize("name", sorted(PROVIDERS))
+def test_a_provider_starts_or_the_error_says_which_are_present(name: str) -> None:
+    settings = OnnxSettings(((name, {}), "cpu") if name != "cpu" else ("cpu",))
+    if PROVIDERS[name] in ort.get_available_providers():
+        assert OnnxModel(content(), settings=settings).providers[0] == name
+        return
+    with pytest.raises(PerceptionError, match=f"{name!r} is not present.* has .*'cpu'"):
+        OnnxModel(content(), settings=settings)
+
+
+def test_options_of_a_provider_reach_onnxruntime(monkeypatch: pytest.MonkeyPatch) -> None:
+    # No accelerator is present wherever this runs, so the session is watched.
+    asked = []
+    session = ort.InferenceSession
+
+    def watched(*arguments: object, providers: list[tuple[str, dict[str, str]]], **named: object):
+        asked.extend(providers)
+        return session(*arguments, providers=["CPUExecutionProvider"], **named)
+
+    monkeypatch.setattr(ort, "get_available_providers", lambda: list(PROVIDERS.values()))
+    monkeypatch.setattr(ort, "InferenceSession", watched)
+    options = {"trt_engine_cache_path": "engines", "trt_fp16_enable": True}
+    with pytest.raises(PerceptionError, match=r"'tensorrt' is built into .* could not start"):
+        OnnxModel(content(), settings=OnnxSettings((("tensorrt", options), "cuda")))
+    assert asked == [
+        (
+            "TensorrtExecutionProvider",
+            {"trt_engine_cache_path": "engines", "trt_fp16_enable": "True"},
+        ),
+        ("CUDAExecutionProvider", {}),
+        ("CPUExecutionProvider", {}),
+    ]
+
+
+def test_options_are_read_from_text() -> None:
+    assert parse_provider_options(["a=1", " b = x=y "]) == {"a": "1", "b": "x=y"}
+    for texts in (["a"], ["=1"], ["a=1", "a=2"]):
+        with pytest.raises(PerceptionError, match="KEY=VALUE, each key once"):
+            parse_provider_options(texts)
 
 
 def test_settings_are_passed_to_onnxruntime() -> None:

@@ -1,0 +1,80 @@
+"""How often the detector may look, by the time that frames take and the time there is."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from ._carried_boxes import MAX_DETECT_EVERY_S
+
+#: Times between two looks of the detector to choose from.
+INTERVALS_S: Final = (0.0, 0.1, 0.15, MAX_DETECT_EVERY_S)
+
+# Share of the budget that frames may take on average before the detector looks less often, and the
+# share that it must stay below before it looks more often, for so many images in a row.
+_TOO_MUCH: Final = 0.95
+_ENOUGH_LEFT: Final = 0.80
+_PATIENCE: Final = 20
+# Weight of the newest time in the running means. The first frames of a process are slow.
+_NEW: Final = 0.15
+_WARM_UP: Final = 3
+
+
+class FrameBudget:
+    """Chooses the time between two looks of the detector; it starts with every image.
+
+    The running means of the detector's time, and of the time of everything else, say what a frame
+    takes on average with each interval. The interval grows at once when that is too much, and
+    shrinks one step at a time when enough is left.
+
+    Args:
+        budget_s: time for a frame, and so the period of frames, > 0.
+    """
+
+    def __init__(self, budget_s: float) -> None:
+        self._budget_s = budget_s
+        self._level = self._patience = self._frames = 0
+        self._detector_s: float | None = None
+        self._rest_s: float | None = None
+
+    @property
+    def every_s(self) -> float:
+        """Time between two looks of the detector; 0 is every image."""
+        return INTERVALS_S[self._level]
+
+    def mean_s(self, level: int) -> float:
+        """Return the mean time of a frame with an interval of :data:`INTERVALS_S`."""
+        every_s = INTERVALS_S[level]
+        # Frames come no faster than the budget says; slow ones come later.
+        share = min(self._budget_s / every_s, 1.0) if every_s > 0.0 else 1.0
+        return (self._rest_s or 0.0) + share * (self._detector_s or 0.0)
+
+    def record(self, detector_s: float | None, rest_s: float) -> None:
+        """Take the times of a frame.
+
+        Args:
+            detector_s: time of the detector; None if it did not look.
+            rest_s: time of everything else.
+        """
+        self._frames += 1
+        if self._frames <= _WARM_UP:
+            return
+        if detector_s is not None:
+            self._detector_s = _mean(self._detector_s, detector_s)
+        self._rest_s = _mean(self._rest_s, rest_s)
+        if self._detector_s is None:
+            return
+        while (
+            self._level + 1 < len(INTERVALS_S)
+            and self.mean_s(self._level) > _TOO_MUCH * self._budget_s
+        ):
+            self._level, self._patience = self._level + 1, 0
+        if self._level and self.mean_s(self._level - 1) < _ENOUGH_LEFT * self._budget_s:
+            self._patience += 1
+            if self._patience >= _PATIENCE:
+                self._level, self._patience = self._level - 1, 0
+        else:
+            self._patience = 0
+
+
+def _mean(mean: float | None, new: float) -> float:
+    return new if mean is None else (1.0 - _NEW) * mean + _NEW * new

@@ -1,0 +1,358 @@
+"""The detector looks at some images only; boxes follow the keypoints in between."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from synthetic_people import person_at
+
+from perception import (
+    AwarenessPipeline,
+    Camera,
+    PerceptionError,
+    PersonDetection,
+    PersonKeypoints,
+    PnpHeadPoseEstimator,
+)
+from perception._frame_budget import FrameBudget
+from perception._scene_changes import SceneChanges
+
+CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
+HALL = np.random.default_rng(3).integers(90, 130, (480, 640, 1)).astype(np.uint8)
+RATE_HZ = 20.0
+
+
+class World:
+    """People who move, a detector and a pose network that see them, and pictures of them.
+
+    A person is a function from time to (x, z, head yaw), or to None where nobody is.
+    """
+
+    def __init__(self, *people, camera_px_per_s=0.0):
+        self.people = people
+        self.camera_px_per_s = camera_px_per_s
+        self.t_s = 0.0
+        self.looks = []
+        self.fails = False
+
+    def present(self):
+        states = [person(self.t_s) for person in self.people]
+        return [
+            person_at((state[0], 0.4, state[1]), head_yaw_rad=state[2])
+            for state in states
+            if state is not None
+        ]
+
+    @staticmethod
+    def box(person):
+        pixels = CAMERA.project(person.points_camera_m)
+        pad = 0.08 * (pixels[:, 1].max() - pixels[:, 1].min())
+        box = np.r_[pixels.min(axis=0) - pad, pixels.max(axis=0) + pad]
+        return np.clip(box, 0.0, (640, 480, 640, 480))
+
+    def image(self):
+        shift = round(self.camera_px_per_s * self.t_s)
+        image = np.repeat(np.roll(HALL, shift, axis=1), 3, axis=2)
+        for person in self.present():
+            left, top, right, bottom = self.box(person).astype(int)
+            image[top:bottom, left:right] = 250
+        return image
+
+    def detect(self, image_rgb):
+        self.looks.append(self.t_s)
+        return tuple(PersonDetection(self.box(person), 0.9) for person in self.present())
+
+    def estimate(self, image_rgb, detections):
+        if self.fails:
+            raise PerceptionError("no keypoints today")
+        present = self.present()
+        centres = [0.5 * (self.box(each)[:2] + self.box(each)[2:]) for each in present]
+        found = []
+        for detection in detections:
+            box = detection.box_xyxy_px
+            middle = 0.5 * (box[:2] + box[2:])
+            off = [np.linalg.norm(centre - middle) for centre in centres]
+            nearest = int(np.argmin(off)) if off else -1
+            if nearest < 0 or off[nearest] > 0.5 * (box[2] - box[0]):
+                flat = np.repeat(middle[None], 17, axis=0)
+                found.append(PersonKeypoints(flat, np.zeros((17, 3)), np.zeros(17), "coco"))
+                continue
+            person = present[nearest]
+            points = person.points_camera_m
+            pixels = CAMERA.project(points)
+            shown = ((pixels > 0.0) & (pixels < (639.0, 479.0))).all(axis=1)
+            root = points[11:13].mean(axis=0)
+            found.append(PersonKeypoints(pixels, points - root, shown.astype(float), "coco"))
+        return tuple(found)
+
+    def run(self, pipeline, frames, rate_hz=RATE_HZ):
+        """Process frames; return the observations of each."""
+        seen = []
+        for index in range(frames):
+            self.t_s = index / rate_hz
+            seen.append(pipeline.process(self.image(), self.t_s))
+        return seen
+
+
+def pipeline(world, every_s):
+    return AwarenessPipeline(CAMERA, world, world, detect_every_s=every_s)
+
+
+def walker(t_s):
+    """Walk to the right at 1.4 m/s, 4 m ahead, and turn the head."""
+    return -1.0 + 1.4 * t_s, 4.0, 0.8 * math.sin(3.0 * t_s)
+
+
+def stander(t_s):
+    return 1.2, 4.0, 0.0
+
+
+def test_the_detector_looks_at_every_image_by_default():
+    world = World(walker)
+    world.run(AwarenessPipeline(CAMERA, world, world), 10)
+    assert len(world.looks) == 10
+
+
+def test_between_looks_boxes_follow_and_awareness_is_of_the_same_image():
+    often, seldom = World(walker), World(walker)
+    wanted = often.run(pipeline(often, 0.0), 25)
+    found = seldom.run(pipeline(seldom, 0.15), 25)
+    assert len(often.looks) == 25
+    assert len(seldom.looks) == 9
+    for index, ((expected,), (carried,)) in enumerate(zip(wanted, found, strict=True)):
+        # The velocity is known from the second image on; until then the box lags 10 px behind.
+        tolerance = 11.0 if index < 2 else 1.0
+        np.testing.assert_allclose(carried.box_xyxy_px, expected.box_xyxy_px, atol=tolerance)
+        # Box and score are all that is carried.
+        assert carried.awareness == pytest.approx(expected.awareness, abs=1e-12)
+        np.testing.assert_allclose(carried.gaze_camera, expected.gaze_camera, atol=1e-12)
+        assert carried.stamp_s == expected.stamp_s
+    assert len({round(each.awareness, 3) for (each,) in found}) > 15
+
+
+@settings(max_examples=30, deadline=None)
+@given(rate_hz=st.floats(5.0, 100.0), every_s=st.floats(0.01, 0.2))
+def test_two_looks_are_never_farther_apart_than_asked(rate_hz, every_s):
+    world = World(stander)
+    count = 12
+    world.run(pipeline(world, every_s), count, rate_hz)
+    gaps = np.diff([*world.looks, (count - 1) / rate_hz])
+    assert gaps.max() <= max(every_s, 1.0 / rate_hz) + 1e-6
+    # And not more often than needed: one image earlier at most.
+    if every_s > 2.0 / rate_hz:
+        assert gaps[:-1].min(initial=np.inf) > every_s - 1.0 / rate_hz - 1e-6
+
+
+@pytest.mark.parametrize("start_s", [0.05, 0.1, 0.31, 0.4, 0.449])
+def test_a_newcomer_is_found_in_the_first_image_of_a_camera_that_stands_still(start_s):
+    world = World(stander, lambda t_s: None if t_s < start_s else (-1.2, 4.0, 0.0))
+    seen = world.run(pipeline(world, 0.2), 14)
+    for index, people in enumerate(seen):
+        assert len(people) == (2 if index / RATE_HZ >= start_s else 1)
+    assert len(world.looks) < 14
+
+
+@pytest.mark.parametrize("start_s", [0.05, 0.1, 0.31, 0.4, 0.449])
+def test_a_newcomer_is_found_within_the_time_asked_by_a_camera_that_moves(start_s):
+    world = World(
+        stander,
+        lambda t_s: None if t_s < start_s else (-1.2, 4.0, 0.0),
+        camera_px_per_s=300.0,
+    )
+    seen = world.run(pipeline(world, 0.2), 20)
+    assert len(world.looks) < 10
+    late = [i / RATE_HZ for i, people in enumerate(seen) if len(people) < 2]
+    assert max(late) < start_s + 0.2
+
+
+def test_nobody_is_reported_who_is_gone():
+    world = World(stander, lambda t_s: (-1.2, 4.0, 0.0) if t_s < 0.32 else None)
+    seen = world.run(pipeline(world, 0.2), 14)
+    assert [len(people) for people in seen] == [2 if i / RATE_HZ < 0.32 else 1 for i in range(14)]
+    assert all(people[0].awareness is not None for people in seen)
+
+
+def test_the_only_person_is_not_reported_when_they_are_gone():
+    world = World(lambda t_s: (-1.2, 4.0, 0.0) if t_s < 0.32 else None)
+
+    class Heads(PnpHeadPoseEstimator):
+        def estimate(self, image_rgb, camera, people):
+            assert people, "heads of nobody"
+            return super().estimate(image_rgb, camera, people)
+
+    pipe = AwarenessPipeline(CAMERA, world, world, Heads(), detect_every_s=0.2)
+    seen = world.run(pipe, 10)
+    assert [len(people) for people in seen] == [1] * 7 + [0] * 3
+
+
+def test_without_anybody_the_detector_still_looks():
+    world = World(lambda t_s: None)
+    assert world.run(pipeline(world, 0.2), 13) == [()] * 13
+    assert len(world.looks) == 4
+
+
+def test_people_who_overlap_are_detected_in_every_image():
+    # They cross between 0.6 and 1.4 s.
+    world = World(lambda t_s: (-1.0 + 1.0 * t_s, 3.5, 0.0), lambda t_s: (1.0 - 1.0 * t_s, 4.5, 0.0))
+    world.run(pipeline(world, 0.2), 41)
+    during = [t_s for t_s in world.looks if 0.75 <= t_s <= 1.25]
+    assert len(during) == 11
+    assert len(world.looks) < 41
+
+
+def test_somebody_of_whom_too_little_is_seen_is_not_carried():
+    # 0.45 m ahead, only the trunk is in the image.
+    world = World(lambda t_s: (0.0, 0.45, 0.0))
+    world.run(pipeline(world, 0.2), 8)
+    assert len(world.looks) == 8
+
+
+@pytest.mark.parametrize("jump_s", [0.5, 60.0, -0.05, -3.0, 0.0])
+def test_after_a_jump_in_time_the_detector_looks(jump_s):
+    world = World(stander)
+    pipe = pipeline(world, 0.2)
+    world.run(pipe, 2)
+    count = len(world.looks)
+    pipe.process(world.image(), world.t_s + jump_s)
+    assert len(world.looks) == count + 1
+
+
+def test_another_scene_needs_the_detector_at_once():
+    world = World(stander)
+    pipe = pipeline(world, 0.2)
+    world.run(pipe, 2)
+    count = len(world.looks)
+    pipe.process(255 - world.image(), world.t_s + 0.05)
+    assert len(world.looks) == count + 1
+
+
+def test_after_a_failure_the_detector_looks():
+    world = World(stander)
+    pipe = pipeline(world, 0.2)
+    world.run(pipe, 2)
+    count = len(world.looks)
+    world.fails = True
+    with pytest.raises(PerceptionError, match="today"):
+        pipe.process(world.image(), 0.1)
+    world.fails = False
+    assert len(pipe.process(world.image(), 0.15)) == 1
+    assert len(world.looks) == count + 1
+
+
+@pytest.mark.parametrize("every_s", [-0.01, 0.21, math.nan, "often"])
+def test_an_interval_beyond_its_limits_is_refused(every_s):
+    with pytest.raises(PerceptionError, match="detect_every_s"):
+        pipeline(World(stander), every_s)
+
+
+def changed(image, boxes=(), reference=None):
+    changes = SceneChanges()
+    changes.refer_to(np.repeat(HALL, 3, axis=2) if reference is None else reference)
+    return changes.found_in(image, boxes)
+
+
+@pytest.mark.parametrize("noise", [0.0, 2.0, 4.0])
+def test_noise_and_light_are_no_change(noise):
+    rng = np.random.default_rng(int(noise))
+    image = np.repeat(HALL, 3, axis=2)
+    for light in (0, 3):
+        noisy = np.clip(image + light + rng.normal(0.0, noise, image.shape), 0, 255)
+        assert not changed(noisy.astype(np.uint8), reference=image)
+
+
+@pytest.mark.parametrize("size", [(160, 120, 3), (480, 640, 3), (1080, 1920, 3), (51, 37, 3)])
+def test_a_person_sized_change_counts_unless_it_is_in_a_box(size):
+    height, width = size[:2]
+    reference = np.full(size, 90, np.uint8)
+    image = reference.copy()
+    left, right = round(0.4 * width), round(0.52 * width)
+    top, bottom = round(0.3 * height), round(0.8 * height)
+    image[top:bottom, left:right] = 180
+    assert changed(image, reference=reference)
+    assert not changed(image, [np.array([left, top, right, bottom])], reference)
+
+
+def test_without_a_reference_everything_is_new():
+    assert SceneChanges().found_in(np.zeros((48, 64, 3), np.uint8), [])
+
+
+class SlowWorld(World):
+    """A world whose detector and pose network take a given time of an injected clock."""
+
+    detector_s, pose_s, clock_s = 0.0, 0.0, 0.0
+
+    def detect(self, image_rgb):
+        self.clock_s += self.detector_s
+        return super().detect(image_rgb)
+
+    def estimate(self, image_rgb, detections):
+        self.clock_s += self.pose_s
+        return super().estimate(image_rgb, detections)
+
+    def run_on_clock(self, pipe, seconds):
+        """Process frames as a live camera gives them; return the period of each in seconds."""
+        periods = []
+        end_s = self.t_s + seconds
+        while self.t_s < end_s:
+            before_s = self.clock_s
+            pipe.process(self.image(), self.t_s)
+            periods.append(max(self.clock_s - before_s, 1.0 / RATE_HZ))
+            self.t_s += periods[-1]
+        return periods
+
+
+@pytest.mark.parametrize("slow", [1.0, 2.0, 3.0])
+def test_a_budget_holds_20_frames_per_second_on_cores_three_times_slower(slow, monkeypatch):
+    world = SlowWorld(stander)
+    # Of one image on the faster core; every image would take 69 ms on the slowest.
+    world.detector_s, world.pose_s = 0.013 * slow, 0.010 * slow
+    monkeypatch.setattr("perception._pipeline.perf_counter", lambda: world.clock_s)
+    pipe = AwarenessPipeline(CAMERA, world, world, frame_budget_s=0.05)
+    world.run_on_clock(pipe, 1.0)
+    world.looks.clear()
+    periods = world.run_on_clock(pipe, 2.0)
+    if slow == 1.0:
+        assert len(world.looks) == len(periods)
+    if slow == 3.0:
+        # Images with a look take 69 ms and the others 30; a camera's queue of one evens it out.
+        assert 0.1 < max(np.diff(world.looks)) <= 0.2 + 1e-6
+        busy_s = len(world.looks) * world.detector_s + len(periods) * world.pose_s
+        assert busy_s / len(periods) < 0.05
+
+
+def test_a_budget_lets_the_detector_look_more_often_again(monkeypatch):
+    world = SlowWorld(stander)
+    world.detector_s, world.pose_s = 0.05, 0.03
+    monkeypatch.setattr("perception._pipeline.perf_counter", lambda: world.clock_s)
+    pipe = AwarenessPipeline(CAMERA, world, world, frame_budget_s=0.05)
+    world.run_on_clock(pipe, 1.5)
+    assert pipe._carrier.every_s > 0.1
+    world.detector_s, world.pose_s = 0.01, 0.01
+    world.run_on_clock(pipe, 6.0)
+    assert pipe._carrier.every_s == 0.0
+
+
+def test_a_budget_between_two_intervals_does_not_swing():
+    for rest_ms in np.arange(1.0, 60.0, 1.0):
+        budget = FrameBudget(0.05)
+        chosen = []
+        for _ in range(300):
+            budget.record(0.02, 1e-3 * rest_ms)
+            chosen.append(budget.every_s)
+        assert len(set(chosen[150:])) == 1
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"frame_budget_s": 0.0}, "frame_budget_s"),
+        ({"frame_budget_s": math.nan}, "frame_budget_s"),
+        ({"frame_budget_s": 0.05, "detect_every_s": 0.1}, "got both"),
+    ],
+)
+def test_a_budget_that_cannot_be_is_refused(options, words):
+    world = World(stander)
+    with pytest.raises(PerceptionError, match=words):
+        AwarenessPipeline(CAMERA, world, world, **options)

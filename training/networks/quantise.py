@@ -1,0 +1,204 @@
+"""Command ``python -m training.networks.quantise``: networks in 8-bit integers.
+
+    awarenav render --frames 60 --range 1.5 6 --layouts aisles open blind_corner --out images
+    python -m training.networks.quantise images --out build/int8
+
+The networks see the images as the pipeline shows them; the ranges of their activations come from
+that (static quantisation, QDQ, weights per channel). Convolutions and matrix products become
+integer; the last one before each output stays as it is. `awarenav judge` says what is lost, on
+other halls than those of the images. Needs no PyTorch.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import cv2
+import onnx
+import onnxruntime as ort
+from numpy.typing import NDArray
+from onnxruntime.quantization import (
+    CalibrationDataReader,
+    CalibrationMethod,
+    QuantFormat,
+    QuantType,
+    quantize_static,
+)
+
+from perception import AwarenessPipeline, Camera
+from perception.networks import (
+    NETWORK_TIME,
+    OnnxModel,
+    OnnxPersonDetector,
+    OnnxPoseEstimator,
+    OnnxSettings,
+)
+from perception.networks.heads import OnnxHeadPoseEstimator
+from perception.shipped import DETECTOR, HEAD, POSE, shipped_model_path
+
+_NAMES: Final = (DETECTOR, POSE, HEAD)
+_HEAVY: Final = ("Conv", "MatMul", "Gemm")
+# Between two convolutions, these need no way back to floating point.
+_BETWEEN: Final = ("Add", "Concat", "MaxPool", "Relu", "Resize", "GlobalAveragePool")
+_MOST_FEEDS: Final = 200
+
+Feeds = Mapping[str, NDArray[Any]]
+
+
+class RecordingModel(OnnxModel):
+    """A network that keeps copies of its inputs, at most 200."""
+
+    def __init__(self, path: Path) -> None:
+        self.feeds: list[Feeds] = []
+        super().__init__(path)
+
+    def run(self, feeds: Feeds, *, timed: bool = True) -> list[NDArray[Any]]:
+        """Run the network and keep the inputs."""
+        if len(self.feeds) < _MOST_FEEDS:
+            self.feeds.append({name: array.copy() for name, array in feeds.items()})
+        return super().run(feeds, timed=timed)
+
+
+class _Reader(CalibrationDataReader):  # type: ignore[misc]
+    def __init__(self, feeds: Sequence[Feeds]) -> None:
+        self._feeds: Iterator[Feeds] = iter(feeds)
+
+    def get_next(self) -> Feeds | None:
+        return next(self._feeds, None)
+
+
+def calibration_feeds(images: Path, models: Mapping[str, Path]) -> dict[str, list[Feeds]]:
+    """Return what each network gets to see in a folder that ``awarenav render`` wrote."""
+    loaded = {name: RecordingModel(path) for name, path in models.items()}
+    pipeline = AwarenessPipeline(
+        Camera.from_yaml(images / "camera.yaml"),
+        OnnxPersonDetector(loaded[DETECTOR]),
+        OnnxPoseEstimator(loaded[POSE]),
+        OnnxHeadPoseEstimator(loaded[HEAD]),
+    )
+    for model in loaded.values():
+        model.feeds.clear()  # empty images that show the shapes
+    paths = sorted(images.glob("[0-9]*.png"))
+    if not paths:
+        raise SystemExit(f"there are no images in {images}: awarenav render writes them")
+    for path in paths:
+        bgr = cv2.imread(str(path))
+        assert bgr is not None, path
+        pipeline.process(cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB), 0.0)
+    return {name: model.feeds for name, model in loaded.items()}
+
+
+def quantise(source: Path, feeds: Sequence[Feeds], out: Path, *, full_range: bool = False) -> None:
+    """Write a network with 8-bit weights and activations; its metadata stay.
+
+    Args:
+        source: the ONNX file.
+        feeds: inputs from which the ranges of the activations come.
+        out: file to write.
+        full_range: weights have 8 bits and not 7. Processors without VNNI (older x86) add
+            pairs of products in 16 bits, which 8 bits overflow without a message.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        folded = Path(folder) / "folded.onnx"
+        _fold_constants(source, folded)
+        quantised = Path(folder) / "int8.onnx"
+        quantize_static(
+            str(folded),
+            str(quantised),
+            _Reader(feeds),
+            quant_format=QuantFormat.QDQ,
+            per_channel=True,
+            activation_type=QuantType.QUInt8,
+            weight_type=QuantType.QInt8,
+            reduce_range=not full_range,
+            calibrate_method=CalibrationMethod.MinMax,
+            op_types_to_quantize=[*_HEAVY, *_BETWEEN],
+            nodes_to_exclude=_outer_nodes(folded),
+        )
+        model = onnx.load(str(quantised))
+    model.producer_name, model.producer_version = "awarenav", ""
+    original = OnnxModel(source)
+    metadata = dict(original.metadata)
+    if original.training_domain is not None:
+        metadata["training_domain"] = original.training_domain
+    del model.metadata_props[:]
+    for key in sorted(metadata):
+        entry = model.metadata_props.add()
+        entry.key, entry.value = key, metadata[key]
+    onnx.checker.check_model(model)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    out.write_bytes(model.SerializeToString(deterministic=True))
+
+
+def run_ms(path: Path, feeds: Sequence[Feeds]) -> float:
+    """Return the processor milliseconds of a run on one thread, the shortest of 20."""
+    model = OnnxModel(path, settings=OnnxSettings(intra_op_threads=1))
+    times = []
+    for feed in itertools.islice(itertools.cycle(feeds), 20):
+        before_s = NETWORK_TIME.processor_s
+        model.run(feed)
+        times.append(NETWORK_TIME.processor_s - before_s)
+    return 1e3 * min(times)
+
+
+def main() -> None:
+    """Quantise the three networks and say how much faster they are."""
+    parser = argparse.ArgumentParser(prog="python -m training.networks.quantise")
+    parser.add_argument("images", type=Path, help="folder that `awarenav render` wrote")
+    parser.add_argument("--models", type=Path, help="folder of the networks (default: the shipped)")
+    parser.add_argument("--out", type=Path, required=True, help="folder of the 8-bit networks")
+    parser.add_argument(
+        "--full-range",
+        action="store_true",
+        help="8 bits of weight in place of 7, for processors with VNNI or of Arm",
+    )
+    chosen = parser.parse_args()
+    paths = {
+        name: shipped_model_path(name)
+        if chosen.models is None
+        else chosen.models / shipped_model_path(name).name
+        for name in _NAMES
+    }
+    feeds = calibration_feeds(chosen.images, paths)
+    for name, path in paths.items():
+        out = chosen.out / path.name
+        quantise(path, feeds[name], out, full_range=chosen.full_range)
+        before, after = run_ms(path, feeds[name]), run_ms(out, feeds[name])
+        print(f"{out}: {before:.2f} ms -> {after:.2f} ms ({before / after:.1f} times as fast)")
+
+
+def _fold_constants(source: Path, out: Path) -> None:
+    """Write the network with constants computed, weights in single precision included."""
+    options = ort.SessionOptions()
+    options.graph_optimization_level = ort.GraphOptimizationLevel.ORT_ENABLE_BASIC
+    options.optimized_model_filepath = str(out)
+    options.log_severity_level = 3
+    ort.InferenceSession(str(source), options, providers=["CPUExecutionProvider"])
+
+
+def _outer_nodes(path: Path) -> list[str]:
+    """Return the names of the nodes from the last convolutions and products to the outputs.
+
+    Their numbers have units: one scale for boxes in pixels and scores would leave no scores.
+    """
+    graph = onnx.load(str(path)).graph
+    makers = {name: node for node in graph.node for name in node.output}
+    outer: dict[str, None] = {}
+    todo = [entry.name for entry in graph.output]
+    while todo:
+        node = makers.get(todo.pop())
+        if node is None or node.name in outer or node.op_type == "Shape":
+            continue
+        outer[node.name] = None
+        if node.op_type not in _HEAVY:
+            todo.extend(node.input)
+    return list(outer)
+
+
+if __name__ == "__main__":
+    main()
