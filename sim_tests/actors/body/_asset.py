@@ -7,7 +7,7 @@ on the floor below the midpoint of the hips. Joint rotations are written in axes
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib import resources
 from pathlib import Path
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from perception.arrays import FloatArray
 
 from ...world.errors import SimError
+from ._irises import with_human_irises
 
 #: Joints in the order of every array; parents come before their children.
 JOINTS: Final = (
@@ -135,10 +136,12 @@ def load_worker(name: str) -> WorkerAsset:
             )
     with (folder / f"{stem}.npz").open("rb") as file, np.load(file, allow_pickle=False) as data:
         arrays = {key: data[key] for key in data.files}
+    joints_m = _read_only_copy(arrays["joints_m"])
     levels = tuple(
         _skin_mesh(arrays, level, _texture_rgb(folder / f"{stem}_lod{level}.jpg"))
         for level in range(DETAIL_LEVELS)
     )
+    levels = (_with_human_irises(levels[0], joints_m), *levels[1:])
     capsules = tuple(
         Capsule(int(joint), tuple(row[:3]), tuple(row[3:6]), row[6])
         for joint, row in zip(
@@ -149,7 +152,7 @@ def load_worker(name: str) -> WorkerAsset:
         name=name,
         description=str(arrays["description"]),
         stature_m=float(arrays["stature_m"]),
-        joints_m=_read_only_copy(arrays["joints_m"]),
+        joints_m=joints_m,
         keypoints_m=_read_only_copy(arrays["keypoints_m"]),
         keypoint_weights=_read_only_copy(arrays["keypoint_weights"]),
         capsules=capsules,
@@ -175,6 +178,17 @@ def _skin_mesh(
         weights=dequantised("weights", 1.0 / 255.0),
         texture_rgb=rgb,
     )
+
+
+def _with_human_irises(skin: SkinMesh, joints_m: FloatArray) -> SkinMesh:
+    """Paint irises; the coarser levels are for people too far away to show any."""
+    eyes = tuple(
+        (joints_m[row], skin.weights[:, row] > 0.5)
+        for row, joint in enumerate(JOINTS)
+        if joint.endswith("_eye")
+    )
+    rgb = with_human_irises(skin.texture_rgb, skin.vertices_m, skin.uv, skin.triangles, eyes)
+    return replace(skin, texture_rgb=rgb)
 
 
 def _texture_rgb(file: Path) -> NDArray[np.uint8]:
