@@ -43,8 +43,8 @@ class PersonObservation:
         stamp_s: time of the frame.
         position_camera_m: (3,) centre line of the body at chest height, in the camera frame.
         position_covariance_m2: (3, 3) covariance of the position.
-        gaze_camera: (3,) unit vector of the head's forward axis in the camera frame, or None
-            without evidence.
+        gaze_camera: (3,) unit vector of the gaze in the camera frame: the head's forward axis, or
+            with ``eyes_seen`` that of the eyes. None without evidence.
         awareness: α in [0, 1], eqs. (1)–(3) of the paper, or None without evidence.
         awareness_std: standard deviation of α, ≥ 0; None if and only if ``awareness`` is None.
         score: confidence of the detection in [0, 1].
@@ -53,6 +53,8 @@ class PersonObservation:
             at the range of ``position_camera_m``; None if no leg was seen.
         awareness_reason: why ``awareness`` is None, one of :data:`AWARENESS_REASONS`; None if it is
             not, or nobody says why.
+        eyes_seen: True if gaze and awareness contain a measurement of the eyes in the head. False:
+            the eyes may look elsewhere than the head, and ``awareness_std`` says how far.
     """
 
     stamp_s: float
@@ -65,6 +67,7 @@ class PersonObservation:
     box_xyxy_px: FloatArray | None = None
     legs_camera_m: FloatArray | None = None
     awareness_reason: AwarenessReason | None = None
+    eyes_seen: bool = False
 
     def __post_init__(self) -> None:
         if (self.awareness is None) != (self.awareness_std is None):
@@ -103,6 +106,7 @@ class PersonObservation:
             legs_camera_m=None
             if self.legs_camera_m is None
             else finite_array("legs_camera_m", self.legs_camera_m, (3,)),
+            eyes_seen=bool(self.eyes_seen),
         )
 
     @staticmethod
@@ -172,7 +176,9 @@ class PersonObservation:
         made = tuple(map(object.__new__, [PersonObservation] * count))
         columns = ([stamp] * count, positions, covariances, gazes, alphas, stds, score.tolist())
         for assign, column in zip(
-            _SETTERS, (*columns, boxes, [None] * count, [None] * count), strict=True
+            _SETTERS,
+            (*columns, boxes, [None] * count, [None] * count, [False] * count),
+            strict=True,
         ):
             deque(map(assign, made, column), maxlen=0)
         return made

@@ -1,4 +1,4 @@
-"""Networks: ONNX models, person detectors and pose estimators; head poses are in ``heads``."""
+"""Networks: ONNX models, detectors, estimators of poses and eyes; head poses are in ``heads``."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ from ._image import rgb_image
 from ._model import NETWORK_TIME, OnnxModel, OnnxSettings
 from ._pixels import PixelFormat
 from .detectors import OnnxPersonDetector
-from .poses import MediaPipePoseEstimator, OnnxPoseEstimator
+from .poses import MediaPipeEyeEstimator, MediaPipePoseEstimator, OnnxPoseEstimator
 
 __all__ = [
     "NETWORK_TIME",
+    "MediaPipeEyeEstimator",
     "MediaPipePoseEstimator",
     "OnnxModel",
     "OnnxPersonDetector",

@@ -62,7 +62,7 @@ def with_human_irises(
         triangles: (T, 3).
         eyes: of each eye, the centre (3,) and which of the (V,) vertices belong to it.
     """
-    painted = texture_rgb.copy()
+    painted: NDArray[np.uint8] = texture_rgb.copy()
     for centre_m, is_eye in eyes:
         shown = triangles[is_eye[triangles].all(axis=1)]
         if len(shown):
