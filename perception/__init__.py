@@ -13,9 +13,8 @@ from ._keypoints import PersonKeypoints
 from ._observation import PersonObservation
 from ._pipeline import AwarenessPipeline
 from ._pnp import PnpHeadPoseEstimator
-from ._protocols import EyeEstimator, HeadPoseEstimator, PersonDetector, PoseEstimator
+from ._protocols import HeadPoseEstimator, PersonDetector, PoseEstimator
 from .errors import PerceptionError
-from .eyes import EyeGaze
 from .networks import OnnxPersonDetector, OnnxPoseEstimator
 from .networks.heads import OnnxHeadPoseEstimator
 
@@ -23,8 +22,6 @@ __all__ = [
     "AttentionCone",
     "AwarenessPipeline",
     "Camera",
-    "EyeEstimator",
-    "EyeGaze",
     "FloorPlane",
     "FusedHeadPoseEstimator",
     "HeadPose",

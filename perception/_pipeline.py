@@ -21,13 +21,13 @@ from ._metric_scale import DEFAULT_MIN_SCORE
 from ._observation import AwarenessReason, PersonObservation
 from ._placement import place_people
 from ._pnp import PnpHeadPoseEstimator
-from ._protocols import EyeEstimator, HeadPoseEstimator, PersonDetector, PoseEstimator
+from ._protocols import HeadPoseEstimator, PersonDetector, PoseEstimator
 from .arrays import FloatArray, ImageRgb, finite_array, finite_number
 from .awareness import AwarenessEstimate, estimate_awareness
 from .body import BodyPlacement, place_bodies
 from .errors import PerceptionError
 from .evidence import FaceEvidence, judge_face
-from .eyes import EyeGaze, known_eyes
+from .eyes import EyeEstimator, EyeGaze, known_eyes
 from .networks import NETWORK_TIME, OnnxSettings
 from .ownership import disowned_keypoints, without_disowned
 from .shipped import (

@@ -9,7 +9,6 @@ from ._detection import PersonDetection
 from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
 from .arrays import ImageRgb
-from .eyes import EyeGaze
 
 
 @runtime_checkable
@@ -40,15 +39,4 @@ class HeadPoseEstimator(Protocol):
         self, image_rgb: ImageRgb, camera: Camera, people: tuple[PersonKeypoints, ...]
     ) -> tuple[HeadPose | None, ...]:
         """Return one head pose per person, in the same order; None where there is no evidence."""
-        ...
-
-
-@runtime_checkable
-class EyeEstimator(Protocol):
-    """Interface: finds how the eyes of people with known head poses are turned in the head."""
-
-    def estimate(
-        self, image_rgb: ImageRgb, camera: Camera, heads: tuple[HeadPose | None, ...]
-    ) -> tuple[EyeGaze | None, ...]:
-        """Return one measurement per head, in the same order; None where eyes are not seen."""
         ...

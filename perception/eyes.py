@@ -10,12 +10,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Protocol, runtime_checkable
 
 import numpy as np
 
+from ._camera import Camera
 from ._head_pose import HeadPose
-from .arrays import FloatArray, covariance_matrix, finite_array, finite_number, set_fields
+from .arrays import FloatArray, ImageRgb, covariance_matrix, finite_array, finite_number, set_fields
 from .errors import PerceptionError
 
 #: Distance of the iris ahead of the eye's centre of rotation. The centre lies 13.5 mm behind the
@@ -66,6 +67,17 @@ class EyeGaze:
         (cy, sy), (cp, sp) = (math.cos(yaw), math.sin(yaw)), (math.cos(pitch), math.sin(pitch))
         # Pitch about z (the right ear), then yaw about the head's up axis −x.
         return np.array([[cp, -sp, 0.0], [cy * sp, cy * cp, sy], [-sy * sp, -sy * cp, cy]])
+
+
+@runtime_checkable
+class EyeEstimator(Protocol):
+    """Interface: finds how the eyes of people with known head poses are turned in the head."""
+
+    def estimate(
+        self, image_rgb: ImageRgb, camera: Camera, heads: tuple[HeadPose | None, ...]
+    ) -> tuple[EyeGaze | None, ...]:
+        """Return one measurement per head, in the same order; None where eyes are not seen."""
+        ...
 
 
 def eyes_from_irises(

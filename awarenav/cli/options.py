@@ -308,8 +308,8 @@ _NETWORK_OPTIONS: Final = (
         "--eyes",
         group=_NETWORKS,
         excludes="--networks",
-        type=OneOf(["auto", "mediapipe", "none"]),
         default="auto",
+        metavar="auto|mediapipe|none",
         help="Eyes of people nearer than about 2.5 m: 'mediapipe' (needs the extra 'mediapipe'), "
         "'none' (the gaze is the head's direction), or 'auto': 'mediapipe' with --pose mediapipe.",
     ),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import ClassVar, Final, Literal
+from typing import ClassVar, Final
 
 from perception import (
     Camera,
@@ -65,7 +65,7 @@ class NetworkChoice(StrictConfig):
     detector: str = SHIPPED
     pose: str = SHIPPED
     head: str = _HEADS[0]
-    eyes: Literal["auto", "mediapipe", "none"] = "auto"
+    eyes: str = _EYES[0]
 
     @classmethod
     def of_options(

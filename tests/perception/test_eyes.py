@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from perception import AttentionCone, Camera, EyeGaze, HeadPose, PerceptionError
+from perception import AttentionCone, Camera, HeadPose, PerceptionError
 from perception.anthropometry import EYES_HEAD_M
 from perception.awareness import estimate_awareness
 from perception.eyes import (
@@ -18,6 +18,7 @@ from perception.eyes import (
     AHEAD_STD_M,
     ARM_RELATIVE_STD,
     IRIS_ARM_M,
+    EyeGaze,
     eyes_from_irises,
     fuse_with_prior,
     known_eyes,

@@ -11,7 +11,6 @@ from perception import (
     AttentionCone,
     AwarenessPipeline,
     Camera,
-    EyeGaze,
     FloorPlane,
     HeadPose,
     PerceptionError,
@@ -19,6 +18,7 @@ from perception import (
     PersonKeypoints,
     PersonObservation,
 )
+from perception.eyes import EyeGaze
 from perception.networks import NETWORK_TIME
 
 CAMERA = Camera.from_fov(1280, 960, math.radians(60.0))

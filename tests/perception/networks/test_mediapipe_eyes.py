@@ -11,7 +11,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from perception import Camera, EyeEstimator, HeadPose, PerceptionError
+from perception import Camera, HeadPose, PerceptionError
+from perception.eyes import EyeEstimator
 from perception.networks import MediaPipeEyeEstimator
 from perception.networks.poses import iris_std_m
 from perception.networks.poses._mediapipe_eyes import iris_offset
