@@ -43,8 +43,8 @@ class PersonObservation:
         stamp_s: time of the frame.
         position_camera_m: (3,) centre line of the body at chest height, in the camera frame.
         position_covariance_m2: (3, 3) covariance of the position.
-        gaze_camera: (3,) unit vector of the head's forward axis in the camera frame, or None
-            without evidence.
+        gaze_camera: (3,) unit vector of the gaze in the camera frame: the head's forward axis, or
+            with ``eyes_seen`` that of the eyes. None without evidence.
         awareness: α in [0, 1], eqs. (1)–(3) of the paper, or None without evidence.
         awareness_std: standard deviation of α, ≥ 0; None if and only if ``awareness`` is None.
         score: confidence of the detection in [0, 1].
@@ -60,6 +60,8 @@ class PersonObservation:
             image, before other cues; None if no size was assumed.
         size_range_relative_std: its relative standard deviation, that of the person's size left
             out; None if and only if ``size_range_m`` is None.
+        eyes_seen: True if gaze and awareness contain a measurement of the eyes in the head. False:
+            the eyes may look elsewhere than the head, and ``awareness_std`` says how far.
     """
 
     stamp_s: float
@@ -75,6 +77,7 @@ class PersonObservation:
     range_lasting_relative_std: float = 0.0
     size_range_m: float | None = None
     size_range_relative_std: float | None = None
+    eyes_seen: bool = False
 
     def __post_init__(self) -> None:
         if (self.awareness is None) != (self.awareness_std is None):
@@ -131,6 +134,7 @@ class PersonObservation:
             else finite_number(
                 "size_range_relative_std", self.size_range_relative_std, minimum=0.0
             ),
+            eyes_seen=bool(self.eyes_seen),
         )
 
     @staticmethod

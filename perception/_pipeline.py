@@ -30,6 +30,7 @@ from .awareness import AwarenessEstimate, estimate_awareness
 from .body import BodyPlacement, place_bodies
 from .errors import PerceptionError
 from .evidence import FaceEvidence, judge_face
+from .eyes import EyeEstimator, EyeGaze, known_eyes
 from .networks import NETWORK_TIME, OnnxSettings
 from .ownership import disowned_keypoints, without_disowned
 from .shipped import (
@@ -59,7 +60,7 @@ class StageTimings:
         detector_s: time of the detector, including the preparation of its input and the reading of
             its output.
         pose_s: the same for the pose estimator.
-        head_pose_s: the same for the head pose estimator.
+        head_pose_s: the same for the head pose estimator, and the eye estimator if there is one.
         rest_s: time of everything else: checks, positions, face evidence, awareness.
         networks_s: the part of all this in runs of ONNX networks. Networks that do not run in ONNX
             Runtime are not included.
@@ -110,6 +111,9 @@ class AwarenessPipeline:
             then follow each other; a jump in time needs the detector.
         frame_budget_s: time for a frame, in place of ``detect_every_s``: the detector looks at
             every image while frames take less than that, else less often, down to every 0.2 s.
+        eye_estimator: measures the eyes of near people, for instance
+            :class:`~perception.networks.MediaPipeEyeEstimator`; default none, then the gaze is the
+            head's direction.
 
     Raises:
         PerceptionError: for an invalid value, or a shipped network that cannot be loaded.
@@ -131,6 +135,7 @@ class AwarenessPipeline:
         onnx_settings: OnnxSettings | None = None,
         detect_every_s: float = 0.0,
         frame_budget_s: float | None = None,
+        eye_estimator: EyeEstimator | None = None,
     ) -> None:
         if not isinstance(camera, Camera):
             raise PerceptionError(f"camera must be a Camera, got {type(camera).__name__}")
@@ -172,6 +177,12 @@ class AwarenessPipeline:
         self._carrier: CarriedBoxes | None = None
         if detect_every_s > 0.0 or self._budget is not None:
             self._carrier = CarriedBoxes(detector, detect_every_s, self._min_score)
+        if eye_estimator is not None and not isinstance(eye_estimator, EyeEstimator):
+            raise PerceptionError(
+                "eye_estimator must have the method estimate(image_rgb, camera, heads), got "
+                f"{type(eye_estimator).__name__}"
+            )
+        self._eye_estimator = eye_estimator
         self._timings = StageTimings()
 
     @property
@@ -242,19 +253,20 @@ class AwarenessPipeline:
             return ()
         heads = tuple(self._head_pose_estimator.estimate(image_rgb, self.camera, people))
         _check_count("head_pose_estimator", len(heads), len(people))
+        eyes = self._eyes(image_rgb, heads)
         headed = perf_counter()
         places = place_people(
             self.camera, detections, people, heads, floor, self._std_px, self._min_score, depth_m
         )
         # The same call as for the places, which is remembered.
         bodies = place_bodies(self.camera, people, self._std_px, self._min_score)
-        estimates, reasons = self._awareness(people, heads, disowned)
+        estimates, reasons = self._awareness(people, heads, eyes, disowned)
         observations = tuple(
             PersonObservation(
                 stamp_s=stamp_s,
                 position_camera_m=place.position_camera_m,
                 position_covariance_m2=place.covariance_m2,
-                gaze_camera=None if head is None or estimate is None else head.gaze_camera,
+                gaze_camera=None if head is None or estimate is None else _gaze(head, turn),
                 awareness=None if estimate is None else estimate.awareness,
                 awareness_std=None if estimate is None else estimate.awareness_std,
                 score=detection.score,
@@ -264,9 +276,10 @@ class AwarenessPipeline:
                 range_lasting_relative_std=place.lasting_relative_std,
                 size_range_m=place.size_range_m,
                 size_range_relative_std=place.size_range_relative_std,
+                eyes_seen=estimate is not None and turn is not None,
             )
-            for detection, place, head, estimate, reason, person, body in zip(
-                detections, places, heads, estimates, reasons, people, bodies, strict=True
+            for detection, place, head, turn, estimate, reason, person, body in zip(
+                detections, places, heads, eyes, estimates, reasons, people, bodies, strict=True
             )
             if place is not None
         )
@@ -305,11 +318,21 @@ class AwarenessPipeline:
         _check_count("pose_estimator", len(people), len(detections))
         disowned = disowned_keypoints(self.camera, detections, people, self._min_score)
         return tuple(map(without_disowned, people, disowned)), disowned
+    def _eyes(
+        self, image_rgb: ImageRgb, heads: tuple[HeadPose | None, ...]
+    ) -> tuple[EyeGaze | None, ...]:
+        """Return the eyes in each head, combined with how eyes turn; None where not known."""
+        if self._eye_estimator is None:
+            return (None,) * len(heads)
+        measured = tuple(self._eye_estimator.estimate(image_rgb, self.camera, heads))
+        _check_count("eye_estimator", len(measured), len(heads))
+        return known_eyes(measured, self._eye_std_rad)
 
     def _awareness(
         self,
         people: tuple[PersonKeypoints, ...],
         heads: tuple[HeadPose | None, ...],
+        eyes: tuple[EyeGaze | None, ...],
         reasons: Sequence[AwarenessReason | None],
     ) -> tuple[list[AwarenessEstimate | None], list[AwarenessReason | None]]:
         """Return the awareness of each person, or None and why there is no evidence.
@@ -337,6 +360,7 @@ class AwarenessPipeline:
             extra_std_rad=np.array([evidence.extra_std_rad for *_, evidence in faces]),
             eye_in_head_std_rad=self._eye_std_rad,
             face_seen=np.array([evidence.seen for *_, evidence in faces]),
+            eyes=[eyes[row] for row, *_ in faces],
         )
         for (row, *_), estimate in zip(faces, face_estimates, strict=True):
             estimates[row] = estimate
@@ -353,6 +377,13 @@ class AwarenessPipeline:
                 f"image_rgb must be uint8 RGB of the camera's shape {wanted}, got "
                 f"{image_rgb.dtype} of shape {image_rgb.shape}"
             )
+
+
+def _gaze(head: HeadPose, eyes: EyeGaze | None) -> FloatArray:
+    """Return the unit vector (3,) of the gaze: of the eyes if they are known, else of the head."""
+    if eyes is None:
+        return head.gaze_camera
+    return np.asarray(head.rotation_camera_head @ eyes.rotation_head_eyes[:, 1])
 
 
 def _check_count(name: str, got: int, wanted: int) -> None:

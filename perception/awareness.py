@@ -13,6 +13,7 @@ from ._attention import AttentionCone
 from ._head_pose import HeadPose
 from .anthropometry import EYES_HEAD_M
 from .arrays import FloatArray
+from .eyes import EyeGaze
 
 # Standard normal distribution in two dimensions on a regular grid (trapezoidal rule). The score has
 # kinks on the axis and at the edge of the cone, where linear propagation fails and a Gauss–Hermite
@@ -74,6 +75,7 @@ def estimate_awareness(
     extra_std_rad: FloatArray,
     eye_in_head_std_rad: tuple[float, float],
     face_seen: FloatArray,
+    eyes: Sequence[EyeGaze | None] = (),
 ) -> tuple[AwarenessEstimate, ...]:
     """Return the awareness of each of N people.
 
@@ -81,6 +83,8 @@ def estimate_awareness(
       if that is lower (near the axis). So uncertainty lowers α and never raises it.
     * The standard deviation is the root mean square difference between α and the person's true
       score, over the errors of the head pose and over the directions of the eyes in the head.
+    * Where the eyes are measured, they are combined with how eyes turn in heads. The gaze is then
+      that of the eyes, and α is lowered by the uncertainty of both, head and eyes.
     * With probability 1 − ``face_seen`` the camera sees no face. A person whose face the camera
       cannot see does not see the camera: then the score is 0, whatever the head pose says. α and
       its standard deviation are the moments of both cases together.
@@ -93,13 +97,19 @@ def estimate_awareness(
             :class:`~perception.evidence.FaceEvidence`.
         eye_in_head_std_rad: standard deviations of the eyes in the head, sideways and up and down.
         face_seen: (N,) probabilities that the camera sees the face.
+        eyes: eyes in each head as :func:`~perception.eyes.known_eyes` returns them, None where they
+            are not known; empty for nobody's.
     """
     if not heads:
         return ()
-    lines = _LinesOfSight(tuple(heads), robot_points_camera_m)
+    measured = [row for row, each in enumerate(eyes) if each is not None]
+    lines = _LinesOfSight(tuple(heads), robot_points_camera_m, eyes)
     nominal = cone_scores(cone, lines.cosines.max(axis=1))
     head_covariance = lines.pose_covariance() + (extra_std_rad**2)[:, None, None] * np.eye(2)
     gaze_covariance = head_covariance + lines.eye_covariance(eye_in_head_std_rad)
+    if measured:
+        head_covariance[measured] += lines.measured_eye_covariance(eyes)
+        gaze_covariance[measured] = head_covariance[measured]
     means, squares = _moments(cone, lines, np.array([head_covariance, gaze_covariance]))
     head_mean, (gaze_mean, gaze_square) = means[0], (means[1], squares[1])
     alpha = face_seen * np.minimum(nominal, head_mean)
@@ -125,11 +135,20 @@ class _LinesOfSight:
     and nearest line of sight, ``across`` lies in this plane.
     """
 
-    def __init__(self, heads: tuple[HeadPose, ...], points: FloatArray) -> None:
+    def __init__(
+        self,
+        heads: tuple[HeadPose, ...],
+        points: FloatArray,
+        eyes: Sequence[EyeGaze | None] = (),
+    ) -> None:
         self._rotation = np.array([head.rotation_camera_head for head in heads])
         self._covariance = np.array([head.covariance for head in heads])
-        gaze = self._rotation[:, :, 1]
         self._arm = self._rotation @ EYES_HEAD_M
+        # From here on the axes of the gaze: those of the head, turned where eyes are measured.
+        for row, each in enumerate(eyes):
+            if each is not None:
+                self._rotation[row] = self._rotation[row] @ each.rotation_head_eyes
+        gaze = self._rotation[:, :, 1]
         apex = self._arm + np.array([head.position_camera_m for head in heads])
         offset = points - apex[:, None]
         distance = np.maximum(np.sqrt((offset * offset).sum(axis=2)), 1e-9)
@@ -172,6 +191,14 @@ class _LinesOfSight:
         """
         axes = self._turning @ (self._rotation[:, :, ::2] * std_rad)
         return np.asarray(axes @ axes.swapaxes(1, 2))
+
+    def measured_eye_covariance(self, eyes: Sequence[EyeGaze | None]) -> FloatArray:
+        """Return (K, 2, 2) covariances of the gaze from the K pairs of eyes that are known."""
+        rows = [row for row, each in enumerate(eyes) if each is not None]
+        covariance = np.array([each.covariance_rad2 for each in eyes if each is not None])
+        # Rotation vectors of yaw and pitch: about the head's up axis −x and its right axis z.
+        axes = self._turning[rows] @ (self._rotation[rows][:, :, ::2] * [-1.0, 1.0])
+        return np.asarray(axes @ covariance @ axes.swapaxes(1, 2))
 
 
 def _cross(first: FloatArray, second: FloatArray) -> FloatArray:

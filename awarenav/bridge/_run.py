@@ -64,6 +64,7 @@ class BridgeOptions:
     detector: str
     pose: str
     head: str
+    eyes: str
     allow_simulator_networks: bool
     threads: int | None
     provider: str
@@ -166,7 +167,7 @@ def bridge_command(options: BridgeOptions) -> int:
 def _networks(options: BridgeOptions) -> tuple[Networks, tuple[str, ...]]:
     """Return the networks, and the roles of those that have seen renders only."""
     choice = NetworkChoice.of_options(
-        options.networks, options.detector, options.pose, options.head
+        options.networks, options.detector, options.pose, options.head, options.eyes
     )
     networks = choose_networks(
         **choice.model_dump(),

@@ -304,11 +304,20 @@ _NETWORK_OPTIONS: Final = (
         "keypoints), 'fused' (both), an ONNX file, or 'auto': 'network' with the shipped pose "
         "network, else 'pnp'.",
     ),
+    option(
+        "--eyes",
+        group=_NETWORKS,
+        excludes="--networks",
+        default="auto",
+        metavar="auto|mediapipe|none",
+        help="Eyes of people nearer than about 2.5 m: 'mediapipe' (needs the extra 'mediapipe'), "
+        "'none' (the gaze is the head's direction), or 'auto': 'mediapipe' with --pose mediapipe.",
+    ),
 )
 
 
 def networks(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Add ``--networks``, ``--detector``, ``--pose`` and ``--head``: who perceives people."""
+    """Add ``--networks``, ``--detector``, ``--pose``, ``--head`` and ``--eyes``."""
     for add in reversed(_NETWORK_OPTIONS):
         function = add(function)
     return function

@@ -60,6 +60,7 @@ class DoctorOptions:
     detector: str
     pose: str
     head: str
+    eyes: str
     camera: Path | None
     fov_deg: float | None
     as_json: bool
@@ -103,7 +104,7 @@ def _source_findings(options: DoctorOptions) -> list[Finding]:
     assert options.source is not None
     with contextlib.closing(open_source(options.source, topic=options.topic)) as source:
         choice = NetworkChoice.of_options(
-            options.networks, options.detector, options.pose, options.head
+            options.networks, options.detector, options.pose, options.head, options.eyes
         )
         networks = choose_networks(**choice.model_dump())
         unfit = () if source.rendered else simulator_networks(networks.training_domains)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import ClassVar, Final
+from typing import Any, ClassVar, Final
 
 from perception import (
     Camera,
@@ -18,6 +18,7 @@ from perception import (
     PoseEstimator,
 )
 from perception.networks import (
+    MediaPipeEyeEstimator,
     MediaPipePoseEstimator,
     OnnxModel,
     OnnxSettings,
@@ -46,6 +47,7 @@ from ._estimator import Networks
 SHIPPED: Final = "shipped"
 _MEDIAPIPE: Final = "mediapipe"
 _WITHOUT_NETWORK: Final = "pnp"
+_EYES: Final = ("auto", _MEDIAPIPE, "none")
 _HEADS: Final = ("auto", "network", _WITHOUT_NETWORK, "fused")
 
 
@@ -56,6 +58,7 @@ class NetworkChoice(StrictConfig):
         detector: as :func:`choose_networks` takes it; so are the others.
         pose: pose network.
         head: head pose.
+        eyes: eyes of near people.
     """
 
     error: ClassVar[type[ValueError]] = AwarenavError
@@ -63,23 +66,27 @@ class NetworkChoice(StrictConfig):
     detector: str = SHIPPED
     pose: str = SHIPPED
     head: str = _HEADS[0]
+    eyes: str = _EYES[0]
 
     @classmethod
-    def of_options(cls, file: Path | None, detector: str, pose: str, head: str) -> NetworkChoice:
-        """Return the file's choice, or without a file that of the three options.
+    def of_options(
+        cls, file: Path | None, detector: str, pose: str, head: str, eyes: str = _EYES[0]
+    ) -> NetworkChoice:
+        """Return the file's choice, or without a file that of the four options.
 
         Raises:
             AwarenavError: for a file that cannot be read.
         """
         if file is not None:
             return cls.from_yaml(file)
-        return cls(detector=detector, pose=pose, head=head)
+        return cls.model_validate({"detector": detector, "pose": pose, "head": head, "eyes": eyes})
 
 
 def choose_networks(
     detector: str = SHIPPED,
     pose: str = SHIPPED,
     head: str = _HEADS[0],
+    eyes: str = _EYES[0],
     *,
     min_score: float = 0.25,
     threads: int | None = None,
@@ -97,6 +104,8 @@ def choose_networks(
         head: ``"network"`` (the shipped one), ``"pnp"`` (the paper's method), ``"fused"`` (both,
             weighted by their uncertainties), an ONNX file, or ``"auto"``: the shipped network with
             the shipped pose network, else PnP.
+        eyes: ``"mediapipe"`` (needs the extra), ``"none"``, or ``"auto"``: MediaPipe's with
+            its pose network, else none.
         min_score: people with a lower detection score are dropped.
         threads: of each network; None leaves the number to onnxruntime.
         provider: one of :data:`~perception.networks.PROVIDERS`.
@@ -108,6 +117,10 @@ def choose_networks(
         PerceptionError: for a file that is missing, damaged or of an unknown layout.
         AwarenavError: for a word that is neither a valid name nor a file.
     """
+    if eyes not in _EYES:
+        raise AwarenavError(f"--eyes must be {', '.join(map(repr, _EYES))}, got {eyes!r}")
+    if eyes == "auto":
+        eyes = pose if pose == _MEDIAPIPE else "none"
     if head == "auto":
         head = "network" if pose == SHIPPED else _WITHOUT_NETWORK
     settings = OnnxSettings(((provider, parse_provider_options(provider_options)),), threads)
@@ -117,12 +130,11 @@ def choose_networks(
     domains = {"detector": detector_domain, "pose": pose_domain}
     if head != _WITHOUT_NETWORK:
         domains["head"] = head_domain
+    options: dict[str, Any] = {"detect_every_s": detect_every_s, "frame_budget_s": frame_budget_s}
+    if eyes == _MEDIAPIPE:
+        options["eye_estimator"] = MediaPipeEyeEstimator()
     return Networks(
-        detector_used,
-        pose_used,
-        head_used,
-        {"detect_every_s": detect_every_s, "frame_budget_s": frame_budget_s},
-        training_domains=domains,
+        detector_used, pose_used, head_used, options, training_domains=domains
     )
 
 

@@ -60,7 +60,7 @@ def _person_record(
     observation: PersonObservation, keypoints: PersonKeypoints | None, track_id: int | None
 ) -> dict[str, Any]:
     box, gaze = observation.box_xyxy_px, observation.gaze_camera
-    return {
+    record = {
         "id": track_id,
         "box_xyxy_px": None if box is None else _rounded_list(box),
         "position_camera_m": _rounded_list(observation.position_camera_m),
@@ -72,6 +72,9 @@ def _person_record(
         "score": _rounded(observation.score),
         "keypoints": {} if keypoints is None else _keypoint_records(keypoints),
     }
+    if observation.eyes_seen:
+        record["eyes_seen"] = True
+    return record
 
 
 def _keypoint_records(person: PersonKeypoints) -> dict[str, list[float]]:

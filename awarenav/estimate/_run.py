@@ -61,6 +61,7 @@ class EstimateOptions:
     detector: str
     pose: str
     head: str
+    eyes: str
     allow_simulator_networks: bool
     min_score: float
     threads: int | None
@@ -121,7 +122,7 @@ def estimate_command(options: EstimateOptions, networks: Networks | None = None)
         until_prefetched.callback(source.close)
         cameras = CameraChoice(_calibration(options, source), options.fov_deg, _log)
         choice = NetworkChoice.of_options(
-            options.networks, options.detector, options.pose, options.head
+            options.networks, options.detector, options.pose, options.head, options.eyes
         )
         if networks is None:
             networks = choose_networks(

@@ -1,4 +1,4 @@
-"""Networks: ONNX models, person detectors and pose estimators; head poses are in ``heads``."""
+"""Networks: ONNX models, detectors, estimators of poses and eyes; head poses are in ``heads``."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from ._model import NETWORK_TIME, OnnxModel
 from ._pixels import PixelFormat
 from ._settings import PROVIDERS, OnnxSettings, Provider, parse_provider_options
 from .detectors import OnnxPersonDetector
-from .poses import MediaPipePoseEstimator, OnnxPoseEstimator
+from .poses import MediaPipeEyeEstimator, MediaPipePoseEstimator, OnnxPoseEstimator
 
 __all__ = [
     "NETWORK_TIME",
     "PROVIDERS",
+    "MediaPipeEyeEstimator",
     "MediaPipePoseEstimator",
     "OnnxModel",
     "OnnxPersonDetector",

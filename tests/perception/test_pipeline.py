@@ -18,6 +18,7 @@ from perception import (
     PersonKeypoints,
     PersonObservation,
 )
+from perception.eyes import EyeGaze
 from perception.networks import NETWORK_TIME
 
 CAMERA = Camera.from_fov(1280, 960, math.radians(60.0))
@@ -293,3 +294,61 @@ def test_head_poses_keypoints_and_detections_refuse_invalid_fields():
         PersonKeypoints(np.zeros((17, 2)), np.zeros((17, 3)), np.zeros(133), "coco_wholebody")
     with pytest.raises(PerceptionError, match="right >= left"):
         PersonDetection([10, 0, 5, 5], 0.5)
+
+
+# --- eyes ---------------------------------------------------------------------------------------
+
+
+class KnownEyes:
+    """An eye estimator that gives the same measurement for everybody, and keeps what it got."""
+
+    def __init__(self, eyes):
+        self.eyes = eyes
+
+    def estimate(self, image_rgb, camera, heads):
+        self.heads = heads
+        return (self.eyes,) * len(heads)
+
+
+def seen_with(eye_estimator, **options):
+    people = [person_at((0.0, 0.4, 1.8), head_yaw_rad=0.2), person_at((0.9, 0.4, 2.5))]
+    known = pipeline(KnownPeople(people), eye_estimator=eye_estimator, **options)
+    return known.process(FRAME, 0.0)
+
+
+def test_measured_eyes_turn_the_gaze_and_awareness_follows():
+    sure = EyeGaze([math.radians(10.0), 0.0], np.eye(2) * 1e-8)
+    alone, turned = seen_with(None), seen_with(KnownEyes(sure))
+    for before, after in zip(alone, turned, strict=True):
+        assert (before.eyes_seen, after.eyes_seen) == (False, True)
+        angle = math.acos(float(before.gaze_camera @ after.gaze_camera))
+        assert angle == pytest.approx(math.radians(10.0), abs=1e-3)
+        # To the person's left, the image's right.
+        assert after.gaze_camera[0] > before.gaze_camera[0]
+        assert np.array_equal(before.position_camera_m, after.position_camera_m)
+        assert after.awareness_std < before.awareness_std
+    # Both heads point past the camera's right already.
+    assert turned[0].awareness < alone[0].awareness
+
+
+@pytest.mark.parametrize("eyes", [None, EyeGaze([0.7, 0.0], np.eye(2) * 1e-4)])
+def test_without_a_credible_measurement_nothing_changes_to_the_bit(eyes):
+    for before, after in zip(seen_with(None), seen_with(KnownEyes(eyes)), strict=True):
+        assert not after.eyes_seen
+        assert np.array_equal(before.gaze_camera, after.gaze_camera)
+        assert (before.awareness, before.awareness_std) == (after.awareness, after.awareness_std)
+
+
+def test_an_eye_estimator_gets_one_head_per_person_and_returns_as_many():
+    estimator = KnownEyes(None)
+    assert len(seen_with(estimator)) == len(estimator.heads) == 2
+    assert all(isinstance(head, HeadPose) for head in estimator.heads)
+
+    class TooFew(KnownEyes):
+        def estimate(self, image_rgb, camera, heads):
+            return ()
+
+    with pytest.raises(PerceptionError, match=r"eye_estimator must return one result per person"):
+        seen_with(TooFew(None))
+    with pytest.raises(PerceptionError, match=r"eye_estimator must have the method estimate"):
+        seen_with(object())

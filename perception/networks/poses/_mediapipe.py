@@ -69,8 +69,8 @@ class MediaPipePoseEstimator(AbstractContextManager["MediaPipePoseEstimator"]):
         confidence = finite_number(
             "min_detection_confidence", min_detection_confidence, minimum=0.0, maximum=1.0
         )
-        pose, face_mesh = _solutions()
-        with _without_protobuf_warnings():
+        pose, face_mesh = mediapipe_solutions("MediaPipePoseEstimator")
+        with without_protobuf_warnings():
             # The package contains the network of complexity 1 only; others would be downloaded.
             self._pose = pose.Pose(
                 static_image_mode=True,
@@ -116,7 +116,7 @@ class MediaPipePoseEstimator(AbstractContextManager["MediaPipePoseEstimator"]):
         image = rgb_image(image_rgb)
         if self._pose is None:
             raise PerceptionError("the MediaPipePoseEstimator has been closed")
-        with _without_protobuf_warnings():
+        with without_protobuf_warnings():
             return tuple(self._person(image, person.box_xyxy_px) for person in detections)
 
     def _person(self, image: ImageRgb, box_xyxy_px: FloatArray) -> PersonKeypoints:
@@ -177,21 +177,26 @@ class MediaPipePoseEstimator(AbstractContextManager["MediaPipePoseEstimator"]):
         return found, _face_scores(points)
 
 
-def _solutions() -> tuple[Any, Any]:
+def mediapipe_solutions(asker: str) -> tuple[Any, Any]:
+    """Return MediaPipe's face mesh and pose solutions, for the class ``asker``.
+
+    Raises:
+        PerceptionError: if MediaPipe is not installed; the message names the extra.
+    """
     try:
-        with _without_protobuf_warnings():
+        with without_protobuf_warnings():
             from mediapipe.python.solutions import face_mesh, pose  # noqa: PLC0415
     except ImportError as cause:
         raise PerceptionError(
-            f"MediaPipePoseEstimator needs mediapipe 0.10.14, which cannot be imported ({cause}); "
+            f"{asker} needs mediapipe 0.10.14, which cannot be imported ({cause}); "
             "it is the extra 'mediapipe': pip install 'awarenav[mediapipe]'"
         ) from cause
     return pose, face_mesh
 
 
 @contextmanager
-def _without_protobuf_warnings() -> Iterator[None]:
-    # MediaPipe 0.10.14 calls deprecated functions of protobuf for each result.
+def without_protobuf_warnings() -> Iterator[None]:
+    """Silence protobuf: MediaPipe 0.10.14 calls deprecated functions of it for each result."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", module=r"google\.protobuf\..*")
         warnings.filterwarnings("ignore", message=r"SymbolDatabase\.GetPrototype")

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from perception.arrays import FloatArray
 
 from ...world.errors import SimError
+from ._irises import with_human_irises
 
 #: Joints in the order of every array; parents come before their children.
 JOINTS: Final = (
@@ -58,6 +59,9 @@ class SkinMesh:
         weights: (V, 16) in [0, 1]: the share of each joint's rotation that a vertex follows. It is
             1 beyond the joint and between 0 and 1 where the skin bends.
         texture_file: image of the texture.
+        eyes: centre (3,) of each eye, and which of the (V,) vertices belong to it, where irises
+            are painted anew: on the finest level only, as the others are for people too far away
+            to show any.
     """
 
     vertices_m: FloatArray
@@ -66,13 +70,15 @@ class SkinMesh:
     triangles: NDArray[np.int64]
     weights: FloatArray
     texture_file: Path
+    eyes: tuple[tuple[FloatArray, NDArray[np.bool_]], ...] = ()
 
     @cached_property
     def texture_rgb(self) -> NDArray[np.uint8]:
         """(H, W, 3) texture; read when it is first asked for, since most episodes draw nothing."""
         data = np.frombuffer(self.texture_file.read_bytes(), np.uint8)
         bgr = cv2.imdecode(data, cv2.IMREAD_COLOR)
-        return np.ascontiguousarray(np.asarray(bgr, dtype=np.uint8)[..., ::-1])
+        rgb = np.ascontiguousarray(np.asarray(bgr, dtype=np.uint8)[..., ::-1])
+        return with_human_irises(rgb, self.vertices_m, self.uv, self.triangles, self.eyes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,8 +139,9 @@ def load_worker(name: str) -> WorkerAsset:
     path = _file_of(name)
     with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
         arrays = {key: data[key] for key in data.files}
+    joints_m = _read_only_copy(arrays["joints_m"])
     levels = tuple(
-        _skin_mesh(arrays, level, path.with_name(f"{path.stem}_lod{level}.jpg"))
+        _skin_mesh(arrays, level, path.with_name(f"{path.stem}_lod{level}.jpg"), joints_m)
         for level in range(DETAIL_LEVELS)
     )
     capsules = tuple(
@@ -147,7 +154,7 @@ def load_worker(name: str) -> WorkerAsset:
         name=name,
         description=str(arrays["description"]),
         stature_m=float(arrays["stature_m"]),
-        joints_m=_read_only_copy(arrays["joints_m"]),
+        joints_m=joints_m,
         keypoints_m=_read_only_copy(arrays["keypoints_m"]),
         keypoint_weights=_read_only_copy(arrays["keypoint_weights"]),
         capsules=capsules,
@@ -178,7 +185,9 @@ def _file_of(name: str) -> Path:
     return Path(str(resources.files("sim_tests.actors.body"))) / "workers" / f"{name}.npz"
 
 
-def _skin_mesh(arrays: dict[str, NDArray[np.generic]], level: int, texture: Path) -> SkinMesh:
+def _skin_mesh(
+    arrays: dict[str, NDArray[np.generic]], level: int, texture: Path, joints_m: FloatArray
+) -> SkinMesh:
     """Undo the quantisation of one level of detail."""
 
     def dequantised(key: str, scale: float) -> FloatArray:
@@ -186,12 +195,19 @@ def _skin_mesh(arrays: dict[str, NDArray[np.generic]], level: int, texture: Path
 
     normals = dequantised("normals", 1.0 / 127.0)
     lengths = np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+    weights = dequantised("weights", 1.0 / 255.0)
+    eyes = tuple(
+        (joints_m[row], weights[:, row] > 0.5)
+        for row, joint in enumerate(JOINTS)
+        if level == 0 and joint.endswith("_eye")
+    )
     return SkinMesh(
         vertices_m=dequantised("vertices", 1e-4),
         normals=_read_only_copy(normals / lengths),
         uv=dequantised("uv", 1.0 / 65535.0),
         triangles=arrays[f"lod{level}_triangles"].astype(np.int64),
-        weights=dequantised("weights", 1.0 / 255.0),
+        weights=weights,
+        eyes=eyes,
         texture_file=texture,
     )
 

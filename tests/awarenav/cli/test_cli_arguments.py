@@ -100,7 +100,7 @@ def test_exclusions_are_those_that_are_known():
         *(
             (name, option, "--networks")
             for name in ("bridge", "doctor", "estimate")
-            for option in ("--detector", "--pose", "--head")
+            for option in ("--detector", "--pose", "--head", "--eyes")
         ),
         ("tracks", "--ids", "--config"),
         ("falsify", "--unsafe-no-floor", "--planner"),
