@@ -318,6 +318,7 @@ class AwarenessPipeline:
         _check_count("pose_estimator", len(people), len(detections))
         disowned = disowned_keypoints(self.camera, detections, people, self._min_score)
         return tuple(map(without_disowned, people, disowned)), disowned
+
     def _eyes(
         self, image_rgb: ImageRgb, heads: tuple[HeadPose | None, ...]
     ) -> tuple[EyeGaze | None, ...]:

@@ -133,9 +133,7 @@ def choose_networks(
     options: dict[str, Any] = {"detect_every_s": detect_every_s, "frame_budget_s": frame_budget_s}
     if eyes == _MEDIAPIPE:
         options["eye_estimator"] = MediaPipeEyeEstimator()
-    return Networks(
-        detector_used, pose_used, head_used, options, training_domains=domains
-    )
+    return Networks(detector_used, pose_used, head_used, options, training_domains=domains)
 
 
 def admit_networks(networks: Networks, *, rendered: bool, allowed: bool) -> tuple[str, ...]:
