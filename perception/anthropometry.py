@@ -115,6 +115,9 @@ HEAD_TEMPLATE_M: Final[FloatArray] = _locked(
 )
 
 
+#: Width of the head template, ear to ear.
+HEAD_WIDTH_M: Final = 0.156
+
 _SIZE_STD: Final = 0.04
 _ASYMMETRY_STD_M: Final = 0.0015
 # Standard deviations (mm) down, forward and outwards: of eyes and ears together relative to the tip
