@@ -31,7 +31,7 @@ CAMERA: Final = Camera.from_fov(640, 480, math.radians(60.0))
 #: χ² of three degrees of freedom that is exceeded in 5 %.
 BOUND_95: Final = 7.815
 
-# Forward, left and up of a body in the axes of a camera that it faces; of a head in those of a body.
+# Forward, left and up of a body in the axes of a camera that it faces, and of a head in a body's.
 _CAMERA_FROM_BODY: Final = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]])
 _BODY_FROM_HEAD: Final = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]])
 # Directions that nose, eyes and ears face in the head, and the angles to the camera from which on

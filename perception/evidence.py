@@ -21,9 +21,9 @@ _MIN_FACE_PX: Final = 5.0
 _WEAK_FACE_PX: Final = 12.0
 _WEAK_FACE_STD_RAD: Final = math.radians(20.0)
 _SIZE_POWER: Final = 4.0
-# Errors of keypoints that agree with a pose: up to so many standard deviations of the noise together
-# with a share of the face's width for the head's own shape, and up to a share in small faces. Beyond
-# it, the same again is the standard deviation of a Gaussian that lowers the probability.
+# Errors of keypoints that agree with a pose: up to so many standard deviations of the noise, with a
+# share of the face's width for the head's own shape; in small faces up to a share alone. Beyond it,
+# the same again is the standard deviation of a Gaussian that lowers the probability.
 _CONSISTENT_STD: Final = 3.5
 _CONSISTENT_SHARE: Final = 0.05
 _SMALL_FACE_SHARE: Final = 0.15
@@ -75,14 +75,15 @@ def judge_face(
       outside the image counts as seen with a probability of at least 0.5: it is cut off, not turned
       away. If two of them are outside, a lower ``head.face_seen`` also counts as 0.5.
     * Nose, eyes and ears lie where a head in this pose has them. A root mean square error of more
-      than 3.5 standard deviations of the keypoints' noise together with 5 % of the face's width (the
-      head's own shape), or of more than 15 % of the width, lowers the probability.
+      than 3.5 standard deviations of the noise together with 5 % of the face's width (the head's
+      own shape), or of more than 15 % of the width, lowers the probability.
     * The face is large enough. Below 12 pixels of width the gaze is very uncertain; below 5 pixels
       there is no evidence.
 
     There is also no evidence if no keypoint of the head is seen and ``head.face_seen`` is None, if
-    the head is larger than the body can carry, or if nose or eyes are missing from a head at the border of the image: what the border cuts off is
-    missing from the pose too, and so the pose may be far off.
+    the head is larger than the body can carry, or if nose or eyes are missing from a head at the
+    border of the image: what the border cuts off is missing from the pose too, and so the pose may
+    be far off.
 
     Args:
         camera: camera that saw the person.
