@@ -43,8 +43,8 @@ _LEG_ROWS: Final = (
     (kp.RIGHT_HIP, kp.RIGHT_ANKLE, kp.RIGHT_KNEE),
 )
 #: Standard deviations of the eyes in the head, sideways and up and down. Sideways as recorded of
-#: four pedestrians before a driverless shuttle in virtual reality. Real people differ widely in how far
-#: they turn their eyes before they turn their head (Thumser and Stahl 2009,
+#: four pedestrians before a driverless shuttle in virtual reality. Real people differ widely in how
+#: far they turn their eyes before they turn their head (Thumser and Stahl 2009,
 #: doi:10.1007/s00221-009-1803-8); replace them if you know better values.
 DEFAULT_EYE_IN_HEAD_STD_RAD: Final = (math.radians(11.3), math.radians(3.4))
 

@@ -346,7 +346,7 @@ def _upright_prior(points: FloatArray, rays: FloatArray) -> HeadPrior:
         np.diag(1.0 / stds**2),
         HEAD_CENTRE_HEAD_M,
         pivot,
-        np.linalg.inv(covariance),
+        np.asarray(np.linalg.inv(covariance), dtype=np.float64),
     )
 
 
