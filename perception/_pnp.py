@@ -17,9 +17,14 @@ from ._keypoints import PersonKeypoints
 from ._metric_scale import DEFAULT_MIN_SCORE, metric_scale
 from ._pose_refinement import HeadPrior, RefinedPose, refine
 from ._rotations import rotation_exp, rotation_log, skew
-from .anthropometry import HEAD_KEYPOINTS, HEAD_TEMPLATE_M
+from .anthropometry import (
+    HEAD_CENTRE_HEAD_M,
+    HEAD_KEYPOINTS,
+    HEAD_SHAPE_FACTOR_M,
+    HEAD_TEMPLATE_M,
+)
 from .arrays import FloatArray, finite_number
-from .body import BodyPlacement, place_body
+from .body import BodyPlacement, place_bodies
 from .errors import PerceptionError
 from .head_frame import lifted_head_model
 
@@ -35,6 +40,11 @@ _NECK_TO_PIVOT_M: Final = np.array([0.046, 0.0, 0.168])
 # Standard deviations of the head's rotation relative to the torso.
 _YAW_STD_RAD, _ROLL_STD_RAD, _PITCH_STD_RAD = map(math.radians, (60.0, 15.0, 25.0))
 _PIVOT_STD_M: Final = 0.04
+# A head without a body is upright in the camera within this, and may look anywhere.
+_UPRIGHT_STD_RAD, _UNKNOWN_YAW_STD_RAD = math.radians(30.0), math.radians(150.0)
+_DOWN_CAMERA: Final = np.array([0.0, 1.0, 0.0])
+# Relative standard deviation of the body's range where the head has a range of its own.
+_LOOSE_SCALE_STD: Final = 0.25
 _YAW_STARTS_RAD: Final = np.radians([0.0, 50.0, -50.0, 100.0, -100.0, 180.0])
 
 # A seen keypoint should face the camera, an unseen one should face away. Each exception costs as
@@ -98,6 +108,9 @@ class PnpHeadPoseEstimator:
         head_model: ``"template"`` for the anatomical template, whose forward axis is the Frankfurt
             horizontal; ``"lifted"`` for the person's own lifted keypoints in the frame of the
             paper's printed formula (on an upright head a bias of about 36° downwards).
+        head_shape_spread: spread of head shapes about the template, as a multiple of that of adults
+            (:data:`~perception.anthropometry.HEAD_SHAPE_FACTOR_M`); 0 for heads that have exactly
+            the template's shape. It is part of the covariance. Lifted keypoints have none.
 
     Raises:
         PerceptionError: for an invalid value.
@@ -108,6 +121,7 @@ class PnpHeadPoseEstimator:
         keypoint_std_px: float = 1.0,
         min_score: float = DEFAULT_MIN_SCORE,
         head_model: HeadModel = "template",
+        head_shape_spread: float = 1.0,
     ) -> None:
         if head_model not in ("template", "lifted"):
             raise PerceptionError(f"head_model must be 'template' or 'lifted', got {head_model!r}")
@@ -116,6 +130,9 @@ class PnpHeadPoseEstimator:
         )
         self._min_score = finite_number("min_score", min_score, minimum=0.0, maximum=1.0)
         self._head_model: HeadModel = head_model
+        spread = finite_number("head_shape_spread", head_shape_spread, minimum=0.0)
+        known = spread == 0.0 or head_model == "lifted"
+        self._shape_factor_m = None if known else spread * HEAD_SHAPE_FACTOR_M
 
     def estimate(
         self, image_rgb: Any, camera: Camera, people: tuple[PersonKeypoints, ...]
@@ -128,14 +145,20 @@ class PnpHeadPoseEstimator:
             people: keypoints of each person.
         """
         poses: list[HeadPose | None] = [None] * len(people)
-        found = [self._head(camera, person, row) for row, person in enumerate(people)]
+        bodies = place_bodies(camera, people, self._std_px, self._min_score)
+        found = [
+            self._head(camera, person, body, row)
+            for row, (person, body) in enumerate(zip(people, bodies, strict=True))
+        ]
         heads = [head for head in found if head is not None]
         if heads:
             for head, pose in zip(heads, self._refined(camera, heads), strict=True):
                 poses[head.row] = pose
         return tuple(poses)
 
-    def _head(self, camera: Camera, person: PersonKeypoints, row: int) -> _Head | None:
+    def _head(
+        self, camera: Camera, person: PersonKeypoints, body: BodyPlacement | None, row: int
+    ) -> _Head | None:
         """Return the points and starting poses of a head; None without enough keypoints."""
         scores = person.scores[_HEAD_ROWS]
         seen = scores >= self._min_score
@@ -150,13 +173,19 @@ class PnpHeadPoseEstimator:
         if len(rows) > 1 and spread < _MIN_SPREAD_STD * self._std_px:
             return None
         rays = camera.normalise(pixels)
-        prior = None
-        if len(rows) >= 4:
-            starts = _sqpnp(model[rows], rays[rows])
-        else:
-            prior = _body_prior(camera, person, self._std_px, self._min_score)
-            starts = _prior_starts(prior) if prior is not None else _sqpnp(model[rows], rays[rows])
-        return None if starts is None else _Head(row, model, rays, seen, *starts, prior)
+        whole = len(rows) >= 4
+        # The printed formula's frame is pitched: a torso says little of it.
+        prior = None if whole and self._head_model == "lifted" else _body_prior(body, whole=whole)
+        if prior is None and len(rows) == 3:
+            prior = _upright_prior(model[rows], rays[rows])
+        starts = [_sqpnp(model[rows], rays[rows])] if whole or prior is None else []
+        if prior is not None:
+            starts.append(_prior_starts(prior))
+        found = [start for start in starts if start is not None]
+        if not found:
+            return None
+        rotations, translations = (np.concatenate(each) for each in zip(*found, strict=True))
+        return _Head(row, model, rays, seen, rotations, translations, prior)
 
     def _refined(self, camera: Camera, heads: list[_Head]) -> list[HeadPose | None]:
         """Refine the starting poses of several heads at once and return their head poses."""
@@ -172,6 +201,7 @@ class PnpHeadPoseEstimator:
             [head.prior for head in heads],
             np.array([head.seen for head in heads], dtype=np.float64)[owner],
             owner,
+            self._shape_factor_m,
         )
         results: list[HeadPose | None] = []
         for index, head in enumerate(heads):
@@ -207,8 +237,9 @@ class PnpHeadPoseEstimator:
             covariance = np.linalg.inv(pose.information)
         except np.linalg.LinAlgError:
             return None
-        squared = float(np.sum((pose.reprojection_px / self._std_px) ** 2))
-        degrees = 2 * points - (0 if with_prior else 6)
+        squared = pose.fit_chi2
+        # Of few points a prior determines what they do not.
+        degrees = 2 * points - (0 if with_prior and points < 4 else 6)
         if degrees > 0 and squared > _FIT_QUANTILE[min(degrees, 6)]:
             covariance = covariance * (squared / degrees)
         covariance = 0.5 * (covariance + covariance.T) + _spread_of_modes(costs)
@@ -270,11 +301,11 @@ def _mirrored(rotation: FloatArray, origin: FloatArray, centre: FloatArray) -> F
     return np.asarray(rotation_exp(axis / sine * angle) @ rotation)
 
 
-def _body_prior(
-    camera: Camera, person: PersonKeypoints, keypoint_std_px: float, min_score: float
-) -> HeadPrior | None:
-    """Return the prior of the head's pose from the torso; None if too little of it is seen."""
-    body = place_body(camera, person, keypoint_std_px, min_score)
+def _body_prior(body: BodyPlacement | None, *, whole: bool) -> HeadPrior | None:
+    """Return the prior of the head's pose from the torso; None if too little of it is seen.
+
+    ``whole`` is True for a head that shows enough keypoints to tell its own range.
+    """
     if body is None:
         return None
     torso = _torso_axes(body)
@@ -284,7 +315,8 @@ def _body_prior(
     forward, left, up = rotation_camera_torso.T
     pivot = neck + rotation_camera_torso @ _NECK_TO_PIVOT_M
     ray = pivot / np.linalg.norm(pivot)
-    along = (body.scale_relative_std * np.linalg.norm(pivot)) ** 2 + _PIVOT_STD_M**2
+    relative = max(body.scale_relative_std, _LOOSE_SCALE_STD if whole else 0.0)
+    along = (relative * np.linalg.norm(pivot)) ** 2 + _PIVOT_STD_M**2
     covariance = _PIVOT_STD_M**2 * (np.eye(3) - np.outer(ray, ray)) + along * np.outer(ray, ray)
     stds = np.array([_YAW_STD_RAD, _ROLL_STD_RAD, _PITCH_STD_RAD])
     return HeadPrior(
@@ -293,6 +325,28 @@ def _body_prior(
         _PIVOT_HEAD_M,
         pivot,
         np.linalg.inv(covariance),
+    )
+
+
+def _upright_prior(points: FloatArray, rays: FloatArray) -> HeadPrior:
+    """Return the prior of a head without a body: upright, at about the range of its size."""
+    span = float(np.linalg.norm(rays - rays.mean(axis=0), axis=1).max())
+    size_m = float(np.linalg.norm(points - points.mean(axis=0), axis=1).max())
+    # Foreshortening makes a head look smaller: the range is the largest one possible.
+    pivot = np.append(rays.mean(axis=0), 1.0) * (0.8 * size_m / max(span, 1e-6))
+    ray = pivot / np.linalg.norm(pivot)
+    right = skew(_DOWN_CAMERA) @ -ray
+    right = right / np.linalg.norm(right)
+    down = skew(-ray) @ right
+    across, along = _PIVOT_STD_M + 0.1, 0.5 * float(np.linalg.norm(pivot))
+    covariance = across**2 * (np.eye(3) - np.outer(ray, ray)) + along**2 * np.outer(ray, ray)
+    stds = np.array([_UNKNOWN_YAW_STD_RAD, _UPRIGHT_STD_RAD, _UPRIGHT_STD_RAD])
+    return HeadPrior(
+        np.stack([down, -ray, right], axis=1),
+        np.diag(1.0 / stds**2),
+        HEAD_CENTRE_HEAD_M,
+        pivot,
+        np.asarray(np.linalg.inv(covariance), dtype=np.float64),
     )
 
 

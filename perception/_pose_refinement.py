@@ -1,4 +1,10 @@
-"""Least-squares refinement of head poses with priors, from many starting poses at once."""
+"""Least-squares refinement of head poses with priors, from many starting poses at once.
+
+The points of a head deviate from the template, each head by its own shape. Their errors in the
+image are therefore correlated, and depend on the pose. A first pass finds the pose with pixel noise
+alone; a second one weights the residuals with the inverse covariance of noise and shape together
+(generalised least squares).
+"""
 
 from __future__ import annotations
 
@@ -13,6 +19,8 @@ from ._rotations import rotation_exp, rotation_log, skew
 from .arrays import FloatArray
 
 _ITERATIONS: Final = 8
+# The second pass starts at the optimum of the first.
+_SHAPE_ITERATIONS: Final = 4
 # A head is converged when no step promises to lower χ² by more; noise changes χ² by about 1.
 _CONVERGED_CHI2: Final = 1e-2
 _MIN_DEPTH_M: Final = 0.05
@@ -90,6 +98,7 @@ class RefinedPose:
         translation_m: (3,) head origin in the camera frame.
         information: (6, 6) inverse covariance, order rotation vector, translation.
         cost: sum of squared normalised residuals, priors included.
+        fit_chi2: sum of squared normalised residuals of the points.
         reprojection_px: (N,) pixel error of each point.
     """
 
@@ -97,7 +106,11 @@ class RefinedPose:
     translation_m: FloatArray
     information: FloatArray
     cost: float
+    fit_chi2: float
     reprojection_px: FloatArray
+
+
+_State = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
 
 def _linearise(
@@ -107,7 +120,8 @@ def _linearise(
     rotation: FloatArray,
     translation: FloatArray,
     prior: _Priors | None,
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    whitening: FloatArray | None,
+) -> _State:
     """Return cost (B,), gradient (B, 6), information (B, 6, 6) and pixel residuals (B, N, 2).
 
     The state is a rotation in camera axes, applied from the left, then the translation.
@@ -127,6 +141,9 @@ def _linearise(
     np.matmul(slope, skew(-turned), out=jacobian[..., :3])
     flat = jacobian.reshape(len(rotation), -1, 6)
     flat_residual = residual.reshape(len(rotation), -1)
+    if whitening is not None:
+        flat = whitening @ flat
+        flat_residual = (whitening @ flat_residual[..., None])[..., 0]
     information = flat.swapaxes(1, 2) @ flat
     gradient = np.einsum("bki,bk->bi", flat, flat_residual)
     cost = np.add.reduce(flat_residual * flat_residual, axis=1)
@@ -170,6 +187,7 @@ def refine(
     priors: Sequence[HeadPrior | None] | None,
     seen: FloatArray | None = None,
     owner: NDArray[np.int64] | None = None,
+    shape_factor_m: FloatArray | None = None,
 ) -> list[RefinedPose]:
     """Refine B starting poses at once, of one or several heads, by Levenberg–Marquardt.
 
@@ -187,6 +205,8 @@ def refine(
         seen: (B, N) 1 for points that count, 0 for others; default all count.
         owner: (B,) head of each start, with the starts of a head in consecutive rows; default one
             head.
+        shape_factor_m: (N, 3, M) factor F of the covariance F Fᵀ of the points (flattened to 3 N)
+            over heads, in the head frame; None for points that are known exactly.
 
     Returns:
         One local optimum per start, in the same order.
@@ -195,13 +215,64 @@ def refine(
     weight = weight[None, None] if seen is None else seen[..., None] * weight
     count = len(rotations)
     owner = np.zeros(count, dtype=np.int64) if owner is None else owner
-    first = np.flatnonzero(np.diff(owner, prepend=-1))
     prior = _Priors.of(priors, owner)
+    problem = _Problem(model_m, rays, weight, prior, owner)
+    rotation, translation, state = _descend(problem, rotations, translations_m, None, _ITERATIONS)
+    fit = state[3].reshape(count, -1)
+    if shape_factor_m is not None:
+        whitening = _whitening(problem, rotation, translation, shape_factor_m)
+        rotation, translation, state = _descend(
+            problem, rotation, translation, whitening, _SHAPE_ITERATIONS
+        )
+        fit = (whitening @ state[3].reshape(count, -1, 1))[..., 0]
+    cost, _, information, residual = state
+    chi2 = np.einsum("bk,bk->b", fit, fit)
+    error_px = keypoint_std_px * np.sqrt(np.einsum("bni,bni->bn", residual, residual))
+    return [
+        RefinedPose(
+            rotation[index],
+            translation[index],
+            information[index],
+            float(cost[index]),
+            float(chi2[index]),
+            error_px[index],
+        )
+        for index in range(count)
+    ]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Problem:
+    """The measurements of B starts; arrays as in :func:`refine`, ``weight_px`` (B or 1, N, 2)."""
+
+    model: FloatArray
+    rays: FloatArray
+    weight_px: FloatArray
+    prior: _Priors | None
+    owner: NDArray[np.int64]
+
+
+def _descend(
+    problem: _Problem,
+    rotation: FloatArray,
+    translation: FloatArray,
+    whitening: FloatArray | None,
+    iterations: int,
+) -> tuple[FloatArray, FloatArray, _State]:
+    """Return rotations, translations and states after some steps of Levenberg–Marquardt."""
+
+    def linearise(rotation: FloatArray, translation: FloatArray) -> _State:
+        return _linearise(
+            problem.model, problem.rays, problem.weight_px, rotation, translation,
+            problem.prior, whitening,
+        )  # fmt: skip
+
+    count, owner = len(rotation), problem.owner
+    first = np.flatnonzero(np.diff(owner, prepend=-1))
     active = np.ones(count, dtype=np.bool_)
     damping: FloatArray = np.full(count, 1e-3)
-    rotation, translation = rotations, translations_m
-    state = _linearise(model_m, rays, weight, rotation, translation, prior)
-    for _ in range(_ITERATIONS):
+    state = linearise(rotation, translation)
+    for _ in range(iterations):
         cost, gradient, information, _ = state
         scale = information.reshape(count, 36)[:, ::7]  # the diagonals
         damped = information + (damping[:, None] * scale + 1e-9)[..., None] * _EYE_6
@@ -216,7 +287,7 @@ def refine(
         turn = turn * np.minimum(1.0, 0.7 / np.maximum(length, 1e-12))
         trial_rotation = rotation_exp(turn) @ rotation
         trial_translation = translation + step[:, 3:]
-        trial = _linearise(model_m, rays, weight, trial_rotation, trial_translation, prior)
+        trial = linearise(trial_rotation, trial_translation)
         better = active & (trial[0] < cost)
         damping = damping * np.where(better, 0.2, 10.0)
         if np.logical_and.reduce(better):
@@ -231,15 +302,24 @@ def refine(
                 np.where(one[..., None], trial[2], information),
                 np.where(one[..., None], trial[3], state[3]),
             )
-    cost, _, information, residual = state
-    error_px = keypoint_std_px * np.sqrt(np.einsum("bni,bni->bn", residual, residual))
-    return [
-        RefinedPose(
-            rotation[index],
-            translation[index],
-            information[index],
-            float(cost[index]),
-            error_px[index],
-        )
-        for index in range(count)
-    ]
+    return rotation, translation, state
+
+
+def _whitening(
+    problem: _Problem, rotation: FloatArray, translation: FloatArray, factor: FloatArray
+) -> FloatArray:
+    """Return W (B, 2 N, 2 N) with W C Wᵀ = 1 for the covariance C of the residuals.
+
+    C = 1 + G Gᵀ, in units of the pixel noise. G is the factor of the points' covariance, projected
+    into the image at each pose.
+    """
+    points = problem.model @ rotation.swapaxes(1, 2) + translation[:, None]
+    depth = np.maximum(points[..., 2], _MIN_DEPTH_M)[..., None]
+    slope = np.empty((*points.shape[:2], 2, 3))
+    slope[..., :2] = _EYE_2 / depth[..., None]
+    slope[..., 2] = -points[..., :2] / depth**2
+    slope *= problem.weight_px[..., None]
+    shape = slope @ rotation[:, None] @ factor
+    shape = shape.reshape(len(rotation), -1, factor.shape[-1])
+    covariance = shape @ shape.swapaxes(1, 2) + np.eye(shape.shape[1])
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))

@@ -13,20 +13,28 @@ from ._camera import Camera
 from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
 from ._observation import AwarenessReason
-from .anthropometry import HEAD_TEMPLATE_M
+from .anthropometry import HEAD_TEMPLATE_M, HEAD_WIDTH_M
 
-# Ear to ear.
-_FACE_WIDTH_M: Final = 0.156
 # A face with a width of less than 5 pixels carries no direction. At 12 pixels the gaze is uncertain
 # by 20°, whatever the estimator says: no estimator is trained or tested on such small faces.
 _MIN_FACE_PX: Final = 5.0
 _WEAK_FACE_PX: Final = 12.0
 _WEAK_FACE_STD_RAD: Final = math.radians(20.0)
 _SIZE_POWER: Final = 4.0
-# Keypoint errors, in widths of the face: up to the first they agree with the pose; beyond it, the
-# second is the standard deviation of a Gaussian that lowers the probability.
-_CONSISTENT_ERROR: Final = 0.15
-_ERROR_SCALE: Final = 0.15
+# Errors of keypoints that agree with a pose: up to so many standard deviations of the noise, with a
+# share of the face's width for the head's own shape; in small faces up to a share alone. Beyond it,
+# the same again is the standard deviation of a Gaussian that lowers the probability.
+_CONSISTENT_STD: Final = 3.5
+_CONSISTENT_SHARE: Final = 0.05
+_SMALL_FACE_SHARE: Final = 0.15
+_ERROR_SCALE: Final = 0.5
+# No head is wider than this share of the extent of its own body, even if no more than the shoulders
+# is seen of it: those of photographs have up to 0.21.
+_LARGEST_SHARE: Final = 0.7
+# Root mean square errors of keypoints above this, in standard deviations of the noise together with
+# this share of the face's width for the head's own shape, are those of no head.
+_MISFIT_STD: Final = 4.5
+_MISFIT_SHARE: Final = 0.06
 # Probability of a face without evidence for or against it.
 _UNKNOWN: Final = 0.5
 _MIN_SCORE_SCALE: Final = 0.05
@@ -51,7 +59,11 @@ class FaceEvidence:
 
 
 def judge_face(
-    camera: Camera, person: PersonKeypoints, head: HeadPose, min_score: float
+    camera: Camera,
+    person: PersonKeypoints,
+    head: HeadPose,
+    min_score: float,
+    keypoint_std_px: float = 1.0,
 ) -> FaceEvidence | AwarenessReason:
     """Return the evidence of a face for a head pose, or why there is too little of it.
 
@@ -63,26 +75,31 @@ def judge_face(
       outside the image counts as seen with a probability of at least 0.5: it is cut off, not turned
       away. If two of them are outside, a lower ``head.face_seen`` also counts as 0.5.
     * Nose, eyes and ears lie where a head in this pose has them. A root mean square error of more
-      than 15 % of the face's width lowers the probability.
+      than 3.5 standard deviations of the noise together with 5 % of the face's width (the head's
+      own shape), or of more than 15 % of the width, lowers the probability.
     * The face is large enough. Below 12 pixels of width the gaze is very uncertain; below 5 pixels
       there is no evidence.
 
-    There is also no evidence if no keypoint of the head is seen and ``head.face_seen`` is None, or
-    if nose or eyes are missing from a head at the border of the image: what the border cuts off is
-    missing from the pose too, and so the pose may be far off.
+    There is also no evidence if no keypoint of the head is seen and ``head.face_seen`` is None, if
+    the head is larger than the body can carry, or if nose or eyes are missing from a head at the
+    border of the image: what the border cuts off is missing from the pose too, and so the pose may
+    be far off.
 
     Args:
         camera: camera that saw the person.
         person: keypoints from which the pose was computed, or with which the head was found.
         head: the pose.
         min_score: keypoints with a lower score count as not seen.
+        keypoint_std_px: standard deviation of the keypoint noise.
     """
     depth = max(float(head.position_camera_m[2]), 0.05)
-    width_px = _FACE_WIDTH_M * math.sqrt(camera.fx_px * camera.fy_px) / depth
+    width_px = HEAD_WIDTH_M * math.sqrt(camera.fx_px * camera.fy_px) / depth
     if width_px < _MIN_FACE_PX or head.position_camera_m[2] <= 0.0:
         return "face too small"
     if head.face_seen is None and _is_cut(camera, person, width_px, min_score):
         return "face cut by the border"
+    if _is_too_large(person, width_px, min_score):
+        return "no body has such limbs"
     outside = _outside_image(camera, head, width_px)
     if head.face_seen is not None:
         seen = max(head.face_seen, _UNKNOWN) if sum(outside) > 1 else head.face_seen
@@ -95,11 +112,24 @@ def judge_face(
         seen = float(np.sort(possible)[1])
     else:
         seen = _UNKNOWN
-    excess = head.reprojection_error_px / width_px - _CONSISTENT_ERROR
+    consistent_px = min(
+        math.hypot(_CONSISTENT_STD * keypoint_std_px, _CONSISTENT_SHARE * width_px),
+        _SMALL_FACE_SHARE * width_px,
+    )
+    excess = head.reprojection_error_px / consistent_px - 1.0
     if excess > 0.0:
         seen *= math.exp(-0.5 * (excess / _ERROR_SCALE) ** 2)
     extra = _WEAK_FACE_STD_RAD * (_WEAK_FACE_PX / width_px) ** _SIZE_POWER
     return FaceEvidence(seen, width_px, extra)
+
+
+def _is_too_large(person: PersonKeypoints, width_px: float, min_score: float) -> bool:
+    """Return whether a head of this width (px) is too large for the body that is seen of it."""
+    seen = person.scores[kp.BODY] >= min_score
+    if not seen[len(HEAD_TEMPLATE_M) :].any():
+        return False
+    extent_px = float(np.ptp(person.keypoints_px[kp.BODY][seen], axis=0).max())
+    return width_px > _LARGEST_SHARE * extent_px
 
 
 def _is_cut(camera: Camera, person: PersonKeypoints, width_px: float, min_score: float) -> bool:

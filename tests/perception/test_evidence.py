@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from perception import AttentionCone, Camera, HeadPose, PersonKeypoints
+from perception import AttentionCone, Camera, HeadPose, PersonKeypoints, PnpHeadPoseEstimator
 from perception.anthropometry import EYES_HEAD_M
 from perception.awareness import awareness_of, cone_scores, estimate_awareness
-from perception.evidence import judge_face
+from perception.evidence import FaceEvidence, judge_face
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
 CONE = AttentionCone()
@@ -312,3 +312,32 @@ def test_awareness_of_does_not_include_eye_movements():
     assert estimate == pytest.approx(alpha, abs=0.01)
     assert estimate_std == pytest.approx(std, rel=0.05)
     assert awareness(head, eyes=(0.12, 0.06))[1] > 1.5 * std
+
+
+@pytest.mark.parametrize("height_px", [(40.0, 110.0), (110.0, 400.0)], ids=["small", "large"])
+def test_random_keypoints_with_good_scores_are_hardly_ever_aware(height_px):
+    """Keypoints drawn evenly in a box, all with a score of at least 0.5."""
+    rng = np.random.default_rng(77)
+    estimator, aware, count = PnpHeadPoseEstimator(), 0, 600
+    for _ in range(count):
+        height = rng.uniform(*height_px)
+        size = np.array([height * rng.uniform(0.3, 0.6), height])
+        pixels = rng.uniform((0.0, 0.0), (640.0, 480.0) - size) + size * rng.random((17, 2))
+        lifted = np.c_[(pixels - pixels[11:13].mean(axis=0)) * 1.75 / height, rng.normal(size=17)]
+        person = PersonKeypoints(pixels, lifted, rng.uniform(0.5, 1.0, 17), "coco")
+        (head,) = estimator.estimate(None, CAMERA, (person,))
+        evidence = None if head is None else judge_face(CAMERA, person, head, 0.3)
+        if isinstance(evidence, FaceEvidence):
+            aware += awareness(head, seen=evidence.seen, extra=evidence.extra_std_rad)[0] >= 0.5
+    assert aware < 0.01 * count
+
+
+def test_a_head_larger_than_its_body_is_no_evidence():
+    # The face is 43 px wide at 2 m; the shoulder is 40 px away.
+    pixels = np.tile((320.0, 240.0), (17, 1))
+    pixels[5] += (0.0, 40.0)
+    near = PersonKeypoints(pixels, np.zeros((17, 3)), np.ones(17), "coco")
+    assert judge_face(CAMERA, near, head_at(), 0.3) == "no body has such limbs"
+    pixels[5] += (0.0, 60.0)
+    person = PersonKeypoints(pixels, np.zeros((17, 3)), np.ones(17), "coco")
+    assert isinstance(judge_face(CAMERA, person, head_at(), 0.3), FaceEvidence)

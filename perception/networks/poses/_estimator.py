@@ -30,8 +30,8 @@ _MAX_BATCH: Final = 16
 class OnnxPoseEstimator:
     """A top-down pose network from an ONNX file: RTMPose, RTMW, RTMW3D or the shipped one.
 
-    Keypoint positions are refined between the bins; the score of a keypoint is that of its weakest
-    axis. A network with a third axis gives depths;
+    Keypoint positions are refined between the bins; the score of a keypoint is the lower
+    of its heights along x and y. A network with a third axis gives depths;
     :func:`~perception.networks.poses.lift_keypoints` describes how the skeleton becomes metric.
     Without a third axis the skeleton is flat: every z is 0, and ``lifted`` is False.
 

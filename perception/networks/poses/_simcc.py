@@ -82,10 +82,13 @@ def simcc_depth_m(places: FloatArray, bins: int, range_m: float = Z_RANGE_M) -> 
 
 
 def simcc_confidence(heights: FloatArray, possible: NDArray[np.bool_]) -> FloatArray:
-    """Return the confidence (N, K) of keypoints in [0, 1]: the height of the weakest axis.
+    """Return the confidence (N, K) of keypoints in [0, 1]: the lower of the heights along x and y.
+
+    The height along z does not count, as in OpenMMLab's ``get_simcc_maximum`` for two axes and for
+    three.
 
     Args:
-        heights: (axes, N, K) heights of the peaks.
+        heights: (2 or 3, N, K) heights of the peaks along x, y and z.
         possible: (N, K) False for keypoints that the image cannot show; their confidence is 0.
     """
-    return np.asarray(possible * np.minimum(np.maximum(heights.min(axis=0), 0.0), 1.0))
+    return np.asarray(possible * np.minimum(np.maximum(heights[:2].min(axis=0), 0.0), 1.0))

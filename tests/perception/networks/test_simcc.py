@@ -58,9 +58,15 @@ def test_axes_of_different_lengths_are_read_together() -> None:
     axes = [gaussian(20.3, 64), gaussian(100.7, 128, height=0.5), gaussian(7.5, 32)]
     places, heights = simcc_peaks(axes)
     np.testing.assert_allclose(places[:, 0, 0], [20.3, 100.7, 7.5], atol=1e-3)
-    # The confidence is that of the weakest of the three axes.
+    # The confidence is that of the weaker of x and y.
     assert simcc_confidence(heights, np.array([[True]]))[0, 0] == pytest.approx(0.5, rel=0.02)
     assert simcc_confidence(heights, np.array([[False]]))[0, 0] == 0.0
+
+
+def test_the_height_along_z_is_no_part_of_the_confidence() -> None:
+    """OpenMMLab's ``get_simcc_maximum`` masks x with y, and takes only the place along z."""
+    heights = np.array([[[0.9, 0.2]], [[0.8, 0.7]], [[0.1, 0.1]]])
+    np.testing.assert_array_equal(simcc_confidence(heights, np.ones((1, 2), bool)), [[0.8, 0.2]])
 
 
 def test_the_confidence_lies_between_0_and_1() -> None:
