@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from time import perf_counter
 from typing import Any, Final
 
 import numpy as np
 
-from . import layouts as kp
 from ._attention import AttentionCone
 from ._camera import Camera
 from ._carried_boxes import MAX_DETECT_EVERY_S, CarriedBoxes
 from ._depth_image import checked_depth
 from ._detection import PersonDetection
 from ._floor import FloorPlane
-from ._frame_budget import FrameBudget
+from ._frame_time import FrameBudget, StageTimings
 from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
 from ._metric_scale import DEFAULT_MIN_SCORE
@@ -27,7 +25,7 @@ from ._pnp import PnpHeadPoseEstimator
 from ._protocols import HeadPoseEstimator, PersonDetector, PoseEstimator
 from .arrays import FloatArray, ImageRgb, finite_array, finite_number
 from .awareness import AwarenessEstimate, estimate_awareness
-from .body import BodyPlacement, place_bodies
+from .body import middle_of_shanks, place_bodies
 from .errors import PerceptionError
 from .evidence import FaceEvidence, judge_face
 from .eyes import EyeEstimator, EyeGaze, known_eyes
@@ -40,48 +38,11 @@ from .shipped import (
 )
 
 _CAMERA_CENTRE: Final = np.zeros((1, 3))
-# Hip of each leg, and the keypoints that tell where its shank is: the knee if the image ends above
-# the foot.
-_LEG_ROWS: Final = (
-    (kp.LEFT_HIP, kp.LEFT_ANKLE, kp.LEFT_KNEE),
-    (kp.RIGHT_HIP, kp.RIGHT_ANKLE, kp.RIGHT_KNEE),
-)
 #: Standard deviations of the eyes in the head, sideways and up and down. Sideways as recorded of
 #: four pedestrians before a driverless shuttle in virtual reality. Real people differ widely in how
 #: far they turn their eyes before they turn their head (Thumser and Stahl 2009,
 #: doi:10.1007/s00221-009-1803-8); replace them if you know better values.
 DEFAULT_EYE_IN_HEAD_STD_RAD: Final = (math.radians(11.3), math.radians(3.4))
-
-
-@dataclass(frozen=True, slots=True)
-class StageTimings:
-    """Wall-clock times of the stages of one frame.
-
-    Attributes:
-        detector_s: time of the detector, including the preparation of its input and the reading of
-            its output.
-        pose_s: the same for the pose estimator.
-        head_pose_s: the same for the head pose estimator, and the eye estimator if there is one.
-        rest_s: time of everything else: checks, positions, face evidence, awareness.
-        networks_s: the part of all this in runs of ONNX networks. Networks that do not run in ONNX
-            Runtime are not included.
-    """
-
-    detector_s: float = 0.0
-    pose_s: float = 0.0
-    head_pose_s: float = 0.0
-    rest_s: float = 0.0
-    networks_s: float = 0.0
-
-    @property
-    def total_s(self) -> float:
-        """Time of the whole frame."""
-        return self.detector_s + self.pose_s + self.head_pose_s + self.rest_s
-
-    @property
-    def outside_s(self) -> float:
-        """Time of the whole frame without the runs of ONNX networks."""
-        return self.total_s - self.networks_s
 
 
 class AwarenessPipeline:
@@ -272,7 +233,9 @@ class AwarenessPipeline:
                 awareness_std=None if estimate is None else estimate.awareness_std,
                 score=detection.score,
                 box_xyxy_px=detection.box_xyxy_px,
-                legs_camera_m=_legs(person, body, place.position_camera_m, self._min_score),
+                legs_camera_m=middle_of_shanks(
+                    person, body, place.position_camera_m, self._min_score
+                ),
                 awareness_reason=reason,
                 range_lasting_relative_std=place.lasting_relative_std,
                 size_range_m=place.size_range_m,
@@ -391,29 +354,6 @@ def _gaze(head: HeadPose, eyes: EyeGaze | None) -> FloatArray:
 def _check_count(name: str, got: int, wanted: int) -> None:
     if got != wanted:
         raise PerceptionError(f"{name} must return one result per person ({wanted}), got {got}")
-
-
-def _legs(
-    person: PersonKeypoints, body: BodyPlacement | None, position_m: FloatArray, min_score: float
-) -> FloatArray | None:
-    """Return the middle (3,) of the shanks, from the body moved along its ray to its place.
-
-    Each leg that is seen counts as far from the middle of the hips as its ankle, or its knee, is
-    from its own hip.
-    """
-    if body is None or not person.lifted:
-        return None
-    points = body.keypoints_camera_m
-    reaches = []
-    for hip, *rows in _LEG_ROWS:
-        seen = [row for row in rows if person.scores[row] >= min_score]
-        if seen:
-            reaches.append(points[seen[0]] - points[hip])
-    if not reaches:
-        return None
-    legs = body.hips_camera_m + np.mean(reaches, axis=0)
-    scale = float(np.linalg.norm(position_m) / np.linalg.norm(body.position_camera_m))
-    return np.asarray(scale * legs)
 
 
 def _checked_floor(floor: Any) -> FloorPlane | None:

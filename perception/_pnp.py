@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from . import layouts as kp
 from ._camera import Camera
 from ._head_pose import HeadPose
+from ._head_prior import HeadPrior, body_prior, prior_starts, upright_prior
 from ._keypoints import PersonKeypoints
 from ._metric_scale import DEFAULT_MIN_SCORE, metric_scale
-from ._pose_refinement import HeadPrior, RefinedPose, refine
+from ._pose_refinement import RefinedPose, refine
 from ._rotations import rotation_exp, rotation_log, skew
 from .anthropometry import (
-    HEAD_CENTRE_HEAD_M,
     HEAD_KEYPOINTS,
     HEAD_SHAPE_FACTOR_M,
     HEAD_TEMPLATE_M,
@@ -31,21 +31,6 @@ from .head_frame import lifted_head_model
 HeadModel = Literal["template", "lifted"]
 
 _HEAD_ROWS: Final = np.array(HEAD_KEYPOINTS)
-
-# The joint of head and neck lies below and between the ears.
-_PIVOT_HEAD_M: Final = np.array([0.035, -0.100, 0.0])
-# From the shoulder midpoint to that joint, in the torso frame (forward, left, up). With it, the
-# nose of a head that looks straight ahead lies where anthropometry says.
-_NECK_TO_PIVOT_M: Final = np.array([0.046, 0.0, 0.168])
-# Standard deviations of the head's rotation relative to the torso.
-_YAW_STD_RAD, _ROLL_STD_RAD, _PITCH_STD_RAD = map(math.radians, (60.0, 15.0, 25.0))
-_PIVOT_STD_M: Final = 0.04
-# A head without a body is upright in the camera within this, and may look anywhere.
-_UPRIGHT_STD_RAD, _UNKNOWN_YAW_STD_RAD = math.radians(30.0), math.radians(150.0)
-_DOWN_CAMERA: Final = np.array([0.0, 1.0, 0.0])
-# Relative standard deviation of the body's range where the head has a range of its own.
-_LOOSE_SCALE_STD: Final = 0.25
-_YAW_STARTS_RAD: Final = np.radians([0.0, 50.0, -50.0, 100.0, -100.0, 180.0])
 
 # A seen keypoint should face the camera, an unseen one should face away. Each exception costs as
 # much as an error of two standard deviations, since exceptions do occur.
@@ -175,12 +160,12 @@ class PnpHeadPoseEstimator:
         rays = camera.normalise(pixels)
         whole = len(rows) >= 4
         # The printed formula's frame is pitched: a torso says little of it.
-        prior = None if whole and self._head_model == "lifted" else _body_prior(body, whole=whole)
+        prior = None if whole and self._head_model == "lifted" else body_prior(body, whole=whole)
         if prior is None and len(rows) == 3:
-            prior = _upright_prior(model[rows], rays[rows])
+            prior = upright_prior(model[rows], rays[rows])
         starts = [_sqpnp(model[rows], rays[rows])] if whole or prior is None else []
         if prior is not None:
-            starts.append(_prior_starts(prior))
+            starts.append(prior_starts(prior))
         found = [start for start in starts if start is not None]
         if not found:
             return None
@@ -299,78 +284,6 @@ def _mirrored(rotation: FloatArray, origin: FloatArray, centre: FloatArray) -> F
         return rotation_exp(math.pi * rotation[:, 0]) @ rotation
     angle = math.atan2(sine, float(forward @ reflected))
     return np.asarray(rotation_exp(axis / sine * angle) @ rotation)
-
-
-def _body_prior(body: BodyPlacement | None, *, whole: bool) -> HeadPrior | None:
-    """Return the prior of the head's pose from the torso; None if too little of it is seen.
-
-    ``whole`` is True for a head that shows enough keypoints to tell its own range.
-    """
-    if body is None:
-        return None
-    torso = _torso_axes(body)
-    if torso is None:
-        return None
-    rotation_camera_torso, neck = torso
-    forward, left, up = rotation_camera_torso.T
-    pivot = neck + rotation_camera_torso @ _NECK_TO_PIVOT_M
-    ray = pivot / np.linalg.norm(pivot)
-    relative = max(body.scale_relative_std, _LOOSE_SCALE_STD if whole else 0.0)
-    along = (relative * np.linalg.norm(pivot)) ** 2 + _PIVOT_STD_M**2
-    covariance = _PIVOT_STD_M**2 * (np.eye(3) - np.outer(ray, ray)) + along * np.outer(ray, ray)
-    stds = np.array([_YAW_STD_RAD, _ROLL_STD_RAD, _PITCH_STD_RAD])
-    return HeadPrior(
-        np.stack([-up, forward, -left], axis=1),
-        np.diag(1.0 / stds**2),
-        _PIVOT_HEAD_M,
-        pivot,
-        np.linalg.inv(covariance),
-    )
-
-
-def _upright_prior(points: FloatArray, rays: FloatArray) -> HeadPrior:
-    """Return the prior of a head without a body: upright, at about the range of its size."""
-    span = float(np.linalg.norm(rays - rays.mean(axis=0), axis=1).max())
-    size_m = float(np.linalg.norm(points - points.mean(axis=0), axis=1).max())
-    # Foreshortening makes a head look smaller: the range is the largest one possible.
-    pivot = np.append(rays.mean(axis=0), 1.0) * (0.8 * size_m / max(span, 1e-6))
-    ray = pivot / np.linalg.norm(pivot)
-    right = skew(_DOWN_CAMERA) @ -ray
-    right = right / np.linalg.norm(right)
-    down = skew(-ray) @ right
-    across, along = _PIVOT_STD_M + 0.1, 0.5 * float(np.linalg.norm(pivot))
-    covariance = across**2 * (np.eye(3) - np.outer(ray, ray)) + along**2 * np.outer(ray, ray)
-    stds = np.array([_UNKNOWN_YAW_STD_RAD, _UPRIGHT_STD_RAD, _UPRIGHT_STD_RAD])
-    return HeadPrior(
-        np.stack([down, -ray, right], axis=1),
-        np.diag(1.0 / stds**2),
-        HEAD_CENTRE_HEAD_M,
-        pivot,
-        np.asarray(np.linalg.inv(covariance), dtype=np.float64),
-    )
-
-
-def _torso_axes(body: BodyPlacement) -> tuple[FloatArray, FloatArray] | None:
-    """Return forward, left, up as columns (3, 3) and the neck (3,), in the camera frame."""
-    shoulders = body.shoulders_camera_m
-    if shoulders is None:
-        return None
-    neck = shoulders.mean(axis=0)
-    up, left = neck - body.hips_camera_m, shoulders[0] - shoulders[1]
-    forward = skew(left) @ up
-    length = float(np.linalg.norm(forward))
-    if length < 1e-6:
-        return None
-    forward = forward / length
-    up = up / np.linalg.norm(up)
-    return np.stack([forward, skew(up) @ forward, up], axis=1), neck
-
-
-def _prior_starts(prior: HeadPrior) -> tuple[FloatArray, FloatArray]:
-    """Return starting poses with several yaw angles about the joint of the prior."""
-    down = prior.rotation_camera_head[:, 0]
-    rotations = rotation_exp(_YAW_STARTS_RAD[:, None] * down) @ prior.rotation_camera_head
-    return rotations, prior.pivot_camera_m - rotations @ prior.pivot_head_m
 
 
 def _costs(

@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ._head_prior import HeadPrior
 from ._rotations import rotation_exp, rotation_log, skew
 from .arrays import FloatArray
 
@@ -27,26 +28,6 @@ _MIN_DEPTH_M: Final = 0.05
 _EYE: Final = np.eye(3)
 _EYE_2: Final = np.eye(2)
 _EYE_6: Final = np.eye(6)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class HeadPrior:
-    """Prior of a head's pose from the body: weak, but enough where few head points are seen.
-
-    Attributes:
-        rotation_camera_head: (3, 3) rotation of a head that looks straight ahead of the torso.
-        rotation_information: (3, 3) inverse covariance of the head's rotation relative to that, as
-            a rotation vector in head axes (x yaw, y roll, z pitch).
-        pivot_head_m: (3,) joint of head and neck in the head frame.
-        pivot_camera_m: (3,) position of that joint according to the body.
-        position_information: (3, 3) inverse covariance of that position, camera frame.
-    """
-
-    rotation_camera_head: FloatArray
-    rotation_information: FloatArray
-    pivot_head_m: FloatArray
-    pivot_camera_m: FloatArray
-    position_information: FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)

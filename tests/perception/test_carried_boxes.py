@@ -16,7 +16,7 @@ from perception import (
     PersonKeypoints,
     PnpHeadPoseEstimator,
 )
-from perception._frame_budget import FrameBudget
+from perception._frame_time import FrameBudget
 from perception._scene_changes import SceneChanges
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))

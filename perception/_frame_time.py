@@ -1,7 +1,8 @@
-"""How often the detector may look, by the time that frames take and the time there is."""
+"""Time that frames take, and how often the detector may look for a frame to take less."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Final
 
 from ._carried_boxes import MAX_DETECT_EVERY_S
@@ -17,6 +18,37 @@ _PATIENCE: Final = 20
 # Weight of the newest time in the running means. The first frames of a process are slow.
 _NEW: Final = 0.15
 _WARM_UP: Final = 3
+
+
+@dataclass(frozen=True, slots=True)
+class StageTimings:
+    """Wall-clock times of the stages of one frame.
+
+    Attributes:
+        detector_s: time of the detector, including the preparation of its input and the reading of
+            its output.
+        pose_s: the same for the pose estimator.
+        head_pose_s: the same for the head pose estimator, and the eye estimator if there is one.
+        rest_s: time of everything else: checks, positions, face evidence, awareness.
+        networks_s: the part of all this in runs of ONNX networks. Networks that do not run in ONNX
+            Runtime are not included.
+    """
+
+    detector_s: float = 0.0
+    pose_s: float = 0.0
+    head_pose_s: float = 0.0
+    rest_s: float = 0.0
+    networks_s: float = 0.0
+
+    @property
+    def total_s(self) -> float:
+        """Time of the whole frame."""
+        return self.detector_s + self.pose_s + self.head_pose_s + self.rest_s
+
+    @property
+    def outside_s(self) -> float:
+        """Time of the whole frame without the runs of ONNX networks."""
+        return self.total_s - self.networks_s
 
 
 class FrameBudget:
