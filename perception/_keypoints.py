@@ -24,7 +24,8 @@ class PersonKeypoints:
             pixels, z is 0. Limbs that point at the camera then look short; the scale comes from
             the others.
         face_evidence: False if high scores of nose and eyes do not mean that the face is seen.
-            MediaPipe Pose, for example, gives scores near 1 on backs of heads.
+            MediaPipe Pose, for example, gives scores near 1 on backs of heads; its face network
+            found none then.
         scale_relative_std: relative standard deviation of the size of the whole skeleton from the
             estimator's noise, beyond the spread of statures and limbs of adults.
     """
