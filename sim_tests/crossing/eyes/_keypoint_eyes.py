@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from perception import AttentionCone, AwarenessPipeline, Camera, FloorPlane
+from perception import AttentionCone, AwarenessPipeline, Camera
 from perception.arrays import FloatArray
 
 from ...world.sightlines import SightLines
@@ -16,9 +16,6 @@ from ._keypoint_camera import KeypointCamera, KeypointNoise
 class KeypointEyes:
     """Eyes with a keypoint camera and the awareness pipeline.
 
-    The pipeline gets the keypoints, their stamp and the floor, which a robot knows from its own
-    pose and the mounting of its camera.
-
     Args:
         stage: the stage of the crossing.
         camera: camera model.
@@ -26,8 +23,6 @@ class KeypointEyes:
         noise: noise of the keypoints.
         rng: random generator of the noise.
         sight: occlusion test of the hall.
-        T_camera_assumed: (4, 4) pose of the camera as the robot assumes it, in the true camera's
-            frame; None where they are the same.
     """
 
     def __init__(
@@ -38,10 +33,8 @@ class KeypointEyes:
         noise: KeypointNoise,
         rng: np.random.Generator,
         sight: SightLines,
-        T_camera_assumed: FloatArray | None = None,
     ) -> None:
         self._stage = stage
-        self._T_camera_assumed = T_camera_assumed
         self._keypoints = KeypointCamera(camera, sight, noise, rng)
         self._pipeline = AwarenessPipeline(
             camera,
@@ -63,12 +56,8 @@ class KeypointEyes:
             detection.box_xyxy_px.tobytes(): worker
             for detection, worker in zip(self._keypoints.detect(None), workers, strict=True)
         }
-        assumed = T_odom_camera
-        if self._T_camera_assumed is not None:
-            assumed = assumed @ self._T_camera_assumed
-        floor = FloorPlane.from_pose(assumed)
         return tuple(
             (observation, worker_of[observation.box_xyxy_px.tobytes()])
-            for observation in self._pipeline.process(self._blank, stamp_s, floor=floor)
+            for observation in self._pipeline.process(self._blank, stamp_s)
             if observation.box_xyxy_px is not None
         )

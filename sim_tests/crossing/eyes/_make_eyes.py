@@ -43,7 +43,7 @@ def make_eyes(
         noise: noise of the keypoint camera.
         rng: random generator of the noise.
         pipeline: pipeline for pixels; None for the shipped networks.
-        T_camera_assumed: see :class:`PixelEyes`; for keypoints and pixels.
+        T_camera_assumed: see :class:`PixelEyes`.
 
     Raises:
         SimError: for another kind.
@@ -56,10 +56,7 @@ def make_eyes(
     if kind == "keypoints":
         warehouse = stage.warehouse
         sight = SightLines(warehouse.layout, warehouse.variant, warehouse.actors)
-        eyes: list[Eyes] = [
-            KeypointEyes(stage, camera, cone, noise, rng, sight, _in_view(view, T_camera_assumed))
-            for view in views
-        ]
+        eyes: list[Eyes] = [KeypointEyes(stage, camera, cone, noise, rng, sight) for _ in views]
     elif kind == "pixels":
         eyes = _pixel_eyes(stage, views, cone, rng, pipeline, T_camera_assumed)
     else:
@@ -90,16 +87,11 @@ def _pixel_eyes(
             view_rng,
             pipeline,
             renderer,
-            _in_view(view, T_camera_assumed),
+            None
+            if T_camera_assumed is None
+            else view.T_camera_view.T @ T_camera_assumed @ view.T_camera_view,
         )
         for view, view_rng in zip(
             views, [rng] if len(views) == 1 else rng.spawn(len(views)), strict=True
         )
     ]
-
-
-def _in_view(view: FlatView, T_camera_assumed: FloatArray | None) -> FloatArray | None:
-    """Return the assumed pose of a view's camera in the frame of the true one."""
-    if T_camera_assumed is None:
-        return None
-    return np.asarray(view.T_camera_view.T @ T_camera_assumed @ view.T_camera_view)
