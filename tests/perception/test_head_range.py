@@ -17,7 +17,13 @@ from perception import (
     PersonKeypoints,
     PersonObservation,
 )
-from perception.anthropometry import HEAD_CENTRE_HEAD_M, STATURE_RELATIVE_STD
+from perception.anthropometry import (
+    HEAD_CENTRE_HEAD_M,
+    STATURE_RELATIVE_STD,
+    UNUSUAL_SIZE_LOG_OFFSET,
+    UNUSUAL_SIZE_LOG_STD,
+    UNUSUAL_SIZE_PROBABILITY,
+)
 from perception.body import place_body
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
@@ -62,25 +68,30 @@ def range_std(observation: PersonObservation) -> float:
     return math.sqrt(position @ covariance @ position) / float(position @ position)
 
 
-def mixture_std(stds: tuple[float, float], stature_stds: tuple[float, float]) -> float:
-    """Two cues that agree: generalised least squares over which of them are right, by matrices."""
+def mixture_std(own: tuple[float, float], stature_stds: tuple[float, float]) -> float:
+    """Two cues that agree: generalised least squares over what is right, by matrices.
+
+    ``own`` are the variances of the cues but for the stature. The person is an adult who stands, or
+    not; and each cue is right or wrong.
+    """
     wrong = (BODY_WRONG, HEAD_WRONG)
-    found = [(0.5**2, 0.5**-1 * math.prod(0.5 * each for each in wrong))]
-    for right in product((False, True), repeat=2):
+    found = [(0.0, 0.5**2, 0.5**-1 * math.prod(0.5 * each for each in wrong))]
+    unusual = (UNUSUAL_SIZE_LOG_STD, UNUSUAL_SIZE_LOG_STD)
+    for usual, right in product((True, False), product((False, True), repeat=2)):
         if not any(right):
             continue
         rows = [row for row in range(2) if right[row]]
-        own = [stds[row] ** 2 - stature_stds[row] ** 2 for row in rows]
-        shared = np.array([stature_stds[row] for row in rows])
-        covariance = np.diag(own) + np.outer(shared, shared)
+        shared = np.array([(stature_stds if usual else unusual)[row] for row in rows])
+        covariance = np.diag([own[row] for row in rows]) + np.outer(shared, shared)
         information = float(np.linalg.inv(covariance).sum())
         weight = math.sqrt(2.0 * math.pi / information)
         weight /= math.sqrt(float(np.linalg.det(2.0 * math.pi * covariance)))
+        weight *= 1.0 - UNUSUAL_SIZE_PROBABILITY if usual else UNUSUAL_SIZE_PROBABILITY
         for row in range(2):
             weight *= 1.0 - wrong[row] if right[row] else 0.5 * wrong[row]
-        found.append((1.0 / information, weight))
-    total = sum(weight for _, weight in found)
-    return math.sqrt(sum(variance * weight for variance, weight in found) / total)
+        found.append((0.0 if usual else UNUSUAL_SIZE_LOG_OFFSET, 1.0 / information, weight))
+    total = sum(weight for *_, weight in found)
+    return math.sqrt(sum((off**2 + var) * weight for off, var, weight in found) / total)
 
 
 @pytest.mark.parametrize("head_std", [0.02, 0.05, 0.10])
@@ -99,12 +110,13 @@ def test_the_range_is_that_of_cues_that_err_together(range_m: float, head_std: f
     head = HeadPose(nose, rotation, 1e-4 * np.eye(6), 0.0, range_relative_std=head_std)
     both = observed(person, head)
 
-    own_std = range_std(alone)
-    stature_std = min(body.scale_relative_std, STATURE_RELATIVE_STD, 0.99 * own_std)
+    stature_std = min(body.scale_relative_std, STATURE_RELATIVE_STD)
+    unusual = UNUSUAL_SIZE_LOG_STD**2 + UNUSUAL_SIZE_LOG_OFFSET**2
+    lasting = stature_std**2 + UNUSUAL_SIZE_PROBABILITY * (unusual - stature_std**2)
+    own = range_std(alone) ** 2 - lasting
     measured_std = math.hypot(head_std, HEAD_OFFSET_M / head_depth)
+    head_stature_std = min(HEAD_STATURE_STD, 0.5 * measured_std)
     expected = mixture_std(
-        (own_std, measured_std), (stature_std, min(HEAD_STATURE_STD, 0.5 * measured_std))
+        (own, measured_std**2 - head_stature_std**2), (stature_std, head_stature_std)
     )
     assert range_std(both) == pytest.approx(expected, rel=2e-3)
-    independent = mixture_std((own_std, measured_std), (stature_std, 0.0))
-    assert range_std(both) > 1.01 * independent

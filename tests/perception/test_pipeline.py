@@ -331,7 +331,7 @@ def test_measured_eyes_turn_the_gaze_and_awareness_follows():
     assert turned[0].awareness < alone[0].awareness
 
 
-@pytest.mark.parametrize("eyes", [None, EyeGaze([0.7, 0.0], np.eye(2) * 1e-4)])
+@pytest.mark.parametrize("eyes", [None, EyeGaze([0.9, 0.0], np.eye(2) * 1e-4)])
 def test_without_a_credible_measurement_nothing_changes_to_the_bit(eyes):
     for before, after in zip(seen_with(None), seen_with(KnownEyes(eyes)), strict=True):
         assert not after.eyes_seen

@@ -85,10 +85,11 @@ def simcc_confidence(heights: FloatArray, possible: NDArray[np.bool_]) -> FloatA
     """Return the confidence (N, K) of keypoints in [0, 1]: the lower of the heights along x and y.
 
     The height along z does not count, as in OpenMMLab's ``get_simcc_maximum`` for two axes and for
-    three.
+    three; but a z that is not finite, for which :func:`simcc_peaks` gives a height of 0, does.
 
     Args:
         heights: (2 or 3, N, K) heights of the peaks along x, y and z.
         possible: (N, K) False for keypoints that the image cannot show; their confidence is 0.
     """
+    possible = possible & (heights[2:] != 0.0).all(axis=0)
     return np.asarray(possible * np.minimum(np.maximum(heights[:2].min(axis=0), 0.0), 1.0))

@@ -80,7 +80,7 @@ def test_options_that_exclude_each_other_are_refused_together(path, name, other,
     both = options_of(COMMANDS[path])
     words = []
     for each in (other, name):
-        words += [each] if both[each].is_flag else [each, "1"]
+        words += [each] if both[each].is_flag else [each, "0.1" if each.endswith("-s") else "1"]
     required = ["x" for each in COMMANDS[path].params if isinstance(each, click.Argument)]
     for each in COMMANDS[path].params:
         if isinstance(each, click.Option) and each.required:
@@ -102,6 +102,7 @@ def test_exclusions_are_those_that_are_known():
             for name in ("bridge", "doctor", "estimate")
             for option in ("--detector", "--pose", "--head", "--eyes")
         ),
+        *((name, "--frame-budget-s", "--detect-every-s") for name in ("bridge", "estimate")),
         ("tracks", "--ids", "--config"),
         ("falsify", "--unsafe-no-floor", "--planner"),
     }
