@@ -30,12 +30,16 @@ def comparison(request):
 
 @pytest.mark.slow
 def test_in_pixels_awareness_of_an_attentive_worker_saves_time():
-    blind = run_crossing(ATTENTIVE, policy="blind", seed=3)
-    result = run_crossing(ATTENTIVE, policy="balanced", perception="pixels", seed=3)
-    assert result.success
-    assert not result.contact
-    assert result.violation_time_s == 0.0
-    assert result.time_to_goal_s < blind.time_to_goal_s - 1.0
+    """In the median: a false track beside who leaves the picture may cost the gain of a run."""
+    saved_s = []
+    for seed in (1, 2, 3):
+        blind = run_crossing(ATTENTIVE, policy="blind", seed=seed)
+        result = run_crossing(ATTENTIVE, policy="balanced", perception="pixels", seed=seed)
+        assert result.success
+        assert not result.contact
+        assert result.violation_time_s == 0.0
+        saved_s.append(blind.time_to_goal_s - result.time_to_goal_s)
+    assert np.median(saved_s) > 1.0
 
 
 def test_all_reach_the_goal_and_the_robot_touches_nobody(comparison):
