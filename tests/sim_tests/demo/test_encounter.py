@@ -44,6 +44,17 @@ def test_the_encounter_in_pixels_reproduces_the_cases_of_the_paper(encounter_in_
     assert lateral == pytest.approx(case.d_lat_m, abs=0.15)
 
 
+def test_the_seed_changes_the_pictures_and_what_is_seen_in_them():
+    scenario = Scenario.shipped("paper_encounter").model_copy(update={"duration_s": 0.4})
+    seen = []
+    for seed in (0, 0, 1):
+        result = run_crossing(scenario, policy="balanced", perception="pixels", seed=seed)
+        seen.append([tuple(map(repr, frame.observations)) for frame in result.frames])
+    assert any(seen[0])
+    assert seen[0] == seen[1]
+    assert seen[0] != seen[2]
+
+
 def test_the_encounter_has_60_frames_a_second_for_25_seconds(encounter):
     assert len(encounter.frames) == 1500
     assert encounter.frames[-1].t_s == pytest.approx(25.0 - 1.0 / 60.0)
