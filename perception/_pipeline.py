@@ -20,9 +20,10 @@ from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
 from ._metric_scale import DEFAULT_MIN_SCORE
 from ._observation import AwarenessReason, PersonObservation
-from ._placement import place_people
+from ._placement import PersonPlace, place_people
 from ._pnp import PnpHeadPoseEstimator
 from ._protocols import HeadPoseEstimator, PersonDetector, PoseEstimator
+from .anthropometry import UNUSUAL_SIZE_PROBABILITY
 from .arrays import FloatArray, ImageRgb, finite_array, finite_number
 from .awareness import AwarenessEstimate, estimate_awareness
 from .body import middle_of_shanks, place_bodies
@@ -77,6 +78,10 @@ class AwarenessPipeline:
             :class:`~perception.networks.MediaPipeEyeEstimator`; default none, then the gaze is the
             head's direction.
 
+        unusual_size_probability: probability in [0, 0.9] that a person has not the size of an adult
+            who stands: a child, somebody bent or seated. 0 where only adults walk and stand: then
+            5 % of range are left of unknown stature, which count as noise of each image.
+
     Raises:
         PerceptionError: for an invalid value, or a shipped network that cannot be loaded.
     """
@@ -97,6 +102,7 @@ class AwarenessPipeline:
         onnx_settings: OnnxSettings | None = None,
         detect_every_s: float = 0.0,
         frame_budget_s: float | None = None,
+        unusual_size_probability: float = UNUSUAL_SIZE_PROBABILITY,
         eye_estimator: EyeEstimator | None = None,
     ) -> None:
         if not isinstance(camera, Camera):
@@ -111,6 +117,9 @@ class AwarenessPipeline:
             "keypoint_std_px", keypoint_std_px, minimum=0.0, exclusive_minimum=True
         )
         self._min_score = finite_number("min_score", min_score, minimum=0.0, maximum=1.0)
+        self._unusual_size = finite_number(
+            "unusual_size_probability", unusual_size_probability, minimum=0.0, maximum=0.9
+        )
         self._floor = _checked_floor(floor)
         self._eye_std_rad = _checked_eye_std(eye_in_head_std_rad)
         shipped_pose = pose_estimator is None
@@ -218,7 +227,15 @@ class AwarenessPipeline:
         eyes = self._eyes(image_rgb, heads)
         headed = perf_counter()
         places = place_people(
-            self.camera, detections, people, heads, floor, self._std_px, self._min_score, depth_m
+            self.camera,
+            detections,
+            people,
+            heads,
+            floor,
+            self._std_px,
+            self._min_score,
+            depth_m,
+            self._unusual_size,
         )
         # The same call as for the places, which is remembered.
         bodies = place_bodies(self.camera, people, self._std_px, self._min_score)
@@ -237,9 +254,7 @@ class AwarenessPipeline:
                     person, body, place.position_camera_m, self._min_score
                 ),
                 awareness_reason=reason,
-                range_lasting_relative_std=place.lasting_relative_std,
-                size_range_m=place.size_range_m,
-                size_range_relative_std=place.size_range_relative_std,
+                **self._sizes(place),
                 eyes_seen=estimate is not None and turn is not None,
             )
             for detection, place, head, turn, estimate, reason, person, body in zip(
@@ -258,6 +273,16 @@ class AwarenessPipeline:
             )
         )
         return observations
+
+    def _sizes(self, place: PersonPlace) -> dict[str, Any]:
+        """Return what an observation says of the person's unknown size: nothing of adults."""
+        if self._unusual_size == 0.0:
+            return {}
+        return {
+            "range_lasting_relative_std": place.lasting_relative_std,
+            "size_range_m": place.size_range_m,
+            "size_range_relative_std": place.size_range_relative_std,
+        }
 
     def _note(self, timings: StageTimings) -> None:
         """Keep the times of a frame, and choose when the detector looks next."""

@@ -119,6 +119,7 @@ def place_people(
     keypoint_std_px: float,
     min_score: float,
     depth_m: FloatArray | None = None,
+    unusual_size_probability: float = UNUSUAL_SIZE_PROBABILITY,
 ) -> tuple[PersonPlace | None, ...]:
     """Return the place of each person's centre line at chest height; None if unknown.
 
@@ -126,7 +127,7 @@ def place_people(
     the direction and a first range. Further cues for the range are the head's range, if its
     estimator measures one, the feet on a known floor, and a depth image (H, W), NaN in its holes.
     :func:`combined_range` combines all cues; any of them may be an outlier, and the person may be
-    no adult who stands.
+    no adult who stands, with ``unusual_size_probability``.
     """
     if not people:
         return ()
@@ -163,7 +164,7 @@ def place_people(
             range_cues.append(_chest_cue(start[0], *chest, bodies[row] is not None))
         rows.append(row)
         starts.append(start)
-        found.append(combined_range(range_cues, UNUSUAL_SIZE_PROBABILITY))
+        found.append(combined_range(range_cues, unusual_size_probability))
         own = math.sqrt(by_size.log_std**2 - by_size.stature_std**2)
         sizes.append(None if body is None else (float(np.linalg.norm(start[0])), own))
     placed: list[PersonPlace | None] = [None] * len(people)

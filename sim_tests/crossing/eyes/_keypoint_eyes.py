@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from perception import AttentionCone, AwarenessPipeline, Camera
+from perception.anthropometry import UNUSUAL_SIZE_PROBABILITY
 from perception.arrays import FloatArray
 
 from ...world.sightlines import SightLines
@@ -23,6 +24,7 @@ class KeypointEyes:
         noise: noise of the keypoints.
         rng: random generator of the noise.
         sight: occlusion test of the hall.
+        unusual_size_probability: as the pipeline takes it.
     """
 
     def __init__(
@@ -33,6 +35,7 @@ class KeypointEyes:
         noise: KeypointNoise,
         rng: np.random.Generator,
         sight: SightLines,
+        unusual_size_probability: float = UNUSUAL_SIZE_PROBABILITY,
     ) -> None:
         self._stage = stage
         self._keypoints = KeypointCamera(camera, sight, noise, rng)
@@ -44,6 +47,7 @@ class KeypointEyes:
             keypoint_std_px=max(noise.pixel_std_px, 0.1),
             # Workers in a crossing turn their heads; their eyes follow.
             eye_in_head_std_rad=0.0,
+            unusual_size_probability=unusual_size_probability,
         )
         self._blank = np.zeros((camera.height_px, camera.width_px, 3), np.uint8)
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import get_args
+from typing import Final, get_args
 
 import numpy as np
 
 from perception import AttentionCone, AwarenessPipeline, Camera
+from perception.anthropometry import UNUSUAL_SIZE_PROBABILITY
 from perception.arrays import FloatArray
 from perception.surround import FlatView
 
+from ...scenario import Scenario
 from ...world.camera import CoarseSceneryRenderer
 from ...world.errors import SimError
 from ...world.sightlines import SightLines
@@ -21,6 +23,9 @@ from ._map_view import MapView
 from ._pixel_eyes import PixelEyes
 from ._sensors import ORACLE, PerceptionKind
 from ._true_eyes import TrueEyes
+
+# Statures of adults: within two and a half standard deviations of the mean.
+_LEAST_ADULT_M: Final = 1.5
 
 
 def make_eyes(
@@ -56,13 +61,24 @@ def make_eyes(
     if kind == "keypoints":
         warehouse = stage.warehouse
         sight = SightLines(warehouse.layout, warehouse.variant, warehouse.actors)
-        eyes: list[Eyes] = [KeypointEyes(stage, camera, cone, noise, rng, sight) for _ in views]
+        unusual = unusual_size_probability(stage.scenario)
+        eyes: list[Eyes] = [
+            KeypointEyes(stage, camera, cone, noise, rng, sight, unusual) for _ in views
+        ]
     elif kind == "pixels":
         eyes = _pixel_eyes(stage, views, cone, rng, pipeline, T_camera_assumed)
     else:
         valid = ", ".join(map(repr, get_args(PerceptionKind)))
         raise SimError(f"perception must be one of {valid}, got {kind!r}")
     return eyes[0] if len(views) == 1 else SurroundEyes(views, eyes)
+
+
+def unusual_size_probability(scenario: Scenario) -> float:
+    """Return what a robot may assume: 0 where all people are adults who stand, else the default."""
+    everybody = (*scenario.workers, *scenario.people)
+    if all(each.stature_m >= _LEAST_ADULT_M and not each.seated for each in everybody):
+        return 0.0
+    return UNUSUAL_SIZE_PROBABILITY
 
 
 def _pixel_eyes(
@@ -78,7 +94,12 @@ def _pixel_eyes(
     renderer = CoarseSceneryRenderer(stage.warehouse, spec.scenery_divisor)
     if pipeline is None:
         # Workers in a crossing turn their heads; their eyes follow.
-        pipeline = AwarenessPipeline(camera, cone=cone, eye_in_head_std_rad=0.0)
+        pipeline = AwarenessPipeline(
+            camera,
+            cone=cone,
+            eye_in_head_std_rad=0.0,
+            unusual_size_probability=unusual_size_probability(stage.scenario),
+        )
     return [
         PixelEyes(
             stage,
