@@ -11,6 +11,7 @@ from perception.anthropometry import UNUSUAL_SIZE_PROBABILITY
 from perception.arrays import FloatArray
 from perception.surround import FlatView
 
+from ...actors.behaviour import PersonSpec, WorkerScript
 from ...scenario import Scenario
 from ...world.camera import CoarseSceneryRenderer
 from ...world.errors import SimError
@@ -75,7 +76,7 @@ def make_eyes(
 
 def unusual_size_probability(scenario: Scenario) -> float:
     """Return what a robot may assume: 0 where all people are adults who stand, else the default."""
-    everybody = (*scenario.workers, *scenario.people)
+    everybody: list[WorkerScript | PersonSpec] = [*scenario.workers, *scenario.people]
     if all(each.stature_m >= _LEAST_ADULT_M and not each.seated for each in everybody):
         return 0.0
     return UNUSUAL_SIZE_PROBABILITY
