@@ -41,7 +41,7 @@ _TILE_PX: Final = 480
 
 @dataclass(frozen=True)
 class PhotographResult:
-    """What was found in one photograph.
+    """People found in one photograph.
 
     Attributes:
         name: of the file.

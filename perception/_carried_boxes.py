@@ -34,7 +34,7 @@ _SLACK_S: Final = 1e-6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Carried:
-    """What is known of one person: from the last image, and from the last detection.
+    """A person as known from the last image, and from the last detection.
 
     Attributes:
         box_px: (4,) around the keypoints of the last image, as detections are.

@@ -79,7 +79,7 @@ _IDENTITY: Final = np.eye(3)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PersonPlace:
-    """Where a person is, by all cues.
+    """A person's place by all cues.
 
     Attributes:
         position_camera_m: (3,) centre line of the body at chest height.

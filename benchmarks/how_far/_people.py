@@ -141,7 +141,7 @@ def _bent(points: FloatArray, chest: FloatArray, case: Case) -> tuple[FloatArray
 
 
 class _Shelf:
-    """What hides everything below a height, close before the person."""
+    """A shelf that hides everything below a height, close before the person."""
 
     def __init__(self, top_m: float) -> None:
         self._top_m = top_m

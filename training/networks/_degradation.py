@@ -1,4 +1,4 @@
-"""What a real camera does to a picture: blur, noise, exposure, white balance, compression.
+"""Effects of a real camera on a picture: blur, noise, exposure, white balance, compression.
 
 The steps come in the order of the light's way: the light in the hall, the lens and the motion
 while the shutter is open, the sensor with its photons and its read noise, its gain and white
@@ -38,7 +38,7 @@ _STRONGEST_MOTION_OF_HEAD: Final = 0.45
 
 @dataclass(frozen=True, slots=True)
 class Degradation:
-    """What a camera does to a picture; the default leaves it as it is.
+    """Effects of a camera on a picture; the default leaves it as it is.
 
     Attributes:
         light: share of full light that falls into the lens, > 0; less light means fewer photons.
