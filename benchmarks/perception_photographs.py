@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from benchmarks._degraded_pictures import pipeline_of
 from benchmarks._harness import make_parser
-from benchmarks.perception_degradations import pipeline_of
 from perception import Camera, PersonObservation
 
 Image = NDArray[np.uint8]

@@ -5,17 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.perception_degradations import (
-    CONDITIONS,
-    HEADER,
-    degraded_picture,
-    main,
-    measure,
-    meets,
-    picture_sets,
-    pictures,
-    row_of,
-)
+from benchmarks._degraded_pictures import CONDITIONS, degraded_picture, picture_sets, pictures
+from benchmarks.perception_degradations import HEADER, main, measure, meets, row_of
 from sim_tests.dataset import RenderConfig
 from training.networks import Recipe
 

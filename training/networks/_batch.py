@@ -44,14 +44,18 @@ def photographed(images: Tensor, generator: torch.Generator, strength: float = 1
     def uniform(low: float, high: float, *shape: int) -> Tensor:
         return low + (high - low) * torch.rand(n, *shape, generator=generator)
 
-    out = images.float()
-    out = (out - 128.0) * uniform(0.6, 1.4, 1, 1, 1) + 128.0 + uniform(-35.0, 35.0, 1, 1, 1)
-    out = out * uniform(0.85, 1.15, 3, 1, 1)
+    contrast, brightness = uniform(0.6, 1.4, 1, 1, 1), uniform(-35.0, 35.0, 1, 1, 1)
+    cast = uniform(0.85, 1.15, 3, 1, 1)
     fade = uniform(-0.6, 0.6, 1, 1, 1).clamp(min=0.0)
-    out = out * (1.0 - fade) + fade * out.mean(1, keepdim=True)
     gamma = torch.exp(uniform(-0.35, 0.35, 1, 1, 1))
-    out = 255.0 * (out.clamp(1.0, 255.0) / 255.0) ** gamma
-    return torch.lerp(images.float(), out.clamp(0.0, 255.0), strength)
+    # In place: a batch of whole images is large, and new memory costs more than the arithmetic.
+    out = images.contiguous().float().mul_(contrast * cast)
+    out.add_((128.0 * (1.0 - contrast) + brightness) * cast)
+    grey = out.mean(1, keepdim=True).mul_(fade)
+    out.mul_(1.0 - fade).add_(grey).clamp_(1.0, 255.0).div_(255.0).pow_(gamma).mul_(255.0)
+    if strength >= 1.0:
+        return out
+    return torch.lerp(images.float(), out, strength)
 
 
 def output_on_photographed(

@@ -217,13 +217,20 @@ def _noisy(
     if not shot and degradation.read_noise_e == 0.0:
         return light
     white_e = degradation.white_e if shot else WHITE_E
-    variance = np.full_like(light, (degradation.read_noise_e / white_e) ** 2)
+    read = np.float32((degradation.read_noise_e / white_e) ** 2)
     if shot:
-        variance += light / np.float32(white_e)
+        spread = light / np.float32(white_e)
+        spread += read
+        np.sqrt(spread, out=spread)
+    else:
+        spread = np.full_like(light, np.sqrt(read))
     noise = rng.standard_normal(light.shape, dtype=np.float32)
     if degradation.grain_px >= _LEAST_BLUR_PX:
         noise = np.asarray(cv2.GaussianBlur(noise, (0, 0), degradation.grain_px), dtype=np.float32)
-    return light + noise * np.sqrt(variance) * np.float32(min(scale, 1.0))
+    noise *= spread
+    noise *= np.float32(min(scale, 1.0))
+    noise += light
+    return noise
 
 
 def random_degradation(

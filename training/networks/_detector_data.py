@@ -37,8 +37,8 @@ MAX_PEOPLE: Final = 8
 _MIN_PIXELS: Final = 350
 _MIN_KEYPOINTS: Final = 4
 # Share of images with a random background, and of images of a background alone.
-_BACKGROUND_SHARE: Final = 0.5
-_EMPTY_SHARE: Final = 0.05
+_BACKGROUND_SHARE: Final = 0.65
+_EMPTY_SHARE: Final = 0.08
 
 
 @dataclass

@@ -42,8 +42,8 @@ DEGRADED_SHARE: Final = 0.5
 LATE: Final = 0.75
 _MIN_SIDE_PX: Final = 10.0
 _MIN_COARSE_PX: Final = 18.0
-# Larger heads are stored with fewer pixels: twice as many as the network's input has.
-_MOST_SIDE_PX: Final = 2.0 * SIZE
+# Larger heads are stored with fewer pixels, still more than the network's input has.
+_MOST_SIDE_PX: Final = 1.5 * SIZE
 
 
 class HeadData:

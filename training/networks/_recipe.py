@@ -30,7 +30,7 @@ class Recipe:
 
     seed: int = 0
     crowd: int = 48
-    scenes: int = 150
+    scenes: int = 112
     frames: int = 28
     person_patches: int = 70
     head_patches: int = 240
@@ -38,9 +38,9 @@ class Recipe:
     variants: tuple[int, int] = (8, 200)
     backgrounds: int = 400
     check_backgrounds: int = 40
-    detector_steps: int = 20000
-    pose_steps: int = 9000
-    head_steps: int = 30000
+    detector_steps: int = 16000
+    pose_steps: int = 8000
+    head_steps: int = 24000
 
     def held_out(self) -> Recipe:
         """Return a recipe with other people, goods and colours, for validation and calibration."""
