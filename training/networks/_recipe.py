@@ -30,7 +30,7 @@ class Recipe:
 
     seed: int = 0
     crowd: int = 48
-    scenes: int = 112
+    scenes: int = 150
     frames: int = 28
     person_patches: int = 70
     head_patches: int = 240
@@ -39,7 +39,7 @@ class Recipe:
     backgrounds: int = 400
     check_backgrounds: int = 40
     detector_steps: int = 16000
-    pose_steps: int = 8000
+    pose_steps: int = 7000
     head_steps: int = 24000
 
     def held_out(self) -> Recipe:
