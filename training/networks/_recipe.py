@@ -38,9 +38,9 @@ class Recipe:
     variants: tuple[int, int] = (8, 200)
     backgrounds: int = 400
     check_backgrounds: int = 40
-    detector_steps: int = 16000
-    pose_steps: int = 7000
-    head_steps: int = 24000
+    detector_steps: int = 12000
+    pose_steps: int = 5000
+    head_steps: int = 22000
 
     def held_out(self) -> Recipe:
         """Return a recipe with other people, goods and colours, for validation and calibration."""
