@@ -19,7 +19,6 @@ from typing import Any, Final, cast
 
 import numpy as np
 
-from perception import AWARENESS_REASONS, AwarenessReason
 from perception.arrays import (
     FloatArray,
     covariance_matrix,
@@ -28,6 +27,7 @@ from perception.arrays import (
     unit_vector,
 )
 from perception.documents import parse_json, read_lines
+from perception.evidence import AWARENESS_REASONS, AwarenessReason
 
 from .errors import AwarenavError, not_one_of
 from .files import atomic_path

@@ -10,21 +10,18 @@ from ._floor import FloorPlane
 from ._fusion import FusedHeadPoseEstimator
 from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
-from ._observation import AWARENESS_REASONS, AwarenessReason, PersonObservation
+from ._observation import PersonObservation
 from ._pipeline import AwarenessPipeline
 from ._pnp import PnpHeadPoseEstimator
 from ._protocols import HeadPoseEstimator, PersonDetector, PoseEstimator
-from .errors import DepthImageError, PerceptionError
+from .errors import PerceptionError
 from .networks import OnnxPersonDetector, OnnxPoseEstimator
 from .networks.heads import OnnxHeadPoseEstimator
 
 __all__ = [
-    "AWARENESS_REASONS",
     "AttentionCone",
     "AwarenessPipeline",
-    "AwarenessReason",
     "Camera",
-    "DepthImageError",
     "FloorPlane",
     "FusedHeadPoseEstimator",
     "HeadPose",

@@ -18,7 +18,7 @@ from ._frame_time import FrameBudget, StageTimings
 from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
 from ._metric_scale import DEFAULT_MIN_SCORE
-from ._observation import AwarenessReason, PersonObservation
+from ._observation import PersonObservation
 from ._placement import PersonPlace, place_people
 from ._pnp import PnpHeadPoseEstimator
 from ._protocols import HeadPoseEstimator, PersonDetector, PoseEstimator
@@ -28,7 +28,7 @@ from .awareness import AwarenessEstimate, estimate_awareness
 from .body import middle_of_shanks, place_bodies
 from .depth_image import checked_depth
 from .errors import PerceptionError
-from .evidence import FaceEvidence, judge_face
+from .evidence import AwarenessReason, FaceEvidence, judge_face
 from .eyes import EyeEstimator, EyeGaze, known_eyes
 from .networks import NETWORK_TIME, OnnxSettings
 from .ownership import disowned_keypoints, without_disowned

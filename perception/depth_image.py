@@ -14,8 +14,9 @@ from ._keypoints import PersonKeypoints
 from .arrays import FloatArray, finite_number
 from .errors import DepthImageError
 
-# A walking person moves 8 cm in this time, no more than a depth image is uncertain by.
-_MOST_APART_S: Final = 0.05
+#: Longest time between a picture and its depth image. A walking person moves 8 cm in it, no more
+#: than a depth image is uncertain by.
+MOST_APART_S: Final = 0.05
 # Depths outside these limits are holes; sensors report them so, or as 0, NaN or infinity.
 _LEAST_M, _MOST_M = 0.15, 100.0
 # Metres read as millimetres, and millimetres read as metres, give medians beyond these.
@@ -66,9 +67,9 @@ def checked_depth(
         )
     if depth_stamp_s is not None:
         apart_s = finite_number("depth_stamp_s", depth_stamp_s, DepthImageError) - stamp_s
-        if abs(apart_s) > _MOST_APART_S:
+        if abs(apart_s) > MOST_APART_S:
             raise DepthImageError(
-                f"the depth image must be of the image's time to {_MOST_APART_S:g} s, got one "
+                f"the depth image must be of the image's time to {MOST_APART_S:g} s, got one "
                 f"{apart_s:+.3f} s from it"
             )
     depth = depth_m.astype(np.float64)

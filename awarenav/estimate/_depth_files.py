@@ -9,8 +9,8 @@ from typing import Any, Final
 import cv2
 import numpy as np
 
-from perception import DepthImageError
 from perception.depth_image import checked_depth
+from perception.errors import DepthImageError
 
 from ..errors import AwarenavError
 from ._images import read_image

@@ -14,7 +14,6 @@ from scipy.optimize import linear_sum_assignment
 from perception import (
     AwarenessPipeline,
     Camera,
-    DepthImageError,
     FloorPlane,
     HeadPoseEstimator,
     PersonDetection,
@@ -24,6 +23,7 @@ from perception import (
     PoseEstimator,
 )
 from perception.arrays import FloatArray
+from perception.errors import DepthImageError
 from perception.ownership import DISOWNED, without_disowned
 from perception.shipped import TrainingDomain
 from tracking import CameraView, PersonTrack, PersonTracker, TrackerConfig
