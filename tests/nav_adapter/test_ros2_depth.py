@@ -88,25 +88,25 @@ def test_a_depth_image_that_cannot_be_read_is_refused(change, message) -> None:
         depth_of(replace(depth_image(START_S), **change))
 
 
-@pytest.mark.parametrize("depth", [np.full((48, 64), 3000, np.uint16), np.full((48, 64), 3.0)])
+@pytest.mark.parametrize("depth", [np.full((48, 64), 2400, np.uint16), np.full((48, 64), 2.4)])
 def test_depth_places_people_in_either_unit(depth: np.ndarray) -> None:
     nav = DepthListener()
     sent = depth if depth.dtype == np.uint16 else depth.astype(np.float32)
     without_m = nav.picture(START_S)
     assert nav.bridge.on_depth(depth_image(START_S + 0.1, sent), START_S + 0.1)
-    assert nav.picture(START_S + 0.1) == pytest.approx(3.12, abs=0.1)
-    assert abs(without_m - 3.12) > 0.5
+    assert nav.picture(START_S + 0.1) == pytest.approx(2.52, abs=0.1)
+    assert abs(without_m - 2.52) > 0.5
     assert nav.bridge.counts["depth_images"] == 1
     assert nav.warnings == []
 
 
 def test_the_nearest_in_time_is_taken_and_none_beyond_50_ms() -> None:
     nav = DepthListener()
-    for offset_s, metres in ((0.0, 3), (0.033, 4), (0.066, 5)):
-        depth = np.full((48, 64), 1000 * metres, np.uint16)
+    for offset_s, metres in ((0.0, 3.0), (0.033, 2.6), (0.066, 2.2)):
+        depth = np.full((48, 64), round(1000 * metres), np.uint16)
         nav.bridge.on_depth(depth_image(START_S + offset_s, depth), START_S + 0.1)
     placed = [nav.picture(START_S + at_s) for at_s in (0.001, 0.05, 0.11)]
-    assert placed == pytest.approx([3.12, 5.12, 5.12], rel=0.05)
+    assert placed == pytest.approx([3.12, 2.32, 2.32], rel=0.05)
     before = nav.bridge.counts["depth_images"]
     nav.picture(START_S + 0.2)
     assert nav.bridge.counts["depth_images"] == before
