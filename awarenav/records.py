@@ -15,7 +15,7 @@ import os
 from collections.abc import Container, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import numpy as np
 
@@ -27,8 +27,9 @@ from perception.arrays import (
     unit_vector,
 )
 from perception.documents import parse_json, read_lines
+from perception.evidence import AWARENESS_REASONS, AwarenessReason
 
-from .errors import AwarenavError
+from .errors import AwarenavError, not_one_of
 from .files import atomic_path
 from .line_files import DamagedLine, set_aside
 
@@ -169,6 +170,12 @@ class PersonRecord:
         score: in [0, 1].
         occlusion: share of the person that other things hide; 0 if the record has none.
         truncation: share of the person outside the image; 0 if the record has none.
+        awareness_reason: why there is no ``awareness``, as in
+            :class:`~perception.PersonObservation`, like all that follow.
+        range_lasting_relative_std: ≥ 0; 0 if the record has none.
+        size_range_m: > 0.
+        size_range_relative_std: ≥ 0; None if and only if ``size_range_m`` is None.
+        eyes_seen: False if the record does not say so.
     """
 
     box_xyxy_px: FloatArray | None
@@ -181,6 +188,11 @@ class PersonRecord:
     score: float
     occlusion: float
     truncation: float
+    awareness_reason: AwarenessReason | None
+    range_lasting_relative_std: float
+    size_range_m: float | None
+    size_range_relative_std: float | None
+    eyes_seen: bool
 
     @property
     def height_px(self) -> float:
@@ -229,8 +241,22 @@ def read_person(person: Any, where: str) -> PersonRecord:
             return default
         return finite_number(f"{where}: {name}", value, AwarenavError, minimum=0.0, maximum=1.0)
 
+    def number(name: str, *, positive: bool = False) -> float | None:
+        value = person.get(name)
+        if value is None:
+            return None
+        return finite_number(
+            f"{where}: {name}", value, AwarenavError, minimum=0.0, exclusive_minimum=positive
+        )
+
     covariance = person.get("position_covariance_m2")
-    std = person.get("awareness_std")
+    size_range_m = number("size_range_m", positive=True)
+    size_std = number("size_range_relative_std")
+    if (size_range_m is None) != (size_std is None):
+        raise AwarenavError(
+            f"{where}: size_range_m and size_range_relative_std must both be given or both be "
+            f"left out, got {size_range_m} and {size_std}"
+        )
     return PersonRecord(
         box_xyxy_px=array("box_xyxy_px", (4,)),
         position_camera_m=array("position_camera_m", (3,)),
@@ -240,13 +266,36 @@ def read_person(person: Any, where: str) -> PersonRecord:
         gaze_camera=unit("gaze_camera"),
         head_forward_camera=unit("head_forward_camera"),
         awareness=share("awareness", None),
-        awareness_std=None
-        if std is None
-        else finite_number(f"{where}: awareness_std", std, AwarenavError, minimum=0.0),
+        awareness_std=number("awareness_std"),
         score=share("score", 1.0) or 0.0,
         occlusion=share("occlusion", 0.0) or 0.0,
         truncation=share("truncation", 0.0) or 0.0,
+        awareness_reason=_reason(person, where),
+        range_lasting_relative_std=number("range_lasting_relative_std") or 0.0,
+        size_range_m=size_range_m,
+        size_range_relative_std=size_std,
+        eyes_seen=_flag(person, "eyes_seen", where),
     )
+
+
+def _reason(person: Record, where: str) -> AwarenessReason | None:
+    reason = person.get("awareness_reason")
+    if reason is None:
+        return None
+    if reason not in AWARENESS_REASONS:
+        raise AwarenavError(f"{where}: {not_one_of('awareness_reason', reason, AWARENESS_REASONS)}")
+    if person.get("awareness") is not None:
+        raise AwarenavError(
+            f"{where}: awareness_reason must be null with an awareness, got {reason!r}"
+        )
+    return cast(AwarenessReason, reason)
+
+
+def _flag(person: Record, name: str, where: str) -> bool:
+    value = person.get(name)
+    if value is not None and not isinstance(value, bool):
+        raise AwarenavError(f"{where}: {name} must be true or false, got {value!r:.60}")
+    return bool(value)
 
 
 def people_by_frame(records: list[Record], path: Any) -> dict[str, list[PersonRecord]]:

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from . import layouts as kp
 from ._detection import PersonDetection
 from ._keypoints import PersonKeypoints
-from ._observation import AwarenessReason
 from ._protocols import PersonDetector
 from ._scene_changes import SceneChanges
 from .arrays import FloatArray, ImageRgb
+from .evidence import AwarenessReason
 
 #: Longest permitted time between two looks of the detector.
 MAX_DETECT_EVERY_S: Final = 0.2

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, fields
-from typing import Any, Final, Literal, cast, get_args
+from typing import Any, Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,19 +20,7 @@ from .arrays import (
     unit_vectors,
 )
 from .errors import PerceptionError
-
-#: Why there is no evidence of awareness.
-AwarenessReason = Literal[
-    "skeleton of another person",
-    "keypoints outside the box",
-    "no body has such limbs",
-    "head of another person",
-    "no head pose",
-    "face too small",
-    "face cut by the border",
-    "no keypoint of the head",
-]
-AWARENESS_REASONS: Final[tuple[AwarenessReason, ...]] = get_args(AwarenessReason)
+from .evidence import AWARENESS_REASONS, AwarenessReason
 
 
 @dataclass(frozen=True, slots=True, eq=False)

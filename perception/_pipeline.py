@@ -12,14 +12,13 @@ import numpy as np
 from ._attention import AttentionCone
 from ._camera import Camera
 from ._carried_boxes import MAX_DETECT_EVERY_S, CarriedBoxes
-from ._depth_image import checked_depth
 from ._detection import PersonDetection
 from ._floor import FloorPlane
 from ._frame_time import FrameBudget, StageTimings
 from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
 from ._metric_scale import DEFAULT_MIN_SCORE
-from ._observation import AwarenessReason, PersonObservation
+from ._observation import PersonObservation
 from ._placement import PersonPlace, place_people
 from ._pnp import PnpHeadPoseEstimator
 from ._protocols import HeadPoseEstimator, PersonDetector, PoseEstimator
@@ -27,8 +26,9 @@ from .anthropometry import UNUSUAL_SIZE_PROBABILITY
 from .arrays import FloatArray, ImageRgb, finite_array, finite_number
 from .awareness import AwarenessEstimate, estimate_awareness
 from .body import middle_of_shanks, place_bodies
+from .depth_image import checked_depth
 from .errors import PerceptionError
-from .evidence import FaceEvidence, judge_face
+from .evidence import AwarenessReason, FaceEvidence, judge_face
 from .eyes import EyeEstimator, EyeGaze, known_eyes
 from .networks import NETWORK_TIME, OnnxSettings
 from .ownership import disowned_keypoints, without_disowned
@@ -187,9 +187,10 @@ class AwarenessPipeline:
             depth_stamp_s: time of the depth image, within 0.05 s; default that of the image.
 
         Raises:
-            PerceptionError: for an image of another size or type, a non-finite stamp, a depth image
-                of another size, type, unit or time, and an estimator that does not return one
-                result per person.
+            DepthImageError: for a depth image of another size, type, unit or time; no network has
+                run then.
+            PerceptionError: for an image of another size or type, a non-finite stamp, and an
+                estimator that does not return one result per person.
         """
         began, run_before_s = perf_counter(), NETWORK_TIME.elapsed_s
         stamp_s = finite_number("stamp_s", stamp_s)

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from . import layouts as kp
 from ._camera import Camera
 from ._depth_cues import CombinedRange, DepthCue, combined_range
-from ._depth_image import chest_depths
 from ._detection import PersonDetection
 from ._floor import FloorPlane
 from ._head_pose import HeadPose
@@ -34,6 +33,7 @@ from .body import (
     place_bodies,
     place_boxes,
 )
+from .depth_image import chest_depths
 
 #: Position (3,) and covariance (3, 3) in the camera frame.
 Placement = tuple[FloatArray, FloatArray]

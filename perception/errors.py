@@ -13,3 +13,7 @@ class AwarenavError(ValueError):
 
 class PerceptionError(AwarenavError):
     """Error for input that perception cannot use."""
+
+
+class DepthImageError(PerceptionError):
+    """Error for a depth image of another size, type, unit or time; the picture may be good."""

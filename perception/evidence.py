@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal, get_args
 
 import numpy as np
 
@@ -12,8 +12,20 @@ from . import layouts as kp
 from ._camera import Camera
 from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
-from ._observation import AwarenessReason
 from .anthropometry import HEAD_TEMPLATE_M, HEAD_WIDTH_M
+
+#: Why there is no evidence of awareness.
+AwarenessReason = Literal[
+    "skeleton of another person",
+    "keypoints outside the box",
+    "no body has such limbs",
+    "head of another person",
+    "no head pose",
+    "face too small",
+    "face cut by the border",
+    "no keypoint of the head",
+]
+AWARENESS_REASONS: Final[tuple[AwarenessReason, ...]] = get_args(AwarenessReason)
 
 # A face with a width of less than 5 pixels carries no direction. At 12 pixels the gaze is uncertain
 # by 20°, whatever the estimator says: no estimator is trained or tested on such small faces.

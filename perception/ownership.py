@@ -14,8 +14,8 @@ from . import layouts as kp
 from ._camera import Camera
 from ._detection import PersonDetection
 from ._keypoints import PersonKeypoints
-from ._observation import AwarenessReason
 from .arrays import FloatArray
+from .evidence import AwarenessReason
 
 #: The reasons that this module gives; the last one is about the head alone.
 DISOWNED: Final[tuple[AwarenessReason, ...]] = (

@@ -45,6 +45,7 @@ class BridgeInputs:
     tf_static: Topic | None = None
     scans: tuple[Topic, ...] = ()
     map: Topic | None = None
+    depth: Topic | None = None
 
 
 class BridgeLoop:
@@ -78,7 +79,7 @@ class BridgeLoop:
         self._period_s = 1.0 / rate_hz
         self._recorder, self._viewer = recorder, viewer
         self.frames = 0
-        for topic in (inputs.image, inputs.camera_info, *inputs.scans):
+        for topic in (inputs.depth, inputs.image, inputs.camera_info, *inputs.scans):
             if topic is not None:
                 node.subscribe(topic)
         # Poses are read before each image and each publication. On busy cores, waking for each of
@@ -138,6 +139,9 @@ class BridgeLoop:
             for cdr in self._node.take_cdr(inputs.camera_info)[-1:]:
                 if bridge.camera is None:
                     self._perception.calibrate(self._decoder(inputs.camera_info, cdr, CameraInfo))
+        if inputs.depth is not None:
+            for cdr in self._node.take_cdr(inputs.depth):
+                self._perception.submit_depth(self._decoder(inputs.depth, cdr, Image))
         if inputs.image is not None:
             for cdr in self._node.take_cdr(inputs.image)[-1:]:
                 self._perception.submit(self._decoder(inputs.image, cdr, Image))

@@ -132,6 +132,9 @@ class BagReplay:
             if bridge.on_image(made, now_s) and self._viewer is not None:
                 self._viewer.draw_frame(bridge)
 
+        def depth(message: Any, now_s: float) -> None:
+            bridge.on_depth(from_ros(Image, message), now_s)
+
         def scan(number: int, message: Any, now_s: float) -> None:
             bridge.on_scan(number, from_ros(LaserScan, message), now_s)
 
@@ -140,6 +143,7 @@ class BagReplay:
         }
         optional: tuple[tuple[Topic | None, Callable[[Any, float], None]], ...] = (
             (inputs.image, image),
+            (inputs.depth, depth),
             (inputs.camera_info, lambda m, t: bridge.on_camera_info(from_ros(CameraInfo, m))),
             (inputs.tf, lambda m, t: bridge.on_transforms(from_ros(TFMessage, m), t)),
             (

@@ -73,6 +73,7 @@ class BridgeOptions:
     frame_budget_s: float | None
     image: str
     compressed: bool
+    depth: str | None = None
     camera_info: str
     camera: Path | None
     no_camera: bool
@@ -133,6 +134,7 @@ def bridge_command(options: BridgeOptions) -> int:
                 T_base_camera=None if robot.camera is None else robot.camera.T_base_camera(),
                 camera=camera,
                 with_camera=not options.no_camera,
+                with_depth=inputs.depth is not None,
                 scanners=scanners,
                 percentage=options.percentage,
                 warn=_log,
@@ -187,7 +189,8 @@ def _networks(options: BridgeOptions) -> tuple[Networks, tuple[str, ...]]:
 def _announce(domain: int, inputs: BridgeInputs, published: Mapping[str, Topic]) -> None:
     if inputs.camera_info is not None:
         _log(f"waiting for /{inputs.camera_info.name}")
-    read = [topic for topic in (inputs.image, *inputs.scans, inputs.odom) if topic is not None]
+    topics = (inputs.image, inputs.depth, *inputs.scans, inputs.odom)
+    read = [topic for topic in topics if topic is not None]
     _log(
         f"domain {domain}: reading {' and '.join('/' + topic.name for topic in read)}, "
         f"publishing {', '.join('/' + topic.name for topic in published.values())}"
@@ -213,7 +216,14 @@ def _recorded(path: Path, inputs: BridgeInputs) -> BagMessages:
     """Return the messages of the inputs in a recording."""
     from ..estimate import BagMessages  # noqa: PLC0415 - needs the extra rosbag
 
-    topics = (inputs.image, inputs.camera_info, inputs.odom, inputs.map, *inputs.scans)
+    topics = (
+        inputs.image,
+        inputs.depth,
+        inputs.camera_info,
+        inputs.odom,
+        inputs.map,
+        *inputs.scans,
+    )
     optional = (inputs.tf, inputs.tf_static)
     required, others = (
         {f"/{topic.name}": ros_type(topic.message) for topic in group if topic is not None}
@@ -224,7 +234,11 @@ def _recorded(path: Path, inputs: BridgeInputs) -> BagMessages:
 
 def _summary(bridge: AwarenessBridge) -> str:
     counts = bridge.counts
-    names = [name for name in ("frames", "scans", "scans_refused") if name in counts]
+    names = [
+        name
+        for name in ("frames", "depth_images", "depth_images_refused", "scans", "scans_refused")
+        if name in counts
+    ]
     return ", ".join(f"{counts[name]} {name.replace('_', ' ')}" for name in names)
 
 
@@ -318,6 +332,8 @@ def _inputs(options: BridgeOptions, robot: RobotFile) -> BridgeInputs:
         raise AwarenavError("--no-camera needs a scanner: --scan TOPIC")
     if options.no_camera and options.camera is not None:
         raise AwarenavError("--no-camera and --camera exclude each other")
+    if options.no_camera and options.depth is not None:
+        raise AwarenavError("--no-camera and --depth exclude each other")
     if options.map is not None and not scans:
         raise AwarenavError("--map is for the scans: it needs --scan TOPIC")
     fixed_map = _is_file(options.map) and options.map_frame == options.odom_frame
@@ -337,6 +353,7 @@ def _inputs(options: BridgeOptions, robot: RobotFile) -> BridgeInputs:
         map=None
         if options.map is None or _is_file(options.map)
         else renamed(READ["map"], options.map),
+        depth=None if options.depth is None else renamed(READ["depth"], options.depth),
     )
 
 

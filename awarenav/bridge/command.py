@@ -59,6 +59,12 @@ _LOG: Final = "Recordings"
     help="The image topic is a sensor_msgs/CompressedImage.",
 )
 @option(
+    "--depth",
+    group=_READ,
+    metavar="TOPIC",
+    help="sensor_msgs/Image of depth, aligned with the images: 16UC1 in mm or 32FC1 in m.",
+)
+@option(
     "--camera-info",
     group=_READ,
     default="camera/camera_info",

@@ -23,11 +23,14 @@ from perception import (
     PoseEstimator,
 )
 from perception.arrays import FloatArray
+from perception.errors import DepthImageError
 from perception.ownership import DISOWNED, without_disowned
 from perception.shipped import TrainingDomain
 from tracking import CameraView, PersonTrack, PersonTracker, TrackerConfig
 
+from ..errors import AwarenavError
 from ._camera import CameraChoice, fixed_camera_pose
+from ._depth_files import DepthFiles
 from ._source import SourceFrame
 
 # An observation farther than this from a track does not belong to it.
@@ -125,6 +128,7 @@ class PeopleEstimator:
             without a pose; it gives the floor.
         track: tracks people from frame to frame. Images without a pose then count as those of a
             fixed camera.
+        depth: the depth images of the frames; None without any.
         unfit: roles of the networks that are not made for such images; every estimate has them.
     """
 
@@ -135,6 +139,7 @@ class PeopleEstimator:
         *,
         fixed_pose_odom_camera: FloatArray | None = None,
         track: bool = False,
+        depth: DepthFiles | None = None,
         unfit: tuple[str, ...] = (),
     ) -> None:
         self._networks = networks
@@ -142,14 +147,15 @@ class PeopleEstimator:
         self._fixed_pose = fixed_pose_odom_camera
         self._pose_estimator = RecordingPoseEstimator(networks.pose_estimator)
         self._pipelines: dict[Camera, AwarenessPipeline] = {}
-        self._track, self._unfit = track, unfit
+        self._track, self._unfit, self._depth = track, unfit, depth
         self._tracker: PersonTracker | None = None
 
     def estimate(self, frame: SourceFrame) -> FrameEstimate:
         """Estimate the people in a frame that has an image.
 
         Raises:
-            AwarenavError: for an image that the calibrated camera cannot have taken.
+            AwarenavError: for an image that the calibrated camera cannot have taken, or a depth
+                image that is missing or cannot be used.
             PerceptionError: for an image, or the output of a network, that cannot be used.
             TrackingError: with ``track``, for a stamp too far before that of the last frame.
         """
@@ -200,7 +206,14 @@ class PeopleEstimator:
                 **self._networks.settings,
             )
         assert frame.image_rgb is not None
-        return pipeline.process(frame.image_rgb, frame.stamp_s, floor=self._floor(frame))
+        floor = self._floor(frame)
+        if self._depth is None:
+            return pipeline.process(frame.image_rgb, frame.stamp_s, floor=floor)
+        path, depth_m = self._depth.of(frame.name)
+        try:
+            return pipeline.process(frame.image_rgb, frame.stamp_s, floor=floor, depth_m=depth_m)
+        except DepthImageError as cause:
+            raise AwarenavError(f"{path}: {cause}") from cause
 
     def _floor(self, frame: SourceFrame) -> FloorPlane | None:
         """Return the floor z = 0 of odom; a recorded pose is more accurate than a typed one."""

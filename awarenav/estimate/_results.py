@@ -74,6 +74,11 @@ def _person_record(
     }
     if observation.eyes_seen:
         record["eyes_seen"] = True
+    if observation.range_lasting_relative_std > 0.0:
+        record["range_lasting_relative_std"] = _rounded(observation.range_lasting_relative_std)
+    if observation.size_range_m is not None:
+        record["size_range_m"] = _rounded(observation.size_range_m)
+        record["size_range_relative_std"] = _rounded(observation.size_range_relative_std)
     return record
 
 

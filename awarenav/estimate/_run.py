@@ -18,6 +18,7 @@ from perception.shipped import simulator_networks_warning
 
 from ..errors import AwarenavError, counted
 from ._camera import CameraChoice, fixed_camera_pose
+from ._depth_files import DepthFiles
 from ._estimator import FrameEstimate, Networks, PeopleEstimator
 from ._networks import NetworkChoice, admit_networks, choose_networks
 from ._open_source import open_source
@@ -57,6 +58,7 @@ class EstimateOptions:
     every: int
     frames: int | None
     topic: str | None
+    depth: Path | None = None
     networks: Path | None
     detector: str
     pose: str
@@ -120,6 +122,7 @@ def estimate_command(options: EstimateOptions, networks: Networks | None = None)
         source = open_source(options.source, topic=options.topic)
         until_prefetched = stack.enter_context(contextlib.ExitStack())
         until_prefetched.callback(source.close)
+        depth = _depth(options, source)
         cameras = CameraChoice(_calibration(options, source), options.fov_deg, _log)
         choice = NetworkChoice.of_options(
             options.networks, options.detector, options.pose, options.head, options.eyes
@@ -144,11 +147,13 @@ def estimate_command(options: EstimateOptions, networks: Networks | None = None)
             cameras,
             fixed_pose_odom_camera=pose,
             track=options.tracks,
+            depth=depth,
             unfit=unfit,
         )
-        settings = settings_hash(
-            {name: getattr(options, name) for name in _SETTINGS} | choice.model_dump()
-        )
+        chosen = {name: getattr(options, name) for name in _SETTINGS} | choice.model_dump()
+        if options.depth is not None:
+            chosen["depth"] = options.depth
+        settings = settings_hash(chosen)
         overlay = _overlay(options, source)
         results = stack.enter_context(
             ResultsFile(options.out, settings, resume=options.resume, overwrite=options.overwrite)
@@ -276,6 +281,12 @@ def _calibration(options: EstimateOptions, source: ImageSource) -> Camera | None
     if options.camera is not None:
         return Camera.from_yaml(options.camera)
     return None if options.fov_deg is not None else source.camera
+
+
+def _depth(options: EstimateOptions, source: ImageSource) -> DepthFiles | None:
+    if options.depth is None:
+        return None
+    return DepthFiles(options.depth, source, every=options.every, limit=options.frames)
 
 
 def _overlay(options: EstimateOptions, source: ImageSource) -> OverlayWriter | None:

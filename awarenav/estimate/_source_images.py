@@ -52,7 +52,7 @@ class ImageFiles:
                 raise AwarenavError(f"{path} has no image ({', '.join(IMAGE_SUFFIXES)})")
         else:
             files = [path]
-        self._files = sorted(files, key=_natural_order)
+        self._files = sorted(files, key=natural_order)
         self._interval_s = interval_s
         self._known = _stamps_and_poses(folder / _TRUTH)
         self.camera = Camera.from_yaml(folder / _CAMERA) if (folder / _CAMERA).exists() else None
@@ -62,6 +62,11 @@ class ImageFiles:
         self.rendered = (folder / _RENDER).exists() and all(
             each.name in self._known for each in self._files
         )
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The image files in their order."""
+        return tuple(self._files)
 
     def frames(self) -> Iterator[SourceFrame]:
         """Yield every image; one that cannot be read has a ``problem``."""
@@ -76,7 +81,7 @@ class ImageFiles:
         """Do nothing: no file is held open."""
 
 
-def _natural_order(path: Path) -> tuple[tuple[tuple[int, int | str], ...], str]:
+def natural_order(path: Path) -> tuple[tuple[tuple[int, int | str], ...], str]:
     """Return a sort key that counts numbers in a name as numbers: image9 before image10."""
     parts = re.split(r"(\d+)", path.name)
     return tuple((0, int(part)) if part.isdigit() else (1, part) for part in parts), path.name

@@ -15,6 +15,7 @@ _CAMERA: Final = "Camera"
     examples=[
         "awarenav estimate photo.jpg --networks robot_networks.yaml --overlay drawn.jpg",
         "awarenav estimate video.mp4 --detector yolox-tiny --pose rtmpose-m",
+        "awarenav estimate images --depth depth --networks robot_networks.yaml",
         "awarenav estimate 0 --networks robot_networks.yaml --fov-deg 70 --tracks",
     ],
     exit_status={
@@ -43,6 +44,14 @@ _CAMERA: Final = "Camera"
 @option("--every", type=POSITIVE, default=1, metavar="N", help="Use every N-th frame only.")
 @option("--frames", type=POSITIVE, metavar="N", help="Stop after N frames.")
 @option("--topic", metavar="NAME", help="Image topic of a recording that has several.")
+@option(
+    "--depth",
+    type=FilePath(),
+    metavar="PATH",
+    help="Depth images that are aligned with the pictures: 16-bit PNG in millimetres, .npy or TIFF "
+    "in floating-point metres. A file for one image; a folder with the same stems for a folder; "
+    "for a video a folder with names by frame number from 0, or with as many files as frames.",
+)
 @options.networks
 @options.allow_simulator_networks()
 @option(

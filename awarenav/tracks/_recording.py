@@ -132,6 +132,9 @@ def _observation(
     if covariance is None:
         counts["no covariance"] += 1
         covariance = ASSUMED_POSITION_STD_M**2 * np.eye(3)
+    lasting = person.range_lasting_relative_std
+    if person.position_covariance_m2 is None:
+        lasting = 0.0  # it is a part of the covariance
     awareness, std = person.awareness, person.awareness_std
     if awareness is not None and std is None:
         counts["no std"] += 1
@@ -145,6 +148,11 @@ def _observation(
         awareness_std=None if awareness is None else std,
         score=person.score,
         box_xyxy_px=person.box_xyxy_px,
+        awareness_reason=person.awareness_reason,
+        range_lasting_relative_std=lasting,
+        size_range_m=person.size_range_m,
+        size_range_relative_std=person.size_range_relative_std,
+        eyes_seen=person.eyes_seen,
     )
 
 

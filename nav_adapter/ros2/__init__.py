@@ -15,7 +15,7 @@ from ._alerts import alerts
 from ._bridge import AwarenessBridge
 from ._grid import occupancy_grid
 from ._image_perception import PerceivedFrame
-from ._images import camera_of, picture_of
+from ._images import camera_of, depth_of, picture_of
 from ._markers import markers
 from ._outgoing import Frames, outgoing
 from ._people import circle_objects, detections, people, teb_obstacles
@@ -57,6 +57,7 @@ __all__ = [
     "circle_objects",
     "collision_polygons",
     "decode",
+    "depth_of",
     "detections",
     "encode",
     "laser_scan_of",

@@ -19,9 +19,10 @@ from .._policy import AwarenessPolicy
 from .._robot import RobotProfile, RobotState
 from ._alerts import sensor_status
 from ._clock import BridgeClock
+from ._depth_reader import DepthReader
 from ._guard import guarded_update, stopped
 from ._image_perception import ImagePerception, PerceivedFrame
-from ._outgoing import Frames, outgoing
+from ._outgoing import Frames, Sender
 from ._pose_reader import PoseReader
 from ._poses import RobotPoses
 from ._scan_perception import ScannerInput, ScanPerception
@@ -71,6 +72,7 @@ class AwarenessBridge:
             networks.
         camera: calibration; None to read it from camera_info. With it, the pipeline is made here.
         with_camera: False for scanners alone; everybody then counts as unaware.
+        with_depth: True if the camera has depth images (:meth:`on_depth`).
         scanners: the laser scanners.
         make_detector: makes the leg detector, if there are scanners.
         percentage: as in :func:`speed_limit`.
@@ -89,6 +91,7 @@ class AwarenessBridge:
         make_pipeline: Callable[[Camera], AwarenessPipeline] = AwarenessPipeline,
         camera: Camera | None = None,
         with_camera: bool = True,
+        with_depth: bool = False,
         scanners: Sequence[ScannerInput] = (),
         make_detector: Callable[[], LegDetector] = LegDetector,
         percentage: bool = False,
@@ -96,9 +99,9 @@ class AwarenessBridge:
         wanted: Callable[[str], bool] = lambda key: True,
     ) -> None:
         self.frames = frames or Frames()
-        self._policy, self._robot, self._publish = policy, robot, publish
-        self._T_base_camera, self._with_camera = T_base_camera, with_camera
-        self._percentage = percentage
+        self._policy, self._robot = policy, robot
+        self._sender = Sender(publish, robot, self.frames, percentage=percentage)
+        self._with_camera = with_camera
         self._wanted = wanted
         self._warn_user, self._warned = warn, ""
         if not with_camera and not scanners:
@@ -117,12 +120,16 @@ class AwarenessBridge:
             [each.name for each in scanners],
             with_camera=with_camera,
             lost_after_s=policy.timing.stale_after_s,
+            with_depth=with_depth,
         )
         self._frames = self._perception_failures = 0
         # For all of the above but the perception, which is not held up by it.
         self._lock = threading.RLock()
         # Keeps the messages of one publication together.
         self._sending = threading.Lock()
+        self._depth: DepthReader | None = None
+        if with_depth:
+            self._depth = DepthReader(self._clock, self._watch, self._lock, self._warn)
         self._scans: ScanReader | None = None
         if inputs := tuple(scanners):
             self._scans = ScanReader(
@@ -155,17 +162,19 @@ class AwarenessBridge:
         ``images_from_future``, which were refused; ``perception_failures``: images that ended in an
         error of the program; ``clock_restarts``. With scanners also ``scans_from_future``, and
         ``scans`` that were processed, ``scans_refused`` for any reason, ``scans_dropped``, and
-        ``frames_refused_by_tracker``, of any sensor.
+        ``frames_refused_by_tracker``, of any sensor. With depth images ``depth_images`` that were
+        used, ``depth_images_refused`` for any reason, and ``depth_images_from_future``.
         """
         with self._lock:
-            refused = dict(self._clock.refused)
-            if self._scans is None:
-                del refused["scans"]
+            refused = self._clock.refused
+            readers = {"scans": self._scans, "depth_images": self._depth}
+            absent = {kind for kind, reader in readers.items() if reader is None}
             return {
                 "frames": self._frames,
-                **{f"{kind}_from_future": count for kind, count in refused.items()},
+                **{f"{key}_from_future": n for key, n in refused.items() if key not in absent},
                 "perception_failures": self._perception_failures,
                 "clock_restarts": self._clock.restarts,
+                **({} if self._depth is None else self._depth.counts),
                 **({} if self._scans is None else self._scans.counts),
             }
 
@@ -214,6 +223,7 @@ class AwarenessBridge:
     def on_image(self, message: Image | CompressedImage, now_s: float) -> bool:
         """Process one image; return True if it was used."""
         stamp_s = to_seconds(message.header.stamp)
+        depth = None if self._depth is None else self._depth.nearest(stamp_s)
         try:
             with self._lock:
                 if self._perception.camera is None:
@@ -224,7 +234,7 @@ class AwarenessBridge:
                 restarts = self._clock.restarts
                 T_odom_camera = self._poses.T_odom_camera(message.header.frame_id, stamp_s)
             frame = self._perception.process(
-                message, stamp_s, T_odom_camera, lambda: self._clock.restarts == restarts
+                message, stamp_s, T_odom_camera, lambda: self._clock.restarts == restarts, depth
             )
         except (NavError, PerceptionError, TrackingError) as problem:
             self._warn(f"image: {problem}")
@@ -235,8 +245,32 @@ class AwarenessBridge:
             self._frame = frame
             self._frames += 1
             self._warned = ""
-            self._watch.saw_image(stamp_s, *self._camera_on_base(message.header.frame_id, stamp_s))
+            assert self._perception.camera is not None
+            T_base_camera = self._poses.camera_in_base(message.header.frame_id, stamp_s)
+            self._watch.saw_image(stamp_s, self._perception.camera, T_base_camera)
+            if self._depth is not None and frame.depth is not None:
+                self._depth.used(frame.depth)
+        if frame.depth_problem:
+            self.refuse_depth(frame.depth_problem, now_s)
         return True
+
+    def on_depth(self, message: Image, now_s: float) -> bool:
+        """Keep a depth image, aligned with the pictures, for the picture of its time.
+
+        It must come before the picture, or while the one before is processed. Return False if it
+        was refused.
+
+        Raises:
+            NavError: if the bridge was made without depth images.
+        """
+        if self._depth is None:
+            raise NavError("the bridge was made without depth images")
+        return self._depth.read(message, now_s)
+
+    def refuse_depth(self, problem: str, now_s: float) -> None:
+        """Count and report a depth image that could not be decoded or used."""
+        if self._depth is not None:
+            self._depth.refuse(problem, now_s)
 
     def on_scan(self, number: int, message: LaserScan, now_s: float) -> bool:
         """Process one scan of a scanner, numbered from 0; return True if it was used.
@@ -284,7 +318,7 @@ class AwarenessBridge:
                 sensors, news = self._sensors(constraints.stamp_s)
             for line in news:
                 self._warn_user(line)
-            self._send(constraints, tracks, state, details, self._wanted, sensors)
+            self._sender.send(constraints, tracks, state, details, self._wanted, sensors)
         return constraints
 
     def refuse(self, problem: str) -> None:
@@ -305,7 +339,7 @@ class AwarenessBridge:
         """Publish a stop, before the caller ends."""
         constraints = stopped(now_s, reason)
         with self._sending:
-            self._send(constraints, (), None, {}, lambda key: True)
+            self._sender.send(constraints, (), None, {}, lambda key: True)
         return constraints
 
     def _constraints(self, now_s: float) -> NavConstraints:
@@ -325,32 +359,7 @@ class AwarenessBridge:
             return "no odometry yet"
         if self._with_camera and self._perception.camera is None:
             return "no camera_info yet"
-        missing = self._watch.missing
-        if missing is None:
-            return ""
-        return f"no {missing} {'frame' if missing == CAMERA else 'scan'} yet"
-
-    def _send(
-        self,
-        constraints: NavConstraints,
-        tracks: tuple[PersonTrack, ...],
-        state: RobotState | None,
-        details: dict[str, str],
-        wanted: Callable[[str], bool],
-        sensors: DiagnosticStatus | None = None,
-    ) -> None:
-        for key, message in outgoing(
-            constraints,
-            tracks,
-            self._robot,
-            state,
-            self.frames,
-            percentage=self._percentage,
-            wanted=wanted,
-            details=details,
-            sensors=sensors,
-        ):
-            self._publish(key, message)
+        return self._watch.missing_text
 
     def _restart(self) -> None:
         """Forget all that has a stamp of the clock before it was set."""
@@ -359,24 +368,14 @@ class AwarenessBridge:
         self._frame = None
         self._pose_reader.forget()
         self._watch.forget()
-        if self._scans is not None:
-            self._scans.forget()
+        for reader in (self._depth, self._scans):
+            if reader is not None:
+                reader.forget()
         self._warn("the clock has been set back: all tracks and moving transforms are deleted")
-
-    def _camera_on_base(self, frame: str, stamp_s: float) -> tuple[Camera, FloatArray | None]:
-        """Return the camera, and its pose in the base frame; None if that is not known."""
-        camera = self._perception.camera
-        assert camera is not None
-        if self._T_base_camera is not None:
-            return camera, self._T_base_camera
-        try:
-            return camera, self._poses.in_base(self.frames.camera or frame, stamp_s)
-        except NavError:
-            return camera, None
 
     def _sensors(self, now_s: float) -> tuple[DiagnosticStatus | None, list[str]]:
         """Return the status of the sensors, and a line for each loss and return."""
-        if self._scans is None:
+        if self._scans is None and self._depth is None:
             return None, []
         status = sensor_status(self._watch.ages_s(now_s), self._watch.lost(now_s))
         return status, self._watch.news(now_s)

@@ -13,7 +13,7 @@ _NEW_CLOCK_AFTER_S: Final = 1.0
 # Readings follow one another at this distance at most: the slowest rate of publishing is 1 Hz.
 _MAX_PAUSE_S: Final = 2.0
 
-InputKind = Literal["odometry", "transforms", "images", "scans"]
+InputKind = Literal["odometry", "transforms", "images", "depth_images", "scans"]
 
 
 class BridgeClock:
@@ -34,6 +34,7 @@ class BridgeClock:
             "odometry": 0,
             "transforms": 0,
             "images": 0,
+            "depth_images": 0,
             "scans": 0,
         }
         self._last_s: float | None = None

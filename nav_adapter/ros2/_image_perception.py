@@ -6,14 +6,17 @@ import math
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from perception import AwarenessPipeline, Camera, FloorPlane, PersonObservation
 from perception.arrays import FloatArray
+from perception.errors import DepthImageError
 from tracking import PersonTrack
 
+from ._depth_reader import StampedDepth
 from ._images import camera_of, picture_of
 from ._shared_tracker import SharedTracker
 from .messages.sensor_msgs import CameraInfo, CompressedImage, Image
@@ -33,6 +36,8 @@ class PerceivedFrame:
         image: (H, W, 3) uint8 RGB.
         observations: one per person seen.
         T_odom_camera: (4, 4) pose of the camera.
+        depth: the depth image that was used; None without one.
+        depth_problem: why a depth image was not used; empty if it was, or there was none.
     """
 
     stamp_s: float
@@ -40,6 +45,8 @@ class PerceivedFrame:
     image: NDArray[np.uint8]
     observations: tuple[PersonObservation, ...]
     T_odom_camera: FloatArray
+    depth: StampedDepth | None = None
+    depth_problem: str = ""
 
 
 class ImagePerception:
@@ -86,24 +93,37 @@ class ImagePerception:
         stamp_s: float,
         T_odom_camera: FloatArray,
         is_current: Callable[[], bool],
+        depth: StampedDepth | None = None,
     ) -> PerceivedFrame | None:
         """Return the frame of an image, or None if ``is_current`` says that it came too late.
+
+        A depth image that does not fit is left out, and the frame says why.
 
         Raises:
             NavError, PerceptionError, TrackingError: for an image that cannot be used.
         """
         with self._busy:
             image = picture_of(message)
-            observations = self._pipeline.process(image, stamp_s, floor=_floor(T_odom_camera))
+            floor, problem = _floor(T_odom_camera), ""
+            try:
+                given = {} if depth is None else _given(depth)
+                observations = self._pipeline.process(image, stamp_s, floor=floor, **given)
+            except DepthImageError as cause:  # before any network has run
+                depth, problem = None, str(cause)
+                observations = self._pipeline.process(image, stamp_s, floor=floor)
             tracks = self._tracker.update(observations, stamp_s, T_odom_camera, is_current)
         if tracks is None:
             return None
-        return PerceivedFrame(stamp_s, tracks, image, observations, T_odom_camera)
+        return PerceivedFrame(stamp_s, tracks, image, observations, T_odom_camera, depth, problem)
 
     def _start(self, camera: Camera) -> None:
         self._pipeline = self._make_pipeline(camera)
         self._tracker.use_camera(camera)
         self._camera = camera
+
+
+def _given(depth: StampedDepth) -> dict[str, Any]:
+    return {"depth_m": depth.depth, "depth_stamp_s": depth.stamp_s}
 
 
 def _floor(T_odom_camera: FloatArray) -> FloorPlane | None:

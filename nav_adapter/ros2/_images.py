@@ -36,6 +36,8 @@ _ENCODINGS: Final[dict[str, tuple[int, int | None]]] = {
     "yuv422_yuy2": (2, cv2.COLOR_YUV2RGB_YUY2),
     "yuyv": (2, cv2.COLOR_YUV2RGB_YUY2),
 }
+# REP 118: millimetres with 0 as hole, and metres with NaN as hole.
+_DEPTH_TYPES: Final = {"16UC1": "u2", "32FC1": "f4"}
 _SIXTEEN_BITS: Final = ("rgb16", "bgr16", "mono16")
 _DISTORTION_MODELS: Final = ("plumb_bob", "rational_polynomial")
 
@@ -57,15 +59,9 @@ def picture_of(message: Any) -> NDArray[np.uint8]:
     if message.encoding not in _ENCODINGS:
         raise NavError(f"encoding must be one of {', '.join(_ENCODINGS)}, got {message.encoding!r}")
     depth, code = _ENCODINGS[message.encoding]
-    height, width, step = int(message.height), int(message.width), int(message.step)
+    height, width = int(message.height), int(message.width)
     wide = message.encoding in _SIXTEEN_BITS
-    row = width * depth * (2 if wide else 1)
-    if height * width == 0 or step < row or len(message.data) < height * step:
-        raise NavError(
-            f"{width} x {height} px of {message.encoding} with {step} bytes per row need "
-            f"{height * max(step, row)} bytes and at least one pixel, got {len(message.data)} bytes"
-        )
-    rows = np.frombuffer(message.data, np.uint8, height * step).reshape(height, step)[:, :row]
+    rows = _rows(message, depth * (2 if wide else 1))
     if wide:
         samples = np.ascontiguousarray(rows).view(">u2" if message.is_bigendian else "<u2")
         native = samples.astype(np.uint16, copy=False)
@@ -76,6 +72,25 @@ def picture_of(message: Any) -> NDArray[np.uint8]:
     except cv2.error as cause:
         raise NavError(f"{message.encoding} of {width} x {height} px: {cause.err}") from cause
     return np.ascontiguousarray(rgb, dtype=np.uint8)
+
+
+def depth_of(message: Any) -> NDArray[Any]:
+    """Return the depth image of a message (REP 118), (H, W): uint16 millimetres or float32 metres.
+
+    Args:
+        message: ``sensor_msgs`` Image of the encoding ``16UC1`` or ``32FC1``.
+
+    Raises:
+        NavError: for another encoding, or too few bytes.
+    """
+    encoding = getattr(message, "encoding", "a compressed image")
+    if encoding not in _DEPTH_TYPES:
+        raise NavError(
+            f"the encoding of a depth image must be {' or '.join(_DEPTH_TYPES)}, got {encoding!r}"
+        )
+    stored = np.dtype((">" if message.is_bigendian else "<") + _DEPTH_TYPES[encoding])
+    rows = np.ascontiguousarray(_rows(message, stored.itemsize)).view(stored)
+    return rows.astype(stored.newbyteorder("="))
 
 
 def camera_of(message: CameraInfo) -> Camera:
@@ -103,6 +118,18 @@ def camera_of(message: CameraInfo) -> Camera:
         )
     except PerceptionError as cause:
         raise NavError(f"camera_info: {cause}") from cause
+
+
+def _rows(message: Any, pixel_bytes: int) -> NDArray[np.uint8]:
+    """Return the rows of a message without their padding, (H, W · bytes of a pixel)."""
+    height, width, step = int(message.height), int(message.width), int(message.step)
+    row = width * pixel_bytes
+    if height * width == 0 or step < row or len(message.data) < height * step:
+        raise NavError(
+            f"{width} x {height} px of {message.encoding} with {step} bytes per row need "
+            f"{height * max(step, row)} bytes and at least one pixel, got {len(message.data)} bytes"
+        )
+    return np.frombuffer(message.data, np.uint8, height * step).reshape(height, step)[:, :row]
 
 
 def _decompressed(message: Any) -> NDArray[np.uint8]:

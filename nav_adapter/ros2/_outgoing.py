@@ -81,3 +81,48 @@ def outgoing(
         yield "detections", detections(constraints, frame_id=odom)
     if wanted("markers"):
         yield "markers", markers(constraints, robot_state, frame_id=odom)
+
+
+class Sender:
+    """Makes and publishes the messages of one publication after the other.
+
+    Args:
+        publish: called with the key of a topic and a message.
+        robot: its profile.
+        frames: names of the frames.
+        percentage: as in :func:`speed_limit`.
+    """
+
+    def __init__(
+        self,
+        publish: Callable[[str, Message], None],
+        robot: RobotProfile,
+        frames: Frames,
+        *,
+        percentage: bool,
+    ) -> None:
+        self._publish, self._robot = publish, robot
+        self._frames, self._percentage = frames, percentage
+
+    def send(
+        self,
+        constraints: NavConstraints,
+        tracks: tuple[PersonTrack, ...],
+        state: RobotState | None,
+        details: dict[str, str],
+        wanted: Callable[[str], bool],
+        sensors: DiagnosticStatus | None = None,
+    ) -> None:
+        """Publish the topics that are ``wanted``; the arguments are those of :func:`outgoing`."""
+        for key, message in outgoing(
+            constraints,
+            tracks,
+            self._robot,
+            state,
+            self._frames,
+            percentage=self._percentage,
+            wanted=wanted,
+            details=details,
+            sensors=sensors,
+        ):
+            self._publish(key, message)

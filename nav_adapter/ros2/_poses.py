@@ -110,6 +110,15 @@ class RobotPoses:
         """
         return self.transforms.lookup(self._frames.base, frame, stamp_s)
 
+    def camera_in_base(self, frame: str, stamp_s: float) -> FloatArray | None:
+        """Return the pose (4, 4) of the camera in the base frame; None if it is not known."""
+        if self._T_base_camera is not None:
+            return self._T_base_camera
+        try:
+            return self.in_base(self._frames.camera or frame, stamp_s)
+        except NavError:
+            return None
+
     def motion(self, start_s: float, end_s: float) -> RobotMotion:
         """Return the robot's motion from one time to a later one, of a scan's first and last ray.
 

@@ -12,6 +12,8 @@ from perception import Camera
 from perception.arrays import FloatArray
 
 CAMERA: Final = "camera"
+#: The camera's depth images, without which it goes on.
+DEPTH: Final = "depth images"
 # Without a camera, scanners must see this far to either side of straight ahead.
 _AHEAD_RAD: Final = math.radians(60.0)
 # Directions are compared at this distance.
@@ -30,11 +32,19 @@ class SensorWatch:
         scanners: names of the scanners.
         with_camera: whether there is a camera.
         lost_after_s: a sensor that is silent for longer is lost.
+        with_depth: whether the camera has depth images.
     """
 
-    def __init__(self, scanners: Sequence[str], *, with_camera: bool, lost_after_s: float) -> None:
+    def __init__(
+        self,
+        scanners: Sequence[str],
+        *,
+        with_camera: bool,
+        lost_after_s: float,
+        with_depth: bool = False,
+    ) -> None:
         self._scanners, self._lost_after_s = tuple(scanners), lost_after_s
-        self._names = (CAMERA, *scanners) if with_camera else tuple(scanners)
+        self._names = (*([CAMERA] * with_camera), *([DEPTH] * with_depth), *scanners)
         self._with_camera = with_camera
         self._needed_rad = (0.0, _AHEAD_RAD)
         self._stamps_s: dict[str, float] = {}
@@ -46,6 +56,10 @@ class SensorWatch:
         self._stamps_s[CAMERA] = max(stamp_s, self._stamps_s.get(CAMERA, -math.inf))
         if T_base_camera is not None:
             self._needed_rad = _field_of(camera, T_base_camera)
+
+    def saw_depth(self, stamp_s: float) -> None:
+        """Note a depth image that was used."""
+        self._stamps_s[DEPTH] = max(stamp_s, self._stamps_s.get(DEPTH, -math.inf))
 
     def saw_scan(
         self, number: int, stamp_s: float, T_base_scanner: FloatArray, field_rad: float
@@ -72,6 +86,16 @@ class SensorWatch:
     def missing(self) -> str | None:
         """The first sensor that nothing has come from yet; None if all have been heard."""
         return next((name for name in self._names if name not in self._stamps_s), None)
+
+    @property
+    def missing_text(self) -> str:
+        """The first sensor that nothing has come from yet, in words; empty if there is none."""
+        missing = self.missing
+        if missing is None:
+            return ""
+        if missing == DEPTH:
+            return "no depth image yet"
+        return f"no {missing} {'frame' if missing == CAMERA else 'scan'} yet"
 
     def ages_s(self, now_s: float) -> dict[str, float]:
         """Return the age of the latest frame of every sensor; infinite before the first."""
@@ -105,12 +129,14 @@ class SensorWatch:
         self._reported.clear()
 
     def _consequence(self, lost: set[str]) -> str:
-        left = [name for name in self._names if name not in lost]
+        left = [name for name in self._names if name not in lost and name != DEPTH]
         if not left:
             return "the robot stops"
         goes_on = f"{' and '.join(left)} {'goes' if len(left) == 1 else 'go'} on"
         if CAMERA in lost:
             return f"{goes_on}, and everybody counts as unaware"
+        if DEPTH in lost:
+            return f"{goes_on}, and distances are less sure"
         return goes_on
 
     def _scanners_stamp_s(self) -> float | None:

@@ -66,6 +66,7 @@ READ: Final = MappingProxyType(
         "compressed": Topic(
             "camera/image_raw/compressed", CompressedImage, reliable=False, depth=1
         ),
+        "depth": Topic("camera/depth_registered/image_raw", Image, reliable=False, depth=2),
         "camera_info": Topic("camera/camera_info", CameraInfo, reliable=False, depth=1),
         "scan": Topic("scan", LaserScan, reliable=False),
         "scan_2": Topic("scan_2", LaserScan, reliable=False),

@@ -4,6 +4,7 @@ Run it with ``python -m nav_adapter.ros2.node --ros-args -p robot_file:=robot.ya
 thread publishes at a fixed rate; perception has threads of its own. Parameters:
 ``robot_file`` (required), ``policy`` (``balanced``), ``rate_hz`` (20.0), ``scanners`` (number of
 laser scanners, 0 to 2), ``use_camera`` (true), ``use_map`` (false), ``compressed`` (false),
+``depth`` (false; whether the camera has depth images),
 ``percentage`` (false), ``detector_file`` and ``pose_file`` (ONNX; by default the shipped networks),
 ``allow_simulator_networks`` (false; the shipped networks have seen renders only, and are refused
 without it), ``odom_frame``, ``base_frame``, ``camera_frame``. Topics are renamed by ROS's
@@ -80,6 +81,7 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
         robot = RobotFile.from_yaml(self._parameter("robot_file", ""))
         policy = self._parameter("policy", "balanced")
         use_camera = self._parameter("use_camera", True)
+        use_depth = use_camera and self._parameter("depth", False)
         scans = self._scan_topics(self._parameter("scanners", 0))
         self._publishers_by_key: dict[str, Any] = {}
         for key, topic in PUBLISHED.items():
@@ -103,6 +105,7 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
                 allowed=self._parameter("allow_simulator_networks", False) or not use_camera,
             ),
             with_camera=use_camera,
+            with_depth=use_depth,
             scanners=scanner_inputs([topic.name for topic in scans], robot),
             warn=self.get_logger().warning,
             wanted=self._wanted,
@@ -119,6 +122,8 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
             kind: Any = CompressedImage if compressed else Image
             image = READ["compressed" if compressed else "image"]
             self._subscribe(image, lambda m: self._image(kind, m))
+        if use_depth:
+            self._subscribe(READ["depth"], self._depth_image)
         self._scans = ScanThread(self._bridge, self._now_s) if scans else None
         for number, topic in enumerate(scans):
             self._subscribe(topic, partial(self._scan, number))
@@ -138,6 +143,9 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
 
     def _image(self, kind: type[Image] | type[CompressedImage], message: Any) -> None:
         self._perception.submit(lambda: from_ros(kind, message))
+
+    def _depth_image(self, message: Any) -> None:
+        self._perception.submit_depth(lambda: from_ros(Image, message))
 
     def _calibration(self, message: Any) -> None:
         if self._bridge.camera is None:

@@ -38,7 +38,7 @@ STORE = get_typestore(Stores.ROS2_HUMBLE)
 START_S, SECONDS, PERSON = 1000.0, 3.0, (2.5, 1.2)
 
 
-def messages(*, camera: bool = False):
+def messages(*, camera: bool = False, depth: bool = False):
     """Yield topic, time of recording and message of a standing robot with one scanner."""
     move = Transform(Vector3(0.3, 0.0, 0.2))
     mounted = TransformStamped(Header(frame_id="base_link"), "scanner", move)
@@ -54,6 +54,12 @@ def messages(*, camera: bool = False):
             yield "/camera/camera_info", now, CameraInfo(header, 48, 64, k=k)
             picture = Image(header, 48, 64, "rgb8", 0, 192, bytes(48 * 192))
             yield "/camera/image_raw", now + 0.01, picture
+        if depth:  # it comes after its picture; the one before is near enough in time
+            far = np.full((48, 64), 3000 if tick != 10 else 30, "<u2" if tick != 10 else "u1")
+            encoding = "16UC1" if tick != 10 else "mono8"
+            step = 64 * far.itemsize
+            sent = Image(Header(to_time(now), "camera"), 48, 64, encoding, 0, step, far.tobytes())
+            yield "/camera/depth", now + 0.03, sent
 
 
 def recorded(path: Path, found) -> Path:
@@ -155,9 +161,24 @@ def test_a_recording_with_a_camera_is_replayed_as_far_as_is_asked(
     assert "replayed 1.0 s: 25 frames, 25 scans, 0 scans refused" in said
 
 
+def test_depth_images_of_a_recording_are_read_and_a_bad_one_is_reported(
+    tmp_path: Path, robot_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bag = recorded(tmp_path / "bag", messages(camera=True, depth=True))
+    arguments = ["--robot", str(robot_file), "--bag", str(bag), "--seconds", "1"]
+    arguments += ["--depth", "/camera/depth", "--allow-simulator-networks"]
+    assert main(["bridge", *arguments]) == 0
+    said = capsys.readouterr().err
+    assert "replayed 1.0 s: 25 frames, 23 depth images, 1 depth images refused" in said
+    assert said.count("depth image refused and counted: the encoding of a depth image") == 1
+    assert main(["bridge", *arguments, "--scan", "scan", "--no-camera"]) == 2
+    assert "--no-camera and --depth exclude each other" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
+        (["--depth", "none"], "no topic /none of type sensor_msgs/msg/Image"),
         (["--no-camera", "--scan", "scan_2"], "no topic /scan_2 of type sensor_msgs/msg/LaserScan"),
         (["--scan", "odom", "--no-camera"], "no topic /odom of type sensor_msgs/msg/LaserScan"),
         (["--scan", "scan"], "no topic /camera/image_raw of type sensor_msgs/msg/Image"),

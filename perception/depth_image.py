@@ -12,10 +12,11 @@ from . import layouts as kp
 from ._detection import PersonDetection
 from ._keypoints import PersonKeypoints
 from .arrays import FloatArray, finite_number
-from .errors import PerceptionError
+from .errors import DepthImageError
 
-# A walking person moves 8 cm in this time, no more than a depth image is uncertain by.
-_MOST_APART_S: Final = 0.05
+#: Longest time between a picture and its depth image. A walking person moves 8 cm in it, no more
+#: than a depth image is uncertain by.
+MOST_APART_S: Final = 0.05
 # Depths outside these limits are holes; sensors report them so, or as 0, NaN or infinity.
 _LEAST_M, _MOST_M = 0.15, 100.0
 # Metres read as millimetres, and millimetres read as metres, give medians beyond these.
@@ -52,23 +53,23 @@ def checked_depth(
         depth_stamp_s: time of the depth image; None for the same.
 
     Raises:
-        PerceptionError: for another type, shape, unit or time; the message says what was given.
+        DepthImageError: for another type, shape, unit or time; the message says what was given.
     """
     if not isinstance(depth_m, np.ndarray):
-        raise PerceptionError(
+        raise DepthImageError(
             f"depth_m must be an array of shape {shape}, got {type(depth_m).__name__}"
         )
     in_mm = depth_m.dtype == np.uint16
     if depth_m.shape != shape or not (in_mm or depth_m.dtype.kind == "f"):
-        raise PerceptionError(
+        raise DepthImageError(
             f"depth_m must be of the image's shape {shape}, in metres (floating point) or in "
             f"millimetres (uint16), got {depth_m.dtype} of shape {depth_m.shape}"
         )
     if depth_stamp_s is not None:
-        apart_s = finite_number("depth_stamp_s", depth_stamp_s) - stamp_s
-        if abs(apart_s) > _MOST_APART_S:
-            raise PerceptionError(
-                f"the depth image must be of the image's time to {_MOST_APART_S:g} s, got one "
+        apart_s = finite_number("depth_stamp_s", depth_stamp_s, DepthImageError) - stamp_s
+        if abs(apart_s) > MOST_APART_S:
+            raise DepthImageError(
+                f"the depth image must be of the image's time to {MOST_APART_S:g} s, got one "
                 f"{apart_s:+.3f} s from it"
             )
     depth = depth_m.astype(np.float64)
@@ -76,12 +77,12 @@ def checked_depth(
     if measured.size:
         median = float(np.median(measured))
         if in_mm and median < _LEAST_MEDIAN_MM:
-            raise PerceptionError(
+            raise DepthImageError(
                 f"depth_m of type uint16 must be in millimetres; its median is {median:g}, which "
                 "looks like another unit"
             )
         if not in_mm and median > _MOST_MEDIAN_M:
-            raise PerceptionError(
+            raise DepthImageError(
                 f"depth_m of floating point must be in metres; its median is {median:g}, which "
                 "looks like millimetres"
             )
