@@ -191,12 +191,13 @@ def test_a_topic_that_the_recording_lacks_is_refused(
     text: str,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    bag = recorded(tmp_path / "bag", messages())
+    bag = recorded(tmp_path / "bag", messages(camera="--depth" in arguments))
     given = ["--robot", str(robot_file), "--bag", str(bag), "--allow-simulator-networks"]
     assert main(["bridge", *given, *arguments]) == 2
     said = capsys.readouterr().err
     assert text in said
-    assert "it has /odom (nav_msgs/msg/Odometry)" in said
+    assert "; it has /" in said
+    assert "/odom (nav_msgs/msg/Odometry)" in said
 
 
 def test_what_is_no_recording_is_refused(
