@@ -12,10 +12,6 @@ al., "Real-time Facial Surface Geometry from Monocular Video on Mobile GPUs", 20
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager
-from types import TracebackType
 from typing import Any, Final
 
 import cv2
@@ -24,9 +20,9 @@ import numpy as np
 from ... import layouts as kp
 from ..._detection import PersonDetection
 from ..._keypoints import PersonKeypoints
-from ...arrays import FloatArray, ImageRgb, finite_number
-from ...errors import PerceptionError
+from ...arrays import FloatArray, ImageRgb
 from .._image import rgb_image
+from ._mediapipe_solutions import MediaPipeEstimator, without_protobuf_warnings
 
 # MediaPipe's landmark of each COCO keypoint.
 _LANDMARKS: Final = (0, 2, 5, 7, 8, 11, 12, 13, 14, 15, 16, 23, 24, 25, 26, 27, 28)
@@ -46,7 +42,7 @@ _EAR_HIDES_RAD: Final = (np.deg2rad(15.0), np.deg2rad(40.0))
 _EYE_HIDES_RAD: Final = (np.deg2rad(50.0), np.deg2rad(80.0))
 
 
-class MediaPipePoseEstimator(AbstractContextManager["MediaPipePoseEstimator"]):
+class MediaPipePoseEstimator(MediaPipeEstimator):
     """Keypoints of detected people by MediaPipe Pose, and of their faces by Face Mesh.
 
     Each person is processed alone, in the padded box, and each frame by itself: nothing is carried
@@ -65,38 +61,15 @@ class MediaPipePoseEstimator(AbstractContextManager["MediaPipePoseEstimator"]):
             invalid value.
     """
 
-    def __init__(self, min_detection_confidence: float = 0.4) -> None:
-        confidence = finite_number(
-            "min_detection_confidence", min_detection_confidence, minimum=0.0, maximum=1.0
+    def _made(self, face_mesh: Any, pose: Any, confidence: float) -> tuple[Any, ...]:
+        # The package contains the network of complexity 1 only; others would be downloaded.
+        self._pose = pose.Pose(
+            static_image_mode=True, model_complexity=1, min_detection_confidence=confidence
         )
-        pose, face_mesh = mediapipe_solutions("MediaPipePoseEstimator")
-        with without_protobuf_warnings():
-            # The package contains the network of complexity 1 only; others would be downloaded.
-            self._pose = pose.Pose(
-                static_image_mode=True,
-                model_complexity=1,
-                min_detection_confidence=confidence,
-            )
-            self._mesh = face_mesh.FaceMesh(
-                static_image_mode=True,
-                max_num_faces=1,
-                min_detection_confidence=confidence,
-            )
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Release MediaPipe's memory; the estimator cannot be used afterwards."""
-        for solution in (self._pose, self._mesh):
-            if solution is not None:
-                solution.close()
-        self._pose = self._mesh = None
+        self._mesh = face_mesh.FaceMesh(
+            static_image_mode=True, max_num_faces=1, min_detection_confidence=confidence
+        )
+        return self._pose, self._mesh
 
     def estimate(
         self, image_rgb: ImageRgb, detections: tuple[PersonDetection, ...]
@@ -114,8 +87,7 @@ class MediaPipePoseEstimator(AbstractContextManager["MediaPipePoseEstimator"]):
             PerceptionError: for an image of another type or shape, and for a closed estimator.
         """
         image = rgb_image(image_rgb)
-        if self._pose is None:
-            raise PerceptionError("the MediaPipePoseEstimator has been closed")
+        self._require_open()
         with without_protobuf_warnings():
             return tuple(self._person(image, person.box_xyxy_px) for person in detections)
 
@@ -175,32 +147,6 @@ class MediaPipePoseEstimator(AbstractContextManager["MediaPipePoseEstimator"]):
         if float(np.linalg.norm(found.mean(axis=0) - centre)) > half:
             return None  # the face of a neighbour
         return found, _face_scores(points)
-
-
-def mediapipe_solutions(asker: str) -> tuple[Any, Any]:
-    """Return MediaPipe's face mesh and pose solutions, for the class ``asker``.
-
-    Raises:
-        PerceptionError: if MediaPipe is not installed; the message names the extra.
-    """
-    try:
-        with without_protobuf_warnings():
-            from mediapipe.python.solutions import face_mesh, pose  # noqa: PLC0415
-    except ImportError as cause:
-        raise PerceptionError(
-            f"{asker} needs mediapipe 0.10.14, which cannot be imported ({cause}); "
-            "it is the extra 'mediapipe': pip install 'awarenav[mediapipe]'"
-        ) from cause
-    return pose, face_mesh
-
-
-@contextmanager
-def without_protobuf_warnings() -> Iterator[None]:
-    """Silence protobuf: MediaPipe 0.10.14 calls deprecated functions of it for each result."""
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", module=r"google\.protobuf\..*")
-        warnings.filterwarnings("ignore", message=r"SymbolDatabase\.GetPrototype")
-        yield
 
 
 def _padded_box(box_xyxy_px: FloatArray, padding: float) -> FloatArray:

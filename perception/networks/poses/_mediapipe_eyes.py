@@ -9,8 +9,6 @@ Source: Grishchenko et al., "Attention Mesh: High-fidelity Face Mesh Prediction 
 from __future__ import annotations
 
 import math
-from contextlib import AbstractContextManager
-from types import TracebackType
 from typing import Any, Final
 
 import numpy as np
@@ -18,12 +16,11 @@ import numpy as np
 from ..._camera import Camera
 from ..._head_pose import HeadPose
 from ...anthropometry import EYES_HEAD_M, HEAD_CENTRE_HEAD_M
-from ...arrays import FloatArray, ImageRgb, finite_number
-from ...errors import PerceptionError
+from ...arrays import FloatArray, ImageRgb
 from ...eyes import EyeGaze, eyes_from_irises
 from .._image import rgb_image
 from ..heads import head_crop, looking_at, ray_focal_px
-from ._mediapipe import mediapipe_solutions, without_protobuf_warnings
+from ._mediapipe_solutions import MediaPipeEstimator, without_protobuf_warnings
 
 # Landmarks of the left and of the right eye: iris, corners, upper and lower lid.
 _IRISES: Final = (473, 468)
@@ -47,7 +44,7 @@ _IRIS_STD_PX: Final = 0.25
 _IRIS_STD_M: Final = (4e-4, 1.5e-3)
 
 
-class MediaPipeEyeEstimator(AbstractContextManager["MediaPipeEyeEstimator"]):
+class MediaPipeEyeEstimator(MediaPipeEstimator):
     """Rotation of the eyes of near people, from MediaPipe's irises.
 
     Each head is processed alone, in a square cut about it, and each frame by itself. There is no
@@ -65,32 +62,14 @@ class MediaPipeEyeEstimator(AbstractContextManager["MediaPipeEyeEstimator"]):
             invalid value.
     """
 
-    def __init__(self, min_detection_confidence: float = 0.4) -> None:
-        confidence = finite_number(
-            "min_detection_confidence", min_detection_confidence, minimum=0.0, maximum=1.0
+    def _made(self, face_mesh: Any, pose: Any, confidence: float) -> tuple[Any, ...]:
+        self._mesh = face_mesh.FaceMesh(
+            static_image_mode=True,
+            max_num_faces=1,
+            refine_landmarks=True,
+            min_detection_confidence=confidence,
         )
-        _, face_mesh = mediapipe_solutions(type(self).__name__)
-        with without_protobuf_warnings():
-            self._mesh = face_mesh.FaceMesh(
-                static_image_mode=True,
-                max_num_faces=1,
-                refine_landmarks=True,
-                min_detection_confidence=confidence,
-            )
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Release MediaPipe's memory; the estimator cannot be used afterwards."""
-        if self._mesh is not None:
-            self._mesh.close()
-        self._mesh = None
+        return (self._mesh,)
 
     def estimate(
         self, image_rgb: ImageRgb, camera: Camera, heads: tuple[HeadPose | None, ...]
@@ -106,8 +85,7 @@ class MediaPipeEyeEstimator(AbstractContextManager["MediaPipeEyeEstimator"]):
             PerceptionError: for an image of another type or shape, and for a closed estimator.
         """
         image = rgb_image(image_rgb)
-        if self._mesh is None:
-            raise PerceptionError("the MediaPipeEyeEstimator has been closed")
+        self._require_open()
         with without_protobuf_warnings():
             return tuple(
                 None if head is None else self._eyes(image, camera, head) for head in heads
