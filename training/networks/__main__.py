@@ -11,6 +11,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -39,7 +40,6 @@ _ROOT: Final = Path(__file__).parents[2]
 _MODELS: Final = _ROOT / "perception" / "models"
 _STAGES: Final = ("data", "head", "pose", "detector", "export")
 _TRAINERS: Final[dict[str, Callable[[Recipe, Path, Path, Path, str], nn.Module]]] = {
-    "head": train_head,
     "pose": train_pose,
     "detector": train_detector,
 }
@@ -88,6 +88,12 @@ def main() -> None:
     parser.add_argument(
         "--device", default=AUTO, help="auto, cpu, cuda or cuda:N (default: %(default)s)"
     )
+    parser.add_argument(
+        "--head-from",
+        type=Path,
+        metavar="FILE",
+        help="exported head network that training goes on from (default: from nothing)",
+    )
     parser.add_argument("--quick", action="store_true", help="a tiny run that checks every stage")
     chosen = parser.parse_args()
     unknown = [stage for stage in chosen.stages if stage not in _STAGES]
@@ -102,6 +108,9 @@ def main() -> None:
         torch_device(chosen.device)
     except ValueError as cause:
         parser.error(str(cause))
+    if chosen.head_from is not None and not chosen.head_from.is_file():
+        parser.error(f"--head-from must be a file of a head network, got {chosen.head_from}")
+    trainers = {"head": partial(train_head, start=chosen.head_from), **_TRAINERS}
     cv2.setNumThreads(1)
     work: Path = chosen.work
     shards, check = work / "shards", work / "shards_check"
@@ -116,7 +125,7 @@ def main() -> None:
             check,
             chosen.processes,
         )
-    for name, train in _TRAINERS.items():
+    for name, train in trainers.items():
         if name in stages:
             train(recipe, shards, check, work / "checkpoints", chosen.device)
     if "export" in stages:

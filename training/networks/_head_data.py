@@ -79,7 +79,7 @@ class HeadData:
 
         Crops are distorted less from ``LATE`` on, the last quarter of the training.
         """
-        rng = np.random.default_rng([self._seed, 22, step])
+        rng = np.random.default_rng([self._seed, 22, step % 2**32])
         strength = 1.0 if done < LATE else 0.5
         return stacked([self.distorted(rng, strength) for _ in range(count)])
 

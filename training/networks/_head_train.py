@@ -16,28 +16,45 @@ from ._fit import AUTO, fit
 from ._head_data import LATE, HeadData
 from ._head_net import BINS, SPAN, HeadNet, averaged, head_rotation, keypoint_means, spread_factor
 from ._recipe import Recipe
+from ._start import start_from
 
 MEAN, STD = 120.0, 60.0
 _DEGREES_OF_FREEDOM = 5.0
+# Highest learning rate from nothing, and from a trained network.
+_LEARNING_RATE, _LEARNING_RATE_ON = 2.5e-3, 1.5e-3
+# Batches for the statistics of a network that training goes on from.
+_START_BATCHES = 16
 
 
 def train_head(
-    recipe: Recipe, shards: Path, held_out: Path, folder: Path, device: str = AUTO
+    recipe: Recipe,
+    shards: Path,
+    held_out: Path,
+    folder: Path,
+    device: str = AUTO,
+    start: Path | None = None,
 ) -> nn.Module:
-    """Train the head network on the shards; figures on held-out people go to the log."""
+    """Train the head network on the shards; figures on held-out people go to the log.
+
+    With ``start``, the file of an exported head network, training goes on from its weights.
+    """
     torch.manual_seed(recipe.seed)
     data = HeadData(shards, recipe.seed, recipe.backgrounds)
     check = HeadData(held_out, recipe.seed, recipe.check_backgrounds)
     print(f"{len(data.heads)} heads for training, {len(check.heads)} held out", flush=True)
+    net = HeadNet()
+    if start is not None:
+        batches = (data.batch(-1 - number, LATE) for number in range(_START_BATCHES))
+        start_from(net, start, (normalised(batch["image"]) for batch in batches))
     return fit(
         "head",
-        HeadNet(),
+        net,
         lambda step: data.batch(step, step / recipe.head_steps),
         head_loss,
         steps=recipe.head_steps,
         folder=folder,
         device=device,
-        learning_rate=2.5e-3,
+        learning_rate=_LEARNING_RATE if start is None else _LEARNING_RATE_ON,
         judge=lambda net: judge_head(net, check),
     )
 

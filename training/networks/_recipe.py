@@ -40,7 +40,7 @@ class Recipe:
     check_backgrounds: int = 40
     detector_steps: int = 12000
     pose_steps: int = 5000
-    head_steps: int = 26000
+    head_steps: int = 18000
 
     def held_out(self) -> Recipe:
         """Return a recipe with other people, goods and colours, for validation and calibration."""
