@@ -8,6 +8,7 @@ network is the same function, and can be trained.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -94,7 +95,7 @@ def _normalised_convolutions(net: nn.Module) -> list[tuple[nn.Conv2d, nn.BatchNo
     modules = [module for module in net.modules() if not list(module.children())]
     return [
         (conv, norm)
-        for conv, norm in zip(modules, modules[1:], strict=False)
+        for conv, norm in pairwise(modules)
         if isinstance(conv, nn.Conv2d) and isinstance(norm, nn.BatchNorm2d)
     ]
 
