@@ -14,6 +14,12 @@ _UNIFORM_DENSITY: Final = 0.5
 # Standard deviation if every cue is an outlier.
 _ALL_OUTLIERS_LOG_STD: Final = 0.5
 _MAX_CUES: Final = 5
+#: A shelf hides about half of somebody: a box is then half as high.
+HIDDEN_OFFSET: Final = 0.7
+# Probability that something hides the lower part of a person of whom there is a box alone, and the
+# spread (logarithm) of how much of the height it hides.
+_HIDDEN_PROBABILITY: Final = 0.05
+_HIDDEN_STD: Final = 0.25
 # By the number of cues: all subsets with at least one inlier.
 _SUBSETS: Final = {
     count: tuple(inliers for inliers in product((False, True), repeat=count) if any(inliers))
@@ -37,6 +43,9 @@ class DepthCue:
         unusual_offset: by how much the cue is then too large on average.
         outlier_farther: share of the outliers that lie beyond the person. Feet that stand on
             something, or that something hides, seem farther away than they are.
+        hidden_offset: by how much the cue is too large on average if the lower part of the person
+            is hidden: of a box, whose height is then too small. Infinite for a cue that is an
+            outlier then: the lower edge is that of what hides them. 0 for other cues.
     """
 
     log_range: float
@@ -46,6 +55,7 @@ class DepthCue:
     unusual_std: float = 0.0
     unusual_offset: float = 0.0
     outlier_farther: float = 0.5
+    hidden_offset: float = 0.0
 
 
 class CombinedRange(NamedTuple):
@@ -125,6 +135,12 @@ def combined_range(cues: Sequence[DepthCue], unusual_probability: float = 0.0) -
             for cue in cues
         ]
         hypotheses.append((unusual, math.log(unusual_probability)))
+    if any(cue.hidden_offset for cue in cues):
+        hypotheses = [
+            (terms, prior + math.log1p(-_HIDDEN_PROBABILITY)) for terms, prior in hypotheses
+        ]
+        hidden = [_hidden_terms(cue, one) for cue, one in zip(cues, usual, strict=True)]
+        hypotheses.append((hidden, math.log(_HIDDEN_PROBABILITY)))
     sided = [row for row, cue in enumerate(cues) if cue.outlier_farther != 0.5]
     for terms, prior in hypotheses:
         for inliers in _SUBSETS[len(cues)]:
@@ -188,6 +204,17 @@ def _terms(cue: DepthCue, value: float, own: float, stature: float) -> _Terms:
         math.log1p(-cue.outlier_probability) - 0.5 * math.log(2.0 * math.pi * own),
         math.log(_UNIFORM_DENSITY * cue.outlier_probability),
     )
+
+
+def _hidden_terms(cue: DepthCue, usual: _Terms) -> _Terms:
+    """Return the terms of a cue if the lower part of the person is hidden."""
+    if not cue.hidden_offset:
+        return usual
+    if math.isinf(cue.hidden_offset):
+        # No inlier, whatever it says.
+        return usual._replace(as_inlier=-math.inf, as_outlier=math.log(_UNIFORM_DENSITY))
+    own = _own_variance(cue.log_std, cue.stature_std) + _HIDDEN_STD**2
+    return _terms(cue, cue.log_range - cue.hidden_offset, own, cue.stature_std)
 
 
 def _least_squares(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from . import layouts as kp
 from ._camera import Camera
-from ._depth_cues import CombinedRange, DepthCue, combined_range
+from ._depth_cues import HIDDEN_OFFSET, CombinedRange, DepthCue, combined_range
 from ._detection import PersonDetection
 from ._floor import FloorPlane
 from ._head_pose import HeadPose
@@ -33,7 +33,7 @@ from .body import (
     place_bodies,
     place_boxes,
 )
-from .depth_image import chest_depths
+from .depth_image import BEHIND_M, chest_depths
 
 #: Position (3,) and covariance (3, 3) in the camera frame.
 Placement = tuple[FloatArray, FloatArray]
@@ -228,7 +228,7 @@ def _range_cues(
     stature = STATURE_RELATIVE_STD if body is None else body.scale_relative_std
     outlier = _BOX_OUTLIER if body is None else _BODY_OUTLIER
     stature = min(stature, STATURE_RELATIVE_STD, 0.99 * along)
-    cues = [DepthCue(0.0, along, stature, outlier, *_UNUSUAL)]
+    cues = [DepthCue(0.0, along, stature, outlier, *_UNUSUAL, 0.5, HIDDEN_OFFSET * (body is None))]
     if (cue := _head_cue(position, person, body, head, floor)) is not None:
         cues.append(cue)
     if floor is not None:
@@ -255,12 +255,15 @@ def _trunk_px(camera: Camera, body: BodyPlacement) -> FloatArray:
 
 def _chest_cue(position: FloatArray, depth_m: float, std_m: float, has_body: bool) -> DepthCue:
     """Return the cue of the chest's depth in a depth image."""
-    value = math.log(depth_m / max(float(position[2]), 1e-3))
+    away_m = max(float(position[2]), 1e-3)
+    if has_body:
+        # The chest of a child is less deep: as much as they are smaller.
+        depth_m -= BEHIND_M * (1.0 - min(max((depth_m - BEHIND_M) / away_m, 0.5), 1.0))
+    value = math.log(depth_m / away_m)
     if has_body:
         return DepthCue(value, std_m / depth_m, 0.0, _CHEST_OUTLIER)
-    return DepthCue(
-        value, std_m / depth_m, 0.0, _BOX_CHEST_OUTLIER, outlier_farther=_FEET_OUTLIER_FARTHER
-    )
+    outlier = _BOX_CHEST_OUTLIER, 0.0, 0.0, _FEET_OUTLIER_FARTHER
+    return DepthCue(value, std_m / depth_m, 0.0, *outlier)
 
 
 def _with_range(starts: Sequence[Placement], found: Sequence[CombinedRange]) -> list[Placement]:
@@ -296,8 +299,7 @@ def _head_cue(
         up = _UP_LEVEL_CAMERA if floor is None else floor.normal_camera
         expected = float(position[2] + _CHEST_TO_HEAD_M * up[2])
         offset = _HEAD_OFFSET_FLAT_STD_M
-    measured = float(centre[2])
-    if measured <= 0.0 or expected <= 0.0:
+    if (measured := float(centre[2])) <= 0.0 or expected <= 0.0:
         return None
     std = math.hypot(head.range_relative_std, offset / expected)
     return DepthCue(
@@ -366,11 +368,8 @@ def _legs_cue(body: BodyPlacement, seen: NDArray[np.bool_], floor: FloorPlane) -
         (kp.HIPS, _HIPS_M, _HIPS_STD_M, _HIPS_OUTLIER),
         (kp.SHOULDERS, _NECK_M, _NECK_STD_M, _NECK_OUTLIER),
     ):
-        shown = [
-            row
-            for row in np.arange(17)[np.array(rows) if isinstance(rows, tuple) else rows]
-            if seen[row]
-        ]
+        joints = np.arange(17)[np.array(rows) if isinstance(rows, tuple) else rows]
+        shown = joints[seen[joints]].tolist()
         if shown:
             up_m = float((body.keypoints_camera_m[shown] @ floor.normal_camera).min())
             down_m = above - up_m
@@ -397,4 +396,5 @@ def _bottom_cue(
     if not (found > 0.0 and expected > 0.0):
         return None
     error = math.hypot(float(std[0]), _TOE_AHEAD_STD_M / expected)
-    return DepthCue(math.log(found / expected), error, 0.0, _BOTTOM_OUTLIER)
+    off = math.log(found / expected)
+    return DepthCue(off, error, 0.0, _BOTTOM_OUTLIER, hidden_offset=math.inf)

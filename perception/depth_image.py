@@ -34,9 +34,10 @@ _BOX_NECK, _BOX_HIPS = 0.17, 0.50
 _SURFACE_M: Final = 0.30
 _SURFACE_SHARE: Final = 0.6
 _FEWEST: Final = 8
-# The centre line lies this far behind the chest's surface: half the chest's depth from in front
-# (Drillis and Contini; with clothes), up to half its breadth from the side.
-_BEHIND_M, _BEHIND_STD_M = 0.12, 0.05
+#: An adult's centre line lies this far behind the chest's surface: half the chest's depth from in
+#: front (Drillis and Contini; with clothes). From the side it is up to half its breadth.
+BEHIND_M: Final = 0.12
+_BEHIND_STD_M: Final = 0.05
 # Error of a depth camera as a share of the depth; that of stereo grows to this at about 4 m.
 _RELATIVE_STD: Final = 0.015
 
@@ -163,4 +164,4 @@ def _chest_depth(
     if count < max(_FEWEST, _SURFACE_SHARE * len(found)):
         return None
     surface_m = float(np.median(found[first : first + count]))
-    return surface_m + _BEHIND_M, math.hypot(_BEHIND_STD_M, _RELATIVE_STD * surface_m)
+    return surface_m + BEHIND_M, math.hypot(_BEHIND_STD_M, _RELATIVE_STD * surface_m)
