@@ -42,11 +42,11 @@ STATURE_RELATIVE_STD: Final = 0.05
 
 #: Probability that a person has not the size of an adult who stands: a child, somebody bent or
 #: seated. Then the logarithm of their size is below an adult's by this much on average, with this
-#: standard deviation (statures of 1.05 to 1.57 m at one standard deviation). About the adult, the
-#: root mean square of the whole mixture is 17 % of the range.
+#: standard deviation (statures of 1.02 to 1.62 m at one standard deviation). About the adult, the
+#: root mean square of the whole mixture is 17.5 % of the range.
 UNUSUAL_SIZE_PROBABILITY: Final = 0.2
 UNUSUAL_SIZE_LOG_OFFSET: Final = 0.3
-UNUSUAL_SIZE_LOG_STD: Final = 0.2
+UNUSUAL_SIZE_LOG_STD: Final = 0.23
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeVar
 
 import cv2
 import torch
@@ -43,6 +43,7 @@ _TRAINERS: Final[dict[str, Callable[[Recipe, Path, Path, Path, str], nn.Module]]
     "pose": train_pose,
     "detector": train_detector,
 }
+_Net = TypeVar("_Net", bound=nn.Module)
 _ENTRIES: Final = (
     {
         "name": "person_detector",
@@ -74,7 +75,11 @@ def main() -> None:
     """Run the stages asked for, by default all."""
     parser = argparse.ArgumentParser(prog="python -m training.networks", description=__doc__)
     parser.add_argument(
-        "stages", nargs="*", metavar="STAGE", help=f"some of {', '.join(_STAGES)} (default: all)"
+        "stages",
+        nargs="*",
+        metavar="STAGE",
+        help=f"some of {', '.join(_STAGES)} (default: all); export writes the networks of the "
+        "stages named beside it, or all",
     )
     parser.add_argument(
         "--work",
@@ -129,7 +134,8 @@ def main() -> None:
         if name in stages:
             train(recipe, shards, check, work / "checkpoints", chosen.device)
     if "export" in stages:
-        _export(recipe, check, work / "checkpoints", chosen.out)
+        names = set(trainers) & set(stages) or set(trainers)
+        _export(recipe, check, work / "checkpoints", chosen.out, names)
 
 
 def _crowd(recipe: Recipe, folder: Path, processes: int) -> tuple[str, ...]:
@@ -140,34 +146,40 @@ def _crowd(recipe: Recipe, folder: Path, processes: int) -> tuple[str, ...]:
     return tuple(str(path) for path in sorted(folder.glob("*.npz")))
 
 
-def _export(recipe: Recipe, check: Path, checkpoints: Path, out: Path) -> None:
-    """Write the networks of the checkpoints, calibrated on held-out people."""
-    nets: dict[str, nn.Module] = {"detector": DetectorNet(), "pose": PoseNet(), "head": HeadNet()}
-    for name, net in nets.items():
-        saved = torch.load(checkpoints / f"{name}.pt", map_location="cpu", weights_only=True)
-        net.load_state_dict(saved["average"])
-        net.eval()
-    head, pose, detector = nets["head"], nets["pose"], nets["detector"]
-    assert isinstance(head, HeadNet)
-    assert isinstance(pose, PoseNet)
-    assert isinstance(detector, DetectorNet)
-    held_out = HeadData(check, recipe.seed, recipe.check_backgrounds)
-    # Half of the crops are degraded: a robot's camera is between the two.
-    factors = calibration(predictions(head, held_out, degraded=True))
-    print("factors on the standard deviations:", factors)
-    export_head(head, out / "head_pose.onnx", factors)
+def _export(recipe: Recipe, check: Path, checkpoints: Path, out: Path, names: set[str]) -> None:
+    """Write networks of the checkpoints, calibrated on held-out people."""
+    if "head" in names:
+        head = _trained(HeadNet(), checkpoints / "head.pt")
+        held_out = HeadData(check, recipe.seed, recipe.check_backgrounds)
+        # Half of the crops are degraded: a robot's camera is between the two.
+        factors = calibration(predictions(head, held_out, degraded=True))
+        print("factors on the standard deviations:", factors)
+        export_head(head, out / "head_pose.onnx", factors)
+    if "pose" in names:
+        pose = _trained(PoseNet(), checkpoints / "pose.pt")
 
-    def with_scale(scale: float) -> OnnxPoseEstimator:
-        export_pose(pose, out / "person_pose.onnx", scale)
-        return OnnxPoseEstimator(out / "person_pose.onnx")
+        def with_scale(scale: float) -> OnnxPoseEstimator:
+            export_pose(pose, out / "person_pose.onnx", scale)
+            return OnnxPoseEstimator(out / "person_pose.onnx")
 
-    crowd = sorted(check.with_name("crowd_check").glob("*.npz"))
-    statures_m = [load_worker(str(path)).stature_m for path in crowd]
-    scale, noise = limb_scale(with_scale, check, statures_m)
-    print(f"limb scale against perception.anthropometry: {scale:.3f}, noise {noise:.3f}")
-    export_pose(pose, out / "person_pose.onnx", scale, noise)
-    export_detector(detector, out / "person_detector.onnx")
-    print("written", update_manifest(out, _ENTRIES))
+        crowd = sorted(check.with_name("crowd_check").glob("*.npz"))
+        statures_m = [load_worker(str(path)).stature_m for path in crowd]
+        scale, noise = limb_scale(with_scale, check, statures_m)
+        print(f"limb scale against perception.anthropometry: {scale:.3f}, noise {noise:.3f}")
+        export_pose(pose, out / "person_pose.onnx", scale, noise)
+    if "detector" in names:
+        detector = _trained(DetectorNet(), checkpoints / "detector.pt")
+        export_detector(detector, out / "person_detector.onnx")
+    files = {"head": "head_pose", "pose": "person_pose", "detector": "person_detector"}
+    written = {files[name] for name in names}
+    print("written", update_manifest(out, [each for each in _ENTRIES if each["name"] in written]))
+
+
+def _trained(net: _Net, checkpoint: Path) -> _Net:
+    """Return the network with the averaged weights of a checkpoint."""
+    saved = torch.load(checkpoint, map_location="cpu", weights_only=True)
+    net.load_state_dict(saved["average"])
+    return net.eval()
 
 
 if __name__ == "__main__":
