@@ -135,7 +135,8 @@ def combined_range(cues: Sequence[DepthCue], unusual_probability: float = 0.0) -
             for cue in cues
         ]
         hypotheses.append((unusual, math.log(unusual_probability)))
-    if any(cue.hidden_offset for cue in cues):
+    # A box's height alone is uncertain enough; its lower edge on a floor would make it sure.
+    if any(math.isinf(cue.hidden_offset) for cue in cues):
         hypotheses = [
             (terms, prior + math.log1p(-_HIDDEN_PROBABILITY)) for terms, prior in hypotheses
         ]

@@ -155,9 +155,10 @@ def _head_shape_factor() -> FloatArray:
 #: depth of eyes and ears from the nose (3 and 2 mm); of the eyes alone (1.5, 1.0 and 1.3 mm down,
 #: forward, outwards) and of the ears alone (3, 5 and 3 mm); each coordinate (1.5 mm, asymmetry and
 #: the labels' own spread). In sum bitragion breadth varies by 8 mm, interpupillary distance by
-#: 4.5 mm, depth of the ears by 7 mm and protrusion of the nose by 2.7 mm, about as in surveys of
-#: head-and-face anthropometry (Zhuang and Bradtmiller 2005, doi:10.1080/15459620500309855; ANSUR
-#: II); so do heads of the parametric model.
+#: 4.5 mm, depth of the ears by 7 mm and protrusion of the nose by 2.7 mm. These are round figures
+#: of the size that surveys of head-and-face anthropometry report (Zhuang and Bradtmiller 2005,
+#: doi:10.1080/15459620500309855; ANSUR II), not fitted to their tables; heads of the parametric
+#: model vary as much.
 HEAD_SHAPE_FACTOR_M: Final = _head_shape_factor()
 
 #: (3,) centre of the head in the paper's head frame: between the ears and a little above them.
