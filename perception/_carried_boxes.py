@@ -70,14 +70,17 @@ class CarriedBoxes:
     The detector must then look at the same image.
 
     Args:
-        detector: finds people.
+        detectors: find people, with smaller and smaller inputs; :attr:`size` is the number of the
+            one in use.
         every_s: longest time between two looks, in [0, 0.2]; it may be set anew.
         min_score: keypoints with a lower score count as not seen.
     """
 
-    def __init__(self, detector: PersonDetector, every_s: float, min_score: float) -> None:
-        self._detector = detector
-        self.every_s = every_s
+    def __init__(
+        self, detectors: Sequence[PersonDetector], every_s: float, min_score: float
+    ) -> None:
+        self._detectors = tuple(detectors)
+        self.every_s, self.size = every_s, 0
         self._min_score = min_score
         self._changes = SceneChanges()
         # People of the last image; None if the next one needs the detector.
@@ -112,7 +115,7 @@ class CarriedBoxes:
 
     def detect(self, image_rgb: ImageRgb) -> tuple[PersonDetection, ...]:
         """Return the boxes that the detector finds in the image of the last stamp."""
-        detections = tuple(self._detector.detect(image_rgb))
+        detections = tuple(self._detectors[self.size].detect(image_rgb))
         self._carrying, self._looked_s = False, self._stamp_s
         self._changes.refer_to(image_rgb)
         if not detections:

@@ -1,7 +1,8 @@
-"""Time that frames take, and how often the detector may look for a frame to take less."""
+"""Time that frames take, and how the detector may look for a frame to take less."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -32,6 +33,8 @@ class StageTimings:
         rest_s: time of everything else: checks, positions, face evidence, awareness.
         networks_s: the part of all this in runs of ONNX networks. Networks that do not run in ONNX
             Runtime are not included.
+        detector_share: pixels of the detector's input, as a share of its whole input. Below 1 a
+            frame budget has made it smaller, and people far away may be missed.
     """
 
     detector_s: float = 0.0
@@ -39,6 +42,7 @@ class StageTimings:
     head_pose_s: float = 0.0
     rest_s: float = 0.0
     networks_s: float = 0.0
+    detector_share: float = 1.0
 
     @property
     def total_s(self) -> float:
@@ -52,18 +56,25 @@ class StageTimings:
 
 
 class FrameBudget:
-    """Chooses the time between two looks of the detector; it starts with every image.
+    """Chooses the time between two looks of the detector, and then the size of its input.
 
-    The running means of the detector's time, and of the time of everything else, say what a frame
-    takes on average with each interval. The interval grows at once when that is too much, and
-    shrinks one step at a time when enough is left.
+    It starts with every image and the whole input. The running means of the detector's time, and of
+    the time of everything else, say what a frame takes on average with each choice. The interval
+    grows at once when that is too much, and where the longest one is not enough, the input gets
+    smaller. Both go back one step at a time when enough is left.
 
     Args:
         budget_s: time for a frame, and so the period of frames, > 0.
+        shares: pixels of the inputs to choose from, as shares of the whole one, largest first. The
+            detector's time is taken to be proportional to them.
     """
 
-    def __init__(self, budget_s: float) -> None:
-        self._budget_s = budget_s
+    def __init__(self, budget_s: float, shares: Sequence[float] = (1.0,)) -> None:
+        self._budget_s, self._shares = budget_s, tuple(shares)
+        self._levels = [
+            *((every_s, 0) for every_s in INTERVALS_S),
+            *((INTERVALS_S[-1], size) for size in range(1, len(self._shares))),
+        ]
         self._level = self._patience = self._frames = 0
         self._detector_s: float | None = None
         self._rest_s: float | None = None
@@ -71,32 +82,42 @@ class FrameBudget:
     @property
     def every_s(self) -> float:
         """Time between two looks of the detector; 0 is every image."""
-        return INTERVALS_S[self._level]
+        return self._levels[self._level][0]
+
+    @property
+    def size(self) -> int:
+        """Number of the input in use, from 0 for the whole one."""
+        return self._levels[self._level][1]
+
+    @property
+    def share(self) -> float:
+        """Pixels of the input in use, as a share of the whole one."""
+        return self._shares[self.size]
 
     def mean_s(self, level: int) -> float:
-        """Return the mean time of a frame with an interval of :data:`INTERVALS_S`."""
-        every_s = INTERVALS_S[level]
+        """Return the mean time of a frame with a choice: intervals first, then smaller inputs."""
+        every_s, size = self._levels[level]
         # Frames come no faster than the budget says; slow ones come later.
-        share = min(self._budget_s / every_s, 1.0) if every_s > 0.0 else 1.0
-        return (self._rest_s or 0.0) + share * (self._detector_s or 0.0)
+        looks = min(self._budget_s / every_s, 1.0) if every_s > 0.0 else 1.0
+        return (self._rest_s or 0.0) + looks * self._shares[size] * (self._detector_s or 0.0)
 
     def record(self, detector_s: float | None, rest_s: float) -> None:
         """Take the times of a frame.
 
         Args:
-            detector_s: time of the detector; None if it did not look.
+            detector_s: time of the detector with the input in use; None if it did not look.
             rest_s: time of everything else.
         """
         self._frames += 1
         if self._frames <= _WARM_UP:
             return
         if detector_s is not None:
-            self._detector_s = _mean(self._detector_s, detector_s)
+            self._detector_s = _mean(self._detector_s, detector_s / self.share)
         self._rest_s = _mean(self._rest_s, rest_s)
         if self._detector_s is None:
             return
         while (
-            self._level + 1 < len(INTERVALS_S)
+            self._level + 1 < len(self._levels)
             and self.mean_s(self._level) > _TOO_MUCH * self._budget_s
         ):
             self._level, self._patience = self._level + 1, 0

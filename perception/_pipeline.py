@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from time import perf_counter
 from typing import Any, Final
 
@@ -21,7 +22,7 @@ from ._metric_scale import DEFAULT_MIN_SCORE
 from ._observation import PersonObservation
 from ._placement import PersonPlace, place_people
 from ._pnp import PnpHeadPoseEstimator
-from ._protocols import HeadPoseEstimator, PersonDetector, PoseEstimator
+from ._protocols import HeadPoseEstimator, PersonDetector, PoseEstimator, ResizableDetector
 from .anthropometry import UNUSUAL_SIZE_PROBABILITY
 from .arrays import FloatArray, ImageRgb, finite_array, finite_number
 from .awareness import AwarenessEstimate, estimate_awareness
@@ -73,7 +74,8 @@ class AwarenessPipeline:
             people overlap, and at once where the pose network finds a person no more. Images must
             then follow each other; a jump in time needs the detector.
         frame_budget_s: time for a frame, in place of ``detect_every_s``: the detector looks at
-            every image while frames take less than that, else less often, down to every 0.2 s.
+            every image while frames take less than that, else less often, down to every 0.2 s, and
+            then with a smaller input, if its network takes one.
         eye_estimator: measures the eyes of near people, for instance
             :class:`~perception.networks.MediaPipeEyeEstimator`; default none, then the gaze is the
             head's direction.
@@ -139,15 +141,16 @@ class AwarenessPipeline:
             "detect_every_s", detect_every_s, minimum=0.0, maximum=MAX_DETECT_EVERY_S
         )
         self._budget: FrameBudget | None = None
+        self._carrier: CarriedBoxes | None = None
         if frame_budget_s is not None:
             if detect_every_s > 0.0:
                 raise PerceptionError("give detect_every_s or frame_budget_s, got both")
-            self._budget = FrameBudget(
-                finite_number("frame_budget_s", frame_budget_s, minimum=0.0, exclusive_minimum=True)
-            )
-        self._carrier: CarriedBoxes | None = None
-        if detect_every_s > 0.0 or self._budget is not None:
-            self._carrier = CarriedBoxes(detector, detect_every_s, self._min_score)
+            finite_number("frame_budget_s", frame_budget_s, minimum=0.0, exclusive_minimum=True)
+            smaller = detector.smaller() if isinstance(detector, ResizableDetector) else ()
+            self._budget = FrameBudget(frame_budget_s, (1.0, *(share for _, share in smaller)))
+            self._carrier = CarriedBoxes((detector, *(d for d, _ in smaller)), 0.0, self._min_score)
+        elif detect_every_s > 0.0:
+            self._carrier = CarriedBoxes((detector,), detect_every_s, self._min_score)
         if eye_estimator is not None and not isinstance(eye_estimator, EyeEstimator):
             raise PerceptionError(
                 "eye_estimator must have the method estimate(image_rgb, camera, heads), got "
@@ -289,9 +292,10 @@ class AwarenessPipeline:
         """Keep the times of a frame, and choose when the detector looks next."""
         self._timings = timings
         if self._budget is not None and self._carrier is not None:
+            self._timings = replace(timings, detector_share=self._budget.share)
             looked = timings.detector_s if self._carrier.looked else None
             self._budget.record(looked, timings.total_s - timings.detector_s)
-            self._carrier.every_s = self._budget.every_s
+            self._carrier.every_s, self._carrier.size = self._budget.every_s, self._budget.size
 
     def _detections(self, image_rgb: ImageRgb, stamp_s: float) -> tuple[PersonDetection, ...]:
         if self._carrier is None:

@@ -344,6 +344,47 @@ def test_a_budget_between_two_intervals_does_not_swing():
         assert len(set(chosen[150:])) == 1
 
 
+class SmallerWorld(SlowWorld):
+    """A slow world whose detector also comes with half of the pixels, and then half the time."""
+
+    def smaller(self):
+        world = self
+
+        class Half:
+            def detect(self, image_rgb):
+                world.clock_s += 0.5 * world.detector_s
+                return World.detect(world, image_rgb)
+
+        return ((Half(), 0.5),)
+
+
+def test_where_seldom_looks_are_not_enough_the_input_gets_smaller(monkeypatch):
+    world = SmallerWorld(stander)
+    # 0.03 + 0.12 / 4 = 60 ms with the longest interval, 45 with half of the pixels.
+    world.detector_s, world.pose_s = 0.12, 0.03
+    monkeypatch.setattr("perception._pipeline.perf_counter", lambda: world.clock_s)
+    pipe = AwarenessPipeline(CAMERA, world, world, frame_budget_s=0.05)
+    assert pipe.last_timings.detector_share == 1.0
+    world.run_on_clock(pipe, 2.0)
+    assert pipe._carrier.every_s == 0.2
+    assert pipe.last_timings.detector_share == 0.5
+    world.detector_s, world.pose_s = 0.04, 0.02
+    world.run_on_clock(pipe, 6.0)
+    assert pipe.last_timings.detector_share == 1.0
+    assert pipe._carrier.every_s > 0.0
+
+
+def test_the_input_gets_no_smaller_while_the_interval_can_grow():
+    for rest_ms in np.arange(1.0, 60.0, 1.0):
+        budget = FrameBudget(0.05, (1.0, 0.7, 0.5))
+        chosen = []
+        for _ in range(300):
+            budget.record(0.04 * budget.share, 1e-3 * rest_ms)
+            chosen.append((budget.every_s, budget.share))
+        assert len(set(chosen[150:])) == 1
+        assert all(every_s == 0.2 or share == 1.0 for every_s, share in chosen)
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from onnx_graphs import cell_centres, cell_count, colour_rtmdet, colour_yolov8, colour_yolox, fixed
 
-from perception import PerceptionError, PersonDetector
+from perception import Camera, PerceptionError, PersonDetector
 from perception.networks import OnnxModel, OnnxPersonDetector
 from perception.networks.detectors import LetterboxGeometry
+from perception.shipped import shipped_detector
 
 HEIGHT, WIDTH = 256, 320
 CELLS = cell_count(HEIGHT, WIDTH)
@@ -140,6 +141,27 @@ def test_networks_get_the_channels_in_their_own_order(
     assert (low >= (199.0, 149.0)).all()
     assert (high <= (301.0, 251.0)).all()
     assert (high - low > 70.0).all()
+
+
+def test_smaller_inputs_are_multiples_of_the_stride_with_fewer_pixels() -> None:
+    whole = shipped_detector(camera=Camera.from_fov(640, 480, 1.0), score_threshold=0.4)
+    height, width = whole.input_size_hw_px
+    shares = [1.0]
+    for detector, share in whole.smaller():
+        size = detector.input_size_hw_px
+        assert size[0] % 32 == size[1] % 32 == 0
+        assert share == pytest.approx(size[0] * size[1] / (height * width))
+        assert 0.3 < share < shares[-1]
+        shares.append(share)
+        assert detector.detect(np.full((480, 640, 3), 90, np.uint8)) == ()
+    assert len(shares) == 3
+
+
+def test_a_network_of_one_size_has_no_smaller_inputs() -> None:
+    assert OnnxPersonDetector(yolov8(np.zeros((0, 4)), np.zeros(0))).smaller() == ()
+    # It declares a free size, and takes one only.
+    one = OnnxPersonDetector(colour_rtmdet(HEIGHT, WIDTH), input_size_hw_px=(HEIGHT, WIDTH))
+    assert one.smaller() == ()
 
 
 def test_only_the_person_class_is_returned() -> None:
