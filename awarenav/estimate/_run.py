@@ -65,7 +65,7 @@ class EstimateOptions:
     head: str
     eyes: str
     allow_simulator_networks: bool
-    min_score: float
+    min_score: float | None
     threads: int | None
     provider: str
     provider_options: str = ""
