@@ -39,7 +39,7 @@ class Recipe:
     backgrounds: int = 400
     check_backgrounds: int = 40
     detector_steps: int = 12000
-    pose_steps: int = 5000
+    pose_steps: int = 9000
     head_steps: int = 18000
 
     def held_out(self) -> Recipe:
