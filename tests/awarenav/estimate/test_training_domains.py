@@ -36,8 +36,10 @@ def told(path: Path, domain: str | None) -> Path:
     # Only the shipped detector itself may leave the size of its images free.
     height, width = model.graph.input[0].type.tensor_type.shape.dim[2:]
     height.dim_value, width.dim_value = 256, 320
-    if domain is not None:
-        onnx.helper.set_model_props(model, {"training_domain": domain})
+    others = {each.key: each.value for each in model.metadata_props}
+    others.pop("training_domain")
+    told_here = {} if domain is None else {"training_domain": domain}
+    onnx.helper.set_model_props(model, others | told_here)
     onnx.save(model, str(path))
     return path
 
