@@ -79,7 +79,7 @@ class RecordingHeads:
 
 @dataclass
 class Sureness:
-    """What the errors of a group of people say of their uncertainties.
+    """Errors of a group of people, in units of their uncertainties.
 
     Attributes:
         nees: of the head's forward axis, two degrees of freedom.

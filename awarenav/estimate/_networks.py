@@ -26,7 +26,6 @@ from perception.networks import (
 )
 from perception.shipped import (
     DETECTOR,
-    DETECTOR_MIN_SCORE,
     HEAD,
     POSE,
     TrainingDomain,
@@ -49,8 +48,6 @@ SHIPPED: Final = "shipped"
 _MEDIAPIPE: Final = "mediapipe"
 _WITHOUT_NETWORK: Final = "pnp"
 _EYES: Final = ("auto", _MEDIAPIPE, "none")
-# Least score of detectors that are not the shipped one.
-_MIN_SCORE: Final = 0.25
 _HEADS: Final = ("auto", "network", _WITHOUT_NETWORK, "fused")
 
 
@@ -109,8 +106,7 @@ def choose_networks(
             the shipped pose network, else PnP.
         eyes: ``"mediapipe"`` (needs the extra), ``"none"``, or ``"auto"``: MediaPipe's with
             its pose network, else none.
-        min_score: people with a lower detection score are dropped; None is 0.25, and for the
-            shipped detector :data:`~perception.shipped.DETECTOR_MIN_SCORE`.
+        min_score: people with a lower detection score are dropped; None is the detector's default.
         threads: of each network; None leaves the number to onnxruntime.
         provider: one of :data:`~perception.networks.PROVIDERS`.
         provider_options: its options, as ``KEY=VALUE``.
@@ -163,16 +159,15 @@ def admit_networks(networks: Networks, *, rendered: bool, allowed: bool) -> tupl
 def _detector(
     name: str, min_score: float | None, settings: OnnxSettings
 ) -> tuple[PersonDetector | Callable[[Camera], PersonDetector], TrainingDomain | None]:
+    options: dict[str, Any] = {} if min_score is None else {"score_threshold": min_score}
     if name == SHIPPED:
         verify_shipped_model(DETECTOR)  # now, not at the first frame
-        least = DETECTOR_MIN_SCORE if min_score is None else min_score
         return (
-            lambda camera: shipped_detector(settings, camera, score_threshold=least),
+            lambda camera: shipped_detector(settings, camera, **options),
             shipped_model(DETECTOR).training_domain,
         )
     model, domain = _onnx_model("--detector", name, (SHIPPED,), settings)
-    least = _MIN_SCORE if min_score is None else min_score
-    return OnnxPersonDetector(model, score_threshold=least), domain
+    return OnnxPersonDetector(model, **options), domain
 
 
 def _pose(name: str, settings: OnnxSettings) -> tuple[PoseEstimator, TrainingDomain | None]:

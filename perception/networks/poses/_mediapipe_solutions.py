@@ -6,9 +6,9 @@ They need the extra ``awarenav[mediapipe]``.
 from __future__ import annotations
 
 import warnings
+from abc import abstractmethod
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
-from types import TracebackType
 from typing import Any, TypeVar
 
 from ...arrays import finite_number
@@ -38,19 +38,14 @@ class MediaPipeEstimator(AbstractContextManager[Any]):
         with without_protobuf_warnings():
             self._solutions = self._made(face_mesh, pose, confidence)
 
+    @abstractmethod
     def _made(self, face_mesh: Any, pose: Any, confidence: float) -> tuple[Any, ...]:
         """Return the solutions, from MediaPipe's modules ``face_mesh`` and ``pose``."""
-        raise NotImplementedError
 
     def __enter__(self: _E) -> _E:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *exception: object) -> None:
         self.close()
 
     def close(self) -> None:
