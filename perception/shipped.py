@@ -52,7 +52,7 @@ __all__ = [
 
 #: Score from which on a box of the shipped detector is a person. It is trained on hard pictures, so
 #: that its scores are low.
-DETECTOR_MIN_SCORE: Final = 0.2
+DETECTOR_MIN_SCORE: Final = 0.25
 
 # Size of the detector's training images, and the focal length of a 60° camera at that size.
 _DETECTOR_WIDTH_PX, _DETECTOR_HEIGHT_PX, _DETECTOR_STRIDE = 320, 256, 32
