@@ -37,7 +37,7 @@ def told(path: Path, domain: str | None) -> Path:
     height, width = model.graph.input[0].type.tensor_type.shape.dim[2:]
     height.dim_value, width.dim_value = 256, 320
     others = {each.key: each.value for each in model.metadata_props}
-    others.pop("training_domain")
+    others.pop("training_domain", None)
     told_here = {} if domain is None else {"training_domain": domain}
     onnx.helper.set_model_props(model, others | told_here)
     onnx.save(model, str(path))
