@@ -23,14 +23,7 @@ from benchmarks._harness import add_seed, count
 from perception import AwarenessPipeline, Camera, HeadPoseEstimator
 from perception.networks import OnnxPersonDetector, OnnxPoseEstimator
 from perception.networks.heads import OnnxHeadPoseEstimator
-from perception.shipped import (
-    DETECTOR,
-    DETECTOR_MIN_SCORE,
-    HEAD,
-    POSE,
-    detector_input_size,
-    load_shipped,
-)
+from perception.shipped import DETECTOR, HEAD, POSE, detector_input_size, load_shipped
 from sim_tests.dataset import RenderConfig, RenderScene
 from sim_tests.world.camera import RenderedView
 from training.networks import Degradation, Recipe, degrade, random_background, rolling_shutter
@@ -243,9 +236,7 @@ def pipeline_of(
     return AwarenessPipeline(
         camera,
         OnnxPersonDetector(
-            load_shipped(DETECTOR, folder=folder),
-            score_threshold=DETECTOR_MIN_SCORE,
-            input_size_hw_px=detector_input_size(camera),
+            load_shipped(DETECTOR, folder=folder), input_size_hw_px=detector_input_size(camera)
         ),
         OnnxPoseEstimator(load_shipped(POSE, folder=folder)),
         OnnxHeadPoseEstimator(load_shipped(HEAD, folder=folder)) if head is None else head,

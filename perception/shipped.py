@@ -28,7 +28,6 @@ from .networks.heads import OnnxHeadPoseEstimator
 
 __all__ = [
     "DETECTOR",
-    "DETECTOR_MIN_SCORE",
     "HEAD",
     "LEGS",
     "POSE",
@@ -50,10 +49,6 @@ __all__ = [
     "write_manifest",
 ]
 
-#: Score from which on a box of the shipped detector is a person. It is trained on hard pictures, so
-#: that its scores are low.
-DETECTOR_MIN_SCORE: Final = 0.25
-
 # Size of the detector's training images, and the focal length of a 60° camera at that size.
 _DETECTOR_WIDTH_PX, _DETECTOR_HEIGHT_PX, _DETECTOR_STRIDE = 320, 256, 32
 _DETECTOR_FOCAL_PX: Final = 160.0 / math.tan(math.radians(30.0))
@@ -71,7 +66,7 @@ def shipped_detector(
     settings: OnnxSettings | None = None,
     camera: Camera | None = None,
     *,
-    score_threshold: float = DETECTOR_MIN_SCORE,
+    score_threshold: float = 0.25,
 ) -> OnnxPersonDetector:
     """Return the shipped person detector; errors as in :func:`load_shipped`.
 

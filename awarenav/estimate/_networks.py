@@ -88,7 +88,7 @@ def choose_networks(
     head: str = _HEADS[0],
     eyes: str = _EYES[0],
     *,
-    min_score: float | None = None,
+    min_score: float = 0.25,
     threads: int | None = None,
     provider: str = "cpu",
     provider_options: Sequence[str] = (),
@@ -106,7 +106,7 @@ def choose_networks(
             the shipped pose network, else PnP.
         eyes: ``"mediapipe"`` (needs the extra), ``"none"``, or ``"auto"``: MediaPipe's with
             its pose network, else none.
-        min_score: people with a lower detection score are dropped; None is the detector's default.
+        min_score: people with a lower detection score are dropped.
         threads: of each network; None leaves the number to onnxruntime.
         provider: one of :data:`~perception.networks.PROVIDERS`.
         provider_options: its options, as ``KEY=VALUE``.
@@ -157,17 +157,16 @@ def admit_networks(networks: Networks, *, rendered: bool, allowed: bool) -> tupl
 
 
 def _detector(
-    name: str, min_score: float | None, settings: OnnxSettings
+    name: str, min_score: float, settings: OnnxSettings
 ) -> tuple[PersonDetector | Callable[[Camera], PersonDetector], TrainingDomain | None]:
-    options: dict[str, Any] = {} if min_score is None else {"score_threshold": min_score}
     if name == SHIPPED:
         verify_shipped_model(DETECTOR)  # now, not at the first frame
         return (
-            lambda camera: shipped_detector(settings, camera, **options),
+            lambda camera: shipped_detector(settings, camera, score_threshold=min_score),
             shipped_model(DETECTOR).training_domain,
         )
     model, domain = _onnx_model("--detector", name, (SHIPPED,), settings)
-    return OnnxPersonDetector(model, **options), domain
+    return OnnxPersonDetector(model, score_threshold=min_score), domain
 
 
 def _pose(name: str, settings: OnnxSettings) -> tuple[PoseEstimator, TrainingDomain | None]:

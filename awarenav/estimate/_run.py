@@ -65,7 +65,7 @@ class EstimateOptions:
     head: str
     eyes: str
     allow_simulator_networks: bool
-    min_score: float | None
+    min_score: float
     threads: int | None
     provider: str
     provider_options: str = ""

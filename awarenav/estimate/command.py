@@ -58,7 +58,7 @@ _CAMERA: Final = "Camera"
     "--min-score",
     group=_NETWORKS,
     type=SHARE,
-    show_default="0.25; 0.2 for the shipped detector",
+    default=0.25,
     metavar="P",
     help="Drop people whose detection score, from 0 to 1, is below this.",
 )
