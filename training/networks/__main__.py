@@ -11,7 +11,6 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Final, TypeVar
 
@@ -30,6 +29,7 @@ from ._export import export_detector, export_head, export_pose
 from ._fit import AUTO, torch_device
 from ._head_data import HeadData
 from ._head_net import HeadNet
+from ._head_shapes import add_head_shapes
 from ._head_train import calibration, predictions, train_head
 from ._pose_net import PoseNet
 from ._pose_train import train_pose
@@ -39,10 +39,12 @@ from ._shards import make_shards
 _ROOT: Final = Path(__file__).parents[2]
 _MODELS: Final = _ROOT / "perception" / "models"
 _STAGES: Final = ("data", "head", "pose", "detector", "export")
-_TRAINERS: Final[dict[str, Callable[[Recipe, Path, Path, Path, str], nn.Module]]] = {
+_TRAINERS: Final[dict[str, Callable[..., nn.Module]]] = {
+    "head": train_head,
     "pose": train_pose,
     "detector": train_detector,
 }
+_FILES: Final = {"head": "head_pose", "pose": "person_pose", "detector": "person_detector"}
 _Net = TypeVar("_Net", bound=nn.Module)
 _ENTRIES: Final = (
     {
@@ -94,10 +96,12 @@ def main() -> None:
         "--device", default=AUTO, help="auto, cpu, cuda or cuda:N (default: %(default)s)"
     )
     parser.add_argument(
-        "--head-from",
+        "--from",
+        dest="start",
         type=Path,
-        metavar="FILE",
-        help="exported head network that training goes on from (default: from nothing)",
+        metavar="FOLDER",
+        help="folder of exported networks; training goes on from those that are there (default: "
+        "from nothing)",
     )
     parser.add_argument("--quick", action="store_true", help="a tiny run that checks every stage")
     chosen = parser.parse_args()
@@ -113,9 +117,10 @@ def main() -> None:
         torch_device(chosen.device)
     except ValueError as cause:
         parser.error(str(cause))
-    if chosen.head_from is not None and not chosen.head_from.is_file():
-        parser.error(f"--head-from must be a file of a head network, got {chosen.head_from}")
-    trainers = {"head": partial(train_head, start=chosen.head_from), **_TRAINERS}
+    starts = {} if chosen.start is None else _starts(chosen.start)
+    if chosen.start is not None and not starts:
+        files = ", ".join(f"{name}.onnx" for name in _FILES.values())
+        parser.error(f"--from must be a folder with one of {files}, got {chosen.start}")
     cv2.setNumThreads(1)
     work: Path = chosen.work
     shards, check = work / "shards", work / "shards_check"
@@ -130,19 +135,26 @@ def main() -> None:
             check,
             chosen.processes,
         )
-    for name, train in trainers.items():
+    for name, train in _TRAINERS.items():
         if name in stages:
-            train(recipe, shards, check, work / "checkpoints", chosen.device)
+            train(recipe, shards, check, work / "checkpoints", chosen.device, starts.get(name))
     if "export" in stages:
-        names = set(trainers) & set(stages) or set(trainers)
+        names = set(_TRAINERS) & set(stages) or set(_TRAINERS)
         _export(recipe, check, work / "checkpoints", chosen.out, names)
 
 
+def _starts(folder: Path) -> dict[str, Path]:
+    """Return the files of exported networks in a folder, by stage."""
+    files = {stage: folder / f"{name}.onnx" for stage, name in _FILES.items()}
+    return {stage: path for stage, path in files.items() if path.is_file()}
+
+
 def _crowd(recipe: Recipe, folder: Path, processes: int) -> tuple[str, ...]:
-    """Return the files of the random workers; make those that are missing."""
+    """Return the files of the random workers, with heads of other shapes; make what is missing."""
     command = ["-m", "training.workers", "--random", str(recipe.crowd), "--jobs", str(processes)]
     command += ["--seed", str(recipe.seed), "--out", str(folder)]
     subprocess.run([sys.executable, *command], cwd=_ROOT, check=True)
+    add_head_shapes(folder, recipe.head_shapes, recipe.seed)
     return tuple(str(path) for path in sorted(folder.glob("*.npz")))
 
 
@@ -170,8 +182,7 @@ def _export(recipe: Recipe, check: Path, checkpoints: Path, out: Path, names: se
     if "detector" in names:
         detector = _trained(DetectorNet(), checkpoints / "detector.pt")
         export_detector(detector, out / "person_detector.onnx")
-    files = {"head": "head_pose", "pose": "person_pose", "detector": "person_detector"}
-    written = {files[name] for name in names}
+    written = {_FILES[name] for name in names}
     print("written", update_manifest(out, [each for each in _ENTRIES if each["name"] in written]))
 
 

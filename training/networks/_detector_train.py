@@ -15,28 +15,42 @@ from ._detector_data import DetectorData
 from ._detector_net import GRID, DetectorNet, cells
 from ._fit import AUTO, fit
 from ._recipe import Recipe
+from ._start import begin
 
 _CANDIDATES: Final = 10
 _ALPHA, _BETA = 0.5, 6.0
 
+# Highest learning rate from nothing, and from a trained network.
+_LEARNING_RATES: Final = (2e-3, 1e-3)
+
 
 def train_detector(
-    recipe: Recipe, shards: Path, held_out: Path, folder: Path, device: str = AUTO
+    recipe: Recipe,
+    shards: Path,
+    held_out: Path,
+    folder: Path,
+    device: str = AUTO,
+    start: Path | None = None,
 ) -> nn.Module:
-    """Train the detector on the shards; figures on held-out people go to the log."""
+    """Train the detector on the shards; figures on held-out people go to the log.
+
+    With ``start``, the file of an exported detector, training goes on from its weights.
+    """
     torch.manual_seed(recipe.seed + 2)
     data = DetectorData(shards, recipe.seed, recipe.backgrounds)
     check = DetectorData(held_out, recipe.seed, recipe.check_backgrounds)
     print(f"{len(data.frames)} images for training, {check.stills} held out", flush=True)
+    net = DetectorNet()
+    rate = begin(net, start, lambda step: normalised(data.batch(step)["image"]), _LEARNING_RATES)
     return fit(
         "detector",
-        DetectorNet(),
+        net,
         data.batch,
         detector_loss,
         steps=recipe.detector_steps,
         folder=folder,
         device=device,
-        learning_rate=2e-3,
+        learning_rate=rate,
         judge=lambda net: judge_detector(net, check),
     )
 

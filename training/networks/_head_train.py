@@ -16,14 +16,12 @@ from ._fit import AUTO, fit
 from ._head_data import LATE, HeadData
 from ._head_net import BINS, SPAN, HeadNet, averaged, head_rotation, keypoint_means, spread_factor
 from ._recipe import Recipe
-from ._start import start_from
+from ._start import begin
 
 MEAN, STD = 120.0, 60.0
 _DEGREES_OF_FREEDOM = 5.0
 # Highest learning rate from nothing, and from a trained network.
-_LEARNING_RATE, _LEARNING_RATE_ON = 2.5e-3, 1.5e-3
-# Batches for the statistics of a network that training goes on from.
-_START_BATCHES = 16
+_LEARNING_RATES = (2.5e-3, 1.5e-3)
 
 
 def train_head(
@@ -43,9 +41,9 @@ def train_head(
     check = HeadData(held_out, recipe.seed, recipe.check_backgrounds)
     print(f"{len(data.heads)} heads for training, {len(check.heads)} held out", flush=True)
     net = HeadNet()
-    if start is not None:
-        batches = (data.batch(-1 - number, LATE) for number in range(_START_BATCHES))
-        start_from(net, start, (normalised(batch["image"]) for batch in batches))
+    rate = begin(
+        net, start, lambda step: normalised(data.batch(step, LATE)["image"]), _LEARNING_RATES
+    )
     return fit(
         "head",
         net,
@@ -54,7 +52,7 @@ def train_head(
         steps=recipe.head_steps,
         folder=folder,
         device=device,
-        learning_rate=_LEARNING_RATE if start is None else _LEARNING_RATE_ON,
+        learning_rate=rate,
         judge=lambda net: judge_head(net, check),
     )
 

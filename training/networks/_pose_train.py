@@ -16,30 +16,43 @@ from ._fit import AUTO, fit
 from ._pose_data import PoseData
 from ._pose_net import BINS_X, BINS_Y, BINS_Z, SPLIT, PoseNet, z_bins, z_metres
 from ._recipe import Recipe
+from ._start import begin
 
 MEAN: Final = (123.675, 116.28, 103.53)
 STD: Final = (58.395, 57.12, 57.375)
 _SIGMA_XY_BINS: Final = 3.0
 _SIGMA_Z_BINS: Final = 2.5
+# Highest learning rate from nothing, and from a trained network.
+_LEARNING_RATES: Final = (2e-3, 1e-3)
 
 
 def train_pose(
-    recipe: Recipe, shards: Path, held_out: Path, folder: Path, device: str = AUTO
+    recipe: Recipe,
+    shards: Path,
+    held_out: Path,
+    folder: Path,
+    device: str = AUTO,
+    start: Path | None = None,
 ) -> nn.Module:
-    """Train the pose network on the shards; figures on held-out people go to the log."""
+    """Train the pose network on the shards; figures on held-out people go to the log.
+
+    With ``start``, the file of an exported pose network, training goes on from its weights.
+    """
     torch.manual_seed(recipe.seed + 1)
     data = PoseData(shards, recipe.seed, recipe.backgrounds)
     check = PoseData(held_out, recipe.seed, recipe.check_backgrounds)
     print(f"{len(data.people)} people for training, {len(check.people)} held out", flush=True)
+    net = PoseNet()
+    rate = begin(net, start, lambda step: normalised(data.batch(step)["image"]), _LEARNING_RATES)
     return fit(
         "pose",
-        PoseNet(),
+        net,
         data.batch,
         pose_loss,
         steps=recipe.pose_steps,
         folder=folder,
         device=device,
-        learning_rate=2e-3,
+        learning_rate=rate,
         judge=lambda net: judge_pose(net, check),
     )
 

@@ -15,6 +15,7 @@ class Recipe:
     Attributes:
         seed: seed of everything random.
         crowd: number of random workers.
+        head_shapes: copies of each with a head of another shape.
         scenes: halls with people of the crowd; a scene is rendered as one shard.
         frames: whole images per scene, for the detector and the pose network.
         person_patches: exact crops of people per scene, for the pose network.
@@ -29,7 +30,8 @@ class Recipe:
     """
 
     seed: int = 0
-    crowd: int = 48
+    crowd: int = 64
+    head_shapes: int = 3
     scenes: int = 150
     frames: int = 28
     person_patches: int = 70
@@ -60,6 +62,7 @@ class Recipe:
         return replace(
             self,
             crowd=2,
+            head_shapes=1,
             scenes=2,
             frames=3,
             person_patches=4,

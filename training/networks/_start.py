@@ -7,9 +7,10 @@ network is the same function, and can be trained.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from itertools import pairwise
+from collections.abc import Callable, Iterable
+from itertools import chain, pairwise
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 import onnx
@@ -17,14 +18,46 @@ import torch
 from onnx import numpy_helper
 from torch import Tensor, nn
 
+# Batches for the statistics of the normalisation.
+_BATCHES: Final = 16
+# Number of the first of them, beyond those that are trained on.
+_BEYOND: Final = 2**31
+
+
+def begin(
+    net: nn.Module,
+    start: Path | None,
+    batch_of: Callable[[int], Tensor],
+    rates: tuple[float, float],
+) -> float:
+    """Give a network the weights that training goes on from, if any.
+
+    Args:
+        net: the network.
+        start: file of an exported network of the same type, or None for training from nothing.
+        batch_of: returns the normalised images of a batch, by its number.
+        rates: highest learning rates from nothing and from a trained network.
+
+    Returns:
+        The learning rate that holds.
+
+    Raises:
+        ValueError: for a file of another network.
+    """
+    if start is None:
+        return rates[0]
+    start_from(net, start, (batch_of(_BEYOND + number) for number in range(_BATCHES)))
+    return rates[1]
+
 
 def start_from(net: nn.Module, path: Path, inputs: Iterable[Tensor]) -> None:
     """Give a network the weights of its exported file.
 
     Args:
-        net: the network, whose layers are registered in the order in which they run.
+        net: the network.
         path: ``.onnx`` file that :mod:`._export` wrote of such a network.
-        inputs: normalised batches (N, 3, H, W) for the statistics of the normalisation.
+        inputs: normalised batches (N, 3, H, W), at least one, for the order in which the layers
+            run and the statistics of the normalisation.
 
     Raises:
         ValueError: for a file of another network.
@@ -35,13 +68,17 @@ def start_from(net: nn.Module, path: Path, inputs: Iterable[Tensor]) -> None:
         if name not in state or tuple(state[name].shape) != array.shape:
             raise ValueError(f"{path} is not a file of {type(net).__name__}: {name} {array.shape}")
         state[name] = torch.from_numpy(array)
+    for name, parameter in net.named_parameters(recurse=False):
+        if name not in named:
+            state[name] = _parameter_of_shape(path, tuple(parameter.shape))
     net.load_state_dict(state)
-    pairs = _normalised_convolutions(net)
-    linear = [
-        module
-        for name, module in net.named_modules()
-        if isinstance(module, nn.Linear) and f"{name}.weight" not in named
-    ]
+    batches = iter(inputs)
+    first = next(batches)
+    running = _running_order(net, first)
+    norm_of = _normalised_convolutions(net)
+    pairs = [(each, norm_of[each]) for each in running if each in norm_of]
+    known = {module for name, module in net.named_modules() if f"{name}.weight" in named}
+    linear = [each for each in running if isinstance(each, nn.Linear) and each not in known]
     if len(pairs) != len(folded) or len(linear) != len(multiplied):
         raise ValueError(
             f"{path} is not a file of {type(net).__name__}: {len(folded)} convolutions and "
@@ -56,11 +93,11 @@ def start_from(net: nn.Module, path: Path, inputs: Iterable[Tensor]) -> None:
             norm.bias.copy_(torch.from_numpy(bias))
             norm.running_mean.zero_()
             norm.running_var.fill_(1.0 - norm.eps)
-    _normalise(net, pairs, inputs)
+    _normalise(net, pairs, chain([first], batches))
 
 
 def _normalise(
-    net: nn.Module, pairs: list[tuple[nn.Conv2d, nn.BatchNorm2d]], inputs: Iterable[Tensor]
+    net: nn.Module, pairs: list[tuple[nn.Module, nn.BatchNorm2d]], inputs: Iterable[Tensor]
 ) -> None:
     """Give each normalisation the statistics of its input, and the scale and shift to match."""
     sums = [torch.zeros(3, norm.num_features, dtype=torch.float64) for _, norm in pairs]
@@ -90,14 +127,43 @@ def _add_up(total: Tensor, out: Tensor) -> None:
     total[2] += (values**2).sum((0, 2, 3))
 
 
-def _normalised_convolutions(net: nn.Module) -> list[tuple[nn.Conv2d, nn.BatchNorm2d]]:
-    """Return the convolutions with the normalisation that follows, in the order of the layers."""
+def _normalised_convolutions(net: nn.Module) -> dict[nn.Module, nn.BatchNorm2d]:
+    """Return the convolutions with the normalisation that follows each."""
     modules = [module for module in net.modules() if not list(module.children())]
-    return [
-        (conv, norm)
+    return {
+        conv: norm
         for conv, norm in pairwise(modules)
         if isinstance(conv, nn.Conv2d) and isinstance(norm, nn.BatchNorm2d)
+    }
+
+
+def _running_order(net: nn.Module, batch: Tensor) -> list[nn.Module]:
+    """Return the layers in the order in which they run, as the nodes of an exported file stand."""
+    running: list[nn.Module] = []
+    hooks = [
+        module.register_forward_hook(lambda module, _, __: running.append(module))
+        for module in net.modules()
+        if not list(module.children())
     ]
+    net.eval()
+    with torch.no_grad():
+        net(batch)
+    for hook in hooks:
+        hook.remove()
+    return running
+
+
+def _parameter_of_shape(path: Path, shape: tuple[int, ...]) -> Tensor:
+    """Return a parameter that export stores without its name, with axes of one before it."""
+    found = [
+        array
+        for each in onnx.load(str(path)).graph.initializer
+        if (array := numpy_helper.to_array(each)).ndim > len(shape)
+        and array.shape == (1,) * (array.ndim - len(shape)) + shape
+    ]
+    if len(found) != 1:
+        raise ValueError(f"{path} has {len(found)} parameters of shape {shape}, not one")
+    return torch.from_numpy(found[0].astype(np.float32).reshape(shape))
 
 
 def _weights(
