@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import re
 import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from paths import ROOT
 
-from perception import PerceptionError
+from perception import Camera, PerceptionError
 from perception.networks import OnnxSettings
 from perception.shipped import (
     DETECTOR,
@@ -20,6 +23,7 @@ from perception.shipped import (
     LEGS,
     POSE,
     ShippedModel,
+    detector_input_size,
     load_shipped,
     shipped_detector,
     shipped_head_pose_estimator,
@@ -109,6 +113,25 @@ def test_a_batch_may_have_any_number_of_people(name, people):
 
 
 # --- refusals -----------------------------------------------------------------------------------
+
+
+@given(
+    width=st.integers(160, 4000),
+    height=st.integers(120, 3000),
+    fov_deg=st.floats(20.0, 150.0),
+)
+def test_people_are_as_large_in_the_detector_as_with_a_60_degree_camera_at_448(
+    width, height, fov_deg
+):
+    camera = Camera.from_fov(width, height, math.radians(fov_deg))
+    input_height, input_width = detector_input_size(camera)
+    assert input_height % 32 == input_width % 32 == 0
+    scale = min(input_width / width, input_height / height)
+    fitting = min(320 / width, 256 / height)
+    assert scale >= fitting * (1.0 - 1e-6)
+    enough = scale * camera.fx_px >= 224.0 / math.tan(math.radians(30.0)) * (1.0 - 1e-6)
+    # Sides grow by a factor of at most 2.
+    assert enough or scale >= 2.0 * fitting * (1.0 - 1e-6)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -33,9 +33,9 @@ class Recipe:
     crowd: int = 64
     head_shapes: int = 3
     scenes: int = 150
-    frames: int = 28
-    person_patches: int = 70
-    head_patches: int = 240
+    frames: int = 24
+    person_patches: int = 60
+    head_patches: int = 400
     layouts: tuple[str, ...] = ("open", "blind_corner", "aisles")
     variants: tuple[int, int] = (8, 200)
     backgrounds: int = 400
