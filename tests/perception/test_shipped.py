@@ -112,9 +112,6 @@ def test_a_batch_may_have_any_number_of_people(name, people):
         assert np.isfinite(output).all()
 
 
-# --- refusals -----------------------------------------------------------------------------------
-
-
 @given(
     width=st.integers(160, 4000),
     height=st.integers(120, 3000),
@@ -132,6 +129,9 @@ def test_people_are_as_large_in_the_detector_as_with_a_60_degree_camera_at_448(
     enough = scale * camera.fx_px >= 224.0 / math.tan(math.radians(30.0)) * (1.0 - 1e-6)
     # Sides grow by a factor of at most 2.
     assert enough or scale >= 2.0 * fitting * (1.0 - 1e-6)
+
+
+# --- refusals -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", NAMES)

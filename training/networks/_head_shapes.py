@@ -4,9 +4,8 @@ A body is expensive to make, and a network that has seen few heads reads the sha
 turn of it. A copy has its head warped by a smooth field, symmetric in left and right, so that the
 head still looks along its own x axis. Joints, keypoints and stature move with the skin.
 
-Depth, width and height vary by 4 % (1 standard deviation), as length and breadth of adults' heads
-do within a population (about 3.6 % and 3.8 % for length and breadth of men in ANSUR II, 2012), and
-the surface by 2.5 mm over lengths of 45 mm.
+Depth, width and height vary by 4 % (1 standard deviation), and the surface by 2.5 mm over lengths
+of 45 mm. Both are judgements, about the spread of adults' heads.
 """
 
 from __future__ import annotations
