@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING
 from awarenav.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from ._checks import scenario_problems, template_problems
-    from ._plans import approach_statistics, closest_approaches, person_plan, robot_plan
+    from ._checks import CHECKED_DRAWS, scenario_problems, template_problems
+    from ._plans import CONFLICT_M, approach_statistics, closest_approaches, person_plan, robot_plan
 
 __all__ = [
+    "CHECKED_DRAWS",
+    "CONFLICT_M",
     "approach_statistics",
     "closest_approaches",
     "person_plan",
@@ -23,10 +25,12 @@ __getattr__ = lazy_names(
     __name__,
     {
         "._checks": (
+            "CHECKED_DRAWS",
             "scenario_problems",
             "template_problems",
         ),
         "._plans": (
+            "CONFLICT_M",
             "approach_statistics",
             "closest_approaches",
             "person_plan",

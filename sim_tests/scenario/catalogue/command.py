@@ -1,15 +1,11 @@
-"""The command ``awarenav scenario``."""
+"""Subcommands of ``awarenav scenario``: list, show and draw."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Final
 
-from awarenav.cli import argument, command, group, option, options
-
-
-@group("scenario")
-def scenario() -> None:
-    """List, explain, draw and check scenarios: shipped ones, or YAML files of yours."""
+from awarenav.cli import argument, command, option, options
 
 
 @command(
@@ -92,29 +88,5 @@ def draw(scenarios: tuple[str, ...], out: Path) -> int:
     return draw_command(scenarios, str(out))
 
 
-@command(
-    "validate",
-    short_help="Check scenario files.",
-    examples=["awarenav scenario validate mine.yaml"],
-    exit_status={0: "All can be run.", 2: "One cannot be run."},
-)
-@argument(
-    "files",
-    nargs=-1,
-    required=True,
-    metavar="NAME|FILE...",
-    shell_complete=options.COMPLETE_SCENARIOS,
-    help="YAML files, or shipped scenarios.",
-)
-def validate(files: tuple[str, ...]) -> int:
-    """Check scenario files: keys, values over many draws, and that nobody stands in a rack.
-
-    Also warns if robot and people would hardly ever meet if nobody reacted.
-    """
-    from ._show import validate_command  # noqa: PLC0415 - help needs no scenarios
-
-    return validate_command(files)
-
-
-for _command in (list_scenarios, show, draw, validate):
-    scenario.add_command(_command)
+#: The subcommands of `awarenav scenario` that need no crossing.
+COMMANDS: Final = (list_scenarios, show, draw)
