@@ -23,6 +23,8 @@ TRACK_PX: Final = 105.0
 # A mark is moved at most so many steps along the upright axis, and aside.
 _MOST_UP: Final = 40
 _MOST_ASIDE: Final = 4
+# One step aside costs as much as so many up or down: across is the margin, which matters more.
+_ASIDE_COST: Final = 3
 
 
 def label_px(text: str) -> float:
@@ -68,7 +70,7 @@ class Region:
 def spread(
     places: Sequence[tuple[float, float, Region]], apart: float
 ) -> tuple[list[tuple[float, float]], int]:
-    """Move marks that would cover each other apart, up or down, and aside if there is no room.
+    """Move marks that would cover each other apart, up or down rather than aside.
 
     Marks stay in their order: an earlier mark keeps its place, and a later one takes the nearest
     that is free. The same marks give the same places.
@@ -80,10 +82,9 @@ def spread(
     Returns:
         The new places, and the number of marks that found none and lie on others.
     """
-    # Aside only where there is no room up or down: across is the margin, which should be exact.
     offsets = sorted(
         itertools.product(range(-_MOST_ASIDE, _MOST_ASIDE + 1), range(-_MOST_UP, _MOST_UP + 1)),
-        key=lambda offset: (abs(offset[0]), abs(offset[1]), offset),
+        key=lambda offset: (_ASIDE_COST * abs(offset[0]) + abs(offset[1]), offset),
     )
     taken: dict[tuple[int, int], list[tuple[float, float]]] = {}
     full: set[tuple[float, float]] = set()

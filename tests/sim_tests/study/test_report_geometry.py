@@ -8,11 +8,11 @@ import re
 import shutil
 import subprocess
 from dataclasses import replace
+from html import unescape
 from pathlib import Path
 
 import numpy as np
 import pytest
-from page_reader import PageReader
 from report_runs import MadeUpRun, made_up_run
 
 from sim_tests.study.report import write_report
@@ -47,14 +47,21 @@ RUNS = {
     "few": lambda: made_up_run(scenarios=5, seeds=3),
     "same": lambda: same_outcomes(made_up_run(scenarios=20, seeds=4)),
     "lost": lambda: lost_everywhere(made_up_run(scenarios=4, seeds=4)),
-    "many": lambda: made_up_run(scenarios=20, seeds=20, faults=("late_frames",)),
+    "many": lambda: made_up_run(scenarios=20, seeds=6, faults=("late_frames",)),
 }
 
 
-@pytest.fixture(scope="module", params=RUNS)
-def page(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    run = RUNS[request.param]()
-    return write_report(run.write(tmp_path_factory.mktemp(request.param)), stills=False)
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("runs")
+    return {
+        name: write_report(run().write(folder / name), stills=False) for name, run in RUNS.items()
+    }
+
+
+@pytest.fixture(params=RUNS)
+def page(request: pytest.FixtureRequest, pages: dict[str, Path]) -> Path:
+    return pages[request.param]
 
 
 def boxes_across(texts: list[tuple[float, str]], length_px: float) -> list[tuple[float, float]]:
@@ -106,7 +113,9 @@ def test_no_mark_covers_another(page: Path) -> None:
 
 def test_marks_keep_to_their_side_of_a_margin_of_0(page: Path) -> None:
     html = page.read_text("utf-8")
-    zero = re.search(r'<line class="zero" x1="([\d.]+)%" x2="[\d.]+%" y1="0" y2="100%"/>\n<g', html)
+    zero = re.search(
+        r'<line class="zero" x1="([\d.]+)%" x2="[\d.]+%" y1="0" y2="100%"/>\s*<g', html
+    )
     if zero is None:
         pytest.skip("all margins are on one side")
     rows = json.loads(re.search(r'\{"arms".*\}', html)[0])["rows"]
@@ -122,8 +131,8 @@ def test_marks_at_one_place_are_all_seen() -> None:
     assert covered == 0
     assert len(set(places)) == 12
     assert places[0] == (50.0, 50.0)
-    assert {x for x, _ in places} == {50.0}
-    assert max(abs(y - 50.0) for _, y in places) == pytest.approx(12.0)
+    assert max(abs(x - 50.0) for x, _ in places) == pytest.approx(2.0)
+    assert max(abs(y - 50.0) for _, y in places) <= 8.0
     assert spread([(50.0, 50.0, WHOLE)] * 12, 2.0)[0] == places
 
 
@@ -191,19 +200,23 @@ addEventListener("load", () => {
 
 @pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
-@pytest.mark.parametrize("width_px", [390, 1280])
 @pytest.mark.parametrize("name", ["same", "many"])
-def test_a_browser_draws_labels_and_marks_apart(name: str, width_px: int, tmp_path: Path) -> None:
-    page = write_report(RUNS[name]().write(tmp_path / "run"), stills=False)
-    html = page.read_text("utf-8")
-    # A frame has the width that is asked; a window may not be narrower than 500 px.
+def test_a_browser_draws_labels_and_marks_apart(
+    name: str, pages: dict[str, Path], tmp_path: Path
+) -> None:
+    html = pages[name].read_text("utf-8")
     (tmp_path / "inner.html").write_text(
         html.replace("</body>", f"<script>{_OVERLAPS}</script></body>"), "utf-8"
     )
-    (tmp_path / "outer.html").write_text(
+    # A frame has the width that is asked; a window cannot be narrower than 500 px.
+    frames = "".join(
         f'<iframe src="inner.html" style="border:0;width:{width_px}px;height:900px"></iframe>'
-        "<script>setInterval(() => { document.title = "
-        "document.querySelector('iframe').contentDocument.title; }, 50);</script>",
+        for width_px in (390, 1280)
+    )
+    (tmp_path / "outer.html").write_text(
+        f"{frames}<script>setInterval(() => {{ document.title = '[' + "
+        "[...document.querySelectorAll('iframe')].map((e) => e.contentDocument.title) + ']'; "
+        "}, 50);</script>",
         "utf-8",
     )
     assert CHROMIUM is not None
@@ -220,7 +233,7 @@ def test_a_browser_draws_labels_and_marks_apart(name: str, width_px: int, tmp_pa
             "--disable-sync",
             "--allow-file-access-from-files",
             f"--user-data-dir={tmp_path / 'profile'}",
-            "--window-size=1400,1000",
+            "--window-size=1800,1000",
             "--virtual-time-budget=5000",
             "--dump-dom",
             (tmp_path / "outer.html").as_uri(),
@@ -230,10 +243,12 @@ def test_a_browser_draws_labels_and_marks_apart(name: str, width_px: int, tmp_pa
         timeout=120,
         check=True,
     )
-    title = PageReader(re.search(r"<title>.*?</title>", done.stdout, re.DOTALL)[0]).text
-    found = json.loads(title)
-    assert found["width"] == width_px
-    assert found["labels"] > 20
-    assert found["out"] == []
-    assert found["wide"] <= 0
-    assert found["marks"] == found["places"] > 100
+    title = re.search(r"<title>(.*?)</title>", done.stdout, re.DOTALL)
+    assert title is not None
+    phone, desk = json.loads(unescape(title[1]))
+    assert (phone["width"], desk["width"]) == (390, 1280)
+    for found in (phone, desk):
+        assert found["labels"] > 20
+        assert found["out"] == []
+        assert found["wide"] <= 0
+        assert found["marks"] == found["places"] > 100
