@@ -269,7 +269,7 @@ def test_only_failures(tmp_path: Path) -> None:
 
 def test_rows_twice_count_once(run: MadeUpRun, tmp_path: Path) -> None:
     page = report(replace(run, records=(*run.records, run.records[0])), tmp_path)
-    assert "1 row of episodes.csv repeat" in page.text
+    assert "1 row repeats an episode in episodes.csv" in page.text
     assert f"{len(run.records)} crossings" in page.text
 
 
