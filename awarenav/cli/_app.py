@@ -80,7 +80,7 @@ _COMMANDS: Final[dict[str, dict[str, _Entry]]] = {
             "Write a run's report as one HTML page.",
         ),
         "scenario": _Entry(
-            "sim_tests.study.validation.command:scenario",
+            "sim_tests.study.scenarios.command:scenario",
             "List, explain, draw and check scenarios.",
         ),
         "render": _Entry(

@@ -1,4 +1,4 @@
-"""The shipped scenarios listed, described, drawn and checked: ``awarenav scenario``."""
+"""Scenarios listed, described, drawn and checked without a crossing."""
 
 from __future__ import annotations
 
@@ -9,15 +9,19 @@ from awarenav.lazy import lazy_names
 if TYPE_CHECKING:
     from ._checks import CHECKED_DRAWS, scenario_problems, template_problems
     from ._plans import CONFLICT_M, approach_statistics, closest_approaches, person_plan, robot_plan
+    from ._show import draw_command, list_command, show_command
 
 __all__ = [
     "CHECKED_DRAWS",
     "CONFLICT_M",
     "approach_statistics",
     "closest_approaches",
+    "draw_command",
+    "list_command",
     "person_plan",
     "robot_plan",
     "scenario_problems",
+    "show_command",
     "template_problems",
 ]
 
@@ -35,6 +39,11 @@ __getattr__ = lazy_names(
             "closest_approaches",
             "person_plan",
             "robot_plan",
+        ),
+        "._show": (
+            "draw_command",
+            "list_command",
+            "show_command",
         ),
     },
 )

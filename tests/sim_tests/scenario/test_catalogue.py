@@ -14,7 +14,7 @@ from sim_tests.scenario.catalogue import (
     scenario_problems,
     template_problems,
 )
-from sim_tests.study.validation import AttentionCheck
+from sim_tests.study.scenarios import AttentionCheck
 
 # Their scripted people stop beside the robot's path on purpose.
 BESIDE = {"crossing_attentive", "crossing_distracted", "paper_encounter"}

@@ -1,4 +1,4 @@
-"""Scenario files checked, and their people's attention measured: ``awarenav scenario validate``."""
+"""Scenarios on the command line, and their people's attention measured: ``awarenav scenario``."""
 
 from __future__ import annotations
 
