@@ -11,7 +11,7 @@ from awarenav.cli import FilePath, command, option, options
     "demo",
     examples=["awarenav demo --out demo"],
     exit_status={0: "Success.", 2: "Bad input, or the extra 'sim' is missing."},
-    epilog="Needs the extra 'sim': pip install 'awarenav[sim]'.",
+    epilog="Needs the extra 'sim'.",
 )
 @options.out_folder("demo")
 @options.seed()
@@ -38,7 +38,7 @@ def demo(out: Path, seed: int, *, no_video: bool, perception: str, as_json: bool
         1: "A metric is worse than the baseline by more than its tolerance.",
         2: "Bad input.",
     },
-    epilog="Needs the extra 'sim': pip install 'awarenav[sim]'.",
+    epilog="Needs the extra 'sim'.",
 )
 @option(
     "--baseline",

@@ -6,6 +6,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, Final
 
+from perception.installation import install_command
+
 from ...world.errors import SimError
 from ..measures import nondeterminism_notes
 from ._awareness_split import split_by_awareness
@@ -27,7 +29,7 @@ try:
 except ImportError as cause:  # pragma: no cover - depends on the installation
     raise SimError(
         "a report needs jinja2, which is not installed; it is part of the extra 'bench': "
-        "pip install 'awarenav[bench]'"
+        + install_command("bench")
     ) from cause
 
 _REPORT: Final = "report.html"
