@@ -272,7 +272,7 @@ function takePolicy(policy) {
 /** Shows the policy of a YAML text, or says why it cannot be used. */
 function takeYaml(text, name) {
   try {
-    takePolicy(checkedPolicy(parseYaml(text) ?? {}));
+    takePolicy(checkedPolicy(parseYaml(text)));
     byId("preset").value = "";
   } catch (error) {
     if (!(error instanceof PolicyError || error instanceof YamlError)) throw error;
