@@ -167,7 +167,7 @@ function drawCharts(now, other, found, state) {
   drawChart({
     ...common, id: "human", y: [0, Math.max(1.15 * human, 0.2)], yText: "m/s",
     curves: over("human_speed_mps", alpha).curves, marks: [[at, found.human_speed_mps]],
-    label: `Counted human speed over the lower bound of α; ${fixed(found.human_speed_mps)} m/s at ${fixed(at)}`,
+    label: `Human speed that counts over the lower bound of α; ${fixed(found.human_speed_mps)} m/s at ${fixed(at)}`,
   });
 }
 

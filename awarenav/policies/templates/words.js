@@ -59,6 +59,7 @@ function awarenessNote(policy, state, found) {
 }
 
 function sentenceOf(policy, robot, state, found) {
+  const { timing, rules } = policy;
   const way = found.reason === "robot maximum"
     ? `The robot may drive at its maximum of ${strong(`${fixed(found.limit_mps)} m/s`)}.`
     : found.limit_mps > 0
@@ -72,11 +73,26 @@ function sentenceOf(policy, robot, state, found) {
     : "The person is not in the path, so the protective field does not count them.";
   const brakes = found.braking_suffices ? ""
     : " Full braking from the present speed would come too late.";
-  const { timing } = policy, apart = policyRadius(policy, 0) - policyRadius(policy, found.awareness_lower);
+  const apart = policyRadius(policy, 0) - policyRadius(policy, found.awareness_lower);
   const shrinks = apart > 0.005
     ? ` After α has risen, the obstacle takes ${fixed(timing.shrink_after_s + apart / timing.shrink_rate_mps, 1)} s to shrink from unaware to this.`
     : "";
-  return `${way} ${who} ${escaped(awarenessNote(policy, state, found))}${brakes}${shrinks}`;
+  const note = awarenessNote(policy, state, found);
+  return `${way} ${ruleNote(rules, policy, found.reason)}${who} ${escaped(note)}${brakes}${shrinks}`;
+}
+
+/** What a rule besides speed and separation does. */
+function ruleNote(rules, policy, reason) {
+  if (reason === "start reserve")
+    return "However aware, the person might set off now, at "
+      + `${rules.start_reserve.human_acceleration_mps2} m/s² up to `
+      + `${fixed(policyHumanSpeed(policy, 0))} m/s. `;
+  if (reason === "distance zone")
+    return `The limit falls from full speed at ${rules.zones.full_speed_beyond_m} m to a stop at `
+      + `${rules.zones.stop_within_m} m. `;
+  if (reason === "cap near people")
+    return `Within ${rules.near_cap.within_m} m the robot drives ${rules.near_cap.speed_mps} m/s at most. `;
+  return "";
 }
 
 /** The figures of the answer, each with its change since the last change began. */
@@ -93,6 +109,6 @@ function answersOf(found, before) {
     + `<div class="reason"><dt>reason</dt><dd><i class="${ruleClass(found.reason)}"></i>${escaped(found.reason)}</dd></div>`
     + entry("obstacle radius", found.radius_m, "m", "", before?.radius_m ?? null)
     + entry("stopping distance", found.stopping_m, "m", "", before?.stopping_m ?? null)
-    + entry("counted human speed", found.human_speed_mps, "m/s", "", before?.human_speed_mps ?? null)
+    + entry("human speed", found.human_speed_mps, "m/s", "", before?.human_speed_mps ?? null)
     + `<div><dt>alert</dt><dd><b>${alert ? alert.kind : "none"}</b>${alert ? ` in ${fixed(alert.time_s, 1)} s` : ""}</dd></div>`;
 }

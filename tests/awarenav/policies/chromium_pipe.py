@@ -95,6 +95,10 @@ class Chromium:
             self.events.append(self._next())
         self.drawn()
 
+    def wait_for_event(self) -> None:
+        """Wait for the next event and keep it."""
+        self.events.append(self._next())
+
     def evaluate(self, expression: str) -> Any:
         """Return the value of a JavaScript expression, as JSON has it; promises are awaited."""
         done = self.call(

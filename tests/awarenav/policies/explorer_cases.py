@@ -92,7 +92,7 @@ def random_policy(draw: random.Random) -> AwarenessPolicy:
     }
     if draw.random() < 0.25:
         inflation = {"table_m": _table(draw, 0.05, 1.5)}
-    ahead_s, fresh_s = draw.choice([0.0, draw.uniform(0.0, 2.0)]), draw.uniform(0.1, 0.5)
+    ahead_s, fresh_s = draw.choice([0.0, draw.uniform(0.1, 1.0), draw.uniform(0.1, 2.0)]), draw.uniform(0.1, 0.5)
     stale_s = fresh_s + draw.uniform(0.0, 0.5)
     return AwarenessPolicy.model_validate(
         {

@@ -25,7 +25,7 @@ def read_by_page(functions: Chromium, text: str) -> Any:
     """Return the policy that the page reads from a text, or its message about the text."""
     return functions.evaluate(
         f"""(() => {{
-          try {{ return checkedPolicy(parseYaml({json.dumps(text)}) ?? {{}}); }}
+          try {{ return checkedPolicy(parseYaml({json.dumps(text)})); }}
           catch (error) {{
             if (!(error instanceof PolicyError || error instanceof YamlError)) throw error;
             return error.message;
