@@ -102,7 +102,7 @@ function approach(policy, robot, state, [x, y]) {
 function gapsOf(policy, robot, state, person) {
   const margin = DATA.body_radius_m + person.uncertainty;
   const both = [person.predicted, person.at];
-  const hull = hullOf(robot.footprint_m);
+  const hull = hullOfRobot(robot);
   const outline = Math.min(...both.map((point) => distanceFrom(hull, point)));
   const centre = Math.min(...both.map(([x, y]) => Math.hypot(x, y)));
   return {

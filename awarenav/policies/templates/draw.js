@@ -27,11 +27,11 @@ const path = (points) => points.map(([x, y], at) => `${at ? "L" : "M"}${fixed(x,
  * Draws a chart.
  * @param {object} chart id, label, x and y ([from, to]), xText, yText, curves ([{of, look}]), band
  *   ([low, high] functions or null), marks ([[x, y]]), lines ([{y, text}]), strip (x to a rule, or
- *   null), pick (called with an x that the user points at).
+ *   null), pick (called with an x that the user points at), small (without names of the axes).
  */
 function drawChart(chart) {
   const svg = byId(chart.id), width = Math.max(svg.clientWidth, 200), height = svg.clientHeight;
-  const box = { left: 38, right: width - 10, top: 8, bottom: height - (chart.strip ? 46 : 34) };
+  const box = { left: 38, right: width - 10, top: 8, bottom: height - (chart.strip ? 46 : 34) + (chart.small ? 14 : 0) };
   const [x0, x1] = chart.x, [y0, y1] = chart.y;
   const px = (x) => box.left + ((x - x0) / (x1 - x0)) * (box.right - box.left);
   const py = (y) => box.bottom - ((Math.min(y, y1) - y0) / (y1 - y0)) * (box.bottom - box.top);
@@ -39,12 +39,12 @@ function drawChart(chart) {
   const xs = Array.from({ length: count + 1 }, (_, at) => x0 + ((x1 - x0) * at) / count);
   const along = (of) => xs.map((x) => [px(x), py(of(x))]);
   let out = "";
-  for (const y of ticks(y0, y1, 4))
+  for (const y of ticks(y0, y1, chart.small ? 2 : 4))
     out += `<line class="grid" x1="${box.left}" x2="${box.right}" y1="${py(y)}" y2="${py(y)}"/>`
       + `<text class="yt" x="${box.left - 6}" y="${py(y) + 4}">${y}</text>`;
-  for (const x of ticks(x0, x1, width > 330 ? 6 : 5))
+  for (const x of ticks(x0, x1, chart.small ? 3 : width > 330 ? 6 : 5))
     out += `<line class="grid" x1="${px(x)}" x2="${px(x)}" y1="${box.top}" y2="${box.bottom}"/>`
-      + `<text class="xt" x="${px(x)}" y="${height - 18}">${x}</text>`;
+      + `<text class="xt" x="${px(x)}" y="${height - (chart.small ? 4 : 18)}">${x}</text>`;
   if (chart.band) {
     const [low, high] = chart.band.map(along);
     out += `<path class="band" d="${path([...high, ...low.reverse()])}Z"/>`;
@@ -58,7 +58,7 @@ function drawChart(chart) {
     if (x >= x0 && x <= x1)
       out += `<path class="cross" d="M${px(x)} ${box.bottom}V${py(y)}H${box.left}"/>`
         + `<circle class="mark" cx="${px(x)}" cy="${py(y)}" r="5"/>`;
-  out += `<text class="xlabel" x="${box.right}" y="${height - 3}">${chart.xText}</text>`
+  if (!chart.small) out += `<text class="xlabel" x="${box.right}" y="${height - 3}">${chart.xText}</text>`
     + `<text class="ylabel" x="${box.left + 4}" y="${box.top + 9}">${chart.yText}</text>`;
   svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
   svg.setAttribute("aria-label", chart.label);
@@ -117,7 +117,7 @@ function drawBudget({ parts, gap, from }) {
     column += wide;
   }
   const end = px(Math.max(gap, 0));
-  out += `<path class="bodyline" d="M${end} 10V42"/><text class="${end > width / 2 ? "yt" : ""}" x="${end + (end > width / 2 ? -2 : 4)}" y="10">body, ${fixed(gap)} m</text>`
+  out += `<path class="bodyline" d="M${end} 10V42"/><text class="${end > width / 2 ? "yt" : ""}" x="${end + (end > width / 2 ? -2 : 4)}" y="10">body, ${fixed(gap).replace("-", "−")} m</text>`
     + (end > 150 ? `<text x="${left}" y="10">${from}</text>` : "");
   const height = 70 + 18 * row;
   svg.style.height = `${height}px`;

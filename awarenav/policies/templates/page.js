@@ -15,7 +15,7 @@ const page = {
 /** The state that the arithmetic takes, from the controls of the situation. */
 function stateOf(situation, robot, filter) {
   const bearing = radians(situation.bearing_deg), unit = [Math.cos(bearing), Math.sin(bearing)];
-  const hull = hullOf(robot.footprint_m), goal = situation.gap_m + DATA.body_radius_m;
+  const hull = hullOfRobot(robot), goal = situation.gap_m + DATA.body_radius_m;
   // The distance along the bearing at which the outline is that far away.
   let near = 0, far = goal + circumscribed(robot);
   for (let round = 0; round < 60; round += 1) {
@@ -44,11 +44,18 @@ function beginChange() {
   page.before = snapshot();
 }
 
-function answerIn({ policy, robot, situation }, change = {}) {
-  const state = { ...stateOf({ ...situation, ...change }, robot, policy.filter) };
-  if (change.alpha !== undefined) state.awareness_lower = change.alpha;
-  return answer(policy, robot, state);
+/** The answer as a function of changes: a distance `gap_m`, a lower bound `alpha`, or neither. */
+function answerer({ policy, robot, situation }) {
+  const here = stateOf(situation, robot, policy.filter);
+  return ({ gap_m: gap, alpha } = {}) => {
+    const state = gap === undefined
+      ? here : stateOf({ ...situation, gap_m: gap }, robot, policy.filter);
+    const bound = alpha ?? state.awareness_lower;
+    return answer(policy, robot, { ...state, awareness_lower: bound });
+  };
 }
+
+const answerIn = (which, change) => answerer(which)(change);
 
 /** Takes over the drafts if they are valid; else says why not. */
 function takeDrafts() {
@@ -107,8 +114,8 @@ function redraw() {
 function draw() {
   const { policy, robot, situation } = page, now = { policy, robot, situation };
   const state = stateOf(situation, robot, policy.filter), found = answer(policy, robot, state);
-  const other = compared(), before = page.before && answerIn(page.before);
-  byId("answers").innerHTML = answersOf(found, before);
+  const other = compared();
+  byId("answers").innerHTML = answersOf(found, other && answerIn(other));
   byId("sentence").innerHTML = sentenceOf(policy, robot, state, found);
   drawPlan(policy, robot, state, found, dragPerson);
   drawBudget(budgetOf(policy, robot, state, found));
@@ -132,17 +139,20 @@ function compared() {
 function drawCharts(now, other, found, state) {
   const { robot, situation } = now, top = Math.max(robot.max_speed_mps, other?.robot.max_speed_mps ?? 0);
   const farthest = Math.max(6, Math.ceil(situation.gap_m));
+  const ours = answerer(now), theirs = other && answerer(other);
   const over = (field, change) => {
-    const of = (which, extra = {}) => (at) => answerIn(which, { ...change(at), ...extra })[field];
-    return { of, curves: [...(other ? [{ of: of(other), look: "other" }] : []), { of: of(now), look: "now" }] };
+    const of = (answers, extra = {}) => (at) => answers({ ...change(at), ...extra })[field];
+    const dashed = theirs ? [{ of: of(theirs), look: "other" }] : [];
+    return { of, curves: [...dashed, { of: of(ours), look: "now" }] };
   };
   const limit = over("limit_mps", (at) => ({ gap_m: at }));
-  drawChart({
+  const docked = byId("dock").clientHeight > 0;
+  drawTwice(docked, {
     id: "distance", x: [0, farthest], y: [0, 1.08 * top], curves: limit.curves,
     label: `Speed limit over distance; ${fixed(found.limit_mps)} m/s at ${fixed(situation.gap_m)} m`,
     xText: "distance (m)", yText: "m/s", marks: [[situation.gap_m, found.limit_mps]],
-    band: [limit.of(now, { alpha: 0 }), limit.of(now, { alpha: 1 })],
-    strip: (at) => answerIn(now, { gap_m: at }).reason,
+    band: [limit.of(ours, { alpha: 0 }), limit.of(ours, { alpha: 1 })],
+    strip: (at) => ours({ gap_m: at }).reason,
     pick: (at) => setSituation("gap_m", Number(at.toFixed(2))),
   });
   const alpha = (at) => ({ alpha: at }), at = state.awareness_lower;
@@ -150,15 +160,17 @@ function drawCharts(now, other, found, state) {
     if (situation.awareness_from === "lower bound of α") setSituation("awareness_lower", Number(value.toFixed(2)));
   };
   const { margins } = now.policy;
-  const unaware = Math.max(...[now, other].filter(Boolean).map((each) => answerIn(each, { alpha: 0 }).radius_m));
-  const human = Math.max(...[now, other].filter(Boolean).map((each) => answerIn(each, { alpha: 0 }).human_speed_mps));
+  const most = (field) => Math.max(
+    ...[ours, theirs].filter(Boolean).map((answers) => answers({ alpha: 0 })[field]),
+  );
+  const unaware = most("radius_m"), human = most("human_speed_mps");
   const common = { x: [0, 1], xText: "lower bound of α", pick };
   drawChart({
     ...common, id: "limit", y: [0, 1.08 * top], yText: "m/s", marks: [[at, found.limit_mps]],
-    curves: over("limit_mps", alpha).curves, strip: (value) => answerIn(now, { alpha: value }).reason,
+    curves: over("limit_mps", alpha).curves, strip: (value) => ours({ alpha: value }).reason,
     label: `Speed limit over the lower bound of α; ${fixed(found.limit_mps)} m/s at ${fixed(at)}`,
   });
-  drawChart({
+  drawTwice(docked, {
     ...common, id: "radius", y: [0, Math.max(1.15 * unaware, 0.5)], yText: "m",
     curves: over("radius_m", alpha).curves, marks: [[at, found.radius_m]],
     lines: [{ y: floorOf(margins), text: `floor ${fixed(floorOf(margins))} m` }],
@@ -169,6 +181,12 @@ function drawCharts(now, other, found, state) {
     curves: over("human_speed_mps", alpha).curves, marks: [[at, found.human_speed_mps]],
     label: `Human speed that counts over the lower bound of α; ${fixed(found.human_speed_mps)} m/s at ${fixed(at)}`,
   });
+}
+
+/** Draws a chart, and a small one at the bottom of a narrow window. */
+function drawTwice(docked, chart) {
+  drawChart(chart);
+  if (docked) drawChart({ ...chart, id: `dock${chart.id}`, small: true, lines: [], pick: null });
 }
 
 function drawLegend(now, other) {
@@ -201,7 +219,7 @@ function showNumber(id, value) {
 /** Puts the person at a place in the base frame. */
 function dragPerson(x, y) {
   const { robot, situation } = page;
-  const gap = distanceFrom(hullOf(robot.footprint_m), [x, y]) - DATA.body_radius_m;
+  const gap = distanceFrom(hullOfRobot(robot), [x, y]) - DATA.body_radius_m;
   const most = DATA.situation.Person[0].slider[1];
   situation.bearing_deg = Math.round((Math.atan2(y, x) * 180) / Math.PI);
   showNumber("situation.bearing_deg", situation.bearing_deg);
@@ -322,6 +340,11 @@ function start() {
     plan.dragging = false;
     redraw();
   });
+  // In a narrow window the drawings scroll away: two small ones stay while the settings are seen.
+  new IntersectionObserver(([{ isIntersecting }]) => {
+    byId("dock").classList.toggle("on", isIntersecting);
+    redraw();
+  }, { rootMargin: "-40% 0px 0px 0px" }).observe(byId("controls"));
   new ResizeObserver(redraw).observe(byId("view"));
   addEventListener("resize", redraw);
   build();

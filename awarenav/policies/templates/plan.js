@@ -2,13 +2,17 @@
 
 const plan = { bounds: null };
 
+/** The radius that the same person would have when unaware. */
+function unawareRadius(policy, found) {
+  const added = policy.margins.uncertainty_sigmas * found.person.sigma;
+  return bounded(policy.margins, policyRadius(policy, 0) + added);
+}
+
 /** Draws the plan view. */
 function drawPlan(policy, robot, state, found, drag) {
   const svg = byId("plan"), width = Math.max(svg.clientWidth, 200), height = svg.clientHeight;
-  const [x, y] = found.person.predicted, unaware = bounded(
-    policy.margins, policyRadius(policy, 0) + policy.margins.uncertainty_sigmas * found.person.sigma,
-  );
-  const hull = hullOf(robot.footprint_m), polygon = obstaclePolygon(policy, state, found);
+  const [x, y] = found.person.predicted, unaware = unawareRadius(policy, found);
+  const hull = hullOfRobot(robot), polygon = obstaclePolygon(policy, state, found);
   const stop = stopZone(robot, state, hull, found.stopping_m);
   if (!plan.dragging || !plan.bounds) plan.bounds = boundsOf([
     ...hull, ...stop, ...polygon, [x - unaware, y - unaware], [x + unaware, y + unaware],

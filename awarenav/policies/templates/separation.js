@@ -56,6 +56,14 @@ function hullOf(points) {
   return [...half(sorted), ...half(sorted.reverse())];
 }
 
+const HULLS = new WeakMap();
+
+/** The convex hull of a robot's footprint, which must not change in place. */
+function hullOfRobot({ footprint_m: corners }) {
+  if (!HULLS.has(corners)) HULLS.set(corners, hullOf(corners));
+  return HULLS.get(corners);
+}
+
 /** The distance of a point from a convex outline, 0 inside. */
 function distanceFrom(hull, [x, y]) {
   let nearest2 = Infinity, inside = true;

@@ -73,7 +73,7 @@ function sentenceOf(policy, robot, state, found) {
     : "The person is not in the path, so the protective field does not count them.";
   const brakes = found.braking_suffices ? ""
     : " Full braking from the present speed would come too late.";
-  const apart = policyRadius(policy, 0) - policyRadius(policy, found.awareness_lower);
+  const apart = unawareRadius(policy, found) - found.radius_m;
   const shrinks = apart > 0.005
     ? ` After α has risen, the obstacle takes ${fixed(timing.shrink_after_s + apart / timing.shrink_rate_mps, 1)} s to shrink from unaware to this.`
     : "";
@@ -95,7 +95,7 @@ function ruleNote(rules, policy, reason) {
   return "";
 }
 
-/** The figures of the answer, each with its change since the last change began. */
+/** The figures of the answer, each with its difference from the answer compared with. */
 function answersOf(found, before) {
   const entry = (name, value, unit, look, was, digits = 2) => {
     const change = was === null ? 0 : value - was;

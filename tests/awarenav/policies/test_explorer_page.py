@@ -12,7 +12,7 @@ from chromium_pipe import Chromium
 from awarenav.cli import main
 from nav_adapter import AwarenessPolicy
 
-WINDOWS = [(1280, 800), (390, 844)]
+WINDOWS = [(1280, 800), (1024, 768), (390, 844)]
 # From the start of the navigation to the end of the load event.
 MOST_MS = 2000.0
 
@@ -89,8 +89,9 @@ TOO_FAINT = """(() => {
 })()"""
 
 TOO_WIDE = """(() => {
-  const width = document.documentElement.clientWidth;
-  return [...document.querySelectorAll("body *")].filter((e) => !e.closest("svg, .skip"))
+  const padding = parseFloat(getComputedStyle(document.body).paddingRight);
+  const width = document.documentElement.clientWidth - padding;
+  return [...document.querySelectorAll("body *")].filter((e) => !e.closest("svg, .skip, #dock"))
     .filter((e) => e.getBoundingClientRect().right > width + 1)
     .map((e) => `${e.tagName}.${e.className} ${e.id}`);
 })()"""
