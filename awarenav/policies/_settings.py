@@ -57,7 +57,7 @@ _MODELS: Final[tuple[type[BaseModel], ...]] = (
     AwarenessFilterConfig,
 )
 #: Fields that take a ramp or a table; the schema of the policy shows the ramp alone.
-_VARIANTS: Final = {
+_VARIANTS: Final[Mapping[str, tuple[type[BaseModel], ...]]] = {
     "inflation": (InterpolatedInflation, TableInflation),
     "speed": (InterpolatedHumanSpeed, TableHumanSpeed),
 }

@@ -3,9 +3,9 @@
 //
 // The state has: x_m, y_m (place of the track in the base frame), vx_mps, vy_mps, sigma_m and
 // velocity_sigma_mps (standard deviations of place and velocity, the same in all directions),
-// awareness_lower, noticed, was_aware, track ("confirmed", "coasting", "tentative" or "first sight"),
-// unseen_s (from the last frame that showed the person to the track), data_age_s (from the track,
-// and from the latest frame, to now), moved_m and moved_age_s, speed_mps and lateral_mps.
+// awareness_lower, noticed, was_aware, track (confirmed, coasting, tentative or first sight),
+// unseen_s (from the last frame that showed the person to the track), data_age_s (from the track
+// and the latest frame to now), moved_m and moved_age_s, speed_mps and lateral_mps.
 
 const radians = (degrees) => degrees * (Math.PI / 180);
 const BRISK_SHARE = 0.75;

@@ -9,7 +9,8 @@ function put(root, keys, value) {
 function element(tag, attributes = {}, ...children) {
   const made = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) {
-    if (name === "on") for (const [event, act] of Object.entries(value)) made.addEventListener(event, act);
+    if (name === "on")
+      for (const [event, act] of Object.entries(value)) made.addEventListener(event, act);
     else if (name === "html") made.innerHTML = value;
     else if (value === true) made.setAttribute(name, "");
     else if (value !== false && value !== null) made.setAttribute(name, value);
@@ -27,7 +28,9 @@ function element(tag, attributes = {}, ...children) {
 function rowOf(field, place) {
   const { root, keys, id } = place, value = get(root, keys);
   const overTime = DATA.over_time.includes(id);
-  const text = element("p", { id: `${id}:text`, class: "text", hidden: true, html: coded(rowText(field)) });
+  const text = element("p", {
+    id: `${id}:text`, class: "text", hidden: true, html: coded(rowText(field)),
+  });
   const more = element("button", {
     type: "button", class: "more", "aria-expanded": "false", "aria-controls": `${id}:text`,
     "aria-label": `About ${field.label ?? field.key}`,
@@ -36,13 +39,15 @@ function rowOf(field, place) {
       more.setAttribute("aria-expanded", String(!text.hidden));
     } },
   }, "?");
-  const name = element("label", { for: id, class: field.label ? "" : "key" }, field.label ?? field.key);
+  const kind = field.label ? "" : "key";
+  const name = element("label", { for: id, class: kind }, field.label ?? field.key);
   const head = element("div", { class: "head" }, name);
   if (field.unit) head.append(element("span", { class: "unit" }, field.unit));
   if (overTime) head.append(element("span", { class: "tag" }, "over time"));
   head.append(more);
   const row = element("div", { class: "row", "data-id": id }, head);
-  if (field.nullable && field.kind === "number") head.prepend(switchOf(field, place, value !== null));
+  if (field.nullable && field.kind === "number")
+    head.prepend(switchOf(field, place, value !== null));
   if (field.kind === "number") row.append(numberOf(field, place));
   else if (field.kind === "choice") row.append(choiceOf(field, place));
   else if (field.kind === "boolean") head.prepend(booleanOf(place));
@@ -55,7 +60,8 @@ function rowOf(field, place) {
 }
 
 const rowText = (field) => {
-  const range = field.kind === "number" ? ` Range ${rangeText(field)}${field.unit ? ` ${field.unit}` : ""}.` : "";
+  const unit = field.unit ? ` ${field.unit}` : "";
+  const range = field.kind === "number" ? ` Range ${rangeText(field)}${unit}.` : "";
   const standard = typeof field.default === "number" ? ` Default ${general(field.default)}.` : "";
   return `${field.text}${range}${field.required || field.label ? "" : standard}`;
 };
@@ -67,9 +73,12 @@ function switchOf(field, { root, keys, id, rebuilt }, on) {
       beginChange();
       // The two settings of the watching level belong together.
       const watching = { watching_above: 0.8, watching_human_speed_mps: 0.05 };
-      const both = Object.hasOwn(watching, keys.at(-1)) ? watching : { [keys.at(-1)]: startOf(field) };
-      for (const [key, value] of Object.entries(both))
-        put(root, [...keys.slice(0, -1), key], event.target.checked ? watchingValue(root, keys, key, value) : null);
+      const last = keys.at(-1), on = event.target.checked;
+      const both = Object.hasOwn(watching, last) ? watching : { [last]: startOf(field) };
+      for (const [key, value] of Object.entries(both)) {
+        const first = on ? watchingValue(root, keys, key, value) : null;
+        put(root, [...keys.slice(0, -1), key], first);
+      }
       rebuilt(`${id}:on`);
     } },
   });
@@ -148,7 +157,8 @@ function booleanOf({ root, keys, id, changed }) {
 /** A table as rows of two numbers. */
 function tableOf(field, place) {
   const { root, keys, id, changed, rebuilt } = place, points = get(root, keys);
-  const names = field.key === "footprint_m" ? ["x in m", "y in m"] : ["α", `value in ${field.unit}`];
+  const names = field.key === "footprint_m"
+    ? ["x in m", "y in m"] : ["α", `value in ${field.unit}`];
   const rows = points.map((pair, at) => element("div", { class: "point" },
     ...pair.map((value, side) => element("input", {
       type: "number", step: "0.01", value, id: `${id}:${at}:${side}`,
@@ -175,7 +185,8 @@ function tableOf(field, place) {
     } },
   }, "Add a point");
   const title = element("p", { class: "unit" }, names.join(", "));
-  return element("div", { id, role: "group", "aria-label": field.key, class: "table" }, title, ...rows, add);
+  const group = { id, role: "group", "aria-label": field.key, class: "table" };
+  return element("div", group, title, ...rows, add);
 }
 
 function nextPoint(field, points) {

@@ -16,12 +16,14 @@ const ruleClass = (reason) => RULES[reason] ?? "r5";
 function ticks(from, to, count) {
   const rough = (to - from) / count, power = 10 ** Math.floor(Math.log10(rough));
   const step = [1, 2, 5, 10].map((each) => each * power).find((each) => each >= rough * 0.999);
-  const first = Math.ceil(from / step - 1e-9), found = [];
-  for (let at = first; at * step <= to + 1e-9; at += 1) found.push(Number((at * step).toPrecision(6)));
+  const found = [];
+  for (let at = Math.ceil(from / step - 1e-9); at * step <= to + 1e-9; at += 1)
+    found.push(Number((at * step).toPrecision(6)));
   return found;
 }
 
-const path = (points) => points.map(([x, y], at) => `${at ? "L" : "M"}${fixed(x, 1)} ${fixed(y, 1)}`).join("");
+const path = (points) =>
+  points.map(([x, y], at) => `${at ? "L" : "M"}${fixed(x, 1)} ${fixed(y, 1)}`).join("");
 
 /**
  * Draws a chart.
@@ -31,7 +33,8 @@ const path = (points) => points.map(([x, y], at) => `${at ? "L" : "M"}${fixed(x,
  */
 function drawChart(chart) {
   const svg = byId(chart.id), width = Math.max(svg.clientWidth, 200), height = svg.clientHeight;
-  const box = { left: 38, right: width - 10, top: 8, bottom: height - (chart.strip ? 46 : 34) + (chart.small ? 14 : 0) };
+  const below = (chart.strip ? 46 : 34) - (chart.small ? 14 : 0);
+  const box = { left: 38, right: width - 10, top: 8, bottom: height - below };
   const [x0, x1] = chart.x, [y0, y1] = chart.y;
   const px = (x) => box.left + ((x - x0) / (x1 - x0)) * (box.right - box.left);
   const py = (y) => box.bottom - ((Math.min(y, y1) - y0) / (y1 - y0)) * (box.bottom - box.top);
@@ -43,7 +46,7 @@ function drawChart(chart) {
     out += `<line class="grid" x1="${box.left}" x2="${box.right}" y1="${py(y)}" y2="${py(y)}"/>`
       + `<text class="yt" x="${box.left - 6}" y="${py(y) + 4}">${y}</text>`;
   for (const x of ticks(x0, x1, chart.small ? 3 : width > 330 ? 6 : 5))
-    out += `<line class="grid" x1="${px(x)}" x2="${px(x)}" y1="${box.top}" y2="${box.bottom}"/>`
+    out += `<path class="grid" d="M${px(x)} ${box.top}V${box.bottom}"/>`
       + `<text class="xt" x="${px(x)}" y="${height - (chart.small ? 4 : 18)}">${x}</text>`;
   if (chart.band) {
     const [low, high] = chart.band.map(along);
@@ -53,13 +56,15 @@ function drawChart(chart) {
     out += `<line class="floor" x1="${box.left}" x2="${box.right}" y1="${py(y)}" y2="${py(y)}"/>`
       + `<text class="floortext" x="${box.right - 2}" y="${py(y) - 4}">${text}</text>`;
   if (chart.strip) out += stripOf(xs, px, chart.strip, box.bottom + 3);
-  for (const { of, look } of chart.curves) out += `<path class="curve ${look}" d="${path(along(of))}"/>`;
+  for (const { of, look } of chart.curves)
+    out += `<path class="curve ${look}" d="${path(along(of))}"/>`;
   for (const [x, y] of chart.marks)
     if (x >= x0 && x <= x1)
       out += `<path class="cross" d="M${px(x)} ${box.bottom}V${py(y)}H${box.left}"/>`
         + `<circle class="mark" cx="${px(x)}" cy="${py(y)}" r="5"/>`;
-  if (!chart.small) out += `<text class="xlabel" x="${box.right}" y="${height - 3}">${chart.xText}</text>`
-    + `<text class="ylabel" x="${box.left + 4}" y="${box.top + 9}">${chart.yText}</text>`;
+  if (!chart.small)
+    out += `<text class="xlabel" x="${box.right}" y="${height - 3}">${chart.xText}</text>`
+      + `<text class="ylabel" x="${box.left + 4}" y="${box.top + 9}">${chart.yText}</text>`;
   svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
   svg.setAttribute("aria-label", chart.label);
   svg.innerHTML = out;
@@ -76,7 +81,8 @@ function stripOf(xs, px, ruleAt, top) {
   rules.forEach((rule, at) => {
     if (at + 1 < rules.length && rules[at + 1] === rule) return;
     const left = px(xs[from]), right = px(xs[Math.min(at + 1, xs.length - 1)]);
-    out += `<rect class="${ruleClass(rule)}" x="${left}" width="${Math.max(right - left, 0)}" y="${top}" height="7"><title>${escaped(rule)}</title></rect>`;
+    out += `<rect class="${ruleClass(rule)}" x="${left}" width="${Math.max(right - left, 0)}"`
+      + ` y="${top}" height="7"><title>${escaped(rule)}</title></rect>`;
     from = at + 1;
   });
   return out;
@@ -108,7 +114,9 @@ function drawBudget({ parts, gap, from }) {
   const all = spare > 5e-4 ? [...parts, { name: "left over", m: spare, look: "b6" }] : parts;
   for (const { name, m, look } of all) {
     if (m <= 5e-4) continue;
-    out += `<rect class="${look}" x="${px(at)}" y="16" width="${Math.max(px(at + m) - px(at) - 1, 1)}" height="20"><title>${name}: ${fixed(m)} m</title></rect>`;
+    const long = Math.max(px(at + m) - px(at) - 1, 1);
+    out += `<rect class="${look}" x="${px(at)}" y="16" width="${long}" height="20">`
+      + `<title>${name}: ${fixed(m)} m</title></rect>`;
     at += m;
     const text = `${name} ${fixed(m)} m`, wide = 22 + 6.6 * text.length;
     if (column + wide > right && column > left) [row, column] = [row + 1, left];
@@ -116,8 +124,10 @@ function drawBudget({ parts, gap, from }) {
       + `<text x="${column + 16}" y="${60 + 18 * row}">${text}</text>`;
     column += wide;
   }
-  const end = px(Math.max(gap, 0));
-  out += `<path class="bodyline" d="M${end} 10V42"/><text class="${end > width / 2 ? "yt" : ""}" x="${end + (end > width / 2 ? -2 : 4)}" y="10">body, ${fixed(gap).replace("-", "−")} m</text>`
+  const end = px(Math.max(gap, 0)), far = end > width / 2;
+  out += `<path class="bodyline" d="M${end} 10V42"/>`
+    + `<text class="${far ? "yt" : ""}" x="${end + (far ? -2 : 4)}" y="10">`
+    + `body, ${fixed(gap).replace("-", "−")} m</text>`
     + (end > 150 ? `<text x="${left}" y="10">${from}</text>` : "");
   const height = 70 + 18 * row;
   svg.style.height = `${height}px`;

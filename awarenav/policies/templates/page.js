@@ -70,7 +70,7 @@ function takeDrafts() {
   if (!problem) page.robot = structuredClone(page.robotDraft);
   const box = byId("problem");
   box.hidden = !problem;
-  box.textContent = problem ? `Not valid, so the drawings show the last valid values: ${problem}` : "";
+  box.textContent = `Not valid, so the drawings show the last valid values: ${problem}`;
   byId("save").disabled = Boolean(problem);
   return !problem;
 }
@@ -137,7 +137,8 @@ function compared() {
 }
 
 function drawCharts(now, other, found, state) {
-  const { robot, situation } = now, top = Math.max(robot.max_speed_mps, other?.robot.max_speed_mps ?? 0);
+  const { robot, situation } = now;
+  const top = Math.max(robot.max_speed_mps, other?.robot.max_speed_mps ?? 0);
   const farthest = Math.max(6, Math.ceil(situation.gap_m));
   const ours = answerer(now), theirs = other && answerer(other);
   const over = (field, change) => {
@@ -149,7 +150,8 @@ function drawCharts(now, other, found, state) {
   const docked = byId("dock").clientHeight > 0;
   drawTwice(docked, {
     id: "distance", x: [0, farthest], y: [0, 1.08 * top], curves: limit.curves,
-    label: `Speed limit over distance; ${fixed(found.limit_mps)} m/s at ${fixed(situation.gap_m)} m`,
+    label: "Speed limit over distance; "
+      + `${fixed(found.limit_mps)} m/s at ${fixed(situation.gap_m)} m`,
     xText: "distance (m)", yText: "m/s", marks: [[situation.gap_m, found.limit_mps]],
     band: [limit.of(ours, { alpha: 0 }), limit.of(ours, { alpha: 1 })],
     strip: (at) => ours({ gap_m: at }).reason,
@@ -157,7 +159,8 @@ function drawCharts(now, other, found, state) {
   });
   const alpha = (at) => ({ alpha: at }), at = state.awareness_lower;
   const pick = (value) => {
-    if (situation.awareness_from === "lower bound of α") setSituation("awareness_lower", Number(value.toFixed(2)));
+    if (situation.awareness_from === "lower bound of α")
+      setSituation("awareness_lower", Number(value.toFixed(2)));
   };
   const { margins } = now.policy;
   const most = (field) => Math.max(
@@ -179,7 +182,8 @@ function drawCharts(now, other, found, state) {
   drawChart({
     ...common, id: "human", y: [0, Math.max(1.15 * human, 0.2)], yText: "m/s",
     curves: over("human_speed_mps", alpha).curves, marks: [[at, found.human_speed_mps]],
-    label: `Human speed that counts over the lower bound of α; ${fixed(found.human_speed_mps)} m/s at ${fixed(at)}`,
+    label: "Human speed that counts over the lower bound of α; "
+      + `${fixed(found.human_speed_mps)} m/s at ${fixed(at)}`,
   });
 }
 
@@ -191,12 +195,14 @@ function drawTwice(docked, chart) {
 
 function drawLegend(now, other) {
   const choice = byId("compare").value;
-  const dashed = Object.hasOwn(DATA.presets, choice) ? `preset ${choice}` : "before the last change";
-  const rules = Object.entries(RULES).map(([name, look]) => `<li><i class="${look}"></i>${name}</li>`);
+  const preset = Object.hasOwn(DATA.presets, choice);
+  const rules = Object.entries(RULES)
+    .map(([name, look]) => `<li><i class="${look}"></i>${name}</li>`).join("");
   byId("legend").innerHTML = [
     '<li><i class="line now"></i>this policy</li>',
-    other ? `<li><i class="line other"></i>${dashed}</li>` : "",
-    '<li><i class="bandkey"></i>from unaware to α = 1</li>', ...rules,
+    other ? '<li><i class="line other"></i>' : "",
+    other ? `${preset ? `preset ${choice}` : "before the last change"}</li>` : "",
+    '<li><i class="bandkey"></i>from unaware to α = 1</li>', rules,
   ].join("");
 }
 
@@ -212,7 +218,8 @@ function showNumber(id, value) {
   const number = byId(id), slider = byId(`${id}:slider`);
   number.value = String(value);
   slider.value = value;
-  const share = (Number(slider.value) - Number(slider.min)) / (Number(slider.max) - Number(slider.min));
+  const [low, high] = [Number(slider.min), Number(slider.max)];
+  const share = (Number(slider.value) - low) / (high - low);
   slider.style.setProperty("--share", `${100 * share}%`);
 }
 
@@ -309,7 +316,8 @@ function start() {
   preset.addEventListener("change", () => takePolicy(checkedPolicy(structuredClone(
     DATA.presets[preset.value] ?? DATA.policy.values,
   ))));
-  compare.append(...["the last change", "nothing", ...names].map((name) => element("option", { value: name }, name)));
+  const others = ["the last change", "nothing", ...names];
+  compare.append(...others.map((name) => element("option", { value: name }, name)));
   compare.addEventListener("change", redraw);
   byId("load").addEventListener("change", async (event) => {
     const [file] = event.target.files;

@@ -19,7 +19,8 @@ function drawPlan(policy, robot, state, found, drag) {
   ], width / height);
   const { left, top, metres } = plan.bounds, scale = width / metres;
   const px = (mx) => (mx - left) * scale, py = (my) => (top - my) * scale;
-  const shape = (points, look) => `<path class="${look}" d="${path(points.map(([a, b]) => [px(a), py(b)]))}Z"/>`;
+  const shape = (points, look) =>
+    `<path class="${look}" d="${path(points.map(([a, b]) => [px(a), py(b)]))}Z"/>`;
   const circle = (radius, look, [cx, cy] = [x, y]) =>
     `<circle class="${look}" cx="${px(cx)}" cy="${py(cy)}" r="${radius * scale}"/>`;
   let out = gridOf(width, height, left, top, metres, scale);
@@ -29,8 +30,9 @@ function drawPlan(policy, robot, state, found, drag) {
   out += circle(DATA.body_radius_m, "body") + shape(robot.footprint_m, "robot");
   out += arrow(px, py, [0, 0], [state.speed_mps, state.lateral_mps], "motion");
   out += arrow(px, py, [x, y], [state.vx_mps, state.vy_mps], "walk");
-  out += placed(px(x), py(y - found.radius_m) + 14, `radius ${fixed(found.radius_m)} m`, width, height);
-  out += placed(px(0), py(Math.max(...hull.map(([, b]) => b))) - 6, "robot", width, height);
+  const size = `radius ${fixed(found.radius_m)} m`, side = Math.max(...hull.map(([, b]) => b));
+  out += placed(px(x), py(y - found.radius_m) + 14, size, width, height);
+  out += placed(px(0), py(side) - 6, "robot", width, height);
   svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
   svg.setAttribute("aria-label", `From above: obstacle radius ${fixed(found.radius_m)} m, person `
     + `${fixed(x)} m ahead and ${fixed(y)} m to the left of the robot`);
@@ -46,13 +48,13 @@ function stopZone(robot, state, hull, way) {
 
 /** Whole half metres around all points, in the shape of the drawing. */
 function boundsOf(points, ratio) {
-  const xs = points.map(([x]) => x), ys = points.map(([, y]) => y), half = (v) => Math.round(2 * v) / 2;
+  const xs = points.map(([x]) => x), ys = points.map(([, y]) => y);
   const from = Math.min(...xs, -1) - 0.3, to = Math.max(...xs, 3) + 0.3;
   const low = Math.min(...ys, -1) - 0.25, high = Math.max(...ys, 1) + 0.25;
   const metres = Math.ceil(2 * Math.max(to - from, (high - low) * ratio)) / 2;
   return {
     metres,
-    left: half((from + to) / 2 - metres / 2),
+    left: Math.round(from + to - metres) / 2,
     top: (low + high) / 2 + metres / ratio / 2,
   };
 }
@@ -75,10 +77,15 @@ function arrow(px, py, [x, y], [vx, vy], look) {
   if (speed < 0.02) return "";
   const [x0, y0, x1, y1] = [px(x), py(y), px(x + vx), py(y + vy)];
   const [ux, uy] = [vx / speed, -vy / speed], size = 8;
-  const wing = (side) => `L${x1 - size * ux + side * 0.6 * size * uy} ${y1 - size * uy - side * 0.6 * size * ux}`;
+  const wing = (side) => [
+    x1 - size * (ux - side * 0.6 * uy), y1 - size * (uy + side * 0.6 * ux),
+  ].join(" ");
   return `<path class="${look}" d="M${x0} ${y0}L${x1} ${y1}"/>`
-    + `<path class="${look} head" d="M${x1} ${y1}${wing(1)}${wing(-1)}Z"/>`;
+    + `<path class="${look} head" d="M${x1} ${y1}L${wing(1)}L${wing(-1)}Z"/>`;
 }
 
-const placed = (x, y, text, width, height) =>
-  `<text class="xt name" x="${Math.min(Math.max(x, 40), width - 48)}" y="${Math.min(Math.max(y, 14), height - 22)}">${text}</text>`;
+/** A text at a place, or as near to it as the drawing allows. */
+function placed(x, y, text, width, height) {
+  const inX = Math.min(Math.max(x, 40), width - 48), inY = Math.min(Math.max(y, 14), height - 22);
+  return `<text class="xt name" x="${inX}" y="${inY}">${text}</text>`;
+}

@@ -48,10 +48,11 @@ function standingOf(policy, alpha) {
 /** What led to the awareness that counts, where it is not the given bound. */
 function awarenessNote(policy, state, found) {
   const { timing } = policy;
-  if (found.stale) return `The data are older than ${timing.stale_after_s} s, so everybody counts as unaware.`;
+  if (found.stale)
+    return `The data are older than ${timing.stale_after_s} s, so everybody counts as unaware.`;
   if (state.track === "tentative") return "A tentative track counts as unaware.";
   if (state.unseen_s + state.data_age_s > timing.fresh_within_s)
-    return `Nobody has seen the person for more than ${timing.fresh_within_s} s: unaware.`;
+    return `No frame has shown the person for more than ${timing.fresh_within_s} s: unaware.`;
   if (state.track === "first sight") return "At first sight everybody counts as unaware.";
   if (found.awareness_lower > state.awareness_lower)
     return `Having noticed the robot counts as α = ${fixed(found.awareness_lower)}.`;
@@ -63,7 +64,8 @@ function sentenceOf(policy, robot, state, found) {
   const way = found.reason === "robot maximum"
     ? `The robot may drive at its maximum of ${strong(`${fixed(found.limit_mps)} m/s`)}.`
     : found.limit_mps > 0
-      ? `The robot may drive ${strong(`${fixed(found.limit_mps)} m/s`)}: ${strong(found.reason)} sets this limit.`
+      ? `The robot may drive ${strong(`${fixed(found.limit_mps)} m/s`)}: `
+        + `${strong(found.reason)} sets this limit.`
       : `The robot must stop: ${strong(found.reason)}.`;
   const assumed = found.human_speed_mps > found.person.assumed + 1e-9
     ? `and counts as coming at ${fixed(found.human_speed_mps)} m/s because of the walk`
@@ -74,11 +76,12 @@ function sentenceOf(policy, robot, state, found) {
   const brakes = found.braking_suffices ? ""
     : " Full braking from the present speed would come too late.";
   const apart = unawareRadius(policy, found) - found.radius_m;
+  const taken = fixed(timing.shrink_after_s + apart / timing.shrink_rate_mps, 1);
   const shrinks = apart > 0.005
-    ? ` After α has risen, the obstacle takes ${fixed(timing.shrink_after_s + apart / timing.shrink_rate_mps, 1)} s to shrink from unaware to this.`
-    : "";
+    ? ` After α has risen, the obstacle takes ${taken} s to shrink from unaware to this.` : "";
   const note = awarenessNote(policy, state, found);
-  return `${way} ${ruleNote(rules, policy, found.reason)}${who} ${escaped(note)}${brakes}${shrinks}`;
+  const rule = ruleNote(rules, policy, found.reason);
+  return `${way} ${rule}${who} ${escaped(note)}${brakes}${shrinks}`;
 }
 
 /** What a rule besides speed and separation does. */
@@ -91,7 +94,8 @@ function ruleNote(rules, policy, reason) {
     return `The limit falls from full speed at ${rules.zones.full_speed_beyond_m} m to a stop at `
       + `${rules.zones.stop_within_m} m. `;
   if (reason === "cap near people")
-    return `Within ${rules.near_cap.within_m} m the robot drives ${rules.near_cap.speed_mps} m/s at most. `;
+    return `Within ${rules.near_cap.within_m} m the robot drives at most `
+      + `${rules.near_cap.speed_mps} m/s. `;
   return "";
 }
 
@@ -104,11 +108,16 @@ function answersOf(found, before) {
     return `<div><dt>${name}</dt><dd class="${look}"><b>${fixed(value, digits)}</b> ${unit}`
       + `<small>${differs ? `${sign}${fixed(Math.abs(change), digits)}` : ""}</small></dd></div>`;
   };
-  const { alert } = found;
-  return entry("speed limit", found.limit_mps, "m/s", found.limit_mps > 0 ? "" : "bad", before?.limit_mps ?? null)
-    + `<div class="reason"><dt>reason</dt><dd><i class="${ruleClass(found.reason)}"></i>${escaped(found.reason)}</dd></div>`
-    + entry("obstacle radius", found.radius_m, "m", "", before?.radius_m ?? null)
-    + entry("stopping distance", found.stopping_m, "m", "", before?.stopping_m ?? null)
-    + entry("human speed", found.human_speed_mps, "m/s", "", before?.human_speed_mps ?? null)
-    + `<div><dt>alert</dt><dd><b>${alert ? alert.kind : "none"}</b>${alert ? ` in ${fixed(alert.time_s, 1)} s` : ""}</dd></div>`;
+  const { alert } = found, cell = (name, value, look = "") =>
+    `<div class="${look}"><dt>${name}</dt><dd>${value}</dd></div>`;
+  const of = (field) => before?.[field] ?? null;
+  const square = `<i class="${ruleClass(found.reason)}"></i>`;
+  return [
+    entry("speed limit", found.limit_mps, "m/s", found.limit_mps > 0 ? "" : "bad", of("limit_mps")),
+    cell("reason", square + escaped(found.reason), "reason"),
+    entry("obstacle radius", found.radius_m, "m", "", of("radius_m")),
+    entry("stopping distance", found.stopping_m, "m", "", of("stopping_m")),
+    entry("human speed", found.human_speed_mps, "m/s", "", of("human_speed_mps")),
+    cell("alert", alert ? `<b>${alert.kind}</b> in ${fixed(alert.time_s, 1)} s` : "<b>none</b>"),
+  ].join("");
 }

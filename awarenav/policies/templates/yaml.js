@@ -212,7 +212,8 @@ function plainScalar(text, fail) {
   if (/^(~|null|Null|NULL|)$/.test(text)) return null;
   if (/^(yes|Yes|YES|true|True|TRUE|on|On|ON)$/.test(text)) return true;
   if (/^(no|No|NO|false|False|FALSE|off|Off|OFF)$/.test(text)) return false;
-  if (/^[-+]?\.(inf|Inf|INF|nan|NaN|NAN)$/.test(text)) return fail(`${text} is not a finite number`);
+  if (/^[-+]?\.(inf|Inf|INF|nan|NaN|NAN)$/.test(text))
+    return fail(`${text} is not a finite number`);
   if (/^[-+]?0[0-9xXbBoO_]|^[-+]?\d+(:\d+)+|^[-+]?[\d.]*_/.test(text))
     return fail(`'${text}' is not a plain decimal number`);
   if (/^[-+]?(0|[1-9]\d*)$/.test(text)) return Number(text);
@@ -278,5 +279,6 @@ function yamlScalar(value) {
   // YAML 1.1 reads a float only with a point, and an exponent only with its sign.
   const [digits, exponent] = String(value).split("e");
   const mantissa = digits.includes(".") ? digits : `${digits}.0`;
-  return exponent ? `${mantissa}e${exponent.startsWith("-") ? "" : "+"}${exponent.replace("+", "")}` : mantissa;
+  if (!exponent) return mantissa;
+  return `${mantissa}e${/^[-+]/.test(exponent) ? "" : "+"}${exponent}`;
 }

@@ -92,7 +92,10 @@ def random_policy(draw: random.Random) -> AwarenessPolicy:
     }
     if draw.random() < 0.25:
         inflation = {"table_m": _table(draw, 0.05, 1.5)}
-    ahead_s, fresh_s = draw.choice([0.0, draw.uniform(0.1, 1.0), draw.uniform(0.1, 2.0)]), draw.uniform(0.1, 0.5)
+    ahead_s, fresh_s = (
+        draw.choice([0.0, draw.uniform(0.1, 1.0), draw.uniform(0.1, 2.0)]),
+        draw.uniform(0.1, 0.5),
+    )
     stale_s = fresh_s + draw.uniform(0.0, 0.5)
     return AwarenessPolicy.model_validate(
         {
@@ -183,7 +186,9 @@ def random_state(draw: random.Random, timing: Any) -> dict[str, Any]:
         "data_age_s": old_s,
         "moved_m": draw.choice([None, draw.uniform(0.0, 0.1)]),
         "moved_age_s": draw.uniform(0.0, 0.2),
-        "speed_mps": draw.choice([0.0, draw.uniform(-2, 2), draw.uniform(0, 2), draw.uniform(0, 2)]),
+        "speed_mps": draw.choice(
+            [0.0, draw.uniform(-2, 2), draw.uniform(0, 2), draw.uniform(0, 2)]
+        ),
         "lateral_mps": sideways,
     }
 
@@ -238,8 +243,11 @@ def adapters_answer(
     if state["track"] == "first sight":
         return update(-age_s, state["awareness_lower"], 0.0)
     step_s = 0.95 * timing.fresh_within_s
-    # Nothing here is larger than 2 m before it shrinks.
-    steps = math.ceil((timing.shrink_after_s + 2.0 / timing.shrink_rate_mps) / step_s) + 3
+    shrinks_m = policy.inflation.radius_m(0.0) - policy.margins.floor_m
+    if policy.outline.unaware_ahead_s > 0.0:
+        shrinks_m = max(shrinks_m, policy.outline.longest_ahead_m)
+    shrinking_s = timing.shrink_after_s + max(shrinks_m, 0.0) / timing.shrink_rate_mps
+    steps = math.ceil(shrinking_s / step_s) + 3
     for step in range(steps, 0, -1):
         remembers = state["was_aware"] and step > steps - 2
         update(seen_s - step * step_s, 1.0 if remembers else state["awareness_lower"])

@@ -51,7 +51,10 @@ TOO_FAINT = """(() => {
       .map((v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4));
     return 0.2126 * r + 0.7152 * g + 0.0722 * b;
   };
-  const ratio = (a, b) => (Math.max(light(a), light(b)) + 0.05) / (Math.min(light(a), light(b)) + 0.05);
+  const ratio = (a, b) => {
+    const [dark, bright] = [light(a), light(b)].sort((one, other) => one - other);
+    return (bright + 0.05) / (dark + 0.05);
+  };
   const behind = (element) => {
     const inDrawing = element instanceof SVGElement && element.parentElement;
     for (let each = inDrawing || element; each; each = each.parentElement) {
@@ -81,7 +84,8 @@ TOO_FAINT = """(() => {
     const value = ratio(rgba(colour), behind(each));
     if (value < 3) faint.push(named(each, value));
   }
-  for (const each of document.querySelectorAll("input[type=number]:enabled, select, main button:enabled")) {
+  const edges = "input[type=number]:enabled, select, main button:enabled";
+  for (const each of document.querySelectorAll(edges)) {
     const value = ratio(rgba(getComputedStyle(each).borderTopColor), behind(each.parentElement));
     if (value < 3 && !each.matches(".more")) faint.push(named(each, value));
   }
@@ -116,7 +120,11 @@ def test_the_page_is_quick_quiet_and_legible(
     chromium.open(explorer, width=width, height=height, dark=dark)
     timing = "performance.getEntriesByType('navigation')[0]"
     assert chromium.evaluate(f"{timing}.loadEventEnd - {timing}.startTime") < MOST_MS
-    for step in ("true", ALL_OPEN, "takePolicy(checkedPolicy(structuredClone(DATA.presets.blind)))"):
+    for step in (
+        "true",
+        ALL_OPEN,
+        "takePolicy(checkedPolicy(structuredClone(DATA.presets.blind)))",
+    ):
         chromium.evaluate(step)
         chromium.drawn()
         found = chromium.evaluate(TOO_FAINT)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import random
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from explorer_cases import (
 )
 
 from nav_adapter import AwarenessPolicy
+from nav_adapter.policies import SpeedRules
 from nav_adapter.ros2 import RobotFile
 from nav_adapter.settled import settled_radius_m, settled_speed_limit_mps
 from tracking import AwarenessFilterConfig
@@ -118,7 +120,7 @@ def test_radius_limit_reason_and_stopping_distance_are_those_of_the_adapter(
 def test_the_presets_give_the_values_of_policy_show(functions: Chromium, name: str) -> None:
     """The controls as they stand: someone who stands ahead, at an exactly known place."""
     alphas, gaps = [0.0, 0.3, 0.6, 0.8, 1.0], [0.0, 0.5, 1.0, 2.0, 3.0, 5.0]
-    policy = AwarenessPolicy.preset(name).model_copy(update={"rules": SPEED_ALONE(name)})
+    policy = AwarenessPolicy.preset(name).model_copy(update={"rules": without_reserve(name)})
     shown = functions.evaluate(
         f"""(() => {{
           const policy = checkedPolicy({json.dumps(policy.model_dump(mode="json"))});
@@ -137,7 +139,7 @@ def test_the_presets_give_the_values_of_policy_show(functions: Chromium, name: s
     assert np.array(shown)[..., 1] == pytest.approx(np.tile(radii[:, None], len(gaps)), abs=1e-9)
 
 
-def SPEED_ALONE(name: str) -> Any:  # noqa: N802
+def without_reserve(name: str) -> SpeedRules:
     """Return the rules of a preset without the reserve, which ``policy show`` leaves out."""
     return AwarenessPolicy.preset(name).rules.model_copy(update={"start_reserve": None})
 
@@ -175,8 +177,6 @@ def test_the_bound_of_one_measurement_is_that_of_the_awareness_filter(functions:
 
 def bound_after(mean: Any, variance: Any, config: AwarenessFilterConfig) -> float:
     """Return the lower bound of a belief that has just been measured."""
-    from statistics import NormalDist  # noqa: PLC0415
-
     z = NormalDist().inv_cdf(config.lower_bound_confidence)
     belief = AwarenessBelief(mean, variance, mean - z * np.sqrt(variance))
     return float(estimate(belief, config).awareness_lower)

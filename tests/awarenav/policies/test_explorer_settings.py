@@ -54,7 +54,9 @@ def test_every_model_and_every_key_is_there() -> None:
             assert "``" not in field["text"]
             if not field["required"]:
                 default = MODELS[name].model_fields[field["key"]].default
-                shown = default.model_dump(mode="json") if hasattr(default, "model_dump") else default
+                shown = (
+                    default.model_dump(mode="json") if hasattr(default, "model_dump") else default
+                )
                 assert field["default"] == shown
 
 

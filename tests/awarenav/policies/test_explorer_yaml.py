@@ -1,4 +1,4 @@
-"""Policies between files, Python and the page: equal both ways, and refused for the same reasons."""
+"""Policies between files, Python and the page: equal both ways, refused by both."""
 
 from __future__ import annotations
 
@@ -49,14 +49,18 @@ def refusal(text: str, tmp_path: Path) -> str:
     return str(caught.value)
 
 
-def test_files_of_python_are_the_same_policy_in_the_page(functions: Chromium, tmp_path: Path) -> None:
+def test_files_of_python_are_the_same_policy_in_the_page(
+    functions: Chromium, tmp_path: Path
+) -> None:
     for policy in [*map(AwarenessPolicy.preset, PRESETS), AwarenessPolicy(), *RANDOM]:
         file = tmp_path / "policy.yaml"
         policy.to_yaml(file)
         assert read_by_page(functions, file.read_text("utf-8")) == policy.model_dump(mode="json")
 
 
-def test_files_of_the_page_are_the_same_policy_in_python(functions: Chromium, tmp_path: Path) -> None:
+def test_files_of_the_page_are_the_same_policy_in_python(
+    functions: Chromium, tmp_path: Path
+) -> None:
     for policy in [*map(AwarenessPolicy.preset, PRESETS), AwarenessPolicy(), *RANDOM]:
         file = tmp_path / "policy.yaml"
         file.write_text(written_by_page(functions, policy), encoding="utf-8")
@@ -194,7 +198,9 @@ WRONG = [
 
 
 @pytest.mark.parametrize("text", WRONG)
-def test_what_python_refuses_the_page_refuses(functions: Chromium, tmp_path: Path, text: str) -> None:
+def test_what_python_refuses_the_page_refuses(
+    functions: Chromium, tmp_path: Path, text: str
+) -> None:
     assert refusal(text, tmp_path)
     told = read_by_page(functions, text)
     assert isinstance(told, str)
