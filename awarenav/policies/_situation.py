@@ -157,7 +157,7 @@ SITUATION: Final[dict[str, list[dict[str, Any]]]] = {
         },
         _number(
             "moved_age_s",
-            "age of that",
+            "age of that bound",
             "s",
             (0.0, 1.0, 0.01),
             0.0,
