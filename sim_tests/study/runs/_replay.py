@@ -1,4 +1,4 @@
-"""The command ``awarenav replay``: one episode of a run again, with a video and a map."""
+"""The command ``awarenav replay``: one episode of a run again, with video and map, or a page."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Final, NoReturn
 
 import cv2
 import numpy as np
@@ -18,6 +18,7 @@ from awarenav.video import VideoWriter
 from perception import AttentionCone
 
 from ...crossing import CrossingFrame, Stage, TopView, draw_camera_view
+from ...viewing import outcome_text, show_page, write_page
 from ...world.camera import CameraRenderer
 from ...world.errors import SimError
 from ..measures import (
@@ -30,6 +31,7 @@ from ..measures import (
 from ._episode import observed_episode
 from ._job import Job
 from ._plan import describe, job_key, template_of
+from ._recording import recorder_of
 from ._run_files import RunFiles, read_jobs
 from ._run_folder import record_key
 
@@ -132,6 +134,7 @@ class ReplayOptions:
     episode: str
     out: Path | None
     no_video: bool
+    view: bool
 
 
 def replay_command(options: ReplayOptions) -> int:
@@ -149,12 +152,36 @@ def replay_command(options: ReplayOptions) -> int:
     name = f"episode_{number:05d}"
     scenario = template_of(job.scenario).for_seed(job.seed)
     total = round(scenario.duration_s * scenario.control_hz)
-    with (
-        tqdm(total=total, desc="replay", unit="frame", file=sys.stderr) as bar,
-        ReplayPictures(
-            out / f"{name}.png", None if options.no_video else out / f"{name}.mp4"
-        ) as pictures,
-    ):
+    with tqdm(total=total, desc="replay", unit="frame", file=sys.stderr) as bar:
+        if options.view:
+            record, written = _write_view(job, page_path(options.folder, number, out), bar)
+        else:
+            video_path = None if options.no_video else out / f"{name}.mp4"
+            record, written = _write_pictures(job, out / f"{name}.png", video_path, bar)
+    for path in written:
+        print(f"Written: {path}")
+    print(_description(record))
+    if options.view:
+        show_page(written[0].resolve().as_uri())
+    return _compare_row(options.folder, job, record)
+
+
+def page_path(folder: Path, number: int, out: Path | None = None) -> Path:
+    """Return the path of the page of an episode of a run.
+
+    Args:
+        folder: of the run.
+        number: of the episode.
+        out: folder of the page; None for the folder of the run's replays.
+    """
+    return (folder / _REPLAYS if out is None else out) / f"episode_{number:05d}.html"
+
+
+def _write_pictures(
+    job: Job, map_path: Path, video_path: Path | None, bar: tqdm[NoReturn]
+) -> tuple[EpisodeRecord, list[Path]]:
+    """Run an episode and write its map and video; return its row and the paths."""
+    with ReplayPictures(map_path, video_path) as pictures:
 
         def observe(frame: CrossingFrame, stage: Stage) -> None:
             pictures.add(frame, stage)
@@ -162,10 +189,20 @@ def replay_command(options: ReplayOptions) -> int:
 
         record = observed_episode(job, observe)[1]
         pictures.finish()
-    for path in pictures.written:
-        print(f"Written: {path}")
-    print(_description(record))
-    return _compare_row(options.folder, job, record)
+    return record, pictures.written
+
+
+def _write_view(job: Job, path: Path, bar: tqdm[NoReturn]) -> tuple[EpisodeRecord, list[Path]]:
+    """Run an episode and write its page; return its row and the path."""
+    recorder = recorder_of(job)
+
+    def observe(frame: CrossingFrame, stage: Stage) -> None:
+        recorder(frame, stage)
+        bar.update()
+
+    result, record = observed_episode(job, observe)
+    write_page(path, recorder.begin, recorder.states, outcome_text(result), recorder.note)
+    return record, [path]
 
 
 def find_episode(jobs: Sequence[Job], episode: str) -> int:
