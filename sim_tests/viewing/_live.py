@@ -162,7 +162,7 @@ def _handler_of(live: LivePage) -> type[BaseHTTPRequestHandler]:
     class Handler(BaseHTTPRequestHandler):
         protocol_version = "HTTP/1.1"
 
-        def do_GET(self) -> None:  # noqa: N802 - the name is the standard library's
+        def do_GET(self) -> None:
             live._answer(self)
 
         def log_message(self, format: str, *arguments: object) -> None:

@@ -60,6 +60,9 @@ def begin_of(episode: Episode, stage: Stage) -> dict[str, Any]:
         "max_speed_mps": _rounded_number(stage.amr.profile.max_speed_mps),
         "cone_half_angle_rad": _rounded_number(AttentionCone().half_angle_rad),
         "body_radius_m": BODY_RADIUS_M,
+        "camera_fov_rad": _rounded_number(
+            math.radians(min(camera.horizontal_fov_deg * len(camera.views_deg), 360.0))
+        ),
         "picture_aspect": _rounded_number(camera.width_px / camera.height_px),
     }
 

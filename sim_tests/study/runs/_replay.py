@@ -37,7 +37,8 @@ from ._run_folder import record_key
 
 Image = NDArray[np.uint8]
 
-_REPLAYS: Final = "replays"
+# The word for all episodes of a run.
+_EVERY: Final = "all"
 _VIDEO_HZ: Final = 10
 _HEIGHT_PX: Final = 480
 _MAP_WIDTH_PX: Final = 720
@@ -138,43 +139,42 @@ class ReplayOptions:
 
 
 def replay_command(options: ReplayOptions) -> int:
-    """Run an episode again, write its pictures and compare its row with that of the run.
+    """Run an episode again, write its pictures or its page, and compare its row with the run's.
 
     Raises:
         SimError: the folder holds no run, or the run does not have the episode.
     """
     jobs = read_jobs(options.folder)
-    number = find_episode(jobs, options.episode)
-    job = jobs[number]
-    print(f"Episode {number}: {describe(job_key(job))}")
-    out = options.out if options.out is not None else options.folder / _REPLAYS
+    every = options.episode == _EVERY
+    numbers = range(len(jobs)) if every else [find_episode(jobs, options.episode)]
+    out = options.out if options.out is not None else RunFiles(options.folder).replays
     out.mkdir(parents=True, exist_ok=True)
+    status = 0
+    for number in numbers:
+        written, differs = _replay(options, number, jobs[number], out)
+        status = max(status, differs)
+        if options.view and not every:
+            show_page(written[0].resolve().as_uri())
+    return status
+
+
+def _replay(options: ReplayOptions, number: int, job: Job, out: Path) -> tuple[Sequence[Path], int]:
+    """Run one episode again; return the files written, and 1 if its row is another, else 0."""
+    print(f"Episode {number}: {describe(job_key(job))}")
     name = f"episode_{number:05d}"
     scenario = template_of(job.scenario).for_seed(job.seed)
     total = round(scenario.duration_s * scenario.control_hz)
     with tqdm(total=total, desc="replay", unit="frame", file=sys.stderr) as bar:
         if options.view:
-            record, written = _write_view(job, page_path(options.folder, number, out), bar)
+            page_path = out / RunFiles(options.folder).page(number).name
+            record, written = _write_view(job, page_path, bar)
         else:
             video_path = None if options.no_video else out / f"{name}.mp4"
             record, written = _write_pictures(job, out / f"{name}.png", video_path, bar)
     for path in written:
         print(f"Written: {path}")
     print(_description(record))
-    if options.view:
-        show_page(written[0].resolve().as_uri())
-    return _compare_row(options.folder, job, record)
-
-
-def page_path(folder: Path, number: int, out: Path | None = None) -> Path:
-    """Return the path of the page of an episode of a run.
-
-    Args:
-        folder: of the run.
-        number: of the episode.
-        out: folder of the page; None for the folder of the run's replays.
-    """
-    return (folder / _REPLAYS if out is None else out) / f"episode_{number:05d}.html"
+    return written, _compare_row(options.folder, job, record)
 
 
 def _write_pictures(

@@ -13,6 +13,7 @@ from awarenav.cli import FolderPath, argument, command, option, options
         "awarenav replay run 12",
         "awarenav replay run blind_corner:3:balanced --no-video",
         "awarenav replay run 12 --view",
+        "awarenav replay run all --view",
     ],
     exit_status={
         0: "The episode gives the same row as before.",
@@ -24,9 +25,11 @@ from awarenav.cli import FolderPath, argument, command, option, options
 @argument(
     "episode",
     help="The number of the episode in episodes.csv, from 0; or SCENARIO:SEED:POLICY, followed by "
-    ":PLANNER and :FAULT if the run has several.",
+    ":PLANNER and :FAULT if the run has several; or 'all'.",
 )
-@options.out_folder(None, "Folder of the video and the map, or of the page.", show_default="DIR/replays")
+@options.out_folder(
+    None, "Folder of the video and the map, or of the page.", show_default="DIR/replays"
+)
 @option("--no-video", is_flag=True, help="Draw only the map (faster).")
 @option(
     "--view",

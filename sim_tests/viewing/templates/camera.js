@@ -1,5 +1,6 @@
 // The picture of the robot's camera with the outlines of what it has estimated.
 
+const MOST_LABELS = 3;
 const CAMERA = { bitmaps: new Map(), most: 80 };
 
 // Decode a JPEG without an address, so that the page makes no request at all.
@@ -43,7 +44,10 @@ function drawCamera(canvas, begin, states, index, layers, whenReady) {
       for (const run of ring.outline) trace(pen, run, width, height);
     }
   }
-  for (const seen of picture.seen) {
+  // The labels of people far away would cover each other.
+  const area = ({ box }) => (box.length ? (box[2] - box[0]) * (box[3] - box[1]) : 0);
+  const near = [...picture.seen].sort((one, other) => area(other) - area(one));
+  for (const seen of near.slice().reverse()) {
     const colour = BRIGHT(seen.awareness);
     if (layers.cones && seen.cone.length) {
       trace(pen, seen.cone, width, height, true);
@@ -60,7 +64,7 @@ function drawCamera(canvas, begin, states, index, layers, whenReady) {
       pen.strokeRect(left * width, top * height, (right - left) * width, (bottom - top) * height);
       const text = seen.awareness === null ? "no face seen"
         : `α ${seen.awareness.toFixed(2)} ± ${seen.awareness_std.toFixed(2)}`;
-      label(pen, text, left * width, top * height, width);
+      if (near.indexOf(seen) < MOST_LABELS) label(pen, text, left * width, top * height, width);
     }
   }
   return true;

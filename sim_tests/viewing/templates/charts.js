@@ -30,7 +30,7 @@ function axes(pen, time, height, bottom, ticks, y) {
   pen.textBaseline = "alphabetic";
   pen.textAlign = "center";
   const inner = time.x(time.span) - GUTTER.left;
-  const step = [0.5, 1, 2, 5, 10, 20].find((each) => (each / time.span) * inner > 46) || 50;
+  const step = [0.5, 1, 2, 5, 10, 20].find((each) => (each / time.span) * inner > 56) || 50;
   for (let t = 0; t <= time.span + 1e-9; t += step) {
     pen.fillStyle = PALETTE.soft;
     pen.fillText(t === 0 ? "0 s" : String(+t.toFixed(1)), time.x(t), height - bottom + 14);
@@ -46,33 +46,51 @@ function playhead(pen, time, state, height) {
   pen.stroke();
 }
 
-function drawAlpha(canvas, begin, states, index) {
+// With more tracks than this, each is drawn as what counts alone until one is chosen.
+const MOST_WHOLE_TRACKS = 3;
+
+function drawAlpha(canvas, begin, states, index, chosen) {
   const { pen, width, height } = prepare(canvas);
   const time = timeScale(width, states, begin), bottom = 18;
   const y = (alpha) => 8 + (1 - alpha) * (height - bottom - 14);
   axes(pen, time, height, bottom, [0, 0.5, 1], y);
-  for (const run of tracksOver(states)) {
+  const all = tracksOver(states);
+  const whole = chosen !== null || new Set(all.map((run) => run.id)).size <= MOST_WHOLE_TRACKS;
+  for (const run of chosen === null ? all : all.filter((each) => each.id === chosen)) {
     const colour = trackColour(run.id);
-    pen.beginPath();
-    for (const [t, alpha] of run.points) pen.lineTo(time.x(t), y(alpha));
-    for (const [t, , lower] of [...run.points].reverse()) pen.lineTo(time.x(t), y(lower));
-    pen.closePath();
-    pen.fillStyle = withOpacity(colour, 0.2);
-    pen.fill();
-    curve(pen, run.points.map(([t, alpha]) => [time.x(t), y(alpha)]), colour, 2);
-    curve(pen, run.points.map(([t, , lower]) => [time.x(t), y(lower)]), colour, 1);
+    if (whole) {
+      pen.beginPath();
+      for (const [t, alpha] of run.points) pen.lineTo(time.x(t), y(alpha));
+      for (const [t, , lower] of [...run.points].reverse()) pen.lineTo(time.x(t), y(lower));
+      pen.closePath();
+      pen.fillStyle = withOpacity(colour, 0.2);
+      pen.fill();
+      curve(pen, run.points.map(([t, alpha]) => [time.x(t), y(alpha)]), colour, 1.2);
+    }
+    curve(pen, run.points.map(([t, , , counts]) => [time.x(t), y(counts)]), colour, 2.6);
   }
   pen.fillStyle = PALETTE.ink;
   const every = Math.max(Math.round((4 * states.length) / Math.max(width, 1)), 1);
-  for (let at = 0; at < states.length; at += every) {
-    for (const person of states[at].people) {
+  for (let at = 0; whole && at < states.length; at += every) {
+    for (const person of peopleOf(states[at], chosen)) {
       pen.fillRect(time.x(states[at].t_s) - 0.8, y(person.awareness) - 0.8, 1.6, 1.6);
     }
   }
   if (states[index]) playhead(pen, time, states[index], height - bottom);
 }
 
-// Return runs of states in which a track is there, as [t_s, α, lower bound].
+// Return the person whom a track follows; everybody without one.
+function peopleOf(state, chosen) {
+  if (chosen === null) return state.people;
+  const track = state.tracks.find((each) => each.id === chosen);
+  if (!track) return [];
+  const away = (person) =>
+    Math.hypot(person.odom[0] - track.odom[0], person.odom[1] - track.odom[1]);
+  const nearest = [...state.people].sort((one, other) => away(one) - away(other))[0];
+  return nearest && away(nearest) < 1 ? [nearest] : [];
+}
+
+// Return runs of states in which a track is there, as [t_s, α, lower bound, what counts].
 function tracksOver(states) {
   const open = new Map(), runs = [];
   states.forEach((state, number) => {
@@ -84,7 +102,9 @@ function tracksOver(states) {
         runs.push(run);
       }
       run.last = number;
-      run.points.push([state.t_s, track.awareness, track.awareness_lower]);
+      const kept = state.obstacles.find((each) => each.id === track.id);
+      const counts = kept ? kept.awareness_lower : track.awareness_lower;
+      run.points.push([state.t_s, track.awareness, track.awareness_lower, counts]);
     }
   });
   return runs;

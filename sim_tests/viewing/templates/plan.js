@@ -98,8 +98,9 @@ function drawPlan(canvas, begin, states, index, layers) {
     pen.fillStyle = PALETTE.ink;
     pen.fill();
   }
+  viewEdges(pen, begin, state, x, y);
   robot(pen, begin, state, x, y, scale);
-  if (layers.tracks) for (const track of state.tracks) trackMark(pen, track, state, x, y, scale);
+  if (layers.tracks) for (const track of state.tracks) trackMark(pen, track, state, x, y, scale, height);
   scaleBar(pen, scale, height);
 }
 
@@ -179,6 +180,23 @@ function cone(pen, person, half, x, y, scale) {
   pen.stroke();
 }
 
+// The edges of what the camera sees; one that sees all around has none.
+function viewEdges(pen, begin, state, x, y) {
+  if (begin.camera_fov_rad >= 2 * Math.PI - 0.01) return;
+  const [px, py, heading] = state.robot_odom;
+  pen.beginPath();
+  for (const side of [-1, 1]) {
+    const angle = heading + (side * begin.camera_fov_rad) / 2;
+    pen.moveTo(x(px), y(py));
+    pen.lineTo(x(px + 3 * Math.cos(angle)), y(py + 3 * Math.sin(angle)));
+  }
+  pen.setLineDash([4, 4]);
+  pen.strokeStyle = PALETTE.soft;
+  pen.lineWidth = 1;
+  pen.stroke();
+  pen.setLineDash([]);
+}
+
 function robot(pen, begin, state, x, y, scale) {
   const [px, py, heading] = state.robot_odom;
   const cos = Math.cos(heading), sin = Math.sin(heading);
@@ -213,9 +231,10 @@ function arrow(pen, u0, v0, u1, v1, colour, thickness) {
   pen.fill();
 }
 
-function trackMark(pen, track, state, x, y, scale) {
+function trackMark(pen, track, state, x, y, scale, bottom) {
   const [px, py, vx, vy] = track.odom;
   const u = x(px), v = y(py), colour = trackColour(track.id);
+  if (v < 0 || v > bottom) return;
   arrow(pen, u, v, x(px + vx), y(py + vy), colour, 2);
   pen.strokeStyle = colour;
   pen.lineWidth = 2.5;
@@ -226,7 +245,9 @@ function trackMark(pen, track, state, x, y, scale) {
   const away = kept ? Math.max(kept.radius_m * scale, 14) : 14;
   font(pen, 12.5, 600);
   pen.textAlign = "center";
-  const text = `track ${track.id}: α ≥ ${track.awareness_lower.toFixed(2)}`;
+  const bound = kept ? kept.awareness_lower : track.awareness_lower;
+  const name = state.tracks.length > 3 ? "" : "track ";
+  const text = `${name}${track.id}: α ≥ ${bound.toFixed(2)}`;
   writeOver(pen, text, u, Math.max(v - away - 6, 14), PALETTE.ink, PALETTE.floor);
 }
 

@@ -20,8 +20,17 @@
       if (pictured) find("note").hidden = true;
       figures(state);
     }
-    drawAlpha(find("alpha"), begin, states, index);
+    drawAlpha(find("alpha"), begin, states, index, chosenTrack());
     drawMotion(find("motion"), begin, states, index);
+  }
+
+  function chosenTrack() {
+    const who = find("who");
+    const known = new Set([...who.options].map((each) => each.value));
+    for (const { id } of player.states[player.index]?.tracks ?? []) {
+      if (!known.has(String(id))) who.append(new Option(String(id), String(id)));
+    }
+    return who.value === "" ? null : Number(who.value);
   }
 
   function request() {
@@ -55,7 +64,7 @@
       name.append(mark, `${track.id}${track.status === "confirmed" ? "" : ", " + track.status}`);
       row.append(name);
       for (const text of [`${fixed(track.awareness)} ± ${fixed(track.awareness_std)}`,
-        fixed(track.awareness_lower), kept ? `${fixed(kept.radius_m)} m` : "–"]) {
+        fixed(track.awareness_lower), kept ? fixed(kept.awareness_lower) : "–", kept ? `${fixed(kept.radius_m)} m` : "–"]) {
         const cell = document.createElement("td");
         cell.textContent = text;
         row.append(cell);
@@ -121,7 +130,7 @@
     player.begin = begin;
     find("title").textContent = begin.scenario;
     find("facts").textContent = [`seed ${begin.seed}`, `policy ${begin.policy}`, begin.planner,
-      `perception ${begin.perception}`, begin.fault && `fault ${begin.fault}`].filter(Boolean).join(" · ");
+      begin.perception, begin.fault && `fault ${begin.fault}`].filter(Boolean).join(" · ");
     find("play").disabled = false;
     request();
   }
@@ -193,6 +202,7 @@
   for (const box of document.querySelectorAll("[data-layer]")) {
     box.addEventListener("change", () => { layers[box.dataset.layer] = box.checked; request(); });
   }
+  find("who").addEventListener("change", request);
   for (const id of ["alpha", "motion"]) {
     const chart = find(id);
     const scrub = (event) => {
@@ -221,6 +231,8 @@
     takeBegin(recording.begin);
     player.states = recording.states;
     takeEnd(recording);
+    const ids = new Set(recording.states.flatMap((state) => state.tracks.map(({ id }) => id)));
+    for (const id of ids) find("who").append(new Option(String(id), String(id)));
     show(0);
     if (!calm) play(true);
   } else {
