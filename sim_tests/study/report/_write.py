@@ -78,7 +78,8 @@ def write_report(
     run = RunData.read(out_dir)
     statistics = RunStatistics.of(run.episodes)
     arms = statistics.arms
-    listed = list_episodes(run, arms)
+    path = run.path / _REPORT if path is None else path
+    listed = list_episodes(run, arms, path.parent)
     errors = sum(len(arm.errors) for arm in arms)
     page = _render_page(
         title=title_of(run, len(arms)),
@@ -100,7 +101,6 @@ def write_report(
         reproduction=reproduction(run),
         metrics=(*MAIN, *FURTHER, *PAIRED_ONLY),
     )
-    path = run.path / _REPORT if path is None else path
     part = path.with_name(path.name + ".part")
     try:
         part.write_text(page, "utf-8")
