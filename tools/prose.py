@@ -25,7 +25,7 @@ RIDDLES = {
     r"\bis (then )?nobody\b": "name the thing: 'is not reported as a person'",
     r"\bwhoever\b": "'a person who'",
     r"\bwhomever\b": "'a person whom'",
-    r"\bwho (runs|walks|comes|looks|stands|sets off|obeys|has) (is|are|was|has|can|may)\b": (
+    r"(^|[.,;:] )who (runs|walks|comes|looks|stands|sets off|obeys) (is|was|has|can|may)\b": (
         "'a person who'"
     ),
     r"\bafter a kill\b": "'a killed run continues with --resume'",
