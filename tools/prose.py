@@ -44,6 +44,7 @@ RIDDLES = {
     r"\bmakes? no secret\b": "say it",
     r"\bis where it is\b": "give the place",
 }
+_END_OF_SENTENCE = r"(?<=[.!?])\s+(?=[\"'(–—]*[A-Z\d])|(?<=[.!?][)\"'])\s+"
 #: Sentences that begin so: the subject of a sentence comes first, and it is a thing.
 RIDDLE_BEGINNINGS = {
     r"Who(se|m|ever)?\b[^?]*$": "begin with the subject: 'A person who …'",
@@ -134,7 +135,7 @@ def sentences(markdown: str) -> list[Sentence]:
         text = re.sub(r"`[^`]*`", "`x`", text)
         text = re.sub(r"<[^>]*>|\*\*|(?<!\w)[*_]|[*_](?!\w)", "", text)
         text = text.replace("`x`", "CODE")
-        for part in re.split(r"(?<=[.!?])[\"')]*\s+(?=[\"'(–—]*[A-Z0-9\d])", _protected(text)):
+        for part in re.split(_END_OF_SENTENCE, _protected(text)):
             plain = part.replace("\0", ".").strip()
             if re.search(r"\w", plain):
                 found.append(Sentence(line, plain))
