@@ -44,7 +44,7 @@ RIDDLES = {
     r"\bmakes? no secret\b": "say it",
     r"\bis where it is\b": "give the place",
 }
-_END_OF_SENTENCE = r"(?<=[.!?])\s+(?=[\"'(–—]*[A-Z\d])|(?<=[.!?][)\"'])\s+"
+_END_OF_SENTENCE = r"(?<=[.!?])\s+(?=[\"'(–—]*[A-Zα-ω\d])|(?<=[.!?][)\"'])\s+"
 #: Sentences that begin so: the subject of a sentence comes first, and it is a thing.
 RIDDLE_BEGINNINGS = {
     r"Who(se|m|ever)?\b[^?]*$": "begin with the subject: 'A person who …'",
@@ -221,7 +221,7 @@ def _without_front_matter(markdown: str) -> list[str]:
 def _protected(text: str) -> str:
     """Hide the full stops that end no sentence."""
     text = re.sub(r"\b(e\.g|i\.e|et al|etc|vs|cf|approx|Eq|Fig|No)\.", r"\1" + "\0", text)
-    return re.sub(r"\b([A-Z])\. (?=[A-Z])", "\\1\0 ", text)
+    return re.sub(r"\b([A-Z])\. ([A-Z])\. (?=[A-Z])", "\\1\0 \\2\0 ", text)  # initials
 
 
 if __name__ == "__main__":
