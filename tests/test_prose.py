@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import ast
+import re
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -15,6 +18,7 @@ finally:
     sys.path.remove(str(ROOT))
 
 PAGES = prose.pages()
+PACKAGES = ("perception", "tracking", "nav_adapter", "awarenav", "sim_tests")
 PAGE = """---
 title: front matter
 ---
@@ -160,3 +164,24 @@ def test_sentences_are_short_over_all_pages() -> None:
     assert {"README.md", "CHANGELOG.md", "docs/safety.md"} <= set(PAGES)
     found = [sentence for markdown in PAGES.values() for sentence in prose.sentences(markdown)]
     assert prose.mean_words(found) <= prose.MEAN_WORDS
+
+
+def docstrings(package: str) -> Iterator[tuple[str, str]]:
+    """The docstrings of a package with their places, help texts of commands included."""
+    for path in sorted((ROOT / package).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if not isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+                continue
+            if text := ast.get_docstring(node):
+                yield f"{path.relative_to(ROOT)}:{getattr(node, 'lineno', 1)}", text
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_docstrings_say_what_a_thing_is_or_does(package: str) -> None:
+    found = dict(docstrings(package))
+    assert len(found) > 50
+    riddles = "|".join(prose.RIDDLES)
+    begins = re.compile("(What|Who|Whom|Whose|Where|Which|Whether|When|Why|How|Whoever|Nobody)\\b")
+    assert [place for place, text in found.items() if begins.match(text)] == []
+    flat = {place: " ".join(text.split()) for place, text in found.items()}
+    assert [place for place, text in flat.items() if re.search(riddles, text, re.I)] == []

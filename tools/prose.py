@@ -37,7 +37,7 @@ RIDDLES = {
     r"\bnot knowing\b": "say what is unknown",
     r"\bis no licen[cs]e\b": "say what the limit is",
     r"\bstood to the robot\b": "'was aware of the robot'",
-    r"\bit is none\b": "'it does not replace one'",
+    r"\b(?-i:it is none)\b": "'it does not replace one'",
     r"\bnone by itself\b": "'it does not replace one'",
     r"\bunasked\b": "'only if you ask for it'",
     r"\blooks? at no\b": "say what is not done",
