@@ -23,7 +23,7 @@ LONG_WORDS = 35
 
 #: Turns of phrase that a reader has to solve, and what to write instead.
 RIDDLES = {
-    r"\b(whom|which|what) nobody\b": "say what happens instead, as 'a person out of view'",
+    r"\b(whom|what) nobody\b": "say what happens instead, as 'a person out of view'",
     r"\bnobody (knows?|sees?|asks?|asked|reads?|heeds?|looks?|nobody)\b": "name the thing itself",
     r"\bwhere nobody is\b": "name the place",
     r"\b(is|are) (then )?nobody\b": "name the thing itself",
