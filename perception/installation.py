@@ -1,4 +1,4 @@
-"""How to install what is missing, in the words of the installation that runs.
+"""Installation commands for what is missing, in the words of the installation that runs.
 
 An installation from an index is extended by ``pip install 'awarenav[sim]'``. One from a checkout or
 an archive is not: that line would look for an index which may not have this version. Installers

@@ -71,7 +71,7 @@ class CrossingRecorder:
             self._on_state(state)
 
     @property
-    def note(self) -> str:
+        """The reason why there are no pictures; empty where there are."""
         """Why there are no pictures; empty where there are."""
         if self._pictures is None:
             return "Recorded without the robot's camera."
