@@ -16,7 +16,8 @@ from tools.sbom import OUT, ROOT, release_date, sbom_of
 def version_of(root: Path) -> str:
     """Return ``__version__`` of the checkout."""
     text = (root / "awarenav/__init__.py").read_text(encoding="utf-8")
-    return re.findall(r'^__version__ = "(.+)"$', text, re.MULTILINE)[0]
+    (version,) = re.findall(r'^__version__ = "(.+)"$', text, re.MULTILINE)
+    return str(version)
 
 
 def problems(root: Path, tag: str) -> tuple[str, ...]:

@@ -86,11 +86,11 @@ def read_lock(text: str) -> tuple[Pin, ...]:
 
 def licence_of(found: metadata.Distribution) -> tuple[str, str]:
     """Return the SPDX expression that a package states, and what it says where that is unclear."""
-    expression = found.metadata.get("License-Expression")
-    if expression:
-        return expression, ""
+    stated = {key: found.metadata[key] for key in ("License-Expression", "License")}
+    if stated["License-Expression"]:
+        return stated["License-Expression"], ""
     # Some packages give the whole text, which begins with its name.
-    text = (found.metadata.get("License") or "").strip().partition("\n")[0].strip()
+    text = (stated["License"] or "").strip().partition("\n")[0].strip()
     for identifier, texts in _TEXTS.items():
         if text in texts:
             return identifier, ""
@@ -101,8 +101,8 @@ def licence_of(found: metadata.Distribution) -> tuple[str, str]:
     ]
     if len(classifiers) == 1 and classifiers[0] in _CLASSIFIERS:
         return _CLASSIFIERS[classifiers[0]], ""
-    stated = "; ".join(classifiers) or text
-    return _UNKNOWN, f"The package states: {stated or 'nothing'}"
+    unclear = "; ".join(classifiers) or text or "nothing"
+    return _UNKNOWN, f"The package states: {unclear}"
 
 
 def installed_licences(folders: Iterable[Path] = ()) -> dict[tuple[str, str], tuple[str, str]]:
