@@ -139,7 +139,7 @@ def test_the_tests_of_the_page_pass(copy: Path) -> None:
 def test_the_code_of_the_page_passes_the_linters(copy: Path) -> None:
     pages = [block.path for block in blocks() if block.language == "diff"]
     run(copy, "ruff", "check", "--no-cache", "--fix", "--select", "I,RUF022", *pages)
-    files = [*pages, *(block.path for block in blocks() if block.language == "python")]
+    files = [*pages, *(block.path for block in blocks() if block.language == "py")]
     run(copy, "ruff", "check", "--no-cache", *files)
     run(copy, "ruff", "format", "--no-cache", "--check", *files)
 
