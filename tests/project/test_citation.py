@@ -1,4 +1,4 @@
-"""CITATION.cff and CITATION.bib: valid, of this version, and of one mind about the paper."""
+"""CITATION.cff and CITATION.bib: valid, of this version, and with the same paper."""
 
 from __future__ import annotations
 
