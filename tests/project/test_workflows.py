@@ -63,7 +63,7 @@ def test_each_right_to_write_is_where_it_is_used() -> None:
         "build": {"id-token", "attestations"},
         "index": {"id-token"},
         "page": {"contents"},
-        "site": {"pages", "id-token"},
+        "site": {"contents"},
     }
 
 
