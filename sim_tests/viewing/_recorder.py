@@ -71,8 +71,8 @@ class CrossingRecorder:
             self._on_state(state)
 
     @property
-        """The reason why there are no pictures; empty where there are."""
-        """Why there are no pictures; empty where there are."""
+    def note(self) -> str:
+        """The reason for which there are no pictures; empty where there are."""
         if self._pictures is None:
             return "Recorded without the robot's camera."
         return self._pictures.trouble
