@@ -83,8 +83,8 @@ class Font:
 
     Args:
         height_px: height of a line of text.
-        weight: 100 (thin) to 1000 (black), 400 is regular. 0 leaves it to OpenCV 5, whose weight
-            then depends on the text that the process drew before.
+        weight: 100 (thin) to 1000 (black), 400 is regular. 0 is OpenCV 5's default, which is not
+            the same in all processes.
     """
 
     def __init__(self, height_px: int, weight: int = 0) -> None:
