@@ -109,7 +109,7 @@ END
 }
 
 # Shows how far an installer is, from its output: one line that changes on a terminal, else one line
-# for each quarter of the $1 packages.
+# for each third of the $1 packages.
 show_progress() {
     fetched=0
     while IFS= read -r line; do
@@ -122,7 +122,7 @@ show_progress() {
             name=${name##*/}
             if [ -t 2 ]; then
                 printf '\r\033[Ksetup: package %s of %s: %s' "$fetched" "$1" "$name" >&2
-            elif [ $((fetched * 4 / $1)) != $(((fetched - 1) * 4 / $1)) ]; then
+            elif [ $((fetched * 3 / $1)) != $(((fetched - 1) * 3 / $1)) ]; then
                 say "fetched $fetched of $1 packages"
             fi
             ;;
@@ -158,9 +158,9 @@ install() {
     : >"$LOG"
     started=$(date +%s)
     count=$(packages)
-    installer=pip
-    ! have_uv || installer=uv
-    say "installing $count pinned packages with $installer: $SIZE, a minute or two"
+    how="pip: $SIZE, a minute or two"
+    ! have_uv || how="uv: $SIZE, less than a minute"
+    say "installing $count pinned packages with $how"
     if have_uv; then
         logged "$count" uv pip install --python "$VENV/bin/python" --no-deps -r "$LOCK"
         logged "$count" uv pip install --quiet --python "$VENV/bin/python" --no-deps \
