@@ -158,8 +158,8 @@ install() {
     : >"$LOG"
     started=$(date +%s)
     count=$(packages)
-    how="pip: $SIZE, a minute or two"
-    ! have_uv || how="uv: $SIZE, less than a minute"
+    how="pip: up to $SIZE, a minute or two"
+    ! have_uv || how="uv: up to $SIZE, less than a minute"
     say "installing $count pinned packages with $how"
     if have_uv; then
         logged "$count" uv pip install --python "$VENV/bin/python" --no-deps -r "$LOCK"

@@ -18,6 +18,7 @@ from perception.arrays import ImageRgb
 
 from ..crossing import CrossingFrame, CrossingResult, Stage
 from ..scenario import Scenario
+from ..world import sees
 from ..world.camera import CameraRenderer
 from ._animated_image import AnimatedImageWriter
 from ._film_panel import PANEL_PX, PORTRAIT_PX, draw_panel
@@ -123,9 +124,10 @@ class PortraitRecorder:
         self._cycles += 1
 
     def _portrait(self, frame: CrossingFrame, stage: Stage) -> ImageRgb | None:
-        if not stage.workers:
-            return None
         T = frame.T_odom_camera
+        robot = frozenset({stage.amr.body})
+        if not stage.workers or not sees(stage.workers[0], T[:3, 3], through=robot):
+            return None
         middle = (stage.workers[0].eyes_odom_m - T[:3, 3]) @ T[:3, :3]
         middle[1] += _PORTRAIT_BELOW_EYES_M
         if middle[2] <= 0.1:

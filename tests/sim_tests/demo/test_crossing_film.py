@@ -106,12 +106,12 @@ def test_the_robots_way_points_up_and_its_left_is_left():
     assert (left - start).tolist() == pytest.approx([-MAP_PX_PER_M, 0.0])
 
 
-def test_portraits_show_the_worker_while_the_camera_sees_the_place(scenario):
-    short = scenario.model_copy(update={"duration_s": 0.5})
-    recorder = PortraitRecorder(short)
-    run_crossing(short, policy="balanced", perception="truth", observer=recorder)
-    assert len(recorder.portraits) == 5
-    for portrait in recorder.portraits:
+def test_portraits_show_the_worker_from_behind_the_rack_to_the_edge_of_the_view(run):
+    shown = [portrait is not None for portrait in run.portraits]
+    assert not shown[0]
+    assert all(shown[10:50])
+    assert not any(shown[65:])
+    for portrait in run.portraits[10:50]:
         assert portrait.shape == (PORTRAIT_PX[1], PORTRAIT_PX[0], 3)
         assert portrait.std() > 10.0
 
