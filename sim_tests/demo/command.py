@@ -15,14 +15,14 @@ from awarenav.cli import FilePath, command, option, options
 )
 @options.out_folder("demo")
 @options.seed()
-@option("--no-video", is_flag=True, help="Write no video (faster).")
+@option("--no-video", is_flag=True, help="Write no films (faster).")
 @options.perception(["keypoints", "pixels"], note=" 'pixels' takes many minutes.")
 @options.as_json("the tables")
 def demo(out: Path, seed: int, *, no_video: bool, perception: str, as_json: bool) -> int:
     """Run the paper's 25 s encounter, and one crossing with and without awareness.
 
-    Prints the results and writes encounter.png, encounter.mp4, encounter.csv, crossings.png and
-    episodes.csv.
+    Prints the results. Writes encounter.png, encounter.mp4 and encounter.csv; crossings.png and
+    episodes.csv; and a film of the crossing with three robots: crossing.webp and crossing.mp4.
     """
     from ._demo import run_demo  # noqa: PLC0415 - help needs no simulator
 
