@@ -95,7 +95,8 @@ class OutsideFiles:
 def page_of(root: Path, target: str) -> str:
     """Return the path on the site of a file or folder of the repository."""
     if target.startswith("docs/"):
-        return target.removeprefix("docs/")
+        # A notebook has a page that shows it.
+        return target.removeprefix("docs/").replace(".ipynb", ".md")
     if (root / target).is_dir():
         return f"{FOLDER}/{target}/index.md"
     shown_as_it_is = target.endswith((".md", *PICTURES))
