@@ -23,7 +23,9 @@ _FETCHED: Final = {
     *(("audio", "src"), ("embed", "src"), ("object", "data"), ("link", "href")),
 }
 #: Kinds of <link> that are fetched; others, such as the canonical address, are not.
-_FETCHED_LINKS: Final = {"stylesheet", "icon", "preload", "preconnect", "dns-prefetch", "modulepreload"}
+_FETCHED_LINKS: Final = frozenset(
+    ("stylesheet", "icon", "preload", "preconnect", "dns-prefetch", "modulepreload")
+)
 _IN_STYLE: Final = re.compile(r"""(?:url\(|@import\s+)["']?((?:https?:)?//[^"')\s]+)""")
 
 

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
 import json
+import re
+import textwrap
 import types
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
 
 import griffe
@@ -27,8 +32,7 @@ _UNITS: Final = {
     "s": "s",
     "hz": "Hz",
     "px": "px",
-    "kg": "kg",
-    "mm": "mm",
+    "m2ps3": "m²/s³",
 }
 _WORDS: Final = {float: "number", int: "whole number", bool: "true or false", str: "text"}
 
@@ -55,7 +59,8 @@ class ConfigPage:
         """Return the page."""
         parts = [f"# {self.title}", self.intro]
         for path, model in self._models():
-            parts += [f"## {path or 'The file'} {{ #{_anchor(model)} }}", *self._section(model)]
+            heading = f"{path}: {model.__name__}" if path else "The file"
+            parts += [f"## {heading} {{ #{_anchor(model)} }}", *self._section(model)]
         return "\n\n".join([*parts, self.closing]).rstrip() + "\n"
 
     def _models(self) -> Iterator[tuple[str, type[BaseModel]]]:
@@ -89,50 +94,70 @@ class ConfigPage:
         sections = docstring.parse("google", warnings=False)
         text = [part.value for part in sections if part.kind is griffe.DocstringSectionKind.text]
         meanings = attribute_meanings(model)
-        rows = ["| key | unit | value | default | meaning |", "| --- | --- | --- | --- | --- |"]
+        rows = ["| key | value | default | meaning |", "| --- | --- | --- | --- |"]
         rows += [
-            f"| `{name}` | {unit_of(name)} | {self._value(info)} | {_default(info)} | "
-            f"{meanings.get(name, '')} |"
+            f"| `{name}` | {self._value(name, info)} | {_default(info)} | {meanings[name]} |"
             for name, info in model.model_fields.items()
         ]
-        return [f"`{model.__name__}`. {plain(text[0] if text else '')}", "\n".join(rows)]
+        return [plain(text[0] if text else ""), "\n".join(rows)]
 
-    def _value(self, info: FieldInfo) -> str:
-        return _cell(self._words(info.annotation) + _range(info.metadata))
+    def _value(self, name: str, info: FieldInfo) -> str:
+        """Return the kind of value, its limits and its unit."""
+        unit = unit_of(name)
+        value = self._words(info.annotation) + _range(info.metadata)
+        return _cell(f"{value}; {unit}" if unit else value)
 
     def _words(self, annotation: Any) -> str:
         """Return an annotation in words."""
-        origin, arguments = get_origin(annotation), get_args(annotation)
         if annotation is type(None):
             return "null"
-        if origin is Annotated:
-            return self._words(arguments[0]) + _range(arguments[1:])
-        if origin is Literal:
-            return " or ".join(f"`{each}`" for each in arguments)
-        if origin in (Union, types.UnionType):
-            return " or ".join(self._words(each) for each in arguments)
-        if origin is tuple and arguments[-1] is Ellipsis:
-            return f"list of {self._words(arguments[0])}"
-        if origin is tuple:
-            return f"[{', '.join(self._words(each) for each in arguments)}]"
-        if origin is dict:
-            return f"mapping of {self._words(arguments[0])} to {self._words(arguments[1])}"
-        models = self._held(annotation)
-        if models:
+        if get_origin(annotation) is not None:
+            return self._composed(get_origin(annotation), get_args(annotation))
+        if models := self._held(annotation):
             return " or ".join(f"[{each.__name__}](#{_anchor(each)})" for each in models)
         return _WORDS.get(annotation, getattr(annotation, "__name__", str(annotation)))
 
+    def _composed(self, origin: Any, arguments: tuple[Any, ...]) -> str:
+        """Return an annotation of several parts in words."""
+        if origin is Literal:
+            return " or ".join(f"`{each}`" for each in arguments)
+        if origin is Annotated:
+            return self._words(arguments[0]) + _range(arguments[1:])
+        words = [self._words(each) for each in arguments if each is not Ellipsis]
+        if origin in (Union, types.UnionType):
+            return " or ".join(words)
+        if origin is tuple:
+            return f"list of {words[0]}" if Ellipsis in arguments else f"[{', '.join(words)}]"
+        return f"mapping of {words[0]} to {words[1]}"
+
 
 def attribute_meanings(model: type[BaseModel]) -> dict[str, str]:
-    """Return what each key means, from the model's docstring and those of its bases."""
+    """Return what each key means, from the docstrings of the model, its fields and its bases."""
     found: dict[str, str] = {}
     for each in reversed(model.__mro__):
-        if not issubclass(each, BaseModel) or not each.__doc__:
+        if not issubclass(each, BaseModel) or each is BaseModel or not each.__doc__:
             continue
         for part in griffe.Docstring(each.__doc__, lineno=1).parse("google", warnings=False):
             if part.kind is griffe.DocstringSectionKind.attributes:
-                found |= {one.name: _cell(plain(one.description)) for one in part.value}
-    return found
+                found |= {one.name: one.description for one in part.value}
+        found |= _field_docstrings(each)
+    # A file says null where Python says None.
+    return {name: _cell(re.sub(r"\bNone\b", "null", plain(text))) for name, text in found.items()}
+
+
+def _field_docstrings(model: type[BaseModel]) -> dict[str, str]:
+    """Return the docstrings that stand below the fields of a model."""
+    (definition,) = ast.parse(textwrap.dedent(inspect.getsource(model))).body
+    body = definition.body if isinstance(definition, ast.ClassDef) else []
+    return {
+        field_.target.id: below.value.value
+        for field_, below in pairwise(body)
+        if isinstance(field_, ast.AnnAssign)
+        and isinstance(field_.target, ast.Name)
+        and isinstance(below, ast.Expr)
+        and isinstance(below.value, ast.Constant)
+        and isinstance(below.value.value, str)
+    }
 
 
 def unit_of(name: str) -> str:
@@ -176,17 +201,19 @@ def _default(info: FieldInfo) -> str:
     value = info.get_default(call_default_factory=True)
     if isinstance(value, BaseModel):
         changed = value.model_dump(mode="json", exclude_defaults=True)
-        return _code(changed) if changed else "its defaults"
+        if any(each.is_required() for each in type(value).model_fields.values()):
+            return _code(changed)
+        return f"its defaults, but {_code(changed)}" if changed else "its defaults"
     if isinstance(value, tuple) and any(isinstance(each, BaseModel) for each in value):
         return _code([each.model_dump(mode="json", exclude_defaults=True) for each in value])
-    if value == ():
+    if value in ((), ""):
         return "none"
     return _code(list(value) if isinstance(value, tuple) else value)
 
 
 def _code(value: Any) -> str:
     text = json.dumps(value, ensure_ascii=False, default=str).replace('"', "")
-    return _cell(f"`{text}`") if len(text) <= 60 else "see the shipped files"
+    return _cell(f"`{text}`") if len(text) <= 60 else "a shipped value"
 
 
 def _cell(text: str) -> str:

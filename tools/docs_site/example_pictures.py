@@ -113,9 +113,7 @@ def _draw_map(axes: Axes, recording: Recording) -> None:
     for number in moments:
         state, constraints = recording.constraints[number]
         heading = state.heading_odom_rad
-        turn = np.array(
-            [[np.cos(heading), -np.sin(heading)], [np.sin(heading), np.cos(heading)]]
-        )
+        turn = np.array([[np.cos(heading), -np.sin(heading)], [np.sin(heading), np.cos(heading)]])
         outline = NOVA_CARTER.footprint_m @ turn.T + state.position_odom_m
         axes.add_patch(Polygon(outline, fc=_ROBOT, ec="none", alpha=0.55))
         for obstacle in constraints.obstacles:

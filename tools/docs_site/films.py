@@ -27,7 +27,7 @@ from sim_tests.crossing import Stage, TopView
 FOLDER: Final = Path(__file__).parents[2] / "docs" / "images" / "films"
 #: Largest film, and largest sum of all films.
 MAX_FILM_BYTES: Final = 150_000
-MAX_SUM_BYTES: Final = 2_600_000
+MAX_SUM_BYTES: Final = 2_850_000
 
 _WIDTH_PX: Final = 440
 _MAX_HEIGHT_PX: Final = 260
@@ -105,9 +105,7 @@ def _reduced(picture: Image.Image, colours: int) -> Image.Image:
     return picture.quantize(colours, dither=Image.Dither.NONE).convert("RGB")
 
 
-def _encoded(
-    pictures: list[Image.Image], *, lossless: bool = True, quality: int = 70
-) -> bytes:
+def _encoded(pictures: list[Image.Image], *, lossless: bool = True, quality: int = 70) -> bytes:
     step_ms = round(1000.0 * _EVERY_S / _SPEED_UP)
     durations = [step_ms] * (len(pictures) - 1) + [_REST_MS]
     stream = io.BytesIO()
@@ -141,14 +139,12 @@ def main() -> int:
     FOLDER.mkdir(parents=True, exist_ok=True)
     for name in names:
         film = Film()
-        run_crossing(
-            name, policy="balanced", perception="keypoints+scanner", seed=0, observer=film
-        )
+        run_crossing(name, policy="balanced", perception="keypoints+scanner", seed=0, observer=film)
         data = film.webp()
         (FOLDER / f"{name}.webp").write_bytes(data)
         print(f"{name}: {len(film.pictures)} pictures, {len(data) / 1e3:.0f} kB", flush=True)
     total = sum(path.stat().st_size for path in FOLDER.glob("*.webp"))
-    print(f"all films: {total / 1e6:.2f} MB of at most {MAX_SUM_BYTES / 1e6:.1f} MB")
+    print(f"all films: {total / 1e6:.2f} MB of at most {MAX_SUM_BYTES / 1e6:.2f} MB")
     return int(total > MAX_SUM_BYTES)
 
 

@@ -16,10 +16,9 @@ ROOT: Final = Path(__file__).resolve().parents[2]
 # MkDocs loads this file by its path; the pages come from the checkout, not from an installation.
 sys.path.insert(0, str(ROOT))
 
+from awarenav import __version__  # noqa: E402
 from tools.docs_site import notebook, reference  # noqa: E402
 from tools.docs_site.outside_files import OutsideFiles  # noqa: E402
-
-from awarenav import __version__  # noqa: E402
 
 #: Pages of the navigation that need not be there yet.
 _TO_COME: Final = (
@@ -32,6 +31,7 @@ _TO_COME: Final = (
     "paper.md",
     "watching.md",
 )
+_WIDE: Final = ("index.md", "gallery.md")
 _outside: OutsideFiles | None = None
 
 
@@ -69,7 +69,9 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
-    """Lead links out of ``docs/`` to pages of the site."""
+    """Lead links out of ``docs/`` to pages of the site; give pages of films their full width."""
+    if page.file.src_uri in _WIDE:
+        page.meta["hide"] = ["navigation"]
     return markdown if _outside is None else _outside.links_rewritten(page.file.src_uri, markdown)
 
 

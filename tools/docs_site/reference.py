@@ -55,8 +55,8 @@ CONFIG_PAGES: Final = {
     ),
     "scenario-keys": ConfigPage(
         "Scenario keys",
-        f"The keys of a scenario's file, for [scenarios](../scenarios.md). {_KEYS} Any number under "
-        "`people`, `workers` and `robot` may be a [distribution](../scenarios.md).",
+        f"The keys of a scenario's file, for [scenarios](../scenarios.md). {_KEYS} Any number "
+        "under `people`, `workers` and `robot` may be a [distribution](../scenarios.md).",
         Scenario,
     ),
     "tracker-keys": ConfigPage(

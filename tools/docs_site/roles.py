@@ -46,9 +46,18 @@ class LinkedRoles(griffe.Extension):
     """Rewrites the references in every docstring that is read."""
 
     def on_object(self, *, obj: griffe.Object, **_: Any) -> None:
-        """Rewrite one object's docstring."""
-        if obj.docstring is not None:
-            obj.docstring.value = linked(obj.docstring.value, _page_of(obj.module.path))
+        """Rewrite the docstring of an object within a package."""
+        _rewrite(obj)
+
+    def on_package(self, *, pkg: griffe.Module, **_: Any) -> None:
+        """Rewrite the docstring of a package, which is no object within another."""
+        _rewrite(pkg)
+
+
+def _rewrite(documented: griffe.Object) -> None:
+    if documented.docstring is not None:
+        home = _page_of(documented.module.path)
+        documented.docstring.value = linked(documented.docstring.value, home)
 
 
 def _page_of(module: str) -> str:

@@ -62,14 +62,20 @@ def topics_page() -> str:
 def _metric_table(metrics: Mapping[str, Metric]) -> str:
     rows = ["| metric | title | unit | better | meaning |", "| --- | --- | --- | --- | --- |"]
     rows += [
-        f"| `{name}` | {each.title} | {each.unit} | {_BETTER[each.better]} | {each.meaning} |"
+        f"| `{name}` | {each.title} | {each.unit} | {_BETTER[each.better]} | "
+        f"{_cell(each.meaning)} |"
         for name, each in metrics.items()
     ]
-    return "\n".join(rows).replace("Mean |α of the track − true α|", "Mean difference of α and truth")
+    return "\n".join(rows).replace(
+        "Mean |α of the track − true α|", "Mean difference of α and truth"
+    )
 
 
 def _topic_table(topics: Iterable[Topic]) -> str:
-    rows = ["| topic | type | reliability | durability | depth |", "| --- | --- | --- | --- | --- |"]
+    rows = [
+        "| topic | type | reliability | durability | depth |",
+        "| --- | --- | --- | --- | --- |",
+    ]
     rows += [
         f"| `/{each.name}` | `{ros_type(each.message).replace('/msg/', '/')}` | "
         f"{'reliable' if each.reliable else 'best effort'} | "
@@ -83,8 +89,13 @@ def _attributes(record: type) -> dict[str, str]:
     """Return the meaning of each attribute in a docstring."""
     parts = griffe.Docstring(record.__doc__ or "", lineno=1).parse("google", warnings=False)
     return {
-        one.name: " ".join(plain(one.description).split()).replace("|", "\\|")
+        one.name: _cell(plain(one.description))
         for part in parts
         if part.kind is griffe.DocstringSectionKind.attributes
         for one in part.value
     }
+
+
+def _cell(text: str) -> str:
+    """Return text for one cell of a table."""
+    return " ".join(text.split()).replace("|", "\\|")
