@@ -58,12 +58,12 @@ class ConfigPage:
     def markdown(self) -> str:
         """Return the page."""
         parts = [f"# {self.title}", self.intro]
-        for path, model in self._models():
+        for path, model in self.models():
             heading = f"{path}: {model.__name__}" if path else "The file"
             parts += [f"## {heading} {{ #{_anchor(model)} }}", *self._section(model)]
         return "\n\n".join([*parts, self.closing]).rstrip() + "\n"
 
-    def _models(self) -> Iterator[tuple[str, type[BaseModel]]]:
+    def models(self) -> Iterator[tuple[str, type[BaseModel]]]:
         """Yield every model once, with the path of the first key that holds it."""
         seen: set[type[BaseModel]] = set()
         waiting: list[tuple[str, type[BaseModel]]] = [("", self.model)]
@@ -126,8 +126,10 @@ class ConfigPage:
         words = [self._words(each) for each in arguments if each is not Ellipsis]
         if origin in (Union, types.UnionType):
             return " or ".join(words)
-        if origin is tuple:
-            return f"list of {words[0]}" if Ellipsis in arguments else f"[{', '.join(words)}]"
+        if origin is tuple and Ellipsis not in arguments:
+            return f"[{', '.join(words)}]"
+        if origin is not dict:
+            return f"list of {words[0]}"
         return f"mapping of {words[0]} to {words[1]}"
 
 
