@@ -18,7 +18,7 @@ sys.path.insert(0, str(ROOT))
 
 from awarenav import __version__  # noqa: E402
 from tools.docs_site import notebook, reference  # noqa: E402
-from tools.docs_site.outside_files import OutsideFiles  # noqa: E402
+from tools.docs_site.outside_files import FOLDER, OutsideFiles  # noqa: E402
 
 #: Pages of the navigation that need not be there yet.
 _TO_COME: Final = (
@@ -69,9 +69,11 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
-    """Lead links out of ``docs/`` to pages of the site; give pages of films their full width."""
+    """Lead links out of ``docs/`` to pages of the site; give films and code their full width."""
     if page.file.src_uri in _WIDE:
         page.meta["hide"] = ["navigation"]
+    elif page.file.src_uri.startswith(f"{FOLDER}/"):
+        page.meta["hide"] = ["navigation", "toc"]
     return markdown if _outside is None else _outside.links_rewritten(page.file.src_uri, markdown)
 
 

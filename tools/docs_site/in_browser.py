@@ -91,7 +91,6 @@ def main() -> int:
                 context = browser.new_context(
                     viewport={"width": width, "height": height},
                     color_scheme=scheme,
-                    reduced_motion="reduce",
                 )
                 context.set_default_timeout(120_000)
                 page = context.new_page()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from typing import Final
 
@@ -89,7 +90,7 @@ def _attributes(record: type) -> dict[str, str]:
     """Return the meaning of each attribute in a docstring."""
     parts = griffe.Docstring(record.__doc__ or "", lineno=1).parse("google", warnings=False)
     return {
-        one.name: _cell(plain(one.description))
+        one.name: _cell(re.sub(r"\bNone\b", "empty", plain(one.description)))
         for part in parts
         if part.kind is griffe.DocstringSectionKind.attributes
         for one in part.value
