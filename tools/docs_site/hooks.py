@@ -29,6 +29,7 @@ _TO_COME: Final = (
     "explorer.md",
     "faq.md",
     "paper.md",
+    "upgrading.md",
     "watching.md",
 )
 _WIDE: Final = ("index.md", "gallery.md")
