@@ -1,4 +1,4 @@
-"""What MkDocs calls while it builds the site: generated pages, and links out of ``docs/``."""
+"""Events of MkDocs while it builds the site: generated pages, and links out of ``docs/``."""
 
 from __future__ import annotations
 

@@ -75,10 +75,9 @@ class OutsideFiles:
 
     def _outside(self, name: str, text: str) -> Iterator[str]:
         """Yield the files outside ``docs/`` that a page links to."""
-        found: list[str] = []
-        outside_code(text, lambda part: found.extend(_LINK.findall(part)) or part)  # type: ignore[func-returns-value]
-        for _, link, _ in found:
-            target = self._resolved(name, link)
+        prose = "".join(part for part in FENCED.split(text) if not FENCED.fullmatch(part))
+        for link in _LINK.finditer(prose):
+            target = self._resolved(name, link.group(2))
             if target and not target.startswith("docs/") and (self._root / target).exists():
                 yield target
 
