@@ -14,7 +14,7 @@ import functools
 import io
 import runpy
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
@@ -176,12 +176,12 @@ def example_names() -> tuple[str, ...]:
     return (*sorted(path.stem for path in (ROOT / "examples").glob("*.py")), *PLANNERS)
 
 
-def main() -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Make the pictures."""
     parser = argparse.ArgumentParser(description="Make the pictures of the examples.")
     parser.add_argument("examples", nargs="*", help="default: all")
     FOLDER.mkdir(parents=True, exist_ok=True)
-    for name in parser.parse_args().examples or example_names():
+    for name in parser.parse_args(arguments).examples or example_names():
         stream = io.BytesIO()
         figure_of(record_example(name)).savefig(stream, format="png")
         image = Image.open(stream).convert("RGB")

@@ -13,6 +13,7 @@ import argparse
 import dataclasses
 import io
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
@@ -29,6 +30,8 @@ FOLDER: Final = Path(__file__).parents[2] / "docs" / "images" / "films"
 MAX_FILM_BYTES: Final = 150_000
 MAX_SUM_BYTES: Final = 2_850_000
 
+#: Films of the home page, which have a still for readers who do not want motion.
+_WITH_STILL: Final = ("crossing_attentive", "crossing_distracted")
 _WIDTH_PX: Final = 440
 _MAX_HEIGHT_PX: Final = 260
 _CAPTION_PX: Final = 22
@@ -131,17 +134,20 @@ def _window(stage: Stage) -> tuple[float, float, float, float]:
     return min(xs) - along, min(ys) - across, max(xs) + along, max(ys) + across
 
 
-def main() -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Make the films; return 1 if they are too large."""
     parser = argparse.ArgumentParser(description="Make the films of the gallery.")
     parser.add_argument("scenarios", nargs="*", help="default: all that are shipped")
-    names = parser.parse_args().scenarios or shipped_scenarios()
+    names = parser.parse_args(arguments).scenarios or shipped_scenarios()
     FOLDER.mkdir(parents=True, exist_ok=True)
     for name in names:
         film = Film()
         run_crossing(name, policy="balanced", perception="keypoints+scanner", seed=0, observer=film)
         data = film.webp()
         (FOLDER / f"{name}.webp").write_bytes(data)
+        if name in _WITH_STILL:
+            still = film.pictures[len(film.pictures) // 2].quantize(_COLOURS[0])
+            still.save(FOLDER / f"{name}.png", optimize=True)
         print(f"{name}: {len(film.pictures)} pictures, {len(data) / 1e3:.0f} kB", flush=True)
     total = sum(path.stat().st_size for path in FOLDER.glob("*.webp"))
     print(f"all films: {total / 1e6:.2f} MB of at most {MAX_SUM_BYTES / 1e6:.2f} MB")
