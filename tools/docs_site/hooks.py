@@ -28,6 +28,7 @@ _TO_COME: Final = (
     "tutorials/nav2-with-camera-and-scanner.md",
     "explorer.md",
     "faq.md",
+    "newcomer.md",
     "paper.md",
     "upgrading.md",
     "watching.md",
