@@ -21,18 +21,6 @@ from tools.docs_site import notebook, reference  # noqa: E402
 from tools.docs_site.outside_files import FOLDER, OutsideFiles  # noqa: E402
 
 #: Pages of the navigation that need not be there yet.
-_TO_COME: Final = (
-    "tutorials/see-who-is-aware.md",
-    "tutorials/plug-it-into-your-planner.md",
-    "tutorials/tune-and-test-a-policy.md",
-    "tutorials/nav2-with-camera-and-scanner.md",
-    "explorer.md",
-    "faq.md",
-    "newcomer.md",
-    "paper.md",
-    "upgrading.md",
-    "watching.md",
-)
 _WIDE: Final = ("index.md", "gallery.md")
 _outside: OutsideFiles | None = None
 
@@ -41,8 +29,6 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
     """Name the version; ask for the list of versions only where `mike` publishes it."""
     if config.repo_url:
         config.edit_uri = "edit/main/docs/"
-    missing = {name for name in _TO_COME if not Path(config.docs_dir, name).is_file()}
-    config.nav = _without(config.nav, missing)
     config.copyright = f"awarenav {__version__} · Apache-2.0"
     if os.environ.get("MIKE_DOCS_VERSION"):
         config.extra["version"] = {"provider": "mike"}
@@ -77,16 +63,6 @@ def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
     elif page.file.src_uri.startswith(f"{FOLDER}/"):
         page.meta["hide"] = ["navigation", "toc"]
     return markdown if _outside is None else _outside.links_rewritten(page.file.src_uri, markdown)
-
-
-def _without(nav: Any, missing: set[str]) -> Any:
-    """Return the navigation without some pages."""
-    if isinstance(nav, list):
-        kept = [_without(entry, missing) for entry in nav]
-        return [entry for entry in kept if entry not in (None, [], {})]
-    if isinstance(nav, dict):
-        return {title: kept for title, each in nav.items() if (kept := _without(each, missing))}
-    return None if nav in missing else nav
 
 
 def _add(files: Files, config: MkDocsConfig, name: str, **source: Any) -> None:
