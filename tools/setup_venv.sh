@@ -11,7 +11,7 @@ INCOMPLETE=$VENV/awarenav.incomplete # there while .venv is being made; left beh
 LOCK=requirements.lock
 LOG=$VENV/setup.log                  # all that pip or uv says
 FAILED=$VENV/setup.failed            # the exit status of a command that failed
-SIZE="550 MB to download, 1.7 GB on disk" # with Python 3.11 on x86-64
+SIZE="600 MB to download, 1.8 GB on disk" # with Python 3.11 on x86-64
 
 say() { printf 'setup: %s\n' "$*" >&2; }
 die() { say "$*"; exit 1; }
