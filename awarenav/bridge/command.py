@@ -21,7 +21,7 @@ _LOG: Final = "Recordings"
     ],
     exit_status={0: "Ended by Ctrl-C, SIGTERM or --seconds.", 2: "Bad input."},
     epilog="The environment variable CYCLONEDDS_URI chooses the network interface, as with "
-    "rmw_cyclonedds_cpp. Needs the extra 'ros2': pip install 'awarenav[ros2]'.",
+    "rmw_cyclonedds_cpp. Needs the extra 'ros2'.",
 )
 @option(
     "--robot",
@@ -95,8 +95,8 @@ _LOG: Final = "Recordings"
     "--map",
     group=_READ,
     metavar="TOPIC|FILE.yaml",
-    help="nav_msgs/OccupancyGrid, or a map file of map_server: what it holds is nobody's legs. "
-    "Needs --scan.",
+    help="nav_msgs/OccupancyGrid, or a map file of map_server. What the map holds is not taken "
+    "for legs. Needs --scan.",
 )
 @option(
     "--map-frame",
