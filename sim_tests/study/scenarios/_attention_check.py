@@ -27,7 +27,7 @@ _NEVER: Final = 0.02
 
 @dataclass(frozen=True, slots=True)
 class PersonAttention:
-    """What one person looked at in all crossings together.
+    """The attention of one person in all crossings together.
 
     Attributes:
         name: name of the person.
@@ -86,7 +86,7 @@ class AttentionCheck:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What was measured, and whether another label would fit better."""
+        """The figures that were measured, and a label that would fit better."""
         crossings = counted(self.crossings, "crossing")
         if not self.people:
             return (

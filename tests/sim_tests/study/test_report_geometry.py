@@ -5,14 +5,13 @@ from __future__ import annotations
 import itertools
 import json
 import re
-import shutil
-import subprocess
+from collections.abc import Iterator
 from dataclasses import replace
-from html import unescape
 from pathlib import Path
 
 import numpy as np
 import pytest
+from chromium_pipe import CHROMIUM, Chromium
 from report_runs import MadeUpRun, made_up_run
 
 from sim_tests.study.report import write_report
@@ -20,7 +19,6 @@ from sim_tests.study.report._geometry import FONT_PX, PLOT_PX, TRACK_PX, Region,
 from sim_tests.study.report._panel import Scale
 
 WHOLE = Region(0.0, 100.0, 0.0, 100.0)
-CHROMIUM = shutil.which("chromium")
 
 
 def same_outcomes(run: MadeUpRun) -> MadeUpRun:
@@ -165,10 +163,9 @@ def test_ticks_fit_their_axis(low: float, high: float, length_px: float) -> None
     assert_apart(boxes_across(list(ticks), length_px))
 
 
-# Boxes of all labels in plots that overlap, and labels beyond the window.
-_OVERLAPS = """
-addEventListener("load", () => {
-  const out = [];
+# Labels in plots that overlap or lie beyond the window; and how many places the marks have.
+_FOUND = """(() => {
+  const overlaps = [];
   for (const svg of document.querySelectorAll(".axis, .frame > svg")) {
     const labels = [...svg.querySelectorAll("text")];
     const boxes = labels.map((each) => each.getBoundingClientRect());
@@ -176,79 +173,45 @@ addEventListener("load", () => {
       const a = boxes[i], b = boxes[i + 1 + k];
       if (Math.min(a.right, b.right) > Math.max(a.left, b.left) &&
           Math.min(a.bottom, b.bottom) > Math.max(a.top, b.top) + 1) {
-        out.push(one.textContent + " / " + two.textContent);
+        overlaps.push(one.textContent + " / " + two.textContent);
       }
     }));
     boxes.forEach((box, i) => {
       if (box.width && (box.left < 0 || box.right > innerWidth)) {
-        out.push(labels[i].textContent + " outside");
+        overlaps.push(labels[i].textContent + " outside");
       }
     });
   }
-  const marks = [...document.querySelectorAll(".marks use")].map((e) => {
-    const box = e.getBoundingClientRect();
-    return Math.round(2 * (box.left + box.right)) + " " + Math.round(2 * (box.top + box.bottom));
-  });
-  document.title = JSON.stringify({
-    labels: document.querySelectorAll(".axis text, .frame text").length, out,
-    marks: marks.length, places: new Set(marks).size,
-    wide: document.documentElement.scrollWidth - innerWidth, width: innerWidth,
-  });
-});
-"""
+  const places = [...document.querySelectorAll(".marks use")].map((each) =>
+    Math.round(2 * each.x.baseVal.value) + " " + Math.round(2 * each.y.baseVal.value));
+  return {
+    overlaps, labels: document.querySelectorAll(".axis text, .frame text").length,
+    marks: places.length, places: new Set(places).size, width: innerWidth,
+    wide: document.documentElement.scrollWidth - innerWidth,
+  };
+})()"""
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
-@pytest.mark.parametrize("name", ["same", "many"])
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chromium]:
+    if CHROMIUM is None:
+        pytest.skip("chromium is not installed")
+    chromium = Chromium(tmp_path_factory.mktemp("profile"))
+    yield chromium
+    chromium.close()
+
+
+@pytest.mark.parametrize("width_px", [390, 1280])
 def test_a_browser_draws_labels_and_marks_apart(
-    name: str, pages: dict[str, Path], tmp_path: Path
+    page: Path, width_px: int, browser: Chromium
 ) -> None:
-    html = pages[name].read_text("utf-8")
-    (tmp_path / "inner.html").write_text(
-        html.replace("</body>", f"<script>{_OVERLAPS}</script></body>"), "utf-8"
-    )
-    # A frame has the width that is asked; a window cannot be narrower than 500 px.
-    frames = "".join(
-        f'<iframe src="inner.html" style="border:0;width:{width_px}px;height:900px"></iframe>'
-        for width_px in (390, 1280)
-    )
-    (tmp_path / "outer.html").write_text(
-        f"{frames}<script>setInterval(() => {{ document.title = '[' + "
-        "[...document.querySelectorAll('iframe')].map((e) => e.contentDocument.title) + ']'; "
-        "}, 50);</script>",
-        "utf-8",
-    )
-    assert CHROMIUM is not None
-    done = subprocess.run(
-        [
-            CHROMIUM,
-            "--headless",
-            "--no-sandbox",
-            "--disable-gpu",
-            "--disable-quic",
-            "--no-first-run",
-            "--disable-background-networking",
-            "--disable-component-update",
-            "--disable-sync",
-            "--allow-file-access-from-files",
-            f"--user-data-dir={tmp_path / 'profile'}",
-            "--window-size=1800,1000",
-            "--virtual-time-budget=5000",
-            "--dump-dom",
-            (tmp_path / "outer.html").as_uri(),
-        ],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=True,
-    )
-    title = re.search(r"<title>(.*?)</title>", done.stdout, re.DOTALL)
-    assert title is not None
-    phone, desk = json.loads(unescape(title[1]))
-    assert (phone["width"], desk["width"]) == (390, 1280)
-    for found in (phone, desk):
-        assert found["labels"] > 20
-        assert found["out"] == []
-        assert found["wide"] <= 0
-        assert found["marks"] == found["places"] > 100
+    browser.open(page, width=width_px, height=900, dark=width_px == 390)
+    found = browser.evaluate(_FOUND)
+    assert found["overlaps"] == []
+    assert found["labels"] > 10
+    assert found["width"] == width_px
+    assert found["wide"] <= 0
+    counted = re.search(r"(\d+) marks? lies? on others", page.read_text("utf-8"))
+    assert found["marks"] - found["places"] == (0 if counted is None else int(counted[1]))
+    assert found["places"] > 0
+    assert browser.complaints() == []
