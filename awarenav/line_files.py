@@ -129,5 +129,6 @@ def set_aside(
         reason = line.reason.removeprefix(f"{path}, line {line.number}").lstrip(": ")
         print(f"{path}, line {line.number} is damaged: {reason}", file=sys.stderr)
     if len(damaged) > _MOST_NAMED:
-        print(f"{path}: {len(damaged) - _MOST_NAMED} more lines are damaged", file=sys.stderr)
+        more = counted(len(damaged) - _MOST_NAMED, "more line is", "more lines are")
+        print(f"{path}: {more} damaged", file=sys.stderr)
     print(f"{counted(len(damaged), 'line')} set aside in {aside}; {remedy}", file=sys.stderr)

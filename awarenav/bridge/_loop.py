@@ -14,6 +14,8 @@ from nav_adapter.ros2.messages.nav_msgs import OccupancyGrid, Odometry
 from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, Image, LaserScan
 from nav_adapter.ros2.messages.tf2_msgs import TFMessage
 
+from ..errors import counted
+
 if TYPE_CHECKING:
     from nav_adapter.ros2 import DdsNode, McapRecorder
 
@@ -110,7 +112,7 @@ class BridgeLoop:
                 total = self._processed
                 report(
                     f"{(total - before) / (now - reported):4.1f} frames/s  "
-                    f"{len(constraints.obstacles)} people  limit "
+                    f"{counted(len(constraints.obstacles), 'person', 'people')}  limit "
                     f"{constraints.speed_limit_mps:.2f} m/s ({constraints.limited_by})"
                 )
                 reported, before = now, total

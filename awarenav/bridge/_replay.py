@@ -14,6 +14,7 @@ from nav_adapter.ros2.messages.nav_msgs import OccupancyGrid, Odometry
 from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, CompressedImage, Image, LaserScan
 from nav_adapter.ros2.messages.tf2_msgs import TFMessage
 
+from ..errors import counted
 from ._loop import BridgeInputs, BridgeViewer
 
 if TYPE_CHECKING:
@@ -115,7 +116,7 @@ class BagReplay:
             self._viewer.draw(self._bridge, constraints)
         if report is not None:
             report(
-                f"{now_s:.1f} s  {len(constraints.obstacles)} people  limit "
+                f"{now_s:.1f} s  {counted(len(constraints.obstacles), 'person', 'people')}  limit "
                 f"{constraints.speed_limit_mps:.2f} m/s ({constraints.limited_by})"
             )
 

@@ -30,7 +30,7 @@ from perception.arrays import finite_number
 from perception.laser import MapCells
 from perception.shipped import simulator_networks_warning
 
-from ..errors import AwarenavError
+from ..errors import AwarenavError, counted
 from ..estimate import (
     NetworkChoice,
     Networks,
@@ -161,8 +161,8 @@ def bridge_command(options: BridgeOptions) -> int:
         stack.callback(_close, loop)
         _announce(domain, inputs, published)
         _run_until_interrupted(loop, bridge, seconds)
-        scans = f" and {bridge.counts['scans']} scans" if inputs.scans else ""
-        _log(f"ended after {loop.frames} frames{scans}; a stop was published")
+        scans = f" and {counted(bridge.counts['scans'], 'scan')}" if inputs.scans else ""
+        _log(f"ended after {counted(loop.frames, 'frame')}{scans}; a stop was published")
     return 0
 
 

@@ -84,7 +84,7 @@ _COMMANDS: Final[dict[str, dict[str, _Entry]]] = {
             "Write a run's report as one HTML page.",
         ),
         "scenario": _Entry(
-            "sim_tests.scenario.catalogue.command:scenario",
+            "sim_tests.study.scenarios.command:scenario",
             "List, explain, draw and check scenarios.",
         ),
         "render": _Entry(

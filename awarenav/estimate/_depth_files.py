@@ -12,7 +12,7 @@ import numpy as np
 from perception.depth_image import checked_depth
 from perception.errors import DepthImageError
 
-from ..errors import AwarenavError
+from ..errors import AwarenavError, counted
 from ._images import read_image
 from ._source import ImageSource
 from ._source_images import ImageFiles, natural_order
@@ -120,10 +120,10 @@ def _numbered(path: Path, count: int | None, every: int, limit: int | None) -> d
     found = _depth_files(path)
     if not all(each.stem.isdecimal() for each in found):
         if count is None or len(found) != count:
-            frames = "an unknown number of" if count is None else count
+            frames = "an unknown number of frames" if count is None else counted(count, "frame")
             raise AwarenavError(
-                f"{path} has {len(found)} depth images for {frames} frames; give one for each, or "
-                "name them by the numbers of their frames, from 0"
+                f"{path} has {counted(len(found), 'depth image')} for {frames}; give one for "
+                "each, or name them by the numbers of their frames, from 0"
             )
         return {str(number): file for number, file in enumerate(found)}
     files: dict[str, Path] = {}

@@ -11,7 +11,7 @@ import cv2
 
 from perception import Camera
 
-from ..errors import AwarenavError
+from ..errors import AwarenavError, counted
 from ._images import as_rgb
 from ._source import SourceFrame
 
@@ -102,7 +102,7 @@ class VideoSource:
     def _early_end(self, read: int) -> str:
         """Return why the source ended too early after ``read`` frames; empty if it did not."""
         if self.live:
-            return f"{self._name} stopped delivering after {read} frames (unplugged?)"
+            return f"{self._name} stopped delivering after {counted(read, 'frame')} (unplugged?)"
         if read == 0:
             return f"{self._name} has no frame that can be decoded"
         if self.count is None:
@@ -110,7 +110,8 @@ class VideoSource:
         missing = self.count - read
         if missing <= max(_MISCOUNTED_FRAMES, _MISCOUNTED_SHARE * self.count):
             return ""
-        return f"{self._name} ends after {read} of {self.count} frames: it is cut off or damaged"
+        frames = counted(self.count, "frame")
+        return f"{self._name} ends after {read} of {frames}: it is cut off or damaged"
 
 
 def _open_silently(what: str | int) -> cv2.VideoCapture:

@@ -8,8 +8,9 @@ from ..lazy import lazy_names
 
 if TYPE_CHECKING:
     from ._judge import JudgeConfig, JudgeLimits, judge_files, judge_frames
-    from ._matching import average_precision
-    from ._report import markdown_report, requirements
+    from ._precision import average_precision
+    from ._report import markdown_report
+    from ._requirements import requirements
 
 __all__ = [
     "JudgeConfig",
@@ -25,7 +26,8 @@ __getattr__ = lazy_names(
     __name__,
     {
         "._judge": ("JudgeConfig", "JudgeLimits", "judge_files", "judge_frames"),
-        "._matching": ("average_precision",),
-        "._report": ("markdown_report", "requirements"),
+        "._precision": ("average_precision",),
+        "._report": ("markdown_report",),
+        "._requirements": ("requirements",),
     },
 )

@@ -13,8 +13,10 @@ from tracking.config import StrictConfig
 
 from ..errors import AwarenavError
 from ..records import PersonRecord, people_by_frame, read_records
-from ._matching import average_precision, match_frame
+from ._intervals import LEVEL, Metrics
+from ._matching import match_frame
 from ._metrics import PersonFrame, person_metrics
+from ._precision import DetectionFrame, precision_with_interval
 
 #: The people of every frame, by the frame's name.
 Frames = dict[str, list[PersonRecord]]
@@ -113,6 +115,10 @@ def judge_frames(
 ) -> dict[str, Any]:
     """Return all metrics: of detection, and of people who had to be found, by facing and range.
 
+    ``"intervals"`` repeats the groups with the 95 % interval (low, high) of each metric that is an
+    estimate. An end is infinite where too few people bound the metric. The intervals take every
+    person in every frame as independent of the others; only the precision resamples whole frames.
+
     Args:
         truth: the people of every frame.
         estimates: the estimated people of every frame. In a frame that is missing here, nobody was
@@ -122,7 +128,7 @@ def judge_frames(
     """
     config = JudgeConfig() if config is None else config
     judged = [name for name in truth if name in estimates or not common]
-    detection_frames = []
+    detection_frames: list[DetectionFrame] = []
     required_people: list[PersonFrame] = []
     all_people: list[PersonFrame] = []
     false_positives = 0
@@ -138,8 +144,19 @@ def judge_frames(
             all_people.append(PersonFrame(person, estimate))
             if required[index]:
                 required_people.append(all_people[-1])
-    overall = person_metrics(required_people)
-    everyone = person_metrics(all_people)
+    overall, everyone = person_metrics(required_people), person_metrics(all_people)
+    by_facing = {
+        name: person_metrics(_between(required_people, _facing_deg, low, high))
+        for name, low, high in _FACINGS_DEG
+    }
+    by_range = {
+        f"{low:g} to {high:g}" if math.isfinite(high) else f"{low:g} and more": person_metrics(
+            _between(required_people, _range_m, low, high)
+        )
+        for low, high in _RANGES_M
+    }
+    detection = _detection_metrics(detection_frames, false_positives, overall)
+    everybody = ("people", "found", "unaware_judged", "false_aware_count", "false_aware")
     return {
         "settings": config.model_dump(),
         "frames": {
@@ -147,28 +164,40 @@ def judge_frames(
             "without_estimates": sum(name not in estimates for name in judged),
             "unknown": sum(name not in truth for name in estimates),
         },
-        "detection": {
-            "ap50": average_precision(detection_frames),
-            "recall": overall["recall"],
-            "false_positives": false_positives,
-            "false_positives_per_frame": false_positives / len(judged) if judged else None,
-        },
-        "overall": overall,
-        "hidden_and_small_too": {
-            name: everyone[name]
-            for name in ("people", "found", "unaware_judged", "false_aware_count", "false_aware")
-        },
-        "by_facing": {
-            name: person_metrics(_between(required_people, _facing_deg, low, high))
-            for name, low, high in _FACINGS_DEG
-        },
-        "by_range_m": {
-            f"{low:g} to {high:g}" if math.isfinite(high) else f"{low:g} and more": person_metrics(
-                _between(required_people, _range_m, low, high)
-            )
-            for low, high in _RANGES_M
+        "detection": detection.values,
+        "overall": overall.values,
+        "hidden_and_small_too": {name: everyone.values[name] for name in everybody},
+        "by_facing": {name: group.values for name, group in by_facing.items()},
+        "by_range_m": {name: group.values for name, group in by_range.items()},
+        "intervals": {
+            "level": LEVEL,
+            "detection": detection.intervals,
+            "overall": overall.intervals,
+            "hidden_and_small_too": {
+                name: ends for name, ends in everyone.intervals.items() if name in everybody
+            },
+            "by_facing": {name: group.intervals for name, group in by_facing.items()},
+            "by_range_m": {name: group.intervals for name, group in by_range.items()},
         },
     }
+
+
+def _detection_metrics(
+    frames: Sequence[DetectionFrame], false_positives: int, overall: Metrics
+) -> Metrics:
+    """Return the metrics of detection.
+
+    Args:
+        frames: truth and estimates.
+        false_positives: number of estimates of nobody.
+        overall: metrics of the people who had to be found.
+    """
+    metrics = Metrics()
+    metrics.add("ap50", *precision_with_interval(frames))
+    metrics.share("recall", overall.values["found"], overall.values["people"])
+    metrics.count("false_positives", false_positives)
+    metrics.rate("false_positives_per_frame", false_positives, len(frames))
+    return metrics
 
 
 def _had_to_be_found(person: PersonRecord, config: JudgeConfig) -> bool:

@@ -1,8 +1,8 @@
-"""Matches estimates to people by box or position, and computes COCO's average precision."""
+"""Matches estimates to people by box or position."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -13,16 +13,12 @@ from perception.arrays import FloatArray
 
 from ..records import PersonRecord
 
-# An estimate and a person with this affinity or more can match: the IoU of their boxes.
-_MIN_AFFINITY: Final = 0.5
-# Without boxes, positions at this distance have the affinity _MIN_AFFINITY.
+#: An estimate and a person with this affinity or more can match: the IoU of their boxes.
+MIN_AFFINITY: Final = 0.5
+# Without boxes, positions at this distance have the affinity MIN_AFFINITY.
 _MAX_DISTANCE_M: Final = 0.5
 # A match with a person who had to be found counts more than any number of others.
 _REQUIRED_BONUS: Final = 10.0
-_RECALLS: Final = np.linspace(0.0, 1.0, 101)
-
-#: Truth, whether each person had to be found, and estimates of a frame.
-DetectionFrame = tuple[Sequence[PersonRecord], Sequence[bool], Sequence[PersonRecord]]
 
 
 def box_iou(first: FloatArray, second: FloatArray) -> FloatArray:
@@ -95,7 +91,7 @@ def match_frame(
     """
     values = affinity(truth, estimates)
     bonus = np.where(np.asarray(required, dtype=bool), _REQUIRED_BONUS, 0.0)[:, None]
-    good = values >= _MIN_AFFINITY
+    good = values >= MIN_AFFINITY
     rows, columns = linear_sum_assignment(np.where(good, values + bonus, 0.0), maximize=True)
     pairs = [
         (int(row), int(column))
@@ -106,77 +102,19 @@ def match_frame(
     false_positives = [
         column
         for column in range(len(estimates))
-        if column not in used and not _covers_ignored(estimates[column], truth, required)
+        if column not in used and not covers_ignored(estimates[column], truth, required)
     ]
     missed = [row for row in range(len(truth)) if required[row] and row not in found]
     return FrameMatch(tuple(pairs), tuple(missed), tuple(false_positives))
 
 
-def _covers_ignored(
+def covers_ignored(
     estimate: PersonRecord, truth: Sequence[PersonRecord], required: Sequence[bool]
 ) -> bool:
     """Return whether half of an estimate's box lies on a person who did not have to be found."""
     box = estimate.box_xyxy_px
     return box is not None and any(
-        float(box_cover(box[None], person.box_xyxy_px[None])[0, 0]) >= _MIN_AFFINITY
+        float(box_cover(box[None], person.box_xyxy_px[None])[0, 0]) >= MIN_AFFINITY
         for person, needed in zip(truth, required, strict=True)
         if not needed and person.box_xyxy_px is not None
-    )
-
-
-def average_precision(frames: Iterable[DetectionFrame]) -> float | None:
-    """Return COCO's AP50: the monotone precision, averaged over 101 recalls from 0 to 1.
-
-    In the order of their scores, estimates match the person with whom they overlap most, each
-    person once. An estimate that only lies on people who did not have to be found is left out
-    (pycocotools ``COCOeval``, but with all estimates of a frame instead of the best hundred).
-
-    Returns:
-        AP in [0, 1], or None if nobody had to be found.
-    """
-    scores: list[float] = []
-    hits: list[bool] = []
-    required_count = 0
-    for truth, required, estimates in frames:
-        required_count += sum(required)
-        values = affinity(truth, estimates)
-        taken: set[int] = set()
-        order = sorted(range(len(estimates)), key=lambda index: -estimates[index].score)
-        for column in order:
-            free = [
-                row
-                for row in range(len(truth))
-                if required[row] and row not in taken and values[row, column] >= _MIN_AFFINITY
-            ]
-            if free:
-                taken.add(max(free, key=lambda row: values[row, column]))
-            elif _matches_ignored(truth, required, estimates[column], values[:, column]):
-                continue
-            scores.append(estimates[column].score)
-            hits.append(bool(free))
-    if required_count == 0:
-        return None
-    if not scores:
-        return 0.0
-    # Stable, so that equal scores keep the order of their frames.
-    ranked = np.asarray(hits)[np.argsort(-np.asarray(scores), kind="stable")]
-    true = np.cumsum(ranked)
-    recall = true / required_count
-    precision = true / np.arange(1, len(ranked) + 1)
-    envelope = np.maximum.accumulate(precision[::-1])[::-1]
-    # A recall such as 57/100 must reach the step 0.57 despite rounding.
-    place = np.searchsorted(recall, _RECALLS - 1.0e-9, side="left")
-    reached = np.append(envelope, 0.0)[place]
-    return float(reached.mean())
-
-
-def _matches_ignored(
-    truth: Sequence[PersonRecord],
-    required: Sequence[bool],
-    estimate: PersonRecord,
-    values: FloatArray,
-) -> bool:
-    """Return whether an estimate matches, or lies on, someone who did not have to be found."""
-    return _covers_ignored(estimate, truth, required) or any(
-        value >= _MIN_AFFINITY for value, needed in zip(values, required, strict=True) if not needed
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from scipy.special import gammaincinv
@@ -13,6 +13,7 @@ from scipy.special import gammaincinv
 from perception.arrays import FloatArray
 
 from ..records import PersonRecord
+from ._intervals import Metrics
 
 # A person with this α or more is aware.
 _AWARE: Final = 0.5
@@ -37,8 +38,8 @@ class PersonFrame:
 _Pairs = Sequence[tuple[PersonRecord, PersonRecord]]
 
 
-def person_metrics(group: Iterable[PersonFrame]) -> dict[str, Any]:
-    """Return the metrics of a group of people who had to be found.
+def person_metrics(group: Iterable[PersonFrame]) -> Metrics:
+    """Return the metrics of a group of people who had to be found, with their intervals.
 
     Shares are from 0 to 1; a metric without people is None. ``awareness_none`` and
     ``gaze_none`` are the shares of found people without an estimate of it. ``false_aware`` is the
@@ -49,21 +50,19 @@ def person_metrics(group: Iterable[PersonFrame]) -> dict[str, Any]:
     """
     everyone = list(group)
     found = [(each.truth, each.estimate) for each in everyone if each.estimate is not None]
-    return {
-        "people": len(everyone),
-        "found": len(found),
-        "recall": _share(len(found), len(everyone)),
-        **_direction_metrics(found),
-        **_position_metrics(found),
-        **_awareness_metrics(everyone, found),
-    }
+    metrics = Metrics()
+    metrics.count("people", len(everyone))
+    metrics.count("found", len(found))
+    metrics.share("recall", len(found), len(everyone))
+    _add_direction(metrics, found)
+    _add_position(metrics, found)
+    _add_awareness(metrics, everyone, found)
+    return metrics
 
 
-def _direction_metrics(found: _Pairs) -> dict[str, Any]:
-    """Return the errors of gaze and head direction."""
-    metrics: dict[str, Any] = {
-        "gaze_none": _share(sum(e.gaze_camera is None for _, e in found), len(found))
-    }
+def _add_direction(metrics: Metrics, found: _Pairs) -> None:
+    """Add the errors of gaze and head direction."""
+    metrics.share("gaze_none", sum(e.gaze_camera is None for _, e in found), len(found))
     for name in ("gaze", "head"):
         errors = []
         for truth, estimate in found:
@@ -77,17 +76,14 @@ def _direction_metrics(found: _Pairs) -> dict[str, Any]:
             if true is not None and guess is not None:
                 sine = float(np.linalg.norm(np.cross(true, guess)))
                 errors.append(math.degrees(math.atan2(sine, float(true @ guess))))
-        metrics |= {
-            f"{name}_count": len(errors),
-            f"{name}_median_deg": _percentile(errors, 50.0),
-            f"{name}_p90_deg": _percentile(errors, 90.0),
-            f"{name}_over_90deg": _share(sum(error > 90.0 for error in errors), len(errors)),
-        }
-    return metrics
+        metrics.count(f"{name}_count", len(errors))
+        metrics.percentile(f"{name}_median_deg", errors, 50.0)
+        metrics.percentile(f"{name}_p90_deg", errors, 90.0)
+        metrics.share(f"{name}_over_90deg", sum(error > 90.0 for error in errors), len(errors))
 
 
-def _position_metrics(found: _Pairs) -> dict[str, Any]:
-    """Return the errors of position as shares of range, and their normalised squares (NEES)."""
+def _add_position(metrics: Metrics, found: _Pairs) -> None:
+    """Add the errors of position as shares of range, and their normalised squares (NEES)."""
     relative, along, nees, within = [], [], [], []
     for truth, estimate in found:
         true, guess = truth.position_camera_m, estimate.position_camera_m
@@ -102,18 +98,16 @@ def _position_metrics(found: _Pairs) -> dict[str, Any]:
             squared = _mahalanobis2(error, covariance)
             nees.append(squared)
             within.append(squared <= _NEES_1SIGMA)
-    return {
-        "position_count": len(relative),
-        "position_median": _percentile(relative, 50.0),
-        "position_p90": _percentile(relative, 90.0),
-        "range_bias": _percentile(along, 50.0),
-        "position_nees": _mean(nees),
-        "position_within_1sigma": _mean(within),
-    }
+    metrics.count("position_count", len(relative))
+    metrics.percentile("position_median", relative, 50.0)
+    metrics.percentile("position_p90", relative, 90.0)
+    metrics.percentile("range_bias", along, 50.0)
+    metrics.mean("position_nees", nees)
+    metrics.shares("position_within_1sigma", within)
 
 
-def _awareness_metrics(everyone: Sequence[PersonFrame], found: _Pairs) -> dict[str, Any]:
-    """Return the errors of α, its calibration, and false and missed awareness."""
+def _add_awareness(metrics: Metrics, everyone: Sequence[PersonFrame], found: _Pairs) -> None:
+    """Add the errors of α, its calibration, and false and missed awareness."""
     known = [each for each in everyone if each.truth.awareness is not None]
     errors, with_none_as_0, inside, inside_all = [], [], [], []
     for truth, estimate in found:
@@ -137,22 +131,20 @@ def _awareness_metrics(everyone: Sequence[PersonFrame], found: _Pairs) -> dict[s
     false_aware = sum(alpha >= _AWARE for alpha in judged)
     aware = [each for each in known if (each.truth.awareness or 0.0) >= _AWARE]
     recognised = sum((_estimated_alpha(each) or 0.0) >= _AWARE for each in aware)
-    return {
-        "awareness_count": len(errors),
-        "awareness_none": _share(sum(e.awareness is None for _, e in found), len(found)),
-        "awareness_mae": _mean(errors),
-        "awareness_mae_none_as_0": _mean(with_none_as_0),
-        "awareness_within_1sigma": _mean(inside),
-        "awareness_within_1sigma_count": len(inside),
-        "awareness_within_1sigma_all": _mean(inside_all),
-        "unaware_people": len(unaware),
-        "unaware_judged": len(judged),
-        "false_aware_count": false_aware,
-        "false_aware": _share(false_aware, len(judged)),
-        "false_aware_of_everyone": _share(false_aware, len(known)),
-        "aware_people": len(aware),
-        "aware_recognised": _share(recognised, len(aware)),
-    }
+    metrics.count("awareness_count", len(errors))
+    metrics.share("awareness_none", sum(e.awareness is None for _, e in found), len(found))
+    metrics.mean("awareness_mae", errors)
+    metrics.mean("awareness_mae_none_as_0", with_none_as_0)
+    metrics.shares("awareness_within_1sigma", inside)
+    metrics.count("awareness_within_1sigma_count", len(inside))
+    metrics.shares("awareness_within_1sigma_all", inside_all)
+    metrics.count("unaware_people", len(unaware))
+    metrics.count("unaware_judged", len(judged))
+    metrics.count("false_aware_count", false_aware)
+    metrics.share("false_aware", false_aware, len(judged))
+    metrics.share("false_aware_of_everyone", false_aware, len(known))
+    metrics.count("aware_people", len(aware))
+    metrics.share("aware_recognised", recognised, len(aware))
 
 
 def _estimated_alpha(each: PersonFrame) -> float | None:
@@ -164,15 +156,3 @@ def _mahalanobis2(error: FloatArray, covariance: FloatArray) -> float:
         return float(error @ np.linalg.solve(covariance, error))
     except np.linalg.LinAlgError:
         return math.inf if np.any(error) else 0.0  # a covariance of zeros
-
-
-def _share(part: int, whole: int) -> float | None:
-    return part / whole if whole else None
-
-
-def _mean(values: Sequence[float] | Sequence[bool]) -> float | None:
-    return float(np.mean(values)) if len(values) else None
-
-
-def _percentile(values: Sequence[float], percent: float) -> float | None:
-    return float(np.percentile(values, percent)) if values else None

@@ -1,13 +1,14 @@
-"""The metrics of ``awarenav judge`` as Markdown tables, and the requirements for them."""
+"""The metrics of ``awarenav judge`` as Markdown tables."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, Final
 
+from ..errors import counted
+from ._intervals import Ends
 from ._judge import JudgeLimits
+from ._requirements import Requirement, interval_text, requirements, value_text
 
 # Rows of the table by group: title, key, unit.
 _GROUP_ROWS: Final = (
@@ -33,161 +34,120 @@ _GROUP_ROWS: Final = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Requirement:
-    """A requirement for a metric; a metric to which nobody contributed does not meet it."""
-
-    name: str
-    value: float | None
-    low: float
-    high: float
-    unit: str
-
-    @property
-    def met(self) -> bool:
-        """True if the metric lies between its limits."""
-        return self.value is not None and self.low <= self.value <= self.high
-
-    @property
-    def limits(self) -> str:
-        """The limits as text."""
-        low, high = (_value_text(limit, self.unit) for limit in (self.low, self.high))
-        if self.low == -math.inf:
-            return f"≤ {high}"
-        return f"≥ {low}" if self.high == math.inf else f"{low} to {high}"
-
-
-def requirements(metrics: dict[str, Any], limits: JudgeLimits | None = None) -> list[Requirement]:
-    """Return the project's requirements with the metrics.
-
-    The gaze is the direction of the head if the truth has both head and eyes.
-    """
-    limits = JudgeLimits() if limits is None else limits
-    overall = metrics["overall"]
-    gaze = "head" if overall["head_count"] else "gaze"
-    middle, margin = limits.within_1sigma, limits.within_1sigma_tolerance
-    return [
-        Requirement("detection AP50", metrics["detection"]["ap50"], limits.min_ap50, math.inf, ""),
-        Requirement(
-            f"{gaze} direction error, median",
-            overall[f"{gaze}_median_deg"],
-            -math.inf,
-            limits.max_gaze_median_deg,
-            "°",
-        ),
-        Requirement(
-            f"{gaze} direction error, 90th percentile",
-            overall[f"{gaze}_p90_deg"],
-            -math.inf,
-            limits.max_gaze_p90_deg,
-            "°",
-        ),
-        Requirement(
-            "position error / range, median",
-            overall["position_median"],
-            -math.inf,
-            limits.max_position_median,
-            "%",
-        ),
-        Requirement(
-            "α mean absolute error",
-            overall["awareness_mae"],
-            -math.inf,
-            limits.max_awareness_mae,
-            "",
-        ),
-        Requirement(
-            "α ≥ 0.5 where the truth is 0",
-            overall["false_aware"],
-            -math.inf,
-            limits.max_false_aware,
-            "%",
-        ),
-        Requirement(
-            "error of α within 1σ (truth or estimate in (0, 1))",
-            overall["awareness_within_1sigma"],
-            middle - margin,
-            middle + margin,
-            "%",
-        ),
-    ]
-
-
 def markdown_report(metrics: dict[str, Any], limits: JudgeLimits | None = None) -> str:
     """Return the report as Markdown."""
     settings, frames, overall = metrics["settings"], metrics["frames"], metrics["overall"]
     detection, others = metrics["detection"], metrics["hidden_and_small_too"]
+    height, hidden, outside = (
+        settings[name] for name in ("min_height_px", "max_occlusion", "max_truncation")
+    )
+    ignored = others["people"] - overall["people"]
     lines = [
-        f"{frames['judged']} frames, {overall['people']} people to be found (at least "
-        f"{settings['min_height_px']:g} px tall, less than {settings['max_occlusion']:.0%} hidden "
-        f"and less than {settings['max_truncation']:.0%} outside the picture); "
-        f"{others['people'] - overall['people']} others count neither way.",
+        f"{counted(frames['judged'], 'frame')}, {counted(overall['people'], 'person', 'people')} "
+        f"to be found (at least {height:g} px tall, less than {hidden:.0%} hidden and less than "
+        f"{outside:.0%} outside the picture); "
+        f"{counted(ignored, 'other counts', 'others count')} neither way.",
     ]
     if frames["without_estimates"]:
-        lines.append(
-            f"{frames['without_estimates']} frames have no estimate: nobody was found in them."
-        )
+        without = counted(frames["without_estimates"], "frame has", "frames have")
+        lines.append(f"{without} no estimate, so nobody was found there.")
     if frames["unknown"]:
-        lines.append(f"{frames['unknown']} estimated frames are not in the truth and left out.")
-    lines += ["", *_table(("figure", "value", "asked", ""), _requirement_rows(metrics, limits))]
+        unknown = counted(frames["unknown"], "estimated frame is", "estimated frames are")
+        lines.append(f"{unknown} not in the truth and left out.")
+    asked = requirements(metrics, limits)
+    lines += ["", *_table(("figure", "value", "95 % interval", "asked", "met"), _rows(asked))]
+    if any(each.verdict == "too few to tell" for each in asked):
+        lines += [
+            "",
+            "Too few to tell: the interval holds values that meet what is asked, and others.",
+        ]
     rows = [
         (
             "found",
-            f"{overall['found']} of {overall['people']} ({_value_text(overall['recall'], '%')})",
+            f"{overall['found']} of {overall['people']} ({value_text(overall['recall'], '%')})",
+            _interval(metrics, "overall", "recall", "%"),
         ),
         (
             "people reported where nobody is, or twice",
             f"{detection['false_positives']} "
-            f"({_value_text(detection['false_positives_per_frame'], '')} per frame)",
+            f"({value_text(detection['false_positives_per_frame'], '')} per frame)",
+            _interval(metrics, "detection", "false_positives_per_frame", ""),
         ),
-        ("found people without a gaze", _value_text(overall["gaze_none"], "%")),
-        ("found people without an α", _value_text(overall["awareness_none"], "%")),
+        (
+            "found people without a gaze",
+            value_text(overall["gaze_none"], "%"),
+            _interval(metrics, "overall", "gaze_none", "%"),
+        ),
+        (
+            "found people without an α",
+            value_text(overall["awareness_none"], "%"),
+            _interval(metrics, "overall", "awareness_none", "%"),
+        ),
         (
             "α mean absolute error, no α counted as 0",
-            _value_text(overall["awareness_mae_none_as_0"], ""),
+            value_text(overall["awareness_mae_none_as_0"], ""),
+            _interval(metrics, "overall", "awareness_mae_none_as_0", ""),
         ),
         (
             "α ≥ 0.5 where the truth is 0",
-            f"{overall['false_aware_count']} of {overall['unaware_judged']} estimates "
-            f"({overall['unaware_people']} such people)",
+            f"{overall['false_aware_count']} of "
+            f"{counted(overall['unaware_judged'], 'estimate')} "
+            f"({counted(overall['unaware_people'], 'such person', 'such people')})",
+            _interval(metrics, "overall", "false_aware", "%"),
         ),
         (
             "the same, hidden and small people too",
             f"{others['false_aware_count']} of {others['unaware_judged']} "
-            f"({_value_text(others['false_aware'], '%')})",
+            f"({value_text(others['false_aware'], '%')})",
+            _interval(metrics, "hidden_and_small_too", "false_aware", "%"),
         ),
         (
             "people with true α ≥ 0.5 recognised",
-            f"{_value_text(overall['aware_recognised'], '%')} of {overall['aware_people']}",
+            f"{value_text(overall['aware_recognised'], '%')} of {overall['aware_people']}",
+            _interval(metrics, "overall", "aware_recognised", "%"),
         ),
     ]
-    lines += ["", *_table(("beside that", ""), rows), "", *_group_table(metrics)]
+    lines += ["", *_table(("beside that", "", "95 % interval"), rows), "", *_group_table(metrics)]
     return "\n".join(lines) + "\n"
 
 
-def _requirement_rows(metrics: dict[str, Any], limits: JudgeLimits | None) -> list[tuple[str, ...]]:
+def _rows(asked: Sequence[Requirement]) -> list[tuple[str, ...]]:
+    """Return a row for each requirement."""
     return [
         (
             each.name,
-            _value_text(each.value, each.unit),
+            value_text(each.value, each.unit),
+            "–" if each.value is None else interval_text(each.interval, each.unit),
             each.limits,
-            "yes" if each.met else "**no**",
+            "**no**" if each.verdict == "no" else each.verdict,
         )
-        for each in requirements(metrics, limits)
+        for each in asked
     ]
+
+
+def _interval(metrics: dict[str, Any], group: str, key: str, unit: str) -> str:
+    ends = metrics["intervals"][group].get(key)
+    return "–" if ends is None else interval_text(ends, unit)
 
 
 def _group_table(metrics: dict[str, Any]) -> list[str]:
     """Return the table with a column for each group of people."""
-    groups = [("all", metrics["overall"]), *metrics["by_facing"].items()]
-    groups += [(f"{name} m", group) for name, group in metrics["by_range_m"].items()]
-    groups = [(name, group) for name, group in groups if group["people"]]
+    ends = metrics["intervals"]
+    groups = [("all", metrics["overall"], ends["overall"])]
+    for part, unit in (("by_facing", ""), ("by_range_m", " m")):
+        groups += [(f"{name}{unit}", metrics[part][name], ends[part][name]) for name in ends[part]]
+    groups = [each for each in groups if each[1]["people"]]
+
+    def cell(values: dict[str, Any], intervals: dict[str, Ends], key: str, unit: str) -> str:
+        text = value_text(values[key], unit)
+        return f"{text} {interval_text(intervals[key], unit)}" if key in intervals else text
+
     rows = [
-        (title, *(_value_text(group[key], unit) for _, group in groups))
+        (title, *(cell(values, intervals, key, unit) for _, values, intervals in groups))
         for title, key, unit in _GROUP_ROWS
-        if any(group[key] is not None for _, group in groups)
+        if any(values[key] is not None for _, values, _ in groups)
     ]
-    return _table(("", *(name for name, _ in groups)), rows)
+    return _table(("", *(name for name, _, _ in groups)), rows)
 
 
 def _table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> list[str]:
@@ -201,18 +161,3 @@ def _table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> list[str
         return "| " + " | ".join(padded) + " |"
 
     return [line(header), line(tuple("-" * width for width in widths)), *map(line, rows)]
-
-
-def _value_text(value: float | None, unit: str) -> str:
-    """Return a metric as text; the unit is "%", "°", "n" (a count) or empty."""
-    if value is None:
-        return "–"
-    if unit == "%":
-        return (
-            f"{100.0 * value:.1f} %"
-            if abs(value) >= 0.1 or value == 0
-            else f"{100.0 * value:.2f} %"
-        )
-    if unit == "°":
-        return f"{value:.1f}°"
-    return f"{value:.0f}" if unit == "n" else f"{value:.3f}"

@@ -8,7 +8,8 @@ from pathlib import Path
 from ..errors import AwarenavError
 from ..files import json_text, write_text
 from ._judge import JudgeConfig, judge_files
-from ._report import markdown_report, requirements
+from ._report import markdown_report
+from ._requirements import requirements
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

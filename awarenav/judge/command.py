@@ -12,7 +12,7 @@ from ..cli import NUMBER, FilePath, argument, command, option, options
     examples=["awarenav judge render/truth.jsonl estimates.jsonl --out report.md"],
     exit_status={
         0: "Success.",
-        1: "With --gate: a requirement is not met.",
+        1: "With --gate: a figure is outside what is asked.",
         2: "Bad input.",
     },
 )
@@ -49,14 +49,16 @@ from ..cli import NUMBER, FilePath, argument, command, option, options
 @option(
     "--gate",
     is_flag=True,
-    help="Exit with status 1 unless the metrics meet the project's requirements for its own "
-    "networks.",
+    help="Exit with status 1 unless the figures themselves, whatever their intervals, meet the "
+    "project's requirements for its own networks.",
 )
 def judge(**values: Any) -> int:
     """Compare ESTIMATES with TRUTH, as `awarenav estimate` and `awarenav render` write them.
 
     Prints Markdown tables: detection (COCO's average precision at IoU 0.5), gaze, position and
     awareness, and whether the stated uncertainties hold; for everybody, by facing and by range.
+    Every figure has its 95 % interval. A requirement is met (yes), not met (no), or there are too
+    few people to tell: the interval holds what is asked and other values too.
     """
     from ._run import JudgeOptions, judge_command  # noqa: PLC0415 - help needs no arrays
 

@@ -14,7 +14,7 @@ import yaml
 from perception import PerceptionError
 from perception.shipped import shipped_models, verify_shipped_model
 
-from ..errors import AwarenavError
+from ..errors import AwarenavError, counted
 from ..files import json_text, write_text
 from ._catalogue import NetworkSet, RealModel
 from ._store import ModelStore, default_folder
@@ -98,7 +98,8 @@ def verify_command(folder: Path | None, *, as_json: bool) -> int:
     for name, state in states:
         print(f"{name:16s}{state}")
     good = len(states) - len(wrong)
-    print(f"{good} of {len(states)} networks are unaltered" if states else "no networks")
+    networks = counted(len(states), "network is", "networks are")
+    print(f"{good} of {networks} unaltered" if states else "no networks")
     return 1 if wrong else 0
 
 

@@ -55,6 +55,8 @@ class TrueView:
         awareness: cone score of the true gaze towards the robot; 0 without a line of sight.
         position_odom_m: (2,) position.
         velocity_odom_mps: (2,) velocity.
+        could_look: the camera is in front of the person's body, at most 90° aside, and in their
+            line of sight.
     """
 
     position_camera_m: FloatArray
@@ -62,6 +64,7 @@ class TrueView:
     awareness: float
     position_odom_m: FloatArray
     velocity_odom_mps: FloatArray
+    could_look: bool = True
 
     @property
     def d_fwd_m(self) -> float:
@@ -197,15 +200,18 @@ class Stage(AbstractContextManager["Stage"]):
         for worker, motion in zip(self.workers, self._motions, strict=True):
             gaze = worker.gaze_odom
             alpha = float(cone.scores(worker.eyes_odom_m, gaze, origin))
-            if alpha > 0.0 and not sees(worker, origin, through=frozenset({self.amr.body})):
-                alpha = 0.0
+            in_front = _faces(motion, origin)
+            sighted = (in_front or alpha > 0.0) and sees(
+                worker, origin, through=frozenset({self.amr.body})
+            )
             views.append(
                 TrueView(
                     (worker.chest_odom_m - origin) @ rotation,
                     gaze @ rotation,
-                    alpha,
+                    alpha if sighted else 0.0,
                     motion.position_odom_m,
                     motion.velocity_odom_mps,
+                    in_front and sighted,
                 )
             )
         return tuple(views)
@@ -335,6 +341,12 @@ class Stage(AbstractContextManager["Stage"]):
             self._behaviours[index].touch(*(-towards).tolist())
         else:
             meter.release(index)
+
+
+def _faces(motion: PersonMotion, target_odom_m: FloatArray) -> bool:
+    """Return whether a target (2,) or (3,) is at most 90° aside of where the body faces."""
+    forward = np.array([math.cos(motion.heading_odom_rad), math.sin(motion.heading_odom_rad)])
+    return bool(forward @ (target_odom_m[:2] - motion.position_odom_m) >= 0.0)
 
 
 def _pose(worker: Worker, motion: PersonMotion) -> None:

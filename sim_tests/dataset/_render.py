@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from awarenav.errors import counted
 from awarenav.files import atomic_path
 from awarenav.line_files import LineFile
 from awarenav.records import (
@@ -81,8 +82,9 @@ def render(
     done = {record["frame"]: record for record in _finished_records(config, out)}
     if len(done) == config.frames and (out / _SHEET).exists() and not resume:
         raise SimError(
-            f"{out} holds a finished set of {config.frames} images: replace it with --overwrite "
-            "(overwrite=True), choose another --out, or keep it with --resume (resume=True)"
+            f"{out} holds a finished set of {counted(config.frames, 'image')}: replace it with "
+            "--overwrite (overwrite=True), choose another --out, or keep it with --resume "
+            "(resume=True)"
         )
     write_records(truth, done.values())
     missing = [frame for frame in range(config.frames) if frame_name(frame) not in done]

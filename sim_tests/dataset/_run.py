@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from awarenav.errors import counted
+
 from ._config import RenderConfig, parse_image_size
 from ._render import render
 
@@ -60,7 +62,7 @@ def render_command(options: RenderOptions) -> int:
         overwrite=options.overwrite,
     )
     print(
-        f"Written to {options.out}: {config.frames} images, camera.yaml, {truth.name}, "
+        f"Written to {options.out}: {counted(config.frames, 'image')}, camera.yaml, {truth.name}, "
         "contact_sheet.png"
     )
     return 0

@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from awarenav.errors import counted
 from awarenav.files import json_text
 from perception import AwarenessPipeline, Camera
 
@@ -85,14 +86,14 @@ def crossings_command(options: CrossingsOptions) -> int:
         print(json_text([asdict(row) for row in summarise(records).policies]), end="")
     else:
         print(_short_table(records))
-        print(f"\nWritten to {options.out}: episodes.csv with {len(records)} episodes")
+        print(f"\nWritten to {options.out}: episodes.csv with {counted(len(records), 'episode')}")
     for note in nondeterminism_notes(records):
         print(note, file=sys.stderr)
     failed = [number for number, record in enumerate(records) if record.error]
     if failed:
         first = records[failed[0]]
         print(
-            f"{len(failed)} of {len(records)} episodes failed; episode {failed[0]} "
+            f"{len(failed)} of {counted(len(records), 'episode')} failed; episode {failed[0]} "
             f"({first.scenario}, seed {first.seed}): {first.error}\n"
             f"{RunFiles(options.out).errors} has the tracebacks",
             file=sys.stderr,

@@ -1,4 +1,4 @@
-"""The shipped scenarios listed, described, drawn and checked: ``awarenav scenario``."""
+"""Scenarios listed, described, drawn and checked without a crossing."""
 
 from __future__ import annotations
 
@@ -7,15 +7,21 @@ from typing import TYPE_CHECKING
 from awarenav.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from ._checks import scenario_problems, template_problems
-    from ._plans import approach_statistics, closest_approaches, person_plan, robot_plan
+    from ._checks import CHECKED_DRAWS, scenario_problems, template_problems
+    from ._plans import CONFLICT_M, approach_statistics, closest_approaches, person_plan, robot_plan
+    from ._show import draw_command, list_command, show_command
 
 __all__ = [
+    "CHECKED_DRAWS",
+    "CONFLICT_M",
     "approach_statistics",
     "closest_approaches",
+    "draw_command",
+    "list_command",
     "person_plan",
     "robot_plan",
     "scenario_problems",
+    "show_command",
     "template_problems",
 ]
 
@@ -23,14 +29,21 @@ __getattr__ = lazy_names(
     __name__,
     {
         "._checks": (
+            "CHECKED_DRAWS",
             "scenario_problems",
             "template_problems",
         ),
         "._plans": (
+            "CONFLICT_M",
             "approach_statistics",
             "closest_approaches",
             "person_plan",
             "robot_plan",
+        ),
+        "._show": (
+            "draw_command",
+            "list_command",
+            "show_command",
         ),
     },
 )

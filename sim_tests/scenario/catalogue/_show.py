@@ -1,4 +1,4 @@
-"""The subcommands of ``awarenav scenario``: list, show, draw and validate."""
+"""The work of ``awarenav scenario list``, ``show`` and ``draw``."""
 
 from __future__ import annotations
 
@@ -14,12 +14,9 @@ from ...world.errors import SimError
 from .._distributions import Choice, Distribution
 from .._files import shipped_scenarios
 from .._template import ScenarioTemplate, shipped_templates
-from ._checks import CHECKED_DRAWS, template_problems
 from ._plans import CONFLICT_M, approach_statistics
 
 _FORMATS: Final = (".png", ".svg", ".pdf")
-# A scenario with a smaller share of conflicts than this tests little.
-_MIN_CONFLICT_SHARE: Final = 0.8
 
 
 def list_command(*, as_json: bool = False) -> int:
@@ -132,39 +129,6 @@ def draw_command(names: Sequence[str], out: str) -> int:
         save_drawing(scenario_figure(template), file)
         print(file)
     return 0
-
-
-def validate_command(files: Sequence[str]) -> int:
-    """Check scenarios and print what is wrong; return 0, or 2 if one cannot be run."""
-    status = 0
-    for file in files:
-        try:
-            template = ScenarioTemplate.named(file)
-            found = template_problems(template)
-        except SimError as error:
-            found, template = (str(error),), None
-        if found or template is None:
-            status = 2
-            print(f"{file}: cannot be run")
-            print("\n".join(f"  {problem}" for problem in found))
-            continue
-        print(f"{file}: {template.id}, {len(template.parameters())} numbers vary: can be run")
-        for remark in _remarks(template):
-            print(f"  {remark}")
-    return status
-
-
-def _remarks(template: ScenarioTemplate) -> list[str]:
-    statistics = approach_statistics(template, CHECKED_DRAWS)
-    if statistics is None:
-        return ["it has no people, or only those of replay_csv"]
-    remark = (
-        f"if nobody reacted, robot and somebody would be nearer than {CONFLICT_M:g} m in "
-        f"{statistics.conflict_share:.0%} of {statistics.draws} draws"
-    )
-    if statistics.conflict_share < _MIN_CONFLICT_SHARE:
-        remark += ": it hardly tests the robot; let people start earlier or later"
-    return [remark]
 
 
 def _person_text(spec: PersonSpec) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from awarenav.errors import counted
 from awarenav.figures import Circle, Polygon, Rectangle, new_figure, save_figure
 
 from ._falsify import Falsification
@@ -84,7 +85,7 @@ def _draw_course(axes: Axes, falsification: Falsification) -> None:
     settings = falsification.settings
     label = " with its floor taken away (UNSAFE)" if settings.unsafe_no_floor else ""
     axes.set_title(
-        f"{len(falsification.trials)} episodes against {settings.policy_name}{label}: "
+        f"{counted(len(falsification.trials), 'episode')} against {settings.policy_name}{label}: "
         f"{falsification.contacts} with a contact that the robot caused (crosses)",
         loc="left",
         fontsize=10,

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from awarenav.errors import counted
+
 from ...crossing.eyes import Perception, PerceptionKind, SensorSet
 from .._files import common_settings
 from ._falsify import Falsification, FalsifySettings, falsify
@@ -95,9 +97,12 @@ def _table_lines(falsification: Falsification, cases: Sequence[WorstCase]) -> li
             f"{record.reaction or '-':12s}" + ("" if case.replays else "  DOES NOT REPLAY")
         )
     contacts, episodes = falsification.contacts, len(falsification.trials)
-    lines.append(f"{contacts} of {episodes} episodes with a contact that the robot caused.")
+    lines.append(
+        f"{contacts} of {counted(episodes, 'episode')} with a contact that the robot caused."
+    )
     if falsification.errors:
-        lines.append(f"{falsification.errors} episodes have no result; episodes.csv says why.")
+        broken = counted(falsification.errors, "episode has", "episodes have")
+        lines.append(f"{broken} no result; episodes.csv says why.")
     return lines
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
+from awarenav.errors import counted
 from nav_adapter import AwarenessPolicy
 
 from ...study.measures import EpisodeRecord, salvage_record_file, write_records
@@ -64,8 +65,8 @@ class PolicyEvaluator:
         evaluation = self.evaluate(name, policy, seeds)
         if evaluation.errors:
             raise SimError(
-                f"{len(evaluation.errors)} episodes of {name} have no result; the first: "
-                f"{evaluation.errors[0]}"
+                f"{counted(len(evaluation.errors), 'episode')} of {name} without a result; the "
+                f"first: {evaluation.errors[0]}"
             )
         return evaluation
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from awarenav.errors import counted
 from awarenav.figures import new_figure, save_figure
 
 from ._evaluation import OBJECTIVES
@@ -81,8 +82,8 @@ def _draw_front(axes: Axes, tuning: Tuning) -> None:
         )
     settings = tuning.settings
     axes.set_title(
-        f"{len(tuning.trials)} trials, {settings.episodes} seeds in "
-        f"{len(settings.scenarios)} scenarios each",
+        f"{counted(len(tuning.trials), 'trial')}, {counted(settings.episodes, 'seed')} in "
+        f"{counted(len(settings.scenarios), 'scenario')} each",
         loc="left",
         fontsize=10,
     )

@@ -8,6 +8,7 @@ import warnings
 from pathlib import Path
 from typing import Any, Final
 
+from awarenav.errors import counted
 from awarenav.files import csv_number, write_text
 
 from ...study.measures import Interval
@@ -152,8 +153,9 @@ def _header(tuning: Tuning, candidate: Candidate) -> str:
         f"{candidate.name.replace('_', ' ')}: trial {candidate.trial} of {len(tuning.trials)} in a "
         f"tuning of {settings.policy_name} ({settings.sampler}, seed {settings.seed}, perception "
         f"{settings.perception}).",
-        f"On {len(held_out.records)} held-out episodes (seeds {_ends(settings.held_out_seeds)} in "
-        f"{', '.join(_scenarios(tuning))}), means with 95 % intervals:",
+        f"On {counted(len(held_out.records), 'held-out episode')} (seeds "
+        f"{_ends(settings.held_out_seeds)} in {', '.join(_scenarios(tuning))}), means with 95 % "
+        "intervals:",
     ]
     for key in OBJECTIVES:
         lines.append(

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, cast
 
+from awarenav.errors import counted
 from nav_adapter import AwarenessPolicy
 
 from ...study.runs import ProcessLock, plan_jobs, policy_of
@@ -232,7 +233,7 @@ def _run_trials(
         return [_outcome(claim, space, evaluator, settings) for claim in claims]
 
     while not study.is_complete:
-        runner.bar.set_postfix_str(f"{study.finished_count} of {settings.trials} trials")
+        runner.bar.set_postfix_str(f"{study.finished_count} of {counted(settings.trials, 'trial')}")
         if not study.evaluate(1, outcomes_of):
             runner.bar.set_postfix_str("others work on the rest of this generation")
             time.sleep(_POLL_S)

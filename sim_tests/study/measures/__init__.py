@@ -7,6 +7,14 @@ from typing import TYPE_CHECKING
 from awarenav.lazy import lazy_names
 
 if TYPE_CHECKING:
+    from ._attention import (
+        ATTENTION_WITHIN_M,
+        ATTENTIVE_FROM,
+        UNAWARE_UP_TO,
+        UNCONFIRMED,
+        MeasuredAttention,
+        measured_part,
+    )
     from ._bootstrap import bootstrap_interval, ratio_interval
     from ._driving import path_length_m
     from ._interval import Interval, proportion_interval, zero_of_n_upper
@@ -29,23 +37,31 @@ if TYPE_CHECKING:
     )
     from ._summary import BASELINE, Comparison, Summary, SummaryRow, summarise
     from ._summary_text import nondeterminism_notes, summary_text, table_text
+    from ._trace import Trace
     from ._variants import Variant, labels
 
 __all__ = [
+    "ATTENTION_WITHIN_M",
+    "ATTENTIVE_FROM",
     "BASELINE",
     "METRICS",
     "RECORD_COLUMNS",
     "SHARES",
+    "UNAWARE_UP_TO",
+    "UNCONFIRMED",
     "Comparison",
     "EpisodeRecord",
     "Interval",
+    "MeasuredAttention",
     "Metric",
     "Summary",
     "SummaryRow",
+    "Trace",
     "Variant",
     "bootstrap_interval",
     "labels",
     "measure",
+    "measured_part",
     "nondeterminism_notes",
     "paired",
     "paired_difference",
@@ -70,6 +86,14 @@ __all__ = [
 __getattr__ = lazy_names(
     __name__,
     {
+        "._attention": (
+            "ATTENTION_WITHIN_M",
+            "ATTENTIVE_FROM",
+            "UNAWARE_UP_TO",
+            "UNCONFIRMED",
+            "MeasuredAttention",
+            "measured_part",
+        ),
         "._bootstrap": (
             "bootstrap_interval",
             "ratio_interval",
@@ -117,6 +141,7 @@ __getattr__ = lazy_names(
             "summary_text",
             "table_text",
         ),
+        "._trace": ("Trace",),
         "._variants": (
             "Variant",
             "labels",

@@ -11,6 +11,7 @@ import numpy as np
 from perception.arrays import FloatArray
 
 from ...crossing import STANDING_SPEED_MPS
+from ._attention import MeasuredAttention
 from ._awareness import awareness_class, awareness_error, nearest_person, track_awareness
 from ._conflict import Outline, min_time_to_collision_s, post_encroachment_s
 from ._driving import (
@@ -111,6 +112,7 @@ def measure(
             awareness_error=error,
             awareness=awareness,
             reaction=reaction,
+            attentive_share=MeasuredAttention.of(trace).least_aware_share,
         )
     )
 

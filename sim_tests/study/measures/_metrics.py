@@ -242,4 +242,12 @@ METRICS: Final = _by_name(
         "Mean |α of the track − true α| over the people tracked.",
         decimals=3,
     ),
+    Metric(
+        "attentive_share",
+        "Least attentive person",
+        "",
+        "neither",
+        "Smallest share of the time for which one of the people had a true α ≥ 0.5, while the "
+        "robot was in front of them, in sight and within 5 m.",
+    ),
 )

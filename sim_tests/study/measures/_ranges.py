@@ -24,9 +24,10 @@ _NOT_NEGATIVE: Final = (
     "intimate_s",
     "personal_s",
     "awareness_error",
+    "attentive_share",
     *(name for name, kind in COLUMN_KINDS.items() if kind == "count" and name != "seed"),
 )
-_AT_MOST_ONE: Final = ("spl", "awareness_error")
+_AT_MOST_ONE: Final = ("spl", "awareness_error", "attentive_share")
 # Any figure of an episode is far smaller, in metres, seconds or counts.
 _LARGEST: Final = 1e9
 _CONTACTS_BY: Final = ("", "robot", "person")

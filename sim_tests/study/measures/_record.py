@@ -67,6 +67,8 @@ class EpisodeRecord:
             its default.
         nondeterministic: the user's planner gave other commands when it drove the task without
             people a second time, with the same seed; the row may differ in another run.
+        attentive_share: smallest share of the time for which one of the people had a true α ≥ 0.5,
+            while they could look at the robot within 5 m.
     """
 
     scenario: str
@@ -110,6 +112,7 @@ class EpisodeRecord:
     reaction: str = ""
     error: str = ""
     nondeterministic: bool = False
+    attentive_share: float | None = None
 
     @property
     def versioned_scenario(self) -> str:

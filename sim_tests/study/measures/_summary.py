@@ -11,6 +11,7 @@ import numpy as np
 
 from perception.short_repr import short_repr
 
+from ._attention import measured_part
 from ._bootstrap import ratio_intervals
 from ._interval import Interval, proportion_interval
 from ._metrics import METRICS
@@ -39,7 +40,7 @@ class Comparison:
     Attributes:
         variant: label of the policy.
         baseline: label of the policy compared with.
-        part: a scenario or an attention; empty for all.
+        part: a scenario or a part of :func:`measured_part`; empty for all.
         pairs: number of pairs.
         won_back: share of the time lost by the baseline that the policy wins back.
         time_lost_s: mean difference in time lost; negative means that the policy is faster.
@@ -183,7 +184,7 @@ def summarise_sources(
         )
     }
     names = labels(ordered)
-    by_scenario, by_attention = attrgetter("versioned_scenario"), attrgetter("attention")
+    by_scenario = attrgetter("versioned_scenario")
 
     def rows(part_of: _Part) -> tuple[SummaryRow, ...]:
         return tuple(
@@ -213,9 +214,9 @@ def summarise_sources(
         level=level,
         policies=rows(lambda record: ""),
         scenarios=rows(by_scenario),
-        attentions=rows(by_attention),
+        attentions=rows(measured_part),
         awareness=rows(_awareness_part),
-        comparisons=comparisons(lambda record: "") + comparisons(by_attention),
+        comparisons=comparisons(lambda record: "") + comparisons(measured_part),
         scenario_comparisons=comparisons(by_scenario),
     )
 

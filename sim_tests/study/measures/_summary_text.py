@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import TypeVar
 
+from awarenav.errors import counted
+
+from ._attention import ATTENTION_WITHIN_M, ATTENTIVE_FROM, UNCONFIRMED
 from ._interval import Interval, number_text
 from ._metrics import METRICS
 from ._record import EpisodeRecord
@@ -190,11 +193,17 @@ def _notes(summary: Summary) -> list[str]:
         "margin, violated, TTC, PET under safety: the worst of all episodes. (≤ x %): upper end\n"
         "of the exact interval. [?]: too few for an interval. docs/metrics.md defines all figures."
     ]
+    if any(row.part == UNCONFIRMED for row in summary.attentions):
+        notes.append(
+            f"{UNCONFIRMED}: the scenario says attentive, but somebody was aware of the robot for\n"
+            f"less than {100.0 * ATTENTIVE_FROM:.0f} % of the time with it in front within "
+            f"{ATTENTION_WITHIN_M:g} m, or it was not measured"
+        )
     for row in summary.policies:
         if row.errors:
             notes.append(
-                f"{row.variant}: {row.errors} of {row.episodes} episodes broke off with an error; "
-                "they count as no success and are in no other figure"
+                f"{row.variant}: {_of(row.errors, row.episodes)} broke off with an error; "
+                "failed episodes count as no success and are in no other figure"
             )
         lost = row.means["time_lost_s"]
         ran = row.episodes - row.errors
@@ -203,18 +212,18 @@ def _notes(summary: Summary) -> list[str]:
         not_reached = ran - row.means["time_to_goal_s"].n
         if not_reached:
             notes.append(
-                f"{row.variant}: {not_reached} of {ran} episodes did not reach the goal; they lost "
-                "all of their time, and have no time to goal"
+                f"{row.variant}: {_of(not_reached, ran)} did not reach the goal; such an episode "
+                "has lost all of its time, and has no time to goal"
             )
         if lost.n < ran:
             notes.append(
-                f"{row.variant}: time lost is known for {lost.n} of {ran} episodes, those whose "
-                "task was also done without people"
+                f"{row.variant}: time lost is known for {_of(lost.n, ran)}, as it needs the same "
+                "task without people"
             )
     for each in summary.comparisons:
         if each.part == "" and each.won_back.left_out:
             notes.append(
-                f"{each.variant}: {each.won_back.left_out} of {each.pairs} pairs are left out of "
+                f"{each.variant}: {_of(each.won_back.left_out, each.pairs, 'pair')} left out of "
                 "the time won back"
             )
     return notes
@@ -236,7 +245,12 @@ def nondeterminism_notes(records: Iterable[EpisodeRecord]) -> tuple[str, ...]:
 def nondeterminism_note(label: str, differing: int, episodes: int) -> str:
     """Return the sentence about a planner, or about a policy and its planner."""
     return (
-        f"{label}: the planner is not deterministic. In {differing} of {episodes} episodes it "
-        "drove the task without people differently the second time, with the same seed; their "
-        "rows may differ when they are run again."
+        f"{label}: the planner is not deterministic. In {_of(differing, episodes)} it drove the "
+        "task without people differently the second time, with the same seed; such rows may "
+        "differ when they are run again."
     )
+
+
+def _of(part: int, whole: int, name: str = "episode") -> str:
+    """Return ``"1 of 1 episode"``, ``"3 of 20 episodes"``."""
+    return f"{part} of {counted(whole, name)}"

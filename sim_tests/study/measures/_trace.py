@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from perception.arrays import FloatArray
 
@@ -29,6 +30,7 @@ class Trace:
         awareness: (N, P) true α.
         separation_m: (N, P) distances between the surfaces; a lower bound where the centres are
             more than 4 m apart.
+        could_look: (N, P) whether the robot was in front of the person and in sight.
     """
 
     t_s: FloatArray
@@ -39,6 +41,7 @@ class Trace:
     people_odom_mps: FloatArray
     awareness: FloatArray
     separation_m: FloatArray
+    could_look: NDArray[np.bool_]
 
     @classmethod
     def of(cls, result: CrossingResult) -> Trace:
@@ -73,6 +76,7 @@ class Trace:
             people_odom_mps=of_people("velocity_odom_mps", (2,)),
             awareness=of_people("awareness", ()),
             separation_m=np.array([frame.separations_m for frame in frames]).reshape(count, people),
+            could_look=of_people("could_look", ()).astype(np.bool_),
         )
 
     @property

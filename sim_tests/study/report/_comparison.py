@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
-from ..measures import METRICS, SHARES, Metric
+from ..measures import METRICS, SHARES, UNCONFIRMED, Metric
 from ._panel import Panel, panel
 from ._statistics import MARGIN, TIME_LOST, VIOLATION, RunStatistics, estimate
 
@@ -41,8 +41,8 @@ FURTHER: Final = (
         )
     ),
 )
-#: Attentions of scenarios: what their people look at.
-ATTENTIONS: Final = ("attentive", "mixed", "unaware")
+#: Parts of the episodes by what their people look at.
+ATTENTIONS: Final = ("attentive", UNCONFIRMED, "mixed", "unaware")
 # Fields of a Comparison.
 _PAIRED: Final = (
     Metric(

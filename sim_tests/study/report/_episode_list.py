@@ -96,8 +96,8 @@ def list_episodes(run: RunData, arms: Sequence[Arm], folder: Path | None = None)
     left_out = ""
     if len(chosen) > MOST_LINES:
         left_out = (
-            f"{plural(len(chosen) - MOST_LINES, 'episode')} of larger margins are left out; "
-            "episodes.csv has them all, and its lines are numbered in the same way."
+            f"Left out: {plural(len(chosen) - MOST_LINES, 'episode')} of larger margins. "
+            "episodes.csv has all episodes, and its lines are numbered in the same way."
         )
         order = sorted(range(len(chosen)), key=lambda i: worst_first(chosen[i]))
         chosen = [chosen[i] for i in sorted(order[:MOST_LINES])]

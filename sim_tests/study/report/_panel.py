@@ -9,6 +9,7 @@ from typing import Final
 
 from ..measures import Interval, Metric
 from ._arm import Arm
+from ._geometry import TRACK_PX, labels_fit
 from ._text import NOTHING, count, number, percent
 
 # An estimate from less than this fraction of the most episodes does not stretch an axis.
@@ -47,8 +48,20 @@ class Scale:
         share = (value - self.low) / (self.high - self.low)
         return round(100.0 * min(max(share, 0.0), 1.0), 2)
 
-    def ticks(self, most: int = 5) -> tuple[tuple[float, str], ...]:
-        """Return at most ``most`` round values in the axis: places in per cent, and texts."""
+    def ticks(self, most: int, length_px: float = math.inf) -> tuple[tuple[float, str], ...]:
+        """Return round values in the axis: places in per cent, and texts.
+
+        Args:
+            most: largest number of values.
+            length_px: length of the axis, along which the texts must not overlap.
+        """
+        for number_of in range(most, 1, -1):
+            found = self._ticks(number_of)
+            if labels_fit(found, length_px):
+                return found
+        return found[:1]
+
+    def _ticks(self, most: int) -> tuple[tuple[float, str], ...]:
         step = _round_step((self.high - self.low) / max(most - 1, 1))
         decimals = max(0, -math.floor(math.log10(step) + 1e-9))
         first, last = math.ceil(self.low / step - 1e-9), math.floor(self.high / step + 1e-9)
@@ -141,7 +154,7 @@ def panel(
         hint,
         metric.meaning,
         tuple(_panel_row(metric, scale, factor, signed, *row) for row in rows),
-        scale.ticks(6),
+        scale.ticks(6, TRACK_PX),
         scale.place(0.0) if inside else None,
     )
 

@@ -61,20 +61,22 @@ class RunData:
         records, repeated = _without_repeats(table.records)
         if repeated:
             missing.append(
-                f"{plural(repeated, 'row')} of {files.episodes.name} repeat an episode; the first "
-                "counts."
+                f"{plural(repeated, 'row repeats', 'rows repeat')} an episode in "
+                f"{files.episodes.name}; the first counts."
             )
         episodes = _numbered(records, jobs)
-        if jobs and len(records) < len(jobs):
+        waiting = len(jobs) - len(records)
+        if jobs and waiting > 0:
             missing.append(
-                f"{count(len(jobs) - len(records))} of {plural(len(jobs), 'episode')} have "
-                "not run yet; the same command with --resume runs them."
+                f"{count(waiting)} of {plural(len(jobs), 'episode')} "
+                f"{'has' if waiting == 1 else 'have'} not run yet; the same command with --resume "
+                "goes on."
             )
         unknown = sum(episode.number is None for episode in episodes)
         if jobs and unknown:
             missing.append(
-                f"{plural(unknown, 'episode')} in {files.episodes.name} stand in no line of "
-                f"{files.jobs.name}, so they have no replay command."
+                f"{plural(unknown, 'episode')} in {files.episodes.name} without a line in "
+                f"{files.jobs.name}, and so without a replay command."
             )
         return cls(path, episodes, jobs, about, tuple(missing))
 

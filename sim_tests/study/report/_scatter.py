@@ -8,6 +8,7 @@ from typing import Any, Final
 
 from ._arm import Arm, Episode
 from ._episode_list import outcome_of
+from ._geometry import PLOT_PX, Region, spread
 from ._panel import Scale
 from ._text import count, number, plural
 
@@ -17,6 +18,13 @@ MOST_MARKS: Final = 3000
 _FAR_SHARE: Final = 0.01
 # Height in per cent of the strip above the axis of time, for episodes that never arrived.
 _BAND: Final = 9.0
+#: Up to so many marks, they are large.
+FEW_MARKS: Final = 300
+# Smallest distance of marks in per cent, large and small: 5 and 2 px on a phone.
+_APART: Final = 1.6
+_APART_MANY: Final = 0.6
+# Marks keep this distance, in per cent, from lines that they must not cross.
+_BESIDE: Final = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +37,7 @@ class Mark:
         arm: number of its arm.
         look: number of the arm's colour and shape.
         x: place in per cent from the left.
-        y: place in per cent from the top.
+        y: place in per cent from the top, moved off other marks.
         touched: the robot moved into a person.
     """
 
@@ -55,7 +63,7 @@ class Scatter:
         band: height in per cent of the strip for episodes that never arrived, 0 without it.
         data: data for the script: scenarios, arms, the replay command up to the number, and one
             row per mark.
-        left_out: a note on episodes that are not drawn; empty for none.
+        left_out: a note on episodes that are not drawn, or lie on others; empty for none.
     """
 
     marks: tuple[Mark, ...]
@@ -66,6 +74,11 @@ class Scatter:
     band: float
     data: dict[str, Any]
     left_out: str
+
+    @property
+    def large(self) -> bool:
+        """True if the marks are few, and large."""
+        return len(self.marks) <= FEW_MARKS
 
 
 def scatter(arms: Sequence[Arm], listed: Sequence[Episode], replay_prefix: str) -> Scatter | None:
@@ -91,17 +104,22 @@ def scatter(arms: Sequence[Arm], listed: Sequence[Episode], replay_prefix: str) 
     places = {name: index for index, name in enumerate(scenarios)}
     numbers = {arm.name: index for index, arm in enumerate(arms)}
     lines = {id(each): index for index, each in enumerate(listed)}
+    x_zero = x_scale.place(0.0) if x_scale.low < 0.0 < x_scale.high else None
+    # Contacts keep their places, and are drawn last, above all other marks.
+    shown = sorted(shown, key=lambda point: not point[1].record.robot_touched)
+    spots, covered = spread(
+        [_place(each, x_scale, y_scale, x_zero, band) for _, each in shown],
+        _APART if len(shown) <= FEW_MARKS else _APART_MANY,
+    )
+    drawn = sorted(
+        zip(shown, spots, strict=True), key=lambda point: point[0][1].record.robot_touched
+    )
     marks, rows = [], []
-    # Contacts are drawn last, above all other marks.
-    for arm, each in sorted(shown, key=lambda point: point[1].record.robot_touched):
+    for (arm, each), (x, y) in drawn:
         record = each.record
         key = -1 if each.number is None else each.number
-        y = 0.5 * band
-        if record.time_to_goal_s is not None:
-            y = round(100.0 - y_scale.place(_lost(each)) * (1.0 - band / 100.0), 2)
         hit = record.robot_touched
         label = f"{arm.name}, {record.scenario}, seed {record.seed}"
-        x = x_scale.place(_margin(each))
         marks.append(Mark(lines.get(id(each), 0), label, numbers[arm.name], arm.look, x, y, hit))
         rows.append(
             [
@@ -116,14 +134,6 @@ def scatter(arms: Sequence[Arm], listed: Sequence[Episode], replay_prefix: str) 
                 outcome_of(each),
             ]
         )
-    missing = []
-    if total > len(points):
-        missing.append(
-            f"{plural(total - len(points), 'episode')} without a margin (nobody came near, or the "
-            "robot never moved) or without a time to compare with"
-        )
-    if len(points) > len(shown):
-        missing.append(f"{count(len(points) - len(shown))} others, evenly thinned out")
     return Scatter(
         tuple(marks),
         tuple(
@@ -131,12 +141,12 @@ def scatter(arms: Sequence[Arm], listed: Sequence[Episode], replay_prefix: str) 
             for index, arm in enumerate(arms)
             if arm.episodes
         ),
-        x_scale.ticks(8),
+        x_scale.ticks(8, PLOT_PX[0]),
         tuple(
             (round(100.0 - place * (1.0 - band / 100.0), 2), text)
             for place, text in y_scale.ticks(6)
         ),
-        x_scale.place(0.0) if x_scale.low < 0.0 < x_scale.high else None,
+        x_zero,
         band,
         {
             "scenarios": scenarios,
@@ -144,8 +154,44 @@ def scatter(arms: Sequence[Arm], listed: Sequence[Episode], replay_prefix: str) 
             "replay": replay_prefix,
             "rows": rows,
         },
-        f"Not drawn: {'; '.join(missing)}." if missing else "",
+        _left_out_note(total, len(points), len(shown), covered),
     )
+
+
+def _left_out_note(total: int, drawable: int, shown: int, covered: int) -> str:
+    """Return the note on episodes that are not drawn, or lie on others; empty for none."""
+    missing = []
+    if total > drawable:
+        missing.append(
+            f"{plural(total - drawable, 'episode')} without a margin (nobody came near, or the "
+            "robot never moved) or without a time to compare with"
+        )
+    if drawable > shown:
+        missing.append(f"{plural(drawable - shown, 'other')}, evenly thinned out")
+    notes = [f"Not drawn: {'; '.join(missing)}."] if missing else []
+    if covered:
+        notes.append(f"{plural(covered, 'mark lies', 'marks lie')} on others.")
+    return " ".join(notes)
+
+
+def _place(
+    episode: Episode, x_scale: Scale, y_scale: Scale, x_zero: float | None, band: float
+) -> tuple[float, float, Region]:
+    """Return the place of an episode in per cent, and where its mark may be moved.
+
+    A mark stays on its side of a margin of 0, and in the strip of those that never arrived or
+    below it.
+    """
+    x = x_scale.place(_margin(episode))
+    left, right = 0.0, 100.0
+    if x_zero is not None and _margin(episode) < 0.0:
+        right = max(x, x_zero - _BESIDE)
+    elif x_zero is not None:
+        left = x_zero
+    if episode.record.time_to_goal_s is None:
+        return x, 0.5 * band, Region(left, right, 0.0, band)
+    y = round(100.0 - y_scale.place(_lost(episode)) * (1.0 - band / 100.0), 2)
+    return x, y, Region(left, right, min(y, band + _BESIDE), 100.0)
 
 
 def _drawable(episode: Episode) -> bool:

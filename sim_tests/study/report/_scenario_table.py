@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from ..measures import Comparison, Metric, SummaryRow
+from ..measures import Comparison, EpisodeRecord, Metric, SummaryRow, measured_part
 from ._arm import Arm, judged_arms
 from ._statistics import MARGIN, TIME_LOST, VIOLATION, RunStatistics, estimate
 from ._text import NOTHING, count, number, percent
@@ -41,7 +41,7 @@ class ScenarioRow:
 
     Attributes:
         name: name, with the version from 2 on.
-        attention: the scenario's ``attention``.
+        attention: the scenario's ``attention``, and in how many episodes its people were not so.
         episodes: number of episodes of all arms.
         contacts: contacts caused by the robot, by arm.
         cells: cells in the columns of all groups.
@@ -72,11 +72,7 @@ def scenario_table(statistics: RunStatistics) -> ScenarioTable:
         _group("Margin violated, s", "mean an episode", arms),
         _group("Smallest margin, m", "the worst episode", arms),
     ]
-    attention = {
-        each.record.versioned_scenario: each.record.attention
-        for arm in arms
-        for each in arm.episodes
-    }
+    attention = _attentions(each.record for arm in arms for each in arm.episodes)
     rows = []
     for scenario in sorted(attention):
         found = [statistics.by_scenario(arm, scenario) for arm in arms]
@@ -94,6 +90,21 @@ def scenario_table(statistics: RunStatistics) -> ScenarioTable:
             )
         )
     return ScenarioTable(tuple(groups), tuple(rows))
+
+
+def _attentions(records: Iterable[EpisodeRecord]) -> dict[str, str]:
+    """Return the attention of each scenario, and in how many episodes it was not measured so."""
+    parts: dict[str, list[str]] = {}
+    labels: dict[str, str] = {}
+    for record in records:
+        parts.setdefault(record.versioned_scenario, []).append(measured_part(record))
+        labels[record.versioned_scenario] = record.attention
+    return {
+        scenario: f"{label}, {count(others)} of {count(len(parts[scenario]))} not"
+        if (others := sum(part != label for part in parts[scenario]))
+        else label
+        for scenario, label in labels.items()
+    }
 
 
 def _group(title: str, meaning: str, arms: Sequence[Arm]) -> ColumnGroup:

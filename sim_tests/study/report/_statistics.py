@@ -17,6 +17,8 @@ from ..measures import (
     SummaryRow,
     Variant,
     labels,
+    measured_part,
+    paired,
     proportion_interval,
     summarise,
 )
@@ -25,6 +27,28 @@ from ._arm import Arm, Episode, arms_of
 TIME_LOST: Final = METRICS["time_lost_s"]
 VIOLATION: Final = METRICS["violation_time_s"]
 MARGIN: Final = METRICS["min_margin_m"]
+
+
+@dataclass(frozen=True, slots=True)
+class Unconfirmed:
+    """The pairs of a scenario labelled attentive that do not count as attentive.
+
+    Attributes:
+        scenario: name, with the version from 2 on.
+        pairs: number of all its pairs.
+        inattentive: number of pairs in which somebody was measured not to be attentive.
+        not_measured: number of pairs in which attention was not measured.
+    """
+
+    scenario: str
+    pairs: int
+    inattentive: int
+    not_measured: int
+
+    @property
+    def left_out(self) -> int:
+        """Number of pairs that do not count."""
+        return self.inattentive + self.not_measured
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +110,7 @@ class RunStatistics:
 
         Args:
             arm: the arm.
-            part: an attention, or a scenario; empty for all episodes.
+            part: a part of :func:`measured_part`, or a scenario; empty for all episodes.
             scenario: ``part`` is a scenario.
         """
         comparisons = self.summary.comparisons
@@ -94,6 +118,32 @@ class RunStatistics:
             comparisons = self.summary.scenario_comparisons
         label = self.labels.get(arm.name)
         return next((c for c in comparisons if (c.variant, c.part) == (label, part)), None)
+
+    def unconfirmed(self, arm: Arm) -> tuple[Unconfirmed, ...]:
+        """Return the pairs with the reference that count as attentive by their label alone.
+
+        In each of them somebody was not attentive in one of its two episodes, or it was not
+        measured.
+        """
+        whole = self.against(arm)
+        if whole is None:
+            return ()
+        base = next(each for each in self.arms if self.labels.get(each.name) == whole.baseline)
+        found: dict[str, Unconfirmed] = {}
+        for pair in paired(*([each.record for each in part.episodes] for part in (base, arm))):
+            if pair[0].attention != "attentive":
+                continue
+            name = pair[0].versioned_scenario
+            old = found.get(name, Unconfirmed(name, 0, 0, 0))
+            unknown = any(each.attentive_share is None for each in pair)
+            counts = all(measured_part(each) == "attentive" for each in pair)
+            found[name] = Unconfirmed(
+                name,
+                old.pairs + 1,
+                old.inattentive + (not counts and not unknown),
+                old.not_measured + unknown,
+            )
+        return tuple(each for each in found.values() if each.left_out)
 
     def _find(self, rows: Iterable[SummaryRow], arm: Arm, part: str) -> SummaryRow | None:
         label = self.labels.get(arm.name)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from ..measures import SHARES, Comparison, Interval
+from ..measures import ATTENTIVE_FROM, SHARES, Comparison, Interval
 from ._arm import Arm, judged_arms
-from ._statistics import RunStatistics, robot_contacts
+from ._statistics import RunStatistics, Unconfirmed, robot_contacts
 from ._text import NOTHING, count, percent, plural
 
 # With fewer pairs, the bootstrap interval is too narrow, and no effect counts as shown.
@@ -39,12 +40,13 @@ class Card:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """The summary of one arm."""
+    """The summary of one arm; ``note`` names what its figures leave out."""
 
     name: str
     look: int
     sentence: str
     cards: tuple[Card, ...]
+    note: str = ""
 
 
 def verdicts(statistics: RunStatistics) -> tuple[Verdict, ...]:
@@ -62,17 +64,60 @@ def _verdict(statistics: RunStatistics, arm: Arm) -> Verdict:
         return Verdict(arm.name, arm.look, "No episode finished, so nothing can be said.", (card,))
     cards = [_contact_card(arm, contacts)]
     sentence = _contact_sentence(contacts)
+    note = ""
     whole = statistics.against(arm)
     if whole is not None:
+        unconfirmed = statistics.unconfirmed(arm)
         attentive = statistics.against(arm, "attentive")
-        known = attentive is not None and attentive.won_back.known
-        who, against = ("attentive people", attentive) if known and attentive else ("people", whole)
-        cards += [_won_back_card(who, against), _violation_card(statistics, arm, whole)]
-        sentence += _won_back_sentence(who, against)
+        if attentive is not None and attentive.won_back.known:
+            cards.append(_won_back_card("attentive people", attentive))
+            sentence += _won_back_sentence("attentive people", attentive)
+        elif unconfirmed:
+            cards.append(_nobody_attentive_card())
+            sentence += " Nobody was measured to be attentive, so time won back cannot be stated."
+        else:
+            cards.append(_won_back_card("people", whole))
+            sentence += _won_back_sentence("people", whole)
+        cards.append(_violation_card(statistics, arm, whole))
+        note = unconfirmed_note(unconfirmed)
     elif arm.role != "reference":
         sentence += " Without the policy blind on the same seeds, time won back cannot be stated."
     cards.append(_arrival_card(arm))
-    return Verdict(arm.name, arm.look, sentence, tuple(cards))
+    return Verdict(arm.name, arm.look, sentence, tuple(cards), note)
+
+
+def unconfirmed_note(unconfirmed: Sequence[Unconfirmed]) -> str:
+    """Return the sentences on pairs that count as attentive by their label alone."""
+    reasons = (
+        (
+            f"not everybody was aware of the robot for {percent(ATTENTIVE_FROM)} of the time",
+            [(each.inattentive, each.scenario) for each in unconfirmed],
+        ),
+        (
+            "what people look at was not measured",
+            [(each.not_measured, each.scenario) for each in unconfirmed],
+        ),
+    )
+    sentences = []
+    for reason, amounts in reasons:
+        total = sum(amount for amount, _ in amounts)
+        if total:
+            names = ", ".join(f"{name} {count(n)}" for n, name in amounts if n)
+            sentences.append(
+                f"{plural(total, 'pair')} labelled attentive {'is' if total == 1 else 'are'} left "
+                f"out of the time won back, because {reason}: {names}."
+            )
+    return " ".join(sentences)
+
+
+def _nobody_attentive_card() -> Card:
+    return Card(
+        "Time won back with attentive people",
+        NOTHING,
+        "no pair whose people were measured to be attentive",
+        "no data",
+        "open",
+    )
 
 
 def _hits(share: Interval) -> int:

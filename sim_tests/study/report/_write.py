@@ -82,6 +82,7 @@ def write_report(
     listed = list_episodes(run, arms, path.parent)
     errors = sum(len(arm.errors) for arm in arms)
     page = _render_page(
+        plural=plural,
         title=title_of(run, len(arms)),
         run=run,
         condition=f"under the fault {statistics.fault}" if statistics.fault else "without faults",

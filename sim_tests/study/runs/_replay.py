@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from awarenav.errors import counted
 from awarenav.video import VideoWriter
 from perception import AttentionCone
 
@@ -215,7 +216,8 @@ def find_episode(jobs: Sequence[Job], episode: str) -> int:
         number = int(episode)
         if number >= len(jobs):
             raise SimError(
-                f"the run has {len(jobs)} episodes, numbered 0 to {len(jobs) - 1}, got {number}"
+                f"the run has {counted(len(jobs), 'episode')}, numbered 0 to {len(jobs) - 1}, got "
+                f"{number}"
             )
         return number
     parts = episode.split(":")

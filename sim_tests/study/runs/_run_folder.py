@@ -10,6 +10,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
+from awarenav.errors import counted
 from awarenav.files import atomic_path, write_text
 from awarenav.line_files import DamagedLine, LineFile, set_aside
 
@@ -138,9 +139,9 @@ class RunFolder(AbstractContextManager["RunFolder"]):
             )
         if about.get("state") == "complete":
             raise SimError(
-                f"{folder} holds a finished run of {about.get('episodes', '?')} episodes: replace "
-                "it with --overwrite (overwrite=True), choose another --out, or read its table "
-                "again with --resume (resume=True)"
+                f"{folder} holds a finished run of {_episodes(about.get('episodes', '?'))}: "
+                "replace it with --overwrite (overwrite=True), choose another --out, or read its "
+                "table again with --resume (resume=True)"
             )
         if about.get("state") != "running" and done >= 0:
             raise SimError(
@@ -176,7 +177,7 @@ class RunFolder(AbstractContextManager["RunFolder"]):
         count = about.get("episodes", len(jobs)) if plan.damaged else plan.lines
         if count != len(jobs):
             raise SimError(
-                f"the run in {folder} has {count} episodes, and {len(jobs)} were asked "
+                f"the run in {folder} has {_episodes(count)}, and {len(jobs)} were asked "
                 "for: resume with the arguments that began it, which run.json holds, or run into "
                 "another folder"
             )
@@ -248,3 +249,8 @@ def record_key(record: EpisodeRecord) -> JobKey:
         record.perception,
         record.fault,
     )
+
+
+def _episodes(count: int | str) -> str:
+    """Return a number of episodes, which an unreadable ``run.json`` leaves unknown, as text."""
+    return counted(count, "episode") if isinstance(count, int) else f"{count} episodes"

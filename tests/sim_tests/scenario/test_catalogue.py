@@ -14,6 +14,7 @@ from sim_tests.scenario.catalogue import (
     scenario_problems,
     template_problems,
 )
+from sim_tests.study.scenarios import AttentionCheck
 
 # Their scripted people stop beside the robot's path on purpose.
 BESIDE = {"crossing_attentive", "crossing_distracted", "paper_encounter"}
@@ -147,11 +148,11 @@ def test_validate_accepts_good_files_and_reports_bad_ones(capsys, tmp_path):
     good.write_text(text)
     bad.write_text(text.replace("x_m: 7.8", "x_m: 70.8"))
     idle.write_text(text.replace("low: 0.0", "low: 18.0").replace("high: 1.0", "high: 19.0"))
-    assert main(["scenario", "validate", str(good), str(idle)]) == 0
+    assert main(["scenario", "validate", "--episodes", "0", str(good), str(idle)]) == 0
     output = capsys.readouterr().out
     assert "reads_phone@1, 2 numbers vary: can be run" in output
     assert "in 0% of 100 draws: it hardly tests the robot" in output
-    assert main(["scenario", "validate", str(good), str(bad)]) == 2
+    assert main(["scenario", "validate", "--episodes", "0", str(good), str(bad)]) == 2
     output = capsys.readouterr().out
     assert "outside the hall" in output
     assert output.count("route point 0") == 1
@@ -214,3 +215,6 @@ def test_the_robot_reaches_its_goal_without_hitting_anybody(name, seed):
     result = run_crossing(scenario, policy="balanced", seed=seed)
     assert result.success
     assert result.contact_by != "robot"
+    # What its people look at is what it says of them.
+    check = AttentionCheck.of(ScenarioTemplate.shipped(name), [result])
+    assert check.contradictions == ()

@@ -154,4 +154,5 @@ def trace(times, robot, people):
         people_odom_mps=walks.reshape(len(times), len(people), 4)[..., 2:],
         awareness=nothing,
         separation_m=nothing,
+        could_look=nothing > 0.0,
     )

@@ -173,6 +173,7 @@ def _episode(
         awareness_error=float(np.clip(0.12 + 0.05 * z[5], 0.0, 1.0)),
         awareness=stands,
         reaction="wait" if truly_aware else "",
+        attentive_share={"attentive": 0.97, "mixed": 0.5, "unaware": 0.0}[attention],
     )
 
 

@@ -8,6 +8,7 @@ import pytest
 from awarenav.cli import main
 from sim_tests import SimError
 from sim_tests.study.measures import (
+    UNCONFIRMED,
     EpisodeRecord,
     Variant,
     labels,
@@ -35,6 +36,7 @@ def episode(scenario, seed, policy, **values):
         "duration_s": 10.0 + lost,
         "attention": ATTENTION[scenario],
         "awareness": "aware" if ATTENTION[scenario] == "attentive" else "unaware",
+        "attentive_share": 0.9 if ATTENTION[scenario] == "attentive" else 0.0,
         **values,
     }
     perception = "truth" if policy == "oracle" else "keypoints"
@@ -81,6 +83,25 @@ def test_every_policy_is_compared_with_the_baseline():
     other = summarise(RECORDS, baseline="balanced")
     assert {each.baseline for each in other.comparisons} == {"balanced"}
     assert summarise(RECORDS, baseline="absent").comparisons == ()
+
+
+def test_pairs_count_as_attentive_only_where_both_were_measured_so():
+    """Seed 1 is not attentive with balanced, seed 2 with nobody, and seed 3 was not measured."""
+    shares = {("balanced", 1): 0.7, ("balanced", 2): 0.1, ("blind", 2): 0.2, ("blind", 3): None}
+    records = [
+        replace(record, attentive_share=shares.get((record.policy, record.seed), 0.9))
+        if record.attention == "attentive"
+        else record
+        for record in RECORDS
+    ]
+    summary = summarise(records)
+    assert only(summary.comparisons, variant="balanced", part="attentive").pairs == 2
+    assert only(summary.comparisons, variant="balanced", part=UNCONFIRMED).pairs == 1
+    assert only(summary.comparisons, variant="balanced", part="").pairs == 10
+    assert only(summary.attentions, variant="blind", part=UNCONFIRMED).episodes == 2
+    text = summary_text(summary)
+    assert "unconfirmed: the scenario says attentive, but somebody was aware" in text
+    assert "unconfirmed" not in summary_text(summarise(RECORDS))
 
 
 def test_the_order_of_rows_changes_nothing():

@@ -1,0 +1,195 @@
+"""What people look at, measured, and the scenario's word for it checked against that."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from measured_scenes import crossing
+
+from awarenav.cli import main
+from sim_tests import ScenarioTemplate, run_crossing, shipped_scenarios
+from sim_tests.study.measures import (
+    UNCONFIRMED,
+    EpisodeRecord,
+    MeasuredAttention,
+    Trace,
+    measured_part,
+)
+from sim_tests.study.scenarios import AttentionCheck, check_attention
+
+T_S = np.arange(0.0, 10.05, 0.1)
+
+
+def still(t):
+    return 0.0, 0.0, 0.0, 0.0
+
+
+def person_at(x_m):
+    return lambda t: (x_m, 0.0, 0.0, 0.0)
+
+
+def seen(result, could_look):
+    """The same crossing in which ``could_look(t, person)`` says who has the robot before them."""
+    frames = [
+        replace(
+            frame,
+            truth=tuple(
+                replace(view, could_look=could_look(frame.t_s, index))
+                for index, view in enumerate(frame.truth)
+            ),
+        )
+        for frame in result.frames
+    ]
+    return replace(result, frames=tuple(frames))
+
+
+def measured(people, awareness, could_look=lambda t, person: True):
+    walks = [person_at(x) for x in people]
+    result = seen(crossing(T_S, still, walks, awareness=awareness), could_look)
+    return MeasuredAttention.of(Trace.of(result))
+
+
+def test_only_the_time_counts_in_which_looking_matters():
+    # Aware for the first 3 s; the robot is before the person from 2 s to 6 s: 1 s of 4 s.
+    found = measured([3.0], lambda t, i: 0.7 if t < 2.95 else 0.0, lambda t, i: 1.95 < t < 5.95)
+    assert found.could_look_s.tolist() == pytest.approx([4.0])
+    assert found.aware_s.tolist() == pytest.approx([1.0])
+    assert found.looked_s.tolist() == [0.0]
+    assert found.least_aware_share == pytest.approx(0.25)
+
+
+def test_people_far_away_and_short_moments_are_not_judged():
+    assert measured([7.0], lambda t, i: 0.0).least_aware_share is None
+    brief = measured([3.0], lambda t, i: 0.0, lambda t, i: t < 0.35)
+    assert brief.could_look_s.tolist() == pytest.approx([0.4])
+    assert brief.least_aware_share is None
+    assert measured([], lambda t, i: 0.0).least_aware_share is None
+
+
+def test_the_least_attentive_person_decides():
+    found = measured([3.0, 4.0], lambda t, i: 0.95 if i == 0 or t < 4.95 else 0.0)
+    assert found.least_aware_share == pytest.approx(0.5)
+    assert found.looked_s.tolist() == pytest.approx([10.0, 5.0])
+
+
+@pytest.mark.parametrize(
+    ("attention", "share", "part"),
+    [
+        ("attentive", 0.95, "attentive"),
+        ("attentive", 0.8, "attentive"),
+        ("attentive", 0.79, UNCONFIRMED),
+        ("attentive", None, UNCONFIRMED),
+        ("mixed", 0.95, "mixed"),
+        ("unaware", 0.95, "unaware"),
+    ],
+)
+def test_only_measured_attention_counts_as_attentive(attention, share, part):
+    record = EpisodeRecord(
+        "a", 0, "blind", "p", "truth", attention=attention, attentive_share=share
+    )
+    assert measured_part(record) == part
+
+
+def checked(label, awareness):
+    data = {
+        "name": "made_up",
+        "attention": label,
+        "duration_s": 30.0,
+        "layout": "open",
+        "robot": {"goal_x_m": 11.0},
+        "people": [{"name": "worker", "route": [{"x_m": 3.0, "y_m": 0.0}]}],
+    }
+    result = crossing(T_S, still, [person_at(3.0)], awareness=awareness)
+    return AttentionCheck.of(ScenarioTemplate(data), [result])
+
+
+@pytest.mark.parametrize(
+    ("label", "alpha", "share", "contradicts"),
+    [
+        ("attentive", 1.0, 0.81, False),
+        ("attentive", 1.0, 0.79, True),
+        ("attentive", 0.49, 1.0, True),
+        ("unaware", 1.0, 0.24, False),
+        ("unaware", 1.0, 0.26, True),
+        ("unaware", 0.6, 1.0, False),
+        ("mixed", 1.0, 1.0, False),
+        ("mixed", 0.0, 1.0, False),
+    ],
+)
+def test_labels_are_contradicted_by_what_people_do(label, alpha, share, contradicts):
+    check = checked(label, lambda t, i: alpha if t < 10.0 * share - 0.05 else 0.0)
+    assert bool(check.contradictions) == contradicts
+    for sentence in check.contradictions:
+        assert f"attention: {label}, but worker" in sentence
+        assert "of 10.0 s" in sentence
+
+
+def test_remarks_have_the_figures_and_the_better_word():
+    assert "its attention could be attentive" in checked("mixed", lambda t, i: 1.0).remarks[1]
+    assert "its attention could be unaware" in checked("mixed", lambda t, i: 0.0).remarks[1]
+    assert checked("mixed", lambda t, i: 1.0 if t < 5.0 else 0.0).remarks[1:] == ()
+    first, cone = checked("unaware", lambda t, i: 0.6).remarks
+    assert first.startswith("in 1 crossing, ")
+    assert "worker aware (α ≥ 0.5) for 100%, looking straight at it for 0% of 10.0 s" in first
+    assert "has it in the attention cone for 100% of the time" in cone
+
+
+def test_a_person_can_look_at_a_robot_ahead_and_in_sight_only():
+    """In the aisle until they have passed each other; round the corner not before the rack ends."""
+    scenario = ScenarioTemplate.shipped("head_on_in_aisle").for_seed(0)
+    frames = run_crossing(scenario, policy="balanced", perception="truth", seed=0).frames
+    for frame in frames:
+        view, ahead_m = frame.truth[0], frame.T_odom_camera[0, 3]
+        distance_m = view.position_odom_m[0] - ahead_m
+        if abs(distance_m) > 0.5:
+            assert view.could_look == (distance_m > 0.0)
+    scenario = ScenarioTemplate.shipped("crossing_from_left").for_seed(0)
+    first = run_crossing(scenario, policy="balanced", perception="truth", seed=0).frames[0].truth[0]
+    assert not first.could_look
+    assert first.awareness == 0.0
+
+
+def wrongly_labelled(folder: Path, name: str, label: str) -> Path:
+    template = ScenarioTemplate.shipped(name)
+    path = folder / f"{name}.yaml"
+    text = template.to_text()
+    path.write_text(text.replace(f"attention: {template.attention}", f"attention: {label}"))
+    return path
+
+
+def test_validate_names_a_wrong_label_with_what_was_measured(tmp_path, capsys):
+    said_attentive = wrongly_labelled(tmp_path, "crossing_distracted", "attentive")
+    said_unaware = wrongly_labelled(tmp_path, "crossing_attentive", "unaware")
+    files = [str(said_attentive), str(said_unaware)]
+    assert main(["scenario", "validate", "--episodes", "1", *files]) == 1
+    output = capsys.readouterr().out
+    assert output.count("can be run, but its attention is wrong") == 2
+    assert "attention: attentive, but worker 0 was aware of the robot (α ≥ 0.5) for 0%" in output
+    assert "attention: unaware, but worker 0 looked straight at the robot" in output
+    assert "0 numbers vary" in output
+    assert main(["scenario", "validate", "--episodes", "0", *files]) == 0
+
+
+def test_one_number_varies_in_the_singular(tmp_path, capsys):
+    path = tmp_path / "one.yaml"
+    text = ScenarioTemplate.shipped("crossing_distracted").to_text()
+    path.write_text(text.replace("goal_x_m: 13.0", "goal_x_m: {uniform: {low: 12.0, high: 13.0}}"))
+    assert main(["scenario", "validate", "--episodes", "0", str(path)]) == 0
+    output = capsys.readouterr().out
+    assert "1 number varies: can be run" in output
+    assert "1 numbers" not in output
+
+
+@pytest.mark.full
+@pytest.mark.slow
+@pytest.mark.parametrize("name", shipped_scenarios())
+def test_people_of_shipped_scenarios_do_what_their_label_says(name):
+    check = check_attention(ScenarioTemplate.shipped(name), range(3))
+    assert check.contradictions == ()
+    if check.label == "attentive":
+        assert min(each.aware_share for each in check.people) >= 0.85
+    assert not any(math.isnan(each.aware_share) for each in check.people)
