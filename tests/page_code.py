@@ -6,7 +6,7 @@ file. A ``text`` block shows what the block before it prints. These comments bef
 what a test does with it::
 
     <!-- not run: REASON -->      left out
-    <!-- slow: REASON -->         run by `pytest --full` only, with everything after it
+    <!-- slow: REASON -->         run by `pytest --full` only
     <!-- exits with 2 -->         the exit status of the last command
     <!-- varies: REASON -->       the output shown is not compared
 """
@@ -33,7 +33,7 @@ Kind = Literal["shell", "python", "file", "output"]
 _SHELLS = ("sh", "console", "bash")
 _COMMANDS = ("awarenav ", "python ", "pytest ", "pip ", "make ", "cd ", "cp ", "git ")
 _DIRECTIVE = re.compile(r"<!-- (not run|slow|varies|exits with)(?::? (.*?))? -->")
-_SAVED = re.compile(r"\bsave\b[^.]*? as `([\w./-]+)`[^`]*:$", re.IGNORECASE | re.DOTALL)
+_SAVED = re.compile(r"\bsave\b[^.]*?\sas\s`([\w./-]+)`[^`]*:$", re.IGNORECASE | re.DOTALL)
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
 _SECONDS = 600
 # A figure may differ between computers by this share, and by two units of its last digit.
@@ -145,9 +145,7 @@ class Reader:
         """Do what the blocks say; return how many of them ran or were compared."""
         done = 0
         for block in blocks:
-            if block.slow and not full:
-                break
-            if block.skipped:
+            if block.skipped or (block.slow and not full):
                 self._printed = None
                 continue
             where = f"{self._page}:{block.line}"
