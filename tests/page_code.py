@@ -36,7 +36,7 @@ _DIRECTIVE = re.compile(r"<!-- (not run|slow|varies|exits with)(?::? (.*?))? -->
 _SAVED = re.compile(r"\bsave\b[^.]*?\sas\s`([\w./-]+)`[^`]*:$", re.IGNORECASE | re.DOTALL)
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
 _SECONDS = 600
-# A figure may differ between computers by this share, and by two units of its last digit.
+# A figure may differ between computers by this share, or by two units of its last digit.
 _TOLERANCE = 0.05
 
 
@@ -242,4 +242,4 @@ def _near(shown: str, printed: str) -> bool:
     if "." not in shown:
         unit = 0.0
     wanted = float(shown)
-    return abs(float(printed) - wanted) <= 2.0 * unit + _TOLERANCE * abs(wanted) + 1e-12
+    return abs(float(printed) - wanted) <= max(2.0 * unit, _TOLERANCE * abs(wanted)) + 1e-12

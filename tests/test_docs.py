@@ -18,7 +18,13 @@ from awarenav.cli import main
 
 PAGES = sorted(
     path.relative_to(ROOT).as_posix()
-    for pattern in ("*.md", "docs/*.md", "benchmarks/*/*.md", "training/*/*.md")
+    for pattern in (
+        "*.md",
+        "docs/*.md",
+        "docs/tutorials/*.md",
+        "benchmarks/*/*.md",
+        "training/*/*.md",
+    )
     for path in ROOT.glob(pattern)
 )
 #: The changelog names modules that are gone.

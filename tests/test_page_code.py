@@ -14,13 +14,15 @@ PAGES = sorted(
     for path in ROOT.glob(pattern)
 )
 BLOCKS = {page: list(blocks_of((ROOT / page).read_text("utf-8"))) for page in PAGES}
-#: Pages with code that a test can run.
-RUN = [
-    page
-    for page in PAGES
-    if any(not block.skipped and block.kind in ("shell", "python") for block in BLOCKS[page])
-]
-SLOW = [page for page in RUN if any(block.slow for block in BLOCKS[page])]
+
+
+def runs(block: Block, *, full: bool) -> bool:
+    """Say whether a test runs a block, rather than to leave it out."""
+    return block.kind in ("shell", "python") and not block.skipped and (full or not block.slow)
+
+
+RUN = [page for page in PAGES if any(runs(block, full=False) for block in BLOCKS[page])]
+SLOW = [page for page in PAGES if any(block.slow for block in BLOCKS[page])]
 
 
 def follow(page: str, folder: Path, monkeypatch: pytest.MonkeyPatch, *, full: bool) -> None:
