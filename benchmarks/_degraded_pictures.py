@@ -56,7 +56,7 @@ class Condition:
 
     @property
     def is_plain(self) -> bool:
-        """Whether the pictures are as rendered."""
+        """True if the pictures are as rendered."""
         return not self.background and self.degradation(0) == Degradation()
 
 

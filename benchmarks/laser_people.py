@@ -2,7 +2,7 @@
 
 A robot with two diagonal scanners drives through the shipped halls. Held-out workers walk and stand
 around it. The figures are: recall per scan of people within 5 m in line of sight, errors of place,
-confirmed tracks where nobody is, and the processor time of a scan.
+confirmed tracks of no person, and the processor time of a scan.
 """
 
 from __future__ import annotations

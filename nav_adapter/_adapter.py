@@ -160,8 +160,8 @@ class NavAdapter:
                 after it unless ``robot_state`` is as new.
             perception_stamp_s: stamp of the latest frame that perception has processed, with or
                 without people. If it is None, the newest track's stamp is used, and empty
-                ``tracks`` mean that nobody is there. So only with this stamp does a dead camera
-                stop a robot that sees nobody.
+                ``tracks`` mean that no person is there. So a dead camera stops a robot without
+                tracks only if this stamp is given.
 
         Returns:
             Obstacles in the order of track ids, the speed limit with the rule that set it, and

@@ -41,8 +41,8 @@ class ObstacleRules:
     no frame does, neither repeated nor predicted tracks shrink an obstacle or raise awareness.
 
     Awareness raises no speed until frames have shown a person for ``shrink_after_s``. A known id at
-    a place that the person could not have reached is somebody new and unaware, and whoever had it
-    is kept for ``hold_s`` under a negative id.
+    a place that the person could not have reached belongs to a new, unaware person. The person
+    who had it is kept for ``hold_s`` under a negative id.
 
     Args:
         policy: radii, human speeds, margins and time behaviour.

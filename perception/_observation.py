@@ -40,7 +40,7 @@ class PersonObservation:
         legs_camera_m: (3,) middle of the ankles, or of the knees if the feet are not in the image,
             at the range of ``position_camera_m``; None if no leg was seen.
         awareness_reason: why ``awareness`` is None, one of :data:`AWARENESS_REASONS`; None if it is
-            not, or nobody says why.
+            not, or if the reason is unknown.
         range_lasting_relative_std: the part of the range's relative standard deviation that is the
             same in every frame of this person, because their size is not known; in
             ``position_covariance_m2`` it is σ² p pᵀ. 0 for a measured range.
@@ -148,8 +148,8 @@ class PersonObservation:
             positions_camera_m: (N, 3).
             position_covariances_m2: (N, 3, 3).
             scores: (N,) in [0, 1].
-            gazes_camera: (N, 3) unit vectors, or None for nobody's.
-            awareness: (N,) in [0, 1], or None for nobody's.
+            gazes_camera: (N, 3) unit vectors, or None without any gaze.
+            awareness: (N,) in [0, 1], or None without any.
             awareness_std: (N,) ≥ 0; None if and only if ``awareness`` is None.
             boxes_xyxy_px: (N, 4), or None for no boxes.
 

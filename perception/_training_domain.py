@@ -1,4 +1,4 @@
-"""What a network has seen in training: renders, or photographs of real people."""
+"""The images that a network has seen in training: renders, or photographs of real people."""
 
 from __future__ import annotations
 

@@ -98,7 +98,7 @@ def estimate_awareness(
         eye_in_head_std_rad: standard deviations of the eyes in the head, sideways and up and down.
         face_seen: (N,) probabilities that the camera sees the face.
         eyes: eyes in each head as :func:`~perception.eyes.known_eyes` returns them, None where they
-            are not known; empty for nobody's.
+            are not known; empty if no eyes are known.
     """
     if not heads:
         return ()

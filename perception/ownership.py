@@ -1,4 +1,4 @@
-"""Whose keypoints: one skeleton for each detection, and only one that a body could have."""
+"""Owners of keypoints: one skeleton for each detection, and only one that a body could have."""
 
 from __future__ import annotations
 
@@ -193,7 +193,7 @@ def _scales(rays: FloatArray, seen: Seen) -> list[list[float]]:
 
 
 def _head_off_m(rays: FloatArray, seen: Seen, scales: Sequence[float]) -> float:
-    """Return how far the head is from where the trunk has it; infinite if nobody knows."""
+    """Return the distance of the head from its place above the trunk; infinite if unknown."""
     head = seen[kp.HEAD]
     if not (head.any() and seen[kp.SHOULDERS].all() and scales):
         return np.inf

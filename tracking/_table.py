@@ -56,8 +56,8 @@ class TrackTable:
             is not in ``covariances`` (``_sizes``).
         size_logs: (N,) ln of the range at which an adult would look as large, over the range.
         size_variances: (N,) of it; ∞ where nothing is known of the person's size.
-        places: (N, K, 4) latest measured places (``_stillness``), oldest first; K is 0 where nobody
-            asks for them.
+        places: (N, K, 4) latest measured places (``_stillness``), oldest first; K is 0 if they
+            are not asked for.
     """
 
     ids: IntArray

@@ -171,8 +171,8 @@ def _evidence(
 def _merged(tracks: TrackTable, pairs: _Pairs, due: BoolArray) -> TrackTable:
     """Return the tracks after those of the pairs that are ``due`` (K,) have become twins.
 
-    The host of a new twin takes the lower awareness of both. Whoever had the twin for a host has
-    its host instead.
+    The host of a new twin takes the lower awareness of both. A track that had the twin for a host
+    has its host instead.
     """
     ids = tracks.ids
     hosts, twins = tracks.host_ids.copy(), tracks.twins.copy()
@@ -209,7 +209,7 @@ def with_hosts(tracks: TrackTable, births: int, config: TrackerConfig) -> TrackT
     """Return the tracks after the last ``births`` of them have got the hosts that they may have.
 
     A new track beside another may be its twin. The other may as well be the twin of the new one:
-    of two boxes in the first frame nobody knows which one lasts.
+    the first frame with two boxes does not show which one lasts.
     """
     count = len(tracks)
     if not births or count < 2:
@@ -239,7 +239,7 @@ def with_hosts(tracks: TrackTable, births: int, config: TrackerConfig) -> TrackT
 def _as_strangers(tracks: TrackTable, released: BoolArray, config: TrackerConfig) -> TrackTable:
     """Return the tracks after those ``released`` (N,) have ceased to be twins: as unaware people.
 
-    Of the faces that the frames showed of two boxes, nobody knows whose they were.
+    The faces in the two boxes may have been those of either person.
     """
     if not released.any():
         return tracks

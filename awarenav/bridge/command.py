@@ -95,8 +95,8 @@ _LOG: Final = "Recordings"
     "--map",
     group=_READ,
     metavar="TOPIC|FILE.yaml",
-    help="nav_msgs/OccupancyGrid, or a map file of map_server: what it holds is nobody's legs. "
-    "Needs --scan.",
+    help="nav_msgs/OccupancyGrid, or a map file of map_server. What the map holds is not taken "
+    "for legs. Needs --scan.",
 )
 @option(
     "--map-frame",

@@ -169,7 +169,7 @@ class _Application(CommandGroup):
 )
 @click.version_option(__version__, prog_name=_PROGRAM, message="%(prog)s %(version)s")
 def app() -> None:
-    """Awareness-aware navigation: see who has noticed the robot, and move accordingly."""
+    """Awareness-aware navigation: estimate who has noticed the robot, and adapt its speed."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -1,4 +1,4 @@
-"""What is wrong with an installation and a camera: ``awarenav doctor``."""
+"""Findings about an installation and a camera: ``awarenav doctor``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the doctor finds, and the order in which it says it."""
+"""Findings of the doctor, and their order."""
 
 from __future__ import annotations
 

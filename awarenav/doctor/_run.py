@@ -68,7 +68,7 @@ class DoctorOptions:
 
 @dataclass(slots=True)
 class _Examined:
-    """What was seen in a source."""
+    """Figures and findings of the images of a source."""
 
     stamps_s: list[float] = field(default_factory=list)
     figures: list[PictureFigures] = field(default_factory=list)

@@ -40,7 +40,7 @@ _Pairs = Sequence[tuple[PersonRecord, PersonRecord]]
 def person_metrics(group: Iterable[PersonFrame]) -> dict[str, Any]:
     """Return the metrics of a group of people who had to be found.
 
-    Shares are from 0 to 1; a metric to which nobody contributes is None. ``awareness_none`` and
+    Shares are from 0 to 1; a metric without people is None. ``awareness_none`` and
     ``gaze_none`` are the shares of found people without an estimate of it. ``false_aware`` is the
     share of α ≥ 0.5 among the estimated α of people whose true α is 0; people without an estimated
     α do not count, so they do not dilute it. ``aware_recognised`` is the share of people with an

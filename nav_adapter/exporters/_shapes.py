@@ -1,7 +1,7 @@
 """Obstacles in the shapes that planners read: circles, points, polygons, boxes.
 
 Pure functions of the constraints, in the odom frame. They have one entry per person, in the order
-of ``constraints.obstacles``, and return an empty array or tuple if there is nobody.
+of ``constraints.obstacles``, and return an empty array or tuple without people.
 
 A policy may stretch an obstacle along the person's motion. Shapes without a velocity are stretched
 with it. Circles are not: planners that use them move them along the velocity.

@@ -281,7 +281,7 @@ class AwarenessBridge:
         return self._scan_reader().read(number, message, now_s)
 
     def on_map(self, message: OccupancyGrid | MapCells) -> None:
-        """Use a map of what stands still, also one from a file: what it holds is nobody's legs.
+        """Use a map of fixed things, also one from a file: they are not taken for legs.
 
         It is used while tf tells where the map is in odom.
         """

@@ -100,7 +100,7 @@ class LegDetectorConfig:
 
 
 class LegDetector:
-    """Finds people in the scans of one robot, and learns what of the surroundings stands still.
+    """Finds people in the scans of one robot, and learns which surroundings stand still.
 
     All scanners of a robot share one detector. It needs the scans in the order of their time.
 

@@ -63,7 +63,7 @@ class _Seated:
 
     @property
     def sits(self) -> bool:
-        """Whether the images show somebody who sits."""
+        """True if the images show a person who sits."""
         beside = float(np.hypot(*self.offset_m[:2]))
         return self.images >= _IMAGES and beside > _BESIDE_M and self.offset_m[2] < _ABOVE_M
 

@@ -96,7 +96,7 @@ class Degradation:
 
     @property
     def changes_light(self) -> bool:
-        """Whether anything but JPEG and the rolling shutter changes the pixels."""
+        """True if anything but JPEG and the rolling shutter changes the pixels."""
         return replace(self, jpeg_quality=None, shutter_shear=0.0) != Degradation()
 
 

@@ -124,7 +124,7 @@ class WorkerScript(StrictConfig):
 
     @property
     def seated(self) -> bool:
-        """Whether the worker sits."""
+        """True if the worker sits."""
         return bool(self.activities) and self.activities[0].activity == "sitting"
 
     def walk(self) -> PlannedWalk:

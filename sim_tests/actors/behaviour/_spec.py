@@ -185,5 +185,5 @@ class PersonSpec(StrictConfig):
 
     @property
     def seated(self) -> bool:
-        """Whether the person sits."""
+        """True if the person sits."""
         return self.activity == "sitting"

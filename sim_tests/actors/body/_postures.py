@@ -110,7 +110,7 @@ class Activity:
 
     @property
     def seated(self) -> bool:
-        """Whether the person sits."""
+        """True if the person sits."""
         return self.name == "sitting"
 
     @property

@@ -1,4 +1,4 @@
-"""False returns in a scan: mirror images beyond shiny surfaces, and legs where nobody is."""
+"""False returns in a scan: mirror images beyond shiny surfaces, and legs that do not exist."""
 
 from __future__ import annotations
 

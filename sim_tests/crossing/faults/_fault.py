@@ -127,7 +127,7 @@ class Fault(StrictConfig):
         """Return both faults at once.
 
         Raises:
-            SimError: where both set the same thing: nobody knows which of them counts.
+            SimError: if both set the same thing, because only one of them could count.
         """
         own, others = (
             each.model_dump(exclude_defaults=True, exclude={"name", "description"})

@@ -64,7 +64,7 @@ class ScannerFault(StrictConfig):
         reflections: surfaces that reflect rays like a mirror, 0.8 m wide, where the scanner
             measured something within 8 m. Beyond them the scan shows people, posts and racks a
             second time, mirrored; images of people move as the people do.
-        ghosts: pairs of legs where nobody is, 0.8 m to 6 m away. Half of them stand; the others
+        ghosts: pairs of legs that do not exist, 0.8 m to 6 m away. Half of them stand; the others
             walk at up to 1.5 m/s. They hide what is behind them.
     """
 

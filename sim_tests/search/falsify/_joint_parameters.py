@@ -80,7 +80,7 @@ def add_joint(data: dict[str, Any], values: Mapping[str, float]) -> None:
 def is_joint_possible(
     data: Mapping[str, Any], values: Mapping[str, float], boxes_odom_m: FloatArray
 ) -> bool:
-    """Return whether people begin apart, and a parked pallet is in nobody's way.
+    """Return whether people begin apart, and a parked pallet blocks no way.
 
     Args:
         data: the changed scenario.
