@@ -216,7 +216,9 @@ def compare_output(shown: str, printed: str, where: str) -> None:
             continue
         while rest and not _same(line, rest[0]):
             rest.pop(0)
-        assert rest, f"{where}: not printed, or not in this order: {line!r}; printed was:\n{printed}"
+        assert rest, (
+            f"{where}: not printed, or not in this order: {line!r}; printed was:\n{printed}"
+        )
 
 
 def _same(shown: str, printed: str) -> bool:

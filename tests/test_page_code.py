@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 from page_code import Block, Reader, blocks_of, compare_output, is_installation
 from paths import ROOT
+
+from nav_adapter import RobotState
 
 PAGES = sorted(
     path.relative_to(ROOT).as_posix()
@@ -40,6 +44,21 @@ def test_a_page_runs_in_an_empty_folder(
     page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     follow(page, tmp_path, monkeypatch, full=False)
+
+
+def test_the_five_lines_of_the_readme_give_obstacles_and_a_limit() -> None:
+    (block,) = (each for each in BLOCKS["README.md"] if each.kind == "python")
+    names: dict[str, Any] = {}
+    exec(compile(block.text, "README.md", "exec"), names)
+    T_odom_camera = [[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 1.4], [0, 0, 0, 1]]
+    state = RobotState(0.0, [0.0, 0.0], 0.0, 0.5, 0.0)
+    image_rgb = np.zeros((480, 640, 3), np.uint8)
+    obstacles, limit_mps, reason = names["on_image"](image_rgb, 0.0, T_odom_camera, state)
+    assert obstacles.shape == (0, 5)
+    assert limit_mps == 1.5
+    assert reason == "robot maximum"
+    lines = block.text.partition("def on_image")[2].splitlines()[1:]
+    assert len([line for line in lines if line.strip()]) == 5
 
 
 @pytest.mark.full
