@@ -119,6 +119,7 @@ def test_riddles_are_found(riddle: str) -> None:
         "No contact occurred, and nobody waited.",
         "The check is that nobody starts inside a rack.",
         "**What it is not.** It is a demonstration.",
+        "[How the limit is made](policies.md) is a page.",
         "What does it cost?",
         "Where no ankle is seen, the lowest joint counts.",
         "`whoever` is a name in code.",

@@ -23,7 +23,7 @@ LONG_WORDS = 35
 
 #: Turns of phrase that a reader has to solve, and what to write instead.
 RIDDLES = {
-    r"\b(whom|which|what) nobody\b": "say what happens instead, as 'a person out of view'",
+    r"\b(whom|what) nobody\b": "say what happens instead, as 'a person out of view'",
     r"\bnobody (knows?|sees?|asks?|asked|reads?|heeds?|looks?|nobody)\b": "name the thing itself",
     r"\bwhere nobody is\b": "name the place",
     r"\b(is|are) (then )?nobody\b": "name the thing itself",
@@ -47,7 +47,7 @@ RIDDLES = {
 #: Beginnings of sentences that put the subject last, and what to write instead.
 RIDDLE_BEGINNINGS = {
     r"Who(se|m|ever)?\b[^?]*$": "begin with the subject, as 'A person who …'",
-    r"(What|How) [^,?]+ (is|are|was|were|counts?|decides?|makes?|lasts?|gives?)\b[^?]*$": (
+    r"(What|How) [^,:?]+ (is|are|was|were|counts?|decides?|makes?|lasts?|gives?)\b[^?]*$": (
         "begin with the subject, as 'The …'"
     ),
     r"(Not|Never|Nowhere|Nor|Only then|Only so) "
@@ -127,6 +127,7 @@ def sentences(markdown: str) -> list[Sentence]:
         text = re.sub(r"^\*\*(?:[^*\s]+\s?){1,5}[.:]\*\*\s*", "", paragraph)  # a title
         text = re.sub(r"`[^`]*`", "CODE", text)
         text = re.sub(r"!\[[^\]]*\]\([^)]*\)(\{[^}]*\})?", "", text)
+        text = re.sub(r"\[(What|How|Who)\b[^\]]*\]\([^)]*\)", "PAGE", text)  # a title as a name
         text = re.sub(r"\[([^\]]*)\]\([^)]*\)(\{[^}]*\})?", r"\1", text)
         text = re.sub(r"<[^>]*>|\*\*|(?<!\w)[*_]|[*_](?!\w)", "", text)
         for part in re.split(_END_OF_SENTENCE, _protected(text)):

@@ -35,7 +35,7 @@ _GROUP_ROWS: Final = (
 
 @dataclass(frozen=True, slots=True)
 class Requirement:
-    """A requirement for a metric; a metric without people does not meet it."""
+    """A requirement for a metric; a metric to which nobody contributed does not meet it."""
 
     name: str
     value: float | None
