@@ -10,7 +10,7 @@ PYTEST := $(PY) -m pytest -n auto --dist worksteal
 export PYTHON
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test mutants lint bench lock clean
+.PHONY: help setup demo test mutants lint bench docs lock clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{printf "%-14s %s\n", $$1, $$2}'
@@ -28,9 +28,10 @@ test: lint ## run the linters, then every test; also build, install and import t
 mutants: setup ## change constants of safety and geometry, one at a time: every change must fail a test
 	$(PY) -m tools.mutants
 
-lint: setup ## run ruff, the import contracts and strict type checks
+lint: setup ## run ruff, the speller, the import contracts and strict type checks
 	$(PY) -m ruff check .
 	$(PY) -m ruff format --check .
+	$(PY) -m codespell_lib
 	$(VENV)/bin/lint-imports
 	$(PY) -m mypy
 
@@ -38,13 +39,19 @@ bench: setup ## measure the speed of crossings and of perception
 	$(AWARENAV) bench
 	$(PY) -m benchmarks.perception_speed
 
+docs: setup ## build the documentation site in site/ and check its links
+	$(PY) -m mkdocs build
+	$(PY) -m tools.docs_site.check site
+
 # The extra mediapipe brings another build of OpenCV, so it is not in the lock.
 lock: setup ## pin the newest packages that pyproject.toml allows, for every supported Python
 	@command -v uv >/dev/null || $(PY) -m pip install --quiet uv
 	PATH="$$PATH:$(VENV)/bin" uv pip compile --universal --python-version 3.10 --extra dev \
 		--upgrade --quiet --custom-compile-command "make lock" \
 		--output-file requirements.lock pyproject.toml
+	$(MAKE) setup
+	$(PY) -m tools.sbom
 
 clean: ## remove results and caches, but not .venv
-	rm -rf demo build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf demo build dist site .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	find . -name .venv -prune -o -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -25,7 +25,7 @@ _SHIFT: Final = 4  # sub-pixel bits of OpenCV's drawing functions
 # OpenCV's fixed-point coordinates overflow not far beyond this.
 _FAR_PX: Final = 20_000.0
 # The fonts of OpenCV 4 have only ASCII characters.
-_ASCII: Final = {"α": "alpha", "±": "+-", "σ": "sigma", "°": " deg", "·": "-"}
+_ASCII: Final = {"α": "alpha", "±": "+-", "σ": "sigma", "°": " deg", "·": "-", "≥": ">=", "–": "-"}
 
 
 def awareness_colour(alpha: float | None) -> Colour:
@@ -83,10 +83,14 @@ class Font:
 
     Args:
         height_px: height of a line of text.
+        weight: 100 (thin) to 1000 (black), 400 is regular. 0 is OpenCV 5's default, which is not
+            the same in all processes.
     """
 
-    def __init__(self, height_px: int) -> None:
+    def __init__(self, height_px: int, weight: int = 0) -> None:
         self.height_px = height_px
+        self._weight = weight
+        self._thickness_px = 1 if weight < 600 else 2
         # The typeface of OpenCV 5 has Greek letters; its size is 0.72 of a line's height.
         self._face: Any = _typeface()
         self._size = max(round(0.72 * height_px), 8)
@@ -96,11 +100,11 @@ class Font:
         if self._face is None:
             plain = _in_ascii(text)
             (width, _), _ = cv2.getTextSize(
-                plain, cv2.FONT_HERSHEY_SIMPLEX, self.height_px / 34.0, 1
+                plain, cv2.FONT_HERSHEY_SIMPLEX, self.height_px / 34.0, self._thickness_px
             )
             return int(width)
         measure: Any = cv2.getTextSize
-        return int(measure((0, 0), text, (0, 0), self._face, self._size)[2])
+        return int(measure((0, 0), text, (0, 0), self._face, self._size, self._weight)[2])
 
     def write(self, image: ImageRgb, text: str, corner: tuple[int, int], colour: Colour) -> None:
         """Write a line of text with its upper left corner at ``corner``."""
@@ -109,9 +113,10 @@ class Font:
         if self._face is None:
             scale = self.height_px / 34.0
             plain = _in_ascii(text)
-            put(image, plain, base, cv2.FONT_HERSHEY_SIMPLEX, scale, colour, 1, cv2.LINE_AA)
+            face, thick = cv2.FONT_HERSHEY_SIMPLEX, self._thickness_px
+            put(image, plain, base, face, scale, colour, thick, cv2.LINE_AA)
         else:
-            put(image, text, base, colour, self._face, self._size)
+            put(image, text, base, colour, self._face, self._size, self._weight)
 
 
 @lru_cache(maxsize=1)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from perception.installation import install_command
+
 from .errors import MissingExtraError
 from .files import atomic_path
 
@@ -21,7 +23,7 @@ try:
 except ImportError as cause:  # pragma: no cover - depends on the installation
     raise MissingExtraError(
         "a plot needs matplotlib, which is not installed; it is the extra 'plot': "
-        "pip install 'awarenav[plot]'. Without it, only tables can be made (--out none)"
+        f"{install_command('plot')}. Without it, only tables can be made (--out none)"
     ) from cause
 
 __all__ = [

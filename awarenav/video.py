@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from perception.installation import install_command
+
 from .errors import AwarenavError, MissingExtraError
 
 try:
@@ -16,7 +18,7 @@ try:
 except ImportError as cause:  # pragma: no cover - depends on the installation
     raise MissingExtraError(
         "writing videos needs PyAV, which is not installed; it is part of the extra 'sim': "
-        "pip install 'awarenav[sim]'"
+        + install_command("sim")
     ) from cause
 
 

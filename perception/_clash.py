@@ -10,6 +10,7 @@ from __future__ import annotations
 from importlib.machinery import all_suffixes
 from importlib.util import find_spec
 from pathlib import Path
+from runpy import run_path
 
 # Each package needs those before it.
 _PACKAGES = ("perception", "tracking", "nav_adapter", "awarenav", "sim_tests")
@@ -34,7 +35,7 @@ def require_sole_owner(package: str) -> None:
             raise ImportError(
                 f"awarenav's {name}/__init__.py is missing from {_SITE / name}, as happens when "
                 "another distribution with a package of that name is uninstalled. "
-                "Put it back: pip install --force-reinstall --no-deps awarenav",
+                f"Put it back: {_reinstall_command()}",
                 name=name,
             )
         init = Path(spec.origin)
@@ -84,8 +85,14 @@ def _message(name: str, place: Path, owners: list[str]) -> str:
     return (
         f"awarenav needs the import name {name!r} to itself, but {place} belongs, all or in part, "
         f"to: {others}. Keep the two in separate virtual environments; or remove the other "
-        f"({removal}), then: pip install --force-reinstall --no-deps awarenav"
+        f"({removal}), then: {_reinstall_command()}"
     )
+
+
+def _reinstall_command() -> str:
+    # By path, as this module is run: the package may not be ours, or only in part.
+    found = run_path(str(Path(__file__).with_name("installation.py")))
+    return str(found["reinstall_command"]())
 
 
 require_sole_owner("perception")

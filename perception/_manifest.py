@@ -16,6 +16,7 @@ from typing import Any, Final, Literal, get_args
 
 from .documents import read_json
 from .errors import PerceptionError
+from .installation import reinstall_command
 
 DETECTOR: Final = "person_detector"
 POSE: Final = "person_pose"
@@ -33,7 +34,6 @@ _FOLDER: Final = Path(__file__).parent / "models"
 _MANIFEST: Final = "manifest.json"
 _NAME: Final = re.compile(r"[a-z0-9_]+")
 _SHA256: Final = re.compile(r"[0-9a-f]{64}")
-_REMEDY: Final = "put it back: pip install --force-reinstall --no-deps awarenav"
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +95,8 @@ def shipped_models(folder: Path | None = None) -> tuple[ShippedModel, ...]:
     path = (_FOLDER if folder is None else folder) / _MANIFEST
     if not path.is_file():
         raise PerceptionError(
-            f"the list of shipped networks {path} cannot be read (no such file); {_REMEDY}"
+            f"the list of shipped networks {path} cannot be read (no such file); "
+            f"put it back: {reinstall_command()}"
         )
     try:
         entries = read_json(path)["models"]
@@ -103,7 +104,8 @@ def shipped_models(folder: Path | None = None) -> tuple[ShippedModel, ...]:
     except (ValueError, KeyError, TypeError) as cause:
         wanted = ", ".join(field.name for field in fields(ShippedModel))
         raise PerceptionError(
-            f"{path} must hold a list 'models' of objects with {wanted}: {cause}; {_REMEDY}"
+            f"{path} must hold a list 'models' of objects with {wanted}: {cause}; "
+            f"put it back: {reinstall_command()}"
         ) from cause
 
 
@@ -132,7 +134,7 @@ def shipped_model_path(name: str, folder: Path | None = None) -> Path:
     if not path.is_file():
         raise PerceptionError(
             f"the shipped network {path} is missing (sha256 {model.sha256}, "
-            f"{model.size_bytes} bytes); {_REMEDY}"
+            f"{model.size_bytes} bytes); put it back: {reinstall_command()}"
         )
     return path
 
@@ -150,7 +152,8 @@ def verify_shipped_model(name: str, folder: Path | None = None) -> Path:
     if found != model.sha256:
         raise PerceptionError(
             f"the shipped network {path} has been altered: its sha256 is {found} "
-            f"({size_bytes} bytes), expected {model.sha256} ({model.size_bytes} bytes); {_REMEDY}"
+            f"({size_bytes} bytes), expected {model.sha256} ({model.size_bytes} bytes); "
+            f"put it back: {reinstall_command()}"
         )
     return path
 

@@ -21,7 +21,7 @@ PLANTED = {
         "tracking/_motion.py",
         "from nav_adapter import NavError",
     ),
-    "sim_tests: search > study | demo > crossing > scenario | dataset > actors > world": (
+    "sim_tests: search > study | demo > viewing > crossing > scenario | dataset > actors > world": (
         "sim_tests/world/_visibility.py",
         "from ..crossing import run_crossing",
     ),
@@ -33,7 +33,7 @@ PLANTED = {
         "sim_tests/actors/body/_asset.py",
         "from ..behaviour import Walker",
     ),
-    "sim_tests.study: suite | command > report > runs > measures": (
+    "sim_tests.study: suite | command | watch > report > runs > measures": (
         "sim_tests/study/measures/_interval.py",
         "from ..runs import run_jobs",
     ),

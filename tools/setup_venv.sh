@@ -9,6 +9,9 @@ VENV=.venv
 STAMP=$VENV/awarenav.stamp           # what was installed, and where; written last
 INCOMPLETE=$VENV/awarenav.incomplete # there while .venv is being made; left behind by an interruption
 LOCK=requirements.lock
+LOG=$VENV/setup.log                  # all that pip or uv says
+FAILED=$VENV/setup.failed            # the exit status of a command that failed
+SIZE="600 MB to download, 1.8 GB on disk" # with Python 3.11 on x86-64
 
 say() { printf 'setup: %s\n' "$*" >&2; }
 die() { say "$*"; exit 1; }
@@ -91,25 +94,86 @@ make_venv() {
     fi
 }
 
+# Prints the number of packages that the lock holds for the interpreter of .venv; without pip's
+# parser of markers, the number that it holds for all.
+packages() {
+    "$VENV/bin/python" - "$LOCK" 2>/dev/null <<'END' ||
+import sys
+from pip._vendor.packaging.requirements import Requirement
+
+lines = [line.partition("#")[0].strip() for line in open(sys.argv[1], encoding="utf-8")]
+pins = [Requirement(line) for line in lines if line]
+print(sum(pin.marker is None or pin.marker.evaluate() for pin in pins))
+END
+        sed -n 's/^\([A-Za-z0-9._-]*\) *[=@].*/\1/p' "$LOCK" | sort -u | wc -l
+}
+
+# Shows how far an installer is, from its output: one line that changes on a terminal, else one line
+# for each third of the $1 packages.
+show_progress() {
+    fetched=0
+    while IFS= read -r line; do
+        printf '%s\n' "$line" >>"$LOG"
+        case $line in
+        "Collecting "* | "Processing "*) # pip, once a package; the second for files on this machine
+            fetched=$((fetched + 1))
+            name=${line#* }
+            name=${name%% *}
+            name=${name##*/}
+            if [ -t 2 ]; then
+                printf '\r\033[Ksetup: package %s of %s: %s' "$fetched" "$1" "$name" >&2
+            elif [ $((fetched * 3 / $1)) != $(((fetched - 1) * 3 / $1)) ]; then
+                say "fetched $fetched of $1 packages"
+            fi
+            ;;
+        "Downloading "*) # uv, once a large package; pip says it with spaces before
+            [ ! -t 2 ] || printf '\r\033[Ksetup: %s' "$line" >&2
+            ;;
+        "Installing collected packages"* | "Prepared "*)
+            [ ! -t 2 ] || printf '\r\033[K' >&2
+            say "unpacking"
+            ;;
+        esac
+    done
+}
+
+# Runs an installer with the arguments after the number of packages; its output goes to the log.
+logged() {
+    total=$1
+    shift
+    { "$@" 2>&1 || echo $? >"$FAILED"; } | show_progress "$total"
+    if [ -e "$FAILED" ]; then
+        [ ! -t 2 ] || printf '\r\033[K' >&2
+        say "failed with exit status $(cat "$FAILED"); the last lines of $PWD/$LOG:"
+        tail -n 12 "$LOG" >&2
+        die "run make setup again to repair it"
+    fi
+}
+
 # The lock names every package, so nothing is resolved here: --no-deps keeps it that way. pip would
 # compile every module, which takes as long as all the rest; Python compiles those that it imports.
 install() {
     : >"$INCOMPLETE"
-    rm -f "$STAMP"
+    rm -f "$STAMP" "$FAILED"
+    : >"$LOG"
+    started=$(date +%s)
+    count=$(packages)
+    how="pip: up to $SIZE, a minute or two"
+    ! have_uv || how="uv: up to $SIZE, less than a minute"
+    say "installing $count pinned packages with $how"
     if have_uv; then
-        say "installing the pinned packages with uv"
-        uv pip install --python "$VENV/bin/python" --no-deps -r "$LOCK"
-        uv pip install --quiet --python "$VENV/bin/python" --no-deps --no-build-isolation -e .
+        logged "$count" uv pip install --python "$VENV/bin/python" --no-deps -r "$LOCK"
+        logged "$count" uv pip install --quiet --python "$VENV/bin/python" --no-deps \
+            --no-build-isolation -e .
     else
-        say "installing the pinned packages with pip (a minute or two)"
-        "$VENV/bin/python" -m pip install --disable-pip-version-check --no-input --no-deps \
-            --no-compile -r "$LOCK"
-        "$VENV/bin/python" -m pip install --disable-pip-version-check --no-input --quiet \
-            --no-deps --no-build-isolation -e .
+        set -- "$VENV/bin/python" -m pip install --disable-pip-version-check --no-input \
+            --progress-bar off --no-deps
+        logged "$count" "$@" --no-compile -r "$LOCK"
+        logged "$count" "$@" --quiet --no-build-isolation -e .
     fi
     printf '%s\n%s\n' "$PWD" "$(wanted)" >"$STAMP"
     rm -f "$INCOMPLETE"
-    say "done"
+    say "done after $(($(date +%s) - started)) s"
 }
 
 wanted() { cat "$LOCK" pyproject.toml tools/setup_venv.sh | cksum; }

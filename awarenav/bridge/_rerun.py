@@ -11,6 +11,7 @@ import numpy as np
 from nav_adapter import NavConstraints
 from nav_adapter.ros2 import AwarenessBridge
 from perception.arrays import FloatArray
+from perception.installation import install_command
 
 from ..drawing import awareness_colour
 from ..errors import AwarenavError, MissingExtraError
@@ -21,7 +22,7 @@ try:
 except ImportError as cause:  # pragma: no cover - depends on the installation
     raise MissingExtraError(
         "--rerun needs the package rerun-sdk, which is not installed; it is the extra 'viz' (on "
-        "Python 3.11 or later): pip install 'awarenav[viz]'"
+        f"Python 3.11 or later): {install_command('viz')}"
     ) from cause
 
 _SEEN_SCORE: Final = 0.3

@@ -21,7 +21,7 @@ _LOG: Final = "Recordings"
     ],
     exit_status={0: "Ended by Ctrl-C, SIGTERM or --seconds.", 2: "Bad input."},
     epilog="The environment variable CYCLONEDDS_URI chooses the network interface, as with "
-    "rmw_cyclonedds_cpp. Needs the extra 'ros2': pip install 'awarenav[ros2]'.",
+    "rmw_cyclonedds_cpp. Needs the extra 'ros2'.",
 )
 @option(
     "--robot",

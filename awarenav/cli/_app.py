@@ -67,9 +67,13 @@ _COMMANDS: Final[dict[str, dict[str, _Entry]]] = {
             "sim_tests.study.command:crossings",
             "Run closed-loop crossings: scenarios, policies, planners, faults.",
         ),
+        "watch": _Entry(
+            "sim_tests.study.watch.command:watch",
+            "Watch a crossing in the browser while it runs.",
+        ),
         "replay": _Entry(
             "sim_tests.study.runs.command:replay",
-            "Run one episode of a run again, with video and map.",
+            "Run one episode of a run again, with video, map or page.",
         ),
         "compare": _Entry(
             "sim_tests.study.measures.command:compare",

@@ -30,9 +30,11 @@ def user_message(error: Exception) -> str | None:
     if isinstance(error, ModuleNotFoundError):
         if error.name not in _SIMULATOR_MODULES:
             return None
+        from perception.installation import install_command  # noqa: PLC0415 - as below
+
         return (
             f"needs {error.name}, which is not installed; it is part of the extra 'sim': "
-            "pip install 'awarenav[sim]'"
+            + install_command("sim")
         )
     # This import loads the networks, which help does not need.
     from perception.errors import AwarenavError  # noqa: PLC0415

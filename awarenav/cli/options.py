@@ -94,9 +94,12 @@ def plot_file(default: str, help: str) -> Decorator:
         chosen = context.get_parameter_source(str(parameter.name)) is not ParameterSource.DEFAULT
         if chosen or context.resilient_parsing or _is_installed("matplotlib"):
             return out
+        # This import loads the networks, which help does not need.
+        from perception.installation import install_command  # noqa: PLC0415
+
         print(
             f"{context.command_path}: no plot, since matplotlib is not installed: "
-            "pip install 'awarenav[plot]'",
+            f"{install_command('plot')}",
             file=sys.stderr,
         )
         return Path("none")

@@ -10,6 +10,7 @@ from typing import Final
 import onnxruntime  # type: ignore[import-untyped]
 
 from perception import PerceptionError
+from perception.installation import reinstall_command
 from perception.shipped import shipped_models, verify_shipped_model
 
 from .. import __version__
@@ -83,7 +84,7 @@ def _shipped() -> list[Finding]:
                 "error",
                 "shipped networks",
                 str(error),
-                "pip install --force-reinstall --no-deps awarenav",
+                reinstall_command(),
             )
         ]
     return [Finding("fine", "shipped networks", f"{', '.join(names)}: unaltered, for renders only")]

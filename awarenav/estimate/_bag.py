@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from perception.documents import read_yaml
+from perception.installation import install_command
 
 from ..errors import AwarenavError, MissingExtraError
 
@@ -16,7 +17,7 @@ try:
 except ImportError as cause:  # pragma: no cover - depends on the installation
     raise MissingExtraError(
         "reading recordings needs the package rosbags, which is not installed; it is the extra "
-        "'rosbag': pip install 'awarenav[rosbag]'"
+        f"'rosbag': {install_command('rosbag')}"
     ) from cause
 
 

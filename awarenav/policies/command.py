@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..cli import NUMBER, argument, command, group, option, options
+from ..cli import NUMBER, FilePath, argument, command, group, option, options
 
 
 @group("policy")
@@ -49,4 +49,41 @@ def show(**values: Any) -> int:
     return show_command(ShowOptions(**values))
 
 
+@command(
+    "explore",
+    short_help="Write a page with sliders for every setting.",
+    examples=[
+        "awarenav policy explore",
+        "awarenav policy explore mine.yaml --robot robot.yaml --out mine.html",
+    ],
+    exit_status={0: "Success.", 2: "Bad input; nothing was written."},
+    epilog="The presets are scanner, blind, conservative, balanced and assertive.",
+)
+@argument(
+    "policy",
+    default="balanced",
+    metavar="[NAME|FILE]",
+    shell_complete=options.COMPLETE_POLICIES,
+    help="The policy that is shown first: a preset, or a YAML file.",
+)
+@option(
+    "--robot",
+    type=FilePath(),
+    metavar="FILE",
+    help="The robot that is shown first: a robot file, as `awarenav bridge` reads it.",
+)
+@options.out_file("explorer.html", "The page; replaces the file.", "FILE.html")
+def explore(**values: Any) -> int:
+    """Write one HTML page that shows what a policy does, with a slider for every setting.
+
+    The page draws obstacle radius, speed limit, stopping distance and the reason of the limit for
+    one person, and loads and saves policies as YAML. It gives what the adapter gives. It needs no
+    network and no other file.
+    """
+    from ._explore import ExploreOptions, explore_command  # noqa: PLC0415 - help needs no policies
+
+    return explore_command(ExploreOptions(**values))
+
+
 policy.add_command(show)
+policy.add_command(explore)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import ClassVar, Final
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from tracking.config import StrictConfig
 
@@ -69,7 +69,7 @@ class TableInflation(StrictConfig):
 
     error: ClassVar[type[ValueError]] = NavError
 
-    table_m: Points
+    table_m: Points = Field(json_schema_extra={"low": _SMALLEST_M, "high": _LARGEST_M})
 
     @model_validator(mode="after")
     def _check_table(self) -> TableInflation:
@@ -91,7 +91,7 @@ class TableHumanSpeed(StrictConfig):
 
     error: ClassVar[type[ValueError]] = NavError
 
-    table_mps: Points
+    table_mps: Points = Field(json_schema_extra={"low": 0.0, "high": _FASTEST_MPS})
 
     @model_validator(mode="after")
     def _check_table(self) -> TableHumanSpeed:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any, Final, TypeVar, cast
 
+from perception.installation import install_command
+
 from .._errors import NavError
 from ._encoder import ENCODING_ERRORS, encoded
 from ._message import FieldType, Message, field_types, ros_type
@@ -26,7 +28,7 @@ try:
 except ImportError as cause:  # pragma: no cover - depends on the installation
     raise NavError(
         "ROS 2 messages need the package cyclonedds, which is not installed; it is part of the "
-        "extra 'ros2': pip install 'awarenav[ros2]'"
+        f"extra 'ros2': {install_command('ros2')}"
     ) from cause
 
 _AnyMessage = TypeVar("_AnyMessage", bound=Message)

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import yaml
 
+from perception.installation import install_command
+
 from .._errors import NavError
 from ._message import definition, ros_type
 from ._topics import Topic
@@ -16,7 +18,7 @@ try:
 except ImportError as cause:  # pragma: no cover - depends on the installation
     raise NavError(
         "recording needs the package mcap, which is not installed; it is part of the extra "
-        "'ros2': pip install 'awarenav[ros2]'"
+        f"'ros2': {install_command('ros2')}"
     ) from cause
 
 

@@ -19,7 +19,7 @@ from awarenav.cli import NUMBER, POSITIVE, OneOf, command, option, options
         130: "Interrupted; the images so far are kept.",
     },
     epilog="The same command continues an interrupted set of images, with or without --resume. "
-    "Needs the extra 'sim': pip install 'awarenav[sim]'.",
+    "Needs the extra 'sim'.",
 )
 @option("--frames", type=POSITIVE, default=400, metavar="N", help="Number of images.")
 @option("--people", type=POSITIVE, default=3, metavar="N", help="Most people in an image.")

@@ -8,8 +8,10 @@ from awarenav.lazy import lazy_names
 
 if TYPE_CHECKING:
     from ._cases import CASES, EncounterCase, case_values
-    from ._demo import compare_policies, run_demo
+    from ._demo import compare_policies, film_runs, run_demo
     from ._encounter import run_encounter
+    from ._film import write_crossing_film
+    from ._film_values import FilmRun, FilmValues, film_values
     from ._tables import ENCOUNTER_COLUMNS, EPISODE_COLUMNS, EpisodeTable, episode_row
 
 __all__ = [
@@ -18,11 +20,16 @@ __all__ = [
     "EPISODE_COLUMNS",
     "EncounterCase",
     "EpisodeTable",
+    "FilmRun",
+    "FilmValues",
     "case_values",
     "compare_policies",
     "episode_row",
+    "film_runs",
+    "film_values",
     "run_demo",
     "run_encounter",
+    "write_crossing_film",
 ]
 
 __getattr__ = lazy_names(
@@ -35,9 +42,16 @@ __getattr__ = lazy_names(
         ),
         "._demo": (
             "compare_policies",
+            "film_runs",
             "run_demo",
         ),
         "._encounter": ("run_encounter",),
+        "._film": ("write_crossing_film",),
+        "._film_values": (
+            "FilmRun",
+            "FilmValues",
+            "film_values",
+        ),
         "._tables": (
             "ENCOUNTER_COLUMNS",
             "EPISODE_COLUMNS",

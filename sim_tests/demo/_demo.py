@@ -5,37 +5,64 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from tqdm import tqdm
 
 from awarenav.files import json_text
 from perception import AwarenessPipeline, Camera
+from perception.arrays import ImageRgb
 
 from ..crossing import CrossingResult, run_crossing
 from ..crossing.eyes import Perception
 from ..scenario import Scenario
 from ._cases import case_values
+from ._comparison_plot import plot_comparison
 from ._encounter import run_encounter
-from ._figures import plot_comparison
+from ._film import PortraitRecorder, write_crossing_film
+from ._film_values import FilmRun
 from ._tables import EpisodeTable
+
+#: Files of the film: for pages, and for players.
+FILMS: Final = ("crossing.webp", "crossing.mp4")
+# Rows of the comparison that the film shows: title, note and colour of the panel.
+_PANELS: Final = {
+    "today's AMR": ("Scanners only", "today's AMR", (31, 78, 121)),
+    "aware, attentive worker": ("Aware robot", "worker watches it", (46, 125, 79)),
+    "aware, distracted worker": ("Aware robot", "worker looks away", (190, 105, 25)),
+}
 
 
 @dataclass(frozen=True, slots=True)
 class ComparisonRow:
-    """One row of the comparison: a label and the crossing."""
+    """One row of the comparison.
+
+    Attributes:
+        label: of the row.
+        result: the crossing.
+        scenario: its scenario.
+        portraits: the worker in the robot's camera, for the film; empty without a camera or a film.
+    """
 
     label: str
     result: CrossingResult
+    scenario: Scenario
+    portraits: tuple[ImageRgb | None, ...] = ()
 
 
 def compare_policies(
-    seed: int = 0, perception: str = "keypoints", progress: bool = False
+    seed: int = 0, perception: str = "keypoints", progress: bool = False, filmed: bool = False
 ) -> tuple[ComparisonRow, ...]:
     """Run the same crossing without people, as today, blind, and aware with two kinds of worker.
 
     The worker walks the same path in every run. Only the gaze and the robot's policy differ. The
     robot has a camera and laser scanners; today's robot has the scanners alone.
+
+    Args:
+        seed: seed of everything random.
+        perception: ``"keypoints"`` or ``"pixels"``.
+        progress: whether to show a progress bar, on a terminal.
+        filmed: whether to take the pictures for the film.
     """
     both = Perception.of(perception, "camera+scanner").name
     alone = Perception.of(perception, "scanner").name
@@ -49,11 +76,35 @@ def compare_policies(
         ("aware, distracted worker", distracted, "balanced", both),
     )
     rows = []
-    with tqdm(runs, desc="crossings", unit="run", disable=not progress, file=sys.stderr) as bar:
+    # None shows the bar on terminals only.
+    hidden = None if progress else True
+    with tqdm(runs, desc="crossings", unit="run", disable=hidden, file=sys.stderr) as bar:
         for label, scenario, policy, senses in bar:
-            result = run_crossing(scenario, policy=policy, perception=senses, seed=seed)
-            rows.append(ComparisonRow(label, result))
+            recorder = (
+                PortraitRecorder(scenario)
+                if filmed and label in _PANELS and senses != alone
+                else None
+            )
+            result = run_crossing(
+                scenario, policy=policy, perception=senses, seed=seed, observer=recorder
+            )
+            portraits = () if recorder is None else recorder.portraits
+            rows.append(ComparisonRow(label, result, scenario, portraits))
     return tuple(rows)
+
+
+def film_runs(rows: tuple[ComparisonRow, ...]) -> tuple[FilmRun, ...]:
+    """Return the panels of the film: today's AMR, and the aware robot with both workers."""
+    return tuple(
+        FilmRun(
+            *_PANELS[row.label],
+            row.result,
+            row.scenario.layout.obstacle_boxes_odom,
+            row.portraits,
+        )
+        for row in rows
+        if row.label in _PANELS
+    )
 
 
 def comparison_table(rows: tuple[ComparisonRow, ...]) -> str:
@@ -152,10 +203,10 @@ def run_demo(
     """Run the demonstration and write its files.
 
     Args:
-        out: folder for ``encounter.png``, ``encounter.mp4``, ``encounter.csv``, ``crossings.png``
-            and ``episodes.csv``; made when missing.
+        out: folder for ``encounter.png``, ``encounter.mp4``, ``encounter.csv``, ``crossings.png``,
+            ``episodes.csv``, ``crossing.webp`` and ``crossing.mp4``; made when missing.
         seed: seed of everything random.
-        video: whether to render the video.
+        video: whether to render the films.
         perception: ``"keypoints"``, or ``"pixels"``: rendered images, through the shipped networks.
         as_json: print the tables as JSON.
     """
@@ -167,7 +218,7 @@ def run_demo(
     scenario = Scenario.shipped("paper_encounter")
     print(f"The encounter of the paper: {scenario.duration_s:g} s", file=text_stream)
     total = round(scenario.duration_s * scenario.control_hz)
-    with tqdm(total=total, desc="encounter", unit="frame", file=sys.stderr) as bar:
+    with tqdm(total=total, desc="encounter", unit="frame", disable=None, file=sys.stderr) as bar:
 
         def update_bar(finished: int) -> None:
             bar.update(finished - bar.n)
@@ -177,7 +228,7 @@ def run_demo(
         )
     print(encounter_table(encounter), file=text_stream)
     print("\nThe same crossing, with and without awareness", file=text_stream)
-    rows = compare_policies(seed, perception, progress=True)
+    rows = compare_policies(seed, perception, progress=True, filmed=video)
     with EpisodeTable(out / "episodes.csv") as table:
         for row in rows:
             table.add(row.result)
@@ -191,6 +242,8 @@ def run_demo(
         )
     if as_json:
         print(json_text(_tables_as_data(encounter, rows, share)), end="")
+    if video:
+        write_crossing_film([out / name for name in FILMS], film_runs(rows), rows[0].result)
     names = ["encounter.png", *(["encounter.mp4"] if video else []), "encounter.csv"]
-    written = ", ".join([*names, "crossings.png", "episodes.csv"])
-    print(f"\nWritten to {out}: {written}", file=text_stream)
+    names += ["crossings.png", "episodes.csv", *(FILMS if video else [])]
+    print(f"\nWritten to {out}: {', '.join(names)}", file=text_stream)

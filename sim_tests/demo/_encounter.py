@@ -18,7 +18,7 @@ from ..crossing import CrossingFrame, CrossingResult, Stage, TopView, draw_camer
 from ..scenario import Scenario
 from ..world.camera import CameraRenderer
 from ._cases import CAMERA_PERIOD_S, CASES
-from ._figures import CaseImages, plot_encounter
+from ._encounter_plot import CaseImages, plot_encounter
 from ._tables import write_encounter
 
 _VIDEO_HZ: Final = 15

@@ -11,18 +11,18 @@ from awarenav.cli import FilePath, command, option, options
     "demo",
     examples=["awarenav demo --out demo"],
     exit_status={0: "Success.", 2: "Bad input, or the extra 'sim' is missing."},
-    epilog="Needs the extra 'sim': pip install 'awarenav[sim]'.",
+    epilog="Needs the extra 'sim'.",
 )
 @options.out_folder("demo")
 @options.seed()
-@option("--no-video", is_flag=True, help="Write no video (faster).")
+@option("--no-video", is_flag=True, help="Write no films (faster).")
 @options.perception(["keypoints", "pixels"], note=" 'pixels' takes many minutes.")
 @options.as_json("the tables")
 def demo(out: Path, seed: int, *, no_video: bool, perception: str, as_json: bool) -> int:
     """Run the paper's 25 s encounter, and one crossing with and without awareness.
 
-    Prints the results and writes encounter.png, encounter.mp4, encounter.csv, crossings.png and
-    episodes.csv.
+    Prints the results. Writes encounter.png, encounter.mp4 and encounter.csv; crossings.png and
+    episodes.csv; and a film of the crossing with three robots: crossing.webp and crossing.mp4.
     """
     from ._demo import run_demo  # noqa: PLC0415 - help needs no simulator
 
@@ -38,7 +38,7 @@ def demo(out: Path, seed: int, *, no_video: bool, perception: str, as_json: bool
         1: "A metric is worse than the baseline by more than its tolerance.",
         2: "Bad input.",
     },
-    epilog="Needs the extra 'sim': pip install 'awarenav[sim]'.",
+    epilog="Needs the extra 'sim'.",
 )
 @option(
     "--baseline",

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
+from perception.installation import install_command
+
 from ..world.errors import SimError
 
 try:
@@ -14,7 +16,7 @@ try:
 except ImportError as cause:  # pragma: no cover - depends on the installation
     raise SimError(
         "tuning and falsification need optuna and cmaes, of which one is not installed; both are "
-        "part of the extra 'bench': pip install 'awarenav[bench]'"
+        f"part of the extra 'bench': {install_command('bench')}"
     ) from cause
 
 optuna.logging.set_verbosity(optuna.logging.WARNING)

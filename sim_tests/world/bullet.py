@@ -11,6 +11,8 @@ import ctypes
 import os
 from collections.abc import Iterator
 
+from perception.installation import install_command
+
 from .errors import MissingSimulatorError
 
 __all__ = ["pybullet"]
@@ -51,5 +53,5 @@ try:
 except ImportError as cause:
     raise MissingSimulatorError(
         "the simulation needs PyBullet, which is not installed; it is the extra 'sim': "
-        "pip install 'awarenav[sim]' (wheels exist for Python 3.10 and 3.11)"
+        f"{install_command('sim')} (wheels exist for Python 3.10 and 3.11)"
     ) from cause

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -13,7 +15,8 @@ from perception.shipped import DETECTOR, HEAD, POSE, shipped_model_path  # noqa:
 from training.networks._detector_net import DetectorExport, DetectorNet  # noqa: E402
 from training.networks._head_net import HeadExport, HeadNet  # noqa: E402
 from training.networks._pose_net import PoseExport, PoseNet  # noqa: E402
-from training.networks._start import begin, start_from  # noqa: E402
+from training.networks._recipe import Recipe, Run  # noqa: E402
+from training.networks._start import start_from, unseen  # noqa: E402
 
 _NETWORKS = {
     HEAD: (HeadNet, HeadExport, (4, 3, 64, 64)),
@@ -62,11 +65,19 @@ def test_normalisation_has_the_statistics_of_the_data():
     assert float((fixed - batch).abs().mean()) < 0.1 * spread
 
 
-def test_learning_is_slower_from_a_trained_network():
-    rates = (2e-3, 1e-3)
-    assert begin(HeadNet(), None, lambda _: torch.randn(4, 3, 64, 64), rates) == rates[0]
-    start = shipped_model_path(HEAD)
-    assert begin(HeadNet(), start, lambda _: torch.randn(4, 3, 64, 64), rates) == rates[1]
+def test_learning_is_slower_from_a_trained_network(tmp_path):
+    run = Run(Recipe(), tmp_path, tmp_path, tmp_path, "cpu")
+    assert run.learning_rate(2e-3, 1e-3) == 2e-3
+    run = replace(run, start=shipped_model_path(HEAD))
+    assert run.learning_rate(2e-3, 1e-3) == 1e-3
+
+
+def test_the_statistics_come_from_batches_that_are_not_trained_on():
+    recipe = Recipe()
+    numbers = [int(batch) for batch in unseen(torch.tensor)]
+    assert len(numbers) == len(set(numbers)) >= 2
+    steps = max(recipe.head_steps, recipe.pose_steps, recipe.detector_steps)
+    assert min(numbers) > steps
 
 
 def test_a_file_of_another_network_is_refused():

@@ -33,13 +33,13 @@ from ._head_shapes import add_head_shapes
 from ._head_train import calibration, predictions, train_head
 from ._pose_net import PoseNet
 from ._pose_train import train_pose
-from ._recipe import Recipe
+from ._recipe import Recipe, Run
 from ._shards import make_shards
 
 _ROOT: Final = Path(__file__).parents[2]
 _MODELS: Final = _ROOT / "perception" / "models"
 _STAGES: Final = ("data", "head", "pose", "detector", "export")
-_TRAINERS: Final[dict[str, Callable[..., nn.Module]]] = {
+_TRAINERS: Final[dict[str, Callable[[Run], nn.Module]]] = {
     "head": train_head,
     "pose": train_pose,
     "detector": train_detector,
@@ -137,7 +137,8 @@ def main() -> None:
         )
     for name, train in _TRAINERS.items():
         if name in stages:
-            train(recipe, shards, check, work / "checkpoints", chosen.device, starts.get(name))
+            start = starts.get(name)
+            train(Run(recipe, shards, check, work / "checkpoints", chosen.device, start))
     if "export" in stages:
         names = set(_TRAINERS) & set(stages) or set(_TRAINERS)
         _export(recipe, check, work / "checkpoints", chosen.out, names)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -13,9 +12,9 @@ from torch.nn import functional as F  # noqa: N812
 from ._batch import Batch, output_on_photographed
 from ._detector_data import DetectorData
 from ._detector_net import GRID, DetectorNet, cells
-from ._fit import AUTO, fit
-from ._recipe import Recipe
-from ._start import begin
+from ._fit import fit
+from ._recipe import Run
+from ._start import start_from, unseen
 
 _CANDIDATES: Final = 10
 _ALPHA, _BETA = 0.5, 6.0
@@ -24,33 +23,26 @@ _ALPHA, _BETA = 0.5, 6.0
 _LEARNING_RATES: Final = (2e-3, 1e-3)
 
 
-def train_detector(
-    recipe: Recipe,
-    shards: Path,
-    held_out: Path,
-    folder: Path,
-    device: str = AUTO,
-    start: Path | None = None,
-) -> nn.Module:
-    """Train the detector on the shards; figures on held-out people go to the log.
-
-    With ``start``, the file of an exported detector, training goes on from its weights.
-    """
+def train_detector(run: Run) -> nn.Module:
+    """Train the detector; figures on held-out people go to the log."""
+    recipe = run.recipe
     torch.manual_seed(recipe.seed + 2)
-    data = DetectorData(shards, recipe.seed, recipe.backgrounds)
-    check = DetectorData(held_out, recipe.seed, recipe.check_backgrounds)
+    data = DetectorData(run.shards, recipe.seed, recipe.backgrounds)
+    check = DetectorData(run.held_out, recipe.seed, recipe.check_backgrounds)
     print(f"{len(data.frames)} images for training, {check.stills} held out", flush=True)
     net = DetectorNet()
-    rate = begin(net, start, lambda step: normalised(data.batch(step)["image"]), _LEARNING_RATES)
+    if run.start is not None:
+        batches = unseen(lambda step: normalised(data.batch(step)["image"]))
+        start_from(net, run.start, batches)
     return fit(
         "detector",
         net,
         data.batch,
         detector_loss,
         steps=recipe.detector_steps,
-        folder=folder,
-        device=device,
-        learning_rate=rate,
+        folder=run.checkpoints,
+        device=run.device,
+        learning_rate=run.learning_rate(*_LEARNING_RATES),
         judge=lambda net: judge_detector(net, check),
     )
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perception.arrays import FloatArray
-from sim_tests.actors.body import DETAIL_LEVELS, JOINTS
+from sim_tests.actors.body import DETAIL_LEVELS, JOINTS, MESH_UNITS
 
 _SCALE_STD: Final = 0.04
 _FIELD_STD_M: Final = 2.5e-3
@@ -27,10 +27,6 @@ _FIELD_LENGTH_M: Final = 0.045
 _WAVES: Final = 48
 _NECK: Final = JOINTS.index("neck")
 _EYES: Final = [JOINTS.index("left_eye"), JOINTS.index("right_eye")]
-# Units of the files: 0.1 mm, 1/127 of a normal, 1/255 of a weight.
-_VERTEX_M: Final = 1e-4
-_NORMAL: Final = 1.0 / 127.0
-_WEIGHT: Final = 1.0 / 255.0
 _STEP_M: Final = 1e-4
 
 
@@ -104,16 +100,16 @@ def _write_copy(path: Path, out: Path, rng: np.random.Generator) -> None:
     joints_m = arrays["joints_m"].astype(np.float64)
     warp = HeadWarp.random(joints_m[_NECK], rng)
     for level in range(DETAIL_LEVELS):
-        share = arrays[f"lod{level}_weights"][:, _NECK].astype(np.float64) * _WEIGHT
+        share = arrays[f"lod{level}_weights"][:, _NECK].astype(np.float64) * MESH_UNITS["weights"]
         rows = np.flatnonzero(share > 0.0)
         vertices = arrays[f"lod{level}_vertices"]
-        points_m = vertices[rows].astype(np.float64) * _VERTEX_M
+        points_m = vertices[rows].astype(np.float64) * MESH_UNITS["vertices"]
         moved_m = points_m + share[rows, None] * warp.displacement_m(points_m)
-        vertices[rows] = np.rint(moved_m / _VERTEX_M).astype(vertices.dtype)
+        vertices[rows] = np.rint(moved_m / MESH_UNITS["vertices"]).astype(vertices.dtype)
         normals = arrays[f"lod{level}_normals"]
-        old = normals[rows].astype(np.float64) * _NORMAL
+        old = normals[rows].astype(np.float64) * MESH_UNITS["normals"]
         new = (1.0 - share[rows, None]) * old + share[rows, None] * warp.normals(points_m, old)
-        normals[rows] = np.rint(new / _NORMAL).astype(normals.dtype)
+        normals[rows] = np.rint(new / MESH_UNITS["normals"]).astype(normals.dtype)
     joints_m[_EYES] += warp.displacement_m(joints_m[_EYES])
     keypoints_m = arrays["keypoints_m"].astype(np.float64)
     follows = arrays["keypoint_weights"][:, _NECK].astype(np.float64)[:, None]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,11 +11,11 @@ from torch.nn import functional as F  # noqa: N812
 
 from ._batch import Batch, output_on_photographed
 from ._blocks import cross_entropy, soft_labels
-from ._fit import AUTO, fit
+from ._fit import fit
 from ._head_data import LATE, HeadData
 from ._head_net import BINS, SPAN, HeadNet, averaged, head_rotation, keypoint_means, spread_factor
-from ._recipe import Recipe
-from ._start import begin
+from ._recipe import Run
+from ._start import start_from, unseen
 
 MEAN, STD = 120.0, 60.0
 _DEGREES_OF_FREEDOM = 5.0
@@ -24,35 +23,26 @@ _DEGREES_OF_FREEDOM = 5.0
 _LEARNING_RATES = (2.5e-3, 6e-4)
 
 
-def train_head(
-    recipe: Recipe,
-    shards: Path,
-    held_out: Path,
-    folder: Path,
-    device: str = AUTO,
-    start: Path | None = None,
-) -> nn.Module:
-    """Train the head network on the shards; figures on held-out people go to the log.
-
-    With ``start``, the file of an exported head network, training goes on from its weights.
-    """
+def train_head(run: Run) -> nn.Module:
+    """Train the head network; figures on held-out people go to the log."""
+    recipe = run.recipe
     torch.manual_seed(recipe.seed)
-    data = HeadData(shards, recipe.seed, recipe.backgrounds)
-    check = HeadData(held_out, recipe.seed, recipe.check_backgrounds)
+    data = HeadData(run.shards, recipe.seed, recipe.backgrounds)
+    check = HeadData(run.held_out, recipe.seed, recipe.check_backgrounds)
     print(f"{len(data.heads)} heads for training, {len(check.heads)} held out", flush=True)
     net = HeadNet()
-    rate = begin(
-        net, start, lambda step: normalised(data.batch(step, LATE)["image"]), _LEARNING_RATES
-    )
+    if run.start is not None:
+        batches = unseen(lambda step: normalised(data.batch(step, LATE)["image"]))
+        start_from(net, run.start, batches)
     return fit(
         "head",
         net,
         lambda step: data.batch(step, step / recipe.head_steps),
         head_loss,
         steps=recipe.head_steps,
-        folder=folder,
-        device=device,
-        learning_rate=rate,
+        folder=run.checkpoints,
+        device=run.device,
+        learning_rate=run.learning_rate(*_LEARNING_RATES),
         judge=lambda net: judge_head(net, check),
     )
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -12,11 +11,11 @@ from torch.nn import functional as F  # noqa: N812
 
 from ._batch import Batch, output_on_photographed
 from ._blocks import cross_entropy, soft_labels
-from ._fit import AUTO, fit
+from ._fit import fit
 from ._pose_data import PoseData
 from ._pose_net import BINS_X, BINS_Y, BINS_Z, SPLIT, PoseNet, z_bins, z_metres
-from ._recipe import Recipe
-from ._start import begin
+from ._recipe import Run
+from ._start import start_from, unseen
 
 MEAN: Final = (123.675, 116.28, 103.53)
 STD: Final = (58.395, 57.12, 57.375)
@@ -26,33 +25,26 @@ _SIGMA_Z_BINS: Final = 2.5
 _LEARNING_RATES: Final = (2e-3, 1e-3)
 
 
-def train_pose(
-    recipe: Recipe,
-    shards: Path,
-    held_out: Path,
-    folder: Path,
-    device: str = AUTO,
-    start: Path | None = None,
-) -> nn.Module:
-    """Train the pose network on the shards; figures on held-out people go to the log.
-
-    With ``start``, the file of an exported pose network, training goes on from its weights.
-    """
+def train_pose(run: Run) -> nn.Module:
+    """Train the pose network; figures on held-out people go to the log."""
+    recipe = run.recipe
     torch.manual_seed(recipe.seed + 1)
-    data = PoseData(shards, recipe.seed, recipe.backgrounds)
-    check = PoseData(held_out, recipe.seed, recipe.check_backgrounds)
+    data = PoseData(run.shards, recipe.seed, recipe.backgrounds)
+    check = PoseData(run.held_out, recipe.seed, recipe.check_backgrounds)
     print(f"{len(data.people)} people for training, {len(check.people)} held out", flush=True)
     net = PoseNet()
-    rate = begin(net, start, lambda step: normalised(data.batch(step)["image"]), _LEARNING_RATES)
+    if run.start is not None:
+        batches = unseen(lambda step: normalised(data.batch(step)["image"]))
+        start_from(net, run.start, batches)
     return fit(
         "pose",
         net,
         data.batch,
         pose_loss,
         steps=recipe.pose_steps,
-        folder=folder,
-        device=device,
-        learning_rate=rate,
+        folder=run.checkpoints,
+        device=run.device,
+        learning_rate=run.learning_rate(*_LEARNING_RATES),
         judge=lambda net: judge_pose(net, check),
     )
 

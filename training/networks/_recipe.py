@@ -1,8 +1,9 @@
-"""All numbers of the training recipe."""
+"""All numbers of the training recipe, and one run of it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 
 @dataclass(frozen=True)
@@ -73,3 +74,29 @@ class Recipe:
             pose_steps=2,
             head_steps=2,
         )
+
+
+@dataclass(frozen=True)
+class Run:
+    """The training of one network.
+
+    Attributes:
+        recipe: amounts and seed.
+        shards: folder of the rendered data.
+        held_out: folder of the data of other people, for figures.
+        checkpoints: folder of the checkpoints and logs.
+        device: see :func:`._fit.torch_device`.
+        start: file of an exported network of the same type that training goes on from; None is
+            training from nothing.
+    """
+
+    recipe: Recipe
+    shards: Path
+    held_out: Path
+    checkpoints: Path
+    device: str
+    start: Path | None = None
+
+    def learning_rate(self, from_nothing: float, from_trained: float) -> float:
+        """Return the highest learning rate: a trained network asks for a lower one."""
+        return from_nothing if self.start is None else from_trained

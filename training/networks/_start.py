@@ -7,7 +7,7 @@ network is the same function, and can be trained.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from itertools import chain, pairwise
 from pathlib import Path
 from typing import Final
@@ -24,30 +24,9 @@ _BATCHES: Final = 16
 _BEYOND: Final = 2**31
 
 
-def begin(
-    net: nn.Module,
-    start: Path | None,
-    batch_of: Callable[[int], Tensor],
-    rates: tuple[float, float],
-) -> float:
-    """Give a network the weights that training goes on from, if any.
-
-    Args:
-        net: the network.
-        start: file of an exported network of the same type, or None for training from nothing.
-        batch_of: returns the normalised images of a batch, by its number.
-        rates: highest learning rates from nothing and from a trained network.
-
-    Returns:
-        The learning rate that holds.
-
-    Raises:
-        ValueError: for a file of another network.
-    """
-    if start is None:
-        return rates[0]
-    start_from(net, start, (batch_of(_BEYOND + number) for number in range(_BATCHES)))
-    return rates[1]
+def unseen(batch_of: Callable[[int], Tensor]) -> Iterator[Tensor]:
+    """Yield batches beyond those that are trained on, for the statistics of the normalisation."""
+    return (batch_of(_BEYOND + number) for number in range(_BATCHES))
 
 
 def start_from(net: nn.Module, path: Path, inputs: Iterable[Tensor]) -> None:
@@ -62,7 +41,7 @@ def start_from(net: nn.Module, path: Path, inputs: Iterable[Tensor]) -> None:
     Raises:
         ValueError: for a file of another network.
     """
-    named, folded, multiplied = _weights(path)
+    arrays, named, folded, multiplied = _weights(path)
     state = net.state_dict()
     for name, array in named.items():
         if name not in state or tuple(state[name].shape) != array.shape:
@@ -70,7 +49,7 @@ def start_from(net: nn.Module, path: Path, inputs: Iterable[Tensor]) -> None:
         state[name] = torch.from_numpy(array)
     for name, parameter in net.named_parameters(recurse=False):
         if name not in named:
-            state[name] = _parameter_of_shape(path, tuple(parameter.shape))
+            state[name] = _parameter_of_shape(path, arrays, tuple(parameter.shape))
     net.load_state_dict(state)
     batches = iter(inputs)
     first = next(batches)
@@ -153,23 +132,27 @@ def _running_order(net: nn.Module, batch: Tensor) -> list[nn.Module]:
     return running
 
 
-def _parameter_of_shape(path: Path, shape: tuple[int, ...]) -> Tensor:
+def _parameter_of_shape(path: Path, arrays: list[np.ndarray], shape: tuple[int, ...]) -> Tensor:
     """Return a parameter that export stores without its name, with axes of one before it."""
     found = [
         array
-        for each in onnx.load(str(path)).graph.initializer
-        if (array := numpy_helper.to_array(each)).ndim > len(shape)
-        and array.shape == (1,) * (array.ndim - len(shape)) + shape
+        for array in arrays
+        if array.ndim > len(shape) and array.shape == (1,) * (array.ndim - len(shape)) + shape
     ]
     if len(found) != 1:
         raise ValueError(f"{path} has {len(found)} parameters of shape {shape}, not one")
-    return torch.from_numpy(found[0].astype(np.float32).reshape(shape))
+    return torch.from_numpy(found[0].reshape(shape))
 
 
 def _weights(
     path: Path,
-) -> tuple[dict[str, np.ndarray], list[tuple[np.ndarray, np.ndarray]], list[np.ndarray]]:
-    """Return parameters with a name, folded convolutions and unnamed matrices in order."""
+) -> tuple[
+    list[np.ndarray],
+    dict[str, np.ndarray],
+    list[tuple[np.ndarray, np.ndarray]],
+    list[np.ndarray],
+]:
+    """Return all arrays, those with a name, folded convolutions and unnamed matrices in order."""
     graph = onnx.load(str(path)).graph
     arrays = {
         each.name: numpy_helper.to_array(each).astype(np.float32) for each in graph.initializer
@@ -196,4 +179,4 @@ def _weights(
             folded.append((arrays[name], arrays[stored.get(node.input[2], node.input[2])]))
         else:
             multiplied.append(arrays[name])
-    return named, folded, multiplied
+    return list(arrays.values()), named, folded, multiplied

@@ -10,6 +10,8 @@ from typing import Final
 import cv2
 import numpy as np
 
+from sim_tests.actors.body import MESH_UNITS
+
 from ._atlas import Baked
 from ._body import Body
 from ._capsules import Row
@@ -25,7 +27,7 @@ _JPEG: Final = (
 def pack(folder: Path, person: Person, body: Body, levels: list[Baked], capsules: list[Row]) -> int:
     """Write ``<name>.npz`` and one JPEG per level; return the bytes written.
 
-    Vertices are kept to 0.1 mm, normals to 1/127, texture coordinates to 1/65535, weights to 1/255.
+    Meshes are stored as whole numbers of ``sim_tests.actors.body.MESH_UNITS``.
     """
     arrays: dict[str, np.ndarray] = {
         "description": np.array(person.description),
@@ -43,11 +45,11 @@ def pack(folder: Path, person: Person, body: Body, levels: list[Baked], capsules
                 f"level {level} has {len(mesh.vertices_m)} vertices, at most 65535 fit"
             )
         arrays |= {
-            f"lod{level}_vertices": np.round(mesh.vertices_m * 1e4).astype(np.int16),
-            f"lod{level}_normals": np.round(mesh.normals * 127.0).astype(np.int8),
-            f"lod{level}_uv": np.round(np.clip(mesh.uv, 0, 1) * 65535.0).astype(np.uint16),
+            f"lod{level}_vertices": _stored(mesh.vertices_m, "vertices", np.int16),
+            f"lod{level}_normals": _stored(mesh.normals, "normals", np.int8),
+            f"lod{level}_uv": _stored(np.clip(mesh.uv, 0, 1), "uv", np.uint16),
             f"lod{level}_triangles": mesh.triangles.astype(np.uint16),
-            f"lod{level}_weights": np.round(mesh.weights * 255.0).astype(np.uint8),
+            f"lod{level}_weights": _stored(mesh.weights, "weights", np.uint8),
         }
         done, picture = cv2.imencode(".jpg", mesh.texture_rgb[..., ::-1], list(_JPEG))
         if not done:
@@ -67,3 +69,8 @@ def pack(folder: Path, person: Person, body: Body, levels: list[Baked], capsules
                 9,
             )
     return total + file.stat().st_size
+
+
+def _stored(values: np.ndarray, key: str, dtype: type[np.integer]) -> np.ndarray:
+    """Return an array of a mesh as whole numbers of its unit."""
+    return np.round(values / MESH_UNITS[key]).astype(dtype)

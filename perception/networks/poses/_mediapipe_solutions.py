@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 
 from ...arrays import finite_number
 from ...errors import PerceptionError
+from ...installation import install_command
 
 _E = TypeVar("_E", bound="MediaPipeEstimator")
 
@@ -71,7 +72,7 @@ def mediapipe_solutions(asker: str) -> tuple[Any, Any]:
     except ImportError as cause:
         raise PerceptionError(
             f"{asker} needs mediapipe 0.10.14, which cannot be imported ({cause}); "
-            "it is the extra 'mediapipe': pip install 'awarenav[mediapipe]'"
+            f"it is the extra 'mediapipe': {install_command('mediapipe')}"
         ) from cause
     return face_mesh, pose
 

@@ -27,7 +27,13 @@ _MARGIN_S: Final = 1.5
 
 
 class Waypoint(StrictConfig):
-    """Position of the body at a time, in odom."""
+    """Position of the body at a time, in odom.
+
+    Attributes:
+        t_s: time from the start of the episode.
+        x_m: position.
+        y_m: position.
+    """
 
     error: ClassVar[type[ValueError]] = SimError
 
@@ -37,7 +43,12 @@ class Waypoint(StrictConfig):
 
 
 class HeadingKey(StrictConfig):
-    """Heading of the body at a time, degrees counter-clockwise from odom x."""
+    """Heading of the body at a time, degrees counter-clockwise from odom x.
+
+    Attributes:
+        t_s: time from the start of the episode.
+        heading_deg: heading, counter-clockwise from odom x.
+    """
 
     error: ClassVar[type[ValueError]] = SimError
 

@@ -34,6 +34,14 @@ class GazeKey(StrictConfig):
     ``look: ahead`` is the heading of the body, ``look: robot`` the direction to the robot's camera.
     The head points ``yaw_deg`` to the left of it and ``pitch_deg`` above it. The eyes turn in the
     head by ``eye_yaw_deg`` and ``eye_pitch_deg``. Head and eyes turn smoothly between two keys.
+
+    Attributes:
+        t_s: time from the start of the episode.
+        look: direction that the angles are counted from.
+        yaw_deg: yaw of the head, left positive.
+        pitch_deg: pitch of the head, up positive.
+        eye_yaw_deg: yaw of the eyes in the head, left positive.
+        eye_pitch_deg: pitch of the eyes in the head, up positive.
     """
 
     error: ClassVar[type[ValueError]] = SimError
@@ -47,7 +55,12 @@ class GazeKey(StrictConfig):
 
 
 class ActivityKey(StrictConfig):
-    """Activity of the hands from a time on; the change takes 0.6 s. Or sitting, from the start."""
+    """Activity of the hands from a time on; the change takes 0.6 s. Or sitting, from the start.
+
+    Attributes:
+        t_s: time from the start of the episode.
+        activity: the activity.
+    """
 
     error: ClassVar[type[ValueError]] = SimError
 

@@ -13,7 +13,12 @@ from ..body import MAX_STATURE_M, MIN_STATURE_M, ActivityName
 
 
 class RoutePoint(StrictConfig):
-    """A corner of a route in odom."""
+    """A corner of a route in odom.
+
+    Attributes:
+        x_m: position.
+        y_m: position.
+    """
 
     error: ClassVar[type[ValueError]] = SimError
 
@@ -22,7 +27,12 @@ class RoutePoint(StrictConfig):
 
 
 class Pause(StrictConfig):
-    """A stop after a length of route, and its duration."""
+    """A stop after a length of route, and its duration.
+
+    Attributes:
+        at_m: length of the route from its start to the stop.
+        for_s: duration of the stop.
+    """
 
     error: ClassVar[type[ValueError]] = SimError
 

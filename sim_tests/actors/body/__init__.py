@@ -7,7 +7,16 @@ and the render world.
 
 from __future__ import annotations
 
-from ._asset import DETAIL_LEVELS, JOINTS, PARENTS, SkinMesh, WorkerAsset, load_worker, worker_names
+from ._asset import (
+    DETAIL_LEVELS,
+    JOINTS,
+    MESH_UNITS,
+    PARENTS,
+    SkinMesh,
+    WorkerAsset,
+    load_worker,
+    worker_names,
+)
 from ._gait import Gait
 from ._gait_pose import GaitPose
 from ._online_footsteps import OnlineFootsteps
@@ -35,6 +44,7 @@ __all__ = [
     "MAX_HEAD_PITCH_RAD",
     "MAX_HEAD_YAW_RAD",
     "MAX_STATURE_M",
+    "MESH_UNITS",
     "MIN_STATURE_M",
     "PARENTS",
     "PHONE_SIZE_M",

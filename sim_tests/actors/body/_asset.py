@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from importlib import resources
 from pathlib import Path
+from types import MappingProxyType
 from typing import Final
 
 import cv2
@@ -45,6 +46,11 @@ JOINTS: Final = (
 PARENTS: Final = (-1, 0, 1, 1, 0, 4, 5, 0, 7, 8, -1, 10, 11, -1, 13, 14)
 #: Number of levels of detail; the finest comes first.
 DETAIL_LEVELS: Final = 3
+#: Unit of the whole numbers in which a file stores each array of a mesh: vertices in metres,
+#: normals, texture coordinates and weights as shares of 1.
+MESH_UNITS: Final = MappingProxyType(
+    {"vertices": 1e-4, "normals": 1.0 / 127.0, "uv": 1.0 / 65535.0, "weights": 1.0 / 255.0}
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,21 +196,22 @@ def _skin_mesh(
 ) -> SkinMesh:
     """Undo the quantisation of one level of detail."""
 
-    def dequantised(key: str, scale: float) -> FloatArray:
-        return _read_only_copy(arrays[f"lod{level}_{key}"].astype(np.float64) * scale)
+    def dequantised(key: str) -> FloatArray:
+        stored = arrays[f"lod{level}_{key}"].astype(np.float64)
+        return _read_only_copy(stored * MESH_UNITS[key])
 
-    normals = dequantised("normals", 1.0 / 127.0)
+    normals = dequantised("normals")
     lengths = np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
-    weights = dequantised("weights", 1.0 / 255.0)
+    weights = dequantised("weights")
     eyes = tuple(
         (joints_m[row], weights[:, row] > 0.5)
         for row, joint in enumerate(JOINTS)
         if level == 0 and joint.endswith("_eye")
     )
     return SkinMesh(
-        vertices_m=dequantised("vertices", 1e-4),
+        vertices_m=dequantised("vertices"),
         normals=_read_only_copy(normals / lengths),
-        uv=dequantised("uv", 1.0 / 65535.0),
+        uv=dequantised("uv"),
         triangles=arrays[f"lod{level}_triangles"].astype(np.int64),
         weights=weights,
         eyes=eyes,

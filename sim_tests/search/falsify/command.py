@@ -20,8 +20,7 @@ from awarenav.cli import POSITIVE, command, option, options
         130: "Interrupted; the episodes so far are kept.",
     },
     epilog="A killed or interrupted search continues with the same command and --resume, and ends "
-    "with the same result, whatever --workers is. Needs the extra 'bench': pip install "
-    "'awarenav[bench]'.",
+    "with the same result, whatever --workers is. Needs the extra 'bench'.",
 )
 @options.policy()
 @options.scenarios("that have a planner and people")

@@ -20,7 +20,7 @@ from awarenav.cli import POSITIVE, FilePath, OneOf, command, option, options
     },
     epilog="A killed or interrupted study continues with the same command and --resume, and ends "
     "with the same result. Several processes that run the command with the same --out share the "
-    "trials. Needs the extra 'bench': pip install 'awarenav[bench]'.",
+    "trials. Needs the extra 'bench'.",
 )
 @options.policy()
 @options.scenarios("that have a planner")

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from awarenav.files import atomic_path
+from perception.installation import install_command
 
 from ...world.errors import SimError
 from ._record import COLUMN_KINDS, EpisodeRecord, check_columns, one_line, parse_row, rounded
@@ -16,7 +17,7 @@ try:
 except ImportError as cause:  # pragma: no cover - depends on the installation
     raise SimError(
         "Parquet needs pyarrow, which is not installed; it is part of the extra 'bench': "
-        "pip install 'awarenav[bench]'"
+        + install_command("bench")
     ) from cause
 
 _TYPES: Final = {

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
+from urllib.parse import quote
 
+from ..runs import RunFiles
 from ._arm import Arm, Episode
 from ._run_data import RunData
 from ._text import count, number, plural
@@ -49,7 +53,10 @@ def _failure(run: RunData, message: str, episodes: Sequence[Episode]) -> Failure
 
 @dataclass(frozen=True, slots=True)
 class EpisodeLine:
-    """One episode as texts; ``look`` is the number of its arm's colour and shape."""
+    """One episode as texts; ``look`` is the number of its arm's colour and shape.
+
+    ``page`` is the address of its replay page, from the report; empty where there is none yet.
+    """
 
     number: str
     scenario: str
@@ -63,6 +70,7 @@ class EpisodeLine:
     outcome: str
     bad: bool
     replay: str
+    page: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,8 +82,15 @@ class EpisodeList:
     left_out: str
 
 
-def list_episodes(run: RunData, arms: Sequence[Arm]) -> EpisodeList:
-    """Return all episodes, or those with the smallest margins where there are too many."""
+def list_episodes(run: RunData, arms: Sequence[Arm], folder: Path | None = None) -> EpisodeList:
+    """Return all episodes, or those with the smallest margins where there are too many.
+
+    Args:
+        run: the run.
+        arms: the arms of the comparison.
+        folder: of the report, where the links begin; None for that of the run.
+    """
+    folder = run.path if folder is None else folder
     arm_of = {id(each): arm for arm in arms for each in (*arm.episodes, *arm.others, *arm.errors)}
     chosen = list(run.episodes)
     left_out = ""
@@ -87,7 +102,9 @@ def list_episodes(run: RunData, arms: Sequence[Arm]) -> EpisodeList:
         order = sorted(range(len(chosen)), key=lambda i: worst_first(chosen[i]))
         chosen = [chosen[i] for i in sorted(order[:MOST_LINES])]
     return EpisodeList(
-        tuple(chosen), tuple(_line(run, each, arm_of[id(each)]) for each in chosen), left_out
+        tuple(chosen),
+        tuple(_line(run, each, arm_of[id(each)], folder) for each in chosen),
+        left_out,
     )
 
 
@@ -111,7 +128,17 @@ def outcome_of(episode: Episode) -> str:
     return "goal not reached" if record.time_to_goal_s is None else ""
 
 
-def _line(run: RunData, episode: Episode, arm: Arm) -> EpisodeLine:
+def _page(run: RunData, episode: Episode, folder: Path) -> str:
+    """Return the address of an episode's replay page, from a folder; empty without a page."""
+    if episode.number is None:
+        return ""
+    page = RunFiles(run.path).page(episode.number)
+    if not page.is_file():
+        return ""
+    return quote(Path(os.path.relpath(page, folder)).as_posix())
+
+
+def _line(run: RunData, episode: Episode, arm: Arm, folder: Path) -> EpisodeLine:
     record = episode.record
     return EpisodeLine(
         "" if episode.number is None else str(episode.number),
@@ -125,5 +152,6 @@ def _line(run: RunData, episode: Episode, arm: Arm) -> EpisodeLine:
         number(record.min_separation_m),
         outcome_of(episode),
         bool(record.error or record.robot_touched),
-        run.replay(episode),
+        run.replay(episode) and f"{run.replay(episode)} --view",
+        _page(run, episode, folder),
     )

@@ -6,6 +6,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, Final
 
+from perception.installation import install_command
+
 from ...world.errors import SimError
 from ..measures import nondeterminism_notes
 from ._awareness_split import split_by_awareness
@@ -27,7 +29,7 @@ try:
 except ImportError as cause:  # pragma: no cover - depends on the installation
     raise SimError(
         "a report needs jinja2, which is not installed; it is part of the extra 'bench': "
-        "pip install 'awarenav[bench]'"
+        + install_command("bench")
     ) from cause
 
 _REPORT: Final = "report.html"
@@ -76,7 +78,8 @@ def write_report(
     run = RunData.read(out_dir)
     statistics = RunStatistics.of(run.episodes)
     arms = statistics.arms
-    listed = list_episodes(run, arms)
+    path = run.path / _REPORT if path is None else path
+    listed = list_episodes(run, arms, path.parent)
     errors = sum(len(arm.errors) for arm in arms)
     page = _render_page(
         title=title_of(run, len(arms)),
@@ -98,7 +101,6 @@ def write_report(
         reproduction=reproduction(run),
         metrics=(*MAIN, *FURTHER, *PAIRED_ONLY),
     )
-    path = run.path / _REPORT if path is None else path
     part = path.with_name(path.name + ".part")
     try:
         part.write_text(page, "utf-8")

@@ -12,7 +12,7 @@ from awarenav.cli import FolderPath, argument, command, option, options
     examples=["awarenav report crossings"],
     exit_status={0: "Success.", 2: "Bad input; nothing was written."},
     epilog="docs/bench.md explains the page. Needs the extra 'bench'; the images of the worst "
-    "episodes also need the extra 'sim': pip install 'awarenav[sim,bench]'.",
+    "episodes also need the extra 'sim'.",
 )
 @argument("folder", type=FolderPath(), metavar="DIR", help="Folder of `awarenav crossings --out`.")
 @options.out_file(None, "The page.", "FILE.html", show_default="DIR/report.html")

@@ -23,9 +23,11 @@ if TYPE_CHECKING:
     from ._planner_choice import make_planner, refuse_unusable_planner
     from ._pool import WorkerPool, run_here, tidy
     from ._process_lock import ProcessLock
+    from ._recording import recorder_of
     from ._run import run_jobs
     from ._run_files import RunFiles, read_jobs, read_run
     from ._sample import sample_jobs
+    from ._seeded_crossing import seeded_crossing
 
 __all__ = [
     "Job",
@@ -45,11 +47,13 @@ __all__ = [
     "policy_text",
     "read_jobs",
     "read_run",
+    "recorder_of",
     "refuse_unusable_planner",
     "run_episode",
     "run_here",
     "run_jobs",
     "sample_jobs",
+    "seeded_crossing",
     "template_of",
     "tidy",
 ]
@@ -84,6 +88,7 @@ __getattr__ = lazy_names(
             "tidy",
         ),
         "._process_lock": ("ProcessLock",),
+        "._recording": ("recorder_of",),
         "._run": ("run_jobs",),
         "._run_files": (
             "RunFiles",
@@ -91,5 +96,6 @@ __getattr__ = lazy_names(
             "read_run",
         ),
         "._sample": ("sample_jobs",),
+        "._seeded_crossing": ("seeded_crossing",),
     },
 )

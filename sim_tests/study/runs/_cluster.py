@@ -11,6 +11,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 from uuid import uuid4
 
+from perception.installation import install_command
+
 from ...world.errors import SimError
 from ._episode import Attempt, attempt, failed
 from ._job import Job
@@ -24,7 +26,7 @@ try:
 except ImportError as cause:  # pragma: no cover - depends on the installation
     raise SimError(
         "a scheduler needs Dask, which is not installed; it is part of the extra 'bench': "
-        "pip install 'awarenav[bench]'"
+        + install_command("bench")
     ) from cause
 
 # The address that stands for a cluster on this computer.

@@ -1,4 +1,4 @@
-"""The command ``awarenav replay``: one episode of a run again, with a video and a map."""
+"""The command ``awarenav replay``: one episode of a run again, with video and map, or a page."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Final, NoReturn
 
 import cv2
 import numpy as np
@@ -18,6 +18,7 @@ from awarenav.video import VideoWriter
 from perception import AttentionCone
 
 from ...crossing import CrossingFrame, Stage, TopView, draw_camera_view
+from ...viewing import outcome_text, show_page, write_page
 from ...world.camera import CameraRenderer
 from ...world.errors import SimError
 from ..measures import (
@@ -30,12 +31,14 @@ from ..measures import (
 from ._episode import observed_episode
 from ._job import Job
 from ._plan import describe, job_key, template_of
+from ._recording import recorder_of
 from ._run_files import RunFiles, read_jobs
 from ._run_folder import record_key
 
 Image = NDArray[np.uint8]
 
-_REPLAYS: Final = "replays"
+# The word for all episodes of a run.
+_EVERY: Final = "all"
 _VIDEO_HZ: Final = 10
 _HEIGHT_PX: Final = 480
 _MAP_WIDTH_PX: Final = 720
@@ -132,29 +135,53 @@ class ReplayOptions:
     episode: str
     out: Path | None
     no_video: bool
+    view: bool
 
 
 def replay_command(options: ReplayOptions) -> int:
-    """Run an episode again, write its pictures and compare its row with that of the run.
+    """Run an episode again, write its pictures or its page, and compare its row with the run's.
 
     Raises:
         SimError: the folder holds no run, or the run does not have the episode.
     """
     jobs = read_jobs(options.folder)
-    number = find_episode(jobs, options.episode)
-    job = jobs[number]
-    print(f"Episode {number}: {describe(job_key(job))}")
-    out = options.out if options.out is not None else options.folder / _REPLAYS
+    every = options.episode == _EVERY
+    numbers = range(len(jobs)) if every else [find_episode(jobs, options.episode)]
+    out = options.out if options.out is not None else RunFiles(options.folder).replays
     out.mkdir(parents=True, exist_ok=True)
+    status = 0
+    for number in numbers:
+        written, differs = _replay(options, number, jobs[number], out)
+        status = max(status, differs)
+        if options.view and not every:
+            show_page(written[0].resolve().as_uri())
+    return status
+
+
+def _replay(options: ReplayOptions, number: int, job: Job, out: Path) -> tuple[Sequence[Path], int]:
+    """Run one episode again; return the files written, and 1 if its row is another, else 0."""
+    print(f"Episode {number}: {describe(job_key(job))}")
     name = f"episode_{number:05d}"
     scenario = template_of(job.scenario).for_seed(job.seed)
     total = round(scenario.duration_s * scenario.control_hz)
-    with (
-        tqdm(total=total, desc="replay", unit="frame", file=sys.stderr) as bar,
-        ReplayPictures(
-            out / f"{name}.png", None if options.no_video else out / f"{name}.mp4"
-        ) as pictures,
-    ):
+    with tqdm(total=total, desc="replay", unit="frame", file=sys.stderr) as bar:
+        if options.view:
+            page_path = out / RunFiles(options.folder).page(number).name
+            record, written = _write_view(job, page_path, bar)
+        else:
+            video_path = None if options.no_video else out / f"{name}.mp4"
+            record, written = _write_pictures(job, out / f"{name}.png", video_path, bar)
+    for path in written:
+        print(f"Written: {path}")
+    print(_description(record))
+    return written, _compare_row(options.folder, job, record)
+
+
+def _write_pictures(
+    job: Job, map_path: Path, video_path: Path | None, bar: tqdm[NoReturn]
+) -> tuple[EpisodeRecord, list[Path]]:
+    """Run an episode and write its map and video; return its row and the paths."""
+    with ReplayPictures(map_path, video_path) as pictures:
 
         def observe(frame: CrossingFrame, stage: Stage) -> None:
             pictures.add(frame, stage)
@@ -162,10 +189,20 @@ def replay_command(options: ReplayOptions) -> int:
 
         record = observed_episode(job, observe)[1]
         pictures.finish()
-    for path in pictures.written:
-        print(f"Written: {path}")
-    print(_description(record))
-    return _compare_row(options.folder, job, record)
+    return record, pictures.written
+
+
+def _write_view(job: Job, path: Path, bar: tqdm[NoReturn]) -> tuple[EpisodeRecord, list[Path]]:
+    """Run an episode and write its page; return its row and the path."""
+    recorder = recorder_of(job)
+
+    def observe(frame: CrossingFrame, stage: Stage) -> None:
+        recorder(frame, stage)
+        bar.update()
+
+    result, record = observed_episode(job, observe)
+    write_page(path, recorder.begin, recorder.states, outcome_text(result), recorder.note)
+    return record, [path]
 
 
 def find_episode(jobs: Sequence[Job], episode: str) -> int:

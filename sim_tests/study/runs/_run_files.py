@@ -53,6 +53,15 @@ class RunFiles:
         return tuple(path.with_name(path.name + ".damaged") for path in (self.episodes, self.jobs))
 
     @property
+    def replays(self) -> Path:
+        """The folder of videos, maps and pages of episodes that were replayed."""
+        return self.folder / "replays"
+
+    def page(self, number: int) -> Path:
+        """Return the path of the replay page of an episode."""
+        return self.replays / f"episode_{number:05d}.html"
+
+    @property
     def lock(self) -> Path:
         """The lock file of the process that runs episodes into the folder."""
         return self.folder / ".lock"

@@ -21,16 +21,21 @@ _RACK_DEPTH_M: Final = 1.1
 
 
 class RackBox(StrictConfig):
-    """A pallet rack as the box that it fills; it stands on the floor, its sides along the axes."""
+    """A pallet rack as the box that it fills; it stands on the floor, its sides along the axes.
+
+    Attributes:
+        x_m: centre in odom.
+        y_m: centre in odom.
+        length_m: extent along odom x.
+        width_m: extent along odom y.
+        height_m: height above the floor.
+    """
 
     error: ClassVar[type[ValueError]] = SimError
 
-    #: Centre in odom.
     x_m: float
     y_m: float
-    #: Extent along odom x.
     length_m: _Positive
-    #: Extent along odom y.
     width_m: _Positive
     height_m: _Positive = 4.0
 
@@ -44,25 +49,35 @@ class RackBox(StrictConfig):
 class WarehouseLayout(StrictConfig):
     """A walled hall; the robot's aisle runs along odom x, centred on y = 0.
 
+    Attributes:
+        x_min_m: inner side of the wall towards negative odom x.
+        y_min_m: inner side of the wall towards negative odom y.
+        x_max_m: inner side of the wall towards positive odom x.
+        y_max_m: inner side of the wall towards positive odom y.
+        wall_height_m: height of the walls.
+        aisle_width_m: width of the robot's aisle between its painted lines.
+        cross_aisle_x_m: centre of an aisle along y that crosses the robot's aisle at a painted
+            zebra; None for no such aisle.
+        cross_aisle_width_m: width of that aisle.
+        racks: pallet racks.
+        props: other things on the floor.
+        floor_friction: Coulomb friction of the floor; PyBullet multiplies it by the wheel's.
+
     Raises pydantic's ``ValidationError`` (a ``ValueError``) or, from a file, :class:`SimError`.
     """
 
     error: ClassVar[type[ValueError]] = SimError
 
-    #: The hall's inner walls.
     x_min_m: float
     y_min_m: float
     x_max_m: float
     y_max_m: float
     wall_height_m: _Positive = 6.0
-    #: Width of the robot's aisle between its painted lines.
     aisle_width_m: _Positive = 3.0
-    #: Centre of an aisle along y that crosses the robot's aisle at a painted zebra; None: no aisle.
     cross_aisle_x_m: float | None = None
     cross_aisle_width_m: _Positive = 3.0
     racks: tuple[RackBox, ...] = ()
     props: tuple[Prop, ...] = ()
-    #: Coulomb friction of the floor; PyBullet multiplies it by the wheel's.
     floor_friction: _Positive = 0.9
 
     @model_validator(mode="after")

@@ -71,15 +71,19 @@ class Prop(StrictConfig):
     Its frame has x forward (forks point along −x for pallet truck and stacker, along +x for the
     forklift) and its origin near the middle of its footprint. Its collision shape is the
     axis-aligned bound of each part: exact at multiples of 90°, larger in between.
+
+    Attributes:
+        kind: one of :data:`PROP_PARTS`.
+        x_m: place of the origin in odom.
+        y_m: place of the origin in odom.
+        yaw_deg: heading, counter-clockwise from odom x.
     """
 
     error: ClassVar[type[ValueError]] = SimError
 
-    #: One of :data:`PROP_PARTS`.
     kind: str
     x_m: float
     y_m: float
-    #: Counter-clockwise from odom x.
     yaw_deg: float = Field(default=0.0, ge=-360.0, le=360.0)
 
     @field_validator("kind", mode="before")

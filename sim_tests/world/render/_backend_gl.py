@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from perception.arrays import FloatArray
+from perception.installation import install_command
 
 from ..bullet import pybullet
 from ..errors import SimError
@@ -267,7 +268,7 @@ def _context_and_program(process_id: int) -> tuple[Any, Any]:
     except ImportError as cause:
         raise SimError(
             "drawing with OpenGL needs moderngl, which is not installed; it is part of the extra "
-            "'sim': pip install 'awarenav[sim]', or use renderer='tiny'"
+            f"'sim': {install_command('sim')}, or use renderer='tiny'"
         ) from cause
     try:
         # macOS and Windows offer contexts without a window by themselves.

@@ -103,6 +103,7 @@ def test_exclusions_are_those_that_are_known():
             for option in ("--detector", "--pose", "--head", "--eyes")
         ),
         *((name, "--frame-budget-s", "--detect-every-s") for name in ("bridge", "estimate")),
+        ("replay", "--view", "--no-video"),
         ("tracks", "--ids", "--config"),
         ("falsify", "--unsafe-no-floor", "--planner"),
     }

@@ -13,6 +13,7 @@ from paths import ROOT
 from awarenav.cli import main
 from awarenav.errors import AwarenavError, MissingExtraError
 from awarenav.records import write_records
+from perception.installation import install_command
 
 
 @pytest.fixture
@@ -53,7 +54,7 @@ def test_a_simulator_that_is_not_installed_is_one_line_and_2(failing, capsys):
     assert failing(error) == 2
     assert capsys.readouterr().err == (
         "awarenav policy show: needs pybullet, which is not installed; it is part of the extra "
-        "'sim': pip install 'awarenav[sim]'\n"
+        f"'sim': {install_command('sim')}\n"
     )
 
 

@@ -13,6 +13,7 @@ from awarenav.cli import main
 from nav_adapter import AwarenessPolicy, NavAdapter, RobotProfile, RobotState
 from nav_adapter.settled import settled_radius_m, settled_speed_limit_mps
 from perception.anthropometry import BODY_RADIUS_M
+from perception.installation import install_command
 from tracking import PersonTrack
 
 HEADS = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
@@ -111,7 +112,7 @@ sys.exit(main(["policy", "show", "balanced", "--out", {out!r}]))
     [
         (["pybullet", "av"], "a.png", 0, ""),
         (["pybullet", "av", "matplotlib"], "none", 0, ""),
-        (["pybullet", "av", "matplotlib"], "a.png", 2, "awarenav[plot]"),
+        (["pybullet", "av", "matplotlib"], "a.png", 2, install_command("plot")),
     ],
 )
 def test_no_simulator_is_needed(blocked, out, status, said, tmp_path):
@@ -136,5 +137,5 @@ def test_without_matplotlib_the_table_is_printed_and_a_remark_says_why_there_is_
     assert main(["policy", "show", "balanced"]) == 0
     printed = capsys.readouterr()
     assert printed.out.startswith("balanced\n")
-    assert "awarenav[plot]" in printed.err
+    assert install_command("plot") in printed.err
     assert list(tmp_path.iterdir()) == []

@@ -4,6 +4,7 @@ import pytest
 from run_scenes import short_jobs
 
 from awarenav.cli import main
+from sim_tests.study.report import write_report
 from sim_tests.study.runs import run_jobs
 
 
@@ -32,6 +33,27 @@ def test_a_replay_with_another_row_names_the_difference(run, tmp_path, capsys):
     assert main(["replay", str(copy), "short:0:blind:misses_30", "--no-video"]) == 1
     assert "success was false, is true" in capsys.readouterr().out
     assert [path.name for path in (copy / "replays").iterdir()] == ["episode_00002.png"]
+
+
+def test_the_report_links_to_the_pages_of_replays(tmp_path, capsys):
+    folder = tmp_path / "a run"
+    run_jobs(short_jobs(1), folder, workers=1)
+    assert main(["replay", str(folder), "1", "--view"]) == 0
+    text = capsys.readouterr().out
+    page = folder / "replays" / "episode_00001.html"
+    assert f"Written: {page}" in text
+    assert "The same row as in" in text
+    assert [path.name for path in page.parent.iterdir()] == [page.name]
+    assert '"scenario":"short","seed":0,"policy":"balanced"' in page.read_text()
+    report = write_report(folder, stills=False).read_text()
+    assert report.count('<a href="replays/episode_00001.html">Watch</a>') == 1
+    assert f"awarenav replay &#39;{folder}&#39; 0 --view" in report
+    assert f"awarenav replay &#39;{folder}&#39; 1 --view" not in report
+    elsewhere = write_report(folder, stills=False, path=tmp_path / "report.html").read_text()
+    assert '<a href="a%20run/replays/episode_00001.html">Watch</a>' in elsewhere
+    assert main(["replay", str(folder), "all", "--view"]) == 0
+    report = write_report(folder, stills=False).read_text()
+    assert report.count(">Watch</a>") == 2
 
 
 @pytest.mark.parametrize(

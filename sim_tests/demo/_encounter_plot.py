@@ -1,4 +1,4 @@
-"""The plots of the demonstration: the encounter, and crossings with and without awareness."""
+"""The plot of the paper's encounter: images of its three cases, and quantities over time."""
 
 from __future__ import annotations
 
@@ -16,10 +16,6 @@ from perception.arrays import FloatArray, ImageRgb
 from ..crossing import CrossingFrame, CrossingResult
 from ._cases import CAMERA_PERIOD_S, CASES, EncounterCase
 
-_COLOURS: Final = ("#8a8f98", "#1f4e79", "#b3261e", "#2e7d4f", "#d9822b")
-_STYLES: Final = ("-", ":", "-", "-", "--")
-# Policies that ignore awareness: their bound says nothing about what the robot does.
-_WITHOUT_AWARENESS: Final = ("blind", "scanner")
 _TRUTH_COLOUR: Final = "#1f4e79"
 _PERCEPTION_COLOUR: Final = "#d9822b"
 _BOUND_COLOUR: Final = "#7fb77e"
@@ -173,47 +169,3 @@ def _with_gaps(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatA
     times, finite_values = time[finite], values[finite].copy()
     breaks = np.flatnonzero(np.diff(times) > 2.0 * CAMERA_PERIOD_S) + 1
     return np.insert(times, breaks, times[breaks]), np.insert(finite_values, breaks, np.nan)
-
-
-def plot_comparison(path: Path, rows: Sequence[tuple[str, CrossingResult]]) -> None:
-    """Plot speed, awareness and obstacle radius of each crossing over the robot's position.
-
-    Args:
-        path: the PNG file.
-        rows: name and result of each crossing.
-    """
-    figure = new_figure(11.0, 6.4)
-    panels = figure.subplots(3, 1, sharex=True)
-    for (label, result), colour, style in zip(rows, _COLOURS, _STYLES, strict=False):
-        along = [float(frame.robot_state.position_odom_m[0]) for frame in result.frames]
-        speed = [frame.robot_state.speed_mps for frame in result.frames]
-        time = "" if result.time_to_goal_s is None else f": {result.time_to_goal_s:.1f} s"
-        panels[0].plot(along, speed, style, color=colour, label=f"{label}{time}")
-        if result.frames[0].truth:
-            radius = [_largest_radius(frame) for frame in result.frames]
-            if result.policy not in _WITHOUT_AWARENESS:
-                bound = [_lowest_bound(frame) for frame in result.frames]
-                panels[1].plot(along, bound, style, color=colour)
-            panels[2].plot(along, radius, style, color=colour)
-    for axes, name in zip(
-        panels,
-        ("robot speed (m/s)", "awareness, lower bound", "obstacle radius (m)"),
-        strict=True,
-    ):
-        axes.set_title(name, fontsize=10, loc="left")
-        axes.grid(alpha=0.25)
-        axes.set_ylim(bottom=0.0)
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
-    panels[1].set_ylim(0.0, 1.0)
-    panels[2].set_xlabel("robot's way along the aisle (m); gaps: nobody tracked")
-    figure.savefig(path, dpi=110)
-
-
-def _lowest_bound(frame: CrossingFrame) -> float:
-    obstacles = frame.constraints.obstacles
-    return min((obstacle.awareness_lower for obstacle in obstacles), default=np.nan)
-
-
-def _largest_radius(frame: CrossingFrame) -> float:
-    obstacles = frame.constraints.obstacles
-    return max((obstacle.radius_m for obstacle in obstacles), default=np.nan)

@@ -1,0 +1,226 @@
+// The answer of the adapter for one person who has been tracked so for long enough.
+// The Python originals are nav_adapter/_obstacle_rules.py, _governor.py, _alerting.py, _adapter.py.
+//
+// The state has: x_m, y_m (place of the track in the base frame), vx_mps, vy_mps, sigma_m and
+// velocity_sigma_mps (standard deviations of place and velocity, the same in all directions),
+// awareness_lower, noticed, was_aware, track (confirmed, coasting, tentative or first sight),
+// unseen_s (from the last frame that showed the person to the track), data_age_s (from the track
+// and the latest frame to now), moved_m and moved_age_s, speed_mps and lateral_mps.
+
+const radians = (degrees) => degrees * (Math.PI / 180);
+const BRISK_SHARE = 0.75;
+const RUNNING_SHARE = 0.25;
+
+/** The person as the adapter knows them: awareness that counts, radius, speeds, uncertainty. */
+function personOf(policy, state) {
+  const { timing, margins, outline } = policy;
+  const stale = state.data_age_s > timing.stale_after_s;
+  const since = state.unseen_s + state.data_age_s;
+  const firstSight = state.track === "first sight";
+  const confirmed = firstSight || state.track === "confirmed";
+  const trusted = !stale && state.track !== "tentative" && since <= timing.fresh_within_s;
+  const looks = trusted ? state.awareness_lower : 0;
+  const rule = policy.noticed;
+  const counts = trusted && confirmed && rule !== null && state.noticed >= rule.at_least;
+  const lower = Math.max(looks, counts ? rule.counts_as_awareness : 0);
+  const before = state.was_aware && !firstSight && state.track !== "tentative";
+  const held = (ramp) => holds(ramp, looks, before);
+  const ahead = Math.min(state.data_age_s, timing.stop_after_s);
+  const sigma = Math.sqrt(state.sigma_m ** 2 + ahead ** 2 * state.velocity_sigma_mps ** 2);
+  const walking = Math.hypot(state.vx_mps, state.vy_mps);
+  const sized = firstSight ? 0 : held(policy.inflation) ? 1 : lower;
+  const share = blend(outline, sized);
+  const aheadS = mixed(share, outline.unaware_ahead_s, outline.aware_ahead_s);
+  const elongates = outline.unaware_ahead_s > 0;
+  const isNew = firstSight && 0 < timing.shrink_after_s - 1e-9;
+  const heard = isNew ? 0 : held(policy.speed) ? 1 : lower;
+  return {
+    counted_alpha: heard, stale, trusted, confirmed, lower, sigma, walking,
+    radius: bounded(margins, policyRadius(policy, sized) + margins.uncertainty_sigmas * sigma),
+    ahead: elongates ? Math.min(aheadS * walking, outline.longest_ahead_m) : 0,
+    assumed: policyHumanSpeed(policy, heard),
+    delay: standingDelay(policy, state, trusted && state.track === "confirmed", walking),
+    uncertainty: sigma * (since > timing.fresh_within_s
+      ? Math.max(margins.uncertainty_sigmas, margins.unseen_sigmas)
+      : margins.uncertainty_sigmas),
+    at: [state.x_m, state.y_m],
+    predicted: [
+      state.x_m + state.data_age_s * state.vx_mps, state.y_m + state.data_age_s * state.vy_mps,
+    ],
+  };
+}
+
+/** How long before the track's stamp a standing person may have begun to walk; else infinite. */
+function standingDelay(policy, state, fresh, walking) {
+  const standing = policy.rules.standing;
+  if (standing === null || !fresh) return Infinity;
+  const squared = walking * walking + state.velocity_sigma_mps ** 2;
+  if (!(squared <= standing.standing_below_mps ** 2)) return Infinity;
+  const least = standing.start_delay_s + state.unseen_s;
+  if (!standing.delay_from_tracks) return least;
+  const moved = state.moved_m ?? Infinity;
+  const moving = Math.sqrt((2 * moved) / standing.human_acceleration_mps2);
+  return Math.max(least, state.moved_age_s + moving);
+}
+
+/** The speed towards the robot that counts: the policy's, or that of the track if it is higher. */
+function countedHumanSpeed(policy, state, person) {
+  if (policy.rules.protective_field !== null) return person.assumed;
+  const [x, y] = person.at, { vx_mps: vx, vy_mps: vy } = state;
+  const distance = Math.max(Math.hypot(x, y), 1e-9);
+  const unaware = policyHumanSpeed(policy, 0);
+  let closing = -(vx * x + vy * y) / distance, assumed = person.assumed;
+  if (person.walking > BRISK_SHARE * unaware) {
+    const across = Math.abs(vx * y - vy * x) / distance;
+    const brisk = (person.walking / Math.max(unaware, 1e-9) - BRISK_SHARE) / (1 - BRISK_SHARE);
+    const turn = radians(policy.rules.people_turn_deg) * Math.min(brisk, 1);
+    closing = Math.atan2(across, closing) <= turn
+      ? person.walking
+      : closing * Math.cos(turn) + across * Math.sin(turn);
+  }
+  const excess = person.walking - unaware;
+  if (excess > 0) {
+    const running = Math.min(excess / Math.max(RUNNING_SHARE * unaware, 1e-9), 1);
+    assumed = Math.max(assumed + excess, assumed + running * (person.walking - assumed));
+  }
+  return Math.max(closing, assumed);
+}
+
+/** The share of the stopping distance that can lead to a point. */
+function approach(policy, robot, state, [x, y]) {
+  const lateral = Math.abs(state.lateral_mps);
+  if (Math.abs(state.speed_mps) < STANDING_MPS && lateral <= LATERAL_NOISE_MPS) return 1;
+  const [ahead, left] = travelOf(state).direction;
+  const angle = Math.abs(Math.atan2(ahead * y - left * x, ahead * x + left * y));
+  let turn = radians(policy.rules.turn_within_stop_deg);
+  if (lateral <= LATERAL_NOISE_MPS && robot.drive !== "differential")
+    turn += Math.atan2(lateral, Math.abs(state.speed_mps));
+  return Math.max(Math.cos(Math.max(angle - turn, 0)), 0);
+}
+
+/** Separations and shares of the stopping distance: [from the footprint, from the circle]. */
+function gapsOf(policy, robot, state, person) {
+  const margin = DATA.body_radius_m + person.uncertainty;
+  const both = [person.predicted, person.at];
+  const hull = hullOfRobot(robot);
+  const outline = Math.min(...both.map((point) => distanceFrom(hull, point)));
+  const centre = Math.min(...both.map(([x, y]) => Math.hypot(x, y)));
+  return {
+    raw: [outline, centre - circumscribed(robot)].map((gap) => gap - DATA.body_radius_m),
+    gaps: [outline - margin, centre - circumscribed(robot) - margin],
+    shares: [1, Math.max(...both.map((point) => approach(policy, robot, state, point)))],
+  };
+}
+
+/**
+ * The limit of each rule in m/s, speed and separation first.
+ * `bounds` gets, for the two rules that have two bounds, the one that counts and its share.
+ */
+function ruleLimits(policy, robot, state, person, human, { gaps, shares }, bounds) {
+  const rules = policy.rules, braking = robot.max_deceleration_mps2;
+  const reaction = robot.reaction_time_s + state.data_age_s;
+  const starting = rules.standing === null ? Infinity : rules.standing.human_acceleration_mps2;
+  const higher = (rule, parts, limit) => {
+    const both = gaps.map((gap, each) => limit(gap, parts[each]));
+    const each = both[1] > both[0] ? 1 : 0;
+    bounds[rule] = { each, share: parts[each] };
+    return both[each];
+  };
+  const clearance = policy.margins.separation_clearance_m;
+  const limits = {
+    "speed and separation": higher("speed and separation", shares, (gap, share) =>
+      highestSpeedFromStanding(
+        gap, human, braking, reaction, clearance, share, starting, person.delay,
+      )),
+  };
+  if (rules.zones !== null) {
+    const drive = gaps[1] > 0 ? gaps[1] / shares[1] : gaps[1];
+    const { stop_within_m: stop, full_speed_beyond_m: full } = rules.zones;
+    const share = (Math.max(gaps[0], drive) - stop) / (full - stop);
+    limits["distance zone"] = robot.max_speed_mps * (share > 0 ? Math.min(share, 1) : 0);
+  }
+  if (rules.near_cap !== null) {
+    const beyond = Math.max(gaps[0] - rules.near_cap.within_m, 0);
+    limits["cap near people"] = Math.sqrt(rules.near_cap.speed_mps ** 2 + 2 * braking * beyond);
+  }
+  if (rules.start_reserve !== null) {
+    const [x, y] = person.at, { travel, direction } = travelOf(state);
+    const distance = Math.max(Math.hypot(x, y), 1e-9);
+    const along = (x * direction[0] + y * direction[1]) / distance;
+    const toward = [1, travel < STANDING_MPS ? 1 : Math.min(Math.max(along, 0), 1)];
+    const closing = Math.max(-(state.vx_mps * x + state.vy_mps * y) / distance, 0);
+    const { human_acceleration_mps2: bound, start_delay_s: delay } = rules.start_reserve;
+    const since = delay + closing / bound, unaware = policyHumanSpeed(policy, 0);
+    limits["start reserve"] = higher("start reserve", toward, (gap, share) =>
+      highestSpeedFromStanding(gap, unaware, braking, reaction, 0, share, bound, since));
+  }
+  return limits;
+}
+
+/** Whether the robot stops in time if it brakes fully from now on. */
+function brakingSuffices(policy, robot, state, person, human, { gaps, shares }) {
+  const { travel } = travelOf(state), braking = robot.max_deceleration_mps2;
+  if (travel < STANDING_MPS) return true;
+  const standing = policy.rules.standing;
+  const starting = standing === null ? Infinity : standing.human_acceleration_mps2;
+  const way = walked(state.data_age_s + travel / braking, human, starting, person.delay);
+  return shares.some((share, each) => {
+    const driven = share * stopping(travel, braking, state.data_age_s);
+    return way + driven + policy.margins.separation_clearance_m <= gaps[each];
+  });
+}
+
+/** The alert for the person if none has been given before, or null. */
+function alertOf(policy, robot, state, person) {
+  const rules = policy.alerts;
+  if (rules === null || person.stale || travelOf(state).travel <= STANDING_MPS) return null;
+  if (state.track === "tentative" || person.lower >= rules.unaware_below) return null;
+  const [x, y] = person.predicted;
+  const vx = state.vx_mps - state.speed_mps, vy = state.vy_mps - state.lateral_mps;
+  const speed2 = vx * vx + vy * vy, closing = -(x * vx + y * vy);
+  if (speed2 < 1e-6 || closing <= 1e-9) return null;
+  const time = closing / speed2;
+  const reach = circumscribed(robot) + DATA.body_radius_m
+    + policy.margins.uncertainty_sigmas * person.sigma;
+  const gap = Math.max(Math.hypot(x + time * vx, y + time * vy) - reach, 0);
+  if (gap > rules.miss_within_m) return null;
+  const kind = time < rules.horn_within_s ? "horn"
+    : time < rules.voice_within_s ? "voice"
+    : time < rules.light_within_s ? "light" : null;
+  return kind && { kind, time_s: time, gap_m: gap };
+}
+
+/** Radius, speed limit, reason and all that they come from. */
+function answer(policy, robot, state) {
+  const person = personOf(policy, state);
+  const human = countedHumanSpeed(policy, state, person);
+  const terms = gapsOf(policy, robot, state, person);
+  const maximum = robot.max_speed_mps, { travel, direction } = travelOf(state);
+  const field = policy.rules.protective_field;
+  const counts = field === null || [person.predicted, person.at].some(
+    (point) => inPath(robot, direction, field.beside_m, point, person.uncertainty),
+  );
+  const bounds = {};
+  const limits = counts ? ruleLimits(policy, robot, state, person, human, terms, bounds) : {};
+  let limit = maximum, reason = "robot maximum";
+  for (const [rule, value] of Object.entries(limits))
+    if (value < limit) [limit, reason] = [value, rule];
+  const suffices = !counts || travel <= limits["speed and separation"]
+    || brakingSuffices(policy, robot, state, person, human, terms);
+  if (state.data_age_s > policy.timing.stop_after_s)
+    [limit, reason] = [0, `stale data: perception is ${state.data_age_s.toFixed(2)} s old`];
+  const lateral = Math.abs(state.lateral_mps);
+  if (robot.drive === "differential" && lateral > LATERAL_NOISE_MPS) {
+    limit = 0;
+    reason = `robot: moves sideways at ${lateral.toFixed(2)} m/s, but its profile says `
+      + "drive='differential'";
+  }
+  const reaction = robot.reaction_time_s + state.data_age_s;
+  return {
+    radius_m: person.radius, ahead_m: person.ahead, awareness_lower: person.lower,
+    human_speed_mps: human, limit_mps: limit, reason, limits, stale: person.stale,
+    stopping_m: stopping(limit, robot.max_deceleration_mps2, reaction),
+    braking_suffices: suffices, alert: alertOf(policy, robot, state, person),
+    gaps_m: terms.raw, uncertainty_m: person.uncertainty, bounds, in_path: counts, person,
+  };
+}

@@ -1,0 +1,192 @@
+"""One panel of the film: the worker's face, the numbers, and the hall from above."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from awarenav.drawing import Colour, Font, awareness_colour, draw_disc, draw_line, fill_hull
+from perception import AttentionCone
+from perception.arrays import FloatArray, ImageRgb
+
+from ..crossing import CrossingFrame, CrossingResult
+from ._film_values import WITHOUT_AWARENESS, FilmRun, FilmValues, film_values, frame_index
+
+#: Width and height of a panel, pixels.
+PANEL_PX: Final = (320, 826)
+#: Width and height of the worker's portrait, pixels.
+PORTRAIT_PX: Final = (136, 150)
+
+_MAP_TOP_PX: Final = 282
+_MAP_PX: Final = (320, 468)
+#: Pixels per metre of the map; the way of the robot points up.
+MAP_PX_PER_M: Final = 32.5
+_MAP_CENTRE_M: Final = np.array([6.35, 0.0])
+
+_BACKGROUND: Final[Colour] = (255, 255, 255)
+_FLOOR: Final[Colour] = (238, 239, 241)
+_RACK: Final[Colour] = (176, 182, 190)
+_INK: Final[Colour] = (28, 30, 36)
+_QUIET: Final[Colour] = (96, 100, 110)
+_GHOST: Final[Colour] = (130, 134, 142)
+_BAD: Final[Colour] = (190, 30, 30)
+
+_LARGE: Final = Font(33, weight=600)
+_TEXT: Final = Font(27, weight=600)
+_SMALL: Final = Font(24, weight=500)
+
+_BODY_RADIUS_M: Final = 0.24
+_HEAD_RADIUS_M: Final = 0.13
+_CONE_LENGTH_M: Final = 1.6
+_PLATE: Final[Colour] = (214, 217, 222)
+
+
+def draw_panel(run: FilmRun, free: CrossingResult, t_s: float, picture: int) -> ImageRgb:
+    """Draw one crossing at one time.
+
+    Args:
+        run: the crossing.
+        free: the same crossing with nobody there.
+        t_s: time since the start; after the end of the crossing the panel stands still.
+        picture: number of the picture in the film, which selects the portrait.
+
+    Returns:
+        An (H, W, 3) RGB image of :data:`PANEL_PX`.
+    """
+    values = film_values(run.result, free, t_s)
+    image = np.full((PANEL_PX[1], PANEL_PX[0], 3), _BACKGROUND, np.uint8)
+    image[:6] = run.colour
+    _LARGE.write(image, run.title, (8, 12), _INK)
+    _SMALL.write(image, run.note, (8, 46), _QUIET)
+    _draw_portrait(image, run, picture)
+    _write_numbers(image, values, run.result.policy in WITHOUT_AWARENESS)
+    bottom = _MAP_TOP_PX + _MAP_PX[1]
+    image[_MAP_TOP_PX:bottom] = draw_map(run, free, t_s)
+    _write_clock(image, run.result, values, bottom + 4)
+    return image
+
+
+def _draw_portrait(image: ImageRgb, run: FilmRun, picture: int) -> None:
+    left, top = 8, 80
+    width, height = PORTRAIT_PX
+    place = image[top : top + height, left : left + width]
+    portrait = None
+    lines = ("no", "camera")
+    if run.portraits:
+        portrait = run.portraits[min(picture, len(run.portraits) - 1)]
+        lines = ("out of", "view")
+    if portrait is not None:
+        place[:] = portrait
+        return
+    place[:] = _PLATE
+    for row, text in enumerate(lines):
+        x = left + (width - _TEXT.width_px(text)) // 2
+        _TEXT.write(image, text, (x, top + 46 + 29 * row), _QUIET)
+
+
+def _write_numbers(image: ImageRgb, values: FilmValues, unused: bool) -> None:
+    left, top = 158, 80
+    if values.alpha is None:
+        _LARGE.write(image, "α unused" if unused else "α –", (left, top), _QUIET)
+    else:
+        draw_disc(image, np.array([left + 9.0, top + 19.0]), 9.0, awareness_colour(values.alpha))
+        _LARGE.write(image, f"α ≥ {values.alpha:.2f}", (left + 26, top), _INK)
+    radius = "–" if values.radius_m is None else f"{values.radius_m:.2f} m"
+    _TEXT.write(image, f"radius {radius}", (left, top + 38), _INK)
+    _LARGE.write(image, f"{values.speed_mps:.2f} m/s", (left, top + 72), _INK)
+    _TEXT.write(image, f"limit {values.speed_limit_mps:.2f} m/s", (left, top + 110), _INK)
+    _SMALL.write(image, f"limited by {values.limited_by}", (8, 240), _QUIET)
+
+
+def _write_clock(image: ImageRgb, result: CrossingResult, values: FilmValues, top: int) -> None:
+    lost = "" if values.lost_s is None else f"{values.lost_s:.1f} s lost"
+    colour = _INK
+    if not values.finished:
+        clock, below = f"{values.t_s:.1f} s", ""
+    elif result.time_to_goal_s is None:
+        clock, below, colour = "not at the goal", "", _BAD
+    else:
+        clock = f"goal {result.time_to_goal_s:.2f} s"
+        below = f"passed at up to {result.max_speed_within_2m_mps:.2f} m/s"
+    if result.contact and values.finished:
+        below, colour = "touched the worker", _BAD
+    if values.finished:
+        image[top - 2 : top + 40] = _PLATE
+    _LARGE.write(image, clock, (8, top), colour)
+    _LARGE.write(image, lost, (PANEL_PX[0] - 8 - _LARGE.width_px(lost), top), colour)
+    _TEXT.write(image, below, (8, top + 40), colour)
+
+
+def draw_map(run: FilmRun, free: CrossingResult, t_s: float) -> ImageRgb:
+    """Draw the hall from above, the robot's way pointing up.
+
+    Shows racks, the worker with head and attention cone, each obstacle as its circle, the robot,
+    and as an outline the robot that meets nobody.
+    """
+    result = run.result
+    index = frame_index(result, t_s)
+    frame = result.frames[index]
+    image = np.full((_MAP_PX[1], _MAP_PX[0], 3), _FLOOR, np.uint8)
+    for x0, y0, x1, y1 in run.boxes_odom_m:
+        fill_hull(image, map_px(np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])), _RACK, 1.0)
+    blind = result.policy in WITHOUT_AWARENESS
+    for obstacle in frame.constraints.obstacles:
+        colour = awareness_colour(None if blind else obstacle.awareness_lower)
+        ring = obstacle.center_odom_m + obstacle.radius_m * _circle()
+        fill_hull(image, map_px(ring), colour, 0.30)
+        draw_line(image, map_px(ring), colour, 2)
+    path = np.array([each.robot_state.position_odom_m for each in result.frames[: index + 1]])
+    draw_line(image, map_px(path), run.colour, 1)
+    for number in range(len(frame.truth)):
+        walked = [each.truth[number].position_odom_m for each in result.frames[: index + 1]]
+        draw_line(image, map_px(np.array(walked)), _GHOST, 1)
+        _draw_person(image, frame, number)
+    ghost = free.frames[frame_index(free, t_s)]
+    draw_line(image, map_px(_footprint(ghost, free)), _GHOST, 2)
+    fill_hull(image, map_px(_footprint(frame, result)), run.colour, 1.0)
+    nose = frame.robot_state.position_odom_m + _turn(frame) @ np.array([0.62, 0.0])
+    draw_line(image, map_px(np.stack([frame.robot_state.position_odom_m, nose])), run.colour, 3)
+    return image
+
+
+def map_px(points_odom_m: FloatArray) -> FloatArray:
+    """Return where points (N, 2) of the hall are on the map: x in odom up, y to the left."""
+    shifted = (np.asarray(points_odom_m) - _MAP_CENTRE_M) * MAP_PX_PER_M
+    return np.stack([0.5 * _MAP_PX[0] - shifted[:, 1], 0.5 * _MAP_PX[1] - shifted[:, 0]], axis=1)
+
+
+def _draw_person(image: ImageRgb, frame: CrossingFrame, number: int) -> None:
+    view = frame.truth[number]
+    gaze = (frame.T_odom_camera[:3, :3] @ view.gaze_camera)[:2]
+    heading = math.atan2(gaze[1], gaze[0])
+    half = AttentionCone().half_angle_rad
+    angles = np.linspace(-half, half, 15) + heading
+    arc = view.position_odom_m + _CONE_LENGTH_M * np.stack([np.cos(angles), np.sin(angles)], 1)
+    sector = map_px(np.vstack([view.position_odom_m, arc]))
+    fill_hull(image, sector, _INK, 0.22)
+    draw_line(image, np.vstack([sector, sector[:1]]), _INK, 1)
+    centre = map_px(view.position_odom_m[None])
+    draw_disc(image, centre, _BODY_RADIUS_M * MAP_PX_PER_M, _QUIET)
+    draw_disc(image, centre, _HEAD_RADIUS_M * MAP_PX_PER_M, _INK)
+    nose = view.position_odom_m + 0.32 * np.array([math.cos(heading), math.sin(heading)])
+    draw_line(image, map_px(np.stack([view.position_odom_m, nose])), _INK, 3)
+
+
+def _circle() -> FloatArray:
+    angles = np.linspace(0.0, 2.0 * math.pi, 65)
+    return np.stack([np.cos(angles), np.sin(angles)], axis=1)
+
+
+def _turn(frame: CrossingFrame) -> FloatArray:
+    heading = frame.robot_state.heading_odom_rad
+    return np.array(
+        [[math.cos(heading), -math.sin(heading)], [math.sin(heading), math.cos(heading)]]
+    )
+
+
+def _footprint(frame: CrossingFrame, result: CrossingResult) -> FloatArray:
+    """Return the closed outline (N, 2) of the robot in odom."""
+    corners = result.robot.footprint_m @ _turn(frame).T + frame.robot_state.position_odom_m
+    return np.vstack([corners, corners[:1]])

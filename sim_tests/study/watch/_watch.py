@@ -1,0 +1,143 @@
+"""The command ``awarenav watch``: one crossing, shown in the browser while it runs."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from ...crossing.eyes import PerceptionKind, SensorSet
+from ...viewing import LivePage, live_page, outcome_text, show_page, write_page
+from ...world.errors import SimError
+from ..runs import (
+    Job,
+    describe,
+    fault_of,
+    job_key,
+    plan_jobs,
+    policy_of,
+    recorder_of,
+    seeded_crossing,
+    template_of,
+)
+
+# Rendering takes at most this share of the time, so that states arrive often.
+_PICTURE_SHARE: Final = 0.25
+_DELIVERY_S: Final = 5.0
+_CATCH_UP_S: Final = 0.3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WatchOptions:
+    """The options of ``awarenav watch``."""
+
+    scenario: str
+    policy: str
+    planner: str
+    perception: PerceptionKind
+    sensors: SensorSet
+    camera: str
+    fault: str
+    seed: int
+    speed: float
+    port: int
+    wait: float
+    out: Path | None
+    no_camera: bool
+    no_browser: bool
+
+
+def watch_command(options: WatchOptions) -> int:
+    """Serve the page, run the crossing at the pace of the clock, and end with it.
+
+    Raises:
+        SimError: an unknown or unusable option.
+        NavError: an unknown preset or unusable policy file.
+        PerceptionError: for pixels, the shipped networks cannot be loaded.
+    """
+    job = _job(options)
+    key = job_key(job)
+    if options.out is not None and not options.out.parent.is_dir():
+        raise SimError(f"cannot write {options.out}: there is no folder {options.out.parent}")
+    with LivePage(live_page(f"awarenav watch: {key.scenario}"), options.port) as page:
+        print(f"{describe(key)}\nWatch it at {page.url} (Ctrl-C ends it)", flush=True)
+        if not options.no_browser:
+            show_page(page.url)
+        pace = _Pace(page, options.speed, options.wait)
+        recorder = recorder_of(
+            job,
+            camera=not options.no_camera,
+            share=_PICTURE_SHARE,
+            on_begin=pace.begin,
+            on_state=pace.state,
+        )
+        result = seeded_crossing(
+            template_of(job.scenario).for_seed(job.seed),
+            job.planner,
+            job.seed,
+            observer=recorder,
+            policy=policy_of(job.policy),
+            perception=job.perception,
+            fault=fault_of(job.fault),
+        )
+        outcome = outcome_text(result)
+        page.end(outcome, recorder.note)
+        page.wait_for_delivery(_DELIVERY_S)
+        print(f"{outcome}.", flush=True)
+        if not page.opened:
+            print("Nobody opened the page.")
+    if options.out is not None:
+        write_page(options.out, recorder.begin, recorder.states, outcome, recorder.note)
+        print(f"Written: {options.out}")
+    return 0
+
+
+class _Pace:
+    """Sends states to a page, not before their time.
+
+    The clock starts when somebody reads the page, or after ``wait_s``.
+    """
+
+    def __init__(self, page: LivePage, speed: float, wait_s: float) -> None:
+        self._page = page
+        self._speed = speed
+        self._open_until = time.monotonic() + wait_s
+        self._started = 0.0
+
+    def begin(self, begin: dict[str, Any]) -> None:
+        """Send hall and robot; wait for a reader."""
+        self._page.begin(begin)
+        left_s = self._open_until - time.monotonic()
+        if not self._page.wait_for_reader(max(left_s, 0.0)):
+            print("Nobody has opened the page yet; the crossing starts.", flush=True)
+        self._started = time.monotonic()
+
+    def state(self, state: dict[str, Any]) -> None:
+        """Send a state when its time has come."""
+        due = self._started + state["t_s"] / self._speed
+        late_s = time.monotonic() - due
+        time.sleep(max(-late_s, 0.0))
+        # A slow computer sets its own pace; only a short delay, as of a picture, is made up for.
+        self._started += max(late_s - _CATCH_UP_S, 0.0)
+        self._page.state(state)
+
+
+def _job(options: WatchOptions) -> Job:
+    """Return the job of the options, as a run of ``awarenav crossings`` would plan it."""
+    jobs = plan_jobs(
+        [options.scenario],
+        [options.policy],
+        [options.seed],
+        planners=[options.planner],
+        perception=options.perception,
+        sensors=[options.sensors],
+        faults=[options.fault],
+        camera=options.camera,
+    )
+    if len(jobs) != 1:
+        raise SimError(
+            f"watch shows one crossing, but scenario {options.scenario!r} with fault "
+            f"{options.fault!r} stands for {len(jobs)}; give one of each"
+        )
+    return jobs[0]

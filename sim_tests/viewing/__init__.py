@@ -1,0 +1,39 @@
+"""A crossing as a page to watch in a browser: states, camera pictures, recorded and live pages."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from awarenav.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from ._live import LivePage
+    from ._page import live_page, page_text, show_page, write_page
+    from ._pictures import CameraPictures
+    from ._recorder import CrossingRecorder
+    from ._states import Episode, begin_of, outcome_text, state_of
+
+__all__ = [
+    "CameraPictures",
+    "CrossingRecorder",
+    "Episode",
+    "LivePage",
+    "begin_of",
+    "live_page",
+    "outcome_text",
+    "page_text",
+    "show_page",
+    "state_of",
+    "write_page",
+]
+
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "._live": ("LivePage",),
+        "._page": ("live_page", "page_text", "show_page", "write_page"),
+        "._pictures": ("CameraPictures",),
+        "._recorder": ("CrossingRecorder",),
+        "._states": ("Episode", "begin_of", "outcome_text", "state_of"),
+    },
+)

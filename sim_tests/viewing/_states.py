@@ -1,0 +1,198 @@
+"""Control cycles of a crossing as JSON values: what a page shows of each instant."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from nav_adapter import PersonObstacle
+from perception import AttentionCone
+from perception.anthropometry import BODY_RADIUS_M
+from perception.arrays import FloatArray
+
+from ..crossing import CrossingFrame, CrossingResult, Stage
+
+#: States per second of simulated time; fewer where the robot's control is slower.
+STATES_HZ: Final = 20.0
+# The plan shows the robot's way with this margin.
+_PLAN_MARGIN_M: Final = 3.0
+# Scan points closer together than this are drawn as one.
+_SCAN_CELL_CM: Final = 5
+_MOST_SCAN_POINTS: Final = 400
+# An outline with more than this share of the circle's area reaches beyond the circle.
+_CIRCLE_SHARE: Final = 1.05
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Episode:
+    """The names of a crossing, as a page shows them; empty for no fault and no planner."""
+
+    scenario: str
+    seed: int
+    policy: str
+    planner: str = ""
+    perception: str = "truth"
+    fault: str = ""
+
+
+def begin_of(episode: Episode, stage: Stage) -> dict[str, Any]:
+    """Return what stays the same in a crossing: hall, robot, goal and names.
+
+    Lengths are in metres in odom, boxes are x_min, y_min, x_max, y_max.
+    """
+    scenario, warehouse = stage.scenario, stage.warehouse
+    task, camera = scenario.robot, scenario.camera
+    hall = scenario.layout
+    floor = (hall.x_min_m, hall.y_min_m, hall.x_max_m, hall.y_max_m)
+    return {
+        **asdict(episode),
+        "step_s": cycles_per_state(scenario.control_hz) / scenario.control_hz,
+        "planned_s": scenario.duration_s,
+        "floor_odom_m": _rounded(floor),
+        "plan_odom_m": _plan_window(task.start_x_m, task.start_y_m, task.goal_x_m, task.goal_y_m),
+        "boxes_odom_m": [_rounded(box) for box in warehouse.obstacle_boxes_odom],
+        "goal_odom_m": _rounded((task.goal_x_m, task.goal_y_m)),
+        "footprint_m": [_rounded(corner) for corner in stage.amr.profile.footprint_m],
+        "max_speed_mps": _rounded_number(stage.amr.profile.max_speed_mps),
+        "cone_half_angle_rad": _rounded_number(AttentionCone().half_angle_rad),
+        "body_radius_m": BODY_RADIUS_M,
+        "camera_fov_rad": _rounded_number(
+            math.radians(min(camera.horizontal_fov_deg * len(camera.views_deg), 360.0))
+        ),
+        "picture_aspect": _rounded_number(camera.width_px / camera.height_px),
+    }
+
+
+def cycles_per_state(control_hz: float) -> int:
+    """Return after how many control cycles a state follows, at least 1."""
+    return max(round(control_hz / STATES_HZ), 1)
+
+
+def state_of(
+    frame: CrossingFrame, stage: Stage, scan_points_odom_m: FloatArray | None = None
+) -> dict[str, Any]:
+    """Return one control cycle as a JSON value.
+
+    Args:
+        frame: the control cycle.
+        stage: gives the places of the people's eyes.
+        scan_points_odom_m: (N, 2) points of the newest scans; None for those of the frame.
+
+    Returns:
+        ``robot_odom`` is x (m), y (m) and heading (rad); each of ``people``, the truth, has
+        ``odom`` (x, y and direction of gaze), the true α, distance and margin; each of ``tracks``
+        has ``odom`` (x, y, vx, vy), α with its standard deviation and lower bound; each of
+        ``obstacles`` has its radius, and its outline where that is no circle. A number that is not
+        finite is None.
+    """
+    state, limit = frame.robot_state, frame.constraints
+    points = frame.scan_points_odom_m if scan_points_odom_m is None else scan_points_odom_m
+    task = stage.scenario.robot
+    window = _plan_window(task.start_x_m, task.start_y_m, task.goal_x_m, task.goal_y_m)
+    return {
+        "t_s": _rounded_number(frame.t_s),
+        "robot_odom": _rounded((*state.position_odom_m, state.heading_odom_rad)),
+        "speed_mps": _rounded_number(state.speed_mps),
+        "command_mps": _rounded_number(frame.command[0]),
+        "limit_mps": _rounded_number(limit.speed_limit_mps),
+        "limited_by": limit.limited_by,
+        "stale": limit.stale,
+        "braking_suffices": limit.braking_suffices,
+        "alerts": [alert.track_id for alert in limit.alerts],
+        "people": _people(frame),
+        "tracks": [
+            {
+                "id": track.id,
+                "status": track.status,
+                "odom": _rounded((*track.position_odom_m, *track.velocity_odom_mps)),
+                "awareness": _rounded_number(track.awareness),
+                "awareness_std": _rounded_number(track.awareness_std),
+                "awareness_lower": _rounded_number(track.awareness_lower),
+            }
+            for track in frame.tracks
+        ],
+        "obstacles": [_obstacle(each) for each in limit.obstacles],
+        "scan_odom_cm": _scan(points, window),
+    }
+
+
+def outcome_text(result: CrossingResult) -> str:
+    """Return the outcome of a crossing as one sentence without a full stop."""
+    parts = ["Goal not reached"]
+    if result.time_to_goal_s is not None:
+        parts = [f"Goal reached after {result.time_to_goal_s:.2f} s"]
+    if math.isfinite(result.min_separation_m):
+        parts.append(f"least separation {result.min_separation_m:.2f} m")
+    if math.isfinite(result.min_margin_m):
+        parts.append(f"least margin {result.min_margin_m:.2f} m")
+    if result.contact:
+        parts.append(f"contact, caused by the {result.contact_by}")
+    return ", ".join(parts)
+
+
+def _people(frame: CrossingFrame) -> list[dict[str, Any]]:
+    """Return the truth about each person."""
+    people = []
+    for index, view in enumerate(frame.truth):
+        gaze = frame.T_odom_camera[:3, :3] @ view.gaze_camera
+        people.append(
+            {
+                "odom": _rounded((*view.position_odom_m, math.atan2(gaze[1], gaze[0]))),
+                "awareness": _rounded_number(view.awareness),
+                "separation_m": _at(frame.separations_m, index),
+                "margin_m": _at(frame.margins_m, index),
+            }
+        )
+    return people
+
+
+def _obstacle(obstacle: PersonObstacle) -> dict[str, Any]:
+    circle_m2 = math.pi * obstacle.radius_m**2
+    outline: list[float | None] = []
+    if obstacle.polygon.area > _CIRCLE_SHARE * circle_m2:
+        outline = _rounded(np.asarray(obstacle.polygon.exterior.coords)[:, :2].ravel())
+    return {
+        "id": obstacle.track_id,
+        "odom": _rounded(obstacle.center_odom_m),
+        "radius_m": _rounded_number(obstacle.radius_m),
+        "awareness_lower": _rounded_number(obstacle.awareness_lower),
+        "outline_odom_m": outline,
+    }
+
+
+def _plan_window(start_x: float, start_y: float, goal_x: float, goal_y: float) -> list[float]:
+    """Return x_min, y_min, x_max, y_max (m) of the robot's way with a margin."""
+    return [
+        round(min(start_x, goal_x) - _PLAN_MARGIN_M, 3),
+        round(min(start_y, goal_y) - _PLAN_MARGIN_M, 3),
+        round(max(start_x, goal_x) + _PLAN_MARGIN_M, 3),
+        round(max(start_y, goal_y) + _PLAN_MARGIN_M, 3),
+    ]
+
+
+def _scan(points_odom_m: FloatArray, window: list[float]) -> list[int]:
+    """Return the points in the window as x, y, x, y … in centimetres, thinned to cells."""
+    low, high = np.array(window[:2]), np.array(window[2:])
+    inside = points_odom_m[((points_odom_m >= low) & (points_odom_m <= high)).all(axis=1)]
+    cells = np.unique(np.round(inside * (100.0 / _SCAN_CELL_CM)).astype(int), axis=0)
+    step = -(-len(cells) // _MOST_SCAN_POINTS) or 1
+    thinned: list[int] = (_SCAN_CELL_CM * cells[::step]).ravel().tolist()
+    return thinned
+
+
+def _at(values: tuple[float, ...], index: int) -> float | None:
+    return _rounded_number(values[index]) if index < len(values) else None
+
+
+def _rounded(values: Iterable[Any]) -> list[float | None]:
+    return [_rounded_number(each) for each in values]
+
+
+def _rounded_number(value: float) -> float | None:
+    """Return a number to a thousandth; None for one that is not finite."""
+    number = float(value)
+    return round(number, 3) + 0.0 if math.isfinite(number) else None

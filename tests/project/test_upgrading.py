@@ -1,0 +1,172 @@
+"""docs/upgrading.md: the defaults, names and reactions that it states are those of the code."""
+
+from __future__ import annotations
+
+import importlib
+import re
+
+import numpy as np
+import pytest
+import yaml
+from paths import ROOT
+
+import awarenav
+import nav_adapter
+import perception
+import tracking
+from awarenav.cli import main
+from nav_adapter import AwarenessPolicy
+from perception import AwarenessPipeline, Camera, PersonObservation
+from tracking import AwarenessFilterConfig, PersonTracker, TrackerConfig, TrackingError
+
+TEXT = (ROOT / "docs" / "upgrading.md").read_text(encoding="utf-8")
+NAMES_OF_0_1_0 = {
+    "perception": "AttentionCone AwarenessPipeline Camera HeadPose HeadPoseEstimator "
+    "PerceptionError PersonDetection PersonDetector PersonKeypoints PersonObservation "
+    "PnpHeadPoseEstimator PoseEstimator",
+    "tracking": "AwarenessFilterConfig PersonTrack PersonTracker TrackStatus TrackerConfig "
+    "TrackingError",
+    "nav_adapter": "AwarenessPolicy InflationPolicy NavAdapter NavConstraints NavError "
+    "PersonObstacle RobotProfile RobotState SpeedPolicy boxes circles max_speed_mps paint_costmap "
+    "points polygons protective_separation_m",
+    "sim_tests": "CameraRenderer CrossingFrame CrossingResult KeypointNoise LocalPlanner "
+    "NOVA_CARTER SamplingPlanner Scenario SimError StraightOn run_crossing shipped_scenarios",
+}
+#: The preset `balanced` as 0.1.0 shipped it.
+POLICY_OF_0_1_0 = """
+inflation: {unaware_below: 0.1, aware_above: 0.6, shape: smoothstep, unaware_radius_m: 1.0,
+  aware_radius_m: 0.45}
+speed: {unaware_below: 0.1, aware_above: 0.6, shape: smoothstep, unaware_human_speed_mps: 1.6,
+  aware_human_speed_mps: 0.35}
+margins: {minimum_clearance_m: 0.1, separation_clearance_m: 0.1, uncertainty_sigmas: 2.0}
+timing: {shrink_rate_mps: 0.5, fresh_within_s: 0.25, hold_s: 1.0, stale_after_s: 0.5,
+  stop_after_s: 1.5}
+"""
+T_ODOM_CAMERA = np.array([[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 1.4], [0, 0, 0, 1.0]])
+
+
+def rows(heading: str) -> list[list[str]]:
+    """Return the cells of the table whose header begins with these words."""
+    (table,) = re.findall(
+        rf"^\| {re.escape(heading)}.*\n\|[-| ]+\n((?:\|.*\n)+)", TEXT, re.MULTILINE
+    )
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()]
+
+
+def policy_value(policy: AwarenessPolicy, path: str) -> object:
+    value: object = policy
+    for name in path.split("."):
+        value = getattr(value, name)
+    return value
+
+
+@pytest.mark.parametrize("package", sorted(NAMES_OF_0_1_0))
+def test_no_public_name_is_gone(package: str) -> None:
+    if package == "sim_tests":
+        pytest.importorskip("pybullet", reason="needs the extra sim")
+    page = importlib.import_module(package)
+    assert set(NAMES_OF_0_1_0[package].split()) <= set(page.__all__)
+
+
+def test_changed_defaults_are_those_of_the_code() -> None:
+    models = {each.__name__: each for each in (TrackerConfig, AwarenessFilterConfig)}
+    table = rows("setting | 0.1.0")
+    assert len(table) == 4
+    for setting, before, now, _ in table:
+        model, field = setting.strip("`").split(".")
+        default = models[model].model_fields[field].default
+        assert default == float(now)
+        assert default != float(before)
+    config = TrackerConfig()
+    assert (config.max_missed_s, config.max_standing_coast_s) == (1.2, 5.0)
+    assert (config.max_lag_s, config.max_pause_s, config.new_clock_after_s) == (0.5, 10.0, 1.0)
+
+
+def test_new_settings_of_policies_are_on_and_can_be_turned_off() -> None:
+    old = AwarenessPolicy.model_validate(yaml.safe_load(POLICY_OF_0_1_0))
+    policy = AwarenessPolicy()
+    assert policy == AwarenessPolicy.preset("balanced")
+    table = rows("setting | default")
+    assert len(table) == 7
+    for setting, default, _, off in table:
+        path = setting.strip("`")
+        value = policy_value(policy, path)
+        if re.fullmatch(r"[\d.]+", default):
+            assert value == float(default), path
+        else:
+            assert value is not None, path
+        in_old_file = policy_value(old, path)
+        assert (in_old_file is None) if path == "speed.watching_above" else in_old_file == value
+
+        chosen = yaml.safe_load(off.split(",")[0].strip("`"))
+        change: dict[str, object] = {path.rpartition(".")[2]: chosen}
+        if path == "speed.watching_above":
+            change["watching_human_speed_mps"] = None
+        data = policy.model_dump()
+        (data if "." not in path else data[path.split(".")[0]]).update(change)
+        assert policy_value(AwarenessPolicy.model_validate(data), path) == chosen
+    assert policy.rules.start_reserve is not None
+    assert policy.rules.start_reserve.human_acceleration_mps2 == 2.0
+    assert policy.rules.start_reserve.start_delay_s == 0.0
+
+
+def test_late_frames_are_sorted_in_and_early_ones_refused() -> None:
+    tracker = PersonTracker()
+
+    def update(stamp_s: float) -> None:
+        place = np.array([0.0, 0.0, 3.0])
+        seen = PersonObservation(stamp_s, place, 0.01 * np.eye(3), None, None, None, 0.9, None)
+        tracker.update([seen], stamp_s, T_ODOM_CAMERA)
+
+    for step in range(6):
+        update(0.1 * step)
+    update(0.3)
+    with pytest.raises(TrackingError, match="max_pause_s = 10 s"):
+        update(100.0)
+    tracker.reset()
+    update(0.0)
+
+
+def test_the_pipeline_needs_no_networks_of_its_user() -> None:
+    assert AwarenessPipeline(Camera.from_fov(64, 48, 1.0)) is not None
+
+
+def test_every_error_is_an_awarenav_error() -> None:
+    assert issubclass(awarenav.AwarenavError, ValueError)
+    for error in (
+        perception.PerceptionError,
+        tracking.TrackingError,
+        nav_adapter.NavError,
+    ):
+        assert issubclass(error, awarenav.AwarenavError)
+
+
+def test_moved_modules_are_where_the_page_says() -> None:
+    pytest.importorskip("pybullet", reason="needs the extra sim")
+    table = rows("before")
+    assert len(table) == 11
+    for _, now in table:
+        for name in re.findall(r"`([\w.]+)`", now):
+            assert importlib.util.find_spec(name) is not None, name
+
+
+def test_all_stands_for_as_many_scenarios_as_the_page_says() -> None:
+    runs = pytest.importorskip("sim_tests.study.runs", reason="needs the extra sim")
+    count = len(runs.plan_jobs(["all"], ["blind"], [0]))
+    assert f"`--scenario all` runs {count} scenarios" in TEXT
+
+
+@pytest.mark.parametrize(
+    ("command", "options"),
+    [
+        ("demo", "--out --seed --no-video"),
+        ("crossings", "--scenario --policy --perception --episodes --out --seed --overwrite"),
+        ("bench", "--baseline --out"),
+    ],
+)
+def test_commands_keep_their_options(
+    command: str, options: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([command, "--help"]) == 0
+    shown = capsys.readouterr().out
+    assert all(re.search(rf"^  {option}\b", shown, re.MULTILINE) for option in options.split())

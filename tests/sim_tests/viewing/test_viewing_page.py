@@ -1,0 +1,153 @@
+"""The page in a real browser: no request, no error, quick, by keyboard, in both schemes."""
+
+from __future__ import annotations
+
+import re
+from importlib import resources
+
+import pytest
+
+
+def player(browser, expression: str):
+    return browser.evaluate(f"crossing.player.{expression}")
+
+
+def still(browser, page_file, **settings) -> None:
+    """Open the page and stop it at its first state."""
+    browser.open(page_file, **settings)
+    browser.evaluate("crossing.play(false), crossing.seek(0), true")
+    browser.drawn()
+
+
+def test_the_page_opens_at_once_without_a_request_or_an_error(watching_browser, page_file):
+    opened_ms = []
+    for _ in range(3):  # a busy machine may be slow once
+        watching_browser.open(page_file)
+        opened_ms.append(watching_browser.evaluate("performance.now()"))
+    assert min(opened_ms) < 2000
+    assert watching_browser.requests() == [page_file.resolve().as_uri()]
+    assert watching_browser.complaints() == []
+    assert player(watching_browser, "playing") is True
+
+
+def test_figures_and_drawings_are_those_of_the_state(watching_browser, page_file, recorder):
+    still(watching_browser, page_file)
+    at = len(recorder.states) // 2
+    watching_browser.evaluate(f"crossing.seek({at}), true")
+    watching_browser.drawn()
+    state = recorder.states[at]
+    text = watching_browser.evaluate("document.body.innerText")
+    assert state["limited_by"] in text
+    assert f"{state['t_s']:.2f} of {recorder.states[-1]['t_s']:.2f} s" in text
+    for name in ("speed", "limit"):
+        shown = watching_browser.evaluate(f"document.getElementById('{name}').textContent")
+        assert float(shown) == pytest.approx(state[f"{name}_mps"], abs=6e-3)
+    rows = watching_browser.evaluate("document.getElementById('tracks').rows.length")
+    assert rows == len(state["tracks"]) >= 1
+    for name in ("plan", "camera", "alpha", "motion"):
+        colours = watching_browser.evaluate(
+            f"(() => {{const c = document.getElementById('{name}');"
+            "const d = new Uint32Array(c.getContext('2d').getImageData(0, 0, c.width, c.height)"
+            ".data.buffer); return new Set(d).size})()"
+        )
+        assert colours > 20, name
+    # Pictures are decoded without an address.
+    assert len(watching_browser.requests()) == 1
+
+
+def test_every_control_works_by_keyboard(watching_browser, page_file, recorder):
+    browser, last = watching_browser, len(recorder.states) - 1
+    still(browser, page_file)
+    browser.press("ArrowRight", 39)
+    assert player(browser, "index") == 1
+    browser.call("Input.dispatchKeyEvent", type="keyDown", key="ArrowRight", modifiers=8)
+    assert player(browser, "index") == 21
+    browser.press("End", 35)
+    assert player(browser, "index") == last
+    browser.press("ArrowLeft", 37)
+    assert player(browser, "index") == last - 1
+    browser.press("Home", 36)
+    browser.press(" ", 32)
+    assert player(browser, "playing") is True
+    browser.press(" ", 32)
+    assert player(browser, "playing") is False
+    order = []
+    for _ in range(11):
+        browser.press("Tab", 9)
+        order.append(
+            browser.evaluate(
+                "document.activeElement.dataset.layer || document.activeElement.id ||"
+                "document.activeElement.className"
+            )
+        )
+        outline = browser.evaluate("getComputedStyle(document.activeElement).outlineStyle")
+        assert outline != "none", order[-1]
+    layers = ["cones", "rings", "tracks", "scan", "paths"]
+    assert order == ["skip", "scroll", "who", "at", "play", "rate", *layers]
+    names = browser.evaluate(
+        "[...document.querySelectorAll('button, input, select, canvas')].filter((each) =>"
+        "!each.getAttribute('aria-label') && !each.labels?.length && !each.textContent.trim())"
+        ".map((each) => each.outerHTML)"
+    )
+    assert names == []
+    assert "limit" in browser.evaluate("document.getElementById('at').ariaValueText")
+
+
+def test_reduced_motion_starts_nothing(watching_browser, page_file):
+    watching_browser.open(page_file)
+    calm = [{"name": "prefers-reduced-motion", "value": "reduce"}]
+    watching_browser.call("Emulation.setEmulatedMedia", features=calm)
+    watching_browser.call("Page.reload")
+    watching_browser.events.clear()
+    while not any(e.get("method") == "Page.loadEventFired" for e in watching_browser.events):
+        watching_browser.wait_for_event()
+    watching_browser.drawn()
+    assert player(watching_browser, "playing") is False
+    assert player(watching_browser, "index") == 0
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+def test_nothing_is_wider_than_the_window(watching_browser, page_file, width, dark):
+    still(watching_browser, page_file, width=width, dark=dark)
+    assert watching_browser.evaluate("document.documentElement.scrollWidth") <= width
+    background = watching_browser.evaluate("getComputedStyle(document.body).backgroundColor")
+    level = sum(int(each) for each in re.findall(r"\d+", background)[:3]) / 3
+    assert (level < 60) is dark
+
+
+STYLE = (resources.files("sim_tests.viewing") / "templates" / "watch.css").read_text("utf-8")
+LIGHT, DARK = re.findall(r":root\{(.*?)\}", STYLE, re.DOTALL)
+#: Colours of text, which need 4.5 : 1, over each colour on which they stand.
+TEXTS = {
+    "ink": ("paper", "card", "floor"),
+    "soft": ("paper", "card"),
+    "accent": ("card",),
+    "on-accent": ("accent",),
+    "unaware": ("card",),
+}
+#: Colours of shapes that carry a meaning, which need 3 : 1.
+SHAPES = ("robot", "rack-edge", "scan", "unaware", "unsure", "aware", "s0", "s1", "s2", "s3")
+
+
+def luminance(colour: str) -> float:
+    """WCAG 2.2, relative luminance."""
+    parts = [int(colour[at : at + 2], 16) / 255 for at in (1, 3, 5)]
+    red, green, blue = (p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts)
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+
+def contrast(one: str, other: str) -> float:
+    low, high = sorted((luminance(one), luminance(other)))
+    return (high + 0.05) / (low + 0.05)
+
+
+@pytest.mark.parametrize("scheme", [LIGHT, DARK], ids=["light", "dark"])
+def test_colours_have_the_contrast_of_wcag_aa(scheme):
+    colours = dict(re.findall(r"--([\w-]+):(#[0-9a-f]{6})", scheme))
+    for text, grounds in TEXTS.items():
+        for ground in grounds:
+            assert contrast(colours[text], colours[ground]) >= 4.5, (text, ground)
+    for shape in SHAPES:
+        for ground in ("card", "floor"):
+            assert contrast(colours[shape], colours[ground]) >= 3.0, (shape, ground)

@@ -1,0 +1,102 @@
+"""Reference tables of metrics, of the columns of ``episodes.csv``, and of ROS 2 topics."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from typing import Final
+
+import griffe
+
+from nav_adapter.ros2 import PUBLISHED, READ, Topic
+from nav_adapter.ros2.messages import ros_type
+from sim_tests.study.measures import METRICS, RECORD_COLUMNS, SHARES, EpisodeRecord, Metric
+
+from .config_pages import unit_of
+from .roles import plain
+
+_METRICS: Final = """# Metrics
+
+The columns that `awarenav crossings` writes and `awarenav compare` prints, from the code that
+defines them. [What is measured, and what it does not say](../metrics.md) has the full definitions.
+An empty cell means that a figure does not apply, which is never the same as 0."""
+_TOPICS: Final = """# ROS 2 topics
+
+The topics of `awarenav bridge` with their types and quality of service, from the code that opens
+them. [Nav2, its collision monitor, TEB and RViz](../nav2.md) says who reads which, and how to set
+up each reader. `--rename` and the other options of
+[`awarenav bridge`](commands.md#awarenav-bridge) change names."""
+_BETTER: Final = {"lower": "lower", "higher": "higher", "neither": "–"}
+
+
+def metrics_page() -> str:
+    """Return the page of metrics and columns."""
+    columns = ["| column | unit | meaning |", "| --- | --- | --- |"]
+    meanings = _attributes(EpisodeRecord)
+    columns += [f"| `{name}` | {unit_of(name)} | {meanings[name]} |" for name in RECORD_COLUMNS]
+    return "\n\n".join(
+        [
+            _METRICS,
+            "## Shares of episodes",
+            _metric_table(SHARES),
+            "## Means over episodes",
+            _metric_table(METRICS),
+            "## Columns of episodes.csv",
+            "\n".join(columns) + "\n",
+        ]
+    )
+
+
+def topics_page() -> str:
+    """Return the page of topics."""
+    return "\n\n".join(
+        [
+            _TOPICS,
+            "## Published",
+            _topic_table(PUBLISHED.values()),
+            "## Read",
+            _topic_table(READ.values()) + "\n",
+        ]
+    )
+
+
+def _metric_table(metrics: Mapping[str, Metric]) -> str:
+    rows = ["| metric | title | unit | better | meaning |", "| --- | --- | --- | --- | --- |"]
+    rows += [
+        f"| `{name}` | {each.title} | {each.unit} | {_BETTER[each.better]} | "
+        f"{_cell(each.meaning)} |"
+        for name, each in metrics.items()
+    ]
+    return "\n".join(rows).replace(
+        "Mean |α of the track − true α|", "Mean difference of α and truth"
+    )
+
+
+def _topic_table(topics: Iterable[Topic]) -> str:
+    rows = [
+        "| topic | type | reliability | durability | depth |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    rows += [
+        f"| `/{each.name}` | `{ros_type(each.message).replace('/msg/', '/')}` | "
+        f"{'reliable' if each.reliable else 'best effort'} | "
+        f"{'transient local' if each.transient_local else 'volatile'} | {each.depth} |"
+        for each in topics
+    ]
+    return "\n".join(rows)
+
+
+def _attributes(record: type) -> dict[str, str]:
+    """Return the meaning of each attribute in a docstring."""
+    parts = griffe.Docstring(record.__doc__ or "", lineno=1).parse("google", warnings=False)
+    return {
+        one.name: _cell(re.sub(r"\bNone\b", "empty", plain(one.description)))
+        for part in parts
+        if part.kind is griffe.DocstringSectionKind.attributes
+        for one in part.value
+    }
+
+
+def _cell(text: str) -> str:
+    """Return text for one cell of a table."""
+    return " ".join(text.split()).replace("|", "\\|")
