@@ -18,7 +18,13 @@ from awarenav.cli import main
 
 PAGES = sorted(
     path.relative_to(ROOT).as_posix()
-    for pattern in ("*.md", "docs/*.md", "benchmarks/*/*.md", "training/*/*.md")
+    for pattern in (
+        "*.md",
+        "docs/*.md",
+        "docs/tutorials/*.md",
+        "benchmarks/*/*.md",
+        "training/*/*.md",
+    )
     for path in ROOT.glob(pattern)
 )
 #: The changelog names modules that are gone.
@@ -107,6 +113,8 @@ def test_python_shown_imports_names_that_exist(page: str) -> None:
         for node in ast.walk(ast.parse(block)):
             if isinstance(node, ast.ImportFrom):
                 assert node.module is not None
+                if f"`{node.module}.py`" in text_of(page):  # the reader saves it
+                    continue
                 for alias in node.names:
                     assert resolves(f"{node.module}.{alias.name}"), alias.name
 

@@ -1,4 +1,4 @@
-"""Every example runs, and so does the Python code on the pages."""
+"""Every example runs; the code on the pages is run by ``test_page_code.py``."""
 
 import os
 import re
@@ -89,22 +89,3 @@ def test_the_two_sensor_example_keeps_the_person_whom_the_robot_passes():
     assert 0.0 < max(limits[-5:]) < 0.7
     gone = silent.index(True)
     assert limits[gone] < 0.5 * limits[gone - 1]
-
-
-@pytest.mark.parametrize(
-    "page",
-    [
-        "README.md",
-        "docs/perception.md",
-        "docs/tracking.md",
-        "docs/rendering.md",
-        "docs/planners.md",
-    ],
-)
-def test_a_page_shows_code_that_runs(page):
-    """Run the Python blocks of the page in order, in one namespace."""
-    blocks = re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(), re.S)
-    assert blocks
-    namespace: dict[str, object] = {}
-    for block in blocks:
-        exec(compile(block, page, "exec"), namespace)

@@ -1,4 +1,4 @@
-"""Planners of the user's own: README's in every tool, and called with what they ask for."""
+"""Planners of the user's own: the tutorial's in every tool, and called with what they ask for."""
 
 import os
 import re
@@ -18,16 +18,19 @@ from sim_tests.study.runs import make_planner, plan_jobs
 HERE = str(Path(__file__).parent)
 
 
-def readme_planner():
-    """Return the Python block of README.md that defines a planner."""
-    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text("utf-8"), re.DOTALL)
+TUTORIAL = ROOT / "docs" / "tutorials" / "plug-it-into-your-planner.md"
+
+
+def tutorial_planner():
+    """Return the Python block of the tutorial that defines a planner."""
+    blocks = re.findall(r"```python\n(.*?)```", TUTORIAL.read_text("utf-8"), re.DOTALL)
     (block,) = (block for block in blocks if "def plan(" in block)
     return block
 
 
 def run_python(folder, *arguments):
-    """Run a module of Python in a folder that holds README's planner, warnings as errors."""
-    (folder / "my_robot.py").write_text(readme_planner(), encoding="utf-8")
+    """Run a module of Python in a folder that holds the tutorial's planner, warnings as errors."""
+    (folder / "my_robot.py").write_text(tutorial_planner(), encoding="utf-8")
     return subprocess.run(
         [sys.executable, "-W", "error", "-m", *arguments],
         cwd=folder,
@@ -39,7 +42,7 @@ def run_python(folder, *arguments):
     )
 
 
-def test_the_planner_of_the_readme_passes_crossings(tmp_path):
+def test_the_planner_of_the_tutorial_passes_crossings(tmp_path):
     done = run_python(
         tmp_path, "awarenav", "crossings", "--planner", "my_robot:MyPlanner", "--scenario",
         "crossing_distracted", "--policy", "balanced", "--perception", "truth", "--episodes", "1",
@@ -49,7 +52,7 @@ def test_the_planner_of_the_readme_passes_crossings(tmp_path):
     assert re.search(r"^balanced +1 +100 % +0 ", done.stdout, re.MULTILINE), done.stdout
 
 
-def test_the_planner_of_the_readme_passes_the_suite(tmp_path):
+def test_the_planner_of_the_tutorial_passes_the_suite(tmp_path):
     done = run_python(
         tmp_path, "pytest", "-p", "no:cacheprovider", *PLUGIN, "--pyargs", "sim_tests",
         "--awarenav-planner", "my_robot:MyPlanner", "--awarenav-scenario", "crossing_attentive",

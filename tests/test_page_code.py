@@ -1,0 +1,133 @@
+"""All code on the pages runs as written, page by page, in an empty folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from page_code import Block, Reader, blocks_of, compare_output, is_installation
+from paths import ROOT
+
+from nav_adapter import RobotState
+
+PAGES = sorted(
+    path.relative_to(ROOT).as_posix()
+    for pattern in ("README.md", "docs/*.md", "docs/tutorials/*.md")
+    for path in ROOT.glob(pattern)
+)
+BLOCKS = {page: list(blocks_of((ROOT / page).read_text("utf-8"))) for page in PAGES}
+
+
+def runs(block: Block, *, full: bool) -> bool:
+    """Say whether a test runs a block, rather than to leave it out."""
+    return block.kind in ("shell", "python") and not block.skipped and (full or not block.slow)
+
+
+RUN = [page for page in PAGES if any(runs(block, full=False) for block in BLOCKS[page])]
+SLOW = [page for page in PAGES if any(block.slow for block in BLOCKS[page])]
+
+
+def follow(page: str, folder: Path, monkeypatch: pytest.MonkeyPatch, *, full: bool) -> None:
+    empty, tools = folder / "empty", folder / "tools"
+    empty.mkdir()
+    tools.mkdir()
+    monkeypatch.chdir(empty)
+    # A page's own modules are imported from its folder, and by this page alone.
+    monkeypatch.syspath_prepend(str(empty))
+    assert Reader(page, empty, tools).follow(BLOCKS[page], full=full)
+
+
+@pytest.mark.parametrize("page", RUN)
+def test_a_page_runs_in_an_empty_folder(
+    page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    follow(page, tmp_path, monkeypatch, full=False)
+
+
+def test_the_five_lines_of_the_readme_give_obstacles_and_a_limit() -> None:
+    (block,) = (each for each in BLOCKS["README.md"] if each.kind == "python")
+    names: dict[str, Any] = {}
+    exec(compile(block.text, "README.md", "exec"), names)
+    T_odom_camera = [[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 1.4], [0, 0, 0, 1]]
+    state = RobotState(0.0, [0.0, 0.0], 0.0, 0.5, 0.0)
+    image_rgb = np.zeros((480, 640, 3), np.uint8)
+    obstacles, limit_mps, reason = names["on_image"](image_rgb, 0.0, T_odom_camera, state)
+    assert obstacles.shape == (0, 5)
+    assert limit_mps == 1.5
+    assert reason == "robot maximum"
+    lines = block.text.partition("def on_image")[2].splitlines()[1:]
+    assert len([line for line in lines if line.strip()]) == 5
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("page", SLOW)
+def test_a_page_runs_with_its_slow_blocks(
+    page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    follow(page, tmp_path, monkeypatch, full=True)
+
+
+def test_what_is_not_run_says_why() -> None:
+    for page, blocks in BLOCKS.items():
+        for block in blocks:
+            assert not block.skipped or len(block.skipped.split()) >= 2, f"{page}:{block.line}"
+
+
+def test_every_tutorial_says_what_it_gives_what_it_needs_and_how_long_it_takes() -> None:
+    tutorials = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
+    assert len(tutorials) == 4
+    for path in tutorials:
+        text = path.read_text("utf-8")
+        head = text.partition("\n## ")[0]
+        for word in ("**At the end**", "**You need**", "**Time**"):
+            assert word in head, f"{path.name}: {word}"
+        assert "\n## Where to go next\n" in text, path.name
+
+
+def test_blocks_are_read_with_what_is_said_before_them() -> None:
+    page = (
+        "Save this as `a/b.py`:\n\n```python\nx = 1\n```\n\nSave nothing. Then:\n\n"
+        "<!-- exits with 2 -->\n\n    awarenav x\n    pip install 'awarenav[sim]'\n\n"
+        "<!-- varies: it has a clock -->\n```text\n12 s\n```\n\n"
+        "<!-- not run: needs a camera -->\n```sh\nawarenav doctor 0\n```\n\n"
+        "A diagram:\n\n    a ─► b\n\n<!-- slow: minutes -->\n```python\ny = 2\n```\n"
+    )
+    assert [(each.kind, each.name, each.status) for each in blocks_of(page)] == [
+        ("file", "a/b.py", 0),
+        ("shell", "", 2),
+        ("output", "", 0),
+        ("shell", "", 0),
+        ("python", "", 0),
+    ]
+    _, shell, output, camera, slow = blocks_of(page)
+    assert shell.text == "awarenav x\npip install 'awarenav[sim]'\n"
+    assert output.varies
+    assert camera.skipped == "needs a camera"
+    assert slow.slow
+
+
+def test_output_may_leave_out_lines_and_differ_in_the_last_digits() -> None:
+    printed = "0%\r50%\nfound  12 people at 3.14 m\nmore\nlimit 0.51 m/s (track 1)\n"
+    compare_output("found 12 people at 3.15 m\n…\nlimit 0.51 m/s (…)\n", printed, "page")
+    for wrong in ("found 11 people at 3.14 m", "found 12 people at 3.5 m", "limit 0.51 m/s"):
+        with pytest.raises(AssertionError, match="not printed"):
+            compare_output(wrong, printed, "page")
+    with pytest.raises(AssertionError, match="not in this order"):
+        compare_output("limit 0.51 m/s (…)\nmore", printed, "page")
+
+
+def test_a_failing_block_names_its_page_and_line(tmp_path: Path) -> None:
+    (tmp_path / "tools").mkdir()
+    reader = Reader("page.md", tmp_path, tmp_path / "tools")
+    with pytest.raises(AssertionError, match=r"page\.md:7"):
+        reader.follow([Block("shell", "python -c 'raise SystemExit(3)'\n", 7)], full=False)
+    assert reader.follow([Block("python", "assert 1 + 1 == 2\n", 8)], full=False) == 1
+
+
+def test_installations_are_not_run_but_name_extras_that_exist() -> None:
+    assert is_installation("pip install 'awarenav[sim,bench]'", "page")
+    assert not is_installation("awarenav doctor", "page")
+    with pytest.raises(AssertionError, match="no extra 'simulator'"):
+        is_installation("pip install 'awarenav[simulator]'", "page")
