@@ -86,7 +86,7 @@ def read_lock(text: str) -> tuple[Pin, ...]:
 
 def licence_of(found: metadata.Distribution) -> tuple[str, str]:
     """Return the SPDX expression that a package states, and what it says where that is unclear."""
-    stated = {key: found.metadata[key] for key in ("License-Expression", "License")}
+    stated = {key: found.metadata.get(key) for key in ("License-Expression", "License")}
     if stated["License-Expression"]:
         return stated["License-Expression"], ""
     # Some packages give the whole text, which begins with its name.

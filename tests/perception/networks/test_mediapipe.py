@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import re
 import sys
 
 import cv2
@@ -12,6 +13,7 @@ import pytest
 from paths import SHARED
 
 from perception import PerceptionError, PersonDetection, PersonKeypoints, PoseEstimator
+from perception.installation import install_command
 from perception.layouts import LEFT_ANKLE, LEFT_SHOULDER, NOSE, RIGHT_ANKLE, RIGHT_SHOULDER
 from perception.networks import MediaPipePoseEstimator
 from perception.networks.poses._mediapipe import _cropped, _face_scores, _in_image
@@ -57,14 +59,14 @@ def labelled(person):
 
 @pytest.mark.skipif(HAS_MEDIAPIPE, reason="mediapipe is installed")
 def test_a_missing_package_is_refused_with_the_name_of_the_extra():
-    with pytest.raises(PerceptionError, match=r"pip install 'awarenav\[mediapipe\]'"):
+    with pytest.raises(PerceptionError, match=re.escape(install_command("mediapipe"))):
         MediaPipePoseEstimator()
 
 
 def test_a_broken_package_is_refused_with_the_name_of_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "mediapipe", None)
     monkeypatch.setitem(sys.modules, "mediapipe.python.solutions", None)
-    with pytest.raises(PerceptionError, match=r"pip install 'awarenav\[mediapipe\]'"):
+    with pytest.raises(PerceptionError, match=re.escape(install_command("mediapipe"))):
         MediaPipePoseEstimator()
 
 

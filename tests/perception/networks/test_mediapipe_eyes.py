@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import math
+import re
 import sys
 from itertools import pairwise
 from types import SimpleNamespace
@@ -13,6 +14,7 @@ import pytest
 
 from perception import Camera, HeadPose, PerceptionError
 from perception.eyes import EyeEstimator
+from perception.installation import install_command
 from perception.networks import MediaPipeEyeEstimator
 from perception.networks.poses import iris_std_m
 from perception.networks.poses._mediapipe_eyes import iris_offset
@@ -50,14 +52,16 @@ def landmarks(left=(0.0, 0.0), right=(0.0, 0.0), opening=0.03):
 
 @pytest.mark.skipif(HAS_MEDIAPIPE, reason="mediapipe is installed")
 def test_a_missing_package_is_refused_with_the_name_of_the_extra():
-    with pytest.raises(PerceptionError, match=r"MediaPipeEyeEstimator needs .*awarenav\[mediapipe"):
+    missing = "MediaPipeEyeEstimator needs .*" + re.escape(install_command("mediapipe"))
+    with pytest.raises(PerceptionError, match=missing):
         MediaPipeEyeEstimator()
 
 
 def test_a_broken_package_is_refused_with_the_name_of_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "mediapipe", None)
     monkeypatch.setitem(sys.modules, "mediapipe.python.solutions", None)
-    with pytest.raises(PerceptionError, match=r"MediaPipeEyeEstimator needs .*awarenav\[mediapipe"):
+    missing = "MediaPipeEyeEstimator needs .*" + re.escape(install_command("mediapipe"))
+    with pytest.raises(PerceptionError, match=missing):
         MediaPipeEyeEstimator()
 
 

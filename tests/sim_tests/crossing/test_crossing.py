@@ -29,10 +29,11 @@ def comparison(request):
 
 
 @pytest.mark.slow
-def test_in_pixels_awareness_of_an_attentive_worker_saves_time():
+@pytest.mark.parametrize("seeds", [(1,), pytest.param((1, 2, 3), marks=pytest.mark.full)])
+def test_in_pixels_awareness_of_an_attentive_worker_saves_time(seeds):
     """In the median: a false track beside who leaves the picture may cost the gain of a run."""
     saved_s = []
-    for seed in (1, 2, 3):
+    for seed in seeds:
         blind = run_crossing(ATTENTIVE, policy="blind", seed=seed)
         result = run_crossing(ATTENTIVE, policy="balanced", perception="pixels", seed=seed)
         assert result.success

@@ -13,7 +13,7 @@ from awarenav.judge import judge_files
 from awarenav.records import read_records
 from perception import AwarenessPipeline, Camera
 
-FRAMES = 100
+FRAMES = 72
 
 
 @pytest.fixture(scope="module")

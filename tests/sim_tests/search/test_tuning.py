@@ -206,6 +206,7 @@ _TUNE += ["--perception", "truth"]
 
 
 @pytest.mark.slow
+@pytest.mark.full
 def test_a_killed_and_resumed_tuning_with_two_workers_writes_the_same_files(tmp_path, capsys):
     scenario = tmp_path / "passing.yaml"
     scenario.write_text(_SCENARIO)

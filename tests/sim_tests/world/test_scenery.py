@@ -237,7 +237,11 @@ def _free_pose(layout: WarehouseLayout, rng: np.random.Generator) -> np.ndarray:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("detector", REQUIRED)
+@pytest.mark.parametrize(
+    "detector",
+    # The largest takes as long as the other two.
+    [pytest.param(name, marks=pytest.mark.full if "640" in name else ()) for name in REQUIRED],
+)
 def test_genuine_detectors_find_nobody_in_an_empty_hall(detector: str) -> None:
     if not (MODELS / f"{detector}.onnx").exists():
         pytest.skip(f"the genuine detector {detector} is not here")

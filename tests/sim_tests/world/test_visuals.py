@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import sys
 from collections.abc import Callable, Iterator
 
@@ -12,6 +13,7 @@ from camera_poses import level_pose
 from visual_actors import AWAY_M, CHECKERBOARD, ShapeActor, ball, upright_square
 
 from perception import Camera
+from perception.installation import install_command
 from sim_tests import SimError
 from sim_tests.actors.robot import Amr
 from sim_tests.world import Warehouse
@@ -224,7 +226,9 @@ def test_where_opengl_does_not_start_auto_is_the_software_renderer() -> None:
 
 @pytest.mark.usefixtures("_no_opengl")
 def test_opengl_without_moderngl_names_the_extra_and_the_other_renderer() -> None:
-    with pytest.raises(SimError, match=r"awarenav\[sim\].*renderer='tiny'"):
+    with pytest.raises(
+        SimError, match=re.escape(f"{install_command('sim')}, or use renderer='tiny'")
+    ):
         Visuals(renderer="gl")
 
 

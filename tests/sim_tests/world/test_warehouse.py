@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 import subprocess
 import sys
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 from perception import Camera
+from perception.installation import install_command
 from sim_tests import SimError
 from sim_tests.actors.body import Worker
 from sim_tests.actors.robot import Amr
@@ -135,7 +137,7 @@ def test_a_missing_simulator_is_named_with_its_extra(monkeypatch: pytest.MonkeyP
     spec = importlib.util.spec_from_file_location("sim_tests.world.bullet_again", bullet.__file__)
     assert spec is not None
     assert spec.loader is not None
-    with pytest.raises(MissingSimulatorError, match=r"awarenav\[sim\]"):
+    with pytest.raises(MissingSimulatorError, match=re.escape(install_command("sim"))):
         spec.loader.exec_module(importlib.util.module_from_spec(spec))
 
 
