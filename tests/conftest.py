@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 
 import pytest
+from chromium_pipe import CHROMIUM, Chromium
 from hypothesis import settings
 
 # A busy machine must not fail a property for being slow; CI draws the same examples every time.
@@ -25,3 +27,13 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item in items:
         if item.get_closest_marker("full"):
             item.add_marker(skip)
+
+
+@pytest.fixture(scope="session")
+def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chromium]:
+    """Return a browser that all tests of a session share; without one they are skipped."""
+    if CHROMIUM is None:
+        pytest.skip("Chromium is not installed")
+    browser = Chromium(tmp_path_factory.mktemp("chromium"))
+    yield browser
+    browser.close()

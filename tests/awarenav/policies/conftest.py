@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from chromium_pipe import CHROMIUM, Chromium
+from chromium_pipe import Chromium
 
 from awarenav.cli import main
 
@@ -17,16 +16,6 @@ def explorer(tmp_path_factory: pytest.TempPathFactory) -> Path:
     page = tmp_path_factory.mktemp("explorer") / "explorer.html"
     assert main(["policy", "explore", "--out", str(page)]) == 0
     return page
-
-
-@pytest.fixture(scope="session")
-def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chromium]:
-    """Return a browser that all tests of a session share."""
-    if CHROMIUM is None:
-        pytest.skip("Chromium is not installed")
-    browser = Chromium(tmp_path_factory.mktemp("chromium"))
-    yield browser
-    browser.close()
 
 
 @pytest.fixture

@@ -5,13 +5,12 @@ from __future__ import annotations
 import itertools
 import json
 import re
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from chromium_pipe import CHROMIUM, Chromium
+from chromium_pipe import Chromium
 from report_runs import MadeUpRun, made_up_run
 
 from sim_tests.study.report import write_report
@@ -192,21 +191,12 @@ _FOUND = """(() => {
 })()"""
 
 
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chromium]:
-    if CHROMIUM is None:
-        pytest.skip("chromium is not installed")
-    chromium = Chromium(tmp_path_factory.mktemp("profile"))
-    yield chromium
-    chromium.close()
-
-
 @pytest.mark.parametrize("width_px", [390, 1280])
 def test_a_browser_draws_labels_and_marks_apart(
-    page: Path, width_px: int, browser: Chromium
+    page: Path, width_px: int, chromium: Chromium
 ) -> None:
-    browser.open(page, width=width_px, height=900, dark=width_px == 390)
-    found = browser.evaluate(_FOUND)
+    chromium.open(page, width=width_px, height=900, dark=width_px == 390)
+    found = chromium.evaluate(_FOUND)
     assert found["overlaps"] == []
     assert found["labels"] > 10
     assert found["width"] == width_px
@@ -214,4 +204,4 @@ def test_a_browser_draws_labels_and_marks_apart(
     counted = re.search(r"(\d+) marks? lies? on others", page.read_text("utf-8"))
     assert found["marks"] - found["places"] == (0 if counted is None else int(counted[1]))
     assert found["places"] > 0
-    assert browser.complaints() == []
+    assert chromium.complaints() == []

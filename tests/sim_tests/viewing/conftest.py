@@ -1,12 +1,10 @@
-"""A recorded crossing, its page and a browser, each made once."""
+"""A recorded crossing and its page, each made once."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from chromium_pipe import CHROMIUM, Chromium
 from viewed_crossing import record
 
 from sim_tests.viewing import CrossingRecorder, outcome_text, write_page
@@ -29,12 +27,3 @@ def page_file(recorded, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("page") / "short.html"
     write_page(path, recorder.begin, recorder.states, outcome_text(result), recorder.note)
     return path
-
-
-@pytest.fixture(scope="session")
-def watching_browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chromium]:
-    if CHROMIUM is None:
-        pytest.skip("Chromium is not installed")
-    browser = Chromium(tmp_path_factory.mktemp("watching"))
-    yield browser
-    browser.close()

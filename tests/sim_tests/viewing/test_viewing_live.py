@@ -92,38 +92,37 @@ def test_nobody_reads(page):
     assert page.wait_for_delivery(0.01)
 
 
-def test_the_browser_follows_scrubs_and_keeps_a_live_crossing(watching_browser, recorder):
-    browser = watching_browser
+def test_the_browser_follows_scrubs_and_keeps_a_live_crossing(chromium, recorder):
     with LivePage(live_page("live")) as page:
-        browser.events.clear()
-        browser.call("Page.navigate", url=page.url)
+        chromium.events.clear()
+        chromium.call("Page.navigate", url=page.url)
         assert page.wait_for_reader(10.0)
         page.begin(recorder.begin)
         for state in recorder.states[:-1]:
             page.state(state)
         count = len(recorder.states)
-        browser.evaluate(waiting(count - 1))
-        assert browser.evaluate("[crossing.player.index, crossing.player.following]") == [
+        chromium.evaluate(waiting(count - 1))
+        assert chromium.evaluate("[crossing.player.index, crossing.player.following]") == [
             count - 2,
             True,
         ]
-        assert browser.evaluate("document.getElementById('status').textContent") == "Live"
-        browser.press("Home", 36)
+        assert chromium.evaluate("document.getElementById('status').textContent") == "Live"
+        chromium.press("Home", 36)
         page.state(recorder.states[-1])
-        browser.evaluate(waiting(count))
-        assert browser.evaluate("[crossing.player.index, crossing.player.following]") == [0, False]
-        browser.press("End", 35)
-        assert browser.evaluate("crossing.player.index") == count - 1
+        chromium.evaluate(waiting(count))
+        assert chromium.evaluate("[crossing.player.index, crossing.player.following]") == [0, False]
+        chromium.press("End", 35)
+        assert chromium.evaluate("crossing.player.index") == count - 1
         page.end("Goal reached after 1.40 s")
         assert page.wait_for_delivery(10.0)
-    browser.drawn()
-    assert browser.evaluate("document.getElementById('status').textContent") == (
+    chromium.drawn()
+    assert chromium.evaluate("document.getElementById('status').textContent") == (
         "Goal reached after 1.40 s"
     )
-    browser.press("Home", 36)
-    assert browser.evaluate("crossing.player.index") == 0
-    assert browser.requests() == [page.url, page.url + "states"]
-    assert browser.complaints() == []
+    chromium.press("Home", 36)
+    assert chromium.evaluate("crossing.player.index") == 0
+    assert chromium.requests() == [page.url, page.url + "states"]
+    assert chromium.complaints() == []
 
 
 def waiting(count: int) -> str:

@@ -19,44 +19,44 @@ def still(browser, page_file, **settings) -> None:
     browser.drawn()
 
 
-def test_the_page_opens_at_once_without_a_request_or_an_error(watching_browser, page_file):
+def test_the_page_opens_at_once_without_a_request_or_an_error(chromium, page_file):
     opened_ms = []
     for _ in range(3):  # a busy machine may be slow once
-        watching_browser.open(page_file)
-        opened_ms.append(watching_browser.evaluate("performance.now()"))
+        chromium.open(page_file)
+        opened_ms.append(chromium.evaluate("performance.now()"))
     assert min(opened_ms) < 2000
-    assert watching_browser.requests() == [page_file.resolve().as_uri()]
-    assert watching_browser.complaints() == []
-    assert player(watching_browser, "playing") is True
+    assert chromium.requests() == [page_file.resolve().as_uri()]
+    assert chromium.complaints() == []
+    assert player(chromium, "playing") is True
 
 
-def test_figures_and_drawings_are_those_of_the_state(watching_browser, page_file, recorder):
-    still(watching_browser, page_file)
+def test_figures_and_drawings_are_those_of_the_state(chromium, page_file, recorder):
+    still(chromium, page_file)
     at = len(recorder.states) // 2
-    watching_browser.evaluate(f"crossing.seek({at}), true")
-    watching_browser.drawn()
+    chromium.evaluate(f"crossing.seek({at}), true")
+    chromium.drawn()
     state = recorder.states[at]
-    text = watching_browser.evaluate("document.body.innerText")
+    text = chromium.evaluate("document.body.innerText")
     assert state["limited_by"] in text
     assert f"{state['t_s']:.2f} of {recorder.states[-1]['t_s']:.2f} s" in text
     for name in ("speed", "limit"):
-        shown = watching_browser.evaluate(f"document.getElementById('{name}').textContent")
+        shown = chromium.evaluate(f"document.getElementById('{name}').textContent")
         assert float(shown) == pytest.approx(state[f"{name}_mps"], abs=6e-3)
-    rows = watching_browser.evaluate("document.getElementById('tracks').rows.length")
+    rows = chromium.evaluate("document.getElementById('tracks').rows.length")
     assert rows == len(state["tracks"]) >= 1
     for name in ("plan", "camera", "alpha", "motion"):
-        colours = watching_browser.evaluate(
+        colours = chromium.evaluate(
             f"(() => {{const c = document.getElementById('{name}');"
             "const d = new Uint32Array(c.getContext('2d').getImageData(0, 0, c.width, c.height)"
             ".data.buffer); return new Set(d).size})()"
         )
         assert colours > 20, name
     # Pictures are decoded without an address.
-    assert len(watching_browser.requests()) == 1
+    assert len(chromium.requests()) == 1
 
 
-def test_every_control_works_by_keyboard(watching_browser, page_file, recorder):
-    browser, last = watching_browser, len(recorder.states) - 1
+def test_every_control_works_by_keyboard(chromium, page_file, recorder):
+    browser, last = chromium, len(recorder.states) - 1
     still(browser, page_file)
     browser.press("ArrowRight", 39)
     assert player(browser, "index") == 1
@@ -93,25 +93,25 @@ def test_every_control_works_by_keyboard(watching_browser, page_file, recorder):
     assert "limit" in browser.evaluate("document.getElementById('at').ariaValueText")
 
 
-def test_reduced_motion_starts_nothing(watching_browser, page_file):
-    watching_browser.open(page_file)
+def test_reduced_motion_starts_nothing(chromium, page_file):
+    chromium.open(page_file)
     calm = [{"name": "prefers-reduced-motion", "value": "reduce"}]
-    watching_browser.call("Emulation.setEmulatedMedia", features=calm)
-    watching_browser.call("Page.reload")
-    watching_browser.events.clear()
-    while not any(e.get("method") == "Page.loadEventFired" for e in watching_browser.events):
-        watching_browser.wait_for_event()
-    watching_browser.drawn()
-    assert player(watching_browser, "playing") is False
-    assert player(watching_browser, "index") == 0
+    chromium.call("Emulation.setEmulatedMedia", features=calm)
+    chromium.call("Page.reload")
+    chromium.events.clear()
+    while not any(e.get("method") == "Page.loadEventFired" for e in chromium.events):
+        chromium.wait_for_event()
+    chromium.drawn()
+    assert player(chromium, "playing") is False
+    assert player(chromium, "index") == 0
 
 
 @pytest.mark.parametrize("width", [1280, 390])
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
-def test_nothing_is_wider_than_the_window(watching_browser, page_file, width, dark):
-    still(watching_browser, page_file, width=width, dark=dark)
-    assert watching_browser.evaluate("document.documentElement.scrollWidth") <= width
-    background = watching_browser.evaluate("getComputedStyle(document.body).backgroundColor")
+def test_nothing_is_wider_than_the_window(chromium, page_file, width, dark):
+    still(chromium, page_file, width=width, dark=dark)
+    assert chromium.evaluate("document.documentElement.scrollWidth") <= width
+    background = chromium.evaluate("getComputedStyle(document.body).backgroundColor")
     level = sum(int(each) for each in re.findall(r"\d+", background)[:3]) / 3
     assert (level < 60) is dark
 
