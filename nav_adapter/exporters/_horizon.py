@@ -20,7 +20,7 @@ _OUTLINE: Final = ObstacleOutline()
 
 
 class PredictedPeople(NamedTuple):
-    """Where people will be, as normal distributions in the odom frame.
+    """Predicted positions of people, as normal distributions in the odom frame.
 
     Attributes:
         means_odom_m: (N, T, 2) positions.
