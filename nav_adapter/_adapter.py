@@ -14,9 +14,9 @@ from tracking.clock import JumpedClock
 from ._alert import Alert
 from ._alerting import AlertHistory, alerts_due
 from ._checks import age_of_s, checked_tracks, refuse_absurd
-from ._constraints import NavConstraints
+from ._constraints import GovernedSpeed, NavConstraints
 from ._errors import NavError
-from ._governor import GovernedSpeed, SpeedGovernor
+from ._governor import SpeedGovernor
 from ._lost import LostPeople, LostPerson
 from ._memory import PersonMemory
 from ._obstacle_rules import ObstacleRules
@@ -203,7 +203,7 @@ class NavAdapter:
         now = finite_number("stamp_s", stamp_s, NavError)
         before = self._memory
         if before.given is None or before.stamp_s is None:
-            return NavConstraints(now, (), 0.0, "stale data: none yet", True)
+            return NavConstraints(now, (), 0.0, "stale data: none yet", True, robot=self._robot)
         if now < before.stamp_s:
             raise NavError(_goes_back(now, before.stamp_s))
         tracks, robot_state, perceived_s = before.given
@@ -295,9 +295,9 @@ class NavAdapter:
         for name, age_s in (("perception", perception_age_s), ("robot state", robot_age_s)):
             if age_s > timing.stop_after_s:
                 reason = f"stale data: {name} is {age_s:.2f} s old"
-                limit = replace(limit, limit_mps=0.0, limited_by=reason)
+                limit = limit.stopped(reason)
         if self._drives_sideways(robot_state):
-            limit = replace(limit, limit_mps=0.0, limited_by=self._drive_problem(robot_state))
+            limit = limit.stopped(self._drive_problem(robot_state))
         limit, ceiling_mps = self._limit_recovery(before, limit, robot_state, pause_s, stale)
         alerts: tuple[Alert, ...] = ()
         alert_history = before.alert_history
@@ -322,6 +322,8 @@ class NavAdapter:
             reachable_speed_limit_mps=max(limit.limit_mps, braked_mps),
             alerts=alerts,
             braking_suffices=limit.braking_suffices,
+            fastest_point_limit_mps=limit.fastest_point_mps,
+            robot=self._robot,
         )
         given = current, robot_state, perceived_s
         return _Memory(people, alert_history, constraints, given, ceiling_mps, lost)
@@ -347,8 +349,8 @@ class NavAdapter:
             if ceiling_mps is not None and not stale:
                 counted_s = min(pause_s, timing.fresh_within_s)
                 ceiling_mps += self._robot.max_acceleration_mps2 * counted_s
-        if ceiling_mps is not None and limit.limit_mps > ceiling_mps:
-            limit = replace(limit, limit_mps=ceiling_mps, limited_by="recovery after stale data")
+        if ceiling_mps is not None:
+            limit = limit.at_most(ceiling_mps, "recovery after stale data")
         if stale:
             return limit, limit.limit_mps
         done = ceiling_mps is None or ceiling_mps >= self._robot.max_speed_mps

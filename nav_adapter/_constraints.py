@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+import math
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, cast
 
 from shapely.geometry import Polygon
 
-from perception.arrays import FloatArray, finite_array, finite_number, set_fields
+from perception.arrays import (
+    FloatArray,
+    covariance_matrix,
+    finite_array,
+    finite_number,
+    set_fields,
+)
 from perception.short_repr import short_repr
 
 from ._alert import Alert
 from ._errors import NavError
+from ._robot import RobotProfile
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -29,6 +37,9 @@ class PersonObstacle:
             bounded rate.
         polygon: the obstacle as a shapely polygon in odom. It contains the circle, and reaches
             farther if the policy's outline asks for it.
+        covariance_odom: (4, 4) covariance of the position (m) and the velocity (m/s) of the track,
+            predicted to the stamp of the constraints with constant velocity; None if it is not
+            known.
     """
 
     track_id: int
@@ -38,6 +49,7 @@ class PersonObstacle:
     height_m: float
     awareness_lower: float
     polygon: Polygon = field(repr=False)
+    covariance_odom: FloatArray | None = field(default=None, repr=False)
 
     __repr__ = short_repr
 
@@ -59,11 +71,15 @@ class PersonObstacle:
                 "awareness_lower", self.awareness_lower, NavError, minimum=0.0, maximum=1.0
             ),
         )
+        if self.covariance_odom is not None:
+            covariance = covariance_matrix("covariance_odom", self.covariance_odom, 4, NavError)
+            set_fields(self, covariance_odom=covariance)
 
 
-_SET_ID, _SET_CENTER, _SET_VELOCITY, _SET_RADIUS, _SET_HEIGHT, _SET_LOWER, _SET_POLYGON = (
-    cast(Any, getattr(PersonObstacle, each.name)).__set__ for each in fields(PersonObstacle)
-)
+(
+    *(_SET_ID, _SET_CENTER, _SET_VELOCITY, _SET_RADIUS, _SET_HEIGHT, _SET_LOWER, _SET_POLYGON),
+    _SET_COVARIANCE,
+) = (cast(Any, getattr(PersonObstacle, each.name)).__set__ for each in fields(PersonObstacle))
 
 
 def trusted_obstacle(
@@ -74,6 +90,7 @@ def trusted_obstacle(
     height_m: float,
     awareness_lower: float,
     polygon: Polygon,
+    covariance_odom: FloatArray,
 ) -> PersonObstacle:
     """Make an obstacle without checks.
 
@@ -88,7 +105,36 @@ def trusted_obstacle(
     _SET_HEIGHT(obstacle, height_m)
     _SET_LOWER(obstacle, awareness_lower)
     _SET_POLYGON(obstacle, polygon)
+    _SET_COVARIANCE(obstacle, covariance_odom)
     return obstacle
+
+
+@dataclass(frozen=True, slots=True)
+class GovernedSpeed:
+    """A speed limit and its reason, while the adapter works it out.
+
+    Attributes:
+        limit_mps: ≥ 0.
+        limited_by: person and rule, or the robot's maximum.
+        braking_suffices: whether a robot that brakes from now on stops in time.
+        fastest_point_mps: the limit without the robot's own maximum, ≥ ``limit_mps``; infinite if
+            nobody limits the robot.
+    """
+
+    limit_mps: float
+    limited_by: str
+    braking_suffices: bool
+    fastest_point_mps: float
+
+    def at_most(self, limit_mps: float, limited_by: str) -> GovernedSpeed:
+        """Return the lower of this limit and another one, which has a reason of its own."""
+        if limit_mps < self.limit_mps:
+            return GovernedSpeed(limit_mps, limited_by, self.braking_suffices, limit_mps)
+        return replace(self, fastest_point_mps=min(self.fastest_point_mps, limit_mps))
+
+    def stopped(self, limited_by: str) -> GovernedSpeed:
+        """Return a limit of 0 for this reason."""
+        return GovernedSpeed(0.0, limited_by, self.braking_suffices, 0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -111,6 +157,11 @@ class NavConstraints:
         braking_suffices: False if a robot that brakes from now on at full deceleration still comes
             nearer to a person than the clearance before it stands, by the assumptions of speed and
             separation. A limit is then not enough: warn, evade or stop harder.
+        fastest_point_limit_mps: the limit for the fastest point of a robot that turns, such as a
+            corner of its footprint. It is ``speed_limit_mps`` where people set the limit. Where the
+            robot's own maximum does, it is higher, and infinite if nobody is near. If it is not
+            given, it is ``speed_limit_mps``.
+        robot: the profile that they hold for; None if they were made without an adapter.
     """
 
     stamp_s: float
@@ -121,6 +172,8 @@ class NavConstraints:
     reachable_speed_limit_mps: float = 0.0
     alerts: tuple[Alert, ...] = ()
     braking_suffices: bool = True
+    fastest_point_limit_mps: float | None = field(default=None, repr=False)
+    robot: RobotProfile | None = field(default=None, repr=False)
 
     __repr__ = short_repr
 
@@ -136,4 +189,44 @@ class NavConstraints:
             speed_limit_mps=limit,
             reachable_speed_limit_mps=max(limit, reachable),
             alerts=tuple(self.alerts),
+            fastest_point_limit_mps=self._checked_fastest_mps(limit),
         )
+
+    def _checked_fastest_mps(self, limit_mps: float) -> float:
+        """Return the limit of the fastest point, which may be infinite."""
+        given = self.fastest_point_limit_mps
+        if given is None or given == math.inf:
+            return limit_mps if given is None else math.inf
+        return max(limit_mps, finite_number("fastest_point_limit_mps", given, NavError))
+
+    def yaw_rate_limit_radps(self, speed_mps: float) -> float:
+        """Return the largest yaw rate, either way, at which no point of the robot is too fast.
+
+        A point at a distance r from the base origin moves at most at |v| + |ω| r. The farthest
+        point is at the circumscribed radius R, so |v| + |ω| R ≤ ``fastest_point_limit_mps`` holds
+        for every point if it holds there. This is assumption 4 of ``docs/safety.md``. The profile's
+        ``max_yaw_rate_radps`` is an upper limit, where it is given.
+
+        Args:
+            speed_mps: speed of the base along its path, of either sign.
+
+        Returns:
+            A yaw rate ≥ 0; 0 if the speed uses the limit up, and infinite if neither people nor
+            the profile limit it.
+
+        Raises:
+            NavError: for a speed that is not finite, or constraints without ``robot``.
+        """
+        speed = abs(finite_number("speed_mps", speed_mps, NavError))
+        assert self.fastest_point_limit_mps is not None
+        left_mps = self.fastest_point_limit_mps - speed
+        if left_mps <= 0.0:
+            return 0.0
+        if self.robot is None:
+            raise NavError(
+                "yaw_rate_limit_radps needs constraints with a robot, as NavAdapter.update gives "
+                "them; these have robot=None"
+            )
+        highest = self.robot.max_yaw_rate_radps
+        limit = left_mps / self.robot.circumscribed_radius_m
+        return limit if highest is None else min(limit, highest)

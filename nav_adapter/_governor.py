@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Final, TypeAlias
 
 import numpy as np
@@ -12,6 +11,7 @@ import numpy as np
 from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
 
+from ._constraints import GovernedSpeed
 from ._footprint import Footprint
 from ._memory import PersonMemory
 from ._obstacle_rules import ObstacleRules
@@ -34,21 +34,6 @@ _RUNNING_SHARE: Final = 0.25
 
 # Gaps and shares of the stopping distance (2, N); human speeds, ages and start delays (N,).
 _Terms: TypeAlias = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
-
-
-@dataclass(frozen=True, slots=True)
-class GovernedSpeed:
-    """A speed limit and its reason.
-
-    Attributes:
-        limit_mps: ≥ 0.
-        limited_by: person and rule, or the robot's maximum.
-        braking_suffices: whether a robot that brakes from now on stops in time.
-    """
-
-    limit_mps: float
-    limited_by: str
-    braking_suffices: bool
 
 
 class SpeedGovernor:
@@ -97,7 +82,7 @@ class SpeedGovernor:
         if self._path is not None:
             people = self._people_in(self._path, people, robot_state, now)
         if not people:
-            return GovernedSpeed(maximum_mps, "robot maximum", True)
+            return GovernedSpeed(maximum_mps, "robot maximum", True, math.inf)
         limits, terms = self._limits_mps(people, robot_state, now, robot_age_s)
         lowest = []
         for rule, limit in limits.items():
@@ -108,8 +93,9 @@ class SpeedGovernor:
         # A robot within speed and separation has the whole reaction time left.
         suffices = speed_mps <= lowest[0][0] or self._braking_suffices(*terms, speed_mps)
         if limit_mps >= maximum_mps:
-            return GovernedSpeed(maximum_mps, "robot maximum", suffices)
-        return GovernedSpeed(limit_mps, f"track {list(people)[row]}: {rule}", suffices)
+            return GovernedSpeed(maximum_mps, "robot maximum", suffices, limit_mps)
+        reason = f"track {list(people)[row]}: {rule}"
+        return GovernedSpeed(limit_mps, reason, suffices, limit_mps)
 
     def limits_mps(
         self,

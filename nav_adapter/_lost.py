@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import NamedTuple
 
-from ._governor import GovernedSpeed, SpeedGovernor
+from ._constraints import GovernedSpeed
+from ._governor import SpeedGovernor
 from ._memory import PersonMemory
 from ._obstacle_rules import ObstacleRules
 from ._policy import AwarenessPolicy
@@ -117,6 +117,5 @@ class LostPeople:
                 continue
             kept[track_id] = person._replace(limit_mps=first_mps)
             allowed_mps = max(own_mps, ceiling_mps)
-            if allowed_mps < limit.limit_mps:
-                limit = replace(limit, limit_mps=allowed_mps, limited_by=f"track {track_id}: lost")
+            limit = limit.at_most(allowed_mps, f"track {track_id}: lost")
         return limit, kept

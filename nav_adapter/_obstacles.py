@@ -41,6 +41,7 @@ def obstacles_of(
             for memory, center, ring in zip(people.values(), centers, rings, strict=True)
         ]
         polygons = [shapely.convex_hull(shapely.multipoints(points)) for points in discs]
+    covariances = _covariances_at(people, now)
     # Huge numbers may have overflowed to infinity: the checking constructor refuses those.
     all_finite = math.isfinite(float(centers.sum()) + float(radii.sum()))
     make = trusted_obstacle if all_finite else PersonObstacle
@@ -53,11 +54,24 @@ def obstacles_of(
             memory.track.height_m,
             memory.awareness_lower,
             polygon,
+            covariance,
         )
-        for (track_id, memory), center, polygon in zip(
-            people.items(), centers, polygons, strict=True
+        for (track_id, memory), center, polygon, covariance in zip(
+            people.items(), centers, polygons, covariances, strict=True
         )
     )
+
+
+def _covariances_at(people: Mapping[int, PersonMemory], now: float) -> FloatArray:
+    """Return the covariances (N, 4, 4) of all tracks, predicted to ``now``; read-only."""
+    covariances = np.array([m.track.covariance_odom for m in people.values()])
+    dt_s = np.array([max(now - m.track.stamp_s, 0.0) for m in people.values()])[:, None, None]
+    if dt_s.any():
+        # F P Fᵀ by blocks, F = [[I, dt I], [0, I]].
+        covariances[:, :2] += dt_s * covariances[:, 2:]
+        covariances[:, :, :2] += dt_s * covariances[:, :, 2:]
+    covariances.setflags(write=False)
+    return covariances
 
 
 def _discs_ahead(

@@ -39,6 +39,10 @@ class RobotProfile:
         drive: ``"differential"`` for a robot that cannot move sideways, ``"holonomic"`` for one
             that can, None if it is not known. With ``"differential"`` the adapter stops a robot
             whose state moves sideways, since one of the two is wrong.
+        max_yaw_rate_radps: > 0, the fastest turn, either way; None if it is not known. It limits
+            commands (:mod:`nav_adapter.motion`) and changes no speed limit.
+        max_yaw_acceleration_radps2: > 0, the fastest change of the yaw rate; None if it is not
+            known.
     """
 
     footprint_m: FloatArray
@@ -47,6 +51,8 @@ class RobotProfile:
     max_deceleration_mps2: float
     reaction_time_s: float
     drive: Drive | None = None
+    max_yaw_rate_radps: float | None = None
+    max_yaw_acceleration_radps2: float | None = None
 
     def __post_init__(self) -> None:
         if self.drive is not None and self.drive not in get_args(Drive):
@@ -76,6 +82,11 @@ class RobotProfile:
             reaction_time_s=finite_number(
                 "reaction_time_s", self.reaction_time_s, NavError, minimum=0.0
             ),
+            **{
+                name: positive(name)
+                for name in ("max_yaw_rate_radps", "max_yaw_acceleration_radps2")
+                if getattr(self, name) is not None
+            },
         )
 
     @cached_property

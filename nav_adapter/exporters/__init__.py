@@ -1,7 +1,8 @@
 """Exporters: constraints in the forms that planners read, in the odom frame.
 
 Each form has one pure function of :class:`nav_adapter.NavConstraints`; only :class:`CostmapPainter`
-keeps state. ``docs/planners.md`` says which planner reads which form.
+keeps state. The ``static_…`` functions give racks and walls in the forms that people have.
+``docs/planners.md`` says which planner reads which form.
 """
 
 from __future__ import annotations
@@ -9,12 +10,14 @@ from __future__ import annotations
 from ._cost import people_cost
 from ._costmap import paint_costmap
 from ._costmap_painter import CostmapPainter
-from ._horizon import predicted_circles
+from ._horizon import PredictedPeople, predicted_circles, predicted_people
 from ._shapes import boxes, circles, points, polygons
+from ._static import static_circles, static_half_planes, static_points, static_polygons
 from ._velocity import half_planes, velocity_obstacles
 
 __all__ = [
     "CostmapPainter",
+    "PredictedPeople",
     "boxes",
     "circles",
     "half_planes",
@@ -23,5 +26,10 @@ __all__ = [
     "points",
     "polygons",
     "predicted_circles",
+    "predicted_people",
+    "static_circles",
+    "static_half_planes",
+    "static_points",
+    "static_polygons",
     "velocity_obstacles",
 ]

@@ -1,8 +1,8 @@
-"""Predicted obstacles over the horizon of a model-predictive controller."""
+"""People over the horizon of a planner: as circles, and as means with covariances."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -10,10 +10,25 @@ from perception.arrays import FloatArray, finite_array, finite_number
 
 from .._constraints import NavConstraints
 from .._errors import NavError
+from ..policies import ObstacleOutline
 from ._shapes import circles
 
 # Distance of an empty slot from the robot: out of reach, but small enough for a solver's scaling.
 _FAR_M = 100.0
+# The outline that a policy may sweep ahead uses the same model of motion.
+_OUTLINE: Final = ObstacleOutline()
+
+
+class PredictedPeople(NamedTuple):
+    """Predicted positions of people, as normal distributions in the odom frame.
+
+    Attributes:
+        means_odom_m: (N, T, 2) positions.
+        covariances_odom_m2: (N, T, 2, 2) of those positions.
+    """
+
+    means_odom_m: FloatArray
+    covariances_odom_m2: FloatArray
 
 
 def predicted_circles(
@@ -44,9 +59,7 @@ def predicted_circles(
     Raises:
         NavError: for an argument that is not finite or out of bounds.
     """
-    times = finite_array("times_s", times_s, ("T",), NavError)
-    if bool((times < 0.0).any()):
-        raise NavError(f"times_s must not be negative, got {times.min():g} s")
+    times = _checked_times(times_s)
     growth = finite_number("growth_mps", growth_mps, NavError, minimum=0.0)
     now = circles(constraints)
     out = np.repeat(now[:, None, :], len(times), axis=1)
@@ -65,3 +78,63 @@ def predicted_circles(
     nearest = np.argsort(gap.min(axis=1, initial=np.inf), kind="stable")[:slots]
     filled[: len(nearest)] = out[nearest]
     return filled
+
+
+def predicted_people(
+    constraints: NavConstraints,
+    times_s: Any,
+    *,
+    acceleration_density_m2ps3: float = _OUTLINE.acceleration_density_m2ps3,
+    overconfidence_per_s: float = _OUTLINE.overconfidence_per_s,
+) -> PredictedPeople:
+    """Return the people at every time, with the uncertainty of their positions.
+
+    For planners with chance constraints, or with a cost in standard deviations. People keep their
+    present velocity. The covariance of their track is predicted with it, and two things are added:
+    white acceleration of density q adds q t³/3 to the variance, and the sum is multiplied by
+    1 + ``overconfidence_per_s`` · t, since people turn and stop. The defaults are those of
+    :class:`~nav_adapter.policies.ObstacleOutline`.
+
+    The size of a person is not part of it: a body is a disc of 0.30 m around the position. The
+    ``radius_m`` of an obstacle already holds the uncertainty of the present.
+
+    Args:
+        constraints: the people, in the order of ``constraints.obstacles``.
+        times_s: (T,) seconds after ``constraints.stamp_s``, ≥ 0.
+        acceleration_density_m2ps3: q ≥ 0.
+        overconfidence_per_s: ≥ 0.
+
+    Raises:
+        NavError: for an argument that is not finite or out of bounds, or an obstacle without
+            ``covariance_odom``.
+    """
+    times = _checked_times(times_s)
+    density = finite_number(
+        "acceleration_density_m2ps3", acceleration_density_m2ps3, NavError, minimum=0.0
+    )
+    growth = finite_number("overconfidence_per_s", overconfidence_per_s, NavError, minimum=0.0)
+    covariances = np.zeros((len(constraints.obstacles), 4, 4))
+    for index, obstacle in enumerate(constraints.obstacles):
+        if obstacle.covariance_odom is None:
+            raise NavError(
+                f"predicted_people needs the covariance of every person, as NavAdapter.update "
+                f"gives it; obstacles[{index}] has covariance_odom=None"
+            )
+        covariances[index] = obstacle.covariance_odom
+    now = circles(constraints)
+    means = now[:, None, :2] + times[:, None] * now[:, None, 2:4]
+    place, cross, motion = (
+        part[:, None]
+        for part in (covariances[:, :2, :2], covariances[:, :2, 2:], covariances[:, 2:, 2:])
+    )
+    t = times[:, None, None]
+    predicted = place + t * (cross + np.swapaxes(cross, -1, -2)) + t * t * motion
+    predicted = predicted + density * t**3 / 3.0 * np.eye(2)
+    return PredictedPeople(means, np.asarray(predicted * (1.0 + growth * t)))
+
+
+def _checked_times(times_s: Any) -> FloatArray:
+    times = finite_array("times_s", times_s, ("T",), NavError)
+    if bool((times < 0.0).any()):
+        raise NavError(f"times_s must not be negative, got {times.min():g} s")
+    return times

@@ -30,7 +30,12 @@ _STRETCHED_AREA_RATIO: Final = 1.02
 
 
 def circles(constraints: NavConstraints) -> FloatArray:
-    """Return (N, 5): x, y (m), vx, vy (m/s) and radius (m), for velocity obstacles, MPC and TEB."""
+    """Return (N, 5): x, y (m), vx, vy (m/s) and radius (m), for velocity obstacles, MPC and TEB.
+
+    A circle may contain the robot, since it grows at once when awareness falls. The robot should
+    then obey the speed limit and drive so that its distance to the centre does not fall
+    (``docs/planners.md``, "Inside a circle").
+    """
     rows = [
         [*o.center_odom_m.tolist(), *o.velocity_odom_mps.tolist(), o.radius_m]
         for o in constraints.obstacles

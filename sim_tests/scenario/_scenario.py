@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Final, Literal
 
 import numpy as np
 import yaml
@@ -24,6 +24,9 @@ from ..world.scanner import DIAGONAL_SCANNERS, ScannerSpec
 from ._distributions import error_text
 from ._files import parse_yaml, read_file, require_version, shipped_text
 from ._parameters import find_parameters, with_numbers
+
+# Largest distance between neighbours on the reference path.
+_PATH_SPACING_M: Final = 0.25
 
 
 class CameraSpec(StrictConfig):
@@ -135,6 +138,18 @@ class RobotTask(StrictConfig):
                 f"{self.goal_y_m:g}) m"
             )
         return self
+
+    @property
+    def path_odom_m(self) -> FloatArray:
+        """The reference path (M, 2) for planners that follow one: straight from start to goal.
+
+        Neighbours are at most 0.25 m apart. It ignores racks and people, as the line of a fleet
+        manager does.
+        """
+        start = np.array([self.start_x_m, self.start_y_m])
+        goal = np.array([self.goal_x_m, self.goal_y_m])
+        steps = max(1, math.ceil(float(np.hypot(*(goal - start))) / _PATH_SPACING_M))
+        return np.asarray(np.linspace(start, goal, steps + 1))
 
 
 def _layout(value: Any) -> Any:

@@ -15,6 +15,9 @@ from ...world import ROBOT_GROUP, Warehouse
 from ...world.bullet import pybullet
 from ...world.errors import SimError
 
+MAX_YAW_RATE_RADPS: Final = 1.5
+MAX_YAW_ACCELERATION_RADPS2: Final = 3.0
+
 #: Nova Carter's published outline; its centre is midway between the drive wheels.
 NOVA_CARTER: Final = RobotProfile(
     footprint_m=np.array([[0.3625, 0.25], [-0.3625, 0.25], [-0.3625, -0.25], [0.3625, -0.25]]),
@@ -22,12 +25,12 @@ NOVA_CARTER: Final = RobotProfile(
     max_acceleration_mps2=1.0,
     max_deceleration_mps2=1.0,
     reaction_time_s=0.3,
+    max_yaw_rate_radps=MAX_YAW_RATE_RADPS,
+    max_yaw_acceleration_radps2=MAX_YAW_ACCELERATION_RADPS2,
 )
 
 WHEEL_RADIUS_M: Final = 0.14
 TRACK_M: Final = 0.414
-MAX_YAW_RATE_RADPS: Final = 1.5
-MAX_YAW_ACCELERATION_RADPS2: Final = 3.0
 CAMERA_HEIGHT_M: Final = 1.4
 # Just ahead of the camera's housing, so that the robot does not see itself.
 CAMERA_FORWARD_M: Final = 0.165

@@ -19,9 +19,11 @@ from ._seeding import FRESH_TORCH_SEED, seeded_generators
 # Names in tables of the reference planner, and of the driver of scenarios without a planner.
 _REFERENCE: Final = "SamplingPlanner"
 _STRAIGHT_ON: Final = "StraightOn"
-# Arguments by these names receive the robot's profile, the racks and walls, and the episode's seed.
+# Arguments by these names receive the robot's profile, the racks and walls, the way from start to
+# goal, and the episode's seed.
 _ROBOT: Final = ("robot", "robot_profile", "profile")
 _BOXES: Final = "static_boxes_odom_m"
+_PATH: Final = "reference_path_odom_m"
 _SEED: Final = "seed"
 
 
@@ -42,6 +44,8 @@ def make_planner(planner: str, scenario: Scenario, seed: int = 0) -> LocalPlanne
     * ``robot`` (or ``robot_profile``, ``profile``, or a first positional argument without a
       default, whatever its name): the robot's :class:`~nav_adapter.RobotProfile`;
     * ``static_boxes_odom_m``: (N, 4) x_min, y_min, x_max, y_max of racks and walls;
+    * ``reference_path_odom_m``: (M, 2) points from the start to the goal, straight, at most 0.25 m
+      apart;
     * ``seed``: the seed of the episode, an int ≥ 0.
 
     Other arguments keep their defaults. A compiled class without a signature is called with the
@@ -54,7 +58,11 @@ def make_planner(planner: str, scenario: Scenario, seed: int = 0) -> LocalPlanne
     if not planner:
         return None
     make, signature = import_planner(planner)
-    available: dict[str, Any] = {_BOXES: scenario.planner_boxes_odom_m, _SEED: seed}
+    available: dict[str, Any] = {
+        _BOXES: scenario.planner_boxes_odom_m,
+        _PATH: scenario.robot.path_odom_m,
+        _SEED: seed,
+    }
     available |= dict.fromkeys(_ROBOT, NOVA_CARTER)
     arguments, keywords = _arguments(planner, signature, available)
     try:
@@ -113,8 +121,8 @@ def _arguments(
         elif required and kind is not parameter.VAR_POSITIONAL:
             raise SimError(
                 f"planner {planner!r} asks for the argument {parameter.name!r} in "
-                f"{signature}; it can have the robot as {_ROBOT[0]!r}, {_BOXES!r} and {_SEED!r}, "
-                "and needs a default for any other"
+                f"{signature}; it can have the robot as {_ROBOT[0]!r}, {_BOXES!r}, {_PATH!r} and "
+                f"{_SEED!r}, and needs a default for any other"
             )
     return positional, keywords
 

@@ -94,6 +94,10 @@ class Everything(Base):
     def __init__(self, seed, static_boxes_odom_m, profile, **options):
         self.given = (seed, static_boxes_odom_m, profile, options)
 
+class Follows(Base):
+    def __init__(self, robot, *, reference_path_odom_m):
+        self.given = (reference_path_odom_m,)
+
 class HandsOn(Robot):
     def __init__(self, *args, **options):
         super().__init__(*args, **options)
@@ -153,6 +157,19 @@ def test_a_planner_may_ask_for_seed_boxes_and_robot_in_any_order(signatures):
     seed, boxes, robot, options = make_planner(f"{signatures}:Everything", scenario, seed=7).given
     assert (seed, robot, options) == (7, NOVA_CARTER, {})
     np.testing.assert_array_equal(boxes, scenario.planner_boxes_odom_m)
+
+
+def test_a_planner_may_ask_for_a_path_to_follow(signatures):
+    scenario = short().median()
+    task = scenario.robot
+    (path,) = make_planner(f"{signatures}:Follows", scenario).given
+    np.testing.assert_array_equal(path, task.path_odom_m)
+    np.testing.assert_array_equal(path[0], [task.start_x_m, task.start_y_m])
+    np.testing.assert_array_equal(path[-1], [task.goal_x_m, task.goal_y_m])
+    steps = np.diff(path, axis=0)
+    length = np.hypot(*steps.T)
+    assert 0.0 < length.max() <= 0.25 + 1e-9
+    np.testing.assert_allclose(steps / length[:, None], np.tile([1.0, 0.0], (len(steps), 1)))
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,245 @@
+"""Commands of a robot that obeys the limits: speeds with yaw rates, and velocities for wheels.
+
+The limit holds for the fastest point of the robot, and the corners of a turning robot move too. So
+a command is a *twist*, the speed and the yaw rate together::
+
+    |v| ≤ speed_limit_mps   and   |v| + |ω| R ≤ fastest_point_limit_mps
+
+with the circumscribed radius R about the base origin. ``docs/planners.md`` shows the functions in
+use, and assumption 4 of ``docs/safety.md`` says what they are for.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from perception.arrays import FloatArray, finite_array, finite_number
+
+from ._constraints import NavConstraints
+from ._errors import NavError
+from ._robot import RobotProfile, RobotState
+
+__all__ = [
+    "ControlPoint",
+    "clip_twists",
+    "control_point",
+    "differential_drive",
+    "twist_envelope",
+]
+
+# Behind the robot, within this angle's sine, noise would decide to which side it turns: a turn
+# that has begun goes on.
+_BEHIND_SINE = 0.3
+
+
+def twist_envelope(constraints: NavConstraints) -> FloatArray:
+    """Return (M, 3) rows a, c, b: a twist is allowed if a·v + c·ω ≥ b in every row.
+
+    For a solver that chooses v (m/s) and ω (rad/s). The region is convex and contains (0, 0):
+    |v| at most the speed limit, |v| + |ω| R at most the limit of the fastest point, and |ω| at most
+    ``max_yaw_rate_radps`` of the robot's profile. Limits that are not there have no rows.
+
+    Raises:
+        NavError: for constraints without ``robot``.
+    """
+    limit_mps, fastest_mps, radius_m, highest_radps = _limits_of(constraints)
+    rows = [[1.0, 0.0, -limit_mps], [-1.0, 0.0, -limit_mps]]
+    if math.isfinite(fastest_mps):
+        signs = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)]
+        rows += [[v, w * radius_m, -fastest_mps] for v, w in signs]
+    if math.isfinite(highest_radps):
+        rows += [[0.0, 1.0, -highest_radps], [0.0, -1.0, -highest_radps]]
+    return np.array(rows)
+
+
+def clip_twists(constraints: NavConstraints, twists: Any) -> FloatArray:
+    """Return twists slowed down until the limits hold, on the same curve.
+
+    All numbers of a twist are multiplied by one factor of at most 1, so the path keeps its
+    curvature. For the samples of a sampling planner, and for the last line of any other.
+
+    Args:
+        constraints: of the present cycle.
+        twists: (..., 2) speed (m/s) and yaw rate (rad/s), or (..., 3) speed forward and to the
+            left, and yaw rate, of a robot that can move sideways.
+
+    Raises:
+        NavError: for twists that are not finite or of another shape, and constraints without
+            ``robot``.
+    """
+    given = np.asarray(twists, dtype=np.float64)
+    if given.ndim < 1 or given.shape[-1] not in (2, 3) or not bool(np.isfinite(given).all()):
+        raise NavError(
+            "twists must be finite, (..., 2) speed and yaw rate or (..., 3) with the speed to the "
+            f"left between them, got shape {given.shape}"
+        )
+    limit_mps, fastest_mps, radius_m, highest_radps = _limits_of(constraints)
+    speed = np.sqrt((given[..., :-1] ** 2).sum(axis=-1))
+    yaw_rate = np.abs(given[..., -1])
+    factor = np.minimum(_share(speed, limit_mps), _share(yaw_rate, highest_radps))
+    factor = np.minimum(factor, _share(speed + radius_m * yaw_rate, fastest_mps))
+    return np.asarray(given * factor[..., None])
+
+
+class ControlPoint(NamedTuple):
+    """A point ahead of a differential drive that can move in every direction.
+
+    Attributes:
+        position_odom_m: (2,).
+        velocity_odom_mps: (2,).
+    """
+
+    position_odom_m: FloatArray
+    velocity_odom_mps: FloatArray
+
+
+def control_point(robot_state: RobotState, ahead_m: float) -> ControlPoint:
+    """Return the point ahead of the base origin that :func:`differential_drive` moves.
+
+    A planner for discs, such as ORCA, plans for this point: position and velocity are the agent's,
+    and the disc around it must hold the whole footprint.
+
+    Args:
+        robot_state: the latest.
+        ahead_m: > 0.
+
+    Raises:
+        NavError: for a distance that is not finite or not positive.
+    """
+    ahead = _positive("ahead_m", ahead_m)
+    heading, left = _axes(robot_state)
+    return ControlPoint(
+        robot_state.position_odom_m + ahead * heading,
+        robot_state.speed_mps * heading + ahead * robot_state.yaw_rate_radps * left,
+    )
+
+
+def differential_drive(
+    velocity_odom_mps: Any,
+    robot_state: RobotState,
+    robot: RobotProfile,
+    *,
+    constraints: NavConstraints | None = None,
+    dt_s: float | None = None,
+    ahead_m: float | None = None,
+) -> tuple[float, float]:
+    """Return the speed and yaw rate with which a differential drive follows a velocity.
+
+    Many planners choose a velocity in the plane, and two wheels cannot move sideways. A point at a
+    distance d ahead of the base origin can: with the heading h and its left normal n it moves at
+    v h + d ω n. So v = u·h and ω = u·n / d give this point the velocity u exactly. This is the
+    input-output linearisation of the unicycle (Siciliano, Sciavicco, Villani and Oriolo 2009,
+    "Robotics: Modelling, Planning and Control", chapter 11). Nothing is divided by the speed, so a
+    velocity near 0 gives a command near (0, 0) and noise does not turn the robot.
+
+    The robot does not reverse. A velocity that leads backwards gives v = 0 and ω = ±|u| / d until
+    the robot faces it. Straight behind, a turn that has begun goes on.
+
+    Limits slow both numbers by the same factor, so the point still moves along u. They are the
+    profile's ``max_speed_mps`` and ``max_yaw_rate_radps`` and, with ``constraints``, those of
+    :func:`clip_twists`. With ``dt_s`` the command also lies within the accelerations of the
+    profile. Where these do not reach the limits within ``dt_s``, it is the nearest that they reach.
+
+    Args:
+        velocity_odom_mps: (2,) wanted velocity u.
+        robot_state: the latest.
+        robot: limits of the motion.
+        constraints: limits of the present cycle; None for the profile's alone.
+        dt_s: > 0, the time for which the command is held; None if the drive ramps by itself.
+        ahead_m: d > 0; the robot's circumscribed radius by default. The heading follows with the
+            time constant d / |u|. Shorter distances follow faster and swing the corners more: for
+            d = R, |v| + |ω| R is at most √2 |u|. It should be longer than |u| times the period of
+            the control loop.
+
+    Returns:
+        Speed ≥ 0 (m/s), unless the robot still rolls backwards, and yaw rate (rad/s,
+        counter-clockwise).
+
+    Raises:
+        NavError: for an argument that is not finite or out of bounds.
+    """
+    wanted = finite_array("velocity_odom_mps", velocity_odom_mps, (2,), NavError)
+    ahead = robot.circumscribed_radius_m if ahead_m is None else _positive("ahead_m", ahead_m)
+    heading, left = _axes(robot_state)
+    forward_mps, left_mps = float(wanted @ heading), float(wanted @ left)
+    speed, yaw_rate = forward_mps, left_mps / ahead
+    if forward_mps < 0.0:
+        length_mps = math.hypot(forward_mps, left_mps)
+        turning = robot_state.yaw_rate_radps
+        keeps_on = abs(left_mps) <= _BEHIND_SINE * length_mps and turning != 0.0
+        speed, yaw_rate = 0.0, math.copysign(length_mps / ahead, turning if keeps_on else left_mps)
+
+    twist = clip_twists(_limits_alone(robot), [speed, yaw_rate])
+    if constraints is not None:
+        if constraints.robot is None:
+            constraints = replace(constraints, robot=robot)
+        twist = clip_twists(constraints, twist)
+    speed, yaw_rate = twist.tolist()
+    if dt_s is None:
+        return speed, yaw_rate
+    period_s = _positive("dt_s", dt_s)
+    now, turning = robot_state.speed_mps, robot_state.yaw_rate_radps
+    faster, slower = robot.max_acceleration_mps2, robot.max_deceleration_mps2
+    if now < 0.0:  # braking leads up to 0
+        faster, slower = slower, faster
+    slowest = now - slower * period_s
+    speed = min(max(speed, slowest), now + faster * period_s)
+    change = math.inf
+    if robot.max_yaw_acceleration_radps2 is not None:
+        change = robot.max_yaw_acceleration_radps2 * period_s
+    if constraints is not None:
+        # A robot that is still too fast has less left for turning, and the other way round.
+        most = constraints.yaw_rate_limit_radps(speed)
+        yaw_rate = min(max(yaw_rate, -most), most)
+    yaw_rate = min(max(yaw_rate, turning - change), turning + change)
+    if constraints is not None:
+        _, fastest_mps, radius_m, _ = _limits_of(constraints)
+        speed = max(min(speed, fastest_mps - abs(yaw_rate) * radius_m), slowest, min(speed, 0.0))
+    return speed, yaw_rate
+
+
+def _share(value: FloatArray, most: float) -> FloatArray:
+    """Return the factor of at most 1 that brings each value down to ``most``."""
+    above = value > most
+    return np.asarray(np.where(above, most / np.where(above, value, 1.0), 1.0))
+
+
+def _limits_alone(robot: RobotProfile) -> NavConstraints:
+    """Return constraints without people."""
+    return NavConstraints(
+        stamp_s=0.0,
+        obstacles=(),
+        speed_limit_mps=robot.max_speed_mps,
+        limited_by="robot maximum",
+        stale=False,
+        fastest_point_limit_mps=math.inf,
+        robot=robot,
+    )
+
+
+def _limits_of(constraints: NavConstraints) -> tuple[float, float, float, float]:
+    """Return the limits of speed and of the fastest point (m/s), R (m) and the yaw rate's limit."""
+    robot = constraints.robot
+    if robot is None:
+        raise NavError(
+            "a twist needs constraints with a robot, as NavAdapter.update gives them; these have "
+            "robot=None"
+        )
+    fastest_mps = constraints.fastest_point_limit_mps
+    assert fastest_mps is not None
+    highest = math.inf if robot.max_yaw_rate_radps is None else robot.max_yaw_rate_radps
+    return constraints.speed_limit_mps, fastest_mps, robot.circumscribed_radius_m, highest
+
+
+def _axes(robot_state: RobotState) -> tuple[FloatArray, FloatArray]:
+    """Return the unit vectors forward and left in odom."""
+    c, s = math.cos(robot_state.heading_odom_rad), math.sin(robot_state.heading_odom_rad)
+    return np.array([c, s]), np.array([-s, c])
+
+
+def _positive(name: str, value: float) -> float:
+    return finite_number(name, value, NavError, minimum=0.0, exclusive_minimum=True)
