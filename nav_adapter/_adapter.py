@@ -23,6 +23,7 @@ from ._obstacle_rules import ObstacleRules
 from ._obstacles import obstacles_of
 from ._policy import AwarenessPolicy
 from ._robot import LATERAL_NOISE_MPS, RobotProfile, RobotState
+from ._speed_basis import SpeedBasis
 
 _LOG = logging.getLogger("nav_adapter")
 # A stamp that is later than the last one by more than this may be wrong.
@@ -322,6 +323,10 @@ class NavAdapter:
             reachable_speed_limit_mps=max(limit.limit_mps, braked_mps),
             alerts=alerts,
             braking_suffices=limit.braking_suffices,
+            speed_basis=SpeedBasis(
+                *(self._policy, self._robot, people, lost, current),
+                *(robot_age_s, perception_age_s, ceiling_mps),
+            ),
         )
         given = current, robot_state, perceived_s
         return _Memory(people, alert_history, constraints, given, ceiling_mps, lost)

@@ -12,6 +12,7 @@ from perception.short_repr import short_repr
 
 from ._alert import Alert
 from ._errors import NavError
+from ._speed_basis import SpeedBasis
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -111,6 +112,8 @@ class NavConstraints:
         braking_suffices: False if a robot that brakes from now on at full deceleration still comes
             nearer to a person than the clearance before it stands, by the assumptions of speed and
             separation. A limit is then not enough: warn, evade or stop harder.
+        speed_basis: what the limit was computed from, for
+            :func:`nav_adapter.exporters.speed_limit_at`; None for constraints made by hand.
     """
 
     stamp_s: float
@@ -121,6 +124,7 @@ class NavConstraints:
     reachable_speed_limit_mps: float = 0.0
     alerts: tuple[Alert, ...] = ()
     braking_suffices: bool = True
+    speed_basis: SpeedBasis | None = field(default=None, repr=False)
 
     __repr__ = short_repr
 
