@@ -11,6 +11,7 @@ from ._costmap import paint_costmap
 from ._costmap_painter import CostmapPainter
 from ._horizon import predicted_circles
 from ._shapes import boxes, circles, points, polygons
+from ._speed_field import limited_by_at, speed_limit_at, time_cost
 from ._velocity import half_planes, velocity_obstacles
 
 __all__ = [
@@ -18,10 +19,13 @@ __all__ = [
     "boxes",
     "circles",
     "half_planes",
+    "limited_by_at",
     "paint_costmap",
     "people_cost",
     "points",
     "polygons",
     "predicted_circles",
+    "speed_limit_at",
+    "time_cost",
     "velocity_obstacles",
 ]
