@@ -12,10 +12,12 @@ from ._costmap_painter import CostmapPainter
 from ._horizon import predicted_circles
 from ._shapes import boxes, circles, points, polygons
 from ._speed_field import limited_by_at, speed_limit_at, time_cost
+from ._speed_map import SpeedMap
 from ._velocity import half_planes, velocity_obstacles
 
 __all__ = [
     "CostmapPainter",
+    "SpeedMap",
     "boxes",
     "circles",
     "half_planes",

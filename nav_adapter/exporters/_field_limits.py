@@ -115,9 +115,7 @@ class FieldLimits:
             if self._rules.protective_field is not None:
                 beside_m = self._rules.protective_field.beside_m
                 body_m = people.margin_m + 10.0 * self._rounding_m
-                own = self._footprint.in_path(
-                    library, poses, along_m, across_m, body_m, beside_m
-                )
+                own = self._footprint.in_path(library, poses, along_m, across_m, body_m, beside_m)
                 held = own if held is None else held | own
             if people.reserved:
                 # The last place is that of the track, which this rule counts.

@@ -63,9 +63,7 @@ class PeopleAhead:
     def mapped(self, change: Callable[[Any], Any]) -> PeopleAhead:
         """Return the people with ``change`` applied to each of their arrays."""
         arrays = {
-            name: change(value)
-            for name in _ARRAYS
-            if (value := getattr(self, name)) is not None
+            name: change(value) for name in _ARRAYS if (value := getattr(self, name)) is not None
         }
         turn = None if self.turn is None else (change(self.turn[0]), change(self.turn[1]))
         return replace(self, turn=turn, **arrays)
@@ -217,9 +215,7 @@ def _person(
     age_s = max(0.0, stamp_s - track.stamp_s)
     unseen_s = stamp_s - min(memory.seen_stamp_s, track.stamp_s - track.time_since_seen_s)
     is_seen = (
-        is_shown
-        and track.status != "coasting"
-        and unseen_s <= timing.fresh_within_s - _SAME_AGE_S
+        is_shown and track.status != "coasting" and unseen_s <= timing.fresh_within_s - _SAME_AGE_S
     )
     start_delay_s = memory.start_delay_s if is_seen else math.inf
     human_mps = np.full(len(times_s), _assumed_mps(policy, memory))
@@ -268,9 +264,7 @@ def _assumed_mps(policy: AwarenessPolicy, memory: PersonMemory) -> float:
     return policy.speed.human_speed_mps(1.0 if memory.speed_held else memory.awareness_lower)
 
 
-def _with_excess_mps(
-    assumed_mps: FloatArray, walking_mps: float, unaware_mps: float
-) -> FloatArray:
+def _with_excess_mps(assumed_mps: FloatArray, walking_mps: float, unaware_mps: float) -> FloatArray:
     """Return the assumed speed of a person who may walk faster than an unaware one."""
     excess_mps = walking_mps - unaware_mps
     if excess_mps <= 0.0:

@@ -78,7 +78,9 @@ def poses_of(
         yaw_rates_radps: or None for any.
     """
     robot, age_s = basis.robot, basis.robot_age_s
-    heading = None if headings_rad is None else (library.cos(headings_rad), library.sin(headings_rad))
+    heading = (
+        None if headings_rad is None else (library.cos(headings_rad), library.sin(headings_rad))
+    )
     if velocities_base_mps is None:
         return Poses(x, y, heading, driven_m=robot.max_speed_mps * age_s)
     forward_mps, left_mps = velocities_base_mps
@@ -165,7 +167,13 @@ class FootprintGaps:
         return library.sqrt(library.where(inside, 0.0 * gap2, gap2))
 
     def in_path(
-        self, library: ArrayLibrary, poses: Poses, along_m: Any, left_m: Any, body_m: Any, beside_m: float
+        self,
+        library: ArrayLibrary,
+        poses: Poses,
+        along_m: Any,
+        left_m: Any,
+        body_m: Any,
+        beside_m: float,
     ) -> Any:
         """Return whether a body reaches into the straight path, as a protective field has it.
 

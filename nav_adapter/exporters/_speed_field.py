@@ -249,9 +249,7 @@ class SpeedField:
         reach_m: float = 0.0,
     ) -> None:
         if not isinstance(constraints, NavConstraints):
-            raise NavError(
-                f"constraints must be NavConstraints, got {type(constraints).__name__}"
-            )
+            raise NavError(f"constraints must be NavConstraints, got {type(constraints).__name__}")
         basis = constraints.speed_basis
         if basis is None and constraints.speed_limit_mps > 0.0:
             raise NavError(
@@ -283,8 +281,8 @@ class SpeedField:
             # Nothing but the shape is needed.
             self._basis, self._poses = None, Poses(self._inner(x), self._inner(y))
             return
-        low = np.array([float(x.min()), float(y.min())])
-        high = np.array([float(x.max()), float(y.max())])
+        low = np.array([x.min().item(), y.min().item()])
+        high = np.array([x.max().item(), y.max().item()])
         reference = 0.5 * (low + high)
         self._poses = poses_of(
             library,
@@ -320,14 +318,18 @@ class SpeedField:
     def limits_mps(self) -> Any:
         """Return the limits (K, T)."""
         library, maximum_mps = self._library, self._maximum_mps
-        lowest = 0.0 * self._poses.x + maximum_mps
+        lowest = 0.0 * self._poses.x + 2.0 * maximum_mps
         if self._basis is not None:
             assert self._rules is not None
             for part, poses, people in self._parts():
                 for limit in self._rules.of(people, poses).values():
-                    lowest[part] = library.minimum(lowest[part], library.lowest(limit))
+                    least = library.lowest(limit)
+                    if library.is_torch:  # all poses, and nothing in place for the gradients
+                        lowest = library.minimum(lowest, least)
+                    else:
+                        np.minimum(lowest[part], least, out=lowest[part])
             lowest = (1.0 - _LIMIT_ROUNDING * library.rounding) * lowest
-        lowest = self._lowered(lowest)
+        lowest = self._lowered(library.minimum(lowest, library.convert(maximum_mps)))
         result = lowest.T if self._times_first else lowest
         if library.is_torch:
             return result
@@ -419,5 +421,3 @@ def _cut_column(part: tuple[slice, slice]) -> Any:
         return values[:, rows, columns]
 
     return cut
-
-
