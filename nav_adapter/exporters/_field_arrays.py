@@ -25,6 +25,7 @@ class ArrayLibrary:
         is_torch: whether gradients are wanted, and all poses are computed at once.
         convert: numbers as an array of the type that the field computes with.
         sqrt: of numbers of at least :data:`TINY`; smaller ones count as that.
+        root: square root of numbers above 0.
         where: the choice between two arrays, or numbers.
         maximum: of two arrays.
         minimum: of two arrays.
@@ -38,6 +39,7 @@ class ArrayLibrary:
     is_torch: bool
     convert: Callable[[Any], Any]
     sqrt: Callable[[Any], Any]
+    root: Callable[[Any], Any]
     where: Callable[[Any, Any, Any], Any]
     maximum: Callable[[Any, Any], Any]
     minimum: Callable[[Any, Any], Any]
@@ -53,6 +55,7 @@ _NUMPY = ArrayLibrary(
     # Single precision takes half the time. Its rounding error is taken off the gaps.
     convert=lambda values: np.asarray(values, dtype=np.float32),
     sqrt=lambda values: np.sqrt(np.maximum(values, np.float32(TINY))),
+    root=np.sqrt,
     where=np.where,
     maximum=np.maximum,
     minimum=np.minimum,
@@ -79,6 +82,7 @@ def library_of(values: Any) -> ArrayLibrary:
         is_torch=True,
         convert=lambda given: torch.as_tensor(given, dtype=values.dtype, device=values.device),
         sqrt=lambda given: torch.sqrt(torch.clamp(given, min=TINY)),
+        root=torch.sqrt,
         where=torch.where,
         maximum=torch.maximum,
         minimum=torch.minimum,

@@ -13,6 +13,8 @@ from ._field_arrays import ArrayLibrary
 from ._field_people import PeopleAhead
 from ._field_poses import FootprintGaps, Poses
 
+# Added where a speed or a time of 0 would leave nothing to divide by; it only lowers a limit.
+_SLOWEST_MPS: Final = 1e-9
 # (gap in metres, share of the stopping distance that leads there or None for all of it)
 _Bound = tuple[Any, Any]
 
@@ -101,9 +103,7 @@ class FieldLimits:
             footprint_m = gap_m if footprint_m is None else library.minimum(footprint_m, gap_m)
             if poses.travel is None or poses.turn is None:
                 continue
-            ahead_x, ahead_y = poses.travel
-            along_m = ahead_x * forward_m + ahead_y * left_m
-            across_m = ahead_x * left_m - ahead_y * forward_m
+            along_m, across_m = poses.along(forward_m, left_m)
             cos_turn, sin_turn = poses.turn
             turned_m = along_m * cos_turn + abs(across_m) * sin_turn
             own = library.where(
@@ -123,7 +123,7 @@ class FieldLimits:
         gap_m = footprint_m - (margin_m + self._rounding_m)
         if share is None:
             return [(gap_m, None)], None, None
-        if ahead is not None:
+        if ahead is not None and poses.stands is not None:
             ahead = library.where(poses.stands, library.convert(1.0), ahead)
         return [(gap_m, None), (circle_m, share)], ahead, held
 
@@ -206,12 +206,14 @@ class FieldLimits:
     def _walker_mps(self, spare_m: Any, human_mps: Any, reaction_s: Any, share: Any) -> Any:
         """Return the limit of speed and separation, given what the gap leaves for braking."""
         library, a = self._library, self._braking_mps2
-        spare_m = library.at_least(spare_m, 0.0)
+        # The quadratic equation times 2a, with a b above 0 that a root can be taken of.
+        spare = (2.0 * a) * library.at_least(spare_m, 0.0)
+        human_mps = human_mps + _SLOWEST_MPS
         if share is None:
-            b, c = a * reaction_s + human_mps, 2.0 * a
-        else:
-            b, c = share * (a * reaction_s) + human_mps, share * (2.0 * a)
-        return (2.0 * a) * spare_m / (b + library.sqrt(b * b + c * spare_m))
+            b = a * reaction_s + human_mps
+            return spare / (b + library.root(b * b + spare))
+        b = share * (a * reaction_s) + human_mps
+        return spare / (b + library.root(b * b + share * spare))
 
     def _starter_mps(
         self,
@@ -225,12 +227,13 @@ class FieldLimits:
         """Return the limit for people who stand, or start; never below that for walkers."""
         library, a, a_h = self._library, self._braking_mps2, human_acceleration_mps2
         since_s, speeding_up_s = reaction_s + delay_s, human_mps / a_h
-        spare_m = library.at_least(gap_m - (0.5 * a_h) * since_s * since_s, 0.0)
+        spare_m = 2.0 * library.at_least(gap_m - (0.5 * a_h) * since_s * since_s, 0.0)
+        b, c = since_s * (a_h / a) + _SLOWEST_MPS, (a_h / a + 1.0) / a
         if share is None:
-            b, c = since_s * (a_h / a) + reaction_s, 2.0 * (a_h / a + 1.0) / a
+            b = b + reaction_s
         else:
-            b, c = since_s * (a_h / a) + share * reaction_s, (share + a_h / a) * (2.0 / a)
-        early_mps = 2.0 * spare_m / (b + library.sqrt(b * b + c * spare_m))
+            b, c = b + share * reaction_s, (share + a_h / a) * (1.0 / a)
+        early_mps = spare_m / (b + library.root(b * b + c * spare_m))
         is_early = early_mps <= a * (speeding_up_s - since_s)
         walker_m = gap_m - human_mps * reaction_s
         late_m = walker_m - human_mps * (delay_s - 0.5 * speeding_up_s)

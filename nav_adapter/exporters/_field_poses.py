@@ -45,12 +45,25 @@ class Poses:
     driven_m: Any = 0.0
     sideways: Any = None
 
+    def along(self, forward_m: Any, left_m: Any) -> tuple[Any, Any]:
+        """Return a place in the base frame along the direction of travel, and to its left."""
+        assert self.travel is not None
+        ahead_x, ahead_y = self.travel
+        if isinstance(ahead_x, float):  # 1 or −1: all poses drive forward, or all backward
+            return ahead_x * forward_m, ahead_x * left_m
+        if isinstance(ahead_y, float):  # 0: nobody drives sideways
+            return ahead_x * forward_m, ahead_x * left_m
+        return (
+            ahead_x * forward_m + ahead_y * left_m,
+            ahead_x * left_m - ahead_y * forward_m,
+        )
+
     def mapped(self, change: Callable[[Any], Any]) -> Poses:
         """Return the poses with ``change`` applied to each of their arrays."""
 
         def changed(value: Any) -> Any:
             if isinstance(value, tuple):
-                return (change(value[0]), change(value[1]))
+                return (changed(value[0]), changed(value[1]))
             return value if value is None or isinstance(value, float) else change(value)
 
         names = ("x", "y", "heading", "travel", "turn", "stands", "driven_m", "sideways")
@@ -84,47 +97,64 @@ def poses_of(
     if velocities_base_mps is None:
         return Poses(x, y, heading, driven_m=robot.max_speed_mps * age_s)
     forward_mps, left_mps = velocities_base_mps
-    travel_mps = library.sqrt(forward_mps * forward_mps + left_mps * left_mps)
-    across_mps = abs(left_mps)
     driven_m: Any = 0.0
+    if left_mps is None:
+        travel_mps, slips = abs(forward_mps), None
+    else:
+        travel_mps = library.sqrt(forward_mps * forward_mps + left_mps * left_mps)
+        slips = _unless_none(abs(left_mps) > LATERAL_NOISE_MPS)
     if age_s > 0.0:
         fastest_mps = library.at_least(travel_mps, robot.max_speed_mps)
         faster_m = 0.5 * robot.max_acceleration_mps2 * age_s**2
         driven_m = library.minimum(travel_mps * age_s + faster_m, fastest_mps * age_s)
-    slips = across_mps > LATERAL_NOISE_MPS
     sideways = slips if robot.drive == "differential" else None
     if heading is None:
         return Poses(x, y, driven_m=driven_m, sideways=sideways)
     one = library.convert(1.0)
-    sign = library.where(forward_mps < 0.0, -one, one)
-    travel = (
-        library.where(slips, forward_mps / travel_mps, sign),
-        library.where(slips, left_mps / travel_mps, 0.0 * sign),
-    )
-    turn_rad = math.radians(basis.policy.rules.turn_within_stop_deg) + 0.0 * forward_mps
+    backward = _unless_none(forward_mps < 0.0)
+    travel: tuple[Any, Any] = (1.0, 0.0)
+    if backward is not None or slips is not None:
+        travel = (library.where(forward_mps < 0.0, -one, one), 0.0)
+    if slips is not None:
+        travel = (
+            library.where(slips, forward_mps / travel_mps, travel[0]),
+            library.where(slips, left_mps / travel_mps, 0.0 * one),
+        )
+    turn_rad: Any = math.radians(basis.policy.rules.turn_within_stop_deg)
+    anywhere = abs(forward_mps) < STANDING_MPS
+    if slips is not None:
+        anywhere = anywhere & ~slips
     if age_s > 0.0:
         # Without a yaw rate the robot may have turned by any angle.
-        rates = math.inf if yaw_rates_radps is None else abs(yaw_rates_radps)
-        turn_rad = turn_rad + (math.pi if rates is math.inf else rates * age_s)
-    if robot.drive != "differential":
-        noise_rad = _angle(library, across_mps, abs(forward_mps))
-        turn_rad = turn_rad + library.where(slips, 0.0 * noise_rad, noise_rad)
-    anywhere = (abs(forward_mps) < STANDING_MPS) & ~slips
-    if age_s > 0.0:
+        turn_rad = turn_rad + (
+            math.pi if yaw_rates_radps is None else abs(yaw_rates_radps) * age_s
+        )
         anywhere = anywhere | (travel_mps <= robot.max_acceleration_mps2 * age_s)
-    anywhere = anywhere | (turn_rad >= math.pi)
-    turn = (
-        library.where(anywhere, -one, library.cos(turn_rad)),
-        library.where(anywhere, 0.0 * one, library.sin(turn_rad)),
-    )
-    stands = travel_mps < STANDING_MPS
+    if left_mps is not None and robot.drive != "differential":
+        # What counts as noise may be motion. The tangent is never below the angle.
+        noise_rad = abs(left_mps) / library.at_least(abs(forward_mps), 1e-3)
+        if slips is not None:
+            noise_rad = library.where(slips, 0.0 * noise_rad, noise_rad)
+        turn_rad = turn_rad + noise_rad
+    turn: tuple[Any, Any]
+    if isinstance(turn_rad, float):
+        turned = turn_rad >= math.pi
+        turn = (-1.0, 0.0) if turned else (math.cos(turn_rad), math.sin(turn_rad))
+    else:
+        anywhere = anywhere | (turn_rad >= math.pi)
+        turn = (library.cos(turn_rad), library.sin(turn_rad))
+    if bool(anywhere.any()):
+        turn = (
+            library.where(anywhere, -one, library.convert(turn[0])),
+            library.where(anywhere, 0.0 * one, library.convert(turn[1])),
+        )
+    stands = _unless_none(travel_mps < STANDING_MPS)
     return Poses(x, y, heading, travel, turn, stands, driven_m, sideways)
 
 
-def _angle(library: ArrayLibrary, across_mps: Any, along_mps: Any) -> Any:
-    """Return an angle that is at least that of a lateral speed off the course."""
-    # The tangent is never below the angle.
-    return across_mps / library.at_least(along_mps, 1e-3)
+def _unless_none(mask: Any) -> Any:
+    """Return a mask, or None if it holds nowhere."""
+    return mask if bool(mask.any()) else None
 
 
 class FootprintGaps:
@@ -186,7 +216,8 @@ class FootprintGaps:
             beside_m: supplement on either side.
         """
         assert poses.travel is not None
-        ahead_x, ahead_y = poses.travel
+        one = library.convert(1.0)
+        ahead_x, ahead_y = (library.convert(each) * one for each in poses.travel)
         rear, right, left = None, None, None
         for x, y in self._corners:
             along, across = x * ahead_x + y * ahead_y, y * ahead_x - x * ahead_y

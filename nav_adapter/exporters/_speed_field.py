@@ -19,7 +19,7 @@ from ._field_people import PeopleAhead, people_ahead
 from ._field_poses import Poses, poses_of
 
 # Numbers computed together: enough that the calls cost little, and few enough for the cache.
-_TOGETHER: Final = 12_000
+_TOGETHER: Final = 20_000
 # Rounding of positions and of limits, in units of the last place.
 _POSITION_ROUNDING: Final = 8.0
 _LIMIT_ROUNDING: Final = 32.0
@@ -223,7 +223,7 @@ class _Request:
             both = checked("speeds_mps", speeds_mps, (*self._shape, 2), positions)
             return both[:, :, 0], both[:, :, 1]
         forward = checked("speeds_mps", speeds_mps, self._shape, positions)
-        return forward, 0.0 * forward
+        return forward, None
 
 
 class SpeedField:
@@ -292,7 +292,10 @@ class SpeedField:
             None if headings_rad is None else self._inner(headings_rad),
             None
             if velocities_mps is None
-            else (self._inner(velocities_mps[0]), self._inner(velocities_mps[1])),
+            else (
+                self._inner(velocities_mps[0]),
+                None if velocities_mps[1] is None else self._inner(velocities_mps[1]),
+            ),
             None if yaw_rates_radps is None else self._inner(yaw_rates_radps),
         )
 
