@@ -42,6 +42,6 @@ class SpeedBasis:
 
     @property
     def stopped(self) -> bool:
-        """Whether the data are so old that the limit is 0 everywhere."""
+        """True if the data are so old that the limit is 0 everywhere."""
         oldest_s = max(self.robot_age_s, self.perception_age_s)
         return oldest_s > self.policy.timing.stop_after_s

@@ -56,8 +56,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     field = field_ms(options.repeats, options.seed)
     print(
-        f"{TRAJECTORIES} × {TIMES} poses, {FIELD_PEOPLE} people: field {field['field']:.1f} ms, with "
-        f"headings and speeds {field['driven']:.1f} ms, update pose by pose "
+        f"{TRAJECTORIES} × {TIMES} poses, {FIELD_PEOPLE} people: field {field['field']:.1f} ms, "
+        f"with headings and speeds {field['driven']:.1f} ms, update pose by pose "
         f"{field['updates']:.0f} ms; speed map of 200 × 200 cells {field['map']:.1f} ms"
     )
 
@@ -67,9 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return finish(metrics, _missed(costs, metrics), baseline, options.out)
 
 
-def _metrics(
-    costs: dict[int, dict[str, float]], field: dict[str, float]
-) -> list[MeasuredValue]:
+def _metrics(costs: dict[int, dict[str, float]], field: dict[str, float]) -> list[MeasuredValue]:
     few, more, most = PEOPLE
     slope_ms = (costs[more]["cycle"] - costs[few]["cycle"]) / (more - few)
     steeper_ms = (costs[most]["cycle"] - costs[more]["cycle"]) / (most - more)

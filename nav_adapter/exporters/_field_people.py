@@ -219,12 +219,13 @@ def _person(
     )
     start_delay_s = memory.start_delay_s if is_seen else math.inf
     human_mps = np.full(len(times_s), _assumed_mps(policy, memory))
-    sigmas, sigma_m = margins.uncertainty_sigmas, np.full(len(times_s), memory.sigma_m)
+    sigmas = np.full(len(times_s), margins.uncertainty_sigmas)
+    sigma_m = np.full(len(times_s), memory.sigma_m)
     ages_s = np.full(len(times_s), age_s)
     if not is_seen:
         # Nobody sees this person again, as far as one can say.
         unseen = unseen_s + times_s > timing.fresh_within_s - _SAME_AGE_S
-        sigmas = np.where(unseen, max(sigmas, margins.unseen_sigmas), sigmas)
+        sigmas = np.where(unseen, np.maximum(sigmas, margins.unseen_sigmas), sigmas)
         human_mps = np.where(unseen, np.maximum(human_mps, unaware_mps), human_mps)
         if is_shown:
             known_s = track.stamp_s + min(age_s, timing.stop_after_s)

@@ -120,15 +120,30 @@ def poses_of(
             library.where(slips, forward_mps / travel_mps, travel[0]),
             library.where(slips, left_mps / travel_mps, 0.0 * one),
         )
+    turn = _turn(library, basis, velocities_base_mps, travel_mps, slips, yaw_rates_radps)
+    stands = _unless_none(travel_mps < STANDING_MPS)
+    return Poses(x, y, heading, travel, turn, stands, driven_m, sideways)
+
+
+def _turn(
+    library: ArrayLibrary,
+    basis: SpeedBasis,
+    velocities_base_mps: tuple[Any, Any],
+    travel_mps: Any,
+    slips: Any,
+    yaw_rates_radps: Any,
+) -> tuple[Any, Any]:
+    """Return cosine and sine of the largest turn while the robot stops; −1 and 0 for any turn."""
+    robot, age_s = basis.robot, basis.robot_age_s
+    forward_mps, left_mps = velocities_base_mps
+    one = library.convert(1.0)
     turn_rad: Any = math.radians(basis.policy.rules.turn_within_stop_deg)
     anywhere = abs(forward_mps) < STANDING_MPS
     if slips is not None:
         anywhere = anywhere & ~slips
     if age_s > 0.0:
         # Without a yaw rate the robot may have turned by any angle.
-        turn_rad = turn_rad + (
-            math.pi if yaw_rates_radps is None else abs(yaw_rates_radps) * age_s
-        )
+        turn_rad = turn_rad + (math.pi if yaw_rates_radps is None else abs(yaw_rates_radps) * age_s)
         anywhere = anywhere | (travel_mps <= robot.max_acceleration_mps2 * age_s)
     if left_mps is not None and robot.drive != "differential":
         # What counts as noise may be motion. The tangent is never below the angle.
@@ -148,8 +163,7 @@ def poses_of(
             library.where(anywhere, -one, library.convert(turn[0])),
             library.where(anywhere, 0.0 * one, library.convert(turn[1])),
         )
-    stands = _unless_none(travel_mps < STANDING_MPS)
-    return Poses(x, y, heading, travel, turn, stands, driven_m, sideways)
+    return turn
 
 
 def _unless_none(mask: Any) -> Any:
@@ -181,7 +195,8 @@ class FootprintGaps:
             beyond = library.at_least(abs(forward_m - self._middle[0]) - self._half[0], 0.0)
             beside = library.at_least(abs(left_m - self._middle[1]) - self._half[1], 0.0)
             return library.sqrt(beyond * beyond + beside * beside)
-        gap2, inside = None, None
+        gap2: Any = None
+        inside: Any = None
         for (x, y), (end_x, end_y) in zip(
             self._corners, [*self._corners[1:], self._corners[0]], strict=True
         ):
@@ -218,7 +233,9 @@ class FootprintGaps:
         assert poses.travel is not None
         one = library.convert(1.0)
         ahead_x, ahead_y = (library.convert(each) * one for each in poses.travel)
-        rear, right, left = None, None, None
+        rear: Any = None
+        right: Any = None
+        left: Any = None
         for x, y in self._corners:
             along, across = x * ahead_x + y * ahead_y, y * ahead_x - x * ahead_y
             rear = along if rear is None else library.minimum(rear, along)

@@ -15,9 +15,9 @@ from perception.short_repr import short_repr
 
 from .._constraints import NavConstraints
 from .._errors import NavError
+from ._field import SpeedField
 from ._field_arrays import library_of
 from ._person_costs import checked_grid
-from ._speed_field import SpeedField
 
 _LARGEST_CELLS: Final = 4_000_000
 

@@ -126,11 +126,12 @@ def scenes(draw: st.DrawFn) -> Scene:
 
 def known_of(state: RobotState, known: int) -> dict[str, Any]:
     """Return what the field is told of the robot: nothing, or more and more."""
-    velocity = state.velocity_base_mps
-    both = [[[state.speed_mps, 0.0]]] if velocity is None else [[velocity.tolist()]]
+    assert state.velocity_base_mps is not None
+    forward, left = state.velocity_base_mps.tolist()
+    speeds = [[[forward, left]]] if left else [[forward]]
     everything = {
         "headings_odom_rad": [[state.heading_odom_rad]],
-        "speeds_mps": both,
+        "speeds_mps": speeds,
         "yaw_rates_radps": [[state.yaw_rate_radps]],
     }
     return dict(list(everything.items())[:known])
