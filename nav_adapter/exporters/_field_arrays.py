@@ -31,6 +31,7 @@ class ArrayLibrary:
         minimum: of two arrays.
         at_least: the maximum of an array and a number.
         lowest: the minimum over the first axis.
+        signbit: whether numbers are negative, −0 included.
         cos: of angles in radians.
         sin: of angles in radians.
         rounding: relative rounding error of a number.
@@ -45,6 +46,7 @@ class ArrayLibrary:
     minimum: Callable[[Any, Any], Any]
     at_least: Callable[[Any, float], Any]
     lowest: Callable[[Any], Any]
+    signbit: Callable[[Any], Any]
     cos: Callable[[Any], Any]
     sin: Callable[[Any], Any]
     rounding: float
@@ -61,6 +63,7 @@ _NUMPY = ArrayLibrary(
     minimum=np.minimum,
     at_least=np.maximum,
     lowest=lambda values: values.min(axis=0),
+    signbit=np.signbit,
     cos=np.cos,
     sin=np.sin,
     rounding=float(np.finfo(np.float32).eps),
@@ -88,6 +91,7 @@ def library_of(values: Any) -> ArrayLibrary:
         minimum=torch.minimum,
         at_least=lambda given, least: torch.clamp(given, min=least),
         lowest=lambda given: torch.amin(given, dim=0),
+        signbit=torch.signbit,
         cos=torch.cos,
         sin=torch.sin,
         rounding=float(torch.finfo(values.dtype).eps),

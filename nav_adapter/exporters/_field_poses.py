@@ -111,10 +111,11 @@ def poses_of(
     if heading is None:
         return Poses(x, y, driven_m=driven_m, sideways=sideways)
     one = library.convert(1.0)
-    backward = _unless_none(forward_mps < 0.0)
+    # A robot that stands with a speed of −0 counts as driving backward, as in the adapter.
+    backward = _unless_none(library.signbit(forward_mps))
     travel: tuple[Any, Any] = (1.0, 0.0)
     if backward is not None or slips is not None:
-        travel = (library.where(forward_mps < 0.0, -one, one), 0.0)
+        travel = (library.where(library.signbit(forward_mps), -one, one), 0.0)
     if slips is not None:
         travel = (
             library.where(slips, forward_mps / travel_mps, travel[0]),

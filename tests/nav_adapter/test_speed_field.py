@@ -159,7 +159,7 @@ def test_the_field_is_never_above_the_limit_of_a_robot_that_gets_there(scene: Sc
     for limit_mps in limits:
         assert 0.0 <= limit_mps <= then.speed_limit_mps + 1e-9
     # Telling more never lowers the field.
-    assert limits == sorted(limits)
+    assert (np.diff(limits) >= -1e-5).all()
 
 
 @st.composite
