@@ -186,7 +186,7 @@ class FieldLimits:
     ) -> Any:
         reserve = self._rules.start_reserve
         assert reserve is not None
-        library, delay_s = self._library, library_zero(people, reserve.start_delay_s)
+        library, delay_s = self._library, _in_shape_of_times(people, reserve.start_delay_s)
         if closing_mps is not None:
             closing_s = library.at_least(closing_mps[0], 0.0) / reserve.human_acceleration_mps2
             delay_s = closing_s + reserve.start_delay_s
@@ -265,6 +265,6 @@ class FieldLimits:
         return limits
 
 
-def library_zero(people: PeopleAhead, number: float) -> Any:
+def _in_shape_of_times(people: PeopleAhead, number: float) -> Any:
     """Return a number in the shape of the people's reaction times."""
     return 0.0 * people.reaction_s + number
