@@ -17,12 +17,13 @@ from ._checks import age_of_s, checked_tracks, refuse_absurd
 from ._constraints import GovernedSpeed, NavConstraints
 from ._errors import NavError
 from ._governor import SpeedGovernor
-from ._lost import LostPeople, LostPerson
-from ._memory import PersonMemory
+from ._lost import LostPeople
+from ._memory import LostPerson, PersonMemory
 from ._obstacle_rules import ObstacleRules
 from ._obstacles import obstacles_of
 from ._policy import AwarenessPolicy
 from ._robot import LATERAL_NOISE_MPS, RobotProfile, RobotState
+from ._speed_basis import SpeedBasis
 
 _LOG = logging.getLogger("nav_adapter")
 # A stamp that is later than the last one by more than this may be wrong.
@@ -324,6 +325,10 @@ class NavAdapter:
             braking_suffices=limit.braking_suffices,
             fastest_point_limit_mps=limit.fastest_point_mps,
             robot=self._robot,
+            speed_basis=SpeedBasis(
+                *(self._policy, self._robot, people, lost, current),
+                *(robot_age_s, perception_age_s, ceiling_mps),
+            ),
         )
         given = current, robot_state, perceived_s
         return _Memory(people, alert_history, constraints, given, ceiling_mps, lost)

@@ -20,6 +20,7 @@ from perception.short_repr import short_repr
 from ._alert import Alert
 from ._errors import NavError
 from ._robot import RobotProfile
+from ._speed_basis import SpeedBasis
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -162,6 +163,8 @@ class NavConstraints:
             robot's own maximum does, it is higher, and infinite if nobody is near. If it is not
             given, it is ``speed_limit_mps``.
         robot: the profile that they hold for; None if they were made without an adapter.
+        speed_basis: what the limit was computed from, for
+            :func:`nav_adapter.exporters.speed_limit_at`; None for constraints made by hand.
     """
 
     stamp_s: float
@@ -174,6 +177,7 @@ class NavConstraints:
     braking_suffices: bool = True
     fastest_point_limit_mps: float | None = field(default=None, repr=False)
     robot: RobotProfile | None = field(default=None, repr=False)
+    speed_basis: SpeedBasis | None = field(default=None, repr=False)
 
     __repr__ = short_repr
 

@@ -25,11 +25,11 @@ from ._separation import (
 )
 
 # Below this speed the robot counts as standing: it may start off either way, or turn on the spot.
-_STANDING_MPS: Final = 0.05
+STANDING_MPS: Final = 0.05
 # Shares of the speed that is assumed for unaware people. A person faster than the first share is a
 # brisk walker, who may turn to the robot. A person faster than that speed by the second share runs.
-_BRISK_SHARE: Final = 0.75
-_RUNNING_SHARE: Final = 0.25
+BRISK_SHARE: Final = 0.75
+RUNNING_SHARE: Final = 0.25
 
 
 # Gaps and shares of the stopping distance (2, N); human speeds, ages and start delays (N,).
@@ -218,7 +218,7 @@ class SpeedGovernor:
     ) -> FloatArray:
         """Return (N,), the share of the stopping distance that can lead to each point."""
         lateral_mps = abs(robot_state.lateral_mps)
-        if abs(robot_state.speed_mps) < _STANDING_MPS and lateral_mps <= LATERAL_NOISE_MPS:
+        if abs(robot_state.speed_mps) < STANDING_MPS and lateral_mps <= LATERAL_NOISE_MPS:
             return np.ones(len(offset_odom_m))
         travel_x, travel_y = robot_state.travel_direction_odom
         x, y = offset_odom_m.T
@@ -318,7 +318,7 @@ class SpeedGovernor:
 
         No reaction time is left then. For a standing robot it is always True.
         """
-        if speed_mps < _STANDING_MPS:
+        if speed_mps < STANDING_MPS:
             return True
         needed_m = protective_separation_m(
             speed_mps,
@@ -349,12 +349,12 @@ class SpeedGovernor:
         distance_m = max(math.hypot(x, y), 1e-9)
         closing_mps = -(vx * x + vy * y) / distance_m
         walking_mps, unaware_mps = math.hypot(vx, vy), self._rules.unaware_human_speed_mps
-        if walking_mps > _BRISK_SHARE * unaware_mps:
+        if walking_mps > BRISK_SHARE * unaware_mps:
             across_mps = abs(vx * y - vy * x) / distance_m
             closing_mps = self._closing_after_turn_mps(closing_mps, across_mps, walking_mps)
         excess_mps = walking_mps - unaware_mps
         if excess_mps > 0.0:
-            running = min(excess_mps / max(_RUNNING_SHARE * unaware_mps, 1e-9), 1.0)
+            running = min(excess_mps / max(RUNNING_SHARE * unaware_mps, 1e-9), 1.0)
             runner_mps = assumed_mps + running * (walking_mps - assumed_mps)
             assumed_mps = max(assumed_mps + excess_mps, runner_mps)
         return closing_mps if closing_mps > assumed_mps else assumed_mps
@@ -368,7 +368,7 @@ class SpeedGovernor:
         and may be rounding a corner.
         """
         unaware_mps = self._rules.unaware_human_speed_mps
-        brisk = (walking_mps / max(unaware_mps, 1e-9) - _BRISK_SHARE) / (1.0 - _BRISK_SHARE)
+        brisk = (walking_mps / max(unaware_mps, 1e-9) - BRISK_SHARE) / (1.0 - BRISK_SHARE)
         turn_rad = self._people_turn_rad * min(brisk, 1.0)
         if math.atan2(across_mps, closing_mps) <= turn_rad:
             return walking_mps
@@ -379,7 +379,7 @@ def _ahead(
     offset_odom_m: FloatArray, distance_m: FloatArray, robot_state: RobotState
 ) -> FloatArray:
     """Return (N,), the cosine of each point's angle off the course, at least 0; 1 at a stand."""
-    if robot_state.travel_mps < _STANDING_MPS:
+    if robot_state.travel_mps < STANDING_MPS:
         return np.ones(len(offset_odom_m))
     along = offset_odom_m @ np.asarray(robot_state.travel_direction_odom)
     return np.asarray(np.clip(along / distance_m, 0.0, 1.0))

@@ -3,28 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
 
 from ._constraints import GovernedSpeed
 from ._governor import SpeedGovernor
-from ._memory import PersonMemory
+from ._memory import LostPerson, PersonMemory
 from ._obstacle_rules import ObstacleRules
 from ._policy import AwarenessPolicy
 from ._robot import RobotProfile, RobotState
-
-
-class LostPerson(NamedTuple):
-    """A person who was dropped although no sensor has shown that they are gone.
-
-    Attributes:
-        memory: as of the last update.
-        since_s: when they ceased to count in full.
-        limit_mps: the limit that they set then; None until it is known.
-    """
-
-    memory: PersonMemory
-    since_s: float
-    limit_mps: float | None = None
 
 
 class LostPeople:

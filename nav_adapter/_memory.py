@@ -85,6 +85,20 @@ class PersonMemory(NamedTuple):
         return self.was_confirmed and stamp_s - self.seen_stamp_s <= hold_s
 
 
+class LostPerson(NamedTuple):
+    """A person who was dropped although no sensor has shown that they are gone.
+
+    Attributes:
+        memory: as of the last update.
+        since_s: when they ceased to count in full.
+        limit_mps: the limit that they set then; None until it is known.
+    """
+
+    memory: PersonMemory
+    since_s: float
+    limit_mps: float | None = None
+
+
 def motion_at(track: PersonTrack, stamp_s: float) -> tuple[Vector2, Vector2, Vector2]:
     """Return the position (m) at the track's stamp and at ``stamp_s``, and the velocity (m/s)."""
     dt = stamp_s - track.stamp_s

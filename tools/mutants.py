@@ -42,8 +42,8 @@ class Mutant(NamedTuple):
 # fmt: off
 MUTANTS: Final = (
     # Speed and separation.
-    Mutant("brisk_share", "nav_adapter/_governor.py", "_BRISK_SHARE: Final = 0.75", "_BRISK_SHARE: Final = 0.90", _BRISK),
-    Mutant("running_share", "nav_adapter/_governor.py", "_RUNNING_SHARE: Final = 0.25", "_RUNNING_SHARE: Final = 0.50", _BRISK),
+    Mutant("brisk_share", "nav_adapter/_governor.py", "BRISK_SHARE: Final = 0.75", "BRISK_SHARE: Final = 0.90", _BRISK),
+    Mutant("running_share", "nav_adapter/_governor.py", "RUNNING_SHARE: Final = 0.25", "RUNNING_SHARE: Final = 0.50", _BRISK),
     Mutant("braking_distance", "nav_adapter/_separation.py", "v**2 / (2.0 * a)", "v**2 / (2.5 * a)", _SEPARATION),
     Mutant("human_way_while_braking", "nav_adapter/_separation.py", "v_h * (T + v / a)", "v_h * T", _SEPARATION),
     Mutant("reaction_way", "nav_adapter/_separation.py", "b = share * a * T + v_h", "b = v_h", _SEPARATION),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from ._cli import main
 from ._cost import CYCLE, cost_ms
 from ._crowd import CELLS, ORIGIN_ODOM_M, RESOLUTION_M, ROBOT, crowd, robot_at
+from ._field import field_ms
 from ._naive import paint_naively
 
 __all__ = [
@@ -15,6 +16,7 @@ __all__ = [
     "ROBOT",
     "cost_ms",
     "crowd",
+    "field_ms",
     "main",
     "paint_naively",
     "robot_at",

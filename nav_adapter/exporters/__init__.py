@@ -12,24 +12,30 @@ from ._costmap import paint_costmap
 from ._costmap_painter import CostmapPainter
 from ._horizon import PredictedPeople, predicted_circles, predicted_people
 from ._shapes import boxes, circles, points, polygons
+from ._speed_field import limited_by_at, speed_limit_at, time_cost
+from ._speed_map import SpeedMap
 from ._static import static_circles, static_half_planes, static_points, static_polygons
 from ._velocity import half_planes, velocity_obstacles
 
 __all__ = [
     "CostmapPainter",
     "PredictedPeople",
+    "SpeedMap",
     "boxes",
     "circles",
     "half_planes",
+    "limited_by_at",
     "paint_costmap",
     "people_cost",
     "points",
     "polygons",
     "predicted_circles",
     "predicted_people",
+    "speed_limit_at",
     "static_circles",
     "static_half_planes",
     "static_points",
     "static_polygons",
+    "time_cost",
     "velocity_obstacles",
 ]

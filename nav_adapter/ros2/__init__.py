@@ -26,6 +26,7 @@ from ._scan_perception import ScannerInput, scanner_inputs
 from ._scan_thread import ScanThread
 from ._scans import laser_scan_of, map_cells_of
 from ._speed_limit import SLOWEST_MPS, speed_limit
+from ._speed_mask import speed_mask
 from ._topics import PUBLISHED, READ, Topic, renamed
 from ._transforms import TransformBuffer
 
@@ -70,6 +71,7 @@ __all__ = [
     "renamed",
     "scanner_inputs",
     "speed_limit",
+    "speed_mask",
     "stop_zone",
     "teb_obstacles",
 ]

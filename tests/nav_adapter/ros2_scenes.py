@@ -21,6 +21,8 @@ STAMP_S = 1_700_000_000.25
 # Messages that rosbags does not ship, from their .msg files.
 DEFINITIONS = {
     "nav2_msgs/msg/SpeedLimit": "std_msgs/Header header\nbool percentage\nfloat64 speed_limit\n",
+    "nav2_msgs/msg/CostmapFilterInfo": "std_msgs/Header header\nuint8 type\n"
+    "string filter_mask_topic\nfloat32 base\nfloat32 multiplier\n",
     "nav2_msgs/msg/CircleObject": "std_msgs/Header header\nunique_identifier_msgs/UUID uuid\n"
     "geometry_msgs/Point32 center\nfloat32 radius\nbool fill\nint8 value\n",
     "costmap_converter_msgs/msg/ObstacleMsg": "std_msgs/Header header\n"

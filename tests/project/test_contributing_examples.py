@@ -20,6 +20,7 @@ PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 PACKAGES = ("perception", "tracking", "nav_adapter", "awarenav", "sim_tests", "examples")
 #: Files that the tests of the page import.
 HELPERS = (
+    "tests/chromium_pipe.py",
     "tests/conftest.py",
     "tests/paths.py",
     "tests/nav_adapter/conftest.py",

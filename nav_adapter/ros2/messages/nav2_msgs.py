@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .._message import Bool, Float32, Float64, Int8, Message
+from .._message import Bool, Float32, Float64, Int8, Message, String, UInt8
 from .geometry_msgs import Point32
 from .std_msgs import Header
 from .unique_identifier_msgs import UUID
@@ -29,3 +29,14 @@ class CircleObject(Message):
     radius: Float32 = 0.0
     fill: Bool = False
     value: Int8 = 0
+
+
+@dataclass(frozen=True)
+class CostmapFilterInfo(Message):
+    """The meaning of a filter mask: base + multiplier × value; type 1 is a speed in per cent."""
+
+    header: Header = Header()
+    type: UInt8 = 0
+    filter_mask_topic: String = ""
+    base: Float32 = 0.0
+    multiplier: Float32 = 0.0

@@ -1,0 +1,46 @@
+"""The basis of a speed limit: everything the adapter computed it from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from tracking import PersonTrack
+
+from ._memory import LostPerson, PersonMemory
+from ._policy import AwarenessPolicy
+from ._robot import RobotProfile
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class SpeedBasis:
+    """The basis of one speed limit, for limits at other poses and times.
+
+    It holds the adapter's own frozen objects, so that keeping it costs an update next to nothing.
+    :func:`nav_adapter.exporters.speed_limit_at` reads it.
+
+    Attributes:
+        policy: the adapter's.
+        robot: the adapter's.
+        people: who count in full, by track id.
+        lost: people who were dropped and still limit the speed, by track id.
+        tracks: the input of the update; people of other tracks are missing.
+        robot_age_s: age of the robot's state at the stamp.
+        perception_age_s: age of the latest frame at the stamp.
+        ceiling_mps: ceiling of the limit during the recovery after stale data, or None.
+    """
+
+    policy: AwarenessPolicy
+    robot: RobotProfile
+    people: Mapping[int, PersonMemory]
+    lost: Mapping[int, LostPerson]
+    tracks: tuple[PersonTrack, ...]
+    robot_age_s: float
+    perception_age_s: float
+    ceiling_mps: float | None
+
+    @property
+    def stopped(self) -> bool:
+        """True if the data are so old that the limit is 0 everywhere."""
+        oldest_s = max(self.robot_age_s, self.perception_age_s)
+        return oldest_s > self.policy.timing.stop_after_s

@@ -1,0 +1,217 @@
+"""The speed limit at hypothetical poses and times."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perception.arrays import finite_number
+
+from .._constraints import NavConstraints
+from .._errors import NavError
+from ._field import SpeedField
+from ._field_arrays import checked, is_tensor, library_of
+
+
+def speed_limit_at(
+    constraints: NavConstraints,
+    positions_odom_m: Any,
+    headings_odom_rad: Any = None,
+    *,
+    dt_s: float,
+    first_s: float = 0.0,
+    speeds_mps: Any = None,
+    yaw_rates_radps: Any = None,
+    aware_for_s: float = math.inf,
+) -> Any:
+    """Return (K, T), the speed limit in m/s at K × T poses, people moving as predicted.
+
+    It is a lower bound of the limit that ``NavAdapter.update`` will give at that time to a robot
+    that is there. All rules of the policy count, and so do lost people, the age of the data and the
+    recovery after stale data. Whatever is not given counts with its worst value:
+
+    * without headings the robot's circumscribed circle counts, and people in every direction;
+    * without speeds the robot may stand or drive in any direction, so people behind count in full;
+    * without yaw rates, a robot whose state has an age may have turned by any angle since.
+
+    The bound holds if
+
+    * people keep the velocity of their track, and those whom the latest frames show are seen as
+      now: with the same covariance, the same age of the data and at least the same awareness;
+    * people out of sight, and missing ones, are not seen again; the uncertainty of a track that
+      coasts grows with its velocity's;
+    * the tracker reports at least once per ``fresh_within_s``, and the adapter is updated as often;
+    * the robot is no faster than its maximum.
+
+    For people who stand and are seen, it is the limit itself.
+
+    With torch tensors of positions the result is a tensor with gradients, computed without a copy
+    in their precision and on their device. Other arrays are computed in single precision, and the
+    rounding error is taken off the limit.
+
+    Args:
+        constraints: of ``NavAdapter.update``.
+        positions_odom_m: (K, T, 2) of the robot's base; entry t is at ``first_s + t·dt_s`` after
+            ``constraints.stamp_s``.
+        headings_odom_rad: (K, T), or None for any.
+        dt_s: > 0, time step.
+        first_s: ≥ 0, time of the first entry.
+        speeds_mps: (K, T) signed along the heading, or (K, T, 2) forward and left, or None.
+        yaw_rates_radps: (K, T), or None.
+        aware_for_s: ≥ 0, how long after the stamp awareness counts. People are unaware from then
+            on, as they may have looked away.
+
+    Raises:
+        NavError: for an argument that is not finite, out of bounds or of a wrong shape, and for
+            constraints that do not come from ``update`` unless they stop the robot.
+    """
+    request = _Request(
+        constraints,
+        positions_odom_m,
+        headings_odom_rad,
+        dt_s,
+        first_s,
+        speeds_mps,
+        yaw_rates_radps,
+        aware_for_s,
+    )
+    return request.limits_mps()
+
+
+def limited_by_at(
+    constraints: NavConstraints,
+    positions_odom_m: Any,
+    headings_odom_rad: Any = None,
+    *,
+    dt_s: float,
+    first_s: float = 0.0,
+    speeds_mps: Any = None,
+    yaw_rates_radps: Any = None,
+    aware_for_s: float = math.inf,
+) -> NDArray[np.object_]:
+    """Return (K, T), the person and the rule that set each limit of :func:`speed_limit_at`.
+
+    The texts are those of :attr:`~nav_adapter.NavConstraints.limited_by`, such as ``"track 3: speed
+    and separation"``. The arguments and errors are those of :func:`speed_limit_at`. It takes
+    several times as long, so ask for the few poses that matter.
+    """
+    request = _Request(
+        constraints,
+        np.asarray(positions_odom_m),
+        headings_odom_rad,
+        dt_s,
+        first_s,
+        speeds_mps,
+        yaw_rates_radps,
+        aware_for_s,
+    )
+    return request.reasons()
+
+
+def time_cost(
+    constraints: NavConstraints,
+    positions_odom_m: Any,
+    headings_odom_rad: Any = None,
+    *,
+    dt_s: float,
+    first_s: float = 0.0,
+    speeds_mps: Any = None,
+    yaw_rates_radps: Any = None,
+    aware_for_s: float = math.inf,
+    slowest_mps: float = 0.05,
+) -> Any:
+    """Return (K,), the seconds that a robot takes along K trajectories at the limits there.
+
+    Each step counts with its length over the lower limit of its two ends. A robot that stands takes
+    no time, so add what remains to the goal, for example the distance over the maximum speed.
+
+    A limit below ``slowest_mps`` counts as that, so the cost is finite. With ``slowest_mps=0`` a
+    trajectory through a place where the robot must stop costs infinite time.
+
+    Args:
+        constraints: as for :func:`speed_limit_at`, like the other arguments.
+        positions_odom_m: (K, T, 2), T ≥ 2 for a cost above 0.
+        headings_odom_rad: (K, T), or None.
+        dt_s: > 0.
+        first_s: ≥ 0.
+        speeds_mps: (K, T), (K, T, 2) or None.
+        yaw_rates_radps: (K, T), or None.
+        aware_for_s: ≥ 0.
+        slowest_mps: ≥ 0, least speed that counts.
+
+    Raises:
+        NavError: as :func:`speed_limit_at`.
+    """
+    slowest = finite_number("slowest_mps", slowest_mps, NavError, minimum=0.0)
+    limits = speed_limit_at(
+        constraints,
+        positions_odom_m,
+        headings_odom_rad,
+        dt_s=dt_s,
+        first_s=first_s,
+        speeds_mps=speeds_mps,
+        yaw_rates_radps=yaw_rates_radps,
+        aware_for_s=aware_for_s,
+    )
+    if is_tensor(positions_odom_m):
+        library, positions = library_of(positions_odom_m), positions_odom_m
+        steps = positions[:, 1:] - positions[:, :-1]
+        lengths = library.sqrt((steps * steps).sum(-1))
+        slower = library.at_least(library.minimum(limits[:, 1:], limits[:, :-1]), slowest)
+        return (lengths / slower).sum(-1)
+    steps = np.diff(np.asarray(positions_odom_m, dtype=np.float64), axis=1)
+    lengths = np.hypot(steps[..., 0], steps[..., 1])
+    slower = np.maximum(np.minimum(limits[:, 1:], limits[:, :-1]), slowest)
+    seconds = np.full(lengths.shape, math.inf)
+    np.divide(lengths, slower, out=seconds, where=slower > 0.0)
+    return np.where(lengths > 0.0, seconds, 0.0).sum(axis=1)
+
+
+class _Request:
+    """Poses and times that were asked for, after a check."""
+
+    def __init__(
+        self,
+        constraints: NavConstraints,
+        positions_odom_m: Any,
+        headings_odom_rad: Any,
+        dt_s: float,
+        first_s: float,
+        speeds_mps: Any,
+        yaw_rates_radps: Any,
+        aware_for_s: float,
+    ) -> None:
+        positions = checked("positions_odom_m", positions_odom_m, ("K", "T", 2), positions_odom_m)
+        self._shape: tuple[int, int] = (int(positions.shape[0]), int(positions.shape[1]))
+        dt = finite_number("dt_s", dt_s, NavError, minimum=0.0, exclusive_minimum=True)
+        first = finite_number("first_s", first_s, NavError, minimum=0.0)
+        if not aware_for_s >= 0.0:
+            raise NavError(f"aware_for_s must be >= 0 s, got {aware_for_s!r:.80}")
+        headings = self._checked("headings_odom_rad", headings_odom_rad, positions)
+        rates = self._checked("yaw_rates_radps", yaw_rates_radps, positions)
+        times_s = first + dt * np.arange(self._shape[1], dtype=np.float64)
+        self.field = SpeedField(constraints, library_of(positions), times_s, aware_for_s)
+        velocities = self._velocities(speeds_mps, positions)
+        self.field.place(positions, headings, velocities, rates)
+
+    def limits_mps(self) -> Any:
+        return self.field.limits_mps()
+
+    def reasons(self) -> NDArray[np.object_]:
+        return self.field.reasons()
+
+    def _checked(self, name: str, values: Any, positions: Any) -> Any:
+        return None if values is None else checked(name, values, self._shape, positions)
+
+    def _velocities(self, speeds_mps: Any, positions: Any) -> tuple[Any, Any] | None:
+        """Return the speeds forward and to the left."""
+        if speeds_mps is None:
+            return None
+        if len(np.shape(speeds_mps)) == 3:
+            both = checked("speeds_mps", speeds_mps, (*self._shape, 2), positions)
+            return both[:, :, 0], both[:, :, 1]
+        forward = checked("speeds_mps", speeds_mps, self._shape, positions)
+        return forward, None
