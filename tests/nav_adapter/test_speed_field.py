@@ -289,18 +289,22 @@ def test_awareness_counts_for_as_long_as_asked() -> None:
     assert mixed[2] < mixed[1]
 
 
-def test_every_shape_of_the_poses_gives_the_same_limits() -> None:
-    rng = np.random.default_rng(1)
-    people = [
+def random_people(rng: np.random.Generator, count: int) -> list[PersonTrack]:
+    """Return people who walk anywhere; every second one is aware."""
+    return [
         person(
             track_id=index,
             position=rng.uniform(-4, 4, 2).tolist(),
             velocity=rng.uniform(-1.2, 1.2, 2).tolist(),
             awareness_lower=float(index % 2),
         )
-        for index in range(8)
+        for index in range(count)
     ]
-    now = settled_update(people, policy=AwarenessPolicy.preset("balanced"))
+
+
+def test_every_shape_of_the_poses_gives_the_same_limits() -> None:
+    rng = np.random.default_rng(1)
+    now = settled_update(random_people(rng, 8), policy=AwarenessPolicy.preset("balanced"))
     places, headings = rng.uniform(-5, 5, (300, 40, 2)), rng.uniform(-3, 3, (300, 40))
     speeds = rng.uniform(-1, 1, (300, 40))
     all_at_once = speed_limit_at(now, places, headings, dt_s=0.1, speeds_mps=speeds)
@@ -377,16 +381,7 @@ def test_the_mask_is_what_nav2_reads() -> None:
 def test_tensors_give_the_same_limits_with_gradients() -> None:
     torch: Any = pytest.importorskip("torch")
     rng = np.random.default_rng(2)
-    people = [
-        person(
-            track_id=index,
-            position=rng.uniform(-4, 4, 2).tolist(),
-            velocity=rng.uniform(-1.2, 1.2, 2).tolist(),
-            awareness_lower=float(index % 2),
-        )
-        for index in range(6)
-    ]
-    now = settled_update(people, policy=AwarenessPolicy.preset("balanced"))
+    now = settled_update(random_people(rng, 6), policy=AwarenessPolicy.preset("balanced"))
     places, headings = rng.uniform(-5, 5, (20, 12, 2)), rng.uniform(-3, 3, (20, 12))
     speeds = rng.uniform(0.2, 1, (20, 12))
     expected = speed_limit_at(now, places, headings, dt_s=0.1, speeds_mps=speeds)

@@ -38,16 +38,16 @@ def test_from_an_index(installed_from):
 
 @pytest.mark.parametrize(("editable", "option"), [(True, "-e "), (False, "")])
 def test_from_a_checkout(installed_from, editable, option):
-    installed_from({"url": "file:///home/you/my%20robot", "dir_info": {"editable": editable}})
+    installed_from({"url": "file:///srv/my%20robot", "dir_info": {"editable": editable}})
     command = install_command("sim,bench")
-    assert command == f"pip install {option}'/home/you/my robot[sim,bench]'"
-    assert shlex.split(command)[-1] == "/home/you/my robot[sim,bench]"
+    assert command == f"pip install {option}'/srv/my robot[sim,bench]'"
+    assert shlex.split(command)[-1] == "/srv/my robot[sim,bench]"
 
 
 def test_from_an_archive(installed_from):
-    installed_from({"url": "file:///tmp/awarenav-9-py3-none-any.whl", "archive_info": {}})
+    installed_from({"url": "file:///srv/awarenav-9-py3-none-any.whl", "archive_info": {}})
     assert shlex.split(install_command("ros2"))[2:] == [
-        "awarenav[ros2] @ file:///tmp/awarenav-9-py3-none-any.whl"
+        "awarenav[ros2] @ file:///srv/awarenav-9-py3-none-any.whl"
     ]
 
 

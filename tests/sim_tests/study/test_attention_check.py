@@ -1,4 +1,4 @@
-"""What people look at, measured, and the scenario's word for it checked against that."""
+"""Measured attention of people, and the check of the scenario's word for it against that."""
 
 from __future__ import annotations
 
