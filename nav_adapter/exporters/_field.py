@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -14,11 +15,17 @@ from .._constraints import NavConstraints
 from .._errors import NavError
 from ._field_arrays import ArrayLibrary
 from ._field_limits import FieldLimits
+from ._field_near import NearPoses
 from ._field_people import PeopleAhead, people_ahead
 from ._field_poses import Poses, poses_of
 
 # Numbers computed together: enough that the calls cost little, and few enough for the cache.
 _TOGETHER: Final = 20_000
+# From so many poses on it pays to find those that a person is near enough to, so many at once.
+_MANY: Final = 4_000
+_FILTERED: Final = 40_000
+# A person is left out only this much farther away than the formula says, for rounding.
+_SPARE_M: Final = 0.001
 # Rounding of positions and of limits, in units of the last place.
 _POSITION_ROUNDING: Final = 8.0
 _LIMIT_ROUNDING: Final = 32.0
@@ -59,6 +66,7 @@ class SpeedField:
         self._times_s = times_s
         self._aware_for_s = aware_for_s
         self._reach_m = reach_m
+        self._spare_m = 0.0
         self._people: list[PeopleAhead] = []
         self._poses = Poses(None, None)
         self._times_first = True
@@ -74,10 +82,10 @@ class SpeedField:
         """Place the robot at the poses (K, T, …)."""
         basis, library = self._basis, self._library
         self._times_first = positions_m.shape[1] <= positions_m.shape[0]
-        x, y = positions_m[:, :, 0], positions_m[:, :, 1]
+        x, y = (self._turned(positions_m[:, :, axis]) for axis in (0, 1))
         if basis is None or not positions_m.shape[0] * positions_m.shape[1]:
             # Nothing but the shape is needed.
-            self._basis, self._poses = None, Poses(self._inner(x), self._inner(y))
+            self._basis, self._poses = None, Poses(self._single(x), self._single(y))
             return
         low = np.array([x.min().item(), y.min().item()])
         high = np.array([x.max().item(), y.max().item()])
@@ -85,8 +93,8 @@ class SpeedField:
         self._poses = poses_of(
             library,
             basis,
-            self._inner(x - float(reference[0])),
-            self._inner(y - float(reference[1])),
+            self._single(x - float(reference[0])),
+            self._single(y - float(reference[1])),
             None if headings_rad is None else self._inner(headings_rad),
             None
             if velocities_mps is None
@@ -97,9 +105,11 @@ class SpeedField:
             None if yaw_rates_radps is None else self._inner(yaw_rates_radps),
         )
 
+        self._spare_m = self._reach_m + _largest(self._poses.driven_m)
+
         def is_near(places_m: FloatArray, within_m: float) -> bool:
-            off_m = places_m - np.clip(places_m, low, high)
-            return bool(np.hypot(off_m[:, 0], off_m[:, 1]).min() <= within_m + self._reach_m)
+            off_m = np.maximum(np.maximum(low - places_m, places_m - high), 0.0)
+            return bool(np.hypot(off_m[:, 0], off_m[:, 1]).min() <= within_m + self._spare_m)
 
         people = people_ahead(
             basis,
@@ -114,21 +124,26 @@ class SpeedField:
         if library.is_torch:
             extent_m += float(np.abs(reference).max())
         rounding_m = _POSITION_ROUNDING * library.rounding * extent_m
+        self._spare_m += _SPARE_M + 4.0 * rounding_m
         self._rules = FieldLimits(library, basis, rounding_m, self._reach_m)
 
     def limits_mps(self) -> Any:
         """Return the limits (K, T)."""
         library, maximum_mps = self._library, self._maximum_mps
-        lowest = 0.0 * self._poses.x + 2.0 * maximum_mps
+        # A little above the maximum, which remains the limit after the rounding is taken off.
+        lowest = 0.0 * self._poses.x + 1.001 * maximum_mps
         if self._basis is not None:
             assert self._rules is not None
-            for part, poses, people in self._parts():
-                for limit in self._rules.of(people, poses).values():
-                    least = library.lowest(limit)
-                    if library.is_torch:  # all poses, and nothing in place for the gradients
-                        lowest = library.minimum(lowest, least)
-                    else:
-                        np.minimum(lowest[part], least, out=lowest[part])
+            if lowest.size >= _MANY and not library.is_torch:
+                self._lower_where_near(lowest)
+            else:
+                for part, poses, people in self._parts():
+                    for limit in self._rules.of(people, poses).values():
+                        least = library.lowest(limit)
+                        if library.is_torch:  # all poses, and nothing in place for the gradients
+                            lowest = library.minimum(lowest, least)
+                        else:
+                            np.minimum(lowest[part], least, out=lowest[part])
             lowest = (1.0 - _LIMIT_ROUNDING * library.rounding) * lowest
         lowest = self._lowered(library.minimum(lowest, library.convert(maximum_mps)))
         result = lowest.T if self._times_first else lowest
@@ -160,6 +175,25 @@ class SpeedField:
             texts[...] = "stale data"
         return np.ascontiguousarray(texts.T if self._times_first else texts)
 
+    def _lower_where_near(self, lowest_mps: Any) -> None:
+        """Lower the limits so far, one person after the other, where that person is near enough.
+
+        Most people are too far from most poses to allow less than somebody else does.
+        """
+        assert self._rules is not None
+        rows, columns = lowest_mps.shape
+        width = min(columns, _FILTERED)
+        height = max(1, _FILTERED // width)
+        for top in range(0, rows, height):
+            for left in range(0, columns, width):
+                part = slice(top, top + height), slice(left, left + width)
+                poses = self._poses.mapped(partial(_contiguous, part))
+                lowest = np.ascontiguousarray(lowest_mps[part])
+                near = NearPoses(poses, lowest, self._spare_m)
+                for people in self._people:
+                    near.lower(self._rules, people.mapped(_cut_column(part)))
+                lowest_mps[part] = lowest
+
     @property
     def _maximum_mps(self) -> float:
         basis = self._constraints.speed_basis
@@ -183,11 +217,16 @@ class SpeedField:
         return limits_mps
 
     def _inner(self, values: Any) -> Any:
+        """Return values (K, T) as the rules compute with them."""
+        return self._single(self._turned(values))
+
+    def _turned(self, values: Any) -> Any:
         """Return values (K, T) with the longer axis last, so that rows are long."""
         values = values.T if self._times_first else values
-        if self._library.is_torch:
-            return values
-        return np.ascontiguousarray(values, dtype=np.float32)
+        return values if self._library.is_torch else np.ascontiguousarray(values)
+
+    def _single(self, values: Any) -> Any:
+        return values if self._library.is_torch else values.astype(np.float32)
 
     def _column(self, values: FloatArray) -> Any:
         """Return numbers (N, T) or (N, 1) as they broadcast with people and poses."""
@@ -207,6 +246,14 @@ class SpeedField:
                 for left in range(0, columns, width):
                     part = slice(top, top + height), slice(left, left + width)
                     yield part, self._poses.mapped(_cut(part)), people.mapped(_cut_column(part))
+
+
+def _contiguous(part: tuple[slice, slice], values: Any) -> Any:
+    return np.ascontiguousarray(values[part]) if values.ndim else values
+
+
+def _largest(values: Any) -> float:
+    return values if isinstance(values, float) else float(values.max())
 
 
 def _cut(part: tuple[slice, slice]) -> Callable[[Any], Any]:

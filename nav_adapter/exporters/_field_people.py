@@ -22,6 +22,28 @@ _SAME_AGE_S: Final = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
+class Reach:
+    """The distance between a robot and a person from which on the person allows it a speed.
+
+    It is a polynomial of the speed in m/s: an upper bound for all rules of the policy, for every
+    direction of robot and person, and for every time.
+
+    Attributes:
+        fixed_m: the part that does not depend on the speed.
+        linear_s: the factor of the speed.
+        square_s2pm: the factor of its square.
+    """
+
+    fixed_m: float
+    linear_s: float
+    square_s2pm: float
+
+    def distance_m(self, speed_mps: float) -> float:
+        """Return the distance for a speed."""
+        return self.fixed_m + speed_mps * (self.linear_s + speed_mps * self.square_s2pm)
+
+
+@dataclass(frozen=True, slots=True)
 class PeopleAhead:
     """Some people at T times, all of whom need the same terms.
 
@@ -43,6 +65,7 @@ class PeopleAhead:
         start_delay_s: of people who stand, or None for people who walk at once.
         reserved: whether the start reserve can make a difference.
         lost_mps: limit that lost people allow at least, or None.
+        reaches: of the N people.
     """
 
     track_ids: tuple[int, ...]
@@ -59,6 +82,7 @@ class PeopleAhead:
     start_delay_s: Any
     reserved: bool
     lost_mps: Any
+    reaches: tuple[Reach, ...]
 
     def mapped(self, change: Callable[[Any], Any]) -> PeopleAhead:
         """Return the people with ``change`` applied to each of their arrays."""
@@ -111,7 +135,7 @@ def people_ahead(
         is_near: whether a person at one of the places (M, 2) may limit a pose, given the distance
             between the centres from which on they do not.
     """
-    groups: dict[tuple[bool, ...], list[_Person]] = {}
+    groups: dict[tuple[bool, ...], list[tuple[_Person, Reach]]] = {}
     reserve = basis.policy.rules.start_reserve
     unaware_mps = basis.policy.speed.human_speed_mps(0.0)
     shown = {track.id: track for track in basis.tracks}
@@ -120,7 +144,8 @@ def people_ahead(
         is_shown = lost_mps is None and shown.get(track_id) is memory.track
         person = _person(basis.policy, track_id, memory, stamp_s, times_s, aware_for_s, is_shown)
         places_m = np.concatenate([person.place_m, person.track_place_m])
-        if not is_near(places_m, _free_m(basis, person, unaware_mps)):
+        reach = _reach(basis, person, unaware_mps)
+        if not is_near(places_m, reach.distance_m(basis.robot.max_speed_mps)):
             continue
         if lost_mps is not None:
             person = replace(person, lost_mps=lost_mps)
@@ -136,7 +161,7 @@ def people_ahead(
             math.isfinite(person.start_delay_s),
             lost_mps is not None,
         )
-        groups.setdefault(key, []).append(person)
+        groups.setdefault(key, []).append((person, reach))
     return [
         _group(group, basis.robot.reaction_time_s, reference_m, *key)
         for key, group in groups.items()
@@ -144,7 +169,7 @@ def people_ahead(
 
 
 def _group(
-    people: list[_Person],
+    group: list[tuple[_Person, Reach]],
     reaction_s: float,
     reference_m: FloatArray,
     is_aged: bool,
@@ -156,6 +181,7 @@ def _group(
     def constant(values: list[float]) -> FloatArray:
         return np.array(values)[:, None]
 
+    people = [person for person, _ in group]
     place_m = np.stack([each.place_m for each in people]) - reference_m
     track_m = np.stack([each.track_place_m for each in people]) - reference_m
     turns_rad = constant([each.turn_rad for each in people])
@@ -167,16 +193,22 @@ def _group(
         y=place_m[:, :, 1],
         track_x=track_m[:, :, 0] if is_aged else None,
         track_y=track_m[:, :, 1] if is_aged else None,
-        margin_m=np.stack([each.margin_m for each in people]),
-        reaction_s=reaction_s + np.stack([each.age_s for each in people]),
-        human_mps=np.stack([each.human_mps for each in people]),
+        margin_m=_short(np.stack([each.margin_m for each in people])),
+        reaction_s=_short(reaction_s + np.stack([each.age_s for each in people])),
+        human_mps=_short(np.stack([each.human_mps for each in people])),
         velocity_x_mps=velocity_mps[:, :1] if has_direction else None,
         velocity_y_mps=velocity_mps[:, 1:] if has_direction else None,
         turn=(np.cos(turns_rad), np.sin(turns_rad)) if turns else None,
         start_delay_s=constant([each.start_delay_s for each in people]) if stands else None,
         reserved=reserved,
         lost_mps=np.stack([np.asarray(each.lost_mps) for each in people]) if is_lost else None,
+        reaches=tuple(reach for _, reach in group),
     )
+
+
+def _short(values: FloatArray) -> FloatArray:
+    """Return numbers (N, T) as (N, 1) if they are the same at all times."""
+    return values[:, :1] if bool((values == values[:, :1]).all()) else values
 
 
 def _lost(
@@ -235,7 +267,8 @@ def _person(
             until_s = np.minimum(stamp_s + times_s, track.stamp_s + timing.stop_after_s)
         later_m = np.array([position_sigma_m(track, until) for until in until_s.tolist()])
         sigma_m = np.maximum(sigma_m, later_m)
-    human_mps = np.where(times_s > aware_for_s, np.maximum(human_mps, unaware_mps), human_mps)
+    if aware_for_s < times_s[-1]:
+        human_mps = np.where(times_s > aware_for_s, np.maximum(human_mps, unaware_mps), human_mps)
     walking_mps = math.hypot(*memory.velocity_odom_mps)
     turn_rad = 0.0
     if rules.protective_field is None:
@@ -275,19 +308,19 @@ def _with_excess_mps(assumed_mps: FloatArray, walking_mps: float, unaware_mps: f
     return np.asarray(np.maximum(assumed_mps + excess_mps, runner_mps))
 
 
-def _free_m(basis: SpeedBasis, person: _Person, unaware_mps: float) -> float:
-    """Return the distance of robot and person from which on the person limits nothing."""
+def _reach(basis: SpeedBasis, person: _Person, unaware_mps: float) -> Reach:
+    """Return the distance from which on a person allows the robot a speed."""
     policy, robot = basis.policy, basis.robot
-    rules, top_mps = policy.rules, robot.max_speed_mps
+    rules, a = policy.rules, robot.max_deceleration_mps2
     human_mps = max(float(person.human_mps.max()), person.walking_mps, unaware_mps)
     reaction_s = robot.reaction_time_s + float(person.age_s.max())
-    braking_m = 0.5 * top_mps**2 / robot.max_deceleration_mps2
-    stop_s = reaction_s + top_mps / robot.max_deceleration_mps2
-    needed_m = human_mps * stop_s + top_mps * reaction_s + braking_m
-    needed_m += policy.margins.separation_clearance_m
+    fixed_m = policy.margins.separation_clearance_m + human_mps * reaction_s
+    linear_s = human_mps / a + reaction_s
     if rules.zones is not None:
-        needed_m = max(needed_m, rules.zones.full_speed_beyond_m)
+        span_m = rules.zones.full_speed_beyond_m - rules.zones.stop_within_m
+        fixed_m = max(fixed_m, rules.zones.stop_within_m)
+        linear_s = max(linear_s, span_m / robot.max_speed_mps)
     if rules.near_cap is not None:
-        needed_m = max(needed_m, rules.near_cap.within_m + braking_m)
-    driven_m = top_mps * basis.robot_age_s
-    return needed_m + robot.circumscribed_radius_m + float(person.margin_m.max()) + driven_m
+        fixed_m = max(fixed_m, rules.near_cap.within_m)
+    body_m = robot.circumscribed_radius_m + float(person.margin_m.max())
+    return Reach(fixed_m + body_m, linear_s, 0.5 / a)

@@ -409,3 +409,34 @@ def test_tensors_give_the_same_limits_with_gradients() -> None:
     assert cost.detach().numpy() == pytest.approx(expected_s, rel=1e-3)
     with pytest.raises(NavError, match="finite"):
         speed_limit_at(now, torch.full((1, 1, 2), float("nan")), dt_s=0.1)
+
+
+@settings(max_examples=25)
+@given(scene=scenes(), seed=st.integers(0, 2**32 - 1), known=st.integers(0, 3))
+def test_many_poses_give_the_limits_of_few_to_the_last_bit(
+    scene: Scene, seed: int, known: int
+) -> None:
+    # With many poses, each person is computed only where they may allow less than others do.
+    with np.errstate(over="ignore"):
+        now, _ = drive(scene)
+    rng, shape = np.random.default_rng(seed), (50, 82)
+    places = rng.normal(0.0, 4.0, (*shape, 2))
+    # The same extent of all parts gives the same rounding.
+    places[:, 0], places[:, 1] = places.min(axis=(0, 1)), places.max(axis=(0, 1))
+    top = scene.robot.max_speed_mps
+    everything = {
+        "headings_odom_rad": rng.uniform(-3.0, 3.0, shape),
+        "speeds_mps": rng.uniform(-top, top, shape),
+        "yaw_rates_radps": rng.uniform(-1.0, 1.0, shape),
+    }
+    told = dict(list(everything.items())[:known])
+    times = {"dt_s": 0.05, "aware_for_s": 2.0}
+    at_once = speed_limit_at(now, places, **told, **times)
+    for start in range(0, 50, 25):
+        part = slice(start, start + 25)
+        some = {name: values[part] for name, values in told.items()}
+        expected = speed_limit_at(now, places[part], **some, **times)
+        if known == 0:
+            assert (at_once[part] == expected).all()
+        else:
+            assert at_once[part] == pytest.approx(expected, rel=1e-6, abs=1e-6)
