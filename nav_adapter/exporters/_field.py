@@ -134,7 +134,7 @@ class SpeedField:
         lowest = 0.0 * self._poses.x + 1.001 * maximum_mps
         if self._basis is not None:
             assert self._rules is not None
-            if lowest.size >= _MANY and not library.is_torch:
+            if not library.is_torch and lowest.size >= _MANY:
                 self._lower_where_near(lowest)
             else:
                 for part, poses, people in self._parts():
