@@ -326,7 +326,7 @@ class NavAdapter:
             fastest_point_limit_mps=limit.fastest_point_mps,
             robot=self._robot,
             speed_basis=SpeedBasis(
-                *(self._policy, self._robot, people, lost, current),
+                *(self._policy, people, lost, current),
                 *(robot_age_s, perception_age_s, ceiling_mps),
             ),
         )

@@ -9,7 +9,6 @@ from tracking import PersonTrack
 
 from ._memory import LostPerson, PersonMemory
 from ._policy import AwarenessPolicy
-from ._robot import RobotProfile
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -17,11 +16,10 @@ class SpeedBasis:
     """The basis of one speed limit, for limits at other poses and times.
 
     It holds the adapter's own frozen objects, so that keeping it costs an update next to nothing.
-    :func:`nav_adapter.exporters.speed_limit_at` reads it.
+    :func:`nav_adapter.exporters.speed_limit_at` reads it, and the robot of the constraints.
 
     Attributes:
         policy: the adapter's.
-        robot: the adapter's.
         people: who count in full, by track id.
         lost: people who were dropped and still limit the speed, by track id.
         tracks: the input of the update; people of other tracks are missing.
@@ -31,7 +29,6 @@ class SpeedBasis:
     """
 
     policy: AwarenessPolicy
-    robot: RobotProfile
     people: Mapping[int, PersonMemory]
     lost: Mapping[int, LostPerson]
     tracks: tuple[PersonTrack, ...]

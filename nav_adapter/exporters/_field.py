@@ -55,13 +55,14 @@ class SpeedField:
     ) -> None:
         if not isinstance(constraints, NavConstraints):
             raise NavError(f"constraints must be NavConstraints, got {type(constraints).__name__}")
-        basis = constraints.speed_basis
-        if basis is None and constraints.speed_limit_mps > 0.0:
+        basis, robot = constraints.speed_basis, constraints.robot
+        if (basis is None or robot is None) and constraints.speed_limit_mps > 0.0:
             raise NavError(
                 "constraints must come from NavAdapter.update, got some without speed_basis"
             )
         self._constraints = constraints
-        self._basis = basis
+        self._basis = None if robot is None else basis
+        self._maximum_mps = 0.0 if basis is None or robot is None else robot.max_speed_mps
         self._library = library
         self._times_s = times_s
         self._aware_for_s = aware_for_s
@@ -80,10 +81,10 @@ class SpeedField:
         yaw_rates_radps: Any = None,
     ) -> None:
         """Place the robot at the poses (K, T, …)."""
-        basis, library = self._basis, self._library
+        basis, robot, library = self._basis, self._constraints.robot, self._library
         self._times_first = positions_m.shape[1] <= positions_m.shape[0]
         x, y = (self._turned(positions_m[:, :, axis]) for axis in (0, 1))
-        if basis is None or not positions_m.shape[0] * positions_m.shape[1]:
+        if basis is None or robot is None or not positions_m.shape[0] * positions_m.shape[1]:
             # Nothing but the shape is needed.
             self._basis, self._poses = None, Poses(self._single(x), self._single(y))
             return
@@ -93,6 +94,7 @@ class SpeedField:
         self._poses = poses_of(
             library,
             basis,
+            robot,
             self._single(x - float(reference[0])),
             self._single(y - float(reference[1])),
             None if headings_rad is None else self._inner(headings_rad),
@@ -113,6 +115,7 @@ class SpeedField:
 
         people = people_ahead(
             basis,
+            robot,
             self._constraints.stamp_s,
             self._times_s,
             self._aware_for_s,
@@ -125,7 +128,7 @@ class SpeedField:
             extent_m += float(np.abs(reference).max())
         rounding_m = _POSITION_ROUNDING * library.rounding * extent_m
         self._spare_m += _SPARE_M + 4.0 * rounding_m
-        self._rules = FieldLimits(library, basis, rounding_m, self._reach_m)
+        self._rules = FieldLimits(library, basis.policy, robot, rounding_m, self._reach_m)
 
     def limits_mps(self) -> Any:
         """Return the limits (K, T)."""
@@ -194,20 +197,15 @@ class SpeedField:
                     near.lower(self._rules, people.mapped(_cut_column(part)))
                 lowest_mps[part] = lowest
 
-    @property
-    def _maximum_mps(self) -> float:
-        basis = self._constraints.speed_basis
-        return 0.0 if basis is None else basis.robot.max_speed_mps
-
     def _lowered(self, limits_mps: Any) -> Any:
         """Return the limits after the recovery from stale data, and what stops the robot."""
-        basis, library = self._basis, self._library
-        if basis is None:
+        basis, robot, library = self._basis, self._constraints.robot, self._library
+        if basis is None or robot is None:
             return limits_mps
         if basis.stopped:
             return 0.0 * limits_mps
         if basis.ceiling_mps is not None:
-            rise_mps2 = 0.0 if self._constraints.stale else basis.robot.max_acceleration_mps2
+            rise_mps2 = 0.0 if self._constraints.stale else robot.max_acceleration_mps2
             ceilings_mps = basis.ceiling_mps + rise_mps2 * self._times_s
             ceilings_mps = (1.0 - _LIMIT_ROUNDING * library.rounding) * ceilings_mps
             ceilings = self._column(ceilings_mps[None, :])[0]

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from .._speed_basis import SpeedBasis
+from .._policy import AwarenessPolicy
+from .._robot import RobotProfile
 from ._field_arrays import ArrayLibrary
 from ._field_people import PeopleAhead
 from ._field_poses import FootprintGaps, Poses
@@ -24,21 +25,27 @@ class FieldLimits:
 
     Args:
         library: of the arrays.
-        basis: policy and robot.
+        policy: the adapter's.
+        robot: likewise.
         rounding_m: taken off every gap, for rounding.
         reach_m: the limits hold for every position within this distance of the poses' own.
     """
 
     def __init__(
-        self, library: ArrayLibrary, basis: SpeedBasis, rounding_m: float, reach_m: float = 0.0
+        self,
+        library: ArrayLibrary,
+        policy: AwarenessPolicy,
+        robot: RobotProfile,
+        rounding_m: float,
+        reach_m: float = 0.0,
     ) -> None:
         self._library = library
-        self._rules = basis.policy.rules
-        self._clearance_m = basis.policy.margins.separation_clearance_m
-        self._unaware_mps = basis.policy.speed.human_speed_mps(0.0)
-        self._braking_mps2 = basis.robot.max_deceleration_mps2
-        self._maximum_mps = basis.robot.max_speed_mps
-        self._footprint = FootprintGaps(basis)
+        self._rules = policy.rules
+        self._clearance_m = policy.margins.separation_clearance_m
+        self._unaware_mps = policy.speed.human_speed_mps(0.0)
+        self._braking_mps2 = robot.max_deceleration_mps2
+        self._maximum_mps = robot.max_speed_mps
+        self._footprint = FootprintGaps(robot)
         self._circle_m: Final = self._footprint.radius_m + rounding_m + reach_m
         self._rounding_m = rounding_m
         self._reach_m = reach_m

@@ -15,6 +15,7 @@ from perception.arrays import FloatArray
 from .._governor import BRISK_SHARE, RUNNING_SHARE
 from .._memory import ROUNDING_S, PersonMemory, position_sigma_m
 from .._policy import AwarenessPolicy
+from .._robot import RobotProfile
 from .._speed_basis import SpeedBasis
 
 # A sighting that is nearly too old for trust counts as too old: stamps are rounded.
@@ -118,6 +119,7 @@ class _Person:
 
 def people_ahead(
     basis: SpeedBasis,
+    robot: RobotProfile,
     stamp_s: float,
     times_s: FloatArray,
     aware_for_s: float,
@@ -128,6 +130,7 @@ def people_ahead(
 
     Args:
         basis: of the constraints.
+        robot: likewise.
         stamp_s: of the constraints.
         times_s: (T,) after the stamp.
         aware_for_s: how long awareness counts.
@@ -144,8 +147,8 @@ def people_ahead(
         is_shown = lost_mps is None and shown.get(track_id) is memory.track
         person = _person(basis.policy, track_id, memory, stamp_s, times_s, aware_for_s, is_shown)
         places_m = np.concatenate([person.place_m, person.track_place_m])
-        reach = _reach(basis, person, unaware_mps)
-        if not is_near(places_m, reach.distance_m(basis.robot.max_speed_mps)):
+        reach = _reach(basis.policy, robot, person, unaware_mps)
+        if not is_near(places_m, reach.distance_m(robot.max_speed_mps)):
             continue
         if lost_mps is not None:
             person = replace(person, lost_mps=lost_mps)
@@ -163,8 +166,7 @@ def people_ahead(
         )
         groups.setdefault(key, []).append((person, reach))
     return [
-        _group(group, basis.robot.reaction_time_s, reference_m, *key)
-        for key, group in groups.items()
+        _group(group, robot.reaction_time_s, reference_m, *key) for key, group in groups.items()
     ]
 
 
@@ -308,9 +310,10 @@ def _with_excess_mps(assumed_mps: FloatArray, walking_mps: float, unaware_mps: f
     return np.asarray(np.maximum(assumed_mps + excess_mps, runner_mps))
 
 
-def _reach(basis: SpeedBasis, person: _Person, unaware_mps: float) -> Reach:
+def _reach(
+    policy: AwarenessPolicy, robot: RobotProfile, person: _Person, unaware_mps: float
+) -> Reach:
     """Return the distance from which on a person allows the robot a speed."""
-    policy, robot = basis.policy, basis.robot
     rules, a = policy.rules, robot.max_deceleration_mps2
     human_mps = max(float(person.human_mps.max()), person.walking_mps, unaware_mps)
     reaction_s = robot.reaction_time_s + float(person.age_s.max())

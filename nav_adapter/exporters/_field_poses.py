@@ -12,7 +12,7 @@ from shapely.geometry import MultiPoint
 from shapely.geometry.polygon import orient
 
 from .._governor import STANDING_MPS
-from .._robot import LATERAL_NOISE_MPS
+from .._robot import LATERAL_NOISE_MPS, RobotProfile
 from .._speed_basis import SpeedBasis
 from ._field_arrays import ArrayLibrary
 
@@ -73,6 +73,7 @@ class Poses:
 def poses_of(
     library: ArrayLibrary,
     basis: SpeedBasis,
+    robot: RobotProfile,
     x: Any,
     y: Any,
     headings_rad: Any,
@@ -83,14 +84,15 @@ def poses_of(
 
     Args:
         library: of the arrays.
-        basis: the robot and the age of its state.
+        basis: the policy, and the age of the robot's state.
+        robot: of the constraints.
         x: relative to the reference point, in metres.
         y: the same.
         headings_rad: in the odom frame, or None for any.
         velocities_base_mps: forward and left, or None for any.
         yaw_rates_radps: or None for any.
     """
-    robot, age_s = basis.robot, basis.robot_age_s
+    age_s = basis.robot_age_s
     heading = (
         None if headings_rad is None else (library.cos(headings_rad), library.sin(headings_rad))
     )
@@ -121,7 +123,7 @@ def poses_of(
             library.where(slips, forward_mps / travel_mps, travel[0]),
             library.where(slips, left_mps / travel_mps, 0.0 * one),
         )
-    turn = _turn(library, basis, velocities_base_mps, travel_mps, slips, yaw_rates_radps)
+    turn = _turn(library, basis, robot, velocities_base_mps, travel_mps, slips, yaw_rates_radps)
     stands = _unless_none(travel_mps < STANDING_MPS)
     return Poses(x, y, heading, travel, turn, stands, driven_m, sideways)
 
@@ -129,13 +131,14 @@ def poses_of(
 def _turn(
     library: ArrayLibrary,
     basis: SpeedBasis,
+    robot: RobotProfile,
     velocities_base_mps: tuple[Any, Any],
     travel_mps: Any,
     slips: Any,
     yaw_rates_radps: Any,
 ) -> tuple[Any, Any]:
     """Return cosine and sine of the largest turn while the robot stops; −1 and 0 for any turn."""
-    robot, age_s = basis.robot, basis.robot_age_s
+    age_s = basis.robot_age_s
     forward_mps, left_mps = velocities_base_mps
     one = library.convert(1.0)
     turn_rad: Any = math.radians(basis.policy.rules.turn_within_stop_deg)
@@ -176,11 +179,11 @@ class FootprintGaps:
     """Distances from a robot's footprint, for arrays of poses.
 
     Args:
-        basis: with the robot.
+        robot: with the footprint.
     """
 
-    def __init__(self, basis: SpeedBasis) -> None:
-        hull = orient(MultiPoint(basis.robot.footprint_m).convex_hull, 1.0)
+    def __init__(self, robot: RobotProfile) -> None:
+        hull = orient(MultiPoint(robot.footprint_m).convex_hull, 1.0)
         corners = np.asarray(hull.exterior.coords)[:-1]
         self._corners: Final[list[list[float]]] = corners.tolist()
         low, high = corners.min(axis=0), corners.max(axis=0)
@@ -188,7 +191,7 @@ class FootprintGaps:
         self._middle: Final[list[float]] = (0.5 * (low + high)).tolist()
         self._half: Final[list[float]] = (0.5 * (high - low)).tolist()
         self._is_rectangle: Final = bool(upright) and len(corners) == 4
-        self.radius_m: Final = basis.robot.circumscribed_radius_m
+        self.radius_m: Final = robot.circumscribed_radius_m
 
     def distance_m(self, library: ArrayLibrary, forward_m: Any, left_m: Any) -> Any:
         """Return the distance of points in the base frame from the footprint, 0 inside."""

@@ -68,7 +68,7 @@ def speed_limit_at(
         NavError: for an argument that is not finite, out of bounds or of a wrong shape, and for
             constraints that do not come from ``update`` unless they stop the robot.
     """
-    request = _Request(
+    field = _placed(
         constraints,
         positions_odom_m,
         headings_odom_rad,
@@ -78,7 +78,7 @@ def speed_limit_at(
         yaw_rates_radps,
         aware_for_s,
     )
-    return request.limits_mps()
+    return field.limits_mps()
 
 
 def limited_by_at(
@@ -98,7 +98,7 @@ def limited_by_at(
     and separation"``. The arguments and errors are those of :func:`speed_limit_at`. It takes
     several times as long, so ask for the few poses that matter.
     """
-    request = _Request(
+    field = _placed(
         constraints,
         np.asarray(positions_odom_m),
         headings_odom_rad,
@@ -108,7 +108,7 @@ def limited_by_at(
         yaw_rates_radps,
         aware_for_s,
     )
-    return request.reasons()
+    return field.reasons()
 
 
 def time_cost(
@@ -170,48 +170,36 @@ def time_cost(
     return np.where(lengths > 0.0, seconds, 0.0).sum(axis=1)
 
 
-class _Request:
-    """Poses and times that were asked for, after a check."""
+def _placed(
+    constraints: NavConstraints,
+    positions_odom_m: Any,
+    headings_odom_rad: Any,
+    dt_s: float,
+    first_s: float,
+    speeds_mps: Any,
+    yaw_rates_radps: Any,
+    aware_for_s: float,
+) -> SpeedField:
+    """Return the field with the robot at the poses, after a check of all arguments."""
+    positions = checked("positions_odom_m", positions_odom_m, ("K", "T", 2), positions_odom_m)
+    shape: tuple[int, int] = (int(positions.shape[0]), int(positions.shape[1]))
+    dt = finite_number("dt_s", dt_s, NavError, minimum=0.0, exclusive_minimum=True)
+    first = finite_number("first_s", first_s, NavError, minimum=0.0)
+    if not aware_for_s >= 0.0:
+        raise NavError(f"aware_for_s must be >= 0 s, got {aware_for_s!r:.80}")
 
-    def __init__(
-        self,
-        constraints: NavConstraints,
-        positions_odom_m: Any,
-        headings_odom_rad: Any,
-        dt_s: float,
-        first_s: float,
-        speeds_mps: Any,
-        yaw_rates_radps: Any,
-        aware_for_s: float,
-    ) -> None:
-        positions = checked("positions_odom_m", positions_odom_m, ("K", "T", 2), positions_odom_m)
-        self._shape: tuple[int, int] = (int(positions.shape[0]), int(positions.shape[1]))
-        dt = finite_number("dt_s", dt_s, NavError, minimum=0.0, exclusive_minimum=True)
-        first = finite_number("first_s", first_s, NavError, minimum=0.0)
-        if not aware_for_s >= 0.0:
-            raise NavError(f"aware_for_s must be >= 0 s, got {aware_for_s!r:.80}")
-        headings = self._checked("headings_odom_rad", headings_odom_rad, positions)
-        rates = self._checked("yaw_rates_radps", yaw_rates_radps, positions)
-        times_s = first + dt * np.arange(self._shape[1], dtype=np.float64)
-        self.field = SpeedField(constraints, library_of(positions), times_s, aware_for_s)
-        velocities = self._velocities(speeds_mps, positions)
-        self.field.place(positions, headings, velocities, rates)
+    def of_shape(name: str, values: Any, *more: int) -> Any:
+        return None if values is None else checked(name, values, (*shape, *more), positions)
 
-    def limits_mps(self) -> Any:
-        return self.field.limits_mps()
-
-    def reasons(self) -> NDArray[np.object_]:
-        return self.field.reasons()
-
-    def _checked(self, name: str, values: Any, positions: Any) -> Any:
-        return None if values is None else checked(name, values, self._shape, positions)
-
-    def _velocities(self, speeds_mps: Any, positions: Any) -> tuple[Any, Any] | None:
-        """Return the speeds forward and to the left."""
-        if speeds_mps is None:
-            return None
-        if len(np.shape(speeds_mps)) == 3:
-            both = checked("speeds_mps", speeds_mps, (*self._shape, 2), positions)
-            return both[:, :, 0], both[:, :, 1]
-        forward = checked("speeds_mps", speeds_mps, self._shape, positions)
-        return forward, None
+    headings = of_shape("headings_odom_rad", headings_odom_rad)
+    rates = of_shape("yaw_rates_radps", yaw_rates_radps)
+    times_s = first + dt * np.arange(shape[1], dtype=np.float64)
+    field = SpeedField(constraints, library_of(positions), times_s, aware_for_s)
+    velocities = None  # forward and to the left
+    if len(np.shape(speeds_mps)) == 3:
+        both = of_shape("speeds_mps", speeds_mps, 2)
+        velocities = both[:, :, 0], both[:, :, 1]
+    elif speeds_mps is not None:
+        velocities = of_shape("speeds_mps", speeds_mps), None
+    field.place(positions, headings, velocities, rates)
+    return field

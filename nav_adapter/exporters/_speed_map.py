@@ -107,8 +107,8 @@ class SpeedMap:
                 f"a map must have 1 to {_LARGEST_CELLS} cells, got {side} x {side} "
                 f"(size_m {size:g}, resolution_m {cell:g})"
             )
-        basis = constraints.speed_basis
-        if basis is None:
+        robot = constraints.robot
+        if constraints.speed_basis is None or robot is None:
             raise NavError(
                 "constraints must come from NavAdapter.update, got some without speed_basis"
             )
@@ -118,7 +118,7 @@ class SpeedMap:
         positions[:, :, 0] = origin[0] + along
         positions[:, :, 1] = (origin[1] + along)[:, None]
         positions = positions.reshape(-1, 1, 2)
-        limits = np.full(side * side, basis.robot.max_speed_mps)
+        limits = np.full(side * side, robot.max_speed_mps)
         for time_s in times:
             field = SpeedField(
                 constraints,
@@ -133,6 +133,6 @@ class SpeedMap:
             constraints.stamp_s,
             origin,
             cell,
-            basis.robot.max_speed_mps,
+            robot.max_speed_mps,
             limits.reshape(side, side),
         )
