@@ -134,12 +134,13 @@ def highest_speed_mps(
     if has_spare.shape != denominator.shape:
         has_spare = np.broadcast_to(has_spare, np.broadcast(denominator, spare).shape)
     # A product too small for a float makes the denominator 0; the speed is then 0 too.
-    speed: FloatArray = np.divide(
-        2.0 * a * spare,
-        denominator,
-        out=np.where(has_spare & (share == 0.0), np.inf, 0.0),
-        where=has_spare & (denominator > 0.0),
-    )
+    with np.errstate(over="ignore"):  # a share of 0 and a speed of nearly 0: infinite too
+        speed: FloatArray = np.divide(
+            2.0 * a * spare,
+            denominator,
+            out=np.where(has_spare & (share == 0.0), np.inf, 0.0),
+            where=has_spare & (denominator > 0.0),
+        )
     return speed
 
 

@@ -40,6 +40,12 @@ def test_a_separation_too_small_for_a_float_gives_a_limit_of_0() -> None:
     assert limit == 0.0
 
 
+def test_a_human_speed_too_small_to_divide_by_gives_no_limit_and_no_warning() -> None:
+    settings = {"deceleration_mps2": 1.0, "reaction_time_s": 0.3, "clearance_m": 0.1}
+    assert max_speed_mps(3.0, 5e-324, approach=0.0, **settings) == np.inf
+    assert max_speed_mps(3.0, 1e-6, approach=0.0, **settings) == pytest.approx(2.9e6)
+
+
 @given(separation=finite(0.0, 30.0), human=finite(0.0, 3.0), **SETTINGS)
 def test_speed_is_the_root_of_the_protective_separation(
     separation: float,
