@@ -19,6 +19,9 @@ from .errors import PerceptionError
 # Numbers of coefficients that OpenCV accepts: plumb_bob has 5, rational_polynomial 8.
 _DISTORTION_SIZES: Final = (4, 5, 8, 12, 14)
 _DISTORTION_MODELS: Final = ("plumb_bob", "rational_polynomial")
+# Intrinsics beyond these are errors of whoever sent them, and products with them may overflow.
+_SHORTEST_PX: Final = 1e-6
+_LONGEST_PX: Final = 1e9
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,10 +34,10 @@ class Camera:
     Attributes:
         width_px: image width, > 0.
         height_px: image height, > 0.
-        fx_px: focal length along u, > 0.
-        fy_px: focal length along v, > 0.
-        cx_px: principal point, u.
-        cy_px: principal point, v.
+        fx_px: focal length along u, 1e-6 to 1e9.
+        fy_px: focal length along v, likewise.
+        cx_px: principal point, u, −1e9 to 1e9.
+        cy_px: principal point, v, likewise.
         distortion: OpenCV's coefficients k1, k2, p1, p2, k3, … (4, 5, 8, 12 or 14), or None.
     """
 
@@ -62,11 +65,13 @@ class Camera:
             self,
             **size,
             distortion=distortion,
-            cx_px=finite_number("cx_px", self.cx_px),
-            cy_px=finite_number("cy_px", self.cy_px),
             **{
-                name: finite_number(name, getattr(self, name), minimum=0.0, exclusive_minimum=True)
-                for name in ("fx_px", "fy_px")
+                name: finite_number(name, getattr(self, name), minimum=low, maximum=_LONGEST_PX)
+                for low, names in (
+                    (-_LONGEST_PX, ("cx_px", "cy_px")),
+                    (_SHORTEST_PX, ("fx_px", "fy_px")),
+                )
+                for name in names
             },
         )
 

@@ -123,6 +123,9 @@ def test_a_missing_file_is_refused_by_name(tmp_path):
     ("change", "message"),
     [
         ({"fx_px": 0.0}, "fx_px"),
+        ({"fy_px": 5e-324}, r"fy_px must lie in \[1e-06, 1e\+09\], got 4.94066e-324"),
+        ({"fx_px": 1e300}, "fx_px"),
+        ({"cx_px": -1e300}, "cx_px"),
         ({"fy_px": math.nan}, "fy_px"),
         ({"width_px": 0}, "width_px"),
         ({"height_px": 10.5}, "height_px"),
