@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +29,8 @@ def atomic_path(path: Path, error: type[AwarenavError] = AwarenavError) -> Itera
     except OSError as cause:
         raise error(f"cannot write {path}: {cause.strerror or cause}") from cause
     finally:
-        part.unlink(missing_ok=True)
+        with suppress(NotADirectoryError):  # a parent is a file, so there is nothing to remove
+            part.unlink(missing_ok=True)
 
 
 def write_text(path: Path, text: str, error: type[AwarenavError] = AwarenavError) -> None:
