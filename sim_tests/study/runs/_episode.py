@@ -90,14 +90,9 @@ def failed(job: Job, error: str, traceback: str = "") -> Attempt:
         return Attempt(replace(record, fault=job.fault_name, error=_error_text(error)), traceback)
     template = template_of(job.scenario)
     record = EpisodeRecord(
-        scenario=key.scenario,
-        seed=key.seed,
-        policy=key.policy,
-        planner=key.planner,
-        perception=key.perception,
+        **key._asdict(),
         scenario_version=template.version,
         attention=template.attention,
-        fault=key.fault,
         error=_error_text(error),
     )
     return Attempt(record, traceback)

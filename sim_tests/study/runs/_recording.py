@@ -28,15 +28,7 @@ def recorder_of(
         on_begin: as for :class:`~sim_tests.viewing.CrossingRecorder`.
         on_state: likewise.
     """
-    key = job_key(job)
-    episode = Episode(
-        scenario=key.scenario,
-        seed=key.seed,
-        policy=key.policy,
-        planner=key.planner,
-        perception=key.perception,
-        fault=key.fault,
-    )
+    episode = Episode(**job_key(job)._asdict())
     scaled = Perception.named(job.perception).kind == "pixels"
     pictures = CameraPictures(boxes_are_scaled=scaled, share=share) if camera else None
     return CrossingRecorder(episode, pictures=pictures, on_begin=on_begin, on_state=on_state)
