@@ -15,11 +15,13 @@ from typing import TYPE_CHECKING, Final, NoReturn
 
 from nav_adapter import NavError
 from nav_adapter.ros2 import (
+    MASK_TOPICS,
     PUBLISHED,
     READ,
     AwarenessBridge,
     Frames,
     RobotFile,
+    SpeedMaskSettings,
     Topic,
     renamed,
     scanner_inputs,
@@ -87,6 +89,9 @@ class BridgeOptions:
     topic: tuple[str, ...]
     only: tuple[str, ...]
     percentage: bool
+    speed_mask: float | None
+    speed_mask_size: float
+    speed_mask_resolution: float
     bag: Path | None
     record: Path | None
     rerun: Path | None
@@ -100,7 +105,10 @@ def bridge_command(options: BridgeOptions) -> int:
     robot = RobotFile.from_yaml(options.robot)
     policy = read_policy(options.policy)
     camera = None if options.camera is None else Camera.from_yaml(options.camera)
-    published = _published_topics(options.topic, options.only)
+    published = _published_topics(
+        options.topic, options.only, with_mask=options.speed_mask is not None
+    )
+    mask = _speed_mask(options, published)
     inputs = _inputs(options, robot)
     map_cells = _map_cells(options)
     scanners = scanner_inputs([topic.name for topic in inputs.scans], robot)
@@ -137,6 +145,7 @@ def bridge_command(options: BridgeOptions) -> int:
                 with_depth=inputs.depth is not None,
                 scanners=scanners,
                 percentage=options.percentage,
+                speed_mask=mask,
                 warn=_log,
                 wanted=publisher.wants,
                 make_pipeline=_pipeline_maker(networks, pose_estimator, cone),
@@ -288,24 +297,43 @@ def _interrupt(number: int, frame: FrameType | None) -> NoReturn:
     raise KeyboardInterrupt
 
 
-def _published_topics(renames: Sequence[str], only: Sequence[str]) -> dict[str, Topic]:
+def _speed_mask(options: BridgeOptions, published: Mapping[str, Topic]) -> SpeedMaskSettings | None:
+    """Return the settings of the speed mask, None without ``--speed-mask``."""
+    if options.speed_mask is None:
+        return None
+    if "speed_mask" not in published:
+        raise AwarenavError("--speed-mask needs --only speed_mask too, or no --only")
+    return SpeedMaskSettings(
+        options.speed_mask,
+        options.speed_mask_size,
+        options.speed_mask_resolution,
+        f"/{published['speed_mask'].name}",
+    )
+
+
+def _published_topics(
+    renames: Sequence[str], only: Sequence[str], *, with_mask: bool
+) -> dict[str, Topic]:
     """Return the topics to publish by key, renamed and selected as the options say."""
-    topics = dict(PUBLISHED)
+    topics = {**PUBLISHED, **MASK_TOPICS}
     for rename in renames:
         key, equals, name = rename.partition("=")
         if not equals or key not in topics:
             raise AwarenavError(
-                f"--topic must be KEY=TOPIC with a key of {', '.join(PUBLISHED)}, got {rename!r}"
+                f"--topic must be KEY=TOPIC with a key of {', '.join(topics)}, got {rename!r}"
             )
         topics[key] = renamed(topics[key], name)
     for key in only:
         if key not in topics:
-            raise AwarenavError(f"--only must name some of {', '.join(PUBLISHED)}, got {key!r}")
+            raise AwarenavError(f"--only must name some of {', '.join(topics)}, got {key!r}")
+        if key in MASK_TOPICS and not with_mask:
+            raise AwarenavError(f"--only {key} needs --speed-mask HZ")
     names = [topic.name for topic in topics.values()]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise NavError(f"two kinds of messages cannot share a topic, got {twice!r} twice")
-    return {key: topic for key, topic in topics.items() if not only or key in only}
+    chosen = only or (topics if with_mask else PUBLISHED)
+    return {key: topic for key, topic in topics.items() if key in chosen}
 
 
 def _is_file(map_option: str | None) -> bool:

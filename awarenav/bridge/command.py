@@ -137,13 +137,38 @@ _LOG: Final = "Recordings"
     show_default="all",
     metavar="KEY...",
     help="Publish only these: speed_limit collision_polygons stop_zone grid circles obstacles "
-    "people detections markers alerts.",
+    "people detections markers alerts; with --speed-mask also speed_mask speed_mask_info.",
 )
 @option(
     "--percentage",
     group=_WRITE,
     is_flag=True,
     help="Send the speed limit in per cent of the robot's maximum speed, not in m/s.",
+)
+@option(
+    "--speed-mask",
+    group=_WRITE,
+    type=NUMBER,
+    show_default="no mask",
+    metavar="HZ",
+    help="Publish the speed limit around the robot at this rate, as the mask of Nav2's speed "
+    "filter, 0.1 to 50. docs/nav2.md says how to set up the filter.",
+)
+@option(
+    "--speed-mask-size",
+    group=_WRITE,
+    type=NUMBER,
+    default=10.0,
+    metavar="M",
+    help="Side of the mask's square around the robot.",
+)
+@option(
+    "--speed-mask-resolution",
+    group=_WRITE,
+    type=NUMBER,
+    default=0.1,
+    metavar="M",
+    help="Side of the mask's cells.",
 )
 @option(
     "--record",

@@ -17,6 +17,7 @@ from ._grid import occupancy_grid
 from ._image_perception import PerceivedFrame
 from ._images import camera_of, depth_of, picture_of
 from ._markers import markers
+from ._mask_stream import SpeedMaskSettings
 from ._outgoing import Frames, outgoing
 from ._people import circle_objects, detections, people, teb_obstacles
 from ._perception_thread import PerceptionThread
@@ -27,7 +28,7 @@ from ._scan_thread import ScanThread
 from ._scans import laser_scan_of, map_cells_of
 from ._speed_limit import SLOWEST_MPS, speed_limit
 from ._speed_mask import speed_mask
-from ._topics import PUBLISHED, READ, Topic, renamed
+from ._topics import MASK_TOPICS, PUBLISHED, READ, Topic, renamed
 from ._transforms import TransformBuffer
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     from ._mcap import McapRecorder
 
 __all__ = [
+    "MASK_TOPICS",
     "PUBLISHED",
     "READ",
     "SLOWEST_MPS",
@@ -51,6 +53,7 @@ __all__ = [
     "ScanThread",
     "ScannerInput",
     "ScannerMount",
+    "SpeedMaskSettings",
     "Topic",
     "TransformBuffer",
     "alerts",

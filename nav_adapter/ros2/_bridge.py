@@ -22,6 +22,7 @@ from ._clock import BridgeClock
 from ._depth_reader import DepthReader
 from ._guard import guarded_update, stopped
 from ._image_perception import ImagePerception, PerceivedFrame
+from ._mask_stream import SpeedMaskSettings
 from ._outgoing import Frames, Sender
 from ._pose_reader import PoseReader
 from ._poses import RobotPoses
@@ -76,6 +77,7 @@ class AwarenessBridge:
         scanners: the laser scanners.
         make_detector: makes the leg detector, if there are scanners.
         percentage: as in :func:`speed_limit`.
+        speed_mask: of Nav2's speed filter; None for no mask.
         warn: called with each problem; a repeated text is passed on only once.
         wanted: called with the key of a topic in every tick; unwanted messages are not made.
     """
@@ -95,12 +97,13 @@ class AwarenessBridge:
         scanners: Sequence[ScannerInput] = (),
         make_detector: Callable[[], LegDetector] = LegDetector,
         percentage: bool = False,
+        speed_mask: SpeedMaskSettings | None = None,
         warn: Callable[[str], None] = lambda text: None,
         wanted: Callable[[str], bool] = lambda key: True,
     ) -> None:
         self.frames = frames or Frames()
         self._policy, self._robot = policy, robot
-        self._sender = Sender(publish, robot, self.frames, percentage=percentage)
+        self._sender = Sender(publish, robot, self.frames, percentage=percentage, mask=speed_mask)
         self._with_camera = with_camera
         self._wanted = wanted
         self._warn_user, self._warned = warn, ""

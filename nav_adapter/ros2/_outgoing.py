@@ -12,6 +12,7 @@ from .._robot import RobotProfile, RobotState
 from ._alerts import alerts
 from ._grid import occupancy_grid
 from ._markers import markers
+from ._mask_stream import SpeedMaskSettings, SpeedMaskStream
 from ._people import circle_objects, detections, people, teb_obstacles
 from ._polygons import collision_polygons, stop_zone
 from ._speed_limit import speed_limit
@@ -91,6 +92,7 @@ class Sender:
         robot: its profile.
         frames: names of the frames.
         percentage: as in :func:`speed_limit`.
+        mask: settings of the speed mask; None for no mask.
     """
 
     def __init__(
@@ -100,9 +102,11 @@ class Sender:
         frames: Frames,
         *,
         percentage: bool,
+        mask: SpeedMaskSettings | None = None,
     ) -> None:
         self._publish, self._robot = publish, robot
         self._frames, self._percentage = frames, percentage
+        self._mask = None if mask is None else SpeedMaskStream(mask, frames.odom)
 
     def send(
         self,
@@ -126,3 +130,6 @@ class Sender:
             sensors=sensors,
         ):
             self._publish(key, message)
+        if self._mask is not None:
+            for key, message in self._mask.messages(constraints, state, wanted):
+                self._publish(key, message)

@@ -11,7 +11,7 @@ from .messages import Message
 from .messages.costmap_converter_msgs import ObstacleArrayMsg
 from .messages.diagnostic_msgs import DiagnosticArray
 from .messages.geometry_msgs import PolygonInstanceStamped, PolygonStamped
-from .messages.nav2_msgs import CircleObject, SpeedLimit
+from .messages.nav2_msgs import CircleObject, CostmapFilterInfo, SpeedLimit
 from .messages.nav_msgs import OccupancyGrid, Odometry
 from .messages.people_msgs import People
 from .messages.sensor_msgs import CameraInfo, CompressedImage, Image, LaserScan
@@ -56,6 +56,16 @@ PUBLISHED: Final = MappingProxyType(
         "markers": Topic("awarenav/markers", MarkerArray, depth=1),
         # Each alert is in one message only, so the depth covers two seconds and more.
         "alerts": Topic("awarenav/alerts", DiagnosticArray, depth=64),
+    }
+)
+
+#: The topics of the speed mask, which the bridge publishes if it is asked to, by key.
+MASK_TOPICS: Final = MappingProxyType(
+    {
+        "speed_mask": Topic("awarenav/speed_mask", OccupancyGrid, transient_local=True, depth=1),
+        "speed_mask_info": Topic(
+            "awarenav/speed_mask_info", CostmapFilterInfo, transient_local=True, depth=1
+        ),
     }
 )
 

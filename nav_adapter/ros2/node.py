@@ -7,7 +7,9 @@ laser scanners, 0 to 2), ``use_camera`` (true), ``use_map`` (false), ``compresse
 ``depth`` (false; whether the camera has depth images),
 ``percentage`` (false), ``detector_file`` and ``pose_file`` (ONNX; by default the shipped networks),
 ``allow_simulator_networks`` (false; the shipped networks have seen renders only, and are refused
-without it), ``odom_frame``, ``base_frame``, ``camera_frame``. Topics are renamed by ROS's
+without it), ``odom_frame``, ``base_frame``, ``camera_frame``; for Nav2's speed filter
+``speed_mask_hz`` (0.0; masks per second, 0 for none), ``speed_mask_size_m`` (10.0) and
+``speed_mask_resolution_m`` (0.1). Topics are renamed by ROS's
 remapping. The module can be imported without ROS; the node then raises an error that says what is
 missing.
 """
@@ -18,7 +20,7 @@ import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from perception import (
     AwarenessPipeline,
@@ -39,12 +41,13 @@ from perception.shipped import (
 from .._errors import NavError
 from .._policy import AwarenessPolicy
 from ._bridge import AwarenessBridge
+from ._mask_stream import SpeedMaskSettings
 from ._outgoing import Frames
 from ._perception_thread import PerceptionThread
 from ._robot_file import RobotFile
 from ._scan_perception import scanner_inputs
 from ._scan_thread import ScanThread
-from ._topics import PUBLISHED, READ, Topic
+from ._topics import MASK_TOPICS, PUBLISHED, READ, Topic
 from .conversions import from_ros, ros_class, to_ros
 from .messages import Message, ros_type
 from .messages.nav_msgs import OccupancyGrid, Odometry
@@ -59,6 +62,8 @@ try:
 except ImportError:  # AwarenessNode says what is missing
     rclpy = None
     Node = object
+
+_TOPICS: Final = {**PUBLISHED, **MASK_TOPICS}
 
 
 class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
@@ -99,6 +104,7 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
             ),
             T_base_camera=None if robot.camera is None else robot.camera.T_base_camera(),
             percentage=self._parameter("percentage", False),
+            speed_mask=self._speed_mask(),
             make_pipeline=_pipelines(
                 self._parameter("detector_file", ""),
                 self._parameter("pose_file", ""),
@@ -173,7 +179,7 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
     def _wanted(self, key: str) -> bool:
         publisher = self._publishers_by_key.get(key)
         return publisher is not None and (
-            PUBLISHED[key].transient_local or publisher.get_subscription_count() > 0
+            _TOPICS[key].transient_local or publisher.get_subscription_count() > 0
         )
 
     def _advertise(self, key: str, topic: Topic) -> None:
@@ -185,6 +191,19 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
             self.get_logger().warning(f"{ros_type(topic.message)}: {problem}; not published")
             return
         self._publishers_by_key[key] = self.create_publisher(kind, topic.name, _qos(topic))
+
+    def _speed_mask(self) -> SpeedMaskSettings | None:
+        """Advertise the speed mask if it is asked for, and return its settings."""
+        rate_hz = self._parameter("speed_mask_hz", 0.0)
+        size_m = self._parameter("speed_mask_size_m", 10.0)
+        resolution_m = self._parameter("speed_mask_resolution_m", 0.1)
+        if rate_hz == 0.0:
+            return None
+        for key, topic in MASK_TOPICS.items():
+            self._advertise(key, topic)
+        # Its name after remapping.
+        name = self._publishers_by_key["speed_mask"].topic_name
+        return SpeedMaskSettings(rate_hz, size_m, resolution_m, name)
 
     def _scan_topics(self, count: Any) -> tuple[Topic, ...]:
         known = (READ["scan"], READ["scan_2"])

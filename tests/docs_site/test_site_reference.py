@@ -15,7 +15,7 @@ pytest.importorskip("pybullet", reason="the reference covers scenarios (extra si
 sys.path.insert(0, str(ROOT))
 
 from awarenav.cli import app
-from nav_adapter.ros2 import PUBLISHED, READ
+from nav_adapter.ros2 import MASK_TOPICS, PUBLISHED, READ
 from sim_tests.study.measures import METRICS, RECORD_COLUMNS, SHARES
 from tools.docs_site import reference
 from tools.docs_site.api_pages import PACKAGES
@@ -91,7 +91,8 @@ def test_every_metric_column_and_topic_is_listed() -> None:
     assert {*RECORD_COLUMNS, *METRICS, *SHARES} <= metrics.keys()
     assert metrics["time_lost_s"][0] == "s"
     topics = rows_of("reference/topics.md")
-    assert {f"/{each.name}" for each in (*PUBLISHED.values(), *READ.values())} == topics.keys()
+    known = (*PUBLISHED.values(), *MASK_TOPICS.values(), *READ.values())
+    assert {f"/{each.name}" for each in known} == topics.keys()
     assert topics["/speed_limit"] == ["`nav2_msgs/SpeedLimit`", "reliable", "volatile", "10"]
 
 

@@ -21,7 +21,7 @@ from scan_scenes import scan_message
 from test_ros2_bridge import INFO, image, odometry
 
 from nav_adapter import NavError
-from nav_adapter.ros2 import PUBLISHED, READ, RobotFile, ScannerMount, node
+from nav_adapter.ros2 import MASK_TOPICS, PUBLISHED, READ, RobotFile, ScannerMount, node
 from nav_adapter.ros2.conversions import to_ros
 
 PATIENCE_S = 20.0
@@ -47,7 +47,11 @@ class StandInNode:
         return SimpleNamespace(now=lambda: SimpleNamespace(nanoseconds=time.time_ns()))
 
     def create_publisher(self, kind: Any, name: str, qos: Any) -> Any:
-        return SimpleNamespace(publish=self.sent[name].append, get_subscription_count=lambda: 1)
+        return SimpleNamespace(
+            publish=self.sent[name].append,
+            get_subscription_count=lambda: 1,
+            topic_name=f"/robot_1/{name}",
+        )
 
     def create_subscription(self, kind: Any, name: str, callback: Any, qos: Any) -> None:
         self.callbacks[name] = callback
@@ -157,6 +161,34 @@ def test_the_node_reads_a_map_and_tf_beside_fixed_mounts(
         assert set(ros_node.callbacks) == {"odom", "scan", "scan_2", "map", "tf", "tf_static"}
     finally:
         ros_node.stop()
+
+
+def test_the_node_publishes_the_speed_mask_if_it_is_asked_to(
+    node_module: Any, two_scanners: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for rate_hz, count in ((0.0, 0), (2.0, 1)):
+        monkeypatch.setitem(StandInNode.parameters, "speed_mask_hz", rate_hz)
+        ros_node = node_module.AwarenessNode()
+        try:
+            end = time.monotonic() + PATIENCE_S
+            while ros_node._bridge.counts["scans"] < 4 and time.monotonic() < end:
+                for key, message in (
+                    ("odom", odometry(time.time(), speed=0.0)),
+                    ("scan", scan_message(time.time())),
+                    ("scan_2", scan_message(time.time())),
+                ):
+                    ros_node.callbacks[READ[key].name](
+                        to_ros(message, lambda kind: SimpleNamespace)
+                    )
+                time.sleep(0.02)
+            ros_node.timer()
+            infos = ros_node.sent[MASK_TOPICS["speed_mask_info"].name]
+            assert len(infos) == count
+            assert len(ros_node.sent[MASK_TOPICS["speed_mask"].name]) == count
+            if infos:  # as remapped
+                assert infos[0].filter_mask_topic == "/robot_1/awarenav/speed_mask"
+        finally:
+            ros_node.stop()
 
 
 def test_the_node_publishes_while_perception_is_busy(node_module: Any) -> None:

@@ -8,7 +8,7 @@ from typing import Final
 
 import griffe
 
-from nav_adapter.ros2 import PUBLISHED, READ, Topic
+from nav_adapter.ros2 import MASK_TOPICS, PUBLISHED, READ, Topic
 from nav_adapter.ros2.messages import ros_type
 from sim_tests.study.measures import METRICS, RECORD_COLUMNS, SHARES, EpisodeRecord, Metric
 
@@ -54,6 +54,8 @@ def topics_page() -> str:
             _TOPICS,
             "## Published",
             _topic_table(PUBLISHED.values()),
+            "## Published with `--speed-mask`",
+            _topic_table(MASK_TOPICS.values()),
             "## Read",
             _topic_table(READ.values()) + "\n",
         ]

@@ -263,6 +263,12 @@ def test_the_loop_waits_while_messages_come_that_it_does_not_need(domain: int) -
         (["--robot", str(ROBOT), "--topic", "speed=x"], "--topic must be KEY=TOPIC"),
         (["--robot", str(ROBOT), "--topic", "people=speed_limit"], "share a topic"),
         (["--robot", str(ROBOT), "--only", "speed"], "--only must name some of"),
+        (["--robot", str(ROBOT), "--only", "speed_mask"], "--only speed_mask needs --speed-mask"),
+        (
+            ["--robot", str(ROBOT), "--speed-mask", "2", "--only", "people"],
+            "--speed-mask needs --only speed_mask too",
+        ),
+        (["--robot", str(ROBOT), "--speed-mask", "0"], "the speed mask's rate_hz"),
         (["--robot", str(ROBOT), "--image", "a b"], "a topic must consist of"),
         (["--robot", str(ROBOT), "--record", "nowhere/run.mcap"], "cannot write nowhere"),
         (["--robot", str(ROBOT), "--camera", "nowhere.yaml"], "cannot read nowhere.yaml"),

@@ -116,6 +116,29 @@ def test_a_recording_gives_the_people_and_limits_of_its_time(
     assert outputs[0].read_bytes() == outputs[1].read_bytes()
 
 
+def test_a_replay_has_the_speed_mask_at_its_rate(tmp_path: Path, robot_file: Path) -> None:
+    bag, out = recorded(tmp_path / "bag", messages()), tmp_path / "mask.mcap"
+    arguments = ["bridge", "--robot", str(robot_file), "--scan", "scan", "--no-camera"]
+    arguments += ["--bag", str(bag), "--record", str(out), "--topic", "speed_mask=robot_1/mask"]
+    arguments += ["--only", "speed_limit", "--only", "speed_mask", "--only", "speed_mask_info"]
+    sizes = ["--speed-mask-size", "6", "--speed-mask-resolution", "0.2"]
+    assert main([*arguments, "--speed-mask", "4", *sizes]) == 0
+    found = published(out)
+    (info,) = [each for _, topic, each in found if topic == "/awarenav/speed_mask_info"]
+    assert (info.filter_mask_topic, info.type) == ("/robot_1/mask", 1)
+    masks = [(at, each) for at, topic, each in found if topic == "/robot_1/mask"]
+    stamps = np.array([at for at, _ in masks])
+    assert 8 <= len(stamps) <= 12
+    np.testing.assert_allclose(np.diff(stamps), 0.25, atol=1e-6)
+    values = np.asarray(masks[-1][1].data, np.int8).reshape(30, 30)
+    x, y = (round((each + 3.0) / 0.2) for each in PERSON)
+    assert values[y, x] == 1  # a stop where the person stands
+    limit = [each.speed_limit for _, topic, each in found if topic == "/speed_limit"][-1]
+    # The cell of the robot holds for every heading, and until the next mask.
+    assert 1 < values[15, 15] <= 100.0 * limit / RobotFile.from_yaml(robot_file).max_speed_mps
+    assert values[0, 0] == 0  # far from the person: no limit
+
+
 def test_what_a_map_file_holds_is_nobody(
     tmp_path: Path, robot_file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
