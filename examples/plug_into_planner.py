@@ -54,7 +54,8 @@ def main() -> None:
         state = RobotState(stamp_s, np.zeros(2), 0.0, 0.5, 0.0)
         tracks = tracker.update(observed(stamp_s), stamp_s, T_ODOM_CAMERA)
         constraints = adapter.update(tracks, state, stamp_s, perception_stamp_s=stamp_s)
-        # Your planner goes here: obstacles as x, y, vx, vy, r and a speed limit.
+        # Your planner goes here: obstacles as x, y, vx, vy, r and a speed limit. A circle may
+        # contain the robot already: docs/planners.md, "Inside a circle".
         for x, y, vx, vy, radius in circles(constraints):
             print(
                 f"{stamp_s:4.1f} s  person at ({x:5.2f}, {y:5.2f}) m moving "

@@ -2,7 +2,8 @@
 
 Each form has one pure function of :class:`nav_adapter.NavConstraints`; only :class:`CostmapPainter`
 keeps state. The ``static_…`` functions give racks and walls in the forms that people have.
-``docs/planners.md`` says which planner reads which form.
+``docs/planners.md`` says which planner reads which form, and what to do with a robot that is inside
+an obstacle already ("Inside a circle").
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ def people_cost(
 
     * g > 0: ``near_cost``·exp(−g / ``decay_m``), which is smooth.
     * g ≤ 0: ``inside_cost``·(1 + depth in metres), which rises with depth, so that samples that
-      are all inside still show the way out.
+      are all inside still show the way out (``docs/planners.md``, "Inside a circle").
 
     The costs of all people are summed.
 

@@ -39,6 +39,9 @@ def paint_costmap(
     An obstacle that the policy stretches along the person's motion is painted as its polygon. Near
     the polygon's corners distances are too small rather than too large.
 
+    The robot may be inside an obstacle. All cells around it are then lethal, and a planner finds no
+    way out (``docs/planners.md``, "Inside a circle").
+
     The default r_i = 0 is for a planner that checks the robot's footprint, or a map that is
     inflated afterwards. To remove people again, see :class:`CostmapPainter`.
 

@@ -44,6 +44,9 @@ def predicted_circles(
     People are predicted with their present velocity. Their radius grows by ``growth_mps``, since
     they may move otherwise.
 
+    A circle may contain the robot. A solver needs a slack on its distance then, or it has no
+    solution (``docs/planners.md``, "Inside a circle").
+
     Some controllers need a fixed number of obstacles. With ``slots`` the first axis has that
     length: first the people whose circles come nearest to the robot within the times, nearest
     first, then circles of radius 0 at a distance of 100 m. ``speed_limit_mps`` takes all people

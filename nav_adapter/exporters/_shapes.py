@@ -49,6 +49,10 @@ def points(constraints: NavConstraints, spacing_m: float) -> FloatArray:
     Neighbours along an outline, the last and the first included, are at most ``spacing_m`` apart.
     Every outline has at least 8 points.
 
+    An outline may lie around the robot, since obstacles grow at once when awareness falls. A
+    planner that cannot cross points then stops. One that can read :func:`circles` knows the way out
+    (``docs/planners.md``, "Inside a circle").
+
     Raises:
         NavError: for a ``spacing_m`` that is not finite or below 1 mm.
     """
@@ -70,7 +74,10 @@ def points(constraints: NavConstraints, spacing_m: float) -> FloatArray:
 
 
 def polygons(constraints: NavConstraints) -> tuple[Polygon, ...]:
-    """Return shapely polygons, each of which contains its obstacle's circle."""
+    """Return shapely polygons, each of which contains its obstacle's circle.
+
+    A polygon may contain the robot (``docs/planners.md``, "Inside a circle").
+    """
     return tuple(obstacle.polygon for obstacle in constraints.obstacles)
 
 
@@ -79,6 +86,8 @@ def boxes(constraints: NavConstraints) -> FloatArray:
 
     Each is the box around the obstacle's outline, on the floor (z = 0) and turned to the direction
     of the person's velocity (yaw 0 for a standing person). Size x is along the yaw direction.
+
+    A box may contain the robot (``docs/planners.md``, "Inside a circle").
     """
     outlines = stretched_outlines(constraints)
     rows = []

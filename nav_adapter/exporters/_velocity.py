@@ -32,7 +32,7 @@ def half_planes(
     collision avoidance"), with n of length 1. With a ``share`` of 1, a disc-shaped robot that keeps
     an allowed velocity touches no obstacle within the horizon, as long as people keep their
     velocity. If the robot is inside an obstacle already, allowed velocities bring it out within
-    ``resolve_s``.
+    ``resolve_s`` (``docs/planners.md``, "Inside a circle").
 
     ORCA has no acceleration limit, so a drive that cannot follow at once is not covered. The rows
     may contradict each other in a crowd; the robot should stop then.
@@ -104,7 +104,8 @@ def velocity_obstacles(
 
     The columns are apex (the person's velocity, m/s, odom), left leg x, y and right leg x, y. A
     velocity leads into the person at some time if and only if it lies between the legs. For a robot
-    inside an obstacle, the legs are at right angles to the direction of its centre.
+    inside an obstacle, the legs are at right angles to the direction of its centre: velocities that
+    lead nearer to it lie between them (``docs/planners.md``, "Inside a circle").
 
     Args:
         constraints: the people.
