@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, Final
@@ -109,9 +110,13 @@ class SpeedField:
 
         self._spare_m = self._reach_m + _largest(self._poses.driven_m)
 
-        def is_near(places_m: FloatArray, within_m: float) -> bool:
-            off_m = np.maximum(np.maximum(low - places_m, places_m - high), 0.0)
-            return bool(np.hypot(off_m[:, 0], off_m[:, 1]).min() <= within_m + self._spare_m)
+        (low_x, low_y), (high_x, high_y) = low.tolist(), high.tolist()
+
+        def is_near(corner_m: FloatArray, other_m: FloatArray, within_m: float) -> bool:
+            (x, y), (other_x, other_y) = corner_m.tolist(), other_m.tolist()
+            off_x = max(min(x, other_x) - high_x, low_x - max(x, other_x), 0.0)
+            off_y = max(min(y, other_y) - high_y, low_y - max(y, other_y), 0.0)
+            return math.hypot(off_x, off_y) <= within_m + self._spare_m
 
         people = people_ahead(
             basis,

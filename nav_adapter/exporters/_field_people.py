@@ -102,14 +102,17 @@ _ARRAYS: Final = (
 
 @dataclass(frozen=True, slots=True)
 class _Person:
-    """One person at T times, before people are put into groups."""
+    """One person at T times, before people are put into groups.
+
+    A number stands for one that is the same at all times.
+    """
 
     track_id: int
     place_m: FloatArray
     track_place_m: FloatArray
-    margin_m: FloatArray
-    age_s: FloatArray
-    human_mps: FloatArray
+    margin_m: float | FloatArray
+    age_s: float | FloatArray
+    human_mps: float | FloatArray
     walking_mps: float
     velocity_mps: tuple[float, float]
     turn_rad: float
@@ -124,7 +127,7 @@ def people_ahead(
     times_s: FloatArray,
     aware_for_s: float,
     reference_m: FloatArray,
-    is_near: Callable[[FloatArray, float], bool],
+    is_near: Callable[[FloatArray, FloatArray, float], bool],
 ) -> list[PeopleAhead]:
     """Return the people who may limit the speed, in groups.
 
@@ -135,8 +138,8 @@ def people_ahead(
         times_s: (T,) after the stamp.
         aware_for_s: how long awareness counts.
         reference_m: (2,) the point that positions are relative to.
-        is_near: whether a person at one of the places (M, 2) may limit a pose, given the distance
-            between the centres from which on they do not.
+        is_near: whether a person in a box, given by two corners (2,), may limit a pose, given the
+            distance between the centres from which on they do not.
     """
     groups: dict[tuple[bool, ...], list[tuple[_Person, Reach]]] = {}
     reserve = basis.policy.rules.start_reserve
@@ -146,27 +149,33 @@ def people_ahead(
     for track_id, memory, lost_mps in (*everyone, *_lost(basis, stamp_s, times_s)):
         is_shown = lost_mps is None and shown.get(track_id) is memory.track
         person = _person(basis.policy, track_id, memory, stamp_s, times_s, aware_for_s, is_shown)
-        places_m = np.concatenate([person.place_m, person.track_place_m])
         reach = _reach(basis.policy, robot, person, unaware_mps)
-        if not is_near(places_m, reach.distance_m(robot.max_speed_mps)):
+        free_m = reach.distance_m(robot.max_speed_mps)
+        is_aged = person.place_m is not person.track_place_m
+        # People move straight on, so that the ends hold all places between them.
+        if not is_near(person.place_m[0], person.place_m[-1], free_m) and not (
+            is_aged and is_near(person.track_place_m[0], person.track_place_m[-1], free_m)
+        ):
             continue
         if lost_mps is not None:
             person = replace(person, lost_mps=lost_mps)
-        is_slow = bool((person.human_mps < unaware_mps).any())
-        reserved = reserve is not None and (is_slow or math.isfinite(person.start_delay_s))
-        counts = basis.policy.rules.protective_field is None and (
-            person.walking_mps > float(person.human_mps.min())
+        least_mps = _extreme(np.min, person.human_mps)
+        reserved = reserve is not None and (
+            least_mps < unaware_mps or math.isfinite(person.start_delay_s)
         )
+        counts = basis.policy.rules.protective_field is None and (person.walking_mps > least_mps)
         key = (
-            bool((person.place_m != person.track_place_m).any()),
+            is_aged,
             counts or (reserved and person.walking_mps > 0.0),
             reserved,
             math.isfinite(person.start_delay_s),
             lost_mps is not None,
         )
         groups.setdefault(key, []).append((person, reach))
+    # Those who need the most terms come last, when they lower the limit of few poses.
     return [
-        _group(group, robot.reaction_time_s, reference_m, *key) for key, group in groups.items()
+        _group(group, robot.reaction_time_s, reference_m, *key)
+        for key, group in sorted(groups.items(), key=lambda each: sum(each[0]))
     ]
 
 
@@ -195,9 +204,9 @@ def _group(
         y=place_m[:, :, 1],
         track_x=track_m[:, :, 0] if is_aged else None,
         track_y=track_m[:, :, 1] if is_aged else None,
-        margin_m=_short(np.stack([each.margin_m for each in people])),
-        reaction_s=_short(reaction_s + np.stack([each.age_s for each in people])),
-        human_mps=_short(np.stack([each.human_mps for each in people])),
+        margin_m=_stacked([each.margin_m for each in people]),
+        reaction_s=reaction_s + _stacked([each.age_s for each in people]),
+        human_mps=_stacked([each.human_mps for each in people]),
         velocity_x_mps=velocity_mps[:, :1] if has_direction else None,
         velocity_y_mps=velocity_mps[:, 1:] if has_direction else None,
         turn=(np.cos(turns_rad), np.sin(turns_rad)) if turns else None,
@@ -208,9 +217,15 @@ def _group(
     )
 
 
-def _short(values: FloatArray) -> FloatArray:
-    """Return numbers (N, T) as (N, 1) if they are the same at all times."""
-    return values[:, :1] if bool((values == values[:, :1]).all()) else values
+def _stacked(values: list[float | FloatArray]) -> FloatArray:
+    """Return numbers of N people as (N, T), or (N, 1) if all are the same at all times."""
+    if all(isinstance(each, float) for each in values):
+        return np.array(values)[:, None]
+    return np.stack(np.broadcast_arrays(*values))
+
+
+def _extreme(of: Callable[[FloatArray], Any], values: float | FloatArray) -> float:
+    return values if isinstance(values, float) else float(of(values))
 
 
 def _lost(
@@ -245,17 +260,19 @@ def _person(
     unaware_mps = policy.speed.human_speed_mps(0.0)
     moved_m = times_s[:, None] * velocity_mps
     place_m = np.array(memory.position_odom_m) + moved_m
-    track_m = np.array(memory.track_position_odom_m) + (moved_m if is_shown else 0.0 * moved_m)
+    track_m = place_m
+    if not is_shown or memory.track_position_odom_m != memory.position_odom_m:
+        track_m = np.array(memory.track_position_odom_m) + (moved_m if is_shown else 0.0 * moved_m)
     age_s = max(0.0, stamp_s - track.stamp_s)
     unseen_s = stamp_s - min(memory.seen_stamp_s, track.stamp_s - track.time_since_seen_s)
     is_seen = (
         is_shown and track.status != "coasting" and unseen_s <= timing.fresh_within_s - _SAME_AGE_S
     )
     start_delay_s = memory.start_delay_s if is_seen else math.inf
-    human_mps = np.full(len(times_s), _assumed_mps(policy, memory))
-    sigmas = np.full(len(times_s), margins.uncertainty_sigmas)
-    sigma_m = np.full(len(times_s), memory.sigma_m)
-    ages_s = np.full(len(times_s), age_s)
+    human_mps: float | FloatArray = _assumed_mps(policy, memory)
+    sigmas: float | FloatArray = margins.uncertainty_sigmas
+    sigma_m: float | FloatArray = memory.sigma_m
+    ages_s: float | FloatArray = age_s
     if not is_seen:
         # Nobody sees this person again, as far as one can say.
         unseen = unseen_s + times_s > timing.fresh_within_s - _SAME_AGE_S
@@ -300,14 +317,17 @@ def _assumed_mps(policy: AwarenessPolicy, memory: PersonMemory) -> float:
     return policy.speed.human_speed_mps(1.0 if memory.speed_held else memory.awareness_lower)
 
 
-def _with_excess_mps(assumed_mps: FloatArray, walking_mps: float, unaware_mps: float) -> FloatArray:
+def _with_excess_mps(
+    assumed_mps: float | FloatArray, walking_mps: float, unaware_mps: float
+) -> float | FloatArray:
     """Return the assumed speed of a person who may walk faster than an unaware one."""
     excess_mps = walking_mps - unaware_mps
     if excess_mps <= 0.0:
         return assumed_mps
     running = min(excess_mps / max(RUNNING_SHARE * unaware_mps, 1e-9), 1.0)
     runner_mps = assumed_mps + running * (walking_mps - assumed_mps)
-    return np.asarray(np.maximum(assumed_mps + excess_mps, runner_mps))
+    faster_mps: float | FloatArray = np.maximum(assumed_mps + excess_mps, runner_mps)
+    return faster_mps
 
 
 def _reach(
@@ -315,8 +335,8 @@ def _reach(
 ) -> Reach:
     """Return the distance from which on a person allows the robot a speed."""
     rules, a = policy.rules, robot.max_deceleration_mps2
-    human_mps = max(float(person.human_mps.max()), person.walking_mps, unaware_mps)
-    reaction_s = robot.reaction_time_s + float(person.age_s.max())
+    human_mps = max(_extreme(np.max, person.human_mps), person.walking_mps, unaware_mps)
+    reaction_s = robot.reaction_time_s + _extreme(np.max, person.age_s)
     fixed_m = policy.margins.separation_clearance_m + human_mps * reaction_s
     linear_s = human_mps / a + reaction_s
     if rules.zones is not None:
@@ -325,5 +345,5 @@ def _reach(
         linear_s = max(linear_s, span_m / robot.max_speed_mps)
     if rules.near_cap is not None:
         fixed_m = max(fixed_m, rules.near_cap.within_m)
-    body_m = robot.circumscribed_radius_m + float(person.margin_m.max())
+    body_m = robot.circumscribed_radius_m + _extreme(np.max, person.margin_m)
     return Reach(fixed_m + body_m, linear_s, 0.5 / a)
