@@ -138,8 +138,9 @@ class SpeedField:
     def limits_mps(self) -> Any:
         """Return the limits (K, T)."""
         library, maximum_mps = self._library, self._maximum_mps
+        less = 1.0 - _LIMIT_ROUNDING * library.rounding
         # A little above the maximum, which remains the limit after the rounding is taken off.
-        lowest = 0.0 * self._poses.x + 1.001 * maximum_mps
+        lowest = 0.0 * self._poses.x + 1.001 * maximum_mps / less
         if self._basis is not None:
             assert self._rules is not None
             if not library.is_torch and lowest.size >= _MANY:
@@ -152,7 +153,7 @@ class SpeedField:
                             lowest = library.minimum(lowest, least)
                         else:
                             np.minimum(lowest[part], least, out=lowest[part])
-            lowest = (1.0 - _LIMIT_ROUNDING * library.rounding) * lowest
+            lowest = less * lowest
         lowest = self._lowered(library.minimum(lowest, library.convert(maximum_mps)))
         result = lowest.T if self._times_first else lowest
         if library.is_torch:
