@@ -257,8 +257,8 @@ def _planner_settings(default: str | list[str]) -> dict[str, Any]:
     return {
         "default": default,
         "callback": _without_reference,
-        "help": "Local planner: 'reference', or a class of yours, which gets the robot's profile, "
-        "and static_boxes_odom_m if it takes that.",
+        "help": "Local planner: 'reference', 'straight_on', or a class of yours, which gets the "
+        "robot's profile, and static_boxes_odom_m if it takes that.",
     }
 
 
