@@ -145,12 +145,14 @@ def workers(default: int | None = None) -> Decorator:
     )
 
 
-def perception(kinds: Sequence[str] = PERCEPTIONS, note: str = "") -> Decorator:
+def perception(
+    kinds: Sequence[str] = PERCEPTIONS, note: str = "", *, default: str = "keypoints"
+) -> Decorator:
     """Add ``--perception``: the kind of perception that the robot has."""
     return option(
         "--perception",
         type=OneOf(kinds),
-        default="keypoints",
+        default=default,
         help=f"How the robot perceives people.{note}",
     )
 
@@ -201,28 +203,49 @@ def policy(default: str = "balanced") -> Decorator:
     )
 
 
-def policies(default: Sequence[str]) -> Decorator:
-    """Add ``--policy``: one or more policies to compare."""
+def policies(default: Sequence[str], *, repeated: bool = False) -> Decorator:
+    """Add ``--policy``: one or more policies to compare.
+
+    Args:
+        default: names.
+        repeated: each policy needs the option before it, as beside positional arguments.
+    """
     return option(
         "--policy",
-        many=True,
+        **_several(repeated),
         default=list(default),
-        metavar="NAME|FILE...",
         shell_complete=_COMPLETE_POLICIES_AND_ORACLE,
-        help="Policies: presets, YAML files, or 'oracle' (balanced with true awareness).",
+        help="Policies: presets, YAML files, or 'oracle' (balanced with true awareness)."
+        + _again(repeated),
     )
 
 
-def scenarios(which: str) -> Decorator:
-    """Add ``--scenario``: shipped scenarios and files."""
+def scenarios(which: str, *, repeated: bool = False) -> Decorator:
+    """Add ``--scenario``: shipped scenarios and files.
+
+    Args:
+        which: the shipped ones that ``all`` stands for.
+        repeated: each scenario needs the option before it, as beside positional arguments.
+    """
     return option(
         "--scenario",
-        many=True,
+        **_several(repeated),
         default=["all"],
-        metavar="NAME|FILE...",
         shell_complete=COMPLETE_SCENARIOS,
-        help=f"Scenarios: shipped ones, YAML files, or 'all' shipped ones {which}.",
+        help=f"Scenarios: shipped ones, YAML files, or 'all' shipped ones {which}."
+        + _again(repeated),
     )
+
+
+def _several(repeated: bool) -> dict[str, Any]:
+    """Return the settings of an option of several values, with or without its name before each."""
+    if repeated:
+        return {"multiple": True, "metavar": "NAME|FILE"}
+    return {"many": True, "metavar": "NAME|FILE..."}
+
+
+def _again(repeated: bool) -> str:
+    return " May be given more than once." if repeated else ""
 
 
 def faults() -> Decorator:
