@@ -240,9 +240,9 @@ def _field_use(with_field: _Group, without: _Group) -> FieldUse:
         arrived = sum(each.record.time_to_goal_s is not None for each in group)
         return proportion_interval(arrived, len(group))
 
-    records = ([each.record for each in group] for group in (without, with_field))
+    before, after = ([each.record for each in group] for group in (without, with_field))
     return FieldUse(
-        paired_difference(*records, field="time_lost_s"), goals(with_field), goals(without)
+        paired_difference(before, after, "time_lost_s"), goals(with_field), goals(without)
     )
 
 

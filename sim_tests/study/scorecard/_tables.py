@@ -10,14 +10,14 @@ from typing import Final
 
 from awarenav.files import csv_number
 
-from ..measures import Interval
+from ..measures import BASELINE, Interval
 from ..report import NOTHING, number, percent
 from ._score import PlannerScore, Score, Scorecard
 from ._verdict import OBEYED, exceeded, factor, hits, of, verdicts
 
 #: The columns of the table of scores: heading, and meaning.
 COLUMNS: Final[dict[str, str]] = {
-    "Goals": "episodes that reached the goal, of all",
+    "Goals": "episodes that reached the goal, of all, with the 95 % interval of the share",
     "Median time, s": "median time to goal of the episodes that reached it",
     "Against blind, s": "mean difference of the time lost to that of the policy blind with the "
     "same planner, scenario and seed, with its 95 % interval; negative is faster",
@@ -25,20 +25,32 @@ COLUMNS: Final[dict[str, str]] = {
     "Unaware, s": "the same for scenarios in which people are unaware",
     "Contacts": "episodes in which the robot moved into a person / a person walked into the robot",
     "Worst margin, m": "smallest separation margin S − S_p of a moving robot",
-    "Negative margin": "share of episodes with a negative margin, with its 95 % interval",
+    "Negative margin": "episodes with a negative margin, with the 95 % interval of the share",
     "Speed limit, m/s": f"largest excess over the speed limit; obeyed: {OBEYED}",
     "Yaw rule, m/s": "the same for |v| + |ω| R and fastest_point_limit_mps",
     "plan(), ms": "median time of a call / 99th percentile",
-    "× reference": "median time of a call, divided by the reference planner's",
+    "× ref.": "median time of a call, divided by the reference planner's",
 }
 
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """A cell: its text, and whether it is bad news."""
+    """A cell.
+
+    Attributes:
+        text: the figure.
+        detail: its interval, or a second figure; empty for none.
+        bad: whether it is bad news.
+    """
 
     text: str
+    detail: str = ""
     bad: bool = False
+
+    @property
+    def whole(self) -> str:
+        """Figure and detail on one line."""
+        return f"{self.text} {self.detail}".rstrip()
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,14 +65,14 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class ProbeRow:
-    """A row about the probes: planner and look, and texts about radii and speed field."""
+    """A row about the probes: planner and look, and cells about radii and speed field."""
 
     planner: str
     look: int
-    changed: str
-    separation: str
-    field: str
-    goals: str
+    changed: Cell
+    separation: Cell
+    field: Cell
+    goals: Cell
 
 
 def rows(card: Scorecard) -> tuple[Row, ...]:
@@ -87,15 +99,15 @@ def probe_rows(card: Scorecard) -> tuple[ProbeRow, ...]:
     )
 
 
-def difference(interval: Interval, decimals: int = 1) -> str:
-    """Return ``"−3.2 [−4.4, −2.1]"``; a dash without a value."""
+def difference(interval: Interval, decimals: int = 1) -> Cell:
+    """Return a difference with its interval, as −3.2 and [−4.4, −2.1]; a dash without a value."""
     if not interval.known:
-        return NOTHING
+        return Cell(NOTHING)
     value = number(interval.value, decimals, sign=True)
     if not interval.bounded:
-        return f"{value} [?]"
+        return Cell(value, "[?]")
     low, high = (number(end, decimals, sign=True) for end in (interval.low, interval.high))
-    return f"{value} [{low}, {high}]"
+    return Cell(value, f"[{low}, {high}]")
 
 
 def markdown(card: Scorecard) -> str:
@@ -106,7 +118,10 @@ def markdown(card: Scorecard) -> str:
     header = ("planner", "policy", *COLUMNS)
     lines += ["", *_markdown_table(header, [_texts(row) for row in rows(card)]), ""]
     probes = [
-        (each.planner, each.changed, each.separation, each.field, each.goals)
+        (
+            each.planner,
+            *(cell.whole for cell in (each.changed, each.separation, each.field, each.goals)),
+        )
         for each in probe_rows(card)
     ]
     lines += [*_markdown_table(PROBE_COLUMNS, probes), ""]
@@ -147,7 +162,7 @@ def csv_text(card: Scorecard) -> str:
 
 
 def _texts(row: Row) -> tuple[str, ...]:
-    return row.planner, row.policy, *(cell.text for cell in row.cells)
+    return row.planner, row.policy, *(cell.whole for cell in row.cells)
 
 
 def _markdown_table(header: Sequence[str], lines: Sequence[Sequence[str]]) -> list[str]:
@@ -158,26 +173,37 @@ def _markdown_table(header: Sequence[str], lines: Sequence[Sequence[str]]) -> li
 
 
 def _cells(score: Score) -> tuple[Cell, ...]:
-    time, negative = score.plan_time, score.negative_margin
-    worst = score.worst_margin_m
-    goals = score.goals
-    share = f"{of(negative)} ({percent(negative.low)} to {percent(negative.high)})"
+    time, negative, goals, worst = (
+        score.plan_time,
+        score.negative_margin,
+        score.goals,
+        score.worst_margin_m,
+    )
+    against = [
+        Cell(NOTHING) if score.policy == BASELINE else difference(each)
+        for each in score.against_blind_s.values()
+    ]
     contacts = f"{hits(score.robot_contacts)} / {hits(score.person_contacts)}"
     return (
-        Cell(of(goals), hits(goals) < goals.n),
+        _share(goals, bad=hits(goals) < goals.n),
         Cell(number(score.median_time_s, 1)),
-        *(Cell(difference(each)) for each in score.against_blind_s.values()),
-        Cell(contacts if score.robot_contacts.n else NOTHING, hits(score.robot_contacts) > 0),
-        Cell(number(worst), worst is not None and worst < 0.0),
-        Cell(share if negative.n else NOTHING, hits(negative) > 0),
-        Cell(exceeded(score.limit), score.limit.obeyed is False),
-        Cell(exceeded(score.fastest_point), score.fastest_point.obeyed is False),
-        Cell(
-            NOTHING if time is None else f"{_ms(time.median_s)} / {_ms(time.p99_s)}",
-            time is not None and time.late,
-        ),
+        *against,
+        Cell(contacts if score.robot_contacts.n else NOTHING, bad=hits(score.robot_contacts) > 0),
+        Cell(number(worst), bad=worst is not None and worst < 0.0),
+        _share(negative, bad=hits(negative) > 0),
+        Cell(exceeded(score.limit), bad=score.limit.obeyed is False),
+        Cell(exceeded(score.fastest_point), bad=score.fastest_point.obeyed is False),
+        Cell(NOTHING)
+        if time is None
+        else Cell(_ms(time.median_s), f"/ {_ms(time.p99_s)}", bad=time.late),
         Cell(NOTHING if time is None or time.ratio is None else factor(time.ratio)),
     )
+
+
+def _share(share: Interval, *, bad: bool) -> Cell:
+    if not share.n:
+        return Cell(NOTHING)
+    return Cell(of(share), f"[{percent(share.low)}, {percent(share.high)}]", bad)
 
 
 def _ms(seconds: float) -> str:
@@ -189,10 +215,12 @@ def _probe_row(look: int, planner: PlannerScore) -> ProbeRow:
     return ProbeRow(
         planner.name,
         look,
-        NOTHING if radii is None else of(radii.changed),
-        NOTHING if radii is None else difference(radii.separation_m, 2),
-        "does not use it" if field is None else difference(field.time_lost_s),
-        NOTHING if field is None else f"{of(field.goals_with)} / {of(field.goals_without)}",
+        Cell(NOTHING) if radii is None else Cell(of(radii.changed)),
+        Cell(NOTHING) if radii is None else difference(radii.separation_m, 2),
+        Cell("does not use it") if field is None else difference(field.time_lost_s),
+        Cell(NOTHING)
+        if field is None
+        else Cell(f"{of(field.goals_with)} / {of(field.goals_without)}"),
     )
 
 

@@ -173,7 +173,10 @@ def _radii(planner: PlannerScore) -> tuple[str, list[Mark]]:
         text = f"Nobody came near enough to tell whether it uses the radii, even with {wider}."
         return text, []
     if not hits(use.changed):
-        text = f"It does not use the radii: its path is the same with {wider}."
+        text = (
+            f"It does not use the radii: its path is the same with {wider}, though it came into a "
+            f"wider circle in {count(use.near)} of {plural(use.changed.n, 'episode')}."
+        )
         return text, [Mark("ignores radii", "bad")]
     text = f"It uses the radii: with {wider}, its path is another in {of(use.changed)} episodes"
     if use.separation_m.known:
