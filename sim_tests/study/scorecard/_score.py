@@ -109,12 +109,13 @@ class FieldUse:
     """The effect of the speed field, with the policy that verdicts speak of.
 
     Attributes:
-        time_lost_s: mean difference of the time lost, with the field minus without it, over pairs.
+        time_s: mean difference of the time to goal, with the field minus without it, over pairs of
+            episodes. One that does not reach its goal counts with all of its time.
         goals_with: share of episodes that reach the goal with the field.
         goals_without: share of episodes that do without it.
     """
 
-    time_lost_s: Interval
+    time_s: Interval
     goals_with: Interval
     goals_without: Interval
 

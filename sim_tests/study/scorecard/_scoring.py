@@ -9,6 +9,8 @@ from pathlib import Path
 from statistics import median
 from typing import Final
 
+import numpy as np
+
 from perception.anthropometry import BODY_RADIUS_M
 
 from ..measures import (
@@ -17,6 +19,7 @@ from ..measures import (
     Conduct,
     EpisodeRecord,
     Interval,
+    bootstrap_interval,
     measured_part,
     paired,
     paired_difference,
@@ -240,10 +243,22 @@ def _field_use(with_field: _Group, without: _Group) -> FieldUse:
         arrived = sum(each.record.time_to_goal_s is not None for each in group)
         return proportion_interval(arrived, len(group))
 
-    before, after = ([each.record for each in group] for group in (without, with_field))
+    records = [[each.record for each in group] for group in (without, with_field)]
+    pairs = [pair for pair in paired(*records) if not any(each.error for each in pair)]
     return FieldUse(
-        paired_difference(before, after, "time_lost_s"), goals(with_field), goals(without)
+        bootstrap_interval(
+            [_taken_s(after) - _taken_s(before) for before, after in pairs],
+            np.random.default_rng(0),
+            strata=[before.scenario for before, _ in pairs],
+        ),
+        goals(with_field),
+        goals(without),
     )
+
+
+def _taken_s(record: EpisodeRecord) -> float:
+    """Return the time to goal, or all of the time of an episode that did not reach it."""
+    return record.time_to_goal_s or record.duration_s or 0.0
 
 
 def _failures(episodes: Iterable[_Episode]) -> tuple[Failure, ...]:

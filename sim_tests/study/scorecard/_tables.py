@@ -217,7 +217,7 @@ def _probe_row(look: int, planner: PlannerScore) -> ProbeRow:
         look,
         Cell(NOTHING) if radii is None else Cell(of(radii.changed)),
         Cell(NOTHING) if radii is None else difference(radii.separation_m, 2),
-        Cell("does not use it") if field is None else difference(field.time_lost_s),
+        Cell("does not use it") if field is None else difference(field.time_s),
         Cell(NOTHING)
         if field is None
         else Cell(f"{of(field.goals_with)} / {of(field.goals_without)}"),

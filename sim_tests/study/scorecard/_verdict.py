@@ -175,7 +175,7 @@ def _radii(planner: PlannerScore) -> tuple[str, list[Mark]]:
     if not hits(use.changed):
         text = (
             f"It does not use the radii: its path is the same with {wider}, though it came into a "
-            f"wider circle in {count(use.near)} of {plural(use.changed.n, 'episode')}."
+            f"wider circle in {count(use.near)} of {count(use.changed.n)} episodes."
         )
         return text, [Mark("ignores radii", "bad")]
     text = f"It uses the radii: with {wider}, its path is another in {of(use.changed)} episodes"
@@ -215,14 +215,14 @@ def _field(planner: PlannerScore) -> tuple[str, list[Mark]]:
     use = planner.field
     if use is None:
         return "It does not use the speed field.", []
-    change = use.time_lost_s
+    change = use.time_s
     goals = f"it reaches {of(use.goals_with)} goals with it and {of(use.goals_without)} without it"
     if not change.known:
         return f"It can use the speed field: {goals}.", []
     ends = ""
     if change.bounded:
         ends = f" (95 % interval {number(change.low, 1)} to {number(change.high, 1)} s)"
-    text = f"With the speed field it loses {_more(change.value, 'without')}{ends}; {goals}."
+    text = f"With the speed field it takes {_more(change.value, 'without')}{ends}; {goals}."
     shown = change.bounded and change.n >= _FEW_PAIRS and (change.high < 0.0 or change.low > 0.0)
     tone: Tone = "open" if not shown else "good" if change.high < 0.0 else "bad"
     return text, [Mark(f"{number(change.value, 1, sign=True)} s by the speed field", tone)]
