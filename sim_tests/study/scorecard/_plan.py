@@ -68,7 +68,7 @@ class Entrant:
 
 @dataclass(frozen=True, slots=True)
 class ComparisonPlan:
-    """What a comparison runs, as plain data.
+    """The questions of a comparison, as plain data.
 
     Attributes:
         entrants: the planners, the reference planner first, each followed by its variant.
