@@ -10,6 +10,8 @@ from collections.abc import Iterator
 import pytest
 from paths import ROOT
 
+from sim_tests import NOVA_CARTER
+
 PLANNERS = {
     "ir-sim": ("irsim", "velocity_obstacles", "VelocityObstaclePlanner"),
     "do-mpc": ("do_mpc", "model_predictive", "ModelPredictivePlanner"),
@@ -35,7 +37,7 @@ def rows(request, examples):
     pytest.importorskip("pybullet", reason="the crossings need the extra sim")
     compare = importlib.import_module("examples.planners._compare")
     planner = getattr(importlib.import_module(f"examples.planners.{module}"), name)
-    return compare.compare(request.param, lambda: planner(compare.NOVA_CARTER))
+    return compare.compare(request.param, lambda: planner(NOVA_CARTER))
 
 
 def test_every_crossing_ends_at_the_goal_without_a_contact(rows):

@@ -33,7 +33,7 @@ PLANTED = {
         "sim_tests/actors/body/_asset.py",
         "from ..behaviour import Walker",
     ),
-    "sim_tests.study: suite | command | watch > report > runs | scenarios > measures": (
+    "sim_tests.study: suite | command | watch | scorecard > report > runs | scenarios > measures": (
         "sim_tests/study/measures/_interval.py",
         "from ..runs import run_jobs",
     ),

@@ -9,7 +9,7 @@ from __future__ import annotations
 from . import options
 from ._app import app, main
 from ._command import Command, CommandGroup, Option, argument, command, group, option
-from ._types import NUMBER, POSITIVE, SHARE, FilePath, FolderPath, Number, OneOf, Whole
+from ._types import NUMBER, POSITIVE, SHARE, FilePath, FolderPath, Number, OneOf, Seeds, Whole
 
 __all__ = [
     "NUMBER",
@@ -22,6 +22,7 @@ __all__ = [
     "Number",
     "OneOf",
     "Option",
+    "Seeds",
     "Whole",
     "app",
     "argument",

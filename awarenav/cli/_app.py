@@ -83,6 +83,10 @@ _COMMANDS: Final[dict[str, dict[str, _Entry]]] = {
             "sim_tests.study.report.command:report",
             "Write a run's report as one HTML page.",
         ),
+        "planners": _Entry(
+            "sim_tests.study.scorecard.command:planners",
+            "List local planners, and compare yours on one page.",
+        ),
         "scenario": _Entry(
             "sim_tests.study.scenarios.command:scenario",
             "List, explain, draw and check scenarios.",

@@ -58,6 +58,32 @@ class Number(click.ParamType[float]):
         return number
 
 
+class Seeds(click.ParamType[tuple[int, ...]]):
+    """Seeds: a number of them from 0 on, or the first and the last."""
+
+    name = "seeds"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, ...]:
+        """Return the seeds, or fail and say what is valid."""
+        if isinstance(value, tuple):
+            return value
+        first, dash, last = str(value).partition("-")
+        try:
+            seeds = range(int(first), int(last) + 1) if dash else range(int(first))
+        except ValueError:
+            seeds = range(0)
+        if not seeds:
+            self.fail(
+                "must be a number of seeds of at least 1, or the first and the last as 10-19, got "
+                f"{str(value)!r}",
+                param,
+                ctx,
+            )
+        return tuple(seeds)
+
+
 #: A whole number of at least 1.
 POSITIVE: Final = Whole(1)
 #: Any number.

@@ -13,7 +13,37 @@ from click.core import ParameterSource
 from click.shell_completion import CompletionItem
 
 from ._command import Decorator, option
-from ._types import POSITIVE, FilePath, FolderPath, Number, OneOf, Whole
+from ._network_options import allow_simulator_networks, networks, running
+from ._types import POSITIVE, FilePath, FolderPath, OneOf, Whole
+
+__all__ = [
+    "COMPLETE_POLICIES",
+    "COMPLETE_SCENARIOS",
+    "PERCEPTIONS",
+    "REFERENCE_PLANNER",
+    "SENSOR_SETS",
+    "allow_simulator_networks",
+    "as_json",
+    "camera",
+    "faults",
+    "networks",
+    "out_file",
+    "out_folder",
+    "overwrite",
+    "perception",
+    "planner",
+    "planners",
+    "plot_file",
+    "policies",
+    "policy",
+    "resume",
+    "running",
+    "scenarios",
+    "seed",
+    "sensor_sets",
+    "sensors",
+    "workers",
+]
 
 #: The command line's name of the reference planner.
 REFERENCE_PLANNER: Final = "reference"
@@ -145,12 +175,14 @@ def workers(default: int | None = None) -> Decorator:
     )
 
 
-def perception(kinds: Sequence[str] = PERCEPTIONS, note: str = "") -> Decorator:
+def perception(
+    kinds: Sequence[str] = PERCEPTIONS, note: str = "", *, default: str = "keypoints"
+) -> Decorator:
     """Add ``--perception``: the kind of perception that the robot has."""
     return option(
         "--perception",
         type=OneOf(kinds),
-        default="keypoints",
+        default=default,
         help=f"How the robot perceives people.{note}",
     )
 
@@ -201,28 +233,49 @@ def policy(default: str = "balanced") -> Decorator:
     )
 
 
-def policies(default: Sequence[str]) -> Decorator:
-    """Add ``--policy``: one or more policies to compare."""
+def policies(default: Sequence[str], *, repeated: bool = False) -> Decorator:
+    """Add ``--policy``: one or more policies to compare.
+
+    Args:
+        default: names.
+        repeated: each policy needs the option before it, as beside positional arguments.
+    """
     return option(
         "--policy",
-        many=True,
+        **_several(repeated),
         default=list(default),
-        metavar="NAME|FILE...",
         shell_complete=_COMPLETE_POLICIES_AND_ORACLE,
-        help="Policies: presets, YAML files, or 'oracle' (balanced with true awareness).",
+        help="Policies: presets, YAML files, or 'oracle' (balanced with true awareness)."
+        + _again(repeated),
     )
 
 
-def scenarios(which: str) -> Decorator:
-    """Add ``--scenario``: shipped scenarios and files."""
+def scenarios(which: str, *, repeated: bool = False) -> Decorator:
+    """Add ``--scenario``: shipped scenarios and files.
+
+    Args:
+        which: the shipped ones that ``all`` stands for.
+        repeated: each scenario needs the option before it, as beside positional arguments.
+    """
     return option(
         "--scenario",
-        many=True,
+        **_several(repeated),
         default=["all"],
-        metavar="NAME|FILE...",
         shell_complete=COMPLETE_SCENARIOS,
-        help=f"Scenarios: shipped ones, YAML files, or 'all' shipped ones {which}.",
+        help=f"Scenarios: shipped ones, YAML files, or 'all' shipped ones {which}."
+        + _again(repeated),
     )
+
+
+def _several(repeated: bool) -> dict[str, Any]:
+    """Return the settings of an option of several values, with or without its name before each."""
+    if repeated:
+        return {"multiple": True, "metavar": "NAME|FILE"}
+    return {"many": True, "metavar": "NAME|FILE..."}
+
+
+def _again(repeated: bool) -> str:
+    return " May be given more than once." if repeated else ""
 
 
 def faults() -> Decorator:
@@ -257,8 +310,8 @@ def _planner_settings(default: str | list[str]) -> dict[str, Any]:
     return {
         "default": default,
         "callback": _without_reference,
-        "help": "Local planner: 'reference', or a class of yours, which gets the robot's profile, "
-        "and static_boxes_odom_m if it takes that.",
+        "help": "Local planner: 'reference', 'straight_on', or a class of yours, which gets the "
+        "robot's profile, and static_boxes_odom_m if it takes that.",
     }
 
 
@@ -267,127 +320,6 @@ def _without_reference(context: click.Context, parameter: click.Parameter, value
     if isinstance(value, tuple):
         return tuple("" if each == REFERENCE_PLANNER else each for each in value)
     return "" if value == REFERENCE_PLANNER else value
-
-
-_NETWORKS: Final = "Networks"
-_NETWORK_OPTIONS: Final = (
-    option(
-        "--networks",
-        group=_NETWORKS,
-        type=FilePath(),
-        metavar="FILE",
-        help="Detector, pose and head from a file, as `awarenav models fetch robot` writes it.",
-    ),
-    option(
-        "--detector",
-        group=_NETWORKS,
-        excludes="--networks",
-        default="shipped",
-        metavar="NAME|FILE",
-        help="Person detector: 'shipped' (made for the simulator), a network that `awarenav "
-        "models` lists, or an ONNX file (YOLOv8, YOLO11, YOLOX, RTMDet).",
-    ),
-    option(
-        "--pose",
-        group=_NETWORKS,
-        excludes="--networks",
-        default="shipped",
-        metavar="NAME|FILE",
-        help="Pose network: 'shipped' (made for the simulator), a network that `awarenav models` "
-        "lists, an ONNX file (RTMPose, RTMW, RTMW3D), or 'mediapipe' (needs the extra "
-        "'mediapipe').",
-    ),
-    option(
-        "--head",
-        group=_NETWORKS,
-        excludes="--networks",
-        default="auto",
-        metavar="NAME|FILE",
-        help="Head pose: 'network' (the shipped one, made for the simulator), 'pnp' (from the "
-        "keypoints), 'fused' (both), an ONNX file, or 'auto': 'network' with the shipped pose "
-        "network, else 'pnp'.",
-    ),
-    option(
-        "--eyes",
-        group=_NETWORKS,
-        excludes="--networks",
-        default="auto",
-        metavar="auto|mediapipe|none",
-        help="Eyes of people nearer than about 2.5 m: 'mediapipe' (needs the extra 'mediapipe'), "
-        "'none' (the gaze is the head's direction), or 'auto': 'mediapipe' with --pose mediapipe.",
-    ),
-)
-
-
-def networks(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Add ``--networks``, ``--detector``, ``--pose``, ``--head`` and ``--eyes``."""
-    for add in reversed(_NETWORK_OPTIONS):
-        function = add(function)
-    return function
-
-
-_RUNNING_OPTIONS: Final = (
-    option(
-        "--threads",
-        group=_NETWORKS,
-        type=POSITIVE,
-        show_default="onnxruntime's own choice",
-        metavar="N",
-        help="Threads of each network.",
-    ),
-    option(
-        "--provider",
-        group=_NETWORKS,
-        type=OneOf(["cpu", "cuda", "tensorrt", "openvino", "coreml"]),
-        default="cpu",
-        help="Execution provider of onnxruntime that runs the networks.",
-    ),
-    option(
-        "--provider-options",
-        group=_NETWORKS,
-        default="",
-        show_default="none",
-        metavar="'KEY=VALUE ...'",
-        help="Options of that provider, separated by spaces, as 'trt_fp16_enable=True "
-        "trt_engine_cache_enable=True trt_engine_cache_path=DIR'.",
-    ),
-    option(
-        "--detect-every-s",
-        group=_NETWORKS,
-        type=Number(0.0, 0.2),
-        default=0.0,
-        metavar="S",
-        help="Longest time between two looks of the detector; boxes follow the keypoints in "
-        "between. 0 looks at every image.",
-    ),
-    option(
-        "--frame-budget-s",
-        group=_NETWORKS,
-        type=Number(0.001, 10.0),
-        excludes="--detect-every-s",
-        show_default="none",
-        metavar="S",
-        help="Time for a frame: the detector looks as often as it allows, at least every 0.2 s.",
-    ),
-)
-
-
-def running(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options of threads, providers and the time between looks of the detector."""
-    for add in reversed(_RUNNING_OPTIONS):
-        function = add(function)
-    return function
-
-
-def allow_simulator_networks() -> Decorator:
-    """Add ``--allow-simulator-networks``: networks of renders may see other images."""
-    return option(
-        "--allow-simulator-networks",
-        group=_NETWORKS,
-        is_flag=True,
-        help="Let networks that have seen renders only, such as the shipped ones, see other "
-        "images. All results say so.",
-    )
 
 
 def as_json(what: str = "the table") -> Decorator:

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from nav_adapter import AwarenessPolicy
-from sim_tests import NOVA_CARTER, CrossingResult, LocalPlanner, Scenario, run_crossing
+from sim_tests import CrossingResult, LocalPlanner, Scenario, run_crossing
+from sim_tests.study.measures import OVERSHOOT_MPS, limit_excess_mps
 
 #: Distance of the worker's stop to the left of the robot's path, metres: near enough that a wide
 #: circle covers the path.
 STOPS_AT_Y_M = 1.5
 #: Radii of unaware people, metres: that of the shipped policy, and a wider one.
 RADII_M = {"": 1.0, ", wide": 1.5}
-# Overshoot of the motors on a ramp, about.
-_OVERSHOOT_MPS = 0.03
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,26 +26,13 @@ class Row:
 
     @property
     def excess_mps(self) -> float:
-        """The largest excess of the speed over that allowed one cycle before, m/s.
-
-        Allowed is the limit, or what full braking leaves of a higher speed, since the limit may
-        fall faster than the robot can brake.
-        """
-        frames = self.result.frames
-        return max(
-            after.robot_state.speed_mps
-            - max(
-                before.constraints.speed_limit_mps,
-                before.robot_state.speed_mps
-                - NOVA_CARTER.max_deceleration_mps2 * (after.t_s - before.t_s),
-            )
-            for before, after in itertools.pairwise(frames)
-        )
+        """The largest excess of the speed over the allowed one, m/s."""
+        return limit_excess_mps(self.result.frames, self.result.robot) or 0.0
 
     @property
     def kept_the_limit(self) -> bool:
         """True if the speed stayed within the allowed one."""
-        return self.excess_mps <= _OVERSHOOT_MPS
+        return self.excess_mps <= OVERSHOOT_MPS
 
     @property
     def is_good(self) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from time import perf_counter
 from typing import Final
 
 import numpy as np
@@ -59,7 +60,7 @@ def run_crossing(
             the scenario gives no rate; or ``"oracle"``: the truth about everybody who is not hidden
             by a rack. ``"keypoints+scanner"`` and ``"pixels+scanner"`` add the scenario's laser
             scanners, and ``"scanner"`` has them alone.
-        seed: the same seed gives the same result, bit for bit.
+        seed: the same seed gives the same result, bit for bit, but for the times of ``plan_s``.
         noise: noise of the keypoint camera; None for the default.
         pipeline: pipeline for ``"pixels"`` instead of the shipped networks; its camera must be that
             of the images.
@@ -116,7 +117,9 @@ def run_crossing(
             constraints = adapter.update(
                 sensed.tracks, sensed.state, t_s, perception_stamp_s=sensed.stamp_s
             )
+            asked_s = perf_counter()
             returned = driver.plan(sensed.state, goal, constraints, dt_s)
+            plan_s = perf_counter() - asked_s
             command = checked_command(driver, returned, t_s)
             stage.amr.command(*command)
             frame = CrossingFrame(
@@ -132,6 +135,7 @@ def run_crossing(
                 margins,
                 tuple(meter.separations_m),
                 sensed.scan_points_odom_m,
+                plan_s,
             )
             frames.append(frame)
             if observer is not None:

@@ -39,6 +39,8 @@ class CrossingFrame:
             same time; a lower bound with centres more than 4 m apart.
         scan_points_odom_m: (N, 2) points of the scans that arrived in this cycle, as the robot
             places them.
+        plan_s: elapsed time of the planner's ``plan``, seconds by the clock of the computer. It is
+            the only field that differs when the same episode is run again.
     """
 
     t_s: float
@@ -53,6 +55,7 @@ class CrossingFrame:
     margins_m: tuple[float, ...]
     separations_m: tuple[float, ...] = ()
     scan_points_odom_m: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
+    plan_s: float = 0.0
 
     __repr__ = short_repr
 

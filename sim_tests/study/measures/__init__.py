@@ -16,6 +16,7 @@ if TYPE_CHECKING:
         measured_part,
     )
     from ._bootstrap import bootstrap_interval, ratio_interval
+    from ._conduct import OVERSHOOT_MPS, Conduct, fastest_point_excess_mps, limit_excess_mps
     from ._driving import path_length_m
     from ._interval import Interval, proportion_interval, zero_of_n_upper
     from ._measure import measure
@@ -45,11 +46,13 @@ __all__ = [
     "ATTENTIVE_FROM",
     "BASELINE",
     "METRICS",
+    "OVERSHOOT_MPS",
     "RECORD_COLUMNS",
     "SHARES",
     "UNAWARE_UP_TO",
     "UNCONFIRMED",
     "Comparison",
+    "Conduct",
     "EpisodeRecord",
     "Interval",
     "MeasuredAttention",
@@ -59,7 +62,9 @@ __all__ = [
     "Trace",
     "Variant",
     "bootstrap_interval",
+    "fastest_point_excess_mps",
     "labels",
+    "limit_excess_mps",
     "measure",
     "measured_part",
     "nondeterminism_notes",
@@ -97,6 +102,12 @@ __getattr__ = lazy_names(
         "._bootstrap": (
             "bootstrap_interval",
             "ratio_interval",
+        ),
+        "._conduct": (
+            "OVERSHOOT_MPS",
+            "Conduct",
+            "fastest_point_excess_mps",
+            "limit_excess_mps",
         ),
         "._driving": ("path_length_m",),
         "._interval": (

@@ -67,7 +67,7 @@ def split_by_awareness(statistics: RunStatistics) -> tuple[AwarenessGroup, ...]:
         panels = tuple(
             panel(
                 metric,
-                [(arm, arm.name, estimate(row, metric)) for arm, row in rows[kind]],
+                [(arm.look, arm.name, estimate(row, metric)) for arm, row in rows[kind]],
                 scale=scales[metric.name],
             )
             for metric in _METRICS

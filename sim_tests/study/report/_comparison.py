@@ -111,7 +111,7 @@ def comparison_section(statistics: RunStatistics) -> ComparisonSection:
     paired = [
         panel(
             metric,
-            [(arm, label, getattr(against, metric.name)) for arm, label, against in groups],
+            [(arm.look, label, getattr(against, metric.name)) for arm, label, against in groups],
             signed=metric.name != "won_back",
         )
         for metric in _PAIRED
@@ -130,7 +130,8 @@ def _panels(statistics: RunStatistics, metrics: Iterable[Metric]) -> tuple[Panel
     panels = []
     for metric in metrics:
         rows = [
-            (arm, arm.name, estimate(statistics.of_arm(arm), metric)) for arm in statistics.shown
+            (arm.look, arm.name, estimate(statistics.of_arm(arm), metric))
+            for arm in statistics.shown
         ]
         if any(interval.known for _, _, interval in rows):
             panels.append(panel(metric, rows))

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Final
 
 from ..measures import Interval, Metric
-from ._arm import Arm
 from ._geometry import TRACK_PX, labels_fit
 from ._text import NOTHING, count, number, percent
 
@@ -129,7 +128,7 @@ class Panel:
 
 def panel(
     metric: Metric,
-    rows: Sequence[tuple[Arm, str, Interval]],
+    rows: Sequence[tuple[int, str, Interval]],
     *,
     scale: Scale | None = None,
     signed: bool = False,
@@ -138,7 +137,7 @@ def panel(
 
     Args:
         metric: the metric.
-        rows: arm, label and estimate of each row.
+        rows: look, label and estimate of each row.
         scale: axis shared with other panels; default one for these rows, in per cent for shares.
         signed: write a plus before positive numbers, for differences.
     """
@@ -180,12 +179,12 @@ def _panel_row(
     scale: Scale,
     factor: float,
     signed: bool,
-    arm: Arm,
+    look: int,
     label: str,
     estimate: Interval,
 ) -> PanelRow:
     if not estimate.known:
-        return PanelRow(label, arm.look, NOTHING, "no data", "", None, None, None)
+        return PanelRow(label, look, NOTHING, "no data", "", None, None, None)
 
     def text(value: float) -> str:
         if metric.share:
@@ -194,7 +193,7 @@ def _panel_row(
 
     return PanelRow(
         label,
-        arm.look,
+        look,
         text(estimate.value),
         f"{text(estimate.low)} to {text(estimate.high)}" if estimate.bounded else "not bounded",
         count(estimate.n),

@@ -1,19 +1,16 @@
-"""The report of a run as one HTML page; the only module that imports Jinja."""
+"""The report of a run as one HTML page."""
 
 from __future__ import annotations
 
-from importlib import resources
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
-from perception.installation import install_command
-
-from ...world.errors import SimError
 from ..measures import nondeterminism_notes
 from ._awareness_split import split_by_awareness
 from ._comparison import FURTHER, MAIN, PAIRED_ONLY, comparison_section
 from ._episode_list import failures, list_episodes
 from ._fault_table import fault_rows
+from ._page import write_page
 from ._reproduction import reproduction, title_of
 from ._run_data import RunData
 from ._scatter import scatter
@@ -23,38 +20,7 @@ from ._still import make_stills
 from ._text import plural
 from ._verdict import verdicts
 
-try:
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-    from markupsafe import Markup
-except ImportError as cause:  # pragma: no cover - depends on the installation
-    raise SimError(
-        "a report needs jinja2, which is not installed; it is part of the extra 'bench': "
-        + install_command("bench")
-    ) from cause
-
 _REPORT: Final = "report.html"
-
-
-def _render_page(**parts: Any) -> str:
-    """Return the HTML of a page; every text of its parts is escaped.
-
-    Args:
-        parts: variables of ``templates/report.html``.
-    """
-    environment = Environment(
-        loader=PackageLoader("sim_tests.study.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    folder = resources.files("sim_tests.study.report") / "templates"
-    assets = {
-        name: Markup((folder / f"report.{ending}").read_text("utf-8"))
-        for name, ending in (("style", "css"), ("script", "js"))
-    }
-    page: str = environment.get_template("report.html").render(**assets, **parts)
-    return page
 
 
 def write_report(
@@ -81,7 +47,9 @@ def write_report(
     path = run.path / _REPORT if path is None else path
     listed = list_episodes(run, arms, path.parent)
     errors = sum(len(arm.errors) for arm in arms)
-    page = _render_page(
+    write_page(
+        path,
+        "report.html",
         plural=plural,
         title=title_of(run, len(arms)),
         run=run,
@@ -102,12 +70,4 @@ def write_report(
         reproduction=reproduction(run),
         metrics=(*MAIN, *FURTHER, *PAIRED_ONLY),
     )
-    part = path.with_name(path.name + ".part")
-    try:
-        part.write_text(page, "utf-8")
-        part.replace(path)
-    except OSError as cause:
-        raise SimError(f"cannot write {path}: {cause.strerror or cause}") from cause
-    finally:
-        part.unlink(missing_ok=True)
     return path

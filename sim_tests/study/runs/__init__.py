@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from awarenav.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from ._episode import attempt, observed_episode, run_episode
+    from ._episode import Attempt, attempt, observed_episode, run_episode
     from ._job import Job
     from ._plan import (
         JobKey,
@@ -20,7 +20,13 @@ if TYPE_CHECKING:
         policy_text,
         template_of,
     )
-    from ._planner_choice import make_planner, refuse_unusable_planner
+    from ._planner_choice import (
+        KNOWN_PLANNERS,
+        make_planner,
+        planner_label,
+        planner_parameters,
+        refuse_unusable_planner,
+    )
     from ._pool import WorkerPool, run_here, tidy
     from ._process_lock import ProcessLock
     from ._recording import recorder_of
@@ -30,6 +36,8 @@ if TYPE_CHECKING:
     from ._seeded_crossing import seeded_crossing
 
 __all__ = [
+    "KNOWN_PLANNERS",
+    "Attempt",
     "Job",
     "JobKey",
     "ProcessLock",
@@ -43,6 +51,8 @@ __all__ = [
     "named_templates",
     "observed_episode",
     "plan_jobs",
+    "planner_label",
+    "planner_parameters",
     "policy_of",
     "policy_text",
     "read_jobs",
@@ -62,6 +72,7 @@ __getattr__ = lazy_names(
     __name__,
     {
         "._episode": (
+            "Attempt",
             "attempt",
             "observed_episode",
             "run_episode",
@@ -79,7 +90,10 @@ __getattr__ = lazy_names(
             "template_of",
         ),
         "._planner_choice": (
+            "KNOWN_PLANNERS",
             "make_planner",
+            "planner_label",
+            "planner_parameters",
             "refuse_unusable_planner",
         ),
         "._pool": (

@@ -13,7 +13,7 @@ from ...crossing import CrossingResult, Observer
 from ...crossing.eyes import Perception
 from ...scenario import CameraSpec
 from ...world.errors import SimError
-from ..measures import EpisodeRecord, measure
+from ..measures import Conduct, EpisodeRecord, measure
 from ._job import Job
 from ._plan import fault_of, job_key, policy_of, template_of
 from ._planner_choice import planner_label
@@ -22,10 +22,17 @@ from ._seeded_crossing import FreeRun, free_run, seeded_crossing
 
 @dataclass(frozen=True, slots=True)
 class Attempt:
-    """The record of an episode, and the traceback of its error; empty without an error."""
+    """The outcome of one episode.
+
+    Attributes:
+        record: its row in the table.
+        traceback: of the error that ended it; empty without an error.
+        conduct: of its planner; None for an episode that ended with an error.
+    """
 
     record: EpisodeRecord
     traceback: str = ""
+    conduct: Conduct | None = None
 
 
 def run_episode(job: Job) -> EpisodeRecord:
@@ -39,7 +46,8 @@ def run_episode(job: Job) -> EpisodeRecord:
 def attempt(job: Job) -> Attempt:
     """Run and measure one episode; only an interruption is raised."""
     try:
-        return Attempt(observed_episode(job)[1])
+        result, record = observed_episode(job)
+        return Attempt(record, conduct=Conduct.of(result))
     except Exception as error:  # a planner may raise anything, and the run continues
         return failed(job, f"{type(error).__name__}: {error}", format_exc())
 

@@ -1,17 +1,22 @@
-"""The planner of an episode: the reference planner, or the user's own as ``module:Class``."""
+"""The planner of an episode: a known one by its name, or the user's own as ``module:Class``."""
 
 from __future__ import annotations
 
+import ast
+import copy
 import inspect
 import sys
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Final
+from types import MappingProxyType
+from typing import Any, Final, NamedTuple
+
+from nav_adapter import RobotProfile
 
 from ...actors.robot import NOVA_CARTER
-from ...crossing.planner import LocalPlanner
+from ...crossing.planner import LocalPlanner, SamplingPlanner, StraightOn
 from ...scenario import Scenario
 from ...world.errors import SimError
 from ._seeding import FRESH_TORCH_SEED, seeded_generators
@@ -27,6 +32,34 @@ _PATH: Final = "reference_path_odom_m"
 _SEED: Final = "seed"
 
 
+class PlannerFactory(NamedTuple):
+    """The class or function that makes a planner.
+
+    Attributes:
+        make: returns a new planner.
+        signature: of ``make``; None for some compiled classes.
+        settings: arguments that were given with the name.
+    """
+
+    make: Callable[..., Any]
+    signature: inspect.Signature | None
+    settings: Mapping[str, Any] = MappingProxyType({})
+
+
+def straight_to_goal(robot: RobotProfile) -> StraightOn:
+    """Return a planner that drives straight to the goal at the robot's maximum speed.
+
+    It reads neither people nor limits, so it shows what measures make of a planner that does not.
+    """
+    return StraightOn(robot.max_speed_mps, stops_at_goal=True)
+
+
+#: Planners that have a name without a module, beside the reference planner.
+KNOWN_PLANNERS: Final[Mapping[str, Callable[..., LocalPlanner]]] = MappingProxyType(
+    {"straight_on": straight_to_goal}
+)
+
+
 def planner_label(planner: str, scenario: Scenario) -> str:
     """Return the name of a planner in tables: the part after the colon, or the default's name."""
     if planner:
@@ -37,9 +70,9 @@ def planner_label(planner: str, scenario: Scenario) -> str:
 def make_planner(planner: str, scenario: Scenario, seed: int = 0) -> LocalPlanner | None:
     """Return a new planner for one episode; None for the default planner.
 
-    ``module:Class`` names a class, or a function that returns a planner. The module is searched on
-    the import path and in the working directory. It is called with those of these arguments that
-    its signature has:
+    ``module:Class`` names a class, a function that returns a planner, or a planner. The module is
+    searched on the import path and in the working directory. A planner is copied for each episode.
+    A class or function is called with those of these arguments that its signature has:
 
     * ``robot`` (or ``robot_profile``, ``profile``, or a first positional argument without a
       default, whatever its name): the robot's :class:`~nav_adapter.RobotProfile`;
@@ -48,8 +81,8 @@ def make_planner(planner: str, scenario: Scenario, seed: int = 0) -> LocalPlanne
       apart;
     * ``seed``: the seed of the episode, an int ≥ 0.
 
-    Other arguments keep their defaults. A compiled class without a signature is called with the
-    robot alone.
+    Other arguments keep their defaults, unless they are given: ``module:Class(gain=2.0)``. A
+    compiled class without a signature is called with the robot and what is given.
 
     Raises:
         SimError: there is no such module or class, it asks for other arguments, it raises an
@@ -57,16 +90,16 @@ def make_planner(planner: str, scenario: Scenario, seed: int = 0) -> LocalPlanne
     """
     if not planner:
         return None
-    make, signature = import_planner(planner)
+    factory = import_planner(planner)
     available: dict[str, Any] = {
         _BOXES: scenario.planner_boxes_odom_m,
         _PATH: scenario.robot.path_odom_m,
         _SEED: seed,
     }
     available |= dict.fromkeys(_ROBOT, NOVA_CARTER)
-    arguments, keywords = _arguments(planner, signature, available)
+    arguments, keywords = _arguments(planner, factory, available)
     try:
-        made = make(*arguments, **keywords)
+        made = factory.make(*arguments, **keywords)
     except Exception as cause:  # the user's code may raise anything
         raise SimError(
             f"planner {planner!r} cannot be made: {type(cause).__name__}: {cause}"
@@ -93,21 +126,23 @@ def refuse_unusable_planner(planner: str, scenario: Scenario) -> None:
 
 
 def _arguments(
-    planner: str, signature: inspect.Signature | None, available: Mapping[str, Any]
+    planner: str, factory: PlannerFactory, available: Mapping[str, Any]
 ) -> tuple[list[Any], dict[str, Any]]:
     """Return the positional and keyword arguments that a signature asks for.
 
     Raises:
-        SimError: it has another argument without a default.
+        SimError: it has another argument without a default, or not one that was given.
     """
+    signature, settings = factory.signature, factory.settings
     positional: list[Any] = []
-    keywords: dict[str, Any] = {}
+    keywords: dict[str, Any] = dict(settings)
     if signature is None:
         return [NOVA_CARTER], keywords
+    _refuse_unknown_settings(planner, signature, settings)
     names_robot = any(name in _ROBOT for name in signature.parameters)
     for number, parameter in enumerate(signature.parameters.values()):
         kind, required = parameter.kind, parameter.default is parameter.empty
-        if kind is parameter.VAR_KEYWORD:
+        if kind is parameter.VAR_KEYWORD or parameter.name in settings:
             continue
         if parameter.name in available and kind is not parameter.VAR_POSITIONAL:
             if kind is not parameter.POSITIONAL_ONLY:
@@ -127,19 +162,70 @@ def _arguments(
     return positional, keywords
 
 
-@lru_cache(maxsize=64)
-def import_planner(planner: str) -> tuple[Callable[..., Any], inspect.Signature | None]:
-    """Return the class or function of ``module:Class``, and its signature if it has one.
+def _refuse_unknown_settings(
+    planner: str, signature: inspect.Signature, settings: Mapping[str, Any]
+) -> None:
+    """Raise SimError for an argument that was given and that the signature does not have."""
+    parameters = signature.parameters.values()
+    if any(each.kind is each.VAR_KEYWORD for each in parameters):
+        return
+    names = [
+        each.name
+        for each in parameters
+        if each.kind in (each.POSITIONAL_OR_KEYWORD, each.KEYWORD_ONLY)
+    ]
+    unknown = [name for name in settings if name not in names]
+    if unknown:
+        raise SimError(
+            f"planner {planner!r} has no argument {unknown[0]!r}; it has "
+            f"{', '.join(map(repr, names)) or 'none'}"
+        )
+
+
+def planner_parameters(planner: str) -> Mapping[str, inspect.Parameter]:
+    """Return the parameters of a planner's class or function; empty if it has no signature.
 
     Raises:
-        SimError: it cannot be imported, or is neither.
+        SimError: as :func:`import_planner`.
     """
-    module_name, colon, name = planner.partition(":")
+    if not planner:
+        return inspect.signature(SamplingPlanner).parameters
+    signature = import_planner(planner).signature
+    return MappingProxyType({}) if signature is None else signature.parameters
+
+
+@lru_cache(maxsize=64)
+def import_planner(planner: str) -> PlannerFactory:
+    """Return what makes the planner of a known name or of ``module:Class``.
+
+    Raises:
+        SimError: it cannot be imported, or is neither a class nor a function nor a planner.
+    """
+    if planner in KNOWN_PLANNERS:
+        return PlannerFactory(KNOWN_PLANNERS[planner], inspect.signature(KNOWN_PLANNERS[planner]))
+    target, settings = _split_settings(planner)
+    module_name, colon, name = target.partition(":")
     if not (colon and module_name and name):
         raise SimError(
-            f"planner must be given as module:Class, e.g. my_robot.planning:MyPlanner, "
-            f"got {planner!r}"
+            f"planner must be given as module:Class, e.g. my_robot.planning:MyPlanner, or as one "
+            f"of {', '.join(('reference', *KNOWN_PLANNERS))}, got {planner!r}"
         )
+    found = _found(planner, module_name, name)
+    if not isinstance(found, type) and callable(getattr(found, "plan", None)):
+        return PlannerFactory(_copier(found), inspect.Signature(), settings)
+    if not callable(found):
+        raise SimError(
+            f"planner {planner!r} must name a class or a function, or an object with plan, "
+            f"got {found!r:.80}"
+        )
+    try:
+        return PlannerFactory(found, inspect.signature(found), settings)
+    except (TypeError, ValueError):  # some compiled classes have no signature
+        return PlannerFactory(found, None, settings)
+
+
+def _found(planner: str, module_name: str, name: str) -> Any:
+    """Return the object of a module by its dotted name; raise SimError if there is none."""
     here = str(Path.cwd())
     if (
         here not in sys.path and "" not in sys.path
@@ -155,9 +241,37 @@ def import_planner(planner: str) -> tuple[Callable[..., Any], inspect.Signature 
         raise SimError(
             f"planner {planner!r} cannot be imported: {type(cause).__name__}: {cause}"
         ) from cause
-    if not callable(found):
-        raise SimError(f"planner {planner!r} must name a class or a function, got {found!r:.80}")
+    return found
+
+
+def _copier(planner: Any) -> Callable[[], Any]:
+    """Return a function that copies a planner with all of its state."""
+
+    def copied() -> Any:
+        return copy.deepcopy(planner)
+
+    return copied
+
+
+def _split_settings(planner: str) -> tuple[str, dict[str, Any]]:
+    """Return ``module:Class`` and the arguments in parentheses behind it, if there are any.
+
+    Raises:
+        SimError: the arguments are not ``name=value``, with numbers, strings, booleans or None.
+    """
+    target, opening, rest = planner.partition("(")
+    if not opening:
+        return planner, {}
     try:
-        return found, inspect.signature(found)
-    except (TypeError, ValueError):  # some compiled classes have no signature
-        return found, None
+        call = ast.parse(f"f({rest}", mode="eval").body
+        if not isinstance(call, ast.Call) or call.args or ":" in rest:
+            raise ValueError("not a call with keywords alone")
+        settings = {str(each.arg): ast.literal_eval(each.value) for each in call.keywords}
+        if not all(isinstance(each, int | float | str | None) for each in settings.values()):
+            raise ValueError("not a plain value")
+    except (SyntaxError, ValueError) as cause:
+        raise SimError(
+            "arguments of a planner must be given as module:Class(name=value, …), with numbers, "
+            f"strings without a colon, True, False or None, got {planner!r}"
+        ) from cause
+    return target, settings

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,7 @@ def run_jobs(
     overwrite: bool = False,
     progress: bool = False,
     about: Mapping[str, Any] | None = None,
+    on_attempt: Callable[[int, Attempt], None] | None = None,
 ) -> tuple[EpisodeRecord, ...]:
     """Run episodes and write their table; the result does not depend on where they run.
 
@@ -50,6 +51,7 @@ def run_jobs(
         overwrite: replace the run in ``out_dir``, which is refused otherwise.
         progress: show progress and the time left on standard error.
         about: command and settings, kept in ``run.json``.
+        on_attempt: called with the number of a job and its outcome, before its row is written.
 
     Returns:
         The records in the order of the jobs; ``error`` of a record says why an episode failed.
@@ -85,6 +87,8 @@ def run_jobs(
             disable=not progress,
         ) as bar:
             for number, result in _results(remaining, int(count), scheduler, limit_s):
+                if on_attempt is not None:
+                    on_attempt(number, result)
                 folder.add(number, result.record, result.traceback)
                 bar.update()
         return folder.finish()

@@ -26,7 +26,7 @@ FRAMES = [
     for k in range(4)
 ]
 # These take minutes, or need a study of many episodes; their own tests read their JSON.
-SLOW = {("bench",), ("demo",), ("falsify",), ("tune",)}
+SLOW = {("bench",), ("demo",), ("falsify",), ("planners", "compare"), ("tune",)}
 
 
 def printed(capfd, *words, status=0):
@@ -51,6 +51,7 @@ def test_every_command_with_json_is_tested_here():
         ("judge",),
         ("models", "list"),
         ("models", "verify"),
+        ("planners", "list"),
         ("policy", "show"),
         ("scenario", "list"),
         ("tracks",),
@@ -69,6 +70,12 @@ def test_models_print_json(capfd, tmp_path):
     assert {"shipped", "real_robot", "named_only"} < set(listed)
     states = printed(capfd, "models", "verify", "--out", tmp_path)
     assert set(states) == {each["name"] for each in listed["shipped"]}
+
+
+def test_planners_list_prints_json(capfd):
+    listed = printed(capfd, "planners", "list")
+    assert [each["name"] for each in listed] == ["reference", "straight_on"]
+    assert all(each["about"].endswith((".", "(Fox, Burgard and Thrun 1997).")) for each in listed)
 
 
 def test_doctor_prints_json(capfd):
