@@ -145,7 +145,7 @@ def differential_drive(
     dt_s: float | None = None,
     ahead_m: float | None = None,
 ) -> tuple[float, float]:
-    """Return the speed and yaw rate with which two wheels, or a robot that steers, follow a velocity.
+    """Return the speed and yaw rate with which a robot on wheels follows a velocity.
 
     Many planners choose a velocity in the plane, and two wheels cannot move sideways. A point at a
     distance d ahead of the base origin can: with the heading h and its left normal n it moves at
