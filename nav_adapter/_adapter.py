@@ -364,16 +364,16 @@ class NavAdapter:
     def _drives_sideways(self, robot_state: RobotState) -> bool:
         """Return whether a robot moves sideways that cannot, according to its profile."""
         lateral_mps = abs(robot_state.lateral_mps)
-        return self._robot.drive == "differential" and lateral_mps > LATERAL_NOISE_MPS
+        return self._robot.moves_sideways is False and lateral_mps > LATERAL_NOISE_MPS
 
     def _drive_problem(self, robot_state: RobotState) -> str:
         return (
             f"robot: moves sideways at {abs(robot_state.lateral_mps):.2f} m/s, but its profile "
-            "says drive='differential'"
+            f"says drive={self._robot.drive!r}"
         )
 
     def _warn_of_drive(self, robot_state: RobotState) -> None:
-        """Log lateral motion of a differential robot, once until it ends."""
+        """Log lateral motion of a robot that has none, once until it ends."""
         sideways = self._drives_sideways(robot_state)
         if sideways and not self._warned_of_drive:
             _LOG.warning("%s: the speed limit is 0", self._drive_problem(robot_state))

@@ -209,7 +209,8 @@ class NavConstraints:
         A point at a distance r from the base origin moves at most at |v| + |ω| r. The farthest
         point is at the circumscribed radius R, so |v| + |ω| R ≤ ``fastest_point_limit_mps`` holds
         for every point if it holds there. This is assumption 4 of ``docs/safety.md``. The profile's
-        ``max_yaw_rate_radps`` is an upper limit, where it is given.
+        ``max_yaw_rate_radps`` and |v| / ``min_turning_radius_m`` are upper limits, where they are
+        given.
 
         Args:
             speed_mps: speed of the base along its path, of either sign.
@@ -231,6 +232,9 @@ class NavConstraints:
                 "yaw_rate_limit_radps needs constraints with a robot, as NavAdapter.update gives "
                 "them; these have robot=None"
             )
-        highest = self.robot.max_yaw_rate_radps
-        limit = left_mps / self.robot.circumscribed_radius_m
-        return limit if highest is None else min(limit, highest)
+        limits = [left_mps / self.robot.circumscribed_radius_m]
+        if self.robot.max_yaw_rate_radps is not None:
+            limits.append(self.robot.max_yaw_rate_radps)
+        if self.robot.min_turning_radius_m is not None:
+            limits.append(speed / self.robot.min_turning_radius_m)
+        return min(limits)

@@ -224,7 +224,7 @@ class SpeedGovernor:
         x, y = offset_odom_m.T
         angle_rad = np.abs(np.arctan2(travel_x * y - travel_y * x, travel_x * x + travel_y * y))
         turn_rad = self._turn_rad + abs(robot_state.yaw_rate_radps) * robot_age_s
-        if lateral_mps <= LATERAL_NOISE_MPS and self._robot.drive != "differential":
+        if lateral_mps <= LATERAL_NOISE_MPS and self._robot.moves_sideways is not False:
             # What counts as noise may be motion.
             turn_rad += math.atan2(lateral_mps, abs(robot_state.speed_mps))
         if self._robot.max_acceleration_mps2 * robot_age_s >= robot_state.travel_mps:

@@ -21,7 +21,12 @@ LATERAL_NOISE_MPS: Final = 0.1
 # The forward speed is given twice with velocity_base_mps.
 _SAME_SPEED_MPS: Final = 1e-6
 
-Drive = Literal["differential", "holonomic"]
+Drive = Literal["differential", "ackermann", "holonomic"]
+_OPTIONAL_LIMITS: Final = (
+    "max_yaw_rate_radps",
+    "max_yaw_acceleration_radps2",
+    "min_turning_radius_m",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,13 +41,21 @@ class RobotProfile:
         max_deceleration_mps2: > 0, a deceleration that the brakes always reach.
         reaction_time_s: ≥ 0, from a change in the scene to the start of braking: exposure,
             perception, the period of the control loop and the delay of the drive.
-        drive: ``"differential"`` for a robot that cannot move sideways, ``"holonomic"`` for one
-            that can, None if it is not known. With ``"differential"`` the adapter stops a robot
-            whose state moves sideways, since one of the two is wrong.
+        drive: ``"differential"`` for a robot that turns on the spot and cannot move sideways,
+            ``"ackermann"`` for one that steers (a car, a tricycle), ``"holonomic"`` for one that
+            can move sideways, None if it is not known. With the first two the adapter stops a
+            robot whose state moves sideways, since one of the two is wrong. The base origin of
+            these two lies on the axle that does not steer.
         max_yaw_rate_radps: > 0, the fastest turn, either way; None if it is not known. It limits
             commands (:mod:`nav_adapter.motion`) and changes no speed limit.
         max_yaw_acceleration_radps2: > 0, the fastest change of the yaw rate; None if it is not
             known.
+        min_turning_radius_m: > 0, the tightest curve of the base origin, needed with
+            ``"ackermann"`` and refused with any other drive: |ω| ≤ |v| / radius. It limits
+            commands and changes no speed limit.
+
+    Raises:
+        NavError: for a value out of these bounds.
     """
 
     footprint_m: FloatArray
@@ -53,11 +66,18 @@ class RobotProfile:
     drive: Drive | None = None
     max_yaw_rate_radps: float | None = None
     max_yaw_acceleration_radps2: float | None = None
+    min_turning_radius_m: float | None = None
 
     def __post_init__(self) -> None:
         if self.drive is not None and self.drive not in get_args(Drive):
             raise NavError(
-                f"drive must be 'differential', 'holonomic' or None, got {self.drive!r:.80}"
+                "drive must be 'differential', 'ackermann', 'holonomic' or None, got "
+                f"{self.drive!r:.80}"
+            )
+        if (self.drive == "ackermann") != (self.min_turning_radius_m is not None):
+            raise NavError(
+                "min_turning_radius_m must be given with drive='ackermann' and with no other "
+                f"drive, got {self.min_turning_radius_m!r:.80} with drive={self.drive!r}"
             )
         footprint = finite_array("footprint_m", self.footprint_m, ("M", 2), NavError)
         if len(footprint) < 3:
@@ -83,11 +103,14 @@ class RobotProfile:
                 "reaction_time_s", self.reaction_time_s, NavError, minimum=0.0
             ),
             **{
-                name: positive(name)
-                for name in ("max_yaw_rate_radps", "max_yaw_acceleration_radps2")
-                if getattr(self, name) is not None
+                name: positive(name) for name in _OPTIONAL_LIMITS if getattr(self, name) is not None
             },
         )
+
+    @property
+    def moves_sideways(self) -> bool | None:
+        """Whether the drive can move sideways; None if it is not known."""
+        return None if self.drive is None else self.drive == "holonomic"
 
     @cached_property
     def circumscribed_radius_m(self) -> float:

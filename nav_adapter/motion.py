@@ -5,7 +5,8 @@ a command is a *twist*, the speed and the yaw rate together::
 
     |v| ≤ speed_limit_mps   and   |v| + |ω| R ≤ fastest_point_limit_mps
 
-with the circumscribed radius R about the base origin. ``docs/planners.md`` shows the functions in
+with the circumscribed radius R about the base origin. A robot that steers has a third limit, its
+curvature: |ω| ≤ |v| / ``min_turning_radius_m``. ``docs/planners.md`` shows the functions in
 use, and assumption 4 of ``docs/safety.md`` says what they are for.
 """
 
@@ -36,12 +37,20 @@ __all__ = [
 _BEHIND_SINE = 0.3
 
 
-def twist_envelope(constraints: NavConstraints) -> FloatArray:
+def twist_envelope(constraints: NavConstraints, *, backward: bool = False) -> FloatArray:
     """Return (M, 3) rows a, c, b: a twist is allowed if a·v + c·ω ≥ b in every row.
 
     For a solver that chooses v (m/s) and ω (rad/s). The region is convex and contains (0, 0):
     |v| at most the speed limit, |v| + |ω| R at most the limit of the fastest point, and |ω| at most
     ``max_yaw_rate_radps`` of the robot's profile. Limits that are not there have no rows.
+
+    The twists of a robot that steers (``min_turning_radius_m``) are two cones, one for each
+    direction of travel, and not convex together. The region then holds one of them.
+
+    Args:
+        constraints: of the present cycle.
+        backward: for a robot that steers, the cone of driving backward; other robots have one
+            region for both directions.
 
     Raises:
         NavError: for constraints without ``robot``.
@@ -53,6 +62,9 @@ def twist_envelope(constraints: NavConstraints) -> FloatArray:
         rows += [[v, w * radius_m, -fastest_mps] for v, w in signs]
     if math.isfinite(highest_radps):
         rows += [[0.0, 1.0, -highest_radps], [0.0, -1.0, -highest_radps]]
+    if (curve_m := _tightest_curve_m(constraints)) > 0.0:
+        direction = -1.0 if backward else 1.0
+        rows += [[direction, curve_m, 0.0], [direction, -curve_m, 0.0]]
     return np.array(rows)
 
 
@@ -60,7 +72,9 @@ def clip_twists(constraints: NavConstraints, twists: Any) -> FloatArray:
     """Return twists slowed down until the limits hold, on the same curve.
 
     All numbers of a twist are multiplied by one factor of at most 1, so the path keeps its
-    curvature. For the samples of a sampling planner, and for the last line of any other.
+    curvature. Only a curve tighter than ``min_turning_radius_m`` of the profile changes: it becomes
+    the tightest one at the same forward speed, and standing robots that steer do not turn. For the
+    samples of a sampling planner, and for the last line of any other.
 
     Args:
         constraints: of the present cycle.
@@ -78,6 +92,10 @@ def clip_twists(constraints: NavConstraints, twists: Any) -> FloatArray:
             f"left between them, got shape {given.shape}"
         )
     limit_mps, fastest_mps, radius_m, highest_radps = _limits_of(constraints)
+    if (curve_m := _tightest_curve_m(constraints)) > 0.0:
+        given = given.copy()
+        most_radps = np.abs(given[..., 0]) / curve_m
+        given[..., -1] = np.minimum(np.maximum(given[..., -1], -most_radps), most_radps)
     speed = np.sqrt((given[..., :-1] ** 2).sum(axis=-1))
     yaw_rate = np.abs(given[..., -1])
     factor = np.minimum(_share(speed, limit_mps), _share(yaw_rate, highest_radps))
@@ -127,7 +145,7 @@ def differential_drive(
     dt_s: float | None = None,
     ahead_m: float | None = None,
 ) -> tuple[float, float]:
-    """Return the speed and yaw rate with which a differential drive follows a velocity.
+    """Return the speed and yaw rate with which a robot on wheels follows a velocity.
 
     Many planners choose a velocity in the plane, and two wheels cannot move sideways. A point at a
     distance d ahead of the base origin can: with the heading h and its left normal n it moves at
@@ -137,9 +155,11 @@ def differential_drive(
     velocity near 0 gives a command near (0, 0) and noise does not turn the robot.
 
     The robot does not reverse. A velocity that leads backwards gives v = 0 and ω = ±|u| / d until
-    the robot faces it. Straight behind, a turn that has begun goes on.
+    the robot faces it. Straight behind, a turn that has begun goes on. A robot that steers cannot
+    turn on the spot: where the curve would be tighter than ``min_turning_radius_m``, it drives the
+    tightest one with this yaw rate, and the point no longer moves along u.
 
-    Limits slow both numbers by the same factor, so the point still moves along u. They are the
+    Limits slow both numbers by the same factor, so the direction does not change. They are the
     profile's ``max_speed_mps`` and ``max_yaw_rate_radps`` and, with ``constraints``, those of
     :func:`clip_twists`. With ``dt_s`` the command also lies within the accelerations of the
     profile. Where these do not reach the limits within ``dt_s``, it is the nearest that they reach.
@@ -173,6 +193,8 @@ def differential_drive(
         keeps_on = abs(left_mps) <= _BEHIND_SINE * length_mps and turning != 0.0
         speed, yaw_rate = 0.0, math.copysign(length_mps / ahead, turning if keeps_on else left_mps)
 
+    curve_m = robot.min_turning_radius_m or 0.0
+    speed = max(speed, abs(yaw_rate) * curve_m)
     twist = clip_twists(_limits_alone(robot), [speed, yaw_rate])
     if constraints is not None:
         if constraints.robot is None:
@@ -199,6 +221,8 @@ def differential_drive(
     if constraints is not None:
         _, fastest_mps, radius_m, _ = _limits_of(constraints)
         speed = max(min(speed, fastest_mps - abs(yaw_rate) * radius_m), slowest, min(speed, 0.0))
+    if curve_m > 0.0:  # the yaw rate of a robot that steers falls with its speed
+        yaw_rate = min(max(yaw_rate, -abs(speed) / curve_m), abs(speed) / curve_m)
     return speed, yaw_rate
 
 
@@ -233,6 +257,12 @@ def _limits_of(constraints: NavConstraints) -> tuple[float, float, float, float]
     assert fastest_mps is not None
     highest = math.inf if robot.max_yaw_rate_radps is None else robot.max_yaw_rate_radps
     return constraints.speed_limit_mps, fastest_mps, robot.circumscribed_radius_m, highest
+
+
+def _tightest_curve_m(constraints: NavConstraints) -> float:
+    """Return the smallest turning radius of the robot, 0 for one that turns on the spot."""
+    robot = constraints.robot
+    return 0.0 if robot is None else robot.min_turning_radius_m or 0.0
 
 
 def _axes(robot_state: RobotState) -> tuple[FloatArray, FloatArray]:

@@ -109,7 +109,7 @@ def poses_of(
         fastest_mps = library.at_least(travel_mps, robot.max_speed_mps)
         faster_m = 0.5 * robot.max_acceleration_mps2 * age_s**2
         driven_m = library.minimum(travel_mps * age_s + faster_m, fastest_mps * age_s)
-    sideways = slips if robot.drive == "differential" else None
+    sideways = slips if robot.moves_sideways is False else None
     if heading is None:
         return Poses(x, y, driven_m=driven_m, sideways=sideways)
     one = library.convert(1.0)
@@ -149,7 +149,7 @@ def _turn(
         # Without a yaw rate the robot may have turned by any angle.
         turn_rad = turn_rad + (math.pi if yaw_rates_radps is None else abs(yaw_rates_radps) * age_s)
         anywhere = anywhere | (travel_mps <= robot.max_acceleration_mps2 * age_s)
-    if left_mps is not None and robot.drive != "differential":
+    if left_mps is not None and robot.moves_sideways is not False:
         # What counts as noise may be motion. The tangent is never below the angle.
         noise_rad = abs(left_mps) / library.at_least(abs(forward_mps), 1e-3)
         if slips is not None:

@@ -109,8 +109,14 @@ class RobotFile(StrictConfig):
         max_acceleration_mps2: > 0.
         max_deceleration_mps2: > 0, a deceleration that the brakes always reach.
         reaction_time_s: ≥ 0, from exposure to the start of braking.
-        drive: ``differential``, or ``holonomic`` for a robot that can move sideways. Without it
-            the odometry tells. A ``differential`` robot whose odometry moves sideways is stopped.
+        drive: ``differential``; ``ackermann`` for a robot that steers; ``holonomic`` for one that
+            can move sideways. Without it the odometry tells. A ``differential`` or ``ackermann``
+            robot whose odometry moves sideways is stopped.
+        max_yaw_rate_radps: > 0, the fastest turn, either way. This and the next two limit commands
+            (``constraints.yaw_rate_limit_radps``, :mod:`nav_adapter.motion`), not the speed.
+        max_yaw_acceleration_radps2: > 0, the fastest change of the yaw rate.
+        min_turning_radius_m: > 0, the tightest curve of the base origin; needed with ``ackermann``
+            and refused with another drive.
         camera: mount of the camera; without it the pose is read from tf.
         scanners: mounts of the laser scanners, in the order of their topics; without it the poses
             are read from tf.
@@ -123,7 +129,10 @@ class RobotFile(StrictConfig):
     max_acceleration_mps2: float = Field(gt=0.0)
     max_deceleration_mps2: float = Field(gt=0.0)
     reaction_time_s: float = Field(ge=0.0)
-    drive: Literal["differential", "holonomic"] | None = None
+    drive: Literal["differential", "ackermann", "holonomic"] | None = None
+    max_yaw_rate_radps: float | None = Field(default=None, gt=0.0)
+    max_yaw_acceleration_radps2: float | None = Field(default=None, gt=0.0)
+    min_turning_radius_m: float | None = Field(default=None, gt=0.0)
     camera: CameraMount | None = None
     scanners: list[ScannerMount] | None = Field(default=None, min_length=1, max_length=2)
 
@@ -131,7 +140,8 @@ class RobotFile(StrictConfig):
         """Return the robot's profile.
 
         Raises:
-            NavError: for a footprint without area.
+            NavError: for a footprint without area, and a turning radius that does not go with the
+                drive.
         """
         return RobotProfile(
             footprint_m=np.array(self.footprint_m),
@@ -140,4 +150,7 @@ class RobotFile(StrictConfig):
             max_deceleration_mps2=self.max_deceleration_mps2,
             reaction_time_s=self.reaction_time_s,
             drive=self.drive,
+            max_yaw_rate_radps=self.max_yaw_rate_radps,
+            max_yaw_acceleration_radps2=self.max_yaw_acceleration_radps2,
+            min_turning_radius_m=self.min_turning_radius_m,
         )

@@ -79,7 +79,7 @@ def _person_limit_mps(
         course = state.heading_odom_rad + math.atan2(counted, forward)
         turn = math.radians(policy.rules.turn_within_stop_deg)
         turn += abs(state.yaw_rate_radps) * state_age_s
-        if counted == 0.0 and robot.drive != "differential":
+        if counted == 0.0 and robot.drive not in ("differential", "ackermann"):
             turn += math.atan2(abs(left), abs(forward))
         if robot.max_acceleration_mps2 * state_age_s >= travel_mps:
             turn = math.pi

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -69,17 +70,20 @@ def test_only_the_direction_of_travel_counts_for_a_round_robot(
     )
 
 
-def test_a_differential_robot_that_moves_sideways_is_stopped_loudly(
-    caplog: pytest.LogCaptureFixture,
+@pytest.mark.parametrize(
+    "changes", [{"drive": "differential"}, {"drive": "ackermann", "min_turning_radius_m": 1.5}]
+)
+def test_a_robot_that_cannot_move_sideways_but_does_is_stopped_loudly(
+    changes: dict[str, Any], caplog: pytest.LogCaptureFixture
 ) -> None:
-    adapter = NavAdapter(AwarenessPolicy(), replace(ROBOT, drive="differential"))
+    adapter = NavAdapter(AwarenessPolicy(), replace(ROBOT, **changes))
     with caplog.at_level(logging.WARNING, logger="nav_adapter"):
         for k in range(5):
             state = replace(moving(0.0, -1.2), stamp_s=0.1 * k)
             result = adapter.update((), state, 0.1 * k)
             assert result.speed_limit_mps == 0.0
             assert "moves sideways at 1.20 m/s" in result.limited_by
-            assert "drive='differential'" in result.limited_by
+            assert f"drive='{changes['drive']}'" in result.limited_by
     assert len(caplog.records) == 1
     quiet = adapter.update((), replace(moving(0.5, 0.09), stamp_s=0.6), 0.6)
     assert "sideways" not in quiet.limited_by
@@ -117,7 +121,7 @@ def test_a_velocity_that_cannot_be_is_refused(changes: dict[str, object], text: 
 
 
 def test_an_unknown_drive_is_refused() -> None:
-    with pytest.raises(NavError, match="drive must be 'differential', 'holonomic' or None"):
+    with pytest.raises(NavError, match="drive must be 'differential', 'ackermann', 'holonomic'"):
         replace(ROBOT, drive="tracked")
 
 

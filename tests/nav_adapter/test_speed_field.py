@@ -101,16 +101,16 @@ def scenes(draw: st.DrawFn) -> Scene:
         }
     )
     policy = policy.model_copy(update={"rules": rules})
-    robot = replace(
-        draw(robots()), drive=draw(st.sampled_from([None, "differential", "holonomic"]))
-    )
+    drive = draw(st.sampled_from([None, "differential", "ackermann", "holonomic"]))
+    radius_m = 1.5 if drive == "ackermann" else None
+    robot = replace(draw(robots()), drive=drive, min_turning_radius_m=radius_m)
     people = draw(crowds())
     after_s = draw(st.just(0.0) | finite(0.0, 2.0))
     top = robot.max_speed_mps
     speed = draw(st.sampled_from([0.0, 0.03]) | finite(-0.7 * top, 0.7 * top))
-    # A differential robot that moves sideways is a fault, with a test of its own.
+    # A robot that cannot move sideways but does is a fault, with a test of its own.
     lateral = draw(st.sampled_from([0.0, 0.0, 0.05]))
-    if robot.drive != "differential":
+    if robot.moves_sideways is not False:
         lateral = draw(st.just(lateral) | finite(-0.7 * top, 0.7 * top))
     state = RobotState(
         after_s - draw(st.just(0.0) | finite(0.0, 0.4)),

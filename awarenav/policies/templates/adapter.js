@@ -86,6 +86,11 @@ function countedHumanSpeed(policy, state, person) {
   return Math.max(closing, assumed);
 }
 
+/** Whether the drive cannot move sideways. */
+function drivesStraight(robot) {
+  return robot.drive === "differential" || robot.drive === "ackermann";
+}
+
 /** The share of the stopping distance that can lead to a point. */
 function approach(policy, robot, state, [x, y]) {
   const lateral = Math.abs(state.lateral_mps);
@@ -93,7 +98,7 @@ function approach(policy, robot, state, [x, y]) {
   const [ahead, left] = travelOf(state).direction;
   const angle = Math.abs(Math.atan2(ahead * y - left * x, ahead * x + left * y));
   let turn = radians(policy.rules.turn_within_stop_deg);
-  if (lateral <= LATERAL_NOISE_MPS && robot.drive !== "differential")
+  if (lateral <= LATERAL_NOISE_MPS && !drivesStraight(robot))
     turn += Math.atan2(lateral, Math.abs(state.speed_mps));
   return Math.max(Math.cos(Math.max(angle - turn, 0)), 0);
 }
@@ -210,10 +215,10 @@ function answer(policy, robot, state) {
   if (state.data_age_s > policy.timing.stop_after_s)
     [limit, reason] = [0, `stale data: perception is ${state.data_age_s.toFixed(2)} s old`];
   const lateral = Math.abs(state.lateral_mps);
-  if (robot.drive === "differential" && lateral > LATERAL_NOISE_MPS) {
+  if (drivesStraight(robot) && lateral > LATERAL_NOISE_MPS) {
     limit = 0;
     reason = `robot: moves sideways at ${lateral.toFixed(2)} m/s, but its profile says `
-      + "drive='differential'";
+      + `drive='${robot.drive}'`;
   }
   const reaction = robot.reaction_time_s + state.data_age_s;
   return {

@@ -152,13 +152,15 @@ def random_robot(draw: random.Random) -> dict[str, Any]:
     count = draw.randint(3, 7)
     angles = [2.0 * math.pi * (step + 0.8 * draw.random()) / count for step in range(count)]
     long_m, wide_m, shift_m = draw.uniform(0.2, 0.8), draw.uniform(0.2, 0.8), draw.uniform(0, 0.3)
+    drive = draw.choice([None, "differential", "ackermann", "holonomic"])
     return {
         "footprint_m": [[long_m * math.cos(a) - shift_m, wide_m * math.sin(a)] for a in angles],
         "max_speed_mps": draw.uniform(0.3, 3.0),
         "max_acceleration_mps2": draw.uniform(0.3, 3.0),
         "max_deceleration_mps2": draw.uniform(0.3, 3.0),
         "reaction_time_s": draw.choice([0.0, draw.uniform(0.0, 0.8)]),
-        "drive": draw.choice([None, "differential", "holonomic"]),
+        "drive": drive,
+        "min_turning_radius_m": 1.5 if drive == "ackermann" else None,
     }
 
 
