@@ -118,12 +118,35 @@ def obeying(
     return speed * share, yaw_rate * share
 
 
-def brake_distance_m(robot: RobotProfile, speed_mps: FloatArray | float) -> FloatArray:
-    """Return the distance to a stop, the reaction included."""
-    speed = np.asarray(speed_mps)
-    return np.asarray(
-        speed * robot.reaction_time_s + speed**2 / (2.0 * robot.max_deceleration_mps2)
-    )
+def follow_curvature(
+    robot_state: RobotState, curvatures_1pm: FloatArray, step_m: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return positions (K, T + 1, 2) and headings (K, T + 1) of ways that begin at the robot.
+
+    Args:
+        robot_state: the latest.
+        curvatures_1pm: (K, T) curvature of each step, left positive, 1/m.
+        step_m: length of a step.
+    """
+    turned = np.cumsum(curvatures_1pm * step_m, axis=1)
+    turned = np.concatenate([np.zeros_like(turned[:, :1]), turned], axis=1)
+    headings = robot_state.heading_odom_rad + turned
+    middle = 0.5 * (headings[:, 1:] + headings[:, :-1])
+    moved = np.cumsum(step_m * np.stack([np.cos(middle), np.sin(middle)], axis=-1), axis=1)
+    moved = np.concatenate([np.zeros_like(moved[:, :1]), moved], axis=1)
+    return robot_state.position_odom_m + moved, headings
+
+
+def speed_to_stop_at_mps(robot: RobotProfile, distance_m: float) -> float:
+    """Return the speed from which 60 % of the robot's deceleration stops it within a distance."""
+    gentle = math.sqrt(1.2 * robot.max_deceleration_mps2 * max(distance_m, 0.0))
+    return min(robot.max_speed_mps, gentle)
+
+
+def bearing_rad(robot_state: RobotState, goal_odom_m: FloatArray) -> float:
+    """Return the angle from the robot's heading to the goal, in [−π, π]."""
+    x, y = (goal_odom_m - robot_state.position_odom_m).tolist()
+    return math.remainder(math.atan2(y, x) - robot_state.heading_odom_rad, math.tau)
 
 
 def _along(corners_odom_m: FloatArray) -> FloatArray:

@@ -1,11 +1,13 @@
-"""A dynamic-window planner (Fox, Burgard and Thrun 1997) in NumPy, to copy and change.
+"""A dynamic-window planner (after Fox, Burgard and Thrun 1997) in NumPy, to copy and change.
 
-It drives a few dozen curves in its head and takes the one that is fastest to the goal. With the
-speed field, the time along a curve is the time that people leave the robot there. So it takes the
-wider, faster way past somebody who stands in an aisle. Without it, people are circles that cost.
+Each cycle it tries a few speeds on a few curves and takes the pair that is fastest to the goal.
+With the speed field, a curve takes the time that people leave the robot along it. So the planner
+takes the wider, faster way past somebody who stands in an aisle. Without it, circles cost time.
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
@@ -13,23 +15,29 @@ from nav_adapter import NavConstraints, RobotProfile, RobotState
 from nav_adapter.exporters import people_cost, time_cost
 from perception.arrays import FloatArray
 
-from ._shared import brake_distance_m, gap_to_boxes_m, no_boxes, obeying
+from ._shared import (
+    bearing_rad,
+    follow_curvature,
+    gap_to_boxes_m,
+    no_boxes,
+    obeying,
+    speed_to_stop_at_mps,
+)
 
-_STEP_S = 0.2
-_STEPS = 20
-_TURN_STEPS = 5  # a candidate turns for this long, and then goes straight
-_SPEEDS = 6
-_YAW_RATES_RADPS = np.array([-1.0, -0.6, -0.35, -0.2, -0.1, -0.05])
-_YAW_RATES_RADPS = np.concatenate([_YAW_RATES_RADPS, [0.0], -_YAW_RATES_RADPS[::-1]])
-# Seconds that a candidate pays for what it does.
-_TURNING_S = 0.1
-_NEAR_A_WALL_S = 1.0
-_NEAR_A_PERSON_S = 0.2
-_NEAR_M = 0.3
+_LENGTH_M, _STEPS = 4.0, 20
+_TURN_STEPS = 6  # a curve bends over this part of its length, and is straight after it
+_SPEED_SHARES = (1.0, 0.7, 0.4, 0.2)
+_BENDS_RAD = (0.0, 0.05, 0.1, 0.2, 0.3, 0.45, 0.65, 0.9, 1.2)
+# Farther than this from its goal's direction, the robot turns on the spot.
+_TURN_BACK_RAD = 1.6
+_TURN_RADPS = 0.8
+# Seconds that a curve costs for a bend of 1 rad, for being near a wall, in one, or in a circle.
+_BEND_S, _NEAR_A_WALL_S, _IN_A_WALL_S, _IN_A_CIRCLE_S = 0.3, 0.5, 10.0, 20.0
+_NEAR_M = 0.1
 
 
 class DynamicWindow:
-    """A planner for a differential drive that tries speeds and yaw rates.
+    """A planner for a differential drive that tries speeds and curves.
 
     Args:
         robot: footprint and limits.
@@ -56,68 +64,68 @@ class DynamicWindow:
         dt_s: float,
     ) -> tuple[float, float]:
         """Return speed (m/s) and yaw rate (rad/s)."""
-        robot = self._robot
         goal_m = float(np.hypot(*(goal_odom_m - robot_state.position_odom_m)))
-        # With the field, a candidate may be faster later than it may be now.
-        top_mps = robot.max_speed_mps if self._use_speed_field else constraints.speed_limit_mps
-        top_mps = min(top_mps, np.sqrt(robot.max_deceleration_mps2 * goal_m))
-        bearing_rad = self._bearing_rad(robot_state, goal_odom_m)
-        turns = np.append(_YAW_RATES_RADPS, np.clip(bearing_rad / (_TURN_STEPS * _STEP_S), -1, 1))
-        speeds = np.linspace(0.0, top_mps, _SPEEDS)
-        speeds, turns = (grid.ravel() for grid in np.meshgrid(speeds, turns, indexing="ij"))
-        positions, headings = self._roll_out(robot_state, speeds, turns)
-        cost = self._seconds(constraints, positions, headings, speeds, goal_odom_m)
-        cost += _TURNING_S * np.abs(turns)
-        best = int(np.argmin(cost))
-        if not np.isfinite(cost[best]):
-            return 0.0, 0.0
-        twist = (float(speeds[best]), float(turns[best]))
+        off_rad = bearing_rad(robot_state, goal_odom_m)
+        if abs(off_rad) > _TURN_BACK_RAD:
+            twist = (0.0, math.copysign(_TURN_RADPS, off_rad))
+        else:
+            twist = self._best(robot_state, goal_odom_m, constraints, goal_m, off_rad)
         return obeying(
             constraints, robot_state, twist, dt_s, use_speed_field=self._use_speed_field
         )
 
-    def _roll_out(
-        self, state: RobotState, speeds: FloatArray, turns: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return positions (K, T, 2) and headings (K, T), beginning now."""
-        turning = np.minimum(np.arange(_STEPS + 1), _TURN_STEPS) * _STEP_S
-        headings = state.heading_odom_rad + turns[:, None] * turning
-        middle = 0.5 * (headings[:, 1:] + headings[:, :-1])
-        steps = speeds[:, None, None] * _STEP_S * np.stack([np.cos(middle), np.sin(middle)], -1)
-        moved = np.concatenate([np.zeros_like(steps[:, :1]), np.cumsum(steps, axis=1)], axis=1)
-        return state.position_odom_m + moved, headings
+    def _best(
+        self,
+        state: RobotState,
+        goal_odom_m: FloatArray,
+        constraints: NavConstraints,
+        goal_m: float,
+        off_rad: float,
+    ) -> tuple[float, float]:
+        """Return the speed and yaw rate that lead to the goal in the least time."""
+        step_m = min(_LENGTH_M, goal_m) / _STEPS
+        bends = np.unique([*_BENDS_RAD, *(-bend for bend in _BENDS_RAD), off_rad])
+        curvatures = np.zeros((len(bends), _STEPS))
+        curvatures[:, :_TURN_STEPS] = bends[:, None] / (_TURN_STEPS * step_m)
+        positions, headings = follow_curvature(state, curvatures, step_m)
+        fixed = self._fixed_s(positions, goal_odom_m) + _BEND_S * np.abs(bends)
+        top_mps = min(
+            speed_to_stop_at_mps(self._robot, goal_m), max(constraints.speed_limit_mps, 0.1)
+        )
+        best_s, best = math.inf, (0.0, 0.0)
+        for speed in (top_mps * share for share in _SPEED_SHARES):
+            seconds = fixed + self._under_way_s(constraints, positions, headings, step_m, speed)
+            index = int(np.argmin(seconds))
+            if seconds[index] < best_s:
+                best_s, best = seconds[index], (speed, speed * curvatures[index, 0])
+        return best
 
-    def _seconds(
+    def _under_way_s(
         self,
         constraints: NavConstraints,
         positions: FloatArray,
         headings: FloatArray,
-        speeds: FloatArray,
-        goal_odom_m: FloatArray,
+        step_m: float,
+        speed_mps: float,
     ) -> FloatArray:
-        """Return (K,), the time to the goal of each candidate; infinite if it cannot stop."""
-        robot = self._robot
-        seconds = np.full(len(positions), _STEPS * _STEP_S)
+        """Return (K,), the time along each curve among people who move on meanwhile."""
+        dt_s = step_m / speed_mps
+        driven_s = dt_s * _STEPS
         if self._use_speed_field:
-            allowed = time_cost(constraints, positions, headings, dt_s=_STEP_S)
-            seconds = np.maximum(seconds, allowed)
-        else:
-            seconds += _NEAR_A_PERSON_S * people_cost(
-                constraints,
-                positions,
-                _STEP_S,
-                robot_radius_m=robot.circumscribed_radius_m,
-                inside_cost=5.0,
-            ).mean(axis=1)
-        seconds += np.hypot(*(goal_odom_m - positions[:, -1]).T) / robot.max_speed_mps
-        gap = gap_to_boxes_m(positions, self._boxes) - robot.circumscribed_radius_m
-        seconds += _NEAR_A_WALL_S * np.clip(1.0 - gap / _NEAR_M, 0.0, 1.0).mean(axis=1)
-        driven = speeds[:, None] * _STEP_S * np.arange(_STEPS + 1)
-        must_be_free = driven <= brake_distance_m(robot, speeds)[:, None] + 0.1
-        return np.where((must_be_free & (gap < 0.0)).any(axis=1), np.inf, seconds)
+            allowed_s = time_cost(constraints, positions, headings, dt_s=dt_s)
+            return np.asarray(np.maximum(driven_s, allowed_s))
+        radius_m = self._robot.circumscribed_radius_m
+        near = people_cost(
+            constraints, positions, dt_s, robot_radius_m=radius_m, inside_cost=2.0, near_cost=0.5
+        )
+        return np.asarray(driven_s + _IN_A_CIRCLE_S * near.mean(axis=1))
 
-    def _bearing_rad(self, state: RobotState, goal_odom_m: FloatArray) -> float:
-        """Return the angle from the robot's heading to the goal, in [−π, π]."""
-        x, y = goal_odom_m - state.position_odom_m
-        angle = np.arctan2(y, x) - state.heading_odom_rad
-        return float(np.arctan2(np.sin(angle), np.cos(angle)))
+    def _fixed_s(self, positions: FloatArray, goal_odom_m: FloatArray) -> FloatArray:
+        """Return (K,), the time from the end of each curve, and the cost of walls beside it."""
+        farther_m = np.hypot(*(goal_odom_m - positions[:, -1]).T)
+        gap = gap_to_boxes_m(positions, self._boxes) - self._robot.circumscribed_radius_m
+        near = np.clip(1.0 - gap / _NEAR_M, 0.0, 1.0).mean(axis=1)
+        hit = (gap < 0.0).mean(axis=1)
+        return np.asarray(
+            farther_m / self._robot.max_speed_mps + _NEAR_A_WALL_S * near + _IN_A_WALL_S * hit
+        )
