@@ -143,6 +143,25 @@ def speed_to_stop_at_mps(robot: RobotProfile, distance_m: float) -> float:
     return min(robot.max_speed_mps, gentle)
 
 
+def stop_distance_m(robot: RobotProfile, speed_mps: float) -> float:
+    """Return the distance in which 60 % of the robot's deceleration stops it."""
+    return speed_mps**2 / (1.2 * robot.max_deceleration_mps2)
+
+
+def free_length_m(gaps_m: FloatArray, step_m: float) -> FloatArray:
+    """Return (K,), how far each way leads before it touches a wall.
+
+    A robot that already touches one may move along it or away.
+
+    Args:
+        gaps_m: (K, T) between the robot's disc and the nearest wall, from now on.
+        step_m: length of a step of the way.
+    """
+    hits = gaps_m < np.minimum(0.0, gaps_m[:, :1] - 1e-3)
+    steps = np.where(hits.any(axis=1), hits.argmax(axis=1) - 1, gaps_m.shape[1])
+    return np.asarray(np.maximum(steps, 0) * step_m)
+
+
 def bearing_rad(robot_state: RobotState, goal_odom_m: FloatArray) -> float:
     """Return the angle from the robot's heading to the goal, in [−π, π]."""
     x, y = (goal_odom_m - robot_state.position_odom_m).tolist()

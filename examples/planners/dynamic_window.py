@@ -18,10 +18,12 @@ from perception.arrays import FloatArray
 from ._shared import (
     bearing_rad,
     follow_curvature,
+    free_length_m,
     gap_to_boxes_m,
     no_boxes,
     obeying,
     speed_to_stop_at_mps,
+    stop_distance_m,
 )
 
 _LENGTH_M, _STEPS = 4.0, 20
@@ -88,13 +90,17 @@ class DynamicWindow:
         curvatures = np.zeros((len(bends), _STEPS))
         curvatures[:, :_TURN_STEPS] = bends[:, None] / (_TURN_STEPS * step_m)
         positions, headings = follow_curvature(state, curvatures, step_m)
-        fixed = self._fixed_s(positions, goal_odom_m) + _BEND_S * np.abs(bends)
+        gaps = gap_to_boxes_m(positions, self._boxes) - self._robot.circumscribed_radius_m
+        free_m = free_length_m(gaps, step_m)
+        fixed = self._fixed_s(positions, gaps, goal_odom_m) + _BEND_S * np.abs(bends)
         top_mps = min(
             speed_to_stop_at_mps(self._robot, goal_m), max(constraints.speed_limit_mps, 0.1)
         )
-        best_s, best = math.inf, (0.0, 0.0)
+        # If every curve ends at a wall, turn on the spot.
+        best_s, best = math.inf, (0.0, math.copysign(_TURN_RADPS, off_rad))
         for speed in (top_mps * share for share in _SPEED_SHARES):
             seconds = fixed + self._under_way_s(constraints, positions, headings, step_m, speed)
+            seconds[free_m < stop_distance_m(self._robot, speed)] = math.inf
             index = int(np.argmin(seconds))
             if seconds[index] < best_s:
                 best_s, best = seconds[index], (speed, speed * curvatures[index, 0])
@@ -120,12 +126,13 @@ class DynamicWindow:
         )
         return np.asarray(driven_s + _IN_A_CIRCLE_S * near.mean(axis=1))
 
-    def _fixed_s(self, positions: FloatArray, goal_odom_m: FloatArray) -> FloatArray:
+    def _fixed_s(
+        self, positions: FloatArray, gaps: FloatArray, goal_odom_m: FloatArray
+    ) -> FloatArray:
         """Return (K,), the time from the end of each curve, and the cost of walls beside it."""
         farther_m = np.hypot(*(goal_odom_m - positions[:, -1]).T)
-        gap = gap_to_boxes_m(positions, self._boxes) - self._robot.circumscribed_radius_m
-        near = np.clip(1.0 - gap / _NEAR_M, 0.0, 1.0).mean(axis=1)
-        hit = (gap < 0.0).mean(axis=1)
+        near = np.clip(1.0 - gaps / _NEAR_M, 0.0, 1.0).mean(axis=1)
+        hit = (gaps < 0.0).mean(axis=1)
         return np.asarray(
             farther_m / self._robot.max_speed_mps + _NEAR_A_WALL_S * near + _IN_A_WALL_S * hit
         )

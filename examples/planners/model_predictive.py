@@ -14,8 +14,10 @@ import casadi
 import numpy as np
 
 from nav_adapter import NavConstraints, RobotProfile, RobotState
-from nav_adapter.exporters import predicted_circles
+from nav_adapter.exporters import predicted_circles, speed_limit_at
 from perception.arrays import FloatArray
+
+from ._shared import no_boxes, obeying
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # about optional parts that are not installed

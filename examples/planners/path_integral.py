@@ -18,6 +18,7 @@ from perception.arrays import FloatArray
 from ._shared import (
     bearing_rad,
     follow_curvature,
+    free_length_m,
     gap_to_boxes_m,
     no_boxes,
     obeying,
@@ -28,6 +29,7 @@ _SAMPLES, _STEPS, _STEP_M = 200, 24, 0.2
 # Standard deviation of the curvature in 1/m, and the number of steps for which a draw lasts.
 _SPREAD_1PM, _LASTS_STEPS = 0.35, 6
 _SHARPEST_1PM = 1.5
+_FASTEST_TURN_RADPS = 0.8
 # Seconds by which a way may be slower for its weight to fall to 1/e.
 _TEMPERATURE_S = 0.15
 _TURN_BACK_RAD = 1.6
@@ -82,10 +84,10 @@ class PathIntegral:
             seconds = self._seconds(constraints, robot_state, samples, goal_odom_m, goal_m)
             weight = np.exp((seconds.min() - seconds) / _TEMPERATURE_S)
             self._curvatures = weight @ samples / weight.sum()
-            speed = min(
-                speed_to_stop_at_mps(self._robot, goal_m), max(constraints.speed_limit_mps, 0.0)
-            )
+            speed = min(constraints.speed_limit_mps, self._clear_mps(robot_state, goal_m))
             twist = (speed, speed * float(self._curvatures[0]))
+            if speed <= 0.0 < constraints.speed_limit_mps:  # the way ends at a wall
+                twist = (0.0, math.copysign(_TURN_RADPS, off_rad))
         return obeying(
             constraints, robot_state, twist, dt_s, use_speed_field=self._use_speed_field
         )
@@ -131,6 +133,14 @@ class PathIntegral:
         seconds += _IN_A_WALL_S * (gap < 0.0).mean(axis=1)
         seconds += _NEAR_A_WALL_S * np.clip(1.0 - gap / _NEAR_M, 0.0, 1.0).mean(axis=1)
         return np.asarray(seconds + _BEND_S * np.abs(samples).mean(axis=1))
+
+    def _clear_mps(self, state: RobotState, goal_m: float) -> float:
+        """Return the speed from which the robot stops on its way before a wall or the goal."""
+        positions, _ = follow_curvature(state, self._curvatures[None], _STEP_M)
+        gaps = gap_to_boxes_m(positions, self._boxes) - self._robot.circumscribed_radius_m
+        clear_m = float(free_length_m(gaps, _STEP_M)[0])
+        sharp_mps = _FASTEST_TURN_RADPS / max(abs(float(self._curvatures[0])), 1e-6)
+        return min(speed_to_stop_at_mps(self._robot, min(clear_m, goal_m)), sharp_mps)
 
     def _move_on(self, driven_m: float) -> None:
         """Take off the last way what the robot has driven since."""

@@ -104,8 +104,9 @@ class ReciprocalVelocity:
             agent = _agent(simulator, (x, y), radius, math.hypot(vx, vy))
             simulator.set_agent_velocity(agent, (vx, vy))
             simulator.set_agent_pref_velocity(agent, (vx, vy))
-        # The disc around the point holds the footprint, or the robot would not fit past a rack.
-        radius_m = self._robot.circumscribed_radius_m
+        # The disc around the point holds the whole footprint.
+        corners_m = self._robot.footprint_m - [_AHEAD_M, 0.0]
+        radius_m = float(np.hypot(*corners_m.T).max())
         robot = _agent(simulator, tuple(point), radius_m, limit_mps)
         simulator.set_agent_velocity(robot, tuple(velocity))
         simulator.set_agent_pref_velocity(robot, tuple(wanted_mps))
