@@ -69,7 +69,7 @@ class ModelPredictivePlanner:
         replan_s: float = 0.1,
         *,
         static_boxes_odom_m: FloatArray | None = None,
-        use_speed_field: bool = True,
+        use_speed_field: bool = False,
     ) -> None:
         self._robot = robot
         self._replan_s = replan_s
