@@ -14,8 +14,10 @@ import casadi
 import numpy as np
 
 from nav_adapter import NavConstraints, RobotProfile, RobotState
-from nav_adapter.exporters import predicted_circles
+from nav_adapter.exporters import predicted_circles, speed_limit_at
 from perception.arrays import FloatArray
+
+from ._shared import no_boxes, obeying
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # about optional parts that are not installed
@@ -28,6 +30,14 @@ with contextlib.suppress(AttributeError):
 _STAGES = 20
 _STAGE_S = 0.15
 _SLOTS = 4
+# Walls per stage: the nearest ones to the last plan.
+_WALLS = 2
+_FAR_M = 100.0
+_WALL_CLEARANCE_M = 0.05
+# Step of the slopes of the limit, and the slowest limit that a plan counts with: at 0 there would
+# be no way to the other side of a slow place.
+_SLOPE_M = 0.05
+_SLOWEST_MPS = 0.05
 _MAX_YAW_RATE_RADPS = 1.0
 # Cost of a stage's excess over limit or circle; soft, so that there always is a solution.
 _PENALTY = 1000.0
@@ -42,19 +52,36 @@ class ModelPredictivePlanner:
     constraint too. It falls over the stages no faster than the robot brakes, because a hard bound
     below the present speed would leave the solver without a solution.
 
+    With the speed field, each stage has the limit at its pose in the last plan, and its slope
+    there. So the solver knows on which side the limit is higher, and the plan moves to that side.
+
     Args:
         robot: footprint and limits.
         replan_s: time for which a solution is held.
+        static_boxes_odom_m: (N, 4) x_min, y_min, x_max, y_max of racks and walls, None for none.
+            They are soft constraints too: a half-plane at the nearest point of each box.
+        use_speed_field: plan with the limit at each place, not only with the present one.
     """
 
-    def __init__(self, robot: RobotProfile, replan_s: float = 0.1) -> None:
+    def __init__(
+        self,
+        robot: RobotProfile,
+        replan_s: float = 0.1,
+        *,
+        static_boxes_odom_m: FloatArray | None = None,
+        use_speed_field: bool = False,
+    ) -> None:
         self._robot = robot
         self._replan_s = replan_s
         self._planned_s = -math.inf
         self._command = (0.0, 0.0)
         self._times_s = _STAGE_S * np.arange(_STAGES + 1)
         self._people = np.zeros((_SLOTS, _STAGES + 1, 5))
-        self._caps_mps = np.zeros(_STAGES + 1)
+        # Per stage: limit = cap + slope · position, and walls as normal · position ≥ bound.
+        self._caps = np.zeros((_STAGES + 1, 3))
+        self._walls = np.zeros((_STAGES + 1, _WALLS, 3))
+        self._boxes = no_boxes(static_boxes_odom_m)
+        self._use_speed_field = use_speed_field
         self._goal = np.zeros(2)
         self._mpc = self._controller(self._model())
         self._started = False
@@ -72,7 +99,10 @@ class ModelPredictivePlanner:
             self._planned_s = robot_state.stamp_s
             self._command = self._solve(robot_state, goal_odom_m, constraints, limit_mps)
         speed, yaw_rate = self._command
-        return min(max(speed, 0.0), limit_mps), yaw_rate
+        twist = (min(max(speed, 0.0), limit_mps), yaw_rate)
+        return obeying(
+            constraints, robot_state, twist, dt_s, use_speed_field=self._use_speed_field
+        )
 
     def _solve(
         self,
@@ -83,8 +113,9 @@ class ModelPredictivePlanner:
     ) -> tuple[float, float]:
         """Return the first speed and yaw rate of the optimal plan."""
         speed = robot_state.speed_mps
-        braked = speed - self._robot.max_deceleration_mps2 * self._times_s
-        self._caps_mps = np.maximum(limit_mps, braked)
+        positions = self._last_positions(robot_state, goal_odom_m, limit_mps)
+        self._caps = self._limits(constraints, robot_state, positions, limit_mps)
+        self._walls = self._half_planes(positions)
         self._people = predicted_circles(
             constraints,
             self._times_s,
@@ -102,6 +133,59 @@ class ModelPredictivePlanner:
         # The speed after the stage is the command for the drive.
         return speed + acceleration * _STAGE_S, yaw_rate
 
+    def _last_positions(
+        self, robot_state: RobotState, goal_odom_m: FloatArray, limit_mps: float
+    ) -> FloatArray:
+        """Return (T, 2) positions of the last plan, or straight to the goal before the first."""
+        if self._started:
+            states = [self._mpc.opt_x_num["_x", stage, 0, -1] for stage in range(_STAGES + 1)]
+            return np.array([np.ravel(state)[:2] for state in states], dtype=np.float64)
+        to_goal = goal_odom_m - robot_state.position_odom_m
+        ahead = to_goal / max(float(np.hypot(*to_goal)), 1e-9)
+        return np.asarray(
+            robot_state.position_odom_m + limit_mps * self._times_s[:, None] * ahead
+        )
+
+    def _limits(
+        self,
+        constraints: NavConstraints,
+        robot_state: RobotState,
+        positions: FloatArray,
+        limit_mps: float,
+    ) -> FloatArray:
+        """Return (T, 3) rows c, gx, gy: the speed of a stage at (x, y) is at most c + gx·x + gy·y.
+
+        The limit falls no faster than the robot brakes.
+        """
+        braked = robot_state.speed_mps - self._robot.max_deceleration_mps2 * self._times_s
+        caps = np.zeros((_STAGES + 1, 3))
+        caps[:, 0] = np.maximum(limit_mps, braked)
+        if not self._use_speed_field:
+            return caps
+        shifts = _SLOPE_M * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
+        at, right, left, up, down = speed_limit_at(
+            constraints, positions + shifts[:, None], dt_s=_STAGE_S
+        )
+        caps[:, 1] = (right - left) / (2.0 * _SLOPE_M)
+        caps[:, 2] = (up - down) / (2.0 * _SLOPE_M)
+        caps[:, 0] = np.maximum(np.maximum(at, _SLOWEST_MPS), braked)
+        caps[:, 0] -= (caps[:, 1:] * positions).sum(axis=1)
+        return caps
+
+    def _half_planes(self, positions: FloatArray) -> FloatArray:
+        """Return (T, W, 3) rows nx, ny, b: the robot is clear of a wall if nx·x + ny·y ≥ b."""
+        rows = np.tile([0.0, 0.0, -_FAR_M], (_STAGES + 1, _WALLS, 1))
+        for stage, position in enumerate(positions):
+            nearest = np.clip(position, self._boxes[:, :2], self._boxes[:, 2:])
+            away = position - nearest
+            distance = np.hypot(*away.T)
+            for slot, index in enumerate(np.argsort(distance)[:_WALLS]):
+                if 0.0 < distance[index]:  # inside a box there is no normal
+                    normal = away[index] / distance[index]
+                    reach = self._robot.circumscribed_radius_m + _WALL_CLEARANCE_M
+                    rows[stage, slot] = [*normal, normal @ nearest[index] + reach]
+        return rows
+
     def _model(self) -> do_mpc.model.Model:
         """Return the robot's motion, with the parameters of goal, limit and people."""
         model = do_mpc.model.Model("continuous")
@@ -110,8 +194,11 @@ class ModelPredictivePlanner:
         )
         acceleration = model.set_variable("_u", "acceleration")
         yaw_rate = model.set_variable("_u", "yaw_rate")
-        for name in ("goal_x", "goal_y", "cap"):
+        for name in ("goal_x", "goal_y", "cap", "cap_x", "cap_y"):
             model.set_variable("_tvp", name)
+        for slot in range(_WALLS):
+            for name in ("wx", "wy", "wb"):
+                model.set_variable("_tvp", f"{name}{slot}")
         for slot in range(_SLOTS):
             for name in ("px", "py", "pr"):
                 model.set_variable("_tvp", f"{name}{slot}")
@@ -140,11 +227,16 @@ class ModelPredictivePlanner:
         mpc.bounds["lower", "_u", "yaw_rate"] = -_MAX_YAW_RATE_RADPS
         mpc.bounds["upper", "_u", "yaw_rate"] = _MAX_YAW_RATE_RADPS
         soft = {"ub": 0.0, "soft_constraint": True, "penalty_term_cons": _PENALTY}
-        mpc.set_nl_cons("over_cap", model.x["speed"] - model.tvp["cap"], **soft)
+        x, y = model.x["x"], model.x["y"]
+        cap = model.tvp["cap"] + model.tvp["cap_x"] * x + model.tvp["cap_y"] * y
+        mpc.set_nl_cons("over_cap", model.x["speed"] - cap, **soft)
+        for slot in range(_WALLS):
+            along = model.tvp[f"wx{slot}"] * x + model.tvp[f"wy{slot}"] * y
+            mpc.set_nl_cons(f"wall{slot}", model.tvp[f"wb{slot}"] - along, **soft)
         mpc.set_nl_cons("backward", -model.x["speed"], **soft)
         for slot in range(_SLOTS):
-            gap_x = model.x["x"] - model.tvp[f"px{slot}"]
-            gap_y = model.x["y"] - model.tvp[f"py{slot}"]
+            gap_x = x - model.tvp[f"px{slot}"]
+            gap_y = y - model.tvp[f"py{slot}"]
             reach = model.tvp[f"pr{slot}"] + robot.circumscribed_radius_m
             mpc.set_nl_cons(f"person{slot}", reach - casadi.hypot(gap_x, gap_y + 1e-6), **soft)
         template = mpc.get_tvp_template()
@@ -153,7 +245,11 @@ class ModelPredictivePlanner:
             for stage in range(_STAGES + 1):
                 template["_tvp", stage, "goal_x"] = self._goal[0]
                 template["_tvp", stage, "goal_y"] = self._goal[1]
-                template["_tvp", stage, "cap"] = self._caps_mps[stage]
+                for name, value in zip(("cap", "cap_x", "cap_y"), self._caps[stage], strict=True):
+                    template["_tvp", stage, name] = value
+                for slot, row in enumerate(self._walls[stage]):
+                    for name, value in zip(("wx", "wy", "wb"), row, strict=True):
+                        template["_tvp", stage, f"{name}{slot}"] = value
                 for slot, (px, py, _, _, pr) in enumerate(self._people[:, stage]):
                     template["_tvp", stage, f"px{slot}"] = px
                     template["_tvp", stage, f"py{slot}"] = py

@@ -12,7 +12,10 @@ import math
 import numpy as np
 
 from nav_adapter import NavConstraints, RobotProfile, RobotState, circles
+from nav_adapter.exporters import static_circles
 from perception.arrays import FloatArray
+
+from ._shared import fastest_direction, no_boxes, obeying
 
 with contextlib.redirect_stdout(io.StringIO()):  # it reports missing windowing systems
     from irsim.lib.behavior.behavior_methods import DiffRVO
@@ -20,6 +23,9 @@ with contextlib.redirect_stdout(io.StringIO()):  # it reports missing windowing 
 # Candidate velocities are slower and faster by up to this.
 _WINDOW_MPS = 1.0
 _SLOW_DOWN_WITHIN_M = 1.0
+_WALL_OVERSHOOT_M = 0.1
+# Walls within this distance of the robot's disc count.
+_WALL_WITHIN_M = 1.5
 
 
 class VelocityObstaclePlanner:
@@ -36,11 +42,24 @@ class VelocityObstaclePlanner:
     Args:
         robot: footprint and limits.
         lookahead_s: only people whose circle the robot could reach within this time count.
+        static_boxes_odom_m: (N, 4) x_min, y_min, x_max, y_max of racks and walls, None for none.
+        use_speed_field: prefer the direction in which the fastest way begins, not that of the
+            goal.
     """
 
-    def __init__(self, robot: RobotProfile, lookahead_s: float = 4.0) -> None:
+    def __init__(
+        self,
+        robot: RobotProfile,
+        lookahead_s: float = 4.0,
+        *,
+        static_boxes_odom_m: FloatArray | None = None,
+        use_speed_field: bool = False,
+    ) -> None:
         self._robot = robot
         self._lookahead_s = lookahead_s
+        self._boxes = no_boxes(static_boxes_odom_m)
+        self._walls = static_circles(self._boxes, _WALL_OVERSHOOT_M)
+        self._use_speed_field = use_speed_field
 
     def plan(
         self,
@@ -55,14 +74,22 @@ class VelocityObstaclePlanner:
             return 0.0, 0.0
         to_goal = goal_odom_m - robot_state.position_odom_m
         distance_m = float(np.hypot(*to_goal))
-        desired = to_goal * (limit_mps * min(1.0 / distance_m, 1.0 / _SLOW_DOWN_WITHIN_M))
+        towards = to_goal / max(distance_m, 1e-9)
+        radius_m = self._robot.circumscribed_radius_m
+        if self._use_speed_field:
+            towards = fastest_direction(
+                constraints, robot_state, goal_odom_m, self._boxes, radius_m
+            )
+        desired = towards * limit_mps * min(distance_m / _SLOW_DOWN_WITHIN_M, 1.0)
         heading = robot_state.heading_odom_rad
         velocity = robot_state.speed_mps * np.array([math.cos(heading), math.sin(heading)])
         people = circles(constraints)
         gap_m = np.hypot(*(people[:, :2] - robot_state.position_odom_m).T) - people[:, 4]
         closing_mps = limit_mps + np.hypot(people[:, 2], people[:, 3])
         near = people[gap_m < closing_mps * self._lookahead_s]
-        radius_m = self._robot.circumscribed_radius_m
+        apart_m = np.hypot(*(self._walls[:, :2] - robot_state.position_odom_m).T)
+        apart_m -= self._walls[:, 4] + radius_m
+        near = np.vstack([near, self._walls[apart_m < _WALL_WITHIN_M]])
         speed, yaw_rate = DiffRVO(
             [*robot_state.position_odom_m, *velocity, radius_m, *desired, heading],
             near.tolist(),
@@ -72,4 +99,7 @@ class VelocityObstaclePlanner:
             mode="vo",
             neighbor_threshold=math.inf,
         ).ravel()
-        return float(np.clip(speed, 0.0, limit_mps)), float(yaw_rate)
+        twist = (float(np.clip(speed, 0.0, limit_mps)), float(yaw_rate))
+        return obeying(
+            constraints, robot_state, twist, dt_s, use_speed_field=self._use_speed_field
+        )

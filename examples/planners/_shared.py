@@ -1,0 +1,176 @@
+"""The three things that every planner here does the same way: walls, ways around, and limits."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from nav_adapter import NavConstraints, RobotProfile, RobotState
+from nav_adapter.exporters import speed_limit_at, time_cost
+from nav_adapter.motion import clip_twists
+from perception.arrays import FloatArray
+
+# Speed that a planner leaves unused below the limit: wheel motors overshoot on a ramp by as much.
+SLACK_MPS = 0.03
+# Cycles between the measurement that a limit comes from and the robot's answer to it.
+_CYCLES_AHEAD = 2
+# A detour leads past a point this far ahead, and this far to either side of the straight way.
+_VIA_AHEAD_M = (1.5, 3.0, 4.5)
+_VIA_ASIDE_M = np.linspace(-1.8, 1.8, 13)
+_WAY_STEPS = 40
+# A detour must save this much time, so that a planner does not waver between two ways.
+_WORTH_S = 0.3
+
+
+def no_boxes(boxes_odom_m: FloatArray | None) -> FloatArray:
+    """Return boxes as (N, 4), none for None."""
+    return np.zeros((0, 4)) if boxes_odom_m is None else np.asarray(boxes_odom_m, dtype=float)
+
+
+def gap_to_boxes_m(positions_odom_m: FloatArray, boxes_odom_m: FloatArray) -> FloatArray:
+    """Return the distance (…) from points (…, 2) to the nearest box; 0 inside, infinite without."""
+    gap = np.full(positions_odom_m.shape[:-1], np.inf)
+    for box in boxes_odom_m:
+        outside = np.maximum(box[:2] - positions_odom_m, positions_odom_m - box[2:])
+        gap = np.minimum(gap, np.hypot(*np.moveaxis(np.maximum(outside, 0.0), -1, 0)))
+    return gap
+
+
+def fastest_direction(
+    constraints: NavConstraints,
+    robot_state: RobotState,
+    goal_odom_m: FloatArray,
+    boxes_odom_m: FloatArray,
+    radius_m: float,
+) -> FloatArray:
+    """Return the unit vector (2,) in which the fastest way to the goal begins.
+
+    Ways are the straight one and detours past one point beside it. Each takes the time that the
+    speed field allows along it. For planners that choose one velocity and see no farther.
+
+    Args:
+        constraints: of the present cycle.
+        robot_state: the latest.
+        goal_odom_m: (2,).
+        boxes_odom_m: (N, 4) racks and walls.
+        radius_m: of the robot's disc, which keeps out of the boxes.
+    """
+    start = robot_state.position_odom_m
+    to_goal = goal_odom_m - start
+    distance_m = float(np.hypot(*to_goal))
+    if distance_m < 1e-6:
+        return np.array([1.0, 0.0])
+    ahead = to_goal / distance_m
+    left = np.array([-ahead[1], ahead[0]])
+    vias = [
+        start + min(along, 0.6 * distance_m) * ahead + aside * left
+        for along in _VIA_AHEAD_M
+        for aside in _VIA_ASIDE_M
+    ]
+    corners = np.array([[start, via, goal_odom_m] for via in [start + 0.5 * to_goal, *vias]])
+    ways = np.array([_along(way) for way in corners])
+    free = (gap_to_boxes_m(ways[:, 1:-1], boxes_odom_m) >= radius_m).all(axis=1)
+    free[0] |= not free.any()
+    # People move while the robot is under way, about as fast as it may drive now.
+    pace_mps = max(constraints.speed_limit_mps, 0.3)
+    dt_s = distance_m / pace_mps / _WAY_STEPS
+    seconds = np.where(free, time_cost(constraints, ways, dt_s=dt_s), np.inf)
+    seconds[0] -= _WORTH_S
+    towards = corners[int(np.argmin(seconds)), 1] - start
+    return np.asarray(towards / max(float(np.hypot(*towards)), 1e-9))
+
+
+def obeying(
+    constraints: NavConstraints,
+    robot_state: RobotState,
+    twist: tuple[float, float],
+    dt_s: float,
+    *,
+    use_speed_field: bool,
+) -> tuple[float, float]:
+    """Return a speed and yaw rate on the same curve at which no point of the robot is too fast.
+
+    The last line of every planner here. It leaves ``SLACK_MPS`` below the limit. With the field,
+    the limit is the lowest of now and of the next cycles, since a command takes effect in them.
+    """
+    speed, yaw_rate = clip_twists(constraints, twist).tolist()
+    robot = constraints.robot
+    assert robot is not None and constraints.fastest_point_limit_mps is not None
+    fastest_mps = speed + abs(yaw_rate) * robot.circumscribed_radius_m
+    if fastest_mps <= 0.0:
+        return 0.0, 0.0
+    most_mps = constraints.fastest_point_limit_mps
+    if use_speed_field:
+        heading = robot_state.heading_odom_rad
+        forward = np.array([math.cos(heading), math.sin(heading)])
+        steps = np.arange(_CYCLES_AHEAD + 1)[:, None]
+        driven = max(robot_state.speed_mps, speed) * dt_s * steps * forward
+        poses = (robot_state.position_odom_m + driven)[None]
+        headings = np.full(poses.shape[:2], heading)
+        ahead = speed_limit_at(
+            constraints, poses, headings, dt_s=dt_s, speeds_mps=np.full(poses.shape[:2], speed)
+        )
+        # The field ends at the robot's maximum, which corners may exceed where nobody is near.
+        if float(ahead.min()) < robot.max_speed_mps - 1e-3:
+            most_mps = min(most_mps, float(ahead.min()))
+    share = min(max(most_mps - SLACK_MPS, 0.0) / fastest_mps, 1.0)
+    return speed * share, yaw_rate * share
+
+
+def follow_curvature(
+    robot_state: RobotState, curvatures_1pm: FloatArray, step_m: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return positions (K, T + 1, 2) and headings (K, T + 1) of ways that begin at the robot.
+
+    Args:
+        robot_state: the latest.
+        curvatures_1pm: (K, T) curvature of each step, left positive, 1/m.
+        step_m: length of a step.
+    """
+    turned = np.cumsum(curvatures_1pm * step_m, axis=1)
+    turned = np.concatenate([np.zeros_like(turned[:, :1]), turned], axis=1)
+    headings = robot_state.heading_odom_rad + turned
+    middle = 0.5 * (headings[:, 1:] + headings[:, :-1])
+    moved = np.cumsum(step_m * np.stack([np.cos(middle), np.sin(middle)], axis=-1), axis=1)
+    moved = np.concatenate([np.zeros_like(moved[:, :1]), moved], axis=1)
+    return robot_state.position_odom_m + moved, headings
+
+
+def speed_to_stop_at_mps(robot: RobotProfile, distance_m: float) -> float:
+    """Return the speed from which 60 % of the robot's deceleration stops it within a distance."""
+    gentle = math.sqrt(1.2 * robot.max_deceleration_mps2 * max(distance_m, 0.0))
+    return min(robot.max_speed_mps, gentle)
+
+
+def stop_distance_m(robot: RobotProfile, speed_mps: float) -> float:
+    """Return the distance in which 60 % of the robot's deceleration stops it."""
+    return speed_mps**2 / (1.2 * robot.max_deceleration_mps2)
+
+
+def free_length_m(gaps_m: FloatArray, step_m: float) -> FloatArray:
+    """Return (K,), how far each way leads before it touches a wall.
+
+    A robot that already touches one may move along it or away.
+
+    Args:
+        gaps_m: (K, T) between the robot's disc and the nearest wall, from now on.
+        step_m: length of a step of the way.
+    """
+    hits = gaps_m < np.minimum(0.0, gaps_m[:, :1] - 1e-3)
+    steps = np.where(hits.any(axis=1), hits.argmax(axis=1) - 1, gaps_m.shape[1])
+    return np.asarray(np.maximum(steps, 0) * step_m)
+
+
+def bearing_rad(robot_state: RobotState, goal_odom_m: FloatArray) -> float:
+    """Return the angle from the robot's heading to the goal, in [−π, π]."""
+    x, y = (goal_odom_m - robot_state.position_odom_m).tolist()
+    return math.remainder(math.atan2(y, x) - robot_state.heading_odom_rad, math.tau)
+
+
+def _along(corners_odom_m: FloatArray) -> FloatArray:
+    """Return points (``_WAY_STEPS`` + 1, 2) at equal distances along a polyline (M, 2)."""
+    lengths = np.hypot(*np.diff(corners_odom_m, axis=0).T)
+    at = np.concatenate([[0.0], np.cumsum(lengths)])
+    along = np.linspace(0.0, at[-1], _WAY_STEPS + 1)
+    return np.stack([np.interp(along, at, corners_odom_m[:, axis]) for axis in (0, 1)], axis=1)
