@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from dataclasses import dataclass
 from importlib import resources
@@ -15,6 +16,8 @@ from ._score import Score, Scorecard
 from ._tables import COLUMNS, PROBE_COLUMNS, looks, probe_rows, rows, scope
 from ._verdict import verdicts
 
+# A line may break here.
+_BREAK: Final = "\N{ZERO WIDTH SPACE}"
 _PACKAGE: Final = "sim_tests.study.scorecard"
 
 _GOALS: Final = Metric(
@@ -48,6 +51,7 @@ _BLIND: Final = Metric(
 class _FailedEpisodes:
     """A line of the list of failures, with the command that shows one of the episodes."""
 
+    look: int
     planner: str
     times: int
     message: str
@@ -71,6 +75,7 @@ def write_page_of(card: Scorecard, folder: Path) -> Path:
         card=card,
         scope=scope(card),
         plural=plural,
+        words=_words,
         verdicts=[(look_of[each.name], each) for each in verdicts(card)],
         columns=COLUMNS,
         rows=rows(card),
@@ -81,6 +86,7 @@ def write_page_of(card: Scorecard, folder: Path) -> Path:
         probed_seeds=PROBED_SEEDS,
         failures=[
             _FailedEpisodes(
+                look_of[planner.name],
                 planner.name,
                 each.times,
                 each.message,
@@ -93,10 +99,15 @@ def write_page_of(card: Scorecard, folder: Path) -> Path:
     return path
 
 
+def _words(name: str) -> list[str]:
+    """Return the parts of a name, between which a line may break: MyPlanner is My and Planner."""
+    return re.findall(r"[A-Z]*[^A-Z_]*_*", name)
+
+
 def _panels(card: Scorecard) -> tuple[Panel, ...]:
     """Return the plots of intervals for the policy that verdicts speak of."""
     judged = [
-        (look, planner.name, score)
+        (look, _BREAK.join(_words(planner.name)), score)
         for look, planner in looks(card)
         if (score := planner.with_policy(card.policy)) is not None
     ]
