@@ -254,11 +254,15 @@ def test_the_probe_of_radii_changes_radii_alone(folder):
 
 
 @pytest.mark.full
-def test_a_planner_that_hangs_costs_its_own_episodes_alone(tmp_path):
-    card = compare_planners(
-        ["scorecard_planners:Hangs"], [scene()], tmp_path, seeds=[0], workers=1, time_limit_s=20.0
-    )
-    assert planner(card, "reference").scores[0].goals.value == 1.0
-    (failure,) = planner(card, "Hangs").failures
-    assert failure.times == 3
-    assert "time limit" in failure.message
+def test_a_planner_that_hangs_costs_its_own_episodes_alone(tmp_path, capfd):
+    (tmp_path / "beside.yaml").write_text(SCENE, encoding="utf-8")
+    words = ["scorecard_planners:Hangs", "--scenario", str(tmp_path / "beside.yaml")]
+    words += ["--seeds", "1-1", "--workers", "1", "--time-limit", "30", "--json"]
+    assert main(["planners", "compare", *words, "--out", str(tmp_path / "out")]) == 1
+    printed = capfd.readouterr()
+    reference, hangs = json.loads(printed.out)["planners"]
+    assert reference["scores"][0]["goals"]["value"] == 1.0
+    (failure,) = hangs["failures"]
+    assert failure["times"] == 3
+    assert "time limit" in failure["message"]
+    assert "3 of 6 episodes failed" in printed.err
