@@ -45,14 +45,14 @@ class ObservationEncoder:
     Args:
         people_slots: number of people that fit, > 0.
         scan_rays: number of rays of the scan, ≥ 0.
-        boxes_odom_m: (N, 4) boxes of the scan: x_min, y_min, x_max, y_max.
+        static_boxes_odom_m: (N, 4) boxes of the scan: x_min, y_min, x_max, y_max.
 
     Raises:
         SimError: for numbers that are not valid.
     """
 
     def __init__(
-        self, people_slots: int = 8, scan_rays: int = 0, boxes_odom_m: Any = NO_BOXES
+        self, people_slots: int = 8, scan_rays: int = 0, static_boxes_odom_m: Any = NO_BOXES
     ) -> None:
         if people_slots < 1 or scan_rays < 0:
             raise SimError(
@@ -61,7 +61,9 @@ class ObservationEncoder:
             )
         self.people_slots = people_slots
         self.scan_rays = scan_rays
-        self._boxes: FloatArray = finite_array("boxes_odom_m", boxes_odom_m, ("N", 4), SimError)
+        self._boxes: FloatArray = finite_array(
+            "static_boxes_odom_m", static_boxes_odom_m, ("N", 4), SimError
+        )
         self._angles = np.arange(scan_rays) * (2.0 * math.pi / max(scan_rays, 1))
 
     def bounds(self) -> dict[str, tuple[NDArray[np.float32], NDArray[np.float32]]]:

@@ -27,7 +27,7 @@ class PolicyPlanner:
         robot: the robot, whose limits are the bounds of the actions.
         people_slots: as in the environment.
         scan_rays: as in the environment.
-        boxes_odom_m: (N, 4) boxes of the scan, in the environment those of
+        static_boxes_odom_m: (N, 4) boxes of the scan, in the environment those of
             ``Scenario.planner_boxes_odom_m``.
         normalised_actions: as in the environment.
 
@@ -42,7 +42,7 @@ class PolicyPlanner:
         *,
         people_slots: int = 8,
         scan_rays: int = 0,
-        boxes_odom_m: Any = NO_BOXES,
+        static_boxes_odom_m: Any = NO_BOXES,
         normalised_actions: bool = True,
     ) -> None:
         if not callable(policy):
@@ -51,7 +51,7 @@ class PolicyPlanner:
             )
         self._policy = policy
         self._robot = robot
-        self._encoder = ObservationEncoder(people_slots, scan_rays, boxes_odom_m)
+        self._encoder = ObservationEncoder(people_slots, scan_rays, static_boxes_odom_m)
         self._normalised = normalised_actions
 
     def plan(

@@ -86,7 +86,7 @@ def test_a_policy_drives_the_same_in_the_environment_and_as_a_planner() -> None:
     scenario = scenario.model_copy(update={"duration_s": 3.0})
     env = make(scenarios=scenario, scan_rays=12)
     observation, _ = env.reset(seed=1)
-    planner = PolicyPlanner(policy, scan_rays=12, boxes_odom_m=scenario.planner_boxes_odom_m)
+    planner = PolicyPlanner(policy, scan_rays=12, static_boxes_odom_m=scenario.planner_boxes_odom_m)
     result = run_crossing(scenario, policy="balanced", planner=planner, seed=1)
     frames, truncated = [], False
     while not truncated:
