@@ -41,7 +41,7 @@ try:
 except ImportError as cause:
     raise MissingExtraError(
         "the environment needs Gymnasium, which is not installed; it is the extra 'gym': "
-        f"{install_command('gym,sim')}"
+        f"{install_command('gym')}"
     ) from cause
 
 View = Literal["top", "camera"]

@@ -17,7 +17,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv  # noqa: E402
 
 from sim_tests import SamplingPlanner, SimError, run_crossing  # noqa: E402
 from sim_tests.actors.robot import NOVA_CARTER  # noqa: E402
-from sim_tests.crossing import CrossingFrame, StraightOn  # noqa: E402
+from sim_tests.crossing import CrossingFrame  # noqa: E402
 from sim_tests.learning import ENVIRONMENT_ID, CrossingEnv, PolicyPlanner  # noqa: E402
 from sim_tests.scenario import ScenarioTemplate  # noqa: E402
 from sim_tests.world.bullet import pybullet  # noqa: E402
@@ -221,14 +221,3 @@ def test_vectors_of_environments(mode: str) -> None:
     envs.close()
     single.close()
     assert mode == "async" or isinstance(envs.unwrapped, SyncVectorEnv)
-
-
-def test_a_straight_drive_is_a_planner_too() -> None:
-    planner = PolicyPlanner(lambda observation: [0.5, 0.0])
-    short = ScenarioTemplate.shipped("crossing_from_left").for_seed(0)
-    short = short.model_copy(update={"duration_s": 1.0})
-    by_policy = run_crossing(short, policy="balanced", planner=planner)
-    by_speed = run_crossing(short, policy="balanced", planner=StraightOn(0.75))
-    assert list(map(signature, by_policy.frames)) == list(map(signature, by_speed.frames))
-    with pytest.raises(SimError, match="policy must be a function"):
-        PolicyPlanner("straight")  # type: ignore[arg-type]
