@@ -21,7 +21,8 @@ PLANTED = {
         "tracking/_motion.py",
         "from nav_adapter import NavError",
     ),
-    "sim_tests: search > study | demo > viewing > crossing > scenario | dataset > actors > world": (
+    "sim_tests: search > study | demo > viewing | learning > crossing > "
+    "scenario | dataset > actors > world": (
         "sim_tests/world/_visibility.py",
         "from ..crossing import run_crossing",
     ),

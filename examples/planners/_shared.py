@@ -96,7 +96,8 @@ def obeying(
     """
     speed, yaw_rate = clip_twists(constraints, twist).tolist()
     robot = constraints.robot
-    assert robot is not None and constraints.fastest_point_limit_mps is not None
+    assert robot is not None
+    assert constraints.fastest_point_limit_mps is not None
     fastest_mps = speed + abs(yaw_rate) * robot.circumscribed_radius_m
     if fastest_mps <= 0.0:
         return 0.0, 0.0

@@ -72,9 +72,7 @@ class DynamicWindow:
             twist = (0.0, math.copysign(_TURN_RADPS, off_rad))
         else:
             twist = self._best(robot_state, goal_odom_m, constraints, goal_m, off_rad)
-        return obeying(
-            constraints, robot_state, twist, dt_s, use_speed_field=self._use_speed_field
-        )
+        return obeying(constraints, robot_state, twist, dt_s, use_speed_field=self._use_speed_field)
 
     def _best(
         self,

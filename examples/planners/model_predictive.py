@@ -100,9 +100,7 @@ class ModelPredictivePlanner:
             self._command = self._solve(robot_state, goal_odom_m, constraints, limit_mps)
         speed, yaw_rate = self._command
         twist = (min(max(speed, 0.0), limit_mps), yaw_rate)
-        return obeying(
-            constraints, robot_state, twist, dt_s, use_speed_field=self._use_speed_field
-        )
+        return obeying(constraints, robot_state, twist, dt_s, use_speed_field=self._use_speed_field)
 
     def _solve(
         self,
@@ -142,9 +140,7 @@ class ModelPredictivePlanner:
             return np.array([np.ravel(state)[:2] for state in states], dtype=np.float64)
         to_goal = goal_odom_m - robot_state.position_odom_m
         ahead = to_goal / max(float(np.hypot(*to_goal)), 1e-9)
-        return np.asarray(
-            robot_state.position_odom_m + limit_mps * self._times_s[:, None] * ahead
-        )
+        return np.asarray(robot_state.position_odom_m + limit_mps * self._times_s[:, None] * ahead)
 
     def _limits(
         self,
@@ -180,7 +176,7 @@ class ModelPredictivePlanner:
             away = position - nearest
             distance = np.hypot(*away.T)
             for slot, index in enumerate(np.argsort(distance)[:_WALLS]):
-                if 0.0 < distance[index]:  # inside a box there is no normal
+                if distance[index] > 0.0:  # inside a box there is no normal
                     normal = away[index] / distance[index]
                     reach = self._robot.circumscribed_radius_m + _WALL_CLEARANCE_M
                     rows[stage, slot] = [*normal, normal @ nearest[index] + reach]

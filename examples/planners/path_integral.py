@@ -88,9 +88,7 @@ class PathIntegral:
             twist = (speed, speed * float(self._curvatures[0]))
             if speed <= 0.0 < constraints.speed_limit_mps:  # the way ends at a wall
                 twist = (0.0, math.copysign(_TURN_RADPS, off_rad))
-        return obeying(
-            constraints, robot_state, twist, dt_s, use_speed_field=self._use_speed_field
-        )
+        return obeying(constraints, robot_state, twist, dt_s, use_speed_field=self._use_speed_field)
 
     def _samples(self, off_rad: float) -> FloatArray:
         """Return (K, T) curvatures: around the last way, the last way, and that to the goal."""

@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
-from ._crossing import Observer, run_crossing
+from ._crossing import (
+    Crossing,
+    Observer,
+    Situation,
+    default_planner,
+    named_policy,
+    run_crossing,
+)
 from ._drawing import TopView, draw_camera_view
 from ._metrics import CLEARANCE_M, STANDING_SPEED_MPS, ContactEvent, SafetyMeter
 from ._result import CrossingFrame, CrossingResult
@@ -13,14 +20,18 @@ __all__ = [
     "CLEARANCE_M",
     "STANDING_SPEED_MPS",
     "ContactEvent",
+    "Crossing",
     "CrossingFrame",
     "CrossingResult",
     "Observer",
     "SafetyMeter",
+    "Situation",
     "Stage",
     "StraightOn",
     "TopView",
     "TrueView",
+    "default_planner",
     "draw_camera_view",
+    "named_policy",
     "run_crossing",
 ]

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 from typing import Final
 
 import numpy as np
 
-from nav_adapter import AwarenessPolicy, NavAdapter, RobotState
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotState
 from perception import AttentionCone, AwarenessPipeline
 from perception.arrays import FloatArray
 
@@ -21,8 +23,8 @@ from ..world.render import RendererName
 from ._command import check_planner, checked_command
 from ._metrics import SafetyMeter
 from ._result import CrossingFrame, CrossingResult
-from ._sensing import Sensing
-from ._stage import Stage
+from ._sensing import Sensed, Sensing
+from ._stage import Stage, TrueView
 from .eyes import KeypointNoise, Perception
 from .faults import Fault
 from .planner import LocalPlanner, SamplingPlanner, StraightOn
@@ -33,6 +35,183 @@ Observer = Callable[[CrossingFrame, Stage], None]
 _GOAL_SPEED_MPS: Final = 0.2
 # Rate of the separation measurements; contacts are checked in every physics step.
 _MEASURED_HZ: Final = 20.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Situation:
+    """One control cycle before its command: the truth, and what the robot knows.
+
+    Attributes:
+        t_s: simulated time.
+        state: true state of the robot.
+        T_odom_camera: (4, 4) true pose of the camera.
+        truth: the truth about each person.
+        sensed: the knowledge of the robot: its own state, and its tracks of the people.
+        constraints: constraints from the adapter.
+        margins_m: separation margin of each person, as last measured.
+        separations_m: distance to the surface of each person, measured at the same time.
+        at_goal: the robot stands at its goal.
+    """
+
+    t_s: float
+    state: RobotState
+    T_odom_camera: FloatArray
+    truth: tuple[TrueView, ...]
+    sensed: Sensed
+    constraints: NavConstraints
+    margins_m: tuple[float, ...]
+    separations_m: tuple[float, ...]
+    at_goal: bool
+
+    def frame(self, command: tuple[float, float], plan_s: float = 0.0) -> CrossingFrame:
+        """Return the control cycle with its command, and the time that planning it took.
+
+        The command is speed (m/s) and yaw rate (rad/s).
+        """
+        observed = self.sensed.observed
+        return CrossingFrame(
+            self.t_s,
+            self.state,
+            self.T_odom_camera,
+            self.truth,
+            tuple(observation for observation, _ in observed),
+            tuple(worker for _, worker in observed),
+            self.sensed.tracks,
+            self.constraints,
+            command,
+            self.margins_m,
+            self.separations_m,
+            self.sensed.scan_points_odom_m,
+            plan_s,
+        )
+
+
+class Crossing(AbstractContextManager["Crossing"]):
+    """The closed loop of one crossing, one control cycle at a time; a context manager.
+
+    Each cycle is :meth:`sense`, :meth:`command` and :meth:`advance`, in this order.
+    :func:`run_crossing` lets a planner give the commands.
+
+    Args:
+        scenario: the scenario.
+        policy: the policy of the adapter.
+        perception: one of :func:`run_crossing`'s.
+        seed: the same seed and commands give the same cycles, bit for bit.
+        noise: noise of the keypoint camera; None for the default.
+        pipeline: pipeline for ``"pixels"``; None for the shipped networks.
+        fault: a fault of sensors, detections or odometry.
+        renderer: renderer of the images.
+
+    Attributes:
+        scenario: as given.
+        stage: hall, robot and people.
+        meter: the safety figures so far.
+        goal_odom_m: (2,) goal.
+        dt_s: length of a control cycle.
+
+    Raises:
+        SimError: unknown perception.
+        PerceptionError: for ``"pixels"``, when the shipped networks cannot be loaded.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        policy: AwarenessPolicy,
+        perception: str = "truth",
+        seed: int = 0,
+        *,
+        noise: KeypointNoise | None = None,
+        pipeline: AwarenessPipeline | None = None,
+        fault: Fault | None = None,
+        renderer: RendererName = "auto",
+    ) -> None:
+        self.scenario = scenario
+        senses = Perception.named(perception)
+        jitter_rng, camera_rng, timing_rng, people_rng = np.random.default_rng(seed).spawn(4)
+        jitter = scenario.start_jitter_s
+        offsets = jitter_rng.uniform(-jitter, jitter, len(scenario.workers))
+        self._cone = AttentionCone()
+        self.meter = SafetyMeter(NOVA_CARTER)
+        self.stage = Stage(scenario, offsets, people_rng, renderer=renderer)
+        try:
+            self._sensing = Sensing(
+                self.stage,
+                senses,
+                policy,
+                self._cone,
+                seed,
+                noise=noise if noise is not None else KeypointNoise(),
+                camera_rng=camera_rng,
+                timing_rng=timing_rng,
+                pipeline=pipeline,
+                fault=fault,
+            )
+        except BaseException:
+            self.stage.close()
+            raise
+        self._adapter = NavAdapter(policy, NOVA_CARTER)
+        self.goal_odom_m = np.array([scenario.robot.goal_x_m, scenario.robot.goal_y_m])
+        self.dt_s = 1.0 / scenario.control_hz
+        self._ticks_per_measurement = max(round(scenario.control_hz / _MEASURED_HZ), 1)
+        self._margins_m: tuple[float, ...] = ()
+        self._ticks = round(scenario.duration_s * scenario.control_hz)
+        self._tick = 0
+
+    def close(self) -> None:
+        """End the physics world; a second call does nothing."""
+        self.stage.close()
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+    @property
+    def t_s(self) -> float:
+        """Simulated time of the present control cycle."""
+        return self._tick * self.dt_s
+
+    @property
+    def time_is_up(self) -> bool:
+        """True once all control cycles of the scenario have run."""
+        return self._tick >= self._ticks
+
+    def sense(self) -> Situation:
+        """Measure the separations, take images and scans, update the constraints.
+
+        Call it once per control cycle. After the last one nothing is measured any more.
+        """
+        t_s = self.t_s
+        if not self.time_is_up and self._tick % self._ticks_per_measurement == 0:
+            self._margins_m = self.stage.measure(
+                self.meter, self._ticks_per_measurement * self.dt_s
+            )
+        T_odom_camera = self.stage.amr.T_odom_camera
+        truth = self.stage.truth(self._cone, T_odom_camera)
+        state = self.stage.amr.state(t_s)
+        sensed = self._sensing.step(t_s, truth)
+        constraints = self._adapter.update(
+            sensed.tracks, sensed.state, t_s, perception_stamp_s=sensed.stamp_s
+        )
+        return Situation(
+            t_s,
+            state,
+            T_odom_camera,
+            truth,
+            sensed,
+            constraints,
+            self._margins_m,
+            tuple(self.meter.separations_m),
+            _at_goal(self.scenario, state, self.goal_odom_m),
+        )
+
+    def command(self, speed_mps: float, yaw_rate_radps: float) -> None:
+        """Give the robot a command; it holds until the next one."""
+        self.stage.amr.command(speed_mps, yaw_rate_radps)
+
+    def advance(self) -> None:
+        """Run robot, people and physics up to the next control cycle."""
+        self.stage.advance(self.t_s + self.dt_s, self.meter)
+        self._tick += 1
 
 
 def run_crossing(
@@ -78,93 +257,58 @@ def run_crossing(
     """
     if isinstance(scenario, str):
         scenario = ScenarioTemplate.shipped(scenario).for_seed(seed)
-    policy_name, policy = _resolve_policy(policy)
-    driver = check_planner(planner) if planner is not None else _default_planner(scenario)
-    jitter_rng, camera_rng, timing_rng, people_rng = np.random.default_rng(seed).spawn(4)
-    jitter = scenario.start_jitter_s
-    offsets = jitter_rng.uniform(-jitter, jitter, len(scenario.workers))
-    cone = AttentionCone()
-    meter = SafetyMeter(NOVA_CARTER)
-    senses = Perception.named(perception)
-    with Stage(scenario, offsets, people_rng, renderer=renderer) as stage:
-        sensing = Sensing(
-            stage,
-            senses,
-            policy,
-            cone,
-            seed,
-            noise=noise if noise is not None else KeypointNoise(),
-            camera_rng=camera_rng,
-            timing_rng=timing_rng,
-            pipeline=pipeline,
-            fault=fault,
-        )
-        adapter = NavAdapter(policy, NOVA_CARTER)
-        goal = np.array([scenario.robot.goal_x_m, scenario.robot.goal_y_m])
-        dt_s = 1.0 / scenario.control_hz
-        frames: list[CrossingFrame] = []
-        reached_s: float | None = None
-        ticks_per_measurement = max(round(scenario.control_hz / _MEASURED_HZ), 1)
-        margins: tuple[float, ...] = ()
-        for tick in range(round(scenario.duration_s * scenario.control_hz)):
-            t_s = tick * dt_s
-            if tick % ticks_per_measurement == 0:
-                margins = stage.measure(meter, ticks_per_measurement * dt_s)
-            T_odom_camera = stage.amr.T_odom_camera
-            truth = stage.truth(cone, T_odom_camera)
-            state = stage.amr.state(t_s)
-            sensed = sensing.step(t_s, truth)
-            constraints = adapter.update(
-                sensed.tracks, sensed.state, t_s, perception_stamp_s=sensed.stamp_s
-            )
+    policy_name, policy = named_policy(policy)
+    driver = check_planner(planner) if planner is not None else default_planner(scenario)
+    frames: list[CrossingFrame] = []
+    reached_s: float | None = None
+    with Crossing(
+        scenario,
+        policy,
+        perception,
+        seed,
+        noise=noise,
+        pipeline=pipeline,
+        fault=fault,
+        renderer=renderer,
+    ) as crossing:
+        while not crossing.time_is_up:
+            now = crossing.sense()
             asked_s = perf_counter()
-            returned = driver.plan(sensed.state, goal, constraints, dt_s)
-            plan_s = perf_counter() - asked_s
-            command = checked_command(driver, returned, t_s)
-            stage.amr.command(*command)
-            frame = CrossingFrame(
-                t_s,
-                state,
-                T_odom_camera,
-                truth,
-                tuple(observation for observation, _ in sensed.observed),
-                tuple(worker for _, worker in sensed.observed),
-                sensed.tracks,
-                constraints,
-                command,
-                margins,
-                tuple(meter.separations_m),
-                sensed.scan_points_odom_m,
-                plan_s,
+            returned = driver.plan(
+                now.sensed.state, crossing.goal_odom_m, now.constraints, crossing.dt_s
             )
-            frames.append(frame)
+            plan_s = perf_counter() - asked_s
+            command = checked_command(driver, returned, now.t_s)
+            crossing.command(*command)
+            frames.append(now.frame(command, plan_s))
             if observer is not None:
-                observer(frame, stage)
-            if _at_goal(scenario, state, goal):
-                reached_s = t_s
+                observer(frames[-1], crossing.stage)
+            if now.at_goal:
+                reached_s = now.t_s
                 break
-            stage.advance(t_s + dt_s, meter)
+            crossing.advance()
         return _result(
             scenario,
             seed,
             policy_name,
             type(driver).__name__,
             perception,
-            meter,
+            crossing.meter,
             frames,
             reached_s,
-            stage.outcomes,
+            crossing.stage.outcomes,
         )
 
 
-def _default_planner(scenario: Scenario) -> LocalPlanner:
+def default_planner(scenario: Scenario) -> LocalPlanner:
+    """Return the planner that a crossing has where none is given."""
     straight = scenario.robot.straight_on_speed_mps
     if straight is not None:
         return StraightOn(straight)
     return SamplingPlanner(NOVA_CARTER, scenario.planner_boxes_odom_m)
 
 
-def _resolve_policy(policy: AwarenessPolicy | str | Path) -> tuple[str, AwarenessPolicy]:
+def named_policy(policy: AwarenessPolicy | str | Path) -> tuple[str, AwarenessPolicy]:
     """Return name and policy, from a policy, a preset's name or a file."""
     if isinstance(policy, AwarenessPolicy):
         return "custom", policy

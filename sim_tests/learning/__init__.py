@@ -1,0 +1,48 @@
+"""Crossings as a Gymnasium environment, and planners made of learned policies.
+
+Importing this page registers ``awarenav/Crossing-v0`` with Gymnasium, the extra ``awarenav[gym]``:
+``gymnasium.make("sim_tests.learning:awarenav/Crossing-v0")``. A :class:`PolicyPlanner` does not
+need Gymnasium.
+"""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from typing import TYPE_CHECKING
+
+from awarenav.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from ._actions import command_of
+    from ._environment import CrossingEnv
+    from ._observations import ObservationEncoder
+    from ._policy_planner import PolicyPlanner
+    from ._reward import RewardWeights
+
+__all__ = [
+    "ENVIRONMENT_ID",
+    "CrossingEnv",
+    "ObservationEncoder",
+    "PolicyPlanner",
+    "RewardWeights",
+    "command_of",
+]
+
+#: The name of the environment in Gymnasium's registry.
+ENVIRONMENT_ID = "awarenav/Crossing-v0"
+
+if find_spec("gymnasium") is not None:
+    from gymnasium.envs.registration import register
+
+    register(ENVIRONMENT_ID, entry_point="sim_tests.learning:CrossingEnv")
+
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "._actions": ("command_of",),
+        "._environment": ("CrossingEnv",),
+        "._observations": ("ObservationEncoder",),
+        "._policy_planner": ("PolicyPlanner",),
+        "._reward": ("RewardWeights",),
+    },
+)

@@ -1,0 +1,368 @@
+"""One crossing as a Gymnasium environment, on the loop of ``run_crossing``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final, Literal, cast
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from awarenav.errors import MissingExtraError, not_one_of
+from nav_adapter import AwarenessPolicy
+from perception import AttentionCone
+from perception.arrays import FloatArray
+from perception.installation import install_command
+
+from ..actors.robot import NOVA_CARTER
+from ..crossing import (
+    STANDING_SPEED_MPS,
+    Crossing,
+    CrossingFrame,
+    Situation,
+    TopView,
+    draw_camera_view,
+    named_policy,
+)
+from ..crossing.eyes import Perception
+from ..scenario import Scenario, ScenarioTemplate
+from ..world.camera import CameraRenderer
+from ..world.errors import SimError
+from ._actions import action_limits, command_of
+from ._observations import Observation, ObservationEncoder
+from ._reward import RewardWeights, over_limit_mps
+
+try:
+    import gymnasium
+    from gymnasium import spaces
+    from gymnasium.utils import EzPickle
+except ImportError as cause:
+    raise MissingExtraError(
+        "the environment needs Gymnasium, which is not installed; it is the extra 'gym': "
+        f"{install_command('gym')}"
+    ) from cause
+
+View = Literal["top", "camera"]
+_VIEWS: Final = ("top", "camera")
+# The plan shows the robot's way with this margin.
+_PLAN_MARGIN_M: Final = 4.0
+_PICTURE_PX: Final = (640, 480)
+
+
+class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
+    """One crossing per episode; a step is one control cycle.
+
+    Observations are those of :class:`ObservationEncoder`. An action is speed and yaw rate. An
+    episode terminates at the goal and at a contact that the robot caused; it is truncated when the
+    scenario's time is up. ``reset(seed=s)`` gives the episode of ``run_crossing(seed=s)``, bit for
+    bit; without a seed the next one is drawn. ``reset(options={"scenario": name})`` chooses the
+    scenario. A copy or an unpickled environment has the same arguments and no episode.
+
+    Args:
+        scenarios: names of shipped scenarios, YAML files, scenarios or templates, one or several;
+            with several each episode draws one.
+        policy: a policy, the name of a preset, or a YAML file.
+        perception: one of ``run_crossing``'s.
+        control_hz: control cycles per second, in (0, 240]; None for the scenario's.
+        people_slots: number of people in an observation.
+        scan_rays: number of rays of the scan in an observation; 0 for no scan.
+        normalised_actions: actions are shares of the robot's largest speed and yaw rate, float32 in
+            [−1, 1]; else they are in m/s and rad/s, float64 within the robot's limits.
+        reward: weights of the reward, as an object or as a mapping; None for the defaults.
+        end_at_contact: a contact that the robot caused ends the episode.
+        render_mode: ``"rgb_array"`` or None.
+        render_view: ``"top"`` for a plan, ``"camera"`` for the robot's camera.
+
+    Raises:
+        SimError: for arguments that are not valid.
+        NavError: for an unknown preset or an unusable policy file.
+    """
+
+    # Gymnasium declares it for instances.
+    metadata: dict[str, Any] = {  # noqa: RUF012
+        "render_modes": ["rgb_array"],
+        "render_fps": 20,
+    }
+
+    def __init__(
+        self,
+        scenarios: str | Scenario | ScenarioTemplate | Sequence[Any] = "crossing_from_left",
+        policy: AwarenessPolicy | str | Path = "balanced",
+        perception: str = "truth",
+        control_hz: float | None = None,
+        people_slots: int = 8,
+        scan_rays: int = 0,
+        normalised_actions: bool = True,
+        reward: RewardWeights | Mapping[str, float] | None = None,
+        end_at_contact: bool = True,
+        render_mode: str | None = None,
+        render_view: View = "top",
+    ) -> None:
+        EzPickle.__init__(
+            self,
+            scenarios=scenarios,
+            policy=policy,
+            perception=perception,
+            control_hz=control_hz,
+            people_slots=people_slots,
+            scan_rays=scan_rays,
+            normalised_actions=normalised_actions,
+            reward=reward,
+            end_at_contact=end_at_contact,
+            render_mode=render_mode,
+            render_view=render_view,
+        )
+        if isinstance(scenarios, (str, Scenario, ScenarioTemplate)):
+            scenarios = (scenarios,)
+        self._scenarios = tuple(map(_template, scenarios))
+        if not self._scenarios:
+            raise SimError("scenarios must name at least one scenario, got none")
+        if control_hz is not None and not 0.0 < control_hz <= 240.0:
+            raise SimError(f"control_hz must be in (0, 240], got {control_hz!r}")
+        if render_mode not in (None, "rgb_array"):
+            raise SimError(f"render_mode must be 'rgb_array' or None, got {render_mode!r}")
+        if render_view not in _VIEWS:
+            raise SimError(not_one_of("render_view", render_view, _VIEWS))
+        Perception.named(perception)
+        self._policy = named_policy(policy)[1]
+        self._perception = perception
+        self._control_hz = control_hz
+        self._normalised = normalised_actions
+        self._weights = _weights(reward)
+        self._end_at_contact = end_at_contact
+        self.render_mode = render_mode
+        self._render_view = render_view
+        self._slots = people_slots, scan_rays
+        self._encoder = ObservationEncoder(*self._slots)
+        arrays = spaces.Dict(
+            {
+                **{
+                    name: spaces.Box(low, high, dtype=np.float32)
+                    for name, (low, high) in self._encoder.bounds().items()
+                },
+                "mask": spaces.MultiBinary(people_slots),
+            }
+        )
+        self.observation_space = cast("spaces.Space[Observation]", arrays)
+        limits = np.array(action_limits(NOVA_CARTER))
+        self.action_space = (
+            spaces.Box(-1.0, 1.0, (2,), np.float32)
+            if normalised_actions
+            else spaces.Box(-limits, limits, dtype=np.float64)
+        )
+        self._crossing: Crossing | None = None
+        self._situation: Situation | None = None
+        self._frame: CrossingFrame | None = None
+        self._plan: TopView | None = None
+        self._camera: CameraRenderer | None = None
+        self._ended = False
+
+    @property
+    def crossing(self) -> Crossing:
+        """The crossing of the present episode; raises SimError before the first reset."""
+        if self._crossing is None:
+            raise SimError("the environment has no episode: call reset first")
+        return self._crossing
+
+    @property
+    def situation(self) -> Situation:
+        """The present control cycle, with the constraints a planner gets."""
+        assert self.crossing is not None
+        assert self._situation is not None
+        return self._situation
+
+    @property
+    def frame(self) -> CrossingFrame | None:
+        """The control cycle of the last step, as ``run_crossing`` records it; None before it."""
+        return self._frame
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Begin an episode; ``options={"scenario": …}`` chooses its scenario.
+
+        Raises:
+            SimError: for other options and an unknown scenario.
+        """
+        super().reset(seed=seed)
+        unknown = sorted(set(options or {}) - {"scenario"})
+        if unknown:
+            raise SimError(f"options of reset must be 'scenario' alone, got {', '.join(unknown)}")
+        drawn = int(self.np_random.integers(2**31))
+        choice = int(self.np_random.integers(len(self._scenarios)))
+        episode_seed = drawn if seed is None else seed
+        given = (options or {}).get("scenario")
+        template = self._scenarios[choice] if given is None else _template(given)
+        scenario = template if isinstance(template, Scenario) else template.for_seed(episode_seed)
+        if self._control_hz is not None:
+            scenario = scenario.model_copy(update={"control_hz": self._control_hz})
+        self.close()
+        self._crossing = Crossing(scenario, self._policy, self._perception, episode_seed)
+        self._encoder = ObservationEncoder(*self._slots, scenario.planner_boxes_odom_m)
+        self._frame = None
+        self._ended = False
+        self._situation = self._crossing.sense()
+        return self._observation(), self._info((0.0, 0.0), {}, "", episode_seed)
+
+    def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Drive for one control cycle.
+
+        Raises:
+            SimError: for an action that is not two finite numbers, and without an episode.
+        """
+        crossing, before = self.crossing, self.situation
+        if self._ended:
+            raise SimError("the episode has ended: call reset")
+        command = command_of(action, crossing.stage.amr.profile, normalised=self._normalised)
+        contacts = _by_robot(crossing)
+        crossing.command(*command)
+        self._frame = before.frame(command)
+        crossing.advance()
+        now = self._situation = crossing.sense()
+        hits = _by_robot(crossing) - contacts
+        terminated = now.at_goal and not crossing.time_is_up
+        reason = "goal" if terminated else ""
+        if hits and self._end_at_contact:
+            terminated, reason = True, "contact"
+        truncated = crossing.time_is_up and not terminated
+        if truncated:
+            reason = "time"
+        self._ended = terminated or truncated
+        goal = crossing.goal_odom_m
+        weights, dt_s = self._weights, crossing.dt_s
+        progress_m = _distance_m(before, goal) - _distance_m(now, goal)
+        parts = {
+            "progress": weights.progress_per_m * progress_m,
+            "goal": weights.goal * (reason == "goal"),
+            "time": weights.time_per_s * dt_s,
+            "over_limit": weights.over_limit_per_m
+            * over_limit_mps(before.constraints, command)
+            * dt_s,
+            "margin": weights.negative_margin_per_s * _violates(now) * dt_s,
+            "contact": weights.contact * hits,
+        }
+        info = self._info(command, parts, reason, None)
+        return self._observation(), float(sum(parts.values())), terminated, truncated, info
+
+    def render(self) -> NDArray[Any] | None:
+        """Return an RGB picture (H, W, 3) of the present control cycle; None without a mode."""
+        if self.render_mode is None:
+            return None
+        crossing = self.crossing
+        command = (0.0, 0.0) if self._frame is None else self._frame.command
+        frame, cone = self.situation.frame(command), AttentionCone()
+        if self._render_view == "top":
+            if self._plan is None:
+                self._plan = TopView(crossing.stage, _PICTURE_PX, _window_m(crossing.scenario))
+            return self._plan.draw(frame, crossing.stage, cone)
+        spec = crossing.scenario.camera
+        camera = spec.camera(_PICTURE_PX[0] / spec.width_px)
+        if self._camera is None:
+            self._camera = CameraRenderer(crossing.stage.warehouse)
+        picture = self._camera.rgb(camera, frame.T_odom_camera)
+        return draw_camera_view(picture, camera, frame, crossing.stage, cone)
+
+    def close(self) -> None:
+        """End the physics world of the episode; a second call does nothing."""
+        if self._crossing is not None:
+            self._crossing.close()
+        self._crossing, self._plan, self._camera = None, None, None
+
+    def _observation(self) -> Observation:
+        now = self.situation
+        return self._encoder.encode(now.sensed.state, self.crossing.goal_odom_m, now.constraints)
+
+    def _info(
+        self,
+        command: tuple[float, float],
+        parts: dict[str, float],
+        reason: str,
+        seed: int | None,
+    ) -> dict[str, Any]:
+        now, meter = self.situation, self.crossing.meter
+        limits = now.constraints
+        info: dict[str, Any] = {
+            "t_s": now.t_s,
+            "scenario": self.crossing.scenario.name,
+            "command": list(command),
+            "distance_to_goal_m": _distance_m(now, self.crossing.goal_odom_m),
+            "margins_m": list(now.margins_m),
+            "separations_m": list(now.separations_m),
+            "min_margin_m": meter.min_margin_m,
+            "min_separation_m": meter.min_separation_m,
+            "violation_time_s": meter.violation_time_s,
+            "speed_limit_mps": limits.speed_limit_mps,
+            "yaw_rate_limit_radps": limits.yaw_rate_limit_radps(now.sensed.state.speed_mps),
+            "limited_by": limits.limited_by,
+            "stale": limits.stale,
+            "braking_suffices": limits.braking_suffices,
+            "obstacles": [
+                [
+                    each.track_id,
+                    *each.center_odom_m.tolist(),
+                    *each.velocity_odom_mps.tolist(),
+                    each.radius_m,
+                    each.awareness_lower,
+                ]
+                for each in limits.obstacles
+            ],
+            "contact": _contact(self.crossing),
+            "end": reason,
+            "is_success": reason == "goal" and not _by_robot(self.crossing),
+            "reward_parts": parts,
+        }
+        if seed is not None:
+            info["seed"] = seed
+        return info
+
+
+def _template(given: Any) -> Scenario | ScenarioTemplate:
+    if isinstance(given, (Scenario, ScenarioTemplate)):
+        return given
+    if not isinstance(given, str):
+        raise SimError(
+            f"a scenario must be a name, a YAML file, a Scenario or a template, got {given!r:.80}"
+        )
+    return ScenarioTemplate.named(given)
+
+
+def _weights(given: RewardWeights | Mapping[str, float] | None) -> RewardWeights:
+    if isinstance(given, RewardWeights):
+        return given
+    try:
+        return RewardWeights(**(given or {}))
+    except (TypeError, ValidationError) as cause:
+        raise SimError(f"reward: {cause}") from cause
+
+
+def _distance_m(now: Situation, goal_odom_m: FloatArray) -> float:
+    """Return the true distance of the base origin to the goal."""
+    return float(np.linalg.norm(goal_odom_m - now.state.position_odom_m))
+
+
+def _violates(now: Situation) -> bool:
+    moving = abs(now.state.speed_mps) > STANDING_SPEED_MPS
+    return moving and min(now.margins_m, default=0.0) < 0.0
+
+
+def _by_robot(crossing: Crossing) -> int:
+    """Return how many contacts the robot has caused."""
+    return sum(contact.by == "robot" for contact in crossing.meter.contacts)
+
+
+def _contact(crossing: Crossing) -> str:
+    """Return who caused a contact in this episode; empty for none."""
+    causes = {contact.by for contact in crossing.meter.contacts}
+    return "robot" if "robot" in causes else "person" if causes else ""
+
+
+def _window_m(scenario: Scenario) -> tuple[float, float, float, float]:
+    task, far = scenario.robot, _PLAN_MARGIN_M
+    return (
+        min(task.start_x_m, task.goal_x_m) - far,
+        min(task.start_y_m, task.goal_y_m) - far,
+        max(task.start_x_m, task.goal_x_m) + far,
+        max(task.start_y_m, task.goal_y_m) + far,
+    )
