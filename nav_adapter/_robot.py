@@ -109,7 +109,7 @@ class RobotProfile:
 
     @property
     def moves_sideways(self) -> bool | None:
-        """Whether the drive can move sideways; None if it is not known."""
+        """True for a drive that can move sideways; None if it is not known."""
         return None if self.drive is None else self.drive == "holonomic"
 
     @cached_property

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib
+import itertools
+import math
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -10,7 +12,7 @@ from collections.abc import Iterator
 import pytest
 from paths import ROOT
 
-from sim_tests import NOVA_CARTER
+from sim_tests import NOVA_CARTER, ScenarioTemplate, run_crossing
 
 PLANNERS = {
     "ir-sim": ("irsim", "velocity_obstacles", "VelocityObstaclePlanner"),
@@ -105,3 +107,33 @@ def test_bad_input_is_refused(arguments, message):
     done = command(*arguments)
     assert done.returncode == 2
     assert message in done.stderr
+
+
+WITH_FIELD = {
+    "dynamic_window:DynamicWindow": "numpy",
+    "path_integral:PathIntegral": "numpy",
+    "reciprocal_velocity:ReciprocalVelocity": "pyrvo",
+}
+
+
+@pytest.mark.parametrize("where", WITH_FIELD)
+def test_with_the_speed_field_somebody_busy_is_passed_and_corners_obey(where, examples):
+    pytest.importorskip("pybullet", reason="the crossings need the extra sim")
+    if importlib.util.find_spec(WITH_FIELD[where]) is None:
+        pytest.skip(f"{WITH_FIELD[where]} is not installed (extra dev)")
+    module, name = where.split(":")
+    planner = getattr(importlib.import_module(f"examples.planners.{module}"), name)
+    scenario = ScenarioTemplate.shipped("busy_in_aisle").for_seed(1)
+    driver = planner(NOVA_CARTER, scenario.planner_boxes_odom_m)
+    result = run_crossing(scenario, policy="balanced", planner=driver, seed=1)
+    assert result.success
+    assert not result.contact
+    assert result.min_margin_m > 0.0
+    R = NOVA_CARTER.circumscribed_radius_m
+    allowed_mps = math.inf
+    for before, after in itertools.pairwise(result.frames):
+        v, w = before.robot_state.speed_mps, before.robot_state.yaw_rate_radps
+        braked = min(abs(v) + abs(w) * R, allowed_mps) - (after.t_s - before.t_s)
+        allowed_mps = max(before.constraints.fastest_point_limit_mps, braked)
+        state = after.robot_state
+        assert abs(state.speed_mps) + abs(state.yaw_rate_radps) * R < allowed_mps + 0.05

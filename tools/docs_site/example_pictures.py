@@ -32,9 +32,12 @@ from tracking import PersonTrack, PersonTracker
 
 ROOT: Final = Path(__file__).parents[2]
 FOLDER: Final = ROOT / "docs" / "images" / "examples"
-#: Planners of other projects, which cross in PyBullet: module and class in examples/planners.
+#: Planners that cross in PyBullet: module and class in examples/planners.
 PLANNERS: Final = {
     "velocity_obstacles": "VelocityObstaclePlanner",
+    "reciprocal_velocity": "ReciprocalVelocity",
+    "dynamic_window": "DynamicWindow",
+    "path_integral": "PathIntegral",
     "model_predictive": "ModelPredictivePlanner",
 }
 _WIDTH_IN: Final = 7.2
