@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import os
+import select
 import shutil
 import subprocess
 from pathlib import Path
@@ -23,6 +24,8 @@ FLAGS = (
     "--disable-dev-shm-usage",
     "--remote-debugging-pipe",
 )
+# A browser that says nothing for so long has hung; a busy computer needs seconds at most.
+_SILENCE_S = 60.0
 
 
 class Chromium:
@@ -72,6 +75,8 @@ class Chromium:
 
     def _next(self) -> dict[str, Any]:
         while b"\0" not in self._unread:
+            ready, _, _ = select.select([self._answers], [], [], _SILENCE_S)
+            assert ready, f"the browser has said nothing for {_SILENCE_S:g} s"
             read = os.read(self._answers, 1 << 20)
             assert read, "the browser has ended"
             self._unread += read

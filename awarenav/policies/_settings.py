@@ -79,6 +79,15 @@ _REACH_OF_DEFAULT: Final = 4.0
 _REACH_WITHOUT_DEFAULT: Final = 5.0
 _STEPS: Final = 200.0
 
+# Fields of a robot file that no speed limit depends on.
+_CHANGES_NO_LIMIT: Final = (
+    "camera",
+    "scanners",
+    "max_yaw_rate_radps",
+    "max_yaw_acceleration_radps2",
+    "min_turning_radius_m",
+)
+
 
 def policy_settings() -> dict[str, Any]:
     """Return the models of a policy by name, each with its text and its fields in their order.
@@ -93,7 +102,7 @@ def policy_settings() -> dict[str, Any]:
 def robot_settings() -> list[dict[str, Any]]:
     """Return the fields of a robot file that a speed limit depends on, as those of a policy."""
     fields: list[dict[str, Any]] = _model(RobotFile)["fields"]
-    return [field for field in fields if field["key"] not in ("camera", "scanners")]
+    return [field for field in fields if field["key"] not in _CHANGES_NO_LIMIT]
 
 
 def _model(model: type[BaseModel]) -> dict[str, Any]:
