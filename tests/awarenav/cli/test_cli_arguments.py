@@ -170,8 +170,10 @@ def test_a_shared_option_means_the_same_in_every_command(name):
         shared = options_of(each).get(name)
         if shared is None or (path[0], name) in OTHER_MEANING:
             continue
-        # One value or several, a file or a folder: the metavar says which.
-        kind = "DIR" if shared.metavar == "DIR" else shared.multiple
+        # One value or several, a file or a folder: the metavar says which. Beside arguments, an
+        # option with several values is given several times and has no dots.
+        dots = (shared.metavar or "").endswith("...")
+        kind = "DIR" if shared.metavar == "DIR" else (shared.multiple, dots)
         found[kind].append(shared)
     assert found
     assert sum(map(len, found.values())) > 1
