@@ -15,7 +15,7 @@ import gymnasium
 import numpy as np
 
 from benchmarks._harness import count, make_parser
-from sim_tests.learning import ENVIRONMENT_ID, CrossingEnv
+from sim_tests.learning import CrossingEnv
 
 SCENARIOS = ("crossing_from_left", "blind_corner", "two_people_one_aware", "crowd_of_eight")
 # Slow enough for the robot not to arrive within the measured steps.
@@ -32,7 +32,7 @@ def main() -> int:
         "--steps", type=count, default=300, metavar="N", help="steps per scenario (default: 300)"
     )
     steps = parser.parse_args().steps
-    env = gymnasium.make(ENVIRONMENT_ID).unwrapped
+    env = gymnasium.make("awarenav/Crossing-v0").unwrapped
     assert isinstance(env, CrossingEnv)
     print("| scenario | people | reset, ms | steps per CPU s | PyBullet alone | ratio |")
     print("| --- | --- | --- | --- | --- | --- |")

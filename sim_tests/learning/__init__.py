@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from ._reward import RewardWeights
 
 __all__ = [
-    "ENVIRONMENT_ID",
     "CrossingEnv",
     "ObservationEncoder",
     "PolicyPlanner",
@@ -28,13 +27,13 @@ __all__ = [
     "command_of",
 ]
 
-#: The name of the environment in Gymnasium's registry.
-ENVIRONMENT_ID = "awarenav/Crossing-v0"
+# The name in Gymnasium's registry.
+_ENVIRONMENT_ID = "awarenav/Crossing-v0"
 
 if find_spec("gymnasium") is not None:
     from gymnasium.envs.registration import register
 
-    register(ENVIRONMENT_ID, entry_point="sim_tests.learning:CrossingEnv")
+    register(_ENVIRONMENT_ID, entry_point="sim_tests.learning:CrossingEnv")
 
 __getattr__ = lazy_names(
     __name__,

@@ -18,13 +18,13 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv  # noqa: E402
 from sim_tests import SamplingPlanner, SimError, run_crossing  # noqa: E402
 from sim_tests.actors.robot import NOVA_CARTER  # noqa: E402
 from sim_tests.crossing import CrossingFrame  # noqa: E402
-from sim_tests.learning import ENVIRONMENT_ID, CrossingEnv, PolicyPlanner  # noqa: E402
+from sim_tests.learning import CrossingEnv, PolicyPlanner  # noqa: E402
 from sim_tests.scenario import ScenarioTemplate  # noqa: E402
 from sim_tests.world.bullet import pybullet  # noqa: E402
 
 
 def make(**kwargs: Any) -> CrossingEnv:
-    env = gymnasium.make(ENVIRONMENT_ID, **kwargs).unwrapped
+    env = gymnasium.make("awarenav/Crossing-v0", **kwargs).unwrapped
     assert isinstance(env, CrossingEnv)
     return env
 
@@ -103,7 +103,7 @@ def test_a_policy_drives_the_same_in_the_environment_and_as_a_planner() -> None:
 def test_gymnasiums_own_check_passes_without_warnings(kwargs: dict[str, Any]) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        env = gymnasium.make(ENVIRONMENT_ID, render_mode="rgb_array", **kwargs)
+        env = gymnasium.make("awarenav/Crossing-v0", render_mode="rgb_array", **kwargs)
         check_env(env.unwrapped)
     env.close()
 
@@ -207,7 +207,7 @@ def test_every_physics_world_is_closed() -> None:
 def test_vectors_of_environments(mode: str) -> None:
     short = ScenarioTemplate.shipped("crossing_from_left").for_seed(0)
     short = short.model_copy(update={"duration_s": 0.2})
-    envs = gymnasium.make_vec(ENVIRONMENT_ID, 2, vectorization_mode=mode, scenarios=short)
+    envs = gymnasium.make_vec("awarenav/Crossing-v0", 2, vectorization_mode=mode, scenarios=short)
     observation, info = envs.reset(seed=4)
     assert observation["people"].shape == (2, 8, 6)
     single = make(scenarios=short)
