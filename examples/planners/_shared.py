@@ -1,4 +1,4 @@
-"""The three things that every planner here does the same way: walls, ways around, and limits."""
+"""Parts that the planners here share: walls, circles, ways around, and limits."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from nav_adapter import NavConstraints, RobotProfile, RobotState
-from nav_adapter.exporters import speed_limit_at, time_cost
+from nav_adapter.exporters import people_cost, speed_limit_at, time_cost
 from nav_adapter.motion import clip_twists
 from perception.arrays import FloatArray
 
@@ -19,6 +19,8 @@ _CYCLES_AHEAD = 2
 _VIA_AHEAD_M = (1.5, 3.0, 4.5)
 _VIA_ASIDE_M = np.linspace(-1.8, 1.8, 13)
 _WAY_STEPS = 40
+# A pose whose gap to a wall is smaller than this is near it.
+_NEAR_WALL_M = 0.1
 # A detour must save this much time, so that a planner does not waver between two ways.
 _WORTH_S = 0.3
 
@@ -37,14 +39,48 @@ def gap_to_boxes_m(positions_odom_m: FloatArray, boxes_odom_m: FloatArray) -> Fl
     return gap
 
 
-def fastest_direction(
+def wall_shares(gaps_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return (K,) how near each way is to walls, in [0, 1], and the share of it within one.
+
+    Args:
+        gaps_m: (K, T) between the robot's disc and the nearest wall.
+    """
+    near = np.clip(1.0 - gaps_m / _NEAR_WALL_M, 0.0, 1.0).mean(axis=1)
+    return np.asarray(near), np.asarray((gaps_m < 0.0).mean(axis=1))
+
+
+def circle_costs(
+    constraints: NavConstraints, positions_odom_m: FloatArray, dt_s: float, radius_m: float
+) -> FloatArray:
+    """Return (K,) the mean cost of the circles along each way, for planners without the field.
+
+    Args:
+        constraints: of the present cycle.
+        positions_odom_m: (K, T, 2) of each way, ``dt_s`` apart.
+        dt_s: > 0.
+        radius_m: of the robot's disc.
+    """
+    cost = people_cost(
+        constraints,
+        positions_odom_m,
+        dt_s,
+        robot_radius_m=radius_m,
+        inside_cost=2.0,
+        near_cost=0.5,
+    )
+    return np.asarray(cost.mean(axis=1))
+
+
+def direction_to_goal(
     constraints: NavConstraints,
     robot_state: RobotState,
     goal_odom_m: FloatArray,
     boxes_odom_m: FloatArray,
     radius_m: float,
+    *,
+    use_speed_field: bool,
 ) -> FloatArray:
-    """Return the unit vector (2,) in which the fastest way to the goal begins.
+    """Return the unit vector (2,) of the goal or, with the field, of the fastest way to it.
 
     Ways are the straight one and detours past one point beside it. Each takes the time that the
     speed field allows along it. For planners that choose one velocity and see no farther.
@@ -55,10 +91,13 @@ def fastest_direction(
         goal_odom_m: (2,).
         boxes_odom_m: (N, 4) racks and walls.
         radius_m: of the robot's disc, which keeps out of the boxes.
+        use_speed_field: choose among ways.
     """
     start = robot_state.position_odom_m
     to_goal = goal_odom_m - start
     distance_m = float(np.hypot(*to_goal))
+    if not use_speed_field:
+        return np.asarray(to_goal / max(distance_m, 1e-9))
     if distance_m < 1e-6:
         return np.array([1.0, 0.0])
     ahead = to_goal / distance_m

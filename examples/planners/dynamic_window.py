@@ -12,11 +12,12 @@ import math
 import numpy as np
 
 from nav_adapter import NavConstraints, RobotProfile, RobotState
-from nav_adapter.exporters import people_cost, time_cost
+from nav_adapter.exporters import time_cost
 from perception.arrays import FloatArray
 
 from ._shared import (
     bearing_rad,
+    circle_costs,
     follow_curvature,
     free_length_m,
     gap_to_boxes_m,
@@ -24,6 +25,7 @@ from ._shared import (
     obeying,
     speed_to_stop_at_mps,
     stop_distance_m,
+    wall_shares,
 )
 
 _LENGTH_M, _STEPS = 4.0, 20
@@ -35,7 +37,6 @@ _TURN_BACK_RAD = 1.6
 _TURN_RADPS = 0.8
 # Seconds that a curve costs for a bend of 1 rad, for being near a wall, in one, or in a circle.
 _BEND_S, _NEAR_A_WALL_S, _IN_A_WALL_S, _IN_A_CIRCLE_S = 0.3, 0.5, 10.0, 20.0
-_NEAR_M = 0.1
 
 
 class DynamicWindow:
@@ -119,18 +120,15 @@ class DynamicWindow:
             allowed_s = time_cost(constraints, positions, headings, dt_s=dt_s)
             return np.asarray(np.maximum(driven_s, allowed_s))
         radius_m = self._robot.circumscribed_radius_m
-        near = people_cost(
-            constraints, positions, dt_s, robot_radius_m=radius_m, inside_cost=2.0, near_cost=0.5
-        )
-        return np.asarray(driven_s + _IN_A_CIRCLE_S * near.mean(axis=1))
+        circles = circle_costs(constraints, positions, dt_s, radius_m)
+        return np.asarray(driven_s + _IN_A_CIRCLE_S * circles)
 
     def _fixed_s(
         self, positions: FloatArray, gaps: FloatArray, goal_odom_m: FloatArray
     ) -> FloatArray:
         """Return (K,), the time from the end of each curve, and the cost of walls beside it."""
         farther_m = np.hypot(*(goal_odom_m - positions[:, -1]).T)
-        near = np.clip(1.0 - gaps / _NEAR_M, 0.0, 1.0).mean(axis=1)
-        hit = (gaps < 0.0).mean(axis=1)
+        near, hit = wall_shares(gaps)
         return np.asarray(
             farther_m / self._robot.max_speed_mps + _NEAR_A_WALL_S * near + _IN_A_WALL_S * hit
         )

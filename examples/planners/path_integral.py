@@ -12,17 +12,19 @@ import math
 import numpy as np
 
 from nav_adapter import NavConstraints, RobotProfile, RobotState
-from nav_adapter.exporters import people_cost, time_cost
+from nav_adapter.exporters import time_cost
 from perception.arrays import FloatArray
 
 from ._shared import (
     bearing_rad,
+    circle_costs,
     follow_curvature,
     free_length_m,
     gap_to_boxes_m,
     no_boxes,
     obeying,
     speed_to_stop_at_mps,
+    wall_shares,
 )
 
 _SAMPLES, _STEPS, _STEP_M = 200, 24, 0.2
@@ -38,7 +40,6 @@ _TURN_RADPS = 0.8
 _SLOWEST_PACE_MPS = 0.3
 # Seconds that a way costs for a curvature of 1/m, near a wall, in one, and in a circle.
 _BEND_S, _NEAR_A_WALL_S, _IN_A_WALL_S, _IN_A_CIRCLE_S = 0.5, 0.5, 20.0, 20.0
-_NEAR_M = 0.1
 
 
 class PathIntegral:
@@ -116,20 +117,13 @@ class PathIntegral:
         if self._use_speed_field:
             seconds = time_cost(constraints, positions, headings, dt_s=dt_s)
         else:
-            radius_m = robot.circumscribed_radius_m
-            near = people_cost(
-                constraints,
-                positions,
-                dt_s,
-                robot_radius_m=radius_m,
-                inside_cost=2.0,
-                near_cost=0.5,
-            )
-            seconds = _STEPS * dt_s + _IN_A_CIRCLE_S * near.mean(axis=1)
+            circles = circle_costs(constraints, positions, dt_s, robot.circumscribed_radius_m)
+            seconds = _STEPS * dt_s + _IN_A_CIRCLE_S * circles
         seconds += np.hypot(*(goal_odom_m - positions[:, -1]).T) / robot.max_speed_mps
         gap = gap_to_boxes_m(positions, self._boxes) - robot.circumscribed_radius_m
-        seconds += _IN_A_WALL_S * (gap < 0.0).mean(axis=1)
-        seconds += _NEAR_A_WALL_S * np.clip(1.0 - gap / _NEAR_M, 0.0, 1.0).mean(axis=1)
+        near, hit = wall_shares(gap)
+        seconds += _IN_A_WALL_S * hit
+        seconds += _NEAR_A_WALL_S * near
         return np.asarray(seconds + _BEND_S * np.abs(samples).mean(axis=1))
 
     def _clear_mps(self, state: RobotState, goal_m: float) -> float:

@@ -16,7 +16,7 @@ from nav_adapter import NavConstraints, RobotProfile, RobotState, circles
 from nav_adapter.motion import control_point, differential_drive
 from perception.arrays import FloatArray
 
-from ._shared import fastest_direction, no_boxes, obeying, speed_to_stop_at_mps
+from ._shared import direction_to_goal, no_boxes, obeying, speed_to_stop_at_mps
 
 _HORIZON_S = 3.0
 _WALL_HORIZON_S = 1.0
@@ -63,13 +63,15 @@ class ReciprocalVelocity:
         if limit_mps <= 0.0:
             return 0.0, 0.0
         radius_m = self._robot.circumscribed_radius_m
-        to_goal = goal_odom_m - robot_state.position_odom_m
-        distance_m = float(np.hypot(*to_goal))
-        towards = to_goal / max(distance_m, 1e-9)
-        if self._use_speed_field:
-            towards = fastest_direction(
-                constraints, robot_state, goal_odom_m, self._boxes, radius_m
-            )
+        distance_m = float(np.hypot(*(goal_odom_m - robot_state.position_odom_m)))
+        towards = direction_to_goal(
+            constraints,
+            robot_state,
+            goal_odom_m,
+            self._boxes,
+            radius_m,
+            use_speed_field=self._use_speed_field,
+        )
         right = np.array([towards[1], -towards[0]])
         speed_mps = min(limit_mps, speed_to_stop_at_mps(self._robot, distance_m))
         chosen = self._velocity(

@@ -15,7 +15,7 @@ from nav_adapter import NavConstraints, RobotProfile, RobotState, circles
 from nav_adapter.exporters import static_circles
 from perception.arrays import FloatArray
 
-from ._shared import fastest_direction, no_boxes, obeying
+from ._shared import direction_to_goal, no_boxes, obeying
 
 with contextlib.redirect_stdout(io.StringIO()):  # it reports missing windowing systems
     from irsim.lib.behavior.behavior_methods import DiffRVO
@@ -72,14 +72,16 @@ class VelocityObstaclePlanner:
         limit_mps = min(constraints.speed_limit_mps, self._robot.max_speed_mps)
         if limit_mps <= 0.0:
             return 0.0, 0.0
-        to_goal = goal_odom_m - robot_state.position_odom_m
-        distance_m = float(np.hypot(*to_goal))
-        towards = to_goal / max(distance_m, 1e-9)
+        distance_m = float(np.hypot(*(goal_odom_m - robot_state.position_odom_m)))
         radius_m = self._robot.circumscribed_radius_m
-        if self._use_speed_field:
-            towards = fastest_direction(
-                constraints, robot_state, goal_odom_m, self._boxes, radius_m
-            )
+        towards = direction_to_goal(
+            constraints,
+            robot_state,
+            goal_odom_m,
+            self._boxes,
+            radius_m,
+            use_speed_field=self._use_speed_field,
+        )
         desired = towards * limit_mps * min(distance_m / _SLOW_DOWN_WITHIN_M, 1.0)
         heading = robot_state.heading_odom_rad
         velocity = robot_state.speed_mps * np.array([math.cos(heading), math.sin(heading)])
