@@ -6,7 +6,6 @@ from ._crossing import (
     Crossing,
     Observer,
     Situation,
-    default_planner,
     named_policy,
     run_crossing,
 )
@@ -30,7 +29,6 @@ __all__ = [
     "StraightOn",
     "TopView",
     "TrueView",
-    "default_planner",
     "draw_camera_view",
     "named_policy",
     "run_crossing",

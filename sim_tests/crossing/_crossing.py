@@ -258,7 +258,7 @@ def run_crossing(
     if isinstance(scenario, str):
         scenario = ScenarioTemplate.shipped(scenario).for_seed(seed)
     policy_name, policy = named_policy(policy)
-    driver = check_planner(planner) if planner is not None else default_planner(scenario)
+    driver = check_planner(planner) if planner is not None else _default_planner(scenario)
     frames: list[CrossingFrame] = []
     reached_s: float | None = None
     with Crossing(
@@ -300,8 +300,7 @@ def run_crossing(
         )
 
 
-def default_planner(scenario: Scenario) -> LocalPlanner:
-    """Return the planner that a crossing has where none is given."""
+def _default_planner(scenario: Scenario) -> LocalPlanner:
     straight = scenario.robot.straight_on_speed_mps
     if straight is not None:
         return StraightOn(straight)

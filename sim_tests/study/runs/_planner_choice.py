@@ -7,7 +7,7 @@ import copy
 import inspect
 import sys
 from collections.abc import Callable, Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
@@ -212,7 +212,7 @@ def import_planner(planner: str) -> PlannerFactory:
         )
     found = _found(planner, module_name, name)
     if not isinstance(found, type) and callable(getattr(found, "plan", None)):
-        return PlannerFactory(_copier(found), inspect.Signature(), settings)
+        return PlannerFactory(partial(copy.deepcopy, found), inspect.Signature(), settings)
     if not callable(found):
         raise SimError(
             f"planner {planner!r} must name a class or a function, or an object with plan, "
@@ -242,15 +242,6 @@ def _found(planner: str, module_name: str, name: str) -> Any:
             f"planner {planner!r} cannot be imported: {type(cause).__name__}: {cause}"
         ) from cause
     return found
-
-
-def _copier(planner: Any) -> Callable[[], Any]:
-    """Return a function that copies a planner with all of its state."""
-
-    def copied() -> Any:
-        return copy.deepcopy(planner)
-
-    return copied
 
 
 def _split_settings(planner: str) -> tuple[str, dict[str, Any]]:
