@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -94,7 +95,9 @@ def table(rows: Sequence[Compared]) -> list[str]:
     """Return the rows as a Markdown table."""
     populations = list(dict.fromkeys(each for row in rows for each in row.simulated))
     lines = [
-        "| quantity | n | recorded | " + " | ".join(f"{each} | KS" for each in populations) + " |",
+        "| quantity | n | recorded people | "
+        + " | ".join(f"`{each}` | KS" for each in populations)
+        + " |",
         "| --- " * (3 + 2 * len(populations)) + "|",
     ]
     for row in rows:
@@ -109,7 +112,7 @@ def table(rows: Sequence[Compared]) -> list[str]:
 def displacement_table(simulated: Mapping[str, Sequence[FloatArray]]) -> list[str]:
     """Return the displacements after standing as a Markdown table: 99th percentile, maximum."""
     lines = [
-        "| after | recorded | " + " | ".join(simulated) + " |",
+        f"| after | recorded people | {_names(simulated)} |",
         "| --- " * (2 + len(simulated)) + "|",
     ]
     for row, (after_s, high_m, most_m) in enumerate(DISPLACEMENTS):
@@ -122,17 +125,17 @@ def displacement_table(simulated: Mapping[str, Sequence[FloatArray]]) -> list[st
 
 def start_table(simulated: Mapping[str, Mapping[str, Sequence[tuple[int, int]]]]) -> list[str]:
     """Return the shares of people who start within 1 s as a Markdown table."""
-    names = ["now", *(f"≤ {within:g} s ago" for within in LOOK_WITHIN_S[1:]), "longer or never"]
+    names = ["now", *_ago(), "longer or never"]
     lines = [
-        "| robot | last look | recorded | " + " | ".join(simulated) + " |",
+        f"| robot | last look | recorded people | {_names(simulated)} |",
         "| --- " * (3 + len(simulated)) + "|",
     ]
     for robot, shares in START_SHARES.items():
         for row, share in enumerate(shares):
-            cells = [robot, names[row], f"{share:.0%}"]
+            cells = [robot, names[row], f"{100.0 * share:.0f} %"]
             for counts in simulated.values():
                 begun, chances = counts[robot][row]
-                cells.append(f"{begun / max(chances, 1):.0%} of {chances}")
+                cells.append(f"{100.0 * begun / max(chances, 1):.0f} % of {chances}")
             lines.append("| " + " | ".join(cells) + " |")
     return lines
 
@@ -140,12 +143,12 @@ def start_table(simulated: Mapping[str, Mapping[str, Sequence[tuple[int, int]]]]
 def looked_table(simulated: Mapping[str, Sequence[float]]) -> list[str]:
     """Return the shares of people who had looked as a Markdown table."""
     lines = [
-        "| looked within | recorded | " + " | ".join(simulated) + " |",
+        f"| looked within | recorded people | {_names(simulated)} |",
         "| --- " * (2 + len(simulated)) + "|",
     ]
     for row, (within, share) in enumerate(LOOKED):
-        cells = [f"{within:g} s", f"{share:.0%}"]
-        cells += [f"{shares[row]:.0%}" for shares in simulated.values()]
+        cells = [f"{within:g} s", f"{100.0 * share:.0f} %"]
+        cells += [f"{100.0 * shares[row]:.0f} %" for shares in simulated.values()]
         lines.append("| " + " | ".join(cells) + " |")
     return lines
 
@@ -187,6 +190,18 @@ def draw(
         if number == 0:
             axes.legend(fontsize=7, loc="lower right")
     figure.savefig(path, dpi=90)
+
+
+def _ago() -> list[str]:
+    """Return the rows between a look now and none."""
+    return [
+        f"≤ {within:g} s ago" if last == 0.0 else f"{last:g}–{within:g} s ago"
+        for last, within in itertools.pairwise(LOOK_WITHIN_S)
+    ]
+
+
+def _names(populations: Iterable[str]) -> str:
+    return " | ".join(f"`{each}`" for each in populations)
 
 
 def _percentiles(values: FloatArray) -> tuple[float, ...]:

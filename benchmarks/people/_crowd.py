@@ -22,7 +22,7 @@ from sim_tests.actors.behaviour import (
 from ._motion import RATE_HZ, Scene
 
 # Groups start within this area, on either side of the yard, and walk on beyond its other side.
-_WIDTH_M: Final = 4.1
+_WIDTH_M: Final = 3.4
 _DEPTH_M: Final = 5.0
 _LENGTH_M: Final = 13.0
 _BEYOND_M: Final = 12.0

@@ -27,9 +27,9 @@ DEFAULT_POPULATION: Final[PopulationName] = "classic"
 _VARIATION: Final = VariationFigures(
     pace_mps=0.08,
     pace_s=0.25,
-    wander_mps=0.06,
+    wander_mps=0.07,
     wander_s=0.4,
-    sway_m=0.027,
+    sway_m=0.0255,
     sway_sigma=0.36,
     stride_hz=0.93,
     stride_sigma=0.06,
@@ -39,7 +39,7 @@ _SPEED_MPS: Final = (1.42, 0.09)
 _HURRY_SHARE: Final = 0.04
 _HURRY_MPS: Final = (1.9, 2.5)
 # Share of the speed that people keep near a robot that they know of.
-_NEAR_ROBOT_SHARE: Final = 0.94
+_NEAR_ROBOT_SHARE: Final = 0.91
 _NEAR_ROBOT_M: Final = 12.0
 # Scenarios in which somebody runs keep the speed.
 _RUNNING_MPS: Final = 1.8
@@ -55,6 +55,8 @@ _ERRAND_M: Final = 1.3
 _ERRAND_SIGMA: Final = 0.8
 _ERRAND_MPS: Final = (0.9, 0.25)
 _ERRAND_TRIES: Final = 8
+# Where the way is not free, the next try is nearer by this factor.
+_NEARER: Final = 0.8
 
 
 def known_population(name: str) -> PopulationName:
@@ -101,9 +103,9 @@ class RecordedWalker(Walker):
     """A walker who moves, looks and starts as recorded people do.
 
     The route, the activity, the reactions and the time of the start stay those of the scenario.
-    The pace varies, the body sways, and the eyes turn in the head. Whoever stands may start at any
-    time, whether or not they have looked at the robot: somebody on the way or waiting goes on, and
-    somebody with nowhere to go walks off in a direction that is free.
+    The pace varies, the body sways, and the eyes turn in the head. A person who stands may start
+    at any time, whether or not they have looked at the robot: somebody on the way or waiting goes
+    on, and somebody with nowhere to go walks off in a direction that is free.
 
     Args:
         spec: the person; speed and glances are drawn anew, see :func:`draw_person`.
@@ -165,6 +167,7 @@ class RecordedWalker(Walker):
             if self._obstacles.is_clear(start, goal):
                 self._follower = RouteFollower(Route([start, goal], []), speed_mps, t_s)
                 return
+            length_m *= _NEARER
 
     def _acceleration(
         self,

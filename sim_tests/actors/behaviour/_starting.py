@@ -20,6 +20,8 @@ START_SHARES: Final = {
 LOOK_WITHIN_S: Final = (0.0, 1.0, 4.0)
 # People start only after they have stood for this long.
 _STOOD_S: Final = 0.5
+# The table counts starts in the second after a look was dated, so on average half a second later.
+_HALF_SECOND_S: Final = 0.5
 # A slower robot yields.
 _YIELDING_MPS: Final = 0.25
 # Robots farther away make nobody start.
@@ -90,5 +92,6 @@ class StartingModel:
         share = self._idle_share
         if not idle:
             yielding = math.hypot(robot.vx_mps, robot.vy_mps) < _YIELDING_MPS
-            share = start_share(t_s - self._looked_s, yielding=yielding)
+            since_look_s = max(t_s - self._looked_s - _HALF_SECOND_S, 0.0)
+            share = start_share(since_look_s, yielding=yielding)
         return bool(self._rng.random() < 1.0 - (1.0 - share) ** dt_s)
