@@ -38,7 +38,7 @@ def disc_distance_m(episode: SocialEpisode) -> FloatArray:
 
 
 def nearest(distances_m: FloatArray) -> FloatArray:
-    """Return the (N,) smallest distances; infinite where nobody is there."""
+    """Return the (N,) smallest distances; infinite at instants without people."""
     smallest: FloatArray = distances_m.min(axis=1, initial=np.inf)
     return smallest
 
@@ -46,7 +46,7 @@ def nearest(distances_m: FloatArray) -> FloatArray:
 def mean_closest_m(episode: SocialEpisode) -> float | None:
     """Return HuNavSim's average distance to the closest person; None without people.
 
-    An instant at which nobody is there adds 0 and counts in the average.
+    An instant without people adds 0 and counts in the average.
     """
     closest = nearest(disc_distance_m(episode))
     there = np.isfinite(closest)
@@ -122,7 +122,7 @@ def gym_compliance(episode: SocialEpisode) -> float | None:
 def navware_psc_percent(episode: SocialEpisode) -> float | None:
     """Return NavWareSet's PSC as its notebook computes it: instants *below* 0.5 m, per cent.
 
-    Distances are those between the centres. Instants at which nobody is there do not count.
+    Distances are those between the centres. Instants without people do not count.
     """
     closest = nearest(episode.centre_distance_m)
     there = np.isfinite(closest)
