@@ -47,6 +47,21 @@ def test_a_run_is_measured_and_agrees_with_its_own_table(run, capsys):
         assert float(after["hunav_min_distance_m"]) <= float(before["min_separation_m"]) + 0.05
 
 
+def test_an_episode_that_broke_off_has_a_row_with_its_error(tmp_path, capsys, monkeypatch):
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "gives_up.py").write_text(
+        "class GivesUp:\n    def plan(self, *_):\n        raise RuntimeError('no way')\n"
+    )
+    jobs = short_jobs(1, planners=["gives_up:GivesUp"])[:1]
+    run_jobs(jobs, tmp_path / "run", workers=1)
+    out = tmp_path / "social.csv"
+    assert main(["measures", str(tmp_path / "run"), "--out", str(out)]) == 1
+    assert "episode 0: RuntimeError: no way" in capsys.readouterr().err
+    (row,) = rows_of(out)
+    assert row["error"] == "RuntimeError: no way"
+    assert {row[name] for name in SOCIAL_MEASURES} == {""}
+
+
 @pytest.mark.parametrize("name", FORMAT_NAMES)
 def test_an_episode_is_exported_checked_and_measured(name, run, tmp_path, capsys):
     if name == "mcap":
