@@ -19,7 +19,7 @@ from awarenav.files import csv_number, json_text, write_text
 
 from ...world.errors import SimError
 from ..measures import EpisodeRecord, Variant, labels, table_text
-from ..runs import Job, attempt, find_episode, one_thread_each, read_jobs
+from ..runs import Job, RunFiles, attempt, find_episode, one_thread_each, read_jobs
 from ._files import FORMATS, check_episode, format_of, read_episode, write_episode
 from ._measures import SOCIAL_MEASURES, social_measures
 from ._recorder import episode_of
@@ -76,7 +76,7 @@ def measures_command(options: MeasuresOptions) -> int:
         rows += _measured_run(path, planned, options.workers)
     out = options.out
     if out is None and len(options.sources) == 1 and jobs:
-        out = options.sources[0] / "social.csv"
+        out = RunFiles(options.sources[0]).social
     if out is not None:
         write_text(out, social_csv(rows), SimError)
     means = _means(rows)
@@ -124,7 +124,7 @@ def export_command(options: ExportOptions) -> int:
         name = "socnav3" if options.out is None else format_of(options.out)
     out = options.out
     if out is None:
-        out = options.folder / "exports" / f"episode_{number:05d}{FORMATS[name].suffix}"
+        out = RunFiles(options.folder).exports / f"episode_{number:05d}{FORMATS[name].suffix}"
     elif out.suffix != FORMATS[name].suffix:
         raise SimError(
             f"--format {name} writes files that end in {FORMATS[name].suffix}, got {out}"

@@ -54,12 +54,14 @@ def test_an_episode_that_broke_off_has_a_row_with_its_error(tmp_path, capsys, mo
     )
     jobs = short_jobs(1, planners=["gives_up:GivesUp"])[:1]
     run_jobs(jobs, tmp_path / "run", workers=1)
-    out = tmp_path / "social.csv"
-    assert main(["measures", str(tmp_path / "run"), "--out", str(out)]) == 1
+    out = tmp_path / "run" / "social.csv"
+    assert main(["measures", str(tmp_path / "run")]) == 1
     assert "episode 0: RuntimeError: no way" in capsys.readouterr().err
     (row,) = rows_of(out)
     assert row["error"] == "RuntimeError: no way"
     assert {row[name] for name in SOCIAL_MEASURES} == {""}
+    run_jobs(jobs, tmp_path / "run", workers=1, overwrite=True)
+    assert not out.exists()  # its rows are not those of the new run
 
 
 @pytest.mark.parametrize("name", FORMAT_NAMES)
