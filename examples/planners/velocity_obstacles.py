@@ -102,4 +102,4 @@ class VelocityObstaclePlanner:
             neighbor_threshold=math.inf,
         ).ravel()
         twist = (float(np.clip(speed, 0.0, limit_mps)), float(yaw_rate))
-        return obeying(constraints, robot_state, twist, dt_s, use_speed_field=self._use_speed_field)
+        return obeying(constraints, robot_state, twist, dt_s)
