@@ -72,7 +72,7 @@ class ModelPredictivePlanner:
         replan_s: float = 0.1,
         *,
         static_boxes_odom_m: FloatArray | None = None,
-        use_speed_field: bool = False,
+        use_speed_field: bool = True,
     ) -> None:
         self._robot = robot
         self._replan_s = replan_s

@@ -53,7 +53,7 @@ class VelocityObstaclePlanner:
         lookahead_s: float = 4.0,
         *,
         static_boxes_odom_m: FloatArray | None = None,
-        use_speed_field: bool = False,
+        use_speed_field: bool = True,
     ) -> None:
         self._robot = robot
         self._lookahead_s = lookahead_s
