@@ -141,7 +141,7 @@ def clip_twists_ahead(
     if now.shape[-1] == 3:
         speeds[:-1, 1] = now[..., 1].ravel()
     speeds[-1] = robot_state.speed_mps, robot_state.lateral_mps, robot_state.yaw_rate_radps
-    times_s = period_s * np.arange(1, cycles + 1)
+    times_s = period_s * np.arange(1, cycles + 1, dtype=np.float64)
     positions, headings = _driven(robot_state, speeds, times_s)
     every_time = np.broadcast_to(speeds[:, None], (*headings.shape, 3))
     limits = speed_limit_at(

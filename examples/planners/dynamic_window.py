@@ -88,17 +88,17 @@ class DynamicWindow:
         off_rad: float,
     ) -> tuple[float, float]:
         """Return the speed and yaw rate that lead to the goal in the least time."""
-        self._goal = goal_odom_m
         step_m = min(_LENGTH_M, goal_m) / _STEPS
         bends = np.unique([*_BENDS_RAD, *(-bend for bend in _BENDS_RAD), off_rad])
-        curvatures = np.zeros((2, len(bends), _STEPS))
-        curvatures[:, :, :_TURN_STEPS] = bends[:, None] / (_TURN_STEPS * step_m)
-        curvatures[1, :, _BACK_FROM : _BACK_FROM + _TURN_STEPS] = -curvatures[1, :, :_TURN_STEPS]
-        curvatures = curvatures.reshape(-1, _STEPS)
+        bends = np.tile(bends, 2)
+        curvatures = np.zeros((len(bends), _STEPS))
+        curvatures[:, :_TURN_STEPS] = bends[:, None] / (_TURN_STEPS * step_m)
+        back = curvatures[len(bends) // 2 :]
+        back[:, _BACK_FROM : _BACK_FROM + _TURN_STEPS] = -back[:, :_TURN_STEPS]
         positions, headings = follow_curvature(state, curvatures, step_m)
         gaps = gap_to_boxes_m(positions, self._boxes) - self._robot.circumscribed_radius_m
         free_m = free_length_m(gaps, step_m)
-        fixed = self._fixed_s(positions, gaps, goal_odom_m) + _BEND_S * np.tile(np.abs(bends), 2)
+        fixed = self._fixed_s(positions, gaps, goal_odom_m) + _BEND_S * np.abs(bends)
         straight = self._straight_on(positions[:, -1], goal_odom_m, step_m)
         top_mps = min(
             speed_to_stop_at_mps(self._robot, goal_m), max(constraints.speed_limit_mps, 0.1)
