@@ -25,9 +25,9 @@ class ImmSettings:
         stay_s: mean time in one mode.
     """
 
-    steady_m2ps3: float = 0.02
-    turning_m2ps3: float = 0.3
-    stopping_s: float = 1.0
+    steady_m2ps3: float = 0.03
+    turning_m2ps3: float = 0.1
+    stopping_s: float = 2.0
     stay_s: float = 2.0
 
 
