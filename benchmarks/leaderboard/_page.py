@@ -118,6 +118,7 @@ def leaderboard_page(board: Board, folder: Path = RESULTS) -> str:
     return _TEMPLATE.read_text(encoding="utf-8").format(
         episodes=scenarios * board.seeds,
         scenarios=scenarios,
+        sets=", ".join(f"`{each}`" for each in board.scenarios),
         seeds=f"the seeds 0 to {board.seeds - 1}" if board.seeds > 1 else "the seed 0",
         table=_table(_COLUMNS, [_cells(each, ranks, baseline) for each in shown]),
         more=_table(_MORE_COLUMNS, [_more_cells(each, baseline, about) for each in shown]),
@@ -137,7 +138,8 @@ def _cells(standing: Standing, ranks: Mapping[str, int], baseline: Standing) -> 
     """Return the cells of the ranking; a row without a rank has a dash, today's AMR is marked."""
     row, ran, contacts = standing.row, standing.ran, standing.robot_contacts
     hits = sum(each.robot_touched for each in ran)
-    policy = f"{ranks.get(row.name, '–')}. `{row.policy_name}`"
+    rank = f"{ranks[row.name]}. " if row.name in ranks else "– "
+    policy = f"{rank}`{row.policy_name}`"
     return [
         f"**{policy}, today's AMR**" if standing is baseline else policy,
         row.sensors,
