@@ -25,11 +25,8 @@ _ATTENTIONS: Final = ("attentive", "mixed", "unaware")
 # Violation times that agree to so many decimals of a second count as equal in the ranking.
 _RANKED_DECIMALS: Final = 2
 
-_COLUMNS: Final = (
-    *("rank, policy", "sensors", "planner"),
-    *("contacts by the robot", "violation (s)", "time lost (s)"),
-)
-_MORE_COLUMNS: Final = ("row", "against today's AMR (s)", "goals", "walked into", "measured")
+_COLUMNS: Final = ("rank, row", "contacts by the robot", "violation (s)", "time lost (s)")
+_MORE_COLUMNS: Final = ("row", "against today's AMR (s)", "goals; walked into", "measured")
 _PARTS_COLUMNS: Final = ("row", *_ATTENTIONS)
 _TEMPLATE: Final = Path(__file__).with_name("page.txt")
 
@@ -139,11 +136,9 @@ def _cells(standing: Standing, ranks: Mapping[str, int], baseline: Standing) -> 
     row, ran, contacts = standing.row, standing.ran, standing.robot_contacts
     hits = sum(each.robot_touched for each in ran)
     rank = f"{ranks[row.name]}. " if row.name in ranks else "– "
-    policy = f"{rank}`{row.policy_name}`"
+    policy = f"**`{row.policy_name}`, today's AMR**" if standing is baseline else _policy(row)
     return [
-        f"**{policy}, today's AMR**" if standing is baseline else policy,
-        row.sensors,
-        _planner(row),
+        f"{rank}{policy}, {row.sensors}, {_planner(row)}",
         f"{hits} of {len(ran)} (≤ {100.0 * contacts.high:.1f} %)",
         standing.mean("violation_time_s").text(2),
         standing.mean("time_lost_s").text(1),
@@ -155,11 +150,12 @@ def _more_cells(
 ) -> list[str]:
     ran, measured = standing.ran, about.get(standing.row.name, {})
     change = paired_difference(baseline.ran, ran, "time_lost_s")
+    arrived = sum(each.time_to_goal_s is not None for each in ran)
+    touched = sum(each.person_touched for each in ran)
     return [
         _label(standing.row),
         "" if standing is baseline else _signed(change),
-        f"{sum(each.time_to_goal_s is not None for each in ran)} of {len(ran)}",
-        f"{sum(each.person_touched for each in ran)} of {len(ran)}",
+        f"{arrived} of {len(ran)}; {touched} of {len(ran)}",
         ", ".join(filter(None, (measured.get(name, "") for name in ("version", "commit", "date")))),
     ]
 
@@ -176,7 +172,11 @@ def _parts_cells(standing: Standing) -> list[str]:
 
 def _label(row: Row) -> str:
     """Return a row in one cell."""
-    return f"`{row.policy_name}`, {row.sensors}, {row.planner.rpartition(':')[2]}"
+    return f"{_policy(row)}, {row.sensors}, {row.planner.rpartition(':')[2]}"
+
+
+def _policy(row: Row) -> str:
+    return f"`{row.policy_name}`"
 
 
 def _planner(row: Row) -> str:

@@ -117,12 +117,12 @@ def test_an_interrupted_measurement_goes_on_and_is_readable_halfway(tmp_path):
     (tmp_path / "mine.csv").write_text("".join(text.splitlines(keepends=True)[:-1]))
     page = leaderboard_page(board, tmp_path)
     assert "Not complete, and so without a rank: `mine`." in " ".join(page.split())
-    assert re.search(r"\| – `balanced` \| truth \| reference \| 0 of 1 ", page)
+    assert re.search(r"\| – `balanced`, truth, reference \| 0 of 1 ", page)
     measure(board, board.rows, tmp_path)
     assert {path.name: path.read_bytes() for path in tmp_path.glob("*.csv")} == whole
     page = leaderboard_page(board, tmp_path)
     assert "Not complete" not in page
-    assert ". `blind`, today's AMR**" in page
+    assert ". **`blind`, today's AMR**, truth, reference |" in page
 
 
 def test_results_of_another_policy_are_not_continued(tmp_path):
