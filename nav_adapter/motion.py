@@ -111,8 +111,10 @@ def clip_twists_ahead(
     centimetre per second is then too fast for a cycle. So this function also asks
     :func:`~nav_adapter.exporters.speed_limit_at` for the limits at the ends of the next cycles:
     where each twist leads, and where the robot's present motion leads. People move as predicted.
-    The lowest of these limits counts, less the slack. Otherwise it is :func:`clip_twists`, and it
-    is never faster.
+    The lowest of these limits counts, less the slack.
+
+    A robot that cannot brake to a twist's speed within a cycle has less left for turning. Only then
+    the curve becomes flatter. Otherwise this is :func:`clip_twists`, and it is never faster.
 
     For the last line of a planner. One twist takes about as long as one call of the field.
 
@@ -155,9 +157,18 @@ def clip_twists_ahead(
     )
     lowest = limits.min(axis=1)
     lowest = np.minimum(lowest[:-1], lowest[-1]).reshape(now.shape[:-1])
-    assert constraints.robot is not None
-    people = lowest < constraints.robot.max_speed_mps - _FIELD_ENDS_MPS
-    return _clipped(constraints, now, slack, np.where(people, lowest, math.inf))
+    robot, fastest_mps = constraints.robot, constraints.fastest_point_limit_mps
+    assert robot is not None
+    assert fastest_mps is not None
+    people = lowest < robot.max_speed_mps - _FIELD_ENDS_MPS
+    fastest = np.minimum(np.where(people, lowest, math.inf), fastest_mps)
+    slower = _clipped(constraints, now, slack, fastest)
+    still_mps = robot_state.travel_mps - robot.max_deceleration_mps2 * period_s
+    left = np.maximum(fastest - slack - still_mps, 0.0) / robot.circumscribed_radius_m
+    turning = np.minimum(np.maximum(slower[..., -1], -left), left)
+    too_fast = np.sqrt((slower[..., :-1] ** 2).sum(axis=-1)) < still_mps
+    slower[..., -1] = np.where(too_fast, turning, slower[..., -1])
+    return slower
 
 
 def _clipped(
