@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 import yaml
 
+from ..actors.behaviour import known_population
 from ._distributions import Distribution
 from ._files import (
     camera_data,
@@ -161,6 +162,20 @@ class ScenarioTemplate:
             {**self._data, "camera": camera_data(name)}, f"{self._source} with camera {name}"
         )
 
+    def with_population(self, name: str) -> ScenarioTemplate:
+        """Return the same scenario among people of another population.
+
+        Args:
+            name: as for :meth:`Scenario.with_population`; empty for the scenario's own.
+
+        Raises:
+            SimError: for an unknown name.
+        """
+        if not name:
+            return self
+        population = known_population(name)
+        return ScenarioTemplate({**self._data, "population": population}, self._source)
+
     def to_text(self) -> str:
         """Return YAML for :meth:`from_text`, with the shared defaults written out."""
         return yaml.safe_dump(self._data, sort_keys=False, allow_unicode=True)
@@ -175,9 +190,13 @@ class ScenarioTemplate:
         return f"ScenarioTemplate({self.id!r}, {len(self._parameters)} parameters)"
 
 
-def shipped_templates() -> tuple[ScenarioTemplate, ...]:
-    """Return every scenario that comes with the package, sorted by name."""
-    return tuple(ScenarioTemplate.shipped(name) for name in shipped_scenarios())
+def shipped_templates(scenario_set: str = "all") -> tuple[ScenarioTemplate, ...]:
+    """Return a set of the scenarios that come with the package, sorted by name.
+
+    Args:
+        scenario_set: as for :func:`shipped_scenarios`.
+    """
+    return tuple(ScenarioTemplate.shipped(name) for name in shipped_scenarios(scenario_set))
 
 
 def _uniform(key: list[int], path: str) -> float:
