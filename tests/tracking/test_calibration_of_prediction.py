@@ -50,7 +50,7 @@ def test_the_calibrated_region_holds_on_people_who_were_not_used(spread: float) 
     off = np.abs(found.before - REGION_SHARE)
     assert off.max() > 0.07  # so that there is something to correct
     assert (np.abs(found.coverage - REGION_SHARE) < chance(*found.stretches)).all()
-    fresh = calibrate(people(120, spread, seed=2), found.model)
+    fresh = calibrate(people(80, spread, seed=2), found.model)
     assert (
         np.abs(fresh.before - REGION_SHARE) < chance(found.stretches[0], fresh.stretches[1])
     ).all()

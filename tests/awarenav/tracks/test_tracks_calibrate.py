@@ -131,7 +131,7 @@ def test_positions_are_read_as_they_stand(tmp_path):
     assert recording.without_covariance == 60
 
 
-def test_smoothed_paths_are_nearer_to_the_truth_and_drawn(crowd, tmp_path, capsys):
+def test_smoothed_paths_are_nearer_to_the_truth_and_drawn(crowd, capsys):
     truth = walks(12, 20.0)
     tracked = track_recording(read_positions(crowd))
     errors = []
@@ -149,17 +149,14 @@ def test_smoothed_paths_are_nearer_to_the_truth_and_drawn(crowd, tmp_path, capsy
     assert len(paths) >= 10
     before, after = np.mean(errors, axis=0)
     assert after < 0.85 * before
-    figure = tracks_figure(tracked, "title", smoothed=paths)
+    figure = tracks_figure(tracked, "title", smoothed=paths, most=4)
     labels = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
     assert "smoothed" in labels
     assert "camera" not in labels
     drawn = {tuple(line.get_xydata()[0]) for line in figure.axes[0].get_lines()}
-    assert all(tuple(path.states[0, :2]) in drawn for path in paths.values())
-    plain = tracks_figure(tracked, "title")
-    assert len(figure.axes[0].get_lines()) == len(plain.axes[0].get_lines()) + len(paths)
-    out = tmp_path / "t.png"
-    assert main(["tracks", str(crowd), "--smooth", "--out", str(out)]) == 0
-    assert out.stat().st_size > 1000
+    starts = [tuple(path.states[0, :2]) in drawn for path in paths.values()]
+    assert sum(starts) == 4  # of the people with a colour
+    assert main(["tracks", str(crowd), "--smooth", "--out", "none"]) == 0
     assert "apart on average" in capsys.readouterr().err
 
 
