@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ._displaced import Displaced, displaced_people
 from ._obstacles import WALKER_RADIUS_M
 from ._person import (
     ALONE,
@@ -12,7 +13,7 @@ from ._person import (
     RobotBody,
     Surroundings,
 )
-from ._replayed import Replayed, read_recordings, replayed_people
+from ._replayed import RecordedPath, Replayed, read_recordings, replayed_people
 from ._script import Scripted, WorkerScript
 from ._spec import Glances, Lapse, PersonSpec, Reactions
 from ._walker import DECISION_PERIOD_S, Walker
@@ -21,6 +22,7 @@ __all__ = [
     "ALONE",
     "DECISION_PERIOD_S",
     "WALKER_RADIUS_M",
+    "Displaced",
     "Glances",
     "Lapse",
     "MovingBody",
@@ -29,12 +31,14 @@ __all__ = [
     "PersonOutcome",
     "PersonSpec",
     "Reactions",
+    "RecordedPath",
     "Replayed",
     "RobotBody",
     "Scripted",
     "Surroundings",
     "Walker",
     "WorkerScript",
+    "displaced_people",
     "read_recordings",
     "replayed_people",
 ]
