@@ -38,7 +38,7 @@ _SMOOTHING_S: Final = 0.2
 
 @dataclass(frozen=True, slots=True)
 class RecordingOptions:
-    """How a recording becomes a scenario.
+    """The settings with which a recording becomes a scenario.
 
     Attributes:
         react: people leave their paths where the robot forces them off, and return.
