@@ -150,6 +150,7 @@ class Replayed:
             eye_yaw_rad=0.0,
             eye_pitch_rad=0.0,
             activity=_IDLE,
+            away=self.is_away(t_s),
         )
 
     def hold(self) -> None:

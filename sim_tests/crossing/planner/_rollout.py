@@ -45,7 +45,7 @@ def clip_to_window(value: ArrayLike, now: float, fall: float, rise: float) -> Fl
 
 
 def ramp_integral(
-    initial: float, target: FloatArray, rate: FloatArray | float, t_s: FloatArray
+    initial: FloatArray | float, target: FloatArray, rate: FloatArray | float, t_s: FloatArray
 ) -> FloatArray:
     """Return the time integral of a value that ramps to ``target`` at ``rate`` and stays there.
 

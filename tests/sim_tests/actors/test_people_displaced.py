@@ -125,6 +125,7 @@ def test_people_who_leave_are_away_before_and_after_their_rows(table: Path) -> N
         assert person.is_away(t_s) == away
         assert not stays.is_away(t_s)
         motion, here = person.motion(t_s, ALONE), stays.motion(t_s, ALONE)
+        assert motion.away == away
         moved = motion.position_odom_m - here.position_odom_m
         np.testing.assert_allclose(moved, [1000.0 if away else 0.0, 0.0])
         feet = np.array(motion.feet.feet)[:, :2] - np.array(here.feet.feet)[:, :2]
