@@ -23,6 +23,7 @@ from ..actors.behaviour import (
     Scripted,
     Surroundings,
     Walker,
+    displaced_people,
     replayed_people,
     walker_of,
 )
@@ -44,6 +45,8 @@ _TOUCH_WITHIN_M: Final = 0.8
 _BODY_UPDATE_HZ: Final = 60.0
 # A body that would move deeper than this into the robot in one update is held.
 _DEEPER_M: Final = 0.002
+# The highest speed that a body is placed with; recorded people may be faster.
+_FASTEST_MPS: Final = 3.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,7 +121,7 @@ class Stage(AbstractContextManager["Stage"]):
                     for script, offset in zip(scenario.workers, start_offsets_s, strict=True)
                 ),
                 *self.walkers,
-                *(() if scenario.replay_csv is None else replayed_people(scenario.replay_csv)),
+                *self._recorded_people(),
             )
             self.workers = tuple(
                 Worker(self.warehouse, each.stature_m, look=each.look, stride_m=each.stride_m)
@@ -240,6 +243,15 @@ class Stage(AbstractContextManager["Stage"]):
             walkers.append(make(spec, own, boxes, offset_s=offset))
         return tuple(walkers)
 
+    def _recorded_people(self) -> tuple[PersonBehaviour, ...]:
+        scenario = self.scenario
+        path, leaves = scenario.replay_csv, scenario.replay_leaves
+        if path is None:
+            return ()
+        if scenario.replay_reacts:
+            return displaced_people(path, self.warehouse.obstacle_boxes_odom, leaves=leaves)
+        return replayed_people(path, leaves=leaves)
+
     def _place_workers(self) -> None:
         robot, others = self._robot_body(), self._moving_bodies()
         motions = []
@@ -356,7 +368,7 @@ def _pose(worker: Worker, motion: PersonMotion) -> None:
         motion.position_odom_m,
         motion.heading_odom_rad,
         motion.walked_m,
-        math.hypot(*motion.velocity_odom_mps.tolist()),
+        min(math.hypot(*motion.velocity_odom_mps.tolist()), _FASTEST_MPS),
         motion.head_yaw_rad,
         motion.head_pitch_rad,
         eye_yaw_rad=motion.eye_yaw_rad,

@@ -191,6 +191,10 @@ class Scenario(StrictConfig):
             people, see :meth:`with_population`.
         replay_csv: table of recorded people to replay, see :func:`read_recordings`; relative
             to the scenario's own file.
+        replay_reacts: the recorded people leave their paths where the robot forces them off, and
+            return; see :class:`Displaced`. Otherwise they walk on whatever the robot does.
+        replay_leaves: the recorded people are away before their first and after their last row;
+            otherwise they stand there.
         start_jitter_s: each worker and each person starts up to this much earlier or later, drawn
             from the seed.
     """
@@ -211,6 +215,8 @@ class Scenario(StrictConfig):
     people: tuple[PersonSpec, ...] = ()
     population: PopulationName = DEFAULT_POPULATION
     replay_csv: str | None = None
+    replay_reacts: bool = False
+    replay_leaves: bool = False
     start_jitter_s: float = Field(default=0.0, ge=0.0)
 
     @model_validator(mode="after")
@@ -219,6 +225,12 @@ class Scenario(StrictConfig):
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise ValueError(f"names of people must be unique, got {', '.join(twice)} twice")
+        return self
+
+    @model_validator(mode="after")
+    def _settings_of_a_replay(self) -> Scenario:
+        if self.replay_csv is None and (self.replay_reacts or self.replay_leaves):
+            raise ValueError("replay_reacts and replay_leaves need recorded people: replay_csv")
         return self
 
     @classmethod
@@ -306,4 +318,5 @@ class Scenario(StrictConfig):
     def without_people(self) -> Scenario:
         """Return the same task in a hall without people."""
         empty: dict[str, Any] = {"workers": (), "people": (), "replay_csv": None}
+        empty |= {"replay_reacts": False, "replay_leaves": False}
         return self.model_copy(update={"name": f"{self.name}_without_people", **empty})
