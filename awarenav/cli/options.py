@@ -37,6 +37,7 @@ __all__ = [
     "policies",
     "policy",
     "resume",
+    "robot",
     "running",
     "scenarios",
     "seed",
@@ -74,6 +75,7 @@ def _shipped(package: str, folder: str, *others: str) -> Callable[..., list[Comp
 #: Completion of scenarios, for ``shell_complete`` of an option or argument.
 COMPLETE_SCENARIOS: Final = _shipped("sim_tests", "scenario/shipped", "all")
 _COMPLETE_CAMERAS: Final = _shipped("sim_tests", "scenario/shipped/cameras")
+_COMPLETE_ROBOTS: Final = _shipped("sim_tests", "actors/robot/shipped", "nova_carter")
 #: Completion of policies.
 COMPLETE_POLICIES: Final = _shipped("nav_adapter", "policies")
 _COMPLETE_POLICIES_AND_ORACLE: Final = _shipped("nav_adapter", "policies", "oracle")
@@ -219,6 +221,19 @@ def camera() -> Decorator:
         shell_complete=_COMPLETE_CAMERAS,
         help="Another camera on the robot: 'forward' (120 degrees, as in the shipped scenarios), "
         "'surround' (360 degrees), or a YAML file.",
+    )
+
+
+def robot() -> Decorator:
+    """Add ``--robot``: another robot, to which the scenarios are fitted."""
+    return option(
+        "--robot",
+        default="",
+        show_default="nova_carter",
+        metavar="NAME|FILE",
+        shell_complete=_COMPLETE_ROBOTS,
+        help="Another robot: 'forklift' (it steers), 'omni' (it moves sideways), 'delivery' "
+        "(small), or a YAML file. Room and time of the scenarios are fitted to it.",
     )
 
 

@@ -9,6 +9,7 @@ from awarenav.lazy import lazy_names
 if TYPE_CHECKING:
     from ._distributions import Choice, Distribution, Integers, read_distribution
     from ._files import shipped_scenarios
+    from ._for_robot import scenario_for_robot
     from ._scenario import CameraSpec, RobotTask, Scenario
     from ._template import ScenarioTemplate, shipped_templates
 
@@ -21,6 +22,7 @@ __all__ = [
     "Scenario",
     "ScenarioTemplate",
     "read_distribution",
+    "scenario_for_robot",
     "shipped_scenarios",
     "shipped_templates",
 ]
@@ -35,6 +37,7 @@ __getattr__ = lazy_names(
             "read_distribution",
         ),
         "._files": ("shipped_scenarios",),
+        "._for_robot": ("scenario_for_robot",),
         "._scenario": (
             "CameraSpec",
             "RobotTask",

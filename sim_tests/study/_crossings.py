@@ -32,6 +32,7 @@ class CrossingsOptions:
     perception: PerceptionKind
     sensors: tuple[SensorSet, ...]
     camera: str
+    robot: str
     fault: tuple[str, ...]
     episodes: int
     sample: int | None
@@ -64,6 +65,7 @@ def crossings_command(options: CrossingsOptions) -> int:
         perception=options.perception,
         sensors=options.sensors,
         camera=options.camera,
+        robot=options.robot,
         faults=options.fault,
     )
     if options.perception == "pixels" and set(options.sensors) != {"scanner"}:
@@ -141,6 +143,8 @@ def _about(options: CrossingsOptions) -> dict[str, Any]:
         settings["sample"] = options.sample
     if options.camera:
         settings["camera"] = options.camera
+    if options.robot:
+        settings["robot"] = options.robot
     words = ["awarenav", "crossings"]
     for name, value in settings.items():
         values = value if isinstance(value, list) else [value]
