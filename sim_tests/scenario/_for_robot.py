@@ -85,8 +85,8 @@ def _widen(data: dict[str, Any], model: RobotModel) -> None:
         return
     along_x = task["start_y_m"] == task["goal_y_m"]
     along, across = ("x_m", "y_m") if along_x else ("y_m", "x_m")
-    middle = task["start_y_m"] if along_x else task["start_x_m"]
-    inner_m = 0.5 * hall["aisle_width_m"]
+    middle = float(task["start_y_m"] if along_x else task["start_x_m"])
+    inner_m = 0.5 * float(hall["aisle_width_m"])
 
     def moved(place: float) -> float:
         off = place - middle

@@ -166,5 +166,5 @@ def test_the_look_lies_within_its_bounds(hall) -> None:
     robot = KinematicRobot(hall, FORKLIFT, (1.0, 0.5), 0.4)
     low, high = KinematicLook(robot).bounds_odom_m()
     x0, y0, x1, y1 = outline(robot).bounds
-    assert low == pytest.approx([x0, y0, 0.05])
+    assert low == pytest.approx([x0, y0, 0.03])
     assert high == pytest.approx([x1, y1, 1.9])
