@@ -19,11 +19,11 @@ from awarenav.lazy import lazy_names
 
 if TYPE_CHECKING:
     from .actors.body import Worker
-    from .actors.robot import NOVA_CARTER, RobotModel
+    from .actors.robot import NOVA_CARTER
     from .crossing import CrossingFrame, CrossingResult, StraightOn, run_crossing
     from .crossing.eyes import KeypointNoise
     from .crossing.planner import LocalPlanner, SamplingPlanner
-    from .scenario import Scenario, ScenarioTemplate, scenario_for_robot, shipped_scenarios
+    from .scenario import Scenario, ScenarioTemplate, shipped_scenarios
     from .world import Warehouse
     from .world.camera import CameraRenderer, SimulatedCamera
     from .world.errors import SimError
@@ -35,7 +35,6 @@ __all__ = [
     "CrossingResult",
     "KeypointNoise",
     "LocalPlanner",
-    "RobotModel",
     "SamplingPlanner",
     "Scenario",
     "ScenarioTemplate",
@@ -45,7 +44,6 @@ __all__ = [
     "Warehouse",
     "Worker",
     "run_crossing",
-    "scenario_for_robot",
     "shipped_scenarios",
 ]
 
@@ -63,7 +61,6 @@ __getattr__ = lazy_names(
         ".scenario": (
             "Scenario",
             "ScenarioTemplate",
-            "scenario_for_robot",
             "shipped_scenarios",
         ),
         ".world": ("Warehouse",),
@@ -72,7 +69,7 @@ __getattr__ = lazy_names(
             "CameraRenderer",
             "SimulatedCamera",
         ),
-        ".actors.robot": ("NOVA_CARTER", "RobotModel"),
+        ".actors.robot": ("NOVA_CARTER",),
         ".crossing.planner": (
             "LocalPlanner",
             "SamplingPlanner",

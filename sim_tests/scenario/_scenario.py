@@ -181,8 +181,8 @@ class Scenario(StrictConfig):
         layout: the hall, a name of :data:`LAYOUTS` or a mapping of :class:`WarehouseLayout`.
         robot: the robot's task.
         robot_model: the robot; a shipped name, a YAML file or the keys of a
-            :class:`~sim_tests.RobotModel`; None for the Nova Carter. See
-            :func:`~sim_tests.scenario_for_robot`, which fits room and time as well.
+            :class:`~sim_tests.actors.robot.RobotModel`; None for the Nova Carter. See
+            :func:`~sim_tests.scenario.scenario_for_robot`, which fits room and time as well.
         camera: the robot's camera; a robot model has its place.
         scanners: the robot's laser scanners; they are used where a crossing asks for them.
         workers: scripted people, who move the same whatever the robot does.

@@ -42,8 +42,8 @@ class ScenarioTemplate:
     ``{choice: [...]}``. A :class:`Scenario` is a template without distributions.
 
     The key ``for_robot`` names a robot (a shipped one, a YAML file, or the keys of a
-    :class:`~sim_tests.RobotModel`) to which every scenario is fitted, see
-    :func:`~sim_tests.scenario_for_robot`.
+    :class:`~sim_tests.actors.robot.RobotModel`) to which every scenario is fitted, see
+    :func:`~sim_tests.scenario.scenario_for_robot`.
 
     Args:
         data: the keys of a scenario, as read from YAML.

@@ -1,6 +1,6 @@
 """The picture of the page on robots: every shipped robot beside a worker, rendered.
 
-    python -m tools.docs_site.robot_pictures                 # into docs/images/robots.png
+python -m tools.docs_site.robot_pictures                 # into docs/images/robots.png
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import numpy as np
 
 from perception import Camera
 from perception.arrays import FloatArray
-from sim_tests import CameraRenderer, RobotModel, Warehouse, Worker
-from sim_tests.actors.robot import Amr, AmrLook, KinematicLook, KinematicRobot
+from sim_tests import CameraRenderer, Warehouse, Worker
+from sim_tests.actors.robot import Amr, AmrLook, KinematicLook, KinematicRobot, RobotModel
 from sim_tests.world.hall import WarehouseLayout
 
 FILE: Final = Path(__file__).parents[2] / "docs" / "images" / "robots.png"

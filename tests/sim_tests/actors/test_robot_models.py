@@ -13,8 +13,14 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from nav_adapter import RobotProfile
-from sim_tests import NOVA_CARTER, RobotModel, SimError, Warehouse, Worker
-from sim_tests.actors.robot import KinematicLook, KinematicRobot, model_meshes, shipped_robots
+from sim_tests import NOVA_CARTER, SimError, Warehouse, Worker
+from sim_tests.actors.robot import (
+    KinematicLook,
+    KinematicRobot,
+    RobotModel,
+    model_meshes,
+    shipped_robots,
+)
 from sim_tests.world.hall import WarehouseLayout
 
 KINEMATIC = [name for name in shipped_robots() if name != "nova_carter"]

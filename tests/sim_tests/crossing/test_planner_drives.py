@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from nav_adapter import NavConstraints, PersonObstacle, RobotProfile, RobotState
 from nav_adapter.exporters import static_polygons
-from sim_tests import RobotModel
+from sim_tests.actors.robot import RobotModel
 from sim_tests.crossing.planner import SamplingPlanner
 
 DT_S = 0.05

@@ -8,15 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sim_tests import (
-    NOVA_CARTER,
-    RobotModel,
-    Scenario,
-    ScenarioTemplate,
-    SimError,
-    scenario_for_robot,
-    shipped_scenarios,
-)
+from sim_tests import NOVA_CARTER, Scenario, ScenarioTemplate, SimError, shipped_scenarios
+from sim_tests.actors.robot import RobotModel
+from sim_tests.scenario import scenario_for_robot
 
 FORKLIFT = RobotModel.shipped("forklift")
 SHIPPED = [Scenario.shipped(name) for name in shipped_scenarios()]
