@@ -10,10 +10,12 @@ import numpy as np
 import shapely
 
 from perception.arrays import FloatArray
+from tracking.prediction import PredictionModel
 
 from ._constraints import PersonObstacle, trusted_obstacle
 from ._memory import PersonMemory, position_sigma_m
 from ._policy import AwarenessPolicy
+from ._predicted import predicted_sigmas_m
 
 _SIDES: Final = 24
 _ANGLES = np.arange(_SIDES) * (2.0 * math.pi / _SIDES)
@@ -24,9 +26,15 @@ _SWEEP_STEP_S: Final = 0.25
 
 
 def obstacles_of(
-    people: Mapping[int, PersonMemory], now: float, policy: AwarenessPolicy
+    people: Mapping[int, PersonMemory],
+    now: float,
+    policy: AwarenessPolicy,
+    prediction: PredictionModel | None = None,
 ) -> tuple[PersonObstacle, ...]:
-    """Return one obstacle per person, in the order of ``people``."""
+    """Return one obstacle per person, in the order of ``people``.
+
+    The prediction gives the width of the sweep; without one, the policy's outline does.
+    """
     if not people:
         return ()
     centers = np.array([m.position_odom_m for m in people.values()])
@@ -37,7 +45,7 @@ def obstacles_of(
     polygons = shapely.polygons(rings)
     if policy.outline.unaware_ahead_s > 0.0 or policy.outline.sweep_s > 0.0:
         discs = [
-            np.concatenate([ring, *_discs_ahead(memory, center, now, policy)])
+            np.concatenate([ring, *_discs_ahead(memory, center, now, policy, prediction)])
             for memory, center, ring in zip(people.values(), centers, rings, strict=True)
         ]
         polygons = [shapely.convex_hull(shapely.multipoints(points)) for points in discs]
@@ -75,7 +83,11 @@ def _covariances_at(people: Mapping[int, PersonMemory], now: float) -> FloatArra
 
 
 def _discs_ahead(
-    memory: PersonMemory, center: FloatArray, now: float, policy: AwarenessPolicy
+    memory: PersonMemory,
+    center: FloatArray,
+    now: float,
+    policy: AwarenessPolicy,
+    prediction: PredictionModel | None,
 ) -> list[FloatArray]:
     """Return polygons around the disc at the end of the elongation and the discs of the sweep."""
     outline, margins = policy.outline, policy.margins
@@ -84,9 +96,12 @@ def _discs_ahead(
     steps = math.ceil(outline.sweep_s / _SWEEP_STEP_S)
     for step in range(1, steps + 1):
         ahead_s = outline.sweep_s * step / steps
-        wider_m = margins.uncertainty_sigmas * max(
-            0.0, _sigma_ahead_m(memory, now, ahead_s, policy) - memory.sigma_m
-        )
+        if prediction is None:
+            sigma_m = _sigma_ahead_m(memory, now, ahead_s, policy)
+        else:
+            horizon_s = np.array([max(now + ahead_s - memory.track.stamp_s, 0.0)])
+            sigma_m = float(predicted_sigmas_m(memory.track, horizon_s, prediction)[0])
+        wider_m = margins.uncertainty_sigmas * max(0.0, sigma_m - memory.sigma_m)
         radius_m = margins.bounded_m(memory.radius_m + wider_m)
         predicted = center + ahead_s * memory.track.velocity_odom_mps
         discs.append(predicted + radius_m * _UNIT_POLYGON)

@@ -17,7 +17,7 @@ from nav_adapter import NavConstraints, RobotProfile, RobotState
 from nav_adapter.exporters import predicted_circles, speed_limit_at
 from perception.arrays import FloatArray
 
-from ._shared import no_boxes, obeying
+from ._shared import direction_to_goal, no_boxes, obeying
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # about optional parts that are not installed
@@ -54,6 +54,7 @@ class ModelPredictivePlanner:
 
     With the speed field, each stage has the limit at its pose in the last plan, and its slope
     there. So the solver knows on which side the limit is higher, and the plan moves to that side.
+    It aims at the fastest way instead of the goal.
 
     Args:
         robot: footprint and limits.
@@ -69,7 +70,7 @@ class ModelPredictivePlanner:
         replan_s: float = 0.1,
         *,
         static_boxes_odom_m: FloatArray | None = None,
-        use_speed_field: bool = False,
+        use_speed_field: bool = True,
     ) -> None:
         self._robot = robot
         self._replan_s = replan_s
@@ -100,7 +101,7 @@ class ModelPredictivePlanner:
             self._command = self._solve(robot_state, goal_odom_m, constraints, limit_mps)
         speed, yaw_rate = self._command
         twist = (min(max(speed, 0.0), limit_mps), yaw_rate)
-        return obeying(constraints, robot_state, twist, dt_s, use_speed_field=self._use_speed_field)
+        return obeying(constraints, robot_state, twist, dt_s)
 
     def _solve(
         self,
@@ -120,7 +121,7 @@ class ModelPredictivePlanner:
             slots=_SLOTS,
             robot_position_odom_m=robot_state.position_odom_m,
         )
-        self._goal = np.asarray(goal_odom_m)
+        self._goal = self._aim(constraints, robot_state, goal_odom_m)
         heading = robot_state.heading_odom_rad
         state = np.array([[*robot_state.position_odom_m, heading, speed]]).T
         if not self._started:
@@ -130,6 +131,24 @@ class ModelPredictivePlanner:
         acceleration, yaw_rate = self._mpc.make_step(state).ravel().tolist()
         # The speed after the stage is the command for the drive.
         return speed + acceleration * _STAGE_S, yaw_rate
+
+    def _aim(
+        self, constraints: NavConstraints, robot_state: RobotState, goal_odom_m: FloatArray
+    ) -> FloatArray:
+        """Return the goal (2,) or, with the field, a point as far away on the fastest way.
+
+        The horizon ends before a slow place, and the way around it begins earlier.
+        """
+        far_m = float(np.hypot(*(goal_odom_m - robot_state.position_odom_m)))
+        towards = direction_to_goal(
+            constraints,
+            robot_state,
+            goal_odom_m,
+            self._boxes,
+            self._robot.circumscribed_radius_m + _WALL_CLEARANCE_M,
+            use_speed_field=self._use_speed_field,
+        )
+        return np.asarray(robot_state.position_odom_m + far_m * towards)
 
     def _last_positions(
         self, robot_state: RobotState, goal_odom_m: FloatArray, limit_mps: float

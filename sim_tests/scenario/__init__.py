@@ -8,12 +8,13 @@ from awarenav.lazy import lazy_names
 
 if TYPE_CHECKING:
     from ._distributions import Choice, Distribution, Integers, read_distribution
-    from ._files import shipped_scenarios
+    from ._files import SCENARIO_SETS, shipped_scenarios
     from ._for_robot import scenario_for_robot
     from ._scenario import CameraSpec, RobotTask, Scenario
     from ._template import ScenarioTemplate, shipped_templates
 
 __all__ = [
+    "SCENARIO_SETS",
     "CameraSpec",
     "Choice",
     "Distribution",
@@ -36,7 +37,10 @@ __getattr__ = lazy_names(
             "Integers",
             "read_distribution",
         ),
-        "._files": ("shipped_scenarios",),
+        "._files": (
+            "SCENARIO_SETS",
+            "shipped_scenarios",
+        ),
         "._for_robot": ("scenario_for_robot",),
         "._scenario": (
             "CameraSpec",

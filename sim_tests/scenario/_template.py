@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 from nav_adapter import RobotProfile
 
+from ..actors.behaviour import known_population
 from ..actors.robot import RobotModel
 from ..world.errors import SimError
 from ._distributions import Distribution, error_text
@@ -200,6 +201,20 @@ class ScenarioTemplate:
             {**self._data, "camera": camera_data(name)}, f"{self._source} with camera {name}"
         )
 
+    def with_population(self, name: str) -> ScenarioTemplate:
+        """Return the same scenario among people of another population.
+
+        Args:
+            name: as for :meth:`Scenario.with_population`; empty for the scenario's own.
+
+        Raises:
+            SimError: for an unknown name.
+        """
+        if not name:
+            return self
+        population = known_population(name)
+        return ScenarioTemplate({**self._data, "population": population}, self._source)
+
     def to_text(self) -> str:
         """Return YAML for :meth:`from_text`, with the shared defaults written out."""
         return yaml.safe_dump(self._data, sort_keys=False, allow_unicode=True)
@@ -222,9 +237,13 @@ def _robot_of(value: Any, source: str) -> RobotModel:
         raise SimError(f"{source}: {_FOR_ROBOT}: {error_text(cause)}") from cause
 
 
-def shipped_templates() -> tuple[ScenarioTemplate, ...]:
-    """Return every scenario that comes with the package, sorted by name."""
-    return tuple(ScenarioTemplate.shipped(name) for name in shipped_scenarios())
+def shipped_templates(scenario_set: str = "all") -> tuple[ScenarioTemplate, ...]:
+    """Return a set of the scenarios that come with the package, sorted by name.
+
+    Args:
+        scenario_set: as for :func:`shipped_scenarios`.
+    """
+    return tuple(ScenarioTemplate.shipped(name) for name in shipped_scenarios(scenario_set))
 
 
 def _uniform(key: list[int], path: str) -> float:

@@ -33,6 +33,7 @@ class CrossingsOptions:
     sensors: tuple[SensorSet, ...]
     camera: str
     robot: str
+    population: str | None
     fault: tuple[str, ...]
     episodes: int
     sample: int | None
@@ -66,6 +67,7 @@ def crossings_command(options: CrossingsOptions) -> int:
         sensors=options.sensors,
         camera=options.camera,
         robot=options.robot,
+        population=options.population or "",
         faults=options.fault,
     )
     if options.perception == "pixels" and set(options.sensors) != {"scanner"}:
@@ -145,6 +147,8 @@ def _about(options: CrossingsOptions) -> dict[str, Any]:
         settings["camera"] = options.camera
     if options.robot:
         settings["robot"] = options.robot
+    if options.population:
+        settings["population"] = options.population
     words = ["awarenav", "crossings"]
     for name, value in settings.items():
         values = value if isinstance(value, list) else [value]

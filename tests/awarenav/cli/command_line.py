@@ -9,14 +9,14 @@ from collections.abc import Iterator
 import click
 from paths import ROOT
 
-from awarenav.cli import app
+from awarenav.cli import Command, app
 
 #: The commands under the headings of the list.
 GROUPS = {
     "On a robot": ["estimate", "judge", "tracks", "bridge", "models", "doctor", "policy"],
     "Simulation": [
-        *("demo", "crossings", "watch", "replay", "compare", "report", "planners", "scenario"),
-        *("render", "tune", "falsify"),
+        *("demo", "crossings", "watch", "replay", "compare", "measures", "export", "report"),
+        *("planners", "scenario", "render", "tune", "falsify"),
     ],
     "Development": ["bench", "completion"],
 }
@@ -39,6 +39,9 @@ def walk(
             command = group.get_command(context, name)
             assert command is not None
             yield (*path, name), command
+            if isinstance(command, Command):
+                for part, each in command.parts.items():
+                    yield (*path, name, part), each
             if isinstance(command, click.Group):
                 yield from walk(command, (*path, name))
 

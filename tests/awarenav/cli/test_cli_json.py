@@ -49,12 +49,14 @@ def test_every_command_with_json_is_tested_here():
         ("crossings",),
         ("doctor",),
         ("judge",),
+        ("measures",),
         ("models", "list"),
         ("models", "verify"),
         ("planners", "list"),
         ("policy", "show"),
         ("scenario", "list"),
         ("tracks",),
+        ("tracks", "calibrate"),
     }
     assert commands == tested | SLOW
 
@@ -95,10 +97,29 @@ def test_tracks_print_json(capfd, tmp_path, estimates):
     assert (tmp_path / "tracks.png").exists()
 
 
+def test_calibrate_prints_json(capfd, tmp_path):
+    rows = ["t_s,id,x_m,y_m"]
+    rows += [f"{0.1 * k:.1f},{id},{0.12 * k:.2f},{10 * id}" for k in range(30) for id in range(4)]
+    (tmp_path / "people.csv").write_text("\n".join(rows))
+    words = ("--longest", "0.4", "--out", tmp_path / "prediction.yaml")
+    table = printed(capfd, "tracks", "calibrate", tmp_path / "people.csv", *words)
+    assert table["people"] == [2, 2]
+    assert [row["horizon_s"] for row in table["horizons"]] == [0.2, 0.4]
+
+
 def test_judge_prints_json(capfd, tmp_path, estimates):
     metrics = printed(capfd, "judge", estimates, estimates, "--out", tmp_path / "report.md")
     assert metrics["detection"]["ap50"] == 1.0
     assert (tmp_path / "report.md").read_text("utf-8").startswith("4 frames")
+
+
+def test_measures_print_json(capfd, tmp_path):
+    track = tmp_path / "track.csv"
+    track.write_text("timestamp,robot_x,robot_y\n0,0,0\n1000000000,0.5,0\n")
+    (found,) = printed(capfd, "measures", track).values()
+    assert found["episodes"] == 1
+    assert found["means"]["navwareset_speed_mps"] == 0.5
+    assert found["means"]["spl"] is None
 
 
 def test_compare_prints_json(capfd, tmp_path):
