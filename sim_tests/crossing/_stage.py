@@ -28,7 +28,7 @@ from ..actors.behaviour import (
     walker_of,
 )
 from ..actors.body import Worker
-from ..actors.robot import NOVA_CARTER, Amr, AmrLook
+from ..actors.robot import NOVA_CARTER, Amr, AmrLook, KinematicLook, KinematicRobot
 from ..scenario import Scenario
 from ..world import Warehouse, sees
 from ..world.bullet import pybullet
@@ -104,14 +104,7 @@ class Stage(AbstractContextManager["Stage"]):
         self.scenario = scenario
         self.warehouse = Warehouse(scenario.layout, renderer=renderer)
         try:
-            task = scenario.robot
-            self.amr = Amr(
-                self.warehouse,
-                (task.start_x_m, task.start_y_m),
-                math.radians(task.start_heading_deg),
-                NOVA_CARTER,
-                camera_mount=scenario.camera.mount,
-            )
+            self.amr = _robot(self.warehouse, scenario)
             self.walkers = self._walkers(
                 np.random.default_rng(0) if people_rng is None else people_rng
             )
@@ -130,13 +123,21 @@ class Stage(AbstractContextManager["Stage"]):
         except BaseException:
             self.warehouse.close()
             raise
-        self.warehouse.add_actor(AmrLook.of(self.warehouse, self.amr))
+        self.warehouse.add_actor(
+            KinematicLook(self.amr)
+            if isinstance(self.amr, KinematicRobot)
+            else AmrLook.of(self.warehouse, self.amr)
+        )
         self._motions: tuple[PersonMotion, ...] = ()
         steps = 1.0 / (_BODY_UPDATE_HZ * self.warehouse.physics_dt_s)
         self._steps_per_body_update = max(round(steps), 1)
         self._near_robot = [False] * len(self.workers)
-        half_length, half_width = np.abs(self.amr.profile.footprint_m).max(axis=0).tolist()
+        corners = self.amr.profile.footprint_m
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        half_length, half_width = (0.5 * (high - low)).tolist()
         self._half_size_m: tuple[float, float] = (half_length, half_width)
+        # The middle of the outline, which is not the base origin of every robot.
+        self._middle_base_m: tuple[float, float] = tuple((0.5 * (low + high)).tolist())
         self._held = [False] * len(self.workers)
         self._last_velocity_mps: FloatArray | None = None
         self._place_workers()
@@ -294,9 +295,10 @@ class Stage(AbstractContextManager["Stage"]):
         x, y = T_odom_base[:2, 3].tolist()
         vx, vy = self.amr.velocity_odom_mps.tolist()
         camera_x, camera_y, camera_z = self.amr.T_odom_camera[:3, 3].tolist()
+        ahead, left = self._middle_base_m
         return RobotBody(
-            x,
-            y,
+            x + ahead * float(T_odom_base[0, 0]) + left * float(T_odom_base[0, 1]),
+            y + ahead * float(T_odom_base[1, 0]) + left * float(T_odom_base[1, 1]),
             math.atan2(T_odom_base[1, 0], T_odom_base[0, 0]),
             vx,
             vy,
@@ -346,15 +348,22 @@ class Stage(AbstractContextManager["Stage"]):
     def _update_contact(
         self, index: int, robot_velocity_mps: FloatArray, meter: SafetyMeter
     ) -> None:
-        touching = pybullet.getContactPoints(
-            self.amr.body, self.workers[index].body, physicsClientId=self.warehouse.client
-        )
-        if self._held[index] or any(point[8] <= 0.0 for point in touching):
+        if self._held[index] or self.amr.touches(self.workers[index].body):
             _, towards = self._separation(index)
             meter.touch(self.t_s, index, robot_velocity_mps, towards)
             self._behaviours[index].touch(*(-towards).tolist())
         else:
             meter.release(index)
+
+
+def _robot(warehouse: Warehouse, scenario: Scenario) -> Amr | KinematicRobot:
+    """Return the robot of a scenario at its start."""
+    task, model = scenario.robot, scenario.robot_model
+    start, heading_rad = (task.start_x_m, task.start_y_m), math.radians(task.start_heading_deg)
+    if model is None or model.body == "nova_carter":
+        mount = scenario.camera.mount
+        return Amr(warehouse, start, heading_rad, NOVA_CARTER, camera_mount=mount)
+    return KinematicRobot(warehouse, model, start, heading_rad)
 
 
 def _faces(motion: PersonMotion, target_odom_m: FloatArray) -> bool:

@@ -24,6 +24,7 @@ from ..actors.behaviour import (
     WorkerScript,
     known_population,
 )
+from ..actors.robot import RobotModel
 from ..world.camera import CameraTiming, SensorConfig
 from ..world.errors import SimError
 from ..world.hall import LAYOUTS, WarehouseLayout
@@ -160,6 +161,10 @@ class RobotTask(StrictConfig):
         return np.asarray(np.linspace(start, goal, steps + 1))
 
 
+def _robot_model(value: Any) -> Any:
+    return RobotModel.of(value) if isinstance(value, str) else value
+
+
 def _layout(value: Any) -> Any:
     if not isinstance(value, str):
         return value
@@ -183,7 +188,10 @@ class Scenario(StrictConfig):
         control_hz: control cycles per second; each is one frame.
         layout: the hall, a name of :data:`LAYOUTS` or a mapping of :class:`WarehouseLayout`.
         robot: the robot's task.
-        camera: the robot's camera.
+        robot_model: the robot; a shipped name, a YAML file or the keys of a
+            :class:`~sim_tests.actors.robot.RobotModel`; None for the Nova Carter. See
+            :func:`~sim_tests.scenario.scenario_for_robot`, which fits room and time as well.
+        camera: the robot's camera; a robot model has its place.
         scanners: the robot's laser scanners; they are used where a crossing asks for them.
         workers: scripted people, who move the same whatever the robot does.
         people: people who look, react and walk by themselves; names are unique.
@@ -209,6 +217,7 @@ class Scenario(StrictConfig):
     control_hz: float = Field(default=20.0, gt=0.0, le=240.0)
     layout: Annotated[WarehouseLayout, BeforeValidator(_layout)] = WarehouseLayout.crossing()
     robot: RobotTask
+    robot_model: Annotated[RobotModel | None, BeforeValidator(_robot_model)] = None
     camera: CameraSpec = CameraSpec()
     scanners: tuple[ScannerSpec, ...] = DIAGONAL_SCANNERS
     workers: tuple[WorkerScript, ...] = ()
@@ -294,7 +303,10 @@ class Scenario(StrictConfig):
 
     def to_text(self) -> str:
         """Return the scenario as YAML, for :meth:`ScenarioTemplate.from_text`."""
-        return yaml.safe_dump(self.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
+        data = self.model_dump(mode="json")
+        if self.robot_model is None:
+            del data["robot_model"]
+        return yaml.safe_dump(data, sort_keys=False, allow_unicode=True)
 
     def with_population(self, name: str) -> Scenario:
         """Return the same task among people of another population.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -173,6 +174,12 @@ class Scene:
         columns = np.array(self._people, dtype=np.float64).reshape(-1, 4).T.reshape(4, -1, 1, 1, 1)
         self._x_m, self._y_m, self._vx_mps, self._vy_mps = columns
         self._radius_m = np.array(self._radii, dtype=np.float64).reshape(-1, 1, 1, 1)
+
+    def without_people(self) -> Scene:
+        """Return the same boxes around the robot, and nobody."""
+        alone = copy.copy(self)
+        alone.has_people = False
+        return alone
 
     def standing_discs_m(
         self, speed_mps: float, margin_m: float
