@@ -28,10 +28,11 @@ from ..actors.behaviour import (
 from ..actors.body import Worker
 from ..actors.robot import NOVA_CARTER, Amr, AmrLook
 from ..scenario import Scenario
-from ..world import Warehouse, sees
+from ..world import Warehouse
 from ..world.bullet import pybullet
 from ..world.render import RendererName
 from ._metrics import STANDING_SPEED_MPS, SafetyMeter
+from ._robot_sight import RobotSight, near_robot
 
 # Distances between surfaces are exact with centres closer than this, else a lower bound.
 _EXACT_WITHIN_M: Final = 4.0
@@ -127,6 +128,7 @@ class Stage(AbstractContextManager["Stage"]):
             self.warehouse.close()
             raise
         self.warehouse.add_actor(AmrLook.of(self.warehouse, self.amr))
+        self._sight = RobotSight(self.warehouse, self.amr, self.workers)
         self._motions: tuple[PersonMotion, ...] = ()
         steps = 1.0 / (_BODY_UPDATE_HZ * self.warehouse.physics_dt_s)
         self._steps_per_body_update = max(round(steps), 1)
@@ -201,9 +203,7 @@ class Stage(AbstractContextManager["Stage"]):
             gaze = worker.gaze_odom
             alpha = float(cone.scores(worker.eyes_odom_m, gaze, origin))
             in_front = _faces(motion, origin)
-            sighted = (in_front or alpha > 0.0) and sees(
-                worker, origin, through=frozenset({self.amr.body})
-            )
+            sighted = (in_front or alpha > 0.0) and self._sight.seen_by(worker)
             views.append(
                 TrueView(
                     (worker.chest_odom_m - origin) @ rotation,
@@ -247,19 +247,24 @@ class Stage(AbstractContextManager["Stage"]):
             around = Surroundings(
                 robot,
                 others[:index] + others[index + 1 :],
-                partial(self._sees_robot, worker),
+                partial(self._sight.seen_by, worker),
             )
-            motions.append(self._move_or_hold(index, worker, behaviour.motion(self.t_s, around)))
+            motion = behaviour.motion(self.t_s, around)
+            motions.append(self._move_or_hold(index, worker, motion, robot))
         self._motions = tuple(motions)
 
-    def _move_or_hold(self, index: int, worker: Worker, motion: PersonMotion) -> PersonMotion:
+    def _move_or_hold(
+        self, index: int, worker: Worker, motion: PersonMotion, robot: RobotBody
+    ) -> PersonMotion:
         """Move a body; one that would move into the robot stays where it was.
 
         Physics cannot push a body away, so a body inside the robot would throw the robot over.
         """
         before = self._motions[index] if self._motions and self._near_robot[index] else None
         depth_m = 0.0 if before is None else self._depth_m(worker)
-        _pose(worker, motion)
+        x_m, y_m = motion.position_odom_m.tolist()
+        # Collision bodies far from the robot are left behind: nothing there touches them.
+        _pose(worker, motion, collides=near_robot(worker, (x_m, y_m), (robot.x_m, robot.y_m)))
         self._held[index] = False
         if before is None or self._depth_m(worker) < depth_m + _DEEPER_M:
             return motion
@@ -296,10 +301,6 @@ class Stage(AbstractContextManager["Stage"]):
             MovingBody(*motion.position_odom_m.tolist(), *motion.velocity_odom_mps.tolist())
             for motion in self._motions
         )
-
-    def _sees_robot(self, worker: Worker) -> bool:
-        camera = self.amr.T_odom_camera[:3, 3]
-        return sees(worker, camera, through=frozenset({self.amr.body}))
 
     def _separation(self, index: int) -> tuple[float, FloatArray]:
         """Return the distance between the surfaces and the direction (2,) from robot to worker."""
@@ -349,7 +350,7 @@ def _faces(motion: PersonMotion, target_odom_m: FloatArray) -> bool:
     return bool(forward @ (target_odom_m[:2] - motion.position_odom_m) >= 0.0)
 
 
-def _pose(worker: Worker, motion: PersonMotion) -> None:
+def _pose(worker: Worker, motion: PersonMotion, *, collides: bool = True) -> None:
     worker.place(
         motion.position_odom_m,
         motion.heading_odom_rad,
@@ -361,4 +362,5 @@ def _pose(worker: Worker, motion: PersonMotion) -> None:
         eye_pitch_rad=motion.eye_pitch_rad,
         activity=motion.activity,
         feet=motion.feet,
+        collides=collides,
     )
