@@ -167,14 +167,9 @@ class Stage(AbstractContextManager["Stage"]):
             self.warehouse.step()
             if current is None:
                 continue
-            velocity = current
-            if previous is not None and previous @ previous > current @ current:
-                velocity = previous
-            if abs(self.amr.driven_speed_mps) <= STANDING_SPEED_MPS:
-                velocity = np.zeros(2)  # only a person who walks into it moves a standing robot
             for index, near in enumerate(self._near_robot):
                 if near:
-                    self._update_contact(index, velocity, meter)
+                    self._update_contact(index, (previous, current), meter)
         self._place_workers()
 
     def measure(self, meter: SafetyMeter, dt_s: float) -> tuple[float, ...]:
@@ -306,7 +301,7 @@ class Stage(AbstractContextManager["Stage"]):
         """Return the distance between the surfaces and the direction (2,) from robot to worker."""
         base = self.amr.T_odom_base[:2, 3]
         centre = self._motions[index].position_odom_m - base
-        distance = float(np.linalg.norm(centre))
+        distance = math.sqrt(centre @ centre)
         towards = centre / max(distance, 1e-9)
         bound = distance - self.amr.profile.circumscribed_radius_m - BODY_RADIUS_M
         if distance > _EXACT_WITHIN_M:
@@ -326,22 +321,38 @@ class Stage(AbstractContextManager["Stage"]):
             return bound, towards
         closest = min(pairs, key=lambda pair: pair[8])
         gap = np.array(closest[6][:2]) - np.array(closest[5][:2])
-        length = float(np.linalg.norm(gap))
+        length = math.sqrt(gap @ gap)
         separation = max(float(closest[8]), 0.0)
         return separation, gap / length if separation > 0.0 and length > 1e-3 else towards
 
     def _update_contact(
-        self, index: int, robot_velocity_mps: FloatArray, meter: SafetyMeter
+        self,
+        index: int,
+        velocities_mps: tuple[FloatArray | None, FloatArray],
+        meter: SafetyMeter,
     ) -> None:
+        """Record whether a person touches the robot.
+
+        Args:
+            index: of the person.
+            velocities_mps: (2,) of the robot before the last step but one, if it is known, and
+                before the last step.
+            meter: takes the contact.
+        """
         touching = pybullet.getContactPoints(
             self.amr.body, self.workers[index].body, physicsClientId=self.warehouse.client
         )
-        if self._held[index] or any(point[8] <= 0.0 for point in touching):
-            _, towards = self._separation(index)
-            meter.touch(self.t_s, index, robot_velocity_mps, towards)
-            self._behaviours[index].touch(*(-towards).tolist())
-        else:
+        if not self._held[index] and not any(point[8] <= 0.0 for point in touching):
             meter.release(index)
+            return
+        previous, velocity = velocities_mps
+        if previous is not None and previous @ previous > velocity @ velocity:
+            velocity = previous
+        if abs(self.amr.driven_speed_mps) <= STANDING_SPEED_MPS:
+            velocity = np.zeros(2)  # only a person who walks into it moves a standing robot
+        _, towards = self._separation(index)
+        meter.touch(self.t_s, index, velocity, towards)
+        self._behaviours[index].touch(*(-towards).tolist())
 
 
 def _faces(motion: PersonMotion, target_odom_m: FloatArray) -> bool:
