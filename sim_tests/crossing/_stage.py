@@ -128,7 +128,7 @@ class Stage(AbstractContextManager["Stage"]):
             self.warehouse.close()
             raise
         self.warehouse.add_actor(AmrLook.of(self.warehouse, self.amr))
-        self._sight = RobotSight(self.warehouse, self.amr, self.workers)
+        self._sight = RobotSight(self.amr, self.workers)
         self._motions: tuple[PersonMotion, ...] = ()
         steps = 1.0 / (_BODY_UPDATE_HZ * self.warehouse.physics_dt_s)
         self._steps_per_body_update = max(round(steps), 1)

@@ -73,6 +73,8 @@ class Worker:
 
     Attributes:
         body: PyBullet's id of the person.
+        collision_left_behind: whether the collision body is not at the present posture.
+        collision_place_odom_m: x and y of the person when it was last moved.
         client: PyBullet's id of the world.
         skin: visual actor of the person.
         actor: number of the skin among the visual actors.
@@ -189,29 +191,24 @@ class Worker:
         self._gait_pose, self._feet_are_local = gait_pose, feet is None
         self._solved_joints: tuple[Quaternion, ...] | None = None
         self._solve_trunk(head)
-        self._collision_pending = True
+        self.collision_left_behind = True
         if collides:
             self.place_collision_body()
 
     def place_collision_body(self) -> None:
         """Move the collision body to the present posture, if it was left behind."""
-        if not self._collision_pending:
+        if not self.collision_left_behind:
             return
-        self._collision_pending = False
+        self.collision_left_behind = False
         held = self.held
         seat = self.T_odom_held if held == "seat" else None
         self._body.place(self._hips_odom_m, self._pelvis, self._joints, held == "box", seat)
-        self._collision_place_m = (self._x_m, self._y_m)
+        self.collision_place_odom_m = (self._x_m, self._y_m)
 
     @property
     def place_odom_m(self) -> tuple[float, float]:
         """Position of the body's centre line, x and y."""
         return self._x_m, self._y_m
-
-    @property
-    def collision_place_odom_m(self) -> tuple[float, float]:
-        """Position of the collision body's centre line when it was last moved."""
-        return self._collision_place_m
 
     @property
     def asset(self) -> WorkerAsset:
