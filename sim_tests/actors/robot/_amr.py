@@ -133,8 +133,7 @@ class Amr:
 
     def advance(self, dt_s: float) -> None:
         """Ramp the wheels towards the command for ``dt_s`` > 0; call it before a physics step."""
-        if not 0.0 < dt_s < math.inf:
-            raise SimError(f"dt_s must be positive and finite, got {dt_s!r} s")
+        dt = finite_number("dt_s", dt_s, SimError, minimum=0.0, exclusive_minimum=True)
         if (
             self._speed_mps == self._target_speed_mps
             and self._yaw_rate_radps == self._target_yaw_rate_radps
@@ -143,10 +142,10 @@ class Amr:
         speed = _ramped(
             self._speed_mps,
             self._target_speed_mps,
-            self.profile.max_acceleration_mps2 * dt_s,
-            self.profile.max_deceleration_mps2 * dt_s,
+            self.profile.max_acceleration_mps2 * dt,
+            self.profile.max_deceleration_mps2 * dt,
         )
-        change = MAX_YAW_ACCELERATION_RADPS2 * dt_s
+        change = MAX_YAW_ACCELERATION_RADPS2 * dt
         yaw_rate = _ramped(self._yaw_rate_radps, self._target_yaw_rate_radps, change, change)
         if speed != self._speed_mps or yaw_rate != self._yaw_rate_radps:
             self._speed_mps, self._yaw_rate_radps = speed, yaw_rate
