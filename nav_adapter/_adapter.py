@@ -10,10 +10,11 @@ from typing import Final
 from perception.arrays import finite_number
 from tracking import PersonTrack
 from tracking.clock import JumpedClock
+from tracking.prediction import PredictionModel
 
 from ._alert import Alert
 from ._alerting import AlertHistory, alerts_due
-from ._checks import age_of_s, checked_tracks, refuse_absurd
+from ._checks import age_of_s, checked_tracks, goes_back, refuse_absurd, require_type
 from ._constraints import GovernedSpeed, NavConstraints
 from ._errors import NavError
 from ._governor import SpeedGovernor
@@ -107,19 +108,26 @@ class NavAdapter:
     Args:
         policy: radii, human speeds, margins and time behaviour.
         robot: footprint, braking and reaction time.
+        prediction: of swept polygons, speed field and alerts; None: as certain as the present.
 
     Raises:
         NavError: for an argument of the wrong type, or a custom policy object whose values are not
             finite or grow with awareness.
     """
 
-    def __init__(self, policy: AwarenessPolicy, robot: RobotProfile) -> None:
-        if not isinstance(policy, AwarenessPolicy):
-            raise NavError(f"policy must be an AwarenessPolicy, got {type(policy).__name__}")
-        if not isinstance(robot, RobotProfile):
-            raise NavError(f"robot must be a RobotProfile, got {type(robot).__name__}")
+    def __init__(
+        self,
+        policy: AwarenessPolicy,
+        robot: RobotProfile,
+        *,
+        prediction: PredictionModel | None = None,
+    ) -> None:
+        require_type("policy", policy, AwarenessPolicy)
+        require_type("robot", robot, RobotProfile)
+        require_type("prediction", prediction, PredictionModel | None)
         self._policy = policy
         self._robot = robot
+        self._prediction = prediction
         self._rules = ObstacleRules(policy)
         self._governor = SpeedGovernor(policy, robot, self._rules)
         self._lost = LostPeople(policy, robot, self._rules, self._governor)
@@ -176,8 +184,7 @@ class NavAdapter:
         """
         now = finite_number("stamp_s", stamp_s, NavError)
         current = checked_tracks(tracks)
-        if not isinstance(robot_state, RobotState):
-            raise NavError(f"robot_state must be a RobotState, got {type(robot_state).__name__}")
+        require_type("robot_state", robot_state, RobotState)
         before, clock = self._starting_point(now, robot_state)
         memory = self._following(before, current, robot_state, now, perception_stamp_s)
         # Nothing can fail from here on. An error above leaves the adapter unchanged.
@@ -206,7 +213,7 @@ class NavAdapter:
         if before.given is None or before.stamp_s is None:
             return NavConstraints(now, (), 0.0, "stale data: none yet", True, robot=self._robot)
         if now < before.stamp_s:
-            raise NavError(_goes_back(now, before.stamp_s))
+            raise NavError(goes_back(now, before.stamp_s))
         tracks, robot_state, perceived_s = before.given
         memory = self._following(before, tracks, robot_state, now, perceived_s)
         assert memory.constraints is not None
@@ -247,7 +254,7 @@ class NavAdapter:
             return _Memory(ceiling_mps=ceiling_mps), _Clock(clock.refused, clock.restarts + 1)
         self._clock = replace(clock, refused=clock.refused + 1, jumped=jumped)
         if pause_s < 0.0:
-            raise NavError(_goes_back(now, last_s))
+            raise NavError(goes_back(now, last_s))
         raise NavError(
             f"stamp_s jumps ahead, got {now:.6f} s after {last_s:.6f} s, with a robot_state of "
             f"{robot_state.stamp_s:.6f} s (at most {_MAX_PAUSE_S:g} s)"
@@ -313,12 +320,13 @@ class NavAdapter:
                 now,
                 self._policy.margins.uncertainty_sigmas,
                 alert_history,
+                self._prediction,
             )
         braked_mps = _latest_travel_mps(before, robot_state)
         braked_mps -= self._robot.max_deceleration_mps2 * pause_s
         constraints = NavConstraints(
             stamp_s=now,
-            obstacles=obstacles_of(people, now, self._policy),
+            obstacles=obstacles_of(people, now, self._policy, self._prediction),
             speed_limit_mps=limit.limit_mps,
             limited_by=limit.limited_by,
             stale=stale,
@@ -329,7 +337,7 @@ class NavAdapter:
             robot=self._robot,
             speed_basis=SpeedBasis(
                 *(self._policy, people, lost, current),
-                *(robot_age_s, perception_age_s, ceiling_mps),
+                *(robot_age_s, perception_age_s, ceiling_mps, self._prediction),
             ),
         )
         given = current, robot_state, perceived_s
@@ -392,7 +400,3 @@ def _latest_travel_mps(before: _Memory, robot_state: RobotState) -> float:
     if robot_state.stamp_s > before.given[1].stamp_s:
         return robot_state.travel_mps
     return min(robot_state.travel_mps, before.constraints.reachable_speed_limit_mps)
-
-
-def _goes_back(now: float, last_s: float) -> str:
-    return f"stamp_s must not go backward, got {now:.6f} s after {last_s:.6f} s"

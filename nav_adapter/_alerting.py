@@ -7,10 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
+import numpy as np
+
 from perception.anthropometry import BODY_RADIUS_M
+from tracking.prediction import PredictionModel
 
 from ._alert import Alert, AlertKind
 from ._memory import PersonMemory, Vector2
+from ._predicted import predicted_sigmas_m
 from ._robot import RobotProfile, RobotState
 from .policies import AlertRules
 
@@ -20,6 +24,8 @@ _STANDING_MPS: Final = 0.05
 _SAME_VELOCITY_MPS: Final = 1e-3
 # Below this value of −(r · v), whether they approach is a matter of rounding.
 _CLOSING_M2PS: Final = 1e-9
+# The prediction is known to hold so far ahead.
+_PREDICTED_S: Final = 2.0
 _SOUNDS: Final[frozenset[AlertKind]] = frozenset(("horn", "voice"))
 
 
@@ -44,14 +50,16 @@ def alerts_due(
     now: float,
     sigmas: float,
     history: AlertHistory,
+    prediction: PredictionModel | None = None,
 ) -> tuple[tuple[Alert, ...], AlertHistory]:
     """Return the alerts to give now, the most urgent first, and the history with them.
 
     Tentative tracks may be clutter and are not warned. Robot and people are predicted with their
     present velocities, the robot straight ahead. The robot counts as its circumscribed circle, and
-    a body is enlarged by ``sigmas`` standard deviations of its position.
+    a body is enlarged by ``sigmas`` standard deviations of its position: the present one, or with a
+    ``prediction`` the one at the closest approach, at most 2 s ahead.
     """
-    candidates = _candidates(rules, robot, people, robot_state, now, sigmas)
+    candidates = _candidates(rules, robot, people, robot_state, now, sigmas, prediction)
     candidates.sort(key=lambda alert: (alert.time_to_closest_s, alert.track_id))
     kept_s = max(rules.repeat_after_s, rules.quiet_s)
     latest = {key: stamp for key, stamp in history.alert_stamps_s.items() if now - stamp < kept_s}
@@ -76,6 +84,7 @@ def _candidates(
     robot_state: RobotState,
     now: float,
     sigmas: float,
+    prediction: PredictionModel | None,
 ) -> list[Alert]:
     """Return the alert for each person to warn, without the limit on how often."""
     if robot_state.travel_mps <= _STANDING_MPS:
@@ -91,6 +100,10 @@ def _candidates(
         time_s, gap_m = _closest_approach(
             memory, position, velocity, age_s, reach_m + sigmas * memory.sigma_m
         )
+        if prediction is not None and math.isfinite(time_s):
+            horizon_s = np.array([max(now - memory.track.stamp_s, 0.0) + min(time_s, _PREDICTED_S)])
+            sigma_m = float(predicted_sigmas_m(memory.track, horizon_s, prediction)[0])
+            gap_m = max(gap_m - sigmas * max(0.0, sigma_m - memory.sigma_m), 0.0)
         kind = _kind(rules, time_s) if gap_m <= rules.miss_within_m else None
         if kind is not None:
             reason = (

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Final
+from types import UnionType
+from typing import Final, get_args
 
 from tracking import PersonTrack
 
@@ -49,6 +50,20 @@ def checked_tracks(tracks: Iterable[PersonTrack]) -> tuple[PersonTrack, ...]:
             raise NavError(f"tracks must have distinct ids, got id {track.id} twice")
         ids.add(track.id)
     return checked
+
+
+def require_type(name: str, value: object, kind: type | UnionType) -> None:
+    """Refuse an argument that is not of this type, or of one of these."""
+    if not isinstance(value, kind):
+        kinds = [each.__name__ for each in get_args(kind) or (kind,)]
+        article = "an" if kinds[0][0] in "AEIOU" else "a"
+        wanted = " or ".join("None" if name == "NoneType" else name for name in kinds)
+        raise NavError(f"{name} must be {article} {wanted}, got {type(value).__name__}")
+
+
+def goes_back(now: float, last_s: float) -> str:
+    """Return the message about a stamp that goes back."""
+    return f"stamp_s must not go backward, got {now:.6f} s after {last_s:.6f} s"
 
 
 def refuse_absurd(people: Mapping[int, PersonMemory]) -> None:

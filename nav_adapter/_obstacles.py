@@ -11,10 +11,12 @@ import numpy as np
 import shapely
 
 from perception.arrays import FloatArray
+from tracking.prediction import PredictionModel
 
 from ._constraints import PersonObstacle, trusted_obstacle
 from ._memory import PersonMemory, position_sigma_m
 from ._policy import AwarenessPolicy
+from ._predicted import predicted_sigmas_m
 
 _SIDES: Final = 24
 _ANGLES = np.arange(_SIDES) * (2.0 * math.pi / _SIDES)
@@ -25,9 +27,15 @@ _SWEEP_STEP_S: Final = 0.25
 
 
 def obstacles_of(
-    people: Mapping[int, PersonMemory], now: float, policy: AwarenessPolicy
+    people: Mapping[int, PersonMemory],
+    now: float,
+    policy: AwarenessPolicy,
+    prediction: PredictionModel | None = None,
 ) -> tuple[PersonObstacle, ...]:
-    """Return one obstacle per person, in the order of ``people``."""
+    """Return one obstacle per person, in the order of ``people``.
+
+    The prediction gives the width of the sweep; without one, the policy's outline does.
+    """
     if not people:
         return ()
     centers = np.array([m.position_odom_m for m in people.values()])
@@ -48,7 +56,7 @@ def obstacles_of(
             memory.track.height_m,
             memory.awareness_lower,
         )
-        outline = partial(_polygon, memory, center, now, policy)
+        outline = partial(_polygon, memory, center, now, policy, prediction)
         obstacles.append(
             trusted_obstacle(*values, outline, covariance)
             if all_finite
@@ -58,12 +66,16 @@ def obstacles_of(
 
 
 def _polygon(
-    memory: PersonMemory, center: FloatArray, now: float, policy: AwarenessPolicy
+    memory: PersonMemory,
+    center: FloatArray,
+    now: float,
+    policy: AwarenessPolicy,
+    prediction: PredictionModel | None,
 ) -> shapely.Polygon:
     """Return the polygon of an obstacle at ``center`` (2,)."""
     ring = center + memory.radius_m * _UNIT_POLYGON
     if policy.outline.unaware_ahead_s > 0.0 or policy.outline.sweep_s > 0.0:
-        points = np.concatenate([ring, *_discs_ahead(memory, center, now, policy)])
+        points = np.concatenate([ring, *_discs_ahead(memory, center, now, policy, prediction)])
         return shapely.convex_hull(shapely.multipoints(points))
     return shapely.polygons(ring)
 
@@ -81,7 +93,11 @@ def _covariances_at(people: Mapping[int, PersonMemory], now: float) -> FloatArra
 
 
 def _discs_ahead(
-    memory: PersonMemory, center: FloatArray, now: float, policy: AwarenessPolicy
+    memory: PersonMemory,
+    center: FloatArray,
+    now: float,
+    policy: AwarenessPolicy,
+    prediction: PredictionModel | None,
 ) -> list[FloatArray]:
     """Return polygons around the disc at the end of the elongation and the discs of the sweep."""
     outline, margins = policy.outline, policy.margins
@@ -90,9 +106,12 @@ def _discs_ahead(
     steps = math.ceil(outline.sweep_s / _SWEEP_STEP_S)
     for step in range(1, steps + 1):
         ahead_s = outline.sweep_s * step / steps
-        wider_m = margins.uncertainty_sigmas * max(
-            0.0, _sigma_ahead_m(memory, now, ahead_s, policy) - memory.sigma_m
-        )
+        if prediction is None:
+            sigma_m = _sigma_ahead_m(memory, now, ahead_s, policy)
+        else:
+            horizon_s = np.array([max(now + ahead_s - memory.track.stamp_s, 0.0)])
+            sigma_m = float(predicted_sigmas_m(memory.track, horizon_s, prediction)[0])
+        wider_m = margins.uncertainty_sigmas * max(0.0, sigma_m - memory.sigma_m)
         radius_m = margins.bounded_m(memory.radius_m + wider_m)
         predicted = center + ahead_s * memory.track.velocity_odom_mps
         discs.append(predicted + radius_m * _UNIT_POLYGON)

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from tracking import PersonTrack
+from tracking.prediction import PredictionModel
 
 from ._memory import LostPerson, PersonMemory
 from ._policy import AwarenessPolicy
@@ -26,6 +27,7 @@ class SpeedBasis:
         robot_age_s: age of the robot's state at the stamp.
         perception_age_s: age of the latest frame at the stamp.
         ceiling_mps: ceiling of the limit during the recovery after stale data, or None.
+        prediction: of the adapter; None if places ahead are as certain as the present one.
     """
 
     policy: AwarenessPolicy
@@ -35,6 +37,7 @@ class SpeedBasis:
     robot_age_s: float
     perception_age_s: float
     ceiling_mps: float | None
+    prediction: PredictionModel | None = None
 
     @property
     def stopped(self) -> bool:

@@ -23,10 +23,12 @@ from perception.arrays import FloatArray, finite_array, finite_number
 from ._constraints import NavConstraints
 from ._errors import NavError
 from ._robot import RobotProfile, RobotState
+from .exporters import speed_limit_at
 
 __all__ = [
     "ControlPoint",
     "clip_twists",
+    "clip_twists_ahead",
     "control_point",
     "differential_drive",
     "twist_envelope",
@@ -35,6 +37,8 @@ __all__ = [
 # Behind the robot, within this angle's sine, noise would decide to which side it turns: a turn
 # that has begun goes on.
 _BEHIND_SINE = 0.3
+# The field ends at the robot's maximum, less its rounding error.
+_FIELD_ENDS_MPS = 1e-3
 
 
 def twist_envelope(constraints: NavConstraints, *, backward: bool = False) -> FloatArray:
@@ -68,7 +72,7 @@ def twist_envelope(constraints: NavConstraints, *, backward: bool = False) -> Fl
     return np.array(rows)
 
 
-def clip_twists(constraints: NavConstraints, twists: Any) -> FloatArray:
+def clip_twists(constraints: NavConstraints, twists: Any, *, slack_mps: float = 0.0) -> FloatArray:
     """Return twists slowed down until the limits hold, on the same curve.
 
     All numbers of a twist are multiplied by one factor of at most 1, so the path keeps its
@@ -80,11 +84,97 @@ def clip_twists(constraints: NavConstraints, twists: Any) -> FloatArray:
         constraints: of the present cycle.
         twists: (..., 2) speed (m/s) and yaw rate (rad/s), or (..., 3) speed forward and to the
             left, and yaw rate, of a robot that can move sideways.
+        slack_mps: ≥ 0, speed that the fastest point of the robot leaves unused below its limit, for
+            drives that overshoot. More slack never gives a faster twist.
 
     Raises:
-        NavError: for twists that are not finite or of another shape, and constraints without
-            ``robot``.
+        NavError: for twists that are not finite or of another shape, a slack that is not finite or
+            negative, and constraints without ``robot``.
     """
+    slack = finite_number("slack_mps", slack_mps, NavError, minimum=0.0)
+    return _clipped(constraints, twists, slack, math.inf)
+
+
+def clip_twists_ahead(
+    constraints: NavConstraints,
+    robot_state: RobotState,
+    twists: Any,
+    dt_s: float,
+    *,
+    cycles: int = 2,
+    slack_mps: float = 0.03,
+) -> FloatArray:
+    """Return twists slowed down until the limits of now and of the next cycles hold.
+
+    A limit is that of a measurement, and a command takes effect after it. Meanwhile robot and
+    people come nearer to each other and the limit falls. A planner that uses its limit to the last
+    centimetre per second is then too fast for a cycle. So this function also asks
+    :func:`~nav_adapter.exporters.speed_limit_at` for the limits at the ends of the next cycles:
+    where each twist leads, and where the robot's present motion leads. People move as predicted.
+    The lowest of these limits counts, less the slack.
+
+    A robot that cannot brake to a twist's speed within a cycle has less left for turning. Only then
+    the curve becomes flatter. Otherwise this is :func:`clip_twists`, and it is never faster.
+
+    For the last line of a planner. One twist takes about as long as one call of the field.
+
+    Args:
+        constraints: of ``NavAdapter.update`` in the present cycle.
+        robot_state: the latest, from which the constraints come.
+        twists: as for :func:`clip_twists`.
+        dt_s: > 0, period of the control loop.
+        cycles: ≥ 0, how many cycles ahead; 0 for the present limit alone.
+        slack_mps: as for :func:`clip_twists`. The default is the overshoot of wheel motors at the
+            end of a ramp.
+
+    Raises:
+        NavError: as :func:`clip_twists` and ``speed_limit_at``, and for ``cycles`` that are not a
+            whole number of at least 0.
+    """
+    slack = finite_number("slack_mps", slack_mps, NavError, minimum=0.0)
+    period_s = _positive("dt_s", dt_s)
+    if not isinstance(cycles, int) or cycles < 0:
+        raise NavError(f"cycles must be a whole number >= 0, got {cycles!r:.80}")
+    now = _clipped(constraints, twists, 0.0, math.inf)
+    if cycles == 0 or now.size == 0:
+        return _clipped(constraints, twists, slack, math.inf)
+    speeds = np.zeros((now.size // now.shape[-1] + 1, 3))
+    speeds[:-1, 0], speeds[:-1, 2] = now[..., 0].ravel(), now[..., -1].ravel()
+    if now.shape[-1] == 3:
+        speeds[:-1, 1] = now[..., 1].ravel()
+    speeds[-1] = robot_state.speed_mps, robot_state.lateral_mps, robot_state.yaw_rate_radps
+    times_s = period_s * np.arange(1, cycles + 1, dtype=np.float64)
+    positions, headings = _driven(robot_state, speeds, times_s)
+    every_time = np.broadcast_to(speeds[:, None], (*headings.shape, 3))
+    limits = speed_limit_at(
+        constraints,
+        positions,
+        headings,
+        dt_s=period_s,
+        first_s=period_s,
+        speeds_mps=every_time[..., :2],
+        yaw_rates_radps=every_time[..., 2],
+    )
+    lowest = limits.min(axis=1)
+    lowest = np.minimum(lowest[:-1], lowest[-1]).reshape(now.shape[:-1])
+    robot, fastest_mps = constraints.robot, constraints.fastest_point_limit_mps
+    assert robot is not None
+    assert fastest_mps is not None
+    people = lowest < robot.max_speed_mps - _FIELD_ENDS_MPS
+    fastest = np.minimum(np.where(people, lowest, math.inf), fastest_mps)
+    slower = _clipped(constraints, now, slack, fastest)
+    still_mps = robot_state.travel_mps - robot.max_deceleration_mps2 * period_s
+    left = np.maximum(fastest - slack - still_mps, 0.0) / robot.circumscribed_radius_m
+    turning = np.minimum(np.maximum(slower[..., -1], -left), left)
+    too_fast = np.sqrt((slower[..., :-1] ** 2).sum(axis=-1)) < still_mps
+    slower[..., -1] = np.where(too_fast, turning, slower[..., -1])
+    return slower
+
+
+def _clipped(
+    constraints: NavConstraints, twists: Any, slack_mps: float, ahead_mps: Any
+) -> FloatArray:
+    """Return twists within the limits; ``ahead_mps`` (...) are more limits of the fastest point."""
     given = np.asarray(twists, dtype=np.float64)
     if given.ndim < 1 or given.shape[-1] not in (2, 3) or not bool(np.isfinite(given).all()):
         raise NavError(
@@ -99,7 +189,8 @@ def clip_twists(constraints: NavConstraints, twists: Any) -> FloatArray:
     speed = np.sqrt((given[..., :-1] ** 2).sum(axis=-1))
     yaw_rate = np.abs(given[..., -1])
     factor = np.minimum(_share(speed, limit_mps), _share(yaw_rate, highest_radps))
-    factor = np.minimum(factor, _share(speed + radius_m * yaw_rate, fastest_mps))
+    fastest = np.maximum(np.minimum(fastest_mps, ahead_mps) - slack_mps, 0.0)
+    factor = np.minimum(factor, _share(speed + radius_m * yaw_rate, fastest))
     return np.asarray(given * factor[..., None])
 
 
@@ -226,7 +317,21 @@ def differential_drive(
     return speed, yaw_rate
 
 
-def _share(value: FloatArray, most: float) -> FloatArray:
+def _driven(
+    robot_state: RobotState, velocities: FloatArray, times_s: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return positions (K, T, 2) and headings (K, T) of K constant base velocities x, y, ω."""
+    turned = velocities[:, 2:] * times_s
+    # The chord of an arc: it points along the mean heading, and is shorter than the arc.
+    towards = robot_state.heading_odom_rad + 0.5 * turned
+    chords_s = times_s * np.sinc(0.5 * turned / np.pi)
+    forward, left = velocities[:, 0, None] * chords_s, velocities[:, 1, None] * chords_s
+    c, s = np.cos(towards), np.sin(towards)
+    moved = np.stack([c * forward - s * left, s * forward + c * left], axis=-1)
+    return robot_state.position_odom_m + moved, robot_state.heading_odom_rad + turned
+
+
+def _share(value: FloatArray, most: float | FloatArray) -> FloatArray:
     """Return the factor of at most 1 that brings each value down to ``most``."""
     above = value > most
     return np.asarray(np.where(above, most / np.where(above, value, 1.0), 1.0))

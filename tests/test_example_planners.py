@@ -30,15 +30,31 @@ def examples() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module", params=["ir-sim", FULL])
-def rows(request, examples):
-    """Crossings with nobody, an aware worker, an unaware one, and one with a wider radius."""
+def make(request, examples):
+    """A function that makes a planner which knows the walls, with or without the speed field."""
     package, module, name = PLANNERS[request.param]
     if importlib.util.find_spec(package) is None:
         pytest.skip(f"{request.param} is not installed (extra dev)")
     pytest.importorskip("pybullet", reason="the crossings need the extra sim")
-    compare = importlib.import_module("examples.planners._compare")
     planner = getattr(importlib.import_module(f"examples.planners.{module}"), name)
-    return compare.compare(request.param, lambda: planner(NOVA_CARTER))
+    boxes = ScenarioTemplate.shipped("crossing_attentive").for_seed(0).planner_boxes_odom_m
+    return lambda field: planner(NOVA_CARTER, static_boxes_odom_m=boxes, use_speed_field=field)
+
+
+@pytest.fixture(scope="module")
+def rows(make):
+    """Crossings with circles alone: nobody, an aware worker, an unaware one, a wider radius."""
+    compare = importlib.import_module("examples.planners._compare")
+    return compare.compare("a planner", lambda: make(False))
+
+
+def test_with_the_speed_field_an_unaware_worker_costs_less_time(make, rows):
+    compare = importlib.import_module("examples.planners._compare")
+    scenario, policy = compare.scenario("crossing_distracted"), compare.policy(1.0)
+    result = run_crossing(scenario, policy=policy, planner=make(True), seed=0)
+    assert result.success
+    assert result.violation_time_s == 0.0
+    assert result.time_to_goal_s < rows[2].result.time_to_goal_s - 5.0
 
 
 def test_every_crossing_ends_at_the_goal_without_a_contact(rows):

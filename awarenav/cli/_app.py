@@ -79,6 +79,14 @@ _COMMANDS: Final[dict[str, dict[str, _Entry]]] = {
             "sim_tests.study.measures.command:compare",
             "Print tables of finished runs, with confidence intervals.",
         ),
+        "measures": _Entry(
+            "sim_tests.study.social.command:measures",
+            "Measure episodes as HuNavSim, SocNavGym and NavWareSet do.",
+        ),
+        "export": _Entry(
+            "sim_tests.study.social.command:export",
+            "Write episodes in the formats of other projects; check such files.",
+        ),
         "report": _Entry(
             "sim_tests.study.report.command:report",
             "Write a run's report as one HTML page.",

@@ -53,18 +53,27 @@ PERCEPTIONS: Final = ("truth", "keypoints", "pixels")
 SENSOR_SETS: Final = ("camera", "camera+scanner", "scanner")
 
 
-def _shipped(package: str, folder: str, *others: str) -> Callable[..., list[CompletionItem]]:
+def _shipped(
+    package: str, folder: str, *others: str, sets: Sequence[str] = ()
+) -> Callable[..., list[CompletionItem]]:
     """Return a completion of the names of a package's YAML files; it does not import the package.
 
-    A word that begins none of the names is completed as a file.
+    Files in the folders of ``sets`` count as well. A word that begins none of the names is
+    completed as a file.
     """
+    folders = [folder, *(f"{folder}/{name}" for name in sets)]
 
     def complete(
         context: click.Context, parameter: click.Parameter, text: str
     ) -> list[CompletionItem]:
         spec = find_spec(package)
         places = [] if spec is None else list(spec.submodule_search_locations or ())
-        names = {path.stem for place in places for path in Path(place, folder).glob("*.yaml")}
+        names = {
+            path.stem
+            for place in places
+            for each in folders
+            for path in Path(place, each).glob("*.yaml")
+        }
         fitting = [name for name in sorted(names | set(others)) if name.startswith(text)]
         return [CompletionItem(name) for name in fitting] or [CompletionItem(text, type="file")]
 
@@ -72,7 +81,9 @@ def _shipped(package: str, folder: str, *others: str) -> Callable[..., list[Comp
 
 
 #: Completion of scenarios, for ``shell_complete`` of an option or argument.
-COMPLETE_SCENARIOS: Final = _shipped("sim_tests", "scenario/shipped", "all")
+COMPLETE_SCENARIOS: Final = _shipped(
+    "sim_tests", "scenario/shipped", "all", "guidelines", sets=["guidelines"]
+)
 _COMPLETE_CAMERAS: Final = _shipped("sim_tests", "scenario/shipped/cameras")
 #: Completion of policies.
 COMPLETE_POLICIES: Final = _shipped("nav_adapter", "policies")
@@ -254,7 +265,7 @@ def scenarios(which: str, *, repeated: bool = False) -> Decorator:
     """Add ``--scenario``: shipped scenarios and files.
 
     Args:
-        which: the shipped ones that ``all`` stands for.
+        which: the shipped ones that the name of a set stands for.
         repeated: each scenario needs the option before it, as beside positional arguments.
     """
     return option(
@@ -262,8 +273,8 @@ def scenarios(which: str, *, repeated: bool = False) -> Decorator:
         **_several(repeated),
         default=["all"],
         shell_complete=COMPLETE_SCENARIOS,
-        help=f"Scenarios: shipped ones, YAML files, or 'all' shipped ones {which}."
-        + _again(repeated),
+        help=f"Scenarios: shipped ones, YAML files, or a set of shipped ones {which}: 'all' or "
+        f"'guidelines'.{_again(repeated)}",
     )
 
 

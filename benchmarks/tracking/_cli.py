@@ -32,6 +32,8 @@ from ._measurements import OCCLUDED, OPEN, record
 from ._naive import Naive, NaiveSettings
 from ._norfair import Norfair
 from ._ours import Ours
+from ._prediction import fit_table, prediction_table
+from ._prediction_sets import HORIZONS_S
 from ._rates import rate_table
 from ._stonesoup import StoneSoupGnn, StoneSoupJpda
 from ._two_sensors import MOVED, two_sensor_cost_ms
@@ -40,9 +42,9 @@ BASELINE = Path(__file__).with_name("baseline.json")
 SETS = {"open": OPEN, "occluded": OCCLUDED}
 #: The baseline holds for runs of this size only.
 STANDARD_SEEDS, STANDARD_FRAMES = 10, 500
-PARTS = ("scores", "rates", "cost", "sensors", "consistency")
-#: Needs the simulator, and minutes.
-STARTS = "starts"
+PARTS = ("scores", "rates", "cost", "sensors", "consistency", "prediction")
+#: These need minutes; the first and the last need the simulator.
+STARTS, FIT, GAZE = "starts", "fit", "gaze"
 #: Recorded people lie beside the repository, if anywhere; see README.md.
 RECORDINGS = Path(__file__).resolve().parents[3] / "shared" / "data"
 COST_PEOPLE = (20, 100, 300)
@@ -73,7 +75,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if judged and missing:
         parser.error(
             f"{' and '.join(missing)} not found; see benchmarks/tracking/requirements.txt "
-            "or leave out what they judge (--parts cost,sensors,consistency)"
+            "or leave out what they judge (--parts cost,sensors,consistency,prediction)"
         )
     makers = _makers(options.trackers, config)
     metrics: list[MeasuredValue] = []
@@ -88,6 +90,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _sensors(options, config, metrics, missed)
     if "consistency" in options.parts:
         _consistency(options, config, metrics, missed)
+    if "prediction" in options.parts:
+        found, off = prediction_table(options.recordings)
+        metrics += found
+        missed += off
+    if FIT in options.parts:
+        fit_table(options.recordings)
+    if GAZE in options.parts:
+        _gaze()
     if STARTS in options.parts:
         _starts(options, missed)
     return finish(metrics, missed, baseline if _is_standard(options) else {}, options.out)
@@ -144,10 +154,10 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--parts",
-        type=_subset((*PARTS, STARTS)),
+        type=_subset((*PARTS, STARTS, FIT, GAZE)),
         default=list(PARTS),
         metavar="NAMES",
-        help="some of scores, rates, cost, sensors, consistency (default: these), starts",
+        help=f"some of {', '.join(PARTS)} (default: these), {STARTS}, {FIT}, {GAZE}",
     )
     parser.add_argument(
         "--stonesoup-up-to",
@@ -161,7 +171,7 @@ def _parser() -> argparse.ArgumentParser:
         type=Path,
         default=RECORDINGS,
         metavar="DIR",
-        help="CSV files of recorded people for the rates, t_s, id, x_m, y_m; left out if absent",
+        help="CSV files of recorded people, t_s, id, x_m, y_m; left out if absent",
     )
     parser.add_argument("--config", type=Path, metavar="FILE", help="TrackerConfig for ours (YAML)")
     return parser
@@ -345,6 +355,16 @@ def _consistency(
         for key, value in on_walkers(recording, config).items():
             print(f"walkers, {name}: {key.replace('_', ' ')}: {value:.2f}")
             metrics.append(MeasuredValue(f"{name}_20_{key}", value, "1", "lower", 0.3))
+
+
+def _gaze() -> None:
+    """Print the value of gaze and body heading for the prediction."""
+    # Needs the simulator.
+    from ._prediction_gaze import gaze_gains  # noqa: PLC0415
+
+    print(f"\n{'error ahead, m':28s}" + "".join(f"{each:>8g} s" for each in HORIZONS_S))
+    for name, errors_m in gaze_gains(range(100, 112), range(12)).items():
+        print(f"{name:28s}" + "".join(f"{each:10.4f}" for each in errors_m), flush=True)
 
 
 def _starts(options: argparse.Namespace, missed: list[str]) -> None:

@@ -46,6 +46,12 @@ def main() -> int:
         help="perception of the robot (default: truth, in all directions and through walls)",
     )
     parser.add_argument("--seed", type=int, default=0, help="seed of every crossing (default: 0)")
+    parser.add_argument(
+        "--circles-alone",
+        action="store_true",
+        help="third-party planners plan with the circles and the present limit, not with the "
+        "speed field; the reference planner is the same",
+    )
     parser.add_argument("--out", type=Path, metavar="FILE", help="also write the table into a file")
     options = parser.parse_args()
     if options.seed < 0:
@@ -66,7 +72,7 @@ def main() -> int:
             bar.set_description(name)
             rows += compare(
                 name,
-                _maker(name),
+                _maker(name, use_speed_field=not options.circles_alone),
                 perception=options.perception,
                 seed=options.seed,
                 done=lambda _: bar.update(),
@@ -78,15 +84,18 @@ def main() -> int:
     return 0 if rows and all(row.is_good for row in rows) else 1
 
 
-def _maker(name: str) -> Callable[[], LocalPlanner]:
-    """Return a function that makes a new planner."""
+def _maker(name: str, *, use_speed_field: bool) -> Callable[[], LocalPlanner]:
+    """Return a function that makes a new planner, which knows the racks and walls."""
+    boxes = scenario("crossing_attentive").planner_boxes_odom_m
     if name == "reference":
-        boxes = scenario("crossing_attentive").layout.obstacle_boxes_odom
         return lambda: SamplingPlanner(NOVA_CARTER, boxes)
     # Imported late: the packages are optional, and take a second to import.
     _, module, planner = _OTHERS[name]
     make = getattr(import_module(f".{module}", __package__), planner)
-    return lambda: cast(LocalPlanner, make(NOVA_CARTER))
+    return lambda: cast(
+        LocalPlanner,
+        make(NOVA_CARTER, static_boxes_odom_m=boxes, use_speed_field=use_speed_field),
+    )
 
 
 if __name__ == "__main__":

@@ -7,14 +7,10 @@ import math
 import numpy as np
 
 from nav_adapter import NavConstraints, RobotProfile, RobotState
-from nav_adapter.exporters import people_cost, speed_limit_at, time_cost
-from nav_adapter.motion import clip_twists
+from nav_adapter.exporters import people_cost, time_cost
+from nav_adapter.motion import clip_twists_ahead
 from perception.arrays import FloatArray
 
-# Speed that a planner leaves unused below the limit: wheel motors overshoot on a ramp by as much.
-SLACK_MPS = 0.03
-# Cycles between the measurement that a limit comes from and the robot's answer to it.
-_CYCLES_AHEAD = 2
 # A detour leads past a point this far ahead, and this far to either side of the straight way.
 _VIA_AHEAD_M = (1.5, 3.0, 4.5)
 _VIA_ASIDE_M = np.linspace(-1.8, 1.8, 13)
@@ -121,41 +117,14 @@ def direction_to_goal(
 
 
 def obeying(
-    constraints: NavConstraints,
-    robot_state: RobotState,
-    twist: tuple[float, float],
-    dt_s: float,
-    *,
-    use_speed_field: bool,
+    constraints: NavConstraints, robot_state: RobotState, twist: tuple[float, float], dt_s: float
 ) -> tuple[float, float]:
-    """Return a speed and yaw rate on the same curve at which no point of the robot is too fast.
+    """Return a speed and yaw rate on the same curve that keep the limits of the next cycles.
 
-    The last line of every planner here. It leaves ``SLACK_MPS`` below the limit. With the field,
-    the limit is the lowest of now and of the next cycles, since a command takes effect in them.
+    The last line of every planner here.
     """
-    speed, yaw_rate = clip_twists(constraints, twist).tolist()
-    robot = constraints.robot
-    assert robot is not None
-    assert constraints.fastest_point_limit_mps is not None
-    fastest_mps = speed + abs(yaw_rate) * robot.circumscribed_radius_m
-    if fastest_mps <= 0.0:
-        return 0.0, 0.0
-    most_mps = constraints.fastest_point_limit_mps
-    if use_speed_field:
-        heading = robot_state.heading_odom_rad
-        forward = np.array([math.cos(heading), math.sin(heading)])
-        steps = np.arange(_CYCLES_AHEAD + 1)[:, None]
-        driven = max(robot_state.speed_mps, speed) * dt_s * steps * forward
-        poses = (robot_state.position_odom_m + driven)[None]
-        headings = np.full(poses.shape[:2], heading)
-        ahead = speed_limit_at(
-            constraints, poses, headings, dt_s=dt_s, speeds_mps=np.full(poses.shape[:2], speed)
-        )
-        # The field ends at the robot's maximum, which corners may exceed where nobody is near.
-        if float(ahead.min()) < robot.max_speed_mps - 1e-3:
-            most_mps = min(most_mps, float(ahead.min()))
-    share = min(max(most_mps - SLACK_MPS, 0.0) / fastest_mps, 1.0)
-    return speed * share, yaw_rate * share
+    speed, yaw_rate = clip_twists_ahead(constraints, robot_state, twist, dt_s).tolist()
+    return speed, yaw_rate
 
 
 def follow_curvature(

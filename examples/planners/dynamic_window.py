@@ -29,7 +29,11 @@ from ._shared import (
 )
 
 _LENGTH_M, _STEPS = 4.0, 20
-_TURN_STEPS = 6  # a curve bends over this part of its length, and is straight after it
+# A curve bends over this many steps and is straight after it. Half of the curves bend back from
+# another step on, and lead past somebody.
+_TURN_STEPS, _BACK_FROM = 6, 10
+# With the speed field, time also counts on this many steps straight to the goal after the curve.
+_STRAIGHT_STEPS = 15
 _SPEED_SHARES = (1.0, 0.7, 0.4, 0.2)
 _BENDS_RAD = (0.0, 0.05, 0.1, 0.2, 0.3, 0.45, 0.65, 0.9, 1.2)
 # Farther than this from its goal's direction, the robot turns on the spot.
@@ -73,7 +77,7 @@ class DynamicWindow:
             twist = (0.0, math.copysign(_TURN_RADPS, off_rad))
         else:
             twist = self._best(robot_state, goal_odom_m, constraints, goal_m, off_rad)
-        return obeying(constraints, robot_state, twist, dt_s, use_speed_field=self._use_speed_field)
+        return obeying(constraints, robot_state, twist, dt_s)
 
     def _best(
         self,
@@ -86,19 +90,26 @@ class DynamicWindow:
         """Return the speed and yaw rate that lead to the goal in the least time."""
         step_m = min(_LENGTH_M, goal_m) / _STEPS
         bends = np.unique([*_BENDS_RAD, *(-bend for bend in _BENDS_RAD), off_rad])
+        bends = np.tile(bends, 2)
         curvatures = np.zeros((len(bends), _STEPS))
         curvatures[:, :_TURN_STEPS] = bends[:, None] / (_TURN_STEPS * step_m)
+        back = curvatures[len(bends) // 2 :]
+        back[:, _BACK_FROM : _BACK_FROM + _TURN_STEPS] = -back[:, :_TURN_STEPS]
         positions, headings = follow_curvature(state, curvatures, step_m)
         gaps = gap_to_boxes_m(positions, self._boxes) - self._robot.circumscribed_radius_m
         free_m = free_length_m(gaps, step_m)
         fixed = self._fixed_s(positions, gaps, goal_odom_m) + _BEND_S * np.abs(bends)
+        straight = self._straight_on(positions[:, -1], goal_odom_m, step_m)
         top_mps = min(
             speed_to_stop_at_mps(self._robot, goal_m), max(constraints.speed_limit_mps, 0.1)
         )
         # If every curve ends at a wall, turn on the spot.
         best_s, best = math.inf, (0.0, math.copysign(_TURN_RADPS, off_rad))
         for speed in (top_mps * share for share in _SPEED_SHARES):
-            seconds = fixed + self._under_way_s(constraints, positions, headings, step_m, speed)
+            dt_s = step_m / speed
+            seconds = fixed + self._under_way_s(constraints, positions, headings, dt_s)
+            if self._use_speed_field:
+                seconds += self._delay_s(constraints, straight, dt_s)
             seconds[free_m < stop_distance_m(self._robot, speed)] = math.inf
             index = int(np.argmin(seconds))
             if seconds[index] < best_s:
@@ -110,11 +121,9 @@ class DynamicWindow:
         constraints: NavConstraints,
         positions: FloatArray,
         headings: FloatArray,
-        step_m: float,
-        speed_mps: float,
+        dt_s: float,
     ) -> FloatArray:
         """Return (K,), the time along each curve among people who move on meanwhile."""
-        dt_s = step_m / speed_mps
         driven_s = dt_s * _STEPS
         if self._use_speed_field:
             allowed_s = time_cost(constraints, positions, headings, dt_s=dt_s)
@@ -122,6 +131,22 @@ class DynamicWindow:
         radius_m = self._robot.circumscribed_radius_m
         circles = circle_costs(constraints, positions, dt_s, radius_m)
         return np.asarray(driven_s + _IN_A_CIRCLE_S * circles)
+
+    def _straight_on(self, ends: FloatArray, goal_odom_m: FloatArray, step_m: float) -> FloatArray:
+        """Return positions (K, S + 1, 2) that lead from the ends of the curves to the goal."""
+        to_goal = goal_odom_m - ends
+        far_m = np.hypot(*to_goal.T)[:, None]
+        lengths_m = np.minimum(step_m * np.arange(_STRAIGHT_STEPS + 1), far_m)
+        shares = lengths_m / np.maximum(far_m, 1e-9)
+        return np.asarray(ends[:, None] + shares[..., None] * to_goal[:, None])
+
+    def _delay_s(
+        self, constraints: NavConstraints, straight: FloatArray, dt_s: float
+    ) -> FloatArray:
+        """Return (K,), the time that people cost after the curves."""
+        allowed_s = time_cost(constraints, straight, dt_s=dt_s, first_s=dt_s * _STEPS)
+        length_m = np.hypot(*(straight[:, -1] - straight[:, 0]).T)
+        return np.asarray(allowed_s - length_m / self._robot.max_speed_mps)
 
     def _fixed_s(
         self, positions: FloatArray, gaps: FloatArray, goal_odom_m: FloatArray

@@ -34,6 +34,9 @@ _SLOTS = 4
 _WALLS = 2
 _FAR_M = 100.0
 _WALL_CLEARANCE_M = 0.05
+# The limit is low at the edge of a circle. Somebody who stands gets this much more room, for a
+# faster way past. Somebody who walks does not: there the room would cost a detour each time.
+_ROOM_M, _STANDS_MPS = 0.3, 0.2
 # Step of the slopes of the limit, and the slowest limit that a plan counts with: at 0 there would
 # be no way to the other side of a slow place.
 _SLOPE_M = 0.05
@@ -69,7 +72,7 @@ class ModelPredictivePlanner:
         replan_s: float = 0.1,
         *,
         static_boxes_odom_m: FloatArray | None = None,
-        use_speed_field: bool = False,
+        use_speed_field: bool = True,
     ) -> None:
         self._robot = robot
         self._replan_s = replan_s
@@ -100,7 +103,7 @@ class ModelPredictivePlanner:
             self._command = self._solve(robot_state, goal_odom_m, constraints, limit_mps)
         speed, yaw_rate = self._command
         twist = (min(max(speed, 0.0), limit_mps), yaw_rate)
-        return obeying(constraints, robot_state, twist, dt_s, use_speed_field=self._use_speed_field)
+        return obeying(constraints, robot_state, twist, dt_s)
 
     def _solve(
         self,
@@ -120,6 +123,8 @@ class ModelPredictivePlanner:
             slots=_SLOTS,
             robot_position_odom_m=robot_state.position_odom_m,
         )
+        stands = np.hypot(self._people[..., 2], self._people[..., 3]) < _STANDS_MPS
+        self._people[..., 4] += _ROOM_M * stands
         self._goal = np.asarray(goal_odom_m)
         heading = robot_state.heading_odom_rad
         state = np.array([[*robot_state.position_odom_m, heading, speed]]).T

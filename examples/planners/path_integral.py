@@ -89,15 +89,16 @@ class PathIntegral:
             twist = (speed, speed * float(self._curvatures[0]))
             if speed <= 0.0 < constraints.speed_limit_mps:  # the way ends at a wall
                 twist = (0.0, math.copysign(_TURN_RADPS, off_rad))
-        return obeying(constraints, robot_state, twist, dt_s, use_speed_field=self._use_speed_field)
+        return obeying(constraints, robot_state, twist, dt_s)
 
     def _samples(self, off_rad: float) -> FloatArray:
-        """Return (K, T) curvatures: around the last way, the last way, and that to the goal."""
+        """Return (K, T) curvatures: half around the way to the goal, half around the last way."""
         draws = self._rng.standard_normal((_SAMPLES, _STEPS // _LASTS_STEPS))
-        samples = self._curvatures + _SPREAD_1PM * np.repeat(draws, _LASTS_STEPS, axis=1)
-        samples[0] = self._curvatures
-        samples[1] = 0.0
-        samples[1, :_LASTS_STEPS] = off_rad / (_LASTS_STEPS * _STEP_M)
+        around = np.tile(self._curvatures, (_SAMPLES, 1))
+        around[::2] = 0.0
+        around[::2, :_LASTS_STEPS] = off_rad / (_LASTS_STEPS * _STEP_M)
+        draws[:2] = 0.0  # the two ways themselves
+        samples = around + _SPREAD_1PM * np.repeat(draws, _LASTS_STEPS, axis=1)
         return np.clip(samples, -_SHARPEST_1PM, _SHARPEST_1PM)
 
     def _seconds(

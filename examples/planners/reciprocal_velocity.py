@@ -80,7 +80,7 @@ class ReciprocalVelocity:
         twist = differential_drive(
             chosen, robot_state, self._robot, constraints=constraints, ahead_m=_AHEAD_M
         )
-        return obeying(constraints, robot_state, twist, dt_s, use_speed_field=self._use_speed_field)
+        return obeying(constraints, robot_state, twist, dt_s)
 
     def _velocity(
         self,

@@ -53,7 +53,7 @@ class VelocityObstaclePlanner:
         lookahead_s: float = 4.0,
         *,
         static_boxes_odom_m: FloatArray | None = None,
-        use_speed_field: bool = False,
+        use_speed_field: bool = True,
     ) -> None:
         self._robot = robot
         self._lookahead_s = lookahead_s
@@ -102,4 +102,4 @@ class VelocityObstaclePlanner:
             neighbor_threshold=math.inf,
         ).ravel()
         twist = (float(np.clip(speed, 0.0, limit_mps)), float(yaw_rate))
-        return obeying(constraints, robot_state, twist, dt_s, use_speed_field=self._use_speed_field)
+        return obeying(constraints, robot_state, twist, dt_s)

@@ -11,10 +11,12 @@ import numpy as np
 
 from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
+from tracking.prediction import PredictionModel
 
 from .._governor import BRISK_SHARE, RUNNING_SHARE
 from .._memory import ROUNDING_S, PersonMemory, position_sigma_m
 from .._policy import AwarenessPolicy
+from .._predicted import predicted_sigmas_m
 from .._robot import RobotProfile
 from .._speed_basis import SpeedBasis
 
@@ -148,7 +150,16 @@ def people_ahead(
     everyone = [(key, memory, None) for key, memory in basis.people.items()]
     for track_id, memory, lost_mps in (*everyone, *_lost(basis, stamp_s, times_s)):
         is_shown = lost_mps is None and shown.get(track_id) is memory.track
-        person = _person(basis.policy, track_id, memory, stamp_s, times_s, aware_for_s, is_shown)
+        person = _person(
+            basis.policy,
+            track_id,
+            memory,
+            stamp_s,
+            times_s,
+            aware_for_s,
+            is_shown,
+            basis.prediction,
+        )
         reach = _reach(basis.policy, robot, person, unaware_mps)
         free_m = reach.distance_m(robot.max_speed_mps)
         is_aged = person.place_m is not person.track_place_m
@@ -253,6 +264,7 @@ def _person(
     times_s: FloatArray,
     aware_for_s: float,
     is_shown: bool,
+    prediction: PredictionModel | None,
 ) -> _Person:
     """Return a person at all times; ``is_shown`` says whether their track is in the input."""
     timing, margins, rules = policy.timing, policy.margins, policy.rules
@@ -286,6 +298,9 @@ def _person(
             until_s = np.minimum(stamp_s + times_s, track.stamp_s + timing.stop_after_s)
         later_m = np.array([position_sigma_m(track, until) for until in until_s.tolist()])
         sigma_m = np.maximum(sigma_m, later_m)
+    if prediction is not None:
+        ahead_m = predicted_sigmas_m(track, age_s + times_s, prediction)
+        sigma_m = np.maximum(sigma_m, ahead_m)
     if aware_for_s < times_s[-1]:
         human_mps = np.where(times_s > aware_for_s, np.maximum(human_mps, unaware_mps), human_mps)
     walking_mps = math.hypot(*memory.velocity_odom_mps)

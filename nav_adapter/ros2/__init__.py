@@ -2,9 +2,10 @@
 
 The messages are plain dataclasses (:mod:`nav_adapter.ros2.messages`), made by pure functions of
 :class:`~nav_adapter.NavConstraints`. Publishing and recording need the extra ``ros2``, which
-:func:`encode`, :func:`decode`, :class:`DdsNode` and :class:`McapRecorder` load at first use. With
-ROS installed, :mod:`nav_adapter.ros2.node` runs the same bridge as an rclpy node. Times, poses and
-rclpy's messages are converted in :mod:`nav_adapter.ros2.conversions`.
+:func:`encode`, :func:`decode`, :class:`DdsNode`, :class:`McapRecorder`, :class:`JsonMcapRecorder`
+and :func:`read_json_messages` load at first use. With ROS installed, :mod:`nav_adapter.ros2.node`
+runs the same bridge as an rclpy node. Times, poses and rclpy's messages are converted in
+:mod:`nav_adapter.ros2.conversions`.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from ._transforms import TransformBuffer
 if TYPE_CHECKING:
     from ._cdr import decode, encode
     from ._dds import DdsNode
-    from ._mcap import McapRecorder
+    from ._mcap import JsonMcapRecorder, McapRecorder, read_json_messages
 
 __all__ = [
     "MASK_TOPICS",
@@ -46,6 +47,7 @@ __all__ = [
     "CameraMount",
     "DdsNode",
     "Frames",
+    "JsonMcapRecorder",
     "McapRecorder",
     "PerceivedFrame",
     "PerceptionThread",
@@ -71,6 +73,7 @@ __all__ = [
     "outgoing",
     "people",
     "picture_of",
+    "read_json_messages",
     "renamed",
     "scanner_inputs",
     "speed_limit",
@@ -90,8 +93,8 @@ def __getattr__(name: str) -> Any:
         from ._dds import DdsNode  # noqa: PLC0415
 
         return DdsNode
-    if name == "McapRecorder":
-        from ._mcap import McapRecorder  # noqa: PLC0415
+    if name in ("JsonMcapRecorder", "McapRecorder", "read_json_messages"):
+        from . import _mcap  # noqa: PLC0415
 
-        return McapRecorder
+        return getattr(_mcap, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -8,11 +8,12 @@ from awarenav.lazy import lazy_names
 
 if TYPE_CHECKING:
     from ._distributions import Choice, Distribution, Integers, read_distribution
-    from ._files import shipped_scenarios
+    from ._files import SCENARIO_SETS, shipped_scenarios
     from ._scenario import CameraSpec, RobotTask, Scenario
     from ._template import ScenarioTemplate, shipped_templates
 
 __all__ = [
+    "SCENARIO_SETS",
     "CameraSpec",
     "Choice",
     "Distribution",
@@ -34,7 +35,10 @@ __getattr__ = lazy_names(
             "Integers",
             "read_distribution",
         ),
-        "._files": ("shipped_scenarios",),
+        "._files": (
+            "SCENARIO_SETS",
+            "shipped_scenarios",
+        ),
         "._scenario": (
             "CameraSpec",
             "RobotTask",

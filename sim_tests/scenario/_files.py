@@ -13,13 +13,27 @@ from perception import documents
 from ..world.errors import SimError
 
 _FOLDER: Final = resources.files("sim_tests.scenario") / "shipped"
+# The folder of each set of shipped scenarios.
+_SETS: Final = {"all": _FOLDER, "guidelines": _FOLDER / "guidelines"}
+#: Names of the sets of shipped scenarios. ``"all"`` is the set that published figures are over.
+#: ``"guidelines"`` adds the situations of Francis et al. that it lacks.
+SCENARIO_SETS: Final = tuple(_SETS)
 _DEFAULTS: Final = _FOLDER / "defaults"
 _CAMERAS: Final = _FOLDER / "cameras"
 
 
-def shipped_scenarios() -> tuple[str, ...]:
-    """Return the names of the scenarios that come with the package, sorted."""
-    return _names_in(_FOLDER)
+def shipped_scenarios(scenario_set: str = "all") -> tuple[str, ...]:
+    """Return the names of a set of the scenarios that come with the package, sorted.
+
+    Args:
+        scenario_set: one of :data:`SCENARIO_SETS`.
+
+    Raises:
+        SimError: for another set.
+    """
+    if scenario_set not in _SETS:
+        raise SimError(not_one_of("set of scenarios", scenario_set, SCENARIO_SETS))
+    return _names_in(_SETS[scenario_set])
 
 
 def shipped_text(name: str) -> tuple[str, str]:
@@ -32,10 +46,10 @@ def shipped_text(name: str) -> tuple[str, str]:
         SimError: for a name that is not shipped.
     """
     plain = str(name).partition("@")[0]
-    names = shipped_scenarios()
-    if plain not in names:
-        raise SimError(not_one_of("scenario", plain, names))
-    return plain, (_FOLDER / f"{plain}.yaml").read_text("utf-8")
+    folders = {name: folder for folder in _SETS.values() for name in _names_in(folder)}
+    if plain not in folders:
+        raise SimError(not_one_of("scenario", plain, tuple(folders)))
+    return plain, (folders[plain] / f"{plain}.yaml").read_text("utf-8")
 
 
 def require_version(name: str, version: int) -> None:

@@ -175,9 +175,13 @@ class ScenarioTemplate:
         return f"ScenarioTemplate({self.id!r}, {len(self._parameters)} parameters)"
 
 
-def shipped_templates() -> tuple[ScenarioTemplate, ...]:
-    """Return every scenario that comes with the package, sorted by name."""
-    return tuple(ScenarioTemplate.shipped(name) for name in shipped_scenarios())
+def shipped_templates(scenario_set: str = "all") -> tuple[ScenarioTemplate, ...]:
+    """Return a set of the scenarios that come with the package, sorted by name.
+
+    Args:
+        scenario_set: as for :func:`shipped_scenarios`.
+    """
+    return tuple(ScenarioTemplate.shipped(name) for name in shipped_scenarios(scenario_set))
 
 
 def _uniform(key: list[int], path: str) -> float:

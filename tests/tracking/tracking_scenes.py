@@ -101,3 +101,25 @@ def white_acceleration(dt_s: float, density_m2ps3: float) -> tuple[FloatArray, F
     block = expm(dt_s * np.block([[-A, W], [np.zeros((4, 4)), A.T]]))
     F = block[4:, 4:].T
     return F, F @ block[:4, 4:]
+
+
+def track_of(
+    *,
+    position: ArrayLike = (0.0, 0.0),
+    velocity: ArrayLike = (0.0, 0.0),
+    covariance: ArrayLike | None = None,
+) -> PersonTrack:
+    """Return a confirmed track at stamp 0."""
+    return PersonTrack(
+        id=1,
+        stamp_s=0.0,
+        status="confirmed",
+        position_odom_m=np.asarray(position, dtype=float),
+        velocity_odom_mps=np.asarray(velocity, dtype=float),
+        covariance_odom=0.01 * np.eye(4) if covariance is None else np.asarray(covariance),
+        awareness=0.5,
+        awareness_std=0.1,
+        awareness_lower=0.3,
+        height_m=1.75,
+        time_since_seen_s=0.0,
+    )

@@ -14,8 +14,7 @@ _RANGE_M: Final = 3.0
 _SLOW_MPS: Final = 0.15
 _CLEARANCE_M: Final = 0.45
 # A person walks no faster towards the robot than covers the distance beyond the standoff in this
-# time. The standoff is measured from the body's centre.
-_STANDOFF_M: Final = 0.45
+# time.
 _APPROACH_S: Final = 0.5
 
 
@@ -49,9 +48,12 @@ class SlowRobotDetour:
 
 
 def limit_approach(
-    desired: DesiredVelocity, x: float, y: float, robot: RobotBody
+    desired: DesiredVelocity, x: float, y: float, robot: RobotBody, standoff_m: float
 ) -> DesiredVelocity:
-    """Return the desired velocity of a person at (x, y), without walking into the robot."""
+    """Return the desired velocity of a person at (x, y), without walking into the robot.
+
+    The standoff is the distance from the body's centre to the robot.
+    """
     near_x, near_y = robot.nearest_point_m(x, y)
     dx, dy = near_x - x, near_y - y
     away = math.hypot(dx, dy)
@@ -59,7 +61,7 @@ def limit_approach(
         return desired
     nx, ny = dx / away, dy / away
     vx, vy = desired.speed_mps * desired.ux, desired.speed_mps * desired.uy
-    limit = max(away - _STANDOFF_M, 0.0) / _APPROACH_S
+    limit = max(away - standoff_m, 0.0) / _APPROACH_S
     excess = max(vx * nx + vy * ny - limit, 0.0)
     if excess <= 0.0:
         return desired

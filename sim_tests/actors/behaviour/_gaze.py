@@ -135,7 +135,7 @@ class Gaze:
         glances: the scenario's figures.
         stature_m: height of the body.
         rng: draws glances.
-        seated: the person sits.
+        activity: of the person, who may sit or kneel.
 
     Attributes:
         noticed_s: time of the first look at the robot; None before.
@@ -148,10 +148,10 @@ class Gaze:
         stature_m: float,
         rng: np.random.Generator,
         *,
-        seated: bool = False,
+        activity: str = "none",
     ) -> None:
         self._glances = glances
-        self._eyes_m = eye_height_m(stature_m, seated=seated)
+        self._eyes_m = eye_height_m(stature_m, activity)
         self._process = GlanceProcess(
             LogNormalDuration.fitted(glances.glance_median_s, glances.glance_quartiles_s),
             LogNormalDuration.fitted(glances.away_median_s, glances.away_quartiles_s),

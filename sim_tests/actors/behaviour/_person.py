@@ -9,15 +9,19 @@ from typing import Final, Protocol
 
 from perception.arrays import FloatArray
 
-from ..body import SEATED_EYE_HEIGHT_SHARE, Activity, GaitPose
+from ..body import KNEELING_EYE_HEIGHT_SHARE, SEATED_EYE_HEIGHT_SHARE, Activity, GaitPose
 
 #: Height of the eyes as a share of stature.
 EYE_HEIGHT_SHARE: Final = 0.94
+_LOW_EYE_HEIGHT_SHARES: Final = {
+    "sitting": SEATED_EYE_HEIGHT_SHARE,
+    "kneeling": KNEELING_EYE_HEIGHT_SHARE,
+}
 
 
-def eye_height_m(stature_m: float, *, seated: bool) -> float:
-    """Return the height of the eyes of a person who stands or sits."""
-    return (SEATED_EYE_HEIGHT_SHARE if seated else EYE_HEIGHT_SHARE) * stature_m
+def eye_height_m(stature_m: float, activity: str = "none") -> float:
+    """Return the height of the eyes of a person who stands, sits or kneels."""
+    return _LOW_EYE_HEIGHT_SHARES.get(activity, EYE_HEIGHT_SHARE) * stature_m
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +120,7 @@ class PersonMotion:
         head_pitch_rad: of the head, up positive.
         eye_yaw_rad: of the eyes from the head, left positive.
         eye_pitch_rad: of the eyes from the head, up positive.
-        activity: of the hands, or sitting.
+        activity: of the hands, or sitting or kneeling.
     """
 
     position_odom_m: FloatArray

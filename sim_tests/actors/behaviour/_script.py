@@ -16,6 +16,7 @@ from ..body import (
     MAX_HEAD_YAW_RAD,
     MAX_STATURE_M,
     MIN_STATURE_M,
+    STAYING,
     Activity,
     ActivityName,
     worker_names,
@@ -55,7 +56,7 @@ class GazeKey(StrictConfig):
 
 
 class ActivityKey(StrictConfig):
-    """Activity of the hands from a time on; the change takes 0.6 s. Or sitting, from the start.
+    """Activity of the hands from a time on; the change takes 0.6 s. Or sitting or kneeling.
 
     Attributes:
         t_s: time from the start of the episode.
@@ -81,8 +82,8 @@ class WorkerScript(StrictConfig):
             the walk.
         gaze: keys of head and eyes; empty looks ahead.
         activities: keys of the hands in order of time, at least 0.6 s apart. The first one holds
-            before its time as well. Empty is none. ``sitting`` is a posture of the whole body for
-            the whole script, of a worker who stays at one place with one heading.
+            before its time as well. Empty is none. ``sitting`` and ``kneeling`` are postures of the
+            whole body for the whole script, of a worker who stays at one place with one heading.
     """
 
     error: ClassVar[type[ValueError]] = SimError
@@ -119,26 +120,27 @@ class WorkerScript(StrictConfig):
         return self
 
     @model_validator(mode="after")
-    def _seated_people_stay(self) -> WorkerScript:
+    def _low_people_stay(self) -> WorkerScript:
         names = {key.activity for key in self.activities}
-        if "sitting" not in names:
+        low = next((name for name in STAYING if name in names), None)
+        if low is None:
             return self
         if len(names) > 1:
             raise ValueError(
-                "a worker who sits stays seated: activities must all be 'sitting', got "
+                f"a worker who sits or kneels stays there: activities must all be {low!r}, got "
                 f"{', '.join(sorted(names))}"
             )
         if len({(point.x_m, point.y_m) for point in self.path}) > 1 or len(self.heading) > 1:
             raise ValueError(
-                "a worker who sits stays at one place with one heading, got "
+                "a worker who sits or kneels stays at one place with one heading, got "
                 f"{len(self.path)} waypoints of path and {len(self.heading)} keys of heading"
             )
         return self
 
     @property
-    def seated(self) -> bool:
-        """True if the worker sits."""
-        return bool(self.activities) and self.activities[0].activity == "sitting"
+    def stays(self) -> bool:
+        """True if the worker sits or kneels."""
+        return bool(self.activities) and self.activities[0].activity in STAYING
 
     def walk(self) -> PlannedWalk:
         """Return the planned walk."""
@@ -246,7 +248,7 @@ class Scripted:
         to_robot = heading, 0.0
         if around.robot is not None:
             camera_x, camera_y, camera_z = around.robot.camera_m
-            up = camera_z - eye_height_m(self.stature_m, seated=self.script.seated)
+            up = camera_z - eye_height_m(self.stature_m, self.script.activity(t_s).name)
             to_robot = (
                 math.atan2(camera_y - y, camera_x - x),
                 math.atan2(up, math.hypot(camera_x - x, camera_y - y)),

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from tracking.config import StrictConfig
 
 from ...world.errors import SimError
-from ..body import MAX_STATURE_M, MIN_STATURE_M, ActivityName
+from ..body import MAX_STATURE_M, MIN_STATURE_M, STAYING, ActivityName
 
 
 class RoutePoint(StrictConfig):
@@ -158,11 +158,13 @@ class PersonSpec(StrictConfig):
         backwards: walk backwards.
         pauses: stops on the way.
         turns_back_at_m: length of route after which the person walks back to the start; None never.
-        activity: activity of the hands; or ``sitting``, at a route of one point. Seated people
-            look, but never move.
+        activity: activity of the hands; or ``sitting`` or ``kneeling``, at a route of one point.
+            Seated and kneeling people look, but never move.
         glances: glances at the robot.
         reactions: shares of the reactions to it.
         lapse: when the person forgets the robot after a look at it; None never.
+        keeps_off_m: distance from the body's centre that the person keeps from a known robot ahead;
+            more for a person who walks behind the robot.
         social: social forces of racks, people and, once it has been noticed, the robot.
     """
 
@@ -182,18 +184,19 @@ class PersonSpec(StrictConfig):
     glances: Glances = Glances()
     reactions: Reactions = Reactions()
     lapse: Lapse | None = None
+    keeps_off_m: float = Field(default=0.45, ge=0.3, le=3.0)
     social: bool = True
 
     @model_validator(mode="after")
-    def _seated_people_stay(self) -> PersonSpec:
-        if self.seated and len(self.route) > 1:
+    def _low_people_stay(self) -> PersonSpec:
+        if self.stays and len(self.route) > 1:
             raise ValueError(
-                "a person with activity 'sitting' stays seated: route must have one point, got "
-                f"{len(self.route)}"
+                f"a person with activity {self.activity!r} stays at one place: route must have one "
+                f"point, got {len(self.route)}"
             )
         return self
 
     @property
-    def seated(self) -> bool:
-        """True if the person sits."""
-        return self.activity == "sitting"
+    def stays(self) -> bool:
+        """True if the person sits or kneels."""
+        return self.activity in STAYING

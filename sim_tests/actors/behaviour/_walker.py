@@ -88,7 +88,7 @@ class Walker:
                 f"route point {number} of {spec.name!r}", point.x_m, point.y_m
             )
         gaze_rng, reaction_rng = rng.spawn(2)
-        self._gaze = Gaze(spec.glances, spec.stature_m, gaze_rng, seated=spec.seated)
+        self._gaze = Gaze(spec.glances, spec.stature_m, gaze_rng, activity=spec.activity)
         self._span = AttentionSpan(spec.lapse)
         self._reactions = ReactionModel(spec.reactions, reaction_rng)
         self._detour = SlowRobotDetour()
@@ -237,7 +237,7 @@ class Walker:
             self._heading += self._turning * (self._now_s - self._tick * DECISION_PERIOD_S)
             self._turning = 0.0
             self._gaze.startle(self._now_s)
-        if self.spec.seated:
+        if self.spec.stays:
             return
         self._touch = (towards_x, towards_y, self._now_s)
         x, y, vx, vy = self._trajectory.state(self._now_s)
@@ -256,7 +256,7 @@ class Walker:
             self._walked_m += math.dist((x, y), self._trajectory.start)
             self._heading += self._turning * DECISION_PERIOD_S
         robot = self._span.known(self._look_at_robot(t_s, (x, y, self._heading), around))
-        if self.spec.seated:
+        if self.spec.stays:
             self._trajectory.start_segment(t_s, (x, y, 0.0, 0.0), (0.0, 0.0), DECISION_PERIOD_S)
             return
         on_route = self._span.lead(self._follower, t_s, x, y, math.hypot(vx, vy))
@@ -269,7 +269,7 @@ class Walker:
         if walking and robot is not None:
             desired = self._detour.steer(desired, x, y, robot)
         if robot is not None:
-            desired = limit_approach(desired, x, y, robot)
+            desired = limit_approach(desired, x, y, robot, self.spec.keeps_off_m)
         desired, facing = self._recoil_or_face(t_s, on_route, desired)
         acceleration = self._acceleration((x, y, vx, vy), desired, robot, around)
         self._turn(facing)

@@ -1,7 +1,7 @@
 """The bodies of workers.
 
 The shipped assets (meshes, joints, keypoints), their skeletons, the gait and its footsteps, the
-postures of the arms, the seated posture, and :class:`Worker`, which places a body in the physics
+postures of the arms, sitting and kneeling, and :class:`Worker`, which places a body in the physics
 and the render world.
 """
 
@@ -22,8 +22,8 @@ from ._gait_pose import GaitPose
 from ._online_footsteps import OnlineFootsteps
 from ._planned_footsteps import plan_footsteps
 from ._pose import BodyPose, link_transforms, skin_points
-from ._postures import ACTIVITIES, BOX_SIZE_M, PHONE_SIZE_M, Activity, ActivityName
-from ._sitting import SEATED_EYE_HEIGHT_SHARE, Seat, SeatKind
+from ._postures import ACTIVITIES, BOX_SIZE_M, PHONE_SIZE_M, STAYING, Activity, ActivityName
+from ._sitting import KNEELING_EYE_HEIGHT_SHARE, SEATED_EYE_HEIGHT_SHARE, Seat, SeatKind
 from ._skeleton import MAX_STATURE_M, MIN_STATURE_M, skeleton
 from ._skin import WorkerSkin
 from ._worker import (
@@ -39,6 +39,7 @@ __all__ = [
     "BOX_SIZE_M",
     "DETAIL_LEVELS",
     "JOINTS",
+    "KNEELING_EYE_HEIGHT_SHARE",
     "MAX_EYE_PITCH_RAD",
     "MAX_EYE_YAW_RAD",
     "MAX_HEAD_PITCH_RAD",
@@ -49,6 +50,7 @@ __all__ = [
     "PARENTS",
     "PHONE_SIZE_M",
     "SEATED_EYE_HEIGHT_SHARE",
+    "STAYING",
     "Activity",
     "ActivityName",
     "BodyPose",

@@ -1,4 +1,4 @@
-"""Postures of the arms: swinging, carrying a box, reading a phone, resting on the thighs."""
+"""Postures of the arms: swinging, carrying a box, reading a phone, resting, working low down."""
 
 from __future__ import annotations
 
@@ -34,9 +34,11 @@ from ._quaternions import (
 )
 from ._skeleton import LEFT, RIGHT, SIDES, SIGNS, Skeleton
 
-ActivityName = Literal["none", "carry_box", "phone", "sitting"]
-#: Names of all activities. People sit with their whole body, and stay seated.
+ActivityName = Literal["none", "carry_box", "phone", "sitting", "kneeling"]
+#: Names of all activities. People sit and kneel with their whole body, and stay there.
 ACTIVITIES: Final = get_args(ActivityName)
+#: The activities of people who stay at their place.
+STAYING: Final = ("sitting", "kneeling")
 #: Depth, width and height of the carried box along its x, y and z.
 BOX_SIZE_M: Final = (0.30, 0.40, 0.28)
 #: Thickness, width and height of the phone along its x, y and z; its screen faces −x.
@@ -76,9 +78,10 @@ Arm = tuple[Quaternion, Quaternion, Quaternion]  # shoulder, elbow, wrist
 
 @dataclass(frozen=True, slots=True)
 class Activity:
-    """The activity of the hands, or the change from one to the next; or sitting.
+    """The activity of the hands, or the change from one to the next; or sitting, or kneeling.
 
-    Nobody sits down or stands up: ``"sitting"`` has no other activity before it.
+    People neither sit down nor kneel down nor stand up: ``"sitting"`` and ``"kneeling"`` have no
+    other activity before them.
 
     Attributes:
         name: the activity, one of :data:`ACTIVITIES`.
@@ -97,11 +100,12 @@ class Activity:
                 raise SimError(f"activity must be one of {valid}, got {name!r}")
         if not 0.0 <= self.share <= 1.0:
             raise SimError(f"share of an activity must lie in [0, 1], got {self.share!r}")
-        if self.name != self.before and "sitting" in (self.name, self.before):
-            raise SimError(
-                "a person who sits stays seated: the activity before sitting must be 'sitting' as "
-                f"well, got {self.before!r} before {self.name!r}"
-            )
+        for doing, stays in (("sitting", "sits stays seated"), ("kneeling", "kneels stays there")):
+            if self.name != self.before and doing in (self.name, self.before):
+                raise SimError(
+                    f"a person who {stays}: the activity before {doing} must be {doing!r} as "
+                    f"well, got {self.before!r} before {self.name!r}"
+                )
 
     @classmethod
     def of(cls, name: str) -> Activity:
@@ -112,6 +116,11 @@ class Activity:
     def seated(self) -> bool:
         """True if the person sits."""
         return self.name == "sitting"
+
+    @property
+    def stays(self) -> bool:
+        """True if the person sits or kneels."""
+        return self.name in STAYING
 
     @property
     def held(self) -> Literal["box", "phone", "seat"] | None:
@@ -137,7 +146,7 @@ class ArmPostures:
     """The arms of one body for every activity, relative to its thorax at rest.
 
     Attributes:
-        carrying: left and right arm with the box in the hands.
+        carrying: left and right arm with the box in the hands; also at work on the knees.
         reading: right arm with the phone in the hand; the left one swings.
         resting: left and right arm of a seated person, the hands on the thighs.
         box_m: middle of the box in the body frame at rest; it moves with the thorax.
@@ -164,7 +173,7 @@ class ArmPostures:
         )
 
     def _arms_of(self, name: str, gait_pose: GaitPose) -> tuple[Arm, Arm]:
-        if name == "carry_box":
+        if name in ("carry_box", "kneeling"):  # both hands at something before the belly
             return self.carrying
         if name == "sitting":
             return self.resting

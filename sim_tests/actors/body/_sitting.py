@@ -1,4 +1,4 @@
-"""The seated posture: level thighs, upright shanks, and the stool or box that is sat on."""
+"""Postures low down: seated on a stool or box, and on both knees."""
 
 from __future__ import annotations
 
@@ -19,6 +19,8 @@ from ._skeleton import SIDES, SIGNS, Skeleton
 SeatKind = Literal["stool", "box"]
 #: Height of the eyes of a seated person as a share of the standing stature.
 SEATED_EYE_HEIGHT_SHARE: Final = 0.71
+#: The same of a person on both knees.
+KNEELING_EYE_HEIGHT_SHARE: Final = 0.67
 
 _MEAN_STATURE_M: Final = 1.75
 # The seat for a body of 1.75 m: depth and width, and its middle ahead of the hips.
@@ -30,6 +32,11 @@ _HIPS_ABOVE_SEAT_M: Final = 0.115
 # Seated feet stand wider apart than the hips, and the toes point outwards.
 _FEET_APART: Final = 1.35
 _TOE_OUT_RAD: Final = math.radians(8.0)
+# Knees and stretched feet on the floor, at 1.75 m: height of the knees' and the ankles' joints, and
+# the pitch of the feet.
+_KNEE_HEIGHT_M: Final = 0.070
+_ANKLE_HEIGHT_M: Final = 0.075
+_FOOT_PITCH_RAD: Final = math.radians(155.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +65,23 @@ def seated_pose(bones: Skeleton) -> GaitPose:
         yaw = SIGNS[number] * _TOE_OUT_RAD
         feet.append((x, _FEET_APART * ankle[1], ankle[2], yaw, 0.0))
         hips += 0.5 * (ankle[2] + shank - (hip[2] - bones.hips_m[2]))
+    return GaitPose((feet[0], feet[1]), hips)
+
+
+@lru_cache(maxsize=64)
+def kneeling_pose(bones: Skeleton) -> GaitPose:
+    """Return feet and hips of a person on both knees, in the body's frame; thighs are upright."""
+    size = bones.stature_m / _MEAN_STATURE_M
+    feet = []
+    hips = 0.0
+    for number, name in enumerate(SIDES):
+        hip = bones.joint_m(f"{name}_hip")
+        leg = bones.legs[number]
+        thigh, shank = math.hypot(*leg.first_m), math.hypot(*leg.second_m)
+        down = (_ANKLE_HEIGHT_M - _KNEE_HEIGHT_M) * size
+        x = hip[0] - bones.hips_m[0] - math.sqrt(shank**2 - down**2)
+        feet.append((x, hip[1], _ANKLE_HEIGHT_M * size, 0.0, _FOOT_PITCH_RAD))
+        hips += 0.5 * (_KNEE_HEIGHT_M * size + thigh - (hip[2] - bones.hips_m[2]))
     return GaitPose((feet[0], feet[1]), hips)
 
 

@@ -32,7 +32,7 @@ from ._quaternions import (
     rotation_z,
     subtract,
 )
-from ._sitting import Seat, SeatKind, fitting_seat, seat_pose, seated_pose
+from ._sitting import Seat, SeatKind, fitting_seat, kneeling_pose, seat_pose, seated_pose
 from ._skeleton import Skeleton, skeleton
 from ._skin import WorkerSkin
 
@@ -155,9 +155,9 @@ class Worker:
             eye_yaw_rad: of the eyes from the head, left positive, within ±35°.
             eye_pitch_rad: of the eyes from the head, up positive, within ±25°.
             activity: ``"none"``, ``"carry_box"``, ``"phone"``, or a change between two of them;
-                or ``"sitting"`` on the seat, with the hips above the position.
+                or ``"sitting"`` on the seat, or ``"kneeling"``; the hips are above the position.
             feet: gait pose in odom, as :func:`plan_footsteps` and :class:`OnlineFootsteps` give it;
-                None takes the straight walk of ``walked_m`` and ``speed_mps``. Unused while seated.
+                None takes the straight walk of ``walked_m`` and ``speed_mps``. Unused low down.
             collides: False leaves the collision body behind until :meth:`place_collision_body`,
                 which saves half the time.
 
@@ -177,8 +177,9 @@ class Worker:
             _checked_angle("eye_pitch_rad", eye_pitch_rad, MAX_EYE_PITCH_RAD),
         )
         doing = activity if isinstance(activity, Activity) else Activity.of(activity)
-        if doing.seated:
-            feet, gait_pose = None, seated_pose(self.skeleton)
+        if doing.stays:
+            low = seated_pose if doing.seated else kneeling_pose
+            feet, gait_pose = None, low(self.skeleton)
         else:
             gait_pose = self.gait.pose(walked, speed) if feet is None else feet
         self._x_m, self._y_m, self._heading_rad = x, y, heading
@@ -200,9 +201,9 @@ class Worker:
         if not self.collision_left_behind:
             return
         self.collision_left_behind = False
-        held = self.held
-        seat = self.T_odom_held if held == "seat" else None
-        self._body.place(self._hips_odom_m, self._pelvis, self._joints, held == "box", seat)
+        doing = self._activity
+        seat = self.T_odom_held if doing.seated else None
+        self._body.place(self._hips_odom_m, self._pelvis, self._joints, doing.held == "box", seat)
         self.collision_place_odom_m = (self._x_m, self._y_m)
 
     @property

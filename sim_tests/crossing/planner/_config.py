@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import ClassVar
+from typing import ClassVar, Final
 
 from pydantic import Field, model_validator
 
+from nav_adapter import RobotProfile
 from tracking.config import StrictConfig
 
 from ...world.errors import SimError
+
+_LONGEST_HORIZON_S: Final = 7.5
 
 
 class PlannerConfig(StrictConfig):
@@ -81,6 +84,33 @@ class PlannerConfig(StrictConfig):
     """Cost of changing the yaw rate by its largest value."""
     keep_right_weight: float = Field(default=0.01, ge=0.0)
     """Cost of turning left at the largest yaw rate while people are about; settles ties."""
+
+    @classmethod
+    def for_robot(cls, robot: RobotProfile) -> PlannerConfig:
+        """Return the defaults, fitted to the limits of ``robot``.
+
+        Turning keeps to the profile's yaw rate and yaw acceleration, and costs as much per rad/s as
+        by default. The horizon is at least twice the time to stop from full speed. Distances to
+        people and boxes stay, since they do not depend on the robot.
+        """
+        usual = cls()
+        yaw_rate = min(usual.max_yaw_rate_radps, robot.max_yaw_rate_radps or math.inf)
+        yaw_acceleration = min(
+            usual.max_yaw_acceleration_radps2, robot.max_yaw_acceleration_radps2 or math.inf
+        )
+        share = yaw_rate / usual.max_yaw_rate_radps
+        stop_s = robot.max_speed_mps / robot.max_deceleration_mps2
+        longer = min(max(2.0 * stop_s / usual.horizon_s, 1.0), _LONGEST_HORIZON_S / usual.horizon_s)
+        return cls(
+            horizon_s=usual.horizon_s * longer,
+            step_s=min(usual.step_s * longer, 0.5),
+            turn_time_s=usual.turn_time_s * longer,
+            max_yaw_rate_radps=yaw_rate,
+            max_yaw_acceleration_radps2=yaw_acceleration,
+            turn_weight=usual.turn_weight * share**2,
+            smoothness_weight=usual.smoothness_weight * share,
+            keep_right_weight=usual.keep_right_weight * share,
+        )
 
     @model_validator(mode="after")
     def _turns_to_its_goal(self) -> PlannerConfig:

@@ -12,6 +12,7 @@ from nav_adapter import NavConstraints, RobotProfile, RobotState
 from perception.arrays import FloatArray, finite_array, finite_number
 
 from ...world.errors import SimError
+from ._candidates import Candidates, Sampler, TwistLimits
 from ._config import PlannerConfig
 from ._detour import detour_bearing_rad
 from ._rollout import Poses, clip_to_window, follow_arcs, ramp_integral, stopping_integral
@@ -22,9 +23,11 @@ from ._scene import FootprintBox, Scene
 # clearance.
 _BRAKING_SAMPLES: Final = 16
 # Tolerance for rounding when a motion is compared with waiting.
-_SLACK_M: Final = 1e-3
+_SLACK_M: Final = 1e-5
 # Costs closer than this are equal; the order of the samples then decides, not the rounding.
 _TIE: Final = 1e-9
+# Added to the distances from which on people and boxes do not count, against rounding.
+_FAR_M: Final = 0.01
 # A slower robot counts as standing.
 _STANDING_MPS: Final = 0.02
 _STANDING: Final = Poses(*(np.asarray(value) for value in (0.0, 0.0, 1.0, 0.0)))
@@ -52,7 +55,7 @@ class SamplingPlanner:
     Args:
         robot: footprint and limits. The footprint counts with its bounding rectangle.
         static_boxes_odom_m: (N, 4) fixed obstacles x_min, y_min, x_max, y_max; None for none.
-        config: sampling and preferences; None for the defaults.
+        config: sampling and preferences; None for :meth:`PlannerConfig.for_robot`.
 
     Raises:
         SimError: if the boxes are not finite or a minimum is not below its maximum.
@@ -65,7 +68,7 @@ class SamplingPlanner:
         config: PlannerConfig | None = None,
     ) -> None:
         self.robot = robot
-        self.config = config = config if config is not None else PlannerConfig()
+        self.config = config = config if config is not None else PlannerConfig.for_robot(robot)
         self._footprint = FootprintBox.of(robot)
         self._boxes_odom_m = _checked_boxes(static_boxes_odom_m)
 
@@ -74,14 +77,16 @@ class SamplingPlanner:
 
         samples = max(2, math.ceil(config.horizon_s / config.step_s))
         self._t_s = along_time(config.horizon_s / samples, config.horizon_s, samples)
+        # From the first sample past the turn on, the heading stays.
+        turning = 1 + int(np.searchsorted(self._t_s.ravel(), config.turn_time_s))
         self._turn_t_s = np.minimum(self._t_s, config.turn_time_s)
+        self._turning = slice(0, turning)
         self._late_people = along_time(1.0, config.late_weight, samples)
         self._late_static = along_time(1.0, config.late_static_weight, samples)
         self._braking_share = along_time(0.0, 1.0, _BRAKING_SAMPLES)
-        self._speed_share = np.linspace(0.0, 1.0, config.speed_samples)
-        spread = np.linspace(-1.0, 1.0, config.yaw_rate_samples)
-        # Two more are filled in for each plan: the present rate, and the one that faces the goal.
-        self._yaw_share = np.append(np.sign(spread) * np.abs(spread) ** 1.5, [0.0, 0.0])
+        self._sampler = Sampler(robot, config)
+        # A robot that steers follows its curve; any other one chooses yaw rate and speed apart.
+        self._steers = robot.min_turning_radius_m is not None
 
     def plan(
         self,
@@ -101,8 +106,9 @@ class SamplingPlanner:
         Returns:
             ``(speed_mps, yaw_rate_radps)``. The robot can reach the speed in ``dt_s``. It is never
             negative, and above ``constraints.speed_limit_mps`` only where full braking does not get
-            below the limit in one tick. The yaw rate is such that no corner of the footprint turns
-            about the base origin faster than the speed limit, with the same exception.
+            below the limit in one tick. With the yaw rate, |v| + |ω| R obeys
+            ``constraints.fastest_point_limit_mps`` (R is the circumscribed radius), with the same
+            exception. A robot that steers gets no curve tighter than its turning radius.
 
         Raises:
             SimError: if the goal is not two finite numbers or ``dt_s`` is not positive.
@@ -111,48 +117,42 @@ class SamplingPlanner:
         dt_s = finite_number("dt_s", dt_s, SimError, minimum=0.0, exclusive_minimum=True)
         goal_x_m, goal_y_m = _in_base(robot_state, goal_odom_m)
         goal_distance_m = math.hypot(goal_x_m, goal_y_m)
-        limit_mps = min(constraints.speed_limit_mps, self.robot.max_speed_mps)
-        if limit_mps <= 0.0 or goal_distance_m <= self.config.goal_tolerance_m:
+        limits = TwistLimits.of(self.robot, self.config, constraints)
+        if limits.speed_mps <= 0.0 or goal_distance_m <= self.config.goal_tolerance_m:
             return self._brake(robot_state, dt_s)
 
-        speeds = self._target_speeds(limit_mps, goal_distance_m)
-        reach_m = max(robot_state.speed_mps, float(speeds[-1])) * self.config.horizon_s
+        gentle_mps2 = self.config.goal_deceleration_fraction * self.robot.max_deceleration_mps2
+        top_mps = min(limits.speed_mps, math.sqrt(2.0 * gentle_mps2 * goal_distance_m))
+        reach_m = max(robot_state.speed_mps, top_mps) * self.config.horizon_s
         scene = Scene(robot_state, constraints, self._boxes_within(robot_state, reach_m))
         bearing_rad = self._bearing(goal_x_m, goal_y_m, scene)
-        yaw_rates = self._target_yaw_rates(robot_state, limit_mps, bearing_rad)
-        speed_now, yaw_rate_now = robot_state.speed_mps, robot_state.yaw_rate_radps
-        fall = self.robot.max_deceleration_mps2 * dt_s
-        rise = self.robot.max_acceleration_mps2 * dt_s
-        yaw_step = self.config.max_yaw_acceleration_radps2 * dt_s
-        speed_commands = np.maximum(clip_to_window(speeds, speed_now, fall, rise), 0.0)
-        yaw_commands = clip_to_window(yaw_rates, yaw_rate_now, yaw_step, yaw_step)
-
-        # Many candidates begin with the same command: few distinct ones are in the window.
-        rows, row_of = _distinct(speed_commands)
-        columns, column_of = _distinct(yaw_commands)
-        safe = self._safe(rows, columns, speed_now, dt_s, scene)
+        candidates = self._sampler.candidates(robot_state, limits, top_mps, bearing_rad, dt_s)
+        speeds, yaw_rates, index = candidates.distinct()
+        safe = np.append(self._safe(speeds, yaw_rates, robot_state, dt_s, scene), False)
         if not safe.any():
             return self._brake(robot_state, dt_s)
-        cost = self._cost(speeds, yaw_rates, robot_state, (goal_distance_m, bearing_rad), scene)
-        cost[~safe[row_of[:, None], column_of]] = np.inf
-        row, column = divmod(int(np.argmax(cost <= cost.min() + _TIE)), len(yaw_rates))
-        return float(speed_commands[row]), float(yaw_commands[column])
+        cost = self._cost(candidates, robot_state, (goal_distance_m, bearing_rad), scene)
+        cost[~safe[index]] = np.inf
+        row, column = divmod(int(np.argmax(cost <= cost.min() + _TIE)), cost.shape[1])
+        return (
+            float(candidates.speed_commands_mps[row, column]),
+            float(candidates.yaw_commands_radps[row, column]),
+        )
 
     def _brake(self, robot_state: RobotState, dt_s: float) -> tuple[float, float]:
         """Return full braking along the present curve, as far as the yaw acceleration allows."""
         speed, yaw_rate = max(robot_state.speed_mps, 0.0), robot_state.yaw_rate_radps
         stop_s = speed / self.robot.max_deceleration_mps2
-        yaw_stop_s = max(stop_s, abs(yaw_rate) / self.config.max_yaw_acceleration_radps2)
+        yaw_stop_s = stop_s if self._steers else float(self._yaw_stop_s(stop_s, yaw_rate))
         return (
             speed * (1.0 - dt_s / stop_s) if stop_s > dt_s else 0.0,
             yaw_rate * (1.0 - dt_s / yaw_stop_s) if yaw_stop_s > dt_s else 0.0,
         )
 
-    def _target_speeds(self, limit_mps: float, goal_distance_m: float) -> FloatArray:
-        """Return (V,) speeds from 0 to the limit, or to the one that can still stop at the goal."""
-        gentle_mps2 = self.config.goal_deceleration_fraction * self.robot.max_deceleration_mps2
-        top_mps = min(limit_mps, math.sqrt(2.0 * gentle_mps2 * goal_distance_m))
-        return np.asarray(top_mps * self._speed_share)
+    def _yaw_stop_s(self, stop_s: ArrayLike, yaw_rate: ArrayLike) -> FloatArray:
+        """Return the time in which a turn ends: with the speed, or later if it has to."""
+        own_s = np.abs(yaw_rate) / self.config.max_yaw_acceleration_radps2
+        return np.asarray(np.maximum(stop_s, own_s))
 
     def _bearing(self, goal_x_m: float, goal_y_m: float, scene: Scene) -> float:
         """Return the bearing of the goal, or past a person who stands in front of it."""
@@ -174,17 +174,6 @@ class SamplingPlanner:
         goal_distance_m = math.hypot(goal_x_m, goal_y_m)
         return detour_bearing_rad(bearing_rad, goal_distance_m, discs, is_free)
 
-    def _target_yaw_rates(
-        self, robot_state: RobotState, limit_mps: float, bearing_rad: float
-    ) -> FloatArray:
-        """Return (W,) rates up to the limit, the present one, and the one that faces the goal."""
-        # The corners of a turning robot obey the speed limit too, for people beside it.
-        top_radps = min(self.config.max_yaw_rate_radps, limit_mps / self._footprint.reach_m)
-        yaw_rates = np.asarray(top_radps * self._yaw_share)
-        extra = (robot_state.yaw_rate_radps, bearing_rad / self.config.turn_time_s)
-        yaw_rates[-2:] = [min(max(rate, -top_radps), top_radps) for rate in extra]
-        return yaw_rates
-
     def _boxes_within(self, robot_state: RobotState, reach_m: float) -> FloatArray:
         """Return the boxes within reach of a roll-out of length ``reach_m``, or of full braking."""
         boxes = self._boxes_odom_m
@@ -201,29 +190,41 @@ class SamplingPlanner:
         self,
         speeds: FloatArray,
         yaw_rates: FloatArray,
-        speed_now_mps: float,
+        state: RobotState,
         dt_s: float,
         scene: Scene,
     ) -> NDArray[np.bool_]:
-        """Return (V, W) whether one tick of a command and then full braking keep the clearance."""
-        safe = np.ones((len(speeds), len(yaw_rates)), dtype=bool)
+        """Return whether one tick of a command and then full braking keep the clearance.
+
+        Args:
+            speeds: (N,) speeds of the commands.
+            yaw_rates: (N,) their yaw rates.
+            state: the robot now.
+            dt_s: length of a tick.
+            scene: people and boxes.
+        """
+        safe = np.ones((1, len(speeds)), dtype=bool)
         if not (scene.has_people or scene.has_boxes):
-            return safe
-        v, w = speeds[:, None], yaw_rates
+            return safe.ravel()
+        v, w = speeds[None], yaw_rates[None]
+        yaw_acceleration = self.config.max_yaw_acceleration_radps2
         stop_s = v / self.robot.max_deceleration_mps2
-        yaw_stop_s = np.maximum(stop_s, np.abs(w) / self.config.max_yaw_acceleration_radps2)
+        yaw_stop_s = stop_s if self._steers else self._yaw_stop_s(stop_s, w)
         t_s = dt_s + yaw_stop_s * self._braking_share
         # During the tick the speed lies between the present one and the command: take the larger.
-        extra_m = np.maximum(speed_now_mps - v, 0.0) * dt_s
-        poses = follow_arcs(
-            stopping_integral(v, stop_s, dt_s, t_s) + extra_m,
-            stopping_integral(w, yaw_stop_s, dt_s, t_s),
-        )
+        extra_m = np.maximum(state.speed_mps - v, 0.0) * dt_s
+        # The yaw rate ramps from the present one.
+        change = state.yaw_rate_radps - w
+        extra_rad = 0.5 * change * np.minimum(np.abs(change) / yaw_acceleration, dt_s)
+        path_m = stopping_integral(v, stop_s, dt_s, t_s) + extra_m
+        poses = follow_arcs(path_m, stopping_integral(w, yaw_stop_s, dt_s, t_s) + extra_rad)
         # A robot that never reverses must not drive to where it cannot turn on the spot.
         margin_m = np.where(v > 0.0, self._footprint.turning_margin_m, 0.0)
         moving = self._footprint.at(poses, margin_m)
         waiting = self._footprint.at(_STANDING, margin_m)
         clearance_m = self.config.clearance_m
+        near_m = float(path_m[-1].max()) + self._footprint.reach_m + clearance_m + _FAR_M
+        scene = scene.within(near_m + self._footprint.turning_margin_m, float(t_s[-1].max()))
         if scene.has_people:
             # The present gap to people is measured without this margin: else it could be used up.
             still = self._footprint.at(_STANDING)
@@ -235,12 +236,11 @@ class SamplingPlanner:
         if scene.has_boxes:
             enough = np.minimum(clearance_m, scene.box_gap_m(waiting) - _SLACK_M)
             safe &= (scene.box_gap_m(moving) >= enough).all(axis=0)
-        return safe
+        return safe.ravel()
 
     def _cost(
         self,
-        speeds: FloatArray,
-        yaw_rates: FloatArray,
+        candidates: Candidates,
         robot_state: RobotState,
         goal: tuple[float, float],
         scene: Scene,
@@ -249,23 +249,23 @@ class SamplingPlanner:
 
         ``goal`` is the distance to it (m) and the bearing to head for (rad).
         """
-        config, robot, t_s = self.config, self.robot, self._t_s
-        v, w = speeds[:, None], yaw_rates
-        rate = np.where(
-            v > robot_state.speed_mps, robot.max_acceleration_mps2, robot.max_deceleration_mps2
-        )
-        # A roll-out ends when it is as long as the distance to the goal.
+        config, t_s = self.config, self._t_s
         goal_distance_m, bearing_rad = goal
-        path = np.minimum(ramp_integral(robot_state.speed_mps, v, rate, t_s), goal_distance_m)
-        yaw_acceleration = config.max_yaw_acceleration_radps2
-        turn = ramp_integral(robot_state.yaw_rate_radps, w, yaw_acceleration, self._turn_t_s)
+        path, turn = self._roll_out(candidates, robot_state)
+        # A roll-out ends when it is as long as the distance to the goal.
+        path = np.minimum(path, goal_distance_m)
         poses = follow_arcs(path, turn)
 
         cost = self._goal_cost(poses, goal_distance_m, bearing_rad)
-        turning = yaw_rates / config.max_yaw_rate_radps
+        turning = candidates.yaw_rates_radps / config.max_yaw_rate_radps
         change = turning - robot_state.yaw_rate_radps / config.max_yaw_rate_radps
         cost += config.turn_weight * turning**2 + config.smoothness_weight * np.abs(change)
         rectangles = self._footprint.at(poses)
+        # Whoever stays farther away than any comfort has no cost.
+        comfort_m = max(config.person_comfort_m, config.room_m, config.static_comfort_m)
+        near_m = float(path[-1].max()) + self._footprint.reach_m + comfort_m + _FAR_M
+        among_people = scene.has_people
+        scene = scene.within(near_m, config.horizon_s + config.front_time_s)
         if scene.has_people:
             close = _closeness(scene.people_gap_m(rectangles, t_s), config.person_comfort_m)
             strip_gap = scene.strip_gap_m(rectangles, t_s, config.front_time_s)
@@ -279,6 +279,7 @@ class SamplingPlanner:
                 near = (_closeness(gaps_m, config.room_m).sum(axis=1) / len(t_s)).max(axis=0)
                 # Compares yaw rates at equal speed only: the speed limit slows the robot already.
                 cost += config.room_weight * (near - near.min(axis=1, keepdims=True))
+        if among_people:
             cost += config.keep_right_weight * np.maximum(turning, 0.0)
         if scene.has_boxes:
             close = _closeness(scene.box_gap_m(rectangles), config.static_comfort_m)
@@ -289,6 +290,26 @@ class SamplingPlanner:
                 worst_box[0] = _closeness(now, config.static_comfort_m)
             cost += config.static_weight * worst_box
         return cost
+
+    def _roll_out(
+        self, candidates: Candidates, robot_state: RobotState
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the paths (m) and headings (rad) of the candidates, both (T, V, W)."""
+        robot, speed = self.robot, robot_state.speed_mps
+        faster, slower = robot.max_acceleration_mps2, robot.max_deceleration_mps2
+        slow, w = candidates.turn_speeds_mps, candidates.yaw_rates_radps
+        rate = np.where(slow > speed, faster, slower)
+        turning_m = ramp_integral(speed, slow, rate, self._turn_t_s)
+        end_s = self.config.turn_time_s
+        after = clip_to_window(slow, speed, slower * end_s, faster * end_s)
+        rate = np.where(candidates.speeds_mps > after, faster, slower)
+        path = turning_m + ramp_integral(
+            after, candidates.speeds_mps, rate, self._t_s - self._turn_t_s
+        )
+        if self._steers:
+            return path, turning_m * (w / np.maximum(slow, _STANDING_MPS))
+        acceleration = self.config.max_yaw_acceleration_radps2
+        return path, ramp_integral(robot_state.yaw_rate_radps, w, acceleration, self._turn_t_s)
 
     def _goal_cost(self, poses: Poses, goal_distance_m: float, bearing_rad: float) -> FloatArray:
         """Return the cost (V, W) of mean distance to the goal and of facing away from it."""
@@ -309,13 +330,6 @@ def _in_base(robot_state: RobotState, point_odom_m: FloatArray) -> tuple[float, 
     x, y = (point_odom_m - robot_state.position_odom_m).tolist()
     c, s = math.cos(robot_state.heading_odom_rad), math.sin(robot_state.heading_odom_rad)
     return c * x + s * y, c * y - s * x
-
-
-def _distinct(values: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
-    """Return the distinct values in order of appearance, and the index of each value in them."""
-    index: dict[float, int] = {}
-    index_of = [index.setdefault(value, len(index)) for value in values.tolist()]
-    return np.array(list(index)), np.array(index_of, dtype=np.intp)
 
 
 def _closeness(gap_m: FloatArray, comfort_m: float) -> FloatArray:

@@ -9,7 +9,7 @@ from awarenav.lazy import lazy_names
 if TYPE_CHECKING:
     from ._checks import CHECKED_DRAWS, scenario_problems, template_problems
     from ._plans import CONFLICT_M, approach_statistics, closest_approaches, person_plan, robot_plan
-    from ._show import draw_command, list_command, show_command
+    from ._show import draw_command, list_command, names_of_sets, show_command
 
 __all__ = [
     "CHECKED_DRAWS",
@@ -18,6 +18,7 @@ __all__ = [
     "closest_approaches",
     "draw_command",
     "list_command",
+    "names_of_sets",
     "person_plan",
     "robot_plan",
     "scenario_problems",
@@ -43,6 +44,7 @@ __getattr__ = lazy_names(
         "._show": (
             "draw_command",
             "list_command",
+            "names_of_sets",
             "show_command",
         ),
     },

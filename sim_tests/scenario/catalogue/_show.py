@@ -12,7 +12,7 @@ from awarenav.files import json_text
 from ...actors.behaviour import PersonSpec
 from ...world.errors import SimError
 from .._distributions import Choice, Distribution
-from .._files import shipped_scenarios
+from .._files import SCENARIO_SETS, shipped_scenarios
 from .._template import ScenarioTemplate, shipped_templates
 from ._plans import CONFLICT_M, approach_statistics
 
@@ -20,26 +20,30 @@ _FORMATS: Final = (".png", ".svg", ".pdf")
 
 
 def list_command(*, as_json: bool = False) -> int:
-    """Print the shipped scenarios."""
-    templates = shipped_templates()
+    """Print the shipped scenarios, set by set."""
+    sets = {name: shipped_templates(name) for name in SCENARIO_SETS}
     if as_json:
-        print(json_text([_list_row(template) for template in templates]), end="")
+        rows = [_list_row(each, name) for name, templates in sets.items() for each in templates]
+        print(json_text(rows), end="")
         return 0
-    width = max(len(template.id) for template in templates)
-    print(f"{'scenario':{width}}  attention  people  varies")
-    for template in templates:
-        scenario = template.median()
-        people = len(scenario.people) + len(scenario.workers)
-        print(f"{template.id:{width}}  {template.attention:9}  {people:6}", end="")
-        print(f"  {len(template.parameters()):6}")
-        print(textwrap.indent(textwrap.fill(template.description, 88), "    "))
+    width = max(len(template.id) for templates in sets.values() for template in templates)
+    for name, templates in sets.items():
+        print(f"{'' if name == SCENARIO_SETS[0] else chr(10)}--scenario {name}")
+        print(f"{'scenario':{width}}  attention  people  varies")
+        for template in templates:
+            scenario = template.median()
+            people = len(scenario.people) + len(scenario.workers)
+            print(f"{template.id:{width}}  {template.attention:9}  {people:6}", end="")
+            print(f"  {len(template.parameters()):6}")
+            print(textwrap.indent(textwrap.fill(template.description, 88), "    "))
     return 0
 
 
-def _list_row(template: ScenarioTemplate) -> dict[str, Any]:
+def _list_row(template: ScenarioTemplate, scenario_set: str) -> dict[str, Any]:
     """Return a row of the list as plain data."""
     scenario = template.median()
     return {
+        "set": scenario_set,
         "name": template.name,
         "version": template.version,
         "attention": template.attention,
@@ -112,7 +116,7 @@ def draw_command(names: Sequence[str], out: str) -> int:
     """Draw scenarios into a file or a folder."""
     from ._drawing import save_drawing, scenario_figure  # noqa: PLC0415 - needs matplotlib
 
-    chosen = [each for name in names for each in (shipped_scenarios() if name == "all" else [name])]
+    chosen = names_of_sets(names)
     templates = [ScenarioTemplate.named(name) for name in chosen]
     path = Path(out)
     is_file = path.suffix.lower() in _FORMATS
@@ -129,6 +133,15 @@ def draw_command(names: Sequence[str], out: str) -> int:
         save_drawing(scenario_figure(template), file)
         print(file)
     return 0
+
+
+def names_of_sets(names: Sequence[str]) -> list[str]:
+    """Return names and files with the names of a set's scenarios in place of the set's."""
+    return [
+        each
+        for name in names
+        for each in (shipped_scenarios(name) if name in SCENARIO_SETS else [name])
+    ]
 
 
 def _person_text(spec: PersonSpec) -> str:

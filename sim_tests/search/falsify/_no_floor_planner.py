@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any, Final
 
@@ -46,5 +47,6 @@ class NoFloorPlanner:
             obstacles=tuple(replace(each, radius_m=_RADIUS_M) for each in constraints.obstacles),
             speed_limit_mps=self._robot.max_speed_mps,
             reachable_speed_limit_mps=self._robot.max_speed_mps,
+            fastest_point_limit_mps=math.inf,
         )
         return self._planner.plan(robot_state, goal_odom_m, unconstrained, dt_s)

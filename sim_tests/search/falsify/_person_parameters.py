@@ -9,6 +9,7 @@ import numpy as np
 
 from perception.arrays import FloatArray
 
+from ...actors.body import STAYING
 from ._variation import Parameter, bent_path
 
 #: Fast walking; a person who is faster in the scenario keeps that speed as the limit.
@@ -57,7 +58,7 @@ def person_parameters(person: Mapping[str, Any]) -> dict[str, Parameter]:
             ),
             "away_yaw_deg": Parameter.of(-80.0, 80.0, glances["away_yaw_deg"]),
         }
-        if person["activity"] != "sitting":  # seated people look, but never move
+        if person["activity"] not in STAYING:  # they look, but never move
             parameters |= _lapse_parameters(person)
         if not glances["watches"]:
             parameters |= {

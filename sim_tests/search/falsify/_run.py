@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from awarenav.errors import counted
 
 from ...crossing.eyes import Perception, PerceptionKind, SensorSet
 from .._files import common_settings
+from .._verdict import Verdict, command_text, episode_words
 from ._falsify import Falsification, FalsifySettings, falsify
 from ._plot import draw_falsification
-from ._worst_cases import WorstCase, write_episodes, write_summary, write_worst
+from ._verdict import policy_against, records_against, verdict_text
+from ._worst_cases import POLICY_FILE, WorstCase, write_episodes, write_summary, write_worst
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,6 +23,7 @@ class FalsifyOptions:
     """The options of ``awarenav falsify``."""
 
     policy: str
+    against: str
     scenario: tuple[str, ...]
     episodes: int
     generation: int
@@ -61,6 +64,7 @@ def falsify_command(options: FalsifyOptions) -> int:
             "UNSAFE: the adapter's floor is taken away on purpose. No robot may drive like this.",
             file=sys.stderr,
         )
+    against = policy_against(options.against, settings)
     falsification = falsify(
         settings,
         options.out,
@@ -70,12 +74,15 @@ def falsify_command(options: FalsifyOptions) -> int:
     )
     write_episodes(falsification, options.out / "episodes.csv")
     cases = write_worst(falsification, options.out, options.worst)
-    write_summary(falsification, cases, options.out / "summary.json")
+    others = records_against(cases, against, settings)
+    text = verdict_text(falsification, cases, others)
+    write_summary(falsification, cases, options.out / "summary.json", verdict=text, against=others)
     draw_falsification(falsification, cases, options.out / "falsify.png")
     if options.as_json:
         print((options.out / "summary.json").read_text(encoding="utf-8"), end="")
     else:
         print("\n".join(_table_lines(falsification, cases)))
+        print("\n".join(Verdict(text, _next_command(falsification, options)).lines()))
         print(f"Written to {options.out}")
     return 1 if falsification.contacts else 0
 
@@ -104,6 +111,28 @@ def _table_lines(falsification: Falsification, cases: Sequence[WorstCase]) -> li
         broken = counted(falsification.errors, "episode has", "episodes have")
         lines.append(f"{broken} no result; episodes.csv says why.")
     return lines
+
+
+def _next_command(falsification: Falsification, options: FalsifyOptions) -> str:
+    """Return the command to run after the search."""
+    if options.unsafe_no_floor:
+        return command_text(
+            *("falsify", "--policy", options.policy, *episode_words(options)),
+            *("--episodes", options.episodes, "--out", f"{options.out}_with_floor"),
+        )
+    own = options.out / POLICY_FILE
+    base = policy_against(options.against, falsification.settings)
+    other = options.against or (base[0] if base else "")
+    if falsification.contacts:
+        found = replace(options, scenario=(str(options.out / "worst_001.yaml"),))
+        return command_text(
+            *("crossings", *episode_words(found), "--policy", own, other),
+            *("--seed", options.seed, "--episodes", 1, "--out", options.out / "worst"),
+        )
+    return command_text(
+        *("crossings", *episode_words(options), "--policy", other, own, "--episodes", 44),
+        *("--out", options.out / "crossings"),
+    )
 
 
 def _two_decimals(value: float | None) -> str:

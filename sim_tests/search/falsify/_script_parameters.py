@@ -12,6 +12,7 @@ from scipy.interpolate import PchipInterpolator
 
 from perception.arrays import FloatArray
 
+from ...actors.body import STAYING
 from ._person_parameters import FASTEST_WALK_MPS
 from ._variation import Parameter, bent_path
 
@@ -58,7 +59,7 @@ def script_parameters(script: Mapping[str, Any]) -> dict[str, Parameter]:
         }
     if len(script["gaze"]) > 1:
         parameters["gaze_later_s"] = Parameter.of(-3.0, 3.0, 0.0)
-    if not any(key["activity"] == "sitting" for key in script["activities"]):
+    if not any(key["activity"] in STAYING for key in script["activities"]):
         parameters |= {
             "sets_off_after_s": Parameter.of(0.0, _STAYS_S, _STAYS_S),
             "sets_off_x_m": Parameter.of(-_LONGEST_WAY_M, _LONGEST_WAY_M, 0.0),

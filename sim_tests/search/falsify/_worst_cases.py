@@ -26,7 +26,8 @@ from ._restarted_search import CONTACT_SCORE, NO_MARGIN_SCORE, EvaluatedTrial
 
 # Least difference between two cases of one scenario, in any parameter, as a share of its range.
 _LEAST_DIFFERENCE: Final = 0.2
-_POLICY_FILE: Final = "policy.yaml"
+#: The falsified policy, in the folder of the worst cases.
+POLICY_FILE: Final = "policy.yaml"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,7 +84,7 @@ def worst_trials(
 def write_worst(falsification: Falsification, folder: Path, most: int) -> list[WorstCase]:
     """Write ``worst_001.yaml`` and so on beside ``policy.yaml``, and run each from its file."""
     settings = falsification.settings
-    write_text(folder / _POLICY_FILE, settings.policy, SimError)
+    write_text(folder / POLICY_FILE, settings.policy, SimError)
     for old in folder.glob("worst_*.yaml"):
         old.unlink()
     cases = []
@@ -124,9 +125,22 @@ def write_episodes(falsification: Falsification, path: Path) -> None:
 
 
 def write_summary(
-    falsification: Falsification, cases: Sequence[WorstCase], path: Path
+    falsification: Falsification,
+    cases: Sequence[WorstCase],
+    path: Path,
+    *,
+    verdict: str,
+    against: Mapping[str, EpisodeRecord],
 ) -> dict[str, Any]:
-    """Write the figures of a falsification as JSON, and return them."""
+    """Write the figures of a falsification as JSON, and return them.
+
+    Args:
+        falsification: the finished search.
+        cases: its worst cases.
+        path: the file.
+        verdict: the verdict in sentences.
+        against: records of the worst cases with another policy, by the name of the file.
+    """
     scenarios = {}
     for name in falsification.spaces:
         scores = [trial.score for trial in falsification.trials if trial.scenario == name]
@@ -143,6 +157,7 @@ def write_summary(
         "episodes": len(falsification.trials),
         "robot_contacts": falsification.contacts,
         "without_result": falsification.errors,
+        "verdict": verdict,
         "scenarios": scenarios,
         "worst": [
             {
@@ -155,12 +170,21 @@ def write_summary(
                 "speed_at_min_separation_mps": case.record.speed_at_min_separation_mps,
                 "awareness": case.record.awareness,
                 "replays": case.replays,
+                "against": _figures_against(against.get(case.path.name)),
             }
             for case in cases
         ],
     }
     write_text(path, json.dumps(summary, indent=1, ensure_ascii=False) + "\n", SimError)
     return summary
+
+
+def _figures_against(record: EpisodeRecord | None) -> dict[str, Any] | None:
+    """Return the figures of a worst case with another policy; None without one."""
+    if record is None:
+        return None
+    names = ("policy", "min_margin_m", "min_separation_m", "robot_contacts", "error")
+    return {name: getattr(record, name) for name in names}
 
 
 def _difference(
@@ -188,7 +212,7 @@ def _header(trial: EvaluatedTrial, settings: FalsifySettings, file: str) -> str:
         f"round {trial.round}, trial {trial.trial}.",
         f"Smallest separation margin at a moving robot {_metres(margin)}, smallest separation "
         f"{_metres(separation)}, contacts caused by the robot {trial.notes['robot_contacts']}.",
-        f"awarenav crossings --scenario {file} --policy {_POLICY_FILE} "
+        f"awarenav crossings --scenario {file} --policy {POLICY_FILE} "
         f"{Perception.named(settings.perception).options}"
         + (f" --planner {planner}" if planner else "")
         + " "

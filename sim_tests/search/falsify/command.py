@@ -23,6 +23,14 @@ from awarenav.cli import POSITIVE, command, option, options
     "with the same result, whatever --workers is. Needs the extra 'bench'.",
 )
 @options.policy()
+@option(
+    "--against",
+    default="",
+    show_default="balanced; blind for balanced itself",
+    metavar="NAME|FILE",
+    shell_complete=options.COMPLETE_POLICIES,
+    help="Policy that the worst cases are run with too, for the verdict.",
+)
 @options.scenarios("that have a planner and people")
 @option(
     "--episodes",
@@ -68,7 +76,8 @@ def falsify(**values: Any) -> int:
     """Search for the situations in which a policy does worst.
 
     Varies start, path, speed, pauses, gaze and reactions of a scenario's people, within human
-    limits, and looks for the smallest separation margin while the robot moves. Writes
+    limits, and looks for the smallest separation margin while the robot moves. Ends with a verdict
+    against another policy in the same situations, and the next command. Writes
     worst_001.yaml and so on (`awarenav crossings --scenario` runs them again), episodes.csv,
     falsify.png, summary.json and the studies.
     """

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Container, Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -64,6 +64,43 @@ class Evaluation:
         completed.sort(key=lambda record: (record.scenario, record.seed))
         return cls(tuple(completed), tuple(record.error for record in records if record.error))
 
+    @classmethod
+    def joined(cls, parts: Iterable[Evaluation]) -> Evaluation:
+        """Return the evaluation of the episodes of several parts."""
+        rows = list(parts)
+        whole = cls.of([record for each in rows for record in each.records])
+        return replace(whole, errors=tuple(error for each in rows for error in each.errors))
+
+    def within(self, scenarios: Container[str]) -> Evaluation:
+        """Return the episodes in some of the scenarios, by name."""
+        return replace(self, records=tuple(r for r in self.records if r.scenario in scenarios))
+
+    def same_episodes(self, other: Evaluation) -> Evaluation:
+        """Return the episodes of which the other evaluation has the scenario and the seed too."""
+        tasks = {(each.scenario, each.seed) for each in other.records}
+        kept = tuple(each for each in self.records if (each.scenario, each.seed) in tasks)
+        return replace(self, records=kept)
+
+    def equals(self, other: Evaluation) -> bool:
+        """Return whether every episode has the same metrics as the other policy's."""
+        mine, others = (
+            [replace(record, policy="") for record in each.records] for each in (self, other)
+        )
+        return mine == others
+
+    def estimate(self, base: Evaluation) -> Point:
+        """Return the objectives over all episodes of the base policy, from fewer episodes.
+
+        They are the base policy's means over all of its episodes, plus the mean paired differences
+        (a control variate). With all episodes they are :attr:`objectives`.
+        """
+        part = base.same_episodes(self).objectives
+        time_s, violation_s = (
+            mine + (whole - same)
+            for mine, whole, same in zip(self.objectives, base.objectives, part, strict=True)
+        )
+        return time_s, violation_s
+
     @property
     def objectives(self) -> tuple[float, float]:
         """Mean time lost and mean violation time, seconds per episode."""
@@ -94,9 +131,9 @@ class Evaluation:
             strata=[record.scenario for record in self.records],
         )
 
-    def minus(self, base: Evaluation, objective: str) -> Interval:
+    def minus(self, base: Evaluation, objective: str, level: float = 0.95) -> Interval:
         """Return the mean difference to another policy on the same episodes, with its interval."""
-        return paired_difference(base.records, self.records, objective)
+        return paired_difference(base.records, self.records, objective, level=level)
 
     def _values(self, name: str) -> list[float]:
         values = [getattr(record, name) for record in self.records]

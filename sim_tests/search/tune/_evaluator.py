@@ -10,22 +10,23 @@ from typing import Final
 from awarenav.errors import counted
 from nav_adapter import AwarenessPolicy
 
+from ...scenario import ScenarioTemplate
 from ...study.measures import EpisodeRecord, salvage_record_file, write_records
 from ...study.runs import ProcessLock, plan_jobs
 from ...world.errors import SimError
 from .._episode_runner import EpisodeRunner
-from .._files import templates_of
 from ._evaluation import Evaluation
+from ._race import stages
 from ._settings import TuneSettings
 
 _FOLDER: Final = "evaluations"
 
 
 class PolicyEvaluator:
-    """Evaluates policies over seeds: every seed in every scenario.
+    """Evaluates policies over seeds: every seed in every one of some scenarios.
 
     Args:
-        settings: scenarios, planner and perception of the episodes.
+        settings: planner and perception of the episodes.
         runner: runs the episodes.
         folder: folder of the tuning, where the records are kept.
     """
@@ -34,35 +35,48 @@ class PolicyEvaluator:
         self._settings = settings
         self._runner = runner
         self._folder = folder
-        self._templates = templates_of(settings.scenarios)
 
-    def evaluate(self, name: str, policy: AwarenessPolicy, seeds: Sequence[int]) -> Evaluation:
+    def evaluate(
+        self,
+        name: str,
+        policy: AwarenessPolicy,
+        seeds: Sequence[int],
+        templates: Sequence[ScenarioTemplate],
+    ) -> Evaluation:
         """Return the evaluation of a policy, from files if this or another process has run it.
 
         Args:
             name: name of the policy, unique in the tuning.
             policy: the policy.
             seeds: consecutive seeds.
+            templates: scenarios, always the same with the same seeds.
         """
         path = self._folder / _FOLDER / f"{name}-{seeds[0]}-{seeds[-1]}.csv"
         with ProcessLock(self._folder / "locks" / f"{path.stem}.lock"):
             if path.exists():
-                kept = self._kept_records(path, name, seeds)
+                kept = self._kept_records(path, name, seeds, len(templates))
                 if kept is not None:
                     return Evaluation.of(kept)
-            records = self._run(name, policy, seeds)
+            records = self._run(name, policy, seeds, templates)
             if not any(record.error for record in records):
                 path.parent.mkdir(parents=True, exist_ok=True)
                 write_records(path, records)
             return Evaluation.of(records)
 
-    def evaluate_all(self, name: str, policy: AwarenessPolicy, seeds: Sequence[int]) -> Evaluation:
+    def evaluate_all(
+        self,
+        name: str,
+        policy: AwarenessPolicy,
+        seeds: range,
+        templates: Sequence[ScenarioTemplate],
+    ) -> Evaluation:
         """Return the evaluation of a policy of which every episode has a result.
 
         Raises:
             SimError: an episode has none.
         """
-        evaluation = self.evaluate(name, policy, seeds)
+        parts = [self.evaluate(name, policy, part, templates) for part in stages(seeds)]
+        evaluation = Evaluation.joined(parts)
         if evaluation.errors:
             raise SimError(
                 f"{counted(len(evaluation.errors), 'episode')} of {name} without a result; the "
@@ -71,7 +85,7 @@ class PolicyEvaluator:
         return evaluation
 
     def _kept_records(
-        self, path: Path, name: str, seeds: Sequence[int]
+        self, path: Path, name: str, seeds: Sequence[int], scenarios: int
     ) -> tuple[EpisodeRecord, ...] | None:
         """Return the records of a file; None for a damaged file, which is set aside."""
         found = salvage_record_file(path)
@@ -80,7 +94,7 @@ class PolicyEvaluator:
         if (
             not found.damaged
             and not found.torn
-            and len(records) == len(episodes) == len(seeds) * len(self._templates)
+            and len(records) == len(episodes) == len(seeds) * scenarios
             and all(record.policy == name and record.seed in seeds for record in records)
         ):
             return records
@@ -95,11 +109,15 @@ class PolicyEvaluator:
         return None
 
     def _run(
-        self, name: str, policy: AwarenessPolicy, seeds: Sequence[int]
+        self,
+        name: str,
+        policy: AwarenessPolicy,
+        seeds: Sequence[int],
+        templates: Sequence[ScenarioTemplate],
     ) -> tuple[EpisodeRecord, ...]:
         return self._runner.run(
             plan_jobs(
-                self._templates,
+                templates,
                 [(name, policy)],
                 seeds,
                 planners=[self._settings.planner],

@@ -18,8 +18,10 @@ from .._files import templates_of, write_csv
 from .._optuna import optuna
 from .._shared_study import NOTES
 from ._evaluation import OBJECTIVES
+from ._finalists import NO_WORSE, REASONS, Candidate
 from ._plot import draw_tuning
-from ._tune import Candidate, Tuning
+from ._tune import Tuning
+from ._verdict import verdict_text
 
 _LABELS: Final = {"time_lost_s": "time lost", "violation_time_s": "time with a negative margin"}
 
@@ -60,52 +62,71 @@ def write_tuning(tuning: Tuning, folder: Path) -> None:
     importance = importances(tuning.study)
     _write_trials(tuning, folder / "trials.csv")
     _write_json(folder / "importances.json", importance)
-    base = tuning.anchors[0]
+    base = tuning.base
+    rows = (*tuning.anchors, *tuning.chosen)
     _write_json(
         folder / "chosen.json",
         {
             "scenarios": _scenarios(tuning),
+            "hold_out_scenarios": list(tuning.settings.hold_out_scenarios),
             "tuning_seeds": _ends(tuning.settings.tuning_seeds),
             "held_out_seeds": _ends(tuning.settings.held_out_seeds),
             "base": base.name,
-            "base_on_front": not any(each.name == "beats_base" for each in tuning.chosen),
-            "policies": [_figures(each, base) for each in (*tuning.anchors, *tuning.chosen)],
+            "base_on_front": not any(NO_WORSE in each.names for each in rows),
+            "beats_base": None if tuning.winner is None else tuning.winner.trial,
+            "verdict": verdict_text(tuning),
+            "policies": [_figures(tuning, each) for each in rows],
         },
     )
     for earlier in (folder / "chosen").glob("*.yaml"):  # of this tuning with fewer trials
         earlier.unlink()
-    for each in tuning.chosen:
-        write_text(
-            folder / "chosen" / f"{each.name}.yaml",
-            _header(tuning, each) + policy_text(each.policy),
-            SimError,
-        )
+    for each in rows:
+        for name in (name for name in each.names if name in REASONS):
+            write_text(
+                folder / "chosen" / f"{name}.yaml",
+                _header(tuning, each, name) + policy_text(each.policy),
+                SimError,
+            )
     draw_tuning(tuning, importance, folder / "pareto.png")
 
 
 def table_lines(tuning: Tuning) -> list[str]:
-    """Return the presets and chosen policies on both sets of seeds, as lines of text."""
+    """Return the presets and chosen policies on both sets of seeds, as lines of text.
+
+    Equal policies have one row.
+    """
+    rows = (*tuning.anchors, *tuning.chosen)
+    names = [", ".join(each.names) for each in rows]
+    width = max(18, *map(len, names)) + 1
     lines = [
-        f"{'':24s}{'tuning seeds':^52s}  {'held-out seeds':^52s}",
-        f"{'policy':18s}{'trial':>6s}"
-        + 2 * f"{'time lost (s)':>21s}{'violation (s)':>21s}{'contacts':>10s}  ",
+        f"{'':{width + 5}s}{'tuning seeds':^52s}  {'held-out seeds':^52s}".rstrip(),
+        f"{'policy':{width}s}{'trial':>5s}"
+        + (2 * f"{'time lost (s)':>21s}{'violation (s)':>21s}{'contacts':>10s}  ").rstrip(),
     ]
-    for each in (*tuning.anchors, *tuning.chosen):
+    for name, each in zip(names, rows, strict=True):
         trial = "" if each.trial is None else str(each.trial)
-        cells = f"{each.name:18s}{trial:>6s}"
+        cells = f"{name:{width}s}{trial:>5s}"
         for evaluation in (each.tuning, each.held_out):
             time_s, violation_s = (evaluation.interval(name) for name in OBJECTIVES)
             cells += (
                 f"{time_s.text(2):>21s}{violation_s.text(3):>21s}{evaluation.robot_contacts:10d}  "
             )
         lines.append(cells.rstrip())
+    trials = [trial.user_attrs.get(NOTES, {}) for trial in tuning.trials]
+    early = [notes for notes in trials if notes.get("dropped")]
+    if early:
+        episodes = sum(notes["episodes"] for notes in early)
+        lines.append(
+            f"{len(early)} of {counted(len(trials), 'trial')} ended early, after "
+            f"{counted(episodes, 'episode')} instead of {len(early) * len(rows[0].tuning.records)}."
+        )
     return lines
 
 
 def _write_trials(tuning: Tuning, path: Path) -> None:
     front = {trial.number for trial in tuning.front}
     names = list(tuning.space.ranges)
-    notes = ("deficit_m", "robot_contacts", "reached")
+    notes = ("deficit_m", "robot_contacts", "reached", "episodes", "dropped")
     write_csv(
         path,
         ["trial", "state", *OBJECTIVES, *notes, "on_front", *names],
@@ -123,13 +144,19 @@ def _write_trials(tuning: Tuning, path: Path) -> None:
     )
 
 
-def _figures(candidate: Candidate, base: Candidate) -> dict[str, Any]:
+def _figures(tuning: Tuning, candidate: Candidate) -> dict[str, Any]:
     """Return the figures of a policy on both sets of seeds, for JSON."""
-    figures: dict[str, Any] = {"name": candidate.name, "trial": candidate.trial}
-    for name, evaluation, other in (
+    base, elsewhere = tuning.base, tuning.settings.hold_out_scenarios
+    name, *also = candidate.names
+    figures: dict[str, Any] = {"name": name, "also": also, "trial": candidate.trial}
+    parts = [
         ("tuning", candidate.tuning, base.tuning),
         ("held_out", candidate.held_out, base.held_out),
-    ):
+    ]
+    if elsewhere:
+        own, other = (each.held_out.within(elsewhere) for each in (candidate, base))
+        parts.append(("held_out_scenarios", own, other))
+    for name, evaluation, other in parts:
         figures[name] = {
             "episodes": len(evaluation.records),
             "robot_contacts": evaluation.robot_contacts,
@@ -146,11 +173,16 @@ def _interval_data(interval: Interval) -> dict[str, Any]:
     return {"mean": round(interval.value, 6), "interval_95": bounds}
 
 
-def _header(tuning: Tuning, candidate: Candidate) -> str:
+def _header(tuning: Tuning, candidate: Candidate, name: str) -> str:
     """Return the comment at the top of a policy file."""
-    held_out, base, settings = candidate.held_out, tuning.anchors[0], tuning.settings
+    held_out, base, settings = candidate.held_out, tuning.base, tuning.settings
+    which = (
+        f"the policy {candidate.name}"
+        if candidate.trial is None
+        else f"trial {candidate.trial} of {len(tuning.trials)}"
+    )
     lines = [
-        f"{candidate.name.replace('_', ' ')}: trial {candidate.trial} of {len(tuning.trials)} in a "
+        f"{name.replace('_', ' ')}: {which} in a "
         f"tuning of {settings.policy_name} ({settings.sampler}, seed {settings.seed}, perception "
         f"{settings.perception}).",
         f"On {counted(len(held_out.records), 'held-out episode')} (seeds "

@@ -6,13 +6,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...crossing.eyes import Perception, PerceptionKind, SensorSet
-from .._files import common_settings
+from .._files import common_settings, templates_of
 from .._optimizer import SamplerName
-from ._evaluation import OBJECTIVES
+from .._verdict import Verdict, command_text, episode_words
+from ._finalists import BEATS_BASE
 from ._policy_space import read_ranges, shipped_ranges
 from ._results import table_lines, write_tuning
-from ._settings import TuneSettings
+from ._settings import TuneSettings, held_out_scenarios
 from ._tune import Tuning, require_trials, tune
+from ._verdict import is_undecided, verdict_text
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,6 +27,7 @@ class TuneOptions:
     trials: int
     episodes: int
     held_out: int
+    hold_out_scenarios: tuple[str, ...]
     generation: int
     sampler: SamplerName
     perception: PerceptionKind
@@ -59,6 +62,9 @@ def tune_command(options: TuneOptions) -> int:
         seed=options.seed,
         sampler=options.sampler,
         generation=options.generation,
+        hold_out_scenarios=held_out_scenarios(
+            options.hold_out_scenarios, templates_of(common["scenarios"])
+        ),
     )
 
     def report(tuning: Tuning) -> None:
@@ -68,7 +74,7 @@ def tune_command(options: TuneOptions) -> int:
             print((options.out / "chosen.json").read_text(encoding="utf-8"), end="")
             return
         print("\n".join(table_lines(tuning)))
-        print("\n".join(_verdict(tuning)))
+        print("\n".join(_verdict(tuning, options).lines()))
 
     tune(
         settings,
@@ -83,20 +89,33 @@ def tune_command(options: TuneOptions) -> int:
     return 0
 
 
-def _verdict(tuning: Tuning) -> list[str]:
-    """Return what the tuning has found, as lines of text."""
-    base = tuning.anchors[0]
-    if not tuning.front:
-        return ["In every trial the robot moved into a person at least once: none was chosen."]
-    better = next((each for each in tuning.chosen if each.name == "beats_base"), None)
-    if better is None:
-        return [
-            f"No trial is at least as good as {base.name} in both objectives on the tuning seeds: "
-            "it lies on the front."
-        ]
-    time_s, violation_s = (better.held_out.minus(base.held_out, name) for name in OBJECTIVES)
-    return [
-        f"beats_base is at least as good as {base.name} in both objectives on the tuning seeds. "
-        f"On the held-out ones it differs by {time_s.text(2)} s of time lost and "
-        f"{violation_s.text(3)} s of violation."
-    ]
+def _verdict(tuning: Tuning, options: TuneOptions) -> Verdict:
+    """Return what the tuning has shown, and the next command."""
+    if tuning.winner is not None:
+        command = command_text(
+            "falsify",
+            *("--policy", options.out / "chosen" / f"{BEATS_BASE}.yaml"),
+            *("--against", options.policy),
+            *episode_words(options),
+            *("--workers", options.workers, "--out", options.out / "falsify"),
+        )
+    elif is_undecided(tuning):
+        command = _continued(options, options.trials, 2 * options.held_out)
+    else:
+        command = _continued(options, 2 * options.trials, options.held_out)
+    return Verdict(verdict_text(tuning), command)
+
+
+def _continued(options: TuneOptions, trials: int, held_out: int) -> str:
+    """Return the command that goes on with the tuning."""
+    ranges = () if options.ranges is None else ("--ranges", options.ranges)
+    return command_text(
+        "tune",
+        *("--policy", options.policy),
+        *episode_words(options),
+        *ranges,
+        *("--trials", trials, "--episodes", options.episodes, "--held-out", held_out),
+        *("--hold-out-scenarios", *options.hold_out_scenarios),
+        *("--generation", options.generation, "--sampler", options.sampler),
+        *("--seed", options.seed, "--workers", options.workers, "--out", options.out, "--resume"),
+    )

@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from awarenav.errors import not_one_of
+
+from ...scenario import ScenarioTemplate
+from ...world.errors import SimError
+from .._files import templates_of
+
+#: Values of ``--hold-out-scenarios`` beside names.
+THIRD: Final = "third"
+NONE: Final = "none"
 # Distance from the first tuning seed to the first held-out seed.
 _HELD_OUT_OFFSET: Final = 1_000_000
 
@@ -26,6 +36,7 @@ class TuneSettings:
         seed: the first tuning seed, and seed of the sampler.
         sampler: ``"tpe"`` or ``"nsga2"``.
         generation: trials per generation.
+        hold_out_scenarios: names of the scenarios that no trial runs.
     """
 
     policy_name: str
@@ -40,6 +51,17 @@ class TuneSettings:
     seed: int
     sampler: str
     generation: int
+    hold_out_scenarios: tuple[str, ...] = ()
+
+    @property
+    def templates(self) -> tuple[ScenarioTemplate, ...]:
+        """All scenarios."""
+        return templates_of(self.scenarios)
+
+    @property
+    def tuning_templates(self) -> tuple[ScenarioTemplate, ...]:
+        """Scenarios by which trials are judged."""
+        return tuple(each for each in self.templates if each.name not in self.hold_out_scenarios)
 
     @property
     def tuning_seeds(self) -> range:
@@ -51,3 +73,30 @@ class TuneSettings:
         """Seeds that no trial has run; disjoint from the tuning seeds."""
         first = self.seed + _HELD_OUT_OFFSET
         return range(first, first + self.held_out)
+
+
+def held_out_scenarios(
+    given: Sequence[str], templates: Sequence[ScenarioTemplate]
+) -> tuple[str, ...]:
+    """Return the names of the scenarios that no trial runs.
+
+    Args:
+        given: names; ``"third"`` for every third scenario, the second of three first, in the order
+            of what people look at (attentive, mixed, unaware) and of the names; or ``"none"``.
+            Of fewer than three scenarios, ``"third"`` holds none out.
+        templates: all scenarios of the tuning.
+
+    Raises:
+        SimError: an unknown name, or no scenario is left to tune on.
+    """
+    names = [each.name for each in sorted(templates, key=lambda each: (each.attention, each.name))]
+    if tuple(given) == (NONE,):
+        return ()
+    if tuple(given) == (THIRD,):
+        return tuple(names[1::3]) if len(names) >= 3 else ()
+    for name in given:
+        if name not in names:
+            raise SimError(not_one_of("--hold-out-scenarios", name, (THIRD, NONE, *names)))
+    if len(set(given)) == len(names):
+        raise SimError("--hold-out-scenarios must leave a scenario to tune on, got all of them")
+    return tuple(name for name in names if name in given)

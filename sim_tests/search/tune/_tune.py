@@ -4,23 +4,26 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, cast
 
 from awarenav.errors import counted
 from nav_adapter import AwarenessPolicy
 
+from ...study.measures import Interval
 from ...study.runs import ProcessLock, plan_jobs, policy_of
 from ...world.errors import SimError
 from .._episode_runner import EpisodeRunner
-from .._files import templates_of, write_or_check_settings
+from .._files import write_or_check_settings
 from .._optimizer import Optimizer, Outcome, SamplerName
 from .._optuna import optuna
 from .._shared_study import NOTES, Claim, SharedStudy
-from ._evaluation import Evaluation, knee, pareto_front
+from ._evaluation import Evaluation, pareto_front
 from ._evaluator import PolicyEvaluator
+from ._finalists import BEATS_BASE, Candidate, chosen_trials, level_of, merged, named_winner
 from ._policy_space import PolicyRange, PolicySpace
+from ._race import Dropped, dropped, stages
 from ._settings import TuneSettings
 
 _SETTINGS_FILE: Final = "tune.json"
@@ -42,25 +45,6 @@ _MOST_CHOSEN: Final = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Candidate:
-    """A policy with its evaluation on both sets of seeds.
-
-    Attributes:
-        name: a preset, the base policy, or the reason why a trial was chosen.
-        trial: number of the trial; None for presets and the base policy.
-        policy: the policy.
-        tuning: evaluation on the tuning seeds.
-        held_out: evaluation on the held-out seeds.
-    """
-
-    name: str
-    trial: int | None
-    policy: AwarenessPolicy
-    tuning: Evaluation
-    held_out: Evaluation
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class Tuning:
     """The result of a tuning.
 
@@ -69,9 +53,9 @@ class Tuning:
         space: its search space.
         study: Optuna's study.
         trials: all finished trials, by number.
-        front: trials on the Pareto front without a contact caused by the robot, by time lost.
+        front: trials on the Pareto front that ran every episode, by time lost.
         anchors: the base policy and the presets.
-        chosen: trials chosen from the front.
+        chosen: trials chosen from the front; none equals one of ``anchors``.
     """
 
     settings: TuneSettings
@@ -81,6 +65,24 @@ class Tuning:
     front: tuple[optuna.trial.FrozenTrial, ...]
     anchors: tuple[Candidate, ...]
     chosen: tuple[Candidate, ...]
+
+    @property
+    def base(self) -> Candidate:
+        """The base policy."""
+        return self.anchors[0]
+
+    @property
+    def winner(self) -> Candidate | None:
+        """The chosen policy that is shown to be better than the base policy, if there is one."""
+        return next((each for each in self.chosen if each.name == BEATS_BASE), None)
+
+    def minus_base(self, candidate: Candidate, objective: str) -> Interval:
+        """Return the paired difference to the base policy on the held-out episodes.
+
+        Its level is that of the decision: all chosen policies together have 95 %.
+        """
+        level = level_of(len(self.chosen))
+        return candidate.held_out.minus(self.base.held_out, objective, level)
 
 
 def tune(
@@ -117,7 +119,7 @@ def tune(
         initial=[space.base_parameters()],
     )
     plan_jobs(  # refuses what cannot be run
-        templates_of(settings.scenarios),
+        settings.templates,
         [(settings.policy_name, base)],
         settings.tuning_seeds,
         planners=[settings.planner],
@@ -132,7 +134,7 @@ def tune(
         resume=resume,
         overwrite=overwrite,
         results=_RESULTS,
-        may_grow=["trials"],
+        may_grow=["trials", "held_out"],
     )
     with (
         SharedStudy(folder, "tune", optimizer, settings.trials) as study,
@@ -142,37 +144,56 @@ def tune(
         runner.bar.total = _planned_episodes(settings, study.finished_count, len(anchors))
         runner.bar.set_postfix_str("presets")
         tuned = {
-            name: evaluator.evaluate_all(name, policy, settings.tuning_seeds)
+            name: evaluator.evaluate_all(
+                name, policy, settings.tuning_seeds, settings.tuning_templates
+            )
             for name, policy in anchors.items()
         }
-        _run_trials(study, settings, space, evaluator, runner)
+        _run_trials(study, settings, _Race(space, evaluator, settings, anchors, tuned), runner)
         runner.bar.set_postfix_str("held-out seeds")
         trials = study.finished_trials()
         front = feasible_front(trials)
 
         def anchor(name: str, policy: AwarenessPolicy) -> Candidate:
-            held_out = evaluator.evaluate_all(name, policy, settings.held_out_seeds)
-            return Candidate(name, None, policy, tuned[name], held_out)
+            held_out = evaluator.evaluate_all(
+                name, policy, settings.held_out_seeds, settings.templates
+            )
+            return Candidate((name,), None, policy, tuned[name], held_out)
 
-        def candidate(name: str, trial: optuna.trial.FrozenTrial) -> Candidate:
+        def candidate(trial: optuna.trial.FrozenTrial, names: tuple[str, ...]) -> Candidate:
             policy, label = space.policy(trial.params), _trial_label(trial.number)
-            on_tuning_seeds = evaluator.evaluate_all(label, policy, settings.tuning_seeds)
-            held_out = evaluator.evaluate_all(label, policy, settings.held_out_seeds)
-            return Candidate(name, trial.number, policy, on_tuning_seeds, held_out)
+            for name, known in anchors.items():
+                if known == policy:
+                    return replace(anchor(name, policy), names=names)
+            return Candidate(
+                names,
+                trial.number,
+                policy,
+                evaluator.evaluate_all(
+                    label, policy, settings.tuning_seeds, settings.tuning_templates
+                ),
+                evaluator.evaluate_all(label, policy, settings.held_out_seeds, settings.templates),
+            )
 
+        reasons = chosen_trials(front, tuned[settings.policy_name])
+        rows = merged(
+            [
+                *(anchor(name, policy) for name, policy in anchors.items()),
+                *(candidate(front[row], names) for row, names in reasons.items()),
+            ]
+        )
+        known = tuple(each for each in rows if each.trial is None)
+        new = [each for each in rows if each.trial is not None]
         tuning = Tuning(
             settings=settings,
             space=space,
             study=study.study,
             trials=tuple(trials),
             front=tuple(front),
-            anchors=tuple(anchor(name, policy) for name, policy in anchors.items()),
-            chosen=tuple(
-                candidate(name, trial)
-                for name, trial in _chosen(front, tuned[settings.policy_name]).items()
-            ),
+            anchors=known,
+            chosen=tuple(named_winner(new, known[0], settings.hold_out_scenarios)),
         )
-        runner.bar.total = runner.bar.n  # some episodes were known before, some trials chosen twice
+        runner.bar.total = runner.bar.n  # some episodes were known before, some trials dropped
         runner.bar.close()
         with ProcessLock(folder / "locks" / "report.lock"):  # several processes may end at once
             report(tuning)
@@ -182,12 +203,16 @@ def tune(
 def feasible_front(
     trials: Sequence[optuna.trial.FrozenTrial],
 ) -> list[optuna.trial.FrozenTrial]:
-    """Return the Pareto front of the trials that satisfy every constraint, by time lost."""
+    """Return the Pareto front of the trials that satisfy every constraint, by time lost.
+
+    A trial that was dropped before it ran every episode is not on it.
+    """
     feasible = [
         trial
         for trial in trials
         if trial.state == optuna.trial.TrialState.COMPLETE
         and all(value <= 0.0 for value in trial.constraints.values())
+        and not trial.user_attrs.get(NOTES, {}).get("dropped")
     ]
     rows = pareto_front([(trial.values[0], trial.values[1]) for trial in feasible])
     return [feasible[row] for row in rows]
@@ -213,73 +238,78 @@ def _anchors(policy_name: str, base: AwarenessPolicy) -> dict[str, AwarenessPoli
 
 def _planned_episodes(settings: TuneSettings, finished_trials: int, anchors: int) -> int:
     """Return the number of episodes that are left at most."""
-    per_trial, per_held_out = (
-        seeds * len(settings.scenarios) for seeds in (settings.episodes, settings.held_out)
-    )
+    per_trial = settings.episodes * len(settings.tuning_templates)
+    per_held_out = settings.held_out * len(settings.scenarios)
     left = settings.trials - finished_trials
     return per_trial * (left + anchors) + per_held_out * (anchors + _MOST_CHOSEN)
 
 
 def _run_trials(
-    study: SharedStudy,
-    settings: TuneSettings,
-    space: PolicySpace,
-    evaluator: PolicyEvaluator,
-    runner: EpisodeRunner,
+    study: SharedStudy, settings: TuneSettings, race: _Race, runner: EpisodeRunner
 ) -> None:
     """Evaluate trials until all are finished, by this or other processes."""
-
-    def outcomes_of(claims: Sequence[Claim]) -> list[Outcome]:
-        return [_outcome(claim, space, evaluator, settings) for claim in claims]
-
     while not study.is_complete:
         runner.bar.set_postfix_str(f"{study.finished_count} of {counted(settings.trials, 'trial')}")
-        if not study.evaluate(1, outcomes_of):
+        if not study.evaluate(1, race.outcomes):
             runner.bar.set_postfix_str("others work on the rest of this generation")
             time.sleep(_POLL_S)
 
 
-def _outcome(
-    claim: Claim, space: PolicySpace, evaluator: PolicyEvaluator, settings: TuneSettings
-) -> Outcome:
-    policy = space.policy(claim.parameters)
-    evaluation = evaluator.evaluate(_trial_label(claim.number), policy, settings.tuning_seeds)
-    if evaluation.errors:
-        # Episodes without a result must not make a policy look better.
-        return Outcome(None, notes={"error": evaluation.errors[0]})
-    return Outcome(
-        evaluation.objectives,
-        {_CONSTRAINT: float(evaluation.robot_contacts)},
-        {
-            "deficit_m": evaluation.deficit_m,
-            "robot_contacts": evaluation.robot_contacts,
-            "reached": evaluation.reached,
-        },
-    )
+@dataclass(frozen=True, slots=True)
+class _Race:
+    """Runs trials, each only as long as it does not lose to the base policy.
+
+    Attributes:
+        space: gives the policy of a trial.
+        evaluator: runs episodes.
+        settings: settings of the tuning.
+        anchors: the base policy and the presets, by name.
+        tuned: their evaluations on the tuning seeds.
+    """
+
+    space: PolicySpace
+    evaluator: PolicyEvaluator
+    settings: TuneSettings
+    anchors: dict[str, AwarenessPolicy]
+    tuned: dict[str, Evaluation]
+
+    def outcomes(self, claims: Sequence[Claim]) -> list[Outcome]:
+        """Return the outcomes of trials."""
+        return [self._outcome(claim) for claim in claims]
+
+    def _outcome(self, claim: Claim) -> Outcome:
+        policy, base = self.space.policy(claim.parameters), self.tuned[self.settings.policy_name]
+        evaluation = Evaluation(())
+        reason: Dropped = ""
+        for name, known in self.anchors.items():
+            if known == policy:  # the first trial is the base policy
+                evaluation = self.tuned[name]
+        if not evaluation.records:
+            for seeds in stages(self.settings.tuning_seeds):
+                part = self.evaluator.evaluate(
+                    _trial_label(claim.number), policy, seeds, self.settings.tuning_templates
+                )
+                if part.errors:
+                    # Episodes without a result must not make a policy look better.
+                    return Outcome(None, notes={"error": part.errors[0]})
+                evaluation = Evaluation.joined([evaluation, part])
+                if len(evaluation.records) == len(base.records):
+                    break
+                reason = dropped(evaluation, base)
+                if reason:
+                    break
+        return Outcome(
+            evaluation.estimate(base),
+            {_CONSTRAINT: float(evaluation.robot_contacts)},
+            {
+                "deficit_m": evaluation.deficit_m,
+                "robot_contacts": evaluation.robot_contacts,
+                "reached": evaluation.reached,
+                "episodes": len(evaluation.records),
+                "dropped": reason,
+            },
+        )
 
 
 def _trial_label(number: int) -> str:
     return f"trial_{number:04d}"
-
-
-def _chosen(
-    front: Sequence[optuna.trial.FrozenTrial], base: Evaluation
-) -> dict[str, optuna.trial.FrozenTrial]:
-    """Return the chosen trials of the front by reason; a trial may have several reasons."""
-    if not front:
-        return {}
-    points = [(trial.values[0], trial.values[1]) for trial in front]
-    chosen = {
-        "least_time_lost": front[0],
-        "knee": front[knee(points)],
-        "least_violation": front[-1],
-    }
-    time_s, violation_s = base.objectives
-    better = [
-        row
-        for row, point in enumerate(points)
-        if point[0] <= time_s and point[1] <= violation_s and point != (time_s, violation_s)
-    ]
-    if better:
-        chosen["beats_base"] = front[better[knee([points[row] for row in better])]]
-    return chosen

@@ -37,7 +37,8 @@ from awarenav.cli import POSITIVE, FilePath, OneOf, command, option, options
     type=POSITIVE,
     default=5,
     metavar="N",
-    help="Tuning seeds; every trial runs each of them in every scenario.",
+    help="Tuning seeds; a trial runs each of them in every tuning scenario, unless it loses to "
+    "--policy before.",
 )
 @option(
     "--held-out",
@@ -45,6 +46,15 @@ from awarenav.cli import POSITIVE, FilePath, OneOf, command, option, options
     default=10,
     metavar="N",
     help="Held-out seeds, on which the presets and the chosen policies are compared.",
+)
+@option(
+    "--hold-out-scenarios",
+    many=True,
+    default=["third"],
+    metavar="NAME...|third|none",
+    shell_complete=options.COMPLETE_SCENARIOS,
+    help="Scenarios that no trial runs, but the comparison on held-out seeds does: names, 'none', "
+    "or every 'third' by attention and name (of at least three).",
 )
 @option(
     "--generation",
@@ -73,7 +83,9 @@ from awarenav.cli import POSITIVE, FilePath, OneOf, command, option, options
 def tune(**values: Any) -> int:
     """Search for policies that lose less time and keep the separation margin.
 
-    Varies the numbers of --policy. A policy with which the robot caused a contact is not chosen.
+    Varies the numbers of --policy. Trials run few episodes first, and end when the paired interval
+    shows that they lose to --policy. A policy with which the robot caused a contact is not chosen.
+    Ends with a verdict against --policy on held-out seeds and scenarios, and the next command.
     Writes study.db, trials.csv, pareto.png, importances.json, chosen.json, and chosen/*.yaml with
     their results on the held-out seeds.
     """

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ._bootstrap import bootstrap_interval, ratio_interval
     from ._conduct import OVERSHOOT_MPS, Conduct, fastest_point_excess_mps, limit_excess_mps
     from ._driving import path_length_m
-    from ._interval import Interval, proportion_interval, zero_of_n_upper
+    from ._interval import FEW_PAIRS, Interval, proportion_interval, zero_of_n_upper
     from ._measure import measure
     from ._metrics import METRICS, SHARES, Metric
     from ._pairs import (
@@ -45,6 +45,7 @@ __all__ = [
     "ATTENTION_WITHIN_M",
     "ATTENTIVE_FROM",
     "BASELINE",
+    "FEW_PAIRS",
     "METRICS",
     "OVERSHOOT_MPS",
     "RECORD_COLUMNS",
@@ -111,6 +112,7 @@ __getattr__ = lazy_names(
         ),
         "._driving": ("path_length_m",),
         "._interval": (
+            "FEW_PAIRS",
             "Interval",
             "proportion_interval",
             "zero_of_n_upper",

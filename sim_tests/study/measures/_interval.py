@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
 from scipy.special import betaincinv
 
 from perception.arrays import finite_number
 
 from ...world.errors import SimError
+
+#: With fewer pairs, the bootstrap interval is too narrow, and no effect counts as shown.
+FEW_PAIRS: Final = 20
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from ..measures import ATTENTIVE_FROM, SHARES, Comparison, Interval
+from ..measures import ATTENTIVE_FROM, FEW_PAIRS, SHARES, Comparison, Interval
 from ._arm import Arm, judged_arms
 from ._statistics import RunStatistics, Unconfirmed, robot_contacts
 from ._text import NOTHING, count, percent, plural
 
-# With fewer pairs, the bootstrap interval is too narrow, and no effect counts as shown.
-_FEW_PAIRS: Final = 20
 # Above this upper bound, "none seen" says too little.
 _LARGEST_SHARE: Final = 0.05
 
@@ -165,7 +163,7 @@ def _won_back_sentence(who: str, against: Comparison) -> str:
     back, reference = against.won_back, against.baseline
     if not back.known:
         return f" No pair with {reference} tells what it wins back."
-    if back.n < _FEW_PAIRS:
+    if back.n < FEW_PAIRS:
         return (
             f" Over only {plural(back.n, 'pair')} with {reference} it wins back "
             f"{percent(back.value)} of the time lost to {who}: too few to tell."
@@ -225,7 +223,7 @@ def _ends(change: Interval, *, sign: bool = False) -> str:
 def _direction(
     change: Interval, up: str, down: str, neither: str, *, more_is_good: bool
 ) -> tuple[str, Tone]:
-    if change.n < _FEW_PAIRS:
+    if change.n < FEW_PAIRS:
         return "too few to tell", "open"
     if change.low > 0.0:
         return up, "good" if more_is_good else "bad"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from awarenav.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from ._episode import Attempt, attempt, observed_episode, run_episode
+    from ._episode import Attempt, attempt, free_run_of, observed_episode, run_episode
     from ._job import Job
     from ._plan import (
         JobKey,
@@ -27,9 +27,10 @@ if TYPE_CHECKING:
         planner_parameters,
         refuse_unusable_planner,
     )
-    from ._pool import WorkerPool, run_here, tidy
+    from ._pool import WorkerPool, one_thread_each, run_here, tidy
     from ._process_lock import ProcessLock
     from ._recording import recorder_of
+    from ._replay import find_episode
     from ._run import run_jobs
     from ._run_files import RunFiles, read_jobs, read_run
     from ._sample import sample_jobs
@@ -46,10 +47,13 @@ __all__ = [
     "attempt",
     "describe",
     "fault_of",
+    "find_episode",
+    "free_run_of",
     "job_key",
     "make_planner",
     "named_templates",
     "observed_episode",
+    "one_thread_each",
     "plan_jobs",
     "planner_label",
     "planner_parameters",
@@ -74,6 +78,7 @@ __getattr__ = lazy_names(
         "._episode": (
             "Attempt",
             "attempt",
+            "free_run_of",
             "observed_episode",
             "run_episode",
         ),
@@ -98,11 +103,13 @@ __getattr__ = lazy_names(
         ),
         "._pool": (
             "WorkerPool",
+            "one_thread_each",
             "run_here",
             "tidy",
         ),
         "._process_lock": ("ProcessLock",),
         "._recording": ("recorder_of",),
+        "._replay": ("find_episode",),
         "._run": ("run_jobs",),
         "._run_files": (
             "RunFiles",

@@ -58,10 +58,8 @@ def observed_episode(
     """Run and measure one episode, watched by ``observer``; exceptions are raised."""
     template, fault = template_of(job.scenario), fault_of(job.fault)
     scenario, senses = template.for_seed(job.seed), Perception.named(job.perception)
-    free = FreeRun(None, None, repeats=True)
-    if job.planner or scenario.robot.straight_on_speed_mps is None:
-        # Before the episode: what a planner imports only while it drives is then there.
-        free = free_run(scenario.without_people().model_dump_json(), job.planner)
+    # Before the episode: what a planner imports only while it drives is then there.
+    free = free_run_of(job)
     result = seeded_crossing(
         scenario,
         job.planner,
@@ -86,6 +84,14 @@ def observed_episode(
         planner=planner_label(job.planner, scenario),
         nondeterministic=not free.repeats,
     )
+
+
+def free_run_of(job: Job) -> FreeRun:
+    """Return the figures of a job's task without people; unknown for a robot without a planner."""
+    scenario = template_of(job.scenario).for_seed(job.seed)
+    if not job.planner and scenario.robot.straight_on_speed_mps is not None:
+        return FreeRun(None, None, repeats=True)
+    return free_run(scenario.without_people().model_dump_json(), job.planner)
 
 
 def failed(job: Job, error: str, traceback: str = "") -> Attempt:

@@ -19,7 +19,7 @@ from perception.documents import parse_yaml
 
 from ...crossing.eyes import ORACLE, Perception
 from ...crossing.faults import Fault, shipped_faults
-from ...scenario import ScenarioTemplate, shipped_templates
+from ...scenario import SCENARIO_SETS, ScenarioTemplate, shipped_templates
 from ...world.errors import SimError
 from ._job import Job
 from ._planner_choice import planner_label, refuse_unusable_planner
@@ -56,8 +56,8 @@ def plan_jobs(
     They are nested in that order.
 
     Args:
-        scenarios: templates, shipped names, YAML files, or ``"all"`` for the shipped scenarios that
-            need a planner.
+        scenarios: templates, shipped names, YAML files, or sets: ``"all"``, or ``"guidelines"``,
+            without the scenarios that need no planner.
         policies: names of presets, YAML files, pairs of a name for the tables and a policy, or
             ``"oracle"``. The oracle is ``balanced`` with perception that knows the truth: the
             upper bound of what better perception could gain.
@@ -108,8 +108,8 @@ def named_templates(names: Sequence[str], camera: str = "") -> tuple[ScenarioTem
     """Return the scenarios of names and YAML files, each once.
 
     Args:
-        names: shipped names, YAML files, or ``"all"`` for the shipped scenarios that need a
-            planner.
+        names: shipped names, YAML files, or sets: ``"all"``, or ``"guidelines"``, without the
+            scenarios that need no planner.
         camera: as for :meth:`ScenarioTemplate.with_camera`.
 
     Raises:
@@ -181,10 +181,10 @@ def _expanded(scenarios: Iterable[str | ScenarioTemplate], camera: str) -> list[
     for each in scenarios:
         if isinstance(each, ScenarioTemplate):
             templates.append(each)
-        elif each == "all":
+        elif each in SCENARIO_SETS:
             templates += [
                 template
-                for template in shipped_templates()
+                for template in shipped_templates(each)
                 if template.median().robot.straight_on_speed_mps is None
             ]
         else:

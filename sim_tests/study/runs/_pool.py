@@ -68,7 +68,7 @@ class WorkerPool(AbstractContextManager["WorkerPool"]):
         self._time_limit_s = time_limit_s
         # Not "fork": a forked process would share the physics.
         self._context = multiprocessing.get_context("spawn")
-        with _one_thread_each():
+        with one_thread_each():
             self._idle = [_Worker(self._context) for _ in range(workers)]
         self._busy: dict[Connection, tuple[_Worker, int, Job, int]] = {}
 
@@ -114,7 +114,7 @@ class WorkerPool(AbstractContextManager["WorkerPool"]):
 
     def _replace(self, worker: _Worker) -> None:
         worker.close()
-        with _one_thread_each():
+        with one_thread_each():
             self._idle.append(_Worker(self._context))
 
     def _overdue(self, ready: Sequence[Connection]) -> list[Connection]:
@@ -209,7 +209,7 @@ def one_thread() -> None:
 
 
 @contextlib.contextmanager
-def _one_thread_each() -> Iterator[None]:
+def one_thread_each() -> Iterator[None]:
     """Let processes that are started in the block use one thread each."""
     before = {name: os.environ.get(name) for name in _THREAD_SETTINGS}
     os.environ.update(dict.fromkeys(_THREAD_SETTINGS, "1"))

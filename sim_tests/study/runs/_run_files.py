@@ -57,6 +57,16 @@ class RunFiles:
         """The folder of videos, maps and pages of episodes that were replayed."""
         return self.folder / "replays"
 
+    @property
+    def social(self) -> Path:
+        """The table of ``awarenav measures``, one row per episode."""
+        return self.folder / "social.csv"
+
+    @property
+    def exports(self) -> Path:
+        """The folder of episodes in the formats of other projects."""
+        return self.folder / "exports"
+
     def page(self, number: int) -> Path:
         """Return the path of the replay page of an episode."""
         return self.replays / f"episode_{number:05d}.html"

@@ -153,7 +153,8 @@ class RunFolder(AbstractContextManager["RunFolder"]):
     def _start(self, jobs: Sequence[Job]) -> None:
         # The old table goes first, so that its rows can never be taken for those of the new jobs.
         self._open_table.cut(0)
-        for path in (self._files.parquet, self._files.errors, *self._files.damaged):
+        files = self._files
+        for path in (files.parquet, files.social, files.errors, *files.damaged):
             path.unlink(missing_ok=True)
         self._write_run("running")
         self._write_jobs(jobs)

@@ -15,6 +15,7 @@ from ...scenario.catalogue import (
     CHECKED_DRAWS,
     CONFLICT_M,
     approach_statistics,
+    names_of_sets,
     template_problems,
 )
 from ...world.errors import MissingSimulatorError, SimError
@@ -28,13 +29,13 @@ def validate_command(files: Sequence[str], episodes: int) -> int:
     """Check scenarios and print what is wrong.
 
     Args:
-        files: names of shipped scenarios, or YAML files.
+        files: names of shipped scenarios or of their sets, or YAML files.
         episodes: number of crossings that measure the attention of people.
 
     Returns:
         0; 1 if a scenario's people contradict its ``attention``; 2 if one cannot be run.
     """
-    return max(_validate(file, episodes) for file in files)
+    return max(_validate(file, episodes) for file in names_of_sets(files))
 
 
 def _validate(file: str, episodes: int) -> int:

@@ -20,7 +20,7 @@ def scenario() -> None:
 )
 @options.as_json("the list")
 def list_scenarios(*, as_json: bool) -> int:
-    """List the shipped scenarios.
+    """List the shipped scenarios, set by set.
 
     Shows name and version, whether the people notice the robot, the number of people, the number of
     values that vary, and what happens.
@@ -73,7 +73,7 @@ def show(scenario: str, *, yaml: bool, seed: int | None) -> int:
     required=True,
     metavar="NAME|FILE...",
     shell_complete=options.COMPLETE_SCENARIOS,
-    help="Shipped scenarios, YAML files, or 'all' shipped ones.",
+    help="Shipped scenarios, YAML files, or a set of shipped ones: 'all' or 'guidelines'.",
 )
 @options.out_file(
     "scenario.png",
@@ -108,7 +108,7 @@ def draw(scenarios: tuple[str, ...], out: Path) -> int:
     required=True,
     metavar="NAME|FILE...",
     shell_complete=options.COMPLETE_SCENARIOS,
-    help="YAML files, or shipped scenarios.",
+    help="YAML files, shipped scenarios, or a set of these: 'all' or 'guidelines'.",
 )
 @option(
     "--episodes",

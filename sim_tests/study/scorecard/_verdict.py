@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from ..measures import BASELINE, OVERSHOOT_MPS, Interval
+from ..measures import BASELINE, FEW_PAIRS, OVERSHOOT_MPS, Interval
 from ..report import NOTHING, count, number, percent, plural
 from ._plan import RADII_FACTOR
 from ._score import Obedience, PlannerScore, Score, Scorecard
-
-# With fewer pairs, the bootstrap interval is too narrow, and no effect counts as shown.
-_FEW_PAIRS: Final = 20
 
 Tone = Literal["good", "bad", "open"]
 
@@ -192,11 +189,11 @@ def _time(score: Score, policy: str) -> tuple[str, list[Mark]]:
     if policy == BASELINE or not change.known:
         return "", []
     text = f"With {policy} it loses {_more(change.value)} {BASELINE}"
-    shown = change.bounded and change.n >= _FEW_PAIRS and (change.high < 0.0 or change.low > 0.0)
+    shown = change.bounded and change.n >= FEW_PAIRS and (change.high < 0.0 or change.low > 0.0)
     if change.bounded:
         ends = f"95 % interval {number(change.low, 1)} to {number(change.high, 1)} s"
         text += f" ({ends}, {plural(change.n, 'pair')})"
-    if change.n < _FEW_PAIRS:
+    if change.n < FEW_PAIRS:
         text += "; too few pairs to tell"
     elif not shown:
         text += "; a difference is not shown"
@@ -223,7 +220,7 @@ def _field(planner: PlannerScore) -> tuple[str, list[Mark]]:
     if change.bounded:
         ends = f" (95 % interval {number(change.low, 1)} to {number(change.high, 1)} s)"
     text = f"With the speed field it takes {_more(change.value, 'without')}{ends}; {goals}."
-    shown = change.bounded and change.n >= _FEW_PAIRS and (change.high < 0.0 or change.low > 0.0)
+    shown = change.bounded and change.n >= FEW_PAIRS and (change.high < 0.0 or change.low > 0.0)
     tone: Tone = "open" if not shown else "good" if change.high < 0.0 else "bad"
     return text, [Mark(f"{number(change.value, 1, sign=True)} s by the speed field", tone)]
 

@@ -15,8 +15,8 @@ from awarenav.cli import app
 GROUPS = {
     "On a robot": ["estimate", "judge", "tracks", "bridge", "models", "doctor", "policy"],
     "Simulation": [
-        *("demo", "crossings", "watch", "replay", "compare", "report", "planners", "scenario"),
-        *("render", "tune", "falsify"),
+        *("demo", "crossings", "watch", "replay", "compare", "measures", "export", "report"),
+        *("planners", "scenario", "render", "tune", "falsify"),
     ],
     "Development": ["bench", "completion"],
 }

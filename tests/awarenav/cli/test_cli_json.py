@@ -49,6 +49,7 @@ def test_every_command_with_json_is_tested_here():
         ("crossings",),
         ("doctor",),
         ("judge",),
+        ("measures",),
         ("models", "list"),
         ("models", "verify"),
         ("planners", "list"),
@@ -99,6 +100,15 @@ def test_judge_prints_json(capfd, tmp_path, estimates):
     metrics = printed(capfd, "judge", estimates, estimates, "--out", tmp_path / "report.md")
     assert metrics["detection"]["ap50"] == 1.0
     assert (tmp_path / "report.md").read_text("utf-8").startswith("4 frames")
+
+
+def test_measures_print_json(capfd, tmp_path):
+    track = tmp_path / "track.csv"
+    track.write_text("timestamp,robot_x,robot_y\n0,0,0\n1000000000,0.5,0\n")
+    (found,) = printed(capfd, "measures", track).values()
+    assert found["episodes"] == 1
+    assert found["means"]["navwareset_speed_mps"] == 0.5
+    assert found["means"]["spl"] is None
 
 
 def test_compare_prints_json(capfd, tmp_path):

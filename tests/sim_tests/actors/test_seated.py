@@ -155,9 +155,9 @@ def test_nobody_sits_down_or_stands_up(hall: Warehouse) -> None:
 def test_a_script_of_somebody_seated_stays_at_one_place() -> None:
     here, there = {"t_s": 0.0, "x_m": 1.0, "y_m": 0.0}, {"t_s": 2.0, "x_m": 2.0, "y_m": 0.0}
     script = WorkerScript(path=[here], activities=[SEATED])
-    assert script.seated
+    assert script.stays
     assert script.activity(3.0).seated
-    assert not WorkerScript(path=[here, there]).seated
+    assert not WorkerScript(path=[here, there]).stays
     with pytest.raises(ValidationError, match="stays at one place"):
         WorkerScript(path=[here, there], activities=[SEATED])
     with pytest.raises(ValidationError, match="must all be 'sitting', got none, sitting"):

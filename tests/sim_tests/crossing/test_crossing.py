@@ -29,8 +29,10 @@ def comparison(request):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seeds", [(1,), pytest.param((1, 2, 3), marks=pytest.mark.full)])
-def test_in_pixels_awareness_of_an_attentive_worker_saves_time(seeds):
+@pytest.mark.parametrize(
+    ("seeds", "least_s"), [((1,), 0.5), pytest.param((1, 2, 3), 1.0, marks=pytest.mark.full)]
+)
+def test_in_pixels_awareness_of_an_attentive_worker_saves_time(seeds, least_s):
     """In the median: a false track beside who leaves the picture may cost the gain of a run."""
     saved_s = []
     for seed in seeds:
@@ -40,7 +42,7 @@ def test_in_pixels_awareness_of_an_attentive_worker_saves_time(seeds):
         assert not result.contact
         assert result.violation_time_s == 0.0
         saved_s.append(blind.time_to_goal_s - result.time_to_goal_s)
-    assert np.median(saved_s) > 1.0
+    assert np.median(saved_s) > least_s
 
 
 def test_all_reach_the_goal_and_the_robot_touches_nobody(comparison):

@@ -43,12 +43,6 @@ def test_a_study_on_a_full_disk_is_said_and_continues(tmp_path):
     assert finish(folder) == expected
 
 
-class Settings:
-    """Only what an evaluator reads at first."""
-
-    scenarios = ()
-
-
 @pytest.mark.parametrize(
     ("damage", "reason"),
     [
@@ -66,16 +60,15 @@ def test_a_damaged_evaluation_is_set_aside_and_runs_again(damage, reason, tmp_pa
             for seed in range(3)
         )
 
-    evaluator = PolicyEvaluator(Settings(), None, tmp_path)
-    evaluator._templates = ("a",)
+    evaluator = PolicyEvaluator(None, None, tmp_path)
     evaluator._run = lambda *_: records()
     path = tmp_path / "evaluations" / "p-0-2.csv"
     path.parent.mkdir()
     write_records(path, records())
     whole = path.read_bytes()
-    assert evaluator.evaluate("p", None, range(3)).records == records()
+    assert evaluator.evaluate("p", None, range(3), ("a",)).records == records()
     path.write_bytes(damage(whole))
-    assert evaluator.evaluate("p", None, range(3)).records == records()
+    assert evaluator.evaluate("p", None, range(3), ("a",)).records == records()
     assert path.read_bytes() == whole
     assert (path.parent / "p-0-2.csv.damaged").read_bytes() == damage(whole)
     assert reason in capsys.readouterr().err

@@ -215,7 +215,9 @@ def test_a_killed_and_resumed_tuning_with_two_workers_writes_the_same_files(tmp_
     assert main([*arguments, "--out", str(one)]) == 0
     printed = capsys.readouterr().out
     for name in (*_PRESETS, "least_time_lost", "knee", "least_violation"):
-        assert f"\n{name}" in printed
+        assert name in printed
+    assert "\nVerdict: keep balanced. " in printed
+    assert "\nNext: awarenav tune --policy balanced " in printed
     with (one / "trials.csv").open(newline="") as file:
         assert len({row["time_lost_s"] for row in csv.DictReader(file)}) > 1
     command = [sys.executable, "-m", "awarenav", *arguments, "--out", str(two)]

@@ -1,0 +1,18 @@
+"""Uncertainty of a predicted position along its most uncertain direction."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from perception.arrays import FloatArray
+from tracking import PersonTrack
+from tracking.prediction import PredictionModel, predict_ahead
+
+
+def predicted_sigmas_m(
+    track: PersonTrack, horizons_s: FloatArray, model: PredictionModel
+) -> FloatArray:
+    """Return standard deviations (T,) at times (T,) ≥ 0 after the track's stamp."""
+    covariances = predict_ahead(track, horizons_s, model).covariances_odom_m2[0]
+    xx, xy, yy = covariances[:, 0, 0], covariances[:, 0, 1], covariances[:, 1, 1]
+    return np.asarray(np.sqrt(0.5 * (xx + yy) + np.hypot(0.5 * (xx - yy), xy)))

@@ -1,0 +1,37 @@
+"""Measures that others use, and episodes in the formats that others read."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from awarenav.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from ._episode import Outcome, SocialEpisode
+    from ._files import FORMATS, check_episode, read_episode, write_episode
+    from ._measures import SOCIAL_MEASURES, SocialMeasure, social_measures
+    from ._recorder import EpisodeRecorder, episode_of
+
+__all__ = [
+    "FORMATS",
+    "SOCIAL_MEASURES",
+    "EpisodeRecorder",
+    "Outcome",
+    "SocialEpisode",
+    "SocialMeasure",
+    "check_episode",
+    "episode_of",
+    "read_episode",
+    "social_measures",
+    "write_episode",
+]
+
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "._episode": ("Outcome", "SocialEpisode"),
+        "._files": ("FORMATS", "check_episode", "read_episode", "write_episode"),
+        "._measures": ("SOCIAL_MEASURES", "SocialMeasure", "social_measures"),
+        "._recorder": ("EpisodeRecorder", "episode_of"),
+    },
+)

@@ -1,0 +1,119 @@
+"""Social forces between robot and people, and the social work that HuNavSim's evaluator sums.
+
+The force is that of Moussaïd et al. (2009, Proc. R. Soc. B 276:2755) with the constants of HuNavSim
+(class ``SFM`` of its evaluator, after the library lightsfm). Forces have the unit m/s².
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from perception.arrays import FloatArray
+
+from ._episode import SocialEpisode, wrapped
+
+# Constants of HuNavSim's evaluator: strengths (m/s²) and ranges (m), and those of the interaction.
+_SOCIAL_MPS2: Final = 2.1
+_OBSTACLE_MPS2: Final = 10.0
+_OBSTACLE_RANGE_M: Final = 0.2
+_LAMBDA: Final = 2.0
+_GAMMA: Final = 0.35
+_N: Final = 2.0
+_N_PRIME: Final = 3.0
+
+
+def social_force(
+    from_m: FloatArray, from_mps: FloatArray, on_m: FloatArray, on_mps: FloatArray
+) -> FloatArray:
+    """Return the social force that one body exerts on another.
+
+    Args:
+        from_m: (..., 2) position of the body that exerts it.
+        from_mps: (..., 2) its velocity.
+        on_m: (..., 2) position of the body on which it acts.
+        on_mps: (..., 2) its velocity.
+
+    Returns:
+        (..., 2) m/s²; 0 for two bodies at one place, which have no direction.
+    """
+    offset = from_m - on_m
+    distance = np.linalg.norm(offset, axis=-1)
+    direction = offset / np.where(distance > 0.0, distance, 1.0)[..., None]
+    interaction = _LAMBDA * (on_mps - from_mps) + direction
+    length = np.linalg.norm(interaction, axis=-1)
+    acts = (distance > 0.0) & (length > 0.0)
+    length = np.where(length > 0.0, length, 1.0)
+    along = interaction / length[..., None]
+    theta = wrapped(
+        np.arctan2(along[..., 1], along[..., 0]) - np.arctan2(direction[..., 1], direction[..., 0])
+    )
+    reach = _GAMMA * length
+    slowing = -np.exp(-distance / reach - (_N_PRIME * reach * theta) ** 2)
+    turning = np.sign(theta) * np.exp(-distance / reach - (_N * reach * theta) ** 2)
+    left = np.stack([-along[..., 1], along[..., 0]], axis=-1)
+    force = _SOCIAL_MPS2 * (slowing[..., None] * along + turning[..., None] * left)
+    return np.where(acts[..., None], force, 0.0)
+
+
+def nearest_wall_points_m(points_m: FloatArray, walls_m: FloatArray) -> FloatArray:
+    """Return the (N, 2) points of (W, 4) walls, W ≥ 1, that are nearest to (N, 2) points."""
+    start, along = walls_m[:, :2], walls_m[:, 2:] - walls_m[:, :2]
+    length2 = (along**2).sum(axis=1)
+    to = points_m[:, None, :] - start
+    share = (to * along).sum(axis=-1) / np.where(length2 > 0.0, length2, 1.0)
+    feet = start + np.clip(share, 0.0, 1.0)[..., None] * along
+    apart = np.linalg.norm(points_m[:, None, :] - feet, axis=-1)
+    found: FloatArray = feet[np.arange(len(points_m)), np.argmin(apart, axis=1)]
+    return found
+
+
+def obstacle_force(points_m: FloatArray, radius_m: float, walls_m: FloatArray) -> FloatArray:
+    """Return the (N, 2) forces (m/s²) of the nearest wall on discs at (N, 2) points; 0 without."""
+    if not len(walls_m):
+        return np.zeros_like(points_m)
+    away = points_m - nearest_wall_points_m(points_m, walls_m)
+    distance = np.linalg.norm(away, axis=-1)
+    strength = _OBSTACLE_MPS2 * np.exp(-(distance - radius_m) / _OBSTACLE_RANGE_M)
+    force: FloatArray = (strength / np.where(distance > 0.0, distance, 1.0))[:, None] * away
+    return force
+
+
+@dataclass(frozen=True, slots=True)
+class SocialWork:
+    """HuNavSim's sums of forces over all instants; they grow with the rate of the instants.
+
+    Attributes:
+        on_people: Σ of the magnitudes of the robot's forces on each person.
+        on_robot: Σ of the magnitudes of each person's force on the robot.
+        obstacles_on_robot: Σ of the magnitudes of the walls' force on the robot.
+        work: Σ of |sum of the people's forces on the robot| + |walls' force on the robot| +
+            ``on_people``.
+    """
+
+    on_people: float
+    on_robot: float
+    obstacles_on_robot: float
+    work: float
+
+    @classmethod
+    def of(cls, episode: SocialEpisode) -> SocialWork:
+        """Return the sums of an episode."""
+        there = episode.present[..., None]
+        robot = np.broadcast_to(episode.robot_m[:, None, :], episode.people_m.shape)
+        robot_mps = np.broadcast_to(episode.robot_mps[:, None, :], episode.people_m.shape)
+        people, people_mps = episode.people_m, episode.people_mps
+        on_people = np.where(there, social_force(robot, robot_mps, people, people_mps), 0.0)
+        on_robot = np.where(there, social_force(people, people_mps, robot, robot_mps), 0.0)
+        walls = obstacle_force(episode.robot_m, episode.robot_radius_m, episode.walls_m)
+        walls_sum = float(np.linalg.norm(walls, axis=-1).sum())
+        people_sum = float(np.linalg.norm(on_people, axis=-1).sum())
+        together = float(np.linalg.norm(on_robot.sum(axis=1), axis=-1).sum())
+        return cls(
+            on_people=people_sum,
+            on_robot=float(np.linalg.norm(on_robot, axis=-1).sum()),
+            obstacles_on_robot=walls_sum,
+            work=together + walls_sum + people_sum,
+        )

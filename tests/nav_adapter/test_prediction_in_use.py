@@ -1,0 +1,136 @@
+"""The prediction model in the adapter and the exporters: on by choice, and never in the limit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from nav_scenes import ROBOT, crowds, person, robot_at
+
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, NavError
+from nav_adapter.exporters import predicted_circles, predicted_people, speed_limit_at
+from nav_adapter.policies import ObstacleOutline
+from tracking import PersonTrack
+from tracking.prediction import FITTED, PredictionModel, predict_ahead
+
+TIMES_S = np.array([0.0, 0.2, 0.5, 1.0, 2.0])
+SWEEPING = AwarenessPolicy().model_copy(update={"outline": ObstacleOutline(sweep_s=2.0)})
+
+
+def walker(**arguments: object) -> PersonTrack:
+    """Return a person whose velocity is uncertain too."""
+    track = person(**arguments)  # type: ignore[arg-type]
+    covariance = np.kron([[0.01, 0.01], [0.01, 0.04]], np.eye(2))
+    return replace(track, covariance_odom=covariance)
+
+
+def constraints_for(
+    tracks: tuple[PersonTrack, ...],
+    prediction: PredictionModel | None = None,
+    *,
+    speed_mps: float = 0.0,
+    policy: AwarenessPolicy = SWEEPING,
+) -> NavConstraints:
+    adapter = NavAdapter(policy, ROBOT, prediction=prediction)
+    return adapter.update(tracks, robot_at(0.0, speed_mps=speed_mps), 0.0)
+
+
+@given(tracks=crowds())
+def test_circles_and_limits_are_those_without_a_prediction(tracks: tuple[PersonTrack, ...]) -> None:
+    plain, wide = constraints_for(tracks), constraints_for(tracks, FITTED)
+    assert wide.speed_limit_mps == plain.speed_limit_mps
+    assert wide.limited_by == plain.limited_by
+    for one, other in zip(plain.obstacles, wide.obstacles, strict=True):
+        assert one.radius_m == other.radius_m
+        np.testing.assert_array_equal(one.center_odom_m, other.center_odom_m)
+        # Rings of the same disc may differ in the last digit after the hull.
+        assert other.polygon.buffer(1e-9).contains(shapely.Point(*other.center_odom_m))
+
+
+def test_swept_polygons_hold_the_predicted_region_and_no_more() -> None:
+    track = walker(position=(4.0, 1.0))
+    obstacle = constraints_for((track,), FITTED).obstacles[0]
+    ahead = predict_ahead(track, [2.0])
+    sigma_m = float(np.sqrt(np.linalg.eigvalsh(ahead.covariances_odom_m2[0, 0])[-1]))
+    rim_m = obstacle.radius_m + 2.0 * (sigma_m - 0.1)
+    inner = shapely.Point(4.0, 1.0).buffer(rim_m - 1e-6, quad_segs=64)
+    outer = shapely.Point(4.0, 1.0).buffer(1.01 * rim_m, quad_segs=64)
+    assert obstacle.polygon.contains(inner)
+    assert outer.contains(obstacle.polygon)
+
+
+def test_people_who_walk_on_are_swept_less_widely_than_those_who_may_set_off() -> None:
+    """The policy's outline makes no difference between the two."""
+    walking, standing = walker(velocity=(1.4, 0.0)), walker(track_id=2, position=(3.0, 9.0))
+    for model, narrower in ((None, False), (FITTED, True)):
+        one, other = constraints_for((walking, standing), model).obstacles
+        across = [each.polygon.bounds[3] - each.polygon.bounds[1] for each in (one, other)]
+        assert (across[0] < 0.9 * across[1]) is narrower
+
+
+def test_the_speed_field_is_more_cautious_the_further_ahead() -> None:
+    track = walker(position=(4.0, 0.0))
+    plain, wide = constraints_for((track,)), constraints_for((track,), FITTED)
+    poses = np.zeros((1, 20, 2))
+    before, after = (speed_limit_at(each, poses, dt_s=0.1)[0] for each in (plain, wide))
+    assert after[0] == pytest.approx(before[0], abs=0.02)
+    assert (np.diff(after) < 0.0).all()
+    assert np.ptp(before) < 1e-6
+    assert after[-1] < before[-1] - 0.1
+
+
+def test_alerts_reach_as_far_as_the_person_may_be_by_then() -> None:
+    """A person who passes at 1.8 m in 1.5 s may have come within half a metre."""
+    aside = walker(position=(1.8, 1.8), velocity=(0.0, 0.0))
+    plain, wide = (
+        constraints_for((aside,), model, speed_mps=1.2).alerts for model in (None, FITTED)
+    )
+    assert plain == ()
+    assert [alert.track_id for alert in wide] == [1]
+
+
+@given(tracks=crowds())
+def test_predicted_people_are_those_of_tracking(tracks: tuple[PersonTrack, ...]) -> None:
+    fresh = tuple(replace(track, stamp_s=0.0) for track in tracks)
+    by_id = sorted(fresh, key=lambda track: track.id)
+    model = PredictionModel(horizons_s=(1.0,), std_factors=(1.3,))
+    constraints = constraints_for(fresh)
+    for chosen in (FITTED, model):
+        found, wanted = (
+            predicted_people(constraints, TIMES_S, model=chosen),
+            predict_ahead(by_id, TIMES_S, chosen),
+        )
+        np.testing.assert_array_equal(found.means_odom_m, wanted.means_odom_m)
+        np.testing.assert_allclose(
+            found.covariances_odom_m2, wanted.covariances_odom_m2, atol=1e-12
+        )
+    np.testing.assert_array_equal(
+        predicted_people(constraints, TIMES_S).covariances_odom_m2,
+        predicted_people(constraints, TIMES_S, model=FITTED).covariances_odom_m2,
+    )
+
+
+def test_predicted_circles_grow_with_the_uncertainty() -> None:
+    tracks = (walker(position=(4.0, 1.0)), walker(track_id=2, velocity=(1.3, 0.0)))
+    constraints = constraints_for(tracks)
+    plain = predicted_circles(constraints, TIMES_S)
+    grown = predicted_circles(constraints, TIMES_S, model=FITTED, sigmas=1.5)
+    np.testing.assert_array_equal(grown[:, :, :4], plain[:, :, :4])
+    spread = predict_ahead(tracks, TIMES_S).covariances_odom_m2
+    sigmas_m = np.sqrt(np.linalg.eigvalsh(spread)[..., -1])
+    wanted = plain[:, :, 4] + 1.5 * np.maximum(sigmas_m - 0.1, 0.0)
+    np.testing.assert_allclose(grown[:, :, 4], wanted, atol=1e-9)
+    assert (np.diff(grown[:, :, 4], axis=1) > 0.0).all()
+
+
+def test_arguments_that_do_not_fit_are_refused() -> None:
+    constraints = constraints_for((walker(),))
+    with pytest.raises(NavError, match="prediction must be a PredictionModel or None, got str"):
+        NavAdapter(AwarenessPolicy(), ROBOT, prediction="prediction.yaml")  # type: ignore[arg-type]
+    with pytest.raises(NavError, match="got both"):
+        predicted_people(constraints, TIMES_S, model=FITTED, overconfidence_per_s=0.5)
+    with pytest.raises(NavError, match="sigmas"):
+        predicted_circles(constraints, TIMES_S, model=FITTED, sigmas=-1.0)

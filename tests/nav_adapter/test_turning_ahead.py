@@ -1,0 +1,225 @@
+"""Clipped twists leave slack, and hold in the next cycles too if people do as predicted."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from nav_scenes import ROBOT, crowds, finite, person, robot_at, settled_update
+
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, NavError, RobotState
+from nav_adapter.motion import clip_twists, clip_twists_ahead, twist_envelope
+from perception.arrays import FloatArray
+from tracking import PersonTrack
+
+ROUNDING = 1e-9
+# The field is computed in single precision.
+SINGLE = 1e-5
+CYCLE_S = 0.05
+TURNS = replace(ROBOT, max_yaw_rate_radps=1.2)
+TWISTS = st.tuples(finite(-2.0, 2.0), finite(-2.0, 2.0), finite(-3.0, 3.0))
+
+
+def limited(limit_mps: float, fastest_mps: float) -> NavConstraints:
+    return NavConstraints(
+        0.0, (), limit_mps, "a test", False, fastest_point_limit_mps=fastest_mps, robot=TURNS
+    )
+
+
+@given(
+    limit_mps=finite(0.0, 1.5),
+    more_mps=st.sampled_from([0.0, 0.5, math.inf]),
+    less_mps=st.tuples(finite(0.0, 0.3), finite(0.0, 0.3)),
+    twist=TWISTS,
+)
+def test_slack_is_left_below_the_limit_of_the_fastest_point(
+    limit_mps: float, more_mps: float, less_mps: tuple[float, float], twist: tuple[float, ...]
+) -> None:
+    constraints = limited(limit_mps, limit_mps + more_mps)
+    rows, radius_m = twist_envelope(constraints), TURNS.circumscribed_radius_m
+    small, large = sorted(less_mps)
+    for wanted in (np.array(twist), np.array([twist[0], twist[2]])):
+        less, least = (clip_twists(constraints, wanted, slack_mps=mps) for mps in (small, large))
+        for clipped, slack_mps in ((less, small), (least, large)):
+            speed, turning = math.hypot(*clipped[:-1]), float(clipped[-1])
+            assert (rows[:, :2] @ [speed, turning] >= rows[:, 2] - ROUNDING).all()
+            left_mps = max(limit_mps + more_mps - slack_mps, 0.0)
+            assert speed + radius_m * abs(turning) <= left_mps + ROUNDING
+        assert (np.abs(least) <= np.abs(less)).all()
+
+
+@given(
+    limit_mps=finite(0.0, 1.5),
+    more_mps=st.sampled_from([0.0, 0.5, math.inf]),
+    v=finite(-2.0, 2.0),
+    w=finite(-3.0, 3.0),
+)
+def test_without_slack_the_limits_are_used_up_to_the_last_bit(
+    limit_mps: float, more_mps: float, v: float, w: float
+) -> None:
+    fastest_mps, factor = limit_mps + more_mps, 1.0
+    speed = math.sqrt(v * v)
+    for value, most in (
+        (speed, limit_mps),
+        (abs(w), 1.2),
+        (speed + TURNS.circumscribed_radius_m * abs(w), fastest_mps),
+    ):
+        factor = min(factor, most / value if value > most else 1.0)
+    clipped = clip_twists(limited(limit_mps, fastest_mps), [v, w], slack_mps=0.0)
+    assert clipped.tolist() == [v * factor, w * factor]
+
+
+@st.composite
+def driving(draw: st.DrawFn) -> RobotState:
+    speed = draw(finite(-0.5, 1.5))
+    lateral = draw(st.sampled_from([0.0, 0.3]))
+    return RobotState(
+        0.0,
+        np.zeros(2),
+        draw(finite(-4.0, 4.0)),
+        speed,
+        draw(finite(-1.2, 1.2)),
+        np.array([speed, lateral]),
+    )
+
+
+@settings(max_examples=60)
+@given(tracks=crowds(), state=driving(), twist=TWISTS, less_mps=st.tuples(*2 * [finite(0.0, 0.3)]))
+def test_looking_ahead_never_makes_a_twist_faster(
+    tracks: tuple[PersonTrack, ...],
+    state: RobotState,
+    twist: tuple[float, ...],
+    less_mps: tuple[float, float],
+) -> None:
+    constraints = settled_update(tracks, state=state, robot=TURNS)
+    wanted, (small, large) = np.array(twist), sorted(less_mps)
+
+    def ahead(slack_mps: float, cycles: int) -> FloatArray:
+        return clip_twists_ahead(
+            constraints, state, wanted, CYCLE_S, cycles=cycles, slack_mps=slack_mps
+        )
+
+    now = clip_twists(constraints, wanted, slack_mps=small)
+    assert ahead(small, 0).tolist() == now.tolist()
+    few, more = ahead(small, 1), ahead(small, 3)
+    assert (np.abs(few) <= np.abs(now) + ROUNDING).all()
+    assert (np.abs(more) <= np.abs(few) + SINGLE).all()
+    assert (np.abs(ahead(large, 1)) <= np.abs(few) + ROUNDING).all()
+    # While the robot brakes to a twist, it may turn less.
+    still_mps = state.travel_mps - TURNS.max_deceleration_mps2 * CYCLE_S
+    flatter = (
+        np.cross(few, wanted) if math.hypot(*few[:2]) >= still_mps else np.cross(few, wanted)[2]
+    )
+    np.testing.assert_allclose(flatter, 0.0, atol=ROUNDING)
+
+
+def driven(state: RobotState, twist: FloatArray, time_s: float) -> RobotState:
+    """Return the state after a time with a constant twist, in a thousand short steps."""
+    step_s = time_s / 1000
+    heading = state.heading_odom_rad + step_s * twist[-1] * (np.arange(1000) + 0.5)
+    steps = np.array([np.cos(heading), np.sin(heading)]) * twist[0]
+    if len(twist) == 3:
+        steps += np.array([-np.sin(heading), np.cos(heading)]) * twist[1]
+    return RobotState(
+        state.stamp_s + time_s,
+        state.position_odom_m + step_s * steps.sum(axis=1),
+        state.heading_odom_rad + time_s * float(twist[-1]),
+        float(twist[0]),
+        float(twist[-1]),
+        twist[:2] if len(twist) == 3 else None,
+    )
+
+
+def walked(track: PersonTrack, time_s: float) -> PersonTrack:
+    position = track.position_odom_m + time_s * track.velocity_odom_mps
+    return replace(track, stamp_s=track.stamp_s + time_s, position_odom_m=position)
+
+
+@settings(max_examples=60)
+@given(tracks=crowds(), state=driving(), twist=TWISTS, sideways=st.booleans())
+def test_a_twist_that_is_held_keeps_the_limits_of_the_next_cycles(
+    tracks: tuple[PersonTrack, ...], state: RobotState, twist: tuple[float, ...], sideways: bool
+) -> None:
+    wanted = np.array(twist if sideways else [twist[0], twist[2]])
+    adapter = NavAdapter(AwarenessPolicy(), TURNS)
+    for ago_s in (0.3, 0.2, 0.1, 0.0):
+        people = [walked(track, -ago_s) for track in tracks]
+        constraints = adapter.update(people, replace(state, stamp_s=-ago_s), -ago_s)
+    command = clip_twists_ahead(constraints, state, wanted, CYCLE_S, cycles=2, slack_mps=0.0)
+    for time_s in (CYCLE_S, 2 * CYCLE_S):
+        people = [walked(track, time_s) for track in tracks]
+        then = adapter.update(people, driven(state, command, time_s), time_s)
+        assert then.fastest_point_limit_mps is not None
+        speed = math.hypot(*command[:-1])
+        fastest_mps = speed + TURNS.circumscribed_radius_m * abs(command[-1])
+        assert speed <= then.speed_limit_mps + ROUNDING
+        # The field ends at the robot's maximum; corners may be faster where people allow it.
+        if then.limited_by != "robot maximum":
+            assert fastest_mps <= then.fastest_point_limit_mps + 1e-3
+
+
+@settings(max_examples=40)
+@given(tracks=crowds(), state=driving(), turning=finite(-1.2, 1.2))
+def test_a_robot_that_is_still_too_fast_turns_less(
+    tracks: tuple[PersonTrack, ...], state: RobotState, turning: float
+) -> None:
+    constraints = settled_update(tracks, state=state, robot=TURNS)
+    assert constraints.fastest_point_limit_mps is not None
+    command = clip_twists_ahead(constraints, state, [0.0, turning], CYCLE_S, slack_mps=0.0)
+    still_mps = max(state.travel_mps - TURNS.max_deceleration_mps2 * CYCLE_S, 0.0)
+    corner_mps = still_mps + TURNS.circumscribed_radius_m * abs(command[1])
+    assert corner_mps <= max(constraints.fastest_point_limit_mps, still_mps) + ROUNDING
+
+
+def test_somebody_who_comes_nearer_slows_the_robot_a_cycle_early() -> None:
+    state = robot_at(speed_mps=0.6)
+    walks = person(position=(3.0, 0.0), velocity=(-1.2, 0.0))
+    constraints = settled_update((walks,), state=state, robot=TURNS)
+    limits = [
+        float(clip_twists_ahead(constraints, state, (1.5, 0.0), CYCLE_S, cycles=n, slack_mps=0)[0])
+        for n in range(4)
+    ]
+    assert limits[0] == constraints.speed_limit_mps
+    steps = -np.diff(limits)
+    # The gap closes by 1.8 m/s · 0.05 s a cycle, and the limit falls by about half as much.
+    assert (steps > 0.02).all()
+    assert (steps < 0.09).all()
+    slack = clip_twists_ahead(constraints, state, (1.5, 0.0), CYCLE_S, slack_mps=0.03)
+    assert slack[0] == pytest.approx(limits[2] - 0.03)
+
+
+def test_with_nobody_near_the_robot_is_free() -> None:
+    constraints = settled_update((), state=robot_at(speed_mps=1.5), robot=TURNS)
+    state = robot_at(speed_mps=1.5)
+    assert clip_twists_ahead(constraints, state, (1.5, 1.2), CYCLE_S).tolist() == [1.5, 1.2]
+
+
+def test_many_twists_are_clipped_as_one_by_one() -> None:
+    state = robot_at(speed_mps=0.4)
+    constraints = settled_update((person(position=(2.0, 0.5)),), state=state, robot=TURNS)
+    samples = np.random.default_rng(1).normal(0.0, 1.0, (4, 3, 2))
+    clipped = clip_twists_ahead(constraints, state, samples, CYCLE_S)
+    assert clipped.shape == samples.shape
+    for sample, result in zip(samples.reshape(-1, 2), clipped.reshape(-1, 2), strict=True):
+        alone = clip_twists_ahead(constraints, state, sample, CYCLE_S)
+        np.testing.assert_allclose(alone, result, atol=SINGLE)
+    assert clip_twists_ahead(constraints, state, np.zeros((0, 2)), CYCLE_S).shape == (0, 2)
+
+
+def test_what_has_no_answer_is_refused() -> None:
+    state, constraints = robot_at(), settled_update(())
+    for slack_mps in (-0.01, math.nan, math.inf):
+        with pytest.raises(NavError, match="slack_mps must"):
+            clip_twists(constraints, [0.1, 0.1], slack_mps=slack_mps)
+        with pytest.raises(NavError, match="slack_mps must"):
+            clip_twists_ahead(constraints, state, [0.1, 0.1], CYCLE_S, slack_mps=slack_mps)
+    with pytest.raises(NavError, match=r"cycles must be a whole number >= 0, got -1"):
+        clip_twists_ahead(constraints, state, [0.1, 0.1], CYCLE_S, cycles=-1)
+    with pytest.raises(NavError, match="dt_s must"):
+        clip_twists_ahead(constraints, state, [0.1, 0.1], 0.0)
+    with pytest.raises(NavError, match="twists must be finite"):
+        clip_twists_ahead(constraints, state, [0.1], CYCLE_S)

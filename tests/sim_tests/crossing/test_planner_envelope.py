@@ -1,0 +1,145 @@
+"""The reference planner's commands within the limit of the robot's fastest point, and its curve."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from nav_adapter import NavConstraints, PersonObstacle, RobotProfile, RobotState
+from nav_adapter.exporters import static_polygons
+from sim_tests.actors.robot import NOVA_CARTER
+from sim_tests.crossing.planner import PlannerConfig, SamplingPlanner
+
+DT_S = 0.05
+ROUNDING = 1e-9
+AISLE = np.array([[-6.0, 1.5, 20.0, 2.5], [-6.0, -2.5, 20.0, -1.5]])
+# A tricycle whose base origin lies on the rear axle, with forks behind it.
+TRICYCLE = RobotProfile(
+    footprint_m=[[1.4, 0.4], [-0.8, 0.4], [-0.8, -0.4], [1.4, -0.4]],
+    max_speed_mps=1.2,
+    max_acceleration_mps2=0.6,
+    max_deceleration_mps2=0.8,
+    reaction_time_s=0.3,
+    drive="ackermann",
+    max_yaw_rate_radps=0.7,
+    max_yaw_acceleration_radps2=1.0,
+    min_turning_radius_m=1.4,
+)
+SLUGGISH = replace(NOVA_CARTER, max_yaw_rate_radps=0.4, max_yaw_acceleration_radps2=0.8)
+ROBOTS = [NOVA_CARTER, SLUGGISH, TRICYCLE]
+
+coordinate = st.floats(-4.0, 4.0)
+people_data = st.lists(
+    st.tuples(
+        st.tuples(coordinate, coordinate),
+        st.tuples(st.floats(-1.6, 1.6), st.floats(-1.6, 1.6)),
+        st.floats(0.4, 1.2),
+    ),
+    max_size=2,
+)
+
+
+def constraints(people: list, limit_mps: float, fastest_mps: float) -> NavConstraints:
+    outline = static_polygons(np.array([[0.0, 0.0, 1.0, 1.0]]))[0]  # the planner takes the circle
+    obstacles = tuple(
+        PersonObstacle(i, center, velocity, radius, 1.75, 0.0, outline)
+        for i, (center, velocity, radius) in enumerate(people)
+    )
+    return NavConstraints(
+        0.0, obstacles, limit_mps, "test", False, fastest_point_limit_mps=fastest_mps
+    )
+
+
+@st.composite
+def situations(draw: st.DrawFn) -> tuple[RobotProfile, RobotState, NavConstraints]:
+    """Return a robot in motion, within or above limits of which one may have fallen just now."""
+    robot = draw(st.sampled_from(ROBOTS))
+    limit = draw(st.floats(0.0, 1.5))
+    fastest = draw(st.sampled_from([limit, limit + 0.3, math.inf]))
+    speed = draw(st.floats(0.0, robot.max_speed_mps))
+    turn = draw(st.floats(-1.0, 1.0)) * (robot.max_yaw_rate_radps or 0.0)
+    if robot.min_turning_radius_m is not None:
+        turn *= min(1.0, speed / robot.min_turning_radius_m / (robot.max_yaw_rate_radps or 1.0))
+    state = RobotState(
+        0.0, (draw(coordinate), draw(st.floats(-0.6, 0.6))), draw(st.floats(-3.0, 3.0)), speed, turn
+    )
+    return robot, state, constraints(draw(people_data), limit, fastest)
+
+
+@settings(max_examples=200, deadline=None)
+@given(situations(), st.sampled_from([None, AISLE]))
+def test_no_point_of_the_robot_is_commanded_above_the_limit(situation, boxes) -> None:
+    robot, state, now = situation
+    speed, yaw_rate = SamplingPlanner(robot, boxes).plan(state, (8.0, 0.0), now, DT_S)
+    radius_m = robot.circumscribed_radius_m
+    fastest_mps = speed + abs(yaw_rate) * radius_m
+    if fastest_mps <= now.fastest_point_limit_mps + ROUNDING:
+        return
+    # Only a robot that was too fast is still too fast: it brakes fully and does not turn harder.
+    assert state.speed_mps + abs(state.yaw_rate_radps) * radius_m > now.fastest_point_limit_mps
+    braked_mps = max(state.speed_mps - robot.max_deceleration_mps2 * DT_S, 0.0)
+    assert speed == pytest.approx(braked_mps, abs=ROUNDING)
+    assert abs(yaw_rate) <= abs(state.yaw_rate_radps) + ROUNDING
+
+
+@settings(max_examples=200, deadline=None)
+@given(situations(), st.sampled_from([None, AISLE]))
+def test_commands_keep_to_the_limits_of_the_profile(situation, boxes) -> None:
+    robot, state, now = situation
+    speed, yaw_rate = SamplingPlanner(robot, boxes).plan(state, (8.0, 0.0), now, DT_S)
+    assert speed <= max(robot.max_speed_mps, state.speed_mps)
+    assert speed - state.speed_mps <= robot.max_acceleration_mps2 * DT_S + ROUNDING
+    assert state.speed_mps - speed <= robot.max_deceleration_mps2 * DT_S + ROUNDING
+    assert abs(yaw_rate) <= max(robot.max_yaw_rate_radps, abs(state.yaw_rate_radps)) + ROUNDING
+    if robot.min_turning_radius_m is None:
+        step = robot.max_yaw_acceleration_radps2 * DT_S
+        assert abs(yaw_rate - state.yaw_rate_radps) <= step + ROUNDING
+    else:
+        assert abs(yaw_rate) <= speed / robot.min_turning_radius_m + ROUNDING
+
+
+def drive(state: RobotState, speed_mps: float, yaw_rate_radps: float) -> RobotState:
+    """Return the state after a tick of a constant twist."""
+    turn, chord = yaw_rate_radps * DT_S, speed_mps * DT_S
+    middle = state.heading_odom_rad + 0.5 * turn
+    x, y = state.position_odom_m + chord * np.array([math.cos(middle), math.sin(middle)])
+    heading = state.heading_odom_rad + turn
+    return RobotState(state.stamp_s + DT_S, (x, y), heading, speed_mps, yaw_rate_radps)
+
+
+@pytest.mark.parametrize("robot", [NOVA_CARTER, SLUGGISH], ids=["Nova Carter", "sluggish"])
+def test_a_limited_robot_passes_somebody_who_stands_and_obeys_all_the_way(robot) -> None:
+    """With 0.6 m/s for its fastest point a robot turns past a person and on to its goal."""
+    planner, state = SamplingPlanner(robot), RobotState(0.0, (0.0, 0.0), 0.0, 0.0, 0.0)
+    now = constraints([((4.0, 0.1), (0.0, 0.0), 0.6)], 0.6, 0.6)
+    fastest_mps = []
+    while state.position_odom_m[0] < 7.5 and state.stamp_s < 40.0:
+        state = drive(state, *planner.plan(state, (9.0, 0.0), now, DT_S))
+        corners_mps = abs(state.yaw_rate_radps) * robot.circumscribed_radius_m
+        fastest_mps.append(state.speed_mps + corners_mps)
+    assert state.stamp_s < 25.0
+    assert abs(state.position_odom_m[1]) < 1.0
+    assert max(fastest_mps) <= 0.6 + ROUNDING
+    assert max(fastest_mps) > 0.55  # it uses what it may
+
+
+def test_the_shipped_robot_has_the_default_settings() -> None:
+    assert PlannerConfig.for_robot(NOVA_CARTER) == PlannerConfig()
+
+
+def test_settings_follow_the_robot() -> None:
+    config = PlannerConfig.for_robot(SLUGGISH)
+    assert config.max_yaw_rate_radps == 0.4
+    assert config.max_yaw_acceleration_radps2 == 0.8
+    # A turn costs as much per rad/s, or a slow turner would not face its goal.
+    usual = PlannerConfig()
+    assert config.smoothness_weight / 0.4 == pytest.approx(
+        usual.smoothness_weight / usual.max_yaw_rate_radps
+    )
+    heavy = replace(NOVA_CARTER, max_speed_mps=2.0, max_deceleration_mps2=0.8)
+    assert PlannerConfig.for_robot(heavy).horizon_s == pytest.approx(2.0 * 2.0 / 0.8)

@@ -1,0 +1,103 @@
+"""The second set of shipped scenarios: its place beside the first, its promises, its crossings."""
+
+from __future__ import annotations
+
+import pytest
+from paths import ROOT
+
+from awarenav.cli import main
+from sim_tests import Scenario, ScenarioTemplate, SimError, run_crossing, shipped_scenarios
+from sim_tests.actors.behaviour import PersonSpec
+from sim_tests.crossing.eyes._make_eyes import unusual_size_probability
+from sim_tests.scenario import SCENARIO_SETS, shipped_templates
+from sim_tests.scenario.catalogue import approach_statistics, template_problems
+from sim_tests.study.runs import named_templates
+from sim_tests.study.scenarios import AttentionCheck
+
+NAMES = shipped_scenarios("guidelines")
+# Short ones; the others take longer.
+QUICK = ("narrow_doorway", "kneels_at_work")
+
+
+def test_the_sets_share_no_scenario_and_all_stays_as_it_was_measured() -> None:
+    assert SCENARIO_SETS == ("all", "guidelines")
+    assert shipped_scenarios() == shipped_scenarios("all")
+    assert not set(NAMES) & set(shipped_scenarios())
+    assert len(named_templates(["all"])) == 23
+    assert [each.name for each in named_templates(["guidelines"])] == list(NAMES)
+    assert len(named_templates(["all", "guidelines", NAMES[0]])) == 23 + len(NAMES)
+    with pytest.raises(SimError, match="must be one of 'all', 'guidelines', got 'guideline'"):
+        shipped_scenarios("guideline")
+    for name in NAMES:
+        assert ScenarioTemplate.shipped(f"{name}@1").name == Scenario.shipped(name).name == name
+
+
+def test_the_list_shows_both_sets(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["scenario", "list"]) == 0
+    first, second = capsys.readouterr().out.split("--scenario guidelines\n")
+    assert first.startswith("--scenario all\n")
+    assert all(f"{name}@" in second and f"{name}@" not in first for name in NAMES)
+    assert all(f"{name}@" in first for name in shipped_scenarios())
+
+
+@pytest.mark.parametrize("template", shipped_templates("guidelines"), ids=lambda each: each.name)
+def test_they_can_be_run_and_are_as_their_page_says(template: ScenarioTemplate) -> None:
+    assert template_problems(template) == ()
+    assert template.parameters()
+    statistics = approach_statistics(template, 200)
+    assert statistics is not None
+    assert statistics.conflict_share >= 0.8
+    assert statistics.median_time_s > 2.0
+    notices_m = [each.glances.notices_within_m for each in template.median().people]
+    if template.attention == "unaware":
+        assert max(notices_m) == 0.0
+    else:
+        assert max(notices_m) > 8.0
+    page = (ROOT / "docs" / "scenarios.md").read_text("utf-8")
+    _, _, section = page.partition(f"### {template.name}\n")
+    text = " ".join(section.partition("\n### ")[0].split())
+    assert text.startswith(template.description)
+    assert (
+        f"({template.attention}; {len(template.parameters())} numbers vary; nearer than 1 m in "
+        f"{statistics.conflict_share:.0%} of 200 draws)"
+    ) in text
+    assert (ROOT / "docs" / "images" / "scenarios" / f"{template.name}.png").is_file()
+
+
+def test_the_child_is_drawn_in_its_size_and_the_robot_is_told_of_unusual_sizes() -> None:
+    template = ScenarioTemplate.shipped("child_visitor")
+    statures = [template.for_seed(seed).people[0].stature_m for seed in range(40)]
+    assert 1.05 <= min(statures) < 1.1
+    assert 1.25 < max(statures) <= 1.3
+    for name in ("child_visitor", "kneels_at_work", "sits_at_work"):
+        assert unusual_size_probability(Scenario.shipped(name)) > 0.0
+    assert unusual_size_probability(Scenario.shipped("narrow_doorway")) == 0.0
+
+
+def follower_gap_m(keeps_off_m: float) -> float:
+    """Return the least distance of the follower's centre from the robot on its way."""
+    scenario = Scenario.shipped("leads_person")
+    (person,) = scenario.people
+    behind = PersonSpec.model_validate({**person.model_dump(), "keeps_off_m": keeps_off_m})
+    short = scenario.model_copy(update={"people": (behind,), "duration_s": 8.0})
+    return run_crossing(short, policy="balanced", seed=0).min_separation_m
+
+
+def test_a_follower_keeps_the_distance_that_it_is_given() -> None:
+    near_m, far_m = follower_gap_m(0.7), follower_gap_m(1.5)
+    # From the body's centre; half a body is about 0.25 m deep.
+    assert 0.3 < near_m < 0.9
+    assert far_m == pytest.approx(near_m + 0.8, abs=0.3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name",
+    [name if name in QUICK else pytest.param(name, marks=pytest.mark.full) for name in NAMES],
+)
+def test_the_robot_touches_no_one_and_people_look_as_the_label_says(name: str) -> None:
+    template = ScenarioTemplate.shipped(name)
+    result = run_crossing(template.for_seed(1), policy="balanced", seed=1)
+    assert result.success
+    assert result.contact_by != "robot"
+    assert AttentionCheck.of(template, [result]).contradictions == ()

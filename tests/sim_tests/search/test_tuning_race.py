@@ -1,0 +1,163 @@
+"""Races of trials against the base policy, what is held out, and when a policy beats another."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nav_adapter import AwarenessPolicy
+from sim_tests import SimError
+from sim_tests.scenario import ScenarioTemplate, shipped_templates
+from sim_tests.search.tune import Evaluation
+from sim_tests.search.tune._finalists import (
+    BEATS_BASE,
+    Candidate,
+    beats,
+    level_of,
+    merged,
+    named_winner,
+)
+from sim_tests.search.tune._race import dropped, stages
+from sim_tests.search.tune._settings import held_out_scenarios
+from sim_tests.study.measures import EpisodeRecord
+
+_TASKS = [(scenario, seed) for scenario in "abcdef" for seed in range(5)]
+
+
+def _evaluation(time_s=5.0, violation_s=0.0, *, tasks=_TASKS, contacts=0, spread=0.3, name="p"):
+    """Episodes of which each scenario and seed has the same chance part in every policy."""
+    records = []
+    for row, (scenario, seed) in enumerate(tasks):
+        chance = np.random.default_rng([ord(scenario), seed]).normal()
+        own = np.random.default_rng([ord(scenario), seed, round(100 * time_s)]).normal()
+        records.append(
+            EpisodeRecord(
+                *(scenario, seed, name, "q", "truth"),
+                time_lost_s=time_s + 2.0 * chance + spread * own,
+                violation_time_s=violation_s,
+                robot_contacts=int(row < contacts),
+            )
+        )
+    return Evaluation.of(records)
+
+
+@given(st.integers(1, 200), st.integers(0, 10**6))
+def test_stages_are_the_seeds_in_order_and_double_what_has_run(count, first):
+    seeds = range(first, first + count)
+    parts = list(stages(seeds))
+    assert list(itertools.chain(*parts)) == list(seeds)
+    done = list(itertools.accumulate(map(len, parts)))
+    assert all(after == min(2 * before, count) for before, after in itertools.pairwise(done))
+    # More seeds keep the earlier parts, so that their files serve again.
+    assert list(stages(range(first, first + 2 * count)))[: len(parts) - 1] == parts[:-1]
+
+
+def test_a_trial_that_is_shown_to_lose_is_dropped_and_an_open_one_goes_on():
+    base = _evaluation()
+    assert dropped(_evaluation(6.5), base) == "loses"
+    assert dropped(_evaluation(3.5), base) == ""
+    assert dropped(_evaluation(5.01), base) == ""
+    # Too few pairs show nothing, a contact is enough.
+    few = _TASKS[:6]
+    assert dropped(_evaluation(6.5, tasks=few), base) == ""
+    assert dropped(_evaluation(3.5, tasks=few, contacts=1), base) == "contact"
+
+
+def test_a_trial_that_trades_one_objective_for_the_other_may_be_on_the_front():
+    base = _evaluation(violation_s=0.2)
+    assert dropped(_evaluation(6.5, violation_s=0.0), base) == ""
+    assert dropped(_evaluation(3.5, violation_s=0.3), base) == ""
+    assert dropped(_evaluation(6.5, violation_s=0.2), base) == "loses"
+
+
+def test_the_estimate_from_few_episodes_uses_the_base_policy_on_the_same():
+    base, whole = _evaluation(), _evaluation(6.0)
+    assert whole.estimate(base) == whole.objectives
+    rng = np.random.default_rng(0)
+    errors_s = []
+    for _ in range(50):
+        rows = rng.choice(len(_TASKS), 8, replace=False)
+        part = _evaluation(6.0, tasks=[_TASKS[row] for row in rows])
+        errors_s.append([part.estimate(base)[0], part.objectives[0]])
+    paired_s, plain_s = np.std(np.array(errors_s) - whole.objectives[0], axis=0)
+    assert paired_s < 0.3 * plain_s
+
+
+def test_a_third_of_the_scenarios_is_held_out_of_every_kind_of_attention():
+    templates = shipped_templates()
+    held_out = held_out_scenarios(["third"], templates)
+    assert held_out == held_out_scenarios(["third"], templates[::-1])
+    assert abs(len(held_out) - len(templates) / 3) < 1
+    kinds = {each.attention for each in templates if each.name in held_out}
+    assert kinds == {"attentive", "mixed", "unaware"}
+    assert held_out_scenarios(["third"], templates[:2]) == ()
+    assert held_out_scenarios(["none"], templates) == ()
+    assert held_out_scenarios(["runs_out"], templates) == ("runs_out",)
+
+
+@pytest.mark.parametrize(
+    ("given_names", "message"),
+    [
+        (["runs_ot"], "did you mean 'runs_out'"),
+        (["runs_out"], "must leave a scenario to tune on"),
+    ],
+)
+def test_scenarios_that_cannot_be_held_out_are_refused(given_names, message):
+    with pytest.raises(SimError, match=message):
+        held_out_scenarios(given_names, [ScenarioTemplate.shipped("runs_out")])
+
+
+def _candidate(name: str, number: int | None = 1, **values) -> Candidate:
+    held_out = values.pop("held_out", None) or _evaluation(**values)
+    policy = AwarenessPolicy.preset("balanced")
+    if number is not None:
+        timing = policy.timing.model_copy(update={"hold_s": 1.0 + 0.01 * number})
+        policy = policy.model_copy(update={"timing": timing})
+    return Candidate((name,), number, policy, _evaluation(values.get("time_s", 5.0)), held_out)
+
+
+def test_a_policy_beats_another_only_when_the_interval_says_so():
+    base = _candidate("base", None)
+    assert beats(_candidate("better", time_s=4.0), base, (), 0.95)
+    assert not beats(_candidate("equal", time_s=4.99), base, (), 0.95)
+    assert not beats(_candidate("worse", time_s=6.0), base, (), 0.95)
+    assert not beats(_candidate("few", time_s=4.0, tasks=_TASKS[:15]), base, (), 0.95)
+    assert not beats(_candidate("touches", time_s=4.0, contacts=1), base, (), 0.95)
+    assert not beats(_candidate("violates", time_s=4.0, violation_s=0.1), base, (), 0.95)
+
+
+def test_a_gain_must_hold_in_the_held_out_scenarios():
+    base = _candidate("base", None)
+    gains = _evaluation(3.0, tasks=_TASKS[:20])
+    loses = _evaluation(6.0, tasks=_TASKS[20:])
+    mixed = _candidate("mixed", held_out=Evaluation.joined([gains, loses]))
+    assert beats(mixed, base, (), 0.95)
+    assert beats(mixed, base, "ab", 0.95)
+    assert not beats(mixed, base, "ef", 0.95)
+
+
+def test_the_winner_gets_the_name_and_more_finalists_need_a_wider_interval():
+    base = _candidate("base", None)
+    rows = [_candidate("knee", 1, time_s=4.2), _candidate("other", 2, time_s=4.0)]
+    names = [each.names for each in named_winner(rows, base, ())]
+    assert names == [("knee",), (BEATS_BASE, "other")]
+    assert [each.names for each in named_winner(rows[:0], base, ())] == []
+    assert named_winner([_candidate("knee", 1, time_s=5.5)], base, ())[0].names == ("knee",)
+    assert level_of(1) == 0.95
+    assert level_of(4) == pytest.approx(0.9875)
+
+
+def test_equal_policies_and_equal_episodes_are_one_row():
+    base, same_policy = _candidate("base", None), _candidate("knee", None)
+    same_episodes = _candidate("least_violation", 3)
+    other = _candidate("least_time_lost", 4, time_s=4.0)
+    rows = merged([base, other, same_policy, same_episodes])
+    assert [each.names for each in rows] == [
+        ("base", "knee", "least_violation"),
+        ("least_time_lost",),
+    ]
+    assert rows[0].trial is None

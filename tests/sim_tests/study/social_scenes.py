@@ -1,0 +1,89 @@
+"""Episodes made from random walks and from formulas, for tests of the measures that others use."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from sim_tests.study.social import Outcome, SocialEpisode
+
+WALLS_M = np.array([[-4.0, -4.0, 8.0, -4.0], [8.0, -4.0, 8.0, 4.0], [2.0, 1.5, 3.0, 2.5]])
+
+
+def random_episode(seed, *, people=4, count=90, absent=True):
+    """Return an episode with uneven times; two people walk together, the last is there at times."""
+    rng = np.random.default_rng(seed)
+    t_s = np.cumsum(rng.uniform(0.03, 0.12, count))
+    heading = np.cumsum(rng.normal(0.0, 0.15, count)) + rng.uniform(-3.0, 3.0)
+    robot_mps = rng.normal((0.8, 0.1), 0.6, (count, 2))
+    people_mps = rng.normal(0.0, 0.3, (count, people, 2)) + rng.normal(0.0, 0.7, (people, 2))
+    steps = np.diff(t_s, prepend=t_s[0])
+    robot_m = np.cumsum(steps[:, None] * robot_mps, axis=0)
+    starts = rng.uniform(-1.5, 4.0, (people, 2))
+    people_m = starts + np.cumsum(steps[:, None, None] * people_mps, axis=0)
+    if people > 1:
+        people_m[:, 1] = people_m[:, 0] + [0.7, 0.4]
+        people_mps[:, 1] = people_mps[:, 0]
+    if people > 2 and absent:
+        people_m[count // 3 : count // 2, people - 1] = np.nan
+    return SocialEpisode(
+        t_s=t_s,
+        robot_m=robot_m,
+        robot_heading_rad=heading,
+        robot_mps=robot_mps,
+        yaw_rate_radps=rng.normal(0.0, 0.5, count),
+        people_m=people_m,
+        people_heading_rad=np.cumsum(rng.normal(0.0, 0.2, (count, people)), axis=0),
+        people_mps=people_mps,
+        robot_size_m=(0.7, 0.5),
+        robot_radius_m=0.43,
+        person_radius_m=0.27,
+        goal_m=np.array([6.0, 1.0]),
+        goal_tolerance_m=0.3,
+        walls_m=WALLS_M,
+        outcome=Outcome(bool(seed % 3), 7.5, 5.0, 0.8 * 6.0, -0.25),
+        name=f"random {seed}",
+    )
+
+
+def formula_episode(t_s, robot, people=(), **values):
+    """Return an episode from formulas: ``robot(t)`` and each of ``people``: x, y, heading, speed.
+
+    Velocities point along the headings.
+    """
+    t_s = np.asarray(t_s, dtype=float)
+
+    def course(formula):
+        return np.array([formula(t) for t in t_s.tolist()], dtype=float).reshape(-1, 4)
+
+    def velocity(rows):
+        return rows[:, 3:] * np.stack([np.cos(rows[:, 2]), np.sin(rows[:, 2])], axis=1)
+
+    own, others = course(robot), [course(person) for person in people]
+    empty = np.zeros((len(t_s), 0, 2))
+    values = {
+        "robot_size_m": (0.6, 0.6),
+        "robot_radius_m": 0.3,
+        "person_radius_m": 0.3,
+        "goal_m": np.array([10.0, 0.0]),
+        **values,
+    }
+    return SocialEpisode(
+        t_s=t_s,
+        robot_m=own[:, :2],
+        robot_heading_rad=own[:, 2],
+        robot_mps=velocity(own),
+        yaw_rate_radps=np.zeros(len(t_s)),
+        people_m=np.stack([each[:, :2] for each in others], axis=1) if others else empty,
+        people_heading_rad=np.stack([each[:, 2] for each in others], axis=1)
+        if others
+        else empty[..., 0],
+        people_mps=np.stack([velocity(each) for each in others], axis=1) if others else empty,
+        **values,
+    )
+
+
+def straight(speed, start=(0.0, 0.0), heading=0.0):
+    cos, sin = math.cos(heading), math.sin(heading)
+    return lambda t: (start[0] + speed * t * cos, start[1] + speed * t * sin, heading, speed)

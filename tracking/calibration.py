@@ -1,0 +1,166 @@
+"""Calibration of the prediction on recordings of one's own: split conformal prediction.
+
+The people of a recording are divided into two halves. On the first, the normalised squared errors
+of each horizon are ranked; the quantile that belongs to the region of two standard deviations gives
+the factor for that horizon. The second half shows whether it holds. If the people of both halves
+are exchangeable, the region covers at least the wanted share of new people on average, whatever
+the distribution (Vovk, Gammerman, Shafer, *Algorithmic Learning in a Random World*, 2005).
+
+Instants of one person are alike. The rank therefore counts stretches of the length of the horizon
+that do not overlap, not instants.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from perception.arrays import FloatArray, finite_array
+
+from ._errors import TrackingError
+from .prediction import FITTED, REGION_SHARE, REGION_SIGMAS, PredictionModel, predict_states
+from .smoothing import SmoothedPath
+
+#: Horizons that a calibration uses unless it is told otherwise, seconds.
+HORIZONS_S: Final = (0.2, 0.5, 1.0, 1.5, 2.0)
+#: Stretches that each half must have at the longest horizon.
+LEAST_STRETCHES: Final = 10
+_LEAST_PEOPLE: Final = 4
+_FACTORS: Final = (0.1, 10.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FollowedPerson:
+    """The track of one person, and the path that counts as the truth.
+
+    Attributes:
+        stamps_s: (N,) increasing.
+        states: (N, 4) x, y (m), vx, vy (m/s) of the track.
+        covariances: (N, 4, 4).
+        reference: the path; ``tracking.smoothing.smooth`` makes it from the track.
+    """
+
+    stamps_s: FloatArray
+    states: FloatArray
+    covariances: FloatArray
+    reference: SmoothedPath
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Calibration:
+    """The calibrated model, and what it was judged by.
+
+    Attributes:
+        model: with the factors.
+        horizons_s: (T,).
+        people: numbers of people in the half that calibrates and in the half that judges.
+        stretches: (2, T) stretches that do not overlap in both halves.
+        before: (T,) share of the judging half inside the region of the model as it was.
+        coverage: (T,) the same of the calibrated model.
+        nees: (T,) mean normalised squared error of the calibrated model over 2, on that half.
+    """
+
+    model: PredictionModel
+    horizons_s: FloatArray
+    people: tuple[int, int]
+    stretches: FloatArray
+    before: FloatArray
+    coverage: FloatArray
+    nees: FloatArray
+
+
+def calibrate(
+    people: Sequence[FollowedPerson],
+    model: PredictionModel = FITTED,
+    horizons_s: Any = HORIZONS_S,
+) -> Calibration:
+    """Return a model whose region covers the wanted share of people at each horizon.
+
+    People are assigned to the halves in turn, in the order of their first stamps.
+
+    Args:
+        people: of one or several recordings.
+        model: to start from; its own factors are replaced.
+        horizons_s: (T,) increasing, > 0.
+
+    Raises:
+        TrackingError: for horizons that are not valid, or recordings that are too short.
+    """
+    times = finite_array("horizons_s", horizons_s, ("T",), TrackingError)
+    if not len(times) or times[0] <= 0.0 or bool((np.diff(times) <= 0.0).any()):
+        raise TrackingError(f"horizons_s must increase from above 0 s, got {times.tolist()}")
+    plain = model.model_copy(update={"horizons_s": (), "std_factors": ()})
+    usable = [each for each in people if each.stamps_s[-1] - each.stamps_s[0] >= times[0]]
+    if len(usable) < _LEAST_PEOPLE:
+        raise TrackingError(
+            f"a calibration needs {_LEAST_PEOPLE} people or more who are tracked for "
+            f"{times[0]:g} s, got {len(usable)}"
+        )
+    usable.sort(key=lambda each: float(each.stamps_s[0]))
+    halves = usable[::2], usable[1::2]
+    stretches = np.array([_stretches(half, times) for half in halves])
+    fewest = int(stretches[:, -1].min())
+    if fewest < LEAST_STRETCHES:
+        raise TrackingError(
+            f"the recording is too short for a horizon of {times[-1]:g} s: each half needs "
+            f"{LEAST_STRETCHES} stretches of that length with a person in track, got {fewest}; "
+            "record longer, or calibrate for shorter horizons"
+        )
+    squared = _squared_errors(halves[0], times, plain)
+    factors = [
+        math.sqrt(_quantile(column, int(count))) / REGION_SIGMAS
+        for column, count in zip(squared.T, stretches[0], strict=True)
+    ]
+    calibrated = plain.model_copy(
+        update={
+            "horizons_s": tuple(times.tolist()),
+            "std_factors": tuple(round(float(np.clip(each, *_FACTORS)), 4) for each in factors),
+        }
+    )
+    before = _squared_errors(halves[1], times, model)
+    after = _squared_errors(halves[1], times, calibrated)
+    return Calibration(
+        calibrated,
+        times,
+        (len(halves[0]), len(halves[1])),
+        stretches,
+        _inside(before),
+        _inside(after),
+        0.5 * np.nanmean(after, axis=0),
+    )
+
+
+def _stretches(half: Sequence[FollowedPerson], times: FloatArray) -> FloatArray:
+    """Return the number (T,) of stretches of each horizon that do not overlap."""
+    spans_s = np.array([each.stamps_s[-1] - each.stamps_s[0] for each in half])
+    return np.asarray(np.floor(spans_s[:, None] / times + 1e-9).sum(axis=0))
+
+
+def _squared_errors(
+    half: Sequence[FollowedPerson], times: FloatArray, model: PredictionModel
+) -> FloatArray:
+    """Return the normalised squared errors (K, T) of all instants, NaN after a track's end."""
+    found = []
+    for each in half:
+        means, covariances = predict_states(each.states, each.covariances, times, model)
+        later = np.stack([each.reference.places_m(each.stamps_s + t) for t in times], axis=1)
+        error = (later - means)[..., None]
+        solved = np.linalg.solve(covariances, error)
+        found.append((error * solved).sum(axis=(-2, -1)))
+    return np.concatenate(found)
+
+
+def _quantile(squared: FloatArray, stretches: int) -> float:
+    """Return the conformal quantile of squared errors, with the rank of so many stretches."""
+    known = squared[np.isfinite(squared)]
+    level = min(math.ceil((stretches + 1) * REGION_SHARE) / stretches, 1.0)
+    return float(np.quantile(known, level, method="higher"))
+
+
+def _inside(squared: FloatArray) -> FloatArray:
+    known = np.isfinite(squared)
+    return np.asarray(((squared <= REGION_SIGMAS**2) & known).sum(axis=0) / known.sum(axis=0))
