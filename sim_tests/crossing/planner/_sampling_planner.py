@@ -294,7 +294,10 @@ class SamplingPlanner:
     def _roll_out(
         self, candidates: Candidates, robot_state: RobotState
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the paths (m) and headings (rad) of the candidates, both (T, V, W)."""
+        """Return the paths (T, V, W) in metres and the headings (K, V, W) of the candidates.
+
+        The headings end with the sample from which on they stay, as in :func:`follow_arcs`.
+        """
         robot, speed = self.robot, robot_state.speed_mps
         faster, slower = robot.max_acceleration_mps2, robot.max_deceleration_mps2
         slow, w = candidates.turn_speeds_mps, candidates.yaw_rates_radps
@@ -307,9 +310,10 @@ class SamplingPlanner:
             after, candidates.speeds_mps, rate, self._t_s - self._turn_t_s
         )
         if self._steers:
-            return path, turning_m * (w / np.maximum(slow, _STANDING_MPS))
+            return path, turning_m[self._turning] * (w / np.maximum(slow, _STANDING_MPS))
         acceleration = self.config.max_yaw_acceleration_radps2
-        return path, ramp_integral(robot_state.yaw_rate_radps, w, acceleration, self._turn_t_s)
+        turning_s = self._turn_t_s[self._turning]
+        return path, ramp_integral(robot_state.yaw_rate_radps, w, acceleration, turning_s)
 
     def _goal_cost(self, poses: Poses, goal_distance_m: float, bearing_rad: float) -> FloatArray:
         """Return the cost (V, W) of mean distance to the goal and of facing away from it."""
