@@ -14,6 +14,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -59,9 +60,7 @@ class Checkout:
 
     def close(self) -> None:
         """End the process."""
-        assert self._process.stdin is not None
-        self._process.stdin.close()
-        self._process.wait()
+        self._process.communicate()
 
 
 def measured(
@@ -87,7 +86,7 @@ def measured(
     ], same
 
 
-def main() -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Measure and print."""
     parser = make_parser(
         "benchmarks.episode_cost",
@@ -101,7 +100,7 @@ def main() -> int:
     parser.add_argument(
         "--against", type=Path, metavar="DIR", help="another checkout, such as a git worktree"
     )
-    options = parser.parse_args()
+    options = parser.parse_args(arguments)
     folders = [_HERE]
     if options.against is not None:
         if not (options.against / "sim_tests").is_dir():

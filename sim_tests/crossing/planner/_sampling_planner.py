@@ -294,9 +294,10 @@ class SamplingPlanner:
     def _roll_out(
         self, candidates: Candidates, robot_state: RobotState
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the paths (T, V, W) in metres and the headings (K, V, W) of the candidates.
+        """Return the paths (T, V, W) in metres and the headings of the candidates.
 
-        The headings end with the sample from which on they stay, as in :func:`follow_arcs`.
+        The headings, (K, V, W) or (K, 1, W), end with the sample from which on they stay, as in
+        :func:`follow_arcs`.
         """
         robot, speed = self.robot, robot_state.speed_mps
         faster, slower = robot.max_acceleration_mps2, robot.max_deceleration_mps2
@@ -313,7 +314,8 @@ class SamplingPlanner:
             return path, turning_m[self._turning] * (w / np.maximum(slow, _STANDING_MPS))
         acceleration = self.config.max_yaw_acceleration_radps2
         turning_s = self._turn_t_s[self._turning]
-        return path, ramp_integral(robot_state.yaw_rate_radps, w, acceleration, turning_s)
+        # The yaw rates are the same for all speeds.
+        return path, ramp_integral(robot_state.yaw_rate_radps, w[:1], acceleration, turning_s)
 
     def _goal_cost(self, poses: Poses, goal_distance_m: float, bearing_rad: float) -> FloatArray:
         """Return the cost (V, W) of mean distance to the goal and of facing away from it."""
