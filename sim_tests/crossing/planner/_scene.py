@@ -92,10 +92,13 @@ def box_gap_m(rectangles: Rectangles, boxes_m: FloatArray) -> FloatArray:
     x_low, x_high = centers.x_m - extent_x, centers.x_m + extent_x
     y_low, y_high = centers.y_m - extent_y, centers.y_m + extent_y
     nearest = np.full(np.shape(x_low), np.inf)
+    gap, other = np.empty_like(nearest), np.empty_like(nearest)
     for x_min, y_min, x_max, y_max in boxes_m.tolist():
-        gap_x = np.maximum(x_min - x_high, x_low - x_max)
-        gap_y = np.maximum(y_min - y_high, y_low - y_max)
-        nearest = np.minimum(nearest, np.maximum(gap_x, gap_y))
+        np.subtract(x_min, x_high, out=gap)
+        np.maximum(gap, np.subtract(x_low, x_max, out=other), out=gap)
+        np.maximum(gap, np.subtract(y_min, y_high, out=other), out=gap)
+        np.maximum(gap, np.subtract(y_low, y_max, out=other), out=gap)
+        np.minimum(nearest, gap, out=nearest)
     return nearest
 
 
