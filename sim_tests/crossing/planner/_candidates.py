@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nav_adapter import NavConstraints, RobotProfile, RobotState
+from nav_adapter.motion import clip_twists_ahead
 from perception.arrays import FloatArray
 
 from ._config import PlannerConfig
@@ -150,3 +151,26 @@ class Motion(Protocol):
 def along_time(first: float, last: float, samples: int) -> FloatArray:
     """Return (T, 1, 1) numbers from ``first`` to ``last``."""
     return np.linspace(first, last, samples, dtype=np.float64)[:, None, None]
+
+
+def within_next_limits(
+    command: tuple[float, ...], state: RobotState, constraints: NavConstraints, dt_s: float
+) -> tuple[float, ...]:
+    """Return a command slowed down until it obeys the limits of the next two ticks.
+
+    It is never slower than full braking. Constraints that ``NavAdapter`` did not make, and those
+    without people, foresee no limit.
+    """
+    robot = constraints.robot
+    if constraints.speed_basis is None or robot is None or not constraints.obstacles:
+        return command
+    speed = math.hypot(*command[:-1])
+    slowest = abs(state.travel_mps) - robot.max_deceleration_mps2 * dt_s
+    if speed <= max(slowest, 0.0):
+        return command
+    *velocity, yaw_rate = clip_twists_ahead(
+        constraints, state, np.array(command), dt_s, slack_mps=0.0
+    ).tolist()
+    clipped = math.hypot(*velocity)
+    share = max(clipped, slowest, 0.0) / speed
+    return *(share * part for part in command[:-1]), yaw_rate

@@ -12,7 +12,7 @@ from nav_adapter import NavConstraints, RobotProfile, RobotState
 from perception.arrays import FloatArray, finite_array, finite_number
 
 from ...world.errors import SimError
-from ._candidates import Aim, Candidates, Motion, TwistLimits, along_time
+from ._candidates import Aim, Candidates, Motion, TwistLimits, along_time, within_next_limits
 from ._config import PlannerConfig
 from ._detour import detour_bearing_rad
 from ._reversing import REVERSE_MPS, Reversing, goal_facing
@@ -111,7 +111,9 @@ class SamplingPlanner:
             robot that steers. It is above ``constraints.speed_limit_mps`` only where full braking
             does not get below the limit in one tick. With the yaw rate, |v| + |ω| R obeys
             ``constraints.fastest_point_limit_mps`` (R is the circumscribed radius), with the same
-            exception. A robot that steers gets no curve tighter than its turning radius.
+            exception. Under constraints of ``NavAdapter`` it also obeys the limits of the next two
+            ticks, as they are foreseen. A robot that steers gets no curve tighter than its turning
+            radius.
 
         Raises:
             SimError: if the goal is not two finite numbers or ``dt_s`` is not positive.
@@ -132,13 +134,14 @@ class SamplingPlanner:
         aim = Aim(goal_distance_m, self._bearing(goal_x_m, goal_y_m, scene))
         reversing = self._reversing
         if reversing is not None and reversing.wanted(robot_state, aim, scene, dt_s):
-            return self._reverse(robot_state, limits, aim, dt_s, scene)
+            command = self._reverse(robot_state, limits, aim, dt_s, scene)
+            return within_next_limits(command, robot_state, constraints, dt_s)
         command = self._choose(robot_state, limits, top_mps, aim, dt_s, scene)
         if reversing is not None and reversing.has_stood(robot_state, command[0], dt_s):
             alone = scene.without_people()
             if self._choose(robot_state, limits, top_mps, aim, dt_s, alone)[0] <= _STANDING_MPS:
                 reversing.begin()  # not people, but boxes are in the way
-        return command
+        return within_next_limits(command, robot_state, constraints, dt_s)
 
     def _choose(
         self,
