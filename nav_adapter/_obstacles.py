@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -40,34 +41,43 @@ def obstacles_of(
     centers = np.array([m.position_odom_m for m in people.values()])
     # The rows become the obstacles' read-only centres.
     centers.setflags(write=False)
-    radii = np.array([m.radius_m for m in people.values()])
-    rings = centers[:, None] + radii[:, None, None] * _UNIT_POLYGON
-    polygons = shapely.polygons(rings)
-    if policy.outline.unaware_ahead_s > 0.0 or policy.outline.sweep_s > 0.0:
-        discs = [
-            np.concatenate([ring, *_discs_ahead(memory, center, now, policy, prediction)])
-            for memory, center, ring in zip(people.values(), centers, rings, strict=True)
-        ]
-        polygons = [shapely.convex_hull(shapely.multipoints(points)) for points in discs]
     covariances = _covariances_at(people, now)
     # Huge numbers may have overflowed to infinity: the checking constructor refuses those.
-    all_finite = math.isfinite(float(centers.sum()) + float(radii.sum()))
-    make = trusted_obstacle if all_finite else PersonObstacle
-    return tuple(
-        make(
+    all_finite = math.isfinite(float(centers.sum()) + sum(m.radius_m for m in people.values()))
+    obstacles = []
+    for (track_id, memory), center, covariance in zip(
+        people.items(), centers, covariances, strict=True
+    ):
+        values = (
             track_id,
             center,
             memory.track.velocity_odom_mps,
             memory.radius_m,
             memory.track.height_m,
             memory.awareness_lower,
-            polygon,
-            covariance,
         )
-        for (track_id, memory), center, polygon, covariance in zip(
-            people.items(), centers, polygons, covariances, strict=True
+        outline = partial(_polygon, memory, center, now, policy, prediction)
+        obstacles.append(
+            trusted_obstacle(*values, outline, covariance)
+            if all_finite
+            else PersonObstacle(*values, outline(), covariance)
         )
-    )
+    return tuple(obstacles)
+
+
+def _polygon(
+    memory: PersonMemory,
+    center: FloatArray,
+    now: float,
+    policy: AwarenessPolicy,
+    prediction: PredictionModel | None,
+) -> shapely.Polygon:
+    """Return the polygon of an obstacle at ``center`` (2,)."""
+    ring = center + memory.radius_m * _UNIT_POLYGON
+    if policy.outline.unaware_ahead_s > 0.0 or policy.outline.sweep_s > 0.0:
+        points = np.concatenate([ring, *_discs_ahead(memory, center, now, policy, prediction)])
+        return shapely.convex_hull(shapely.multipoints(points))
+    return shapely.polygons(ring)
 
 
 def _covariances_at(people: Mapping[int, PersonMemory], now: float) -> FloatArray:

@@ -89,7 +89,8 @@ def match_frame(
     gates = sensor.gates
     if math.isfinite(period_s):
         reach_m = _REACH_SIGMAS * config.initial_velocity_std_mps * period_s
-        gates = replace(gates, distance_m=max(gates.distance_m, reach_m))
+        if reach_m > gates.distance_m:
+            gates = replace(gates, distance_m=reach_m)
     wide = wide_match(tracks, measured, origin_m, sensor, sensors, clocks, frame.stamp_s)
     sizes = sized(tracks, measured, origin_m)
     found = _matches(tracks, measured, gates, wide, sizes)

@@ -135,7 +135,16 @@ def advance(state: TrackerState, frame: Frame, sensors: Sensors) -> TrackerState
     if double.any():
         tracks = without(tracks, double, config)
     next_id = state.next_id + int(np.count_nonzero(unmatched))
-    return replace(state, tracks=tracks, next_id=next_id, exits=exits)
+    return TrackerState(
+        tracks,
+        state.clocks,
+        next_id,
+        state.stamp_s,
+        state.faces,
+        exits,
+        state.origin_odom_m,
+        state.origin_velocity_mps,
+    )
 
 
 def predicted(tracks: TrackTable, from_s: float, to_s: float, config: TrackerConfig) -> TrackTable:
@@ -166,13 +175,15 @@ def _with_clocks(state: TrackerState, frame: Frame, sensors: Sensors) -> Tracker
             velocity = ((x_m - origin[0]) / dt_s, (y_m - origin[1]) / dt_s)
         origin = (x_m, y_m)
     faces = state.faces.after(stamp) if sensor.settings.sees_faces else state.faces
-    return replace(
-        state,
-        clocks=tuple(clocks),
-        stamp_s=stamp,
-        faces=faces,
-        origin_odom_m=origin,
-        origin_velocity_mps=velocity,
+    return TrackerState(
+        state.tracks,
+        tuple(clocks),
+        state.next_id,
+        stamp,
+        faces,
+        state.exits,
+        origin,
+        velocity,
     )
 
 

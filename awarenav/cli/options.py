@@ -39,6 +39,7 @@ __all__ = [
     "policy",
     "population",
     "resume",
+    "robot",
     "running",
     "scenarios",
     "seed",
@@ -89,6 +90,7 @@ COMPLETE_SCENARIOS: Final = _shipped(
     "sim_tests", "scenario/shipped", "all", "guidelines", sets=["guidelines"]
 )
 _COMPLETE_CAMERAS: Final = _shipped("sim_tests", "scenario/shipped/cameras")
+_COMPLETE_ROBOTS: Final = _shipped("sim_tests", "actors/robot/shipped", "nova_carter")
 #: Completion of policies.
 COMPLETE_POLICIES: Final = _shipped("nav_adapter", "policies")
 _COMPLETE_POLICIES_AND_ORACLE: Final = _shipped("nav_adapter", "policies", "oracle")
@@ -234,6 +236,19 @@ def camera() -> Decorator:
         shell_complete=_COMPLETE_CAMERAS,
         help="Another camera on the robot: 'forward' (120 degrees, as in the shipped scenarios), "
         "'surround' (360 degrees), or a YAML file.",
+    )
+
+
+def robot() -> Decorator:
+    """Add ``--robot``: another robot, to which the scenarios are fitted."""
+    return option(
+        "--robot",
+        default="",
+        show_default="nova_carter",
+        metavar="NAME|FILE",
+        shell_complete=_COMPLETE_ROBOTS,
+        help="Another robot: 'forklift' (it steers), 'omni' (it moves sideways), 'delivery' "
+        "(small), or a YAML file. Room and time of the scenarios are fitted to it.",
     )
 
 

@@ -69,12 +69,12 @@ def displacements(people: str, count: int = 229, seed: int = 0) -> list[FloatArr
             "route": [{"x_m": 0.0, "y_m": float(rng.uniform(1.0, 4.0))}],
             "heading_deg": float(rng.uniform(-180.0, 180.0)),
         }
-        seen = watch(_person(people, spec, rng), -2.0, 0.2, 20.0)
-        frames = np.flatnonzero(_stands(seen.place_m))
+        place_m = _places(_person(people, spec, rng), -2.0, 0.2, 20.0)
+        frames = np.flatnonzero(_stands(place_m))
         for row, (after_s, *_) in enumerate(DISPLACEMENTS):
             step = round(after_s * _RATE_HZ)
-            at = frames[frames + step < len(seen.place_m)]
-            off = seen.place_m[at + step] - seen.place_m[at]
+            at = frames[frames + step < len(place_m)]
+            off = place_m[at + step] - place_m[at]
             found[row].append(np.linalg.norm(off, axis=1))
     return [np.concatenate(values) for values in found]
 
@@ -153,8 +153,7 @@ def watch(walker: Walker, robot_x_m: float, robot_mps: float, for_s: float) -> W
     for frame in range(round(for_s * _RATE_HZ)):
         t_s = frame / _RATE_HZ
         x = robot_x_m + robot_mps * t_s
-        robot = RobotBody(x, 0.0, 0.0, robot_mps, 0.0, 0.36, 0.25, (x, 0.0, 0.8))
-        motion = walker.motion(t_s, Surroundings(robot, (), _always))
+        motion = walker.motion(t_s, _around(x, robot_mps))
         px, py = motion.position_odom_m.tolist()
         gaze = motion.heading_odom_rad + motion.head_yaw_rad + motion.eye_yaw_rad
         off = math.remainder(math.atan2(-py, x - px) - gaze, math.tau)
@@ -162,6 +161,21 @@ def watch(walker: Walker, robot_x_m: float, robot_mps: float, for_s: float) -> W
         looks.append(walker.noticed_s is not None and abs(off) < _ON_TARGET_RAD)
         eyes.append(motion.eye_yaw_rad)
     return Watched(np.array(places), np.array(looks), np.array(eyes))
+
+
+def _places(walker: Walker, robot_x_m: float, robot_mps: float, for_s: float) -> FloatArray:
+    """Return (frames, 2) the places of a person who is watched without feet and eyes."""
+    places = []
+    for frame in range(round(for_s * _RATE_HZ)):
+        t_s = frame / _RATE_HZ
+        walker.advance(t_s, _around(robot_x_m + robot_mps * t_s, robot_mps))
+        places.append(walker.place_odom_m)
+    return np.array(places)
+
+
+def _around(robot_x_m: float, robot_mps: float) -> Surroundings:
+    robot = RobotBody(robot_x_m, 0.0, 0.0, robot_mps, 0.0, 0.36, 0.25, (robot_x_m, 0.0, 0.8))
+    return Surroundings(robot, (), _always)
 
 
 def _person(people: str, spec: dict[str, Any], rng: np.random.Generator) -> Walker:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Final
-
-import numpy as np
 
 from nav_adapter import RobotProfile, protective_separation_m
 from perception.arrays import FloatArray
@@ -80,7 +79,7 @@ class SafetyMeter:
             towards_human: (2,) unit vector from the robot to the person, in odom.
             dt_s: time since the last measurement.
         """
-        speed = float(np.linalg.norm(robot_velocity_mps))
+        speed = math.sqrt(robot_velocity_mps @ robot_velocity_mps)
         robot_closing = max(float(robot_velocity_mps @ towards_human), 0.0)
         human_closing = max(float(-(human_velocity_mps @ towards_human)), 0.0)
         moving = speed > STANDING_SPEED_MPS
@@ -120,7 +119,7 @@ class SafetyMeter:
         closing = float(robot_velocity_mps @ towards_human)
         by = "robot" if closing > STANDING_SPEED_MPS else "person"
         self.contacts.append(
-            ContactEvent(t_s, worker, by, float(np.linalg.norm(robot_velocity_mps)))
+            ContactEvent(t_s, worker, by, math.sqrt(robot_velocity_mps @ robot_velocity_mps))
         )
 
     def release(self, worker: int) -> None:

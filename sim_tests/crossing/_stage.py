@@ -23,16 +23,18 @@ from ..actors.behaviour import (
     Scripted,
     Surroundings,
     Walker,
+    displaced_people,
     replayed_people,
     walker_of,
 )
 from ..actors.body import Worker
-from ..actors.robot import NOVA_CARTER, Amr, AmrLook
+from ..actors.robot import NOVA_CARTER, Amr, AmrLook, KinematicLook, KinematicRobot
 from ..scenario import Scenario
-from ..world import Warehouse, sees
+from ..world import Warehouse
 from ..world.bullet import pybullet
 from ..world.render import RendererName
 from ._metrics import STANDING_SPEED_MPS, SafetyMeter
+from ._robot_sight import RobotSight, near_robot
 
 # Distances between surfaces are exact with centres closer than this, else a lower bound.
 _EXACT_WITHIN_M: Final = 4.0
@@ -44,6 +46,8 @@ _TOUCH_WITHIN_M: Final = 0.8
 _BODY_UPDATE_HZ: Final = 60.0
 # A body that would move deeper than this into the robot in one update is held.
 _DEEPER_M: Final = 0.002
+# The highest speed that a body is placed with; recorded people may be faster.
+_FASTEST_MPS: Final = 3.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,14 +105,7 @@ class Stage(AbstractContextManager["Stage"]):
         self.scenario = scenario
         self.warehouse = Warehouse(scenario.layout, renderer=renderer)
         try:
-            task = scenario.robot
-            self.amr = Amr(
-                self.warehouse,
-                (task.start_x_m, task.start_y_m),
-                math.radians(task.start_heading_deg),
-                NOVA_CARTER,
-                camera_mount=scenario.camera.mount,
-            )
+            self.amr = _robot(self.warehouse, scenario)
             self.walkers = self._walkers(
                 np.random.default_rng(0) if people_rng is None else people_rng
             )
@@ -118,7 +115,7 @@ class Stage(AbstractContextManager["Stage"]):
                     for script, offset in zip(scenario.workers, start_offsets_s, strict=True)
                 ),
                 *self.walkers,
-                *(() if scenario.replay_csv is None else replayed_people(scenario.replay_csv)),
+                *self._recorded_people(),
             )
             self.workers = tuple(
                 Worker(self.warehouse, each.stature_m, look=each.look, stride_m=each.stride_m)
@@ -127,13 +124,22 @@ class Stage(AbstractContextManager["Stage"]):
         except BaseException:
             self.warehouse.close()
             raise
-        self.warehouse.add_actor(AmrLook.of(self.warehouse, self.amr))
+        self.warehouse.add_actor(
+            KinematicLook(self.amr)
+            if isinstance(self.amr, KinematicRobot)
+            else AmrLook.of(self.warehouse, self.amr)
+        )
+        self._sight = RobotSight(self.amr, self.workers)
         self._motions: tuple[PersonMotion, ...] = ()
         steps = 1.0 / (_BODY_UPDATE_HZ * self.warehouse.physics_dt_s)
         self._steps_per_body_update = max(round(steps), 1)
         self._near_robot = [False] * len(self.workers)
-        half_length, half_width = np.abs(self.amr.profile.footprint_m).max(axis=0).tolist()
+        corners = self.amr.profile.footprint_m
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        half_length, half_width = (0.5 * (high - low)).tolist()
         self._half_size_m: tuple[float, float] = (half_length, half_width)
+        # The middle of the outline, which is not the base origin of every robot.
+        self._middle_base_m: tuple[float, float] = tuple((0.5 * (low + high)).tolist())
         self._held = [False] * len(self.workers)
         self._last_velocity_mps: FloatArray | None = None
         self._place_workers()
@@ -166,14 +172,9 @@ class Stage(AbstractContextManager["Stage"]):
             self.warehouse.step()
             if current is None:
                 continue
-            velocity = current
-            if previous is not None and previous @ previous > current @ current:
-                velocity = previous
-            if abs(self.amr.driven_speed_mps) <= STANDING_SPEED_MPS:
-                velocity = np.zeros(2)  # only a person who walks into it moves a standing robot
             for index, near in enumerate(self._near_robot):
                 if near:
-                    self._update_contact(index, velocity, meter)
+                    self._update_contact(index, (previous, current), meter)
         self._place_workers()
 
     def measure(self, meter: SafetyMeter, dt_s: float) -> tuple[float, ...]:
@@ -202,9 +203,7 @@ class Stage(AbstractContextManager["Stage"]):
             gaze = worker.gaze_odom
             alpha = float(cone.scores(worker.eyes_odom_m, gaze, origin))
             in_front = _faces(motion, origin)
-            sighted = (in_front or alpha > 0.0) and sees(
-                worker, origin, through=frozenset({self.amr.body})
-            )
+            sighted = (in_front or alpha > 0.0) and self._sight.seen_by(worker)
             views.append(
                 TrueView(
                     (worker.chest_odom_m - origin) @ rotation,
@@ -240,6 +239,15 @@ class Stage(AbstractContextManager["Stage"]):
             walkers.append(make(spec, own, boxes, offset_s=offset))
         return tuple(walkers)
 
+    def _recorded_people(self) -> tuple[PersonBehaviour, ...]:
+        scenario = self.scenario
+        path, leaves = scenario.replay_csv, scenario.replay_leaves
+        if path is None:
+            return ()
+        if scenario.replay_reacts:
+            return displaced_people(path, self.warehouse.obstacle_boxes_odom, leaves=leaves)
+        return replayed_people(path, leaves=leaves)
+
     def _place_workers(self) -> None:
         robot, others = self._robot_body(), self._moving_bodies()
         motions = []
@@ -249,19 +257,24 @@ class Stage(AbstractContextManager["Stage"]):
             around = Surroundings(
                 robot,
                 others[:index] + others[index + 1 :],
-                partial(self._sees_robot, worker),
+                partial(self._sight.seen_by, worker),
             )
-            motions.append(self._move_or_hold(index, worker, behaviour.motion(self.t_s, around)))
+            motion = behaviour.motion(self.t_s, around)
+            motions.append(self._move_or_hold(index, worker, motion, robot))
         self._motions = tuple(motions)
 
-    def _move_or_hold(self, index: int, worker: Worker, motion: PersonMotion) -> PersonMotion:
+    def _move_or_hold(
+        self, index: int, worker: Worker, motion: PersonMotion, robot: RobotBody
+    ) -> PersonMotion:
         """Move a body; one that would move into the robot stays where it was.
 
         Physics cannot push a body away, so a body inside the robot would throw the robot over.
         """
         before = self._motions[index] if self._motions and self._near_robot[index] else None
         depth_m = 0.0 if before is None else self._depth_m(worker)
-        _pose(worker, motion)
+        x_m, y_m = motion.position_odom_m.tolist()
+        # Collision bodies far from the robot are left behind: nothing there touches them.
+        _pose(worker, motion, collides=near_robot(worker, (x_m, y_m), (robot.x_m, robot.y_m)))
         self._held[index] = False
         if before is None or self._depth_m(worker) < depth_m + _DEEPER_M:
             return motion
@@ -282,9 +295,10 @@ class Stage(AbstractContextManager["Stage"]):
         x, y = T_odom_base[:2, 3].tolist()
         vx, vy = self.amr.velocity_odom_mps.tolist()
         camera_x, camera_y, camera_z = self.amr.T_odom_camera[:3, 3].tolist()
+        ahead, left = self._middle_base_m
         return RobotBody(
-            x,
-            y,
+            x + ahead * float(T_odom_base[0, 0]) + left * float(T_odom_base[0, 1]),
+            y + ahead * float(T_odom_base[1, 0]) + left * float(T_odom_base[1, 1]),
             math.atan2(T_odom_base[1, 0], T_odom_base[0, 0]),
             vx,
             vy,
@@ -299,15 +313,11 @@ class Stage(AbstractContextManager["Stage"]):
             for motion in self._motions
         )
 
-    def _sees_robot(self, worker: Worker) -> bool:
-        camera = self.amr.T_odom_camera[:3, 3]
-        return sees(worker, camera, through=frozenset({self.amr.body}))
-
     def _separation(self, index: int) -> tuple[float, FloatArray]:
         """Return the distance between the surfaces and the direction (2,) from robot to worker."""
         base = self.amr.T_odom_base[:2, 3]
         centre = self._motions[index].position_odom_m - base
-        distance = float(np.linalg.norm(centre))
+        distance = math.sqrt(centre @ centre)
         towards = centre / max(distance, 1e-9)
         bound = distance - self.amr.profile.circumscribed_radius_m - BODY_RADIUS_M
         if distance > _EXACT_WITHIN_M:
@@ -327,22 +337,45 @@ class Stage(AbstractContextManager["Stage"]):
             return bound, towards
         closest = min(pairs, key=lambda pair: pair[8])
         gap = np.array(closest[6][:2]) - np.array(closest[5][:2])
-        length = float(np.linalg.norm(gap))
+        length = math.sqrt(gap @ gap)
         separation = max(float(closest[8]), 0.0)
         return separation, gap / length if separation > 0.0 and length > 1e-3 else towards
 
     def _update_contact(
-        self, index: int, robot_velocity_mps: FloatArray, meter: SafetyMeter
+        self,
+        index: int,
+        velocities_mps: tuple[FloatArray | None, FloatArray],
+        meter: SafetyMeter,
     ) -> None:
-        touching = pybullet.getContactPoints(
-            self.amr.body, self.workers[index].body, physicsClientId=self.warehouse.client
-        )
-        if self._held[index] or any(point[8] <= 0.0 for point in touching):
-            _, towards = self._separation(index)
-            meter.touch(self.t_s, index, robot_velocity_mps, towards)
-            self._behaviours[index].touch(*(-towards).tolist())
-        else:
+        """Record whether a person touches the robot.
+
+        Args:
+            index: of the person.
+            velocities_mps: (2,) of the robot before the last step but one, if it is known, and
+                before the last step.
+            meter: takes the contact.
+        """
+        if not self._held[index] and not self.amr.touches(self.workers[index].body):
             meter.release(index)
+            return
+        previous, velocity = velocities_mps
+        if previous is not None and previous @ previous > velocity @ velocity:
+            velocity = previous
+        if abs(self.amr.driven_speed_mps) <= STANDING_SPEED_MPS:
+            velocity = np.zeros(2)  # only a person who walks into it moves a standing robot
+        _, towards = self._separation(index)
+        meter.touch(self.t_s, index, velocity, towards)
+        self._behaviours[index].touch(*(-towards).tolist())
+
+
+def _robot(warehouse: Warehouse, scenario: Scenario) -> Amr | KinematicRobot:
+    """Return the robot of a scenario at its start."""
+    task, model = scenario.robot, scenario.robot_model
+    start, heading_rad = (task.start_x_m, task.start_y_m), math.radians(task.start_heading_deg)
+    if model is None or model.body == "nova_carter":
+        mount = scenario.camera.mount
+        return Amr(warehouse, start, heading_rad, NOVA_CARTER, camera_mount=mount)
+    return KinematicRobot(warehouse, model, start, heading_rad)
 
 
 def _faces(motion: PersonMotion, target_odom_m: FloatArray) -> bool:
@@ -351,16 +384,17 @@ def _faces(motion: PersonMotion, target_odom_m: FloatArray) -> bool:
     return bool(forward @ (target_odom_m[:2] - motion.position_odom_m) >= 0.0)
 
 
-def _pose(worker: Worker, motion: PersonMotion) -> None:
+def _pose(worker: Worker, motion: PersonMotion, *, collides: bool = True) -> None:
     worker.place(
         motion.position_odom_m,
         motion.heading_odom_rad,
         motion.walked_m,
-        math.hypot(*motion.velocity_odom_mps.tolist()),
+        min(math.hypot(*motion.velocity_odom_mps.tolist()), _FASTEST_MPS),
         motion.head_yaw_rad,
         motion.head_pitch_rad,
         eye_yaw_rad=motion.eye_yaw_rad,
         eye_pitch_rad=motion.eye_pitch_rad,
         activity=motion.activity,
         feet=motion.feet,
+        collides=collides,
     )

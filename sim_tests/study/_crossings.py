@@ -32,6 +32,7 @@ class CrossingsOptions:
     perception: PerceptionKind
     sensors: tuple[SensorSet, ...]
     camera: str
+    robot: str
     population: str | None
     fault: tuple[str, ...]
     episodes: int
@@ -65,6 +66,7 @@ def crossings_command(options: CrossingsOptions) -> int:
         perception=options.perception,
         sensors=options.sensors,
         camera=options.camera,
+        robot=options.robot,
         population=options.population or "",
         faults=options.fault,
     )
@@ -143,6 +145,8 @@ def _about(options: CrossingsOptions) -> dict[str, Any]:
         settings["sample"] = options.sample
     if options.camera:
         settings["camera"] = options.camera
+    if options.robot:
+        settings["robot"] = options.robot
     if options.population:
         settings["population"] = options.population
     words = ["awarenav", "crossings"]

@@ -117,7 +117,7 @@ def test_a_crowd_repeats_with_its_seed() -> None:
 
 @pytest.mark.parametrize("robot", ["yielding", "moving"])
 def test_people_at_the_kerb_start_as_often_as_the_table_says(robot: str) -> None:
-    counts = starts("recorded", yielding=robot == "yielding", count=45)
+    counts = starts("recorded", yielding=robot == "yielding", count=36)
     for (begun, chances), share in zip(counts, START_SHARES[robot], strict=True):
         # Chances overlap four times, and so does their evidence.
         found = binomtest(begun // 4, max(chances // 4, 1)).proportion_ci(0.999)
@@ -151,9 +151,9 @@ def test_an_episode_becomes_a_scene_with_its_robot() -> None:
 
 
 def test_people_have_looked_as_recorded_ones() -> None:
-    shares = looked_within("recorded", count=60)
+    shares = looked_within("recorded", count=50)
     for share, (within_s, recorded) in zip(shares, LOOKED, strict=True):
-        assert share == pytest.approx(recorded, abs=3.3 * np.sqrt(0.25 / 60)), within_s
+        assert share == pytest.approx(recorded, abs=3.3 * np.sqrt(0.25 / 50)), within_s
 
 
 def test_the_summary_is_that_of_the_recordings() -> None:

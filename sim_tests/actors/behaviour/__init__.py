@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ._displaced import Displaced, displaced_people
 from ._obstacles import WALKER_RADIUS_M
 from ._person import (
     ALONE,
@@ -21,7 +22,7 @@ from ._population import (
     known_population,
     walker_of,
 )
-from ._replayed import Replayed, read_recordings, replayed_people
+from ._replayed import RecordedPath, Replayed, read_recordings, replayed_people
 from ._script import Scripted, WorkerScript
 from ._spec import Glances, Lapse, PersonSpec, Reactions
 from ._starting import LOOK_WITHIN_S, START_SHARES, start_share
@@ -35,6 +36,7 @@ __all__ = [
     "POPULATIONS",
     "START_SHARES",
     "WALKER_RADIUS_M",
+    "Displaced",
     "Glances",
     "Lapse",
     "MovingBody",
@@ -44,6 +46,7 @@ __all__ = [
     "PersonSpec",
     "PopulationName",
     "Reactions",
+    "RecordedPath",
     "RecordedWalker",
     "Replayed",
     "RobotBody",
@@ -51,6 +54,7 @@ __all__ = [
     "Surroundings",
     "Walker",
     "WorkerScript",
+    "displaced_people",
     "draw_person",
     "known_population",
     "read_recordings",

@@ -87,8 +87,12 @@ class _Foot:
     def copy(self) -> _Foot:
         """Return an independent foot in the same state."""
         other = _Foot(self.place)
-        for name in self.__slots__:
-            setattr(other, name, getattr(self, name))
+        other.target = self.target
+        other.swinging = self.swinging
+        other.phase = self.phase
+        other.lift_off_phase = self.lift_off_phase
+        other.landed_for_s = self.landed_for_s
+        other.pitch, other.lift_off_pitch = self.pitch, self.lift_off_pitch
         return other
 
 

@@ -17,6 +17,7 @@ from ._asset import JOINTS, WorkerAsset, load_worker
 from ._gait import Gait
 from ._gait_pose import GaitPose
 from ._held_object import HeldObject
+from ._joint_angles import Foot, JointAngles
 from ._physics import WorkerBody
 from ._pose import BodyPose, SkinnedPoints, link_transforms
 from ._postures import Activity, arm_postures
@@ -24,19 +25,15 @@ from ._quaternions import (
     Quaternion,
     Vector,
     add,
-    axis_angle,
-    inverse,
     multiply,
     rotate,
     rotation_matrix,
     rotation_vector,
-    rotation_x,
-    rotation_y,
     rotation_z,
     subtract,
 )
 from ._sitting import Seat, SeatKind, fitting_seat, kneeling_pose, seat_pose, seated_pose
-from ._skeleton import LEFT, RIGHT, SIDES, Skeleton, skeleton
+from ._skeleton import Skeleton, skeleton
 from ._skin import WorkerSkin
 
 #: Largest yaw and pitch of the head from the body.
@@ -53,10 +50,6 @@ _REACH_M: Final = 1.0
 _ROTATION_HEAD_OPTICAL: Final = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 # The chest lies at this share of the way from the hips to the shoulders.
 _CHEST_SHARE: Final = 0.7
-# The trunk leans forward in a walk at 1.2 m/s.
-_LEAN_RAD: Final = math.radians(3.5)
-# The knee follows this share of the foot's yaw from the pelvis, the ankle the rest.
-_KNEE_YAW_SHARE: Final = 0.2
 _NECK: Final = "neck"
 _SPINE: Final = "spine"
 _RIGHT_WRIST: Final = JOINTS.index("right_wrist")
@@ -80,6 +73,8 @@ class Worker:
 
     Attributes:
         body: PyBullet's id of the person.
+        collision_left_behind: whether the collision body is not at the present posture.
+        collision_place_odom_m: x and y of the person when it was last moved.
         client: PyBullet's id of the world.
         skin: visual actor of the person.
         actor: number of the skin among the visual actors.
@@ -113,7 +108,7 @@ class Worker:
         finite_number("heading_odom_rad", heading_odom_rad, SimError)
         bones = self.skeleton
         self._arms = arm_postures(bones)
-        self._hips = tuple(subtract(bones.joint_m(f"{side}_hip"), bones.hips_m) for side in SIDES)
+        self._angles = JointAngles(bones)
         self._waist = subtract(bones.joint_m(_SPINE), bones.hips_m)
         self._neck = subtract(bones.joint_m(_NECK), bones.joint_m(_SPINE))
         self._chest = (
@@ -146,6 +141,7 @@ class Worker:
         eye_pitch_rad: float = 0.0,
         activity: str | Activity = "none",
         feet: GaitPose | None = None,
+        collides: bool = True,
     ) -> None:
         """Place the person in a posture. The same arguments always give the same posture.
 
@@ -162,6 +158,8 @@ class Worker:
                 or ``"sitting"`` on the seat, or ``"kneeling"``; the hips are above the position.
             feet: gait pose in odom, as :func:`plan_footsteps` and :class:`OnlineFootsteps` give it;
                 None takes the straight walk of ``walked_m`` and ``speed_mps``. Unused low down.
+            collides: False leaves the collision body behind until :meth:`place_collision_body`,
+                which saves half the time.
 
         Raises:
             SimError: for a value that is not finite or out of range; the person is not moved then.
@@ -191,9 +189,27 @@ class Worker:
         self._pose: BodyPose | None = None
         self._links: FloatArray | None = None
         self._head_rotation: FloatArray | None = None
-        self._solve_joints(gait_pose, head, local=feet is None)
+        self._gait_pose, self._feet_are_local = gait_pose, feet is None
+        self._solved_joints: tuple[Quaternion, ...] | None = None
+        self._solve_trunk(head)
+        self.collision_left_behind = True
+        if collides:
+            self.place_collision_body()
+
+    def place_collision_body(self) -> None:
+        """Move the collision body to the present posture, if it was left behind."""
+        if not self.collision_left_behind:
+            return
+        self.collision_left_behind = False
+        doing = self._activity
         seat = self.T_odom_held if doing.seated else None
         self._body.place(self._hips_odom_m, self._pelvis, self._joints, doing.held == "box", seat)
+        self.collision_place_odom_m = (self._x_m, self._y_m)
+
+    @property
+    def place_odom_m(self) -> tuple[float, float]:
+        """Position of the body's centre line, x and y."""
+        return self._x_m, self._y_m
 
     @property
     def asset(self) -> WorkerAsset:
@@ -325,58 +341,37 @@ class Worker:
         """(3,) midpoint of the shoulder keypoints."""
         return np.asarray(self.keypoints_odom_m[[LEFT_SHOULDER, RIGHT_SHOULDER]].mean(axis=0))
 
-    def _solve_joints(self, gait_pose: GaitPose, head: tuple[float, float], *, local: bool) -> None:
-        """Set all joints from feet, hips, head and hands.
-
-        The joints are solved in the heading frame: the body's position with x along its heading.
-        Feet that are ``local`` are given in it, others in odom.
-        """
-        activity = self._activity
-        pelvis = multiply(
-            rotation_z(gait_pose.pelvis_yaw_rad), rotation_x(gait_pose.pelvis_list_rad)
-        )
-        lean = _LEAN_RAD * gait_pose.stride_ratio * (1.0 - activity.upright)
-        thorax = multiply(rotation_z(gait_pose.thorax_yaw_rad), rotation_y(lean))
-        facing = multiply(rotation_z(head[0]), rotation_y(-head[1]))
-        hips = (0.0, gait_pose.sway_m, gait_pose.hip_height_m)
-        back = inverse(pelvis)
-        legs: list[Quaternion] = []
-        for side in (LEFT, RIGHT):
-            foot = gait_pose.feet[side]
-            ankle, yaw, pitch = (foot[:3], *foot[3:]) if local else self._local_ankle(foot)
-            hip = add(hips, rotate(pelvis, self._hips[side]))
-            knee_yaw = gait_pose.pelvis_yaw_rad + _KNEE_YAW_SHARE * (yaw - gait_pose.pelvis_yaw_rad)
-            across = rotate(back, (-math.sin(knee_yaw), math.cos(knee_yaw), 0.0))
-            leg = self.skeleton.legs[side]
-            thigh, bend = leg.solve(rotate(back, subtract(ankle, hip)), across)
-            knee = axis_angle(leg.axis, bend)
-            turned_foot = multiply(back, multiply(rotation_z(yaw), rotation_y(pitch)))
-            legs += (thigh, knee, multiply(inverse(multiply(thigh, knee)), turned_foot))
-        eye = multiply(rotation_z(self._eyes[0]), rotation_y(-self._eyes[1]))
-        left, right = self._arms.arms(gait_pose, activity)
-        self._joints: tuple[Quaternion, ...] = (
-            multiply(back, thorax),
-            multiply(inverse(thorax), facing),
-            eye,
-            eye,
-            *left,
-            *right,
-            *legs,
-        )
+    def _solve_trunk(self, head_rad: tuple[float, float]) -> None:
+        """Set hips, trunk and head, from which everything but the limbs follows."""
+        trunk = self._trunk = JointAngles.trunk(self._gait_pose, self._activity.upright, head_rad)
         heading = rotation_z(self._heading_rad)
-        x, y, z = rotate(heading, hips)
+        x, y, z = rotate(heading, trunk.hips_m)
         self._hips_odom_m: Vector = (self._x_m + x, self._y_m + y, z)
-        self._pelvis: Quaternion = multiply(heading, pelvis)
-        self._thorax: Quaternion = multiply(heading, thorax)
-        self._head: Quaternion = multiply(heading, facing)
+        self._pelvis: Quaternion = multiply(heading, trunk.pelvis)
+        self._thorax: Quaternion = multiply(heading, trunk.thorax)
+        self._head: Quaternion = multiply(heading, trunk.head)
         self._waist_odom_m = add(self._hips_odom_m, rotate(self._pelvis, self._waist))
         self._neck_odom_m = add(self._waist_odom_m, rotate(self._thorax, self._neck))
 
-    def _local_ankle(
-        self, foot: tuple[float, float, float, float, float]
-    ) -> tuple[Vector, float, float]:
-        """Return ankle, yaw and pitch of a foot, from odom to the heading frame."""
+    @property
+    def _joints(self) -> tuple[Quaternion, ...]:
+        """The rotation of every joint, solved when it is first asked for."""
+        if self._solved_joints is None:
+            left, right = self._gait_pose.feet
+            self._solved_joints = self._angles.joints(
+                self._trunk,
+                self._gait_pose,
+                (self._local_foot(left), self._local_foot(right)),
+                self._eyes,
+                self._activity,
+            )
+        return self._solved_joints
+
+    def _local_foot(self, foot: tuple[float, float, float, float, float]) -> Foot:
+        """Return a foot in the heading frame; one of a gait without ``feet`` is given in it."""
         x, y, z, yaw, pitch = foot
+        if self._feet_are_local:
+            return (x, y, z), yaw, pitch
         cos, sin = math.cos(self._heading_rad), math.sin(self._heading_rad)
         dx, dy = x - self._x_m, y - self._y_m
         ankle = (cos * dx + sin * dy, cos * dy - sin * dx, z)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from importlib import resources
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 
@@ -43,6 +43,16 @@ _MAX_WHEEL_TORQUE_NM: Final = 25.0
 _TYRE_FRICTION: Final = 1.0
 # The axes of the optical frame (x right, y down, z forward) in the base frame, as columns.
 _ROTATION_BASE_OPTICAL: Final = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+
+
+class _Motion(NamedTuple):
+    """Pose and velocity of the base after one step of the physics."""
+
+    rotation: FloatArray
+    origin_m: FloatArray
+    heading_rad: float
+    speed_mps: float
+    yaw_rate_radps: float
 
 
 class Amr:
@@ -84,7 +94,10 @@ class Amr:
             "camera_pitch_rad", camera_pitch_rad, SimError, minimum=-1.57, maximum=1.57
         )
         self.profile = profile
-        self.T_base_camera = _camera_pose(pitch, camera_mount == "top")
+        self.T_base_camera = camera_pose(
+            _ABOVE_POST_M if camera_mount == "top" else (CAMERA_FORWARD_M, 0.0, CAMERA_HEIGHT_M),
+            pitch,
+        )
         self._warehouse = warehouse
         self._client = warehouse.client
         source = resources.files("sim_tests.actors.robot") / "amr.urdf"
@@ -100,19 +113,21 @@ class Amr:
         self._set_up_dynamics()
         # PyBullet reports the pose of the base link's centre of mass; this leads back to its frame.
         dynamics = pybullet.getDynamicsInfo(self.body, -1, physicsClientId=self._client)
-        self._com_base_m = np.array(dynamics[3])
+        self._to_base_m = -np.array(dynamics[3])
         self._target_speed_mps = 0.0
         self._target_yaw_rate_radps = 0.0
         self._speed_mps = 0.0
         self._yaw_rate_radps = 0.0
         self._read_at_step = -1
-        self._last_motion = (np.eye(4), 0.0, 0.0, np.eye(4))
+        self._last_motion = _Motion(np.eye(3), np.zeros(3), 0.0, 0.0, 0.0)
+        self._last_poses: tuple[_Motion | None, FloatArray, FloatArray] = None, np.eye(4), np.eye(4)
         self._drive()
 
-    def command(self, speed_mps: float, yaw_rate_radps: float) -> None:
+    def command(self, speed_mps: float, yaw_rate_radps: float, lateral_mps: float = 0.0) -> None:
         """Set the target speed (m/s forwards) and yaw rate (rad/s counter-clockwise).
 
-        A command beyond the robot's limits is clipped, as by its motor controller.
+        Its wheels cannot move sideways: ``lateral_mps`` has no effect. A command beyond the
+        robot's limits is clipped, as by its motor controller.
         """
         speed = finite_number("speed_mps", speed_mps, SimError)
         yaw_rate = finite_number("yaw_rate_radps", yaw_rate_radps, SimError)
@@ -128,14 +143,14 @@ class Amr:
             and self._yaw_rate_radps == self._target_yaw_rate_radps
         ):
             return
-        speed = _ramped(
+        speed = ramped(
             self._speed_mps,
             self._target_speed_mps,
             self.profile.max_acceleration_mps2 * dt,
             self.profile.max_deceleration_mps2 * dt,
         )
         change = MAX_YAW_ACCELERATION_RADPS2 * dt
-        yaw_rate = _ramped(self._yaw_rate_radps, self._target_yaw_rate_radps, change, change)
+        yaw_rate = ramped(self._yaw_rate_radps, self._target_yaw_rate_radps, change, change)
         if speed != self._speed_mps or yaw_rate != self._yaw_rate_radps:
             self._speed_mps, self._yaw_rate_radps = speed, yaw_rate
             self._drive()
@@ -147,34 +162,39 @@ class Amr:
 
     def state(self, stamp_s: float) -> RobotState:
         """Return the robot's state in the physics."""
-        T, speed, yaw_rate, _ = self._motion()
+        motion = self._motion()
         return RobotState(
             stamp_s=stamp_s,
-            position_odom_m=T[:2, 3],
-            heading_odom_rad=math.atan2(T[1, 0], T[0, 0]),
-            speed_mps=speed,
-            yaw_rate_radps=yaw_rate,
+            position_odom_m=motion.origin_m[:2],
+            heading_odom_rad=motion.heading_rad,
+            speed_mps=motion.speed_mps,
+            yaw_rate_radps=motion.yaw_rate_radps,
         )
 
     @property
     def velocity_odom_mps(self) -> FloatArray:
         """(2,) velocity of the base origin, which points along the heading."""
-        T, speed, _, _ = self._motion()
-        heading = math.atan2(T[1, 0], T[0, 0])
-        return speed * np.array([math.cos(heading), math.sin(heading)])
+        motion = self._motion()
+        heading, speed = motion.heading_rad, motion.speed_mps
+        return np.array([speed * math.cos(heading), speed * math.sin(heading)])
 
     @property
     def T_odom_base(self) -> FloatArray:  # noqa: N802
         """(4, 4) pose of the base frame in odom, with the slight pitch of its motion."""
-        return self._motion()[0]
+        return self._poses()[0]
 
     @property
     def T_odom_camera(self) -> FloatArray:  # noqa: N802
         """(4, 4) pose of the camera's optical frame in odom."""
-        return self._motion()[3]
+        return self._poses()[1]
 
-    def _motion(self) -> tuple[FloatArray, float, float, FloatArray]:
-        """Return T_odom_base, speed, yaw rate and T_odom_camera; they are read once per step."""
+    def touches(self, body: int) -> bool:
+        """Return whether another body touches the robot."""
+        points = pybullet.getContactPoints(self.body, body, physicsClientId=self._client)
+        return any(point[8] <= 0.0 for point in points)
+
+    def _motion(self) -> _Motion:
+        """Return the motion after the latest step; it is read once per step."""
         if self._read_at_step == self._warehouse.steps:
             return self._last_motion
         self._read_at_step = self._warehouse.steps
@@ -183,19 +203,31 @@ class Amr:
         )
         velocity, angular = pybullet.getBaseVelocity(self.body, physicsClientId=self._client)
         rotation = np.array(pybullet.getMatrixFromQuaternion(quaternion)).reshape(3, 3)
-        arm = rotation @ -self._com_base_m
-        T = np.eye(4)
-        T[:3, :3] = rotation
-        T[:3, 3] = com + arm
-        (wx, wy, wz), (x, y, z) = angular, arm
-        turning = (wy * z - wz * y, wz * x - wx * z, wx * y - wy * x)
-        origin_velocity = np.array(velocity) + turning
-        T.setflags(write=False)
-        T_odom_camera = np.asarray(T @ self.T_base_camera)
-        T_odom_camera.setflags(write=False)
-        speed = float(origin_velocity @ rotation[:, 0])
-        self._last_motion = T, speed, float(angular[2]), T_odom_camera
+        arm = rotation @ self._to_base_m
+        (wx, wy, wz), (x, y, z), (vx, vy, vz) = angular, arm.tolist(), velocity
+        origin_velocity = np.array(
+            [vx + (wy * z - wz * y), vy + (wz * x - wx * z), vz + (wx * y - wy * x)]
+        )
+        self._last_motion = _Motion(
+            rotation,
+            com + arm,
+            math.atan2(rotation[1, 0], rotation[0, 0]),
+            float(origin_velocity @ rotation[:, 0]),
+            angular[2],
+        )
         return self._last_motion
+
+    def _poses(self) -> tuple[FloatArray, FloatArray]:
+        """Return T_odom_base and T_odom_camera of the latest step."""
+        motion = self._motion()
+        if self._last_poses[0] is not motion:
+            T = np.eye(4)
+            T[:3, :3], T[:3, 3] = motion.rotation, motion.origin_m
+            T.setflags(write=False)
+            T_odom_camera = np.asarray(T @ self.T_base_camera)
+            T_odom_camera.setflags(write=False)
+            self._last_poses = motion, T, T_odom_camera
+        return self._last_poses[1:]
 
     def _set_up_dynamics(self) -> None:
         links = {
@@ -239,18 +271,18 @@ class Amr:
         )
 
 
-def _camera_pose(pitch_rad: float, on_top: bool) -> FloatArray:
-    """Return T_base_camera of a camera on the post that looks down by ``pitch_rad``."""
+def camera_pose(place_base_m: tuple[float, float, float], pitch_rad: float = 0.0) -> FloatArray:
+    """Return T_base_camera of a camera that looks ahead, and down by ``pitch_rad``."""
     cos, sin = math.cos(pitch_rad), math.sin(pitch_rad)
     down = np.array([[cos, 0.0, sin], [0.0, 1.0, 0.0], [-sin, 0.0, cos]])  # about base y
     pose = np.eye(4)
     pose[:3, :3] = down @ _ROTATION_BASE_OPTICAL
-    pose[:3, 3] = _ABOVE_POST_M if on_top else (CAMERA_FORWARD_M, 0.0, CAMERA_HEIGHT_M)
+    pose[:3, 3] = place_base_m
     pose.setflags(write=False)
     return pose
 
 
-def _ramped(now: float, target: float, rise: float, fall: float) -> float:
+def ramped(now: float, target: float, rise: float, fall: float) -> float:
     """Return a step from ``now`` to ``target``: by ``rise`` away from zero, by ``fall`` towards it.
 
     A change of sign stops at zero first.

@@ -82,6 +82,29 @@ class OcclusionTest(Protocol):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class _InImage:
+    """A person with enough keypoints inside the image, hidden or not.
+
+    Attributes:
+        worker: number of the person.
+        stature_m: body height.
+        points_odom_m: (23, 3) keypoints.
+        points_m: (23, 3) in the camera frame.
+        pixels_px: (23, 2) their projections, with noise.
+        lift_noise_m: (23,) noise of their depths.
+        rows: (K,) the keypoints inside the image.
+    """
+
+    worker: int
+    stature_m: float
+    points_odom_m: FloatArray
+    points_m: FloatArray
+    pixels_px: FloatArray
+    lift_noise_m: FloatArray
+    rows: NDArray[np.intp]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class _VisiblePerson:
     worker: int
     detection: PersonDetection
@@ -116,9 +139,15 @@ class KeypointCamera:
 
     def look(self, T_odom_camera: FloatArray, workers: Sequence[TrueBody]) -> tuple[int, ...]:
         """Take a frame; return the visible workers' indices, in the order of the detections."""
+        found = (
+            self._in_image(index, worker, T_odom_camera) for index, worker in enumerate(workers)
+        )
+        inside = [person for person in found if person is not None]
         people = (
-            self._detect_worker(index, worker, T_odom_camera)
-            for index, worker in enumerate(workers)
+            self._visible_person(person, unhidden)
+            for person, unhidden in zip(
+                inside, self._unhidden(inside, T_odom_camera[:3, 3]), strict=True
+            )
         )
         self._visible = tuple(person for person in people if person is not None)
         return tuple(person.worker for person in self._visible)
@@ -139,9 +168,7 @@ class KeypointCamera:
                 "detections must be those that detect() returned for this frame"
             ) from None
 
-    def _detect_worker(
-        self, index: int, worker: TrueBody, T_odom_camera: FloatArray
-    ) -> _VisiblePerson | None:
+    def _in_image(self, index: int, worker: TrueBody, T_odom_camera: FloatArray) -> _InImage | None:
         # Every worker draws the same amount of noise, visible or not, so that the noise of one
         # worker does not depend on another.
         missed = self._rng.random() < self._noise.miss_rate
@@ -160,20 +187,31 @@ class KeypointCamera:
             & (pixels[:, 1] >= -0.5)
             & (pixels[:, 1] < self._camera.height_px - 0.5)
         )
-        if np.count_nonzero(inside) < _MIN_VISIBLE:
+        rows = np.flatnonzero(inside)
+        if len(rows) < _MIN_VISIBLE:
             return None
-        visible = inside & self._unhidden(points, points_odom, inside, origin)
-        if np.count_nonzero(visible) < _MIN_VISIBLE:
+        return _InImage(
+            index, worker.stature_m, points_odom, points, pixels + pixel_noise, lift_noise, rows
+        )
+
+    def _visible_person(
+        self, person: _InImage, unhidden: NDArray[np.bool_]
+    ) -> _VisiblePerson | None:
+        """Return a person as detected; ``unhidden`` (K,) says which of their rows are seen."""
+        if np.count_nonzero(unhidden) < _MIN_VISIBLE:
             return None
-        noisy = np.where(visible[:, None], pixels + pixel_noise, 0.0)
+        visible = np.zeros(_KEYPOINTS, dtype=bool)
+        visible[person.rows] = unhidden
+        noisy = np.where(visible[:, None], person.pixels_px, 0.0)
         # A lifting network knows the proportions but not the stature: skeletons have average size.
+        points = person.points_m
         root = points[11:13].mean(axis=0)
-        lifted = (points - root) * (MEAN_STATURE_M / worker.stature_m)
-        lifted[:, 2] += lift_noise
+        lifted = (points - root) * (MEAN_STATURE_M / person.stature_m)
+        lifted[:, 2] += person.lift_noise_m
         keypoints = PersonKeypoints(
             _padded(noisy), _padded(lifted), _padded(visible.astype(float)), _LAYOUT
         )
-        return _VisiblePerson(index, self._detection(noisy[visible]), keypoints)
+        return _VisiblePerson(person.worker, self._detection(noisy[visible]), keypoints)
 
     def _is_outside(self, box_odom_m: FloatArray, T_odom_camera: FloatArray) -> bool:
         """Return True only when all of a box (2, 3) lies beyond one side of the image."""
@@ -192,19 +230,25 @@ class KeypointCamera:
         return PersonDetection(box, 0.9)
 
     def _unhidden(
-        self, points: FloatArray, points_odom: FloatArray, inside: Any, eye_odom_m: FloatArray
-    ) -> Any:
-        """Return which of the keypoints inside the image are not hidden."""
-        unhidden = np.zeros(len(points), dtype=bool)
-        rows = np.flatnonzero(inside)
-        face = rows < FACE_KEYPOINTS
+        self, people: Sequence[_InImage], eye_odom_m: FloatArray
+    ) -> list[NDArray[np.bool_]]:
+        """Return which of the keypoints inside the image are not hidden, person by person.
+
+        The lines to all people are tested at once, which costs little more than those to one.
+        """
+        if not people:
+            return []
+        counts = [len(person.rows) for person in people]
+        face = np.concatenate([person.rows for person in people]) < FACE_KEYPOINTS
+        depth = np.concatenate([person.points_m[person.rows, 2] for person in people])
+        points = np.concatenate([person.points_odom_m[person.rows] for person in people])
         # A line ends before the keypoint, where the surface of the body may be.
         tolerance = np.where(face, FACE_DEPTH_M, JOINT_DEPTH_M)
-        share = np.maximum(1.0 - tolerance / points[rows, 2], 0.0)[:, None]
-        ends = eye_odom_m + share * (points_odom[rows] - eye_odom_m)
+        share = np.maximum(1.0 - tolerance / depth, 0.0)[:, None]
+        ends = eye_odom_m + share * (points - eye_odom_m)
         detail = np.where(face, _FACE_DETAIL, _BODY_DETAIL)
-        unhidden[rows] = ~self._sight.blocked(eye_odom_m, ends, detail)
-        return unhidden
+        unhidden = ~self._sight.blocked(eye_odom_m, ends, detail)
+        return np.split(unhidden, np.cumsum(counts)[:-1])
 
 
 def _frustum_normals(camera: Camera) -> FloatArray:

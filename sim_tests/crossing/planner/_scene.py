@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -91,10 +92,13 @@ def box_gap_m(rectangles: Rectangles, boxes_m: FloatArray) -> FloatArray:
     x_low, x_high = centers.x_m - extent_x, centers.x_m + extent_x
     y_low, y_high = centers.y_m - extent_y, centers.y_m + extent_y
     nearest = np.full(np.shape(x_low), np.inf)
+    gap, other = np.empty_like(nearest), np.empty_like(nearest)
     for x_min, y_min, x_max, y_max in boxes_m.tolist():
-        gap_x = np.maximum(x_min - x_high, x_low - x_max)
-        gap_y = np.maximum(y_min - y_high, y_low - y_max)
-        nearest = np.minimum(nearest, np.maximum(gap_x, gap_y))
+        np.subtract(x_min, x_high, out=gap)
+        np.maximum(gap, np.subtract(x_low, x_max, out=other), out=gap)
+        np.maximum(gap, np.subtract(y_min, y_high, out=other), out=gap)
+        np.maximum(gap, np.subtract(y_low, y_max, out=other), out=gap)
+        np.minimum(nearest, gap, out=nearest)
     return nearest
 
 
@@ -173,6 +177,12 @@ class Scene:
         columns = np.array(self._people, dtype=np.float64).reshape(-1, 4).T.reshape(4, -1, 1, 1, 1)
         self._x_m, self._y_m, self._vx_mps, self._vy_mps = columns
         self._radius_m = np.array(self._radii, dtype=np.float64).reshape(-1, 1, 1, 1)
+
+    def without_people(self) -> Scene:
+        """Return the same boxes around the robot, and nobody."""
+        alone = copy.copy(self)
+        alone.has_people = False
+        return alone
 
     def standing_discs_m(
         self, speed_mps: float, margin_m: float

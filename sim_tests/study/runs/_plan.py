@@ -50,6 +50,7 @@ def plan_jobs(
     sensors: Sequence[str] = ("camera",),
     faults: Sequence[str | Fault] = ("",),
     camera: str = "",
+    robot: str = "",
     population: str = "",
 ) -> tuple[Job, ...]:
     """Return the jobs of every scenario, seed, fault, planner, policy and set of sensors.
@@ -72,6 +73,8 @@ def plan_jobs(
             are joined by ``+`` for every combination.
         camera: a shipped name or a YAML file that replaces the camera of every scenario; empty
             keeps each scenario's own.
+        robot: a shipped name or a YAML file of a robot, to which every scenario is fitted; empty
+            keeps each scenario's own.
         population: as for :meth:`ScenarioTemplate.with_population`.
 
     Raises:
@@ -79,7 +82,7 @@ def plan_jobs(
         NavError: an unknown preset or unusable policy file.
     """
     perceptions = [Perception.of(perception, each).name for each in sensors]
-    templates = _expanded(scenarios, camera, population)
+    templates = [each.with_robot(robot) for each in _expanded(scenarios, camera, population)]
     policy_texts = [text for each in policies for text in _named_policy(each, perceptions)]
     fault_texts = [_named_fault(each) for given in faults for each in _matching_faults(given)]
     checked_seeds = [_checked_seed(seed) for seed in seeds]

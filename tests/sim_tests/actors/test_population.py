@@ -60,7 +60,7 @@ def test_classic_people_are_those_of_before(name: str) -> None:
 
 
 def test_recorded_people_repeat_with_their_seed() -> None:
-    scenario = short("late_glance", 4.0)
+    scenario = short("late_glance", 3.0)
     first, again = (positions(scenario, "recorded") for _ in range(2))
     assert np.array_equal(first, again)
     assert not np.array_equal(first, positions(scenario))
