@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from perception.arrays import FloatArray, finite_array
+from perception.installation import install_command
 
 from ._config import TrackerConfig
 from ._errors import TrackingError
@@ -53,10 +54,17 @@ def smooth(
         config: of the tracker, for its motion model; None for the defaults.
 
     Raises:
-        TrackingError: for arrays of a wrong shape or not finite, or stamps that do not increase.
+        TrackingError: for arrays of a wrong shape or not finite, stamps that do not increase, or
+            without filterpy (extra ``smooth``).
     """
-    # It takes seconds to import, and only recordings are smoothed.
-    from filterpy.kalman import KalmanFilter  # noqa: PLC0415
+    try:
+        # It takes seconds to import, and only recordings are smoothed.
+        from filterpy.kalman import KalmanFilter  # noqa: PLC0415
+    except ImportError as cause:
+        raise TrackingError(
+            "smoothing needs the package filterpy, which is not installed; it is the extra "
+            f"'smooth': {install_command('smooth')}"
+        ) from cause
 
     density_m2ps3 = (config or TrackerConfig()).acceleration_density_m2ps3
     stamps = finite_array("stamps_s", stamps_s, ("N",), TrackingError)

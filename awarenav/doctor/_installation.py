@@ -31,6 +31,7 @@ _EXTRAS: Final = (
     ("ros2", "cyclonedds", "the bridge"),
     ("rosbag", "rosbags", "recordings"),
     ("plot", "matplotlib", "plots"),
+    ("smooth", "filterpy", "smoothed tracks"),
     ("mediapipe", "mediapipe", "MediaPipe's pose network"),
 )
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 from tracking_scenes import CAMERA, FloatArray, observe, white_acceleration
@@ -98,3 +100,9 @@ def test_input_that_cannot_be_smoothed_is_refused() -> None:
         smooth(stamps_s, states[:-1], covariances)
     with pytest.raises(TrackingError, match="covariances"):
         smooth(stamps_s, states, np.full_like(covariances, np.nan))
+
+
+def test_without_filterpy_the_message_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "filterpy.kalman", None)
+    with pytest.raises(TrackingError, match="it is the extra 'smooth': pip install"):
+        smooth([0.0], np.zeros((1, 4)), np.eye(4)[None])
