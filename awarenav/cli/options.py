@@ -20,6 +20,7 @@ __all__ = [
     "COMPLETE_POLICIES",
     "COMPLETE_SCENARIOS",
     "PERCEPTIONS",
+    "POPULATIONS",
     "REFERENCE_PLANNER",
     "SENSOR_SETS",
     "allow_simulator_networks",
@@ -36,6 +37,7 @@ __all__ = [
     "plot_file",
     "policies",
     "policy",
+    "population",
     "resume",
     "running",
     "scenarios",
@@ -49,6 +51,8 @@ __all__ = [
 REFERENCE_PLANNER: Final = "reference"
 #: The kinds of perception that the robot of a crossing can have.
 PERCEPTIONS: Final = ("truth", "keypoints", "pixels")
+#: The habits that the people of a crossing can have.
+POPULATIONS: Final = ("classic", "recorded")
 #: The sensors that the robot of a crossing can have.
 SENSOR_SETS: Final = ("camera", "camera+scanner", "scanner")
 
@@ -230,6 +234,16 @@ def camera() -> Decorator:
         shell_complete=_COMPLETE_CAMERAS,
         help="Another camera on the robot: 'forward' (120 degrees, as in the shipped scenarios), "
         "'surround' (360 degrees), or a YAML file.",
+    )
+
+
+def population() -> Decorator:
+    """Add ``--population``: the habits of the people in a crossing."""
+    return option(
+        "--population",
+        type=OneOf(POPULATIONS),
+        show_default="each scenario's own",
+        help="Habits of the people: 'classic', or 'recorded' as fitted to recorded people.",
     )
 
 

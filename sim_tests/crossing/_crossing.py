@@ -226,6 +226,7 @@ def run_crossing(
     observer: Observer | None = None,
     fault: Fault | None = None,
     renderer: RendererName = "auto",
+    population: str | None = None,
 ) -> CrossingResult:
     """Run one crossing in PyBullet and measure it.
 
@@ -248,15 +249,19 @@ def run_crossing(
         fault: a fault of sensors, detections or odometry; frames keep the truth about the robot.
         renderer: renderer of the images: ``"tiny"``, ``"gl"``, or ``"auto"`` for the fastest
             available. Their pixels are nearly, but not exactly, the same.
+        population: habits of the people, ``"classic"`` or ``"recorded"``; None for the scenario's
+            own. See :meth:`Scenario.with_population`.
 
     Raises:
-        SimError: unknown scenario or perception, a planner without ``plan``, or a command that is
-            not two finite numbers.
+        SimError: unknown scenario, population or perception, a planner without ``plan``, or a
+            command that is not two finite numbers.
         NavError: unknown preset or unusable policy file.
         PerceptionError: for ``"pixels"``, when the shipped networks cannot be loaded.
     """
     if isinstance(scenario, str):
         scenario = ScenarioTemplate.shipped(scenario).for_seed(seed)
+    if population is not None:
+        scenario = scenario.with_population(population)
     policy_name, policy = named_policy(policy)
     driver = check_planner(planner) if planner is not None else _default_planner(scenario)
     frames: list[CrossingFrame] = []

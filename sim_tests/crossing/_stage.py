@@ -24,6 +24,7 @@ from ..actors.behaviour import (
     Surroundings,
     Walker,
     replayed_people,
+    walker_of,
 )
 from ..actors.body import Worker
 from ..actors.robot import NOVA_CARTER, Amr, AmrLook
@@ -229,13 +230,14 @@ class Stage(AbstractContextManager["Stage"]):
     def _walkers(self, rng: np.random.Generator) -> tuple[Walker, ...]:
         """Return the people who react, each with a random generator of their own."""
         jitter = self.scenario.start_jitter_s
+        make = walker_of(self.scenario.population)
         walkers = []
         for spec, own in zip(
             self.scenario.people, rng.spawn(len(self.scenario.people)), strict=True
         ):
             offset = float(own.uniform(-jitter, jitter))
             boxes = self.warehouse.obstacle_boxes_odom
-            walkers.append(Walker(spec, own, boxes, offset_s=offset))
+            walkers.append(make(spec, own, boxes, offset_s=offset))
         return tuple(walkers)
 
     def _place_workers(self) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,7 +17,13 @@ from perception.arrays import FloatArray
 from perception.surround import FlatView, ring_of_views
 from tracking.config import StrictConfig
 
-from ..actors.behaviour import PersonSpec, WorkerScript
+from ..actors.behaviour import (
+    DEFAULT_POPULATION,
+    PersonSpec,
+    PopulationName,
+    WorkerScript,
+    known_population,
+)
 from ..world.camera import CameraTiming, SensorConfig
 from ..world.errors import SimError
 from ..world.hall import LAYOUTS, WarehouseLayout
@@ -24,6 +31,7 @@ from ..world.scanner import DIAGONAL_SCANNERS, ScannerSpec
 from ._distributions import error_text
 from ._files import parse_yaml, read_file, require_version, shipped_text
 from ._parameters import find_parameters, with_numbers
+from ._population import person_of_script
 
 # Largest distance between neighbours on the reference path.
 _PATH_SPACING_M: Final = 0.25
@@ -179,6 +187,8 @@ class Scenario(StrictConfig):
         scanners: the robot's laser scanners; they are used where a crossing asks for them.
         workers: scripted people, who move the same whatever the robot does.
         people: people who look, react and walk by themselves; names are unique.
+        population: habits of the people: ``"classic"``, or ``"recorded"`` as fitted to recorded
+            people, see :meth:`with_population`.
         replay_csv: table of recorded people to replay, see :func:`read_recordings`; relative
             to the scenario's own file.
         start_jitter_s: each worker and each person starts up to this much earlier or later, drawn
@@ -199,6 +209,7 @@ class Scenario(StrictConfig):
     scanners: tuple[ScannerSpec, ...] = DIAGONAL_SCANNERS
     workers: tuple[WorkerScript, ...] = ()
     people: tuple[PersonSpec, ...] = ()
+    population: PopulationName = DEFAULT_POPULATION
     replay_csv: str | None = None
     start_jitter_s: float = Field(default=0.0, ge=0.0)
 
@@ -243,9 +254,10 @@ class Scenario(StrictConfig):
             SimError: naming the wrong key.
         """
         try:
-            return cls.model_validate(data)
+            scenario = cls.model_validate(data)
         except ValidationError as cause:
             raise SimError(f"{source}: {error_text(cause)}") from cause
+        return scenario.with_population(scenario.population)
 
     @classmethod
     def _at_medians(cls, data: dict[str, Any], source: str) -> Scenario:
@@ -271,6 +283,25 @@ class Scenario(StrictConfig):
     def to_text(self) -> str:
         """Return the scenario as YAML, for :meth:`ScenarioTemplate.from_text`."""
         return yaml.safe_dump(self.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
+
+    def with_population(self, name: str) -> Scenario:
+        """Return the same task among people of another population.
+
+        With ``"recorded"``, people who react also take the place of scripted workers, unless the
+        robot drives straight on.
+
+        Raises:
+            SimError: for an unknown name.
+        """
+        population = known_population(name)
+        changes: dict[str, Any] = {"population": population}
+        if population == "recorded" and self.robot.straight_on_speed_mps is None:
+            taken = {person.name for person in self.people}
+            names = (f"worker {number}" for number in itertools.count(1))
+            free = (each for each in names if each not in taken)
+            added = tuple(person_of_script(script, next(free)) for script in self.workers)
+            changes.update(workers=(), people=(*added, *self.people))
+        return self.model_copy(update=changes)
 
     def without_people(self) -> Scenario:
         """Return the same task in a hall without people."""

@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 import yaml
 
+from ..actors.behaviour import known_population
 from ._distributions import Distribution
 from ._files import (
     camera_data,
@@ -160,6 +161,20 @@ class ScenarioTemplate:
         return ScenarioTemplate(
             {**self._data, "camera": camera_data(name)}, f"{self._source} with camera {name}"
         )
+
+    def with_population(self, name: str) -> ScenarioTemplate:
+        """Return the same scenario among people of another population.
+
+        Args:
+            name: as for :meth:`Scenario.with_population`; empty for the scenario's own.
+
+        Raises:
+            SimError: for an unknown name.
+        """
+        if not name:
+            return self
+        population = known_population(name)
+        return ScenarioTemplate({**self._data, "population": population}, self._source)
 
     def to_text(self) -> str:
         """Return YAML for :meth:`from_text`, with the shared defaults written out."""

@@ -32,6 +32,7 @@ class CrossingsOptions:
     perception: PerceptionKind
     sensors: tuple[SensorSet, ...]
     camera: str
+    population: str | None
     fault: tuple[str, ...]
     episodes: int
     sample: int | None
@@ -64,6 +65,7 @@ def crossings_command(options: CrossingsOptions) -> int:
         perception=options.perception,
         sensors=options.sensors,
         camera=options.camera,
+        population=options.population or "",
         faults=options.fault,
     )
     if options.perception == "pixels" and set(options.sensors) != {"scanner"}:
@@ -141,6 +143,8 @@ def _about(options: CrossingsOptions) -> dict[str, Any]:
         settings["sample"] = options.sample
     if options.camera:
         settings["camera"] = options.camera
+    if options.population:
+        settings["population"] = options.population
     words = ["awarenav", "crossings"]
     for name, value in settings.items():
         values = value if isinstance(value, list) else [value]

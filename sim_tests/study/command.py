@@ -30,6 +30,7 @@ from awarenav.cli import NUMBER, POSITIVE, command, option, options
 @options.perception()
 @options.sensor_sets()
 @options.camera()
+@options.population()
 @options.faults()
 @option("--episodes", type=POSITIVE, default=1, metavar="N", help="Number of seeds per scenario.")
 @option(
