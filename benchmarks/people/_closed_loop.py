@@ -41,7 +41,7 @@ def scene_of(result: CrossingResult) -> Scene:
     """Return the people and the robot of an episode, at the rate of the recordings."""
     stamps = np.array([frame.t_s for frame in result.frames])
     places = np.array([[view.position_odom_m for view in frame.truth] for frame in result.frames])
-    robot = np.array([frame.state.position_odom_m for frame in result.frames])
+    robot = np.array([frame.robot_state.position_odom_m for frame in result.frames])
     wanted = np.arange(stamps[0], stamps[-1], 1.0 / RATE_HZ)
     return Scene(
         CubicSpline(stamps, places)(wanted).transpose(1, 0, 2),

@@ -41,7 +41,8 @@ _HURRY_MPS: Final = (1.9, 2.5)
 # Share of the speed that people keep near a robot that they know of.
 _NEAR_ROBOT_SHARE: Final = 0.91
 _NEAR_ROBOT_M: Final = 12.0
-# Scenarios in which somebody runs keep the speed.
+# Speeds of somebody who dawdles or runs in the scenario are kept.
+_DAWDLING_MPS: Final = 0.95
 _RUNNING_MPS: Final = 1.8
 _EYE_SPREAD_RAD: Final = math.radians(10.0)
 _LOOKER_SHARE: Final = 0.886
@@ -80,12 +81,13 @@ def walker_of(population: str) -> Callable[..., Walker]:
 def draw_person(spec: PersonSpec, rng: np.random.Generator) -> PersonSpec:
     """Return a person with the same task, and with a recorded person's speed and glances.
 
-    Somebody who runs keeps the speed, and somebody who watches the robot goes on watching it.
+    Somebody who runs or dawdles keeps the speed, and somebody who watches the robot goes on
+    watching it.
     """
     speed, hurries = float(rng.normal(*_SPEED_MPS)), rng.random() < _HURRY_SHARE
     hurry = float(rng.uniform(*_HURRY_MPS))
     changes: dict[str, Any] = {}
-    if spec.speed_mps < _RUNNING_MPS:
+    if _DAWDLING_MPS < spec.speed_mps < _RUNNING_MPS:
         changes["speed_mps"] = hurry if hurries else max(speed, 0.5)
     glances = {
         "glance_median_s": _GLANCE_MEDIAN_S,
@@ -131,7 +133,7 @@ class RecordedWalker(Walker):
         self._starting = StartingModel(_IDLE_SHARE, start_rng)
 
     def _decide(self, around: Surroundings) -> None:
-        if not self.spec.seated:
+        if not self.spec.stays:
             self._maybe_start(around.robot)
         super()._decide(around)
 
