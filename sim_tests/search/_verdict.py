@@ -48,15 +48,23 @@ class EpisodeOptions(Protocol):
         """Another camera; empty for each scenario's own."""
 
     @property
+    def population(self) -> str | None:
+        """Another population of people; None for each scenario's own."""
+
+    @property
     def planner(self) -> str:
         """``"module:Class"``, empty for the reference planner."""
 
 
 def episode_words(options: EpisodeOptions) -> list[str]:
-    """Return the words of the command line that repeat scenarios, sensors, camera and planner."""
+    """Return the words of the command line that repeat scenarios, people, sensors and planner."""
     words = ["--scenario", *options.scenario]
     words += Perception.of(options.perception, options.sensors).options.split()
-    for name, value in (("--camera", options.camera), ("--planner", options.planner)):
+    for name, value in (
+        ("--camera", options.camera),
+        ("--population", options.population),
+        ("--planner", options.planner),
+    ):
         if value:
             words += [name, value]
     return words

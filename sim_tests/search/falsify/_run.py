@@ -127,7 +127,9 @@ def _next_command(falsification: Falsification, options: FalsifyOptions) -> str:
     base = policy_against(options.against, falsification.settings)
     other = options.against or (base[0] if base else "")
     if falsification.contacts:
-        found = replace(options, scenario=(str(options.out / "worst_001.yaml"),))
+        # The file has the camera and the population.
+        worst = (str(options.out / "worst_001.yaml"),)
+        found = replace(options, scenario=worst, camera="", population=None)
         return command_text(
             *("crossings", *episode_words(found), "--policy", own, other),
             *("--seed", options.seed, "--episodes", 1, "--out", options.out / "worst"),

@@ -311,6 +311,7 @@ def test_a_removed_floor_is_found_and_the_worst_cases_replay(tmp_path, capsys):
     [
         (["--episodes", "5"], "at least one generation of 12 per scenario"),
         (["--policy", "balancd"], "did you mean 'balanced'"),
+        (["--against", "blnd"], "did you mean 'blind'"),
         (["--resume"], "there is no falsification"),
         (["--planner", "nowhere"], "module:Class"),
     ],

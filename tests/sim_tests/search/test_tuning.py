@@ -249,6 +249,8 @@ def test_a_killed_and_resumed_tuning_with_two_workers_writes_the_same_files(tmp_
         (["--policy", "balancd"], "did you mean 'balanced'"),
         (["--scenario", "crossing_atentive"], "did you mean 'crossing_attentive'"),
         (["--ranges", "nowhere.yaml"], "cannot read nowhere.yaml"),
+        (["--hold-out-scenarios", "crossing_atentive"], "did you mean 'crossing_attentive'"),
+        (["--hold-out-scenarios", "crossing_attentive"], "must leave a scenario to tune on"),
         (["--resume"], "there is no tuning"),
         (["--generation", "1"], "at least 2 trials"),
         (["--planner", "nowhere"], "module:Class"),
