@@ -70,7 +70,7 @@ def command_lines(page: str) -> Iterator[list[str]]:
 @cache
 def help_text(*command: str) -> str | None:
     """The help of a command; None where there is no such command."""
-    assert all(word.isalpha() for word in command)
+    assert all(re.fullmatch("[a-z]+(-[a-z]+)*", word) for word in command)
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(io.StringIO()):
         status = main([*command, "--help"])
@@ -143,7 +143,7 @@ def test_commands_shown_exist_with_their_options(page: str) -> None:
         line = " ".join(words)
         about = help_text(words[0])
         assert about is not None, line
-        subcommands = re.findall(r"^  ([a-z]+) ", about.partition("\nCommands:")[2], re.MULTILINE)
+        subcommands = re.findall(r"^  ([a-z-]+) ", about.partition("\nCommands:")[2], re.MULTILINE)
         if len(words) > 1 and words[1] in subcommands:
             about = help_text(*words[:2]) or ""
         for word in words:

@@ -1,10 +1,12 @@
 """Calibration of the prediction on recordings of one's own: split conformal prediction.
 
-The people of a recording are divided into two halves. On the first, the normalised squared errors
-of each horizon are ranked; the quantile that belongs to the region of two standard deviations gives
-the factor for that horizon. The second half shows whether it holds. If the people of both halves
-are exchangeable, the region covers at least the wanted share of new people on average, whatever
-the distribution (Vovk, Gammerman, Shafer, *Algorithmic Learning in a Random World*, 2005).
+The normalised squared errors of tracked people are ranked for each horizon. The quantile that
+belongs to the region of two standard deviations gives the factor for that horizon. If new people
+are like those of the recording, the region covers at least the wanted share of them on average,
+whatever the distribution (Vovk, Gammerman, Shafer, *Algorithmic Learning in a Random World*, 2005).
+
+To check this, the people are divided at random into two halves, and each is judged by the factors
+of the other. The factors that are returned are those of all people.
 
 Instants of one person are alike. The rank therefore counts stretches of the length of the horizon
 that do not overlap, not instants.
@@ -31,6 +33,8 @@ HORIZONS_S: Final = (0.2, 0.5, 1.0, 1.5, 2.0)
 LEAST_STRETCHES: Final = 10
 _LEAST_PEOPLE: Final = 4
 _FACTORS: Final = (0.1, 10.0)
+# Of the division into halves: the same recordings give the same model.
+_SEED: Final = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,16 +56,16 @@ class FollowedPerson:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
-    """The calibrated model, and what it was judged by.
+    """The calibrated model, and how its factors were checked.
 
     Attributes:
-        model: with the factors.
+        model: with the factors of all people.
         horizons_s: (T,).
-        people: numbers of people in the half that calibrates and in the half that judges.
+        people: numbers of people in the two halves.
         stretches: (2, T) stretches that do not overlap in both halves.
-        before: (T,) share of the judging half inside the region of the model as it was.
-        coverage: (T,) the same of the calibrated model.
-        nees: (T,) mean normalised squared error of the calibrated model over 2, on that half.
+        before: (T,) share of all people inside the region of the model as it was.
+        halves: (2, T) share of each half inside the region by the factors of the other.
+        nees: (T,) mean normalised squared error over 2, likewise of both halves.
     """
 
     model: PredictionModel
@@ -69,8 +73,13 @@ class Calibration:
     people: tuple[int, int]
     stretches: FloatArray
     before: FloatArray
-    coverage: FloatArray
+    halves: FloatArray
     nees: FloatArray
+
+    @property
+    def coverage(self) -> FloatArray:
+        """(T,) mean of ``halves``."""
+        return np.asarray(self.halves.mean(axis=0))
 
 
 def calibrate(
@@ -79,8 +88,6 @@ def calibrate(
     horizons_s: Any = HORIZONS_S,
 ) -> Calibration:
     """Return a model whose region covers the wanted share of people at each horizon.
-
-    People are assigned to the halves in turn, in the order of their first stamps.
 
     Args:
         people: of one or several recordings.
@@ -100,8 +107,8 @@ def calibrate(
             f"a calibration needs {_LEAST_PEOPLE} people or more who are tracked for "
             f"{times[0]:g} s, got {len(usable)}"
         )
-    usable.sort(key=lambda each: float(each.stamps_s[0]))
-    halves = usable[::2], usable[1::2]
+    order = np.random.default_rng(_SEED).permutation(len(usable)).tolist()
+    halves = [usable[index] for index in order[::2]], [usable[index] for index in order[1::2]]
     stretches = np.array([_stretches(half, times) for half in halves])
     fewest = int(stretches[:, -1].min())
     if fewest < LEAST_STRETCHES:
@@ -110,28 +117,34 @@ def calibrate(
             f"{LEAST_STRETCHES} stretches of that length with a person in track, got {fewest}; "
             "record longer, or calibrate for shorter horizons"
         )
-    squared = _squared_errors(halves[0], times, plain)
-    factors = [
-        math.sqrt(_quantile(column, int(count))) / REGION_SIGMAS
-        for column, count in zip(squared.T, stretches[0], strict=True)
+    made = [_calibrated(half, times, plain) for half in (*halves, usable)]
+    checked = [
+        _squared_errors(halves[1], times, made[0]),
+        _squared_errors(halves[0], times, made[1]),
     ]
-    calibrated = plain.model_copy(
-        update={
-            "horizons_s": tuple(times.tolist()),
-            "std_factors": tuple(round(float(np.clip(each, *_FACTORS)), 4) for each in factors),
-        }
-    )
-    before = _squared_errors(halves[1], times, model)
-    after = _squared_errors(halves[1], times, calibrated)
     return Calibration(
-        calibrated,
+        made[2],
         times,
         (len(halves[0]), len(halves[1])),
         stretches,
-        _inside(before),
-        _inside(after),
-        0.5 * np.nanmean(after, axis=0),
+        _inside(_squared_errors(usable, times, model)),
+        np.array([_inside(squared) for squared in checked]),
+        0.5 * np.nanmean(np.concatenate(checked), axis=0),
     )
+
+
+def _calibrated(
+    people: Sequence[FollowedPerson], times: FloatArray, plain: PredictionModel
+) -> PredictionModel:
+    """Return the model with the factors of these people."""
+    squared = _squared_errors(people, times, plain)
+    counts = _stretches(people, times).astype(int).tolist()
+    factors = [
+        math.sqrt(_quantile(column, count)) / REGION_SIGMAS
+        for column, count in zip(squared.T, counts, strict=True)
+    ]
+    bounded = tuple(round(float(np.clip(each, *_FACTORS)), 4) for each in factors)
+    return plain.model_copy(update={"horizons_s": tuple(times.tolist()), "std_factors": bounded})
 
 
 def _stretches(half: Sequence[FollowedPerson], times: FloatArray) -> FloatArray:

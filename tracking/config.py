@@ -62,7 +62,13 @@ class StrictConfig(BaseModel):
     def to_yaml(self, path: str | Path) -> None:
         """Write the config as YAML for :meth:`from_yaml`; the file is replaced in one step."""
         path = Path(path)
-        text = yaml.safe_dump(self.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
+        text = self.yaml_text()
         partial = path.with_name(path.name + ".part")
         partial.write_text(text, encoding="utf-8")
         partial.replace(path)
+
+    def yaml_text(self) -> str:
+        """Return the text that :meth:`to_yaml` writes."""
+        return str(
+            yaml.safe_dump(self.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
+        )

@@ -87,6 +87,25 @@ class Command(click.Command):
         super().__init__(*args, **kwargs)
         self.examples = tuple(examples)
         self.exit_status = dict(exit_status or {})
+        #: Commands that this one has besides its own work, such as ``awarenav tracks calibrate``.
+        self.parts: dict[str, click.Command] = {}
+
+    def add_part(self, part: click.Command) -> None:
+        """Add a command of this command; its name must not be that of a file to work on."""
+        self.parts[str(part.name)] = part
+
+    def make_context(
+        self,
+        info_name: str | None,
+        args: list[str],
+        parent: click.Context | None = None,
+        **extra: Any,
+    ) -> click.Context:
+        """Return the context of the command, or of the part that the first word names."""
+        part = self.parts.get(args[0]) if args else None
+        if part is None:
+            return super().make_context(info_name, args, parent, **extra)
+        return part.make_context(f"{info_name} {part.name}", args[1:], parent, **extra)
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse the arguments; split the values of options that take several."""
@@ -117,7 +136,12 @@ class Command(click.Command):
                 formatter.write_dl(records)
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the examples, the exit status and the closing remark."""
+        """Write the parts, the examples, the exit status and the closing remark."""
+        if self.parts:
+            with formatter.section("Commands"):
+                formatter.write_dl(
+                    [(name, part.get_short_help_str(80)) for name, part in self.parts.items()]
+                )
         if self.examples:
             with formatter.section("Examples"):
                 for line in self.examples:
@@ -130,6 +154,9 @@ class Command(click.Command):
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Complete a further value of an option that takes several, else an option's name."""
         option = ctx.meta.get(_OPEN_OPTION)
+        parts = [name for name in self.parts if incomplete and name.startswith(incomplete)]
+        if parts:
+            return [*map(CompletionItem, parts), *super().shell_complete(ctx, incomplete)]
         if option is not None and not incomplete.startswith("-"):
             items: list[CompletionItem] = option.shell_complete(ctx, incomplete)
             return items

@@ -20,6 +20,7 @@ __all__ = [
     "COMPLETE_POLICIES",
     "COMPLETE_SCENARIOS",
     "PERCEPTIONS",
+    "POPULATIONS",
     "REFERENCE_PLANNER",
     "SENSOR_SETS",
     "allow_simulator_networks",
@@ -36,7 +37,9 @@ __all__ = [
     "plot_file",
     "policies",
     "policy",
+    "population",
     "resume",
+    "robot",
     "running",
     "scenarios",
     "seed",
@@ -49,6 +52,8 @@ __all__ = [
 REFERENCE_PLANNER: Final = "reference"
 #: The kinds of perception that the robot of a crossing can have.
 PERCEPTIONS: Final = ("truth", "keypoints", "pixels")
+#: The habits that the people of a crossing can have.
+POPULATIONS: Final = ("classic", "recorded")
 #: The sensors that the robot of a crossing can have.
 SENSOR_SETS: Final = ("camera", "camera+scanner", "scanner")
 
@@ -85,6 +90,7 @@ COMPLETE_SCENARIOS: Final = _shipped(
     "sim_tests", "scenario/shipped", "all", "guidelines", sets=["guidelines"]
 )
 _COMPLETE_CAMERAS: Final = _shipped("sim_tests", "scenario/shipped/cameras")
+_COMPLETE_ROBOTS: Final = _shipped("sim_tests", "actors/robot/shipped", "nova_carter")
 #: Completion of policies.
 COMPLETE_POLICIES: Final = _shipped("nav_adapter", "policies")
 _COMPLETE_POLICIES_AND_ORACLE: Final = _shipped("nav_adapter", "policies", "oracle")
@@ -230,6 +236,29 @@ def camera() -> Decorator:
         shell_complete=_COMPLETE_CAMERAS,
         help="Another camera on the robot: 'forward' (120 degrees, as in the shipped scenarios), "
         "'surround' (360 degrees), or a YAML file.",
+    )
+
+
+def robot() -> Decorator:
+    """Add ``--robot``: another robot, to which the scenarios are fitted."""
+    return option(
+        "--robot",
+        default="",
+        show_default="nova_carter",
+        metavar="NAME|FILE",
+        shell_complete=_COMPLETE_ROBOTS,
+        help="Another robot: 'forklift' (it steers), 'omni' (it moves sideways), 'delivery' "
+        "(small), or a YAML file. Room and time of the scenarios are fitted to it.",
+    )
+
+
+def population() -> Decorator:
+    """Add ``--population``: the habits of the people in a crossing."""
+    return option(
+        "--population",
+        type=OneOf(POPULATIONS),
+        show_default="each scenario's own",
+        help="Habits of the people: 'classic', or 'recorded' as fitted to recorded people.",
     )
 
 

@@ -40,7 +40,7 @@ def tracks_in_file(recording: Recording) -> TrackedRecording:
         builder.add(frame.stamp_s, samples)
         without_id += sum(id is None for id in frame.ids)
     remarks = [f"{counted(without_id, 'observation')} without an id left out"] if without_id else []
-    poses = [camera_pose(frame.T_odom_camera) for frame in frames]
+    poses = [camera_pose(frame.T_odom_camera) for frame in frames if recording.has_camera]
     return TrackedRecording(
         builder.histories(),
         np.array([frame.stamp_s for frame in frames]),

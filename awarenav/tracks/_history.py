@@ -33,6 +33,7 @@ class TrackSample:
         awareness_lower: its lower bound, which navigation uses.
         measured_awareness: α of the frame's own observation; None without evidence.
         measured_awareness_std: its standard deviation.
+        covariance_odom: (4, 4) of position and velocity, or None if it is not known.
     """
 
     stamp_s: float
@@ -47,6 +48,7 @@ class TrackSample:
     awareness_lower: float
     measured_awareness: float | None = None
     measured_awareness_std: float | None = None
+    covariance_odom: FloatArray | None = None
 
 
 class TrackHistory:

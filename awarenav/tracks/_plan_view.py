@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
 
 from perception import Camera
 from perception.arrays import FloatArray
+from tracking.smoothing import SmoothedPath
 
 from ..errors import counted
 from ..figures import Axes, Ellipse, Wedge
@@ -24,6 +25,8 @@ LINE_STYLES: Final[dict[str, tuple[float, tuple[float, tuple[float, ...]]]]] = {
     "coasting": (1.4, (0.0, (2.0, 1.4))),
     "given": (2.0, (0.0, ())),
 }
+#: Look of a smoothed path.
+SMOOTHED_LINE: Final[dict[str, Any]] = {"color": TEXT_COLOUR, "linewidth": 0.9, "alpha": 0.85}
 # Most ellipses and fields of view along a path.
 _MOST_ELLIPSES: Final = 8
 _MOST_VIEWS: Final = 5
@@ -63,6 +66,7 @@ def draw_plan(
     others: Sequence[TrackHistory],
     people: Sequence[TruePerson],
     camera: Camera | None,
+    smoothed: Mapping[int, SmoothedPath],
 ) -> None:
     """Draw camera, truth and tracks into axes that have their limits and equal scales.
 
@@ -73,6 +77,7 @@ def draw_plan(
         others: tracks that are drawn grey and without their ids.
         people: of the truth; may be empty.
         camera: gives the field of view; None draws only the direction of view.
+        smoothed: paths by the ids of tracks; those of coloured tracks are drawn.
     """
     extent_m = float(np.ptp(axes.get_xlim()))
     _draw_camera(axes, tracked.camera_poses, camera, 0.12 * extent_m)
@@ -83,6 +88,9 @@ def draw_plan(
         _draw_path(axes, history, FAINT_COLOUR, None)
     for history, colour in coloured:
         _draw_path(axes, history, colour, extent_m / 14.0)
+        if history.id in smoothed:
+            x, y = smoothed[history.id].states[:, :2].T
+            axes.plot(x, y, zorder=6, **SMOOTHED_LINE)
     for history, colour in coloured:
         _draw_ends(axes, history, colour)
     if not tracked.histories:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from perception import Camera
+from tracking.smoothing import SmoothedPath
 
 from ..figures import Axes, Figure, Line2D, Patch
 from ._awareness_panel import draw_awareness
@@ -20,7 +21,7 @@ from ._page import (
     Page,
     track_colour,
 )
-from ._plan_view import LINE_STYLES, draw_plan, plan_limits
+from ._plan_view import LINE_STYLES, SMOOTHED_LINE, draw_plan, plan_limits
 from ._truth import Truth
 
 # Sizes, margins and gaps in inches.
@@ -61,6 +62,7 @@ def tracks_figure(
     *,
     camera: Camera | None = None,
     truth: Truth | None = None,
+    smoothed: Mapping[int, SmoothedPath] | None = None,
     most: int = 20,
 ) -> Figure:
     """Draw the tracks of a recording.
@@ -70,6 +72,7 @@ def tracks_figure(
         title: of the figure.
         camera: for its field of view.
         truth: is drawn dotted in black.
+        smoothed: paths by the ids of tracks, drawn thin in black over those with a colour.
         most: most tracks with a colour and a panel; a line of text gives the number of others.
     """
     shown, others = shown_tracks(tracked.histories, most)
@@ -91,13 +94,15 @@ def tracks_figure(
     page.write(_LEFT, 0.58, _note_on_others(others), size=9.5)
     plan = page.axes(_LEFT, _TOP, plan_width, plan_height)
     _set_plan_limits(plan, limits, plan_width / plan_height)
-    draw_plan(plan, tracked, coloured, others, people, camera)
+    draw_plan(plan, tracked, coloured, others, people, camera, smoothed or {})
     _draw_legends(
         page.figure,
         plan,
         0.1 / _WIDTH,
         with_tracker=_has_tracker(tracked),
         truth=truth is not None,
+        smoothed=bool(smoothed),
+        with_camera=bool(len(tracked.camera_poses)),
         field_of_view=camera is not None,
     )
     panel_width = (_WIDTH - _LEFT - _RIGHT + _COLUMN_GAP) / columns - _COLUMN_GAP
@@ -120,7 +125,15 @@ def tracks_figure(
 
 
 def _draw_legends(
-    figure: Figure, plan: Axes, gap: float, *, with_tracker: bool, truth: bool, field_of_view: bool
+    figure: Figure,
+    plan: Axes,
+    gap: float,
+    *,
+    with_tracker: bool,
+    truth: bool,
+    smoothed: bool,
+    with_camera: bool,
+    field_of_view: bool,
 ) -> None:
     """Draw the legends of plan and panels to the right of the plan.
 
@@ -130,6 +143,8 @@ def _draw_legends(
         gap: between both, as a share of the figure's width.
         with_tracker: whether a tracker made the tracks.
         truth: whether the truth is drawn.
+        smoothed: whether smoothed paths are drawn.
+        with_camera: whether there is a camera.
         field_of_view: whether the camera's field of view is drawn.
     """
 
@@ -155,8 +170,11 @@ def _draw_legends(
         mark("o", "birth", markerfacecolor=BACKGROUND_COLOUR),
         mark("x", "death", markeredgewidth=2.2),
         mark("o", "2σ of position", markerfacecolor="none", markersize=10, markeredgewidth=0.8),
-        mark("s", "camera", color=CAMERA_COLOUR, markersize=5),
     ]
+    if with_camera:
+        plan_marks.append(mark("s", "camera", color=CAMERA_COLOUR, markersize=5))
+    if smoothed:
+        plan_marks.append(Line2D([], [], label="smoothed", **SMOOTHED_LINE))
     if field_of_view:
         plan_marks.append(Patch(facecolor=CAMERA_COLOUR, alpha=0.2, label="its field of view"))
     awareness_marks: list[Line2D | Patch] = [

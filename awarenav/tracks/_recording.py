@@ -55,12 +55,14 @@ class Recording:
         frames: in the order of the lines.
         remarks: sentences about everything that was left out or assumed.
         without_covariance: number of observations with the assumed position covariance.
+        has_camera: whether the poses of the frames are those of a camera; not so for positions.
     """
 
     path: Path
     frames: tuple[RecordedFrame, ...]
     remarks: tuple[str, ...]
     without_covariance: int
+    has_camera: bool = True
 
 
 def read_recording(path: Path) -> Recording:

@@ -7,14 +7,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+import numpy as np
+
 from perception import Camera
 from tracking import TrackerConfig
+from tracking.smoothing import SmoothedPath
 
 from ..errors import AwarenavError, counted
 from ..files import json_text
 from ._file_tracks import tracks_in_file
 from ._history import TrackedRecording
+from ._positions import is_positions, read_positions
 from ._recording import Recording, read_recording
+from ._smoothed import distances_m, smoothed_path
 from ._tables import summary_lines, summary_records, write_csv
 from ._tracking import track_recording
 from ._truth import Truth, truth_beside_tracks
@@ -37,6 +42,7 @@ class TracksOptions:
     truth: Path | None
     config: Path | None
     ids: bool
+    smooth: bool
     camera: Path | None
     most: int
 
@@ -56,26 +62,29 @@ def tracks_command(options: TracksOptions) -> int:
         from ..figures import save_figure  # noqa: PLC0415
         from ._plot import tracks_figure  # noqa: PLC0415
     config = None if options.config is None else TrackerConfig.from_yaml(options.config)
-    camera = _camera(options)
-    recording = _read(options.file)
-    truth_recording = None if options.truth is None else _read(options.truth)
+    recording = read_file(options.file)
+    camera = _camera(options) if recording.has_camera else None
+    truth_recording = None if options.truth is None else read_file(options.truth)
     if options.ids:
         tracked = tracks_in_file(recording)
     else:
         tracked = track_recording(recording, config, camera)
     for remark in tracked.remarks:
-        _log(remark)
+        log(remark)
     if tracked.camera_jump_m > _MAX_CAMERA_STEP_M:
-        _log(
+        log(
             f"the camera jumps by {tracked.camera_jump_m:.1f} m from frame to frame: these look "
             "like single images, in which people cannot be tracked"
         )
     truth = None
     if truth_recording is not None:
         truth = truth_beside_tracks(tracked.histories, truth_recording)
+    smoothed = _smoothed(tracked, config) if options.smooth else {}
     if out is not None:
         title = _title(recording, tracked)
-        figure = tracks_figure(tracked, title, camera=camera, truth=truth, most=options.most)
+        figure = tracks_figure(
+            tracked, title, camera=camera, truth=truth, smoothed=smoothed, most=options.most
+        )
         save_figure(figure, out)
     if options.csv is not None:
         write_csv(options.csv, tracked.histories)
@@ -84,7 +93,9 @@ def tracks_command(options: TracksOptions) -> int:
 
 
 def _check(options: TracksOptions, out: Path | None) -> None:
-    """Refuse outputs with another suffix, or that would replace an input."""
+    """Refuse outputs with another suffix, or that would replace an input, and a camera too many."""
+    if options.camera is not None and is_positions(options.file):
+        raise AwarenavError(f"--camera cannot be used with positions, got {options.file}")
     if out is not None and out.suffix.lower() not in _FORMATS:
         raise AwarenavError(f"--out must end in {', '.join(_FORMATS)} or be none, got {out}")
     inputs = {
@@ -109,20 +120,38 @@ def _camera(options: TracksOptions) -> Camera | None:
     if path is None:
         path = options.file.parent / _CAMERA
         if not path.exists():
-            _log(
+            log(
                 "no --camera and no camera.yaml beside the file: the field of view is not known, "
                 "and the tracks of all unseen people are kept equally long"
             )
             return None
-        _log(f"the field of view is that of {path}")
+        log(f"the field of view is that of {path}")
     return Camera.from_yaml(path)
 
 
-def _read(path: Path) -> Recording:
-    recording = read_recording(path)
+def read_file(path: Path) -> Recording:
+    """Read frames as JSON Lines, or positions as CSV, and print remarks about what was left out."""
+    recording = read_positions(path) if is_positions(path) else read_recording(path)
     for remark in recording.remarks:
-        _log(f"{path}: {remark}")
+        log(f"{path}: {remark}")
     return recording
+
+
+def _smoothed(tracked: TrackedRecording, config: TrackerConfig | None) -> dict[int, SmoothedPath]:
+    """Return the smoothed paths by id, and print how far the tracks are from them."""
+    paths, apart_m = {}, []
+    for history in tracked.histories:
+        path = smoothed_path(history, config)
+        if path is not None:
+            paths[history.id] = path
+            apart_m.append(distances_m(history, path))
+    if apart_m:
+        every = np.concatenate(apart_m)
+        log(
+            f"tracks and smoothed paths are {every.mean():.3f} m apart on average, "
+            f"{np.percentile(every, 95.0):.3f} m in 95 % of the frames at most"
+        )
+    return paths
 
 
 def _title(recording: Recording, tracked: TrackedRecording) -> str:
@@ -158,5 +187,6 @@ def _report(
         print(f"Written to {' and '.join(written)}")
 
 
-def _log(text: str) -> None:
+def log(text: str) -> None:
+    """Print a remark on standard error."""
     print(f"awarenav tracks: {text}", file=sys.stderr)

@@ -64,10 +64,12 @@ def track_recording(
         builder.add(
             frame.stamp_s, _samples(tracks, frame.stamp_s, is_frame=True, measured=measured)
         )
+    shown = accepted if recording.has_camera else []
+    poses = np.array([camera_pose(frame.T_odom_camera) for frame in shown])
     return TrackedRecording(
         builder.histories(),
         np.array([frame.stamp_s for frame in accepted]),
-        np.array([camera_pose(frame.T_odom_camera) for frame in accepted]).reshape(-1, 3),
+        poses.reshape(-1, 3),
         tuple(_remarks(recording, late, refused, ahead)),
         "tracks",
     )
@@ -170,6 +172,7 @@ def _sample(
         awareness_lower=track.awareness_lower,
         measured_awareness=None if measured is None else measured[0],
         measured_awareness_std=None if measured is None else measured[1],
+        covariance_odom=track.covariance_odom,
     )
 
 
@@ -177,7 +180,8 @@ def _remarks(recording: Recording, late: int, refused: int, ahead: int) -> Itera
     if recording.without_covariance:
         yield (
             f"{counted(recording.without_covariance, 'observation')} without "
-            f"position_covariance_m2: a standard deviation of {ASSUMED_POSITION_STD_M:g} m is "
+            f"{'position_covariance_m2' if recording.has_camera else 'std_m'}: "
+            f"a standard deviation of {ASSUMED_POSITION_STD_M:g} m is "
             "assumed"
         )
     if late:

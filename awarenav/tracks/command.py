@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..cli import POSITIVE, FilePath, argument, command, option, options
+from ..cli import POSITIVE, Command, FilePath, Number, argument, command, option, options
 
 
 @command(
@@ -12,6 +12,7 @@ from ..cli import POSITIVE, FilePath, argument, command, option, options
     examples=[
         "awarenav tracks estimates.jsonl --out tracks.png --csv tracks.csv",
         "awarenav tracks estimates.jsonl --truth render/truth.jsonl",
+        "awarenav tracks people.csv --smooth",
     ],
     exit_status={
         0: "Success.",
@@ -19,7 +20,12 @@ from ..cli import POSITIVE, FilePath, argument, command, option, options
         130: "Interrupted.",
     },
 )
-@argument("file", type=FilePath(), metavar="FILE.jsonl", help="Estimates, or rendered truth.")
+@argument(
+    "file",
+    type=FilePath(),
+    metavar="FILE.jsonl|FILE.csv",
+    help="Estimates, rendered truth, or positions as CSV: t_s, id, x_m, y_m, and std_m if known.",
+)
 @options.plot_file("tracks.png", "The plot; replaces the file.")
 @options.as_json()
 @option(
@@ -32,6 +38,12 @@ from ..cli import POSITIVE, FilePath, argument, command, option, options
     help="Also draw the true paths and the true awareness, matched by stamp.",
 )
 @option("--config", type=FilePath(), metavar="FILE", help="Settings of the tracker (YAML).")
+@option(
+    "--smooth",
+    is_flag=True,
+    excludes="--ids",
+    help="Also draw each path smoothed with what came later, as the reference.",
+)
 @option(
     "--ids",
     is_flag=True,
@@ -55,9 +67,52 @@ from ..cli import POSITIVE, FilePath, argument, command, option, options
 def tracks(**values: Any) -> int:
     """Track the people in FILE.jsonl; print one line per track, and plot paths and awareness.
 
-    Reads JSON Lines as `awarenav estimate` and `awarenav render` write them. Frames are processed
-    in the order of the file, as on a robot.
+    Reads JSON Lines as `awarenav estimate` and `awarenav render` write them, or positions as CSV.
+    Frames are processed in the order of the file, as on a robot.
     """
     from ._run import TracksOptions, tracks_command  # noqa: PLC0415 - help needs no tracker
 
     return tracks_command(TracksOptions(**values))
+
+
+@command(
+    "calibrate",
+    short_help="Fit the uncertainty of predicted people to recordings of yours.",
+    examples=[
+        "awarenav tracks calibrate estimates.jsonl",
+        "awarenav tracks calibrate monday.csv tuesday.csv --longest 1.5 --out site.yaml",
+    ],
+    exit_status={0: "Success.", 2: "Bad input; nothing was written."},
+)
+@argument(
+    "files",
+    nargs=-1,
+    required=True,
+    type=FilePath(),
+    metavar="FILE...",
+    help="Recordings, as `awarenav tracks` reads them.",
+)
+@options.out_file("prediction.yaml", "The model; replaces the file.", "FILE.yaml")
+@options.as_json()
+@option("--config", type=FilePath(), metavar="FILE", help="Settings of the tracker (YAML).")
+@option(
+    "--longest",
+    type=Number(0.2, 10.0),
+    default=2.0,
+    metavar="S",
+    help="Longest horizon of the prediction.",
+)
+def calibrate(**values: Any) -> int:
+    """Track the people in FILE, and set how uncertain their predicted places are.
+
+    Each horizon gets a factor with which the region of two standard deviations holds 86.5 % of the
+    people. To check it, each half of them is judged by the factors of the other half. The smoothed
+    tracks count as the truth. Read the file with `PredictionModel.from_yaml`.
+    """
+    from ._calibrate import CalibrateOptions, calibrate_command  # noqa: PLC0415
+
+    return calibrate_command(CalibrateOptions(**values))
+
+
+assert isinstance(tracks, Command)
+tracks.add_part(calibrate)

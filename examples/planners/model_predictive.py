@@ -17,7 +17,7 @@ from nav_adapter import NavConstraints, RobotProfile, RobotState
 from nav_adapter.exporters import predicted_circles, speed_limit_at
 from perception.arrays import FloatArray
 
-from ._shared import no_boxes, obeying
+from ._shared import direction_to_goal, no_boxes, obeying
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # about optional parts that are not installed
@@ -34,9 +34,6 @@ _SLOTS = 4
 _WALLS = 2
 _FAR_M = 100.0
 _WALL_CLEARANCE_M = 0.05
-# The limit is low at the edge of a circle. Somebody who stands gets this much more room, for a
-# faster way past. Somebody who walks does not: there the room would cost a detour each time.
-_ROOM_M, _STANDS_MPS = 0.3, 0.2
 # Step of the slopes of the limit, and the slowest limit that a plan counts with: at 0 there would
 # be no way to the other side of a slow place.
 _SLOPE_M = 0.05
@@ -57,6 +54,7 @@ class ModelPredictivePlanner:
 
     With the speed field, each stage has the limit at its pose in the last plan, and its slope
     there. So the solver knows on which side the limit is higher, and the plan moves to that side.
+    It aims at the fastest way instead of the goal.
 
     Args:
         robot: footprint and limits.
@@ -123,9 +121,7 @@ class ModelPredictivePlanner:
             slots=_SLOTS,
             robot_position_odom_m=robot_state.position_odom_m,
         )
-        stands = np.hypot(self._people[..., 2], self._people[..., 3]) < _STANDS_MPS
-        self._people[..., 4] += _ROOM_M * stands
-        self._goal = np.asarray(goal_odom_m)
+        self._goal = self._aim(constraints, robot_state, goal_odom_m)
         heading = robot_state.heading_odom_rad
         state = np.array([[*robot_state.position_odom_m, heading, speed]]).T
         if not self._started:
@@ -135,6 +131,24 @@ class ModelPredictivePlanner:
         acceleration, yaw_rate = self._mpc.make_step(state).ravel().tolist()
         # The speed after the stage is the command for the drive.
         return speed + acceleration * _STAGE_S, yaw_rate
+
+    def _aim(
+        self, constraints: NavConstraints, robot_state: RobotState, goal_odom_m: FloatArray
+    ) -> FloatArray:
+        """Return the goal (2,) or, with the field, a point as far away on the fastest way.
+
+        The horizon ends before a slow place, and the way around it begins earlier.
+        """
+        far_m = float(np.hypot(*(goal_odom_m - robot_state.position_odom_m)))
+        towards = direction_to_goal(
+            constraints,
+            robot_state,
+            goal_odom_m,
+            self._boxes,
+            self._robot.circumscribed_radius_m + _WALL_CLEARANCE_M,
+            use_speed_field=self._use_speed_field,
+        )
+        return np.asarray(robot_state.position_odom_m + far_m * towards)
 
     def _last_positions(
         self, robot_state: RobotState, goal_odom_m: FloatArray, limit_mps: float

@@ -104,7 +104,7 @@ def predicted_people(
 
     For planners with chance constraints, or with a cost in standard deviations. People keep their
     present velocity. The covariance is that of :mod:`tracking.prediction`: on recorded and on
-    simulated people its region of two standard deviations holds 82 to 91 % of them, 86.5 % being
+    simulated people its region of two standard deviations holds 84 to 90 % of them, 86.5 % being
     right, up to 2 s ahead.
 
     With either of the last two arguments it is the earlier formula, whose defaults are those of

@@ -11,13 +11,13 @@ from typing import Final
 
 import numpy as np
 
-from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotState
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile, RobotState
 from perception import AttentionCone, AwarenessPipeline
 from perception.arrays import FloatArray
 
 from ..actors.behaviour import PersonOutcome
-from ..actors.robot import NOVA_CARTER
-from ..scenario import Scenario, ScenarioTemplate
+from ..actors.robot import NOVA_CARTER, RobotModel
+from ..scenario import Scenario, ScenarioTemplate, scenario_for_robot
 from ..world.errors import SimError
 from ..world.render import RendererName
 from ._command import check_planner, checked_command
@@ -63,10 +63,12 @@ class Situation:
     separations_m: tuple[float, ...]
     at_goal: bool
 
-    def frame(self, command: tuple[float, float], plan_s: float = 0.0) -> CrossingFrame:
+    def frame(
+        self, command: tuple[float, float], plan_s: float = 0.0, lateral_mps: float = 0.0
+    ) -> CrossingFrame:
         """Return the control cycle with its command, and the time that planning it took.
 
-        The command is speed (m/s) and yaw rate (rad/s).
+        The command is speed (m/s) and yaw rate (rad/s), ``lateral_mps`` its speed to the left.
         """
         observed = self.sensed.observed
         return CrossingFrame(
@@ -83,6 +85,7 @@ class Situation:
             self.separations_m,
             self.sensed.scan_points_odom_m,
             plan_s,
+            lateral_mps,
         )
 
 
@@ -93,7 +96,7 @@ class Crossing(AbstractContextManager["Crossing"]):
     :func:`run_crossing` lets a planner give the commands.
 
     Args:
-        scenario: the scenario.
+        scenario: the scenario; its ``robot_model`` drives.
         policy: the policy of the adapter.
         perception: one of :func:`run_crossing`'s.
         seed: the same seed and commands give the same cycles, bit for bit.
@@ -104,6 +107,7 @@ class Crossing(AbstractContextManager["Crossing"]):
 
     Attributes:
         scenario: as given.
+        robot: profile of the robot.
         stage: hall, robot and people.
         meter: the safety figures so far.
         goal_odom_m: (2,) goal.
@@ -132,7 +136,8 @@ class Crossing(AbstractContextManager["Crossing"]):
         jitter = scenario.start_jitter_s
         offsets = jitter_rng.uniform(-jitter, jitter, len(scenario.workers))
         self._cone = AttentionCone()
-        self.meter = SafetyMeter(NOVA_CARTER)
+        self.robot = _profile_of(scenario)
+        self.meter = SafetyMeter(self.robot)
         self.stage = Stage(scenario, offsets, people_rng, renderer=renderer)
         try:
             self._sensing = Sensing(
@@ -150,7 +155,7 @@ class Crossing(AbstractContextManager["Crossing"]):
         except BaseException:
             self.stage.close()
             raise
-        self._adapter = NavAdapter(policy, NOVA_CARTER)
+        self._adapter = NavAdapter(policy, self.robot)
         self.goal_odom_m = np.array([scenario.robot.goal_x_m, scenario.robot.goal_y_m])
         self.dt_s = 1.0 / scenario.control_hz
         self._ticks_per_measurement = max(round(scenario.control_hz / _MEASURED_HZ), 1)
@@ -204,9 +209,12 @@ class Crossing(AbstractContextManager["Crossing"]):
             _at_goal(self.scenario, state, self.goal_odom_m),
         )
 
-    def command(self, speed_mps: float, yaw_rate_radps: float) -> None:
-        """Give the robot a command; it holds until the next one."""
-        self.stage.amr.command(speed_mps, yaw_rate_radps)
+    def command(self, speed_mps: float, yaw_rate_radps: float, lateral_mps: float = 0.0) -> None:
+        """Give the robot a command; it holds until the next one.
+
+        ``lateral_mps`` is the speed to the left, for a robot that can move sideways.
+        """
+        self.stage.amr.command(speed_mps, yaw_rate_radps, lateral_mps)
 
     def advance(self) -> None:
         """Run robot, people and physics up to the next control cycle."""
@@ -221,11 +229,13 @@ def run_crossing(
     planner: LocalPlanner | None = None,
     perception: str = "truth",
     seed: int = 0,
+    robot: RobotModel | RobotProfile | str | Path | None = None,
     noise: KeypointNoise | None = None,
     pipeline: AwarenessPipeline | None = None,
     observer: Observer | None = None,
     fault: Fault | None = None,
     renderer: RendererName = "auto",
+    population: str | None = None,
 ) -> CrossingResult:
     """Run one crossing in PyBullet and measure it.
 
@@ -240,6 +250,8 @@ def run_crossing(
             by a rack. ``"keypoints+scanner"`` and ``"pixels+scanner"`` add the scenario's laser
             scanners, and ``"scanner"`` has them alone.
         seed: the same seed gives the same result, bit for bit, but for the times of ``plan_s``.
+        robot: a robot model, a shipped name, a YAML file, or a profile; the scenario is fitted to
+            it by :func:`scenario_for_robot`. None for the scenario's own.
         noise: noise of the keypoint camera; None for the default.
         pipeline: pipeline for ``"pixels"`` instead of the shipped networks; its camera must be that
             of the images.
@@ -248,15 +260,21 @@ def run_crossing(
         fault: a fault of sensors, detections or odometry; frames keep the truth about the robot.
         renderer: renderer of the images: ``"tiny"``, ``"gl"``, or ``"auto"`` for the fastest
             available. Their pixels are nearly, but not exactly, the same.
+        population: habits of the people, ``"classic"`` or ``"recorded"``; None for the scenario's
+            own. See :meth:`Scenario.with_population`.
 
     Raises:
-        SimError: unknown scenario or perception, a planner without ``plan``, or a command that is
-            not two finite numbers.
+        SimError: unknown scenario, robot, population or perception, a planner without ``plan``, or
+            a command that is not two finite numbers (three for a robot that can move sideways).
         NavError: unknown preset or unusable policy file.
         PerceptionError: for ``"pixels"``, when the shipped networks cannot be loaded.
     """
     if isinstance(scenario, str):
         scenario = ScenarioTemplate.shipped(scenario).for_seed(seed)
+    if population is not None:
+        scenario = scenario.with_population(population)
+    if robot is not None:
+        scenario = scenario_for_robot(scenario, robot)
     policy_name, policy = named_policy(policy)
     driver = check_planner(planner) if planner is not None else _default_planner(scenario)
     frames: list[CrossingFrame] = []
@@ -278,9 +296,11 @@ def run_crossing(
                 now.sensed.state, crossing.goal_odom_m, now.constraints, crossing.dt_s
             )
             plan_s = perf_counter() - asked_s
-            command = checked_command(driver, returned, now.t_s)
-            crossing.command(*command)
-            frames.append(now.frame(command, plan_s))
+            speed, yaw_rate, lateral = checked_command(
+                driver, returned, now.t_s, sideways=crossing.robot.drive == "holonomic"
+            )
+            crossing.command(speed, yaw_rate, lateral)
+            frames.append(now.frame((speed, yaw_rate), plan_s, lateral))
             if observer is not None:
                 observer(frames[-1], crossing.stage)
             if now.at_goal:
@@ -304,7 +324,11 @@ def _default_planner(scenario: Scenario) -> LocalPlanner:
     straight = scenario.robot.straight_on_speed_mps
     if straight is not None:
         return StraightOn(straight)
-    return SamplingPlanner(NOVA_CARTER, scenario.planner_boxes_odom_m)
+    return SamplingPlanner(_profile_of(scenario), scenario.planner_boxes_odom_m)
+
+
+def _profile_of(scenario: Scenario) -> RobotProfile:
+    return NOVA_CARTER if scenario.robot_model is None else scenario.robot_model.profile
 
 
 def named_policy(policy: AwarenessPolicy | str | Path) -> tuple[str, AwarenessPolicy]:
@@ -324,7 +348,7 @@ def _at_goal(scenario: Scenario, state: RobotState, goal: FloatArray) -> bool:
         return False
     distance = float(np.linalg.norm(goal - state.position_odom_m))
     tolerance = scenario.robot.goal_tolerance_m
-    return distance <= tolerance and abs(state.speed_mps) <= _GOAL_SPEED_MPS
+    return distance <= tolerance and state.travel_mps <= _GOAL_SPEED_MPS
 
 
 def _result(
@@ -359,4 +383,5 @@ def _result(
         frames=tuple(frames),
         people=people,
         scripted=len(scenario.workers),
+        robot=_profile_of(scenario),
     )

@@ -41,6 +41,7 @@ class CrossingFrame:
             places them.
         plan_s: elapsed time of the planner's ``plan``, seconds by the clock of the computer. It is
             the only field that differs when the same episode is run again.
+        lateral_command_mps: commanded speed to the left, of a robot that can move sideways.
     """
 
     t_s: float
@@ -56,6 +57,7 @@ class CrossingFrame:
     separations_m: tuple[float, ...] = ()
     scan_points_odom_m: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
     plan_s: float = 0.0
+    lateral_command_mps: float = 0.0
 
     __repr__ = short_repr
 

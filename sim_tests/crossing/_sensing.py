@@ -140,7 +140,7 @@ class Sensing:
         known = self._odometry.update(state, T_odom_camera)
         sightings: tuple[Sighting, ...] = ()
         if self._scanners is not None:
-            velocity = np.array([state.speed_mps, 0.0])
+            velocity = np.array([state.speed_mps, state.lateral_mps])
             motion = RobotMotion(t_s, amr.T_odom_base, velocity, state.yaw_rate_radps)
             sightings = self._scanners.look(t_s, motion, known_motion(known.state))
         if self._camera is not None:

@@ -23,10 +23,12 @@ from ..actors.behaviour import (
     Scripted,
     Surroundings,
     Walker,
+    displaced_people,
     replayed_people,
+    walker_of,
 )
 from ..actors.body import Worker
-from ..actors.robot import NOVA_CARTER, Amr, AmrLook
+from ..actors.robot import NOVA_CARTER, Amr, AmrLook, KinematicLook, KinematicRobot
 from ..scenario import Scenario
 from ..world import Warehouse
 from ..world.bullet import pybullet
@@ -44,6 +46,8 @@ _TOUCH_WITHIN_M: Final = 0.8
 _BODY_UPDATE_HZ: Final = 60.0
 # A body that would move deeper than this into the robot in one update is held.
 _DEEPER_M: Final = 0.002
+# The highest speed that a body is placed with; recorded people may be faster.
+_FASTEST_MPS: Final = 3.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,14 +105,7 @@ class Stage(AbstractContextManager["Stage"]):
         self.scenario = scenario
         self.warehouse = Warehouse(scenario.layout, renderer=renderer)
         try:
-            task = scenario.robot
-            self.amr = Amr(
-                self.warehouse,
-                (task.start_x_m, task.start_y_m),
-                math.radians(task.start_heading_deg),
-                NOVA_CARTER,
-                camera_mount=scenario.camera.mount,
-            )
+            self.amr = _robot(self.warehouse, scenario)
             self.walkers = self._walkers(
                 np.random.default_rng(0) if people_rng is None else people_rng
             )
@@ -118,7 +115,7 @@ class Stage(AbstractContextManager["Stage"]):
                     for script, offset in zip(scenario.workers, start_offsets_s, strict=True)
                 ),
                 *self.walkers,
-                *(() if scenario.replay_csv is None else replayed_people(scenario.replay_csv)),
+                *self._recorded_people(),
             )
             self.workers = tuple(
                 Worker(self.warehouse, each.stature_m, look=each.look, stride_m=each.stride_m)
@@ -127,14 +124,22 @@ class Stage(AbstractContextManager["Stage"]):
         except BaseException:
             self.warehouse.close()
             raise
-        self.warehouse.add_actor(AmrLook.of(self.warehouse, self.amr))
+        self.warehouse.add_actor(
+            KinematicLook(self.amr)
+            if isinstance(self.amr, KinematicRobot)
+            else AmrLook.of(self.warehouse, self.amr)
+        )
         self._sight = RobotSight(self.amr, self.workers)
         self._motions: tuple[PersonMotion, ...] = ()
         steps = 1.0 / (_BODY_UPDATE_HZ * self.warehouse.physics_dt_s)
         self._steps_per_body_update = max(round(steps), 1)
         self._near_robot = [False] * len(self.workers)
-        half_length, half_width = np.abs(self.amr.profile.footprint_m).max(axis=0).tolist()
+        corners = self.amr.profile.footprint_m
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        half_length, half_width = (0.5 * (high - low)).tolist()
         self._half_size_m: tuple[float, float] = (half_length, half_width)
+        # The middle of the outline, which is not the base origin of every robot.
+        self._middle_base_m: tuple[float, float] = tuple((0.5 * (low + high)).tolist())
         self._held = [False] * len(self.workers)
         self._last_velocity_mps: FloatArray | None = None
         self._place_workers()
@@ -224,14 +229,24 @@ class Stage(AbstractContextManager["Stage"]):
     def _walkers(self, rng: np.random.Generator) -> tuple[Walker, ...]:
         """Return the people who react, each with a random generator of their own."""
         jitter = self.scenario.start_jitter_s
+        make = walker_of(self.scenario.population)
         walkers = []
         for spec, own in zip(
             self.scenario.people, rng.spawn(len(self.scenario.people)), strict=True
         ):
             offset = float(own.uniform(-jitter, jitter))
             boxes = self.warehouse.obstacle_boxes_odom
-            walkers.append(Walker(spec, own, boxes, offset_s=offset))
+            walkers.append(make(spec, own, boxes, offset_s=offset))
         return tuple(walkers)
+
+    def _recorded_people(self) -> tuple[PersonBehaviour, ...]:
+        scenario = self.scenario
+        path, leaves = scenario.replay_csv, scenario.replay_leaves
+        if path is None:
+            return ()
+        if scenario.replay_reacts:
+            return displaced_people(path, self.warehouse.obstacle_boxes_odom, leaves=leaves)
+        return replayed_people(path, leaves=leaves)
 
     def _place_workers(self) -> None:
         robot, others = self._robot_body(), self._moving_bodies()
@@ -280,9 +295,10 @@ class Stage(AbstractContextManager["Stage"]):
         x, y = T_odom_base[:2, 3].tolist()
         vx, vy = self.amr.velocity_odom_mps.tolist()
         camera_x, camera_y, camera_z = self.amr.T_odom_camera[:3, 3].tolist()
+        ahead, left = self._middle_base_m
         return RobotBody(
-            x,
-            y,
+            x + ahead * float(T_odom_base[0, 0]) + left * float(T_odom_base[0, 1]),
+            y + ahead * float(T_odom_base[1, 0]) + left * float(T_odom_base[1, 1]),
             math.atan2(T_odom_base[1, 0], T_odom_base[0, 0]),
             vx,
             vy,
@@ -333,16 +349,10 @@ class Stage(AbstractContextManager["Stage"]):
     ) -> None:
         """Record whether a person touches the robot.
 
-        Args:
-            index: of the person.
-            velocities_mps: (2,) of the robot before the last step but one, if it is known, and
-                before the last step.
-            meter: takes the contact.
+        ``velocities_mps`` are those (2,) of the robot before the last step but one, if it is known,
+        and before the last step.
         """
-        touching = pybullet.getContactPoints(
-            self.amr.body, self.workers[index].body, physicsClientId=self.warehouse.client
-        )
-        if not self._held[index] and not any(point[8] <= 0.0 for point in touching):
+        if not self._held[index] and not self.amr.touches(self.workers[index].body):
             meter.release(index)
             return
         previous, velocity = velocities_mps
@@ -353,6 +363,16 @@ class Stage(AbstractContextManager["Stage"]):
         _, towards = self._separation(index)
         meter.touch(self.t_s, index, velocity, towards)
         self._behaviours[index].touch(*(-towards).tolist())
+
+
+def _robot(warehouse: Warehouse, scenario: Scenario) -> Amr | KinematicRobot:
+    """Return the robot of a scenario at its start."""
+    task, model = scenario.robot, scenario.robot_model
+    start, heading_rad = (task.start_x_m, task.start_y_m), math.radians(task.start_heading_deg)
+    if model is None or model.body == "nova_carter":
+        mount = scenario.camera.mount
+        return Amr(warehouse, start, heading_rad, NOVA_CARTER, camera_mount=mount)
+    return KinematicRobot(warehouse, model, start, heading_rad)
 
 
 def _faces(motion: PersonMotion, target_odom_m: FloatArray) -> bool:
@@ -366,7 +386,7 @@ def _pose(worker: Worker, motion: PersonMotion, *, collides: bool = True) -> Non
         motion.position_odom_m,
         motion.heading_odom_rad,
         motion.walked_m,
-        math.hypot(*motion.velocity_odom_mps.tolist()),
+        min(math.hypot(*motion.velocity_odom_mps.tolist()), _FASTEST_MPS),
         motion.head_yaw_rad,
         motion.head_pitch_rad,
         eye_yaw_rad=motion.eye_yaw_rad,

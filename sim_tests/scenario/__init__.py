@@ -9,6 +9,7 @@ from awarenav.lazy import lazy_names
 if TYPE_CHECKING:
     from ._distributions import Choice, Distribution, Integers, read_distribution
     from ._files import SCENARIO_SETS, shipped_scenarios
+    from ._for_robot import scenario_for_robot
     from ._scenario import CameraSpec, RobotTask, Scenario
     from ._template import ScenarioTemplate, shipped_templates
 
@@ -22,6 +23,7 @@ __all__ = [
     "Scenario",
     "ScenarioTemplate",
     "read_distribution",
+    "scenario_for_robot",
     "shipped_scenarios",
     "shipped_templates",
 ]
@@ -39,6 +41,7 @@ __getattr__ = lazy_names(
             "SCENARIO_SETS",
             "shipped_scenarios",
         ),
+        "._for_robot": ("scenario_for_robot",),
         "._scenario": (
             "CameraSpec",
             "RobotTask",

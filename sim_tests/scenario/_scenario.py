@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,7 +17,14 @@ from perception.arrays import FloatArray
 from perception.surround import FlatView, ring_of_views
 from tracking.config import StrictConfig
 
-from ..actors.behaviour import PersonSpec, WorkerScript
+from ..actors.behaviour import (
+    DEFAULT_POPULATION,
+    PersonSpec,
+    PopulationName,
+    WorkerScript,
+    known_population,
+)
+from ..actors.robot import RobotModel
 from ..world.camera import CameraTiming, SensorConfig
 from ..world.errors import SimError
 from ..world.hall import LAYOUTS, WarehouseLayout
@@ -24,6 +32,7 @@ from ..world.scanner import DIAGONAL_SCANNERS, ScannerSpec
 from ._distributions import error_text
 from ._files import parse_yaml, read_file, require_version, shipped_text
 from ._parameters import find_parameters, with_numbers
+from ._population import person_of_script
 
 # Largest distance between neighbours on the reference path.
 _PATH_SPACING_M: Final = 0.25
@@ -152,6 +161,10 @@ class RobotTask(StrictConfig):
         return np.asarray(np.linspace(start, goal, steps + 1))
 
 
+def _robot_model(value: Any) -> Any:
+    return RobotModel.of(value) if isinstance(value, str) else value
+
+
 def _layout(value: Any) -> Any:
     if not isinstance(value, str):
         return value
@@ -175,12 +188,21 @@ class Scenario(StrictConfig):
         control_hz: control cycles per second; each is one frame.
         layout: the hall, a name of :data:`LAYOUTS` or a mapping of :class:`WarehouseLayout`.
         robot: the robot's task.
-        camera: the robot's camera.
+        robot_model: the robot; a shipped name, a YAML file or the keys of a
+            :class:`~sim_tests.actors.robot.RobotModel`; None for the Nova Carter. See
+            :func:`~sim_tests.scenario.scenario_for_robot`, which fits room and time as well.
+        camera: the robot's camera; a robot model has its place.
         scanners: the robot's laser scanners; they are used where a crossing asks for them.
         workers: scripted people, who move the same whatever the robot does.
         people: people who look, react and walk by themselves; names are unique.
+        population: habits of the people: ``"classic"``, or ``"recorded"`` as fitted to recorded
+            people, see :meth:`with_population`.
         replay_csv: table of recorded people to replay, see :func:`read_recordings`; relative
             to the scenario's own file.
+        replay_reacts: the recorded people leave their paths where the robot forces them off, and
+            return; see :class:`Displaced`. Otherwise they walk on whatever the robot does.
+        replay_leaves: the recorded people are away before their first and after their last row;
+            otherwise they stand there.
         start_jitter_s: each worker and each person starts up to this much earlier or later, drawn
             from the seed.
     """
@@ -195,11 +217,15 @@ class Scenario(StrictConfig):
     control_hz: float = Field(default=20.0, gt=0.0, le=240.0)
     layout: Annotated[WarehouseLayout, BeforeValidator(_layout)] = WarehouseLayout.crossing()
     robot: RobotTask
+    robot_model: Annotated[RobotModel | None, BeforeValidator(_robot_model)] = None
     camera: CameraSpec = CameraSpec()
     scanners: tuple[ScannerSpec, ...] = DIAGONAL_SCANNERS
     workers: tuple[WorkerScript, ...] = ()
     people: tuple[PersonSpec, ...] = ()
+    population: PopulationName = DEFAULT_POPULATION
     replay_csv: str | None = None
+    replay_reacts: bool = False
+    replay_leaves: bool = False
     start_jitter_s: float = Field(default=0.0, ge=0.0)
 
     @model_validator(mode="after")
@@ -208,6 +234,12 @@ class Scenario(StrictConfig):
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise ValueError(f"names of people must be unique, got {', '.join(twice)} twice")
+        return self
+
+    @model_validator(mode="after")
+    def _settings_of_a_replay(self) -> Scenario:
+        if self.replay_csv is None and (self.replay_reacts or self.replay_leaves):
+            raise ValueError("replay_reacts and replay_leaves need recorded people: replay_csv")
         return self
 
     @classmethod
@@ -243,9 +275,10 @@ class Scenario(StrictConfig):
             SimError: naming the wrong key.
         """
         try:
-            return cls.model_validate(data)
+            scenario = cls.model_validate(data)
         except ValidationError as cause:
             raise SimError(f"{source}: {error_text(cause)}") from cause
+        return scenario.with_population(scenario.population)
 
     @classmethod
     def _at_medians(cls, data: dict[str, Any], source: str) -> Scenario:
@@ -270,9 +303,32 @@ class Scenario(StrictConfig):
 
     def to_text(self) -> str:
         """Return the scenario as YAML, for :meth:`ScenarioTemplate.from_text`."""
-        return yaml.safe_dump(self.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
+        data = self.model_dump(mode="json")
+        if self.robot_model is None:
+            del data["robot_model"]
+        return yaml.safe_dump(data, sort_keys=False, allow_unicode=True)
+
+    def with_population(self, name: str) -> Scenario:
+        """Return the same task among people of another population.
+
+        With ``"recorded"``, people who react also take the place of scripted workers, unless the
+        robot drives straight on.
+
+        Raises:
+            SimError: for an unknown name.
+        """
+        population = known_population(name)
+        changes: dict[str, Any] = {"population": population}
+        if population == "recorded" and self.robot.straight_on_speed_mps is None:
+            taken = {person.name for person in self.people}
+            names = (f"worker {number}" for number in itertools.count(1))
+            free = (each for each in names if each not in taken)
+            added = tuple(person_of_script(script, next(free)) for script in self.workers)
+            changes.update(workers=(), people=(*added, *self.people))
+        return self.model_copy(update=changes)
 
     def without_people(self) -> Scenario:
         """Return the same task in a hall without people."""
         empty: dict[str, Any] = {"workers": (), "people": (), "replay_csv": None}
+        empty |= {"replay_reacts": False, "replay_leaves": False}
         return self.model_copy(update={"name": f"{self.name}_without_people", **empty})

@@ -6,12 +6,18 @@ import copy
 import hashlib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 import yaml
+from pydantic import ValidationError
 
-from ._distributions import Distribution
+from nav_adapter import RobotProfile
+
+from ..actors.behaviour import known_population
+from ..actors.robot import RobotModel
+from ..world.errors import SimError
+from ._distributions import Distribution, error_text
 from ._files import (
     camera_data,
     parse_yaml,
@@ -20,8 +26,12 @@ from ._files import (
     shipped_scenarios,
     shipped_text,
 )
+from ._for_robot import scenario_for_robot
 from ._parameters import find_parameters, with_numbers
 from ._scenario import Scenario
+
+# The key of a robot to which the scenario is fitted.
+_FOR_ROBOT: Final = "for_robot"
 
 
 class ScenarioTemplate:
@@ -32,6 +42,10 @@ class ScenarioTemplate:
     ``{lognormal: {median:, quartiles: [,]}}``, ``{integers: {low:, high:}}`` or
     ``{choice: [...]}``. A :class:`Scenario` is a template without distributions.
 
+    The key ``for_robot`` names a robot (a shipped one, a YAML file, or the keys of a
+    :class:`~sim_tests.actors.robot.RobotModel`) to which every scenario is fitted, see
+    :func:`~sim_tests.scenario.scenario_for_robot`.
+
     Args:
         data: the keys of a scenario, as read from YAML.
         source: name of the scenario in messages.
@@ -41,12 +55,15 @@ class ScenarioTemplate:
             that is not valid at the medians.
     """
 
-    __slots__ = ("_data", "_median", "_parameters", "_source")
+    __slots__ = ("_data", "_median", "_parameters", "_robot", "_source")
 
     def __init__(self, data: Mapping[str, Any], source: str = "scenario") -> None:
         self._data: dict[str, Any] = copy.deepcopy(dict(data))
         self._source = source
-        self._parameters = find_parameters(self._data, source)
+        self._robot: RobotModel | None = None
+        if _FOR_ROBOT in self._data:
+            self._robot = _robot_of(self._data[_FOR_ROBOT], source)
+        self._parameters = find_parameters(self._scenario_data, source)
         self._median = self.with_values({})
 
     @classmethod
@@ -142,8 +159,31 @@ class ScenarioTemplate:
         Raises:
             SimError: for a path that is no parameter, and for values that are not valid.
         """
-        data = with_numbers(self._data, self._parameters, values, self._source)
-        return Scenario.from_data(data, self._source)
+        data = with_numbers(self._scenario_data, self._parameters, values, self._source)
+        scenario = Scenario.from_data(data, self._source)
+        return scenario if self._robot is None else scenario_for_robot(scenario, self._robot)
+
+    def with_robot(self, robot: RobotModel | RobotProfile | str | Path) -> ScenarioTemplate:
+        """Return the same scenario fitted to another robot.
+
+        Args:
+            robot: as for :func:`scenario_for_robot`; empty for the scenario's own.
+
+        Raises:
+            SimError: for an unknown robot, and a scenario that has another robot already.
+        """
+        if robot == "":
+            return self
+        model = RobotModel.of(robot)
+        return ScenarioTemplate(
+            {**self._data, _FOR_ROBOT: model.model_dump(mode="json")},
+            f"{self._source} with robot {model.name}",
+        )
+
+    @property
+    def _scenario_data(self) -> dict[str, Any]:
+        """The keys of the scenario alone."""
+        return {key: value for key, value in self._data.items() if key != _FOR_ROBOT}
 
     def with_camera(self, name: str) -> ScenarioTemplate:
         """Return the same scenario with another camera on the robot.
@@ -161,6 +201,20 @@ class ScenarioTemplate:
             {**self._data, "camera": camera_data(name)}, f"{self._source} with camera {name}"
         )
 
+    def with_population(self, name: str) -> ScenarioTemplate:
+        """Return the same scenario among people of another population.
+
+        Args:
+            name: as for :meth:`Scenario.with_population`; empty for the scenario's own.
+
+        Raises:
+            SimError: for an unknown name.
+        """
+        if not name:
+            return self
+        population = known_population(name)
+        return ScenarioTemplate({**self._data, "population": population}, self._source)
+
     def to_text(self) -> str:
         """Return YAML for :meth:`from_text`, with the shared defaults written out."""
         return yaml.safe_dump(self._data, sort_keys=False, allow_unicode=True)
@@ -173,6 +227,14 @@ class ScenarioTemplate:
 
     def __repr__(self) -> str:
         return f"ScenarioTemplate({self.id!r}, {len(self._parameters)} parameters)"
+
+
+def _robot_of(value: Any, source: str) -> RobotModel:
+    """Return the robot of the key ``for_robot``."""
+    try:
+        return RobotModel.model_validate(value) if isinstance(value, dict) else RobotModel.of(value)
+    except ValidationError as cause:
+        raise SimError(f"{source}: {_FOR_ROBOT}: {error_text(cause)}") from cause
 
 
 def shipped_templates(scenario_set: str = "all") -> tuple[ScenarioTemplate, ...]:

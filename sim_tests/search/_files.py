@@ -26,13 +26,16 @@ _STUDY: Final = ("study.db", "study.db-*")
 _LOCKS: Final = ("locks/*.lock",)
 
 
-def common_settings(policy: str, scenarios: Sequence[str], camera: str) -> dict[str, Any]:
+def common_settings(
+    policy: str, scenarios: Sequence[str], camera: str, population: str = ""
+) -> dict[str, Any]:
     """Return the settings that tuning and falsification share, as plain values.
 
     Args:
         policy: name of a preset, or a YAML file.
         scenarios: shipped names, YAML files, or ``"all"``.
         camera: as for :meth:`ScenarioTemplate.with_camera`.
+        population: as for :meth:`ScenarioTemplate.with_population`.
 
     Returns:
         ``policy_name``, and ``policy`` and ``scenarios`` as YAML.
@@ -44,7 +47,9 @@ def common_settings(policy: str, scenarios: Sequence[str], camera: str) -> dict[
     return {
         "policy_name": Path(policy).stem,
         "policy": policy_text(read_policy(policy)),
-        "scenarios": tuple(each.to_text() for each in named_templates(scenarios, camera)),
+        "scenarios": tuple(
+            each.to_text() for each in named_templates(scenarios, camera, population)
+        ),
     }
 
 

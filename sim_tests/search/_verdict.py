@@ -72,19 +72,21 @@ def is_shown(change: Interval) -> bool:
     return change.n >= FEW_PAIRS and (change.low > 0.0 or change.high < 0.0)
 
 
-def change_text(change: Interval, decimals: int, less: str, more: str) -> str:
+def change_text(change: Interval, decimals: int, verb: str) -> str:
     """Return a paired difference of seconds in words, such as ``"loses 0.3 s less (…)"``.
 
     Args:
         change: mean difference with its interval.
         decimals: of the seconds.
-        less: words for less than 0, with ``{}`` for the amount: ``"loses {} less"``.
-        more: words for more than 0.
+        verb: the words before the amount.
     """
     if not change.known:
-        return f"{less.format('?')} (no pair)"
-    amount = f"{abs(change.value):.{decimals}f} s"
-    text = (less if change.value <= 0.0 else more).format(amount)
+        return f"{verb} ? (no pair)"
+    amount = f"{abs(change.value):.{decimals}f}"
+    if float(amount):
+        text = f"{verb} {amount} s {'less' if change.value < 0.0 else 'more'}"
+    else:
+        text = f"{verb} neither less nor more"
     if not change.bounded:
         return f"{text} (too few pairs for an interval)"
     return f"{text} ({change.low:+.{decimals}f} to {change.high:+.{decimals}f} s)"

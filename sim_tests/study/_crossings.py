@@ -32,6 +32,8 @@ class CrossingsOptions:
     perception: PerceptionKind
     sensors: tuple[SensorSet, ...]
     camera: str
+    robot: str
+    population: str | None
     fault: tuple[str, ...]
     episodes: int
     sample: int | None
@@ -64,6 +66,8 @@ def crossings_command(options: CrossingsOptions) -> int:
         perception=options.perception,
         sensors=options.sensors,
         camera=options.camera,
+        robot=options.robot,
+        population=options.population or "",
         faults=options.fault,
     )
     if options.perception == "pixels" and set(options.sensors) != {"scanner"}:
@@ -141,6 +145,10 @@ def _about(options: CrossingsOptions) -> dict[str, Any]:
         settings["sample"] = options.sample
     if options.camera:
         settings["camera"] = options.camera
+    if options.robot:
+        settings["robot"] = options.robot
+    if options.population:
+        settings["population"] = options.population
     words = ["awarenav", "crossings"]
     for name, value in settings.items():
         values = value if isinstance(value, list) else [value]

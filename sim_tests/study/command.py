@@ -13,6 +13,7 @@ from awarenav.cli import NUMBER, POSITIVE, command, option, options
         "awarenav crossings --scenario blind_corner --policy blind balanced",
         "awarenav crossings --policy mine.yaml blind --episodes 20 --out run",
         "awarenav crossings --planner my_planners:Dwa reference --fault none ghosts",
+        "awarenav crossings --robot forklift --scenario blind_corner head_on_in_aisle",
         "awarenav crossings --fault 'scanner_*' --sensors camera+scanner --sample 50",
     ],
     exit_status={
@@ -30,6 +31,8 @@ from awarenav.cli import NUMBER, POSITIVE, command, option, options
 @options.perception()
 @options.sensor_sets()
 @options.camera()
+@options.robot()
+@options.population()
 @options.faults()
 @option("--episodes", type=POSITIVE, default=1, metavar="N", help="Number of seeds per scenario.")
 @option(

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given
+from hypothesis import given, settings
 from nav_scenes import ROBOT, crowds, person, robot_at
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, NavError
@@ -38,6 +38,7 @@ def constraints_for(
     return adapter.update(tracks, robot_at(0.0, speed_mps=speed_mps), 0.0)
 
 
+@settings(max_examples=25)
 @given(tracks=crowds())
 def test_circles_and_limits_are_those_without_a_prediction(tracks: tuple[PersonTrack, ...]) -> None:
     plain, wide = constraints_for(tracks), constraints_for(tracks, FITTED)
@@ -92,6 +93,7 @@ def test_alerts_reach_as_far_as_the_person_may_be_by_then() -> None:
     assert [alert.track_id for alert in wide] == [1]
 
 
+@settings(max_examples=25)
 @given(tracks=crowds())
 def test_predicted_people_are_those_of_tracking(tracks: tuple[PersonTrack, ...]) -> None:
     fresh = tuple(replace(track, stamp_s=0.0) for track in tracks)

@@ -22,8 +22,8 @@ def people(count: int, spread: float, seed: int, seconds: float = 12.0) -> list[
     steps = round(seconds / PERIOD_S)
     for index in range(count):
         stamps_s = 100.0 * index + PERIOD_S * np.arange(steps)
-        # Heavy tails: in both halves, some people wander three times as much as others.
-        wild = spread * (0.5, 1.5)[index // 2 % 2]
+        # Heavy tails: some people wander three times as much as others.
+        wild = spread * (0.5, 1.5)[index % 2]
         velocity = np.empty((steps, 2))
         velocity[0] = rng.normal(0.0, 1.0, 2)
         for step in range(1, steps):
@@ -50,7 +50,7 @@ def test_the_calibrated_region_holds_on_people_who_were_not_used(spread: float) 
     off = np.abs(found.before - REGION_SHARE)
     assert off.max() > 0.07  # so that there is something to correct
     assert (np.abs(found.coverage - REGION_SHARE) < chance(*found.stretches)).all()
-    fresh = calibrate(people(120, spread, seed=2), found.model)
+    fresh = calibrate(people(80, spread, seed=2), found.model)
     assert (
         np.abs(fresh.before - REGION_SHARE) < chance(found.stretches[0], fresh.stretches[1])
     ).all()
@@ -63,7 +63,8 @@ def test_factors_of_a_model_before_do_not_matter() -> None:
     plain = calibrate(crowd)
     again = calibrate(crowd, plain.model)
     assert again.model == plain.model
-    np.testing.assert_array_equal(again.before, plain.coverage)
+    np.testing.assert_array_equal(again.halves, plain.halves)
+    assert (np.abs(again.before - REGION_SHARE) < 0.03).all()
 
 
 def test_few_stretches_are_calibrated_more_cautiously() -> None:

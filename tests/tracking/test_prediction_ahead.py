@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from tracking_scenes import track_of
 
@@ -100,7 +100,6 @@ def test_the_covariance_grows_with_the_horizon(state: FloatArray, covariance: Fl
     assert (np.linalg.eigvalsh(found) > 0.0).all()
 
 
-@settings(max_examples=200)
 @given(state=states, covariance=covariances(), model=models(), angle=finite(-math.pi, math.pi))
 def test_nothing_is_predicted_outside_the_envelope(
     state: FloatArray, covariance: FloatArray, model: PredictionModel, angle: float

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ._displaced import Displaced, displaced_people
 from ._obstacles import WALKER_RADIUS_M
 from ._person import (
     ALONE,
@@ -12,15 +13,30 @@ from ._person import (
     RobotBody,
     Surroundings,
 )
-from ._replayed import Replayed, read_recordings, replayed_people
+from ._population import (
+    DEFAULT_POPULATION,
+    POPULATIONS,
+    PopulationName,
+    RecordedWalker,
+    draw_person,
+    known_population,
+    walker_of,
+)
+from ._replayed import RecordedPath, Replayed, read_recordings, replayed_people
 from ._script import Scripted, WorkerScript
 from ._spec import Glances, Lapse, PersonSpec, Reactions
+from ._starting import LOOK_WITHIN_S, START_SHARES, start_share
 from ._walker import DECISION_PERIOD_S, Walker
 
 __all__ = [
     "ALONE",
     "DECISION_PERIOD_S",
+    "DEFAULT_POPULATION",
+    "LOOK_WITHIN_S",
+    "POPULATIONS",
+    "START_SHARES",
     "WALKER_RADIUS_M",
+    "Displaced",
     "Glances",
     "Lapse",
     "MovingBody",
@@ -28,13 +44,21 @@ __all__ = [
     "PersonMotion",
     "PersonOutcome",
     "PersonSpec",
+    "PopulationName",
     "Reactions",
+    "RecordedPath",
+    "RecordedWalker",
     "Replayed",
     "RobotBody",
     "Scripted",
     "Surroundings",
     "Walker",
     "WorkerScript",
+    "displaced_people",
+    "draw_person",
+    "known_population",
     "read_recordings",
     "replayed_people",
+    "start_share",
+    "walker_of",
 ]

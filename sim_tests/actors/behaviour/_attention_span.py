@@ -38,6 +38,11 @@ class AttentionSpan:
         self.lapsed = over and not touched
         return visible and not (self.lapsed and self._lapse.looks_away)
 
+    def end_halt(self) -> None:
+        """Let a person who halted set off now, and still know of the robot."""
+        self._lapse = None
+        self.halted = False
+
     def known(self, robot: RobotBody | None) -> RobotBody | None:
         """Return the robot as the person reacts to it: None once it is forgotten."""
         return None if self.lapsed else robot

@@ -70,3 +70,9 @@ def limit_approach(
     if speed < 1e-6:
         return DesiredVelocity(desired.ux, desired.uy, 0.0)
     return DesiredVelocity(vx / speed, vy / speed, speed)
+
+
+def without_part(vx: float, vy: float, nx: float, ny: float) -> tuple[float, float]:
+    """Return a velocity without its part along a direction; the opposite part stays."""
+    along = max(vx * nx + vy * ny, 0.0)
+    return vx - along * nx, vy - along * ny

@@ -29,6 +29,8 @@ _HEAD_RADPS: Final = 3.2
 _HEAD_RADPS2: Final = 25.0
 _HEAD_RATE_HZ: Final = 6.0
 _EYE_RADPS: Final = 8.0
+# Eyes change their place in the head after this mean time, and with every glance.
+_REST_S: Final = 1.5
 # The robot is noticed once the gaze is this near to it.
 _ON_TARGET_RAD: Final = math.radians(10.0)
 
@@ -125,6 +127,31 @@ class GlanceProcess:
         return self._looking
 
 
+class EyeRest:
+    """The yaw in the head at which eyes come to rest, drawn anew with every shift of the gaze.
+
+    Args:
+        spread_rad: standard deviation.
+        rng: draws it.
+    """
+
+    def __init__(self, spread_rad: float, rng: np.random.Generator) -> None:
+        self._spread_rad, self._rng = spread_rad, rng
+        self._looking = False
+        self._left_s = 0.0
+        self._yaw_rad = 0.0
+
+    def yaw_rad(self, dt_s: float, looking: bool) -> float:
+        """Return the yaw, ``dt_s`` after the last call; ``looking`` tells glances apart."""
+        self._left_s -= dt_s
+        if self._left_s <= 0.0 or looking != self._looking:
+            yaw = self._spread_rad * float(self._rng.standard_normal())
+            self._yaw_rad = _clipped(yaw, MAX_EYE_YAW_RAD)
+            self._left_s = float(self._rng.exponential(_REST_S))
+        self._looking = looking
+        return self._yaw_rad
+
+
 class Gaze:
     """Head and eyes of one person.
 
@@ -140,6 +167,8 @@ class Gaze:
     Attributes:
         noticed_s: time of the first look at the robot; None before.
         looking: whether a glance at the robot is on.
+        eye_rest: where the eyes come to rest in the head, which turns the rest of the way; None:
+            in the middle.
     """
 
     def __init__(
@@ -151,6 +180,7 @@ class Gaze:
         activity: str = "none",
     ) -> None:
         self._glances = glances
+        self.eye_rest: EyeRest | None = None
         self._eyes_m = eye_height_m(stature_m, activity)
         self._process = GlanceProcess(
             LogNormalDuration.fitted(glances.glance_median_s, glances.glance_quartiles_s),
@@ -209,12 +239,14 @@ class Gaze:
             off = (target[0] - yaw - eye_yaw, target[1] - pitch - eye_pitch)
             if self.noticed_s is None and math.hypot(*off) < _ON_TARGET_RAD:
                 self.noticed_s = t_s
+        rest = (0.0 if self.eye_rest is None else self.eye_rest.yaw_rad(dt_s, self.looking), 0.0)
         limits = (MAX_HEAD_YAW_RAD, MAX_HEAD_PITCH_RAD)
         eye_limits = (MAX_EYE_YAW_RAD, MAX_EYE_PITCH_RAD)
         rates, eye_rates = [], []
         for axis in (0, 1):
             head = self._head[axis]
-            rate = _head_rate(head, self._head_rates[axis], target[axis], limits[axis], dt_s)
+            head_target = target[axis] - rest[axis]
+            rate = _head_rate(head, self._head_rates[axis], head_target, limits[axis], dt_s)
             # Eyes reach the target first and turn back while the head follows.
             eye_target = _clipped(target[axis] - head - rate * dt_s, eye_limits[axis])
             step = _clipped(eye_target - self._eyes[axis], _EYE_RADPS * dt_s)

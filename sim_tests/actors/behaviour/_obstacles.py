@@ -48,6 +48,16 @@ class Obstacles:
             ay += py
         return ax, ay
 
+    def is_clear(self, start: tuple[float, float], goal: tuple[float, float]) -> bool:
+        """Return whether the straight way keeps half a body's width from all boxes."""
+        steps = max(math.ceil(math.dist(start, goal) / (0.5 * WALKER_RADIUS_M)), 1)
+        for step in range(1, steps + 1):
+            x = start[0] + step / steps * (goal[0] - start[0])
+            y = start[1] + step / steps * (goal[1] - start[1])
+            if any(_distance((x, y), box) < WALKER_RADIUS_M for box in self._boxes):
+                return False
+        return True
+
     def end_of_step(
         self, start: tuple[float, float], goal: tuple[float, float]
     ) -> tuple[float, float]:

@@ -121,6 +121,7 @@ class PersonMotion:
         eye_yaw_rad: of the eyes from the head, left positive.
         eye_pitch_rad: of the eyes from the head, up positive.
         activity: of the hands, or sitting or kneeling.
+        away: the person is not there, and placed far outside of the hall.
     """
 
     position_odom_m: FloatArray
@@ -133,6 +134,7 @@ class PersonMotion:
     eye_yaw_rad: float
     eye_pitch_rad: float
     activity: Activity
+    away: bool = False
 
 
 class PersonBehaviour(Protocol):

@@ -83,6 +83,11 @@ class ReactionModel:
         """True while the person goes first in an encounter."""
         return self.reaction in ("walk_on", "hurry", "claim") and not self._passed
 
+    def go_first(self) -> None:
+        """Change the mind of a person who lets the robot pass: go first after all."""
+        if self.reaction in ("wait", "pass_behind"):
+            self.reaction = "claim"
+
     def react(
         self,
         t_s: float,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -25,6 +25,8 @@ _IDLE: Final = Activity()
 _STATURE_M: Final = 1.75
 # A faster person was mixed up with another one, or the units are wrong.
 _MAX_SPEED_MPS: Final = 12.0
+# People who are away are this far from their place, out of every sensor's range.
+_AWAY_M: Final = 1000.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,21 +52,28 @@ class Replayed:
     """A person who follows a recorded path regardless of the surroundings.
 
     The rows are met exactly. Between them position and heading are monotone cubics and the head's
-    yaw is linear. The person stands before the first and after the last row.
+    yaw is linear. The person stands before the first and after the last row, or is away.
 
     Args:
         recording: the path of one person.
         look: name of a shipped worker; None is the one of nearest stature.
         stature_m: height of the body.
+        leaves: the person is away, 1 km off, before the first and after the last row.
 
     Attributes:
         recording: as given.
     """
 
     def __init__(
-        self, recording: RecordedPath, look: str | None = None, stature_m: float = _STATURE_M
+        self,
+        recording: RecordedPath,
+        look: str | None = None,
+        stature_m: float = _STATURE_M,
+        *,
+        leaves: bool = False,
     ) -> None:
         self.recording = recording
+        self._leaves = leaves
         self._look, self._stature_m = look, stature_m
         times = recording.times_s
         path = tuple(
@@ -102,6 +111,11 @@ class Replayed:
         """None: the stride follows the speed."""
         return None
 
+    def is_away(self, t_s: float) -> bool:
+        """Return whether the person is away at ``t_s``."""
+        times = self.recording.times_s
+        return self._leaves and not times[0] <= t_s <= times[-1]
+
     def motion(self, t_s: float, around: Surroundings) -> PersonMotion:
         """Return the recorded motion at ``t_s``."""
         recording = self.recording
@@ -119,17 +133,24 @@ class Replayed:
         yaw = 0.0
         if recording.head_yaws_rad is not None:
             yaw = float(np.interp(at_s, recording.times_s, recording.head_yaws_rad))
+        feet = walk.feet
+        if self.is_away(t_s):
+            position = position + np.array([_AWAY_M, 0.0])
+            (ax, ay, az, ayaw, apitch), (bx, by, bz, byaw, bpitch) = feet.feet
+            left, right = (ax + _AWAY_M, ay, az, ayaw, apitch), (bx + _AWAY_M, by, bz, byaw, bpitch)
+            feet = replace(feet, feet=(left, right))
         return PersonMotion(
             position_odom_m=position,
             velocity_odom_mps=velocity,
             heading_odom_rad=heading,
             walked_m=walk.walked_m,
-            feet=walk.feet,
+            feet=feet,
             head_yaw_rad=min(max(yaw, -MAX_HEAD_YAW_RAD), MAX_HEAD_YAW_RAD),
             head_pitch_rad=0.0,
             eye_yaw_rad=0.0,
             eye_pitch_rad=0.0,
             activity=_IDLE,
+            away=self.is_away(t_s),
         )
 
     def hold(self) -> None:
@@ -139,15 +160,19 @@ class Replayed:
         """Do nothing: the recording continues."""
 
 
-def replayed_people(path: str | Path) -> tuple[Replayed, ...]:
+def replayed_people(path: str | Path, *, leaves: bool = False) -> tuple[Replayed, ...]:
     """Return the people of a table in order of their first rows, with different looks.
+
+    Args:
+        path: the table.
+        leaves: as for :class:`Replayed`.
 
     Raises:
         SimError: see :func:`read_recordings`.
     """
     looks = worker_names()
     return tuple(
-        Replayed(recording, looks[number % len(looks)])
+        Replayed(recording, looks[number % len(looks)], leaves=leaves)
         for number, recording in enumerate(read_recordings(path))
     )
 

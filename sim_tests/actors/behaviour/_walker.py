@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 
 from ...world.errors import SimError
 from ..body import Activity, Gait, OnlineFootsteps, skeleton
 from ._attention_span import AttentionSpan
-from ._avoidance import SlowRobotDetour, limit_approach
+from ._avoidance import SlowRobotDetour, limit_approach, without_part
 from ._gaze import Gaze
 from ._obstacles import Obstacles
 from ._person import ALONE, PersonMotion, PersonOutcome, RobotBody, Surroundings
@@ -70,6 +70,9 @@ class Walker:
         SimError: for a route with a corner inside a rack or a wall.
     """
 
+    # Strength of the force of other people.
+    _FORCE_SHARE: ClassVar[float] = 1.0
+
     def __init__(
         self,
         spec: PersonSpec,
@@ -82,7 +85,8 @@ class Walker:
         self._boxes_odom_m = boxes_odom_m
         self._obstacles = Obstacles(boxes_odom_m)
         route = Route.from_spec(spec)
-        self._follower = RouteFollower(route, spec.speed_mps, max(spec.start_s + offset_s, 0.0))
+        start_s = max(spec.start_s + offset_s, 0.0)
+        self._follower = self._task = RouteFollower(route, spec.speed_mps, start_s)
         for number, point in enumerate(spec.route):
             self._obstacles.check_free(
                 f"route point {number} of {spec.name!r}", point.x_m, point.y_m
@@ -151,12 +155,12 @@ class Walker:
     @property
     def arrived(self) -> bool:
         """True once the end of the route was reached."""
-        return self._follower.arrived_s is not None
+        return self._task.arrived_s is not None
 
     def outcome(self) -> PersonOutcome:
         """Return the outcome for the person up to now."""
         time_s = None
-        follower = self._follower
+        follower = self._task
         if follower.arrived_s is not None and follower.started_s is not None:
             time_s = follower.arrived_s - follower.started_s
         free_time_s, free_length_m = self._free_time_and_length()
@@ -351,7 +355,7 @@ class Walker:
             next_vx, next_vy = next_vx * fastest / speed, next_vy * fastest / speed
         t_s = self._tick * DECISION_PERIOD_S
         if self._touch is not None and t_s - self._touch[2] <= _TOUCHING_S:
-            next_vx, next_vy = _without_part(next_vx, next_vy, self._touch[0], self._touch[1])
+            next_vx, next_vy = without_part(next_vx, next_vy, self._touch[0], self._touch[1])
         return (next_vx - vx) / DECISION_PERIOD_S, (next_vy - vy) / DECISION_PERIOD_S
 
     def _social_force(
@@ -364,7 +368,7 @@ class Walker:
         x, y, vx, vy = state
         ax, ay = self._obstacles.force(x, y)
         fx, fy = people_force(x, y, vx, vy, around.others)
-        ax, ay = ax + fx, ay + fy
+        ax, ay = ax + self._FORCE_SHARE * fx, ay + self._FORCE_SHARE * fy
         if robot is not None:
             near_x, near_y = robot.nearest_point_m(x, y)
             too_near = math.hypot(near_x - x, near_y - y) < _TOO_NEAR_M
@@ -377,14 +381,14 @@ class Walker:
         """Return time and length of the walk without robot and people; time None without an end."""
         if self._free_walk is None:
             self._free_walk = (None, 0.0)
-            if self._follower.route.length_m > 0.0:
+            if self._task.route.length_m > 0.0:
                 self._free_walk = self._walk_alone()
         return self._free_walk
 
     def _walk_alone(self) -> tuple[float | None, float]:
         spec = self.spec.model_copy(update={"start_s": 0.0})
         alone = Walker(spec, np.random.default_rng(0), self._boxes_odom_m)
-        route = self._follower.route
+        route = self._task.route
         pauses = sum(stop.for_s for stop in route.stops[:-1])
         longest_s = _MAX_FREE_TIME_FACTOR * (route.length_m / spec.speed_mps + 5.0) + pauses
         while not alone.arrived:
@@ -392,9 +396,3 @@ class Walker:
             if alone._tick * DECISION_PERIOD_S > longest_s:
                 return None, 0.0
         return alone._follower.arrived_s, alone._walked_m
-
-
-def _without_part(vx: float, vy: float, nx: float, ny: float) -> tuple[float, float]:
-    """Return a velocity without its part along a direction; the opposite part stays."""
-    along = max(vx * nx + vy * ny, 0.0)
-    return vx - along * nx, vy - along * ny

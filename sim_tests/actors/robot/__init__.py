@@ -1,4 +1,4 @@
-"""The robot: its physics, its dimensions and limits, and its visual meshes."""
+"""Robots: their physics, dimensions and limits, and their visual meshes."""
 
 from __future__ import annotations
 
@@ -11,8 +11,11 @@ from ._amr import (
     WHEEL_RADIUS_M,
     Amr,
 )
+from ._kinematic_look import KinematicLook, model_meshes
+from ._kinematic_robot import KinematicRobot
 from ._look import AmrLook
 from ._meshes import amr_meshes
+from ._model import BodyPart, RobotModel, shipped_robots
 
 __all__ = [
     "CAMERA_FORWARD_M",
@@ -23,5 +26,11 @@ __all__ = [
     "WHEEL_RADIUS_M",
     "Amr",
     "AmrLook",
+    "BodyPart",
+    "KinematicLook",
+    "KinematicRobot",
+    "RobotModel",
     "amr_meshes",
+    "model_meshes",
+    "shipped_robots",
 ]

@@ -94,7 +94,10 @@ class Amr:
             "camera_pitch_rad", camera_pitch_rad, SimError, minimum=-1.57, maximum=1.57
         )
         self.profile = profile
-        self.T_base_camera = _camera_pose(pitch, camera_mount == "top")
+        self.T_base_camera = camera_pose(
+            _ABOVE_POST_M if camera_mount == "top" else (CAMERA_FORWARD_M, 0.0, CAMERA_HEIGHT_M),
+            pitch,
+        )
         self._warehouse = warehouse
         self._client = warehouse.client
         source = resources.files("sim_tests.actors.robot") / "amr.urdf"
@@ -120,10 +123,11 @@ class Amr:
         self._last_poses: tuple[_Motion | None, FloatArray, FloatArray] = None, np.eye(4), np.eye(4)
         self._drive()
 
-    def command(self, speed_mps: float, yaw_rate_radps: float) -> None:
+    def command(self, speed_mps: float, yaw_rate_radps: float, lateral_mps: float = 0.0) -> None:
         """Set the target speed (m/s forwards) and yaw rate (rad/s counter-clockwise).
 
-        A command beyond the robot's limits is clipped, as by its motor controller.
+        Its wheels cannot move sideways: ``lateral_mps`` has no effect. A command beyond the
+        robot's limits is clipped, as by its motor controller.
         """
         speed = finite_number("speed_mps", speed_mps, SimError)
         yaw_rate = finite_number("yaw_rate_radps", yaw_rate_radps, SimError)
@@ -139,14 +143,14 @@ class Amr:
             and self._yaw_rate_radps == self._target_yaw_rate_radps
         ):
             return
-        speed = _ramped(
+        speed = ramped(
             self._speed_mps,
             self._target_speed_mps,
             self.profile.max_acceleration_mps2 * dt,
             self.profile.max_deceleration_mps2 * dt,
         )
         change = MAX_YAW_ACCELERATION_RADPS2 * dt
-        yaw_rate = _ramped(self._yaw_rate_radps, self._target_yaw_rate_radps, change, change)
+        yaw_rate = ramped(self._yaw_rate_radps, self._target_yaw_rate_radps, change, change)
         if speed != self._speed_mps or yaw_rate != self._yaw_rate_radps:
             self._speed_mps, self._yaw_rate_radps = speed, yaw_rate
             self._drive()
@@ -183,6 +187,11 @@ class Amr:
     def T_odom_camera(self) -> FloatArray:  # noqa: N802
         """(4, 4) pose of the camera's optical frame in odom."""
         return self._poses()[1]
+
+    def touches(self, body: int) -> bool:
+        """Return whether another body touches the robot."""
+        points = pybullet.getContactPoints(self.body, body, physicsClientId=self._client)
+        return any(point[8] <= 0.0 for point in points)
 
     def _motion(self) -> _Motion:
         """Return the motion after the latest step; it is read once per step."""
@@ -262,18 +271,18 @@ class Amr:
         )
 
 
-def _camera_pose(pitch_rad: float, on_top: bool) -> FloatArray:
-    """Return T_base_camera of a camera on the post that looks down by ``pitch_rad``."""
+def camera_pose(place_base_m: tuple[float, float, float], pitch_rad: float = 0.0) -> FloatArray:
+    """Return T_base_camera of a camera that looks ahead, and down by ``pitch_rad``."""
     cos, sin = math.cos(pitch_rad), math.sin(pitch_rad)
     down = np.array([[cos, 0.0, sin], [0.0, 1.0, 0.0], [-sin, 0.0, cos]])  # about base y
     pose = np.eye(4)
     pose[:3, :3] = down @ _ROTATION_BASE_OPTICAL
-    pose[:3, 3] = _ABOVE_POST_M if on_top else (CAMERA_FORWARD_M, 0.0, CAMERA_HEIGHT_M)
+    pose[:3, 3] = place_base_m
     pose.setflags(write=False)
     return pose
 
 
-def _ramped(now: float, target: float, rise: float, fall: float) -> float:
+def ramped(now: float, target: float, rise: float, fall: float) -> float:
     """Return a step from ``now`` to ``target``: by ``rise`` away from zero, by ``fall`` towards it.
 
     A change of sign stops at zero first.

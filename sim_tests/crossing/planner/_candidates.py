@@ -1,9 +1,10 @@
-"""The twists that a planner compares: what they aim at, and what they command in the next tick."""
+"""The motions that a planner compares, and the limits that they obey."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +13,10 @@ from nav_adapter import NavConstraints, RobotProfile, RobotState
 from perception.arrays import FloatArray
 
 from ._config import PlannerConfig
-from ._rollout import clip_to_window
+from ._rollout import Poses
 
-# Tolerance for rounding when a twist is compared with a limit, in m/s.
-_ROUNDING_MPS = 1e-9
+#: Tolerance for rounding when a speed is compared with a limit.
+ROUNDING_MPS = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,120 +61,92 @@ class TwistLimits:
         return np.asarray(most_radps)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Candidates:
-    """Motions that turn for a while and then go straight; rows (V) have one final speed.
+@dataclass(frozen=True, slots=True)
+class Aim:
+    """The place that a plan heads for.
 
     Attributes:
-        speeds_mps: (V, 1) final speeds, ascending from 0.
-        turn_speeds_mps: (V, W) speeds while turning, slower where the corners need it.
-        yaw_rates_radps: (V, W) yaw rates of the turn.
-        speed_commands_mps: (V, W) what the next tick reaches of the speeds.
-        yaw_commands_radps: (V, W) what it reaches of the yaw rates.
-        allowed: (V, W) whether the command obeys the limits, or brakes as hard as it can.
+        distance_m: distance to the goal.
+        bearing_rad: direction to head for, in the base frame.
     """
 
-    speeds_mps: FloatArray
-    turn_speeds_mps: FloatArray
-    yaw_rates_radps: FloatArray
-    speed_commands_mps: FloatArray
-    yaw_commands_radps: FloatArray
-    allowed: NDArray[np.bool_]
+    distance_m: float
+    bearing_rad: float
 
-    def distinct(self) -> tuple[FloatArray, FloatArray, NDArray[np.intp]]:
-        """Return the distinct allowed commands (N,), (N,), and the index (V, W) of each pair.
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidates:
+    """Motions to compare; rows (V) have one final speed, columns (W) one turn or direction.
+
+    Attributes:
+        commands: (V, W, 2) speed and yaw rate of the next tick, or (V, W, 3) speeds forward and to
+            the left, and yaw rate.
+        allowed: (V, W) whether the command obeys the limits, or brakes as hard as it can.
+        poses: (T, V, W) the motion over the horizon.
+        course: cosine and sine (V, W) of the direction of travel at its end, in the base frame.
+        turning: (V, W) share of the largest turn, left positive.
+        turning_now: the same of the present motion.
+    """
+
+    commands: FloatArray
+    allowed: NDArray[np.bool_]
+    poses: Poses
+    course: tuple[FloatArray, FloatArray]
+    turning: FloatArray
+    turning_now: float
+
+    def distinct(self) -> tuple[FloatArray, NDArray[np.intp]]:
+        """Return the distinct allowed commands (N, 2 or 3), and the index (V, W) of each in them.
 
         Many candidates begin with the same command, since few are in the window of one tick. The
-        index of a pair that is not allowed is N.
+        index of a command that is not allowed is N.
         """
-        index: dict[tuple[float, float], int] = {}
+        size = self.commands.shape[-1]
+        index: dict[tuple[float, ...], int] = {}
         index_of = [
-            index.setdefault((speed, yaw_rate), len(index)) if may else -1
-            for speed, yaw_rate, may in zip(
-                self.speed_commands_mps.ravel().tolist(),
-                self.yaw_commands_radps.ravel().tolist(),
+            index.setdefault(tuple(command), len(index)) if may else -1
+            for command, may in zip(
+                self.commands.reshape(-1, size).tolist(),
                 self.allowed.ravel().tolist(),
                 strict=True,
             )
         ]
-        pairs = np.array(list(index), dtype=np.float64).reshape(-1, 2)
+        commands = np.array(list(index), dtype=np.float64).reshape(-1, size)
         where = np.array(index_of, dtype=np.intp).reshape(self.allowed.shape)
-        return pairs[:, 0], pairs[:, 1], np.where(where < 0, len(index), where)
+        return commands, np.where(where < 0, len(index), where)
 
 
-class Sampler:
-    """The candidates of a robot from tick to tick.
-
-    Args:
-        robot: limits of the motion.
-        config: number of samples and limits of turning.
-    """
-
-    def __init__(self, robot: RobotProfile, config: PlannerConfig) -> None:
-        self._robot = robot
-        self._config = config
-        self._speed_share = np.append(np.linspace(0.0, 1.0, config.speed_samples), 1.0)[:, None]
-        spread = np.linspace(-1.0, 1.0, config.yaw_rate_samples)
-        # Two more are filled in for each plan: the present rate, and the one that faces the goal.
-        self._yaw_share = np.append(np.sign(spread) * np.abs(spread) ** 1.5, [0.0, 0.0])
+class Motion(Protocol):
+    """The kinematics of a robot, as a planner samples them."""
 
     def candidates(
-        self,
-        state: RobotState,
-        limits: TwistLimits,
-        top_mps: float,
-        bearing_rad: float,
-        dt_s: float,
+        self, state: RobotState, limits: TwistLimits, top_mps: float, aim: Aim, dt_s: float
     ) -> Candidates:
-        """Return motions that end at speeds up to ``top_mps``, with all yaw rates for each.
+        """Return motions that end at speeds up to ``top_mps``.
 
         Args:
             state: the robot now.
             limits: its limits now.
             top_mps: largest final speed, at most that of the limits.
-            bearing_rad: direction to head for, in the base frame.
+            aim: the place to head for.
             dt_s: length of a tick.
         """
-        speeds = top_mps * self._speed_share
-        speeds[-1] = min(max(state.speed_mps, 0.0), top_mps)
-        facing = bearing_rad / self._config.turn_time_s
-        turn_speeds, yaw_rates = self._turns(speeds, state, facing, limits)
+        ...
 
-        fall = self._robot.max_deceleration_mps2 * dt_s
-        rise = self._robot.max_acceleration_mps2 * dt_s
-        commands = np.maximum(clip_to_window(turn_speeds, state.speed_mps, fall, rise), 0.0)
-        # The swing of the corners obeys the limit in the next tick already.
-        most_radps = limits.most_yaw_rate_radps(commands)
-        turns = np.minimum(np.maximum(yaw_rates, -most_radps), most_radps)
-        step = self._config.max_yaw_acceleration_radps2 * dt_s
-        turns = clip_to_window(turns, state.yaw_rate_radps, step, step)
-        if math.isfinite(limits.curvature_per_m):  # the yaw rate falls with the speed
-            tightest = commands * limits.curvature_per_m
-            turns = np.minimum(np.maximum(turns, -tightest), tightest)
-        swing_mps = (np.abs(turns) - most_radps) * limits.reach_m
-        allowed = (swing_mps <= _ROUNDING_MPS) | (commands <= max(state.speed_mps - fall, 0.0))
-        return Candidates(speeds, turn_speeds, yaw_rates, commands, turns, allowed)
+    def stopping(
+        self, commands: FloatArray, state: RobotState, dt_s: float
+    ) -> tuple[Poses, FloatArray]:
+        """Return poses (T, 1, N) and times (T, 1, N) of one tick of each command and a full stop.
 
-    def _turns(
-        self, speeds: FloatArray, state: RobotState, facing_radps: float, limits: TwistLimits
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return speeds and yaw rates (V, W) of the turns before the final speeds."""
-        if math.isfinite(limits.curvature_per_m):
-            # |v| (1 + |curvature| R) is the speed of the fastest point.
-            curve = limits.curvature_per_m * self._yaw_share
-            extra = np.array([state.yaw_rate_radps, facing_radps]) / max(state.speed_mps, 0.1)
-            curve[-2:] = np.clip(extra, -limits.curvature_per_m, limits.curvature_per_m)
-            turning = np.abs(curve)
-            slower = limits.fastest_point_mps / (1.0 + turning * limits.reach_m)
-            slower = np.minimum(slower, limits.yaw_rate_radps / np.maximum(turning, 1e-9))
-            turn_speeds = np.minimum(speeds, slower)
-            return turn_speeds, curve * turn_speeds
-        top_radps = min(limits.yaw_rate_radps, limits.fastest_point_mps / limits.reach_m)
-        yaw_rates = top_radps * self._yaw_share
-        yaw_rates[-2:] = [
-            min(max(rate, -top_radps), top_radps) for rate in (state.yaw_rate_radps, facing_radps)
-        ]
-        left_mps = np.maximum(limits.fastest_point_mps - np.abs(yaw_rates) * limits.reach_m, 0.0)
-        return np.minimum(speeds, left_mps), np.broadcast_to(
-            yaw_rates, (len(speeds), len(yaw_rates))
-        )
+        The first time is the end of the tick.
+        """
+        ...
+
+    def brake(self, state: RobotState, dt_s: float) -> tuple[float, ...]:
+        """Return the command that brakes as hard as it may along the present curve."""
+        ...
+
+
+def along_time(first: float, last: float, samples: int) -> FloatArray:
+    """Return (T, 1, 1) numbers from ``first`` to ``last``."""
+    return np.linspace(first, last, samples, dtype=np.float64)[:, None, None]

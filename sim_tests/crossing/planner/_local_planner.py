@@ -23,8 +23,12 @@ class LocalPlanner(Protocol):
         goal_odom_m: FloatArray,
         constraints: NavConstraints,
         dt_s: float,
-    ) -> tuple[float, float]:
-        """Return ``(speed_mps, yaw_rate_radps)`` for the next ``dt_s``; the goal is (2,)."""
+    ) -> tuple[float, ...]:
+        """Return ``(speed_mps, yaw_rate_radps)`` for the next ``dt_s``; the goal is (2,).
+
+        For a robot that can move sideways it may return ``(forward_mps, left_mps,
+        yaw_rate_radps)``.
+        """
         ...
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import copy
 import math
-from copy import copy
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -186,7 +186,7 @@ class Scene:
                 box left out is nearer along x or y.
             horizon_s: time over which people go on at constant velocity.
         """
-        near = copy(self)
+        near = copy.copy(self)
         rows = [
             row
             for row, (person, radius) in enumerate(zip(self._people, self._radii, strict=True))
@@ -198,7 +198,7 @@ class Scene:
             near._x_m, near._y_m = self._x_m[rows], self._y_m[rows]
             near._vx_mps, near._vy_mps = self._vx_mps[rows], self._vy_mps[rows]
             near._radius_m = self._radius_m[rows]
-            near.has_people = bool(rows)
+            near.has_people = self.has_people and bool(rows)
         if self.has_boxes:
             x_m, y_m = float(self._base_odom.x_m), float(self._base_odom.y_m)
             near._boxes_odom_m = np.array(
@@ -210,6 +210,12 @@ class Scene:
             ).reshape(-1, 4)
             near.has_boxes = bool(len(near._boxes_odom_m))
         return near
+
+    def without_people(self) -> Scene:
+        """Return the same boxes around the robot, and nobody."""
+        alone = copy.copy(self)
+        alone.has_people = False
+        return alone
 
     def standing_discs_m(
         self, speed_mps: float, margin_m: float

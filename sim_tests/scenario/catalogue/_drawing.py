@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import Final
@@ -24,7 +24,7 @@ from awarenav.figures import (
 )
 from perception.arrays import FloatArray
 
-from ...actors.behaviour import PersonSpec, WorkerScript
+from ...actors.behaviour import PersonSpec, RecordedPath, WorkerScript, read_recordings
 from ...actors.robot import NOVA_CARTER
 from ...world.errors import SimError
 from .._scenario import Scenario
@@ -52,16 +52,19 @@ _MARGIN_M: Final = 0.8
 _WATCHES: Final = "#2e7d4f"
 _GLANCES: Final = "#b8860b"
 _NEVER: Final = "#b3261e"
+_RECORDED: Final = "#6a4c93"
 
 
 def scenario_figure(template: ScenarioTemplate) -> Figure:
     """Return the drawing of a scenario at its medians, with thin lines for other draws.
 
     People and robot stand where they would be 1.5 s before their closest approach if nobody
-    reacted. Dots are 2 s apart. A sector of ±60° shows the gaze of a person.
+    reacted. Dots are 2 s apart. A sector of ±60° shows the gaze of a person. Recorded people are
+    shown as their paths.
     """
     scenario = template.median()
-    x_min, y_min, x_max, y_max = _window(scenario)
+    recorded = () if scenario.replay_csv is None else read_recordings(scenario.replay_csv)
+    x_min, y_min, x_max, y_max = _window(scenario, recorded)
     width, height = x_max - x_min, y_max - y_min
     figure = new_figure(_WIDTH_IN, max(_WIDTH_IN * height / width, 1.8) + 0.75, dpi=_DPI)
     axes = figure.subplots()
@@ -85,6 +88,8 @@ def scenario_figure(template: ScenarioTemplate) -> Figure:
         _draw_person(axes, spec, now_s, robot_m)
     for script in scenario.workers:
         _draw_worker(axes, script, now_s, scenario.duration_s, robot_m)
+    for recording in recorded:
+        _draw_recorded(axes, recording)
     _draw_legend(figure, axes, scenario)
     return figure
 
@@ -114,16 +119,19 @@ def save_drawing(figure: Figure, path: Path) -> None:
         part.unlink(missing_ok=True)
 
 
-def _window(scenario: Scenario) -> tuple[float, float, float, float]:
+def _window(
+    scenario: Scenario, recorded: Sequence[RecordedPath]
+) -> tuple[float, float, float, float]:
     """Return x_min, y_min, x_max, y_max of the part to draw: the paths and what is beside them."""
     task, hall = scenario.robot, scenario.layout
     places = [(task.start_x_m, task.start_y_m), (task.goal_x_m, task.goal_y_m)]
     places += [(point.x_m, point.y_m) for person in scenario.people for point in person.route]
     places += [(point.x_m, point.y_m) for script in scenario.workers for point in script.path]
-    corners = np.array(places)
+    corners = np.vstack([np.array(places), *(path.positions_odom_m for path in recorded)])
     low, high = corners.min(axis=0) - _MARGIN_M, corners.max(axis=0) + _MARGIN_M
-    # Show the racks on both sides of the aisle, and cross aisles only as far as they are used.
-    low[1], high[1] = np.clip(low[1], -4.8, -3.3), np.clip(high[1], 3.3, 4.8)
+    if not recorded:
+        # Show the racks on both sides of the aisle, and cross aisles only as far as they are used.
+        low[1], high[1] = np.clip(low[1], -4.8, -3.3), np.clip(high[1], 3.3, 4.8)
     x_min, y_min = np.maximum(low, (hall.x_min_m, hall.y_min_m)).tolist()
     x_max, y_max = np.minimum(high, (hall.x_max_m, hall.y_max_m)).tolist()
     return x_min, y_min, x_max, y_max
@@ -212,6 +220,17 @@ def _draw_worker(
     gaze, _ = script.gaze_angles(now_s, now.heading_odom_rad, (to_robot, 0.0))
     _draw_sector(axes, here, gaze, _GLANCES)
     _draw_body(axes, here, now.heading_odom_rad, _GLANCES)
+
+
+def _draw_recorded(axes: Axes, path: RecordedPath) -> None:
+    """Draw a recorded path with its dots, and a ring where it begins."""
+    times, places = path.times_s, path.positions_odom_m
+    axes.plot(*places.T, color=_RECORDED, lw=1.2)
+    dots = np.arange(math.ceil(times[0] / _DOT_STEP_S) * _DOT_STEP_S, times[-1], _DOT_STEP_S)
+    dotted = np.column_stack([np.interp(dots, times, places[:, axis]) for axis in (0, 1)])
+    _draw_times(axes, dotted, dots, _RECORDED)
+    x, y = places[0].tolist()
+    axes.add_patch(Circle((x, y), _BODY_M, fc="white", ec=_RECORDED, lw=1.4, zorder=5))
 
 
 def _draw_times(
@@ -303,6 +322,8 @@ def _draw_legend(figure: Figure, axes: Axes, scenario: Scenario) -> None:
     for colour, text in texts.items():
         if colour in present:
             axes.plot([], [], color=colour, marker="o", mfc="white", label=text)
+    if scenario.replay_csv is not None:
+        axes.plot([], [], color=_RECORDED, marker="o", mfc="white", label="recorded person")
     figure.legend(
         loc="outside upper center", ncols=4, fontsize=7.5, frameon=False, columnspacing=1.2
     )

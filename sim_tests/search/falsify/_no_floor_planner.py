@@ -40,7 +40,7 @@ class NoFloorPlanner:
         goal_odom_m: FloatArray,
         constraints: NavConstraints,
         dt_s: float,
-    ) -> tuple[float, float]:
+    ) -> tuple[float, ...]:
         """Plan as :class:`~sim_tests.LocalPlanner` does, without the adapter's constraints."""
         unconstrained = replace(
             constraints,

@@ -32,6 +32,7 @@ class FalsifyOptions:
     perception: PerceptionKind
     sensors: SensorSet
     camera: str
+    population: str | None
     planner: str
     unsafe_no_floor: bool
     seed: int
@@ -50,7 +51,9 @@ def falsify_command(options: FalsifyOptions) -> int:
         NavError: an unusable policy.
     """
     settings = FalsifySettings(
-        **common_settings(options.policy, options.scenario, options.camera),
+        **common_settings(
+            options.policy, options.scenario, options.camera, options.population or ""
+        ),
         episodes=options.episodes,
         people=options.people,
         perception=Perception.of(options.perception, options.sensors).name,

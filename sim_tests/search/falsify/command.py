@@ -58,6 +58,7 @@ from awarenav.cli import POSITIVE, command, option, options
 @options.perception()
 @options.sensors()
 @options.camera()
+@options.population()
 @options.planner()
 @option(
     "--unsafe-no-floor",

@@ -33,6 +33,7 @@ class TuneOptions:
     perception: PerceptionKind
     sensors: SensorSet
     camera: str
+    population: str | None
     planner: str
     seed: int
     workers: int
@@ -49,7 +50,9 @@ def tune_command(options: TuneOptions) -> int:
         SimError: an unusable option.
         NavError: an unusable policy.
     """
-    common = common_settings(options.policy, options.scenario, options.camera)
+    common = common_settings(
+        options.policy, options.scenario, options.camera, options.population or ""
+    )
     ranges = shipped_ranges() if options.ranges is None else read_ranges(options.ranges)
     settings = TuneSettings(
         **common,

@@ -14,8 +14,8 @@ from ._finalists import BEATS_BASE, NO_WORSE, Candidate, beats, level_of
 from ._tune import Tuning
 
 _WORDS: Final = {
-    "time_lost_s": (2, "loses {} less", "loses {} more"),
-    "violation_time_s": (3, "violates the margin {} less", "violates the margin {} more"),
+    "time_lost_s": (2, "loses"),
+    "violation_time_s": (3, "violates the margin"),
 }
 
 

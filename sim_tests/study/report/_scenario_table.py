@@ -5,7 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
+from perception.documents import parse_yaml
+
+from ...world.errors import SimError
 from ..measures import Comparison, EpisodeRecord, Metric, SummaryRow, measured_part
+from ..runs import Job
 from ._arm import Arm, judged_arms
 from ._statistics import MARGIN, TIME_LOST, VIOLATION, RunStatistics, estimate
 from ._text import NOTHING, count, number, percent
@@ -90,6 +94,25 @@ def scenario_table(statistics: RunStatistics) -> ScenarioTable:
             )
         )
     return ScenarioTable(tuple(groups), tuple(rows))
+
+
+def recorded_people(jobs: Iterable[Job]) -> tuple[str, ...]:
+    """Return a sentence about each scenario of recorded people: whether they react to the robot."""
+    notes: dict[str, str] = {}
+    for text in dict.fromkeys(job.scenario for job in jobs):
+        try:
+            data = parse_yaml(text, "scenario", SimError)
+        except SimError:
+            continue
+        if isinstance(data, dict) and data.get("replay_csv"):
+            does = (
+                "leave their paths where the robot forces them off, and return"
+                if data.get("replay_reacts")
+                else "do not react to the robot"
+            )
+            name = str(data.get("name", ""))
+            notes[name] = f"The recorded people of {name} {does}."
+    return tuple(notes[name] for name in sorted(notes))
 
 
 def _attentions(records: Iterable[EpisodeRecord]) -> dict[str, str]:

@@ -14,7 +14,7 @@ from ._page import write_page
 from ._reproduction import reproduction, title_of
 from ._run_data import RunData
 from ._scatter import scatter
-from ._scenario_table import scenario_table
+from ._scenario_table import recorded_people, scenario_table
 from ._statistics import RunStatistics
 from ._still import make_stills
 from ._text import plural
@@ -60,6 +60,7 @@ def write_report(
         groups=split_by_awareness(statistics),
         scatter=scatter(arms, listed.episodes, run.replay_prefix),
         table=scenario_table(statistics),
+        recorded=recorded_people(run.jobs),
         stills=make_stills(run, arms, pictures=stills, progress=progress),
         pictured=stills,
         faults=fault_rows(statistics),

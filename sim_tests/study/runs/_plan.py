@@ -50,6 +50,8 @@ def plan_jobs(
     sensors: Sequence[str] = ("camera",),
     faults: Sequence[str | Fault] = ("",),
     camera: str = "",
+    robot: str = "",
+    population: str = "",
 ) -> tuple[Job, ...]:
     """Return the jobs of every scenario, seed, fault, planner, policy and set of sensors.
 
@@ -71,13 +73,16 @@ def plan_jobs(
             are joined by ``+`` for every combination.
         camera: a shipped name or a YAML file that replaces the camera of every scenario; empty
             keeps each scenario's own.
+        robot: a shipped name or a YAML file of a robot, to which every scenario is fitted; empty
+            keeps each scenario's own.
+        population: as for :meth:`ScenarioTemplate.with_population`.
 
     Raises:
         SimError: an unknown or unusable argument, or two episodes with the same key.
         NavError: an unknown preset or unusable policy file.
     """
     perceptions = [Perception.of(perception, each).name for each in sensors]
-    templates = _expanded(scenarios, camera)
+    templates = [each.with_robot(robot) for each in _expanded(scenarios, camera, population)]
     policy_texts = [text for each in policies for text in _named_policy(each, perceptions)]
     fault_texts = [_named_fault(each) for given in faults for each in _matching_faults(given)]
     checked_seeds = [_checked_seed(seed) for seed in seeds]
@@ -104,19 +109,22 @@ def plan_jobs(
     return jobs
 
 
-def named_templates(names: Sequence[str], camera: str = "") -> tuple[ScenarioTemplate, ...]:
+def named_templates(
+    names: Sequence[str], camera: str = "", population: str = ""
+) -> tuple[ScenarioTemplate, ...]:
     """Return the scenarios of names and YAML files, each once.
 
     Args:
         names: shipped names, YAML files, or sets: ``"all"``, or ``"guidelines"``, without the
             scenarios that need no planner.
         camera: as for :meth:`ScenarioTemplate.with_camera`.
+        population: as for :meth:`ScenarioTemplate.with_population`.
 
     Raises:
         SimError: an unknown name, an unusable file or camera, or two scenarios of one name.
     """
     found: dict[str, ScenarioTemplate] = {}
-    for template in _expanded(names, camera):
+    for template in _expanded(names, camera, population):
         if found.setdefault(template.name, template) != template:
             raise SimError(f"two scenarios are called {template.name!r}; give them other names")
     return tuple(found.values())
@@ -175,8 +183,10 @@ def policy_text(policy: AwarenessPolicy) -> str:
         ) from cause
 
 
-def _expanded(scenarios: Iterable[str | ScenarioTemplate], camera: str) -> list[ScenarioTemplate]:
-    """Return the templates of names and files, with another camera unless it is empty."""
+def _expanded(
+    scenarios: Iterable[str | ScenarioTemplate], camera: str, population: str
+) -> list[ScenarioTemplate]:
+    """Return the templates of names and files, with another camera and population if given."""
     templates: list[ScenarioTemplate] = []
     for each in scenarios:
         if isinstance(each, ScenarioTemplate):
@@ -189,7 +199,7 @@ def _expanded(scenarios: Iterable[str | ScenarioTemplate], camera: str) -> list[
             ]
         else:
             templates.append(ScenarioTemplate.named(each))
-    return [template.with_camera(camera) for template in templates]
+    return [each.with_camera(camera).with_population(population) for each in templates]
 
 
 def _named_policy(

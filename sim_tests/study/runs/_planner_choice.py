@@ -96,8 +96,10 @@ def make_planner(planner: str, scenario: Scenario, seed: int = 0) -> LocalPlanne
         _PATH: scenario.robot.path_odom_m,
         _SEED: seed,
     }
-    available |= dict.fromkeys(_ROBOT, NOVA_CARTER)
-    arguments, keywords = _arguments(planner, factory, available)
+    model = scenario.robot_model
+    robot = NOVA_CARTER if model is None else model.profile
+    available |= dict.fromkeys(_ROBOT, robot)
+    arguments, keywords = _arguments(planner, factory, available, robot)
     try:
         made = factory.make(*arguments, **keywords)
     except Exception as cause:  # the user's code may raise anything
@@ -126,7 +128,7 @@ def refuse_unusable_planner(planner: str, scenario: Scenario) -> None:
 
 
 def _arguments(
-    planner: str, factory: PlannerFactory, available: Mapping[str, Any]
+    planner: str, factory: PlannerFactory, available: Mapping[str, Any], robot: RobotProfile
 ) -> tuple[list[Any], dict[str, Any]]:
     """Return the positional and keyword arguments that a signature asks for.
 
@@ -137,7 +139,7 @@ def _arguments(
     positional: list[Any] = []
     keywords: dict[str, Any] = dict(settings)
     if signature is None:
-        return [NOVA_CARTER], keywords
+        return [robot], keywords
     _refuse_unknown_settings(planner, signature, settings)
     names_robot = any(name in _ROBOT for name in signature.parameters)
     for number, parameter in enumerate(signature.parameters.values()):
@@ -152,7 +154,7 @@ def _arguments(
         elif (
             number == 0 and required and kind is not parameter.KEYWORD_ONLY and not names_robot
         ):  # of any name, or *args of a decorator that hands everything on
-            positional.append(NOVA_CARTER)
+            positional.append(robot)
         elif required and kind is not parameter.VAR_POSITIONAL:
             raise SimError(
                 f"planner {planner!r} asks for the argument {parameter.name!r} in "

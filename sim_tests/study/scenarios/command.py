@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 
-from awarenav.cli import Whole, argument, command, group, option, options
+from awarenav.cli import NUMBER, FilePath, Whole, argument, command, group, option, options
 
 
 @group("scenario")
@@ -130,5 +131,67 @@ def validate(files: tuple[str, ...], *, episodes: int) -> int:
     return validate_command(files, episodes)
 
 
-for _command in (list_scenarios, show, draw, validate):
+@command(
+    "from-recording",
+    short_help="Make a scenario of recorded people.",
+    examples=[
+        "awarenav scenario from-recording people.csv --out hall.yaml",
+        "awarenav scenario from-recording people.csv --robot-id agv --react --out hall.yaml",
+    ],
+    exit_status={0: "Success.", 2: "Bad input; nothing was written."},
+)
+@argument(
+    "table",
+    metavar="FILE.csv",
+    type=FilePath(),
+    help="Positions of people, with the columns t_s, id, x_m, y_m and perhaps heading_rad.",
+)
+@option(
+    "--react",
+    is_flag=True,
+    help="People leave their paths where the robot forces them off, and return.",
+)
+@option("--robot-id", metavar="ID", help="The id of a robot's rows: no person, and the task.")
+@option("--start", nargs=2, type=NUMBER, metavar="X Y", help="Start of the robot, in metres.")
+@option("--goal", nargs=2, type=NUMBER, metavar="X Y", help="Goal of the robot, in metres.")
+@option(
+    "--from-s",
+    type=NUMBER,
+    metavar="S",
+    show_default="the robot's first row, or the first",
+    help="Time of the recording at which the episode begins.",
+)
+@option("--until-s", type=NUMBER, metavar="S", help="Leave later rows out.")
+@options.out_file("recording.yaml", "The scenario; people go to a CSV beside it.", "FILE.yaml")
+def from_recording(
+    table: Path,
+    *,
+    react: bool,
+    robot_id: str | None,
+    start: tuple[float, float] | None,
+    goal: tuple[float, float] | None,
+    from_s: float | None,
+    until_s: float | None,
+    out: Path,
+) -> int:
+    """Make a scenario of recorded people: the robot drives in closed loop among them.
+
+    The recorded people do not react to the robot, or with --react leave their paths where it
+    forces them off. Positions stay as recorded. Without --robot-id, --start and --goal the robot
+    drives along the longer side of the floor.
+    """
+    from ...scenario.recordings import (  # noqa: PLC0415 - help needs no scenarios
+        RecordingOptions,
+        scenario_from_recording,
+    )
+
+    chosen = RecordingOptions(react, robot_id, start, goal, from_s, until_s)
+    made = scenario_from_recording(table, out, chosen)
+    print("\n".join(made.remarks))
+    print(f"\nWritten: {made.scenario} and {made.people}. Run it:")
+    print(f"  awarenav crossings --scenario {shlex.quote(str(made.scenario))} --perception truth")
+    return 0
+
+
+for _command in (list_scenarios, show, draw, validate, from_recording):
     scenario.add_command(_command)

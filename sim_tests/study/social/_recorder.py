@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -46,6 +47,8 @@ class EpisodeRecorder:
                     each.heading_odom_rad,
                     *each.velocity_odom_mps.tolist(),
                 )
+                if not each.away
+                else (math.nan,) * 5
                 for each in stage.motions
             ]
         )

@@ -38,6 +38,7 @@ class WatchOptions:
     perception: PerceptionKind
     sensors: SensorSet
     camera: str
+    robot: str
     fault: str
     seed: int
     speed: float
@@ -134,6 +135,7 @@ def _job(options: WatchOptions) -> Job:
         sensors=[options.sensors],
         faults=[options.fault],
         camera=options.camera,
+        robot=options.robot,
     )
     if len(jobs) != 1:
         raise SimError(

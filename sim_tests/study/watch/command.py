@@ -33,6 +33,7 @@ from awarenav.cli import FilePath, Number, Whole, argument, command, option, opt
 @options.perception()
 @options.sensors()
 @options.camera()
+@options.robot()
 @option(
     "--fault",
     default="none",

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import click
 from paths import ROOT
 
-from awarenav.cli import app
+from awarenav.cli import Command, app
 
 #: The commands under the headings of the list.
 GROUPS = {
@@ -39,6 +39,9 @@ def walk(
             command = group.get_command(context, name)
             assert command is not None
             yield (*path, name), command
+            if isinstance(command, Command):
+                for part, each in command.parts.items():
+                    yield (*path, name, part), each
             if isinstance(command, click.Group):
                 yield from walk(command, (*path, name))
 

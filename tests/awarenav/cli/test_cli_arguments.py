@@ -114,7 +114,7 @@ def test_exclusions_are_those_that_are_known():
     [
         (["estimat"], "awarenav: No such command 'estimat'. Did you mean 'estimate'?"),
         (["models", "lst"], "awarenav models: No such command 'lst'. Did you mean 'list'?"),
-        (["crossings", "--polic", "x"], "No such option '--polic'. Did you mean '--policy'?"),
+        (["crossings", "--workrs", "x"], "No such option '--workrs'. Did you mean '--workers'?"),
         (["--versio"], "No such option '--versio'. Did you mean '--version'?"),
         (["demo", "--perception", "pixel"], "got 'pixel'; did you mean 'pixels'?"),
         (["tune", "--sampler", "nsga"], "got 'nsga'; did you mean 'nsga2'?"),

@@ -56,6 +56,7 @@ def test_every_command_with_json_is_tested_here():
         ("policy", "show"),
         ("scenario", "list"),
         ("tracks",),
+        ("tracks", "calibrate"),
     }
     assert commands == tested | SLOW
 
@@ -94,6 +95,16 @@ def test_tracks_print_json(capfd, tmp_path, estimates):
     assert track["id"] == 1
     assert track["seen_frames"] == len(FRAMES)
     assert (tmp_path / "tracks.png").exists()
+
+
+def test_calibrate_prints_json(capfd, tmp_path):
+    rows = ["t_s,id,x_m,y_m"]
+    rows += [f"{0.1 * k:.1f},{id},{0.12 * k:.2f},{10 * id}" for k in range(30) for id in range(4)]
+    (tmp_path / "people.csv").write_text("\n".join(rows))
+    words = ("--longest", "0.4", "--out", tmp_path / "prediction.yaml")
+    table = printed(capfd, "tracks", "calibrate", tmp_path / "people.csv", *words)
+    assert table["people"] == [2, 2]
+    assert [row["horizon_s"] for row in table["horizons"]] == [0.2, 0.4]
 
 
 def test_judge_prints_json(capfd, tmp_path, estimates):

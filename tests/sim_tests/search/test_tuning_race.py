@@ -22,7 +22,9 @@ from sim_tests.search.tune._finalists import (
     named_winner,
 )
 from sim_tests.search.tune._race import dropped, stages
-from sim_tests.search.tune._settings import held_out_scenarios
+from sim_tests.search.tune._settings import TuneSettings, held_out_scenarios
+from sim_tests.search.tune._tune import Tuning
+from sim_tests.search.tune._verdict import is_undecided, verdict_text
 from sim_tests.study.measures import EpisodeRecord
 
 _TASKS = [(scenario, seed) for scenario in "abcdef" for seed in range(5)]
@@ -161,3 +163,45 @@ def test_equal_policies_and_equal_episodes_are_one_row():
         ("least_time_lost",),
     ]
     assert rows[0].trial is None
+
+
+def _tuning(*chosen: Candidate, hold_out=("e", "f")) -> Tuning:
+    settings = TuneSettings(
+        *("balanced", "{}", (), {}, 10, 5, 5, "truth", "", 0, "tpe", 4),
+        hold_out_scenarios=hold_out,
+    )
+    base = _candidate("balanced", None)
+    rows = tuple(named_winner(chosen, base, hold_out))
+    return Tuning(settings, None, None, (), ("a trial",), (base,), rows)
+
+
+def test_the_verdict_names_a_winner_with_its_intervals_and_says_that_it_was_not_falsified():
+    tuning = _tuning(_candidate("knee", 7, time_s=4.0))
+    text = verdict_text(tuning)
+    assert text.startswith("beats_base (trial 7, knee) is better than balanced. On 30 held-out ")
+    alone = tuning.winner.held_out.within("ef").minus(tuning.base.held_out, "time_lost_s")
+    assert f"in the 2 held-out scenarios alone it loses {-alone.value:.2f} s less" in text
+    assert "(95 % intervals)" in text
+    assert "The robot moved into nobody (at most 9.5 % with 95 % confidence)." in text
+    assert text.endswith("It has not been falsified yet.")
+
+
+@pytest.mark.parametrize(
+    ("values", "reason", "undecided"),
+    [
+        ({"time_s": 4.88}, "a difference is not shown", True),
+        ({"time_s": 6.0}, "it is shown to be worse in one of the two", False),
+        ({"time_s": 4.0, "contacts": 2}, "the robot moved into a person", False),
+        ({"time_s": 4.0, "tasks": _TASKS[:15]}, "fewer than 20 pairs", True),
+    ],
+)
+def test_the_verdict_keeps_the_base_policy_and_says_why(values, reason, undecided):
+    tuning = _tuning(_candidate("knee", 7, **values))
+    text = verdict_text(tuning)
+    assert text.startswith(f"keep balanced. The nearest is knee (trial 7): {reason}")
+    assert is_undecided(tuning) == undecided
+
+
+def test_the_verdict_says_that_no_scenario_was_held_out():
+    text = verdict_text(_tuning(_candidate("knee", 7, time_s=4.0), hold_out=()))
+    assert "no scenario was held out" in text

@@ -1,0 +1,124 @@
+"""The work of ``awarenav tracks calibrate``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from tracking import TrackerConfig
+from tracking.calibration import HORIZONS_S, Calibration, FollowedPerson, calibrate
+from tracking.prediction import REGION_SHARE
+
+from ..errors import AwarenavError
+from ..files import json_text, write_text
+from ._run import log, read_file
+from ._smoothed import arrays_of, smoothed_path
+from ._tracking import track_recording
+
+_FORMATS: Final = (".yaml", ".yml")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CalibrateOptions:
+    """The options of ``awarenav tracks calibrate``."""
+
+    files: tuple[Path, ...]
+    out: Path
+    as_json: bool
+    config: Path | None
+    longest: float
+
+
+def calibrate_command(options: CalibrateOptions) -> int:
+    """Run the command; return the exit status.
+
+    Raises:
+        AwarenavError: for input that cannot be used; nothing is written then.
+        TrackingError: for settings that cannot be used, or recordings that are too short.
+    """
+    if options.out.suffix.lower() not in _FORMATS:
+        raise AwarenavError(f"--out must end in {' or '.join(_FORMATS)}, got {options.out}")
+    inputs = {path.resolve() for path in (*options.files, options.config) if path is not None}
+    if options.out.resolve() in inputs:
+        raise AwarenavError(f"--out {options.out} would replace an input")
+    config = None if options.config is None else TrackerConfig.from_yaml(options.config)
+    people = [each for path in options.files for each in followed_people(path, config)]
+    horizons_s = sorted({*(each for each in HORIZONS_S if each < options.longest), options.longest})
+    found = calibrate(people, horizons_s=horizons_s)
+    write_text(options.out, found.model.yaml_text())
+    if options.as_json:
+        print(json_text(_record(found)), end="")
+    else:
+        print("\n".join(_lines(found)))
+        print(f"Written to {options.out}")
+    return 0
+
+
+def followed_people(path: Path, config: TrackerConfig | None) -> list[FollowedPerson]:
+    """Return the confirmed tracks of a recording, each with its smoothed path."""
+    tracked = track_recording(read_file(path), config)
+    for remark in tracked.remarks:
+        log(remark)
+    people = []
+    for history in tracked.histories:
+        path_m = smoothed_path(history, config)
+        confirmed_s = history.confirmed_s
+        if path_m is None or confirmed_s is None:
+            continue
+        end_s = float(path_m.stamps_s[-1])
+        samples = [each for each in history.frames if confirmed_s <= each.stamp_s <= end_s]
+        if samples:
+            people.append(FollowedPerson(*arrays_of(samples), path_m))
+    return people
+
+
+def _lines(found: Calibration) -> list[str]:
+    """Return the table, one line per horizon, and how to read it."""
+    lines = [
+        f"{'horizon':>9s}{'factor':>9s}{'inside before':>15s}{'after':>9s}{'1st half':>10s}"
+        f"{'2nd half':>10s}{'NEES/2':>9s}{'stretches':>12s}",
+    ]
+    for row in _rows(found):
+        used, judged = row["stretches"]
+        first, second = row["inside_halves"]
+        lines.append(
+            f"{row['horizon_s']:7g} s{row['factor']:9.2f}{row['inside_before']:15.1%}"
+            f"{row['inside']:9.1%}{first:10.1%}{second:10.1%}{row['nees_over_2']:9.2f}"
+            f"{f'{used} + {judged}':>12s}"
+        )
+    first, second = found.people
+    lines.append(
+        f"{REGION_SHARE:.1%} inside is right. Each half ({first} and {second} people) is judged by "
+        "the factors of the other; the file has those of all."
+    )
+    return lines
+
+
+def _rows(found: Calibration) -> list[dict[str, Any]]:
+    return [
+        {
+            "horizon_s": horizon_s,
+            "factor": factor,
+            "inside_before": before,
+            "inside": after,
+            "inside_halves": halves,
+            "nees_over_2": nees,
+            "stretches": stretches,
+        }
+        for horizon_s, factor, before, after, halves, nees, stretches in zip(
+            found.horizons_s.tolist(),
+            found.model.std_factors,
+            found.before.tolist(),
+            found.coverage.tolist(),
+            found.halves.T.tolist(),
+            found.nees.tolist(),
+            found.stretches.T.astype(int).tolist(),
+            strict=True,
+        )
+    ]
+
+
+def _record(found: Calibration) -> dict[str, Any]:
+    """Return the table as plain data."""
+    return {"people": list(found.people), "wanted": REGION_SHARE, "horizons": _rows(found)}

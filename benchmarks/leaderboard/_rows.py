@@ -1,0 +1,150 @@
+"""The rows of the leaderboard, as ``docs/leaderboard/rows.yaml`` lists them."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import ClassVar, Final, Literal
+
+from pydantic import Field, ValidationError, model_validator
+
+from awarenav.errors import not_one_of
+from awarenav.policies import read_policy
+from perception.documents import read_yaml
+from sim_tests import SimError
+from sim_tests.crossing.eyes import Perception
+from sim_tests.scenario import ScenarioTemplate
+from sim_tests.study.runs import Job, named_templates, plan_jobs, policy_text
+from tracking.config import StrictConfig
+
+_ROOT: Final = Path(__file__).resolve().parents[2]
+#: Folder of the rows and of their results.
+RESULTS: Final = _ROOT / "docs" / "leaderboard"
+#: The page.
+PAGE: Final = _ROOT / "docs" / "leaderboard.md"
+_ROWS_FILE: Final = "rows.yaml"
+_TRUTH: Final = "truth"
+_REFERENCE: Final = "reference"
+
+
+class Row(StrictConfig):
+    """One row: a policy with sensors and a planner.
+
+    Attributes:
+        name: name of the file of its results.
+        policy: a preset, or a YAML file by its path in the repository.
+        sensors: ``"truth"`` knows everybody in all directions; the others perceive.
+        planner: ``"reference"`` or ``"module:Class"``.
+    """
+
+    error: ClassVar[type[ValueError]] = SimError
+
+    name: str = Field(pattern=r"^[\w.+-]+$")
+    policy: str
+    sensors: Literal["truth", "camera", "camera+scanner", "scanner"]
+    planner: str = _REFERENCE
+
+    @property
+    def perception(self) -> str:
+        """The perception of its episodes."""
+        if self.sensors == _TRUTH:
+            return _TRUTH
+        return Perception.of("keypoints", self.sensors).name
+
+    @property
+    def policy_name(self) -> str:
+        """The policy's name in tables."""
+        return Path(self.policy).stem
+
+    @property
+    def policy_yaml(self) -> str:
+        """The whole policy as YAML."""
+        path = _ROOT / self.policy
+        return policy_text(read_policy(str(path) if path.suffix else self.policy))
+
+    @property
+    def digest(self) -> str:
+        """A digest of policy, perception and planner's name, by which results belong to the row."""
+        text = "\n".join((self.policy_yaml, self.perception, self.planner))
+        return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+    def jobs(self, templates: Sequence[ScenarioTemplate], seeds: Sequence[int]) -> tuple[Job, ...]:
+        """Return its episodes: every seed in every scenario.
+
+        Raises:
+            SimError: its planner cannot be made.
+        """
+        return tuple(
+            Job(
+                each.scenario,
+                each.seed,
+                self.policy_name,
+                self.policy_yaml,
+                each.planner,
+                self.perception,
+            )
+            for each in plan_jobs(
+                templates,
+                ["blind"],
+                seeds,
+                planners=["" if self.planner == _REFERENCE else self.planner],
+                perception=_TRUTH,
+            )
+        )
+
+
+class Board(StrictConfig):
+    """All rows, and the episodes that each of them runs.
+
+    Attributes:
+        scenarios: shipped names, or ``all`` of those that have a planner.
+        seeds: number of seeds from 0 on; every row runs each of them in every scenario.
+        baseline: name of the row that others are compared with.
+        rows: the rows.
+    """
+
+    error: ClassVar[type[ValueError]] = SimError
+
+    scenarios: tuple[str, ...]
+    seeds: int = Field(ge=1)
+    baseline: str
+    rows: tuple[Row, ...]
+
+    @model_validator(mode="after")
+    def _names_fit(self) -> Board:
+        names = [row.name for row in self.rows]
+        if len(set(names)) < len(names):
+            raise ValueError(f"each row needs a name of its own, got {', '.join(names)}")
+        if self.baseline not in names:
+            raise ValueError(not_one_of("baseline", self.baseline, names))
+        return self
+
+    @classmethod
+    def read(cls, folder: Path = RESULTS) -> Board:
+        """Read ``rows.yaml`` of a folder.
+
+        Raises:
+            SimError: it cannot be read, or a row is not valid.
+        """
+        path = folder / _ROWS_FILE
+        try:
+            return cls.model_validate(read_yaml(path, SimError))
+        except ValidationError as cause:
+            raise SimError(f"{path.name}: {cause}") from cause
+
+    @property
+    def templates(self) -> tuple[ScenarioTemplate, ...]:
+        """The scenarios."""
+        return named_templates(self.scenarios)
+
+    def named(self, name: str) -> Row:
+        """Return a row.
+
+        Raises:
+            SimError: there is none of that name.
+        """
+        found = next((row for row in self.rows if row.name == name), None)
+        if found is None:
+            raise SimError(not_one_of("--row", name, [row.name for row in self.rows]))
+        return found

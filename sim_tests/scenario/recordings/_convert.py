@@ -1,0 +1,323 @@
+"""A recording of people as a scenario: resampled paths, a floor that fits, a task for the robot."""
+
+from __future__ import annotations
+
+import csv
+import math
+from dataclasses import dataclass, replace
+from io import StringIO
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import yaml
+
+from awarenav.files import write_text
+from perception.anthropometry import BODY_RADIUS_M
+from perception.arrays import FloatArray, finite_array, finite_number
+
+from ...actors.robot import NOVA_CARTER
+from ...world.errors import SimError
+from .._template import ScenarioTemplate
+from ..catalogue import robot_plan
+from ._table import RecordedTable, RecordedTrack, read_table
+
+_Point = tuple[float, float]
+
+# The floor ends this far beyond people, start and goal.
+_MARGIN_M: Final = 3.0
+# Without a task the robot drives along the longer side of the floor, from and to this far outside.
+_OUTSIDE_M: Final = 1.0
+_SHORTEST_TASK_M: Final = 1.0
+_LONGEST_S: Final = 600.0
+# The robot has at least this time, and as long as the way takes at half its speed.
+_SPARE_S: Final = 10.0
+# Samples within half this time of an instant give its position.
+_SMOOTHING_S: Final = 0.2
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingOptions:
+    """The settings with which a recording becomes a scenario.
+
+    Attributes:
+        react: people leave their paths where the robot forces them off, and return.
+        robot_id: ``id`` of a robot's rows; it is no person, and its first and last place are start
+            and goal.
+        start_odom_m: start of the robot; None is that of ``robot_id``, or the middle of an end of
+            the floor.
+        goal_odom_m: goal of the robot; None as for the start.
+        from_s: the episode begins at this time of the recording; None at its first row.
+        until_s: rows after this time are left out; None leaves none out.
+        rate_hz: rows a second of the people's table.
+    """
+
+    react: bool = False
+    robot_id: str | None = None
+    start_odom_m: _Point | None = None
+    goal_odom_m: _Point | None = None
+    from_s: float | None = None
+    until_s: float | None = None
+    rate_hz: float = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class ConvertedRecording:
+    """A scenario made from a recording.
+
+    Attributes:
+        scenario: the written file.
+        people: the written table of its people.
+        remarks: sentences about what was read and made.
+    """
+
+    scenario: Path
+    people: Path
+    remarks: tuple[str, ...]
+
+
+def scenario_from_recording(
+    table: Path | str, out: Path | str, options: RecordingOptions | None = None
+) -> ConvertedRecording:
+    """Write a scenario of recorded people, and their resampled paths beside it.
+
+    Positions stay as recorded. Time 0 is the recording's start, or ``from_s``.
+
+    Args:
+        table: CSV, see :func:`read_table`.
+        out: the scenario's YAML file; the people go to ``NAME_people.csv`` beside it.
+        options: None for the defaults.
+
+    Raises:
+        SimError: for a table that cannot be used, see :func:`read_table`; an unknown ``robot_id``;
+            nobody in the chosen time; and a start or a goal on top of a person.
+    """
+    options = RecordingOptions() if options is None else options
+    _check_options(options)
+    table, out = Path(table), Path(out)
+    people_file = out.with_name(f"{out.stem}_people.csv")
+    if out.suffix not in (".yaml", ".yml"):
+        raise SimError(f"the scenario must be a file that ends in .yaml, got {out}")
+    if table.resolve() in (out.resolve(), people_file.resolve()):
+        raise SimError(f"{people_file} would overwrite the recording {table}")
+    recorded = read_table(table)
+    robot, tracks = _split(recorded, table, options)
+    begin_s = min(track.times_s[0] for track in (robot or tracks))
+    begin_s = float(begin_s if options.from_s is None else options.from_s)
+    end_s = math.inf if options.until_s is None else options.until_s
+    people = [
+        resampled
+        for track in tracks
+        if (resampled := _resampled(track, begin_s, end_s, options.rate_hz)) is not None
+    ]
+    if not people:
+        raise SimError(
+            f"{table}: nobody has two rows from {begin_s:g} s on"
+            + (f" up to {end_s:g} s" if math.isfinite(end_s) else "")
+        )
+    start, goal = _task(table, people, robot, options)
+    _check_place("start", start, people, at_s=0.0)
+    data = _scenario_data(table, people_file.name, people, (start, goal), options)
+    text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=100)
+    template = ScenarioTemplate.from_text(text, str(out))
+    write_text(people_file, _people_text(people), SimError)
+    write_text(out, text, SimError)
+    return ConvertedRecording(out, people_file, _remarks(recorded, people, template))
+
+
+def _check_options(options: RecordingOptions) -> None:
+    finite_number("rate_hz", options.rate_hz, SimError, minimum=2.0, maximum=100.0)
+    for name in ("from_s", "until_s"):
+        value = getattr(options, name)
+        if value is not None:
+            finite_number(name, value, SimError)
+    for name in ("start_odom_m", "goal_odom_m"):
+        value = getattr(options, name)
+        if value is not None:
+            finite_array(name, value, (2,), SimError)
+
+
+def _split(
+    recorded: RecordedTable, table: Path, options: RecordingOptions
+) -> tuple[tuple[RecordedTrack, ...], tuple[RecordedTrack, ...]]:
+    """Return the tracks of the robot and of the people."""
+    if options.robot_id is None:
+        return (), recorded.tracks
+    robot = recorded.of(options.robot_id)
+    if not robot:
+        ids = dict.fromkeys(track.id for track in recorded.tracks)
+        raise SimError(
+            f"{table} has no rows of the robot {options.robot_id!r}; its ids are {', '.join(ids)}"
+        )
+    people = tuple(track for track in recorded.tracks if track.id != options.robot_id)
+    if not people:
+        raise SimError(f"{table} has only rows of the robot {options.robot_id!r}")
+    return robot, people
+
+
+def _resampled(
+    track: RecordedTrack, begin_s: float, end_s: float, rate_hz: float
+) -> RecordedTrack | None:
+    """Return a track at whole multiples of the period after ``begin_s``; None without two rows.
+
+    The position at an instant is that of a line fitted to the samples within 0.1 s of it, or lies
+    between its neighbours where there are fewer than three.
+    """
+    first = math.ceil((max(track.times_s[0], begin_s) - begin_s) * rate_hz - 1e-6)
+    last = math.floor((min(track.times_s[-1], end_s) - begin_s) * rate_hz + 1e-6)
+    if last <= first:
+        return None
+    times = np.arange(first, last + 1) / rate_hz
+    at_s = np.clip(times + begin_s, track.times_s[0], track.times_s[-1])
+    positions = np.column_stack(
+        [np.interp(at_s, track.times_s, track.positions_odom_m[:, axis]) for axis in (0, 1)]
+    )
+    lows = np.searchsorted(track.times_s, at_s - 0.5 * _SMOOTHING_S - 1e-9)
+    highs = np.searchsorted(track.times_s, at_s + 0.5 * _SMOOTHING_S + 1e-9)
+    for row, (low, high) in enumerate(zip(lows.tolist(), highs.tolist(), strict=True)):
+        if high - low >= 3:
+            ahead_s = track.times_s[low:high] - at_s[row]
+            middle_s = ahead_s.mean()
+            near = track.positions_odom_m[low:high]
+            slope = (ahead_s - middle_s) @ near / ((ahead_s - middle_s) ** 2).sum()
+            positions[row] = near.mean(axis=0) - slope * middle_s
+    headings = track.headings_odom_rad
+    if headings is not None:
+        headings = np.interp(at_s, track.times_s, headings)
+    return replace(track, times_s=times, positions_odom_m=positions, headings_odom_rad=headings)
+
+
+def _task(
+    table: Path,
+    people: list[RecordedTrack],
+    robot: tuple[RecordedTrack, ...],
+    options: RecordingOptions,
+) -> tuple[_Point, _Point]:
+    """Return start and goal: as given, as the robot drove, or along the longer side."""
+    if robot:
+        ends = robot[0].positions_odom_m[0], robot[-1].positions_odom_m[-1]
+    else:
+        places = np.vstack([track.positions_odom_m for track in people])
+        low, high = places.min(axis=0), places.max(axis=0)
+        longer = int(high[1] - low[1] > high[0] - low[0])
+        ends = np.median(places, axis=0), np.median(places, axis=0)
+        ends[0][longer], ends[1][longer] = low[longer] - _OUTSIDE_M, high[longer] + _OUTSIDE_M
+    start = options.start_odom_m or _rounded(ends[0])
+    goal = options.goal_odom_m or _rounded(ends[1])
+    if math.dist(start, goal) < _SHORTEST_TASK_M:
+        raise SimError(
+            f"{table}: start {start} and goal {goal} of the robot are less than "
+            f"{_SHORTEST_TASK_M:g} m apart; give --start and --goal"
+        )
+    return start, goal
+
+
+def _rounded(point: FloatArray) -> _Point:
+    x, y = np.round(point, 2).tolist()
+    return x, y
+
+
+def _check_place(what: str, place: _Point, people: list[RecordedTrack], at_s: float) -> None:
+    """Raise SimError if somebody is where the robot starts."""
+    apart_m = NOVA_CARTER.circumscribed_radius_m + BODY_RADIUS_M
+    for track in people:
+        if track.times_s[0] <= at_s <= track.times_s[-1]:
+            row = int(np.searchsorted(track.times_s, at_s))
+            gap_m = math.dist(place, track.positions_odom_m[row].tolist())
+            if gap_m < apart_m:
+                raise SimError(
+                    f"the robot's {what} ({place[0]:g}, {place[1]:g}) m is {gap_m:.2f} m from "
+                    f"{track.name!r} at that time; it needs {apart_m:.2f} m: give another --{what}"
+                )
+
+
+def _scenario_data(
+    table: Path,
+    people_file: str,
+    people: list[RecordedTrack],
+    task: tuple[_Point, _Point],
+    options: RecordingOptions,
+) -> dict[str, Any]:
+    """Return the keys of the scenario's file."""
+    places = np.vstack([*(track.positions_odom_m for track in people), np.array(task)])
+    low, high = np.floor(places.min(axis=0) - _MARGIN_M), np.ceil(places.max(axis=0) + _MARGIN_M)
+    start, goal = task
+    span_s = max(float(track.times_s[-1]) for track in people)
+    drive_s = _SPARE_S + 2.0 * math.dist(start, goal) / NOVA_CARTER.max_speed_mps
+    does = (
+        "They follow the recording until the robot forces them off it, and then return."
+        if options.react
+        else "They do not react to the robot."
+    )
+    count = f"{len(people)} recorded {'path' if len(people) == 1 else 'paths'}"
+    heading = math.degrees(math.atan2(goal[1] - start[1], goal[0] - start[0]))
+    return {
+        "name": Path(people_file).stem.removesuffix("_people"),
+        "version": 1,
+        "description": f"People of {table.name}: {count} of {span_s:.1f} s. {does}",
+        "attention": "mixed",
+        "extends": "hall",
+        "duration_s": round(min(max(span_s, drive_s), _LONGEST_S), 1),
+        "layout": {
+            "x_min_m": float(low[0]),
+            "y_min_m": float(low[1]),
+            "x_max_m": float(high[0]),
+            "y_max_m": float(high[1]),
+        },
+        "robot": {
+            "start_x_m": start[0],
+            "start_y_m": start[1],
+            "start_heading_deg": round(heading, 1),
+            "goal_x_m": goal[0],
+            "goal_y_m": goal[1],
+        },
+        "replay_csv": people_file,
+        "replay_reacts": options.react,
+        "replay_leaves": True,
+    }
+
+
+def _people_text(people: list[RecordedTrack]) -> str:
+    text = StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    headed = people[0].headings_odom_rad is not None
+    writer.writerow(["t_s", "id", "x_m", "y_m", *(["heading_rad"] if headed else [])])
+    for track in people:
+        columns = [track.times_s, *track.positions_odom_m.T]
+        if track.headings_odom_rad is not None:
+            columns.append(track.headings_odom_rad)
+        for t_s, *values in np.column_stack(columns).tolist():
+            writer.writerow([f"{t_s:.4f}", track.name, *(f"{value:.4f}" for value in values)])
+    return text.getvalue()
+
+
+def _remarks(
+    recorded: RecordedTable, people: list[RecordedTrack], template: ScenarioTemplate
+) -> tuple[str, ...]:
+    """Return what was read and made, one sentence each."""
+    scenario = template.median()
+    task, hall = scenario.robot, scenario.layout
+    found = [template.description]
+    if recorded.filled_gaps or recorded.long_gaps or recorded.lone_rows:
+        found.append(
+            f"Gaps: {recorded.filled_gaps} of at most 0.5 s filled; at {recorded.long_gaps} longer "
+            f"ones people leave and come back; {recorded.lone_rows} lone rows left out."
+        )
+    if recorded.ignored:
+        found.append(f"Columns that are not read: {', '.join(recorded.ignored)}.")
+    found.append(
+        f"Floor {hall.x_max_m - hall.x_min_m:g} m by {hall.y_max_m - hall.y_min_m:g} m, robot from "
+        f"({task.start_x_m:g}, {task.start_y_m:g}) to ({task.goal_x_m:g}, {task.goal_y_m:g}) m."
+    )
+    nearest = []
+    for track in people:
+        robot = robot_plan(task, track.times_s)
+        gaps_m = np.linalg.norm(track.positions_odom_m - robot, axis=1)
+        row = int(gaps_m.argmin())
+        nearest.append((float(gaps_m[row]), float(track.times_s[row]), track.name))
+    gap_m, at_s, name = min(nearest)
+    found.append(
+        f"If the robot drove straight on, it would come within {gap_m:.2f} m of {name!r} at "
+        f"{at_s:.1f} s."
+    )
+    return tuple(found)

@@ -1,0 +1,158 @@
+"""The leaderboard: its order, its committed results, and single episodes of it measured again."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import pytest
+
+from benchmarks.leaderboard import (
+    PAGE,
+    RESULTS,
+    Board,
+    Row,
+    differences,
+    leaderboard_page,
+    measure,
+    ranked,
+    read_results,
+    remeasured,
+)
+from benchmarks.leaderboard._page import Standing
+from sim_tests import SimError
+from sim_tests.study.measures import EpisodeRecord
+
+_BOARD = Board.read()
+# Short episodes of a cheap and of a costly row.
+_CELLS = [("today", "crossing_attentive", 0), ("balanced-camera+scanner", "crossing_attentive", 0)]
+
+
+@pytest.mark.parametrize(("name", "scenario", "seed"), _CELLS)
+def test_a_committed_episode_is_measured_again_and_the_same(name, scenario, seed):
+    """After a change of planner, people or sensors: python -m benchmarks.leaderboard --again."""
+    row = _BOARD.named(name)
+    (committed,) = (
+        each for each in read_results(_BOARD, row) if (each.scenario, each.seed) == (scenario, seed)
+    )
+    assert differences(committed, remeasured(row, scenario, seed)) == []
+
+
+def test_the_page_is_made_from_the_committed_results():
+    assert PAGE.read_text(encoding="utf-8") == leaderboard_page(_BOARD)
+
+
+def test_every_file_of_results_belongs_to_a_row_and_the_best_rows_are_whole():
+    assert {path.stem for path in RESULTS.glob("*.csv")} <= {row.name for row in _BOARD.rows}
+    planned = len(_BOARD.templates) * _BOARD.seeds
+    for row in _BOARD.rows:
+        assert len(read_results(_BOARD, row)) <= planned
+    assert len(read_results(_BOARD, _BOARD.named(_BOARD.baseline))) == planned
+
+
+def _standing(name, *, contacts=0, violation_s=0.0, lost_s=5.0, missing=0) -> Standing:
+    row = Row(name=name, policy="balanced", sensors="camera")
+    records = tuple(
+        EpisodeRecord(
+            *("a", seed, "balanced", "SamplingPlanner", "keypoints"),
+            robot_contacts=int(seed < contacts),
+            violation_time_s=violation_s + 0.001 * seed,
+            time_lost_s=lost_s + 0.1 * seed,
+        )
+        for seed in range(10 - missing)
+    )
+    return Standing(row, records, 10)
+
+
+def test_contacts_come_before_violation_and_violation_before_time():
+    rows = [
+        _standing("touches", contacts=1, lost_s=0.1),
+        _standing("violates", violation_s=0.3, lost_s=1.0),
+        _standing("slow", lost_s=6.0),
+        _standing("fast", lost_s=4.0),
+        _standing("fast-but-0.004-s-more", violation_s=0.0003, lost_s=3.9),
+        _standing("unfinished", lost_s=0.0, missing=1),
+    ]
+    names = [each.row.name for each in ranked(rows)]
+    assert names == ["fast-but-0.004-s-more", "fast", "slow", "violates", "touches"]
+    assert [each.row.name for each in ranked(rows[::-1])] == names
+
+
+def test_an_episode_that_failed_leaves_its_row_without_a_rank():
+    whole = _standing("whole")
+    failed = replace(whole, records=(*whole.records[1:], replace(whole.records[0], error="died")))
+    assert [each.row.name for each in ranked([failed])] == []
+
+
+# A robot that drives 0.6 m past a person who stands.
+_SCENARIO = """
+name: short
+description: Two seconds.
+duration_s: 2.0
+control_hz: 10.0
+layout: {x_min_m: -3.0, y_min_m: -3.0, x_max_m: 6.0, y_max_m: 3.0}
+robot: {goal_x_m: 0.6}
+workers:
+  - path: [{t_s: 0.0, x_m: {uniform: {low: 3.0, high: 4.0}}, y_m: -1.0}]
+"""
+
+
+def _small_board(folder, **changed) -> Board:
+    scenario = folder / "short.yaml"
+    scenario.write_text(_SCENARIO)
+    rows = [
+        {"name": "today", "policy": "blind", "sensors": "truth"},
+        {"name": "mine", "policy": "balanced", "sensors": "truth", **changed},
+    ]
+    return Board(scenarios=[str(scenario)], seeds=2, baseline="today", rows=rows)
+
+
+def test_an_interrupted_measurement_goes_on_and_is_readable_halfway(tmp_path):
+    board = _small_board(tmp_path)
+    measure(board, board.rows, tmp_path)
+    whole = {path.name: path.read_bytes() for path in tmp_path.glob("*.csv")}
+    assert set(whole) == {"today.csv", "mine.csv"}
+    # As after a kill: the last episode of the second row is missing.
+    text = whole["mine.csv"].decode()
+    (tmp_path / "mine.csv").write_text("".join(text.splitlines(keepends=True)[:-1]))
+    page = leaderboard_page(board, tmp_path)
+    assert "Not complete, and so without a rank: `mine`." in " ".join(page.split())
+    assert re.search(r"\| – `balanced`, truth, reference \| 0 of 1 ", page)
+    measure(board, board.rows, tmp_path)
+    assert {path.name: path.read_bytes() for path in tmp_path.glob("*.csv")} == whole
+    page = leaderboard_page(board, tmp_path)
+    assert "Not complete" not in page
+    assert ". **`blind`, today's AMR**, truth, reference |" in page
+
+
+def test_results_of_another_policy_are_not_continued(tmp_path):
+    board = _small_board(tmp_path)
+    measure(board, board.rows, tmp_path)
+    other = _small_board(tmp_path, policy="assertive")
+    with pytest.raises(SimError, match="'mine' belong to another policy"):
+        measure(other, other.rows, tmp_path)
+    measure(other, other.rows[1:], tmp_path, again=True)
+    assert {each.policy for each in read_results(other, other.rows[1], tmp_path)} == {"assertive"}
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"sensors": "lidar"}, "sensors"),
+        ({"plannner": "reference"}, "did you mean 'planner'"),
+        ({"name": "today"}, "a name of its own"),
+    ],
+)
+def test_rows_that_are_not_valid_are_refused(tmp_path, changed, message):
+    with pytest.raises((SimError, ValueError), match=message):
+        _small_board(tmp_path, **changed)
+
+
+def test_differences_beyond_rounding_are_said():
+    was = EpisodeRecord("a", 0, "p", "q", "truth", time_lost_s=5.0, violation_time_s=0.0)
+    assert differences(was, replace(was, time_lost_s=5.1)) == []
+    assert differences(was, replace(was, time_lost_s=5.4)) == [
+        "time_lost_s: committed 5.0 s, now 5.4 s"
+    ]
+    assert len(differences(was, replace(was, robot_contacts=1, violation_time_s=0.3))) == 2
+    assert len(differences(was, replace(was, time_lost_s=None))) == 1

@@ -1,0 +1,153 @@
+"""Populations: the classic people stay as they are, the fitted ones keep task and figures."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+
+import numpy as np
+import pytest
+
+from sim_tests import run_crossing
+from sim_tests.actors.behaviour import (
+    DEFAULT_POPULATION,
+    PersonSpec,
+    RecordedWalker,
+    RobotBody,
+    Surroundings,
+    Walker,
+    draw_person,
+    start_share,
+    walker_of,
+)
+from sim_tests.actors.behaviour._gait_variation import GaitVariation, VariationFigures
+from sim_tests.crossing.planner import StraightOn
+from sim_tests.scenario import Scenario, ScenarioTemplate
+from sim_tests.world.errors import SimError
+
+NO_BOXES = np.zeros((0, 4))
+#: Checksums of the people's positions, rounded to micrometres, before there were populations.
+BEFORE = {"late_glance": "482c96b29ee50060", "crossing_attentive": "6f88f6ed82c97ec6"}
+
+
+def short(name: str, duration_s: float = 7.5) -> Scenario:
+    return ScenarioTemplate.shipped(name).for_seed(1).model_copy(update={"duration_s": duration_s})
+
+
+def positions(scenario: Scenario, population: str | None = None) -> np.ndarray:
+    # A robot that drives straight on: neither planner nor policy has a part in the checksum.
+    result = run_crossing(
+        scenario, policy="blind", planner=StraightOn(0.8), seed=1, population=population
+    )
+    return np.array([[v.position_odom_m for v in frame.truth] for frame in result.frames])
+
+
+def person(**changes: object) -> PersonSpec:
+    data = {"name": "one", "route": [{"x_m": 0.0, "y_m": 3.0}, {"x_m": 0.0, "y_m": -3.0}]}
+    return PersonSpec.model_validate({**data, **changes})
+
+
+def beside(x_m: float = -2.0, speed_mps: float = 0.0) -> Surroundings:
+    robot = RobotBody(x_m, 0.0, 0.0, speed_mps, 0.0, 0.36, 0.25, (x_m, 0.0, 0.8))
+    return Surroundings(robot, (), lambda: True)
+
+
+@pytest.mark.parametrize("name", BEFORE)
+def test_classic_people_are_those_of_before(name: str) -> None:
+    assert DEFAULT_POPULATION == "classic"
+    found = positions(short(name))
+    assert hashlib.sha256(np.round(found, 6).tobytes()).hexdigest()[:16] == BEFORE[name]
+
+
+def test_recorded_people_repeat_with_their_seed() -> None:
+    scenario = short("late_glance", 3.0)
+    first, again = (positions(scenario, "recorded") for _ in range(2))
+    assert np.array_equal(first, again)
+    assert not np.array_equal(first, positions(scenario))
+
+
+def test_a_scenario_keeps_its_tasks_among_recorded_people() -> None:
+    template = ScenarioTemplate.shipped("crossing_attentive").with_population("recorded")
+    (worker,) = template.median().people
+    assert template.median().workers == ()
+    assert worker.glances.watches
+    assert worker.speed_mps == pytest.approx(5.8 / 5.6)
+    assert [(point.x_m, point.y_m) for point in worker.route][-1] == (8.0, 2.4)
+    assert ScenarioTemplate.from_text(template.median().to_text()).median() == template.median()
+    paper = ScenarioTemplate.shipped("paper_encounter").with_population("recorded").median()
+    assert paper.workers, "a robot that drives straight on keeps its scripted workers"
+
+
+def test_other_names_are_refused() -> None:
+    with pytest.raises(SimError, match="population must be one of classic, recorded, got 'odd'"):
+        ScenarioTemplate.shipped("late_glance").with_population("odd")
+    with pytest.raises(SimError, match="population"):
+        walker_of("odd")
+    assert walker_of("classic") is Walker
+
+
+def test_speed_and_looks_are_drawn_and_the_task_is_kept() -> None:
+    rng = np.random.default_rng(0)
+    drawn = [draw_person(person(), rng) for _ in range(2000)]
+    speeds = np.array([each.speed_mps for each in drawn])
+    assert np.median(speeds) == pytest.approx(1.42, abs=0.02)
+    assert np.mean(speeds > 1.85) == pytest.approx(0.04, abs=0.015)
+    assert {each.glances.looker_share for each in drawn} == {0.886}
+    assert draw_person(person(speed_mps=2.2), rng).speed_mps == 2.2
+    assert draw_person(person(speed_mps=0.8), rng).speed_mps == 0.8
+    assert draw_person(person(glances={"watches": True}), rng).glances.looker_share == 1.0
+
+
+def test_the_variation_has_the_figures_it_was_given() -> None:
+    figures = VariationFigures(0.2, 0.3, 0.1, 0.4, 0.03, 0.0, 0.9, 0.0, 0.0)
+    rng = np.random.default_rng(0)
+    variation = GaitVariation(figures, rng)
+    steps = np.array([variation.step(0.05, 1.0) for _ in range(40_000)])[100:]
+    sway_mps = 0.03 * math.tau * 0.9
+    assert steps[:, 0].std() == pytest.approx(0.2, rel=0.1)
+    assert steps[:, 1].std() == pytest.approx(math.hypot(0.1, sway_mps / math.sqrt(2.0)), rel=0.1)
+    # The accelerations are the rates of the velocities.
+    assert np.diff(steps[:, 0]) / 0.05 == pytest.approx(steps[1:, 2])
+    still = GaitVariation(figures, rng)
+    assert np.abs([still.step(0.05, 0.0) for _ in range(50)]).max() == 0.0
+
+
+def test_having_looked_raises_or_lowers_the_chance_of_a_start() -> None:
+    assert start_share(0.0, yielding=True) == 0.39
+    assert start_share(0.5, yielding=True) == 0.45
+    assert start_share(2.0, yielding=False) == 0.09
+    assert start_share(math.inf, yielding=False) == 0.10
+    assert start_share(0.0, yielding=True) > start_share(0.0, yielding=False)
+
+
+def test_people_on_the_way_change_their_mind_and_seated_people_stay() -> None:
+    pausing = person(pauses=[{"at_m": 1.0, "for_s": 300.0}])
+    on = 0
+    for seed in range(12):
+        walker = RecordedWalker(pausing, np.random.default_rng(seed), NO_BOXES)
+        walker.advance(20.0, beside())
+        on += walker.place_odom_m[1] < 1.5
+    assert on >= 8
+    alone = RecordedWalker(pausing, np.random.default_rng(0), NO_BOXES)
+    alone.advance(20.0, Surroundings(None, (), lambda: False))
+    assert alone.place_odom_m[1] == pytest.approx(2.0, abs=0.2)
+    clerk = person(route=[{"x_m": 1.0, "y_m": 1.0}], activity="sitting")
+    seated = RecordedWalker(clerk, np.random.default_rng(0), NO_BOXES)
+    seated.advance(30.0, beside())
+    assert seated.place_odom_m == (1.0, 1.0)
+
+
+def test_an_errand_leads_out_of_no_rack_and_counts_for_no_walk() -> None:
+    # A cell 2.8 m wide: whoever walks off stays in it.
+    sides = [(-2.0, 1.4, 2.0, 1.6), (-2.0, -1.6, 2.0, -1.4)]
+    walls = np.array([*sides, *((y0, x0, y1, x1) for x0, y0, x1, y1 in sides)])
+    spec = person(route=[{"x_m": 0.0, "y_m": 0.0}])
+    moved = []
+    for seed in range(6):
+        walker = RecordedWalker(spec, np.random.default_rng(seed), walls)
+        walker.advance(30.0, beside(-4.0))
+        x, y = walker.place_odom_m
+        assert max(abs(x), abs(y)) < 1.2
+        assert walker.outcome().free_time_s is None
+        moved.append(math.hypot(x, y))
+    assert max(moved) > 0.1

@@ -1,0 +1,110 @@
+"""Scenarios fitted to other robots: room for their outline, and time for their speed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sim_tests import NOVA_CARTER, Scenario, ScenarioTemplate, SimError, shipped_scenarios
+from sim_tests.actors.robot import RobotModel
+from sim_tests.scenario import scenario_for_robot
+
+FORKLIFT = RobotModel.shipped("forklift")
+SHIPPED = [Scenario.shipped(name) for name in shipped_scenarios()]
+PLANNED = [each for each in SHIPPED if each.robot.straight_on_speed_mps is None]
+
+
+def test_the_shipped_robot_changes_nothing() -> None:
+    assert all(scenario_for_robot(each, "nova_carter") is each for each in SHIPPED)
+
+
+@pytest.mark.parametrize("name", ["forklift", "omni", "delivery"])
+@pytest.mark.parametrize("scenario", PLANNED, ids=lambda each: each.name)
+def test_every_scenario_has_room_and_time_for_every_robot(scenario: Scenario, name: str) -> None:
+    model = RobotModel.shipped(name)
+    fitted = scenario_for_robot(scenario, model)
+    assert fitted.name == f"{scenario.name}_{name}"
+    task, profile = fitted.robot, model.profile
+    # As much room beside the outline as the Nova Carter has, at least.
+    wider_m = np.abs(profile.footprint_m[:, 1]).max() - NOVA_CARTER.footprint_m[:, 1].max()
+    if task.lane_half_width_m is not None:
+        assert task.lane_half_width_m >= scenario.robot.lane_half_width_m + wider_m - 1e-9
+    start = np.array([task.start_x_m, task.start_y_m])
+    goal = np.array([task.goal_x_m, task.goal_y_m])
+    usual = _least_gap_m(scenario, start, goal)
+    assert _least_gap_m(fitted, start, goal) >= usual + wider_m - 1e-9
+    # As long as the way takes longer.
+    way_m = float(np.linalg.norm(goal - start))
+    slower_s = way_m / profile.max_speed_mps - way_m / NOVA_CARTER.max_speed_mps
+    assert fitted.duration_s >= scenario.duration_s + slower_s - 1e-9
+    for before, after in zip(scenario.people, fitted.people, strict=True):
+        assert after.start_s >= before.start_s
+        assert after.speed_mps == before.speed_mps
+    for before, after in zip(scenario.workers, fitted.workers, strict=True):
+        delays = [b.t_s - a.t_s for a, b in zip(before.path, after.path, strict=True)]
+        assert np.ptp(delays) < 1e-9
+        assert delays[0] >= 0.0
+
+
+def _least_gap_m(scenario: Scenario, start: np.ndarray, goal: np.ndarray) -> float:
+    """Return the smallest distance from the line between start and goal to a box of the hall."""
+    boxes = scenario.layout.obstacle_boxes_odom
+    line = start + np.linspace(0.0, 1.0, 200)[:, None] * (goal - start)
+    outside = np.maximum(boxes[:, None, :2] - line, line - boxes[:, None, 2:]).clip(0.0)
+    return float(np.hypot(outside[..., 0], outside[..., 1]).min())
+
+
+def test_order_beside_the_aisle_stays_and_racks_keep_their_size() -> None:
+    before = Scenario.shipped("standing_in_aisle")
+    after = scenario_for_robot(before, FORKLIFT)
+    for old, new in zip(before.layout.racks, after.layout.racks, strict=True):
+        assert new.x_m == old.x_m
+        assert new.width_m == pytest.approx(old.width_m)
+        assert abs(new.y_m) > abs(old.y_m)
+    extra_m = after.robot.lane_half_width_m - before.robot.lane_half_width_m
+    assert abs(after.layout.racks[0].y_m) == pytest.approx(before.layout.racks[0].y_m + extra_m)
+    assert after.layout.x_max_m > before.layout.x_max_m
+
+
+def test_a_task_along_y_is_widened_along_x() -> None:
+    data = Scenario.shipped("crowd_of_eight").model_dump()
+    data["robot"] |= {"goal_x_m": 0.0, "goal_y_m": 4.0, "start_heading_deg": 90.0}
+    before = Scenario.model_validate(data)
+    after = scenario_for_robot(before, FORKLIFT)
+    assert after.layout.x_max_m > before.layout.x_max_m
+    assert [rack.y_m for rack in after.layout.racks] == [rack.y_m for rack in before.layout.racks]
+
+
+def test_a_fitted_scenario_is_not_fitted_again() -> None:
+    fitted = scenario_for_robot(Scenario.shipped("blind_corner"), FORKLIFT)
+    assert scenario_for_robot(fitted, "forklift") is fitted
+    with pytest.raises(SimError, match="for the robot 'forklift' already, got 'omni'"):
+        scenario_for_robot(fitted, "omni")
+
+
+def test_a_fitted_template_draws_fitted_scenarios_and_survives_text() -> None:
+    template = ScenarioTemplate.shipped("crossing_from_left")
+    fitted = template.with_robot("forklift")
+    assert fitted.name == "crossing_from_left_forklift"
+    assert fitted.for_seed(3) == scenario_for_robot(template.for_seed(3), "forklift")
+    assert ScenarioTemplate.from_text(fitted.to_text()).for_seed(3) == fitted.for_seed(3)
+    assert template.with_robot("") is template
+    # A scenario as text keeps its robot, and one without a robot does not mention any.
+    scenario = fitted.median()
+    assert ScenarioTemplate.from_text(scenario.to_text()).median() == scenario
+    assert "robot_model" not in template.median().to_text()
+
+
+def test_a_slow_robot_gets_more_time() -> None:
+    slow = RobotModel.of(replace(NOVA_CARTER, max_speed_mps=0.5))
+    before = Scenario.shipped("crossing_from_left")
+    after = scenario_for_robot(before, slow)
+    assert after.duration_s > 2.5 * before.duration_s
+    # People wait for as long as the robot takes longer to the middle of its way.
+    half_m = 0.5 * math.hypot(before.robot.goal_x_m, before.robot.goal_y_m)
+    later_s = after.people[0].start_s - before.people[0].start_s
+    assert later_s == pytest.approx(half_m / 0.5 - half_m / 1.5, abs=1.0)
+    assert after.layout == before.layout
