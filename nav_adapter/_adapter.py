@@ -236,9 +236,7 @@ class NavAdapter:
         if 0.0 <= pause_s <= self._policy.timing.stale_after_s:
             if self._has_caught_up(now):
                 memory = replace(memory, people=self._rules.after_silence(memory.people))
-            if clock.jumped is not None or clock.before_jump is not None:
-                clock = replace(clock, jumped=None, before_jump=None)
-            return memory, clock
+            return memory, replace(clock, jumped=None, before_jump=None)
         if pause_s >= 0.0 and min(pause_s, now - robot_state.stamp_s) <= _MAX_PAUSE_S:
             # A pause of the caller, as it seems.
             return memory, replace(clock, jumped=None, before_jump=memory)

@@ -349,11 +349,8 @@ class Stage(AbstractContextManager["Stage"]):
     ) -> None:
         """Record whether a person touches the robot.
 
-        Args:
-            index: of the person.
-            velocities_mps: (2,) of the robot before the last step but one, if it is known, and
-                before the last step.
-            meter: takes the contact.
+        ``velocities_mps`` are those (2,) of the robot before the last step but one, if it is known,
+        and before the last step.
         """
         if not self._held[index] and not self.amr.touches(self.workers[index].body):
             meter.release(index)

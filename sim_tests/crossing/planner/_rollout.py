@@ -80,8 +80,7 @@ def follow_arcs(path_m: FloatArray, turn_rad: FloatArray) -> Poses:
 
     Args:
         path_m: (T, ...) travelled distance at each sample.
-        turn_rad: (K, ...) heading at the first K ≤ T samples, broadcast against ``path_m``; from
-            then on the heading stays.
+        turn_rad: (T, ...) heading at each sample, broadcast against ``path_m``.
     """
     half_turn = 0.5 * _steps(turn_rad)
     # chord / arc = sin(h)/h by its series; the error h⁶/5040 is below 1e-6 for a step of 0.8 rad.
@@ -89,24 +88,11 @@ def follow_arcs(path_m: FloatArray, turn_rad: FloatArray) -> Poses:
     chord = 1.0 - h2 * (1.0 - h2 / 20.0) / 6.0
     middle = turn_rad - half_turn
     step_m = _steps(path_m)
-    cos, sin = np.cos(turn_rad), np.sin(turn_rad)
-    ahead, aside = chord * np.cos(middle), chord * np.sin(middle)
-    straight = len(path_m) - len(turn_rad)
-    if straight:
-        cos, sin, ahead, aside = (
-            np.concatenate([turning, np.repeat(last, straight, axis=0)])
-            for turning, last in (
-                (cos, cos[-1:]),
-                (sin, sin[-1:]),
-                (ahead, cos[-1:]),
-                (aside, sin[-1:]),
-            )
-        )
     return Poses(
-        np.add.accumulate(step_m * ahead, axis=0),
-        np.add.accumulate(step_m * aside, axis=0),
-        cos,
-        sin,
+        np.add.accumulate(step_m * (chord * np.cos(middle)), axis=0),
+        np.add.accumulate(step_m * (chord * np.sin(middle)), axis=0),
+        np.cos(turn_rad),
+        np.sin(turn_rad),
     )
 
 

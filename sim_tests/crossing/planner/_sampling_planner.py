@@ -28,6 +28,8 @@ _TIE: Final = 1e-9
 # A robot that steers turns back, whatever the way costs, to a goal beyond this bearing.
 _BEHIND_RAD: Final = 1.75
 _TURN_BACK: Final = 10.0
+# Added to the distances from which on people and boxes do not count, against rounding.
+_FAR_M: Final = 0.01
 # A slower robot counts as standing.
 _STANDING_MPS: Final = 0.02
 _STANDING: Final = Poses(*(np.asarray(value) for value in (0.0, 0.0, 1.0, 0.0)))
@@ -232,6 +234,8 @@ class SamplingPlanner:
         moving = self._footprint.at(poses, margin_m)
         waiting = self._footprint.at(_STANDING, margin_m)
         clearance_m = self.config.clearance_m
+        near_m = _reach_m(poses) + self._footprint.reach_m + turning_m + clearance_m + _FAR_M
+        scene = scene.within(near_m, float(t_s[-1].max()))
         if scene.has_people:
             # The present gap to people is measured without this margin: else it could be used up.
             still = self._footprint.at(_STANDING)
@@ -259,6 +263,11 @@ class SamplingPlanner:
         change = turning - candidates.turning_now
         cost += config.turn_weight * turning**2 + config.smoothness_weight * np.abs(change)
         rectangles = self._footprint.at(poses)
+        # Whoever stays farther away than any comfort has no cost.
+        comfort_m = max(config.person_comfort_m, config.room_m, config.static_comfort_m)
+        near_m = _reach_m(poses) + self._footprint.reach_m + comfort_m + _FAR_M
+        among_people = scene.has_people
+        scene = scene.within(near_m, config.horizon_s + config.front_time_s)
         if scene.has_people:
             close = _closeness(scene.people_gap_m(rectangles, t_s), config.person_comfort_m)
             strip_gap = scene.strip_gap_m(rectangles, t_s, config.front_time_s)
@@ -272,6 +281,7 @@ class SamplingPlanner:
                 near = (_closeness(gaps_m, config.room_m).sum(axis=1) / len(t_s)).max(axis=0)
                 # Compares yaw rates at equal speed only: the speed limit slows the robot already.
                 cost += config.room_weight * (near - near.min(axis=1, keepdims=True))
+        if among_people:
             cost += config.keep_right_weight * np.maximum(turning, 0.0)
         if scene.has_boxes:
             close = _closeness(scene.box_gap_m(rectangles), config.static_comfort_m)
@@ -315,6 +325,11 @@ def _in_base(robot_state: RobotState, point_odom_m: FloatArray) -> tuple[float, 
     x, y = (point_odom_m - robot_state.position_odom_m).tolist()
     c, s = math.cos(robot_state.heading_odom_rad), math.sin(robot_state.heading_odom_rad)
     return c * x + s * y, c * y - s * x
+
+
+def _reach_m(poses: Poses) -> float:
+    """Return a distance from the origin that no pose exceeds."""
+    return float(np.abs(poses.x_m).max() + np.abs(poses.y_m).max())
 
 
 def _closeness(gap_m: FloatArray, comfort_m: float) -> FloatArray:

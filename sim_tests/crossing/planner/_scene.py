@@ -178,6 +178,39 @@ class Scene:
         self._x_m, self._y_m, self._vx_mps, self._vy_mps = columns
         self._radius_m = np.array(self._radii, dtype=np.float64).reshape(-1, 1, 1, 1)
 
+    def within(self, distance_m: float, horizon_s: float) -> Scene:
+        """Return the scene without the people and boxes that stay away from the base.
+
+        Args:
+            distance_m: no disc of a person left out comes nearer to the present base origin, and no
+                box left out is nearer along x or y.
+            horizon_s: time over which people go on at constant velocity.
+        """
+        near = copy.copy(self)
+        rows = [
+            row
+            for row, (person, radius) in enumerate(zip(self._people, self._radii, strict=True))
+            if _nearest_m(*person, horizon_s) < distance_m + radius
+        ]
+        if len(rows) < len(self._people):
+            near._people = [self._people[row] for row in rows]
+            near._radii = [self._radii[row] for row in rows]
+            near._x_m, near._y_m = self._x_m[rows], self._y_m[rows]
+            near._vx_mps, near._vy_mps = self._vx_mps[rows], self._vy_mps[rows]
+            near._radius_m = self._radius_m[rows]
+            near.has_people = self.has_people and bool(rows)
+        if self.has_boxes:
+            x_m, y_m = float(self._base_odom.x_m), float(self._base_odom.y_m)
+            near._boxes_odom_m = np.array(
+                [
+                    box
+                    for box in self._boxes_odom_m.tolist()
+                    if max(box[0] - x_m, x_m - box[2], box[1] - y_m, y_m - box[3]) < distance_m
+                ]
+            ).reshape(-1, 4)
+            near.has_boxes = bool(len(near._boxes_odom_m))
+        return near
+
     def without_people(self) -> Scene:
         """Return the same boxes around the robot, and nobody."""
         alone = copy.copy(self)
@@ -234,3 +267,10 @@ class Scene:
         """Return a lower bound (T, V, W) of the gap between the robot and the nearest box."""
         centers_odom = robot.centers.transformed(self._base_odom)
         return box_gap_m(robot._replace(centers=centers_odom), self._boxes_odom_m)
+
+
+def _nearest_m(x_m: float, y_m: float, vx_mps: float, vy_mps: float, horizon_s: float) -> float:
+    """Return the least distance from the origin of somebody who goes on at constant velocity."""
+    speed2 = vx_mps * vx_mps + vy_mps * vy_mps
+    at_s = min(max(-(x_m * vx_mps + y_m * vy_mps) / max(speed2, 1e-12), 0.0), horizon_s)
+    return math.hypot(x_m + vx_mps * at_s, y_m + vy_mps * at_s)

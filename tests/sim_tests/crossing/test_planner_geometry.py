@@ -65,14 +65,6 @@ def test_follow_arcs_is_exact_for_a_constant_twist(speed: float, yaw_rate: float
     np.testing.assert_allclose(poses.y_m, chord * np.sin(half), atol=1e-7)
 
 
-@given(st.floats(0.1, 1.5), st.floats(-1.5, 1.5), st.integers(1, 15))
-def test_a_heading_that_stays_need_not_be_repeated(speed: float, turn: float, turns: int) -> None:
-    t = np.arange(0.2, 3.01, 0.2)
-    headings = turn * np.minimum(t, t[turns - 1])
-    long, short = (follow_arcs(speed * t, each) for each in (headings, headings[:turns]))
-    assert all(np.array_equal(one, other) for one, other in zip(long, short, strict=True))
-
-
 pose_data = st.tuples(st.floats(-2, 2), st.floats(-2, 2), st.floats(-4, 4))
 coordinate = st.floats(-4.0, 4.0)
 
