@@ -8,6 +8,7 @@ from awarenav.cli import main
 from sim_tests import SimError
 from sim_tests.actors.robot import RobotModel
 from sim_tests.study.runs import job_key, make_planner, plan_jobs, template_of
+from sim_tests.study.scorecard._plan import plan_comparison
 
 
 class Keeps:
@@ -34,6 +35,18 @@ def test_planners_get_the_profile_of_the_robot() -> None:
     planner = make_planner(f"{__name__}:Keeps", template_of(job.scenario).median())
     assert isinstance(planner, Keeps)
     assert planner.robot.drive == "holonomic"
+
+
+def test_a_comparison_of_planners_takes_a_robot() -> None:
+    _, jobs = plan_comparison(
+        ["straight_on"],
+        ["crossing_from_left"],
+        ["balanced"],
+        (0,),
+        perception="truth",
+        robot="delivery",
+    )
+    assert {job_key(job).scenario for job in jobs} == {"crossing_from_left_delivery"}
 
 
 def test_the_command_names_the_robots_that_there_are(tmp_path, capsys) -> None:
