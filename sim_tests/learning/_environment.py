@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from awarenav.errors import MissingExtraError, not_one_of
-from nav_adapter import AwarenessPolicy
+from nav_adapter import AwarenessPolicy, RobotProfile
 from perception import AttentionCone
 from perception.arrays import FloatArray
 from perception.installation import install_command
 
-from ..actors.robot import NOVA_CARTER
+from ..actors.robot import NOVA_CARTER, RobotModel
 from ..crossing import (
     STANDING_SPEED_MPS,
     Crossing,
@@ -27,7 +27,7 @@ from ..crossing import (
     named_policy,
 )
 from ..crossing.eyes import Perception
-from ..scenario import Scenario, ScenarioTemplate
+from ..scenario import Scenario, ScenarioTemplate, scenario_for_robot
 from ..world.camera import CameraRenderer
 from ..world.errors import SimError
 from ._actions import action_limits, command_of
@@ -74,6 +74,8 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         end_at_contact: a contact that the robot caused ends the episode.
         render_mode: ``"rgb_array"`` or None.
         render_view: ``"top"`` for a plan, ``"camera"`` for the robot's camera.
+        robot: another robot, to which every scenario is fitted: a model, a shipped name, a YAML
+            file or a profile. A holonomic one is driven by speed and yaw rate too.
 
     Raises:
         SimError: for arguments that are not valid.
@@ -99,6 +101,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         end_at_contact: bool = True,
         render_mode: str | None = None,
         render_view: View = "top",
+        robot: RobotModel | RobotProfile | str | Path | None = None,
     ) -> None:
         EzPickle.__init__(
             self,
@@ -113,6 +116,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
             end_at_contact=end_at_contact,
             render_mode=render_mode,
             render_view=render_view,
+            robot=robot,
         )
         if isinstance(scenarios, (str, Scenario, ScenarioTemplate)):
             scenarios = (scenarios,)
@@ -146,7 +150,9 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
             }
         )
         self.observation_space = cast("spaces.Space[Observation]", arrays)
-        limits = np.array(action_limits(NOVA_CARTER))
+        self._robot = None if robot is None else RobotModel.of(robot)
+        profile = NOVA_CARTER if self._robot is None else self._robot.profile
+        limits = np.array(action_limits(profile))
         self.action_space = (
             spaces.Box(-1.0, 1.0, (2,), np.float32)
             if normalised_actions
@@ -198,6 +204,8 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         scenario = template if isinstance(template, Scenario) else template.for_seed(episode_seed)
         if self._control_hz is not None:
             scenario = scenario.model_copy(update={"control_hz": self._control_hz})
+        if self._robot is not None:
+            scenario = scenario_for_robot(scenario, self._robot)
         self.close()
         self._crossing = Crossing(scenario, self._policy, self._perception, episode_seed)
         self._encoder = ObservationEncoder(*self._slots, scenario.planner_boxes_odom_m)

@@ -37,6 +37,7 @@ def compare_planners(
     perception: str = "truth",
     sensors: str = "camera",
     camera: str = "",
+    robot: str = "",
     workers: int | None = 1,
     time_limit_s: float | None = None,
     resume: bool = False,
@@ -62,6 +63,7 @@ def compare_planners(
         perception: ``"truth"``, ``"keypoints"`` or ``"pixels"``.
         sensors: ``"camera"``, ``"camera+scanner"`` or ``"scanner"``.
         camera: a shipped name or a YAML file that replaces each scenario's camera.
+        robot: a shipped name or a YAML file of the robot that they are fitted to.
         workers: number of processes; 1 runs in this process unless there is a time limit.
         time_limit_s: wall-clock limit of an episode, which ends planners that hang.
         resume: continue the comparison in the folder.
@@ -85,6 +87,7 @@ def compare_planners(
         perception=perception,
         sensors=sensors,
         camera=camera,
+        robot=robot,
     )
     try:
         with ConductFile(folder, resume=resume) as conducts:
@@ -150,6 +153,7 @@ class CompareOptions:
     perception: PerceptionKind
     sensors: SensorSet
     camera: str
+    robot: str
     workers: int | None
     time_limit: float
     out: Path
@@ -174,6 +178,7 @@ def compare_command(options: CompareOptions) -> int:
         perception=options.perception,
         sensors=options.sensors,
         camera=options.camera,
+        robot=options.robot,
         workers=options.workers,
         time_limit_s=options.time_limit,
         resume=options.resume,
@@ -220,4 +225,6 @@ def _command_line(options: CompareOptions) -> str:
         words += ["--sensors", options.sensors]
     if options.camera:
         words += ["--camera", options.camera]
+    if options.robot:
+        words += ["--robot", options.robot]
     return shlex.join([*words, "--out", str(options.out)])

@@ -118,6 +118,7 @@ def plan_comparison(
     perception: str,
     sensors: str = "camera",
     camera: str = "",
+    robot: str = "",
 ) -> tuple[ComparisonPlan, tuple[Job, ...]]:
     """Return the plan of a comparison and its episodes.
 
@@ -132,6 +133,7 @@ def plan_comparison(
         perception: as for :func:`sim_tests.study.runs.plan_jobs`.
         sensors: likewise.
         camera: likewise.
+        robot: likewise.
 
     Raises:
         SimError: an unknown or unusable argument, or a scenario that needs no planner.
@@ -139,7 +141,7 @@ def plan_comparison(
     """
     if not seeds:
         raise SimError("seeds must be at least one, got none")
-    templates = _driven(scenarios, camera)
+    templates = tuple(each.with_robot(robot) for each in _driven(scenarios, camera))
     entrants = _entrants(planners, templates[0].median())
     own = [each for each in entrants if not each.variant_of]
     conditions: dict[str, Any] = {"perception": perception, "sensors": (sensors,)}

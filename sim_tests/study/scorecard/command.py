@@ -63,6 +63,7 @@ def list_planners(*, as_json: bool) -> int:
 @options.perception(default="truth")
 @options.sensors()
 @options.camera()
+@options.robot()
 @options.workers()
 @option(
     "--time-limit",

@@ -1,0 +1,53 @@
+"""The Gymnasium environment with another robot."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sim_tests import SimError, run_crossing
+
+pytest.importorskip("gymnasium", reason="the environment needs the extra gym")
+
+from sim_tests.learning import CrossingEnv
+
+
+class Ahead:
+    """A planner that drives ahead and turns a little."""
+
+    def plan(self, robot_state, goal_odom_m, constraints, dt_s):
+        if robot_state.stamp_s > 1.0:
+            raise StopIteration
+        return 0.7, 0.1
+
+
+def test_an_episode_is_the_crossing_of_the_same_robot() -> None:
+    env = CrossingEnv("crossing_from_left", robot="forklift", normalised_actions=False)
+    np.testing.assert_allclose(env.action_space.high, [1.4, 0.9])
+    env.reset(seed=2)
+    states = []
+    for _ in range(20):
+        env.step(np.array([0.7, 0.1]))
+        states.append(env.situation.state)
+    assert env.crossing.scenario.name == "crossing_from_left_forklift"
+    env.close()
+    frames = []
+    with pytest.raises(StopIteration):
+        run_crossing(
+            "crossing_from_left",
+            policy="balanced",
+            planner=Ahead(),
+            robot="forklift",
+            seed=2,
+            observer=lambda frame, _: frames.append(frame),
+        )
+    for state, frame in zip(states[:19], frames[1:20], strict=True):
+        np.testing.assert_array_equal(state.position_odom_m, frame.robot_state.position_odom_m)
+    assert 0.0 < states[-1].speed_mps <= 0.7
+    # It steers: no turn is tighter than its turning radius.
+    assert all(abs(each.yaw_rate_radps) <= each.speed_mps / 1.3 + 1e-9 for each in states)
+
+
+def test_an_unknown_robot_is_refused() -> None:
+    with pytest.raises(SimError, match="did you mean 'omni'"):
+        CrossingEnv("crossing_from_left", robot="omny")
