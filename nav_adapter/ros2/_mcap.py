@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import yaml
 
@@ -28,7 +28,44 @@ except ImportError as cause:  # pragma: no cover - depends on the installation
     ) from cause
 
 
-class McapRecorder(AbstractContextManager["McapRecorder"]):
+_FileT = TypeVar("_FileT", bound="_McapFile")
+
+
+class _McapFile(AbstractContextManager["_McapFile"]):
+    """An MCAP file that is being written; its index is written when it is closed.
+
+    Args:
+        path: of the file; an existing file is replaced.
+        profile: of the messages, as in the MCAP specification.
+
+    Raises:
+        NavError: if the file cannot be written.
+    """
+
+    def __init__(self, path: str | Path, profile: str) -> None:
+        self._path = Path(path)
+        try:
+            self._stream = self._path.open("wb")
+        except OSError as cause:
+            raise NavError(f"cannot write {self._path}: {cause.strerror or cause}") from cause
+        self._writer = Writer(self._stream)
+        self._writer.start(profile=profile, library="awarenav")
+        self._channels: dict[str, int] = {}
+
+    def close(self) -> None:
+        """Write the index and close the file."""
+        if not self._stream.closed:
+            self._writer.finish()
+            self._stream.close()
+
+    def __enter__(self: _FileT) -> _FileT:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+class McapRecorder(_McapFile):
     """Writes CDR messages with their ROS 2 schemas to an MCAP file.
 
     The profile is "ros2", schemas are "ros2msg" and messages "cdr", which Foxglove,
@@ -43,14 +80,7 @@ class McapRecorder(AbstractContextManager["McapRecorder"]):
     """
 
     def __init__(self, path: str | Path) -> None:
-        self._path = Path(path)
-        try:
-            self._stream = self._path.open("wb")
-        except OSError as cause:
-            raise NavError(f"cannot write {self._path}: {cause.strerror or cause}") from cause
-        self._writer = Writer(self._stream)
-        self._writer.start(profile="ros2", library="awarenav")
-        self._channels: dict[str, int] = {}
+        super().__init__(path, "ros2")
         self._schemas: dict[str, int] = {}
 
     def write(self, topic: Topic, cdr: bytes, stamp_s: float) -> None:
@@ -62,15 +92,6 @@ class McapRecorder(AbstractContextManager["McapRecorder"]):
         stamp_ns = round(stamp_s * 1e9)
         self._writer.add_message(self._channels[topic.name], stamp_ns, cdr, stamp_ns)
 
-    def close(self) -> None:
-        """Write the index and close the file."""
-        if not self._stream.closed:
-            self._writer.finish()
-            self._stream.close()
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
     def _schema(self, topic: Topic) -> int:
         name = ros_type(topic.message)
         if name not in self._schemas:
@@ -79,7 +100,7 @@ class McapRecorder(AbstractContextManager["McapRecorder"]):
         return self._schemas[name]
 
 
-class JsonMcapRecorder(AbstractContextManager["JsonMcapRecorder"]):
+class JsonMcapRecorder(_McapFile):
     """Writes JSON messages with their JSON Schemas to an MCAP file, which Foxglove reads.
 
     Use it as a context manager: the index is written when the file is closed.
@@ -92,14 +113,7 @@ class JsonMcapRecorder(AbstractContextManager["JsonMcapRecorder"]):
     """
 
     def __init__(self, path: str | Path) -> None:
-        self._path = Path(path)
-        try:
-            self._stream = self._path.open("wb")
-        except OSError as cause:
-            raise NavError(f"cannot write {self._path}: {cause.strerror or cause}") from cause
-        self._writer = Writer(self._stream)
-        self._writer.start(profile="", library="awarenav")
-        self._channels: dict[str, int] = {}
+        super().__init__(path, "")
 
     def add_topic(self, topic: str, schema_name: str, schema: Mapping[str, Any]) -> None:
         """Open a topic whose messages follow a JSON Schema."""
@@ -112,15 +126,6 @@ class JsonMcapRecorder(AbstractContextManager["JsonMcapRecorder"]):
         stamp_ns = round(stamp_s * 1e9)
         data = json.dumps(message, ensure_ascii=False).encode()
         self._writer.add_message(self._channels[topic], stamp_ns, data, stamp_ns)
-
-    def close(self) -> None:
-        """Write the index and close the file."""
-        if not self._stream.closed:
-            self._writer.finish()
-            self._stream.close()
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
 
 def read_json_messages(path: str | Path) -> Iterator[tuple[str, Any]]:
