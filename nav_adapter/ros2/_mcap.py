@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
-from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -31,7 +30,7 @@ except ImportError as cause:  # pragma: no cover - depends on the installation
 _FileT = TypeVar("_FileT", bound="_McapFile")
 
 
-class _McapFile(AbstractContextManager["_McapFile"]):
+class _McapFile:
     """An MCAP file that is being written; its index is written when it is closed.
 
     Args:
