@@ -130,6 +130,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print("\nShare of people who had looked before crossing\n")
     print("\n".join(looked_table(looked)), flush=True)
     if options.plots is not None:
+        options.plots.mkdir(parents=True, exist_ok=True)
         for name, quantities in _PLOTS.items():
             draw(known, scenes, options.plots / name, quantities)
     if options.episodes > 0:

@@ -48,5 +48,6 @@ class NoFloorPlanner:
             speed_limit_mps=self._robot.max_speed_mps,
             reachable_speed_limit_mps=self._robot.max_speed_mps,
             fastest_point_limit_mps=math.inf,
+            speed_basis=None,  # what the planner foresees of the limits is the floor too
         )
         return self._planner.plan(robot_state, goal_odom_m, unconstrained, dt_s)

@@ -105,6 +105,7 @@ def test_exclusions_are_those_that_are_known():
         *((name, "--frame-budget-s", "--detect-every-s") for name in ("bridge", "estimate")),
         ("replay", "--view", "--no-video"),
         ("tracks", "--ids", "--config"),
+        ("tracks", "--smooth", "--ids"),
         ("falsify", "--unsafe-no-floor", "--planner"),
     }
 

@@ -88,6 +88,7 @@ def test_a_planner_may_move_a_holonomic_robot_sideways_and_no_other() -> None:
         run_crossing(scenario, policy="balanced", planner=Sideways(), robot="forklift")
 
 
+@pytest.mark.full
 def test_scanners_and_camera_of_a_robot_see_people_and_not_itself() -> None:
     """The forks and the mast of the forklift are no people; the worker ahead is one."""
     seen = []
