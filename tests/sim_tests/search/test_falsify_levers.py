@@ -133,7 +133,7 @@ def test_pallets_and_companions_are_in_nobodys_way(name, seed):
         assert shapely.box(*box).distance(place) >= PALLET_RADIUS_M - 1e-9
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_the_search_runs_from_keypoints_and_scans(tmp_path):
     """The episodes are those of the perception asked for, and the file replays."""
     out = tmp_path / "out"
