@@ -13,6 +13,10 @@ def predicted_sigmas_m(
     track: PersonTrack, horizons_s: FloatArray, model: PredictionModel
 ) -> FloatArray:
     """Return standard deviations (T,) at times (T,) ≥ 0 after the track's stamp."""
-    covariances = predict_ahead(track, horizons_s, model).covariances_odom_m2[0]
-    xx, xy, yy = covariances[:, 0, 0], covariances[:, 0, 1], covariances[:, 1, 1]
+    return largest_sigmas_m(predict_ahead(track, horizons_s, model).covariances_odom_m2[0])
+
+
+def largest_sigmas_m(covariances_m2: FloatArray) -> FloatArray:
+    """Return standard deviations (...) of positions (..., 2, 2), in their most uncertain way."""
+    xx, xy, yy = (covariances_m2[..., 0, 0], covariances_m2[..., 0, 1], covariances_m2[..., 1, 1])
     return np.asarray(np.sqrt(0.5 * (xx + yy) + np.hypot(0.5 * (xx - yy), xy)))

@@ -11,6 +11,7 @@ from tracking.prediction import FITTED, PredictionModel, predict_states
 
 from .._constraints import NavConstraints
 from .._errors import NavError
+from .._predicted import largest_sigmas_m
 from ..policies import ObstacleOutline
 from ._shapes import circles
 
@@ -138,12 +139,14 @@ def predicted_people(
             "predicted_people takes a model, or acceleration_density_m2ps3 and "
             "overconfidence_per_s, got both"
         )
-    given = (acceleration_density_m2ps3, _OUTLINE.acceleration_density_m2ps3)
-    density_m2ps3 = next(value for value in given if value is not None)
-    given = (overconfidence_per_s, _OUTLINE.overconfidence_per_s)
-    growth_per_s = next(value for value in given if value is not None)
-    density = finite_number("acceleration_density_m2ps3", density_m2ps3, NavError, minimum=0.0)
-    growth = finite_number("overconfidence_per_s", growth_per_s, NavError, minimum=0.0)
+    if acceleration_density_m2ps3 is None:
+        acceleration_density_m2ps3 = _OUTLINE.acceleration_density_m2ps3
+    if overconfidence_per_s is None:
+        overconfidence_per_s = _OUTLINE.overconfidence_per_s
+    density = finite_number(
+        "acceleration_density_m2ps3", acceleration_density_m2ps3, NavError, minimum=0.0
+    )
+    growth = finite_number("overconfidence_per_s", overconfidence_per_s, NavError, minimum=0.0)
     means = now[:, None, :2] + times[:, None] * now[:, None, 2:4]
     place, cross, motion = (
         part[:, None]
@@ -166,9 +169,8 @@ def _spread_m(
     count = finite_number("sigmas", sigmas, NavError, minimum=0.0)
     covariances = _covariances_of(constraints, "predicted_circles with a model")
     ahead = predict_states(now[:, :4], covariances, times, model).covariances_odom_m2
-    present = np.linalg.eigvalsh(covariances[:, :2, :2])[:, -1:]
-    variances = np.linalg.eigvalsh(ahead)[..., -1]
-    return np.asarray(count * np.maximum(np.sqrt(variances) - np.sqrt(present), 0.0))
+    present_m = largest_sigmas_m(covariances[:, None, :2, :2])
+    return np.asarray(count * np.maximum(largest_sigmas_m(ahead) - present_m, 0.0))
 
 
 def _covariances_of(constraints: NavConstraints, name: str) -> FloatArray:
