@@ -59,6 +59,11 @@ class PlannerConfig(StrictConfig):
     front_time_s: float = Field(default=1.2, ge=0.0, le=5.0)
     """Length of the strip ahead of a walking person, in seconds; being in it costs, so that the
     robot passes behind a crossing person."""
+    give_way_s: float = Field(default=6.0, ge=0.0, le=20.0)
+    """Time within which people have to enter the robot's way for it to let them pass first, in
+    seconds; 0 turns this off. The robot slows down early instead of stopping near them."""
+    crossing_speed_mps: float = Field(default=0.5, gt=0.0)
+    """Speed across the robot's way below which people may be waiting for it, in m/s."""
     late_weight: float = Field(default=0.3, ge=0.0, le=1.0)
     """Weight of closeness to people at the end of the horizon relative to closeness now."""
     late_static_weight: float = Field(default=0.0, ge=0.0, le=1.0)

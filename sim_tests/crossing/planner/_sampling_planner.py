@@ -15,6 +15,7 @@ from ...world.errors import SimError
 from ._candidates import Aim, Candidates, Motion, TwistLimits, along_time, within_next_limits
 from ._config import PlannerConfig
 from ._detour import detour_bearing_rad
+from ._give_way import Way, giving_way_mps
 from ._reversing import REVERSE_MPS, Reversing, goal_facing
 from ._rollout import Poses
 from ._scene import FootprintBox, Scene
@@ -134,6 +135,14 @@ class SamplingPlanner:
         reach_m = max(reach_m, self.robot.min_turning_radius_m or 0.0)
         scene = Scene(robot_state, constraints, self._boxes_within(robot_state, reach_m))
         aim = Aim(goal_distance_m, self._bearing(goal_x_m, goal_y_m, scene))
+        if scene.has_people and self.config.give_way_s > 0.0:
+            top_mps = giving_way_mps(
+                self._way(aim),
+                scene.people,
+                top_mps,
+                crossing_mps=self.config.crossing_speed_mps,
+                within_s=self.config.give_way_s,
+            )
         reversing = self._reversing
         if reversing is not None and reversing.wanted(robot_state, aim, scene, dt_s):
             command = self._reverse(robot_state, limits, aim, dt_s, scene)
@@ -202,6 +211,17 @@ class SamplingPlanner:
 
         goal_distance_m = math.hypot(goal_x_m, goal_y_m)
         return detour_bearing_rad(bearing_rad, goal_distance_m, discs, is_free)
+
+    def _way(self, aim: Aim) -> Way:
+        """Return the strip in which the robot drives to its aim."""
+        box = self._footprint
+        return Way(
+            aim.bearing_rad,
+            aim.distance_m,
+            box.half_size_m[1] + self.config.clearance_m,
+            box.center_m[0] + box.half_size_m[0],
+            box.half_size_m[0] - box.center_m[0],
+        )
 
     def _boxes_within(self, robot_state: RobotState, reach_m: float) -> FloatArray:
         """Return the boxes within reach of a roll-out of length ``reach_m``, or of full braking."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -210,6 +211,11 @@ class Scene:
             ).reshape(-1, 4)
             near.has_boxes = bool(len(near._boxes_odom_m))
         return near
+
+    @property
+    def people(self) -> Sequence[tuple[float, float, float, float]]:
+        """Return x, y, vx, vy of each person."""
+        return self._people
 
     def without_people(self) -> Scene:
         """Return the same boxes around the robot, and nobody."""
