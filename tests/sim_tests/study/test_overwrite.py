@@ -19,8 +19,8 @@ workers:
 """
 COMMANDS = {
     "crossings": ["--episodes", "1", "--policy", "blind", "--workers", "1", "--no-report"],
-    "tune": ["--trials", "2", "--generation", "2", "--episodes", "1", "--held-out", "1"],
-    "falsify": ["--episodes", "4", "--generation", "4", "--worst", "1"],
+    "tune": ["--workers", "1", "--trials", "2", "--generation", "2", "--episodes", "1", "--held-out", "1"],
+    "falsify": ["--workers", "1", "--episodes", "4", "--generation", "4", "--worst", "1"],
     "render": ["--frames", "2", "--scenes", "1", "--size", "64x48", "--processes", "1"],
 }
 # The rest of a study's files depends on the order in which its processes write.
