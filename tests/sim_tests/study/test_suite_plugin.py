@@ -10,7 +10,9 @@ import pytest
 from run_scenes import SHORT
 
 from sim_tests import SimError
+from sim_tests.actors.robot import RobotModel
 from sim_tests.study.measures import EpisodeRecord
+from sim_tests.study.runs import read_jobs, template_of
 from sim_tests.study.suite import EpisodeThresholds, Thresholds
 
 HERE = Path(__file__).parent
@@ -70,9 +72,18 @@ def test_a_bad_planner_fails_with_the_check_the_scenario_the_seed_and_the_replay
     assert "Traceback" not in done.stdout
 
 
-def test_chosen_tests_run_their_episodes_alone(folder):
-    done = run_pytest(folder, *SUITE, "-k", "short-1")
-    assert done.returncode == 0, done.stdout + done.stderr
+def test_a_chosen_test_runs_its_episode_alone_with_the_robot_and_people_asked_for(folder):
+    (folder / "thresholds.yaml").write_text("scenarios: {short: {min_separation_m: 50.0}}")
+    done = run_pytest(
+        folder, *SUITE, "-k", "short_delivery-1", "--awarenav-thresholds", "thresholds.yaml",
+        "--awarenav-robot", "delivery", "--awarenav-population", "recorded",
+    )  # fmt: skip
+    assert done.returncode == 1, done.stdout + done.stderr
+    assert "asked for 50 (short_delivery, seed 1," in done.stdout
+    (job,) = read_jobs(folder / "awarenav-suite")
+    scenario = template_of(job.scenario).for_seed(1)
+    assert scenario.robot_model == RobotModel.shipped("delivery")
+    assert scenario.population == "recorded"
     assert (folder / "awarenav-suite" / "episodes.csv").read_text().count("\n") == 2
 
 
@@ -80,6 +91,11 @@ def test_chosen_tests_run_their_episodes_alone(folder):
     ("arguments", "message"),
     [
         (["--awarenav-planner", "nowhere:Planner"], "No module named 'nowhere'"),
+        pytest.param(
+            ["--awarenav-population", "modern"],
+            "population must be one of classic, recorded, got 'modern'",
+            marks=pytest.mark.full,
+        ),
         pytest.param(
             ["--awarenav-policy", "brave"], "preset must be one of", marks=pytest.mark.full
         ),
