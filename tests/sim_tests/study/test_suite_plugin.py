@@ -1,11 +1,13 @@
 """The crossings as a test-suite of the user's: what passes, what fails, and what is said."""
 
 import os
+import re
 import subprocess
 import sys
 from importlib.metadata import entry_points
 from pathlib import Path
 
+import paths
 import pytest
 from run_scenes import SHORT
 
@@ -14,6 +16,7 @@ from sim_tests.actors.robot import RobotModel
 from sim_tests.study.measures import EpisodeRecord
 from sim_tests.study.runs import read_jobs, template_of
 from sim_tests.study.suite import EpisodeThresholds, Thresholds
+from sim_tests.study.suite.plugin import pytest_addoption
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
@@ -46,6 +49,18 @@ def folder(tmp_path):
 
 SUITE = ["--pyargs", "sim_tests", "--awarenav-scenario", "short.yaml", "--awarenav-workers", "1",
          "--awarenav-perception", "truth", "--awarenav-episodes", "2"]  # fmt: skip
+
+
+def test_the_page_has_every_option():
+    parser = pytest.Parser(_ispytest=True)
+    pytest_addoption(parser)
+    options = parser.parse_known_args([])
+    names = {f"--{name.replace('_', '-')}" for name in vars(options) if "awarenav" in name}
+    page = (paths.ROOT / "docs" / "test-suite.md").read_text(encoding="utf-8")
+    rows = [line for line in page.splitlines() if line.startswith("| `--awarenav-")]
+    found = {word for line in rows for word in re.findall(r"`(--awarenav-[a-z]+)", line)}
+    assert found == names
+    assert len(names) >= 12
 
 
 def test_a_good_planner_passes(folder):
