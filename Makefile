@@ -8,6 +8,8 @@ PYTEST_ARGS ?=
 # One worker process per core; a worker that is done takes tests from the others.
 PYTEST := $(PY) -m pytest -n auto --dist worksteal
 export PYTHON
+# Set-up compiles nothing, so that every process would compile again what it imports.
+unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test mutants lint bench docs lock clean

@@ -19,6 +19,7 @@ from ..world import Warehouse, crosses_boxes
 from ..world.camera import CameraRenderer, expose
 from ..world.errors import SimError
 from ..world.hall import LAYOUTS, LIGHTINGS, Lighting, WarehouseLayout
+from ..world.render import RendererName
 from ._config import RenderConfig
 from ._truth import frame_truth
 
@@ -51,6 +52,8 @@ class RenderScene(AbstractContextManager["RenderScene"]):
     Args:
         config: settings of the set of images.
         number: number of the scene, from 0.
+        renderer: renderer of the images, as for :class:`~sim_tests.world.Warehouse`; images of
+            ``"tiny"`` are the same on every computer.
 
     Attributes:
         warehouse: the hall.
@@ -58,7 +61,9 @@ class RenderScene(AbstractContextManager["RenderScene"]):
         renderer: the renderer of the camera.
     """
 
-    def __init__(self, config: RenderConfig, number: int) -> None:
+    def __init__(
+        self, config: RenderConfig, number: int, *, renderer: RendererName = "tiny"
+    ) -> None:
         self._config = config
         self.number = number
         rng = np.random.default_rng([config.seed, 1, number])
@@ -68,7 +73,9 @@ class RenderScene(AbstractContextManager["RenderScene"]):
         self.lighting_name = str(lights[number % len(lights)])
         first, last = config.variants
         self.warehouse = Warehouse(
-            WarehouseLayout.named(self.layout_name), variant=int(rng.integers(first, last + 1))
+            WarehouseLayout.named(self.layout_name),
+            variant=int(rng.integers(first, last + 1)),
+            renderer=renderer,
         )
         try:
             self.workers = tuple(

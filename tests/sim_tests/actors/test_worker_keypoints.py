@@ -44,7 +44,7 @@ POSES = (
 
 @pytest.fixture(scope="module")
 def hall() -> Iterator[Warehouse]:
-    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
+    with Warehouse(WarehouseLayout.open_floor(), renderer="auto") as warehouse:
         yield warehouse
 
 

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from nav_adapter import NavConstraints
-from sim_tests import run_crossing
+from sim_tests import Scenario, run_crossing
 from sim_tests.study.measures import measure, summarise
 
 LINES, COLUMNS = 10, 100
@@ -13,7 +13,8 @@ LINES, COLUMNS = 10, 100
 
 @pytest.fixture(scope="module")
 def result():
-    return run_crossing("crowd_of_eight", policy="balanced", perception="keypoints", seed=0)
+    crowd = Scenario.shipped("crowd_of_eight").model_copy(update={"duration_s": 4.0})
+    return run_crossing(crowd, policy="balanced", perception="keypoints", seed=0)
 
 
 def lines(value):

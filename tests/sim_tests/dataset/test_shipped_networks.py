@@ -5,24 +5,42 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
 from awarenav.cli import main
 from awarenav.judge import judge_files
-from awarenav.records import read_records
+from awarenav.records import read_records, write_records
 from perception import AwarenessPipeline, Camera
+from sim_tests.dataset import RenderConfig, RenderScene
 
-FRAMES = 72
+HELD_OUT = RenderConfig(
+    frames=72,
+    scenes=5,
+    min_range_m=1.5,
+    max_range_m=6.0,
+    eyes="ahead",
+    layouts=("crossing", "staging_hall"),
+    seed=77,
+)
 
 
 @pytest.fixture(scope="module")
 def held_out(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder of rendered images and the estimates of the shipped networks."""
     folder = tmp_path_factory.mktemp("held_out")
-    size = ["--frames", str(FRAMES), "--scenes", "5", "--range", "1.5", "6", "--eyes", "ahead"]
-    halls = ["--layouts", "crossing", "staging_hall", "--seed", "77"]
-    assert main(["render", *size, *halls, "--out", str(folder)]) == 0
+    records = []
+    for number in range(HELD_OUT.scene_count):
+        with RenderScene(HELD_OUT, number, renderer="auto") as scene:
+            for frame in range(HELD_OUT.frames):
+                if HELD_OUT.scene_of(frame) == number:
+                    image_rgb, record = scene.snapshot(frame)
+                    assert cv2.imwrite(str(folder / record["frame"]), image_rgb[..., ::-1])
+                    records.append(record)
+    HELD_OUT.camera.to_yaml(folder / "camera.yaml")
+    HELD_OUT.to_yaml(folder / "render.yaml")
+    write_records(folder / "truth.jsonl", records)
     networks = ["--overlay", "none", "--min-score", "0.01"]
     assert main(["estimate", str(folder), *networks, "--out", str(folder / "seen.jsonl")]) == 0
     return folder

@@ -18,7 +18,7 @@ workers:
   - path: [{t_s: 0.0, x_m: {uniform: {low: 3.0, high: 4.0}}, y_m: -1.0}]
 """
 COMMANDS = {
-    "crossings": ["--episodes", "1", "--policy", "blind", "--workers", "1", "--no-report"],
+    "crossings": ["--episodes", "1", "--policy", "blind", "--no-report"],
     "tune": ["--trials", "2", "--generation", "2", "--episodes", "1", "--held-out", "1"],
     "falsify": ["--episodes", "4", "--generation", "4", "--worst", "1"],
     "render": ["--frames", "2", "--scenes", "1", "--size", "64x48", "--processes", "1"],
@@ -33,7 +33,8 @@ def words(name, tmp_path):
         return [name, *COMMANDS[name], "--out", str(out)], out
     scenario = tmp_path / "short.yaml"
     scenario.write_text(SCENARIO)
-    always = ["--scenario", str(scenario), "--perception", "truth", "--out", str(out)]
+    always = ["--scenario", str(scenario), "--perception", "truth", "--workers", "1"]
+    always += ["--out", str(out)]
     return [name, *COMMANDS[name], *always], out
 
 
