@@ -151,7 +151,8 @@ def test_a_crossing_person_is_passed_behind(side: float, radius_m: float, start_
     person_y = person(run.states[crossing].stamp_s)[0][1]
     assert -side * (person_y - run.path_m[crossing, 1]) > radius_m
     assert run.duration_s < EMPTY_TIME_S + 2.0
-    assert reversals(run.speeds_mps) <= 9
+    # Giving way changes the speed once more: down early, up when the person has left.
+    assert reversals(run.speeds_mps) <= 11
 
 
 def test_a_person_who_has_passed_costs_no_time() -> None:

@@ -100,7 +100,7 @@ def test_commands_keep_to_the_limits_of_the_profile(situation, boxes) -> None:
         step = robot.max_yaw_acceleration_radps2 * DT_S
         assert abs(yaw_rate - state.yaw_rate_radps) <= step + ROUNDING
     else:
-        assert abs(yaw_rate) <= speed / robot.min_turning_radius_m + ROUNDING
+        assert abs(yaw_rate) <= abs(speed) / robot.min_turning_radius_m + ROUNDING  # or backward
 
 
 def drive(state: RobotState, speed_mps: float, yaw_rate_radps: float) -> RobotState:
