@@ -120,14 +120,18 @@ def position_sigma_m(track: PersonTrack, stamp_s: float) -> float:
     xx = x_x + dt * (x_u + u_x) + dt * dt * u_u
     yy = y_y + dt * (y_v + v_y) + dt * dt * v_v
     xy = x_y + dt * (x_v + u_y) + dt * dt * u_v
-    return math.sqrt(max(0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy), 0.0))
+    return math.sqrt(_larger_eigenvalue(xx, yy, xy))
 
 
 def velocity_variance_m2ps2(track: PersonTrack) -> float:
     """Return the variance of the velocity along its most uncertain direction."""
     _, _, (_, _, u_u, u_v), (_, _, _, v_v) = track.covariance_odom.tolist()
-    largest: float = 0.5 * (u_u + v_v) + math.hypot(0.5 * (u_u - v_v), u_v)
-    return max(largest, 0.0)
+    return _larger_eigenvalue(u_u, v_v, u_v)
+
+
+def _larger_eigenvalue(xx: float, yy: float, xy: float) -> float:
+    """Return the larger eigenvalue of a covariance on the plane; 0 if rounding makes it less."""
+    return max(0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy), 0.0)
 
 
 def has_jumped(before: PersonMemory, track: PersonTrack, walking_mps: float) -> bool:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Final, Literal, get_args
+from typing import Any, Final, Literal, get_args
 
 import numpy as np
 from shapely.geometry import MultiPoint
@@ -106,6 +106,15 @@ class RobotProfile:
                 name: positive(name) for name in _OPTIONAL_LIMITS if getattr(self, name) is not None
             },
         )
+
+    @classmethod
+    def of_settings(cls, settings: Any) -> RobotProfile:
+        """Return the profile of settings whose attributes have the names of its fields.
+
+        Raises:
+            NavError: for a value out of bounds.
+        """
+        return cls(**{each.name: getattr(settings, each.name) for each in fields(cls)})
 
     @property
     def moves_sideways(self) -> bool | None:

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -91,6 +92,25 @@ class PredictionModel(StrictConfig):
         if not all(0.1 <= factor <= 10.0 for factor in factors):
             raise ValueError(f"std_factors must lie in [0.1, 10], got {list(factors)}")
         return self
+
+    @classmethod
+    def from_calibration(cls, path: str | Path) -> PredictionModel:
+        """Read a whole file of ``awarenav tracks calibrate``, whose last keys are the factors.
+
+        Raises:
+            TrackingError: naming the file; it cannot be read, holds something else, or is not
+                whole.
+        """
+        model = cls.from_yaml(path)
+        missing = [
+            key for key in ("horizons_s", "std_factors") if key not in model.model_fields_set
+        ]
+        if missing:
+            raise TrackingError(
+                f"{path} must be a whole file of `awarenav tracks calibrate`, but has no "
+                f"{' and no '.join(missing)}"
+            )
+        return model
 
     def factors_at(self, times_s: FloatArray) -> FloatArray:
         """Return the factors (T,) on standard deviations at times (T,) in seconds."""

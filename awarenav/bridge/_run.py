@@ -31,6 +31,7 @@ from perception import AttentionCone, AwarenessPipeline, Camera, PersonDetector
 from perception.arrays import finite_number
 from perception.laser import MapCells
 from perception.shipped import simulator_networks_warning
+from tracking.prediction import PredictionModel
 
 from ..errors import AwarenavError, counted
 from ..estimate import (
@@ -59,6 +60,7 @@ class BridgeOptions:
 
     robot: Path
     policy: str
+    prediction: Path | None = None
     domain: int | None
     rate: float
     seconds: float | None
@@ -104,6 +106,7 @@ def bridge_command(options: BridgeOptions) -> int:
     domain = _domain(options.domain)
     robot = RobotFile.from_yaml(options.robot)
     policy = read_policy(options.policy)
+    prediction = _prediction(options.prediction)
     camera = None if options.camera is None else Camera.from_yaml(options.camera)
     published = _published_topics(
         options.topic, options.only, with_mask=options.speed_mask is not None
@@ -144,6 +147,7 @@ def bridge_command(options: BridgeOptions) -> int:
                 with_camera=not options.no_camera,
                 with_depth=inputs.depth is not None,
                 scanners=scanners,
+                prediction=prediction,
                 percentage=options.percentage,
                 speed_mask=mask,
                 warn=_log,
@@ -275,6 +279,10 @@ def _pipeline_maker(
         )
 
     return make
+
+
+def _prediction(path: Path | None) -> PredictionModel | None:
+    return None if path is None else PredictionModel.from_calibration(path)
 
 
 def _seconds(option: float | None) -> float | None:

@@ -16,6 +16,8 @@ _LOG: Final = "Recordings"
     examples=[
         "awarenav bridge --robot robot.yaml --networks robot_networks.yaml --scan scan",
         "awarenav bridge --robot robot.yaml --detector yolox-tiny --pose rtmpose-m",
+        "awarenav bridge --robot robot.yaml --networks robot_networks.yaml "
+        "--prediction prediction.yaml",
         "awarenav bridge --robot robot.yaml --no-camera --scan scan_front --scan scan_rear",
         "awarenav bridge --robot robot.yaml --no-camera --scan scan --bag drive --record seen.mcap",
     ],
@@ -31,6 +33,14 @@ _LOG: Final = "Recordings"
     help="Footprint, speeds, braking and mounts of the sensors (YAML, as docs/nav2/robot.yaml).",
 )
 @options.policy()
+@option(
+    "--prediction",
+    type=FilePath(),
+    show_default="none",
+    metavar="FILE",
+    help="Prediction calibrated on your own recordings, as `awarenav tracks calibrate` writes it: "
+    "for polygons with sweep_s, alerts and the speed mask.",
+)
 @option(
     "--domain",
     type=Whole(0, 232),

@@ -11,6 +11,7 @@ from perception import AwarenessPipeline, Camera, PerceptionError
 from perception.arrays import FloatArray
 from perception.laser import LegDetector, MapCells
 from tracking import PersonTrack, TrackerConfig, TrackingError
+from tracking.prediction import PredictionModel
 
 from .._adapter import NavAdapter
 from .._constraints import NavConstraints
@@ -69,13 +70,13 @@ class AwarenessBridge:
         publish: called with the key of a topic and a message.
         frames: names of the frames.
         T_base_camera: pose of a fixed camera; None to look it up in tf.
-        make_pipeline: makes perception for a camera, once it is known; by default with the shipped
-            networks.
+        make_pipeline: makes perception for a camera once it is known; by default the shipped one.
         camera: calibration; None to read it from camera_info. With it, the pipeline is made here.
         with_camera: False for scanners alone; everybody then counts as unaware.
         with_depth: True if the camera has depth images (:meth:`on_depth`).
         scanners: the laser scanners.
         make_detector: makes the leg detector, if there are scanners.
+        prediction: as for :class:`NavAdapter`.
         percentage: as in :func:`speed_limit`.
         speed_mask: of Nav2's speed filter; None for no mask.
         warn: called with each problem; a repeated text is passed on only once.
@@ -96,6 +97,7 @@ class AwarenessBridge:
         with_depth: bool = False,
         scanners: Sequence[ScannerInput] = (),
         make_detector: Callable[[], LegDetector] = LegDetector,
+        prediction: PredictionModel | None = None,
         percentage: bool = False,
         speed_mask: SpeedMaskSettings | None = None,
         warn: Callable[[str], None] = lambda text: None,
@@ -112,7 +114,7 @@ class AwarenessBridge:
         config = TrackerConfig(awareness=policy.filter, standing_window_s=policy.standing_window_s)
         self._tracker = SharedTracker(config, len(scanners))
         self._perception = ImagePerception(make_pipeline, self._tracker, camera)
-        self._adapter = NavAdapter(policy, robot)
+        self._adapter = NavAdapter(policy, robot, prediction=prediction)
         self._poses = RobotPoses(self.frames, T_base_camera)
         self._frame: PerceivedFrame | None = None
         self._clock = BridgeClock()

@@ -143,14 +143,4 @@ class RobotFile(StrictConfig):
             NavError: for a footprint without area, and a turning radius that does not go with the
                 drive.
         """
-        return RobotProfile(
-            footprint_m=np.array(self.footprint_m),
-            max_speed_mps=self.max_speed_mps,
-            max_acceleration_mps2=self.max_acceleration_mps2,
-            max_deceleration_mps2=self.max_deceleration_mps2,
-            reaction_time_s=self.reaction_time_s,
-            drive=self.drive,
-            max_yaw_rate_radps=self.max_yaw_rate_radps,
-            max_yaw_acceleration_radps2=self.max_yaw_acceleration_radps2,
-            min_turning_radius_m=self.min_turning_radius_m,
-        )
+        return RobotProfile.of_settings(self)

@@ -2,8 +2,9 @@
 
 Run it with ``python -m nav_adapter.ros2.node --ros-args -p robot_file:=robot.yaml``. The executor's
 thread publishes at a fixed rate; perception has threads of its own. Parameters:
-``robot_file`` (required), ``policy`` (``balanced``), ``rate_hz`` (20.0), ``scanners`` (number of
-laser scanners, 0 to 2), ``use_camera`` (true), ``use_map`` (false), ``compressed`` (false),
+``robot_file`` (required), ``policy`` (``balanced``), ``prediction_file`` (of ``awarenav tracks
+calibrate``; by default none), ``rate_hz`` (20.0), ``scanners`` (number of laser scanners, 0 to 2),
+``use_camera`` (true), ``use_map`` (false), ``compressed`` (false),
 ``depth`` (false; whether the camera has depth images),
 ``percentage`` (false), ``detector_file`` and ``pose_file`` (ONNX; by default the shipped networks),
 ``allow_simulator_networks`` (false; the shipped networks have seen renders only, and are refused
@@ -37,6 +38,8 @@ from perception.shipped import (
     simulator_networks,
     simulator_networks_warning,
 )
+from tracking import TrackingError
+from tracking.prediction import PredictionModel
 
 from .._errors import NavError
 from .._policy import AwarenessPolicy
@@ -74,6 +77,7 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
 
     Raises:
         NavError: without rclpy or ``nav2_msgs``, or for a wrong parameter.
+        TrackingError: for a file of ``prediction_file`` that cannot be used.
     """
 
     def __init__(self) -> None:
@@ -85,6 +89,7 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
         super().__init__("awarenav")
         robot = RobotFile.from_yaml(self._parameter("robot_file", ""))
         policy = self._parameter("policy", "balanced")
+        calibration = self._parameter("prediction_file", "")
         use_camera = self._parameter("use_camera", True)
         use_depth = use_camera and self._parameter("depth", False)
         scans = self._scan_topics(self._parameter("scanners", 0))
@@ -103,6 +108,7 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
                 self._parameter("camera_frame", ""),
             ),
             T_base_camera=None if robot.camera is None else robot.camera.T_base_camera(),
+            prediction=PredictionModel.from_calibration(calibration) if calibration else None,
             percentage=self._parameter("percentage", False),
             speed_mask=self._speed_mask(),
             make_pipeline=_pipelines(
@@ -232,7 +238,7 @@ def main() -> int:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = AwarenessNode()
-    except (NavError, PerceptionError) as problem:
+    except (NavError, PerceptionError, TrackingError) as problem:
         print(f"awarenav node: {problem}", file=sys.stderr)
         return 2
     try:

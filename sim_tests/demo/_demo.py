@@ -15,7 +15,7 @@ from perception.arrays import ImageRgb
 
 from ..crossing import CrossingResult, run_crossing
 from ..crossing.eyes import Perception
-from ..scenario import Scenario
+from ..scenario import Scenario, ScenarioTemplate
 from ._cases import case_values
 from ._comparison_plot import plot_comparison
 from ._encounter import run_encounter
@@ -51,23 +51,34 @@ class ComparisonRow:
 
 
 def compare_policies(
-    seed: int = 0, perception: str = "keypoints", progress: bool = False, filmed: bool = False
+    seed: int = 0,
+    perception: str = "keypoints",
+    progress: bool = False,
+    filmed: bool = False,
+    *,
+    robot: str = "",
+    population: str = "",
 ) -> tuple[ComparisonRow, ...]:
     """Run the same crossing without people, as today, blind, and aware with two kinds of worker.
 
-    The worker walks the same path in every run. Only the gaze and the robot's policy differ. The
-    robot has a camera and laser scanners; today's robot has the scanners alone.
+    Only the gaze and the robot's policy differ. A scripted worker walks the same path in every run;
+    a recorded one begins the same, and then answers to the robot. The robot has a camera and laser
+    scanners; today's robot has the scanners alone.
 
     Args:
         seed: seed of everything random.
         perception: ``"keypoints"`` or ``"pixels"``.
         progress: whether to show a progress bar, on a terminal.
         filmed: whether to take the pictures for the film.
+        robot: a shipped name or a YAML file of the robot; empty for the Nova Carter.
+        population: habits of the worker, ``"classic"`` or ``"recorded"``; empty for the scenario's.
+
+    Raises:
+        SimError: an unknown robot or population.
     """
+    attentive, distracted = _crossings(robot, population)
     both = Perception.of(perception, "camera+scanner").name
     alone = Perception.of(perception, "scanner").name
-    attentive = Scenario.shipped("crossing_attentive")
-    distracted = Scenario.shipped("crossing_distracted")
     runs = (
         ("nobody there", attentive.without_people(), "balanced", both),
         ("today's AMR", attentive, "scanner", alone),
@@ -91,6 +102,15 @@ def compare_policies(
             portraits = () if recorder is None else recorder.portraits
             rows.append(ComparisonRow(label, result, scenario, portraits))
     return tuple(rows)
+
+
+def _crossings(robot: str, population: str) -> tuple[Scenario, Scenario]:
+    """Return the crossings with an attentive and with a distracted worker."""
+    attentive, distracted = (
+        ScenarioTemplate.shipped(name).with_population(population).with_robot(robot).median()
+        for name in ("crossing_attentive", "crossing_distracted")
+    )
+    return attentive, distracted
 
 
 def film_runs(rows: tuple[ComparisonRow, ...]) -> tuple[FilmRun, ...]:
@@ -198,6 +218,8 @@ def run_demo(
     seed: int = 0,
     video: bool = True,
     perception: str = "keypoints",
+    robot: str = "",
+    population: str = "",
     as_json: bool = False,
 ) -> None:
     """Run the demonstration and write its files.
@@ -208,8 +230,14 @@ def run_demo(
         seed: seed of everything random.
         video: whether to render the films.
         perception: ``"keypoints"``, or ``"pixels"``: rendered images, through the shipped networks.
+        robot: robot of the crossings, as for :func:`compare_policies`.
+        population: likewise.
         as_json: print the tables as JSON.
+
+    Raises:
+        SimError: an unknown robot or population; nothing is written then.
     """
+    _crossings(robot, population)  # refuses unknown names before anything runs
     if perception == "pixels":
         AwarenessPipeline(Camera.from_fov(640, 480, 1.0))  # fails now if networks are missing
     # With JSON on standard output, text goes to standard error.
@@ -228,7 +256,9 @@ def run_demo(
         )
     print(encounter_table(encounter), file=text_stream)
     print("\nThe same crossing, with and without awareness", file=text_stream)
-    rows = compare_policies(seed, perception, progress=True, filmed=video)
+    rows = compare_policies(
+        seed, perception, progress=True, filmed=video, robot=robot, population=population
+    )
     with EpisodeTable(out / "episodes.csv") as table:
         for row in rows:
             table.add(row.result)

@@ -9,16 +9,30 @@ from awarenav.cli import FilePath, command, option, options
 
 @command(
     "demo",
-    examples=["awarenav demo --out demo"],
+    examples=[
+        "awarenav demo --out demo",
+        "awarenav demo --robot omni --population recorded --no-video --out omni",
+    ],
     exit_status={0: "Success.", 2: "Bad input, or the extra 'sim' is missing."},
-    epilog="Needs the extra 'sim'.",
+    epilog="Needs the extra 'sim'. The encounter keeps the paper's robot and its scripted worker.",
 )
 @options.out_folder("demo")
 @options.seed()
 @option("--no-video", is_flag=True, help="Write no films (faster).")
 @options.perception(["keypoints", "pixels"], note=" 'pixels' takes many minutes.")
+@options.robot()
+@options.population()
 @options.as_json("the tables")
-def demo(out: Path, seed: int, *, no_video: bool, perception: str, as_json: bool) -> int:
+def demo(
+    out: Path,
+    seed: int,
+    *,
+    no_video: bool,
+    perception: str,
+    robot: str,
+    population: str | None,
+    as_json: bool,
+) -> int:
     """Run the paper's 25 s encounter, and one crossing with and without awareness.
 
     Prints the results. Writes encounter.png, encounter.mp4 and encounter.csv; crossings.png and
@@ -26,7 +40,15 @@ def demo(out: Path, seed: int, *, no_video: bool, perception: str, as_json: bool
     """
     from ._demo import run_demo  # noqa: PLC0415 - help needs no simulator
 
-    run_demo(out, seed=seed, video=not no_video, perception=perception, as_json=as_json)
+    run_demo(
+        out,
+        seed=seed,
+        video=not no_video,
+        perception=perception,
+        robot=robot,
+        population=population or "",
+        as_json=as_json,
+    )
     return 0
 
 

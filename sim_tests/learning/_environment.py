@@ -16,6 +16,7 @@ from perception import AttentionCone
 from perception.arrays import FloatArray
 from perception.installation import install_command
 
+from ..actors.behaviour import known_population
 from ..actors.robot import NOVA_CARTER, RobotModel
 from ..crossing import (
     STANDING_SPEED_MPS,
@@ -76,6 +77,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         render_view: ``"top"`` for a plan, ``"camera"`` for the robot's camera.
         robot: another robot, to which every scenario is fitted: a model, a shipped name, a YAML
             file or a profile. A holonomic one is driven by speed and yaw rate too.
+        population: habits of the people, as for ``run_crossing``; None for each scenario's own.
 
     Raises:
         SimError: for arguments that are not valid.
@@ -102,6 +104,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         render_mode: str | None = None,
         render_view: View = "top",
         robot: RobotModel | RobotProfile | str | Path | None = None,
+        population: str | None = None,
     ) -> None:
         EzPickle.__init__(
             self,
@@ -117,6 +120,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
             render_mode=render_mode,
             render_view=render_view,
             robot=robot,
+            population=population,
         )
         if isinstance(scenarios, (str, Scenario, ScenarioTemplate)):
             scenarios = (scenarios,)
@@ -150,6 +154,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
             }
         )
         self.observation_space = cast("spaces.Space[Observation]", arrays)
+        self._population = None if population is None else known_population(population)
         self._robot = None if robot is None else RobotModel.of(robot)
         profile = NOVA_CARTER if self._robot is None else self._robot.profile
         limits = np.array(action_limits(profile))
@@ -204,6 +209,8 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         scenario = template if isinstance(template, Scenario) else template.for_seed(episode_seed)
         if self._control_hz is not None:
             scenario = scenario.model_copy(update={"control_hz": self._control_hz})
+        if self._population is not None:
+            scenario = scenario.with_population(self._population)
         if self._robot is not None:
             scenario = scenario_for_robot(scenario, self._robot)
         self.close()

@@ -27,7 +27,7 @@ _LOCKS: Final = ("locks/*.lock",)
 
 
 def common_settings(
-    policy: str, scenarios: Sequence[str], camera: str, population: str = ""
+    policy: str, scenarios: Sequence[str], camera: str, population: str = "", robot: str = ""
 ) -> dict[str, Any]:
     """Return the settings that tuning and falsification share, as plain values.
 
@@ -36,19 +36,20 @@ def common_settings(
         scenarios: shipped names, YAML files, or ``"all"``.
         camera: as for :meth:`ScenarioTemplate.with_camera`.
         population: as for :meth:`ScenarioTemplate.with_population`.
+        robot: as for :meth:`ScenarioTemplate.with_robot`.
 
     Returns:
         ``policy_name``, and ``policy`` and ``scenarios`` as YAML.
 
     Raises:
-        SimError: an unknown scenario or camera.
+        SimError: an unknown scenario, camera or robot.
         NavError: an unusable policy.
     """
     return {
         "policy_name": Path(policy).stem,
         "policy": policy_text(read_policy(policy)),
         "scenarios": tuple(
-            each.to_text() for each in named_templates(scenarios, camera, population)
+            each.to_text() for each in named_templates(scenarios, camera, population, robot)
         ),
     }
 

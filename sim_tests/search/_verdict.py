@@ -52,6 +52,10 @@ class EpisodeOptions(Protocol):
         """Another population of people; None for each scenario's own."""
 
     @property
+    def robot(self) -> str:
+        """Another robot; empty for the Nova Carter."""
+
+    @property
     def planner(self) -> str:
         """``"module:Class"``, empty for the reference planner."""
 
@@ -62,6 +66,7 @@ def episode_words(options: EpisodeOptions) -> list[str]:
     words += Perception.of(options.perception, options.sensors).options.split()
     for name, value in (
         ("--camera", options.camera),
+        ("--robot", options.robot),
         ("--population", options.population),
         ("--planner", options.planner),
     ):

@@ -23,6 +23,8 @@ from test_ros2_bridge import INFO, image, odometry
 from nav_adapter import NavError
 from nav_adapter.ros2 import MASK_TOPICS, PUBLISHED, READ, RobotFile, ScannerMount, node
 from nav_adapter.ros2.conversions import to_ros
+from tracking import TrackingError
+from tracking.prediction import PredictionModel
 
 PATIENCE_S = 20.0
 
@@ -150,6 +152,22 @@ def test_the_node_refuses_sensors_that_make_no_sense(
     monkeypatch.setattr(StandInNode, "parameters", parameters)
     with pytest.raises(NavError, match=text):
         node_module.AwarenessNode()
+
+
+def test_the_node_takes_a_calibrated_prediction_or_refuses_the_file(
+    node_module: Any, two_scanners: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    path = tmp_path / "prediction.yaml"
+    monkeypatch.setitem(StandInNode.parameters, "prediction_file", str(path))
+    with pytest.raises(TrackingError, match=r"prediction\.yaml"):
+        node_module.AwarenessNode()
+    model = PredictionModel(horizons_s=(1.0,), std_factors=(1.2,))
+    model.to_yaml(path)
+    ros_node = node_module.AwarenessNode()
+    try:
+        assert ros_node._bridge._adapter._prediction == model
+    finally:
+        ros_node.stop()
 
 
 def test_the_node_reads_a_map_and_tf_beside_fixed_mounts(

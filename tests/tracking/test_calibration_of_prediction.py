@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from perception.arrays import FloatArray
 from tracking import TrackingError
 from tracking.calibration import HORIZONS_S, FollowedPerson, calibrate
-from tracking.prediction import REGION_SHARE
+from tracking.prediction import REGION_SHARE, PredictionModel
 from tracking.smoothing import SmoothedPath
 
 PERIOD_S = 0.1
@@ -96,3 +98,23 @@ def test_what_cannot_be_calibrated_is_refused(
     with pytest.raises(TrackingError) as refused:
         calibrate(crowd, horizons_s=horizons_s)
     assert words in str(refused.value)
+
+
+def test_a_calibration_is_read_as_it_was_written_or_not_at_all(tmp_path: Path) -> None:
+    model = PredictionModel(horizons_s=(0.2, 1.0, 2.0), std_factors=(0.9, 1.1, 1.3))
+    path = tmp_path / "prediction.yaml"
+    model.to_yaml(path)
+    assert PredictionModel.from_calibration(path) == model
+    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    for kept in range(len(lines)):  # as a copy that was interrupted leaves it
+        path.write_text("".join(lines[:kept]), encoding="utf-8")
+        with pytest.raises(TrackingError, match=r"prediction\.yaml"):
+            PredictionModel.from_calibration(path)
+
+
+def test_a_file_without_factors_is_a_model_and_no_calibration(tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text("sway_s: 0.03\nhorizons_s: []\n", encoding="utf-8")
+    assert PredictionModel.from_yaml(path).sway_s == 0.03
+    with pytest.raises(TrackingError, match=r"must be a whole file of .* but has no std_factors$"):
+        PredictionModel.from_calibration(path)

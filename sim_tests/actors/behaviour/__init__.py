@@ -15,11 +15,13 @@ from ._person import (
 )
 from ._population import (
     DEFAULT_POPULATION,
+    FASTEST_RECORDED_MPS,
     POPULATIONS,
     PopulationName,
     RecordedWalker,
     draw_person,
     known_population,
+    median_person,
     walker_of,
 )
 from ._replayed import RecordedPath, Replayed, read_recordings, replayed_people
@@ -32,6 +34,7 @@ __all__ = [
     "ALONE",
     "DECISION_PERIOD_S",
     "DEFAULT_POPULATION",
+    "FASTEST_RECORDED_MPS",
     "LOOK_WITHIN_S",
     "POPULATIONS",
     "START_SHARES",
@@ -57,6 +60,7 @@ __all__ = [
     "displaced_people",
     "draw_person",
     "known_population",
+    "median_person",
     "read_recordings",
     "replayed_people",
     "start_share",

@@ -38,6 +38,8 @@ _VARIATION: Final = VariationFigures(
 _SPEED_MPS: Final = (1.42, 0.09)
 _HURRY_SHARE: Final = 0.04
 _HURRY_MPS: Final = (1.9, 2.5)
+#: Highest speed of recorded people, unless the scenario has a higher one.
+FASTEST_RECORDED_MPS: Final = _HURRY_MPS[1]
 # Share of the speed that people keep near a robot that they know of.
 _NEAR_ROBOT_SHARE: Final = 0.91
 _NEAR_ROBOT_M: Final = 12.0
@@ -82,13 +84,30 @@ def draw_person(spec: PersonSpec, rng: np.random.Generator) -> PersonSpec:
     """Return a person with the same task, and with a recorded person's speed and glances.
 
     Somebody who runs or dawdles keeps the speed, and somebody who watches the robot goes on
-    watching it.
+    watching it. Somebody who is to stay as written keeps everything.
     """
+    if spec.as_written:
+        return spec
     speed, hurries = float(rng.normal(*_SPEED_MPS)), rng.random() < _HURRY_SHARE
     hurry = float(rng.uniform(*_HURRY_MPS))
+    return _as_recorded(spec, hurry if hurries else max(speed, 0.5))
+
+
+def median_person(spec: PersonSpec) -> PersonSpec:
+    """Return the person of :func:`draw_person` with every draw at its median, to stay as written.
+
+    Whether somebody looks at all remains a draw, with the recorded share.
+    """
+    if spec.as_written:
+        return spec
+    return _as_recorded(spec, _SPEED_MPS[0]).model_copy(update={"as_written": True})
+
+
+def _as_recorded(spec: PersonSpec, speed_mps: float) -> PersonSpec:
+    """Return a person with recorded glances, and with a speed unless the task has a special one."""
     changes: dict[str, Any] = {}
     if _DAWDLING_MPS < spec.speed_mps < _RUNNING_MPS:
-        changes["speed_mps"] = hurry if hurries else max(speed, 0.5)
+        changes["speed_mps"] = speed_mps
     glances = {
         "glance_median_s": _GLANCE_MEDIAN_S,
         "glance_quartiles_s": _GLANCE_QUARTILES_S,

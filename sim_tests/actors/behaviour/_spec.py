@@ -166,6 +166,7 @@ class PersonSpec(StrictConfig):
         keeps_off_m: distance from the body's centre that the person keeps from a known robot ahead;
             more for a person who walks behind the robot.
         social: social forces of racks, people and, once it has been noticed, the robot.
+        as_written: a population that draws speeds and glances keeps those of this person.
     """
 
     error: ClassVar[type[ValueError]] = SimError
@@ -186,6 +187,7 @@ class PersonSpec(StrictConfig):
     lapse: Lapse | None = None
     keeps_off_m: float = Field(default=0.45, ge=0.3, le=3.0)
     social: bool = True
+    as_written: bool = False
 
     @model_validator(mode="after")
     def _low_people_stay(self) -> PersonSpec:

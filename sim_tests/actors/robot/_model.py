@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
-from typing import ClassVar, Final, Literal
+from typing import Any, ClassVar, Final, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -105,7 +106,7 @@ class RobotModel(StrictConfig):
                     f"y {y0:g} to {y1:g} m"
                 )
         try:
-            self._make_profile()
+            RobotProfile.of_settings(self)
         except NavError as cause:
             raise ValueError(str(cause)) from cause
         return self
@@ -146,26 +147,13 @@ class RobotModel(StrictConfig):
     @cached_property
     def profile(self) -> RobotProfile:
         """The profile, for adapter and planner."""
-        return NOVA_CARTER if self.body == "nova_carter" else self._make_profile()
+        return NOVA_CARTER if self.body == "nova_carter" else RobotProfile.of_settings(self)
 
     @cached_property
     def outline_m(self) -> FloatArray:
         """The corners (M, 2) of the convex outline, counter-clockwise."""
         hull = MultiPoint(self.footprint_m).convex_hull
         return np.array(hull.exterior.coords, dtype=np.float64)[-2::-1]
-
-    def _make_profile(self) -> RobotProfile:
-        return RobotProfile(
-            footprint_m=np.array(self.footprint_m),
-            max_speed_mps=self.max_speed_mps,
-            max_acceleration_mps2=self.max_acceleration_mps2,
-            max_deceleration_mps2=self.max_deceleration_mps2,
-            reaction_time_s=self.reaction_time_s,
-            drive=self.drive,
-            max_yaw_rate_radps=self.max_yaw_rate_radps,
-            max_yaw_acceleration_radps2=self.max_yaw_acceleration_radps2,
-            min_turning_radius_m=self.min_turning_radius_m,
-        )
 
 
 def shipped_robots() -> tuple[str, ...]:
@@ -207,15 +195,6 @@ def _from_profile(profile: RobotProfile) -> RobotModel:
     )
 
 
-def _limits(profile: RobotProfile) -> dict[str, object]:
-    return {
-        "footprint_m": tuple((x, y) for x, y in profile.footprint_m.tolist()),
-        "max_speed_mps": profile.max_speed_mps,
-        "max_acceleration_mps2": profile.max_acceleration_mps2,
-        "max_deceleration_mps2": profile.max_deceleration_mps2,
-        "reaction_time_s": profile.reaction_time_s,
-        "drive": profile.drive,
-        "max_yaw_rate_radps": profile.max_yaw_rate_radps,
-        "max_yaw_acceleration_radps2": profile.max_yaw_acceleration_radps2,
-        "min_turning_radius_m": profile.min_turning_radius_m,
-    }
+def _limits(profile: RobotProfile) -> dict[str, Any]:
+    values = {each.name: getattr(profile, each.name) for each in fields(profile)}
+    return {**values, "footprint_m": tuple((x, y) for x, y in profile.footprint_m.tolist())}

@@ -78,7 +78,10 @@ def add_joint(data: dict[str, Any], values: Mapping[str, float]) -> None:
 
 
 def is_joint_possible(
-    data: Mapping[str, Any], values: Mapping[str, float], boxes_odom_m: FloatArray
+    data: Mapping[str, Any],
+    values: Mapping[str, float],
+    boxes_odom_m: FloatArray,
+    robot_longer_m: float = 0.0,
 ) -> bool:
     """Return whether people begin apart, and a parked pallet blocks no way.
 
@@ -86,6 +89,7 @@ def is_joint_possible(
         data: the changed scenario.
         values: as for :func:`add_joint`.
         boxes_odom_m: (N, 4) racks, walls and props of the scenario as written.
+        robot_longer_m: how much farther the robot reaches than the Nova Carter.
     """
     paths = [person_path(person) for person in data["people"]]
     if values.get("companion.kind", 0.0) > _KINDS[0]:
@@ -100,7 +104,7 @@ def is_joint_possible(
         return False
     task = data["robot"]
     way = [[task["start_x_m"], task["start_y_m"]], [task["goal_x_m"], task["goal_y_m"]]]
-    ways = [(np.array(way), PALLET_LANE_CLEARANCE_M)]
+    ways = [(np.array(way), PALLET_LANE_CLEARANCE_M + robot_longer_m)]
     ways += [(path, PALLET_CLEARANCE_M) for path in paths]
     return all(place.distance(_line(path)) >= clearance for path, clearance in ways)
 
@@ -159,4 +163,5 @@ def _companion(person: dict[str, Any], values: Mapping[str, float]) -> dict[str,
         "start_s": max(person["start_s"] + later_s, 0.0),
         "activity": "carry_box" if _KINDS[1] < kind <= _KINDS[2] else "none",
         "glances": {"notices_within_m": 0.0},
+        "as_written": person["as_written"],
     }

@@ -31,8 +31,15 @@ _LOOKS_ON_S: Final = 10.0
 _REACTIONS: Final = ("walk_on", "wait", "hurry", "pass_behind", "claim")
 
 
-def person_parameters(person: Mapping[str, Any]) -> dict[str, Parameter]:
-    """Return the parameters of a person: start, speed, route, a pause, gaze, reaction, lapse."""
+def person_parameters(
+    person: Mapping[str, Any], fastest_mps: float = FASTEST_WALK_MPS
+) -> dict[str, Parameter]:
+    """Return the parameters of a person: start, speed, route, a pause, gaze, reaction, lapse.
+
+    Args:
+        person: the person in the scenario as written.
+        fastest_mps: highest speed of somebody who walks ahead.
+    """
     start_s, speed_mps = float(person["start_s"]), float(person["speed_mps"])
     walks = len(person["route"]) > 1
     parameters = {
@@ -40,7 +47,7 @@ def person_parameters(person: Mapping[str, Any]) -> dict[str, Parameter]:
         "aside_last_m": Parameter.of(-_ASIDE_M, _ASIDE_M, 0.0),
     }
     if walks:
-        fastest = FASTEST_BACKWARDS_MPS if person["backwards"] else FASTEST_WALK_MPS
+        fastest = FASTEST_BACKWARDS_MPS if person["backwards"] else fastest_mps
         parameters |= {
             "start_s": Parameter.of(max(start_s - _EARLIER_S, 0.0), start_s + _EARLIER_S, start_s),
             "speed_mps": Parameter.of(_SLOWEST_MPS, fastest, speed_mps),

@@ -32,6 +32,7 @@ class FalsifyOptions:
     perception: PerceptionKind
     sensors: SensorSet
     camera: str
+    robot: str
     population: str | None
     planner: str
     unsafe_no_floor: bool
@@ -52,7 +53,11 @@ def falsify_command(options: FalsifyOptions) -> int:
     """
     settings = FalsifySettings(
         **common_settings(
-            options.policy, options.scenario, options.camera, options.population or ""
+            options.policy,
+            options.scenario,
+            options.camera,
+            options.population or "",
+            options.robot,
         ),
         episodes=options.episodes,
         people=options.people,
@@ -127,9 +132,9 @@ def _next_command(falsification: Falsification, options: FalsifyOptions) -> str:
     base = policy_against(options.against, falsification.settings)
     other = options.against or (base[0] if base else "")
     if falsification.contacts:
-        # The file has the camera and the population.
+        # The file has the camera, the robot and the population.
         worst = (str(options.out / "worst_001.yaml"),)
-        found = replace(options, scenario=worst, camera="", population=None)
+        found = replace(options, scenario=worst, camera="", robot="", population=None)
         return command_text(
             *("crossings", *episode_words(found), "--policy", own, other),
             *("--seed", options.seed, "--episodes", 1, "--out", options.out / "worst"),

@@ -10,11 +10,18 @@ from pydantic import ValidationError
 
 from perception.arrays import FloatArray
 
+from ...actors.behaviour import FASTEST_RECORDED_MPS, PersonSpec, median_person
+from ...actors.robot import NOVA_CARTER
 from ...scenario import Choice, Distribution, Integers, Scenario, ScenarioTemplate
 from ...world.errors import SimError
 from .._optimizer import Range
 from ._joint_parameters import add_joint, is_joint_possible, joint_parameters
-from ._person_parameters import changed_person, person_parameters, person_path
+from ._person_parameters import (
+    FASTEST_WALK_MPS,
+    changed_person,
+    person_parameters,
+    person_path,
+)
 from ._script_parameters import changed_script, is_human, script_parameters, script_path
 from ._variation import RACK_CLEARANCE_M, ROBOT_CLEARANCE_M, Parameter, clearance_m
 
@@ -22,8 +29,8 @@ from ._variation import RACK_CLEARANCE_M, ROBOT_CLEARANCE_M, Parameter, clearanc
 _SHARES: Final = (1.0, 0.75, 0.5, 0.25, 0.0)
 # Searched by quantile, because nothing exists between their values.
 _DISCRETE: Final = (Choice, Integers)
-# Parameters of each kind of person, by its key in the scenario.
-_PARAMETERS: Final = {"workers": script_parameters, "people": person_parameters}
+# Kinds of people, by their keys in the scenario.
+_KINDS: Final = ("workers", "people")
 
 
 class ScenarioSpace:
@@ -34,6 +41,10 @@ class ScenarioSpace:
     pallet, or exchange two people's ways (:func:`joint_parameters`). A variation that leads through
     a rack, begins at the robot or exceeds human speed or acceleration is drawn back towards the
     scenario as written, as far as needed. Every point of the space is therefore a scenario.
+
+    The varied people of the recorded population do not draw their speed and glances. These begin at
+    the population's medians instead (:func:`~sim_tests.actors.behaviour.median_person`), and are
+    parameters as in the classic one.
 
     Args:
         template: the scenario.
@@ -48,15 +59,21 @@ class ScenarioSpace:
         median = template.median()
         self._median: dict[str, Any] = median.model_dump(mode="json")
         self._boxes = median.layout.obstacle_boxes_odom
-        everybody = [(kind, row) for kind in _PARAMETERS for row in range(len(self._median[kind]))]
+        self._longer_m = 0.0
+        if median.robot_model is not None:
+            reach_m = median.robot_model.profile.circumscribed_radius_m
+            self._longer_m = max(reach_m - NOVA_CARTER.circumscribed_radius_m, 0.0)
+        self._is_recorded = median.population == "recorded"
+        everybody = [(kind, row) for kind in _KINDS for row in range(len(self._median[kind]))]
         varied = everybody[:people]
         if not varied:
             raise SimError(f"scenario {template.name!r} has no people to vary")
         self._varied_people = varied
+        self._take_medians(self._median)
         self._distributions = template.parameters()
         self.parameters: dict[str, Parameter] = {}
         for kind, row in varied:
-            for name, parameter in _PARAMETERS[kind](self._median[kind][row]).items():
+            for name, parameter in self._own_parameters(kind, row).items():
                 self.parameters[f"{kind}.{row}.{name}"] = parameter
         reactive = [self._median[kind][row] for kind, row in varied if kind == "people"]
         self._joint = joint_parameters(reactive)
@@ -98,6 +115,7 @@ class ScenarioSpace:
         }
         data: dict[str, Any] = self.template.with_values(drawn).model_dump(mode="json")
         data["start_jitter_s"] = 0.0
+        self._take_medians(data)
         for kind, row in self._varied_people:
             prefix = f"{kind}.{row}."
             own_values = {
@@ -110,11 +128,26 @@ class ScenarioSpace:
         add_joint(data, {name: values[name] for name in self._joint})
         return data
 
+    def _own_parameters(self, kind: str, row: int) -> dict[str, Parameter]:
+        person = self._median[kind][row]
+        if kind == "workers":
+            return script_parameters(person)
+        fastest = FASTEST_RECORDED_MPS if self._is_recorded else FASTEST_WALK_MPS
+        return person_parameters(person, fastest)
+
+    def _take_medians(self, data: dict[str, Any]) -> None:
+        """Give the varied people of the recorded population its medians."""
+        if not self._is_recorded:
+            return
+        for kind, row in self._varied_people:
+            if kind == "people":
+                person = PersonSpec.model_validate(data[kind][row])
+                data[kind][row] = median_person(person).model_dump(mode="json")
+
     def _is_possible(self, data: Mapping[str, Any], values: Mapping[str, float]) -> bool:
         robot = np.array([data["robot"]["start_x_m"], data["robot"]["start_y_m"]])
-        if not is_joint_possible(data, values, self._boxes) or not self._is_companion_possible(
-            data, robot
-        ):
+        joint = is_joint_possible(data, values, self._boxes, self._longer_m)
+        if not joint or not self._is_companion_possible(data, robot):
             return False
         for kind, row in self._varied_people:
             changed, original = data[kind][row], self._median[kind][row]
@@ -127,7 +160,7 @@ class ScenarioSpace:
                     clearance_m(original_path, self._boxes),
                 ),
                 (
-                    ROBOT_CLEARANCE_M,
+                    ROBOT_CLEARANCE_M + self._longer_m,
                     float(np.linalg.norm(path[0] - robot)),
                     float(np.linalg.norm(original_path[0] - robot)),
                 ),
@@ -144,7 +177,7 @@ class ScenarioSpace:
             path = person_path(person)
             if clearance_m(path, self._boxes) < RACK_CLEARANCE_M - 1e-9:
                 return False
-            if float(np.linalg.norm(path[0] - robot)) < ROBOT_CLEARANCE_M:
+            if float(np.linalg.norm(path[0] - robot)) < ROBOT_CLEARANCE_M + self._longer_m:
                 return False
         return True
 

@@ -58,6 +58,7 @@ from awarenav.cli import POSITIVE, command, option, options
 @options.perception()
 @options.sensors()
 @options.camera()
+@options.robot()
 @options.population()
 @options.planner()
 @option(
@@ -77,10 +78,11 @@ def falsify(**values: Any) -> int:
     """Search for the situations in which a policy does worst.
 
     Varies start, path, speed, pauses, gaze and reactions of a scenario's people, within human
-    limits, and looks for the smallest separation margin while the robot moves. Ends with a verdict
-    against another policy in the same situations, and the next command. Writes
-    worst_001.yaml and so on (`awarenav crossings --scenario` runs them again), episodes.csv,
-    falsify.png, summary.json and the studies.
+    limits, and looks for the smallest separation margin while the robot moves. People of
+    --population recorded do not draw the speed and glances that are varied; --seed draws their
+    pace, sway and starts by chance. Ends with a verdict against another policy in the same
+    situations, and the next command. Writes worst_001.yaml and so on (`awarenav crossings
+    --scenario` runs them again), episodes.csv, falsify.png, summary.json and the studies.
     """
     from ._run import FalsifyOptions, falsify_command  # noqa: PLC0415 - help needs no simulator
 

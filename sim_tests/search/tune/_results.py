@@ -11,6 +11,7 @@ from typing import Any, Final
 from awarenav.errors import counted
 from awarenav.files import csv_number, write_text
 
+from ...actors.behaviour import DEFAULT_POPULATION
 from ...study.measures import Interval
 from ...study.runs import policy_text
 from ...world.errors import SimError
@@ -184,7 +185,7 @@ def _header(tuning: Tuning, candidate: Candidate, name: str) -> str:
     lines = [
         f"{name.replace('_', ' ')}: {which} in a "
         f"tuning of {settings.policy_name} ({settings.sampler}, seed {settings.seed}, perception "
-        f"{settings.perception}).",
+        f"{settings.perception}{_others(tuning)}).",
         f"On {counted(len(held_out.records), 'held-out episode')} (seeds "
         f"{_ends(settings.held_out_seeds)} in {', '.join(_scenarios(tuning))}), means with 95 % "
         "intervals:",
@@ -200,6 +201,16 @@ def _header(tuning: Tuning, candidate: Candidate, name: str) -> str:
         f"deepest negative margin {held_out.deficit_m:.3f} m"
     )
     return "".join(f"# {line}\n" for line in lines)
+
+
+def _others(tuning: Tuning) -> str:
+    """Return robots and populations that are not the default."""
+    medians = [template.median() for template in tuning.settings.templates]
+    robots = {each.robot_model.name for each in medians if each.robot_model is not None}
+    populations = {each.population for each in medians} - {DEFAULT_POPULATION}
+    words = [f"robot {name}" for name in sorted(robots)]
+    words += [f"{name} people" for name in sorted(populations)]
+    return "".join(f", {each}" for each in words)
 
 
 def _scenarios(tuning: Tuning) -> list[str]:

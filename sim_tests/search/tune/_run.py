@@ -33,6 +33,7 @@ class TuneOptions:
     perception: PerceptionKind
     sensors: SensorSet
     camera: str
+    robot: str
     population: str | None
     planner: str
     seed: int
@@ -51,7 +52,11 @@ def tune_command(options: TuneOptions) -> int:
         NavError: an unusable policy.
     """
     common = common_settings(
-        options.policy, options.scenario, options.camera, options.population or ""
+        options.policy,
+        options.scenario,
+        options.camera,
+        options.population or "",
+        options.robot,
     )
     ranges = shipped_ranges() if options.ranges is None else read_ranges(options.ranges)
     settings = TuneSettings(

@@ -81,9 +81,9 @@ def held_out_scenarios(
     """Return the names of the scenarios that no trial runs.
 
     Args:
-        given: names; ``"third"`` for every third scenario, the second of three first, in the order
-            of what people look at (attentive, mixed, unaware) and of the names; or ``"none"``.
-            Of fewer than three scenarios, ``"third"`` holds none out.
+        given: names, with or without the robot's; ``"third"`` for every third scenario, the second
+            of three first, in the order of what people look at (attentive, mixed, unaware) and of
+            the names; or ``"none"``. Of fewer than three scenarios, ``"third"`` holds none out.
         templates: all scenarios of the tuning.
 
     Raises:
@@ -94,9 +94,11 @@ def held_out_scenarios(
         return ()
     if tuple(given) == (THIRD,):
         return tuple(names[1::3]) if len(names) >= 3 else ()
+    meant = {also: each.name for each in templates for also in each.names}
     for name in given:
-        if name not in names:
+        if name not in meant:
             raise SimError(not_one_of("--hold-out-scenarios", name, (THIRD, NONE, *names)))
-    if len(set(given)) == len(names):
+    chosen = {meant[name] for name in given}
+    if len(chosen) == len(names):
         raise SimError("--hold-out-scenarios must leave a scenario to tune on, got all of them")
-    return tuple(name for name in names if name in given)
+    return tuple(name for name in names if name in chosen)

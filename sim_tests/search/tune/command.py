@@ -73,6 +73,7 @@ from awarenav.cli import POSITIVE, FilePath, OneOf, command, option, options
 @options.perception()
 @options.sensors()
 @options.camera()
+@options.robot()
 @options.population()
 @options.planner()
 @options.seed()

@@ -82,7 +82,7 @@ def plan_jobs(
         NavError: an unknown preset or unusable policy file.
     """
     perceptions = [Perception.of(perception, each).name for each in sensors]
-    templates = [each.with_robot(robot) for each in _expanded(scenarios, camera, population)]
+    templates = _expanded(scenarios, camera, population, robot)
     policy_texts = [text for each in policies for text in _named_policy(each, perceptions)]
     fault_texts = [_named_fault(each) for given in faults for each in _matching_faults(given)]
     checked_seeds = [_checked_seed(seed) for seed in seeds]
@@ -110,7 +110,7 @@ def plan_jobs(
 
 
 def named_templates(
-    names: Sequence[str], camera: str = "", population: str = ""
+    names: Sequence[str], camera: str = "", population: str = "", robot: str = ""
 ) -> tuple[ScenarioTemplate, ...]:
     """Return the scenarios of names and YAML files, each once.
 
@@ -119,12 +119,13 @@ def named_templates(
             scenarios that need no planner.
         camera: as for :meth:`ScenarioTemplate.with_camera`.
         population: as for :meth:`ScenarioTemplate.with_population`.
+        robot: as for :meth:`ScenarioTemplate.with_robot`.
 
     Raises:
-        SimError: an unknown name, an unusable file or camera, or two scenarios of one name.
+        SimError: an unknown name, an unusable file, camera or robot, or two scenarios of one name.
     """
     found: dict[str, ScenarioTemplate] = {}
-    for template in _expanded(names, camera, population):
+    for template in _expanded(names, camera, population, robot):
         if found.setdefault(template.name, template) != template:
             raise SimError(f"two scenarios are called {template.name!r}; give them other names")
     return tuple(found.values())
@@ -184,9 +185,9 @@ def policy_text(policy: AwarenessPolicy) -> str:
 
 
 def _expanded(
-    scenarios: Iterable[str | ScenarioTemplate], camera: str, population: str
+    scenarios: Iterable[str | ScenarioTemplate], camera: str, population: str, robot: str
 ) -> list[ScenarioTemplate]:
-    """Return the templates of names and files, with another camera and population if given."""
+    """Return the templates of names and files, with another camera, population and robot."""
     templates: list[ScenarioTemplate] = []
     for each in scenarios:
         if isinstance(each, ScenarioTemplate):
@@ -199,7 +200,9 @@ def _expanded(
             ]
         else:
             templates.append(ScenarioTemplate.named(each))
-    return [each.with_camera(camera).with_population(population) for each in templates]
+    return [
+        each.with_camera(camera).with_population(population).with_robot(robot) for each in templates
+    ]
 
 
 def _named_policy(

@@ -38,6 +38,7 @@ def compare_planners(
     sensors: str = "camera",
     camera: str = "",
     robot: str = "",
+    population: str = "",
     workers: int | None = 1,
     time_limit_s: float | None = None,
     resume: bool = False,
@@ -64,6 +65,7 @@ def compare_planners(
         sensors: ``"camera"``, ``"camera+scanner"`` or ``"scanner"``.
         camera: a shipped name or a YAML file that replaces each scenario's camera.
         robot: a shipped name or a YAML file of the robot that they are fitted to.
+        population: ``"classic"`` or ``"recorded"`` people; empty for each scenario's own.
         workers: number of processes; 1 runs in this process unless there is a time limit.
         time_limit_s: wall-clock limit of an episode, which ends planners that hang.
         resume: continue the comparison in the folder.
@@ -88,6 +90,7 @@ def compare_planners(
         sensors=sensors,
         camera=camera,
         robot=robot,
+        population=population,
     )
     try:
         with ConductFile(folder, resume=resume) as conducts:
@@ -154,6 +157,7 @@ class CompareOptions:
     sensors: SensorSet
     camera: str
     robot: str
+    population: str | None
     workers: int | None
     time_limit: float
     out: Path
@@ -179,6 +183,7 @@ def compare_command(options: CompareOptions) -> int:
         sensors=options.sensors,
         camera=options.camera,
         robot=options.robot,
+        population=options.population or "",
         workers=options.workers,
         time_limit_s=options.time_limit,
         resume=options.resume,
@@ -227,4 +232,6 @@ def _command_line(options: CompareOptions) -> str:
         words += ["--camera", options.camera]
     if options.robot:
         words += ["--robot", options.robot]
+    if options.population:
+        words += ["--population", options.population]
     return shlex.join([*words, "--out", str(options.out)])

@@ -119,6 +119,7 @@ def plan_comparison(
     sensors: str = "camera",
     camera: str = "",
     robot: str = "",
+    population: str = "",
 ) -> tuple[ComparisonPlan, tuple[Job, ...]]:
     """Return the plan of a comparison and its episodes.
 
@@ -134,6 +135,7 @@ def plan_comparison(
         sensors: likewise.
         camera: likewise.
         robot: likewise.
+        population: likewise.
 
     Raises:
         SimError: an unknown or unusable argument, or a scenario that needs no planner.
@@ -141,7 +143,7 @@ def plan_comparison(
     """
     if not seeds:
         raise SimError("seeds must be at least one, got none")
-    templates = tuple(each.with_robot(robot) for each in _driven(scenarios, camera))
+    templates = _driven(scenarios, camera, population, robot)
     entrants = _entrants(planners, templates[0].median())
     own = [each for each in entrants if not each.variant_of]
     conditions: dict[str, Any] = {"perception": perception, "sensors": (sensors,)}
@@ -170,15 +172,16 @@ def plan_comparison(
 
 
 def _driven(
-    scenarios: Sequence[str | ScenarioTemplate], camera: str
+    scenarios: Sequence[str | ScenarioTemplate], camera: str, population: str, robot: str
 ) -> tuple[ScenarioTemplate, ...]:
     """Return the scenarios, each of which must need a planner."""
     found: list[ScenarioTemplate] = []
     for each in scenarios:
         if isinstance(each, ScenarioTemplate):
-            found.append(each.with_camera(camera))
+            changed = each.with_camera(camera).with_population(population)
+            found.append(changed.with_robot(robot))
         else:
-            found += named_templates([each], camera)
+            found += named_templates([each], camera, population, robot)
     if not found:
         raise SimError("scenarios must be at least one, got none")
     for template in found:

@@ -64,6 +64,7 @@ def list_planners(*, as_json: bool) -> int:
 @options.sensors()
 @options.camera()
 @options.robot()
+@options.population()
 @options.workers()
 @option(
     "--time-limit",

@@ -13,7 +13,7 @@ from nav_adapter import NavError
 
 from ...world.errors import SimError
 from ..measures import nondeterminism_notes
-from ..runs import Job, JobKey, describe, job_key, plan_jobs, run_jobs
+from ..runs import Job, JobKey, describe, job_key, plan_jobs, run_jobs, template_of
 from ._thresholds import Thresholds
 
 _PLAN = pytest.StashKey["SuitePlan"]()
@@ -55,10 +55,12 @@ class SuitePlan:
             sensors=[option("sensors")],
             faults=[option("fault")],
             camera=option("camera"),
+            robot=option("robot"),
+            population=option("population"),
         )
         file, workers = option("thresholds"), option("workers")
         thresholds = Thresholds.from_yaml(file) if file else Thresholds()
-        known = {job_key(job).scenario for job in jobs}
+        known = {name for job in jobs for name in template_of(job.scenario).names}
         for name in thresholds.scenarios:
             if name not in known and config.getoption("--awarenav-scenario") == []:
                 raise SimError(f"{file}: scenarios: there is no scenario {name!r}")
@@ -100,7 +102,8 @@ class SuiteRun:
         """Return why an episode fails and how to replay it; empty when it passes."""
         job, record = self._plan.jobs[number], self._records[self._row[number]]
         key = job_key(job)
-        failures = list(self._plan.thresholds.of(key.scenario).failures(record))
+        names = template_of(job.scenario).names
+        failures = list(self._plan.thresholds.of(*names).failures(record))
         return "\n".join(self._lines(failures, key, number)) if failures else ""
 
     def overall(self) -> str:

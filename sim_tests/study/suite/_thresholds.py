@@ -77,9 +77,10 @@ class Thresholds(StrictConfig):
     max_mean_violation_time_s: float | None = Field(default=None, ge=0.0)
     max_mean_time_lost_s: float | None = None
 
-    def of(self, scenario: str) -> EpisodeThresholds:
-        """Return the thresholds of an episode of a scenario."""
-        return self.scenarios.get(scenario, self.episode)
+    def of(self, *names: str) -> EpisodeThresholds:
+        """Return the thresholds of an episode of a scenario, by the first of its names."""
+        found = (self.scenarios[name] for name in names if name in self.scenarios)
+        return next(found, self.episode)
 
     def failures(self, records: Sequence[EpisodeRecord]) -> Iterator[str]:
         """Yield the failed checks of all episodes together; a failed episode is no success."""

@@ -21,6 +21,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         ("perception", "KIND", "keypoints", "truth, keypoints or pixels (default: keypoints)"),
         ("sensors", "SET", "camera", "camera, camera+scanner or scanner (default: camera)"),
         ("camera", "NAME|FILE", "", "forward, surround or YAML file (default: the scenarios')"),
+        ("robot", "NAME|FILE", "", "forklift, omni, delivery or YAML file (default: nova_carter)"),
+        ("population", "NAME", "", "classic or recorded people (default: the scenarios')"),
         ("fault", "NAME|FILE", "none", "shipped fault or YAML file (default: none)"),
         ("episodes", "N", "3", "seeds per scenario (default: 3)"),
         ("seed", "N", "0", "first seed (default: 0)"),

@@ -39,6 +39,7 @@ class WatchOptions:
     sensors: SensorSet
     camera: str
     robot: str
+    population: str | None
     fault: str
     seed: int
     speed: float
@@ -136,6 +137,7 @@ def _job(options: WatchOptions) -> Job:
         faults=[options.fault],
         camera=options.camera,
         robot=options.robot,
+        population=options.population or "",
     )
     if len(jobs) != 1:
         raise SimError(

@@ -12,6 +12,7 @@ from awarenav.cli import FilePath, Number, Whole, argument, command, option, opt
     examples=[
         "awarenav watch crossing_attentive",
         "awarenav watch blind_corner --seed 3 --policy blind --sensors camera+scanner",
+        "awarenav watch late_glance --population recorded --robot delivery",
         "awarenav watch late_glance --port 8765 --wait 300 --out late_glance.html",
     ],
     exit_status={
@@ -34,6 +35,7 @@ from awarenav.cli import FilePath, Number, Whole, argument, command, option, opt
 @options.sensors()
 @options.camera()
 @options.robot()
+@options.population()
 @option(
     "--fault",
     default="none",

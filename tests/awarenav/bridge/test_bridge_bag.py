@@ -7,6 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+import shapely
 from paths import ROOT
 
 pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
@@ -33,6 +34,7 @@ from nav_adapter.ros2.messages.nav_msgs import Odometry
 from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, Image
 from nav_adapter.ros2.messages.std_msgs import Header
 from nav_adapter.ros2.messages.tf2_msgs import TFMessage
+from tracking.prediction import PredictionModel
 
 STORE = get_typestore(Stores.ROS2_HUMBLE)
 START_S, SECONDS, PERSON = 1000.0, 3.0, (2.5, 1.2)
@@ -137,6 +139,60 @@ def test_a_replay_has_the_speed_mask_at_its_rate(tmp_path: Path, robot_file: Pat
     # The cell of the robot holds for every heading, and until the next mask.
     assert 1 < values[15, 15] <= 100.0 * limit / RobotFile.from_yaml(robot_file).max_speed_mps
     assert values[0, 0] == 0  # far from the person: no limit
+
+
+def test_a_calibrated_prediction_sweeps_polygons_and_leaves_the_limit(
+    tmp_path: Path, robot_file: Path
+) -> None:
+    bag, policy = recorded(tmp_path / "bag", messages()), tmp_path / "sweeping.yaml"
+    policy.write_text("outline: {sweep_s: 1.0}\n")
+    arguments = ["bridge", "--robot", str(robot_file), "--scan", "scan", "--no-camera"]
+    arguments += ["--bag", str(bag), "--policy", str(policy), "--seconds", "1.5"]
+    arguments += ["--only", "speed_limit", "--only", "collision_polygons"]
+    limits, areas_m2 = [], []
+    for factor in (None, 0.5, 2.0):
+        out, more = tmp_path / f"{factor}.mcap", []
+        if factor is not None:
+            calibration = tmp_path / f"{factor}.yaml"
+            PredictionModel(horizons_s=(1.0,), std_factors=(factor,)).to_yaml(calibration)
+            more = ["--prediction", str(calibration)]
+        assert main([*arguments, *more, "--record", str(out)]) == 0
+        found = published(out)
+        limits.append([each.speed_limit for _, topic, each in found if topic == "/speed_limit"])
+        polygons = [each.polygon for _, topic, each in found if topic.endswith("polygons")]
+        person = [each for each in polygons if each.id >= 0][-1]  # not the stop polygon
+        corners = [(point.x, point.y) for point in person.polygon.points]
+        areas_m2.append(shapely.Polygon(corners).area)
+    assert limits[0] == limits[1] == limits[2]
+    assert areas_m2[1] < areas_m2[2] - 0.5
+    assert areas_m2[0] not in areas_m2[1:]
+
+
+@pytest.mark.parametrize(
+    ("content", "text"),
+    [
+        (None, "No such file"),
+        ("lag_per_s2: 1.5\nresponse_s: 0.9\n", "has no horizons_s and no std_factors"),
+        ("horizons_s: [1.0, 2.0]\nstd_factors: [1.1]\n", "must be equally long, got 2 and 1"),
+        ("inflation: {aware_radius_m: 0.5}\n", "unknown key 'inflation' in PredictionModel"),
+    ],
+)
+def test_what_is_no_calibrated_prediction_is_refused(
+    tmp_path: Path,
+    robot_file: Path,
+    content: str | None,
+    text: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    path = tmp_path / "prediction.yaml"
+    if content is not None:
+        path.write_text(content)
+    given = ["bridge", "--robot", str(robot_file), "--scan", "scan", "--no-camera"]
+    assert main([*given, "--bag", str(robot_file), "--prediction", str(path)]) == 2
+    said = capsys.readouterr().err
+    assert text in said
+    assert str(path) in said
+    assert "Traceback" not in said
 
 
 def test_what_a_map_file_holds_is_nobody(

@@ -1,4 +1,4 @@
-"""The Gymnasium environment with another robot."""
+"""The Gymnasium environment with another robot, and among other people."""
 
 from __future__ import annotations
 
@@ -51,3 +51,31 @@ def test_an_episode_is_the_crossing_of_the_same_robot() -> None:
 def test_an_unknown_robot_is_refused() -> None:
     with pytest.raises(SimError, match="did you mean 'omni'"):
         CrossingEnv("crossing_from_left", robot="omny")
+
+
+def test_an_episode_is_the_crossing_among_the_same_people() -> None:
+    env = CrossingEnv("being_overtaken", population="recorded", normalised_actions=False)
+    env.reset(seed=2)
+    for _ in range(20):
+        env.step(np.array([0.7, 0.1]))
+    scenario, last = env.crossing.scenario, env.frame
+    env.close()
+    assert scenario.population == "recorded"
+    frames = []
+    with pytest.raises(StopIteration):
+        run_crossing(
+            "being_overtaken",
+            policy="balanced",
+            planner=Ahead(),
+            population="recorded",
+            seed=2,
+            observer=lambda frame, _: frames.append(frame),
+        )
+    (own,), (other,), (first,) = (each.truth for each in (last, frames[19], frames[0]))
+    np.testing.assert_array_equal(own.position_odom_m, other.position_odom_m)
+    assert np.hypot(*(own.position_odom_m - first.position_odom_m)) > 0.5
+
+
+def test_an_unknown_population_is_refused() -> None:
+    with pytest.raises(SimError, match="classic, recorded, got 'modern'"):
+        CrossingEnv("late_glance", population="modern")

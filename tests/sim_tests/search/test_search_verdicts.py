@@ -28,6 +28,7 @@ class _Options:
     perception: str = "keypoints"
     sensors: str = "camera+scanner"
     camera: str = ""
+    robot: str = ""
     population: str | None = None
     planner: str = ""
 
@@ -112,5 +113,5 @@ def test_the_next_command_repeats_the_sensors_and_is_safe_for_a_shell():
         *("--perception", "keypoints", "--sensors", "camera+scanner", "--planner", "a.b:C")
     ]
     assert "--camera" not in words
-    recorded = episode_words(_Options(population="recorded"))
-    assert recorded[-2:] == ["--population", "recorded"]
+    others = episode_words(_Options(population="recorded", robot="my robot.yaml"))
+    assert others[-4:] == ["--robot", "my robot.yaml", "--population", "recorded"]

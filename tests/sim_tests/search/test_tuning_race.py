@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 
 import numpy as np
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 from nav_adapter import AwarenessPolicy
 from sim_tests import SimError
 from sim_tests.scenario import ScenarioTemplate, shipped_templates
+from sim_tests.search._files import common_settings
 from sim_tests.search.tune import Evaluation
 from sim_tests.search.tune._finalists import (
     BEATS_BASE,
@@ -22,6 +24,7 @@ from sim_tests.search.tune._finalists import (
     named_winner,
 )
 from sim_tests.search.tune._race import dropped, stages
+from sim_tests.search.tune._results import _header
 from sim_tests.search.tune._settings import TuneSettings, held_out_scenarios
 from sim_tests.search.tune._tune import Tuning
 from sim_tests.search.tune._verdict import is_undecided, verdict_text
@@ -205,3 +208,20 @@ def test_the_verdict_keeps_the_base_policy_and_says_why(values, reason, undecide
 def test_the_verdict_says_that_no_scenario_was_held_out():
     text = verdict_text(_tuning(_candidate("knee", 7, time_s=4.0), hold_out=()))
     assert "no scenario was held out" in text
+
+
+@pytest.mark.parametrize(
+    ("robot", "population", "words"),
+    [
+        ("", "", "(tpe, seed 0, perception truth)."),
+        ("omni", "", "(tpe, seed 0, perception truth, robot omni)."),
+        ("omni", "recorded", "(tpe, seed 0, perception truth, robot omni, recorded people)."),
+    ],
+)
+def test_a_chosen_policy_says_for_which_robot_and_people_it_was_tuned(robot, population, words):
+    knee = _candidate("knee", 7, time_s=4.0)
+    tuning = _tuning(knee)
+    common = common_settings("balanced", ["runs_out"], "", population, robot)
+    settings = dataclasses.replace(tuning.settings, scenarios=common["scenarios"])
+    header = _header(dataclasses.replace(tuning, settings=settings), knee, "knee")
+    assert words in header.splitlines()[0]

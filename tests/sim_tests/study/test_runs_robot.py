@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import pytest
+from run_scenes import SHORT
 
 from awarenav.cli import main
 from sim_tests import SimError
 from sim_tests.actors.robot import RobotModel
-from sim_tests.study.runs import job_key, make_planner, plan_jobs, template_of
+from sim_tests.scenario import ScenarioTemplate
+from sim_tests.study.runs import job_key, make_planner, plan_jobs, read_jobs, template_of
+from sim_tests.study.scorecard._compare import CompareOptions, _command_line
 from sim_tests.study.scorecard._plan import plan_comparison
+from sim_tests.study.watch._watch import WatchOptions, _job
 
 
 class Keeps:
@@ -47,6 +54,61 @@ def test_a_comparison_of_planners_takes_a_robot() -> None:
         robot="delivery",
     )
     assert {job_key(job).scenario for job in jobs} == {"crossing_from_left_delivery"}
+
+
+def test_a_comparison_of_planners_takes_a_population() -> None:
+    _, jobs = plan_comparison(
+        ["straight_on"],
+        ["late_glance", ScenarioTemplate.shipped("crossing_attentive")],
+        ["balanced"],
+        (0,),
+        perception="truth",
+        population="recorded",
+    )
+    drawn = [template_of(job.scenario).for_seed(0) for job in jobs]
+    assert {(each.population, each.workers) for each in drawn} == {("recorded", ())}
+
+
+def test_the_command_of_a_comparison_names_robot_and_population() -> None:
+    options = CompareOptions(
+        **{"planners": ("reference",), "scenario": ("runs_out",), "policy": ("blind",)},
+        **{"seeds": (0, 1), "perception": "truth", "sensors": "camera", "camera": ""},
+        **{"robot": "omni", "population": "recorded", "workers": 1, "time_limit": 60.0},
+        **{"out": Path("out"), "resume": False, "overwrite": False, "as_json": False},
+    )
+    words = _command_line(options)
+    assert "--robot omni --population recorded --out out" in words
+    usual = _command_line(replace(options, robot="", population=None))
+    assert words.replace(" --robot omni --population recorded", "") == usual
+
+
+def test_a_replay_has_the_robot_and_the_people_of_the_run(tmp_path, capsys) -> None:
+    (tmp_path / "short.yaml").write_text(SHORT.format(name="short"))
+    words = ["crossings", "--scenario", str(tmp_path / "short.yaml"), "--policy", "blind"]
+    words += ["--perception", "truth", "--workers", "1", "--no-report", "--out", str(tmp_path)]
+    assert main([*words, "--robot", "delivery", "--population", "recorded"]) == 0
+    (job,) = read_jobs(tmp_path)
+    scenario = template_of(job.scenario).for_seed(job.seed)
+    assert scenario.robot_model == RobotModel.shipped("delivery")
+    assert scenario.population == "recorded"
+    capsys.readouterr()
+    assert main(["replay", str(tmp_path), "0", "--no-video"]) == 0
+    assert "short_delivery" in (text := capsys.readouterr().out)
+    assert "The same row as in" in text
+
+
+def test_a_crossing_is_watched_with_another_robot_and_population() -> None:
+    options = WatchOptions(
+        **{"scenario": "late_glance", "policy": "blind", "planner": "", "perception": "truth"},
+        **{"sensors": "camera", "camera": "", "robot": "omni", "population": "recorded"},
+        **{"fault": "none", "seed": 3, "speed": 1.0, "port": 0, "wait": 0.0, "out": None},
+        **{"no_camera": True, "no_browser": True},
+    )
+    scenario = template_of(_job(options).scenario).for_seed(3)
+    assert scenario.robot_model == RobotModel.shipped("omni")
+    assert scenario.population == "recorded"
+    (own,) = plan_jobs(["late_glance"], ["blind"], [3], perception="truth")
+    assert _job(replace(options, robot="", population=None)) == own
 
 
 def test_the_command_names_the_robots_that_there_are(tmp_path, capsys) -> None:

@@ -1,17 +1,22 @@
 """The crossings as a test-suite of the user's: what passes, what fails, and what is said."""
 
 import os
+import re
 import subprocess
 import sys
 from importlib.metadata import entry_points
 from pathlib import Path
 
+import paths
 import pytest
 from run_scenes import SHORT
 
 from sim_tests import SimError
+from sim_tests.actors.robot import RobotModel
 from sim_tests.study.measures import EpisodeRecord
+from sim_tests.study.runs import read_jobs, template_of
 from sim_tests.study.suite import EpisodeThresholds, Thresholds
+from sim_tests.study.suite.plugin import pytest_addoption
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
@@ -46,6 +51,18 @@ SUITE = ["--pyargs", "sim_tests", "--awarenav-scenario", "short.yaml", "--awaren
          "--awarenav-perception", "truth", "--awarenav-episodes", "2"]  # fmt: skip
 
 
+def test_the_page_has_every_option():
+    parser = pytest.Parser(_ispytest=True)
+    pytest_addoption(parser)
+    options = parser.parse_known_args([])
+    names = {f"--{name.replace('_', '-')}" for name in vars(options) if "awarenav" in name}
+    page = (paths.ROOT / "docs" / "test-suite.md").read_text(encoding="utf-8")
+    rows = [line for line in page.splitlines() if line.startswith("| `--awarenav-")]
+    found = {word for line in rows for word in re.findall(r"`(--awarenav-[a-z]+)", line)}
+    assert found == names
+    assert len(names) >= 12
+
+
 def test_a_good_planner_passes(folder):
     done = run_pytest(folder, *SUITE, "-v", "-W", "error")
     assert done.returncode == 0, done.stdout + done.stderr
@@ -70,9 +87,18 @@ def test_a_bad_planner_fails_with_the_check_the_scenario_the_seed_and_the_replay
     assert "Traceback" not in done.stdout
 
 
-def test_chosen_tests_run_their_episodes_alone(folder):
-    done = run_pytest(folder, *SUITE, "-k", "short-1")
-    assert done.returncode == 0, done.stdout + done.stderr
+def test_a_chosen_test_runs_its_episode_alone_with_the_robot_and_people_asked_for(folder):
+    (folder / "thresholds.yaml").write_text("scenarios: {short: {min_separation_m: 50.0}}")
+    done = run_pytest(
+        folder, *SUITE, "-k", "short_delivery-1", "--awarenav-thresholds", "thresholds.yaml",
+        "--awarenav-robot", "delivery", "--awarenav-population", "recorded",
+    )  # fmt: skip
+    assert done.returncode == 1, done.stdout + done.stderr
+    assert "asked for 50 (short_delivery, seed 1," in done.stdout
+    (job,) = read_jobs(folder / "awarenav-suite")
+    scenario = template_of(job.scenario).for_seed(1)
+    assert scenario.robot_model == RobotModel.shipped("delivery")
+    assert scenario.population == "recorded"
     assert (folder / "awarenav-suite" / "episodes.csv").read_text().count("\n") == 2
 
 
@@ -80,6 +106,11 @@ def test_chosen_tests_run_their_episodes_alone(folder):
     ("arguments", "message"),
     [
         (["--awarenav-planner", "nowhere:Planner"], "No module named 'nowhere'"),
+        pytest.param(
+            ["--awarenav-population", "modern"],
+            "population must be one of classic, recorded, got 'modern'",
+            marks=pytest.mark.full,
+        ),
         pytest.param(
             ["--awarenav-policy", "brave"], "preset must be one of", marks=pytest.mark.full
         ),
