@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Iterator
 
 import pytest
@@ -12,6 +13,11 @@ from hypothesis import settings
 # A busy machine must not fail a property for being slow; CI draws the same examples every time.
 settings.register_profile("awarenav", deadline=None, derandomize=bool(os.environ.get("CI")))
 settings.load_profile("awarenav")
+
+# A shell ignores interrupts in what it runs in the background, and so do the commands that tests
+# start there and interrupt.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -4,6 +4,7 @@ import os
 import re
 import subprocess
 import sys
+from functools import cache
 
 import pytest
 from paths import ROOT
@@ -25,6 +26,7 @@ DRIVING = (
 )
 
 
+@cache
 def printed(name, *arguments):
     """Return the output of an example, run with warnings as errors."""
     done = subprocess.run(

@@ -1,4 +1,4 @@
-"""``awarenav crossings`` and ``awarenav demo`` from the command line to their files."""
+"""``awarenav crossings`` from the command line to its files; ``demo`` is in ``sim_tests/demo``."""
 
 from __future__ import annotations
 
@@ -9,14 +9,6 @@ from command_line import SHORT_SCENARIO
 
 from awarenav.cli import main
 from sim_tests.study.measures import RECORD_COLUMNS
-
-ENCOUNTER_COLUMNS = [
-    "t_s",
-    "perception",
-    "awareness",
-    "d_fwd_m",
-    "d_lat_m",
-]
 
 
 def rows(path):
@@ -95,25 +87,3 @@ def test_bad_input_is_one_line_and_exit_status_2(arguments, message, tmp_path, c
     assert message in error
     assert "Traceback" not in error
     assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.slow
-def test_demo_writes_its_tables_pictures_and_video(tmp_path, capsys):
-    assert main(["demo", "--out", str(tmp_path), "--no-video"]) == 0
-    text = capsys.readouterr().out
-    for line in ("today's AMR", "awareness-blind", "aware, attentive", "aware, distracted worker"):
-        assert line in text
-    header, *body = rows(tmp_path / "encounter.csv")
-    assert header == ENCOUNTER_COLUMNS
-    assert len(body) == 3000
-    assert {row[1] for row in body} == {"truth", "keypoints"}
-    for picture in ("encounter.png", "crossings.png"):
-        assert (tmp_path / picture).read_bytes().startswith(b"\x89PNG")
-    _, *episodes = rows(tmp_path / "episodes.csv")
-    assert [(row[0], row[2], row[4]) for row in episodes] == [
-        ("crossing_attentive_without_people", "balanced", "keypoints+scanner"),
-        ("crossing_attentive", "scanner", "scanner"),
-        ("crossing_attentive", "blind", "keypoints+scanner"),
-        ("crossing_attentive", "balanced", "keypoints+scanner"),
-        ("crossing_distracted", "balanced", "keypoints+scanner"),
-    ]

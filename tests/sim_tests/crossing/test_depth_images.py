@@ -29,7 +29,7 @@ class Clear:
 
 @pytest.fixture(scope="module")
 def hall():
-    with Warehouse() as warehouse:
+    with Warehouse(renderer="auto") as warehouse:
         yield warehouse
 
 

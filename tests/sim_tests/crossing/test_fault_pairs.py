@@ -1,6 +1,6 @@
 """Pairs of faults of camera or odometry and of scanners: the robot touches nobody.
 
-Every second pair of the sample always runs. docs/runs.md has the command for all pairs.
+One pair in each scenario always runs. docs/runs.md has the command for all pairs.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def test_the_sample_holds_every_fault():
 @pytest.mark.parametrize(
     ("pair", "scenario"),
     [
-        pytest.param(*each, marks=pytest.mark.full if row % 3 else ())
+        pytest.param(*each, marks=() if row in (0, 3, 6, 9) else pytest.mark.full)
         for row, each in enumerate(PAIRS)
     ],
 )

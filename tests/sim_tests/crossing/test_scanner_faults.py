@@ -102,25 +102,32 @@ def test_scan_faults_leave_the_random_streams_of_camera_and_odometry_faults_alon
     np.testing.assert_array_equal(FaultInjection(plain, 7)._eyes_rng.random(5), old[0].random(5))
 
 
+def world(fault):
+    """Return what robot, people and camera do in each frame, and the scans, as bytes."""
+    scenario = Scenario.shipped("paper_encounter").model_copy(update={"duration_s": 1.5})
+    result = run_crossing(
+        scenario, policy="balanced", perception="keypoints+scanner", seed=2, fault=fault
+    )
+    return [
+        (
+            frame.robot_state.position_odom_m.tobytes(),
+            [view.position_odom_m.tobytes() for view in frame.truth],
+            [each.position_camera_m.tobytes() for each in frame.observations],
+        )
+        for frame in result.frames
+    ], [frame.scan_points_odom_m.tobytes() for frame in result.frames]
+
+
+@pytest.fixture(scope="module")
+def world_without_fault():
+    return world(None)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SCANNER_FAULTS)
-def test_a_scan_fault_changes_neither_people_nor_what_the_camera_sees(name):
+def test_a_scan_fault_changes_neither_people_nor_what_the_camera_sees(name, world_without_fault):
     """The robot of the paper drives straight on, so the world may not differ by a bit."""
-    scenario = Scenario.shipped("paper_encounter").model_copy(update={"duration_s": 1.5})
-    options = {"policy": "balanced", "perception": "keypoints+scanner", "seed": 2}
-
-    def world(fault):
-        result = run_crossing(scenario, fault=fault, **options)
-        return [
-            (
-                frame.robot_state.position_odom_m.tobytes(),
-                [view.position_odom_m.tobytes() for view in frame.truth],
-                [each.position_camera_m.tobytes() for each in frame.observations],
-            )
-            for frame in result.frames
-        ], [frame.scan_points_odom_m.tobytes() for frame in result.frames]
-
-    (plain, plain_scans), (faulty, scans) = world(None), world(Fault.shipped(name))
+    (plain, plain_scans), (faulty, scans) = world_without_fault, world(Fault.shipped(name))
     assert faulty == plain
     if name in ("scanner_yawed", "scanner_late", "scanner_clock_ahead", "scanner_clock_behind"):
         assert scans != plain_scans

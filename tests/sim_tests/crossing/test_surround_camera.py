@@ -173,7 +173,7 @@ def run_counted(name: str) -> tuple[CrossingResult, Counter[str]]:
     [
         pytest.param("crowd_of_eight", marks=pytest.mark.full),
         "two_people_one_aware",
-        "standing_in_aisle",
+        pytest.param("standing_in_aisle", marks=pytest.mark.full),
     ],
 )
 def test_in_a_crossing_each_person_is_reported_once(name: str) -> None:

@@ -1,16 +1,66 @@
-"""The paper's encounter: its three cases, and awareness over its whole time."""
+"""``awarenav demo``, and its encounter: the paper's three cases, awareness over the whole time."""
+
+import contextlib
+import csv
+import io
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from awarenav.cli import main
 from sim_tests import Scenario, run_crossing
-from sim_tests.demo import CASES, case_values
+from sim_tests.demo import CASES, _demo, case_values
 from sim_tests.world.camera import CameraTiming
+
+COLUMNS = ["t_s", "perception", "awareness", "d_fwd_m", "d_lat_m"]
 
 
 @pytest.fixture(scope="module")
-def encounter():
-    return run_crossing("paper_encounter", policy="balanced", perception="keypoints", seed=0)
+def demo(tmp_path_factory):
+    """The command's folder, what it prints, and the encounter that it runs."""
+    out, printed, encounters = tmp_path_factory.mktemp("demo"), io.StringIO(), []
+    run_encounter = _demo.run_encounter
+
+    def remembered(*arguments, **options):
+        encounters.append(run_encounter(*arguments, **options))
+        return encounters[-1]
+
+    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(printed):
+        patch.setattr(_demo, "run_encounter", remembered)
+        assert main(["demo", "--out", str(out), "--no-video"]) == 0
+    (encounter,) = encounters
+    return SimpleNamespace(out=out, text=printed.getvalue(), encounter=encounter)
+
+
+@pytest.fixture(scope="module")
+def encounter(demo):
+    return demo.encounter
+
+
+def rows(path):
+    with path.open(newline="") as file:
+        return list(csv.reader(file))
+
+
+@pytest.mark.slow
+def test_demo_writes_its_tables_and_pictures(demo):
+    for line in ("today's AMR", "awareness-blind", "aware, attentive", "aware, distracted worker"):
+        assert line in demo.text
+    header, *body = rows(demo.out / "encounter.csv")
+    assert header == COLUMNS
+    assert len(body) == 3000
+    assert {row[1] for row in body} == {"truth", "keypoints"}
+    for picture in ("encounter.png", "crossings.png"):
+        assert (demo.out / picture).read_bytes().startswith(b"\x89PNG")
+    _, *episodes = rows(demo.out / "episodes.csv")
+    assert [(row[0], row[2], row[4]) for row in episodes] == [
+        ("crossing_attentive_without_people", "balanced", "keypoints+scanner"),
+        ("crossing_attentive", "scanner", "scanner"),
+        ("crossing_attentive", "blind", "keypoints+scanner"),
+        ("crossing_attentive", "balanced", "keypoints+scanner"),
+        ("crossing_distracted", "balanced", "keypoints+scanner"),
+    ]
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.meaning)

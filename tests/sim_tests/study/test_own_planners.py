@@ -42,6 +42,8 @@ def run_python(folder, *arguments):
     )
 
 
+# The test of the tutorial's page runs the command with another scenario.
+@pytest.mark.full
 def test_the_planner_of_the_tutorial_passes_crossings(tmp_path):
     done = run_python(
         tmp_path, "awarenav", "crossings", "--planner", "my_robot:MyPlanner", "--scenario",

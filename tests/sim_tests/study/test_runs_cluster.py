@@ -65,24 +65,21 @@ def test_an_episode_that_kills_every_worker_fails_and_affects_no_other(tmp_path)
     assert "KilledWorker" in records[2].error
 
 
-def test_a_run_on_a_local_cluster_ends_without_log_messages(tmp_path, capfd, monkeypatch):
+def test_a_run_on_a_local_cluster_needs_no_fixed_port_and_ends_without_log_messages(
+    tmp_path, capfd, monkeypatch
+):
     # With so many heartbeats, workers would notice a scheduler that ends before them.
     monkeypatch.setattr("distributed.scheduler.heartbeat_interval", lambda workers: 0.01)
-    records = run_jobs(short_jobs(2), tmp_path / "run", workers=2, scheduler="local")
-    assert all(record.success for record in records)
-    captured = capfd.readouterr()
-    # The workers are processes of their own.
-    assert "distributed" not in captured.err + captured.out
-
-
-def test_a_local_cluster_needs_no_fixed_port(tmp_path, capfd):
     with socket.socket() as first:
         with contextlib.suppress(OSError):  # something else may listen on it already
             first.bind(("127.0.0.1", 8787))
             first.listen()
-        records = run_jobs(short_jobs(1), tmp_path / "run", workers=1, scheduler="local")
+        records = run_jobs(short_jobs(2), tmp_path / "run", workers=2, scheduler="local")
     assert all(record.success for record in records)
-    assert "8787" not in capfd.readouterr().err
+    captured = capfd.readouterr()
+    # The workers are processes of their own.
+    assert "distributed" not in captured.err + captured.out
+    assert "8787" not in captured.err
 
 
 def test_a_scheduler_that_does_not_answer_is_refused(tmp_path, monkeypatch):
