@@ -74,7 +74,7 @@ def test_one_person_in_closed_form() -> None:
     assert result.obstacles[0].radius_m == pytest.approx(1.0)
     unaware = float(max_speed_mps(separation_m, 1.6, **braking))
     assert result.speed_limit_mps == pytest.approx(unaware, abs=1e-12)
-    assert unaware < 0.6 * limit
+    assert unaware < 0.5 * limit
 
 
 def test_without_people_the_limit_is_the_robots_maximum() -> None:
