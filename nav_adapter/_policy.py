@@ -86,9 +86,7 @@ class AwarenessPolicy(StrictConfig):
 
     Attributes:
         inflation: radius of a person over ``awareness_lower``: a ramp, a table or a custom object.
-        speed: assumed human speed over ``awareness_lower``: a ramp, a table or a custom object. The
-            default has a level for people who watch the robot; another ``speed`` has none unless it
-            sets one.
+        speed: assumed human speed over ``awareness_lower``: a ramp, a table or a custom object.
         outline: the part of the obstacles' polygons beyond their circles; by default nothing.
         rules: assumed turns, and speed limits besides speed and separation.
         noticed: what it counts that a person noticed the robot some seconds ago, or None for
@@ -108,7 +106,7 @@ class AwarenessPolicy(StrictConfig):
         InterpolatedInflation()
     )
     speed: Annotated[SpeedPolicy, _ShippedOrCustom("speed", "human_speed_mps")] = (
-        InterpolatedHumanSpeed(watching_above=0.8, watching_human_speed_mps=0.05)
+        InterpolatedHumanSpeed()
     )
     outline: ObstacleOutline = ObstacleOutline()
     rules: SpeedRules = SpeedRules(start_reserve=StartReserve())

@@ -63,20 +63,18 @@ def test_one_person_in_closed_form() -> None:
     assert obstacle.radius_m == pytest.approx(0.45)
     assert obstacle.awareness_lower == 1.0
     assert obstacle.height_m == 1.75
-    limit = max_speed_mps(
-        2.0 - 0.3625 - BODY_RADIUS_M,
-        0.05,
-        deceleration_mps2=1.0,
-        reaction_time_s=0.3,
-        clearance_m=0.1,
-    )
-    assert result.speed_limit_mps == pytest.approx(float(limit), abs=1e-12)
+    separation_m = 2.0 - 0.3625 - BODY_RADIUS_M
+    braking = {"deceleration_mps2": 1.0, "reaction_time_s": 0.3, "clearance_m": 0.1}
+    limit = float(max_speed_mps(separation_m, 0.7, **braking))
+    assert result.speed_limit_mps == pytest.approx(limit, abs=1e-12)
     assert result.limited_by == "track 1: speed and separation"
     assert not result.stale
 
     result = settled(0.0, position=(2.0, 0.0))
     assert result.obstacles[0].radius_m == pytest.approx(1.0)
-    assert result.speed_limit_mps < 0.5 * float(limit)
+    unaware = float(max_speed_mps(separation_m, 1.6, **braking))
+    assert result.speed_limit_mps == pytest.approx(unaware, abs=1e-12)
+    assert unaware < 0.5 * limit
 
 
 def test_without_people_the_limit_is_the_robots_maximum() -> None:

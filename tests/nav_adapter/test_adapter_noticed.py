@@ -44,9 +44,12 @@ def test_it_counts_as_aware_and_not_as_watching() -> None:
     assert numbers(constraints(noticing(near))) == numbers(aware)
     assert aware.speed_limit_mps > constraints(near).speed_limit_mps + 0.2
     watches = replace(near, awareness_lower=0.9)
-    watching = constraints(watches)
-    assert watching.speed_limit_mps > aware.speed_limit_mps + 0.1
-    assert numbers(constraints(noticing(watches))) == numbers(watching)
+    speed = AwarenessPolicy.preset("assertive").speed  # has a level for people who watch
+    two_levels = NOTICED.model_copy(update={"speed": speed})
+    aware = constraints(noticing(near), policy=two_levels)
+    watching = constraints(watches, policy=two_levels)
+    assert watching.speed_limit_mps > aware.speed_limit_mps + 0.05
+    assert numbers(constraints(noticing(watches), policy=two_levels)) == numbers(watching)
 
 
 def test_the_obstacle_says_which_bound_was_used() -> None:
@@ -111,8 +114,7 @@ def test_at_first_sight_and_after_a_jump_the_speed_is_that_for_the_unaware() -> 
 
 def test_it_holds_no_hysteresis() -> None:
     """Hysteresis is held by looks: what one remembers must not prolong itself."""
-    shape = {"shape": "hysteresis", "watching_above": None, "watching_human_speed_mps": None}
-    speed = BALANCED.speed.model_copy(update=shape)
+    speed = BALANCED.speed.model_copy(update={"shape": "hysteresis"})
     inflation = BALANCED.inflation.model_copy(update={"shape": "hysteresis"})
     policy = with_rule(BALANCED.model_copy(update={"speed": speed, "inflation": inflation}))
     adapter = NavAdapter(policy, ROBOT)

@@ -64,7 +64,9 @@ def test_both_ends_are_reached_exactly(
 
 
 def test_watching_people_have_a_lower_speed_than_aware_ones() -> None:
-    speed = AwarenessPolicy().speed
+    speed = InterpolatedHumanSpeed(
+        aware_human_speed_mps=0.35, watching_above=0.8, watching_human_speed_mps=0.05
+    )
     assert [speed.human_speed_mps(alpha) for alpha in (0.0, 0.6, 0.8, 1.0)] == [
         1.6,
         0.35,
@@ -74,17 +76,18 @@ def test_watching_people_have_a_lower_speed_than_aware_ones() -> None:
     assert speed.human_speed_mps(0.7) == pytest.approx(0.2)
     assert speed.human_speed_mps(float("nan")) == 1.6
     # Up to ``aware_above`` there is no difference.
-    plain = InterpolatedHumanSpeed()
+    plain = InterpolatedHumanSpeed(aware_human_speed_mps=0.35)
     for alpha in np.linspace(0.0, 0.6, 31):
         assert speed.human_speed_mps(alpha) == plain.human_speed_mps(alpha)
     assert plain.human_speed_mps(1.0) == 0.35
-    # A file with the key ``speed`` replaces the whole default, watching level included.
-    assert (
-        AwarenessPolicy.model_validate(
-            {"speed": {"aware_human_speed_mps": 0.5}}
-        ).speed.human_speed_mps(1.0)
-        == 0.5
-    )
+
+
+def test_by_default_looking_straight_at_the_robot_wins_no_more_than_awareness() -> None:
+    speed = AwarenessPolicy().speed
+    assert [speed.human_speed_mps(alpha) for alpha in (0.0, 0.6, 0.8, 1.0)] == [1.6, 0.7, 0.7, 0.7]
+    # A file with the key ``speed`` replaces the whole default.
+    file = {"speed": {"aware_human_speed_mps": 0.5}}
+    assert AwarenessPolicy.model_validate(file).speed.human_speed_mps(1.0) == 0.5
 
 
 def test_the_shapes_in_closed_form() -> None:
@@ -170,8 +173,8 @@ def test_presets_are_loaded_by_name() -> None:
             "watching_above must exceed aware_above, got 0.6 and 0.6",
         ),
         (
-            "speed: {watching_above: 0.8, watching_human_speed_mps: 0.5}",
-            "at most aware_human_speed_mps, got 0.5 m/s and 0.35 m/s",
+            "speed: {watching_above: 0.8, watching_human_speed_mps: 0.8}",
+            "at most aware_human_speed_mps, got 0.8 m/s and 0.7 m/s",
         ),
         (
             "speed: {shape: two_level, watching_above: 0.8, watching_human_speed_mps: 0.1}",

@@ -16,6 +16,7 @@ import perception
 import tracking
 from awarenav.cli import main
 from nav_adapter import AwarenessPolicy
+from nav_adapter.policies import InterpolatedHumanSpeed
 from perception import AwarenessPipeline, Camera, PersonObservation
 from tracking import AwarenessFilterConfig, PersonTracker, TrackerConfig, TrackingError
 
@@ -69,9 +70,10 @@ def test_no_public_name_is_gone(package: str) -> None:
 
 
 def test_changed_defaults_are_those_of_the_code() -> None:
-    models = {each.__name__: each for each in (TrackerConfig, AwarenessFilterConfig)}
+    shipped = (TrackerConfig, AwarenessFilterConfig, InterpolatedHumanSpeed)
+    models = {each.__name__: each for each in shipped}
     table = rows("setting | 0.1.0")
-    assert len(table) == 4
+    assert len(table) == 5
     for setting, before, now, _ in table:
         model, field = setting.strip("`").split(".")
         default = models[model].model_fields[field].default
@@ -87,7 +89,7 @@ def test_new_settings_of_policies_are_on_and_can_be_turned_off() -> None:
     policy = AwarenessPolicy()
     assert policy == AwarenessPolicy.preset("balanced")
     table = rows("setting | default")
-    assert len(table) == 7
+    assert len(table) == 6
     for setting, default, _, off in table:
         path = setting.strip("`")
         value = policy_value(policy, path)
@@ -95,13 +97,10 @@ def test_new_settings_of_policies_are_on_and_can_be_turned_off() -> None:
             assert value == float(default), path
         else:
             assert value is not None, path
-        in_old_file = policy_value(old, path)
-        assert (in_old_file is None) if path == "speed.watching_above" else in_old_file == value
+        assert policy_value(old, path) == value
 
         chosen = yaml.safe_load(off.split(",")[0].strip("`"))
         change: dict[str, object] = {path.rpartition(".")[2]: chosen}
-        if path == "speed.watching_above":
-            change["watching_human_speed_mps"] = None
         data = policy.model_dump()
         (data if "." not in path else data[path.split(".")[0]]).update(change)
         assert policy_value(AwarenessPolicy.model_validate(data), path) == chosen

@@ -160,7 +160,7 @@ WRONG = [
     "inflation: {table_m: [[0.1, 0.5]], shape: linear}",
     "speed: {watching_above: 0.8}",
     "speed: {watching_above: 0.5, watching_human_speed_mps: 0.05}",
-    "speed: {watching_above: 0.8, watching_human_speed_mps: 0.5}",
+    "speed: {watching_above: 0.8, watching_human_speed_mps: 0.8}",
     "speed: {shape: two_level, watching_above: 0.8, watching_human_speed_mps: 0.05}",
     "speed: {aware_human_speed_mps: 2.0}",
     "speed: {table_mps: [[0.5, 10.5]]}",

@@ -50,6 +50,9 @@ def without_reserve() -> AwarenessPolicy:
     """Return ``balanced`` as it was when the search found this case."""
     data = AwarenessPolicy.preset("balanced").model_dump(mode="json")
     data["rules"]["start_reserve"] = None
+    data["speed"].update(
+        aware_human_speed_mps=0.35, watching_above=0.8, watching_human_speed_mps=0.05
+    )
     return AwarenessPolicy.model_validate(data)
 
 
