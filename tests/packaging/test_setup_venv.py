@@ -121,6 +121,9 @@ def test_a_failure_shows_the_end_of_the_log_and_the_next_run_repairs_it(checkout
 def test_an_interpreter_that_does_not_run_is_refused_before_anything_is_removed(
     checkout: Path,
 ) -> None:
+    # The tests before may have run in another process.
+    make = [sys.executable, "-m", "venv", "--without-pip", checkout / ".venv"]
+    subprocess.run(make, check=True)
     environment = os.environ | {"PYTHON": "/bin/false"}
     refused = subprocess.run(
         ["sh", "tools/setup_venv.sh"],

@@ -251,7 +251,7 @@ def test_genuine_detectors_find_nobody_in_an_empty_hall(detector: str) -> None:
     lights = sorted(LIGHTINGS)
     highest = []
     for number, name in enumerate(LAYOUTS):
-        with Warehouse(WarehouseLayout.named(name), variant=number) as warehouse:
+        with Warehouse(WarehouseLayout.named(name), variant=number, renderer="auto") as warehouse:
             for _ in range(4):
                 light = Lighting.preset(lights[rng.integers(len(lights))])
                 renderer = CameraRenderer(warehouse, lighting=light)
