@@ -9,7 +9,7 @@ from typing import Any, Final
 from nav_adapter import NavConstraints, RobotProfile, RobotState
 from perception.arrays import FloatArray
 
-from ...crossing.planner import SamplingPlanner
+from ...crossing.planner import PlannerConfig, SamplingPlanner
 
 #: Suffix of the policy's name in tables.
 LABEL: Final = "UNSAFE-NO-FLOOR"
@@ -23,7 +23,8 @@ class NoFloorPlanner:
     """The reference planner without the adapter's floor: UNSAFE, to check that a search finds it.
 
     The adapter has no switch for this, and must not have one. This planner ignores the adapter's
-    radii and speed limits: every person is a point, and no speed-and-separation rule holds.
+    radii and speed limits: every person is a point, no speed-and-separation rule holds, and nobody
+    is given way.
 
     Args:
         robot: as for the reference planner.
@@ -32,7 +33,9 @@ class NoFloorPlanner:
 
     def __init__(self, robot: RobotProfile, static_boxes_odom_m: Any = None) -> None:
         self._robot = robot
-        self._planner = SamplingPlanner(robot, static_boxes_odom_m)
+        # Giving way knows where people are, whatever their radius.
+        config = PlannerConfig.for_robot(robot).model_copy(update={"give_way_s": 0.0})
+        self._planner = SamplingPlanner(robot, static_boxes_odom_m, config)
 
     def plan(
         self,
