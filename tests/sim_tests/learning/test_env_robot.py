@@ -21,6 +21,21 @@ class Ahead:
         return 0.7, 0.1
 
 
+def frames_ahead(scenario, **settings):
+    """Return the frames of the first second of a crossing that drives ahead, with seed 2."""
+    frames = []
+    with pytest.raises(StopIteration):
+        run_crossing(
+            scenario,
+            policy="balanced",
+            planner=Ahead(),
+            seed=2,
+            observer=lambda frame, _: frames.append(frame),
+            **settings,
+        )
+    return frames
+
+
 def test_an_episode_is_the_crossing_of_the_same_robot() -> None:
     env = CrossingEnv("crossing_from_left", robot="forklift", normalised_actions=False)
     np.testing.assert_allclose(env.action_space.high, [1.4, 0.9])
@@ -31,16 +46,7 @@ def test_an_episode_is_the_crossing_of_the_same_robot() -> None:
         states.append(env.situation.state)
     assert env.crossing.scenario.name == "crossing_from_left_forklift"
     env.close()
-    frames = []
-    with pytest.raises(StopIteration):
-        run_crossing(
-            "crossing_from_left",
-            policy="balanced",
-            planner=Ahead(),
-            robot="forklift",
-            seed=2,
-            observer=lambda frame, _: frames.append(frame),
-        )
+    frames = frames_ahead("crossing_from_left", robot="forklift")
     for state, frame in zip(states[:19], frames[1:20], strict=True):
         np.testing.assert_array_equal(state.position_odom_m, frame.robot_state.position_odom_m)
     assert 0.0 < states[-1].speed_mps <= 0.7
@@ -61,16 +67,7 @@ def test_an_episode_is_the_crossing_among_the_same_people() -> None:
     scenario, last = env.crossing.scenario, env.frame
     env.close()
     assert scenario.population == "recorded"
-    frames = []
-    with pytest.raises(StopIteration):
-        run_crossing(
-            "being_overtaken",
-            policy="balanced",
-            planner=Ahead(),
-            population="recorded",
-            seed=2,
-            observer=lambda frame, _: frames.append(frame),
-        )
+    frames = frames_ahead("being_overtaken", population="recorded")
     (own,), (other,), (first,) = (each.truth for each in (last, frames[19], frames[0]))
     np.testing.assert_array_equal(own.position_odom_m, other.position_odom_m)
     assert np.hypot(*(own.position_odom_m - first.position_odom_m)) > 0.5
