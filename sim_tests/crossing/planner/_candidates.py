@@ -74,6 +74,17 @@ class Aim:
     distance_m: float
     bearing_rad: float
 
+    @classmethod
+    def at(cls, place_odom_m: FloatArray, state: RobotState) -> Aim:
+        """Return the aim at a place; one straight behind always has the bearing −π."""
+        x, y = (place_odom_m - state.position_odom_m).tolist()
+        c, s = math.cos(state.heading_odom_rad), math.sin(state.heading_odom_rad)
+        forward_m, left_m = c * x + s * y, c * y - s * x
+        bearing_rad = math.atan2(left_m, forward_m)
+        if bearing_rad > math.pi - 1e-6:  # else rounding would choose the side to turn to
+            bearing_rad -= math.tau
+        return cls(math.hypot(forward_m, left_m), bearing_rad)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidates:

@@ -123,18 +123,17 @@ class SamplingPlanner:
         """
         goal_odom_m = finite_array("goal_odom_m", goal_odom_m, (2,), SimError)
         dt_s = finite_number("dt_s", dt_s, SimError, minimum=0.0, exclusive_minimum=True)
-        goal_x_m, goal_y_m = _in_base(robot_state, goal_odom_m)
-        goal_distance_m = math.hypot(goal_x_m, goal_y_m)
+        goal = Aim.at(goal_odom_m, robot_state)
         limits = TwistLimits.of(self.robot, self.config, constraints)
-        if limits.speed_mps <= 0.0 or goal_distance_m <= self.config.goal_tolerance_m:
+        if limits.speed_mps <= 0.0 or goal.distance_m <= self.config.goal_tolerance_m:
             return self._motion.brake(robot_state, dt_s)
 
         gentle_mps2 = self.config.goal_deceleration_fraction * self.robot.max_deceleration_mps2
-        top_mps = min(limits.speed_mps, math.sqrt(2.0 * gentle_mps2 * goal_distance_m))
+        top_mps = min(limits.speed_mps, math.sqrt(2.0 * gentle_mps2 * goal.distance_m))
         reach_m = max(robot_state.travel_mps, top_mps) * self.config.horizon_s
         reach_m = max(reach_m, self.robot.min_turning_radius_m or 0.0)
         scene = Scene(robot_state, constraints, self._boxes_within(robot_state, reach_m))
-        aim = Aim(goal_distance_m, self._bearing(goal_x_m, goal_y_m, scene))
+        aim = Aim(goal.distance_m, self._past_standing_rad(goal, scene))
         if scene.has_people and self.config.give_way_s > 0.0:
             top_mps = giving_way_mps(
                 self._way(aim),
@@ -152,6 +151,8 @@ class SamplingPlanner:
             alone = scene.without_people()
             if self._choose(robot_state, limits, top_mps, aim, dt_s, alone)[0] <= _STANDING_MPS:
                 reversing.begin()  # not people, but boxes are in the way
+        if self._must_turn_round(robot_state, command, goal):
+            command = self._face(robot_state, limits, goal, dt_s, scene)
         return within_next_limits(command, robot_state, constraints, dt_s)
 
     def _choose(
@@ -169,6 +170,35 @@ class SamplingPlanner:
         if not safe.any():
             return self._motion.brake(robot_state, dt_s)
         return _cheapest(candidates, self._cost(candidates, robot_state, aim, scene), safe)
+
+    def _must_turn_round(
+        self, robot_state: RobotState, command: tuple[float, ...], goal: Aim
+    ) -> bool:
+        """Return whether the robot stands, and stays, with its goal behind it.
+
+        No roll-out leads there, and the swing of the corners near people may cost more than the
+        first part of the turn gains. So a robot amid a group would stand for ever.
+        """
+        return (
+            self._turns_on_the_spot
+            and abs(goal.bearing_rad) > _BEHIND_RAD
+            and max(robot_state.travel_mps, command[0]) <= _STANDING_MPS
+        )
+
+    def _face(
+        self,
+        robot_state: RobotState,
+        limits: TwistLimits,
+        goal: Aim,
+        dt_s: float,
+        scene: Scene,
+    ) -> tuple[float, ...]:
+        """Return the safe turn on the spot that leads to the goal, or full braking."""
+        candidates = self._motion.candidates(robot_state, limits, 0.0, goal, dt_s)
+        safe = self._safe(candidates, robot_state, dt_s, scene)
+        if not safe.any():
+            return self._motion.brake(robot_state, dt_s)
+        return _cheapest(candidates, self._goal_cost(candidates, goal), safe)
 
     def _reverse(
         self,
@@ -192,11 +222,9 @@ class SamplingPlanner:
         cost[0] += math.tau  # rather slowly than not at all
         return _cheapest(candidates, cost, safe)
 
-    def _bearing(self, goal_x_m: float, goal_y_m: float, scene: Scene) -> float:
+    def _past_standing_rad(self, goal: Aim, scene: Scene) -> float:
         """Return the bearing of the goal, or past a person who stands in front of it."""
-        bearing_rad = math.atan2(goal_y_m, goal_x_m)
-        if bearing_rad > math.pi - 1e-6:  # behind: turn the same way whatever the rounding
-            bearing_rad -= math.tau
+        bearing_rad = goal.bearing_rad
         config = self.config
         margin_m = self._footprint.half_size_m[1] + config.clearance_m + config.detour_margin_m
         discs = scene.standing_discs_m(config.standing_speed_mps, margin_m)
@@ -209,8 +237,7 @@ class SamplingPlanner:
             pose = Poses(*(np.asarray(value) for value in (x_m, y_m, c, s)))
             return bool(scene.box_gap_m(self._footprint.at(pose)) >= config.clearance_m)
 
-        goal_distance_m = math.hypot(goal_x_m, goal_y_m)
-        return detour_bearing_rad(bearing_rad, goal_distance_m, discs, is_free)
+        return detour_bearing_rad(bearing_rad, goal.distance_m, discs, is_free)
 
     def _way(self, aim: Aim) -> Way:
         """Return the strip in which the robot drives to its aim."""
@@ -339,12 +366,6 @@ def _cheapest(
     cost[~safe] = np.inf
     row, column = divmod(int(np.argmax(cost <= cost.min() + _TIE)), cost.shape[1])
     return tuple(candidates.commands[row, column].tolist())
-
-
-def _in_base(robot_state: RobotState, point_odom_m: FloatArray) -> tuple[float, float]:
-    x, y = (point_odom_m - robot_state.position_odom_m).tolist()
-    c, s = math.cos(robot_state.heading_odom_rad), math.sin(robot_state.heading_odom_rad)
-    return c * x + s * y, c * y - s * x
 
 
 def _reach_m(poses: Poses) -> float:

@@ -253,6 +253,16 @@ def test_boxes_are_never_hit(seed: int) -> None:
     assert run.path_m[:, 0].max() > 0.5
 
 
+@pytest.mark.parametrize("near_m", [1.5, 1.65])
+def test_a_robot_amid_a_group_turns_round_and_leaves(near_m: float) -> None:
+    """The swing of its corners towards people must not keep it there."""
+    group = [(near_m, 0.9), (near_m + 0.5, 0.0), (near_m, -0.9)]
+    people = [walker(x, y, 0.0, 0.0, 1.06) for x, y in group]
+    run = simulate(people, (-8.0, 0.0), limit_mps=lambda _: 0.5)
+    assert run.arrived
+    assert run.path_m[:, 0].max() < 0.1
+
+
 def test_an_off_centre_footprint_keeps_clear_of_the_wall() -> None:
     corners = OUTLINE_M + np.array([0.2, -0.15])
     planner = SamplingPlanner(RobotProfile(corners, 1.5, 1.0, 1.0, 0.3), AISLE)
