@@ -12,7 +12,7 @@ pytest.importorskip("pybullet", reason="the gallery shows crossings (extra sim)"
 sys.path.insert(0, str(ROOT))
 
 from awarenav.figures import Image
-from sim_tests import run_crossing, shipped_scenarios
+from sim_tests import run_crossing
 from tools.docs_site import films
 from tools.docs_site.example_pictures import FOLDER, PLANNERS, example_names, record_example
 from tools.docs_site.gallery import PAGE, gallery_page
@@ -21,14 +21,14 @@ from tools.docs_site.gallery import PAGE, gallery_page
 def test_the_page_is_what_its_command_writes() -> None:
     text = PAGE.read_text("utf-8")
     assert text == gallery_page(), "run python -m tools.docs_site.gallery"
-    for name in shipped_scenarios():
+    for name in films.filmed_scenarios():
         assert f"### {name}\n" in text
         assert f"images/films/{name}.webp" in text
     for path in (ROOT / "examples").glob("*.py"):
         assert f"(../examples/{path.name})" in text
 
 
-@pytest.mark.parametrize("name", shipped_scenarios())
+@pytest.mark.parametrize("name", films.filmed_scenarios())
 def test_a_scenario_has_a_film(name: str) -> None:
     path = films.FOLDER / f"{name}.webp"
     assert path.is_file(), f"run python -m tools.docs_site.films {name}"
@@ -43,7 +43,7 @@ def test_a_scenario_has_a_film(name: str) -> None:
 
 def test_no_film_is_left_of_a_scenario_that_is_gone() -> None:
     kept = {path.stem for path in films.FOLDER.glob("*.webp")}
-    assert kept == set(shipped_scenarios())
+    assert kept == set(films.filmed_scenarios())
     total = sum(path.stat().st_size for path in films.FOLDER.glob("*.webp"))
     assert total <= films.MAX_SUM_BYTES
 

@@ -11,6 +11,7 @@ import ast
 import re
 import sys
 import textwrap
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
@@ -38,6 +39,12 @@ scenario; [Scenarios](scenarios.md) says what varies in each. With reduced motio
 browser, you see plans instead of films.
 
 <div class="gallery" markdown>"""
+_GUIDELINES: Final = """## The guidelines' situations
+
+These scenarios are a set of their own, `--scenario guidelines`.
+[Scenarios](scenarios.md#the-guidelines-situations) says where they come from.
+
+<div class="gallery" markdown>"""
 _FILM: Final = """<picture>
 <source media="(prefers-reduced-motion: reduce)" srcset="images/scenarios/{name}.png">
 <img src="images/films/{name}.webp" alt="Film of {name} from above" loading="lazy">
@@ -57,11 +64,7 @@ speed limit and the largest radius over time. [Planners](planners.md) explains t
 
 def gallery_page() -> str:
     """Return the Markdown of the gallery."""
-    parts = [_HEAD]
-    for name in shipped_scenarios():
-        template = ScenarioTemplate.shipped(name)
-        about = f"{template.median().description} ({template.attention})"
-        parts.append(_ENTRY.format(f"### {name}\n\n{_wrapped(about)}\n\n{_FILM.format(name=name)}"))
+    parts = [_HEAD, *_films("all"), "</div>\n", _GUIDELINES, *_films("guidelines")]
     parts += ["</div>\n", _EXAMPLES]
     for name in example_names():
         folder = "examples/planners" if name in PLANNERS else "examples"
@@ -73,6 +76,14 @@ def gallery_page() -> str:
         )
         parts.append(_ENTRY.format(entry))
     return "\n".join([*parts, "</div>\n"])
+
+
+def _films(scenario_set: str) -> Iterator[str]:
+    """Yield an entry for every scenario of a set."""
+    for name in shipped_scenarios(scenario_set):
+        template = ScenarioTemplate.shipped(name)
+        about = f"{template.median().description} ({template.attention})"
+        yield _ENTRY.format(f"### {name}\n\n{_wrapped(about)}\n\n{_FILM.format(name=name)}")
 
 
 def _first_sentence(path: Path) -> str:
