@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -166,10 +168,8 @@ class SamplingPlanner:
     ) -> tuple[float, ...]:
         """Return the command of the best candidate that is safe, or full braking."""
         candidates = self._motion.candidates(robot_state, limits, top_mps, aim, dt_s)
-        safe = self._safe(candidates, robot_state, dt_s, scene)
-        if not safe.any():
-            return self._motion.brake(robot_state, dt_s)
-        return _cheapest(candidates, self._cost(candidates, robot_state, aim, scene), safe)
+        cost = partial(self._cost, candidates, robot_state, aim, scene)
+        return self._cheapest_safe(candidates, cost, robot_state, dt_s, scene)
 
     def _must_turn_round(
         self, robot_state: RobotState, command: tuple[float, ...], goal: Aim
@@ -195,10 +195,8 @@ class SamplingPlanner:
     ) -> tuple[float, ...]:
         """Return the safe turn on the spot that leads to the goal, or full braking."""
         candidates = self._motion.candidates(robot_state, limits, 0.0, goal, dt_s)
-        safe = self._safe(candidates, robot_state, dt_s, scene)
-        if not safe.any():
-            return self._motion.brake(robot_state, dt_s)
-        return _cheapest(candidates, self._goal_cost(candidates, goal), safe)
+        cost = partial(self._goal_cost, candidates, goal)
+        return self._cheapest_safe(candidates, cost, robot_state, dt_s, scene)
 
     def _reverse(
         self,
@@ -212,15 +210,33 @@ class SamplingPlanner:
         assert isinstance(self._motion, SteeredMotion)
         top_mps = min(REVERSE_MPS, limits.speed_mps)
         candidates = self._motion.backward(robot_state, limits, top_mps, aim, dt_s)
+
+        def cost() -> FloatArray:
+            cost = goal_facing(candidates.poses, aim)
+            if scene.has_boxes:
+                gaps_m = scene.box_gap_m(self._footprint.at(candidates.poses))
+                cost = cost + _closeness(gaps_m, self.config.static_comfort_m).max(axis=0)
+            cost[0] += math.tau  # rather slowly than not at all
+            return cost
+
+        return self._cheapest_safe(candidates, cost, robot_state, dt_s, scene)
+
+    def _cheapest_safe(
+        self,
+        candidates: Candidates,
+        cost_of_all: Callable[[], FloatArray],
+        robot_state: RobotState,
+        dt_s: float,
+        scene: Scene,
+    ) -> tuple[float, ...]:
+        """Return the safe command that costs least, the first of equal ones, or full braking."""
         safe = self._safe(candidates, robot_state, dt_s, scene)
         if not safe.any():
             return self._motion.brake(robot_state, dt_s)
-        cost = goal_facing(candidates.poses, aim)
-        if scene.has_boxes:
-            gaps_m = scene.box_gap_m(self._footprint.at(candidates.poses))
-            cost = cost + _closeness(gaps_m, self.config.static_comfort_m).max(axis=0)
-        cost[0] += math.tau  # rather slowly than not at all
-        return _cheapest(candidates, cost, safe)
+        cost = cost_of_all()
+        cost[~safe] = np.inf
+        row, column = divmod(int(np.argmax(cost <= cost.min() + _TIE)), cost.shape[1])
+        return tuple(candidates.commands[row, column].tolist())
 
     def _past_standing_rad(self, goal: Aim, scene: Scene) -> float:
         """Return the bearing of the goal, or past a person who stands in front of it."""
@@ -357,15 +373,6 @@ class SamplingPlanner:
             weight *= _TURN_BACK  # its turn leads away from the goal at first
         facing = weight * np.abs(off_rad) * away
         return np.asarray(farther_m / full_gain_m + facing)
-
-
-def _cheapest(
-    candidates: Candidates, cost: FloatArray, safe: NDArray[np.bool_]
-) -> tuple[float, ...]:
-    """Return the command of the safe candidate that costs least; the first of equal ones."""
-    cost[~safe] = np.inf
-    row, column = divmod(int(np.argmax(cost <= cost.min() + _TIE)), cost.shape[1])
-    return tuple(candidates.commands[row, column].tolist())
 
 
 def _reach_m(poses: Poses) -> float:
