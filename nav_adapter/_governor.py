@@ -11,6 +11,7 @@ import numpy as np
 from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
 
+from ._approach import Turn, human_speed_mps, turn_of
 from ._constraints import GovernedSpeed
 from ._footprint import Footprint
 from ._memory import PersonMemory
@@ -21,16 +22,11 @@ from ._robot import LATERAL_NOISE_MPS, RobotProfile, RobotState
 from ._separation import (
     highest_speed_from_standing_mps,
     highest_speed_mps,
-    protective_separation_m,
+    separation_from_standing_m,
 )
 
 # Below this speed the robot counts as standing: it may start off either way, or turn on the spot.
 STANDING_MPS: Final = 0.05
-# Shares of the speed that is assumed for unaware people. A person faster than the first share is a
-# brisk walker, who may turn to the robot. A person faster than that speed by the second share runs.
-BRISK_SHARE: Final = 0.75
-RUNNING_SHARE: Final = 0.25
-
 
 # Gaps and shares of the stopping distance (2, N); human speeds, ages and start delays (N,).
 _Terms: TypeAlias = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
@@ -68,6 +64,10 @@ class SpeedGovernor:
         self._human_acceleration_mps2 = (
             math.inf if standing is None else standing.human_acceleration_mps2
         )
+        walking = policy.rules.walking
+        self._turn_acceleration_mps2 = (
+            math.inf if walking is None else walking.human_acceleration_mps2
+        )
         self._people_turn_rad = math.radians(policy.rules.people_turn_deg)
 
     def limit(
@@ -83,7 +83,7 @@ class SpeedGovernor:
             people = self._people_in(self._path, people, robot_state, now)
         if not people:
             return GovernedSpeed(maximum_mps, "robot maximum", True, math.inf)
-        limits, terms = self._limits_mps(people, robot_state, now, robot_age_s)
+        limits, terms, turn = self._limits_mps(people, robot_state, now, robot_age_s)
         lowest = []
         for rule, limit in limits.items():
             row = int(limit.argmin())
@@ -91,7 +91,7 @@ class SpeedGovernor:
         limit_mps, row, rule = min(lowest, key=lambda entry: entry[0])
         speed_mps = robot_state.travel_mps
         # A robot within speed and separation has the whole reaction time left.
-        suffices = speed_mps <= lowest[0][0] or self._braking_suffices(*terms, speed_mps)
+        suffices = speed_mps <= lowest[0][0] or self._braking_suffices(terms, turn, speed_mps)
         if limit_mps >= maximum_mps:
             return GovernedSpeed(maximum_mps, "robot maximum", suffices, limit_mps)
         reason = f"track {list(people)[row]}: {rule}"
@@ -110,7 +110,7 @@ class SpeedGovernor:
             inside = self._people_in(self._path, people, robot_state, now)
         if not inside:
             return [maximum_mps] * len(people)
-        limits, _ = self._limits_mps(inside, robot_state, now, robot_age_s)
+        limits, _, _ = self._limits_mps(inside, robot_state, now, robot_age_s)
         lowest_mps = np.minimum(np.stack(list(limits.values())).min(axis=0), maximum_mps)
         found = dict(zip(inside, lowest_mps.tolist(), strict=True))
         return [found.get(track_id, maximum_mps) for track_id in people]
@@ -121,7 +121,7 @@ class SpeedGovernor:
         robot_state: RobotState,
         now: float,
         robot_age_s: float,
-    ) -> tuple[dict[str, FloatArray], _Terms]:
+    ) -> tuple[dict[str, FloatArray], _Terms, Turn | None]:
         """Return the limits (N,) for each person by the name of the rule, and their terms.
 
         Speed and separation comes first.
@@ -138,13 +138,29 @@ class SpeedGovernor:
         ]
         age_s, human_mps, delay_s = np.array(rows).T.copy()
         terms = gaps_m, shares, human_mps, age_s, delay_s
+        closing_mps, ahead = _closing(people, robot_state)
+        turn = self._turn(people, closing_mps, age_s)
         limits = {
-            "speed and separation": self._separation_limit_mps(*terms),
+            "speed and separation": self._separation_limit_mps(terms, turn),
             **self._rule_limits_mps(gaps_m, shares[1]),
         }
         if self._policy.rules.start_reserve is not None:
-            limits["start reserve"] = self._start_limit_mps(gaps_m, people, robot_state, age_s)
-        return limits, terms
+            limits["start reserve"] = self._start_limit_mps(gaps_m, closing_mps, ahead, age_s, turn)
+        return limits, terms, turn
+
+    def _human_speed_mps(self, memory: PersonMemory, robot_x: float, robot_y: float) -> float:
+        """Return the assumed speed of a person towards the robot."""
+        assumed_mps = self._rules.human_speed_mps(memory)
+        if self._path is not None:
+            return assumed_mps
+        return human_speed_mps(
+            memory,
+            robot_x,
+            robot_y,
+            assumed_mps=assumed_mps,
+            unaware_mps=self._rules.unaware_human_speed_mps,
+            turn_rad=self._people_turn_rad,
+        )
 
     def _people_in(
         self,
@@ -232,15 +248,18 @@ class SpeedGovernor:
         beyond_rad = np.maximum(angle_rad - turn_rad, 0.0)
         return np.asarray(np.maximum(np.cos(beyond_rad), 0.0))
 
-    def _separation_limit_mps(
-        self,
-        gaps_m: FloatArray,
-        shares: FloatArray,
-        human_mps: FloatArray,
-        age_s: FloatArray,
-        delay_s: FloatArray,
-    ) -> FloatArray:
+    def _turn(
+        self, people: Mapping[int, PersonMemory], closing_mps: FloatArray, age_s: FloatArray
+    ) -> Turn | None:
+        """Return the bound for people who must turn to the robot; None if it holds for nobody."""
+        if all(memory.turn_delay_s == math.inf for memory in people.values()):
+            return None
+        until_braking_s = self._robot.reaction_time_s + age_s
+        return turn_of(people.values(), closing_mps, until_braking_s, self._turn_acceleration_mps2)
+
+    def _separation_limit_mps(self, terms: _Terms, turn: Turn | None) -> FloatArray:
         """Return (N,), the higher limit of the two bounds for each person."""
+        gaps_m, shares, human_mps, age_s, delay_s = terms
         arguments = (
             gaps_m,
             human_mps,
@@ -255,37 +274,66 @@ class SpeedGovernor:
             )
         else:
             limits_mps = highest_speed_mps(*arguments)
+        if turn is not None:
+            turned_mps = self._turned_limit_mps(turn, *arguments)
+            np.maximum(limits_mps[1], turned_mps, out=limits_mps[1])
         return np.asarray(np.maximum(limits_mps[0], limits_mps[1]))
+
+    def _turned_limit_mps(
+        self,
+        turn: Turn,
+        gaps_m: FloatArray,
+        human_mps: FloatArray,
+        a: float,
+        T: FloatArray,
+        C: float,
+        shares: FloatArray,
+    ) -> FloatArray:
+        """Return the limit (N,) of the second bound for people who have to turn to the robot.
+
+        The direction in which they come nearer is that of the base, not of the nearest corner.
+        """
+        return highest_speed_from_standing_mps(
+            gaps_m[1] - turn.nearer_m,
+            human_mps,
+            a,
+            T,
+            C,
+            shares[1],
+            self._turn_acceleration_mps2,
+            turn.delay_s,
+        )
 
     def _start_limit_mps(
         self,
         gaps_m: FloatArray,
-        people: Mapping[int, PersonMemory],
-        robot_state: RobotState,
+        closing_mps: FloatArray,
+        ahead: FloatArray,
         age_s: FloatArray,
+        turn: Turn | None,
     ) -> FloatArray:
         """Return (N,), the limit with which the robot stands before anybody who sets off now."""
         reserve = self._policy.rules.start_reserve
         assert reserve is not None
-        positions = np.array([m.track_position_odom_m for m in people.values()])
-        offset = positions - robot_state.position_odom_m
-        distance_m = np.maximum(np.hypot(offset[:, 0], offset[:, 1]), 1e-9)
         shares = np.ones_like(gaps_m)
-        shares[1] = _ahead(offset, distance_m, robot_state)
+        shares[1] = ahead
         # Whoever comes already has been speeding up for as long as that takes.
-        velocity = np.array([m.velocity_odom_mps for m in people.values()])
-        closing_mps = np.maximum(-(velocity * offset).sum(axis=1) / distance_m, 0.0)
-        delay_s = reserve.start_delay_s + closing_mps / reserve.human_acceleration_mps2
-        limits_mps = highest_speed_from_standing_mps(
+        delay_s = np.maximum(closing_mps, 0.0) / reserve.human_acceleration_mps2
+        delay_s = reserve.start_delay_s + delay_s
+        arguments = (
             gaps_m,
-            np.full(len(people), self._rules.unaware_human_speed_mps),
+            np.full(len(age_s), self._rules.unaware_human_speed_mps),
             self._robot.max_deceleration_mps2,
             self._robot.reaction_time_s + age_s,
             0.0,
             shares,
-            reserve.human_acceleration_mps2,
-            delay_s,
         )
+        limits_mps = highest_speed_from_standing_mps(
+            *arguments, reserve.human_acceleration_mps2, delay_s
+        )
+        if turn is not None and (turn.delay_s < 0.0).any():
+            turned_mps = self._turned_limit_mps(turn, *arguments)
+            np.maximum(limits_mps[1], turned_mps, out=limits_mps[1], where=turn.delay_s < 0.0)
         return np.asarray(np.maximum(limits_mps[0], limits_mps[1]))
 
     def _rule_limits_mps(self, gaps_m: FloatArray, approach: FloatArray) -> dict[str, FloatArray]:
@@ -305,81 +353,42 @@ class SpeedGovernor:
             limits["cap near people"] = rules.near_cap.limit_mps(footprint_gap_m, deceleration_mps2)
         return limits
 
-    def _braking_suffices(
-        self,
-        gaps_m: FloatArray,
-        shares: FloatArray,
-        human_mps: FloatArray,
-        age_s: FloatArray,
-        delay_s: FloatArray,
-        speed_mps: float,
-    ) -> bool:
+    def _braking_suffices(self, terms: _Terms, turn: Turn | None, speed_mps: float) -> bool:
         """Return whether the robot stops in time if it brakes fully from now on.
 
         No reaction time is left then. For a standing robot it is always True.
         """
         if speed_mps < STANDING_MPS:
             return True
-        needed_m = protective_separation_m(
-            speed_mps,
-            human_mps,
-            deceleration_mps2=self._robot.max_deceleration_mps2,
-            reaction_time_s=age_s,
-            clearance_m=self._policy.margins.separation_clearance_m,
-            approach=shares,
-            human_acceleration_mps2=self._human_acceleration_mps2,
-            start_delay_s=delay_s,
+        gaps_m, shares, human_mps, age_s, delay_s = terms
+
+        a, C = self._robot.max_deceleration_mps2, self._policy.margins.separation_clearance_m
+        needed_m = separation_from_standing_m(
+            speed_mps, human_mps, a, age_s, C, shares, self._human_acceleration_mps2, delay_s
         )
+        if turn is not None:
+            turned_m = turn.nearer_m + separation_from_standing_m(
+                *(speed_mps, human_mps, a, age_s, C, shares[1]),
+                self._turn_acceleration_mps2,
+                turn.delay_s,
+            )
+            np.minimum(needed_m[1], turned_m, out=needed_m[1])
         return bool((needed_m <= gaps_m).any(axis=0).all())
 
-    def _human_speed_mps(self, memory: PersonMemory, robot_x: float, robot_y: float) -> float:
-        """Return the assumed speed of a person towards the robot.
 
-        It is the policy's assumption, or the closing speed of the track if that is higher: an aware
-        person is not expected to step towards the robot, but may do so. Speed above that assumed
-        for unaware people is added, since an attentive runner cannot stop as fast as an attentive
-        walker. From a quarter above it on, awareness no longer counts: a running person is assumed
-        to run straight at the robot. With a protective field it is the assumption alone.
-        """
-        (x, y), (vx, vy) = memory.track_position_odom_m, memory.velocity_odom_mps
-        x, y = x - robot_x, y - robot_y
-        assumed_mps = self._rules.human_speed_mps(memory)
-        if self._path is not None:
-            return assumed_mps
-        distance_m = max(math.hypot(x, y), 1e-9)
-        closing_mps = -(vx * x + vy * y) / distance_m
-        walking_mps, unaware_mps = math.hypot(vx, vy), self._rules.unaware_human_speed_mps
-        if walking_mps > BRISK_SHARE * unaware_mps:
-            across_mps = abs(vx * y - vy * x) / distance_m
-            closing_mps = self._closing_after_turn_mps(closing_mps, across_mps, walking_mps)
-        excess_mps = walking_mps - unaware_mps
-        if excess_mps > 0.0:
-            running = min(excess_mps / max(RUNNING_SHARE * unaware_mps, 1e-9), 1.0)
-            runner_mps = assumed_mps + running * (walking_mps - assumed_mps)
-            assumed_mps = max(assumed_mps + excess_mps, runner_mps)
-        return closing_mps if closing_mps > assumed_mps else assumed_mps
+def _closing(
+    people: Mapping[int, PersonMemory], robot_state: RobotState
+) -> tuple[FloatArray, FloatArray]:
+    """Return (N,), the speed at which each track comes nearer, and how far ahead it is.
 
-    def _closing_after_turn_mps(
-        self, closing_mps: float, across_mps: float, walking_mps: float
-    ) -> float:
-        """Return the closing speed of a brisk walker after the largest turn towards the robot.
-
-        A person at normal pace who has seen the robot stops within a step. A faster one walks on,
-        and may be rounding a corner.
-        """
-        unaware_mps = self._rules.unaware_human_speed_mps
-        brisk = (walking_mps / max(unaware_mps, 1e-9) - BRISK_SHARE) / (1.0 - BRISK_SHARE)
-        turn_rad = self._people_turn_rad * min(brisk, 1.0)
-        if math.atan2(across_mps, closing_mps) <= turn_rad:
-            return walking_mps
-        return closing_mps * math.cos(turn_rad) + across_mps * math.sin(turn_rad)
-
-
-def _ahead(
-    offset_odom_m: FloatArray, distance_m: FloatArray, robot_state: RobotState
-) -> FloatArray:
-    """Return (N,), the cosine of each point's angle off the course, at least 0; 1 at a stand."""
+    That is the cosine of its angle off the robot's course, at least 0; 1 at a stand.
+    """
+    positions = np.array([m.track_position_odom_m for m in people.values()])
+    velocity = np.array([m.velocity_odom_mps for m in people.values()])
+    offset = positions - robot_state.position_odom_m
+    distance_m = np.maximum(np.hypot(offset[:, 0], offset[:, 1]), 1e-9)
+    closing_mps = -(velocity * offset).sum(axis=1) / distance_m
     if robot_state.travel_mps < STANDING_MPS:
-        return np.ones(len(offset_odom_m))
-    along = offset_odom_m @ np.asarray(robot_state.travel_direction_odom)
-    return np.asarray(np.clip(along / distance_m, 0.0, 1.0))
+        return closing_mps, np.ones(len(offset))
+    along = offset @ np.asarray(robot_state.travel_direction_odom)
+    return closing_mps, np.asarray(np.clip(along / distance_m, 0.0, 1.0))

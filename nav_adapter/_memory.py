@@ -49,6 +49,10 @@ class PersonMemory(NamedTuple):
         speed_held: the same for the speed policy.
         start_delay_s: how long before the track's stamp this person may have begun to walk
             unnoticed; infinite for anybody who does not count as standing.
+        turn_delay_s: how long before the track's stamp this person may have begun to turn
+            unnoticed; infinite for anybody who may turn at once.
+        velocity_spread_mps: by how much this person may come nearer faster than the track; 0 for
+            anybody who may turn at once.
     """
 
     track: PersonTrack
@@ -68,6 +72,8 @@ class PersonMemory(NamedTuple):
     inflation_held: bool
     speed_held: bool
     start_delay_s: float = math.inf
+    turn_delay_s: float = math.inf
+    velocity_spread_mps: float = 0.0
 
     def newly_seen_s(self, seen_stamp_s: float) -> float:
         """Return the time from the last sighting to this one, or 0 if it is not a new one."""

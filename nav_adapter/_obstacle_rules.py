@@ -23,7 +23,6 @@ from ._memory import (
     velocity_variance_m2ps2,
 )
 from ._policy import AwarenessPolicy
-from .policies import StandingPeople
 
 # Below this speed the direction of a velocity is noise.
 _WALKING_MPS: Final = 0.1
@@ -203,12 +202,27 @@ class ObstacleRules:
             seen_stamp_s=seen_stamp_s,
             noticed_lower=noticed_lower,
         )
-        standing = self._policy.rules.standing
-        if standing is not None and trusted and self._is_standing(standing, person):
-            # Between the frame that showed the person and the track's stamp nobody looked.
-            unseen_s = max(track.stamp_s - seen_stamp_s, 0.0)
-            delay_s = standing.delay_s(unseen_s, track.moved_m, track.moved_age_s)
-            return person._replace(start_delay_s=delay_s)
+        if not trusted or track.status != "confirmed" or self._is_first_sight(person):
+            return person
+        # Between the frame that showed the person and the track's stamp nobody looked.
+        return self._bounded(person, max(track.stamp_s - seen_stamp_s, 0.0))
+
+    def _bounded(self, person: PersonMemory, unseen_s: float) -> PersonMemory:
+        """Return a freshly seen person with the bounds on human acceleration that hold."""
+        rules, track = self._policy.rules, person.track
+        if rules.standing is None and rules.walking is None:
+            return person
+        variance_m2ps2 = velocity_variance_m2ps2(track)
+        if rules.standing is not None and rules.standing.is_standing(
+            math.hypot(*person.velocity_odom_mps), variance_m2ps2
+        ):
+            delay_s = rules.standing.delay_s(unseen_s, track.moved_m, track.moved_age_s)
+            person = person._replace(start_delay_s=delay_s)
+        if rules.walking is not None:
+            person = person._replace(
+                turn_delay_s=rules.walking.turn_delay_s + unseen_s,
+                velocity_spread_mps=rules.walking.velocity_sigmas * math.sqrt(variance_m2ps2),
+            )
         return person
 
     def _noticed_lower(self, track: PersonTrack) -> float:
@@ -221,17 +235,6 @@ class ObstacleRules:
     def _is_first_sight(self, memory: PersonMemory) -> bool:
         """Return whether frames have shown a person for less than ``shrink_after_s``."""
         return memory.known_s < self._timing.shrink_after_s - ROUNDING_S
-
-    def _is_standing(self, standing: StandingPeople, memory: PersonMemory) -> bool:
-        """Return whether the bound on human acceleration holds for a freshly seen person."""
-        track = memory.track
-        return (
-            track.status == "confirmed"
-            and not self._is_first_sight(memory)
-            and standing.is_standing(
-                math.hypot(*memory.velocity_odom_mps), velocity_variance_m2ps2(track)
-            )
-        )
 
     def _new_person(
         self,

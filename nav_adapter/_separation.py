@@ -69,9 +69,9 @@ def protective_separation_m(
         speed_mps, human_speed_mps, deceleration_mps2, reaction_time_s, clearance_m, approach
     )
     start = _checked_start(human_acceleration_mps2, start_delay_s)
-    stopping_m = share * (v * T + v * v / (2.0 * a))
     if start is not None:
-        return np.asarray(_walked_m(T + v / a, v_h, *start) + stopping_m + C)
+        return separation_from_standing_m(v, v_h, a, T, C, share, *start)
+    stopping_m = share * (v * T + v * v / (2.0 * a))
     separation: FloatArray = np.float64(v_h * (T + v / a) + stopping_m + C)
     return separation
 
@@ -164,7 +164,8 @@ def highest_speed_from_standing_mps(
 ) -> FloatArray:
     """Return :func:`max_speed_mps` of its arguments in their order, without checks.
 
-    Where a_h or the delay is infinite, it is :func:`highest_speed_mps` to the bit.
+    Where a_h or the delay is infinite, it is :func:`highest_speed_mps` to the bit. A delay below 0,
+    but at least −T, is the time for which the person still stands.
     """
     walker_mps = highest_speed_mps(separation_m, v_h, a, T, C, share)
     bounded = np.isfinite(a_h) & np.isfinite(delay_s)
@@ -189,12 +190,31 @@ def highest_speed_from_standing_mps(
     return np.asarray(np.where(bounded, np.maximum(walker_mps, starter_mps), walker_mps))
 
 
+def separation_from_standing_m(
+    v: FloatArray | float,
+    v_h: FloatArray,
+    a: FloatArray | float,
+    T: FloatArray,
+    C: FloatArray | float,
+    share: FloatArray,
+    a_h: FloatArray | float,
+    delay_s: FloatArray,
+) -> FloatArray:
+    """Return :func:`protective_separation_m` of its arguments in their order, without checks.
+
+    A delay below 0 is the time for which the person still stands.
+    """
+    stopping_m = share * (v * T + v * v / (2.0 * a))
+    return np.asarray(_walked_m(T + v / a, v_h, a_h, delay_s) + stopping_m + C)
+
+
 def _walked_m(
-    time_s: FloatArray, v_h: FloatArray, a_h: FloatArray, delay_s: FloatArray
+    time_s: FloatArray, v_h: FloatArray, a_h: FloatArray | float, delay_s: FloatArray
 ) -> FloatArray:
     """Return S_h over ``time_s``: v_h t, or the way from standing if that is shorter."""
     bounded = np.isfinite(a_h) & np.isfinite(delay_s)
     a_h, since_s = np.where(bounded, a_h, 1.0), time_s + np.where(bounded, delay_s, 0.0)
+    since_s = np.maximum(since_s, 0.0)
     speeding_up_s = np.minimum(since_s, v_h / a_h)
     started_m = 0.5 * a_h * speeding_up_s**2 + v_h * (since_s - speeding_up_s)
     return np.asarray(

@@ -68,12 +68,15 @@ class FieldLimits:
         closing_mps = None if people.velocity_x_mps is None else self._closing_mps(people, track)
         human_mps = people.human_mps
         if closing_mps is not None and rules.protective_field is None:
-            human_mps = library.maximum(self._turned_mps(people, track, *closing_mps), human_mps)
-        limits = {"speed and separation": self._separation_mps(people, bounds, human_mps)}
+            human_mps = library.maximum(
+                self._turned_mps(people, track, *closing_mps[:2]), human_mps
+            )
+        turn = self._turn(people, closing_mps)
+        limits = {"speed and separation": self._separation_mps(people, bounds, human_mps, turn)}
         if rules.zones is not None or rules.near_cap is not None:
             limits.update(self._distance_limits_mps(bounds))
         if people.reserved:
-            limits["start reserve"] = self._reserve_mps(people, bounds, ahead, closing_mps)
+            limits["start reserve"] = self._reserve_mps(people, bounds, ahead, closing_mps, turn)
         if held is not None:
             beyond_mps = library.convert(2.0 * self._maximum_mps)
             limits = {
@@ -129,26 +132,34 @@ class FieldLimits:
                 ahead = library.at_least(along_m, 0.0) / distance_m
         gap_m = footprint_m - (margin_m + self._rounding_m)
         if share is None:
-            return [(gap_m, None)], None, None
+            bounds = [(gap_m, None)]
+            if people.turn_delay_s is not None:
+                bounds.append((circle_m, None))
+            return bounds, None, None
         if ahead is not None and poses.stands is not None:
             ahead = library.where(poses.stands, library.convert(1.0), ahead)
         return [(gap_m, None), (circle_m, share)], ahead, held
 
-    def _closing_mps(self, people: PeopleAhead, track: tuple[Any, Any, Any]) -> tuple[Any, Any]:
-        """Return the speed towards the robot, and that across."""
+    def _closing_mps(
+        self, people: PeopleAhead, track: tuple[Any, Any, Any]
+    ) -> tuple[Any, Any, Any]:
+        """Return the speed towards the robot, that across, and the signed speed towards it."""
         x, y, distance_m = track
         velocity_x, velocity_y = people.velocity_x_mps, people.velocity_y_mps
         closing_mps = -(velocity_x * x + velocity_y * y) / distance_m
         across_mps = None
         if people.turn is not None:
             across_mps = abs(velocity_x * y - velocity_y * x) / distance_m
+        signed_mps = closing_mps
         if self._reach_m > 0.0:
             # The robot may be in a direction that differs by this sine.
             walking_mps = self._library.sqrt(velocity_x * velocity_x + velocity_y * velocity_y)
             closing_mps = self._library.at_least(closing_mps, 0.0)
             closing_mps = closing_mps + walking_mps * (self._reach_m / distance_m)
             closing_mps = self._library.minimum(closing_mps, walking_mps)
-        return closing_mps, across_mps
+            signed_mps = signed_mps + 2.0 * walking_mps * (self._reach_m / distance_m)
+            signed_mps = self._library.minimum(signed_mps, walking_mps)
+        return closing_mps, across_mps, signed_mps
 
     def _turned_mps(
         self, people: PeopleAhead, track: tuple[Any, Any, Any], closing_mps: Any, across_mps: Any
@@ -166,7 +177,23 @@ class FieldLimits:
             turned_mps = library.minimum(turned_mps, walking_mps)
         return library.where(closing_mps >= walking_mps * cos, walking_mps, turned_mps)
 
-    def _separation_mps(self, people: PeopleAhead, bounds: list[_Bound], human_mps: Any) -> Any:
+    def _turn(self, people: PeopleAhead, closing_mps: Any) -> _Bound | None:
+        """Return delay and way of people who have to turn to the robot, as in ``Turn``."""
+        if people.turn_delay_s is None or closing_mps is None:
+            return None
+        library, walking = self._library, self._rules.walking
+        assert walking is not None
+        a_h = walking.human_acceleration_mps2
+        nearing_mps = closing_mps[2] + people.velocity_spread_mps
+        delay_s = nearing_mps / a_h + people.turn_delay_s
+        counted_s = library.at_least(delay_s, 0.0)
+        since_s = people.turn_delay_s
+        nearer_m = (0.5 * a_h) * library.at_least(since_s * since_s - counted_s * counted_s, 0.0)
+        return library.maximum(delay_s, -people.reaction_s), nearer_m
+
+    def _separation_mps(
+        self, people: PeopleAhead, bounds: list[_Bound], human_mps: Any, turn: _Bound | None
+    ) -> Any:
         limit, standing = None, self._rules.standing
         for gap_m, share in bounds:
             if people.start_delay_s is None or standing is None:
@@ -186,10 +213,35 @@ class FieldLimits:
                     people.start_delay_s,
                 )
             limit = own if limit is None else self._library.maximum(limit, own)
+        if turn is not None:
+            # The last bound is that of the circle about the base.
+            gap_m, share = bounds[-1]
+            turned = self._turning_mps(people, turn, gap_m - self._clearance_m, human_mps, share)
+            limit = self._library.maximum(limit, turned)
         return limit
 
+    def _turning_mps(
+        self, people: PeopleAhead, turn: _Bound, gap_m: Any, human_mps: Any, share: Any
+    ) -> Any:
+        walking = self._rules.walking
+        assert walking is not None
+        delay_s, nearer_m = turn
+        return self._starter_mps(
+            gap_m - nearer_m,
+            human_mps,
+            people.reaction_s,
+            share,
+            walking.human_acceleration_mps2,
+            delay_s,
+        )
+
     def _reserve_mps(
-        self, people: PeopleAhead, bounds: list[_Bound], ahead: Any, closing_mps: Any
+        self,
+        people: PeopleAhead,
+        bounds: list[_Bound],
+        ahead: Any,
+        closing_mps: Any,
+        turn: _Bound | None,
     ) -> Any:
         reserve = self._rules.start_reserve
         assert reserve is not None
@@ -208,6 +260,12 @@ class FieldLimits:
                 delay_s,
             )
             limit = own if limit is None else library.maximum(limit, own)
+        if turn is not None:
+            gap_m, share = bounds[-1]
+            unaware_mps = library.convert(self._unaware_mps)
+            share = None if share is None else ahead
+            turned = self._turning_mps(people, turn, gap_m, unaware_mps, share)
+            limit = library.where(turn[0] < 0.0, library.maximum(limit, turned), limit)
         return limit
 
     def _walker_mps(self, spare_m: Any, human_mps: Any, reaction_s: Any, share: Any) -> Any:
@@ -254,8 +312,8 @@ class FieldLimits:
         limits = {}
         if zones is not None:
             distance_m = gap_m
-            if len(bounds) > 1:
-                circle_m, share = bounds[1]
+            circle_m, share = bounds[-1]
+            if share is not None:
                 # The distance that the robot drives until it has come nearer by the gap.
                 drive_m = library.where(
                     circle_m > 0.0, circle_m / library.at_least(share, 1e-9), circle_m

@@ -13,7 +13,7 @@ from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
 from tracking.prediction import PredictionModel
 
-from .._governor import BRISK_SHARE, RUNNING_SHARE
+from .._approach import BRISK_SHARE, RUNNING_SHARE
 from .._memory import ROUNDING_S, PersonMemory, position_sigma_m
 from .._policy import AwarenessPolicy
 from .._predicted import predicted_sigmas_m
@@ -66,6 +66,8 @@ class PeopleAhead:
         velocity_y_mps: the same.
         turn: cosine and sine of the turn towards the robot that counts, or None.
         start_delay_s: of people who stand, or None for people who walk at once.
+        turn_delay_s: of people who have to turn to the robot, or None for people who turn at once.
+        velocity_spread_mps: of the same.
         reserved: whether the start reserve can make a difference.
         lost_mps: limit that lost people allow at least, or None.
         reaches: of the N people.
@@ -83,6 +85,8 @@ class PeopleAhead:
     velocity_y_mps: Any
     turn: tuple[Any, Any] | None
     start_delay_s: Any
+    turn_delay_s: Any
+    velocity_spread_mps: Any
     reserved: bool
     lost_mps: Any
     reaches: tuple[Reach, ...]
@@ -99,6 +103,7 @@ class PeopleAhead:
 _ARRAYS: Final = (
     *("x", "y", "track_x", "track_y", "margin_m", "reaction_s", "human_mps"),
     *("velocity_x_mps", "velocity_y_mps", "start_delay_s", "lost_mps"),
+    *("turn_delay_s", "velocity_spread_mps"),
 )
 
 
@@ -119,6 +124,8 @@ class _Person:
     velocity_mps: tuple[float, float]
     turn_rad: float
     start_delay_s: float
+    turn_delay_s: float
+    velocity_spread_mps: float
     lost_mps: FloatArray | None
 
 
@@ -175,11 +182,13 @@ def people_ahead(
             least_mps < unaware_mps or math.isfinite(person.start_delay_s)
         )
         counts = basis.policy.rules.protective_field is None and (person.walking_mps > least_mps)
+        turns = math.isfinite(person.turn_delay_s)
         key = (
             is_aged,
-            counts or (reserved and person.walking_mps > 0.0),
+            counts or turns or (reserved and person.walking_mps > 0.0),
             reserved,
             math.isfinite(person.start_delay_s),
+            turns,
             lost_mps is not None,
         )
         groups.setdefault(key, []).append((person, reach))
@@ -198,6 +207,7 @@ def _group(
     has_direction: bool,
     reserved: bool,
     stands: bool,
+    may_turn: bool,
     is_lost: bool,
 ) -> PeopleAhead:
     def constant(values: list[float]) -> FloatArray:
@@ -222,6 +232,10 @@ def _group(
         velocity_y_mps=velocity_mps[:, 1:] if has_direction else None,
         turn=(np.cos(turns_rad), np.sin(turns_rad)) if turns else None,
         start_delay_s=constant([each.start_delay_s for each in people]) if stands else None,
+        turn_delay_s=constant([each.turn_delay_s for each in people]) if may_turn else None,
+        velocity_spread_mps=(
+            constant([each.velocity_spread_mps for each in people]) if may_turn else None
+        ),
         reserved=reserved,
         lost_mps=np.stack([np.asarray(each.lost_mps) for each in people]) if is_lost else None,
         reaches=tuple(reach for _, reach in group),
@@ -281,6 +295,7 @@ def _person(
         is_shown and track.status != "coasting" and unseen_s <= timing.fresh_within_s - _SAME_AGE_S
     )
     start_delay_s = memory.start_delay_s if is_seen else math.inf
+    turn_delay_s = memory.turn_delay_s if is_seen else math.inf
     human_mps: float | FloatArray = _assumed_mps(policy, memory)
     sigmas: float | FloatArray = margins.uncertainty_sigmas
     sigma_m: float | FloatArray = memory.sigma_m
@@ -321,6 +336,8 @@ def _person(
         velocity_mps=memory.velocity_odom_mps,
         turn_rad=turn_rad,
         start_delay_s=start_delay_s,
+        turn_delay_s=turn_delay_s,
+        velocity_spread_mps=memory.velocity_spread_mps,
         lost_mps=None,
     )
 

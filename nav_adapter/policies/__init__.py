@@ -13,6 +13,7 @@ from ._speed_rules import (
     SpeedRules,
     StandingPeople,
     StartReserve,
+    WalkingPeople,
 )
 from ._tables import TableHumanSpeed, TableInflation
 
@@ -34,4 +35,5 @@ __all__ = [
     "TableHumanSpeed",
     "TableInflation",
     "TimeBehaviour",
+    "WalkingPeople",
 ]

@@ -139,6 +139,30 @@ class StandingPeople(StrictConfig):
         return speed_mps * speed_mps + velocity_variance_m2ps2 <= self.standing_below_mps**2
 
 
+class WalkingPeople(StrictConfig):
+    """A bound on human acceleration, for people who walk: who walks away must first turn round.
+
+    Speed and separation then counts from the velocity of the track, which changes by at most
+    ``human_acceleration_mps2`` in any direction, up to the assumed human speed. The way is never
+    longer than without this rule. It holds for confirmed people beyond first sight whom a frame of
+    the last ``fresh_within_s`` shows, at every α.
+
+    Attributes:
+        human_acceleration_mps2: of a person who turns to the robot. With 2 m/s² after 0.25 s no
+            recorded person got farther off their course (docs/safety.md).
+        turn_delay_s: longest time for which your sensors and tracker may still show the velocity
+            from before the turn, beyond ``velocity_sigmas``.
+        velocity_sigmas: so many standard deviations, in the most uncertain direction, the velocity
+            towards the robot may be above that of the track.
+    """
+
+    error: ClassVar[type[ValueError]] = NavError
+
+    human_acceleration_mps2: float = Field(default=2.0, ge=0.1, le=20.0)
+    turn_delay_s: float = Field(default=0.25, ge=0.0, le=2.0)
+    velocity_sigmas: float = Field(default=2.0, ge=0.0, le=10.0)
+
+
 class StartReserve(StrictConfig):
     """A reserve for people who set off, however aware they are.
 
@@ -211,6 +235,7 @@ class SpeedRules(StrictConfig):
         protective_field: a field like that of a safety laser scanner, for the baseline ``scanner``,
             or None.
         standing: how far people get who stand, or None for people who walk at once.
+        walking: how fast people change their velocity, or None for people who turn at once.
         start_reserve: a reserve for people who set off, however aware they are, or None.
         zones: a limit over distance, or None.
         near_cap: a limit near people, or None.
@@ -222,6 +247,7 @@ class SpeedRules(StrictConfig):
     people_turn_deg: float = Field(default=45.0, ge=0.0, le=180.0)
     protective_field: ProtectiveField | None = None
     standing: StandingPeople | None = None
+    walking: WalkingPeople | None = None
     start_reserve: StartReserve | None = None
     zones: DistanceZones | None = None
     near_cap: NearCap | None = None

@@ -21,6 +21,7 @@ from nav_adapter.policies import (
     TableHumanSpeed,
     TableInflation,
     TimeBehaviour,
+    WalkingPeople,
 )
 
 SHAPES = ["linear", "smoothstep", "logistic", "two_level"]
@@ -90,6 +91,15 @@ def standing_rules(draw: st.DrawFn, lowest_mps2: float = 0.5) -> StandingPeople:
 
 
 @st.composite
+def walking_rules(draw: st.DrawFn) -> WalkingPeople:
+    return WalkingPeople(
+        human_acceleration_mps2=draw(finite(0.5, 6.0)),
+        turn_delay_s=draw(st.just(0.0) | finite(0.0, 0.6)),
+        velocity_sigmas=draw(finite(0.0, 3.0)),
+    )
+
+
+@st.composite
 def policies(draw: st.DrawFn) -> AwarenessPolicy:
     fresh, ahead = draw(finite(0.05, 0.3)), draw(finite(0.0, 1.0))
     stale = fresh + draw(finite(0.0, 1.0))
@@ -107,6 +117,7 @@ def policies(draw: st.DrawFn) -> AwarenessPolicy:
         rules=SpeedRules(
             turn_within_stop_deg=draw(finite(45.0, 180.0)),
             standing=draw(st.none() | standing_rules()),
+            walking=draw(st.none() | walking_rules()),
             zones=draw(st.sampled_from([None, zones])),
             near_cap=draw(st.sampled_from([None, cap])),
         ),

@@ -7,7 +7,7 @@ form, its geometry or its bookkeeping does not repeat itself.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from shapely.affinity import rotate, translate
@@ -89,18 +89,56 @@ def _person_limit_mps(
     if known and _stands(policy, track, now):
         begun_s = _begun_s(policy, track)
     age_s = now - track.stamp_s
-    return max(
-        _fastest_mps(policy, robot, footprint_gap_m, human_mps, age_s, 1.0, begun_s),
-        _fastest_mps(policy, robot, circle_gap_m, human_mps, age_s, share, begun_s),
-    )
+
+    def walked_m(time_s: float) -> float:
+        return _walked_m(policy, human_mps, time_s, begun_s)
+
+    limits = [
+        _fastest_mps(policy, robot, footprint_gap_m, age_s, 1.0, walked_m),
+        _fastest_mps(policy, robot, circle_gap_m, age_s, share, walked_m),
+    ]
+    if known and policy.rules.walking is not None and _is_fresh(policy, track, now):
+        braking_s = robot.reaction_time_s + age_s
+        turned_m = _turned_way(policy, state, track, human_mps, braking_s)
+        limits.append(_fastest_mps(policy, robot, circle_gap_m, age_s, share, turned_m))
+    return max(limits)
+
+
+def _is_fresh(policy: AwarenessPolicy, track: PersonTrack, now: float) -> bool:
+    seen_s = track.stamp_s - track.time_since_seen_s
+    return track.status == "confirmed" and now - seen_s <= policy.timing.fresh_within_s
+
+
+def _turned_way(
+    policy: AwarenessPolicy,
+    state: RobotState,
+    track: PersonTrack,
+    human_mps: float,
+    braking_s: float,
+) -> Callable[[float], float]:
+    """The way towards the robot of somebody whose velocity changes by bounded accelerations."""
+    rule = policy.rules.walking
+    a, unnoticed_s = rule.human_acceleration_mps2, rule.turn_delay_s + track.time_since_seen_s
+    variance = max(np.linalg.eigvalsh(track.covariance_odom[2:, 2:])[-1], 0.0)
+    to_robot = state.position_odom_m - track.position_odom_m
+    coming_mps = track.velocity_odom_mps @ to_robot / max(math.hypot(*to_robot), 1e-9)
+    coming_mps += rule.velocity_sigmas * math.sqrt(variance)
+    # The time since which somebody who stood may be walking; before the present if negative.
+    since_s = unnoticed_s + coming_mps / a
+    nearer_m = max(a * unnoticed_s**2 - a * max(since_s, 0.0) ** 2, 0.0) / 2.0
+
+    def way_m(time_s: float) -> float:
+        top_mps = a * max(time_s + max(since_s, -braking_s), 0.0)
+        tip_mps = max(top_mps - human_mps, 0.0)
+        return min((top_mps**2 - tip_mps**2) / (2.0 * a), human_mps * time_s) + nearer_m
+
+    return way_m
 
 
 def _stands(policy: AwarenessPolicy, track: PersonTrack, now: float) -> bool:
     """Return True if a fresh measurement shows a confirmed person standing (assumption 8)."""
     rule = policy.rules.standing
-    if rule is None or track.status != "confirmed":
-        return False
-    if now - (track.stamp_s - track.time_since_seen_s) > policy.timing.fresh_within_s:
+    if rule is None or not _is_fresh(policy, track, now):
         return False
     variance = max(np.linalg.eigvalsh(track.covariance_odom[2:, 2:])[-1], 0.0)
     return math.hypot(*track.velocity_odom_mps, math.sqrt(variance)) <= rule.standing_below_mps
@@ -185,18 +223,17 @@ def _fastest_mps(
     policy: AwarenessPolicy,
     robot: RobotProfile,
     gap_m: float,
-    human_mps: float,
     track_age_s: float,
     share: float,
-    begun_s: float | None,
+    walked_m: Callable[[float], float],
 ) -> float:
     """The highest speed whose protective separation fits into the gap, by bisection."""
     a, T = robot.max_deceleration_mps2, robot.reaction_time_s + track_age_s
 
     def fits(v: float) -> bool:
         way_m = v * T + v * v / (2.0 * a)
-        walked_m = _walked_m(policy, human_mps, T + v / a, begun_s)
-        return walked_m + share * way_m + policy.margins.separation_clearance_m <= gap_m
+        clearance_m = policy.margins.separation_clearance_m
+        return walked_m(T + v / a) + share * way_m + clearance_m <= gap_m
 
     low, high = 0.0, 2.0 * robot.max_speed_mps
     if not fits(low):

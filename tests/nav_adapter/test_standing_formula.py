@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from hypothesis import given
+from hypothesis import strategies as st
 from nav_scenes import finite
 from scipy.integrate import quad
 from scipy.optimize import brentq
@@ -48,7 +49,12 @@ def test_the_way_is_the_integral_of_the_speed_since_the_start(
     assert walked == pytest.approx(min(way, human * (reaction + speed)), abs=1e-9)
 
 
-@given(separation=finite(0.0, 30.0), human=finite(0.0, 3.0), **ROBOT, **START)
+@given(
+    separation=st.just(0.0) | finite(1e-9, 30.0),
+    human=st.just(0.0) | finite(1e-9, 3.0),
+    **{**ROBOT, "approach": st.just(0.0) | finite(1e-9, 1.0)},
+    **START,
+)
 def test_the_limit_is_the_root_of_the_protective_separation(
     separation: float, human: float, **settings: float
 ) -> None:
