@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -38,21 +37,21 @@ class Turn(NamedTuple):
 
 
 def turn_of(
-    people: Iterable[PersonMemory],
     closing_mps: FloatArray,
+    unnoticed_s: FloatArray,
+    spread_mps: FloatArray,
     until_braking_s: FloatArray,
     human_acceleration_mps2: float,
 ) -> Turn:
-    """Return the bound for people whose tracks come nearer at ``closing_mps`` (N,), signed.
+    """Return the bound for N people; all arrays are (N,).
 
     Args:
-        people: N of them.
-        closing_mps: of their tracks.
-        until_braking_s: (N,), from the stamps of the tracks until the robot brakes.
+        closing_mps: u, signed.
+        unnoticed_s: δ ≥ 0; infinite for people who may turn at once.
+        spread_mps: z ≥ 0.
+        until_braking_s: from the stamps of the tracks until the robot brakes.
         human_acceleration_mps2: a_h > 0.
     """
-    rows = [(memory.turn_delay_s, memory.velocity_spread_mps) for memory in people]
-    unnoticed_s, spread_mps = np.array(rows).T.copy()
     delay_s = unnoticed_s + (closing_mps + spread_mps) / human_acceleration_mps2
     bounded = np.isfinite(unnoticed_s)
     unnoticed_s = np.where(bounded, unnoticed_s, 0.0)

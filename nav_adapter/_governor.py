@@ -252,10 +252,15 @@ class SpeedGovernor:
         self, people: Mapping[int, PersonMemory], closing_mps: FloatArray, age_s: FloatArray
     ) -> Turn | None:
         """Return the bound for people who must turn to the robot; None if it holds for nobody."""
-        if all(memory.turn_delay_s == math.inf for memory in people.values()):
+        rows = [(memory.turn_delay_s, memory.velocity_spread_mps) for memory in people.values()]
+        if all(delay_s == math.inf for delay_s, _ in rows):
             return None
-        until_braking_s = self._robot.reaction_time_s + age_s
-        return turn_of(people.values(), closing_mps, until_braking_s, self._turn_acceleration_mps2)
+        return turn_of(
+            closing_mps,
+            *np.array(rows).T,
+            self._robot.reaction_time_s + age_s,
+            self._turn_acceleration_mps2,
+        )
 
     def _separation_limit_mps(self, terms: _Terms, turn: Turn | None) -> FloatArray:
         """Return (N,), the higher limit of the two bounds for each person."""

@@ -26,10 +26,12 @@ from .policies import (
     SafetyMargins,
     SpeedPolicy,
     SpeedRules,
+    StandingPeople,
     StartReserve,
     TableHumanSpeed,
     TableInflation,
     TimeBehaviour,
+    WalkingPeople,
 )
 
 # Presets are read once per process: they are frozen, and reading takes longer than an episode.
@@ -109,7 +111,11 @@ class AwarenessPolicy(StrictConfig):
         InterpolatedHumanSpeed()
     )
     outline: ObstacleOutline = ObstacleOutline()
-    rules: SpeedRules = SpeedRules(start_reserve=StartReserve())
+    rules: SpeedRules = SpeedRules(
+        standing=StandingPeople(delay_from_tracks=True),
+        walking=WalkingPeople(),
+        start_reserve=StartReserve(),
+    )
     noticed: NoticedPeople | None = NoticedPeople()
     alerts: AlertRules | None = AlertRules()
     margins: SafetyMargins = SafetyMargins()
