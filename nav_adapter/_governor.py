@@ -27,6 +27,8 @@ from ._separation import (
 
 # Below this speed the robot counts as standing: it may start off either way, or turn on the spot.
 STANDING_MPS: Final = 0.05
+# The two bounds, and that from the circumscribed circle once more.
+_TWO_AND_CIRCLE: Final = [0, 1, 1]
 
 # Gaps and shares of the stopping distance (2, N); human speeds, ages and start delays (N,).
 _Terms: TypeAlias = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
@@ -61,13 +63,16 @@ class SpeedGovernor:
         field = policy.rules.protective_field
         self._path = None if field is None else StraightPath(robot.footprint_m, field.beside_m)
         standing = policy.rules.standing
-        self._human_acceleration_mps2 = (
-            math.inf if standing is None else standing.human_acceleration_mps2
-        )
         walking = policy.rules.walking
         self._turn_acceleration_mps2 = (
             math.inf if walking is None else walking.human_acceleration_mps2
         )
+        self._human_acceleration_mps2 = (
+            math.inf if standing is None else standing.human_acceleration_mps2
+        )
+        # For people who start, twice, and who turn: (3, 1).
+        both = [self._human_acceleration_mps2] * 2
+        self._human_accelerations_mps2 = np.array([*both, self._turn_acceleration_mps2])[:, None]
         self._people_turn_rad = math.radians(policy.rules.people_turn_deg)
 
     def limit(
@@ -257,7 +262,8 @@ class SpeedGovernor:
             return None
         return turn_of(
             closing_mps,
-            *np.array(rows).T,
+            np.array([delay_s for delay_s, _ in rows]),
+            np.array([spread_mps for _, spread_mps in rows]),
             self._robot.reaction_time_s + age_s,
             self._turn_acceleration_mps2,
         )
@@ -265,49 +271,30 @@ class SpeedGovernor:
     def _separation_limit_mps(self, terms: _Terms, turn: Turn | None) -> FloatArray:
         """Return (N,), the higher limit of the two bounds for each person."""
         gaps_m, shares, human_mps, age_s, delay_s = terms
-        arguments = (
-            gaps_m,
+        robot = (
             human_mps,
             self._robot.max_deceleration_mps2,
             self._robot.reaction_time_s + age_s,
             self._policy.margins.separation_clearance_m,
-            shares,
         )
-        if np.isfinite(delay_s).any():
+        accelerations_mps2 = self._human_accelerations_mps2
+        if turn is not None:
+            # People come nearer to the base, so only the bound from the circle has this one too.
+            gaps_m = np.stack([gaps_m[0], gaps_m[1], gaps_m[1] - turn.nearer_m])
             limits_mps = highest_speed_from_standing_mps(
-                *arguments, self._human_acceleration_mps2, delay_s
+                gaps_m,
+                *robot,
+                shares[_TWO_AND_CIRCLE],
+                accelerations_mps2,
+                np.stack([delay_s, delay_s, turn.delay_s]),
+            )
+        elif np.isfinite(delay_s).any():
+            limits_mps = highest_speed_from_standing_mps(
+                gaps_m, *robot, shares, accelerations_mps2[:2], delay_s
             )
         else:
-            limits_mps = highest_speed_mps(*arguments)
-        if turn is not None:
-            turned_mps = self._turned_limit_mps(turn, *arguments)
-            np.maximum(limits_mps[1], turned_mps, out=limits_mps[1])
-        return np.asarray(np.maximum(limits_mps[0], limits_mps[1]))
-
-    def _turned_limit_mps(
-        self,
-        turn: Turn,
-        gaps_m: FloatArray,
-        human_mps: FloatArray,
-        a: float,
-        T: FloatArray,
-        C: float,
-        shares: FloatArray,
-    ) -> FloatArray:
-        """Return the limit (N,) of the second bound for people who have to turn to the robot.
-
-        The direction in which they come nearer is that of the base, not of the nearest corner.
-        """
-        return highest_speed_from_standing_mps(
-            gaps_m[1] - turn.nearer_m,
-            human_mps,
-            a,
-            T,
-            C,
-            shares[1],
-            self._turn_acceleration_mps2,
-            turn.delay_s,
-        )
+            limits_mps = highest_speed_mps(gaps_m, *robot, shares)
+        return np.asarray(limits_mps.max(axis=0))
 
     def _start_limit_mps(
         self,
@@ -320,25 +307,25 @@ class SpeedGovernor:
         """Return (N,), the limit with which the robot stands before anybody who sets off now."""
         reserve = self._policy.rules.start_reserve
         assert reserve is not None
-        shares = np.ones_like(gaps_m)
-        shares[1] = ahead
+        a_h, reaction_s = reserve.human_acceleration_mps2, self._robot.reaction_time_s + age_s
         # Whoever comes already has been speeding up for as long as that takes.
-        delay_s = np.maximum(closing_mps, 0.0) / reserve.human_acceleration_mps2
-        delay_s = reserve.start_delay_s + delay_s
-        arguments = (
+        delay_s = reserve.start_delay_s + np.maximum(closing_mps, 0.0) / a_h
+        if turn is not None and self._turn_acceleration_mps2 <= a_h:
+            # Whoever has to turn round is no nearer when the robot brakes, and from then on.
+            at_once_m = 0.5 * a_h * (reaction_s + reserve.start_delay_s) ** 2
+            later = turn.nearer_m + 0.5 * a_h * (reaction_s + turn.delay_s) ** 2 <= at_once_m
+            gaps_m = np.stack([gaps_m[0], gaps_m[1] - np.where(later, turn.nearer_m, 0.0)])
+            delay_s = np.stack([delay_s, np.where(later, turn.delay_s, delay_s)])
+        limits_mps = highest_speed_from_standing_mps(
             gaps_m,
             np.full(len(age_s), self._rules.unaware_human_speed_mps),
             self._robot.max_deceleration_mps2,
-            self._robot.reaction_time_s + age_s,
+            reaction_s,
             0.0,
-            shares,
+            np.stack([np.ones_like(ahead), ahead]),
+            a_h,
+            delay_s,
         )
-        limits_mps = highest_speed_from_standing_mps(
-            *arguments, reserve.human_acceleration_mps2, delay_s
-        )
-        if turn is not None and (turn.delay_s < 0.0).any():
-            turned_mps = self._turned_limit_mps(turn, *arguments)
-            np.maximum(limits_mps[1], turned_mps, out=limits_mps[1], where=turn.delay_s < 0.0)
         return np.asarray(np.maximum(limits_mps[0], limits_mps[1]))
 
     def _rule_limits_mps(self, gaps_m: FloatArray, approach: FloatArray) -> dict[str, FloatArray]:

@@ -213,17 +213,18 @@ class ObstacleRules:
         if rules.standing is None and rules.walking is None:
             return person
         variance_m2ps2 = velocity_variance_m2ps2(track)
+        start_delay_s = turn_delay_s = math.inf
+        spread_mps = 0.0
         if rules.standing is not None and rules.standing.is_standing(
             math.hypot(*person.velocity_odom_mps), variance_m2ps2
         ):
-            delay_s = rules.standing.delay_s(unseen_s, track.moved_m, track.moved_age_s)
-            person = person._replace(start_delay_s=delay_s)
+            start_delay_s = rules.standing.delay_s(unseen_s, track.moved_m, track.moved_age_s)
         if rules.walking is not None:
-            person = person._replace(
-                turn_delay_s=rules.walking.turn_delay_s + unseen_s,
-                velocity_spread_mps=rules.walking.velocity_sigmas * math.sqrt(variance_m2ps2),
-            )
-        return person
+            turn_delay_s = rules.walking.turn_delay_s + unseen_s
+            spread_mps = rules.walking.velocity_sigmas * math.sqrt(variance_m2ps2)
+        return person._replace(
+            start_delay_s=start_delay_s, turn_delay_s=turn_delay_s, velocity_spread_mps=spread_mps
+        )
 
     def _noticed_lower(self, track: PersonTrack) -> float:
         """Return the lower bound of α that stands for having noticed the robot before."""

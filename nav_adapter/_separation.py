@@ -167,15 +167,11 @@ def highest_speed_from_standing_mps(
     Where a_h or the delay is infinite, it is :func:`highest_speed_mps` to the bit. A delay below 0,
     but at least −T, is the time for which the person still stands.
     """
-    walker_mps = highest_speed_mps(separation_m, v_h, a, T, C, share)
     bounded = np.isfinite(a_h) & np.isfinite(delay_s)
     a_h, delay_s = np.where(bounded, a_h, 1.0), np.where(bounded, delay_s, 0.0)
     speeding_up_s = v_h / a_h
-    # At v_h when the robot stands: like a walker who began half the time of speeding up later.
-    late_mps = highest_speed_mps(
-        separation_m, v_h, a, T, C + v_h * (delay_s - 0.5 * speeding_up_s), share
-    )
-    # Still speeding up then: the root of (a_h/a + share) v²/2a + (a_h s/a + share T) v = spare.
+    # Still speeding up when the robot stands: the root of
+    # (a_h/a + share) v²/2a + (a_h s/a + share T) v = spare.
     since_s = T + delay_s
     spare = separation_m - C - 0.5 * a_h * since_s**2
     # Written so that NaN becomes 0.
@@ -185,9 +181,13 @@ def highest_speed_from_standing_mps(
     early_mps = np.divide(
         2.0 * spare, denominator, out=np.zeros_like(denominator), where=denominator > 0.0
     )
-    starter_mps = np.where(since_s + early_mps / a <= speeding_up_s, early_mps, late_mps)
+    is_early = bounded & (since_s + early_mps / a <= speeding_up_s)
+    # At v_h then: like a walker who began half the time of speeding up later, if that is shorter.
+    later_m = np.minimum(v_h * (delay_s - 0.5 * speeding_up_s), 0.0)
+    later_m = np.where(bounded & ~is_early, later_m, 0.0)
+    walker_mps = highest_speed_mps(separation_m, v_h, a, T, C + later_m, share)
     # The shorter way is the higher speed.
-    return np.asarray(np.where(bounded, np.maximum(walker_mps, starter_mps), walker_mps))
+    return np.asarray(np.where(is_early, np.maximum(walker_mps, early_mps), walker_mps))
 
 
 def separation_from_standing_m(

@@ -6,7 +6,7 @@ large arrays: without copies where nothing differs, and differentiable.
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from .._policy import AwarenessPolicy
 from .._robot import RobotProfile
@@ -18,6 +18,14 @@ from ._field_poses import FootprintGaps, Poses
 _SLOWEST_MPS: Final = 1e-9
 # (gap in metres, share of the stopping distance that leads there or None for all of it)
 _Bound = tuple[Any, Any]
+
+
+class _Turn(NamedTuple):
+    """The bound for people who have to turn to the robot, as in :mod:`nav_adapter._approach`."""
+
+    acceleration_mps2: float
+    delay_s: Any
+    nearer_m: Any
 
 
 class FieldLimits:
@@ -177,63 +185,39 @@ class FieldLimits:
             turned_mps = library.minimum(turned_mps, walking_mps)
         return library.where(closing_mps >= walking_mps * cos, walking_mps, turned_mps)
 
-    def _turn(self, people: PeopleAhead, closing_mps: Any) -> _Bound | None:
-        """Return delay and way of people who have to turn to the robot, as in ``Turn``."""
+    def _turn(self, people: PeopleAhead, closing_mps: Any) -> _Turn | None:
+        """Return the bound for people who have to turn to the robot; None if it does not hold."""
         if people.turn_delay_s is None or closing_mps is None:
             return None
         library, walking = self._library, self._rules.walking
         assert walking is not None
-        a_h = walking.human_acceleration_mps2
-        nearing_mps = closing_mps[2] + people.velocity_spread_mps
-        delay_s = nearing_mps / a_h + people.turn_delay_s
+        a_h, since_s = walking.human_acceleration_mps2, people.turn_delay_s
+        delay_s = (closing_mps[2] + people.velocity_spread_mps) * (1.0 / a_h) + since_s
         counted_s = library.at_least(delay_s, 0.0)
-        since_s = people.turn_delay_s
-        nearer_m = (0.5 * a_h) * library.at_least(since_s * since_s - counted_s * counted_s, 0.0)
-        return library.maximum(delay_s, -people.reaction_s), nearer_m
+        nearer_m = library.at_least((since_s * since_s - counted_s * counted_s) * (0.5 * a_h), 0.0)
+        return _Turn(a_h, library.maximum(delay_s, -people.reaction_s), nearer_m)
 
     def _separation_mps(
-        self, people: PeopleAhead, bounds: list[_Bound], human_mps: Any, turn: _Bound | None
+        self, people: PeopleAhead, bounds: list[_Bound], human_mps: Any, turn: _Turn | None
     ) -> Any:
-        limit, standing = None, self._rules.standing
-        for gap_m, share in bounds:
-            if people.start_delay_s is None or standing is None:
-                own = self._walker_mps(
-                    gap_m - (self._clearance_m + human_mps * people.reaction_s),
-                    human_mps,
-                    people.reaction_s,
-                    share,
-                )
-            else:
-                own = self._starter_mps(
-                    gap_m - self._clearance_m,
-                    human_mps,
-                    people.reaction_s,
-                    share,
-                    standing.human_acceleration_mps2,
-                    people.start_delay_s,
-                )
-            limit = own if limit is None else self._library.maximum(limit, own)
-        if turn is not None:
-            # The last bound is that of the circle about the base.
-            gap_m, share = bounds[-1]
-            turned = self._turning_mps(people, turn, gap_m - self._clearance_m, human_mps, share)
-            limit = self._library.maximum(limit, turned)
+        limit, reaction_s = None, people.reaction_s
+        starts: list[tuple[float, Any, Any]] = []
+        if people.start_delay_s is not None and self._rules.standing is not None:
+            a_h = self._rules.standing.human_acceleration_mps2
+            starts = [(a_h, people.start_delay_s, None)]
+        for number, (gap_m, share) in enumerate(bounds, start=1):
+            spare_m, ways = gap_m - self._clearance_m, starts
+            if turn is not None and number == len(bounds):
+                # The last bound is that from the circle about the base.
+                ways = [*starts, (turn.acceleration_mps2, turn.delay_s, turn.nearer_m)]
+            if not ways:
+                walker_m = spare_m - human_mps * reaction_s
+                own = self._walker_mps(walker_m, human_mps, reaction_s, share)
+                limit = own if limit is None else self._library.maximum(limit, own)
+            for way in ways:
+                own = self._starter_mps(spare_m, human_mps, reaction_s, share, *way)
+                limit = own if limit is None else self._library.maximum(limit, own)
         return limit
-
-    def _turning_mps(
-        self, people: PeopleAhead, turn: _Bound, gap_m: Any, human_mps: Any, share: Any
-    ) -> Any:
-        walking = self._rules.walking
-        assert walking is not None
-        delay_s, nearer_m = turn
-        return self._starter_mps(
-            gap_m - nearer_m,
-            human_mps,
-            people.reaction_s,
-            share,
-            walking.human_acceleration_mps2,
-            delay_s,
-        )
 
     def _reserve_mps(
         self,
@@ -241,31 +225,28 @@ class FieldLimits:
         bounds: list[_Bound],
         ahead: Any,
         closing_mps: Any,
-        turn: _Bound | None,
+        turn: _Turn | None,
     ) -> Any:
         reserve = self._rules.start_reserve
         assert reserve is not None
-        library, delay_s = self._library, _in_shape_of_times(people, reserve.start_delay_s)
+        library, a_h = self._library, reserve.human_acceleration_mps2
+        delay_s = _in_shape_of_times(people, reserve.start_delay_s)
         if closing_mps is not None:
-            closing_s = library.at_least(closing_mps[0], 0.0) / reserve.human_acceleration_mps2
-            delay_s = closing_s + reserve.start_delay_s
-        limit = None
-        for gap_m, share in bounds:
-            own = self._starter_mps(
-                gap_m,
-                library.convert(self._unaware_mps),
-                people.reaction_s,
-                None if share is None else ahead,
-                reserve.human_acceleration_mps2,
-                delay_s,
-            )
+            delay_s = library.at_least(closing_mps[0], 0.0) / a_h + reserve.start_delay_s
+        limit, unaware_mps = None, library.convert(self._unaware_mps)
+        for number, (gap_m, share) in enumerate(bounds, start=1):
+            spare_m = gap_m
+            if turn is not None and number == len(bounds) and turn.acceleration_mps2 <= a_h:
+                # Nearly equal does not count: the adapter may see it otherwise.
+                at_once_s = people.reaction_s + reserve.start_delay_s
+                in_time_s = people.reaction_s + turn.delay_s
+                sooner_m = (0.5 * a_h) * (at_once_s * at_once_s - in_time_s * in_time_s)
+                later = sooner_m >= turn.nearer_m + 1e-4
+                delay_s = library.where(later, turn.delay_s, delay_s)
+                spare_m = library.where(later, gap_m - turn.nearer_m, gap_m)
+            part = None if share is None else ahead
+            own = self._starter_mps(spare_m, unaware_mps, people.reaction_s, part, a_h, delay_s)
             limit = own if limit is None else library.maximum(limit, own)
-        if turn is not None:
-            gap_m, share = bounds[-1]
-            unaware_mps = library.convert(self._unaware_mps)
-            share = None if share is None else ahead
-            turned = self._turning_mps(people, turn, gap_m, unaware_mps, share)
-            limit = library.where(turn[0] < 0.0, library.maximum(limit, turned), limit)
         return limit
 
     def _walker_mps(self, spare_m: Any, human_mps: Any, reaction_s: Any, share: Any) -> Any:
@@ -288,11 +269,16 @@ class FieldLimits:
         share: Any,
         human_acceleration_mps2: float,
         delay_s: Any,
+        nearer_m: Any = None,
     ) -> Any:
-        """Return the limit for people who stand, or start; never below that for walkers."""
+        """Return the limit for people who stand, start or turn; never below that for walkers."""
         library, a, a_h = self._library, self._braking_mps2, human_acceleration_mps2
         since_s, speeding_up_s = reaction_s + delay_s, human_mps / a_h
-        spare_m = 2.0 * library.at_least(gap_m - (0.5 * a_h) * since_s * since_s, 0.0)
+        walked_m = (0.5 * a_h) * since_s * since_s
+        late_m = human_mps * (delay_s - 0.5 * speeding_up_s)
+        if nearer_m is not None:
+            walked_m, late_m = walked_m + nearer_m, late_m + nearer_m
+        spare_m = 2.0 * library.at_least(gap_m - walked_m, 0.0)
         b, c = since_s * (a_h / a) + _SLOWEST_MPS, (a_h / a + 1.0) / a
         if share is None:
             b = b + reaction_s
@@ -301,8 +287,7 @@ class FieldLimits:
         early_mps = spare_m / (b + library.root(b * b + c * spare_m))
         is_early = early_mps <= a * (speeding_up_s - since_s)
         walker_m = gap_m - human_mps * reaction_s
-        late_m = walker_m - human_mps * (delay_s - 0.5 * speeding_up_s)
-        spare_m = library.where(is_early, walker_m, library.maximum(walker_m, late_m))
+        spare_m = library.where(is_early, walker_m, library.maximum(walker_m, walker_m - late_m))
         late_mps = self._walker_mps(spare_m, human_mps, reaction_s, share)
         return library.where(is_early, library.maximum(early_mps, late_mps), late_mps)
 

@@ -19,6 +19,7 @@ from .._policy import AwarenessPolicy
 from .._predicted import predicted_sigmas_m
 from .._robot import RobotProfile
 from .._speed_basis import SpeedBasis
+from ..policies import SpeedRules
 
 # A sighting that is nearly too old for trust counts as too old: stamps are rounded.
 _SAME_AGE_S: Final = 1e-6
@@ -295,7 +296,6 @@ def _person(
         is_shown and track.status != "coasting" and unseen_s <= timing.fresh_within_s - _SAME_AGE_S
     )
     start_delay_s = memory.start_delay_s if is_seen else math.inf
-    turn_delay_s = memory.turn_delay_s if is_seen else math.inf
     human_mps: float | FloatArray = _assumed_mps(policy, memory)
     sigmas: float | FloatArray = margins.uncertainty_sigmas
     sigma_m: float | FloatArray = memory.sigma_m
@@ -319,6 +319,9 @@ def _person(
     if aware_for_s < times_s[-1]:
         human_mps = np.where(times_s > aware_for_s, np.maximum(human_mps, unaware_mps), human_mps)
     walking_mps = math.hypot(*memory.velocity_odom_mps)
+    turn_delay_s = memory.turn_delay_s if is_seen else math.inf
+    if not _may_gain(rules, memory, walking_mps, _extreme(np.max, human_mps)):
+        turn_delay_s = math.inf
     turn_rad = 0.0
     if rules.protective_field is None:
         human_mps = _with_excess_mps(human_mps, walking_mps, unaware_mps)
@@ -340,6 +343,22 @@ def _person(
         velocity_spread_mps=memory.velocity_spread_mps,
         lost_mps=None,
     )
+
+
+def _may_gain(
+    rules: SpeedRules, memory: PersonMemory, walking_mps: float, human_mps: float
+) -> bool:
+    """Return whether the time to turn counts for a person who walks straight away from a pose."""
+    if rules.walking is None:
+        return False
+    a_h, since_s = rules.walking.human_acceleration_mps2, memory.turn_delay_s
+    best_s = since_s + (memory.velocity_spread_mps - walking_mps) / a_h
+    if rules.start_reserve is not None and best_s < rules.start_reserve.start_delay_s:
+        return True
+    # The way of a walker at this speed is longer by so much in the end.
+    human_mps = max(human_mps, walking_mps)
+    saved_m = human_mps * (0.5 * human_mps / a_h - best_s)
+    return saved_m > 0.5 * a_h * (since_s**2 - max(best_s, 0.0) ** 2)
 
 
 def _assumed_mps(policy: AwarenessPolicy, memory: PersonMemory) -> float:
