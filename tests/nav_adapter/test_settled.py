@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ OUTLINES = {
     "corner ahead": [[0.5, 0.0], [0.0, 0.3], [-0.4, 0.0], [0.0, -0.3]],
     "corner ahead and aside": [[0.5, 0.1], [-0.4, 0.3], [-0.4, -0.3], [0.2, -0.3]],
 }
-RULES = {
+RULES: dict[str, dict[str, Any]] = {
     "walking": {"walking": WalkingPeople()},
     "at once": {"walking": WalkingPeople(turn_delay_s=0.0, human_acceleration_mps2=1.0)},
     "standing too": {
