@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 from numpy.typing import ArrayLike
 
+from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
 
+from ._footprint import Footprint
 from ._policy import AwarenessPolicy
-from ._robot import RobotProfile
+from ._robot import RobotProfile, RobotState
 from ._separation import max_speed_mps
+
+# Halvings of a few metres, to the precision of a float.
+_ROUNDS: Final = 60
 
 
 def settled_radius_m(policy: AwarenessPolicy, awareness_lower: ArrayLike) -> FloatArray:
@@ -37,6 +44,8 @@ def settled_speed_limit_mps(
 ) -> FloatArray:
     """Return the speed limit for a person straight ahead, who stands and has been seen for long.
 
+    Position and velocity are known exactly. The robot's outline matters for ``rules.walking`` only.
+
     Args:
         policy: the policy.
         robot: the robot.
@@ -44,23 +53,50 @@ def settled_speed_limit_mps(
         awareness_lower: lower bound of α.
 
     Returns:
-        The smallest limit of all rules in m/s, as :class:`~nav_adapter.NavAdapter` gives it, in the
-        broadcast shape. With ``delay_from_tracks`` it is the limit at the least delay.
+        The smallest limit of all rules but the start reserve in m/s, as
+        :class:`~nav_adapter.NavAdapter` gives it, in the broadcast shape. With
+        ``delay_from_tracks`` it is the limit at the least delay.
     """
     separation = np.asarray(separation_m, dtype=np.float64)
-    standing = policy.rules.standing
-    limit = max_speed_mps(
-        separation,
-        settled_human_speed_mps(policy, awareness_lower),
-        deceleration_mps2=robot.max_deceleration_mps2,
-        reaction_time_s=robot.reaction_time_s,
-        clearance_m=policy.margins.separation_clearance_m,
-        human_acceleration_mps2=np.inf if standing is None else standing.human_acceleration_mps2,
-        start_delay_s=0.0 if standing is None else standing.start_delay_s,
-    )
+    human_mps = settled_human_speed_mps(policy, awareness_lower)
+
+    def limit_mps(gap_m: FloatArray, a_h: float, delay_s: float) -> FloatArray:
+        return max_speed_mps(
+            gap_m,
+            human_mps,
+            deceleration_mps2=robot.max_deceleration_mps2,
+            reaction_time_s=robot.reaction_time_s,
+            clearance_m=policy.margins.separation_clearance_m,
+            human_acceleration_mps2=a_h,
+            start_delay_s=delay_s,
+        )
+
     rules = policy.rules
+    standing, walking = rules.standing, rules.walking
+    if standing is None:
+        limit = limit_mps(separation, np.inf, 0.0)
+    else:
+        limit = limit_mps(separation, standing.human_acceleration_mps2, standing.start_delay_s)
+    if walking is not None:
+        # It counts from the circle about the base: the gap to that is never larger.
+        circle_gap_m = _ahead_m(robot, separation + BODY_RADIUS_M) - BODY_RADIUS_M
+        circle_gap_m -= robot.circumscribed_radius_m
+        turned = limit_mps(circle_gap_m, walking.human_acceleration_mps2, walking.turn_delay_s)
+        limit = np.maximum(limit, turned)
     if rules.zones is not None:
         limit = np.minimum(limit, rules.zones.limit_mps(separation, robot.max_speed_mps))
     if rules.near_cap is not None:
         limit = np.minimum(limit, rules.near_cap.limit_mps(separation, robot.max_deceleration_mps2))
     return np.minimum(limit, robot.max_speed_mps)
+
+
+def _ahead_m(robot: RobotProfile, away_m: FloatArray) -> FloatArray:
+    """Return how far ahead of the base a point is that lies ``away_m`` from the outline."""
+    footprint, base = Footprint(robot.footprint_m), RobotState(0.0, np.zeros(2), 0.0, 0.0, 0.0)
+    near_m, far_m = np.zeros_like(away_m), away_m + robot.circumscribed_radius_m
+    for _ in range(_ROUNDS):
+        middle_m = 0.5 * (near_m + far_m)
+        points = np.stack([middle_m.ravel(), np.zeros(away_m.size)], axis=1)
+        is_near = footprint.distance_m(points, base).reshape(away_m.shape) < away_m
+        near_m, far_m = np.where(is_near, middle_m, near_m), np.where(is_near, far_m, middle_m)
+    return near_m

@@ -15,7 +15,7 @@ from perception.anthropometry import BODY_RADIUS_M
 from ..errors import AwarenavError
 from ..files import write_text
 from ._settings import policy_settings, robot_settings
-from ._show import read_policy
+from ._show import FOOTPRINT_M, read_policy
 from ._situation import OVER_TIME, SITUATION
 
 #: In the order from the baseline of today to the least careful policy.
@@ -25,7 +25,7 @@ ARITHMETIC: Final = ("values", "separation", "adapter", "outline")
 _SCRIPTS: Final = (*ARITHMETIC, "check", "yaml", "draw", "plan", "words", "controls", "page")
 # That of the figures in docs/policies.md.
 _ROBOT: Final = RobotFile(
-    footprint_m=[[0.35, 0.25], [-0.35, 0.25], [-0.35, -0.25], [0.35, -0.25]],
+    footprint_m=[list(corner) for corner in FOOTPRINT_M],
     max_speed_mps=1.5,
     max_acceleration_mps2=1.0,
     max_deceleration_mps2=1.0,

@@ -32,6 +32,7 @@ from nav_adapter.policies import (
     TableHumanSpeed,
     TableInflation,
     TimeBehaviour,
+    WalkingPeople,
 )
 from nav_adapter.ros2 import RobotFile
 from tracking import AwarenessFilterConfig
@@ -47,6 +48,7 @@ _MODELS: Final[tuple[type[BaseModel], ...]] = (
     SpeedRules,
     ProtectiveField,
     StandingPeople,
+    WalkingPeople,
     StartReserve,
     DistanceZones,
     NearCap,

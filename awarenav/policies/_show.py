@@ -18,8 +18,9 @@ from ..files import json_text
 _FORMATS: Final = (".png", ".svg", ".pdf")
 _AWARENESS: Final = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 _DISTANCES_M: Final = (1.0, 2.0, 3.0, 5.0)
-# Any outline will do, since distances are measured from it.
-_FOOTPRINT_M: Final = ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))
+#: The robot of the tables in docs/policies.md. Distances are measured from its outline, so this
+#: matters for rules.walking alone, which counts from the circle around it.
+FOOTPRINT_M: Final = ((0.35, 0.25), (-0.35, 0.25), (-0.35, -0.25), (0.35, -0.25))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,7 +124,7 @@ def _robot(options: ShowOptions) -> RobotProfile:
 
     deceleration_mps2 = number("--deceleration (m/s²)", options.deceleration, 0.0)
     return RobotProfile(
-        footprint_m=np.array(_FOOTPRINT_M),
+        footprint_m=np.array(FOOTPRINT_M),
         max_speed_mps=number("--max-speed (m/s)", options.max_speed, 0.0),
         max_acceleration_mps2=deceleration_mps2,
         max_deceleration_mps2=deceleration_mps2,

@@ -124,8 +124,8 @@ SITUATION: Final[dict[str, list[dict[str, Any]]]] = {
             "m/s",
             (0.0, 1.0, 0.01),
             0.1,
-            "Standard deviation of the velocity, the same in all directions. Matters for standing "
-            "people and for old data.",
+            "Standard deviation of the velocity, the same in all directions. Matters for "
+            "`rules.standing` and `rules.walking`, and for old data.",
         ),
         _number(
             "unseen_s",

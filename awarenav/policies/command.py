@@ -39,10 +39,11 @@ def policy() -> None:
 )
 @option("--farthest", type=NUMBER, default=6.0, metavar="M", help="End of the distance axis.")
 def show(**values: Any) -> int:
-    """Show a policy's effect for one person straight ahead whose position is known exactly.
+    """Show a policy's effect for one person who stands straight ahead.
 
-    Prints and draws obstacle radius and assumed human speed over awareness, and the speed limit
-    over awareness and distance. Distances are from the robot's footprint to the person's body.
+    Position and velocity are known exactly. Prints and draws obstacle radius and assumed human
+    speed over awareness, and the speed limit over awareness and distance. Distances are from the
+    robot's footprint (0.70 m × 0.50 m) to the person's body. The start reserve is left out.
     """
     from ._show import ShowOptions, show_command  # noqa: PLC0415 - help needs no policies
 

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
+import nav_scenes
 import numpy as np
 import pytest
 import yaml
-from nav_scenes import ROBOT
 from paths import ROOT
 
+from awarenav.policies._show import FOOTPRINT_M
 from nav_adapter import AwarenessPolicy
 from nav_adapter.settled import settled_human_speed_mps, settled_radius_m, settled_speed_limit_mps
 from perception.arrays import FloatArray
 
 TEXT = (ROOT / "docs" / "policies.md").read_text(encoding="utf-8")
+# Of 0.70 m × 0.50 m, as in the explorer and in `awarenav policy show`.
+ROBOT = replace(nav_scenes.ROBOT, footprint_m=np.array(FOOTPRINT_M))
 ENDS = np.array([0.0, 1.0])
 DISTANCE_M = np.linspace(0.0, 6.0, 6001)
 

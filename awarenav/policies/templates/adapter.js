@@ -1,5 +1,6 @@
 // The answer of the adapter for one person who has been tracked so for long enough.
-// The Python originals are nav_adapter/_obstacle_rules.py, _governor.py, _alerting.py, _adapter.py.
+// The Python originals are nav_adapter/_obstacle_rules.py, _approach.py, _governor.py, _alerting.py
+// and _adapter.py.
 //
 // The state has: x_m, y_m (place of the track in the base frame), vx_mps, vy_mps, sigma_m and
 // velocity_sigma_mps (standard deviations of place and velocity, the same in all directions),
@@ -34,12 +35,16 @@ function personOf(policy, state) {
   const elongates = outline.unaware_ahead_s > 0;
   const isNew = firstSight && 0 < timing.shrink_after_s - 1e-9;
   const heard = isNew ? 0 : held(policy.speed) ? 1 : lower;
+  const fresh = trusted && state.track === "confirmed";
   return {
-    counted_alpha: heard, stale, trusted, confirmed, lower, sigma, walking,
+    counted_alpha: heard, stale, trusted, confirmed, fresh, lower, sigma, walking,
     radius: bounded(margins, policyRadius(policy, sized) + margins.uncertainty_sigmas * sigma),
     ahead: elongates ? Math.min(aheadS * walking, outline.longest_ahead_m) : 0,
     assumed: policyHumanSpeed(policy, heard),
-    delay: standingDelay(policy, state, trusted && state.track === "confirmed", walking),
+    start: {
+      bound: policy.rules.standing?.human_acceleration_mps2 ?? Infinity,
+      delay: standingDelay(policy, state, fresh, walking),
+    },
     uncertainty: sigma * (since > timing.fresh_within_s
       ? Math.max(margins.uncertainty_sigmas, margins.unseen_sigmas)
       : margins.uncertainty_sigmas),
@@ -63,13 +68,36 @@ function standingDelay(policy, state, fresh, walking) {
   return Math.max(least, state.moved_age_s + moving);
 }
 
+/** The speed at which a track at a point comes nearer, negative if it leaves. */
+function closingSpeed({ vx_mps: vx, vy_mps: vy }, [x, y]) {
+  return -(vx * x + vy * y) / Math.max(Math.hypot(x, y), 1e-9);
+}
+
+/**
+ * How soon a person comes who must turn to the robot; null for one who may turn at once.
+ * They get as far as somebody who starts from standing after `delay` at `bound`, and by `nearer`
+ * farther. A negative delay is the time that it takes to turn round.
+ */
+function turnOf(policy, robot, state, person) {
+  const rule = policy.rules.walking;
+  if (rule === null || !person.fresh) return null;
+  const bound = rule.human_acceleration_mps2, unnoticed = rule.turn_delay_s + state.unseen_s;
+  const spread = rule.velocity_sigmas * state.velocity_sigma_mps;
+  const delay = unnoticed + (closingSpeed(state, person.at) + spread) / bound;
+  const untilBraking = robot.reaction_time_s + state.data_age_s;
+  return {
+    bound, delay: Math.max(delay, -untilBraking),
+    nearer: 0.5 * bound * Math.max(unnoticed ** 2 - Math.max(delay, 0) ** 2, 0),
+  };
+}
+
 /** The speed towards the robot that counts: the policy's, or that of the track if it is higher. */
 function countedHumanSpeed(policy, state, person) {
   if (policy.rules.protective_field !== null) return person.assumed;
   const [x, y] = person.at, { vx_mps: vx, vy_mps: vy } = state;
   const distance = Math.max(Math.hypot(x, y), 1e-9);
   const unaware = policyHumanSpeed(policy, 0);
-  let closing = -(vx * x + vy * y) / distance, assumed = person.assumed;
+  let closing = closingSpeed(state, person.at), assumed = person.assumed;
   if (person.walking > BRISK_SHARE * unaware) {
     const across = Math.abs(vx * y - vy * x) / distance;
     const brisk = (person.walking / Math.max(unaware, 1e-9) - BRISK_SHARE) / (1 - BRISK_SHARE);
@@ -118,25 +146,35 @@ function gapsOf(policy, robot, state, person) {
 }
 
 /**
- * The limit of each rule in m/s, speed and separation first.
- * `bounds` gets, for the two rules that have two bounds, the one that counts and its share.
+ * The bounds on how much nearer person and robot come, each with its gap and its share of the
+ * stopping distance. A turn counts with the second, whose direction is that of the base.
  */
-function ruleLimits(policy, robot, state, person, human, { gaps, shares }, bounds) {
+function boundsFor(gaps, shares, start, turn) {
+  const bounds = gaps.map((gap, each) => ({ each, gap, share: shares[each], ...start, nearer: 0 }));
+  return turn ? [...bounds, { ...bounds[1], ...turn, turns: true }] : bounds;
+}
+
+/**
+ * The limit of each rule in m/s, speed and separation first.
+ * `counting` gets, for the two rules that have several bounds, the one that allows most speed.
+ */
+function ruleLimits(policy, robot, state, person, human, { gaps, shares }, counting) {
   const rules = policy.rules, braking = robot.max_deceleration_mps2;
   const reaction = robot.reaction_time_s + state.data_age_s;
-  const starting = rules.standing === null ? Infinity : rules.standing.human_acceleration_mps2;
-  const higher = (rule, parts, limit) => {
-    const both = gaps.map((gap, each) => limit(gap, parts[each]));
-    const each = both[1] > both[0] ? 1 : 0;
-    bounds[rule] = { each, share: parts[each] };
-    return both[each];
+  const turn = turnOf(policy, robot, state, person);
+  const highest = (rule, speed, clearance, bounds) => {
+    const limits = bounds.map(({ gap, nearer, share, bound, delay }) => highestSpeedFromStanding(
+      gap - nearer, speed, braking, reaction, clearance, share, bound, delay,
+    ));
+    const most = Math.max(...limits);
+    counting[rule] = bounds[limits.indexOf(most)];
+    return most;
   };
-  const clearance = policy.margins.separation_clearance_m;
   const limits = {
-    "speed and separation": higher("speed and separation", shares, (gap, share) =>
-      highestSpeedFromStanding(
-        gap, human, braking, reaction, clearance, share, starting, person.delay,
-      )),
+    "speed and separation": highest(
+      "speed and separation", human, policy.margins.separation_clearance_m,
+      boundsFor(gaps, shares, person.start, turn),
+    ),
   };
   if (rules.zones !== null) {
     const drive = gaps[1] > 0 ? gaps[1] / shares[1] : gaps[1];
@@ -153,11 +191,12 @@ function ruleLimits(policy, robot, state, person, human, { gaps, shares }, bound
     const distance = Math.max(Math.hypot(x, y), 1e-9);
     const along = (x * direction[0] + y * direction[1]) / distance;
     const toward = [1, travel < STANDING_MPS ? 1 : Math.min(Math.max(along, 0), 1)];
-    const closing = Math.max(-(state.vx_mps * x + state.vy_mps * y) / distance, 0);
     const { human_acceleration_mps2: bound, start_delay_s: delay } = rules.start_reserve;
-    const since = delay + closing / bound, unaware = policyHumanSpeed(policy, 0);
-    limits["start reserve"] = higher("start reserve", toward, (gap, share) =>
-      highestSpeedFromStanding(gap, unaware, braking, reaction, 0, share, bound, since));
+    const start = { bound, delay: delay + Math.max(closingSpeed(state, person.at), 0) / bound };
+    limits["start reserve"] = highest(
+      "start reserve", policyHumanSpeed(policy, 0), 0,
+      boundsFor(gaps, toward, start, turn?.delay < 0 ? turn : null),
+    );
   }
   return limits;
 }
@@ -166,12 +205,11 @@ function ruleLimits(policy, robot, state, person, human, { gaps, shares }, bound
 function brakingSuffices(policy, robot, state, person, human, { gaps, shares }) {
   const { travel } = travelOf(state), braking = robot.max_deceleration_mps2;
   if (travel < STANDING_MPS) return true;
-  const standing = policy.rules.standing;
-  const starting = standing === null ? Infinity : standing.human_acceleration_mps2;
-  const way = walked(state.data_age_s + travel / braking, human, starting, person.delay);
-  return shares.some((share, each) => {
-    const driven = share * stopping(travel, braking, state.data_age_s);
-    return way + driven + policy.margins.separation_clearance_m <= gaps[each];
+  const turn = turnOf(policy, robot, state, person), time = state.data_age_s + travel / braking;
+  return boundsFor(gaps, shares, person.start, turn).some((each) => {
+    const way = walked(time, human, each.bound, each.delay) + each.nearer;
+    const driven = each.share * stopping(travel, braking, state.data_age_s);
+    return way + driven + policy.margins.separation_clearance_m <= each.gap;
   });
 }
 
@@ -205,7 +243,7 @@ function answer(policy, robot, state) {
   const counts = field === null || [person.predicted, person.at].some(
     (point) => inPath(robot, direction, field.beside_m, point, person.uncertainty),
   );
-  const bounds = {};
+  const bounds = {};  // of the rules that have several, the one that counts
   const limits = counts ? ruleLimits(policy, robot, state, person, human, terms, bounds) : {};
   let limit = maximum, reason = "robot maximum";
   for (const [rule, value] of Object.entries(limits))

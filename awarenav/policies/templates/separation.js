@@ -11,7 +11,10 @@ function highestSpeed(gap, human, braking, reaction, clearance, share) {
   return share === 0 ? Infinity : 0;
 }
 
-/** The same for a person who stands and speeds up by at most `starting`, `delay` ago at first. */
+/**
+ * The same for a person who stands and speeds up by at most `starting`, `delay` ago at first.
+ * A delay below 0, but at least −`reaction`, is the time for which the person still stands.
+ */
 function highestSpeedFromStanding(
   gap, human, braking, reaction, clearance, share, starting, delay,
 ) {
@@ -32,7 +35,7 @@ function highestSpeedFromStanding(
 /** The way that a person walks in `time`, at once or from standing. */
 function walked(time, human, starting, delay) {
   if (!Number.isFinite(starting) || !Number.isFinite(delay)) return human * time;
-  const since = time + delay;
+  const since = Math.max(time + delay, 0);
   const speedingUp = Math.min(since, human / starting);
   const started = 0.5 * starting * speedingUp * speedingUp + human * (since - speedingUp);
   return Math.min(human * time, started);

@@ -7,21 +7,12 @@ const coded = (text) => escaped(text).replace(/`([^`]*)`/g, "<code>$1</code>");
 function budgetOf(policy, robot, state, found) {
   const limit = found.limit_mps, { person, bounds } = found;
   const braking = robot.max_deceleration_mps2, reaction = robot.reaction_time_s + state.data_age_s;
-  const reserve = found.reason === "start reserve" ? policy.rules.start_reserve : null;
+  const reserve = found.reason === "start reserve";
   const rule = reserve ? "start reserve" : "speed and separation";
-  const { each, share } = bounds[rule] ?? { each: 0, share: 1 };
-  const time = reaction + limit / braking;
-  let human = 0;
-  if (reserve) {
-    const [x, y] = person.at, distance = Math.max(Math.hypot(x, y), 1e-9);
-    const closing = Math.max(-(state.vx_mps * x + state.vy_mps * y) / distance, 0);
-    const bound = reserve.human_acceleration_mps2;
-    const since = reserve.start_delay_s + closing / bound;
-    human = walked(time, policyHumanSpeed(policy, 0), bound, since);
-  } else {
-    const starting = policy.rules.standing?.human_acceleration_mps2 ?? Infinity;
-    human = walked(time, found.human_speed_mps, starting, person.delay);
-  }
+  const { each, share, bound, delay, nearer } = bounds[rule]
+    ?? { each: 0, share: 1, ...person.start, nearer: 0 };
+  const speed = reserve ? policyHumanSpeed(policy, 0) : found.human_speed_mps;
+  const human = walked(reaction + limit / braking, speed, bound, delay) + nearer;
   const clearance = reserve ? 0 : policy.margins.separation_clearance_m;
   return {
     gap: found.gaps_m[each],
@@ -81,7 +72,16 @@ function sentenceOf(policy, robot, state, found) {
     ? ` After α has risen, the obstacle takes ${taken} s to shrink from unaware to this.` : "";
   const note = awarenessNote(policy, state, found);
   const rule = ruleNote(rules, policy, found.reason);
-  return `${way} ${rule}${who} ${escaped(note)}${brakes}${shrinks}`;
+  return `${way} ${rule}${who} ${turnNote(found)}${escaped(note)}${brakes}${shrinks}`;
+}
+
+/** What `rules.walking` says of the person, where it raises the limit. */
+function turnNote({ bounds, reason }) {
+  if (!bounds[reason]?.turns) return "";
+  const { delay } = bounds[reason];
+  return delay < 0
+    ? `The person must first turn round, which takes at least ${fixed(-delay)} s. `
+    : `The person counts as having set off from a stand ${fixed(delay)} s ago. `;
 }
 
 /** What a rule besides speed and separation does. */

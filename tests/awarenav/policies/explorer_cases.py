@@ -19,6 +19,8 @@ from nav_adapter import (
 from tracking import PersonTrack
 
 TRACKS = ("confirmed", "confirmed", "confirmed", "coasting", "tentative", "first sight")
+#: The rules that a policy may leave out.
+OPTIONAL_RULES = ("protective_field", "standing", "walking", "start_reserve", "zones", "near_cap")
 _SHAPES = ("smoothstep", "linear", "logistic", "two_level")
 
 
@@ -70,6 +72,8 @@ def _rules(draw: random.Random) -> dict[str, Any]:
             "delay_from_tracks": draw.random() < 0.5,
         }
     if draw.random() < 0.5:
+        rules["walking"] = _walking(draw)
+    if draw.random() < 0.5:
         rules["start_reserve"] = {
             "human_acceleration_mps2": draw.uniform(0.3, 5.0),
             "start_delay_s": draw.uniform(0.0, 0.5),
@@ -80,6 +84,28 @@ def _rules(draw: random.Random) -> dict[str, Any]:
     if draw.random() < 0.3:
         rules["near_cap"] = {"within_m": draw.uniform(0.1, 3), "speed_mps": draw.uniform(0.1, 1.5)}
     return rules
+
+
+def _walking(draw: random.Random) -> dict[str, Any]:
+    return {
+        "human_acceleration_mps2": draw.choice([draw.uniform(0.3, 5.0), draw.uniform(0.8, 2.5)]),
+        "turn_delay_s": draw.choice([0.0, draw.uniform(0.0, 0.6)]),
+        "velocity_sigmas": draw.choice([0.0, draw.uniform(0.0, 3.0)]),
+    }
+
+
+def walking_policy(draw: random.Random) -> AwarenessPolicy:
+    """Return a random policy with the rule for people who walk, and none that hides it."""
+    values = random_policy(draw).model_dump(mode="json")
+    hiding = {"protective_field": None, "zones": None, "near_cap": None}
+    values["rules"].update({"walking": _walking(draw), **hiding})
+    aware_mps = draw.uniform(0.5, 1.5)
+    values["speed"] = {
+        **_ramp(draw),
+        "unaware_human_speed_mps": draw.choice([1.6, draw.uniform(aware_mps, 2.0)]),
+        "aware_human_speed_mps": aware_mps,
+    }
+    return AwarenessPolicy.model_validate(values)
 
 
 def random_policy(draw: random.Random) -> AwarenessPolicy:
@@ -164,6 +190,17 @@ def random_robot(draw: random.Random) -> dict[str, Any]:
     }
 
 
+def round_robot(draw: random.Random) -> dict[str, Any]:
+    """Return a fast robot whose outline is nearly its circle, from which some bounds count."""
+    angles, radius_m = np.arange(12) * (math.pi / 6.0), draw.uniform(0.2, 0.5)
+    corners = radius_m * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    return {
+        **random_robot(draw),
+        "footprint_m": corners.tolist(),
+        "max_speed_mps": draw.uniform(1.0, 3.0),
+    }
+
+
 def random_state(draw: random.Random, timing: Any) -> dict[str, Any]:
     """Return the state that the page's ``answer`` takes."""
     angle, distance_m = draw.uniform(-math.pi, math.pi), draw.uniform(0.2, 6.0)
@@ -192,6 +229,28 @@ def random_state(draw: random.Random, timing: Any) -> dict[str, Any]:
             [0.0, draw.uniform(-2, 2), draw.uniform(0, 2), draw.uniform(0, 2)]
         ),
         "lateral_mps": sideways,
+    }
+
+
+def walking_state(draw: random.Random, timing: Any) -> dict[str, Any]:
+    """Return a state with somebody who walks near the robot: away from it, across or towards it."""
+    bearing, distance_m = draw.gauss(0.0, 0.6), draw.uniform(0.8, 3.0)
+    off = draw.choice([math.pi, 0.0, -0.5 * math.pi, 0.5 * math.pi]) + draw.uniform(-0.7, 0.7)
+    walking_mps, course = (
+        draw.choice([0.0, draw.uniform(0.1, 0.5), draw.uniform(0.1, 1.8)]),
+        bearing + off,
+    )
+    return {
+        **random_state(draw, timing),
+        "x_m": distance_m * math.cos(bearing),
+        "y_m": distance_m * math.sin(bearing),
+        "vx_mps": walking_mps * math.cos(course),
+        "vy_mps": walking_mps * math.sin(course),
+        "sigma_m": draw.uniform(0.0, 0.1),
+        "velocity_sigma_mps": draw.choice([0.0, draw.uniform(0.0, 0.3)]),
+        "track": draw.choice(["confirmed", "confirmed", "confirmed", *TRACKS]),
+        "speed_mps": draw.choice([0.0, draw.uniform(0.0, 1.5), draw.uniform(0.3, 1.0)]),
+        "lateral_mps": 0.0,
     }
 
 

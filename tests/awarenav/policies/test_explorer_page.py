@@ -18,16 +18,14 @@ MOST_MS = 2000.0
 
 # Everything that a policy can have is switched on and opened.
 ALL_OPEN = """(() => {
-  for (const name of ["protective_field", "standing", "start_reserve", "zones", "near_cap"])
-    page.draft.rules[name] ??= checkedModel(
-      { protective_field: "ProtectiveField", standing: "StandingPeople",
-        start_reserve: "StartReserve", zones: "DistanceZones", near_cap: "NearCap" }[name], {}, "");
+  const rules = DATA.models.SpeedRules.fields.filter(({ kind }) => kind === "model");
+  for (const { key, models: [name] } of rules) page.draft.rules[key] ??= checkedModel(name, {}, "");
   for (const field of ["noticed", "alerts"])
     page.draft[field] ??= structuredClone(DATA.presets.balanced[field] ?? null);
   document.querySelectorAll("details").forEach((each) => { page.open.add(each.id); });
   const paths = ["inflation", "speed", "outline", "rules", "noticed", "alerts", "margins", "timing",
-    "filter", "rules.protective_field", "rules.standing", "rules.start_reserve", "rules.zones",
-    "rules.near_cap", "Person", "Track", "Robot's motion", "Robot"];
+    "filter", "Person", "Track", "Robot's motion", "Robot"];
+  rules.forEach(({ key }) => paths.push(`rules.${key}`));
   paths.forEach((path) => page.open.add(path));
   takeDrafts();
   build();

@@ -1,8 +1,9 @@
-"""The policy explorer gives what the adapter gives: 1 000 random states in Chromium."""
+"""The policy explorer gives what the adapter gives: 1 400 random states in Chromium."""
 
 from __future__ import annotations
 
 import json
+import math
 import random
 from statistics import NormalDist
 from typing import Any
@@ -15,7 +16,10 @@ from explorer_cases import (
     random_policy,
     random_robot,
     random_state,
+    round_robot,
     stopping_distance_m,
+    walking_policy,
+    walking_state,
 )
 
 from nav_adapter import AwarenessPolicy
@@ -27,6 +31,10 @@ from tracking.awareness_filter import AwarenessBelief, estimate, evidence
 
 STATES = 1000
 POLICIES = 200
+#: More of them, for people who walk.
+WALKING_STATES = 400
+WALKING_POLICIES = 60
+WALKING_ROBOTS = 20
 ROBOTS = 50
 #: The requirement; the largest difference measured is far below.
 TOLERANCE = 1e-9
@@ -39,10 +47,18 @@ ANSWERS = """(() => {
     const found = answer(checked[policy], robots[robot], state);
     const polygon = obstaclePolygon(checked[policy], state, found);
     const directions = [0, 1, 2, 3, 4, 5].map((each) => (each * Math.PI) / 3 + 0.1);
+    const turning = structuredClone(checked[policy]);
+    turning.rules.walking = null;
+    const atOnce = answer(turning, robots[robot], state);
+    const budget = budgetOf(checked[policy], robots[robot], state, found);
     return {
       radius_m: found.radius_m, limit_mps: found.limit_mps, reason: found.reason,
       stopping_m: found.stopping_m, awareness_lower: found.awareness_lower, stale: found.stale,
       braking_suffices: found.braking_suffices, alert: found.alert,
+      turning_raises: found.limit_mps > atOnce.limit_mps,
+      turning_suffices: found.braking_suffices && !atOnce.braking_suffices,
+      turning_stays: found.bounds["start reserve"]?.turns ?? false,
+      unused_m: budget.parts.reduce((left, { m }) => left - m, budget.gap),
       reach_m: directions.map((angle) => Math.max(
         ...polygon.map(([x, y]) => x * Math.cos(angle) + y * Math.sin(angle)))),
     };
@@ -64,12 +80,23 @@ def cases() -> tuple[list[AwarenessPolicy], list[dict[str, Any]], list[dict[str,
         for policy in policies
     ]
     policies += [random_policy(draw) for _ in range(POLICIES - len(policies))]
+    policies += [walking_policy(draw) for _ in range(WALKING_POLICIES)]
     robots = [random_robot(draw) for _ in range(ROBOTS)]
+    robots += [round_robot(draw) for _ in range(WALKING_ROBOTS)]
     drawn = []
-    for _ in range(STATES):
-        number = draw.randrange(POLICIES)
-        state = random_state(draw, policies[number].timing)
-        drawn.append({"policy": number, "robot": draw.randrange(ROBOTS), "state": state})
+    for count, numbers, bodies, state_of in (
+        (STATES, range(POLICIES), range(ROBOTS), random_state),
+        (
+            WALKING_STATES,
+            range(POLICIES, len(policies)),
+            range(ROBOTS, len(robots)),
+            walking_state,
+        ),
+    ):
+        for _ in range(count):
+            number = draw.choice(numbers)
+            state = state_of(draw, policies[number].timing)
+            drawn.append({"policy": number, "robot": draw.choice(bodies), "state": state})
     return policies, robots, drawn
 
 
@@ -87,6 +114,7 @@ def test_radius_limit_reason_and_stopping_distance_are_those_of_the_adapter(
     angles = np.arange(6) * (np.pi / 3.0) + 0.1
     directions = np.stack([np.cos(angles), np.sin(angles)])
     reasons: dict[str, int] = {}
+    turned: dict[str, int] = {}
     for case, got in zip(drawn, shown, strict=True):
         policy, robot = policies[case["policy"]], profiles[case["robot"]]
         wanted = adapters_answer(policy, robot, case["state"])
@@ -102,6 +130,10 @@ def test_radius_limit_reason_and_stopping_distance_are_those_of_the_adapter(
         assert got["awareness_lower"] == obstacle.awareness_lower, case
         assert got["stale"] == wanted.stale, case
         assert got["braking_suffices"] == wanted.braking_suffices, case
+        if rule in ("speed and separation", "start reserve") and got["limit_mps"] > 0.0:
+            assert got["unused_m"] == pytest.approx(0.0, abs=TOLERANCE), case
+        for effect in effects_of_walking(got, case["state"]):
+            turned[effect] = turned.get(effect, 0) + 1
         assert got["reach_m"] == pytest.approx((corners @ directions).max(axis=0), abs=1e-9), case
         (alert,) = wanted.alerts or (None,)
         assert (got["alert"] or {}).get("kind") == (alert and alert.kind), case
@@ -114,6 +146,82 @@ def test_radius_limit_reason_and_stopping_distance_are_those_of_the_adapter(
         *("robot maximum", "stale data", "robot"),
     }
     assert min(reasons.values()) >= 10, reasons
+    # So has the rule for people who must turn round, whichever way they walk.
+    assert set(turned) == {"leaves", "crosses", "approaches", "stands", "braking", "start reserve"}
+    assert min(turned.values()) >= 10, turned
+
+
+def effects_of_walking(got: dict[str, Any], state: dict[str, Any]) -> list[str]:
+    """Return what ``rules.walking`` changes in an answer, by the way in which the person walks."""
+    effects = [
+        name
+        for name, key in (("braking", "turning_suffices"), ("start reserve", "turning_stays"))
+        if got[key]
+    ]
+    if not got["turning_raises"]:
+        return effects
+    walking_mps = math.hypot(state["vx_mps"], state["vy_mps"])
+    if walking_mps == 0.0:
+        return [*effects, "stands"]
+    leaving_mps = state["vx_mps"] * state["x_m"] + state["vy_mps"] * state["y_m"]
+    share = leaving_mps / (walking_mps * math.hypot(state["x_m"], state["y_m"]))
+    return [*effects, "leaves" if share > 0.4 else "crosses" if share > -0.4 else "approaches"]
+
+
+def test_people_who_walk_away_must_first_turn_round(functions: Chromium) -> None:
+    """Of `balanced`, who has the rule: the page credits the turn where the adapter does."""
+    policy = AwarenessPolicy.preset("balanced")
+    robot = functions.evaluate("DATA.robot")
+    away = functions.evaluate("stateOf(page.situation, page.robot, page.policy.filter)")
+    away |= {"awareness_lower": 0.0, "x_m": 1.8, "y_m": 0.0, "vx_mps": 1.0, "vy_mps": 0.0}
+    coming = {**away, "vx_mps": -1.0}
+    states = {
+        "leaving": away,
+        "leaving, hardly known velocity": {**away, "velocity_sigma_mps": 1.0},
+        "leaving, coasting": {**away, "track": "coasting"},
+        "leaving, tentative": {**away, "track": "tentative"},
+        "leaving, first sight": {**away, "track": "first sight"},
+        "leaving, unseen for long": {**away, "unseen_s": 0.4},
+        "leaving, old data": {**away, "data_age_s": 0.4},
+        "coming": coming,
+    }
+    shown = functions.evaluate(
+        f"""(() => {{
+          const policy = checkedPolicy({json.dumps(policy.model_dump(mode="json"))});
+          return {json.dumps(list(states.values()))}.map((state) => {{
+            const found = answer(policy, page.robot, state);
+            return [found.limit_mps, sentenceOf(policy, page.robot, state, found)];
+          }});
+        }})()"""
+    )
+    profile = RobotFile.model_validate(robot).profile()
+    without = policy.model_copy(update={"rules": policy.rules.model_copy(update={"walking": None})})
+    for (name, state), (limit_mps, sentence) in zip(states.items(), shown, strict=True):
+        wanted_mps = adapters_answer(policy, profile, state).speed_limit_mps
+        at_once_mps = adapters_answer(without, profile, state).speed_limit_mps
+        assert limit_mps == pytest.approx(wanted_mps, abs=TOLERANCE), name
+        must_turn = name == "leaving"
+        assert (limit_mps > at_once_mps + 0.2) is must_turn, name
+        assert ("first turn round" in sentence) is must_turn, name
+
+
+def test_somebody_who_still_turns_when_the_robot_stands_has_come_no_nearer(
+    functions: Chromium,
+) -> None:
+    policy = AwarenessPolicy.preset("balanced")
+    robot = {**functions.evaluate("DATA.robot"), "reaction_time_s": 0.8}
+    walks = functions.evaluate("stateOf(page.situation, page.robot, page.policy.filter)")
+    walks |= {"speed_mps": 0.2, "vx_mps": 2.2, "vy_mps": 0.0, "y_m": 0.0, "awareness_lower": 0.0}
+    states = [{**walks, "x_m": x_m} for x_m in np.linspace(0.8, 1.4, 25).tolist()]
+    given = json.dumps([policy.model_dump(mode="json"), robot, states])
+    shown = functions.evaluate(
+        f"""(([policy, robot, states]) => states.map(
+          (state) => answer(checkedPolicy(policy), robot, state).braking_suffices))({given})"""
+    )
+    profile = RobotFile.model_validate(robot).profile()
+    wanted = [adapters_answer(policy, profile, state).braking_suffices for state in states]
+    assert shown == wanted
+    assert 3 < sum(wanted) < 22
 
 
 @pytest.mark.parametrize("name", PRESETS)

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from chromium_pipe import Chromium
-from explorer_cases import random_policy, random_robot, random_state
+from explorer_cases import OPTIONAL_RULES, random_policy, random_robot, random_state
 from pydantic import BaseModel
 
 from awarenav.policies._settings import policy_settings, robot_settings
@@ -92,12 +92,7 @@ def test_units_follow_the_keys() -> None:
 
 
 def test_every_setting_and_every_part_of_the_situation_has_a_control(page: Chromium) -> None:
-    everything = {
-        "rules": {
-            name: {}
-            for name in ("protective_field", "standing", "start_reserve", "zones", "near_cap")
-        }
-    }
+    everything = {"rules": {name: {} for name in OPTIONAL_RULES}}
     policy = AwarenessPolicy.model_validate(everything).model_dump(mode="json")
     page.evaluate(f"takePolicy({json.dumps(policy)})")
     ids = set(page.evaluate("[...document.querySelectorAll('[id]')].map((each) => each.id)"))

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 import yaml
 from chromium_pipe import Chromium
-from explorer_cases import random_policy
+from explorer_cases import OPTIONAL_RULES, random_policy
 from paths import ROOT
 
 from nav_adapter import AwarenessPolicy, NavError
@@ -88,6 +88,7 @@ FORMS = [
     'speed: {"shape": "logistic", steepness: 1.2e+1}\n',
     "alerts: ~\nnoticed:\nrules:\n  zones: {}\n",
     "alerts: null\nrules: {standing: {delay_from_tracks: yes}, near_cap: {within_m: 2}}\n",
+    "rules:\n  walking: {}  # as its defaults are\n  standing:\n",
     "filter: {clip_awareness: 1e-9, lower_bound_confidence: '0.95'}\n",
     "\ufeffmargins:\r\n  maximum_radius_m: 3.0\r\n",
 ]
@@ -107,12 +108,7 @@ def misspelt() -> list[tuple[str, str]]:
     """Return texts with one key that has a letter too many, for every key of every model."""
     found = []
     dumped = AwarenessPolicy.model_validate(
-        {
-            "rules": {
-                name: {}
-                for name in ("protective_field", "standing", "start_reserve", "zones", "near_cap")
-            }
-        }
+        {"rules": {name: {} for name in OPTIONAL_RULES}}
     ).model_dump(mode="json")
 
     def walk(values: dict[str, Any], path: list[str]) -> None:
@@ -168,6 +164,11 @@ WRONG = [
     "rules: {turn_within_stop_deg: 44.9}",
     "rules: {standing: {start_delay_s: 0.05}}",
     "rules: {standing: {delay_from_tracks: 3}}",
+    "rules: {walking: {human_acceleration_mps2: 0.05}}",
+    "rules: {walking: {turn_delay_s: 2.1}}",
+    "rules: {walking: {velocity_sigmas: null}}",
+    "rules: {walking: {start_delay_s: 0.2}}",
+    "rules: {walking: true}",
     "rules: {zones: {stop_within_m: 3.0}}",
     "rules: {near_cap: 3}",
     "rules: null",
