@@ -89,7 +89,7 @@ def test_new_settings_of_policies_are_on_and_can_be_turned_off() -> None:
     policy = AwarenessPolicy()
     assert policy == AwarenessPolicy.preset("balanced")
     table = rows("setting | default")
-    assert len(table) == 6
+    assert len(table) == 8
     for setting, default, _, off in table:
         path = setting.strip("`")
         value = policy_value(policy, path)
