@@ -1,4 +1,4 @@
-"""How fast people may come at the robot: their assumed speed, and how soon they can have it."""
+"""Speeds at which people may come at the robot, and how soon they can have them."""
 
 from __future__ import annotations
 

@@ -55,7 +55,8 @@ def settled_speed_limit_mps(
     Returns:
         The smallest limit of all rules but the start reserve in m/s, as
         :class:`~nav_adapter.NavAdapter` gives it, in the broadcast shape. With
-        ``delay_from_tracks`` it is the limit at the least delay.
+        ``delay_from_tracks`` the person has not moved: ``moved_m`` and ``moved_age_s`` of the track
+        are 0, so that the delay is ``start_delay_s``.
     """
     separation = np.asarray(separation_m, dtype=np.float64)
     human_mps = settled_human_speed_mps(policy, awareness_lower)

@@ -84,7 +84,9 @@ def test_somebody_whose_place_is_shown_empty_is_gone_at_once() -> None:
 
 def test_a_foreign_tracker_that_drops_people_at_once_has_them_held_and_then_lost() -> None:
     results = lose(NavAdapter(POLICY, ROBOT), 4.0, coasting_s=0.0)
-    limits = [each.speed_limit_mps for each in results]
+    # Beyond first sight: from then on somebody who stands gets time to set off.
+    first_s = POLICY.timing.shrink_after_s
+    limits = [each.speed_limit_mps for each in results if each.stamp_s > first_s + 1e-6]
     assert {each.obstacles == () for each in results if 1.0 < each.stamp_s < 1.95} == {False}
     assert max(b - a for a, b in pairwise(limits)) <= RISE_MPS2 * PERIOD_S + 1e-6
     assert results[-1].limited_by == "robot maximum"

@@ -13,13 +13,16 @@ from nav_policies import policies, robots
 from nav_scenes import ROBOT, crowds, finite, person, robot_at, settled_update
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavError, RobotProfile, max_speed_mps
-from nav_adapter.policies import SpeedRules, StandingPeople
+from nav_adapter.policies import SpeedRules, StandingPeople, StartReserve
 from nav_adapter.settled import settled_speed_limit_mps
 from perception.anthropometry import BODY_RADIUS_M
 from tracking import PersonTrack
 
 RULE = StandingPeople(human_acceleration_mps2=2.0, start_delay_s=0.25, standing_below_mps=0.2)
-BLIND = AwarenessPolicy.preset("blind")
+# Without the other bounds on human acceleration.
+BLIND = AwarenessPolicy.preset("blind").model_copy(
+    update={"rules": SpeedRules(start_reserve=StartReserve())}
+)
 AHEAD_M, FRONT_M = 3.0, 0.3625
 GAP_M = AHEAD_M - FRONT_M - BODY_RADIUS_M
 BRAKING = {"deceleration_mps2": 1.0, "reaction_time_s": 0.3, "clearance_m": 0.1}
@@ -165,7 +168,9 @@ def test_without_a_fresh_measurement_nobody_stands(how: str) -> None:
 @pytest.mark.parametrize("alpha", [0.6, 0.7, 1.0])
 def test_people_who_are_assumed_to_be_slow_already_gain_nothing(alpha: float) -> None:
     """At 0.35 m/s and below, 2 m/s² and 0.25 s the start is over before it is noticed."""
-    balanced = AwarenessPolicy.preset("balanced")
+    preset = AwarenessPolicy.preset("balanced")
+    rules = preset.rules.model_copy(update={"standing": None, "walking": None})
+    balanced = preset.model_copy(update={"rules": rules})
     track = person(awareness_lower=alpha)
     assert limit_mps(track, with_rule(balanced, RULE)) == limit_mps(track, balanced)
 
@@ -225,9 +230,11 @@ def test_the_rule_never_lowers_a_limit_and_a_later_start_never_raises_one(
     assert min(limit(later), limit(faster)) >= limit(None)
 
 
-def test_no_preset_has_the_rule_and_it_survives_a_file(tmp_path: Any) -> None:
-    for name in ("blind", "conservative", "balanced", "assertive", "scanner"):
-        assert AwarenessPolicy.preset(name).rules.standing is None
+def test_the_presets_have_the_rule_with_own_delays_and_it_survives_a_file(tmp_path: Any) -> None:
+    for name in ("blind", "conservative", "balanced", "assertive"):
+        standing = AwarenessPolicy.preset(name).rules.standing
+        assert standing == StandingPeople(delay_from_tracks=True)
+    assert AwarenessPolicy.preset("scanner").rules.standing is None
     STANDING.to_yaml(tmp_path / "mine.yaml")
     assert AwarenessPolicy.from_yaml(tmp_path / "mine.yaml") == STANDING
 

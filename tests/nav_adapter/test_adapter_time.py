@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from nav_scenes import FLOOR_M, ROBOT, crowds, finite, person, robot_at, settled_update
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, max_speed_mps
-from nav_adapter.policies import SafetyMargins
+from nav_adapter.policies import SafetyMargins, SpeedRules
 from perception.anthropometry import BODY_RADIUS_M
 from tracking import PersonTrack
 
@@ -238,7 +238,8 @@ def test_a_person_who_returns_continues_with_the_held_radius() -> None:
 def test_two_levels_over_time() -> None:
     """Between the thresholds the level stays the same; without evidence it is unaware."""
     levels = {"shape": "two_level", "unaware_below": 0.2, "aware_above": 0.6}
-    policy = AwarenessPolicy(inflation=levels, speed=levels)
+    # Without the bounds on human acceleration, which do not hold at first sight.
+    policy = AwarenessPolicy(inflation=levels, speed=levels, rules=SpeedRules())
     adapter, limits, radii = NavAdapter(policy, ROBOT), [], []
     phases = [0.5] * 40 + [0.7] * 40 + [0.4] * 40 + [0.1] + [0.4] * 20
     for step, alpha in enumerate(phases):

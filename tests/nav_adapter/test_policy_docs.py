@@ -14,6 +14,7 @@ from paths import ROOT
 from awarenav.policies._show import FOOTPRINT_M
 from nav_adapter import AwarenessPolicy
 from nav_adapter.settled import settled_human_speed_mps, settled_radius_m, settled_speed_limit_mps
+from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
 
 TEXT = (ROOT / "docs" / "policies.md").read_text(encoding="utf-8")
@@ -56,6 +57,26 @@ def test_the_table_of_presets_shows_their_figures(column: int, name: str) -> Non
         assert shown[-1] == pytest.approx(aware, abs=0.0051), title
     shrinking = row("shrinks at")[column]
     assert shrinking == [policy.timing.shrink_rate_mps, policy.timing.shrink_after_s]
+
+
+@pytest.mark.parametrize(
+    ("variance", "text"), [(0.0, "leaves 0.28, 0.70 and 1.06 m/s"), (0.01, "0.21, 0.64 and 1.01")]
+)
+def test_the_page_says_what_is_left_without_moved_m(variance: float, text: str) -> None:
+    """Of the rule for people who walk, by the adapter, with the velocity known so well."""
+    assert text in " ".join(TEXT.split())
+    shown = [float(number) for number in re.findall(r"\d\.\d+", text)]
+    for name in ("blind", "conservative", "balanced", "assertive"):
+        for distance_m, limit_mps in zip((1.0, 2.0, 3.0), shown, strict=True):
+            at_m = ROBOT.footprint_m[:, 0].max() + BODY_RADIUS_M + distance_m
+            track = replace(
+                nav_scenes.person(position=(at_m, 0.0)),
+                covariance_odom=np.diag([0.0, 0.0, variance, variance]),
+            )
+            found = nav_scenes.settled_update(
+                [track], policy=AwarenessPolicy.preset(name), robot=ROBOT
+            )
+            assert found.speed_limit_mps == pytest.approx(limit_mps, abs=0.0051)
 
 
 def test_no_preset_has_a_maximum_radius() -> None:

@@ -30,6 +30,11 @@ RULES: dict[str, dict[str, Any]] = {
         "walking": WalkingPeople(human_acceleration_mps2=1.0),
         "standing": StandingPeople(),
     },
+    "own delay": {"standing": StandingPeople(delay_from_tracks=True)},
+    "of the presets": {
+        "walking": WalkingPeople(),
+        "standing": StandingPeople(delay_from_tracks=True),
+    },
 }
 
 
@@ -37,12 +42,11 @@ def from_adapter(
     policy: AwarenessPolicy, outline: FloatArray, ahead_m: FloatArray, alpha: float
 ) -> list[float]:
     robot = replace(ROBOT, footprint_m=outline)
-    return [
-        settled_update(
-            [person(position=(x, 0.0), awareness_lower=alpha)], policy=policy, robot=robot
-        ).speed_limit_mps
+    people = [
+        replace(person(position=(x, 0.0), awareness_lower=alpha), moved_m=0.0)
         for x in ahead_m.tolist()
     ]
+    return [settled_update([each], policy=policy, robot=robot).speed_limit_mps for each in people]
 
 
 @pytest.mark.parametrize("rules", list(RULES))

@@ -29,8 +29,9 @@ PRESETS = ("blind", "conservative", "balanced", "assertive")
 
 
 def with_rule(name: str, rule: StandingPeople | None) -> AwarenessPolicy:
+    """Return a preset with this rule, and without the one for people who walk."""
     policy = AwarenessPolicy.preset(name)
-    rules = policy.rules.model_copy(update={"standing": rule})
+    rules = policy.rules.model_copy(update={"standing": rule, "walking": None})
     return policy.model_copy(update={"rules": rules})
 
 
@@ -153,8 +154,9 @@ def test_the_rule_survives_a_file(tmp_path: Any) -> None:
 
 
 def test_a_policy_says_what_its_tracker_needs() -> None:
-    policy = AwarenessPolicy()
-    assert policy.standing_window_s is None
-    own = StandingPeople(start_delay_s=0.2, delay_from_tracks=True)
-    rules = policy.rules.model_copy(update={"standing": own})
-    assert policy.model_copy(update={"rules": rules}).standing_window_s == 1.0
+    assert with_rule("balanced", None).standing_window_s is None
+    assert with_rule("balanced", StandingPeople(start_delay_s=0.2)).standing_window_s is None
+    assert with_rule("balanced", RULE).standing_window_s == 1.0
+    assert AwarenessPolicy.preset("scanner").standing_window_s is None
+    for name in PRESETS:
+        assert AwarenessPolicy.preset(name).standing_window_s == 1.0

@@ -84,10 +84,10 @@ function turnOf(policy, robot, state, person) {
   const bound = rule.human_acceleration_mps2, unnoticed = rule.turn_delay_s + state.unseen_s;
   const spread = rule.velocity_sigmas * state.velocity_sigma_mps;
   const delay = unnoticed + (closingSpeed(state, person.at) + spread) / bound;
-  const untilBraking = robot.reaction_time_s + state.data_age_s;
+  const untilBraking = robot.reaction_time_s + state.data_age_s, counted = Math.max(delay, 0);
   return {
     bound, delay: Math.max(delay, -untilBraking),
-    nearer: 0.5 * bound * Math.max(unnoticed ** 2 - Math.max(delay, 0) ** 2, 0),
+    nearer: 0.5 * bound * Math.max(unnoticed * unnoticed - counted * counted, 0),
   };
 }
 
@@ -193,10 +193,15 @@ function ruleLimits(policy, robot, state, person, human, { gaps, shares }, count
     const toward = [1, travel < STANDING_MPS ? 1 : Math.min(Math.max(along, 0), 1)];
     const { human_acceleration_mps2: bound, start_delay_s: delay } = rules.start_reserve;
     const start = { bound, delay: delay + Math.max(closingSpeed(state, person.at), 0) / bound };
-    limits["start reserve"] = highest(
-      "start reserve", policyHumanSpeed(policy, 0), 0,
-      boundsFor(gaps, toward, start, turn?.delay < 0 ? turn : null),
-    );
+    const bounds = boundsFor(gaps, toward, start, null);
+    if (turn !== null && turn.bound <= bound) {
+      // Whoever has to turn round is no nearer when the robot brakes, and from then on.
+      const atOnce = reaction + delay, inTime = reaction + turn.delay;
+      const way = turn.nearer + 0.5 * bound * (inTime * inTime);
+      if (way <= 0.5 * bound * (atOnce * atOnce))
+        bounds[1] = { ...bounds[1], delay: turn.delay, nearer: turn.nearer, turns: true };
+    }
+    limits["start reserve"] = highest("start reserve", policyHumanSpeed(policy, 0), 0, bounds);
   }
   return limits;
 }

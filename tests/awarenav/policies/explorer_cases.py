@@ -108,6 +108,23 @@ def walking_policy(draw: random.Random) -> AwarenessPolicy:
     return AwarenessPolicy.model_validate(values)
 
 
+def reserve_policy(draw: random.Random) -> AwarenessPolicy:
+    """Return one of these whose start reserve limits the robot before aware people."""
+    values = walking_policy(draw).model_dump(mode="json")
+    # The turn counts with the reserve if its bound is the lower one.
+    walking = values["rules"]["walking"]
+    bound_mps2, turn_delay_s = walking["human_acceleration_mps2"], walking["turn_delay_s"]
+    values["rules"]["start_reserve"] = {
+        "human_acceleration_mps2": bound_mps2 * draw.choice([1.0, 1.5, draw.uniform(0.6, 1.0)]),
+        "start_delay_s": draw.choice(
+            [0.0, draw.uniform(0.5, 1.0) * turn_delay_s, draw.uniform(0.3, 0.8)]
+        ),
+    }
+    values["margins"]["separation_clearance_m"] = 0.0
+    values["speed"] = {**_ramp(draw), "aware_human_speed_mps": draw.uniform(0.0, 0.3)}
+    return AwarenessPolicy.model_validate(values)
+
+
 def random_policy(draw: random.Random) -> AwarenessPolicy:
     """Return a valid policy; every setting that an answer depends on may have any value."""
     unaware = draw.uniform(0.2, 1.5)
@@ -251,6 +268,20 @@ def walking_state(draw: random.Random, timing: Any) -> dict[str, Any]:
         "track": draw.choice(["confirmed", "confirmed", "confirmed", *TRACKS]),
         "speed_mps": draw.choice([0.0, draw.uniform(0.0, 1.5), draw.uniform(0.3, 1.0)]),
         "lateral_mps": 0.0,
+    }
+
+
+def leaving_state(draw: random.Random, timing: Any) -> dict[str, Any]:
+    """Return a state with somebody aware who walks away from the robot, or nearly across."""
+    state = walking_state(draw, timing)
+    away = math.atan2(state["y_m"], state["x_m"]) + draw.uniform(-1.6, 1.6)
+    walking_mps = draw.uniform(0.0, 1.5)
+    return {
+        **state,
+        "vx_mps": walking_mps * math.cos(away),
+        "vy_mps": walking_mps * math.sin(away),
+        "awareness_lower": 1.0,
+        "track": "confirmed",
     }
 
 

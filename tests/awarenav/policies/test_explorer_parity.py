@@ -1,4 +1,4 @@
-"""The policy explorer gives what the adapter gives: 1 400 random states in Chromium."""
+"""The policy explorer gives what the adapter gives: 1 600 random states in Chromium."""
 
 from __future__ import annotations
 
@@ -13,9 +13,11 @@ import pytest
 from chromium_pipe import Chromium
 from explorer_cases import (
     adapters_answer,
+    leaving_state,
     random_policy,
     random_robot,
     random_state,
+    reserve_policy,
     round_robot,
     stopping_distance_m,
     walking_policy,
@@ -35,6 +37,9 @@ POLICIES = 200
 WALKING_STATES = 400
 WALKING_POLICIES = 60
 WALKING_ROBOTS = 20
+#: And for those who leave while the start reserve limits the robot.
+LEAVING_STATES = 200
+LEAVING_POLICIES = 40
 ROBOTS = 50
 #: The requirement; the largest difference measured is far below.
 TOLERANCE = 1e-9
@@ -57,7 +62,8 @@ ANSWERS = """(() => {
       braking_suffices: found.braking_suffices, alert: found.alert,
       turning_raises: found.limit_mps > atOnce.limit_mps,
       turning_suffices: found.braking_suffices && !atOnce.braking_suffices,
-      turning_stays: found.bounds["start reserve"]?.turns ?? false,
+      reserve_turns: found.bounds["start reserve"]?.turns ?? false,
+      turn: turnOf(checked[policy], robots[robot], state, found.person),
       unused_m: budget.parts.reduce((left, { m }) => left - m, budget.gap),
       reach_m: directions.map((angle) => Math.max(
         ...polygon.map(([x, y]) => x * Math.cos(angle) + y * Math.sin(angle)))),
@@ -84,19 +90,18 @@ def cases() -> tuple[list[AwarenessPolicy], list[dict[str, Any]], list[dict[str,
     robots = [random_robot(draw) for _ in range(ROBOTS)]
     robots += [round_robot(draw) for _ in range(WALKING_ROBOTS)]
     drawn = []
-    for count, numbers, bodies, state_of in (
+    walking, bodies = range(POLICIES, len(policies)), range(ROBOTS, len(robots))
+    policies += [reserve_policy(draw) for _ in range(LEAVING_POLICIES)]
+    leaving = range(walking.stop, len(policies))
+    for count, numbers, among, state_of in (
         (STATES, range(POLICIES), range(ROBOTS), random_state),
-        (
-            WALKING_STATES,
-            range(POLICIES, len(policies)),
-            range(ROBOTS, len(robots)),
-            walking_state,
-        ),
+        (WALKING_STATES, walking, bodies, walking_state),
+        (LEAVING_STATES, leaving, bodies, leaving_state),
     ):
         for _ in range(count):
             number = draw.choice(numbers)
             state = state_of(draw, policies[number].timing)
-            drawn.append({"policy": number, "robot": draw.choice(bodies), "state": state})
+            drawn.append({"policy": number, "robot": draw.choice(among), "state": state})
     return policies, robots, drawn
 
 
@@ -132,7 +137,7 @@ def test_radius_limit_reason_and_stopping_distance_are_those_of_the_adapter(
         assert got["braking_suffices"] == wanted.braking_suffices, case
         if rule in ("speed and separation", "start reserve") and got["limit_mps"] > 0.0:
             assert got["unused_m"] == pytest.approx(0.0, abs=TOLERANCE), case
-        for effect in effects_of_walking(got, case["state"]):
+        for effect in effects_of_walking(got, case["state"], policy):
             turned[effect] = turned.get(effect, 0) + 1
         assert got["reach_m"] == pytest.approx((corners @ directions).max(axis=0), abs=1e-9), case
         (alert,) = wanted.alerts or (None,)
@@ -147,17 +152,32 @@ def test_radius_limit_reason_and_stopping_distance_are_those_of_the_adapter(
     }
     assert min(reasons.values()) >= 10, reasons
     # So has the rule for people who must turn round, whichever way they walk.
-    assert set(turned) == {"leaves", "crosses", "approaches", "stands", "braking", "start reserve"}
-    assert min(turned.values()) >= 10, turned
+    assert set(turned) == {
+        *("leaves", "crosses", "approaches", "stands", "braking"),
+        *("reserve, turns round", "reserve, turned", "reserve, may set off faster"),
+        "reserve, would be nearer",
+    }
+    assert min(turned.values()) >= 10, sorted(turned.items())
 
 
-def effects_of_walking(got: dict[str, Any], state: dict[str, Any]) -> list[str]:
-    """Return what ``rules.walking`` changes in an answer, by the way in which the person walks."""
-    effects = [
-        name
-        for name, key in (("braking", "turning_suffices"), ("start reserve", "turning_stays"))
-        if got[key]
-    ]
+def effects_of_walking(
+    got: dict[str, Any], state: dict[str, Any], policy: AwarenessPolicy
+) -> list[str]:
+    """Return what ``rules.walking`` changes in an answer, by the way in which the person walks.
+
+    And by what it does to the start reserve, where that sets the limit.
+    """
+    effects = ["braking"] if got["turning_suffices"] else []
+    if got["reason"] == "start reserve" and got["limit_mps"] > 0.0 and got["turn"] is not None:
+        reserve, turn = policy.rules.start_reserve, got["turn"]
+        assert reserve is not None
+        if got["reserve_turns"]:
+            effects.append(f"reserve, {'turns round' if turn['delay'] < 0.0 else 'turned'}")
+        elif turn["bound"] > reserve.human_acceleration_mps2:
+            if turn["delay"] < reserve.start_delay_s:
+                effects.append("reserve, may set off faster")
+        elif turn["delay"] < reserve.start_delay_s:
+            effects.append("reserve, would be nearer")
     if not got["turning_raises"]:
         return effects
     walking_mps = math.hypot(state["vx_mps"], state["vy_mps"])
@@ -226,13 +246,15 @@ def test_somebody_who_still_turns_when_the_robot_stands_has_come_no_nearer(
 
 @pytest.mark.parametrize("name", PRESETS)
 def test_the_presets_give_the_values_of_policy_show(functions: Chromium, name: str) -> None:
-    """The controls as they stand: someone who stands ahead, at an exactly known place."""
+    """Somebody who stands ahead, at an exactly known place, and has not moved."""
     alphas, gaps = [0.0, 0.3, 0.6, 0.8, 1.0], [0.0, 0.5, 1.0, 2.0, 3.0, 5.0]
     policy = AwarenessPolicy.preset(name).model_copy(update={"rules": without_reserve(name)})
     shown = functions.evaluate(
         f"""(() => {{
           const policy = checkedPolicy({json.dumps(policy.model_dump(mode="json"))});
-          const still = {{ ...page.situation, sigma_m: 0, velocity_sigma_mps: 0, speed_mps: 0 }};
+          const still = {{
+            ...page.situation, sigma_m: 0, velocity_sigma_mps: 0, moved_m: 0, speed_mps: 0,
+          }};
           return {json.dumps(alphas)}.map((alpha) => {json.dumps(gaps)}.map((gap_m) => {{
             const situation = {{ ...still, awareness_lower: alpha, gap_m }};
             const found = answerIn({{ policy, robot: page.robot, situation }});
