@@ -154,7 +154,8 @@ def test_the_film_in_the_documentation_is_whole_and_fits_a_readme():
     assert 100_000 < path.stat().st_size <= MAX_BYTES
     with Image.open(path) as film:
         assert film.size == film_size_px(3)
-        assert film.n_frames > 15 * FILM_HZ
+        # The longest of the three crossings takes 14.65 s.
+        assert film.n_frames > 14.6 * FILM_HZ
 
 
 def test_the_film_shows_todays_robot_and_the_aware_one_with_both_workers(run, free, scenario):
