@@ -20,9 +20,10 @@ from ._detour import detour_bearing_rad
 from ._give_way import Way, giving_way_mps
 from ._reversing import REVERSE_MPS, Reversing, goal_facing
 from ._rollout import Poses
-from ._scene import FootprintBox, Scene
+from ._scene import FootprintBox, Scene, checked_boxes
 from ._sideways import SidewaysMotion
 from ._steered import SteeredMotion
+from ._waiting import Waiting
 
 # Tolerance for rounding when a motion is compared with waiting.
 _SLACK_M: Final = 1e-5
@@ -77,7 +78,7 @@ class SamplingPlanner:
         self.robot = robot
         self.config = config = config if config is not None else PlannerConfig.for_robot(robot)
         self._footprint = FootprintBox.of(robot)
-        self._boxes_odom_m = _checked_boxes(static_boxes_odom_m)
+        self._boxes_odom_m = checked_boxes(static_boxes_odom_m)
 
         samples = max(2, math.ceil(config.horizon_s / config.step_s))
         self._t_s = along_time(config.horizon_s / samples, config.horizon_s, samples)
@@ -89,6 +90,7 @@ class SamplingPlanner:
             else SteeredMotion(robot, config)
         )
         self._turns_on_the_spot = robot.drive in (None, "differential")
+        self._waiting = Waiting()
         self._reversing: Reversing | None = None
         if robot.min_turning_radius_m is not None:
             self._reversing = Reversing(
@@ -149,6 +151,8 @@ class SamplingPlanner:
             command = self._reverse(robot_state, limits, aim, dt_s, scene)
             return within_next_limits(command, robot_state, constraints, dt_s)
         command = self._choose(robot_state, limits, top_mps, aim, dt_s, scene)
+        if self._waiting.goes_on(robot_state, command, top_mps, dt_s):
+            command = self._choose(robot_state, limits, top_mps, aim, dt_s, scene, room_weight=0.0)
         if reversing is not None and reversing.has_stood(robot_state, command[0], dt_s):
             alone = scene.without_people()
             if self._choose(robot_state, limits, top_mps, aim, dt_s, alone)[0] <= _STANDING_MPS:
@@ -165,10 +169,12 @@ class SamplingPlanner:
         aim: Aim,
         dt_s: float,
         scene: Scene,
+        room_weight: float | None = None,
     ) -> tuple[float, ...]:
         """Return the command of the best candidate that is safe, or full braking."""
         candidates = self._motion.candidates(robot_state, limits, top_mps, aim, dt_s)
-        cost = partial(self._cost, candidates, robot_state, aim, scene)
+        weight = self.config.room_weight if room_weight is None else room_weight
+        cost = partial(self._cost, candidates, robot_state, aim, scene, weight)
         return self._cheapest_safe(candidates, cost, robot_state, dt_s, scene)
 
     def _must_turn_round(
@@ -318,6 +324,7 @@ class SamplingPlanner:
         robot_state: RobotState,
         aim: Aim,
         scene: Scene,
+        room_weight: float,
     ) -> FloatArray:
         """Return the cost (V, W) of each candidate over the horizon, dimensionless."""
         config, t_s = self.config, self._t_s
@@ -343,7 +350,7 @@ class SamplingPlanner:
             if len(gaps_m):
                 near = (_closeness(gaps_m, config.room_m).sum(axis=1) / len(t_s)).max(axis=0)
                 # Compares yaw rates at equal speed only: the speed limit slows the robot already.
-                cost += config.room_weight * (near - near.min(axis=1, keepdims=True))
+                cost += room_weight * (near - near.min(axis=1, keepdims=True))
         if among_people:
             cost += config.keep_right_weight * np.maximum(turning, 0.0)
         if scene.has_boxes:
@@ -384,17 +391,3 @@ def _closeness(gap_m: FloatArray, comfort_m: float) -> FloatArray:
     """Return 0 for gaps from ``comfort_m``, rising quadratically to 1 at contact, and 1 inside."""
     share = np.minimum(np.maximum(1.0 - gap_m / comfort_m, 0.0), 1.0)
     return np.asarray(share * share)
-
-
-def _checked_boxes(boxes: ArrayLike | None) -> FloatArray:
-    if boxes is None:
-        return np.zeros((0, 4))
-    checked = finite_array("static_boxes_odom_m", boxes, ("N", 4), SimError)
-    wrong = np.flatnonzero((checked[:, :2] >= checked[:, 2:]).any(axis=1))
-    if len(wrong):
-        row = int(wrong[0])
-        raise SimError(
-            "static_boxes_odom_m must hold x_min < x_max and y_min < y_max in metres, "
-            f"row {row} is {checked[row].tolist()}"
-        )
-    return checked
