@@ -263,6 +263,15 @@ def test_a_robot_amid_a_group_turns_round_and_leaves(near_m: float) -> None:
     assert run.path_m[:, 0].max() < 0.1
 
 
+def test_a_robot_beside_somebody_who_stands_does_not_wait_for_ever() -> None:
+    """No curve that has room leads on, and nothing calls for a stop: not disc, box or limit."""
+    person = walker(1.9, -1.0, 0.0, 0.0, 1.07)
+    run = simulate([person], (1.5, 0.06), limit_mps=lambda _: 0.5, duration_s=12.0)
+    assert run.speeds_mps[20:40].max() < 0.05
+    assert run.path_m[-1, 0] > 0.4
+    assert run.gaps_m.min() > 0.3
+
+
 def test_an_off_centre_footprint_keeps_clear_of_the_wall() -> None:
     corners = OUTLINE_M + np.array([0.2, -0.15])
     planner = SamplingPlanner(RobotProfile(corners, 1.5, 1.0, 1.0, 0.3), AISLE)
