@@ -24,14 +24,16 @@ from ._separation import (
     highest_speed_mps,
     separation_from_standing_m,
 )
+from .policies import StartReserve
 
 # Below this speed the robot counts as standing: it may start off either way, or turn on the spot.
 STANDING_MPS: Final = 0.05
 # The two bounds, and that from the circumscribed circle once more.
 _TWO_AND_CIRCLE: Final = [0, 1, 1]
 
-# Gaps and shares of the stopping distance (2, N); human speeds, ages and start delays (N,).
-_Terms: TypeAlias = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
+# Gaps and shares of the stopping distance (2, N); human speeds, ages and start delays (N,); the
+# bound for people who must turn to the robot, or None if it holds for nobody.
+_Terms: TypeAlias = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, Turn | None]
 
 
 class SpeedGovernor:
@@ -88,7 +90,7 @@ class SpeedGovernor:
             people = self._people_in(self._path, people, robot_state, now)
         if not people:
             return GovernedSpeed(maximum_mps, "robot maximum", True, math.inf)
-        limits, terms, turn = self._limits_mps(people, robot_state, now, robot_age_s)
+        limits, terms = self._limits_mps(people, robot_state, now, robot_age_s)
         lowest = []
         for rule, limit in limits.items():
             row = int(limit.argmin())
@@ -96,7 +98,7 @@ class SpeedGovernor:
         limit_mps, row, rule = min(lowest, key=lambda entry: entry[0])
         speed_mps = robot_state.travel_mps
         # A robot within speed and separation has the whole reaction time left.
-        suffices = speed_mps <= lowest[0][0] or self._braking_suffices(terms, turn, speed_mps)
+        suffices = speed_mps <= lowest[0][0] or self._braking_suffices(terms, speed_mps)
         if limit_mps >= maximum_mps:
             return GovernedSpeed(maximum_mps, "robot maximum", suffices, limit_mps)
         reason = f"track {list(people)[row]}: {rule}"
@@ -115,7 +117,7 @@ class SpeedGovernor:
             inside = self._people_in(self._path, people, robot_state, now)
         if not inside:
             return [maximum_mps] * len(people)
-        limits, _, _ = self._limits_mps(inside, robot_state, now, robot_age_s)
+        limits, _ = self._limits_mps(inside, robot_state, now, robot_age_s)
         lowest_mps = np.minimum(np.stack(list(limits.values())).min(axis=0), maximum_mps)
         found = dict(zip(inside, lowest_mps.tolist(), strict=True))
         return [found.get(track_id, maximum_mps) for track_id in people]
@@ -126,7 +128,7 @@ class SpeedGovernor:
         robot_state: RobotState,
         now: float,
         robot_age_s: float,
-    ) -> tuple[dict[str, FloatArray], _Terms, Turn | None]:
+    ) -> tuple[dict[str, FloatArray], _Terms]:
         """Return the limits (N,) for each person by the name of the rule, and their terms.
 
         Speed and separation comes first.
@@ -142,16 +144,18 @@ class SpeedGovernor:
             for m in people.values()
         ]
         age_s, human_mps, delay_s = np.array(rows).T.copy()
-        terms = gaps_m, shares, human_mps, age_s, delay_s
-        closing_mps, ahead = _closing(people, robot_state)
-        turn = self._turn(people, closing_mps, age_s)
+        reserve, turn = self._policy.rules.start_reserve, None
+        if reserve is not None or self._policy.rules.walking is not None:
+            closing_mps, ahead = _closing(people, robot_state)
+            turn = self._turn(people, closing_mps, age_s)
+        terms = gaps_m, shares, human_mps, age_s, delay_s, turn
         limits = {
-            "speed and separation": self._separation_limit_mps(terms, turn),
+            "speed and separation": self._separation_limit_mps(terms),
             **self._rule_limits_mps(gaps_m, shares[1]),
         }
-        if self._policy.rules.start_reserve is not None:
-            limits["start reserve"] = self._start_limit_mps(gaps_m, closing_mps, ahead, age_s, turn)
-        return limits, terms, turn
+        if reserve is not None:
+            limits["start reserve"] = self._start_limit_mps(reserve, terms, closing_mps, ahead)
+        return limits, terms
 
     def _human_speed_mps(self, memory: PersonMemory, robot_x: float, robot_y: float) -> float:
         """Return the assumed speed of a person towards the robot."""
@@ -268,9 +272,9 @@ class SpeedGovernor:
             self._turn_acceleration_mps2,
         )
 
-    def _separation_limit_mps(self, terms: _Terms, turn: Turn | None) -> FloatArray:
+    def _separation_limit_mps(self, terms: _Terms) -> FloatArray:
         """Return (N,), the higher limit of the two bounds for each person."""
-        gaps_m, shares, human_mps, age_s, delay_s = terms
+        gaps_m, shares, human_mps, age_s, delay_s, turn = terms
         robot = (
             human_mps,
             self._robot.max_deceleration_mps2,
@@ -297,16 +301,10 @@ class SpeedGovernor:
         return np.asarray(limits_mps.max(axis=0))
 
     def _start_limit_mps(
-        self,
-        gaps_m: FloatArray,
-        closing_mps: FloatArray,
-        ahead: FloatArray,
-        age_s: FloatArray,
-        turn: Turn | None,
+        self, reserve: StartReserve, terms: _Terms, closing_mps: FloatArray, ahead: FloatArray
     ) -> FloatArray:
         """Return (N,), the limit with which the robot stands before anybody who sets off now."""
-        reserve = self._policy.rules.start_reserve
-        assert reserve is not None
+        gaps_m, _, _, age_s, _, turn = terms
         a_h, reaction_s = reserve.human_acceleration_mps2, self._robot.reaction_time_s + age_s
         # Whoever comes already has been speeding up for as long as that takes.
         delay_s = reserve.start_delay_s + np.maximum(closing_mps, 0.0) / a_h
@@ -345,15 +343,14 @@ class SpeedGovernor:
             limits["cap near people"] = rules.near_cap.limit_mps(footprint_gap_m, deceleration_mps2)
         return limits
 
-    def _braking_suffices(self, terms: _Terms, turn: Turn | None, speed_mps: float) -> bool:
+    def _braking_suffices(self, terms: _Terms, speed_mps: float) -> bool:
         """Return whether the robot stops in time if it brakes fully from now on.
 
         No reaction time is left then. For a standing robot it is always True.
         """
         if speed_mps < STANDING_MPS:
             return True
-        gaps_m, shares, human_mps, age_s, delay_s = terms
-
+        gaps_m, shares, human_mps, age_s, delay_s, turn = terms
         a, C = self._robot.max_deceleration_mps2, self._policy.margins.separation_clearance_m
         needed_m = separation_from_standing_m(
             speed_mps, human_mps, a, age_s, C, shares, self._human_acceleration_mps2, delay_s
