@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_recorded_reach import RECORDINGS, TIMES_S, reach_m, walks
+from test_recorded_reach import RECORDINGS, TIMES_S, reach_m, seen_at, walks
 
 from nav_adapter.policies import StandingPeople
-from perception import PersonObservation
 from perception.arrays import FloatArray
 from tracking import PersonTracker, TrackerConfig
 
@@ -32,16 +31,7 @@ def stood() -> list[tuple[float, FloatArray]]:
             continue
         tracker = PersonTracker(TrackerConfig(standing_window_s=0.5))
         for row, (stamp_s, place) in enumerate(zip(stamps_s.tolist(), places, strict=True)):
-            seen = PersonObservation(
-                stamp_s=stamp_s,
-                position_camera_m=np.array([*(place + rng.normal(0.0, NOISE_M, 2)), 0.0]),
-                position_covariance_m2=0.02**2 * np.eye(3),
-                gaze_camera=None,
-                awareness=None,
-                awareness_std=None,
-                score=1.0,
-                box_xyxy_px=None,
-            )
+            seen = seen_at(stamp_s, place + rng.normal(0.0, NOISE_M, 2), 0.02)
             tracks = tracker.update((seen,), stamp_s, np.eye(4))
             if len(tracks) == 1 and np.isfinite(tracks[0].moved_m):
                 later = [row + round(time_s * RATE_HZ) for time_s in TIMES_S.tolist()]

@@ -47,6 +47,20 @@ def walks() -> Iterator[tuple[FloatArray, FloatArray]]:
             yield mine["t_s"], np.stack([mine["x_m"], mine["y_m"]], axis=1)
 
 
+def seen_at(stamp_s: float, place_m: FloatArray, sigma_m: float) -> PersonObservation:
+    """Return somebody at a place (2,) on the floor, known to this standard deviation."""
+    return PersonObservation(
+        stamp_s=stamp_s,
+        position_camera_m=np.array([*place_m, 0.0]),
+        position_covariance_m2=sigma_m**2 * np.eye(3),
+        gaze_camera=None,
+        awareness=None,
+        awareness_std=None,
+        score=1.0,
+        box_xyxy_px=None,
+    )
+
+
 def recorded_m() -> list[FloatArray]:
     """Displacements after each time, of people within 0.1 m of their place for half a second."""
     found: list[list[float]] = [[] for _ in TIMES_S]
@@ -131,16 +145,7 @@ def test_whoever_the_tracker_shows_standing_gets_no_farther_than_assumed() -> No
     for stamps_s, places in walks():
         tracker = PersonTracker()
         for row, (stamp_s, place) in enumerate(zip(stamps_s.tolist(), places, strict=True)):
-            seen = PersonObservation(
-                stamp_s=stamp_s,
-                position_camera_m=np.array([*(place + rng.normal(0.0, 0.03, 2)), 0.0]),
-                position_covariance_m2=0.03**2 * np.eye(3),
-                gaze_camera=None,
-                awareness=None,
-                awareness_std=None,
-                score=1.0,
-                box_xyxy_px=None,
-            )
+            seen = seen_at(stamp_s, place + rng.normal(0.0, 0.03, 2), 0.03)
             tracks = tracker.update((seen,), stamp_s, np.eye(4))
             if len(tracks) != 1 or tracks[0].status != "confirmed":
                 continue

@@ -7,12 +7,11 @@ from typing import Final, NamedTuple
 import numpy as np
 import pytest
 from paths import ROOT
-from test_recorded_reach import needs_recordings, walks
+from test_recorded_reach import needs_recordings, seen_at, walks
 
 from nav_adapter._approach import turn_of
 from nav_adapter._separation import separation_from_standing_m
 from nav_adapter.policies import WalkingPeople
-from perception import PersonObservation
 from perception.arrays import FloatArray
 from tracking import PersonTracker
 
@@ -49,16 +48,7 @@ def walkers(rate_hz: float, noise_m: float) -> list[Walker]:
             places = np.stack(
                 [np.interp(times_s, recorded_s, each, right=np.nan) for each in recorded_m.T], -1
             )
-            seen = PersonObservation(
-                stamp_s=stamp_s,
-                position_camera_m=np.array([*(places[0] + rng.normal(0.0, noise_m, 2)), 0.0]),
-                position_covariance_m2=(1.2 * noise_m + 0.01) ** 2 * np.eye(3),
-                gaze_camera=None,
-                awareness=None,
-                awareness_std=None,
-                score=1.0,
-                box_xyxy_px=None,
-            )
+            seen = seen_at(stamp_s, places[0] + rng.normal(0.0, noise_m, 2), 1.2 * noise_m + 0.01)
             tracks = tracker.update((seen,), stamp_s, np.eye(4))
             if len(tracks) != 1 or tracks[0].status != "confirmed":
                 continue
