@@ -105,6 +105,23 @@ def finite_number(
     return number
 
 
+def boxes_on_floor(name: str, value: Any, error: type[ValueError] = PerceptionError) -> FloatArray:
+    """Return boxes (N, 4) x_min, y_min, x_max, y_max in metres.
+
+    Raises:
+        error: for another shape, a number that is not finite, or a minimum not below its maximum.
+    """
+    boxes = finite_array(name, value, ("N", 4), error)
+    wrong = np.flatnonzero((boxes[:, :2] >= boxes[:, 2:]).any(axis=1))
+    if len(wrong):
+        row = int(wrong[0])
+        raise error(
+            f"{name} must hold x_min < x_max and y_min < y_max in metres, row {row} is "
+            f"{boxes[row].tolist()}"
+        )
+    return boxes
+
+
 def covariance_matrix(
     name: str, value: Any, size: int, error: type[ValueError] = PerceptionError
 ) -> FloatArray:

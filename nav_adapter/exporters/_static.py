@@ -15,7 +15,7 @@ import numpy as np
 import shapely
 from shapely.geometry import Polygon
 
-from perception.arrays import FloatArray, finite_array, finite_number
+from perception.arrays import FloatArray, boxes_on_floor, finite_array, finite_number
 
 from .._errors import NavError
 
@@ -141,12 +141,4 @@ def static_half_planes(
 
 
 def _checked_boxes(boxes_odom_m: Any) -> FloatArray:
-    boxes = finite_array("boxes_odom_m", boxes_odom_m, ("N", 4), NavError)
-    wrong = np.flatnonzero((boxes[:, :2] >= boxes[:, 2:]).any(axis=1))
-    if len(wrong):
-        row = int(wrong[0])
-        raise NavError(
-            "boxes_odom_m must hold x_min < x_max and y_min < y_max in metres, row "
-            f"{row} is {boxes[row].tolist()}"
-        )
-    return boxes
+    return boxes_on_floor("boxes_odom_m", boxes_odom_m, NavError)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nav_adapter import NavConstraints, RobotProfile, RobotState
-from perception.arrays import FloatArray, finite_array, finite_number
+from perception.arrays import FloatArray, boxes_on_floor, finite_array, finite_number
 
 from ...world.errors import SimError
 from ._candidates import Aim, Candidates, Motion, TwistLimits, along_time, within_next_limits
@@ -20,7 +20,7 @@ from ._detour import detour_bearing_rad
 from ._give_way import Way, giving_way_mps
 from ._reversing import REVERSE_MPS, Reversing, goal_facing
 from ._rollout import Poses
-from ._scene import FootprintBox, Scene, checked_boxes
+from ._scene import FootprintBox, Scene
 from ._sideways import SidewaysMotion
 from ._steered import SteeredMotion
 from ._waiting import Waiting
@@ -78,7 +78,8 @@ class SamplingPlanner:
         self.robot = robot
         self.config = config = config if config is not None else PlannerConfig.for_robot(robot)
         self._footprint = FootprintBox.of(robot)
-        self._boxes_odom_m = checked_boxes(static_boxes_odom_m)
+        boxes = np.zeros((0, 4)) if static_boxes_odom_m is None else static_boxes_odom_m
+        self._boxes_odom_m = boxes_on_floor("static_boxes_odom_m", boxes, SimError)
 
         samples = max(2, math.ceil(config.horizon_s / config.step_s))
         self._t_s = along_time(config.horizon_s / samples, config.horizon_s, samples)

@@ -9,13 +9,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from nav_adapter import NavConstraints, RobotProfile, RobotState
 from perception.anthropometry import BODY_RADIUS_M
-from perception.arrays import FloatArray, finite_array
+from perception.arrays import FloatArray
 
-from ...world.errors import SimError
 from ._rollout import Poses
 
 
@@ -282,18 +280,3 @@ def _nearest_m(x_m: float, y_m: float, vx_mps: float, vy_mps: float, horizon_s: 
     speed2 = vx_mps * vx_mps + vy_mps * vy_mps
     at_s = min(max(-(x_m * vx_mps + y_m * vy_mps) / max(speed2, 1e-12), 0.0), horizon_s)
     return math.hypot(x_m + vx_mps * at_s, y_m + vy_mps * at_s)
-
-
-def checked_boxes(boxes: ArrayLike | None) -> FloatArray:
-    """Return boxes (N, 4) x_min, y_min, x_max, y_max after a check; none for None."""
-    if boxes is None:
-        return np.zeros((0, 4))
-    checked = finite_array("static_boxes_odom_m", boxes, ("N", 4), SimError)
-    wrong = np.flatnonzero((checked[:, :2] >= checked[:, 2:]).any(axis=1))
-    if len(wrong):
-        row = int(wrong[0])
-        raise SimError(
-            "static_boxes_odom_m must hold x_min < x_max and y_min < y_max in metres, "
-            f"row {row} is {checked[row].tolist()}"
-        )
-    return checked
