@@ -44,7 +44,7 @@ def settled_speed_limit_mps(
 ) -> FloatArray:
     """Return the speed limit for a person straight ahead, who stands and has been seen for long.
 
-    Position and velocity are known exactly. The robot's outline matters for ``rules.walking`` only.
+    Position and velocity are known exactly. The outline matters for ``rules.walking`` only.
 
     Args:
         policy: the policy.
@@ -53,37 +53,48 @@ def settled_speed_limit_mps(
         awareness_lower: lower bound of α.
 
     Returns:
-        The smallest limit of all rules but the start reserve in m/s, as
-        :class:`~nav_adapter.NavAdapter` gives it, in the broadcast shape. With
-        ``delay_from_tracks`` the person has not moved: ``moved_m`` and ``moved_age_s`` of the track
-        are 0, so that the delay is ``start_delay_s``.
+        The smallest limit of all rules in m/s, as :class:`~nav_adapter.NavAdapter` gives it, in the
+        broadcast shape. With ``delay_from_tracks`` the person has not moved: ``moved_m`` and
+        ``moved_age_s`` of the track are 0, so that the delay is ``start_delay_s``.
     """
     separation = np.asarray(separation_m, dtype=np.float64)
-    human_mps = settled_human_speed_mps(policy, awareness_lower)
+    # Rules for people who turn count from the circle about the base: that gap is never larger.
+    circle_gap_m = _ahead_m(robot, separation + BODY_RADIUS_M) - BODY_RADIUS_M
+    circle_gap_m -= robot.circumscribed_radius_m
 
-    def limit_mps(gap_m: FloatArray, a_h: float, delay_s: float) -> FloatArray:
+    def limit_mps(
+        gap_m: FloatArray, human_mps: ArrayLike, clearance_m: float, a_h: float, delay_s: float
+    ) -> FloatArray:
         return max_speed_mps(
             gap_m,
             human_mps,
             deceleration_mps2=robot.max_deceleration_mps2,
             reaction_time_s=robot.reaction_time_s,
-            clearance_m=policy.margins.separation_clearance_m,
+            clearance_m=clearance_m,
             human_acceleration_mps2=a_h,
             start_delay_s=delay_s,
         )
 
     rules = policy.rules
-    standing, walking = rules.standing, rules.walking
+    standing, walking, reserve = rules.standing, rules.walking, rules.start_reserve
+    human_mps = settled_human_speed_mps(policy, awareness_lower)
+    assumed = human_mps, policy.margins.separation_clearance_m
     if standing is None:
-        limit = limit_mps(separation, np.inf, 0.0)
+        limit = limit_mps(separation, *assumed, np.inf, 0.0)
     else:
-        limit = limit_mps(separation, standing.human_acceleration_mps2, standing.start_delay_s)
+        a_h, delay_s = standing.human_acceleration_mps2, standing.start_delay_s
+        limit = limit_mps(separation, *assumed, a_h, delay_s)
     if walking is not None:
-        # It counts from the circle about the base: the gap to that is never larger.
-        circle_gap_m = _ahead_m(robot, separation + BODY_RADIUS_M) - BODY_RADIUS_M
-        circle_gap_m -= robot.circumscribed_radius_m
-        turned = limit_mps(circle_gap_m, walking.human_acceleration_mps2, walking.turn_delay_s)
-        limit = np.maximum(limit, turned)
+        a_h, delay_s = walking.human_acceleration_mps2, walking.turn_delay_s
+        limit = np.maximum(limit, limit_mps(circle_gap_m, *assumed, a_h, delay_s))
+    if reserve is not None:
+        a_h, delay_s = reserve.human_acceleration_mps2, reserve.start_delay_s
+        whoever = policy.speed.human_speed_mps(0.0), 0.0
+        start_limit = limit_mps(separation, *whoever, a_h, delay_s)
+        if walking is not None and walking.human_acceleration_mps2 <= a_h:
+            turned = limit_mps(circle_gap_m, *whoever, a_h, min(delay_s, walking.turn_delay_s))
+            start_limit = np.maximum(start_limit, turned)
+        limit = np.minimum(limit, start_limit)
     if rules.zones is not None:
         limit = np.minimum(limit, rules.zones.limit_mps(separation, robot.max_speed_mps))
     if rules.near_cap is not None:

@@ -43,7 +43,7 @@ def show(**values: Any) -> int:
 
     Position and velocity are known exactly. Prints and draws obstacle radius and assumed human
     speed over awareness, and the speed limit over awareness and distance. Distances are from the
-    robot's footprint (0.70 m × 0.50 m) to the person's body. The start reserve is left out.
+    robot's footprint (0.70 m × 0.50 m) to the person's body.
     """
     from ._show import ShowOptions, show_command  # noqa: PLC0415 - help needs no policies
 

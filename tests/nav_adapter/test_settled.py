@@ -11,7 +11,7 @@ from nav_scenes import ROBOT, person, settled_update
 from shapely.geometry import MultiPoint, Point
 
 from nav_adapter import AwarenessPolicy
-from nav_adapter.policies import SpeedRules, StandingPeople, WalkingPeople
+from nav_adapter.policies import SpeedRules, StandingPeople, StartReserve, WalkingPeople
 from nav_adapter.settled import settled_speed_limit_mps
 from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
@@ -34,6 +34,15 @@ RULES: dict[str, dict[str, Any]] = {
     "of the presets": {
         "walking": WalkingPeople(),
         "standing": StandingPeople(delay_from_tracks=True),
+        "start_reserve": StartReserve(),
+    },
+    "late reserve": {
+        "walking": WalkingPeople(),
+        "start_reserve": StartReserve(start_delay_s=0.4),
+    },
+    "reserve for slower starts": {
+        "walking": WalkingPeople(human_acceleration_mps2=4.0, turn_delay_s=0.0),
+        "start_reserve": StartReserve(human_acceleration_mps2=3.0, start_delay_s=0.4),
     },
 }
 
@@ -53,7 +62,7 @@ def from_adapter(
 @pytest.mark.parametrize("shape", list(OUTLINES))
 def test_the_limit_is_that_of_the_adapter(shape: str, rules: str) -> None:
     outline, robot = OUTLINES[shape], replace(ROBOT, footprint_m=OUTLINES[shape])
-    plain = AwarenessPolicy(rules=SpeedRules())
+    plain = AwarenessPolicy(rules=SpeedRules(start_reserve=RULES[rules].get("start_reserve")))
     policy = AwarenessPolicy(rules=SpeedRules(**RULES[rules]))
     ahead_m = np.linspace(0.9, 5.0, 15)
     hull = MultiPoint(outline).convex_hull

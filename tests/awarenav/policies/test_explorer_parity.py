@@ -25,7 +25,6 @@ from explorer_cases import (
 )
 
 from nav_adapter import AwarenessPolicy
-from nav_adapter.policies import SpeedRules
 from nav_adapter.ros2 import RobotFile
 from nav_adapter.settled import settled_radius_m, settled_speed_limit_mps
 from tracking import AwarenessFilterConfig
@@ -248,7 +247,7 @@ def test_somebody_who_still_turns_when_the_robot_stands_has_come_no_nearer(
 def test_the_presets_give_the_values_of_policy_show(functions: Chromium, name: str) -> None:
     """Somebody who stands ahead, at an exactly known place, and has not moved."""
     alphas, gaps = [0.0, 0.3, 0.6, 0.8, 1.0], [0.0, 0.5, 1.0, 2.0, 3.0, 5.0]
-    policy = AwarenessPolicy.preset(name).model_copy(update={"rules": without_reserve(name)})
+    policy = AwarenessPolicy.preset(name)
     shown = functions.evaluate(
         f"""(() => {{
           const policy = checkedPolicy({json.dumps(policy.model_dump(mode="json"))});
@@ -267,11 +266,6 @@ def test_the_presets_give_the_values_of_policy_show(functions: Chromium, name: s
     radii = settled_radius_m(policy, alphas)
     assert np.array(shown)[..., 0] == pytest.approx(limits, abs=1e-9)
     assert np.array(shown)[..., 1] == pytest.approx(np.tile(radii[:, None], len(gaps)), abs=1e-9)
-
-
-def without_reserve(name: str) -> SpeedRules:
-    """Return the rules of a preset without the reserve, which ``policy show`` leaves out."""
-    return AwarenessPolicy.preset(name).rules.model_copy(update={"start_reserve": None})
 
 
 def test_the_bound_of_one_measurement_is_that_of_the_awareness_filter(functions: Chromium) -> None:
