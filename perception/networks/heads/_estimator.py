@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -11,7 +12,7 @@ from ..._head_pose import HeadPose
 from ..._keypoints import PersonKeypoints
 from ..._manifest import HEAD
 from ..._metric_scale import DEFAULT_MIN_SCORE
-from ..._rotations import skew
+from ..._rotations import rotation_log, skew
 from ...anthropometry import HEAD_CENTRE_HEAD_M, HEAD_TEMPLATE_M
 from ...arrays import FloatArray, ImageRgb, finite_number
 from ...errors import PerceptionError
@@ -22,7 +23,7 @@ from .._settings import OnnxSettings
 from ._crops import HeadCrops
 from ._layouts import recognise
 from ._locate import locate_heads
-from ._outputs import HeadOutputs, read_outputs, read_placement, read_rows
+from ._outputs import HeadOutputs, read_outputs, read_placement, read_rotations, read_rows
 
 # A smaller crop shows nothing of a head.
 _MIN_SIDE_PX: Final = 8.0
@@ -50,9 +51,10 @@ class OnnxHeadPoseEstimator:
     The keypoints of the pose estimator (head, else shoulders) tell where the head is. The crops of
     all people of a frame form one batch if the network's batch axis is free. A network of
     awarenav's layout gives the head's centre in the crop and the size of the crop, so a second pass
-    cuts the crop better. A network of the 6DRepNet kind (224 × 224, a rotation matrix or six
-    numbers) gives a rotation only: its pose has a fixed standard deviation of 10° per axis, and the
-    distance comes from the body's scale.
+    cuts the crop better. What the two see differently joins the covariance: a network knows little
+    of the errors that blur and compression cause, but they differ from crop to crop. A network of
+    the 6DRepNet kind (224 × 224, a rotation matrix or six numbers) gives a rotation only: its pose
+    has a fixed standard deviation of 10° per axis, and the distance comes from the body's scale.
 
     Args:
         path: the ONNX file, its bytes, or a loaded :class:`~perception.networks.OnnxModel`; None
@@ -117,10 +119,11 @@ class OnnxHeadPoseEstimator:
             return tuple(poses)
         places = [place for place in (found[row] for row in rows) if place is not None]
         size_px = self.layout.crop_side_m * np.array([place[1] for place in places])
-        output_rows, crops = self._run_passes(
+        output_rows, crops, scatter = self._run_passes(
             image, HeadCrops.of_sizes(camera, np.array([place[0] for place in places]), size_px)
         )
         outputs = read_outputs(self.layout, self.model, output_rows)
+        outputs = replace(outputs, covariance_ray=outputs.covariance_ray + scatter)
         found_poses = _poses(outputs, crops, self.layout.crop_side_m)
         for index, row in enumerate(rows):
             if outputs.head is None or outputs.head[index] >= self._min_head:
@@ -135,9 +138,16 @@ class OnnxHeadPoseEstimator:
         inside = -reach < u < shape[1] + reach and -reach < v < shape[0] + reach
         return bool(inside and side >= _MIN_SIDE_PX)
 
-    def _run_passes(self, image: ImageRgb, crops: HeadCrops) -> tuple[FloatArray, HeadCrops]:
-        """Return the network's rows for the last crop of each head, and these crops."""
+    def _run_passes(
+        self, image: ImageRgb, crops: HeadCrops
+    ) -> tuple[FloatArray, HeadCrops, FloatArray]:
+        """Return the network's rows for the last crop of each head, these crops, and the scatter.
+
+        The scatter (N, 3, 3) of the last two crops' rotations, in ray axes, is the covariance of
+        one of them if their errors are independent; 0 for a head that was cut once.
+        """
         rows = self._run(image, crops)
+        scatter = np.zeros((len(rows), 3, 3))
         for _ in range(self._passes - 1 if self.layout.is_awarenav else 0):
             centre, side_m, head = read_placement(rows)
             larger = side_m / self.layout.crop_side_m
@@ -146,11 +156,15 @@ class OnnxHeadPoseEstimator:
             again = (off & (head >= 0.5 * self._min_head)).nonzero()[0]
             if not len(again):
                 break
+            before = crops.axes[again] @ read_rotations(self.model, rows[again])
             # The limits keep a wrong output from leading to a crop of the whole image or one pixel.
             factor = 1.0 / np.minimum(np.maximum(larger[again], 0.5), 2.0)
             crops = crops.recentred(again, centre[again], factor)
             rows[again] = self._run(image, crops.subset(again))
-        return rows, crops
+            now = read_rotations(self.model, rows[again])
+            turn = rotation_log(crops.axes[again].swapaxes(1, 2) @ before @ now.swapaxes(1, 2))
+            scatter[again] = 0.5 * turn[:, :, None] * turn[:, None, :]
+        return rows, crops, scatter
 
     def _run(self, image: ImageRgb, crops: HeadCrops) -> FloatArray:
         """Return the network's row of outputs for each crop."""

@@ -27,6 +27,7 @@ def _columns() -> dict[str, slice]:
 _COLUMNS: Final = _columns()
 _ROW_LENGTH: Final = max(columns.stop for columns in _COLUMNS.values())
 _CENTRE, _SIDE, _HEAD = _COLUMNS["centre"], _COLUMNS["side_m"].start, _COLUMNS["head"].start
+_ROTATION: Final = _COLUMNS["rotation"]
 _IDENTITY: Final = np.eye(3)
 # Largest error of a rotation that comes from rounding to float32.
 _ROUNDING: Final = 1e-5
@@ -97,6 +98,17 @@ def read_placement(rows: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray
     return rows[:, _CENTRE], rows[:, _SIDE], rows[:, _HEAD]
 
 
+def read_rotations(model: OnnxModel, rows: FloatArray) -> FloatArray:
+    """Return the rotations (N, 3, 3) from the paper's head frame to ray axes.
+
+    ``rows`` are those of a network of awarenav's layout.
+
+    Raises:
+        PerceptionError: for matrices that are not rotations.
+    """
+    return nearest_rotations(model, rows[:, _ROTATION].reshape(-1, 3, 3))
+
+
 def read_outputs(layout: HeadLayout, model: OnnxModel, rows: FloatArray) -> HeadOutputs:
     """Convert the rows of :func:`read_rows` to outputs.
 
@@ -111,7 +123,7 @@ def read_outputs(layout: HeadLayout, model: OnnxModel, rows: FloatArray) -> Head
     }
     covariance = named["rotation_covariance"]
     return HeadOutputs(
-        nearest_rotations(model, named["rotation"]),
+        read_rotations(model, rows),
         0.5 * (covariance + covariance.swapaxes(1, 2)),
         named["keypoints"],
         np.abs(named["keypoints_std"]),

@@ -135,6 +135,40 @@ def test_the_covariance_agrees_with_random_errors():
     np.testing.assert_allclose(head.covariance / scale, drawn / scale, atol=0.05)
 
 
+def test_what_two_passes_see_differently_joins_the_covariance(monkeypatch):
+    """Both passes err independently by 0.1 rad, of which the network knows nothing."""
+    rotation_std, error_std, rng = 0.02, 0.1, np.random.default_rng(5)
+    estimator = OnnxHeadPoseEstimator(disc_network(FACING_HEAD, rotation_std=rotation_std))
+    run, runs = estimator._run, []
+
+    def with_error(image, crops):
+        rows = run(image, crops)
+        wrong = Rotation.from_rotvec(rng.normal(0.0, error_std, 3)).as_matrix()
+        rows[0, :9] = (wrong @ rows[0, :9].reshape(3, 3)).ravel()
+        runs.append(rows)
+        return rows
+
+    monkeypatch.setattr(estimator, "_run", with_error)
+    truth = np.array([0.8, -0.3, 2.5])
+    image, pixel = disc_at(truth)
+    px_per_m = CAMERA.fx_px / 2.5
+    once, twice = person_about(pixel, px_per_m), person_about(pixel, px_per_m, (9.0, 0.0))
+    covariances = []
+    for _ in range(400):
+        runs.clear()
+        (head,) = estimator.estimate(image, CAMERA, (twice,))
+        assert len(runs) == 2
+        covariances.append(head.covariance[:3, :3])
+    known = rotation_std**2 + math.radians(0.5) ** 2
+    expected = (known + error_std**2) * np.eye(3)
+    # A standard deviation of √2 relative to the mean, of 400 samples: 7 %.
+    np.testing.assert_allclose(np.mean(covariances, axis=0), expected, atol=0.25 * error_std**2)
+    runs.clear()
+    (head,) = estimator.estimate(image, CAMERA, (once,))
+    assert len(runs) == 1
+    np.testing.assert_allclose(head.covariance[:3, :3], known * np.eye(3), atol=1e-9)
+
+
 def test_head_poses_are_in_the_order_of_the_people_for_any_batch_size():
     truths = [np.array([-0.9, -0.2, 2.5]), np.array([0.9, -0.1, 3.5])]
     images, pixels = zip(*(disc_at(truth) for truth in truths), strict=True)
