@@ -79,7 +79,7 @@ _ARRAYS: Final = (
 
 
 class _Terms(NamedTuple):
-    """Which terms of the limit a person needs. People who need the same ones are computed together.
+    """Terms of the limit that a person needs. People who need the same ones are computed together.
 
     Attributes:
         aged: the track's position at its own stamp.

@@ -83,12 +83,12 @@ class PersonAhead:
 
     @property
     def is_aged(self) -> bool:
-        """Whether the track is somewhere else at its own stamp."""
+        """Return whether the track is somewhere else at its own stamp."""
         return self.place_m is not self.track_place_m
 
     @property
     def least_mps(self) -> float:
-        """The lowest speed that is assumed at any time."""
+        """Return the lowest speed that is assumed at any time."""
         return _extreme(np.min, self.human_mps)
 
     def reach(self, policy: AwarenessPolicy, robot: RobotProfile) -> Reach:
@@ -111,7 +111,7 @@ class PersonAhead:
 
 
 class Foresight:
-    """What the adapter will know and assume of people at later times if they go straight on.
+    """Looks ahead: what the adapter will know and assume of people who go straight on.
 
     Args:
         policy: the policy.
