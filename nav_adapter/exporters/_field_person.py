@@ -182,9 +182,9 @@ class Foresight:
         return place_m, track_m + (moved_m if is_shown else 0.0 * moved_m)
 
     def _unseen(self, memory: PersonMemory, is_shown: bool) -> NDArray[np.bool_] | None:
-        """Return (T,), when the last sighting is too old for trust; None for a person seen now.
+        """Return (T,) whether the last sighting is too old for trust; None for a person seen now.
 
-        Nobody sees those again, as far as one can say.
+        It assumes that no later frame shows a person who is not seen now.
         """
         track, fresh_s = memory.track, self._policy.timing.fresh_within_s - _SAME_AGE_S
         seen_stamp_s = min(memory.seen_stamp_s, track.stamp_s - track.time_since_seen_s)
