@@ -42,6 +42,13 @@ class Perception(NamedTuple):
         return self.kind + _AND_SCANNER if self.kind else _SCANNER
 
     @property
+    def sensors(self) -> SensorSet:
+        """The set of sensors: with the kind, what :meth:`of` takes."""
+        if not self.has_scanners:
+            return "camera"
+        return "camera+scanner" if self.kind else "scanner"
+
+    @property
     def options(self) -> str:
         """The options of the command line, such as ``"--perception keypoints"``."""
         if not self.has_scanners:

@@ -155,6 +155,7 @@ def falsify(
         resume=resume,
         overwrite=overwrite,
         results=_RESULTS,
+        may_grow=["episodes"],
     )
     with ProcessLock(folder / "locks" / "folder.lock", wait=False) as lock:
         if not lock.held:

@@ -20,7 +20,8 @@ from awarenav.cli import POSITIVE, command, option, options
         130: "Interrupted; the episodes so far are kept.",
     },
     epilog="A killed or interrupted search continues with the same command and --resume, and ends "
-    "with the same result, whatever --workers is. Needs the extra 'bench'.",
+    "with the same result, whatever --workers is. --episodes may be raised then. Needs the extra "
+    "'bench'.",
 )
 @options.policy()
 @option(

@@ -12,7 +12,7 @@ from nav_adapter import AwarenessPolicy
 
 from ...scenario import ScenarioTemplate
 from ...study.measures import EpisodeRecord, salvage_record_file, write_records
-from ...study.runs import ProcessLock, plan_jobs
+from ...study.runs import ProcessLock
 from ...world.errors import SimError
 from .._episode_runner import EpisodeRunner
 from ._evaluation import Evaluation
@@ -115,12 +115,4 @@ class PolicyEvaluator:
         seeds: Sequence[int],
         templates: Sequence[ScenarioTemplate],
     ) -> tuple[EpisodeRecord, ...]:
-        return self._runner.run(
-            plan_jobs(
-                templates,
-                [(name, policy)],
-                seeds,
-                planners=[self._settings.planner],
-                perception=self._settings.perception,
-            )
-        )
+        return self._runner.run(self._settings.jobs(name, policy, seeds, templates))

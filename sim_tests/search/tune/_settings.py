@@ -7,8 +7,11 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from awarenav.errors import not_one_of
+from nav_adapter import AwarenessPolicy
 
+from ...crossing.eyes import Perception
 from ...scenario import ScenarioTemplate
+from ...study.runs import Job, plan_jobs
 from ...world.errors import SimError
 from .._files import templates_of
 
@@ -31,7 +34,7 @@ class TuneSettings:
         trials: number of policies to try.
         episodes: number of tuning seeds, each run in every scenario.
         held_out: number of held-out seeds, each run in every scenario.
-        perception: as for :func:`sim_tests.run_crossing`.
+        perception: as for :func:`sim_tests.run_crossing`, such as ``"keypoints+scanner"``.
         planner: ``"module:Class"``, empty for the reference planner.
         seed: the first tuning seed, and seed of the sampler.
         sampler: ``"tpe"`` or ``"nsga2"``.
@@ -73,6 +76,28 @@ class TuneSettings:
         """Seeds that no trial has run; disjoint from the tuning seeds."""
         first = self.seed + _HELD_OUT_OFFSET
         return range(first, first + self.held_out)
+
+    def jobs(
+        self,
+        name: str,
+        policy: AwarenessPolicy,
+        seeds: Sequence[int],
+        templates: Sequence[ScenarioTemplate],
+    ) -> tuple[Job, ...]:
+        """Return the episodes of a policy: every seed in every one of some scenarios.
+
+        Raises:
+            SimError: an episode that cannot be run.
+        """
+        perception = Perception.named(self.perception)
+        return plan_jobs(
+            templates,
+            [(name, policy)],
+            seeds,
+            planners=[self.planner],
+            perception=perception.kind or "keypoints",  # without a camera it does not matter
+            sensors=[perception.sensors],
+        )
 
 
 def held_out_scenarios(

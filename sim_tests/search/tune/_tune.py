@@ -12,7 +12,7 @@ from awarenav.errors import counted
 from nav_adapter import AwarenessPolicy
 
 from ...study.measures import Interval
-from ...study.runs import ProcessLock, plan_jobs, policy_of
+from ...study.runs import ProcessLock, policy_of
 from ...world.errors import SimError
 from .._episode_runner import EpisodeRunner
 from .._files import write_or_check_settings
@@ -118,13 +118,8 @@ def tune(
         objectives=2,
         initial=[space.base_parameters()],
     )
-    plan_jobs(  # refuses what cannot be run
-        settings.templates,
-        [(settings.policy_name, base)],
-        settings.tuning_seeds,
-        planners=[settings.planner],
-        perception=settings.perception,
-    )
+    # Refuses what cannot be run.
+    settings.jobs(settings.policy_name, base, settings.tuning_seeds, settings.templates)
     anchors = _anchors(settings.policy_name, base)
     write_or_check_settings(
         settings,

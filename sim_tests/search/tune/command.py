@@ -19,8 +19,8 @@ from awarenav.cli import POSITIVE, FilePath, OneOf, command, option, options
         130: "Interrupted; the trials so far are kept.",
     },
     epilog="A killed or interrupted study continues with the same command and --resume, and ends "
-    "with the same result. Several processes that run the command with the same --out share the "
-    "trials. Needs the extra 'bench'.",
+    "with the same result; --trials and --held-out may be raised then. Several processes that run "
+    "the command with the same --out share the trials. Needs the extra 'bench'.",
 )
 @options.policy()
 @options.scenarios("that have a planner")

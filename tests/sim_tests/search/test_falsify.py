@@ -306,6 +306,22 @@ def test_a_removed_floor_is_found_and_the_worst_cases_replay(tmp_path, capsys):
         assert (one / name).read_bytes() == (two / name).read_bytes()
 
 
+@pytest.mark.slow
+def test_a_falsification_goes_on_with_more_episodes(tmp_path, capsys):
+    scenario = tmp_path / "crosses_ahead.yaml"
+    scenario.write_text(_SCENARIO)
+    options = [*_FALSIFY, "--scenario", str(scenario), "--generation", "2"]
+    grown, whole = tmp_path / "grown", tmp_path / "whole"
+    main([*options, "--episodes", "2", "--out", str(grown)])
+    main([*options, "--episodes", "4", "--out", str(grown), "--resume"])
+    main([*options, "--episodes", "4", "--out", str(whole)])
+    for name in ("falsify.json", "episodes.csv", "summary.json", "worst_001.yaml"):
+        assert (grown / name).read_bytes() == (whole / name).read_bytes()
+    capsys.readouterr()
+    assert main([*options, "--episodes", "2", "--out", str(grown), "--resume"]) == 2
+    assert "another episodes: 4, now 2" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [

@@ -11,7 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from search_process import SPACE, history, make_optimizer, outcome, work
 
+from nav_adapter import AwarenessPolicy
 from sim_tests import SimError
+from sim_tests.scenario import shipped_templates
 from sim_tests.search import Optimizer, Outcome, Range, SharedStudy, write_or_check_settings
 from sim_tests.search.tune import TuneSettings
 
@@ -219,6 +221,18 @@ def test_a_search_is_resumed_with_the_same_settings_or_more_trials(tmp_path):
     with pytest.raises(SimError, match="there is no tuning"):
         _write_or_check(tmp_path / "other", True)
     assert not (tmp_path / "other").exists()
+
+
+@pytest.mark.parametrize(
+    "name", ["truth", "keypoints", "pixels", "keypoints+scanner", "pixels+scanner", "scanner"]
+)
+def test_the_episodes_of_a_tuning_have_its_perception(name):
+    settings = _settings(perception=name)
+    balanced = AwarenessPolicy.preset("balanced")
+    jobs = settings.jobs("b", balanced, range(7, 9), shipped_templates()[:3])
+    assert len(jobs) == 6
+    assert {(job.perception, job.policy_name) for job in jobs} == {(name, "b")}
+    assert sorted({job.seed for job in jobs}) == [7, 8]
 
 
 @given(seed=st.integers(0, 10**6), episodes=st.integers(1, 10**6), held_out=st.integers(1, 10**6))
