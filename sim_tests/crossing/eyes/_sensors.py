@@ -96,6 +96,6 @@ class Perception(NamedTuple):
         if kind in _TRUTHS:
             raise SimError(
                 f"perception {kind!r} has no use for a scanner: sensors must be 'camera', got "
-                f"{sensors!r}"
+                f"{sensors!r}; or perception must be 'keypoints' or 'pixels'"
             )
         return cls(kind, has_scanners=True)
